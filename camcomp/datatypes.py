@@ -1,0 +1,71 @@
+"""The nouns that more than one room uses: struct of arrays, first axis = motion, float64, read-only."""
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+RAPID, LINE, ARC = 0, 1, 2
+
+_FORMS: dict[str, tuple[type, tuple[int, ...]]] = {
+    "line": (np.int64, ()),
+    "kind": (np.int8, ()),
+    "start": (np.float64, (3,)),
+    "end": (np.float64, (3,)),
+    "centre": (np.float64, (3,)),
+    "axis": (np.float64, (3,)),
+    "angle": (np.float64, ()),
+    "feed": (np.float64, ()),
+    "speed": (np.float64, ()),
+    "tool": (np.int64, ()),
+    "known": (np.bool_, ()),
+    "machine": (np.bool_, ()),
+}
+
+
+def frozen(values: ArrayLike, dtype: type = np.float64) -> NDArray:
+    """Read-only view of `values` as an array of `dtype`; the caller's own array keeps its write flag."""
+    array: NDArray = np.ascontiguousarray(values, dtype=dtype).view()
+    array.flags.writeable = False
+    return array
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """What a program asks the tool tip to do: n motions in program order, whatever the dialect.
+
+    Points are tool tips in mm in the program frame of G54 as it stands at program start; every other offset is
+    resolved. Raises ValueError when the arrays do not have one row per motion.
+    """
+
+    line: Ints  # (n,) source line, counted from 1
+    kind: NDArray[np.int8]  # (n,) RAPID, LINE or ARC
+    start: Floats  # (n, 3) mm
+    end: Floats  # (n, 3) mm
+    centre: Floats  # (n, 3) mm, arc centre at the height of the start; NaN for lines and rapids
+    axis: Floats  # (n, 3) unit normal of the arc plane: +X, +Y or +Z of G19, G18, G17; 0 for lines and rapids
+    angle: Floats  # (n,) rad about `axis`, + = counter-clockwise seen from its tip; extra turns add 2 pi
+    feed: Floats  # (n,) mm/min of the tip; NaN for rapids
+    speed: Floats  # (n,) spindle, rev/min
+    tool: Ints  # (n,) tool number
+    known: Bools  # (n,) X, Y and Z have all been commanded by the end of this motion
+    machine: Bools  # (n,) move in machine coordinates (G53, G28, G30)
+
+    def __post_init__(self) -> None:
+        n = np.shape(self.line)[0]
+        for name, (dtype, row) in _FORMS.items():
+            array = frozen(getattr(self, name), dtype)
+            if array.shape != (n, *row):
+                raise ValueError(f"Path.{name} has shape {array.shape}, not {(n, *row)}")
+            object.__setattr__(self, name, array)
+
+    def __len__(self) -> int:
+        return int(self.line.shape[0])
+
+    def take(self, rows: NDArray) -> "Path":
+        """The motions that `rows` (indices or mask) picks."""
+        return Path(**{each.name: getattr(self, each.name)[rows] for each in fields(self)})
