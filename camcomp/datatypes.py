@@ -29,7 +29,7 @@ _FORMS: dict[str, tuple[type, tuple[int, ...]]] = {
 
 def frozen(values: ArrayLike, dtype: type = np.float64) -> NDArray:
     """Read-only view of `values` as an array of `dtype`; the caller's own array keeps its write flag."""
-    array: NDArray = np.ascontiguousarray(values, dtype=dtype).view()
+    array: NDArray = np.asarray(values, dtype=dtype, order="C").view()
     array.flags.writeable = False
     return array
 

@@ -1,0 +1,101 @@
+"""The only disk access: bytes in, bytes out, `-` for the standard streams, several outputs all or none."""
+
+import os
+import sys
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+
+from camcomp.diagnostics import FileError
+
+STANDARD = "-"
+
+
+def read_bytes(path: str | Path) -> bytes:
+    """Content of a file, or of standard input for "-". Raises FileError CC500."""
+    if str(path) == STANDARD:
+        return sys.stdin.buffer.read()
+    try:
+        return Path(path).read_bytes()
+    except OSError as error:
+        raise FileError("CC500", f"cannot read {path}: {error.strerror}") from error
+
+
+def display_name(path: str | Path) -> str:
+    """Name of an input for messages."""
+    return "<stdin>" if str(path) == STANDARD else str(path)
+
+
+def write_all(outputs: Mapping[str | Path, bytes], *, inputs: tuple[str | Path, ...] = ()) -> None:
+    """Write every output or none: whole files are made beside their targets first and then moved into place.
+
+    A target keeps its permissions; a link is followed. "-" goes to standard output, after the files. Raises FileError:
+    CC502 when an output is one of `inputs`, CC501 when one cannot be written.
+    """
+    targets = {path: Path(path).resolve() for path in outputs if str(path) != STANDARD}
+    _refuse_clashes(targets, inputs)
+    made: list[tuple[str, Path]] = []
+    try:
+        for path, target in targets.items():
+            made.append((_write_beside(target, outputs[path]), target))
+        while made:
+            os.replace(*made[0])
+            made.pop(0)
+    except OSError as error:
+        raise FileError(
+            "CC501", f"cannot write {error.filename2 or error.filename}: {error.strerror}"
+        ) from error
+    finally:
+        for temporary, _ in made:
+            os.unlink(temporary)
+    for path, data in outputs.items():
+        if str(path) == STANDARD:
+            sys.stdout.buffer.write(data)
+            sys.stdout.buffer.flush()
+
+
+def _refuse_clashes(targets: Mapping[str | Path, Path], inputs: tuple[str | Path, ...]) -> None:
+    sources = [Path(path) for path in inputs if str(path) != STANDARD]
+    for path, target in targets.items():
+        for source in sources:
+            if target == source.resolve() or (
+                target.exists() and source.exists() and target.samefile(source)
+            ):
+                raise FileError("CC502", f"{path} is an input and would be overwritten")
+    if len(set(targets.values())) < len(targets):
+        names = ", ".join(str(path) for path in targets)
+        raise FileError(
+            "CC502", f"two outputs go to the same file: {names}", hint="give each output its own name"
+        )
+
+
+def _write_beside(target: Path, data: bytes) -> str:
+    if target.is_dir():
+        raise IsADirectoryError(21, "is a directory", str(target))
+    try:
+        handle, temporary = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
+    except OSError as error:  # name the file asked for, not the temporary one
+        raise OSError(error.errno, error.strerror, str(target)) from error
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(data)
+        os.chmod(temporary, target.stat().st_mode & 0o7777 if target.exists() else 0o666 & ~_umask())
+    except BaseException:
+        os.unlink(temporary)
+        raise
+    return temporary
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
+
+
+def shipped(name: str) -> Path:
+    """Path of a file of `config/` or `samples/`, in a checkout as in an installed camcomp. Raises FileError CC500."""
+    package = Path(__file__).parent
+    for root in (package / "data", package.parent):
+        if (root / name).exists():
+            return root / name
+    raise FileError("CC500", f"camcomp does not ship {name}")
