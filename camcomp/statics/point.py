@@ -402,7 +402,7 @@ def approach(rigid, start_R, start_tip, tool, R_to, tip_to, rho, y):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def solve_many(
-    mode, P, rigid, joint_var, tool, start_R, start_tip, R_aim, near, aim, force, wrench, rho, check,
+    mode, P, rigid, joint_var, tool, start_R, start_tip, R_aim, near, aim, force, wrench, rho, follow, check,
     rho_nominal, tip_cmd, R_cmd, tip, R, drive, status, passes, x_all, F_all,
 ):  # fmt: skip
     """Points one after the other, each started from the one before; falls back to a cold start, then to load steps.
@@ -430,6 +430,8 @@ def solve_many(
             status[i] = code
             y[:] = y_before
             continue
+        if follow:  # the control is told to go to `near`
+            rho[i] = rho_nominal[i]
         for attempt in range(3):
             if attempt == 0 and not warm:
                 continue

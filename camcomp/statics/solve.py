@@ -85,7 +85,8 @@ def solve(
     """Solves every point in one of the modes of camcomp.statics.point.
 
     near (n, 3): a tip position near the answer (its nominal joint coordinates start the solver). force (n, 3) at the
-    tip, wrench (n, 6) at the platform reference, rho (n, m) where the mode gives them. check: prove stability.
+    tip, wrench (n, 6) at the platform reference. rho (n, m) commanded in FREE, HOLD and CLAMP; without it the control is
+    told to go to `near`. check: prove stability.
     """
     near = np.ascontiguousarray(near, float)
     n, m = len(near), len(machine.actuators)
@@ -109,7 +110,7 @@ def solve(
         k = s if keep else slice(0, 0)
         point.solve_many(
             mode, machine.elastic, machine.rigid, machine.joint_var, tool, start_R, start_tip, R_aim[s], near[s],
-            aim[s], f[s], w[s], r[s], check, nominal[s], commanded[s], R_cmd[s], tip[s], R[s], drive[s], status[s],
+            aim[s], f[s], w[s], r[s], rho is None, check, nominal[s], commanded[s], R_cmd[s], tip[s], R[s], drive[s], status[s],
             passes[s], x[k], F[k],
         )  # fmt: skip
 
