@@ -3,12 +3,15 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+from pydantic import Field, create_model
 
 from camcomp import shelf
-from camcomp.diagnostics import CamcompError, ConfigError, FileError, raise_all
+from camcomp.diagnostics import CamcompError, ConfigError, FileError, Location, raise_all
 from camcomp.files import display_name, read_bytes
 from camcomp.spec import Config, Experiment
+from camcomp.specbase import Spec
 from camcomp.specrobot import Robot
 from camcomp.yamlcheck import check, choose
 from camcomp.yamltree import Node, merge, plain, read_tree
@@ -19,6 +22,8 @@ _ROBOT_KEYS = (
     "start_reference_mm",
 )  # belong to the robot, whatever plug-in builds its chains
 
+_NO_FORCE = Node({"model": Node("none", Location("", 1, 1))}, Location("", 1, 1))
+
 
 def load_config(paths: Sequence[Path | str]) -> Config:
     """The configuration that `paths` make together: later files over earlier ones, key by key.
@@ -27,12 +32,12 @@ def load_config(paths: Sequence[Path | str]) -> Config:
     """
     tree, errors = _read_merged(paths)
     if tree is None:
-        raise_all(errors)
+        _raise(errors)
         raise ConfigError("CC212", "no configuration is given", hint="name one with --config FILE")
     if _get(tree, "robot") is None:
         errors.append(ConfigError("CC212", "there is no section 'robot'", at=tree.at))
     config, more = _check_config(tree)
-    raise_all([*errors, *more])
+    _raise([*errors, *more])
     assert config is not None
     return config
 
@@ -40,14 +45,14 @@ def load_config(paths: Sequence[Path | str]) -> Config:
 def check_config(paths: Sequence[Path | str]) -> None:
     """Raise what is wrong with `paths`, which need not be complete: a file of overrides may lack the robot."""
     tree, errors = _read_merged(paths)
-    raise_all([*errors, *(_check_config(tree)[1] if tree is not None else [])])
+    _raise([*errors, *(_check_config(tree)[1] if tree is not None else [])])
 
 
 def load_experiment(path: Path | str) -> Experiment:
     """An experiment file, its paths resolved against its own folder. Raises as load_config."""
     tree, errors = _read_merged([path])
     experiment, more = check(Experiment, tree) if tree is not None else (None, [])
-    raise_all([*errors, *more])
+    _raise([*errors, *more])
     assert experiment is not None
     folder = Path(path).parent
     runs = [
@@ -65,6 +70,16 @@ def is_experiment(data: bytes) -> bool:
     """Whether YAML text is an experiment file: it has `runs` and no `robot`."""
     tree, _ = read_tree(data, "")
     return _get(tree, "runs") is not None and _get(tree, "robot") is None
+
+
+def _raise(errors: Sequence[CamcompError]) -> None:
+    """Raise all errors: files that cannot be read first, then file by file from top to bottom."""
+
+    def place(error: CamcompError) -> tuple[int, int, int]:
+        return (files.index(error.at.file), error.at.line, error.at.column) if error.at else (-1, 0, 0)
+
+    files = list(dict.fromkeys(error.at.file for error in errors if error.at))
+    raise_all(sorted(errors, key=place))
 
 
 def _read_merged(paths: Sequence[Path | str]) -> tuple[Node | None, list[CamcompError]]:
@@ -92,7 +107,7 @@ def _check_config(tree: Node) -> tuple[Config | None, list[CamcompError]]:
         skip = ["robot"]  # missing in a file of overrides, or its own errors are known already
     config, more = check(Config, tree, data, skip=skip)
     errors += more
-    force, more = _plugin("forces", "model", _get(tree, "process", "force"))
+    force, more = _plugin("forces", "model", _get(tree, "process", "force") or _NO_FORCE)
     errors += more
     entries = _get(tree, "effects")
     listed = entries.value if entries is not None and isinstance(entries.value, list) else []
@@ -124,7 +139,7 @@ def _robot_from_plugin(node: Node) -> tuple[Robot | None, list[CamcompError]]:
 def _plugin(
     shelf_name: str, key: str, node: Node | None, *, also: Sequence[str] = (), free: bool = False
 ) -> tuple[Any, list[CamcompError]]:
-    """Parameters of the plug-in that `node` names under `key`, checked by its Params; None when it has none."""
+    """Parameters of the plug-in that `node` names under `key`, as its own spec; None when it has none."""
     chosen = _get(node, key)
     if node is None or chosen is None or not isinstance(chosen.value, str):
         return None, []  # missing or mistyped: the spec of the section says so
@@ -132,24 +147,40 @@ def _plugin(
         member = shelf.load(shelf_name, chosen.value, at=chosen.at)
     except ConfigError as error:
         return None, [error]
-    if free or not hasattr(member, "Params"):
+    if free:
         return None, []
     own = {name: each for name, each in node.value.items() if name != key and name not in also}
-    return check(member.Params, replace(node, value=own))
+    return check(_params_of(member), replace(node, value=own))
+
+
+def _params_of(member: Any) -> type[Spec]:
+    """A plug-in's spec: its class Params, or one made from the records PARAMETERS of an effect."""
+    if hasattr(member, "PARAMETERS"):
+        fields: dict[str, Any] = {
+            each.name: (Annotated[float, Field(ge=each.low, le=each.high)], each.nominal)
+            for each in member.PARAMETERS
+        }
+        return create_model("Parameters", __base__=Spec, **fields)
+    return member.Params
 
 
 def _check_targets(config: Config) -> list[CamcompError]:
-    names = list(config.robot.actuators) if config.robot is not None else []
-    return [
-        ConfigError(
-            "CC205",
-            f"effects[{i + 1}].target: there is no actuator '{each.target}'",
-            at=config.at("effects", i, "target"),
-            hint=choose(each.target, names),
-        )
-        for i, each in enumerate(config.effects)
-        if each.target is not None and each.target not in names
-    ]
+    """Whether every effect has the target it needs: an actuator of this robot, or none."""
+    names = list(config.robot.actuators)
+    errors: list[CamcompError] = []
+    for i, each in enumerate(config.effects):
+        at = config.at("effects", i, "target" if each.target is not None else "effect")
+        kind = getattr(shelf.load("effects", each.effect), "TARGET", "either")
+        if each.target is not None and each.target not in names:
+            message, hint = f"there is no actuator '{each.target}'", choose(each.target, names)
+        elif kind == "actuator" and each.target is None:
+            message, hint = f"'{each.effect}' needs a target", f"add target: one of {', '.join(names)}"
+        elif kind == "machine" and each.target is not None:
+            message, hint = f"'{each.effect}' concerns the machine as a whole", "leave the target out"
+        else:
+            continue
+        errors.append(ConfigError("CC205", f"effects[{i + 1}]: {message}", at=at, hint=hint))
+    return errors
 
 
 def _get(node: Node | None, *keys: str) -> Node | None:

@@ -66,8 +66,7 @@ class Tool(Spec):
 class Choice(Spec):
     """A plug-in chosen by name, with its own parameters beside the name.
 
-    `given` are these parameters as written; `params` the same, checked by the `Params` of the plug-in (None when the
-    plug-in leaves them free).
+    `given` are these parameters as written; `params` the same as checked and completed by the plug-in's own spec.
     """
 
     model_config = ConfigDict(extra="allow")
@@ -96,6 +95,11 @@ class EffectChoice(Choice):
 
     effect: str
     target: str | None = None
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Every parameter of the effect by name; what the file leaves out has its nominal value."""
+        return self.params.model_dump(exclude={"source"})
 
 
 class Process(Spec):

@@ -84,6 +84,20 @@ def _explain(detail: ErrorDetails, tree: Node, data: Any, seen: dict[int, type[S
     if kind == "literal_error":
         names = [each.strip("' ") for each in str(context["expected"]).replace(" or ", ",").split(",")]
         return ConfigError(rule, f"{name}: '{value}' is not known", at=node.at, hint=choose(value, names))
+    if kind in ("too_short", "too_long"):
+        limit = context.get("min_length", context.get("max_length"))
+        return ConfigError(
+            rule, f"{name}: has to have {limit} items, not {context['actual_length']}", at=node.at
+        )
+    if kind in ("model_type", "dict_type"):
+        what = (
+            "nothing"
+            if node.value is None
+            else "a list"
+            if isinstance(node.value, list)
+            else f"'{node.value}'"
+        )
+        return ConfigError(rule, f"{name}: has to be a mapping (key: value), not {what}", at=node.at)
     if loc and loc[-1] == "[key]":
         return ConfigError(rule, f"{name}: {_words(detail['msg'])}", at=node.key_at or node.at)
     return ConfigError(rule, f"{name}: {_words(detail['msg'])}", at=node.at)
@@ -110,8 +124,8 @@ def _walk(loc: Keys, tree: Node, data: Any) -> tuple[str, Node, Any]:
     for part in loc:
         below = child(node, part)
         if below is not None:
-            name += f"[{part + 1}]" if isinstance(node.value, list) else f".{part}"
-            data = data[part] if isinstance(data, dict | list) else None
+            name += f"[{int(part) + 1}]" if isinstance(node.value, list) else f".{part}"
+            data = data[part] if isinstance(data, dict | list) else None  # type: ignore[index]
             node = below
     return name.removeprefix(".") or "the file", node, data
 
@@ -119,8 +133,6 @@ def _walk(loc: Keys, tree: Node, data: Any) -> tuple[str, Node, Any]:
 def _words(message: str) -> str:
     message = message.removeprefix("Input ").removeprefix("Value error, ")
     for pydantic, ours in (
-        ("should be a valid dictionary or instance of", "has to be a mapping with the keys of"),
-        ("should be a valid dictionary", "has to be a mapping"),
         ("should be a valid list", "has to be a list"),
         ("should be a valid", "has to be a"),
         ("should have", "has to have"),
