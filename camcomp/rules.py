@@ -84,6 +84,79 @@ RULES: dict[str, Rule] = {
         "Exactly one of several ways to say the same thing has to be chosen, e.g. a link by its compliance, its "
         "stiffness or its beam section.",
     ),
+    "CC250": Rule(
+        "spindle speed missing",
+        "Milling force models need the feed per tooth, which is feed over teeth and spindle speed; a speed of zero "
+        "means that nothing turns while the tool cuts.",
+        "give S in the program, or add process: spindle_rpm",
+    ),
+    "CC251": Rule(
+        "number of teeth missing",
+        "Milling force models need the feed per tooth, which is feed over teeth and spindle speed.",
+        "add tool: teeth",
+    ),
+    "CC252": Rule(
+        "feed missing",
+        "A point at which the tool cuts has no feed above zero, so the chip has no thickness.",
+        "give F in the program, or add process: feed_mm_per_min",
+    ),
+    "CC253": Rule(
+        "axial depth missing",
+        "Milling forces grow with the axial depth of the cut. It is either a constant, or the depth of the programmed "
+        "point below the top of the stock.",
+        "add process: depth_mm, or workpiece: stock_top_mm",
+    ),
+    "CC254": Rule(
+        "tool diameter missing",
+        "Over which part of its turn a tooth cuts follows from radial width and tool diameter.",
+        "add tool: diameter_mm",
+    ),
+    "CC255": Rule(
+        "radial width not possible",
+        "The radial width of a cut lies between zero and the tool diameter; without it a slot is assumed.",
+        "correct process: width_mm or tool: diameter_mm",
+    ),
+    "CC256": Rule(
+        "up or down milling not said",
+        "A cut on one side of the tool pushes it differently in up (conventional) and in down (climb) milling.",
+        "add process: force: milling: up, or down",
+    ),
+    "CC257": Rule(
+        "force ratio missing",
+        "Kienzle's law gives the tangential force only. The radial and the axial force follow by ratios that depend on "
+        "tool, material and wear; there is no value that would be right in general.",
+        "measure one slot and divide: radial = force against the feed over force square to it",
+    ),
+    "CC260": Rule(
+        "force table empty",
+        "A force table is CSV text: one header row, then rows of plain numbers.",
+        "columns: s_mm or line, and Fr_N,Ft_N,Fz_N or fx_N,fy_N,fz_N",
+    ),
+    "CC261": Rule(
+        "column missing in the force table",
+        "A force table says where (s_mm or line) and how strong (all three forces, in one of the two frames).",
+        "columns: s_mm or line, and Fr_N,Ft_N,Fz_N (path frame) or fx_N,fy_N,fz_N (machine frame)",
+    ),
+    "CC262": Rule(
+        "no number in the force table",
+        "A row that gives a force gives all three, and the place.",
+        "fill the cell, or leave all three forces of the row empty",
+    ),
+    "CC263": Rule(
+        "force table out of order",
+        "Rows with s_mm follow the path. A repeated s_mm is allowed and marks a jump of the force.",
+        "sort the rows by s_mm",
+    ),
+    "CC264": Rule(
+        "point outside the force table",
+        "The program cuts at a point for which the table says nothing; a force is not made up.",
+        "extend the table; a row of zeros says that there is no force",
+    ),
+    "CC265": Rule(
+        "coefficients cannot be fitted",
+        "The fit draws a straight line through mean slot forces at two or more feeds per tooth.",
+        "measure slots at three or more feeds, everything else unchanged",
+    ),
     # --- CC3xx physics -----------------------------------------------------------------------------------------
     # --- CC4xx logs, experiments -------------------------------------------------------------------------------
     # --- CC5xx input and output --------------------------------------------------------------------------------

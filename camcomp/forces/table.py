@@ -1,0 +1,47 @@
+"""A measured force along the path, from a CSV file (columns: see camcomp/cutting/forcetable.py)."""
+
+from functools import lru_cache
+from pathlib import Path
+
+from pydantic import Field
+
+from camcomp.cutting.cut import Cut
+from camcomp.cutting.forcetable import ForceTable, look_up, parse_table
+from camcomp.cutting.frame import to_components
+from camcomp.datatypes import Floats
+from camcomp.diagnostics import FileError
+from camcomp.specbase import Spec
+
+SOURCES = "The user's own measurement; the table is interpolated linearly along the path."
+
+# The table says itself where the tool cuts, plunges included.
+PLUNGES = True
+
+
+class Params(Spec):
+    """Where the table is."""
+
+    file: str = Field(description="CSV file; a relative path counts from the folder of the config file")
+    on_workpiece: bool = Field(False, description="true when a dynamometer under the work measured; all signs change")
+
+
+def force(cut: Cut, params: Params) -> Floats:
+    """(Fr, Ft, Fz) (n, 3) in N. Raises ConfigError CC260 to CC264, FileError CC500."""
+    table = _table(params.file)
+    value = look_up(table, cut.arc_length, cut.line)
+    if table.in_machine:
+        value = to_components(value @ cut.to_machine, cut.tangent, cut.tool_axis)
+    return -value if params.on_workpiece else value
+
+
+def _table(name: str) -> ForceTable:
+    try:
+        stamp = Path(name).stat()
+        return _cached(name, stamp.st_mtime_ns, stamp.st_size)
+    except (OSError, UnicodeDecodeError) as error:
+        raise FileError("CC500", f"the force table {name} cannot be read: {error}") from error
+
+
+@lru_cache(maxsize=8)
+def _cached(name: str, _time: int, _size: int) -> ForceTable:
+    return parse_table(Path(name).read_text(encoding="utf-8"), name)
