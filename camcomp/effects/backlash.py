@@ -1,0 +1,24 @@
+"""Play between encoder and carriage: after a reversal the encoder moves by the full width before the carriage does."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from camcomp.datatypes import Floats
+from camcomp.gap.effect import Motion, Parameter
+from camcomp.gap.memory import play
+
+STAGE = "drive"
+TARGET = "actuator"
+SOURCE = "play operator (Krasnoselskii, Pokrovskii: Systems with hysteresis, 1989); reversal value B of ISO 230-2"
+PARAMETERS = (
+    Parameter("width_mm", "mm", 0.0, 0.0, 0.5, 0.02, 0.0002, "worn ball screws: 2 to 50 um (ISO 230-2 reports)", sign=1),
+)
+
+
+def on_drive(error: Floats, motion: Motion, which: Floats, p: Mapping[str, float]) -> Floats:
+    """Carriage minus encoder (n, m), mm; the carriage starts in the middle of its play."""
+    width = p["width_mm"]
+    if width == 0.0 or not motion.ordered:
+        return error
+    return error + np.where(which > 0, play(motion.encoder, width), 0.0)

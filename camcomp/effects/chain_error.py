@@ -1,0 +1,32 @@
+"""A chain is assembled with its base rolled about the axis of its actuator."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from camcomp.effects._aim import place
+from camcomp.gap.effect import Parameter
+from camcomp.statics.description import Actuator, Robot, Transform
+from camcomp.statics.rotation import exp_rotation
+
+STAGE = "structure"
+TARGET = "actuator"
+SOURCE = "assembly error of Klimchik et al. (ARK 2012): about 1 degree around the actuated axis"
+PARAMETERS = (
+    Parameter("roll_deg", "deg", 0.0, -20.0, 20.0, 0.4, 0.002, "assembly without fixtures: 0.1 to 1 degree"),
+)
+
+
+def on_robot(robot: Robot, actuators: tuple[str, ...], p: Mapping[str, float]) -> Robot:
+    """Copy of the machine with these chains rolled in front of their first element."""
+    roll = p["roll_deg"]
+    if roll == 0.0:
+        return robot
+    for name in actuators:
+        chain, k = place(robot, name)
+        joint = chain.elements[k]
+        assert isinstance(joint, Actuator)
+        turn = Transform(rotation=exp_rotation(np.radians(roll) * joint.axis))
+        # In front of the actuator itself, so that in a serial machine the axis meant is the joint's own.
+        robot = robot.edit_chain(chain.name, elements=(*chain.elements[:k], turn, *chain.elements[k:]))
+    return robot

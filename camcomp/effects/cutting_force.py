@@ -1,0 +1,18 @@
+"""The cutting force is a constant factor of what the force model says."""
+
+from collections.abc import Mapping
+
+from camcomp.gap.effect import Load, Motion, Parameter
+
+STAGE = "process"
+TARGET = "machine"
+SOURCE = "definition; scatter of specific cutting forces between batches (Altintas: Manufacturing automation)"
+PARAMETERS = (
+    Parameter("factor", "1", 1.0, 0.02, 20.0, 0.3, 0.01, "specific cutting forces are known to 10 to 50 %", log=True),
+)
+
+
+def on_load(load: Load, motion: Motion, p: Mapping[str, float]) -> Load:
+    """The load with the cutting force scaled."""
+    factor = p["factor"]
+    return load if factor == 1.0 else Load(load.force * factor, load.wrench)

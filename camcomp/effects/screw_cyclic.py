@@ -1,0 +1,40 @@
+"""The screw runs out: the carriage swings about its encoder once per turn (or per pitch of another period)."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from camcomp.datatypes import Floats
+from camcomp.gap.effect import Motion, Parameter
+
+STAGE = "drive"
+TARGET = "actuator"
+SOURCE = "carriage minus encoder = amplitude sin(2 pi (encoder - home) / pitch + phase); v2pi of ISO 3408-3"
+_PITCHES = tuple(float(each) for each in np.geomspace(1.0, 40.0, 160))
+PARAMETERS = (
+    Parameter("amplitude_mm", "mm", 0.0, 0.0, 0.3, 0.005, 0.0001, "wobble of ball screws: 1 to 10 um", sign=1),
+    Parameter("pitch_mm", "mm", 5.0, 0.5, 100.0, 1.0, 0.0, "screws of feed drives: 1 to 40 mm per turn"),
+    Parameter("phase_rad", "rad", 0.0, -np.pi, np.pi, 2.0, 0.0, "any"),
+)
+# The effect is linear in its two components, which is what a fit needs; the scan finds the pitch.
+FITTED = (
+    Parameter("sine_mm", "mm", 0.0, -0.3, 0.3, 0.004, 0.0001, "as the amplitude"),
+    Parameter("cosine_mm", "mm", 0.0, -0.3, 0.3, 0.004, 0.0001, "as the amplitude"),
+    Parameter("pitch_mm", "mm", 5.0, 0.5, 100.0, 1.0, 0.0, "as above", scan=_PITCHES),
+)
+
+
+def public(fitted: Mapping[str, float]) -> dict[str, float]:
+    """Amplitude, pitch and phase from the fitted components."""
+    sine, cosine = fitted["sine_mm"], fitted["cosine_mm"]
+    phase = float(np.arctan2(cosine, sine))
+    return {"amplitude_mm": float(np.hypot(sine, cosine)), "pitch_mm": fitted["pitch_mm"], "phase_rad": phase}
+
+
+def on_drive(error: Floats, motion: Motion, which: Floats, p: Mapping[str, float]) -> Floats:
+    """Carriage minus encoder (n, m), mm."""
+    amplitude = p["amplitude_mm"]
+    if amplitude == 0.0:
+        return error
+    phase = 2.0 * np.pi * (motion.encoder - motion.home) / p["pitch_mm"] + p["phase_rad"]
+    return error + which * amplitude * np.sin(phase)

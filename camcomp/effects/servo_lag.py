@@ -1,0 +1,24 @@
+"""The encoder follows its set-point as a first-order lag: tau d(encoder)/dt = set-point - encoder."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from camcomp.datatypes import Floats
+from camcomp.gap.effect import Motion, Parameter
+from camcomp.gap.memory import first_order
+
+STAGE = "control"
+TARGET = "either"
+SOURCE = "first-order position loop, tau = 1/kv (Gross, Hamann, Wiegaertner: Electrical feed drives in automation)"
+PARAMETERS = (
+    Parameter("time_constant_ms", "ms", 0.0, 0.0, 100.0, 3.0, 0.02, "loop gains kv of 100 to 2000 1/s", sign=1),
+)
+
+
+def on_servo(position: Floats, motion: Motion, which: Floats, p: Mapping[str, float]) -> Floats:
+    """Encoder positions (n, m); the lag starts settled."""
+    tau = p["time_constant_ms"] * 1e-3
+    if tau == 0.0 or not motion.ordered:
+        return position
+    return np.where(which > 0, first_order(position, motion.time, tau), position)

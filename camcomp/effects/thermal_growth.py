@@ -1,0 +1,36 @@
+"""A warming drive grows: carriage minus encoder is proportional to the temperature above 20 deg C."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from camcomp.datatypes import Floats
+from camcomp.gap.effect import Motion, Parameter
+
+STAGE = "drive"
+TARGET = "either"
+SOURCE = "linear expansion; first-order warm-up where no temperature is logged"
+REFERENCE_C = 20.0
+WARM_UP_K = 10.0  # rise that an unlogged warm-up ends at; only its product with the growth shows
+PARAMETERS = (
+    Parameter("growth_mm_per_K", "mm/K", 0.0, -0.1, 0.1, 0.004, 0.00005, "steel, 11.5e-6 per K, 100 to 500 mm free length"),
+    Parameter(
+        "warm_up_s", "s", 3600.0, 60.0, 1e5, 1.0, 0.0, "feed drives warm up in 10 minutes to 3 hours",
+        scan=(300.0, 900.0, 1800.0, 3600.0, 7200.0, 14400.0),
+    ),
+)  # fmt: skip
+
+
+def warmth(motion: Motion, warm_up_s: float) -> Floats:
+    """Kelvin above 20 deg C (n,): as logged, or along a first-order warm-up from the start of the common clock."""
+    if motion.temperature is not None:
+        return motion.temperature - REFERENCE_C
+    return WARM_UP_K * -np.expm1(-np.maximum(motion.common, 0.0) / warm_up_s)
+
+
+def on_drive(error: Floats, motion: Motion, which: Floats, p: Mapping[str, float]) -> Floats:
+    """Carriage minus encoder (n, m), mm."""
+    growth = p["growth_mm_per_K"]
+    if growth == 0.0:
+        return error
+    return error + growth * warmth(motion, p["warm_up_s"])[:, None] * which

@@ -1,0 +1,20 @@
+"""The cutting force grows with the time that the tool has cut; air moves and pauses do not wear it."""
+
+from collections.abc import Mapping
+
+from camcomp.gap.effect import Load, Motion, Parameter
+
+STAGE = "process"
+TARGET = "machine"
+SOURCE = "linear middle part of the wear curve (ISO 8688-2)"
+PARAMETERS = (
+    Parameter("growth_per_min", "1/min", 0.0, 0.0, 20.0, 0.2, 0.002, "tool lives of 5 to 60 minutes", sign=1),
+)
+
+
+def on_load(load: Load, motion: Motion, p: Mapping[str, float]) -> Load:
+    """The load with the cutting force grown by the minutes of cutting so far."""
+    growth = p["growth_per_min"]
+    if growth == 0.0:
+        return load
+    return Load(load.force * (1.0 + growth * motion.cut_min)[:, None], load.wrench)
