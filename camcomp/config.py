@@ -16,7 +16,7 @@ from camcomp.specrobot import Robot
 from camcomp.yamlcheck import check, choose
 from camcomp.yamltree import Node, merge, plain, read_tree
 
-_ROBOT_KEYS = (
+ROBOT_KEYS = (
     "name",
     "source",
     "start_reference_mm",
@@ -107,13 +107,18 @@ def _check_config(tree: Node) -> tuple[Config | None, list[CamcompError]]:
         skip = ["robot"]  # missing in a file of overrides, or its own errors are known already
     config, more = check(Config, tree, data, skip=skip)
     errors += more
-    force, more = _plugin("forces", "model", _get(tree, "process", "force") or _NO_FORCE)
+    force, more = _plugin(
+        "forces", "model", _get(tree, "process", "force") or _NO_FORCE, name="process.force"
+    )
     errors += more
     entries = _get(tree, "effects")
     listed = entries.value if entries is not None and isinstance(entries.value, list) else []
-    effects = [_plugin("effects", "effect", entry, also=("target",)) for entry in listed]
+    effects = [
+        _plugin("effects", "effect", entry, name=f"effects[{i + 1}]", also=("target",))
+        for i, entry in enumerate(listed)
+    ]
     errors += [each for _, more in effects for each in more]
-    errors += _plugin("dialects", "dialect", _get(tree, "control"), free=True)[1]
+    errors += _dialect(_get(tree, "control", "dialect"))
     if config is None or errors:
         return None, errors
     config._tree = tree
@@ -127,17 +132,17 @@ def _robot_from_plugin(node: Node) -> tuple[Robot | None, list[CamcompError]]:
     if "chains" in node.value:
         message = "a robot is given by its type or by its chains, not by both"
         return None, [ConfigError("CC215", message, at=node.value["chains"].key_at)]
-    params, errors = _plugin("robots", "type", node, also=_ROBOT_KEYS)
+    params, errors = _plugin("robots", "type", node, name="robot", also=ROBOT_KEYS)
     if params is None or errors:
         return None, errors
     chains = shelf.load("robots", node.value["type"].value).chains(params)
-    own = {key: plain(node.value[key]) for key in _ROBOT_KEYS if key in node.value}
+    own = {key: plain(node.value[key]) for key in ROBOT_KEYS if key in node.value}
     robot, errors = check(Robot, node, {**own, "chains": chains})
     return robot and robot.model_copy(update={"type": node.value["type"].value}), errors
 
 
 def _plugin(
-    shelf_name: str, key: str, node: Node | None, *, also: Sequence[str] = (), free: bool = False
+    shelf_name: str, key: str, node: Node | None, *, name: str = "", also: Sequence[str] = ()
 ) -> tuple[Any, list[CamcompError]]:
     """Parameters of the plug-in that `node` names under `key`, as its own spec; None when it has none."""
     chosen = _get(node, key)
@@ -147,13 +152,19 @@ def _plugin(
         member = shelf.load(shelf_name, chosen.value, at=chosen.at)
     except ConfigError as error:
         return None, [error]
-    if free:
-        return None, []
-    own = {name: each for name, each in node.value.items() if name != key and name not in also}
-    return check(_params_of(member), replace(node, value=own))
+    own = {each: below for each, below in node.value.items() if each not in (key, *also)}
+    return check(params_of(member), replace(node, value=own), name=name)
 
 
-def _params_of(member: Any) -> type[Spec]:
+def _dialect(chosen: Node | None) -> list[CamcompError]:
+    names = shelf.members("dialects")
+    if chosen is None or not isinstance(chosen.value, str) or chosen.value in names:
+        return []
+    message = f"there is no dialect called '{chosen.value}'"
+    return [ConfigError("CC213", message, at=chosen.at, hint=choose(chosen.value, names))]
+
+
+def params_of(member: Any) -> type[Spec]:
     """A plug-in's spec: its class Params, or one made from the records PARAMETERS of an effect."""
     if hasattr(member, "PARAMETERS"):
         fields: dict[str, Any] = {

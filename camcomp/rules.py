@@ -167,5 +167,6 @@ RULES: dict[str, Rule] = {
         "An output names the file that is being read. The input is never overwritten.",
         "choose another name for the output",
     ),
+    "CC503": Rule("input or output failed", "The operating system refused a file or stream.", "check disk and rights"),
     # --- CC6xx checks ------------------------------------------------------------------------------------------
 }

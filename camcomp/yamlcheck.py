@@ -26,11 +26,11 @@ _RULES = {
 
 
 def check(
-    spec: type[Model], tree: Node, data: Any = None, *, skip: Sequence[str] = ()
+    spec: type[Model], tree: Node, data: Any = None, *, name: str = "", skip: Sequence[str] = ()
 ) -> tuple[Model | None, list[CamcompError]]:
     """`tree` as a `spec`, or None and every error with its place in the YAML text.
 
-    `data` replaces the bare values of the tree where some of them are built already; what is wrong with the top-level
+    `name` is what the tree is called in messages; `data` replaces the bare values of the tree where some of them are built already; what is wrong with the top-level
     keys in `skip` is left out.
     """
     seen: dict[int, type[Spec]] = {}
@@ -45,7 +45,7 @@ def check(
         ]
     found: dict[Any, CamcompError] = {}
     for detail in details:
-        each = _explain(detail, tree, data, seen)
+        each = _explain(detail, tree, data, seen, name)
         # An anchor used in three chains is one mistake, and so is a value that fits neither of two types.
         which = detail["loc"][-1] if each.rule == "CC203" else None
         found.setdefault((each.rule, each.at, which), each)
@@ -59,17 +59,19 @@ def choose(name: Any, known: Sequence[str]) -> str:
     return f"{start}known here: {', '.join(known)}"
 
 
-def _explain(detail: ErrorDetails, tree: Node, data: Any, seen: dict[int, type[Spec]]) -> CamcompError:
+def _explain(
+    detail: ErrorDetails, tree: Node, data: Any, seen: dict[int, type[Spec]], prefix: str
+) -> CamcompError:
     kind, loc, context = detail["type"], detail["loc"], detail.get("ctx", {})
     rule = (
         kind
         if kind in RULES
         else _RULES.get(kind, "CC204" if kind.endswith(("_type", "_parsing")) else "CC205")
     )
-    name, node, value = _walk(loc, tree, data)
+    name, node, value = _walk(loc, tree, data, prefix)
     if rule == "CC201":
         key = str(loc[-1])
-        inside, _, parent = _walk(loc[:-1], tree, data)
+        inside, _, parent = _walk(loc[:-1], tree, data, prefix)
         return _unknown_key(key, inside, node, seen.get(id(parent)))
     if rule == "CC203":
         key = str(context.get("discriminator", loc[-1])).strip("'")
@@ -118,9 +120,9 @@ def _unknown_key(key: str, inside: str, node: Node, spec: type[Spec] | None) -> 
     )
 
 
-def _walk(loc: Keys, tree: Node, data: Any) -> tuple[str, Node, Any]:
+def _walk(loc: Keys, tree: Node, data: Any, prefix: str) -> tuple[str, Node, Any]:
     """Dotted name, node and bare value under `loc`; parts that are no keys (tags of unions) are passed over."""
-    name, node = "", tree
+    name, node = prefix, tree
     for part in loc:
         below = child(node, part)
         if below is not None:
