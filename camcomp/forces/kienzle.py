@@ -13,8 +13,8 @@ from camcomp.specbase import Spec
 
 SOURCES = (
     "Kienzle's law kc = kc1.1 h^-mc (h in mm), integrated exactly over the engagement. kc falls by about 1 % per degree "
-    "of rake (material note in FreeCAD; Sandvik: tables hold for neutral inserts). Blind predictions of measured slots in "
-    "aluminium are 6 to 31 % high, depending on the table used for it."
+    "of rake (material note in FreeCAD; Sandvik: tables hold for neutral inserts). Predicted for aluminium, measured "
+    "slots come out 6 to 31 % too high, depending on the table."
 )
 
 RAKE_LOSS_PER_DEG = 0.01

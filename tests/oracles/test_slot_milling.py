@@ -1,7 +1,8 @@
 """Milling forces against numbers from elsewhere, and against a cutter that is turned tooth by tooth.
 
-Measured: slots in aluminium, flat end mill of 25 mm, 2 teeth, 6000 rev/min, 3 mm deep; mean forces by leekunhwee,
-ForceCalculation (GitHub, commit 3fda341), in the frame of camcomp.cutting.average, axial force counted down the tool.
+Measured: slots by a flat end mill of 25 mm, 2 teeth, 6000 rev/min, 3 mm deep, in a material that is not stated; mean forces
+by leekunhwee, ForceCalculation (GitHub, commit 3fda341), in the frame of camcomp.cutting.average, axial force counted
+down the tool.
 """
 
 from typing import Any

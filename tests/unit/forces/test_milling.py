@@ -2,6 +2,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 
 from camcomp.cutting.cut import Cut
 from camcomp.diagnostics import ConfigError
@@ -88,3 +89,23 @@ def test_both_models_complain_about_missing_data(rule: str, changes: dict) -> No
         with pytest.raises(ConfigError) as caught:
             model.force(cut(**changes), params)
         assert caught.value.rule == rule
+
+
+@pytest.mark.parametrize(
+    ("model", "key", "value"),
+    [
+        (kienzle, "kc11_N_per_mm2", 0.0),
+        (kienzle, "mc", 1.0),
+        (kienzle, "mc", -0.1),
+        (kienzle, "rake_deg", 90.0),
+        (kienzle, "milling", "climb"),
+        (mechanistic, "Ktc_N_per_mm2", 0.0),
+        (mechanistic, "spindle", "left"),
+    ],
+)
+def test_parameters_without_meaning_are_refused(model: Any, key: str, value: Any) -> None:
+    good = COEFFICIENTS if model is mechanistic else {"kc11_N_per_mm2": 641.0, "mc": 0.27}
+    model.Params(**good)
+    with pytest.raises(ValidationError) as caught:
+        model.Params(**good | {key: value})
+    assert caught.value.errors()[0]["loc"] == (key,)
