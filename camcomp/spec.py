@@ -10,7 +10,7 @@ from camcomp.specbase import NotNegative, Positive, Spec, Vector, Zero, exactly_
 from camcomp.specrobot import Robot
 from camcomp.yamltree import Node, find
 
-WorkOffset = Annotated[str, Field(pattern=r"^G5([4-9]|9\.[123])$")]
+WorkOffset = Annotated[str, Field(pattern=r"^G5([5-9]|9\.[123])$")]
 ToolNumber = Annotated[int, Field(ge=0)]
 NotEmpty = Annotated[str, Field(min_length=1)]
 
@@ -122,13 +122,18 @@ class Control(Spec):
     )
     offsets_mm: dict[WorkOffset, Vector] = Field(
         default_factory=dict,
-        description="work offsets against machine zero of the control, e.g. G55: [100, 0, 0]",
+        description="origins of G55 to G59.3 in the machine frame, e.g. G55: [100, 0, 0]; that of G54 is "
+        "workpiece.origin_mm",
     )
+    tool_number: ToolNumber = Field(0, description="tool in the spindle when the program starts")
     tool_lengths_mm: dict[ToolNumber, float] = Field(
-        default_factory=dict, description="length offsets by tool number"
+        default_factory=dict, description="length offsets of G43 by tool number"
     )
     reference_positions_mm: dict[Literal["G28", "G30"], Vector] = Field(
         default_factory=dict, description="machine coordinates to which G28 and G30 go"
+    )
+    block_delete: bool = Field(
+        False, description="the switch is on: lines that start with / are not executed"
     )
     input_increment_mm: Positive | None = Field(
         None,

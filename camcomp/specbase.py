@@ -129,12 +129,3 @@ Axis = Annotated[
     PlainValidator(_axis),
     WithJsonSchema({"anyOf": [{"enum": list(get_args(AxisLetter))}, _NUMBERS]}),
 ]
-
-
-def unit_vector(axis: str | list[float]) -> list[float]:
-    """Unit vector (3,) of an axis given by letter or by three numbers."""
-    if isinstance(axis, str):
-        sign = -1.0 if axis.startswith("-") else 1.0
-        return [sign if letter == axis[-1] else 0.0 for letter in "xyz"]
-    norm = float(np.linalg.norm(axis))
-    return [value / norm for value in axis]

@@ -188,6 +188,6 @@ def leaves(node: Node, name: str = "") -> Iterator[tuple[str, Node]]:
             yield from leaves(each, f"{name}.{key}" if name else str(key))
     elif isinstance(node.value, list) and any(isinstance(each.value, dict) for each in node.value):
         for i, each in enumerate(node.value):
-            yield from leaves(each, f"{name}[{i}]")
+            yield from leaves(each, f"{name}[{i + 1}]")
     else:
         yield name, node
