@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from camcomp.datatypes import ARC, RAPID, Floats, Ints, Path
+from camcomp import pathgeometry
+from camcomp.datatypes import RAPID, Floats, Ints, Path
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,47 +48,6 @@ class Timeline:
             return np.where(self.length[k] > 0, np.clip(done / self.length[k], 0.0, 1.0), 1.0)
 
 
-def arc_length(path: Path) -> Floats:
-    """Length (n,) mm of every motion, helices included."""
-    chord = np.linalg.norm(path.end - path.start, axis=1)
-    arc = path.kind == ARC
-    if not arc.any():
-        return chord
-    rise = np.einsum("ij,ij->i", path.end - path.start, path.axis)
-    spoke = path.start - np.where(np.isnan(path.centre), 0.0, path.centre)
-    spoke = spoke - np.einsum("ij,ij->i", spoke, path.axis)[:, None] * path.axis
-    turn = np.linalg.norm(spoke, axis=1) * np.abs(path.angle)
-    return np.where(arc, np.hypot(turn, rise), chord)
-
-
-def point_at(path: Path, motion: Ints, share: Floats) -> tuple[Floats, Floats]:
-    """Tip (n, 3) mm and unit feed direction (n, 3) at the share (n,) of each motion (n,)."""
-    start, end = path.start[motion], path.end[motion]
-    tip = start + share[:, None] * (end - start)
-    step = end - start
-    arc = path.kind[motion] == ARC
-    if arc.any():
-        m = motion[arc]
-        axis = path.axis[m]
-        spoke = path.start[m] - path.centre[m]
-        rise = np.einsum("ij,ij->i", spoke, axis)
-        spoke = spoke - rise[:, None] * axis
-        lift = np.einsum("ij,ij->i", path.end[m] - path.start[m], axis)
-        angle = path.angle[m] * share[arc]
-        side = np.cross(axis, spoke)
-        c, s = np.cos(angle)[:, None], np.sin(angle)[:, None]
-        # The end radius may differ from the start radius by rounding; spread the difference along the arc.
-        last = path.end[m] - path.centre[m]
-        last = last - np.einsum("ij,ij->i", last, axis)[:, None] * axis
-        radius = np.linalg.norm(spoke, axis=1)
-        grow = 1.0 + share[arc] * (np.linalg.norm(last, axis=1) / np.where(radius > 0, radius, 1.0) - 1.0)
-        tip[arc] = path.centre[m] + (c * spoke + s * side) * grow[:, None]
-        tip[arc] += (rise + lift * share[arc])[:, None] * axis
-        step[arc] = path.angle[m][:, None] * (c * side - s * spoke) + lift[:, None] * axis
-    size = np.linalg.norm(step, axis=1)
-    return tip, step / np.where(size > 0, size, 1.0)[:, None]
-
-
 def trapezoid_duration(length: Floats, feed: Floats, acceleration: float) -> Floats:
     """Time (n,) s for length mm from stop to stop at feed mm/s with acceleration mm/s2."""
     cruise = length / feed + feed / acceleration
@@ -104,7 +64,7 @@ def _trapezoid(t: Floats, duration: Floats, length: Floats, feed: Floats, accele
 
 def schedule(path: Path, acceleration: float) -> Timeline:
     """Timeline of a path's feed motions, one after the other from time 0; motions without length take no time."""
-    length = arc_length(path)
+    length = pathgeometry.lengths(path)
     index = np.flatnonzero((path.kind != RAPID) & (length > 0) & ~path.machine)
     feed = path.feed[index] / 60.0
     duration = trapezoid_duration(length[index], feed, acceleration)

@@ -1,0 +1,148 @@
+"""One run as the twin sees it: where the set-points are in time, and where in the program every row of a log stands."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from camcomp import pathgeometry
+from camcomp.cutting.track import Track
+from camcomp.datatypes import Floats
+from camcomp.gap.memory import direction
+from camcomp.gap.pieces import Pieces, Places, cut, direct
+from camcomp.gap.timeline import Timeline
+
+STEP_S = 0.001  # grid of what has memory: 0.2 um of interpolation at 1500 mm/s2
+MOST_STEPS = 40000
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """A run's set-points and nodes. n rows, q nodes, g instants of a fine time grid, m actuators.
+
+    Everything that needs inverse kinematics is computed once, when the course is made.
+    """
+
+    name: str
+    time: Floats  # (n,) s of the rows
+    started: float  # s on the common clock
+    ordered: bool
+    node_tip: Floats  # (q, 3) mm machine frame
+    node_force: Floats  # (q, 3) N machine frame, as modelled
+    node_rho: Floats  # (q, m) set-points
+    node_time: Floats  # (q,) s
+    grid: Floats  # (g,) s
+    grid_rho: Floats  # (g, m) set-points
+    grid_cut: Floats  # (g,) 1 where the model cuts
+    grid_piece: np.ndarray  # (g,) piece
+    pieces: int
+    place: Callable[[Floats], Places]  # times (n,) -> where they lie between the nodes
+    row_rho: Floats  # (n, m) set-points at the rows
+    temperature: Floats | None  # (n,) deg C at the rows
+    timeline: Timeline | None
+    cut_before_min: float = 0.0
+
+    @property
+    def cut_min(self) -> float:
+        """Minutes of cutting in this run."""
+        dt = np.diff(self.grid, prepend=self.grid[:1])
+        return float((dt * self.grid_cut).sum() / 60.0)
+
+
+def course_of_program(
+    name: str,
+    timeline: Timeline,
+    track: Track,
+    time: Floats,
+    *,
+    started: float,
+    to_machine: Callable[[Floats], Floats],
+    vectors: Callable[[Floats], Floats],
+    inverse: Callable[[Floats], Floats],
+    setpoints: Floats | None = None,
+    temperature: Floats | None = None,
+) -> Course:
+    """Course of a program's feed motions, whose loads are those of `track`.
+
+    to_machine: tips (q, 3) program -> machine frame; vectors: the same for vectors. inverse: machine tips (q, 3) ->
+    set-points (q, m). setpoints (n, m): as logged, instead of computed.
+    """
+    rank = np.full(len(timeline.path), -1)
+    rank[timeline.index] = np.arange(len(timeline.index))
+    own = np.flatnonzero((rank[track.motion] >= 0) & (track.length > 0.0))
+    part, u0, u1 = cut(timeline.path, track.motion[own], track.u0[own], track.u1[own], track.length[own])
+    pieces = Pieces(rank[track.motion[own]][part], u0, u1)
+    piece, w = pieces.nodes()
+    share = pieces.share(piece, w)
+    tip = to_machine(pathgeometry.points(timeline.path, timeline.index[pieces.motion[piece]], share))
+    rho = inverse(tip)
+    of_track = own[part][piece]
+    within = (share - track.u0[of_track]) / (track.u1[of_track] - track.u0[of_track])
+    load = vectors(track.force(of_track, np.clip(within, 0.0, 1.0)))
+
+    def place(at: Floats) -> Places:
+        return pieces.at(*timeline.locate(at))
+
+    first, last = min(0.0, float(time.min(initial=0.0))), max(timeline.end, float(time.max(initial=0.0)))
+    steps = int(min(np.ceil((last - first) / STEP_S) + 1, MOST_STEPS))
+    grid = np.linspace(first, last, max(steps, 2))
+    where = place(grid)
+    grid_rho = where.of(rho)
+    row_rho = place(time).of(rho)
+    if setpoints is not None:
+        ahead = np.where(np.isfinite(setpoints), setpoints - row_rho, 0.0)
+        row_rho = row_rho + ahead
+        grid_rho = grid_rho + np.column_stack([np.interp(grid, time, each) for each in ahead.T])
+    grid_cut = (np.abs(where.of(load)).sum(axis=1) > 1e-9).astype(float)
+    grid_cut[(grid < 0.0) | (grid > timeline.end)] = 0.0
+    return Course(
+        name, time, started, True, tip, load, rho, _node_times(timeline, pieces.motion[piece], share), grid, grid_rho, grid_cut,
+        where.piece, len(pieces.motion), place, row_rho, temperature, timeline,
+    )  # fmt: skip
+
+
+def course_of_poses(
+    name: str,
+    time: Floats,
+    rho: Floats,
+    tip: Floats,
+    *,
+    started: float,
+    force: Floats | None = None,
+    ordered: bool = False,
+    temperature: Floats | None = None,
+) -> Course:
+    """Course without a program: rows are poses at set-points rho (n, m), near the tips (n, 3) in the machine frame."""
+    n = len(rho)
+    load = np.zeros((n, 3)) if force is None else force
+
+    def place(at: Floats) -> Places:
+        if not ordered:
+            return direct(n)
+        i = np.clip(np.searchsorted(time, at, side="right") - 1, 0, max(n - 2, 0))
+        t = np.clip((at - time[i]) / np.maximum(time[np.minimum(i + 1, n - 1)] - time[i], 1e-12), 0.0, 1.0)
+        j = np.minimum(i + 1, n - 1)
+        return Places(np.where(t > 0.5, j, i), np.column_stack([i, j]), np.column_stack([1.0 - t, t]))
+
+    cuts = (np.abs(load).sum(axis=1) > 1e-9).astype(float)
+    return Course(
+        name, time, started, ordered, tip, load, rho, time, time, rho, cuts, np.arange(n), n, place, rho, temperature,
+        None,
+    )  # fmt: skip
+
+
+def _node_times(timeline: Timeline, k: np.ndarray, share: Floats) -> Floats:
+    """Time (q,) at which motion k (q,) has done a share (q,); the trapezoid turned round on a table."""
+    table = np.linspace(0.0, 1.0, 201)
+    out = np.empty(len(k))
+    for motion in np.unique(k):
+        at = timeline.start[motion] + table * timeline.duration[motion]
+        done = timeline.share(np.full(len(at), motion), at)
+        mine = k == motion
+        out[mine] = np.interp(share[mine], done, at)
+    return out
+
+
+def travel_direction(course: Course, encoder: Floats) -> Floats:
+    """Direction of travel with memory (g, m) of encoders on the fine grid (g, m); zero for unordered poses."""
+    return direction(encoder) if course.ordered else np.zeros_like(encoder)

@@ -1,0 +1,294 @@
+"""The one forward model: set-points in time -> control -> drive -> structure -> tool -> workpiece -> sensor.
+
+simulate prints it, diagnose compares it with logs, compensate inverts it. Effects act at fixed hooks in this order and
+nowhere else. The loaded equilibrium is solved at the nodes of a course; between them, and for small differences, its
+first derivatives carry on.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from camcomp.datatypes import Floats
+from camcomp.diagnostics import PhysicsError
+from camcomp.course import Course, travel_direction
+from camcomp.gap.effect import Cause, Load, Motion
+from camcomp.gap.pieces import Places
+from camcomp.statics.description import Robot
+from camcomp.statics.machine import Machine, build_machine
+from camcomp.statics.solve import FREE, STATUS, solve
+
+_RHO_STEP = 1e-3  # mm or 1e-3 mrad of drive, to first order linear within 1e-6
+_FORCE_STEP = 1.0  # N
+_MOMENT_STEP = 100.0  # N mm
+
+
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """What the sensors show in n rows: tip (n, 3) mm program frame, encoder (n, m), drive (n, m) N, dyno (n, 3) N."""
+
+    tip: Floats
+    encoder: Floats
+    drive: Floats
+    dyno: Floats
+    motion: Motion
+    carriage: Floats  # (n, m) where the carriages stand
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """The structure at a course's nodes, for the drive positions and loads it was solved with."""
+
+    key: tuple
+    shift: Floats  # (pieces, m) carriage minus set-point, piece by piece
+    force: Floats  # (q, 3)
+    wrench: Floats  # (q, 6)
+    tip: Floats  # (q, 3) machine frame
+    drive: Floats  # (q, m)
+
+
+@dataclass(frozen=True, eq=False)
+class Slopes:
+    """First derivatives at the nodes: of tip and drive force by carriage (q, ., m) and by wrench at the reference (q, ., 6)."""
+
+    tip_rho: Floats
+    tip_wrench: Floats
+    drive_rho: Floats
+    drive_wrench: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Twin:
+    """A machine under judgement. origin (3,), rotation (3, 3): program frame in the machine frame."""
+
+    robot: Robot
+    nominal: Robot
+    origin: Floats
+    rotation: Floats
+    causes: tuple[Cause, ...] = ()
+
+    @property
+    def actuators(self) -> tuple[str, ...]:
+        """Names in the order of every actuator array."""
+        return tuple(each.name for each in self.robot.actuators)
+
+    def to_machine(self, tip: Floats) -> Floats:
+        """Tips (n, 3) program -> machine frame."""
+        return self.origin + tip @ self.rotation.T
+
+    def to_program(self, tip: Floats) -> Floats:
+        """Tips (n, 3) machine -> program frame."""
+        return (tip - self.origin) @ self.rotation
+
+    def inverse(self, tip: Floats) -> Floats:
+        """Set-points (n, m) that the control computes for machine tips (n, 3). Raises PhysicsError CC301."""
+        machine = _machine(self.nominal, self.nominal)
+        state = solve(machine, FREE, tip, check=False)
+        if (state.status == 3).any():
+            bad = int(np.argmax(state.status == 3))
+            raise PhysicsError("CC410", f"tip {np.round(tip[bad], 3).tolist()} (machine frame) is {STATUS[3]}")
+        return state.rho_nominal
+
+    def machine(self, causes: Sequence[Cause]) -> tuple[Machine, tuple]:
+        """The machine with the effects on it, and a key that tells equal ones."""
+        robot, key = self.robot, []
+        for cause in causes:
+            hook = cause.hook("on_robot")
+            if hook is not None:
+                changed = hook(robot, cause.aimed(self.actuators), cause.values)
+                if changed is not robot:
+                    key.append((cause.name, cause.target, tuple(sorted(cause.values.items()))))
+                robot = changed
+        return _machine(robot, self.nominal), tuple(key)
+
+    # -- the signal path ----------------------------------------------------------------------------------------------
+
+    def sense(
+        self,
+        course: Course,
+        causes: Sequence[Cause] = (),
+        *,
+        solved: Solved | None = None,
+        slopes: Slopes | None = None,
+        measured: Floats | None = None,
+    ) -> tuple[Reading, Solved]:
+        """Readings of a run with the machine's own causes and `causes` on top, and the structure they stand on.
+
+        solved: structure to reuse when the machine is the same and drives and loads differ little (needs slopes).
+        measured (n, m): logged encoders; the difference to the model's encoders then moves the carriages too, so that
+        what the control does differently is not blamed on what follows it.
+        """
+        causes = (*self.causes, *causes)
+        # control, drive
+        grid = self._grid_motion(course, causes)
+        error = np.zeros_like(grid.encoder)
+        for cause in causes:
+            if (hook := cause.hook("on_drive")) is not None:
+                error = hook(error, grid, cause.which(self.actuators), cause.values)
+        carriage = grid.encoder + error
+        seen = course.time
+        for cause in causes:
+            if (hook := cause.hook("on_clock")) is not None:
+                seen = hook(seen, cause.values)
+        rows = self._rows(course, grid, course.time, course.row_rho)
+        encoder = rows.encoder
+        ahead = np.zeros_like(encoder)
+        if measured is not None:
+            ahead = np.where(np.isfinite(measured), measured - encoder, 0.0)
+        late = seen is not course.time
+        at_tip = self._rows(course, grid, seen, None) if late else rows
+        gap = carriage - course.grid_rho  # carriage minus set-point
+        gap_row = _interpolate(course, course.time, gap) + ahead
+        place = course.place(course.time)
+        place_tip = course.place(seen) if late else place
+        gap_tip = _interpolate(course, seen, gap) + ahead if late else gap_row
+        # structure
+        machine, key = self.machine(causes)
+        nodes = self._nodes(course, grid)
+        node_load = self._load(causes, nodes, course.node_force)
+        if solved is None or slopes is None or solved.key != key:
+            shift = _piece_means(course, gap) if solved is None or slopes is None else solved.shift
+            load = node_load if solved is None or slopes is None else Load(solved.force, solved.wrench)
+            solved = self.structure(course, machine, key, shift, load)
+        load = self._load(causes, rows, place.of(course.node_force))
+        load_tip = self._load(causes, at_tip, place_tip.of(course.node_force)) if late else load
+        drive = place.of(solved.drive)
+        tip = place_tip.of(solved.tip)
+        if slopes is not None:
+            d_rho, d_wrench = self._differences(solved, place, gap_row, load)
+            drive = drive + _apply(place.of(slopes.drive_rho), d_rho) + _apply(place.of(slopes.drive_wrench), d_wrench)
+            if late:
+                d_rho, d_wrench = self._differences(solved, place_tip, gap_tip, load_tip)
+            tip = tip + _apply(place_tip.of(slopes.tip_rho), d_rho) + _apply(place_tip.of(slopes.tip_wrench), d_wrench)
+        effort = np.zeros_like(grid.encoder)
+        for cause in causes:
+            if (hook := cause.hook("on_drive_force")) is not None:
+                effort = hook(effort, grid, cause.which(self.actuators), cause.values)
+        if effort.any():
+            drive = drive + _interpolate(course, course.time, effort)
+        # tool, workpiece, sensor
+        for cause in causes:
+            if (hook := cause.hook("on_pose")) is not None:
+                tip = hook(tip, load_tip, at_tip, cause.values)
+        tip = self.to_program(tip)
+        for cause in causes:
+            if (hook := cause.hook("on_workpiece")) is not None:
+                tip = hook(tip, cause.values)
+        reading = Reading(tip, encoder, drive, load.force, rows, course.row_rho + gap_row)
+        for cause in causes:
+            if (hook := cause.hook("on_reading")) is not None:
+                reading = hook(reading, rows, cause.values)
+        return reading, solved
+
+    def structure(self, course: Course, machine: Machine, key: tuple, shift: Floats, load: Load) -> Solved:
+        """Loaded equilibrium at the nodes. Raises PhysicsError CC411 when a node cannot be solved."""
+        node_piece = np.arange(len(course.node_tip)) // max(len(course.node_tip) // max(course.pieces, 1), 1)
+        rho = course.node_rho + shift[node_piece]
+        state = solve(machine, FREE, course.node_tip, force=load.force, wrench=load.wrench, rho=rho, check=False)
+        if (state.status != 0).any():
+            bad = int(np.argmax(state.status != 0))
+            where = np.round(self.to_program(course.node_tip[bad]), 3).tolist()
+            raise PhysicsError("CC411", f"run '{course.name}', tip {where}: {STATUS[int(state.status[bad])]}")
+        return Solved(key, shift, load.force, load.wrench, state.tip, state.drive)
+
+    def slopes(self, course: Course, causes: Sequence[Cause], solved: Solved) -> Slopes:
+        """Derivatives of the structure at the nodes, by differences of its own solution."""
+        causes = (*self.causes, *causes)
+        machine, key = self.machine(causes)
+        m = len(self.actuators)
+        tips, drives = [], []
+        for j in range(m):
+            shift = solved.shift + _RHO_STEP * np.eye(m)[j]
+            moved = self.structure(course, machine, key, shift, Load(solved.force, solved.wrench))
+            tips.append((moved.tip - solved.tip) / _RHO_STEP)
+            drives.append((moved.drive - solved.drive) / _RHO_STEP)
+        for j in range(6):
+            step = _FORCE_STEP if j < 3 else _MOMENT_STEP
+            load = Load(solved.force, solved.wrench + step * np.eye(6)[j])
+            moved = self.structure(course, machine, key, solved.shift, load)
+            tips.append((moved.tip - solved.tip) / step)
+            drives.append((moved.drive - solved.drive) / step)
+        tip, drive = np.stack(tips, axis=2), np.stack(drives, axis=2)
+        return Slopes(tip[:, :, :m], tip[:, :, m:], drive[:, :, :m], drive[:, :, m:])
+
+    # -- pieces of the path -------------------------------------------------------------------------------------------
+
+    def _grid_motion(self, course: Course, causes: Sequence[Cause]) -> Motion:
+        stiffness = np.array([np.inf if a.stiffness is None else a.stiffness for a in self.robot.actuators])
+        home = np.array([a.home for a in self.robot.actuators])
+        t = course.grid
+        temperature = course.temperature
+        if temperature is not None and len(t) != len(temperature):
+            temperature = np.interp(t, course.time, temperature)
+        dt = np.diff(t, prepend=t[:1])
+        worn = course.cut_before_min + np.cumsum(dt * course.grid_cut) / 60.0
+        zero = np.zeros_like(course.grid_rho)
+        motion = Motion(t, course.started + t, worn, temperature, course.grid_rho, zero, zero, home, stiffness, course.ordered)
+        encoder = course.grid_rho
+        for cause in causes:
+            if (hook := cause.hook("on_servo")) is not None:
+                encoder = hook(encoder, motion, cause.which(self.actuators), cause.values)
+        speed = np.gradient(encoder, t, axis=0) if course.ordered and len(t) > 1 else zero
+        return replace(motion, encoder=encoder, speed=speed, direction=travel_direction(course, encoder))
+
+    def _rows(self, course: Course, grid: Motion, at: Floats, rho: Floats | None) -> Motion:
+        """The grid's motion at other times (n,); rho: set-points there when they are known exactly."""
+        late = grid.encoder - course.grid_rho
+        setpoint = _interpolate(course, at, course.grid_rho) if rho is None else rho
+        temperature = None if grid.temperature is None else _interpolate(course, at, grid.temperature[:, None])[:, 0]
+        return replace(
+            grid,
+            time=at,
+            common=course.started + at,
+            cut_min=_interpolate(course, at, grid.cut_min[:, None])[:, 0],
+            temperature=temperature,
+            encoder=setpoint + _interpolate(course, at, late) if late.any() else setpoint,
+            speed=_interpolate(course, at, grid.speed),
+            direction=_interpolate(course, at, grid.direction),
+        )
+
+    def _nodes(self, course: Course, grid: Motion) -> Motion:
+        return self._rows(course, grid, course.node_time, course.node_rho)
+
+    def _load(self, causes: Sequence[Cause], motion: Motion, force: Floats) -> Load:
+        load = Load(force, np.zeros((len(force), 6)))
+        for cause in causes:
+            if (hook := cause.hook("on_load")) is not None:
+                load = hook(load, motion, cause.values)
+        return load
+
+    def _differences(self, solved: Solved, place: Places, gap: Floats, load: Load) -> tuple[Floats, Floats]:
+        """Carriage (n, m) and wrench at the reference (n, 6) beyond what the nodes were solved with."""
+        d_rho = gap - solved.shift[place.piece]
+        d_force = load.force - place.of(solved.force)
+        d_wrench = load.wrench - place.of(solved.wrench)
+        lever = self.nominal.tool  # platform axes; its tilt under load is of second order here
+        d_wrench = d_wrench + np.concatenate([d_force, np.cross(lever, d_force)], axis=1)
+        return d_rho, d_wrench
+
+
+def _machine(robot: Robot, nominal: Robot) -> Machine:
+    return build_machine(robot, nominal)
+
+
+def _interpolate(course: Course, at: Floats, values: Floats) -> Floats:
+    """Grid values (g, c) at times (n,); rows of unordered poses are the grid itself."""
+    if not course.ordered:
+        return values
+    i = np.clip(np.searchsorted(course.grid, at, side="right") - 1, 0, len(course.grid) - 2)
+    step = course.grid[i + 1] - course.grid[i]
+    u = np.clip((at - course.grid[i]) / np.where(step > 0, step, 1.0), 0.0, 1.0)[:, None]
+    return (1.0 - u) * values[i] + u * values[i + 1]
+
+
+def _piece_means(course: Course, gap: Floats) -> Floats:
+    """Mean (pieces, m) of grid values (g, m) over each piece."""
+    count = np.bincount(course.grid_piece, minlength=course.pieces)
+    total = np.column_stack([np.bincount(course.grid_piece, each, course.pieces) for each in gap.T])
+    return total / np.maximum(count, 1)[:, None]
+
+
+def _apply(slope: Floats, change: Floats) -> Floats:
+    """Slopes (n, 3, k) times changes (n, k)."""
+    return np.einsum("nik,nk->ni", slope, change)
