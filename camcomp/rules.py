@@ -17,6 +17,106 @@ class Rule(NamedTuple):
 
 RULES: dict[str, Rule] = {
     # --- CC1xx NC programs -------------------------------------------------------------------------------------
+    "CC100": Rule(
+        "program moves nothing",
+        "The file holds no motion: it is empty, a comment only, or ends before the first move.",
+        "is this the right file?",
+    ),
+    "CC101": Rule(
+        "decimal comma",
+        "Controls read `X1,5` as X1, as X15, or not at all. It is refused so that nobody cuts at the wrong place.",
+        "write a point",
+    ),
+    "CC102": Rule(
+        "number malformed",
+        "A number is digits with at most one point and a sign in front, without blanks inside: `X1.2.3` and `X1 0` "
+        "are read differently by different controls.",
+    ),
+    "CC103": Rule("letter or number alone", "Every word is a letter followed by its number."),
+    "CC104": Rule(
+        "word twice in a block",
+        "A block may hold each letter once (G and M excepted). Which of two X words counts differs between controls.",
+        "delete one of the two, or split the line",
+    ),
+    "CC105": Rule(
+        "codes exclude each other",
+        "Two codes of one modal group stand in a block, e.g. G0 and G1, or G90 and G91.",
+        "keep one of the two, or split the line",
+    ),
+    "CC106": Rule(
+        "unknown code",
+        "camcomp does not know the code, so it cannot know whether it changes the geometry of what follows.",
+        "check the dialect (--dialect, or control: dialect: in the YAML)",
+    ),
+    "CC107": Rule("unknown character", "The character has no meaning at this place of a program."),
+    "CC108": Rule(
+        "axis words without a clear user",
+        "Two codes in the block want the axis words, or the code with which they stand has no use for them, as in "
+        "`G4 X1.5`, which dwells on one control and moves on another.",
+        "split the line",
+    ),
+    "CC109": Rule(
+        "word not used",
+        "Nothing in the block uses the word. On some controls such a word has a meaning that changes the geometry, "
+        "e.g. a corner radius.",
+        "delete the word if it has no purpose",
+    ),
+    "CC110": Rule(
+        "feed missing",
+        "A cutting motion is due and no feed was given in the feed mode in force; a change of the feed mode "
+        "(G93, G94, G95) makes the old one void.",
+        "add an F word",
+    ),
+    "CC111": Rule(
+        "arc radii differ",
+        "Start and end of the arc are not equally far from the centre given by I, J, K, by more than controls allow. "
+        "Usual reasons: centres meant absolute (G90.1), a lost line, the wrong plane.",
+    ),
+    "CC112": Rule(
+        "arc not defined",
+        "Centre or radius are missing, contradict each other, or do not lead to the end point.",
+    ),
+    "CC113": Rule("turns of an arc", "P in an arc block counts turns: a whole number, 1 or more."),
+    "CC114": Rule(
+        "cutter radius compensation",
+        "With G41 or G42 the control offsets the path by a radius that the program does not contain, so the point "
+        "where the tool touches is not known here.",
+        "post the program with the tool's centre line (G40)",
+    ),
+    "CC115": Rule(
+        "rotary or extra axis",
+        "A, B, C, U, V or W moves an axis that the machine of the configuration does not have.",
+        "post the program for three axes",
+    ),
+    "CC116": Rule("polar coordinates", "G16 and polar words are not followed.", "post in Cartesian coordinates"),
+    "CC117": Rule("scaling or mirroring", "G51 is not followed.", "post at full scale, without mirroring"),
+    "CC118": Rule("rotated coordinates", "G68 and rotated work offsets are not followed.", "post unrotated"),
+    "CC119": Rule("splines", "Spline and NURBS moves are not followed.", "post lines and arcs"),
+    "CC120": Rule("spindle-synchronous motion", "Threading follows the spindle, not the feed.", ""),
+    "CC121": Rule("probing", "Where a probing move ends is known at the machine only.", ""),
+    "CC122": Rule("turning", "Lathe modes are not followed: camcomp is for milling.", ""),
+    "CC123": Rule(
+        "expression or parameter",
+        "A parameter is not set, an expression is malformed, or its value is known at the machine only.",
+    ),
+    "CC128": Rule("encoding", "The file is marked as UTF-16 and cannot be decoded.", "save it as UTF-8 or ASCII"),
+    "CC129": Rule("offset statement", "The words of G10, G52 or G92 do not say which offset to set to what.", ""),
+    "CC130": Rule("G53 misused", "A move in machine coordinates is a straight one with absolute words.", ""),
+    "CC131": Rule("dwell without a time", "G4 needs its time as P.", ""),
+    "CC132": Rule("canned cycle", "A word that the cycle needs is missing or makes no sense.", ""),
+    "CC133": Rule("tool statement", "T, H, M6, M61 or G43 has a word that is missing or makes no sense.", ""),
+    "CC134": Rule(
+        "no motion code in force",
+        "Axis words stand alone, and no G0 to G3 or cycle is in force (none yet, or G80 ended it).",
+        "add G0 or G1",
+    ),
+    "CC137": Rule(
+        "line cannot be rewritten",
+        "The line does too much at once for its motion to be replaced by several: it changes a mode and stops the "
+        "program in the same block.",
+        "split the line",
+    ),
+    "CC138": Rule("value out of range", "The number is not finite, negative where it must not be, or too large.", ""),
     # --- CC2xx usage, YAML, config -----------------------------------------------------------------------------
     "CC200": Rule(
         "YAML cannot be read",
@@ -158,6 +258,29 @@ RULES: dict[str, Rule] = {
         "measure slots at three or more feeds, everything else unchanged",
     ),
     # --- CC3xx physics -----------------------------------------------------------------------------------------
+    "CC301": Rule(
+        "no convergence",
+        "The loaded equilibrium was not found: the load is too large for the machine at this point, or the model is "
+        "close to a limit.",
+        "check the force and the stiffness values; look at the point with a smaller force",
+    ),
+    "CC302": Rule(
+        "out of reach",
+        "The rigid machine cannot bring its platform to this point: a leg is too short, or the point lies outside the "
+        "workspace.",
+        "check the workpiece origin, the units of the program (G20/G21) and the tool length",
+    ),
+    "CC303": Rule(
+        "singular configuration",
+        "Some motion of the platform or of a leg costs no force here, or the drives cannot move the platform; the "
+        "stiffness model has no answer.",
+        "move the workpiece away from the singular configuration, or remove an idle joint from the chain",
+    ),
+    "CC304": Rule(
+        "not stable",
+        "Under this load the elastic machine would buckle: the equilibrium exists, but it is not stable.",
+        "reduce the load, or check the stiffness values",
+    ),
     # --- CC4xx logs, experiments -------------------------------------------------------------------------------
     # --- CC5xx input and output --------------------------------------------------------------------------------
     "CC500": Rule("file cannot be read", "The file is not there, or may not be read.", "check the path"),
@@ -169,4 +292,19 @@ RULES: dict[str, Rule] = {
     ),
     "CC503": Rule("input or output failed", "The operating system refused a file or stream.", "check disk and rights"),
     # --- CC6xx checks ------------------------------------------------------------------------------------------
+    "CC601": Rule(
+        "residual over tolerance",
+        "The corrected program, as written, leaves more of the tip error than the tolerance allows.",
+        "raise --tolerance-um, or give the control a finer control.resolution_mm",
+    ),
+    "CC602": Rule(
+        "travel limit",
+        "An actuator would have to leave the travel that the machine file states.",
+        "move the workpiece (workpiece.origin_mm)",
+    ),
+    "CC603": Rule(
+        "already compensated",
+        "The program carries the stamp of camcomp. A second compensation would apply the correction twice.",
+        "compensate the original program",
+    ),
 }

@@ -1,0 +1,84 @@
+"""camcomp compensate."""
+
+import json
+import sys
+
+import click
+
+from camcomp import __version__
+from camcomp.config import load_config
+from camcomp.diagnostics import CheckFailed
+from camcomp.files import STANDARD, write_all
+
+
+@click.command()
+@click.argument("program")
+@click.option("--config", "configs", metavar="FILE", multiple=True, required=True, help="Machine; later files win.")
+@click.option("-o", "--output", metavar="OUT.nc", help="Corrected program; - is standard output.")
+@click.option("--joints", metavar="OUT.csv", help="Actuator coordinates and drive forces at every end point.")
+@click.option("--summary", "summary_file", metavar="OUT.json", help="Figures of the run.")
+@click.option("--paths", metavar="OUT.csv", help="The five trajectories: target, errors, force, both, adjusted.")
+@click.option(
+    "--method",
+    type=click.Choice(["newton", "stiffness", "fixed-point", "linear"]),
+    help="How the target is found; default: what the machine file says, newton.",
+)
+@click.option("--tolerance-um", type=click.FloatRange(min=0, min_open=True), help="Bound of the error left.")
+def command(
+    program: str,
+    configs: tuple[str, ...],
+    output: str | None,
+    joints: str | None,
+    summary_file: str | None,
+    paths: str | None,
+    method: str | None,
+    tolerance_um: float | None,
+) -> None:
+    """Write the deflection of the machine back into an NC program.
+
+    PROGRAM is a G-code file, - reads standard input. Without any output option the corrected program goes to standard
+    output. Exit code 1: everything is written, but a check failed, or the program was compensated before.
+    """
+    config = load_config(configs)
+    from camcomp.compensate import compensate, trajectories
+    from camcomp.job import Job
+    from camcomp.programs import open_program
+    from camcomp.report import tables
+
+    job = Job(config)
+    source = open_program(program, config, refuse_stamped=True)
+    tolerance = tolerance_um or config.compensation.tolerance_um
+    result = compensate(
+        source, job, method=method or config.compensation.method, tolerance_um=tolerance, version=__version__
+    )
+    figures = tables.summary(result)
+    outputs: dict[str, bytes] = {}
+    if output or not (joints or summary_file or paths):
+        outputs[output or STANDARD] = result.written.data
+    if joints:
+        outputs[joints] = tables.joint_csv(result, job)
+    if paths:
+        outputs[paths] = tables.paths_csv(result, trajectories(result, job))
+    if summary_file:
+        outputs[summary_file] = (json.dumps(figures, indent=2) + "\n").encode()
+    write_all(outputs, inputs=(program, *configs))
+    _tell(figures)
+    failed = result.failed_checks(job, tolerance)
+    if failed:
+        first, *rest = (CheckFailed(rule, text) for rule, text in failed)
+        first.others = tuple(rest)
+        raise first
+
+
+def _tell(figures: dict) -> None:
+    before, after = figures["before"], figures["after"]
+    lines = [
+        f"{figures['segments_in']} motions in, {figures['points']} end points out ({figures['method']})",
+        f"tip error before: rms {before['rms_um']:.2f} um, max {before['max_um']:.2f} um",
+        f"tip error after:  rms {after['rms_um']:.2f} um, max {after['max_um']:.2f} um",
+        f"largest change of an actuator {figures['actuator_change_max_mm']:.4f} mm, "
+        f"largest drive force {figures['actuator_force_max_N']:.1f} N, "
+        f"platform tilt left {figures['platform_tilt_max_mrad']:.2f} mrad",
+    ]
+    lines += [f"warning: {each}" for each in figures["warnings"]]
+    print("\n".join(lines), file=sys.stderr)

@@ -1,0 +1,310 @@
+"""Compensate a program: which tips must be commanded so that the loaded machine cuts what was programmed.
+
+Read, lay the cutting force along the path, solve the modified target at trial points, divide where the correction
+bends, solve again at the division points, write, and put the written program through the full model.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from camcomp.cutting.track import Track, lay_track
+from camcomp.datatypes import LINE, RAPID, Bools, Floats, Ints
+from camcomp.diagnostics import Location, PhysicsError
+from camcomp.gcode.program import Program
+from camcomp.gcode.rewrite import Output, Rewritten, rewrite
+from camcomp.job import Job
+from camcomp.splitting import Nodes, divide, second_derivative, trial_nodes
+from camcomp.statics.solve import STATUS
+from camcomp.statics.target import Correction, correct, settle
+
+RULES = {2: "CC301", 3: "CC302", 4: "CC303", 5: "CC304"}
+MAX_ROUNDS = 6
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """End points (N,) of the motions of the corrected program, in order."""
+
+    piece: Ints
+    motion: Ints
+    w: Floats  # fraction of the piece at the end point
+    kind: Ints
+    joining: Bools
+    corrected: Bools  # False: passes as programmed
+    force: Floats  # (N, 3) N at the end point, program frame
+    target: Floats  # (N, 3) mm programmed tip
+    end: Floats  # (N, 3) mm commanded tip, program frame
+    feed: Floats  # (N,) mm/min
+
+
+@dataclass(frozen=True, eq=False)
+class Compensated:
+    """The corrected program and everything that is known about it; points (N, ...) are its end points."""
+
+    program: Program
+    written: Rewritten
+    rows: Rows
+    s: Floats  # (N,) mm programmed path length
+    t: Floats  # (N,) s
+    nominal: Floats  # (N, m) inverse kinematics of the programmed tip
+    state: Correction  # loaded machine at the written end points
+    uncorrected: Floats  # (N, 3) loaded tip of the original program, program frame
+    before: Floats  # errors (k, 3) mm of the original program along feed motions
+    after: Floats  # errors (k, 3) mm of the corrected program along feed motions
+    iterations: int
+    method: str
+    warnings: list[str]
+
+    @property
+    def lines(self) -> Ints:
+        """Source line (N,) of every end point."""
+        return self.program.path.line[self.rows.motion]
+
+    def failed_checks(self, job: Job, tolerance_um: float) -> list[tuple[str, str]]:
+        """Rule id and text of every check that the finished program does not pass."""
+        out = []
+        size = 1e3 * np.linalg.norm(self.after, axis=1)
+        worst = float(np.nanmax(size)) if len(size) else 0.0
+        if not worst <= tolerance_um * (1.0 + 1e-9):
+            out.append(("CC601", f"{worst:.3f} um are left, more than the tolerance of {tolerance_um:g} um"))
+        for a, name in enumerate(job.machine.actuators):
+            low, high = job.machine.limits[a]
+            value = self.state.rho[:, a]
+            over = np.flatnonzero((value < low) | (value > high))
+            if len(over):
+                lines = ", ".join(str(n) for n in np.unique(self.lines[over])[:10])
+                out.append(("CC602", f"actuator {name} leaves its travel {low:g} to {high:g} at source lines {lines}"))
+        return out
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectories:
+    """Where the original program takes the tip (N, 3) mm, program frame, for one cause at a time: seed Fig. 4."""
+
+    chain_error: Floats  # imperfect chains, no load
+    force: Floats  # perfect chains, cutting force
+
+
+def trajectories(result: Compensated, job: Job) -> Trajectories:
+    """The trajectories of the original program that a compensation does not need itself."""
+    target = job.frame.to_machine(result.rows.target)
+    force = job.frame.vectors(result.rows.force)
+    alone, _ = settle(job.machine, target, np.zeros_like(force))
+    loaded, _ = settle(job.perfect_machine, target, force)
+    return Trajectories(job.frame.to_program(alone), job.frame.to_program(loaded))
+
+
+def compensate(program: Program, job: Job, *, method: str, tolerance_um: float, version: str) -> Compensated:
+    """The corrected program. Raises PhysicsError where the machine cannot do what is asked."""
+    track = lay_track(program.path, job.conditions)
+    path, resolution = program.path, job.config.control.resolution_mm
+    corrected = path.known[track.motion] & ~path.machine[track.motion]
+    feeding = corrected & (path.kind[track.motion] != RAPID)
+    rounding = 0.5 * np.sqrt(3.0) * resolution
+    budget = max(1e-3 * tolerance_um - rounding, 0.1e-3 * tolerance_um)
+    tolerance = np.full(len(track.motion), budget)
+
+    angle = np.where(np.isnan(path.angle), 0.0, path.angle)[track.motion] * (track.u1 - track.u0)
+    trial = trial_nodes(track.length, angle, feeding & (track.length > 0.0))
+    aimed = _aim(program, job, track, trial, corrected, method)
+    bend = second_derivative(trial, aimed.commanded)
+    for _ in range(MAX_ROUNDS):
+        nodes, shift = divide(trial, bend, tolerance)
+        solved = _aim(program, job, track, nodes, corrected, method)
+        rows = _rows(program, job, track, nodes, solved.commanded + shift, corrected)
+        written = rewrite(program, _output(rows), resolution_mm=resolution, version=version)
+        after = _check(job, track, rows, written, feeding)
+        worst = np.zeros(len(tolerance))
+        np.maximum.at(worst, after.piece, np.linalg.norm(after.error, axis=1))
+        missed = worst > 1e-3 * tolerance_um
+        if not missed.any():
+            break
+        tolerance = np.where(missed, tolerance * np.clip(0.9e-3 * tolerance_um / worst, 0.3, 0.9), tolerance)
+    plain = _before(job, track, rows, after)
+    return _assemble(program, job, track, rows, written, plain, after, int(aimed.iterations.max(initial=0)), method)
+
+
+@dataclass(frozen=True, eq=False)
+class _Aimed:
+    commanded: Floats  # (k, 3) program frame
+    iterations: Ints
+
+
+def _aim(program: Program, job: Job, track: Track, nodes: Nodes, corrected: Bools, method: str) -> _Aimed:
+    """Modified targets at nodes, program frame; nodes of uncorrected pieces stay as programmed."""
+    target = track.points(nodes.piece, nodes.w)
+    on = corrected[nodes.piece]
+    force = job.frame.vectors(track.force(nodes.piece[on], nodes.w[on]))
+    result = correct(job.machine, job.frame.to_machine(target[on]), force, method=method)
+    _refuse(program, track, nodes.piece[on], target[on], result.status)
+    out = target.copy()
+    out[on] = job.frame.to_program(result.commanded)
+    iterations = np.zeros(len(target), np.int64)
+    iterations[on] = result.iterations
+    return _Aimed(out, iterations)
+
+
+def _refuse(program: Program, track: Track, piece: Ints, target: Floats, status: Ints) -> None:
+    """Raises PhysicsError for every source line with a point that could not be solved."""
+    bad = np.flatnonzero(status != 0)
+    errors: list[PhysicsError] = []
+    seen: set[int] = set()
+    for i in bad:
+        line = int(program.path.line[track.motion[piece[i]]])
+        if line in seen:
+            continue
+        seen.add(line)
+        code = int(status[i])
+        x, y, z = target[i]
+        text = f"{STATUS.get(code, 'no solution')} at X{x:.4f} Y{y:.4f} Z{z:.4f} (program frame, mm)"
+        errors.append(PhysicsError(RULES.get(code, "CC301"), text, at=_place(program, int(track.motion[piece[i]]))))
+        if len(errors) == 20:
+            break
+    if errors:
+        first, *rest = errors
+        first.others = tuple(rest)
+        raise first
+
+
+def _place(program: Program, motion: int) -> Location:
+    """Where a motion stands in the text: its first axis word."""
+    row = int(program.sites.row[motion])
+    words = program.sites.begin[motion, :3]
+    words = words[words >= 0]
+    column = int(words.min() - program.text.starts[row]) if len(words) else 0
+    return program.text.place(row, max(column, 0))
+
+
+def _rows(program: Program, job: Job, track: Track, nodes: Nodes, commanded: Floats, corrected: Bools) -> Rows:
+    """End points of the corrected program: the nodes but the first of each piece, and joining lines at jumps."""
+    path = program.path
+    k = np.arange(len(nodes.w)) - nodes.first[nodes.piece]
+    n = len(track.motion)
+    kind = path.kind[track.motion]
+    # A joining line stands in front of the piece behind the jump; in front of a rapid or an uncorrected move it stands
+    # behind the cut instead, because only feed lines can join.
+    before = np.concatenate(([False], corrected[:-1]))
+    wanted = track.jump & before
+    leading = wanted & corrected & (kind != RAPID)
+    trailing = np.concatenate((wanted[1:] & ~leading[1:], [False])) & corrected & (kind != RAPID)
+    keep = (k > 0) | leading[nodes.piece]
+    extra = np.flatnonzero(trailing)
+    piece = np.concatenate((nodes.piece[keep], extra))
+    w = np.concatenate((nodes.w[keep], np.ones(len(extra))))
+    joining = np.concatenate(((k == 0)[keep], np.ones(len(extra), np.bool_)))
+    free = track.points(extra, np.ones(len(extra)))
+    if len(extra):  # behind the cut, without its force
+        result = correct(job.machine, job.frame.to_machine(free), np.zeros((len(extra), 3)))
+        _refuse(program, track, extra, free, result.status)
+        free = job.frame.to_program(result.commanded)
+    end = np.concatenate((commanded[keep], free))
+    order = np.lexsort((joining & (w > 0.0), w, piece))
+    piece, w, joining, end = piece[order], w[order], joining[order], end[order]
+    trailing_row = joining & (w > 0.0)
+    target = track.points(piece, w)
+    force = track.force(piece, w)
+    force[trailing_row] = 0.0
+    rows_kind = np.where(kind[piece] == RAPID, RAPID, LINE)
+    passed = ~corrected[piece]
+    whole = np.bincount(piece, minlength=n) == 1
+    rows_kind = np.where(passed & whole[piece], kind[piece], rows_kind)
+    rows = Rows(piece, track.motion[piece], w, rows_kind, joining, ~passed, force, target, end, np.empty(len(piece)))
+    return replace(rows, feed=_feeds(program, track, rows))
+
+
+def _feeds(program: Program, track: Track, rows: Rows) -> Floats:
+    """Feed of every row so that the tip keeps its programmed speed: scaled by commanded over programmed length."""
+    feed = program.path.feed[rows.motion]
+    start = np.concatenate((rows.end[:1], rows.end[:-1]))
+    same = np.concatenate(([False], (rows.piece[1:] == rows.piece[:-1])))
+    w0 = np.where(same, np.concatenate(([0.0], rows.w[:-1])), 0.0)
+    programmed = (rows.w - w0) * track.length[rows.piece]
+    commanded = np.linalg.norm(rows.end - start, axis=1)
+    scale = np.divide(commanded, programmed, out=np.ones(len(feed)), where=programmed > 1e-6)
+    plain = rows.joining | (rows.kind == RAPID) | ~rows.corrected | (programmed < 0.01)
+    return np.where(plain, feed, feed * np.clip(scale, 0.2, 5.0))
+
+
+def _output(rows: Rows) -> Output:
+    n = len(rows.piece)
+    return Output(
+        motion=rows.motion,
+        kind=rows.kind,
+        end=rows.end,
+        centre=np.full((n, 3), np.nan),
+        angle=np.zeros(n),
+        feed=rows.feed,
+        joining=rows.joining,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Checked:
+    """Errors along the feed motions of the corrected program, and its loaded end points."""
+
+    piece: Ints  # (k,)
+    w: Floats
+    error: Floats  # (k, 3) mm, program frame
+    state: Correction  # at the end points
+
+
+def _check(job: Job, track: Track, rows: Rows, written: Rewritten, feeding: Bools) -> _Checked:
+    """Puts the program as written through the full model: its end points, and the middles of its straight lines."""
+    tip, state = settle(job.machine, job.frame.to_machine(written.end), job.frame.vectors(rows.force))
+    error = job.frame.to_program(tip) - rows.target
+    cut = feeding[rows.piece] & ~rows.joining
+    previous = np.concatenate(([False], rows.piece[1:] == rows.piece[:-1])) & cut
+    inner = np.flatnonzero(cut)
+    start_w = np.where(previous, np.concatenate(([0.0], rows.w[:-1])), 0.0)[inner]
+    middle_w = 0.5 * (start_w + rows.w[inner])
+    piece = rows.piece[inner]
+    start = np.concatenate((written.end[:1], written.end[:-1]))[inner]
+    middle = 0.5 * (start + written.end[inner])
+    moving = track.length[piece] > 0.0
+    force = track.force(piece[moving], middle_w[moving])
+    middle_tip, _ = settle(job.machine, job.frame.to_machine(middle[moving]), job.frame.vectors(force))
+    between = job.frame.to_program(middle_tip) - track.points(piece[moving], middle_w[moving])
+    return _Checked(
+        np.concatenate((piece, piece[moving])),
+        np.concatenate((rows.w[inner], middle_w[moving])),
+        np.concatenate((error[inner], between)),
+        state,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Plain:
+    nominal: Floats  # (N, m)
+    tip: Floats  # (N, 3) program frame
+    error: Floats  # (k, 3)
+
+
+def _before(job: Job, track: Track, rows: Rows, after: _Checked) -> _Plain:
+    """The original program through the full model, at the end points and where the corrected one was checked."""
+    tip, state = settle(job.machine, job.frame.to_machine(rows.target), job.frame.vectors(rows.force))
+    target = track.points(after.piece, after.w)
+    force = job.frame.vectors(track.force(after.piece, after.w))
+    cut_tip, _ = settle(job.machine, job.frame.to_machine(target), force)
+    return _Plain(state.rho_nominal, job.frame.to_program(tip), job.frame.to_program(cut_tip) - target)
+
+
+def _assemble(
+    program: Program, job: Job, track: Track, rows: Rows, written: Rewritten, plain: _Plain, after: _Checked,
+    iterations: int, method: str,
+) -> Compensated:  # fmt: skip
+    s = track.s0[rows.piece] + rows.w * track.length[rows.piece]
+    feed = program.path.feed[rows.motion]
+    default = job.config.process.feed_mm_per_min or np.nan
+    speed = np.where(np.isnan(feed), default, feed)
+    step = np.diff(s, prepend=0.0)
+    moving = (rows.kind != RAPID) & (speed > 0.0)
+    t = np.cumsum(np.where(moving, step / np.where(moving, speed, 1.0) * 60.0, 0.0))
+    warnings = list(program.warnings)
+    joins = int(rows.joining.sum())
+    if joins:
+        warnings.append(f"{joins} joining lines where the cutting force jumps; they are not part of before and after")
+    return Compensated(program, written, rows, s, t, plain.nominal, after.state, plain.tip, plain.error, after.error,
+                       iterations, method, warnings)  # fmt: skip

@@ -1,0 +1,90 @@
+"""A configuration made ready for work: the machine, the frames, the cutting conditions, the control."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property, partial
+
+import numpy as np
+
+from camcomp import shelf
+from camcomp.cutting.track import Conditions
+from camcomp.datatypes import Floats
+from camcomp.diagnostics import ConfigError
+from camcomp.spec import Config
+from camcomp.statics.build import build_robot, rotation_of
+from camcomp.statics.machine import Machine, build_machine
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """The program frame (G54 at program start) in the machine frame: machine = origin + rotation @ program."""
+
+    origin: Floats  # (3,) mm
+    rotation: Floats  # (3, 3)
+
+    def to_machine(self, points: Floats) -> Floats:
+        """Points (n, 3) mm, program to machine frame."""
+        return self.origin + points @ self.rotation.T
+
+    def to_program(self, points: Floats) -> Floats:
+        """Points (n, 3) mm, machine to program frame."""
+        return (points - self.origin) @ self.rotation
+
+    def vectors(self, vectors: Floats) -> Floats:
+        """Vectors (n, 3), program to machine axes."""
+        return vectors @ self.rotation.T
+
+
+@dataclass(frozen=True, eq=False)
+class Job:
+    """What the stories need from a Config."""
+
+    config: Config
+
+    @cached_property
+    def frame(self) -> Frame:
+        """Program frame in the machine frame."""
+        return Frame(np.asarray(self.config.workpiece.origin_mm, float), rotation_of(self.config.workpiece.rotation))
+
+    @cached_property
+    def machine(self) -> Machine:
+        """The machine with its chain errors. Raises ConfigError CC216 when it cannot be built."""
+        return self._build(*build_robot(self.config.robot, self.config.tool.tip))
+
+    @cached_property
+    def perfect_machine(self) -> Machine:
+        """The same machine with perfect chains."""
+        _, nominal = build_robot(self.config.robot, self.config.tool.tip)
+        return self._build(nominal, nominal)
+
+    def _build(self, robot, nominal) -> Machine:
+        try:
+            return build_machine(robot, nominal)
+        except ValueError as error:
+            raise ConfigError("CC205", str(error), at=self.config.at("robot")) from error
+
+    @cached_property
+    def conditions(self) -> Conditions:
+        """Cutting conditions for camcomp.cutting.track, with the force model of the config."""
+        c = self.config
+        choice = c.process.force
+        member = shelf.load("forces", choice.model)
+        none = choice.model == "none"
+        return Conditions(
+            model=None if none else partial(_call, member.force, choice.params),
+            plunges=bool(getattr(member, "PLUNGES", False)),
+            tool_axis=self.frame.rotation.T @ np.array([0.0, 0.0, 1.0]),
+            stock_top_mm=c.workpiece.stock_top_mm,
+            depth_mm=c.process.depth_mm,
+            width_mm=c.process.width_mm,
+            spindle_rpm=c.process.spindle_rpm,
+            feed_mm_per_min=c.process.feed_mm_per_min,
+            diameter_mm=c.tool.diameter_mm,
+            teeth=c.tool.teeth,
+            to_machine=self.frame.rotation,
+        )
+
+
+def _call(force, params, cut):
+    return force(cut, params)

@@ -1,0 +1,95 @@
+"""Results of a compensation as CSV text and as a summary; columns as documented in the README."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from camcomp.compensate import Compensated, Trajectories
+from camcomp.datatypes import Floats
+from camcomp.job import Job
+
+CHUNK = 20_000
+DECIMALS = 6
+
+
+def actuator_columns(job: Job) -> tuple[list[str], list[str], list[str]]:
+    """Column names of nominal coordinates, commanded coordinates and drive forces, in actuator order."""
+    nominal, commanded, force = [], [], []
+    for name, rotary in zip(job.machine.actuators, job.machine.revolute, strict=True):
+        length, load = ("rad", "Nmm") if rotary else ("mm", "N")
+        nominal.append(f"act_{name}_nominal_{length}")
+        commanded.append(f"act_{name}_{length}")
+        force.append(f"act_{name}_{load}")
+    return nominal, commanded, force
+
+
+def joint_csv(result: Compensated, job: Job) -> bytes:
+    """One row per end point of every motion of the corrected program."""
+    nominal, commanded, force = actuator_columns(job)
+    head = ["line", "s_mm", "t_s", "x_mm", "y_mm", "z_mm", "xc_mm", "yc_mm", "zc_mm", "fx_N", "fy_N", "fz_N"]
+    head += [c for trio in zip(nominal, commanded, force, strict=True) for c in trio]
+    m = len(nominal)
+    actuators = np.stack((result.nominal, result.state.rho, result.state.drive), axis=2).reshape(-1, 3 * m)
+    values = np.column_stack(
+        (result.s, result.t, result.rows.target, result.written.end, job.frame.vectors(result.rows.force), actuators)
+    )
+    return _csv(head, result.lines, values)
+
+
+def paths_csv(result: Compensated, trajectories: Trajectories) -> bytes:
+    """The five trajectories of the tool tip, program frame: seed Fig. 4."""
+    named = {
+        "target": result.rows.target,
+        "chain_error": trajectories.chain_error,
+        "force": trajectories.force,
+        "both": result.uncorrected,
+        "adjusted": result.written.end,
+    }
+    head = ["line", "s_mm"] + [f"{name}_{axis}_mm" for name in named for axis in "xyz"]
+    return _csv(head, result.lines, np.column_stack((result.s, *named.values())))
+
+
+def _csv(head: Sequence[str], line: np.ndarray, values: Floats) -> bytes:
+    """A table whose first column is the source line. Values that do not exist stand as empty cells."""
+    values = values + 0.0  # no minus zero
+    row = "%d" + f",%.{DECIMALS}f" * values.shape[1] + "\n"
+    parts = [",".join(head) + "\n"]
+    for a in range(0, len(line), CHUNK):
+        block = np.column_stack((line[a : a + CHUNK], values[a : a + CHUNK]))
+        parts.append((row * len(block)) % tuple(block.ravel().tolist()))
+    text = "".join(parts).replace("-0.000000,", "0.000000,").replace("-0.000000\n", "0.000000\n")
+    return text.replace("nan", "").encode("ascii")
+
+
+def summary(result: Compensated) -> dict:
+    """The figures of a run: see the README for their meaning."""
+    change = np.abs(result.state.rho - result.nominal)[result.rows.corrected]
+    force = np.abs(result.state.drive)[result.rows.corrected]
+    return {
+        "points": len(result.rows.piece),
+        "segments_in": len(result.program.path),
+        "lines_out": result.written.data.count(b"\n"),
+        "before": _size(result.before),
+        "after": _size(result.after),
+        "actuator_change_max_mm": _most(change),
+        "actuator_force_max_N": _most(force),
+        "iterations_max": result.iterations,
+        "method": result.method,
+        "platform_tilt_max_mrad": 1e3 * _most(np.linalg.norm(result.state.tilt, axis=1)[result.rows.corrected]),
+        "joining_lines": int(result.rows.joining.sum()),
+        "warnings": result.warnings,
+    }
+
+
+def _most(values: Floats) -> float:
+    return float(np.nanmax(values)) if np.isfinite(values).any() else 0.0
+
+
+def _size(error: Floats) -> dict[str, float]:
+    size = np.linalg.norm(error, axis=1)
+    size = 1e3 * size[np.isfinite(size)]
+    if not len(size):
+        return {"rms_um": 0.0, "max_um": 0.0}
+    return {"rms_um": float(np.sqrt(np.mean(size**2))), "max_um": float(size.max())}
