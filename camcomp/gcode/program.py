@@ -1,0 +1,81 @@
+"""What reading a program needs to know of its machine, and what it gives."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from camcomp.datatypes import Bools, Floats, Ints, Path
+from camcomp.gcode.text import Text
+
+Triple = tuple[float, float, float]
+ZERO: Triple = (0.0, 0.0, 0.0)
+
+# Columns of Sites.begin and Sites.finish.
+X, Y, Z, I, J, K, R, F, P, G = range(10)
+LETTERS = "XYZIJKRFPG"
+
+
+@dataclass(frozen=True)
+class Setup:
+    """The control before the program starts; lengths in mm."""
+
+    start_mm: Triple = ZERO  # tool tip in the program frame
+    offsets: Mapping[str, Triple] = field(default_factory=dict)  # "G54".."G59.3": origin in the machine frame
+    tools: Mapping[int, float] = field(default_factory=dict)  # length offsets
+    home_mm: Triple = ZERO  # G28, machine coordinates
+    second_home_mm: Triple = ZERO  # G30
+    tool: int = 0  # in the spindle
+    increment_mm: float | None = None  # what a number without a point counts, on a control that has it so
+    skip_deleted: bool = False  # the block delete switch: lines that start with `/` are not executed
+
+
+@dataclass(frozen=True, eq=False)
+class Sites:
+    """Where each motion stands in the text and in which modal state, so that it can be written anew; n motions.
+
+    Opaque to everybody but gcode: the reader fills it, the writer uses it.
+    """
+
+    row: Ints  # (n,) line index, from 0
+    begin: NDArray[np.int64]  # (n, 10) index in the text of each word's letter, -1 when the word is not there
+    finish: NDArray[np.int64]  # (n, 10) index behind each word
+    unit: Floats  # (n,) mm per programmed unit
+    offset: Floats  # (n, 3) mm from a local value to the program frame
+    relative: Bools  # (n,) G91
+    centre_absolute: Bools  # (n,) G90.1
+    code: NDArray[np.int8]  # (n,) 0..3, the motion code in force; -1 where the statement needs none (G28)
+    plane: NDArray[np.int8]  # (n,) 17, 18 or 19
+    feed_mode: NDArray[np.int8]  # (n,) 93, 94 or 95
+    moved: Bools  # (n, 3) axes that the statement commands
+    code_stated: Bools  # (n,) the motion code was stated since the previous motion, here or before
+    feed_stated: Bools  # (n,) an F word was read since the previous motion
+    modes_changed: Bools  # (n,) the line itself changes a mode that the meaning of its words depends on
+    stops: Bools  # (n,) the line stops the program after its motion (M0, M2, ...)
+    fixed: Bools  # (n,) more than one motion stands in the line, or it is no G0..G3: not to be rewritten in place
+
+
+@dataclass(frozen=True)
+class Rebase:
+    """A statement whose effect depends on where the machine stands (G92 X0): line, words, and what it set."""
+
+    motion: int  # number of motions before it
+    row: int
+    axes: tuple[tuple[int, int, int], ...]  # axis, index of the letter in the text, index behind the word
+    value: Triple  # programmed values, in units
+    unit: float
+
+
+@dataclass(frozen=True, eq=False)
+class Program:
+    """A program as read: its bytes, the path of the tool tip, and what is needed to write it again."""
+
+    data: bytes
+    name: str
+    dialect: str
+    path: Path
+    warnings: tuple[str, ...]
+    text: Text
+    sites: Sites
+    rebases: tuple[Rebase, ...]

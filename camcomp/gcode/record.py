@@ -1,0 +1,173 @@
+"""Collects motions while a program is executed, and packs them into arrays."""
+
+import math
+from array import array
+from collections.abc import Sequence
+from typing import Protocol
+
+import numpy as np
+
+from camcomp.datatypes import ARC, LINE, RAPID, Path, frozen
+from camcomp.gcode.arcs import PLANES
+from camcomp.gcode.program import LETTERS, Sites
+from camcomp.gcode.state import State
+from camcomp.gcode.text import Text
+from camcomp.gcode.words import Word
+
+_NO_CENTRE = [math.nan, math.nan, math.nan]
+
+
+class Statement(Protocol):
+    """What the recorder needs of a block."""
+
+    row: int
+    words: dict[str, Word]
+    groups: dict[int, tuple[int, Word]]
+    axes: list[int]
+
+
+class Recorder:
+    """Motions in program order. Flags about the text are set by the interpreter before each motion."""
+
+    def __init__(self, text: Text) -> None:
+        self._starts = text.starts
+        self._count = 0
+        self._numbers = array("d")  # 23 per motion
+        self._spans = array("q")  # 20 per motion
+        self._line_first = 0
+        self.code_stated = False
+        self.feed_stated = False
+        self.modes_changed = False
+        self.stops = False
+        self._fixed: list[int] = []
+
+    def __len__(self) -> int:
+        return self._count
+
+    def begin_line(self, row: int) -> None:
+        """A new block starts."""
+        self._line_first = self._count
+        self.modes_changed = False
+        self.stops = False
+
+    def end_line(self) -> None:
+        """The block is over: where it moved more than once, no single motion owns its words."""
+        if self._count > self._line_first + 1:
+            self._fixed.extend(range(self._line_first, self._count))
+
+    def line_motion(self, block: Statement, state: State, code: int, end: list[float], feed: float) -> None:
+        """A rapid (code 0) or a straight cut (code 1)."""
+        self._add(block, state, LINE if code else RAPID, code, end, _NO_CENTRE, 0.0, feed, False, block.axes)
+
+    def machine_motion(
+        self,
+        block: Statement,
+        state: State,
+        code: int,
+        end: list[float],
+        feed: float = math.nan,
+        moved: Sequence[int] | None = None,
+    ) -> None:
+        """A move in machine coordinates; code -1 where it needs no motion code (G28)."""
+        axes = block.axes if moved is None else moved
+        kind = LINE if code == 1 else RAPID
+        self._add(block, state, kind, code, end, _NO_CENTRE, 0.0, feed, True, axes)
+
+    def arc_motion(
+        self,
+        block: Statement,
+        state: State,
+        code: int,
+        end: list[float],
+        centre: list[float],
+        angle: float,
+        feed: float,
+    ) -> None:
+        """An arc or helix."""
+        self._add(block, state, ARC, code, end, centre, angle, feed, False, block.axes)
+
+    def _add(
+        self,
+        block: Statement,
+        state: State,
+        kind: int,
+        code: int,
+        end: list[float],
+        centre: Sequence[float],
+        angle: float,
+        feed: float,
+        machine: bool,
+        moved: Sequence[int],
+    ) -> None:
+        flags = (
+            machine
+            | all(state.commanded) << 1
+            | state.relative << 2
+            | state.centre_absolute << 3
+            | self.code_stated << 4
+            | self.feed_stated << 5
+            | self.modes_changed << 6
+            | self.stops << 7
+        )
+        for axis in moved:
+            flags |= 1 << 8 + axis
+        self._numbers.extend((block.row, kind, code, *state.position, *end, *centre, angle, feed))
+        self._numbers.extend((state.speed, state.tool, state.unit, *state.offset, state.plane, state.feed_mode, flags))
+        base = int(self._starts[block.row])
+        words = block.words
+        for letter in LETTERS[:-1]:
+            word = words.get(letter)
+            self._spans.extend((base + word.begin, base + word.end) if word else (-1, -1))
+        g = block.groups.get(1)
+        self._spans.extend((base + g[1].begin, base + g[1].end) if g else (-1, -1))
+        self._count += 1
+        if code >= 0:
+            self.code_stated = self.feed_stated = False
+        state.position = end
+
+    def finish(self) -> tuple[Path, Sites]:
+        """All motions as arrays."""
+        n = self._count
+        a = np.frombuffer(self._numbers, float).reshape(n, -1) if n else np.zeros((0, 23))
+        spans = np.frombuffer(self._spans, np.int64).reshape(n, 10, 2) if n else np.zeros((0, 10, 2), np.int64)
+        kind = a[:, 1].astype(np.int8)
+        flags = a[:, 22].astype(np.int64)
+        plane = a[:, 20].astype(np.int8)
+        axis = np.zeros((n, 3))
+        for number, (_, _, w) in PLANES.items():
+            axis[(kind == ARC) & (plane == number), w] = 1.0
+        path = Path(
+            line=a[:, 0].astype(np.int64) + 1,
+            kind=kind,
+            start=a[:, 3:6],
+            end=a[:, 6:9],
+            centre=a[:, 9:12],
+            axis=axis,
+            angle=a[:, 12],
+            feed=a[:, 13],
+            speed=a[:, 14],
+            tool=a[:, 15].astype(np.int64),
+            known=(flags & 2) > 0,
+            machine=(flags & 1) > 0,
+        )
+        fixed = np.zeros(n, bool)
+        fixed[self._fixed] = True
+        sites = Sites(
+            row=frozen(a[:, 0], np.int64),
+            begin=frozen(spans[:, :, 0], np.int64),
+            finish=frozen(spans[:, :, 1], np.int64),
+            unit=frozen(a[:, 16]),
+            offset=frozen(a[:, 17:20]),
+            relative=frozen((flags & 4) > 0, np.bool_),
+            centre_absolute=frozen((flags & 8) > 0, np.bool_),
+            code=frozen(a[:, 2], np.int8),
+            plane=frozen(plane, np.int8),
+            feed_mode=frozen(a[:, 21], np.int8),
+            moved=frozen((flags[:, None] >> np.array([8, 9, 10])) & 1, np.bool_),
+            code_stated=frozen((flags & 16) > 0, np.bool_),
+            feed_stated=frozen((flags & 32) > 0, np.bool_),
+            modes_changed=frozen((flags & 64) > 0, np.bool_),
+            stops=frozen((flags & 128) > 0, np.bool_),
+            fixed=frozen(fixed, np.bool_),
+        )
+        return path, sites

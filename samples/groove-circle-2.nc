@@ -1,0 +1,13 @@
+%
+(circular groove, radius 1 mm, cut counter-clockwise)
+(the program origin is the centre of the circle, on the floor of the groove)
+N10 G21 G90 G17 G94
+N20 T1 M6
+N30 S8000 M3
+N40 G0 X1 Y0 Z5
+N50 G1 Z0 F300
+N60 G3 X1 Y0 I-1 J0 F120
+N70 G1 Z5 F1000
+N80 M5
+N90 M30
+%
