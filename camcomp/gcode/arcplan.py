@@ -1,0 +1,81 @@
+"""How an arc is written so that the control, which sees only rounded words, makes the arc that was meant.
+
+A block says where an arc ends, not how far it turns. When rounding lets start and end coincide, a tiny arc would
+become a full circle; when it separates them, a full circle would become a tiny arc. Both are written otherwise here.
+"""
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+from camcomp.datatypes import ARC, LINE
+from camcomp.gcode.arcs import PLANES, SAME_POINT, sweep
+
+_FULL = 2.0 * math.pi
+Point = list[float]
+
+
+class Move(NamedTuple):
+    """One block to be written; lengths in mm, program frame."""
+
+    kind: int
+    end: Point
+    centre: Point
+    angle: float
+
+
+def turns_of(angle: float) -> int:
+    """Full or partial turns of a sweep: 1 up to a full circle."""
+    return max(1, math.ceil(abs(angle) / _FULL - 1e-6))
+
+
+def plan(
+    start: Point,
+    move: Move,
+    plane: int,
+    written: Callable[[Point], Point],
+    resolution: float,
+    turns_allowed: bool = True,
+) -> list[Move]:
+    """Blocks for an arc that starts at `start` (as written); `written` rounds an end point the way words do.
+
+    One block where it says what is meant, else several arcs of at most half a turn, or a line where the arc is not
+    longer than a few steps of the resolution.
+    """
+    u, v, _ = PLANES[plane]
+    end = written(move.end)
+    radius = math.hypot(start[u] - move.centre[u], start[v] - move.centre[v])
+    turns = turns_of(move.angle)
+    s, e, c = (start[u], start[v]), (end[u], end[v]), (move.centre[u], move.centre[v])
+    slack = 8.0 * resolution
+    if radius > slack and (turns == 1 or turns_allowed) and math.dist(e, c) > slack:
+        seen = sweep(s, e, c, move.angle > 0.0, turns)
+        same = math.dist(s, e) <= SAME_POINT
+        # Words that differ by less than the control's own arithmetic are no safe way to say "full circle".
+        near = not same and math.dist(s, e) < 0.5 * resolution
+        if abs(seen - move.angle) * radius <= slack and not near:
+            return [move]
+    if abs(move.angle) * radius <= 4.0 * slack:
+        return [Move(LINE, move.end, [math.nan] * 3, 0.0)]
+    pieces = max(2, math.ceil(abs(move.angle) / math.pi))
+    return divide(start, move, plane, pieces)
+
+
+def divide(start: Point, move: Move, plane: int, pieces: int) -> list[Move]:
+    """The arc in equal parts; radius and height go linearly from start to end."""
+    u, v, w = PLANES[plane]
+    c = (move.centre[u], move.centre[v])
+    first = math.hypot(start[u] - c[0], start[v] - c[1])
+    last = math.hypot(move.end[u] - c[0], move.end[v] - c[1])
+    begin = math.atan2(start[v] - c[1], start[u] - c[0])
+    moves = []
+    for k in range(1, pieces + 1):
+        share = k / pieces
+        angle = begin + share * move.angle
+        radius = first + share * (last - first)
+        end = list(move.end)
+        if k < pieces:
+            end[u], end[v] = c[0] + radius * math.cos(angle), c[1] + radius * math.sin(angle)
+            end[w] = start[w] + share * (move.end[w] - start[w])
+        moves.append(Move(ARC, end, move.centre, move.angle / pieces))
+    return moves
