@@ -1,12 +1,17 @@
 """camcomp validate."""
 
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
+from typing import TypeVar
 
 import click
 
 from camcomp.config import check_config, is_experiment, load_config, load_experiment
 from camcomp.diagnostics import CamcompError, raise_all
-from camcomp.files import STANDARD, display_name, read_bytes
+from camcomp.files import display_name, read_bytes
+
+T = TypeVar("T")
 
 
 @click.command()
@@ -17,16 +22,14 @@ from camcomp.files import STANDARD, display_name, read_bytes
 def command(files: tuple[str, ...], configs: tuple[str, ...]) -> None:
     """Check YAML files and NC programs; report every error at once.
 
-    A file of overrides is checked as far as it goes. An experiment file is checked together with the machine files,
-    programs and logs it names. Everything that does not end in .yaml or .yml is read as an NC program.
+    Of an NC program the first mistake is told, since what follows it cannot be read for sure. A file of overrides is
+    checked as far as it goes, an experiment file together with the machine files, programs and logs it names.
+    Everything that does not end in .yaml or .yml is read as an NC program.
     """
     errors: list[CamcompError] = []
     for file in files:
-        try:
-            kind = _check(file, configs)
-        except CamcompError as error:
-            errors.append(error)
-        else:
+        kind = _collect(errors, partial(_check, file, configs))
+        if kind is not None:
             click.echo(f"{display_name(file)}: ok ({kind})")
     raise_all(errors)
 
@@ -34,7 +37,7 @@ def command(files: tuple[str, ...], configs: tuple[str, ...]) -> None:
 def _check(file: str, configs: tuple[str, ...]) -> str:
     if Path(file).suffix.lower() not in (".yaml", ".yml"):
         return _check_program(file, configs)
-    if file != STANDARD and is_experiment(read_bytes(file)):
+    if is_experiment(read_bytes(file)):
         return _check_experiment(file)
     check_config([file])
     return "configuration"
@@ -52,19 +55,21 @@ def _check_program(file: str, configs: tuple[str, ...]) -> str:
 def _check_experiment(file: str) -> str:
     experiment = load_experiment(file)
     errors: list[CamcompError] = []
-    config = None
-    try:
-        config = load_config(experiment.config)
-    except CamcompError as error:
-        errors.append(error)
+    config = _collect(errors, partial(load_config, experiment.config))
     for run in experiment.runs:
-        try:
-            read_bytes(run.log)
-            if run.program is not None and config is not None:
-                from camcomp.programs import open_program
+        _collect(errors, partial(read_bytes, run.log))
+        if run.program is not None:
+            from camcomp.programs import open_program
 
-                open_program(run.program, config)
-        except CamcompError as error:
-            errors.append(error)
+            _collect(errors, partial(open_program, run.program, config))
     raise_all(errors)
     return f"experiment, {len(experiment.runs)} runs"
+
+
+def _collect(errors: list[CamcompError], read: Callable[[], T]) -> T | None:
+    """What `read` gives, or None and one more of `errors`."""
+    try:
+        return read()
+    except CamcompError as error:
+        errors.append(error)
+        return None
