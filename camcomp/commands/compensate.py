@@ -41,12 +41,15 @@ def command(
     """
     config = load_config(configs)
     from camcomp.compensate import compensate, trajectories
+    from camcomp.gcode.stamp import is_stamped
     from camcomp.job import Job
     from camcomp.programs import open_program
     from camcomp.report import tables
 
     job = Job(config)
-    source = open_program(program, config, refuse_stamped=True)
+    source = open_program(program, config)
+    if is_stamped(source.data):
+        raise CheckFailed("CC603", f"{source.name} was compensated before")
     tolerance = tolerance_um or config.compensation.tolerance_um
     result = compensate(
         source, job, method=method or config.compensation.method, tolerance_um=tolerance, version=__version__
