@@ -3,7 +3,7 @@
 import os
 import sys
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from camcomp.diagnostics import FileError
@@ -26,18 +26,21 @@ def display_name(path: str | Path) -> str:
     return "<stdin>" if str(path) == STANDARD else str(path)
 
 
-def write_all(outputs: Mapping[str | Path, bytes], *, inputs: tuple[str | Path, ...] = ()) -> None:
+def write_all(
+    outputs: Mapping[str, bytes] | Mapping[Path, bytes], *, inputs: Sequence[str | Path] = ()
+) -> None:
     """Write every output or none: whole files are made beside their targets first and then moved into place.
 
     A target keeps its permissions; a link is followed. "-" goes to standard output, after the files. Raises FileError:
     CC502 when an output is one of `inputs`, CC501 when one cannot be written.
     """
-    targets = {path: Path(path).resolve() for path in outputs if str(path) != STANDARD}
+    contents = {str(path): data for path, data in outputs.items()}
+    targets = {path: Path(path).resolve() for path in contents if path != STANDARD}
     _refuse_clashes(targets, inputs)
     made: list[tuple[str, Path]] = []
     try:
         for path, target in targets.items():
-            made.append((_write_beside(target, outputs[path]), target))
+            made.append((_write_beside(target, contents[path]), target))
         while made:
             os.replace(*made[0])
             made.pop(0)
@@ -48,13 +51,12 @@ def write_all(outputs: Mapping[str | Path, bytes], *, inputs: tuple[str | Path, 
     finally:
         for temporary, _ in made:
             os.unlink(temporary)
-    for path, data in outputs.items():
-        if str(path) == STANDARD:
-            sys.stdout.buffer.write(data)
-            sys.stdout.buffer.flush()
+    if STANDARD in contents:
+        sys.stdout.buffer.write(contents[STANDARD])
+        sys.stdout.buffer.flush()
 
 
-def _refuse_clashes(targets: Mapping[str | Path, Path], inputs: tuple[str | Path, ...]) -> None:
+def _refuse_clashes(targets: Mapping[str, Path], inputs: Sequence[str | Path]) -> None:
     sources = [Path(path) for path in inputs if str(path) != STANDARD]
     for path, target in targets.items():
         for source in sources:
@@ -63,7 +65,7 @@ def _refuse_clashes(targets: Mapping[str | Path, Path], inputs: tuple[str | Path
             ):
                 raise FileError("CC502", f"{path} is an input and would be overwritten")
     if len(set(targets.values())) < len(targets):
-        names = ", ".join(str(path) for path in targets)
+        names = ", ".join(targets)
         raise FileError(
             "CC502", f"two outputs go to the same file: {names}", hint="give each output its own name"
         )

@@ -40,14 +40,14 @@ def command(directory: Path) -> None:
 
     DIR is made when it is not there. Nothing in it is overwritten.
     """
-    outputs: dict[str | Path, bytes] = {
+    outputs: dict[Path, bytes] = {
         directory / "machine.yaml": shipped("config/orthoglide.yaml").read_bytes() + _KEYS.encode(),
         directory / "groove.nc": shipped("samples/groove-circle-50.nc").read_bytes(),
         directory / "camcomp.schema.json": shipped("config/camcomp.schema.json").read_bytes(),
         directory / "README.md": _README.encode(),
     }
     for path in outputs:
-        if Path(path).exists():
+        if path.exists():
             raise FileError("CC501", f"{path} is there already", hint="choose another folder")
     directory.mkdir(parents=True, exist_ok=True)
     write_all(outputs)

@@ -14,7 +14,7 @@ import camcomp
 
 PACKAGE = Path(camcomp.__file__).parent
 GROUND = {
-    "datatypes", "diagnostics", "pathgeometry", "rules", "se3", "shelf", "spec", "specbase", "specrobot", "yamlcheck",
+    "datatypes", "diagnostics", "pathgeometry", "rules", "se3", "shelf", "spec", "specbase", "speclink", "specrobot", "yamlcheck",
     "yamltree",
 }  # fmt: skip
 ENGINES = {"gcode", "statics", "cutting", "gap"}

@@ -83,6 +83,9 @@ def test_without_robot_a_file_is_no_machine_but_may_be_an_override(write):
     check_config([file])
     assert [each.rule for each in refused(write("tool: {length: 3}"), read=check_config)] == ["CC202"]
     assert [each.rule for each in refused(write("robot: {name: a}"), read=check_config)] == ["CC203"]
+    check_config(
+        [write("robot: {chains: {y: {base_error: {rotation_deg: [1, 0, 0]}}}}\nprocess: {force: {Fr_N: 1}}")]
+    )
 
 
 def test_no_files_at_all():

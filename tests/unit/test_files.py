@@ -66,7 +66,7 @@ def test_the_input_is_never_overwritten(tmp_path, kind):
 
 def test_two_outputs_need_two_names(tmp_path):
     with pytest.raises(FileError) as caught:
-        files.write_all({tmp_path / "a": b"1", str(tmp_path / "x" / ".." / "a"): b"2"})
+        files.write_all({tmp_path / "a": b"1", tmp_path / "x" / ".." / "a": b"2"})
     assert caught.value.rule == "CC502"
 
 

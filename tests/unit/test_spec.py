@@ -6,7 +6,7 @@ import pytest
 
 from camcomp.config import load_config
 from camcomp.diagnostics import CamcompError
-from camcomp.specrobot import Beam, Rectangle, Round, Square, Tube
+from camcomp.speclink import Beam, Rectangle, Round, Square, Tube
 
 MACHINE = """\
 robot:
