@@ -29,7 +29,8 @@ class Transform:
 class Actuator:
     """Actuated joint with its drive spring: coordinate rho (commanded) plus spring deflection.
 
-    stiffness in N/mm (prismatic) or N mm/rad (revolute), None = rigid. home and limits in mm or rad.
+    stiffness in N/mm (prismatic) or N mm/rad (revolute), None = rigid. home, limits and start in mm or rad; start is
+    the coordinate at the machine's start pose, None = home. It fixes the branch of an arm.
     """
 
     name: str
@@ -38,6 +39,7 @@ class Actuator:
     stiffness: float | None
     home: float = 0.0
     limits: tuple[float, float] = (-np.inf, np.inf)
+    start: float | None = None
 
 
 @dataclass(frozen=True)
@@ -102,13 +104,22 @@ class Chain:
 
 @dataclass(frozen=True)
 class Robot:
-    """A machine: chains, the tool (3,) mm from the platform reference to the tip, and the start pose (3,) mm."""
+    """A machine: chains, the tool (3,) mm from the platform reference to the tip, and the start pose (3,) mm, (3, 3).
+
+    held (3, 3): orientation in which the control keeps the platform along a path; None = that of the start pose.
+    """
 
     name: str
     chains: tuple[Chain, ...]
     tool: Array
     start_reference: Array = field(default_factory=lambda: np.zeros(3))
     start_rotation: Array = field(default_factory=lambda: np.eye(3))
+    held: Array | None = None
+
+    @property
+    def held_rotation(self) -> Array:
+        """Orientation (3, 3) of the platform along a path."""
+        return self.start_rotation if self.held is None else self.held
 
     @property
     def actuators(self) -> tuple[Actuator, ...]:

@@ -77,7 +77,7 @@ def _rows(chain: Chain, rigid: bool, actuator_index: dict[str, int]):
                 {"kind": REVOLUTE if e.revolute else PRISMATIC, "vector": e.axis, "var": len(start), "sign": 1.0,
                  "joint_stiffness": k, "act": actuator_index[e.name]}
             )
-            start.append(e.home)
+            start.append(e.home if e.start is None else e.start)
         elif isinstance(e, Passive):
             rows.append(
                 {"kind": REVOLUTE if e.revolute else PRISMATIC, "vector": e.axis, "var": len(start), "sign": 1.0,

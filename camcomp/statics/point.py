@@ -7,8 +7,7 @@ One Newton iteration linearises every chain (kernel.chain_response), eliminates 
     HOLD     rho given, tip given         -> tilt, holding force      F = f(t | t0), seed eq. (1)
     TARGET   tip given, force given       -> tilt, commanded tip      F = f(t0 | t0F), seed eqs. (2)-(3)
     CLAMP    rho given, pose given        -> wrench (6,)              f(t | t0) with the full pose held
-
-With six actuators HOLD and TARGET hold the full pose and ask for the full wrench or commanded pose.
+    POSE     pose given, force given      -> commanded pose           TARGET without tilt; needs six actuators
 """
 
 import numpy as np
@@ -28,7 +27,7 @@ from camcomp.statics.kernel import (
 from camcomp.statics.pack import LENGTH
 from camcomp.statics.rotation import cross_matrix, exp_rotation, log_rotation
 
-FREE, HOLD, TARGET, CLAMP = 0, 1, 2, 3
+FREE, HOLD, TARGET, CLAMP, POSE = 0, 1, 2, 3, 4
 OK, MAX_ITERATIONS, OUT_OF_REACH, SINGULAR, UNSTABLE = 0, 2, 3, 4, 5
 
 STEP_DONE = 1e-6  # mm: after a Newton step this short the next one is below 1e-12
@@ -198,7 +197,8 @@ def solve_point(mode, P, rigid, tool, R_aim, tip_aim, force, wrench, rho, y, x, 
     """
     m = rho.shape[0]
     nc = P.nvar.shape[0]
-    full = m == 6
+    full = mode == POSE
+    aimed = mode == TARGET or full
     step_x = np.zeros_like(x)
     responses = np.zeros((nc, x.shape[1] + 6, 7 + m))
     rates = np.zeros((m, 6))
@@ -248,11 +248,11 @@ def solve_point(mode, P, rigid, tool, R_aim, tip_aim, force, wrench, rho, y, x, 
                 w = log_rotation(_mul33(R_aim, R.T))
                 dt[:3] = e + _cross(lever, w)
                 dt[3:] = w
-            if mode == TARGET:
+            if aimed:
                 if not rigid_rates(rigid, y, rates):
                     return SINGULAR, passes
                 K_cmd = K_rho @ rates
-            if mode == TARGET and full:
+            if full:
                 # commanded twist at the tip: dp = d tip + lever_cmd x omega
                 shift = cross_matrix(_mul(R_cmd, tool))
                 M = K_cmd.copy()
@@ -265,7 +265,7 @@ def solve_point(mode, P, rigid, tool, R_aim, tip_aim, force, wrench, rho, y, x, 
                 tip_cmd += B[:3, 0]
                 R_cmd[:] = _mul33(exp_rotation(B[3:, 0]), R_cmd)
                 size = max(size, np.max(np.abs(B[:3, 0])), LENGTH * np.max(np.abs(B[3:, 0])))
-            elif mode == TARGET or (mode == HOLD and not full):
+            elif mode == TARGET or mode == HOLD:
                 M = np.empty((6, 6))
                 M[:, :3] = S[:, :3].copy() @ pull + S[:, 3:]
                 if mode == TARGET:
@@ -284,7 +284,7 @@ def solve_point(mode, P, rigid, tool, R_aim, tip_aim, force, wrench, rho, y, x, 
                     size = max(size, np.max(np.abs(B[3:, 0])))
                 else:
                     force += B[3:, 0]
-            if mode == TARGET:
+            if aimed:
                 before = rho.copy()
                 status, _ = rigid_kinematics(rigid, R_cmd, tip_cmd - _mul(R_cmd, tool), rho, y)
                 if status != OK:
@@ -435,16 +435,16 @@ def solve_many(
         for attempt in range(3):
             if attempt == 0 and not warm:
                 continue
-            if mode == TARGET:
+            if mode == TARGET or mode == POSE:
                 rho[i] = rho_nominal[i]
                 if attempt == 0:
                     tip_cmd[i] = near[i] + (tip_cmd[i - 1] - near[i - 1])
-                    R_cmd[i] = R_cmd[i - 1]
+                    R_cmd[i] = R_cmd[i - 1] if mode == POSE else R_aim[i]
                 else:
                     tip_cmd[i] = near[i]
                     R_cmd[i] = R_aim[i]
             y_now = y.copy()
-            if mode == TARGET and attempt == 0:
+            if (mode == TARGET or mode == POSE) and attempt == 0:
                 rigid_kinematics(rigid, R_cmd[i], tip_cmd[i] - _mul(R_cmd[i], tool), rho[i], y_now)
             steps = 8 if attempt == 2 else 1
             if attempt > 0:

@@ -19,7 +19,7 @@ from camcomp.statics.machine import Machine
 
 Array = NDArray[np.float64]
 PIECE = 256
-FREE, HOLD, TARGET, CLAMP = point.FREE, point.HOLD, point.TARGET, point.CLAMP
+FREE, HOLD, TARGET, CLAMP, POSE = point.FREE, point.HOLD, point.TARGET, point.CLAMP, point.POSE
 STATUS = {
     point.OK: "solved",
     point.MAX_ITERATIONS: "no convergence",
@@ -95,7 +95,7 @@ def solve(
     tool = np.ascontiguousarray(machine.robot.tool, float)
     start_tip = machine.nominal.start_reference + start_R @ tool
     aim = near if aim is None else np.ascontiguousarray(aim, float)
-    R_aim = _per_point(start_R if aim_rotation is None else aim_rotation, n, (3, 3))
+    R_aim = _per_point(machine.nominal.held_rotation if aim_rotation is None else aim_rotation, n, (3, 3))
     f = _per_point(force, n, (3,))
     w = _per_point(wrench, n, (6,))
     r = np.zeros((n, m)) if rho is None else np.array(rho, float).reshape(n, m)
