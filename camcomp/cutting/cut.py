@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from camcomp.datatypes import Floats, Ints, frozen
+from camcomp.datatypes import Bools, Floats, Ints, frozen
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,6 +26,8 @@ class Cut:
     diameter_mm: float | None = None
     teeth: int | None = None
     to_machine: Floats = field(default_factory=lambda: np.eye(3))  # (3, 3) program axes to machine axes
+    # (n,) the point is seen as the end of a motion, not as the start of the next; empty: nowhere
+    ends: Bools = field(default_factory=lambda: np.zeros(0, np.bool_))
 
     def __post_init__(self) -> None:
         n = np.shape(self.line)[0]
@@ -36,6 +38,7 @@ class Cut:
                 raise ValueError(f"Cut.{name} has shape {array.shape}, not {rows.get(name, (n,))}")
             object.__setattr__(self, name, array)
         object.__setattr__(self, "line", frozen(self.line, np.int64))
+        object.__setattr__(self, "ends", frozen(self.ends if np.size(self.ends) else np.zeros(n), np.bool_))
 
     def __len__(self) -> int:
         return int(self.line.shape[0])

@@ -2,8 +2,9 @@
 
 Columns used: `s_mm` (path length) or `line` (source line), and three forces on the tool, either `Fr_N, Ft_N, Fz_N` in
 the path frame or `fx_N, fy_N, fz_N` in the machine frame. Other columns are left alone, so that a log or a joint table
-can be given as it is. With `s_mm` rows are in path order and may repeat a place, where the force jumps; with `line`
-alone the rows of a line are averaged. Rows without any force are skipped.
+can be given as it is. With `s_mm` rows are in path order and may repeat a place, where the force jumps: the first row
+holds for the motion that ends there, the last for the one that starts, and a `line` column settles which is which.
+With `line` alone the rows of a line are averaged. Rows without any force are skipped.
 """
 
 import csv
@@ -13,11 +14,14 @@ from difflib import get_close_matches
 
 import numpy as np
 
-from camcomp.datatypes import Floats
+from camcomp.datatypes import Bools, Floats, Ints
 from camcomp.diagnostics import CamcompError, ConfigError, Location, raise_all
 
 PATH_COLUMNS = ("Fr_N", "Ft_N", "Fz_N")
 MACHINE_COLUMNS = ("fx_N", "fy_N", "fz_N")
+
+# Lengths of path and table are both rounded sums; closer than this they are the same place.
+SAME_PLACE_MM = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,6 +32,7 @@ class ForceTable:
     force: Floats  # (k, 3) N
     by_length: bool
     in_machine: bool  # frame of `force`: machine axes, or the path frame
+    line: Floats | None = None  # (k,) source line of each row, beside a path length
 
 
 class _Reader:
@@ -70,10 +75,11 @@ def parse_table(text: str, name: str) -> ForceTable:
         raise ConfigError("CC261", "no column says where: s_mm or line", at=reader.at(reader.head_line))
     if names is None:
         raise _no_force(reader)
-    columns = [head.index(each) for each in (key_name, *names)]
-    values = []
+    also = ("line",) if key_name == "s_mm" and "line" in head else ()
+    columns = [head.index(each) for each in (key_name, *names, *also)]
+    values: list[list[float]] = []
     for line, row in reader.rows:
-        if any(column < len(row) and row[column].strip() for column in columns[1:]):
+        if any(column < len(row) and row[column].strip() for column in columns[1:4]):
             values.append([reader.number(line, row, column) for column in columns])
             if key_name == "s_mm" and len(values) > 1 and values[-1][0] < values[-2][0]:
                 text = f"s_mm falls from {values[-2][0]:g} to {values[-1][0]:g}"
@@ -82,13 +88,13 @@ def parse_table(text: str, name: str) -> ForceTable:
     if not values:
         raise ConfigError("CC260", "no row of the force table holds a force", at=reader.at(reader.head_line))
     table = np.array(values)
-    key, force = table[:, 0], table[:, 1:]
+    key, force = table[:, 0], table[:, 1:4]
     if key_name == "line":
         key, rows = np.unique(key, return_inverse=True)
         total = np.zeros((key.size, 3))
         np.add.at(total, rows, force)
         force = total / np.bincount(rows)[:, None]
-    return ForceTable(key, force, key_name == "s_mm", names is MACHINE_COLUMNS)
+    return ForceTable(key, force, key_name == "s_mm", names is MACHINE_COLUMNS, table[:, 4] if also else None)
 
 
 def _no_force(reader: _Reader) -> ConfigError:
@@ -102,16 +108,15 @@ def _no_force(reader: _Reader) -> ConfigError:
     return ConfigError("CC261", text, at=reader.at(reader.head_line))
 
 
-def look_up(table: ForceTable, arc_length: Floats, line: np.ndarray) -> Floats:
+def look_up(table: ForceTable, arc_length: Floats, line: Ints, ends: Bools) -> Floats:
     """Force (n, 3) in N, in the table's own frame: linear between rows, or that of the source line.
 
-    Raises ConfigError CC264 for a point that the table does not cover.
+    ends (n,): the point closes a motion, so that before a jump the row before it holds. Raises ConfigError CC264 for a
+    point that the table does not cover.
     """
     if table.by_length:
-        # Both lengths are written with a few decimals; a micrometre beyond an end is the end.
-        outside = (arc_length < table.key[0] - 1e-3) | (arc_length > table.key[-1] + 1e-3)
-        columns = [np.interp(arc_length, table.key, table.force[:, i]) for i in range(3)]
-        value = np.stack(columns, axis=-1) if arc_length.size else np.zeros((0, 3))
+        outside = (arc_length < table.key[0] - SAME_PLACE_MM) | (arc_length > table.key[-1] + SAME_PLACE_MM)
+        value = _along(table, arc_length, line, ends)
         covered = f"s_mm = {table.key[0]:g} to {table.key[-1]:g}"
     else:
         rows = np.clip(np.searchsorted(table.key, line), 0, table.key.size - 1)
@@ -123,3 +128,22 @@ def look_up(table: ForceTable, arc_length: Floats, line: np.ndarray) -> Floats:
         text = f"program line {line[first]}, s_mm = {arc_length[first]:g}: the force table does not cover this point"
         raise ConfigError("CC264", f"{text}; it covers {covered}")
     return value
+
+
+def _along(table: ForceTable, s: Floats, line: Ints, ends: Bools) -> Floats:
+    key, force, last = table.key, table.force, table.key.size - 1
+    high = np.clip(np.searchsorted(key, s, side="right"), 0, last)
+    low = np.maximum(high - 1, 0)
+    step = key[high] - key[low]
+    share = np.clip((s - key[low]) / np.where(step > 0, step, 1.0), 0.0, 1.0)[:, None]
+    between = force[low] + share * (force[high] - force[low])
+    # A jump is one place with several rows, from `first` to `final`.
+    first = np.clip(np.searchsorted(key, s - SAME_PLACE_MM, side="left"), 0, last)
+    final = np.maximum(np.searchsorted(key, s + SAME_PLACE_MM, side="right") - 1, 0)
+    jump = (final > first) & (key[first] == key[final])
+    before = ends
+    if table.line is not None:
+        own_first, own_final = table.line[first] == line, table.line[final] == line
+        before = np.where(own_first == own_final, ends, own_first)
+    at_jump = np.where(before[:, None], force[first], force[final])
+    return np.where(jump[:, None], at_jump, between)

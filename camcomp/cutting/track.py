@@ -99,6 +99,7 @@ def _force(
         diameter_mm=c.diameter_mm,
         teeth=c.teeth,
         to_machine=np.eye(3) if c.to_machine is None else c.to_machine,
+        ends=w[on] == 1.0,
     )
     out[on] = to_vector(c.model(cut), cut.tangent, cut.tool_axis)
     return out

@@ -28,7 +28,7 @@ class Params(Spec):
 def force(cut: Cut, params: Params) -> Floats:
     """(Fr, Ft, Fz) (n, 3) in N. Raises ConfigError CC260 to CC264, FileError CC500."""
     table = _table(params.file)
-    value = look_up(table, cut.arc_length, cut.line)
+    value = look_up(table, cut.arc_length, cut.line, cut.ends)
     if table.in_machine:
         value = to_components(value @ cut.to_machine, cut.tangent, cut.tool_axis)
     return -value if params.on_workpiece else value
