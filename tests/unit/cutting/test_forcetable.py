@@ -89,3 +89,10 @@ def test_a_point_that_the_table_does_not_cover_is_refused(text: str, s: float, l
     with pytest.raises(ConfigError) as caught:
         look_up(parse_table(text, "f.csv"), np.array([s]), np.array([line]), np.array([False]))
     assert caught.value.rule == "CC264" and f"line {line}" in caught.value.message
+
+
+def test_inside_a_line_the_motion_decides_about_a_jump_and_rows_without_force_do_not_count() -> None:
+    text = "line,s_mm,Fr_N,Ft_N,Fz_N\n7,0,0,0,0\n7,5,,,\n7,10,0,0,0\n7,10,200,0,0\n7,20,100,0,0\n"
+    ends = np.array([True, False, False])
+    force = look_up(parse_table(text, "f.csv"), np.array([10.0, 10.0, 5.0]), np.array([7, 7, 7]), ends)
+    np.testing.assert_array_equal(force[:, 0], [0, 200, 0])

@@ -46,3 +46,10 @@ def test_a_file_that_cannot_be_read(tmp_path: Path, content: bytes | None) -> No
     with pytest.raises(FileError) as caught:
         force(cut(), Params(file=str(tmp_path / "forces.csv")))
     assert caught.value.rule == "CC500" and "forces.csv" in caught.value.message
+
+
+def test_before_a_jump_the_end_of_a_motion_takes_the_row_before_it(tmp_path: Path) -> None:
+    file = tmp_path / "forces.csv"
+    file.write_text("s_mm,Fr_N,Ft_N,Fz_N\n0,0,0,0\n1,0,0,0\n1,9,0,0\n5,9,0,0\n")
+    at = Cut(TANGENT, [0, 0, 1], *[np.full(3, np.nan)] * 4, [0, 1, 1], [7, 7, 8], ends=[False, True, False])
+    np.testing.assert_array_equal(force(at, Params(file=str(file)))[:, 0], [0, 0, 9])
