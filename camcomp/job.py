@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
 import numpy as np
@@ -12,7 +12,8 @@ from camcomp.cutting.track import Conditions
 from camcomp.datatypes import Floats
 from camcomp.diagnostics import ConfigError
 from camcomp.spec import Config
-from camcomp.statics.build import build_robot, rotation_of
+from camcomp.statics.build import build_robot, held_orientation, rotation_of
+from camcomp.statics.description import Robot
 from camcomp.statics.machine import Machine, build_machine
 
 
@@ -50,13 +51,21 @@ class Job:
     @cached_property
     def machine(self) -> Machine:
         """The machine with its chain errors. Raises ConfigError CC216 when it cannot be built."""
-        return self._build(*build_robot(self.config.robot, self.config.tool.tip))
+        return self._build(*self._robots)
 
     @cached_property
     def perfect_machine(self) -> Machine:
         """The same machine with perfect chains."""
-        _, nominal = build_robot(self.config.robot, self.config.tool.tip)
-        return self._build(nominal, nominal)
+        return self._build(self._robots[1], self._robots[1])
+
+    @cached_property
+    def _robots(self) -> tuple[Robot, Robot]:
+        """The robot as it is and as its control believes it to be, with the orientation that the tool keeps."""
+        robots = build_robot(self.config.robot, self.config.tool.tip)
+        if len(robots[0].actuators) != 6:
+            return robots
+        held = held_orientation(robots[1], self.frame.rotation, self.config.tool.turn_deg)
+        return replace(robots[0], held=held), replace(robots[1], held=held)
 
     def _build(self, robot, nominal) -> Machine:
         try:
@@ -74,7 +83,7 @@ class Job:
         return Conditions(
             model=None if none else partial(_call, member.force, choice.params),
             plunges=bool(getattr(member, "PLUNGES", False)),
-            tool_axis=self.frame.rotation.T @ np.array([0.0, 0.0, 1.0]),
+            tool_axis=self.frame.rotation.T @ self.machine.nominal.held_rotation[:, 2],
             stock_top_mm=c.workpiece.stock_top_mm,
             depth_mm=c.process.depth_mm,
             width_mm=c.process.width_mm,

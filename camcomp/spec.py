@@ -46,6 +46,11 @@ class Tool(Spec):
     vector_mm: Vector | None = Field(
         None, description="from the tip to the platform reference point, in platform axes"
     )
+    turn_deg: float | None = Field(
+        None,
+        description="of the platform's x axis from program X about the tool axis, for machines with six actuators; "
+        "default: what is nearest to the start pose",
+    )
     diameter_mm: Positive | None = None
     teeth: Annotated[int, Field(ge=1)] | None = None
 

@@ -55,12 +55,18 @@ class PrismaticActuator(_Prismatic):
     type: Literal["actuator"]
     name: Name | None = Field(None, description="default: the name of the chain")
     home_mm: float = 0.0
+    start_mm: float | None = Field(None, description="position in the start pose of an arm; default: home_mm")
     limits_mm: Limits | None = None
 
     @property
     def home(self) -> float:
         """Position of the home switch, mm."""
         return self.home_mm
+
+    @property
+    def start(self) -> float | None:
+        """Position in the start pose, mm; None = home."""
+        return self.start_mm
 
     @property
     def limits(self) -> tuple[float, float] | None:
@@ -74,12 +80,20 @@ class RevoluteActuator(_Revolute):
     type: Literal["actuator"]
     name: Name | None = Field(None, description="default: the name of the chain")
     home_deg: float = 0.0
+    start_deg: float | None = Field(
+        None, description="angle in the start pose, which fixes the branch of an arm; default: home_deg"
+    )
     limits_deg: Limits | None = None
 
     @property
     def home(self) -> float:
         """Position of the home switch, rad."""
         return radians(self.home_deg)
+
+    @property
+    def start(self) -> float | None:
+        """Angle in the start pose, rad; None = home."""
+        return None if self.start_deg is None else radians(self.start_deg)
 
     @property
     def limits(self) -> tuple[float, float] | None:
@@ -203,7 +217,8 @@ class Robot(Spec):
     chains: Annotated[dict[Name, Chain], Field(min_length=1)]
     start_reference_mm: Vector = Field(
         default_factory=lambda: [0.0, 0.0, 0.0],
-        description="platform reference point at which the start guesses of the passive joints hold",
+        description="platform reference point at which the start guesses of the passive joints hold; an arm's start "
+        "pose follows from the start angles of its joints instead",
     )
 
     @model_validator(mode="after")

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
 from camcomp import specrobot as spec
+from camcomp.statics.arm import arm_of, end_pose
 from camcomp.statics.description import (
     Actuator,
     Chain,
@@ -73,6 +76,7 @@ def _element(given: spec.Element, chain: str) -> Element:
             given.stiffness,
             given.home,
             given.limits or (-np.inf, np.inf),
+            given.start,
         )
     if isinstance(given, spec.PrismaticPassive | spec.RevolutePassive):
         return Passive(given.rotary, axis_vector(given.axis), given.stiffness or 0.0, given.rest, given.start)
@@ -111,7 +115,31 @@ def build_robot(given: spec.Robot, tip_mm: list[float]) -> tuple[Robot, Robot]:
         )
     tool, start = np.asarray(tip_mm, float), np.asarray(given.start_reference_mm, float)
     robot = Robot(given.name, tuple(chains), tool, start)
-    return robot, perfect(robot)
+    nominal = perfect(robot)
+    arm = arm_of(nominal)
+    if arm is not None:
+        rotation, point = end_pose(arm, arm.start)
+        robot, nominal = (replace(each, start_reference=point, start_rotation=rotation) for each in (robot, nominal))
+    return robot, nominal
+
+
+def held_orientation(robot: Robot, program: Array, turn_deg: float | None) -> Array:
+    """Orientation (3, 3) in which a machine with six actuators keeps its platform along a path.
+
+    program (3, 3): program frame in the machine frame. The platform's z axis (away from the workpiece) is the program's Z.
+    The turn about it is free: its x axis stands at turn_deg from program X, or as near as it can to where it points
+    in the start pose, so that any program is milled in the posture in which the arm was set up.
+    """
+    if turn_deg is not None:
+        c, s = np.cos(np.radians(turn_deg)), np.sin(np.radians(turn_deg))
+        return program @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    z = program[:, 2]
+    x = robot.start_rotation[:, 0] - z * (z @ robot.start_rotation[:, 0])
+    if np.linalg.norm(x) < 0.1:  # the start pose's x axis points along the tool: its y axis decides instead
+        y = robot.start_rotation[:, 1] - z * (z @ robot.start_rotation[:, 1])
+        x = np.cross(y, z)
+    x /= np.linalg.norm(x)
+    return np.column_stack((x, np.cross(z, x), z))
 
 
 def perfect(robot: Robot) -> Robot:
