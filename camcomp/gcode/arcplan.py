@@ -5,13 +5,13 @@ become a full circle; when it separates them, a full circle would become a tiny 
 """
 
 import math
-from collections.abc import Callable
 from typing import NamedTuple
 
 from camcomp.datatypes import ARC, LINE
-from camcomp.gcode.arcs import PLANES, SAME_POINT, sweep
+from camcomp.gcode.arcs import PLANES, SAME_POINT, SPIRAL_INCH, SPIRAL_MM, SPIRAL_RELATIVE, sweep
 
 _FULL = 2.0 * math.pi
+_CHORD = 0.05  # rad
 Point = list[float]
 
 
@@ -32,22 +32,26 @@ def turns_of(angle: float) -> int:
 def plan(
     start: Point,
     move: Move,
+    end: Point,
     plane: int,
-    written: Callable[[Point], Point],
     resolution: float,
+    unit: float = 1.0,
     turns_allowed: bool = True,
 ) -> list[Move]:
-    """Blocks for an arc that starts at `start` (as written); `written` rounds an end point the way words do.
+    """Blocks for an arc from `start` to `end`, the points where its words, as they are rounded, begin and lead.
 
     One block where it says what is meant, else several arcs of at most half a turn, or a line where the arc is not
     longer than a few steps of the resolution.
     """
     u, v, _ = PLANES[plane]
-    end = written(move.end)
     radius = math.hypot(start[u] - move.centre[u], start[v] - move.centre[v])
     turns = turns_of(move.angle)
     s, e, c = (start[u], start[v]), (end[u], end[v]), (move.centre[u], move.centre[v])
     slack = 8.0 * resolution
+    if _uneven(s, e, c, unit):
+        # The tool does not start where the arc needs it; short lines lead from one radius to the other.
+        short = divide(start, move, plane, math.ceil(abs(move.angle) / _CHORD))
+        return [Move(LINE, each.end, [math.nan] * 3, 0.0) for each in short]
     if radius > slack and (turns == 1 or turns_allowed) and math.dist(e, c) > slack:
         seen = sweep(s, e, c, move.angle > 0.0, turns)
         same = math.dist(s, e) <= SAME_POINT
@@ -59,6 +63,12 @@ def plan(
         return [Move(LINE, move.end, [math.nan] * 3, 0.0)]
     pieces = max(2, math.ceil(abs(move.angle) / math.pi))
     return divide(start, move, plane, pieces)
+
+
+def _uneven(s: tuple[float, float], e: tuple[float, float], c: tuple[float, float], unit: float) -> bool:
+    first, last = math.dist(s, c) / unit, math.dist(e, c) / unit
+    off = abs(first - last)
+    return off > 0.5 * (SPIRAL_MM if unit == 1.0 else SPIRAL_INCH) and off > 0.5 * SPIRAL_RELATIVE * max(first, last)
 
 
 def divide(start: Point, move: Move, plane: int, pieces: int) -> list[Move]:

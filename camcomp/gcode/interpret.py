@@ -220,11 +220,12 @@ class Interpreter:
         if explicit is not None:
             state.motion = None if explicit == 800 else explicit // 10
             self.record.code_stated = True
-        taken = zero_code in AXIS_USERS
+        dynamic = block.groups.get(8, (0, None))[0] == 431
+        taken = zero_code in AXIS_USERS or dynamic
         if explicit is not None and explicit != 800 and taken and block.axes:
             self.refuse(
                 "CC108",
-                f"{code_name(zero_code or 0)} and {code_name(explicit)} both want the axis words",
+                f"{code_name(431 if dynamic else zero_code or 0)} and {code_name(explicit)} both want the axis words",
                 block.groups[1][1],
             )
         if taken:
@@ -305,8 +306,6 @@ class Interpreter:
         elif code == 431:
             for axis in block.axes:
                 state.tool_offset[axis] = words["XYZ"[axis]].value * state.unit
-            block.axes = []
-            block.used |= set("XYZ")
         else:
             number = state.tool
             if "H" in words:
@@ -446,7 +445,7 @@ class Interpreter:
             return
         end = self._target(block, machine)
         if motion and state.feed_mode == 93:
-            feed *= math.dist(state.position, end)
+            feed *= math.dist(state.position, end) or 1.0
         if machine:
             self.record.machine_motion(block, state, motion, end, feed=feed)
         else:

@@ -48,6 +48,7 @@ class Sites:
     code: NDArray[np.int8]  # (n,) 0..3, the motion code in force; -1 where the statement needs none (G28)
     plane: NDArray[np.int8]  # (n,) 17, 18 or 19
     feed_mode: NDArray[np.int8]  # (n,) 93, 94 or 95
+    modal_feed: Floats  # (n,) feed in force: mm/min in G94, mm/rev in G95, 1/min in G93; NaN: none
     moved: Bools  # (n, 3) axes that the statement commands
     code_stated: Bools  # (n,) the motion code was stated since the previous motion, here or before
     feed_stated: Bools  # (n,) an F word was read since the previous motion

@@ -32,7 +32,7 @@ class Recorder:
     def __init__(self, text: Text) -> None:
         self._starts = text.starts
         self._count = 0
-        self._numbers = array("d")  # 23 per motion
+        self._numbers = array("d")  # 24 per motion
         self._spans = array("q")  # 20 per motion
         self._line_first = 0
         self.code_stated = False
@@ -112,7 +112,9 @@ class Recorder:
         for axis in moved:
             flags |= 1 << 8 + axis
         self._numbers.extend((block.row, kind, code, *state.position, *end, *centre, angle, feed))
-        self._numbers.extend((state.speed, state.tool, state.unit, *state.offset, state.plane, state.feed_mode, flags))
+        modal = math.nan if state.feed is None else state.feed
+        self._numbers.extend((state.speed, state.tool, state.unit, *state.offset))
+        self._numbers.extend((state.plane, state.feed_mode, flags, modal))
         base = int(self._starts[block.row])
         words = block.words
         for letter in LETTERS[:-1]:
@@ -128,7 +130,7 @@ class Recorder:
     def finish(self) -> tuple[Path, Sites]:
         """All motions as arrays."""
         n = self._count
-        a = np.frombuffer(self._numbers, float).reshape(n, -1) if n else np.zeros((0, 23))
+        a = np.frombuffer(self._numbers, float).reshape(n, -1) if n else np.zeros((0, 24))
         spans = np.frombuffer(self._spans, np.int64).reshape(n, 10, 2) if n else np.zeros((0, 10, 2), np.int64)
         kind = a[:, 1].astype(np.int8)
         flags = a[:, 22].astype(np.int64)
@@ -163,6 +165,7 @@ class Recorder:
             code=frozen(a[:, 2], np.int8),
             plane=frozen(plane, np.int8),
             feed_mode=frozen(a[:, 21], np.int8),
+            modal_feed=frozen(a[:, 23]),
             moved=frozen((flags[:, None] >> np.array([8, 9, 10])) & 1, np.bool_),
             code_stated=frozen((flags & 16) > 0, np.bool_),
             feed_stated=frozen((flags & 32) > 0, np.bool_),

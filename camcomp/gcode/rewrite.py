@@ -150,22 +150,37 @@ class Writer:
     def _write(self, row: int, new: bool, after: bool) -> None:
         out = self.out
         kind = int(out.kind[row])
-        move = Move(kind, out.end[row].tolist(), out.centre[row].tolist(), float(out.angle[row]))
-        moves = [move]
+        moves = [Move(kind, out.end[row].tolist(), out.centre[row].tolist(), float(out.angle[row]))]
         if kind == ARC:
             plane = int(self.sites.plane[self.k])
-            moves = plan(self.position, move, plane, self._rounded, self.resolution)
-        if not new and len(moves) > 1 and self.sites.stops[self.k]:
-            *early, moves_last = moves
-            for each in early:
-                self._line(each, row, before=True)
-            moves = [moves_last]
+            end = self._landing(moves[0].end, new)
+            moves = plan(self.position, moves[0], end, plane, self.resolution, self.unit)
+        at_line = 0
+        if not new and self.sites.stops[self.k]:
+            at_line = len(moves) - 1
         for number, each in enumerate(moves):
-            if new or number:
+            if new:
                 self._line(each, row, before=not after)
-            else:
+            elif number == at_line:
                 self._in_place(each, row)
+            else:
+                self._line(each, row, before=number < at_line)
         self.ends[row] = self.position
+
+    def _landing(self, point: Point, new: bool) -> Point:
+        """Where the control goes for `point`: to the rounded words, or where no word has to change, as it was."""
+        k, here = self.k, self.position
+        base = here if self.relative else self.offset
+        end = []
+        for axis in range(3):
+            stays = here[axis]
+            if not new and self.begin[axis] >= 0:
+                programmed = float(self.path.end[k, axis])
+                stays = stays + programmed - float(self.path.start[k, axis]) if self.relative else programmed
+            if abs(stays - point[axis]) > self.half:
+                stays = base[axis] + round((point[axis] - base[axis]) / self.unit, self.digits) * self.unit
+            end.append(stays)
+        return end
 
     def _line(self, move: Move, row: int, before: bool) -> None:
         """A move on a line of its own, before or after the motion's line."""
@@ -174,19 +189,19 @@ class Writer:
         if code != self.code:
             words.append(f"G{code}")
             self.code = code
-        start, end = self.position, self._rounded(move.end)
-        axes = [axis for axis in range(3) if abs(end[axis] - start[axis]) > 1e-9]
-        if move.kind == ARC:
-            axes = sorted({*axes, *PLANES[int(self.sites.plane[self.k])][:2]})
-        words += ["XYZ"[axis] + self._number(self._value(end, axis)) for axis in axes or [0]]
+        start, end = self.position, self._landing(move.end, new=True)
+        axes = [axis for axis in range(3) if end[axis] != start[axis]]
+        if not axes and move.kind != ARC:
+            # A move of its own has a word, and the word may lead half a step away.
+            axes = [0]
+            end[0] = start[0] if self.relative else self.offset[0] + self._value(start, 0) * self.unit
+        words += ["XYZ"[axis] + self._number(self._value(end, axis)) for axis in axes]
         if move.kind == ARC:
             words += self._centre_words(move)
         if move.kind != RAPID:
             words += self._feed_words(float(self.out.feed[row]), self._length(move, start, end))
-        line = self.text.line(self.row)
-        lower = any(self.begin[word] >= 0 and self.text.string[self.begin[word]].islower() for word in _SHAPE_WORDS)
-        string = ("/" if line.lstrip(_BLANKS).startswith("/") else "") + " ".join(words)
-        string = string.lower() if lower else string
+        slash = "/" if self.text.line(self.row).lstrip(_BLANKS).startswith("/") else ""
+        string = slash + self._gap().join(map(self._cased, words))
         eol = self.text.end_of_line(self.row)
         if before:
             self.edits.insert(int(self.text.starts[self.row]), string + eol)
@@ -200,25 +215,22 @@ class Writer:
     def _in_place(self, move: Move, row: int) -> None:
         """The move on the motion's own line."""
         k = self.k
-        start = list(self.position)
-        end = list(start)
-        kept = True
+        start, end = self.position, self._landing(move.end, new=False)
         self._code_on_line(self._code_of(move))
-        rounded = self._rounded(move.end)
+        kept = True
         for axis in range(3):
+            stays = start[axis]
             if self.begin[axis] >= 0:
-                step = self.path.end[k, axis] - self.path.start[k, axis] if self.relative else 0.0
-                stays = start[axis] + step if self.relative else float(self.path.end[k, axis])
-                if abs(stays - move.end[axis]) <= self.half:
-                    end[axis] = stays
-                    continue
-                self._replace(axis, self._number(self._value(rounded, axis)))
-            elif abs(start[axis] - move.end[axis]) <= self.half:
+                programmed = float(self.path.end[k, axis])
+                stays = stays + programmed - float(self.path.start[k, axis]) if self.relative else programmed
+            if end[axis] == stays:
                 continue
-            else:
-                self.fresh.append("XYZ"[axis] + self._number(self._value(rounded, axis)))
-            end[axis] = rounded[axis]
             kept = False
+            number = self._number(self._value(end, axis))
+            if self.begin[axis] >= 0:
+                self._replace(axis, number)
+            else:
+                self.fresh.append("XYZ"[axis] + number)
         if move.kind == ARC:
             self._centre_on_line(move, start, kept)
         elif self.path.kind[k] == ARC:
@@ -288,10 +300,9 @@ class Writer:
             self.edits.insert(first, self._cased(f"G{code}") + self._gap())
         self.code = code
 
-    def _programmed_feed(self) -> tuple[int, float]:
-        k = self.k
-        mode, feed = int(self.sites.feed_mode[k]), float(self.path.feed[k])
-        return mode, feed / float(self.path.speed[k]) if mode == 95 else feed
+    def _programmed_feed(self) -> tuple[int, float] | None:
+        mode, feed = int(self.sites.feed_mode[self.k]), float(self.sites.modal_feed[self.k])
+        return None if math.isnan(feed) else (mode, feed)
 
     def _wanted_feed(self, feed: float, length: float) -> tuple[int, float]:
         """Feed mode and value (G94 mm/min, G95 mm/rev, G93 1/min) for a tip speed in mm/min."""
@@ -300,7 +311,7 @@ class Writer:
         if math.isnan(feed):
             raise ValueError(f"Output row of motion {self.k}: a cut in the place of a rapid needs a feed")
         if mode == 93:
-            return mode, feed / length if length > 0.0 else 1.0e4
+            return mode, feed / length if length > 0.0 else float(self.sites.modal_feed[self.k])
         return mode, feed / float(self.path.speed[self.k]) if mode == 95 else feed
 
     def _feed_words(self, feed: float, length: float) -> list[str]:
@@ -316,24 +327,13 @@ class Writer:
         if self.begin[F] < 0:
             self.fresh += self._feed_words(feed, length)
             return
-        mode = int(self.sites.feed_mode[self.k])
-        if mode == 93:
-            same = self._length_programmed()
-            programmed = (mode, float(self.path.feed[self.k]) / same if same > 0.0 else 0.0)
+        mode, programmed = int(self.sites.feed_mode[self.k]), float(self.sites.modal_feed[self.k])
+        value = self._wanted_feed(feed, length)[1]
+        if abs(value - programmed) <= _FEED_SLACK * programmed:
+            value = programmed
         else:
-            programmed = self._programmed_feed()
-        wanted = self._wanted_feed(feed, length) if length > 0.0 or mode != 93 else programmed
-        if abs(wanted[1] - programmed[1]) <= _FEED_SLACK * programmed[1]:
-            wanted = programmed
-        else:
-            self._replace(F, significant(wanted[1] if mode == 93 else wanted[1] / self.unit))
-        self.feed = None if mode == 93 else wanted
-
-    def _length_programmed(self) -> float:
-        k = self.k
-        start, end = self.path.start[k].tolist(), self.path.end[k].tolist()
-        kind, angle = int(self.path.kind[k]), float(self.path.angle[k])
-        return self._length(Move(kind, end, self.path.centre[k].tolist(), angle), start, end)
+            self._replace(F, significant(value if mode == 93 else value / self.unit))
+        self.feed = None if mode == 93 else (mode, value)
 
     def _length(self, move: Move, start: Point, end: Point) -> float:
         if move.kind != ARC:
@@ -345,13 +345,9 @@ class Writer:
     # --- numbers and words -------------------------------------------------------------------------------------
 
     def _value(self, point: Point, axis: int) -> float:
+        """Number of the word that leads to `point` from the present position."""
         base = self.position[axis] if self.relative else self.offset[axis]
         return round((point[axis] - base) / self.unit, self.digits)
-
-    def _rounded(self, point: Point) -> Point:
-        """Where the words for `point` lead from the present position."""
-        base = self.position if self.relative else self.offset
-        return [base[axis] + self._value(point, axis) * self.unit for axis in range(3)]
 
     def _number(self, value: float) -> str:
         return plain(value, self.digits)
@@ -400,7 +396,7 @@ class Writer:
             raise ProgramError(
                 "CC137", "a corrected position would be stored as home position", at=self.text.place(rebase.row)
             )
-        digits = decimals(self.resolution, rebase.unit) + 2
+        digits = decimals(self.resolution, rebase.unit) + 4
         for axis, begin, finish in rebase.axes:
             if abs(moved[axis]) > 1e-9:
                 value = rebase.value[axis] + moved[axis] / rebase.unit
