@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from camcomp.cutting.track import Track, lay_track
-from camcomp.datatypes import LINE, RAPID, Bools, Floats, Ints
+from camcomp.datatypes import LINE, RAPID, Bools, Floats, Ints, Path
 from camcomp.diagnostics import Location, PhysicsError
 from camcomp.gcode.program import Program
 from camcomp.gcode.rewrite import Output, Rewritten, rewrite
@@ -101,7 +101,7 @@ def compensate(program: Program, job: Job, *, method: str, tolerance_um: float, 
     """The corrected program. Raises PhysicsError where the machine cannot do what is asked."""
     track = lay_track(program.path, job.conditions)
     path, resolution = program.path, job.config.control.resolution_mm
-    corrected = path.known[track.motion] & ~path.machine[track.motion]
+    corrected = row_layout(path, track).corrected
     feeding = corrected & (path.kind[track.motion] != RAPID)
     rounding = 0.5 * np.sqrt(3.0) * resolution
     budget = max(1e-3 * tolerance_um - rounding, 0.1e-3 * tolerance_um)
@@ -139,7 +139,7 @@ def _aim(program: Program, job: Job, track: Track, nodes: Nodes, corrected: Bool
     on = corrected[nodes.piece]
     force = job.frame.vectors(track.force(nodes.piece[on], nodes.w[on]))
     result = correct(job.machine, job.frame.to_machine(target[on]), force, method=method)
-    _refuse(program, track, nodes.piece[on], target[on], result.status)
+    refuse_unsolved(program, track, nodes.piece[on], target[on], result.status)
     out = target.copy()
     out[on] = job.frame.to_program(result.commanded)
     iterations = np.zeros(len(target), np.int64)
@@ -147,7 +147,7 @@ def _aim(program: Program, job: Job, track: Track, nodes: Nodes, corrected: Bool
     return _Aimed(out, iterations)
 
 
-def _refuse(program: Program, track: Track, piece: Ints, target: Floats, status: Ints) -> None:
+def refuse_unsolved(program: Program, track: Track, piece: Ints, target: Floats, status: Ints) -> None:
     """Raises PhysicsError for every source line with a point that could not be solved."""
     bad = np.flatnonzero(status != 0)
     errors: list[PhysicsError] = []
@@ -178,18 +178,37 @@ def _place(program: Program, motion: int) -> Location:
     return program.text.place(row, max(column, 0))
 
 
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """Which pieces (p,) are corrected, and which get a joining line in front of or behind them."""
+
+    corrected: Bools
+    leading: Bools
+    trailing: Bools
+
+
+def row_layout(path: Path, track: Track) -> Layout:
+    """Corrected pieces and joining lines of a track.
+
+    A joining line stands in front of the piece behind the jump; in front of a rapid or an uncorrected move it stands
+    behind the cut instead, because only feed lines can join.
+    """
+    corrected = path.known[track.motion] & ~path.machine[track.motion]
+    feed = corrected & (path.kind[track.motion] != RAPID)
+    wanted = track.jump & np.concatenate(([False], corrected[:-1]))
+    leading = wanted & feed
+    trailing = np.concatenate((wanted[1:] & ~leading[1:], [False])) & feed
+    return Layout(corrected, leading, trailing)
+
+
 def _rows(program: Program, job: Job, track: Track, nodes: Nodes, commanded: Floats, corrected: Bools) -> Rows:
     """End points of the corrected program: the nodes but the first of each piece, and joining lines at jumps."""
     path = program.path
     k = np.arange(len(nodes.w)) - nodes.first[nodes.piece]
     n = len(track.motion)
     kind = path.kind[track.motion]
-    # A joining line stands in front of the piece behind the jump; in front of a rapid or an uncorrected move it stands
-    # behind the cut instead, because only feed lines can join.
-    before = np.concatenate(([False], corrected[:-1]))
-    wanted = track.jump & before
-    leading = wanted & corrected & (kind != RAPID)
-    trailing = np.concatenate((wanted[1:] & ~leading[1:], [False])) & corrected & (kind != RAPID)
+    layout = row_layout(path, track)
+    leading, trailing = layout.leading, layout.trailing
     keep = (k > 0) | leading[nodes.piece]
     extra = np.flatnonzero(trailing)
     piece = np.concatenate((nodes.piece[keep], extra))
@@ -198,7 +217,7 @@ def _rows(program: Program, job: Job, track: Track, nodes: Nodes, commanded: Flo
     free = track.points(extra, np.ones(len(extra)))
     if len(extra):  # behind the cut, without its force
         result = correct(job.machine, job.frame.to_machine(free), np.zeros((len(extra), 3)))
-        _refuse(program, track, extra, free, result.status)
+        refuse_unsolved(program, track, extra, free, result.status)
         free = job.frame.to_program(result.commanded)
     end = np.concatenate((commanded[keep], free))
     order = np.lexsort((joining & (w > 0.0), w, piece))
@@ -232,7 +251,7 @@ def _output(rows: Rows) -> Output:
     n = len(rows.piece)
     return Output(
         motion=rows.motion,
-        kind=rows.kind,
+        kind=rows.kind.astype(np.int8),
         end=rows.end,
         centre=np.full((n, 3), np.nan),
         angle=np.zeros(n),

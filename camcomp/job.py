@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from typing import Any
 
 import numpy as np
 
 from camcomp import shelf
+from camcomp.cutting.cut import Cut
 from camcomp.cutting.track import Conditions
 from camcomp.datatypes import Floats
 from camcomp.diagnostics import ConfigError
@@ -67,7 +70,7 @@ class Job:
         held = held_orientation(robots[1], self.frame.rotation, self.config.tool.turn_deg)
         return replace(robots[0], held=held), replace(robots[1], held=held)
 
-    def _build(self, robot, nominal) -> Machine:
+    def _build(self, robot: Robot, nominal: Robot) -> Machine:
         try:
             return build_machine(robot, nominal)
         except ValueError as error:
@@ -95,5 +98,5 @@ class Job:
         )
 
 
-def _call(force, params, cut):
+def _call(force: Callable[[Cut, Any], Floats], params: Any, cut: Cut) -> Floats:
     return force(cut, params)

@@ -307,4 +307,9 @@ RULES: dict[str, Rule] = {
         "The program carries the stamp of camcomp. A second compensation would apply the correction twice.",
         "compensate the original program",
     ),
+    "CC604": Rule(
+        "not a correction of this program",
+        "The moves of the program could not be matched to those of the original, so there is nothing to compare.",
+        "name the original from which the program was made",
+    ),
 }

@@ -79,8 +79,8 @@ def _tell(figures: dict) -> None:
         f"{figures['segments_in']} motions in, {figures['points']} end points out ({figures['method']})",
         f"tip error before: rms {before['rms_um']:.2f} um, max {before['max_um']:.2f} um",
         f"tip error after:  rms {after['rms_um']:.2f} um, max {after['max_um']:.2f} um",
-        f"largest change of an actuator {figures['actuator_change_max_mm']:.4f} mm, "
-        f"largest drive force {figures['actuator_force_max_N']:.1f} N, "
+        f"largest change of an actuator {figures['actuator_change_max_mm']:.4f} mm",
+        f"largest drive force {figures['actuator_force_max_N']:.1f} N",
         f"platform tilt left {figures['platform_tilt_max_mrad']:.2f} mrad",
     ]
     lines += [f"warning: {each}" for each in figures["warnings"]]

@@ -1,0 +1,193 @@
+"""Verify a corrected program from its text alone: where does the loaded machine take the tip, and how far off is that?
+
+The corrected program is read as the control reads it, its moves are matched to the motions of the original, and points
+along every move go through the full model. The residual is the distance from the programmed path. Joining lines are
+not counted.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from camcomp import pathgeometry
+from camcomp.compensate import Layout, refuse_unsolved, row_layout
+from camcomp.cutting.track import Track, lay_track
+from camcomp.datatypes import ARC, RAPID, Bools, Floats, Ints, Path
+from camcomp.diagnostics import CheckFailed
+from camcomp.gcode.program import Program
+from camcomp.gcode.stamp import is_stamped
+from camcomp.job import Job
+from camcomp.statics.target import correct, settle
+
+PER_SECTION = 4  # points looked at within each straight move or section of an arc
+ARC_STEP = 0.1  # rad, section of an arc
+NEAR_MM = 5.0  # a matched end may be this far from where it is expected
+
+
+@dataclass(frozen=True, eq=False)
+class LineResult:
+    """Residual of one source line in um, and its parts.
+
+    convergence: what the solver itself leaves. rounding: half the last digit written, worst case. vertex: end points
+    of moves, where rounding and the sharing of the chord's miss show. chord: what the straight lines between them add.
+    """
+
+    line: int
+    moves: int
+    residual_um: float
+    convergence_um: float
+    rounding_um: float
+    vertex_um: float
+    chord_um: float
+
+
+@dataclass(frozen=True, eq=False)
+class Verified:
+    """Residuals (k,) mm at all points looked at along feed moves, and per source line."""
+
+    residual: Floats
+    lines: list[LineResult]
+    joining: int
+
+    def as_json(self, tolerance_um: float) -> dict:
+        """The figures of a verification."""
+        size = 1e3 * self.residual
+        return {
+            "tolerance_um": tolerance_um,
+            "residual": {
+                "rms_um": float(np.sqrt(np.mean(size**2))) if len(size) else 0.0,
+                "max_um": float(size.max()) if len(size) else 0.0,
+            },
+            "points": len(size),
+            "joining_lines": self.joining,
+            "lines": [vars(each) for each in self.lines],
+        }
+
+
+def verify(corrected: Program, original: Program, job: Job) -> Verified:
+    """Residual of a corrected program. Raises CheckFailed CC604 when it is not one of this original."""
+    track = lay_track(original.path, job.conditions)
+    layout = row_layout(original.path, track)
+    expected = _expected_ends(original, job, track, layout.corrected)
+    first, last, joins = _match(corrected, track, expected, layout, is_stamped(corrected.data))
+    feeding = np.flatnonzero(layout.corrected & (original.path.kind[track.motion] != RAPID) & (track.length > 0.0))
+    piece, move, f = _samples(corrected.path, feeding, first[feeding], last[feeding])
+    commanded = pathgeometry.points(corrected.path, move, f)
+    residual, w = _residual(job, track, piece, commanded, _fraction(corrected.path, piece, move, f))
+    vertex = f == 1.0
+    convergence = _convergence(job, track, piece[vertex], w[vertex])
+    lines = _per_line(original, job, track, piece, vertex, residual, convergence)
+    return Verified(residual, lines, joins)
+
+
+def _samples(path: Path, pieces: Ints, first: Ints, last: Ints) -> tuple[Ints, Ints, Floats]:
+    """Points looked at: piece (k,), move (k,) of the corrected path, and fraction (k,) of the move."""
+    none = np.zeros(0, np.int64)
+    move = np.concatenate([none, *(np.arange(a, b) for a, b in zip(first, last, strict=True))])
+    piece = np.repeat(pieces, last - first)
+    sections = np.ceil(np.abs(np.where(path.kind[move] == ARC, path.angle[move], 0.0)) / ARC_STEP)
+    count = PER_SECTION * np.maximum(sections, 1).astype(np.int64)
+    begin = np.cumsum(count) - count
+    k = np.arange(count.sum()) - np.repeat(begin, count) + 1
+    return np.repeat(piece, count), np.repeat(move, count), k / np.repeat(count, count)
+
+
+def _expected_ends(program: Program, job: Job, track: Track, corrected: Bools) -> Floats:
+    """Commanded tip (p, 3) at the end of every piece, as compensate would have it."""
+    pieces = np.arange(len(track.motion))
+    one = np.ones(len(pieces))
+    out = track.points(pieces, one)
+    on = np.flatnonzero(corrected)
+    force = job.frame.vectors(track.force(on, one[on]))
+    result = correct(job.machine, job.frame.to_machine(out[on]), force)
+    refuse_unsolved(program, track, on, out[on], result.status)
+    out[on] = job.frame.to_program(result.commanded)
+    return out
+
+
+def _match(corrected: Program, track: Track, expected: Floats, layout: Layout, stamped: bool) -> tuple[Ints, Ints, int]:
+    """Moves [first, last) of the corrected program that belong to every piece, and the number of joining lines."""
+    end = corrected.path.end
+    step = pathgeometry.lengths(corrected.path)
+    n, moves = len(track.motion), len(end)
+    first, last = np.zeros(n, np.int64), np.zeros(n, np.int64)
+    at = joins = 0
+    for i in range(n):
+        if stamped and layout.leading[i]:
+            at, joins = at + 1, joins + 1
+        left = n - i - 1
+        stop, walked = at, 0.0
+        best, found = np.inf, -1
+        limit = 1.3 * track.length[i] + NEAR_MM
+        while stop < moves - left:
+            walked += step[stop]
+            if walked > limit and stop > at:
+                break
+            off = float(np.linalg.norm(end[stop] - expected[i]))
+            score = off + 0.1 * abs(walked - track.length[i])
+            if score < best - 1e-9:
+                best, found = score, stop
+            stop += 1
+        if found < 0 or best > NEAR_MM + 0.1 * limit:
+            line = int(track.path.line[track.motion[i]])
+            raise CheckFailed("CC604", f"no moves that cut line {line} of the original are found")
+        first[i], last[i] = at, found + 1
+        at = found + 1
+        if stamped and layout.trailing[i]:
+            at, joins = at + 1, joins + 1
+    if at != moves:
+        raise CheckFailed("CC604", f"{moves - at} moves at the end have no counterpart in the original")
+    return first, last, joins
+
+
+def _fraction(path: Path, piece: Ints, move: Ints, f: Floats) -> Floats:
+    """First guess (k,) of the fraction of each piece: by commanded length."""
+    length = pathgeometry.lengths(path)
+    before = np.cumsum(length) - length
+    run = before[move] + f * length[move]
+    n = int(piece.max(initial=-1)) + 1
+    start, stop = np.full(n, np.inf), np.zeros(n)
+    np.minimum.at(start, piece, before[move])
+    np.maximum.at(stop, piece, run)
+    return np.clip((run - start[piece]) / np.maximum(stop - start, 1e-300)[piece], 0.0, 1.0)
+
+
+def _residual(job: Job, track: Track, piece: Ints, commanded: Floats, w: Floats) -> tuple[Floats, Floats]:
+    """Distance (k,) mm of the loaded tip from the programmed path, and the fraction of the nearest point."""
+    for _ in range(4):
+        force = job.frame.vectors(track.force(piece, w))
+        tip, _ = settle(job.machine, job.frame.to_machine(commanded), force)
+        gap = job.frame.to_program(tip) - track.points(piece, w)
+        along = np.sum(gap * pathgeometry.tangents(track.path, track.motion[piece], track.u(piece, w)), axis=1)
+        better = np.clip(w + along / track.length[piece], 0.0, 1.0)
+        if np.abs((better - w) * track.length[piece]).max(initial=0.0) < 1e-7:
+            break
+        w = better
+    return np.linalg.norm(gap, axis=1), w
+
+
+def _convergence(job: Job, track: Track, piece: Ints, w: Floats) -> Floats:
+    """What the solver leaves (k,) mm: the exact command of the nearest point, put through the model again."""
+    target = job.frame.to_machine(track.points(piece, w))
+    force = job.frame.vectors(track.force(piece, w))
+    tip, _ = settle(job.machine, correct(job.machine, target, force).commanded, force)
+    return np.linalg.norm(tip - target, axis=1)
+
+
+def _per_line(
+    original: Program, job: Job, track: Track, piece: Ints, vertex: Bools, residual: Floats, convergence: Floats
+) -> list[LineResult]:
+    line = original.path.line[track.motion[piece]]
+    rounding = 0.5 * np.sqrt(3.0) * 1e3 * job.config.control.resolution_mm
+    out = []
+    for number in np.unique(line):
+        on = line == number
+        v, all_of_it = float(residual[on & vertex].max()), float(residual[on].max())
+        solver = float(convergence[line[vertex] == number].max())
+        chord = max(0.0, all_of_it - v)
+        out.append(
+            LineResult(int(number), int((on & vertex).sum()), 1e3 * all_of_it, 1e3 * solver, rounding, 1e3 * v, 1e3 * chord)
+        )
+    return out
