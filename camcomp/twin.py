@@ -83,14 +83,14 @@ class Twin:
 
     def inverse(self, tip: Floats) -> Floats:
         """Set-points (n, m) that the control computes for machine tips (n, 3). Raises PhysicsError CC301."""
-        machine = _machine(self.nominal, self.nominal)
+        machine = build_machine(self.nominal, self.nominal)
         state = solve(machine, FREE, tip, check=False)
         if (state.status == 3).any():
             bad = int(np.argmax(state.status == 3))
             raise PhysicsError("CC410", f"tip {np.round(tip[bad], 3).tolist()} (machine frame) is {STATUS[3]}")
         return state.rho_nominal
 
-    def machine(self, causes: Sequence[Cause]) -> tuple[Machine, tuple]:
+    def edited(self, causes: Sequence[Cause]) -> tuple[Robot, tuple]:
         """The machine with the effects on it, and a key that tells equal ones."""
         robot, key = self.robot, []
         for cause in causes:
@@ -100,7 +100,7 @@ class Twin:
                 if changed is not robot:
                     key.append((cause.name, cause.target, tuple(sorted(cause.values.items()))))
                 robot = changed
-        return _machine(robot, self.nominal), tuple(key)
+        return robot, tuple(key)
 
     # -- the signal path ----------------------------------------------------------------------------------------------
 
@@ -144,13 +144,13 @@ class Twin:
         place_tip = course.place(seen) if late else place
         gap_tip = _interpolate(course, seen, gap) + ahead if late else gap_row
         # structure
-        machine, key = self.machine(causes)
+        robot, key = self.edited(causes)
         nodes = self._nodes(course, grid)
         node_load = self._load(causes, nodes, course.node_force)
         if solved is None or slopes is None or solved.key != key:
             shift = _piece_means(course, gap) if solved is None or slopes is None else solved.shift
             load = node_load if solved is None or slopes is None else Load(solved.force, solved.wrench)
-            solved = self.structure(course, machine, key, shift, load)
+            solved = self.structure(course, build_machine(robot, self.nominal), key, shift, load)
         load = self._load(causes, rows, place.of(course.node_force))
         load_tip = self._load(causes, at_tip, place_tip.of(course.node_force)) if late else load
         drive = place.of(solved.drive)
@@ -195,7 +195,8 @@ class Twin:
     def slopes(self, course: Course, causes: Sequence[Cause], solved: Solved) -> Slopes:
         """Derivatives of the structure at the nodes, by differences of its own solution."""
         causes = (*self.causes, *causes)
-        machine, key = self.machine(causes)
+        robot, key = self.edited(causes)
+        machine = build_machine(robot, self.nominal)
         m = len(self.actuators)
         tips, drives = [], []
         for j in range(m):
@@ -266,10 +267,6 @@ class Twin:
         lever = self.nominal.tool  # platform axes; its tilt under load is of second order here
         d_wrench = d_wrench + np.concatenate([d_force, np.cross(lever, d_force)], axis=1)
         return d_rho, d_wrench
-
-
-def _machine(robot: Robot, nominal: Robot) -> Machine:
-    return build_machine(robot, nominal)
 
 
 def _interpolate(course: Course, at: Floats, values: Floats) -> Floats:

@@ -48,11 +48,10 @@ class Noise:
             white[lag:] -= phi[lag - 1] * x[:-lag]
         white /= share
         # the first rows after a gap have no past: their own size is all there is to scale them by
-        first = np.flatnonzero(fresh)
         for lag in range(ORDER):
-            at = first + lag
+            at = np.flatnonzero(fresh) + lag
             at = at[at < len(x)]
-            white[at] = x[at] if lag == 0 else x[at] / 1.0
+            white[at] = x[at]
         return white
 
 
@@ -62,7 +61,7 @@ def starts(time: Floats, present: Bools) -> Bools:
     if len(index) == 0:
         return np.zeros(0, bool)
     step = np.diff(time[index])
-    usual = np.median(np.diff(time)) if len(time) > 1 else 1.0
+    usual = float(np.median(step)) if len(step) else 1.0
     gap = (step > _REGULAR * usual) | (step < 0) if usual > 0 else np.ones(len(step), bool)
     return np.concatenate([[True], gap])
 

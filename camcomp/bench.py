@@ -1,0 +1,149 @@
+"""Runs on the bench: differences between logs and twin, and how every parameter would change them.
+
+Columns are differences of the twin itself, at nominal or at any set of causes, so that what is fitted is what
+simulate and compensate use.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from camcomp.course import Course
+from camcomp.datatypes import Floats
+from camcomp.gap.effect import Cause, Parameter
+from camcomp.gap.observation import Measured, stack
+from camcomp.twin import Reading, Slopes, Solved, Twin
+
+_SHARE_OF_SCALE = 0.05  # step of a difference
+
+
+@dataclass(frozen=True)
+class Atom:
+    """One possible cause: an effect at a target. Fitted parameters in order; shape holds the scanned ones."""
+
+    name: str
+    target: str | None
+    effect: Any
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """The fitted parameters whose nominal value means no effect, i.e. all but the scanned shapes."""
+        return tuple(p for p in fitted(self.effect) if not p.scan)
+
+    @property
+    def shapes(self) -> tuple[Parameter, ...]:
+        """The scanned parameters."""
+        return tuple(p for p in fitted(self.effect) if p.scan)
+
+    @property
+    def label(self) -> str:
+        """Name for messages."""
+        return f"{self.name}({self.target})" if self.target else self.name
+
+
+def fitted(effect: Any) -> tuple[Parameter, ...]:
+    """The parameters in which an effect is fitted; those of its file unless it says otherwise."""
+    return tuple(getattr(effect, "FITTED", effect.PARAMETERS))
+
+
+def public_values(effect: Any, values: Mapping[str, float]) -> dict[str, float]:
+    """Parameter values of an effect's file from the fitted ones."""
+    return dict(effect.public(values)) if hasattr(effect, "public") else dict(values)
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """A run on the bench: its course, what was measured, its labels, and a factor by which rows are thinned."""
+
+    name: str
+    course: Course
+    measured: Measured
+    clamping: str | int | None
+    clock: str | int | None
+    thin: int = 1
+
+
+@dataclass(eq=False)
+class Bench:
+    """A twin and the runs compared with it."""
+
+    twin: Twin
+    runs: Sequence[Run]
+    solved: list[Solved] = field(default_factory=list)
+    slopes: list[Slopes] = field(default_factory=list)
+    nominal: list[Reading] = field(default_factory=list)
+    _row_slopes: dict[int, Floats] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for run in self.runs:
+            reading, solved = self.twin.sense(run.course, measured=self._encoders(run))
+            slopes = self.twin.slopes(run.course, (), solved)
+            self.solved.append(solved)
+            self.slopes.append(slopes)
+            reading, _ = self.twin.sense(run.course, solved=solved, slopes=slopes, measured=self._encoders(run))
+            self.nominal.append(reading)
+
+    @property
+    def actuators(self) -> tuple[str, ...]:
+        """Names in order."""
+        return self.twin.actuators
+
+    def _encoders(self, run: Run) -> Floats | None:
+        return run.measured.encoder if run.measured.has("encoder") else None
+
+    def read(self, k: int, causes: Sequence[Cause]) -> Reading:
+        """Readings of run k with causes on top of the config."""
+        run = self.runs[k]
+        return self.twin.sense(
+            run.course, causes, solved=self.solved[k], slopes=self.slopes[k], measured=self._encoders(run)
+        )[0]
+
+    def row_slopes(self, k: int) -> Floats:
+        """Derivative (n, 3, m) of the tip in the program frame by the carriages, at every row of run k."""
+        if k not in self._row_slopes:
+            run = self.runs[k]
+            at_nodes = self.twin.rotation.T @ self.slopes[k].tip_rho
+            self._row_slopes[k] = run.course.place(run.course.time).of(at_nodes)
+        return self._row_slopes[k]
+
+    def channels(self, reading: Reading) -> Floats:
+        """Channels (n, c) of readings."""
+        return stack(reading.tip, reading.encoder, reading.drive, reading.dyno)
+
+    def observed(self, k: int) -> Floats:
+        """Channels (n, c) as measured in run k; NaN where missing."""
+        m = self.runs[k].measured
+        return stack(m.tip, m.encoder, m.drive, m.dyno)
+
+    def residual(self, k: int, causes: Sequence[Cause] = ()) -> Floats:
+        """Measured minus model (n, c) in run k, thinned."""
+        reading = self.read(k, causes) if causes else self.nominal[k]
+        return thinned(self.observed(k) - self.channels(reading), self.runs[k].thin)
+
+    def column(self, k: int, causes: Sequence[Cause], before: Cause, after: Cause, step: float) -> Floats:
+        """Change (n, c) of run k's channels per unit of coordinate when `before` becomes `after` among the causes."""
+        others = [c for c in causes if c is not before]
+        a = self.channels(self.read(k, [*others, before])) if before in causes else self.channels(self.read(k, others))
+        b = self.channels(self.read(k, [*others, after]))
+        return thinned((b - a) / step, self.runs[k].thin)
+
+
+def thinned(values: Floats, factor: int) -> Floats:
+    """Means (n // factor, c) of `factor` rows each, NaN where one is missing."""
+    if factor == 1:
+        return values
+    n = len(values) // factor
+    return values[: n * factor].reshape(n, factor, -1).mean(axis=1)
+
+
+def cause_of(atom: Atom, coordinates: Mapping[str, float]) -> Cause:
+    """The cause at fitting coordinates by parameter name; what is missing is nominal."""
+    values = {p.name: p.value(coordinates.get(p.name, 0.0 if not p.scan else p.nominal)) for p in fitted(atom.effect)}
+    return Cause(atom.name, atom.effect, atom.target, public_values(atom.effect, values))
+
+
+def step_of(parameter: Parameter) -> float:
+    """Coordinate step of a difference."""
+    return parameter.scale * _SHARE_OF_SCALE if not parameter.scan else 1e-4 * max(abs(parameter.nominal), 1e-3)

@@ -1,0 +1,132 @@
+"""Experiment files and logs to runs on the bench: what is read is checked, what does not fit is refused with a reason."""
+
+import csv
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path as FilePath
+
+import numpy as np
+
+from camcomp import shelf
+from camcomp.bench import Run
+from camcomp.config import load_config, load_experiment
+from camcomp.course import Course, course_of_program
+from camcomp.cutting.track import lay_track
+from camcomp.datatypes import Floats
+from camcomp.diagnostics import ConfigError, Location
+from camcomp.files import display_name, read_bytes
+from camcomp.gap.effect import Cause
+from camcomp.gap.observation import Measured
+from camcomp.gap.timeline import fit_to_log, schedule
+from camcomp.job import Job
+from camcomp.programs import open_program
+from camcomp.spec import Config, Experiment
+from camcomp.spec import Run as RunSpec
+from camcomp.twin import Twin
+
+MOST_ROWS = 3000  # rows of a run beyond which neighbours are averaged
+
+
+@dataclass(frozen=True, eq=False)
+class Campaign:
+    """An experiment ready for the bench. notes: what the reader should know about the logs."""
+
+    experiment: Experiment
+    config: Config
+    twin: Twin
+    runs: tuple[Run, ...]
+    notes: tuple[str, ...]
+
+
+def twin_of(config: Config) -> Twin:
+    """The forward model of a config, its `effects:` included."""
+    job = Job(config)
+    machine = job.machine
+    causes = tuple(
+        Cause(each.effect, shelf.load("effects", each.effect), each.target, dict(each.values)) for each in config.effects
+    )
+    return Twin(machine.robot, machine.nominal, job.frame.origin, job.frame.rotation, causes)
+
+
+def open_campaign(path: str | FilePath) -> Campaign:
+    """Reads an experiment file with everything it names. Raises ConfigError, ProgramError, FileError, PhysicsError."""
+    experiment = load_experiment(path)
+    config = load_config(experiment.config)
+    twin = twin_of(config)
+    notes: list[str] = []
+    runs = [open_run(spec, config, twin, notes) for spec in experiment.runs]
+    order = sorted(range(len(runs)), key=lambda k: experiment.runs[k].started_s)
+    worn = 0.0
+    for k in order:
+        runs[k] = replace(runs[k], course=replace(runs[k].course, cut_before_min=worn))
+        worn += runs[k].course.cut_min
+    return Campaign(experiment, config, twin, tuple(runs), tuple(notes))
+
+
+def open_run(spec: RunSpec, config: Config, twin: Twin, notes: list[str]) -> Run:
+    """One run of an experiment."""
+    measured = read_log(spec.log, twin)
+    if spec.program is None:
+        raise ConfigError("CC402", f"run '{spec.name}' has no program")
+    program = open_program(spec.program, config)
+    job = Job(config)
+    conditions = job.conditions if spec.cutting else replace(job.conditions, model=None)
+    timeline = schedule(program.path, config.control.acceleration_mm_per_s2)
+    fit = fit_to_log(timeline, measured.time, measured.line)
+    track = lay_track(program.path, conditions)
+    temperature = _filled(measured.time, measured.temperature)
+    course: Course = course_of_program(
+        spec.name, fit.timeline, track, measured.time, started=spec.started_s, to_machine=twin.to_machine,
+        vectors=job.frame.vectors, inverse=twin.inverse,
+        setpoints=measured.setpoint if measured.has("setpoint") else None, temperature=temperature,
+    )  # fmt: skip
+    thin = int(np.ceil(len(measured.time) / MOST_ROWS))
+    return Run(spec.name, course, measured, spec.clamping, spec.clock, thin)
+
+
+def _filled(time: Floats, values: Floats) -> Floats | None:
+    known = np.isfinite(values)
+    return np.interp(time, time[known], values[known]) if known.any() else None
+
+
+def read_log(path: str, twin: Twin) -> Measured:
+    """A log CSV. Raises ConfigError CC400 (not a table), CC401 (column), CC403 (cell)."""
+    name = display_name(path)
+    text = read_bytes(path).decode("utf-8-sig", errors="replace")
+    rows = [row for row in csv.reader(io.StringIO(text)) if row and any(cell.strip() for cell in row)]
+    if len(rows) < 2:
+        raise ConfigError("CC400", "the log has no rows", at=Location(name, 1, 1))
+    header = [cell.strip() for cell in rows[0]]
+    table = np.full((len(rows) - 1, len(header)), np.nan)
+    for i, row in enumerate(rows[1:]):
+        for j, cell in enumerate(row[: len(header)]):
+            if cell.strip():
+                try:
+                    table[i, j] = float(cell)
+                except ValueError:
+                    at = Location(name, i + 2, 1 + sum(len(each) + 1 for each in row[:j]), ",".join(row))
+                    raise ConfigError("CC403", f"'{cell}' in column {header[j]} is not a number", at=at) from None
+
+    def column(label: str) -> Floats:
+        return table[:, header.index(label)] if label in header else np.full(len(table), np.nan)
+
+    def group(labels: Sequence[str]) -> Floats:
+        return np.column_stack([column(each) for each in labels])
+
+    units = ["rad" if a.revolute else "mm" for a in twin.robot.actuators]
+    efforts = ["Nmm" if a.revolute else "N" for a in twin.robot.actuators]
+    names = twin.actuators
+    time = column("t_s")
+    if not np.isfinite(time).all():
+        raise ConfigError("CC401", "the log needs a column t_s with a number in every row", at=Location(name, 1, 1))
+    return Measured(
+        time,
+        column("line"),
+        group(["x_mm", "y_mm", "z_mm"]),
+        group([f"cmd_{a}_{u}" for a, u in zip(names, units, strict=True)]),
+        group([f"act_{a}_{u}" for a, u in zip(names, units, strict=True)]),
+        group([f"act_{a}_{u}" for a, u in zip(names, efforts, strict=True)]),
+        group(["fx_N", "fy_N", "fz_N"]),
+        column("temp_C"),
+    )

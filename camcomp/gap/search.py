@@ -1,0 +1,110 @@
+"""Searching the sets of up to three causes: all sets that look good linearly, re-fitted through the twin, then ranked.
+
+The search knows grams, priors and numbers of atoms; what an atom is, and how it is re-fitted, its caller says.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import combinations
+
+import numpy as np
+from scipy.special import logsumexp
+
+from camcomp.datatypes import Floats
+from camcomp.gap.evidence import TOLERANCES, Base, Gram, Prior, base, log_bayes
+
+Members = tuple[int, ...]
+SIZES = (0.5, 0.35, 0.12, 0.03)  # prior probability of 0, 1, 2 and 3 causes
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """A set of causes with the evidence for it. theta (d,): coordinates of its columns in units of their scales."""
+
+    members: Members
+    theta: Floats
+    covariance: Floats
+    log_evidence: float
+    held_out: float  # gain in log predictive density of runs left out, against the same set less its weakest member
+    grams: tuple[Gram, ...]  # per run, about the fit, in absolute coordinates
+    extra: Mapping[int, Mapping[str, float]] = field(default_factory=dict)  # scanned shapes by atom
+
+
+@dataclass(frozen=True, eq=False)
+class Atoms:
+    """Columns of every atom, and the log prior weight of each as a member."""
+
+    columns: tuple[tuple[int, ...], ...]
+    weight: Floats
+    exclusive: Callable[[int, int], bool]  # whether two atoms make no sense together
+
+    def prior(self, members: Members) -> float:
+        """Log prior probability of a set."""
+        d = len(members)
+        if d == 0:
+            return float(np.log(SIZES[0]))
+        orders = float(np.log(np.arange(1, d + 1)).sum())
+        return float(np.log(SIZES[d]) + orders + sum(self.weight[i] for i in members))
+
+
+def total(grams: Sequence[Gram]) -> Gram:
+    """Sum over runs."""
+    out = grams[0]
+    for each in grams[1:]:
+        out = out + each
+    return out
+
+
+class Scale:
+    """Evidence of sets of atoms for one gram, averaged over how far off the tolerances may be."""
+
+    def __init__(self, data: Gram, prior: Prior, atoms: Atoms) -> None:
+        self.prior, self.atoms = prior, atoms
+        self.bases: list[Base] = [base(data, prior, f) for f in TOLERANCES]
+
+    def __call__(self, members: Members) -> float:
+        """Log evidence of a set."""
+        sets = [self.atoms.columns[i] for i in members]
+        values = [b.log_evidence + (log_bayes(b, self.prior, sets) if sets else 0.0) for b in self.bases]
+        return float(logsumexp(values) - np.log(len(values)))
+
+
+def predictive(grams: Sequence[Gram], prior: Prior, atoms: Atoms, sets: Sequence[Members]) -> Floats:
+    """Sum over runs of the log density of a run given the others (s,), for every set; one run only: its evidence."""
+    everything = total(grams)
+    whole = Scale(everything, prior, atoms)
+    full = np.array([whole(each) for each in sets])
+    if len(grams) == 1:
+        return full
+    out = np.zeros(len(sets))
+    for g in grams:
+        rest = Scale(everything - g, prior, atoms)
+        out += full - np.array([rest(each) for each in sets])
+    return out
+
+
+def extensions(scale: Scale, members: Members, candidates: Sequence[int]) -> list[tuple[float, Members]]:
+    """The set with one more atom each: (log evidence + log prior, set), best first."""
+    found = []
+    for i in candidates:
+        if i in members or any(scale.atoms.exclusive(i, j) for j in members):
+            continue
+        more = tuple(sorted((*members, i)))
+        found.append((scale(more) + scale.atoms.prior(more), more))
+    return sorted(found, reverse=True)
+
+
+def pairs(scale: Scale, candidates: Sequence[int]) -> list[tuple[float, Members]]:
+    """All sets of two, best first."""
+    found = [
+        (scale(two) + scale.atoms.prior(two), two)
+        for two in combinations(sorted(candidates), 2)
+        if not scale.atoms.exclusive(*two)
+    ]
+    return sorted(found, reverse=True)
+
+
+def probabilities(fits: Sequence[Fitted], atoms: Atoms, temperature: float = 1.0) -> Floats:
+    """Posterior probability of every set among those fitted."""
+    value = np.array([f.log_evidence / temperature + atoms.prior(f.members) for f in fits])
+    return np.exp(value - logsumexp(value))
