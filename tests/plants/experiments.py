@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from tests.plants.causes import Cause
-from tests.plants.designs import plan
+from tests.plants.designs import Planned, plan
 from tests.plants.machine import ORIGIN, Run, State, Truth, observe
 from tests.plants.motion import Timeline, read
 
@@ -59,6 +59,7 @@ class Plan:
     samples: int = 500
     nuisance: float = 1.0
     noise: Noise = Noise()
+    world: int | None = None  # programs, order and pauses are drawn from this; default: the seed
 
 
 def small_errors(rng: np.random.Generator, scale: float) -> Truth:
@@ -101,7 +102,7 @@ class Made:
     record: dict
 
 
-def _even(run: Run, count: int) -> np.ndarray:
+def even(run: Run, count: int) -> np.ndarray:
     """Times in the middle of `count` equal parts of a run."""
     return (np.arange(count) + 0.5) * run.timeline.log_end / count
 
@@ -116,7 +117,7 @@ def _busy(runs: list[Run]) -> list[tuple[float, float]]:
     return [(r.started_s, r.started_s + r.timeline.log_end) for r in runs]
 
 
-def schedule(planned, rng: np.random.Generator) -> list[Run]:
+def schedule(planned: list[Planned], rng: np.random.Generator) -> list[Run]:
     """Runs with pauses between them; minutes of cutting add up."""
     runs: list[Run] = []
     clock, cut = float(rng.integers(60, 400)), 0.0
@@ -156,7 +157,7 @@ def severity(a: list[State], b: list[State], noise: Noise, channels: tuple[str, 
 
 def size(plan_: Plan, runs: list[Run], base: Truth, cause: Cause, ratio: float) -> float:
     """Amplitude at which the cause, put into `base`, reaches the ratio; clipped to what is physical."""
-    times = [_even(r, 60) for r in runs]
+    times = [even(r, 60) for r in runs]
     before = observe_all(runs, base, times)
     span = middle(runs)
     low, high = cause.bounds()
@@ -174,11 +175,17 @@ def size(plan_: Plan, runs: list[Run], base: Truth, cause: Cause, ratio: float) 
     return float(np.clip(a, low, high))
 
 
+def executed(plan_: Plan) -> tuple[list[Planned], list[Run]]:
+    """What a plan executes, before anything is wrong with it."""
+    rng = np.random.default_rng([plan_.seed if plan_.world is None else plan_.world, 5])
+    planned = plan(plan_.design, rng)
+    return planned, schedule(planned, rng)
+
+
 def make(plan_: Plan) -> Made:
     """Runs the machine: everything but noise and files."""
+    planned, runs = executed(plan_)
     rng = np.random.default_rng([plan_.seed, 7])
-    planned = plan(plan_.design, rng)
-    runs = schedule(planned, rng)
     base = small_errors(rng, plan_.nuisance)
     truth, listed = base, []
     span = middle(runs)
@@ -191,13 +198,14 @@ def make(plan_: Plan) -> Made:
         listed.append(
             {"effect": cause.effect, "target": cause.target, "ratio": ratio, "parameters": parameters}
         )
-    few = [_even(r, 40) for r in runs]
+    few = [even(r, 40) for r in runs]
     times = [_times(r, plan_, rng) for r in runs]
     states = observe_all(runs, truth, times)
     record = {
         "seed": plan_.seed,
         "design": plan_.design,
         "channels": plan_.channels,
+        "world": plan_.world,
         "causes": listed,
         "noise_rms_um": 1e3 * plan_.noise.tip_rms,
         "nuisance_rms_um": 1e3 * _rms(observe_all(runs, base, few), observe_all(runs, pure, few)),
@@ -223,7 +231,7 @@ def _rms(a: list[State], b: list[State]) -> float:
 
 def _times(run: Run, plan_: Plan, rng: np.random.Generator) -> np.ndarray:
     """Sample times: even, jittered, now and then a lost sample; quantised as they will be written."""
-    t = _even(run, plan_.samples)
+    t = even(run, plan_.samples)
     t += rng.normal(0, 0.06 * t[0], len(t))
     keep = rng.uniform(size=len(t)) > 0.005
     return np.unique(np.round(np.clip(t[keep], 0, run.timeline.log_end), 5))
@@ -277,12 +285,17 @@ def write_log(path: Path, names: list[str], values: np.ndarray, formats: list[st
             )
 
 
-def write(made: Made, plan_: Plan, folder: Path, config: Path) -> Path:
-    """Writes programs, logs, the machine file and experiment.yaml; returns the path of the latter."""
+def write(made: Made, plan_: Plan, folder: Path, config: Path | str) -> Path:
+    """Writes programs, logs and experiment.yaml; returns the path of the latter.
+
+    config: a machine file to copy into the folder, or text that experiment.yaml shall name instead.
+    """
     folder.mkdir(parents=True, exist_ok=True)
-    shutil.copyfile(config, folder / "machine.yaml")
+    if isinstance(config, Path):
+        shutil.copyfile(config, folder / "machine.yaml")
+        config = "machine.yaml"
     rng = np.random.default_rng([plan_.seed, 11])
-    lines = ["config:", "  - machine.yaml", "runs:"]
+    lines = ["config:", f"  - {config}", "runs:"]
     for i, (run, program, state) in enumerate(zip(made.runs, made.programs, made.states, strict=True), 1):
         (folder / f"program-{i}.nc").write_text(program)
         write_log(folder / f"log-{i}.csv", *table(state, plan_, rng))
@@ -303,7 +316,7 @@ def truth_json(made: Made, plan_: Plan) -> str:
 def rerun(made: Made, programs: list[str], cutting: bool = True) -> list[State]:
     """The same machine executes other programs (corrected ones); states at 500 even times, noise-free."""
     runs = [Run(Timeline(read(text)), cutting, made.runs[-1].started_s + 600.0) for text in programs]
-    times = [_even(r, 500) for r in runs]
+    times = [even(r, 500) for r in runs]
     return observe_all(runs, made.truth, times)
 
 

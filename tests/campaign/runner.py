@@ -1,0 +1,78 @@
+"""Makes experiments, asks camcomp through its command, scores the answers.  The truth never enters the folder it reads."""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+import time
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+from tests.campaign import absorb
+from tests.campaign.cases import Case
+from tests.campaign.score import score
+from tests.plants.experiments import make, write
+
+ROOT = Path(__file__).resolve().parents[2]
+CONFIG = ROOT / "config" / "orthoglide.yaml"
+
+
+def ask(experiment: Path, without: tuple[str, ...] = ()) -> dict[str, Any]:
+    """The result JSON of `camcomp diagnose`, run in this process; raises what the command raises."""
+    from click.testing import CliRunner
+
+    from camcomp.cli import main
+
+    answer = experiment.parent.parent / f"{experiment.parent.name}.json"
+    arguments = ["diagnose", str(experiment), "--json", str(answer)]
+    for effect in without:
+        arguments += ["--without", effect]
+    got = CliRunner().invoke(main, arguments)
+    if not answer.exists():
+        raise RuntimeError(f"exit {got.exit_code}: {got.output.strip()[-400:]} {got.exception!r}")
+    return json.loads(answer.read_text())
+
+
+def run_case(case: Case) -> dict[str, Any]:
+    """Makes, asks and scores one case."""
+    row: dict[str, Any] = {"name": case.name, "category": case.category, "ratio": case.ratio}
+    row |= {"design": case.plan.design, "channels": case.plan.channels}
+    with tempfile.TemporaryDirectory() as folder:
+        made = make(case.plan)
+        path = write(made, case.plan, Path(folder) / "experiment", CONFIG)
+        begin = time.perf_counter()
+        try:
+            result = ask(path, case.without)
+        except Exception as error:  # noqa: BLE001 - a crash is a result too: it is counted, not hidden
+            return row | {"failed": f"{type(error).__name__}: {error}"[:500]}
+        row["seconds"] = time.perf_counter() - begin
+    row |= score(result, made.record)
+    if case.category in ("foreign", "withheld"):
+        row["left"] = absorb.left(case.plan.causes[0], case.plan, case.without)
+    return row
+
+
+def run(cases: list[Case], results: Path, processes: int = 2) -> list[dict[str, Any]]:
+    """Runs the cases that `results` (JSON lines) does not hold yet and returns all rows."""
+    rows: dict[str, dict[str, Any]] = {}
+    if results.exists():
+        for line in results.read_text().splitlines():
+            row = json.loads(line)
+            rows[row["name"]] = row
+    todo = [c for c in cases if c.name not in rows]
+    os.environ.setdefault("NUMBA_NUM_THREADS", "1")
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    with (
+        results.open("a") as out,
+        ProcessPoolExecutor(processes, mp_context=get_context("spawn"), max_tasks_per_child=200) as pool,
+    ):
+        for future in as_completed([pool.submit(run_case, c) for c in todo]):
+            row = future.result()
+            rows[row["name"]] = row
+            out.write(json.dumps(row) + "\n")
+            out.flush()
+    wanted = {c.name for c in cases}
+    return [r for n, r in rows.items() if n in wanted]
