@@ -16,6 +16,7 @@ from camcomp.diagnostics import Location, PhysicsError
 from camcomp.gcode.program import Program
 from camcomp.gcode.rewrite import Output, Rewritten, rewrite
 from camcomp.job import Job
+from camcomp.posture import check_posture, whole_pose
 from camcomp.splitting import Nodes, divide, second_derivative, trial_nodes
 from camcomp.statics.solve import STATUS
 from camcomp.statics.target import Correction, correct, settle
@@ -76,7 +77,9 @@ class Compensated:
             over = np.flatnonzero((value < low) | (value > high))
             if len(over):
                 lines = ", ".join(str(n) for n in np.unique(self.lines[over])[:10])
-                out.append(("CC602", f"actuator {name} leaves its travel {low:g} to {high:g} at source lines {lines}"))
+                unit, k = ("deg", 180.0 / np.pi) if job.machine.revolute[a] else ("mm", 1.0)
+                span = f"{k * low:g} to {k * high:g} {unit}"
+                out.append(("CC602", f"actuator {name} leaves its travel {span} at source lines {lines}"))
         return out
 
 
@@ -325,5 +328,8 @@ def _assemble(
     joins = int(rows.joining.sum())
     if joins:
         warnings.append(f"{joins} joining lines where the cutting force jumps; they are not part of before and after")
-    return Compensated(program, written, rows, s, t, plain.nominal, after.state, plain.tip, plain.error, after.error,
+    target, force = job.frame.to_machine(rows.target), job.frame.vectors(rows.force)
+    warnings += check_posture(program, job, program.path.line[rows.motion], target, plain.nominal)
+    state = after.state if method == "linear" else whole_pose(job, rows.corrected, target, force, after.state)
+    return Compensated(program, written, rows, s, t, plain.nominal, state, plain.tip, plain.error, after.error,
                        iterations, method, warnings)  # fmt: skip

@@ -281,6 +281,12 @@ RULES: dict[str, Rule] = {
         "Under this load the elastic machine would buckle: the equilibrium exists, but it is not stable.",
         "reduce the load, or check the stiffness values",
     ),
+    "CC305": Rule(
+        "branch changes",
+        "An arm reaches most points in several postures. It keeps that of the start pose; between two end points of "
+        "the program the joints would have to change over to another one.",
+        "choose start angles nearer to the work, move the workpiece, or turn the tool about its axis (tool.turn_deg)",
+    ),
     # --- CC4xx logs, experiments -------------------------------------------------------------------------------
     # --- CC5xx input and output --------------------------------------------------------------------------------
     "CC500": Rule("file cannot be read", "The file is not there, or may not be read.", "check the path"),

@@ -54,7 +54,7 @@ def command(
     result = compensate(
         source, job, method=method or config.compensation.method, tolerance_um=tolerance, version=__version__
     )
-    figures = tables.summary(result)
+    figures = tables.summary(result, job)
     outputs: dict[str, bytes] = {}
     if output or not (joints or summary_file or paths):
         outputs[output or STANDARD] = result.written.data
@@ -79,9 +79,15 @@ def _tell(figures: dict) -> None:
         f"{figures['segments_in']} motions in, {figures['points']} end points out ({figures['method']})",
         f"tip error before: rms {before['rms_um']:.2f} um, max {before['max_um']:.2f} um",
         f"tip error after:  rms {after['rms_um']:.2f} um, max {after['max_um']:.2f} um",
-        f"largest change of an actuator {figures['actuator_change_max_mm']:.4f} mm",
-        f"largest drive force {figures['actuator_force_max_N']:.1f} N",
+        f"largest change of an actuator {_either(figures, 'actuator_change_max_mm', 'actuator_change_max_rad')}",
+        f"largest drive force {_either(figures, 'actuator_force_max_N', 'actuator_torque_max_Nmm')}",
         f"platform tilt left {figures['platform_tilt_max_mrad']:.2f} mrad",
     ]
     lines += [f"warning: {each}" for each in figures["warnings"]]
     print("\n".join(lines), file=sys.stderr)
+
+
+def _either(figures: dict, *keys: str) -> str:
+    """The figures that are not zero, in their own units; a machine may have slides, hinges or both."""
+    parts = [f"{figures[key]:.4g} {key.rsplit('_', 1)[1]}" for key in keys if figures.get(key)]
+    return " and ".join(parts) or "0"

@@ -63,18 +63,27 @@ def _csv(head: Sequence[str], line: np.ndarray, values: Floats) -> bytes:
     return text.replace("nan", "").encode("ascii")
 
 
-def summary(result: Compensated) -> dict:
+def summary(result: Compensated, job: Job) -> dict:
     """The figures of a run: see the README for their meaning."""
     change = np.abs(result.state.rho - result.nominal)[result.rows.corrected]
     force = np.abs(result.state.drive)[result.rows.corrected]
+    rotary = job.machine.revolute
+    sizes = {
+        "actuator_change_max_mm": _most(change[:, ~rotary]),
+        "actuator_force_max_N": _most(force[:, ~rotary]),
+    }
+    if rotary.any():
+        sizes |= {
+            "actuator_change_max_rad": _most(change[:, rotary]),
+            "actuator_torque_max_Nmm": _most(force[:, rotary]),
+        }
     return {
         "points": len(result.rows.piece),
         "segments_in": len(result.program.path),
         "lines_out": result.written.data.count(b"\n"),
         "before": _size(result.before),
         "after": _size(result.after),
-        "actuator_change_max_mm": _most(change),
-        "actuator_force_max_N": _most(force),
+        **sizes,
         "iterations_max": result.iterations,
         "method": result.method,
         "platform_tilt_max_mrad": 1e3 * _most(np.linalg.norm(result.state.tilt, axis=1)[result.rows.corrected]),

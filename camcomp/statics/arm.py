@@ -84,3 +84,33 @@ def dexterity(arm: Arm, q: Array) -> Array:
         return np.empty(0)
     sizes = np.linalg.svd(stacked, compute_uv=False)
     return sizes[:, -1] / sizes[:, 0]
+
+
+def follow(arm: Arm, q: Array, rotation: Array, start: Array, end: Array, step: float = 5.0) -> Array | None:
+    """Joint coordinates (m,) at `end` (3,) after walking straight from `start` (3,), where they are q, with the
+    platform kept at rotation (3, 3); None where the walk gets stuck. For arms with six joints.
+    """
+    q = np.array(q, float)
+    count = max(int(np.ceil(np.linalg.norm(end - start) / step)), 1)
+    for k in range(1, count + 1):
+        point = start + (end - start) * (k / count)
+        for _ in range(20):
+            R, p = end_pose(arm, q)
+            gap = np.concatenate((point - p, rotation_vector(rotation @ R.T)))
+            try:
+                move = np.linalg.solve(jacobian(arm, q), gap)
+            except np.linalg.LinAlgError:
+                return None
+            q += move * min(1.0, 0.3 / max(float(np.abs(move).max()), 1e-300))
+            if np.abs(move).max() < 1e-9:
+                break
+        else:
+            return None
+    return q
+
+
+def rotation_vector(R: Array) -> Array:
+    """Rotation vector (3,) rad of a rotation (3, 3) of less than half a turn."""
+    w = 0.5 * np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
+    s = float(np.linalg.norm(w))
+    return w if s < 1e-12 else w * (np.arctan2(s, 0.5 * (np.trace(R) - 1.0)) / s)

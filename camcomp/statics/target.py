@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camcomp.statics.machine import Machine
-from camcomp.statics.solve import FREE, HOLD, TARGET, State, solve
+from camcomp.statics.solve import FREE, HOLD, POSE, TARGET, State, solve
 
 Array = NDArray[np.float64]
 METHODS = ("newton", "stiffness", "fixed-point", "linear")
@@ -46,16 +46,17 @@ class Correction:
 
 
 def correct(
-    machine: Machine, aim: Array, force: Array, wrench: Array | None = None, method: str = "newton"
+    machine: Machine, aim: Array, force: Array, wrench: Array | None = None, method: str = "newton", *, pose: bool = False
 ) -> Correction:
     """Commanded tips t0F with F = f(t0 | t0F) at every point.
 
     aim (n, 3) mm programmed tips, force (n, 3) N at the tip, wrench (n, 6) at the platform reference; machine frame.
     method: newton = eq. (3), stiffness = eq. (4), fixed-point = eq. (5), linear = one step with the unloaded Cartesian
-    compliance (baseline, no iteration). Raises ValueError for an unknown method.
+    compliance (baseline, no iteration). pose (newton, machines with six actuators): the orientation is brought back
+    too, not only the tip. Raises ValueError for an unknown method.
     """
     if method == "newton":
-        state = solve(machine, TARGET, aim, force=force, wrench=wrench)
+        state = solve(machine, POSE if pose else TARGET, aim, force=force, wrench=wrench)
         return Correction.of(state, state.passes)
     if method in ("stiffness", "fixed-point"):
         return _iterate(machine, aim, force, wrench, method)
