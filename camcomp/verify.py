@@ -12,13 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from camcomp import pathgeometry
-from camcomp.compensate import Layout, refuse_unsolved, row_layout
 from camcomp.cutting.track import Track, lay_track
 from camcomp.datatypes import ARC, RAPID, Bools, Floats, Ints, Path
 from camcomp.diagnostics import CheckFailed
 from camcomp.gcode.program import Program
 from camcomp.gcode.stamp import is_stamped
 from camcomp.job import Job
+from camcomp.moves import Layout, refuse_unsolved, row_layout
 from camcomp.statics.target import correct, settle
 
 PER_SECTION = 4  # points looked at within each straight move or section of an arc

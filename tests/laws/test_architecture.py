@@ -19,7 +19,7 @@ GROUND = {
 }  # fmt: skip
 ENGINES = {"gcode", "statics", "cutting", "gap"}
 SHELVES = {"robots", "dialects", "forces", "effects"}
-JOINTS = {"bench", "course", "job", "splitting", "twin"}
+JOINTS = {"bench", "course", "job", "moves", "splitting", "twin"}
 STORIES = {"compensate", "verify", "simulate", "diagnose"}
 FLOORS = (GROUND, ENGINES, JOINTS, STORIES)  # and the doors above
 APART = (ENGINES, STORIES)  # rooms of these floors do not import each other

@@ -1,0 +1,70 @@
+"""What the moves of a corrected program are: which pieces are corrected, where joining lines stand, what cannot be done.
+
+Shared by the stories that write corrected programs and that check them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from camcomp.cutting.track import Track
+from camcomp.datatypes import RAPID, Bools, Floats, Ints, Path
+from camcomp.diagnostics import Location, PhysicsError, raise_all
+from camcomp.gcode.program import Program
+from camcomp.statics.solve import STATUS
+
+RULES = {2: "CC301", 3: "CC302", 4: "CC303", 5: "CC304"}
+MOST_ERRORS = 20
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """Which pieces (p,) are corrected, and which get a joining line in front of or behind them."""
+
+    corrected: Bools
+    leading: Bools
+    trailing: Bools
+
+
+def row_layout(path: Path, track: Track) -> Layout:
+    """Corrected pieces and joining lines of a track.
+
+    A joining line stands in front of the piece behind the jump; in front of a rapid or an uncorrected move it stands
+    behind the cut instead, because only feed lines can join.
+    """
+    corrected = path.known[track.motion] & ~path.machine[track.motion]
+    feed = corrected & (path.kind[track.motion] != RAPID)
+    wanted = track.jump & np.concatenate(([False], corrected[:-1]))
+    leading = wanted & feed
+    trailing = np.concatenate((wanted[1:] & ~leading[1:], [False])) & feed
+    return Layout(corrected, leading, trailing)
+
+
+def refuse_unsolved(program: Program, track: Track, piece: Ints, target: Floats, status: Ints) -> None:
+    """Raises PhysicsError for every source line with a point that could not be solved."""
+    bad = np.flatnonzero(status != 0)
+    errors: list[PhysicsError] = []
+    seen: set[int] = set()
+    for i in bad:
+        line = int(program.path.line[track.motion[piece[i]]])
+        if line in seen:
+            continue
+        seen.add(line)
+        code = int(status[i])
+        x, y, z = target[i]
+        text = f"{STATUS.get(code, 'no solution')} at X{x:.4f} Y{y:.4f} Z{z:.4f} (program frame, mm)"
+        errors.append(PhysicsError(RULES.get(code, "CC301"), text, at=_place(program, int(track.motion[piece[i]]))))
+        if len(errors) == MOST_ERRORS:
+            break
+    raise_all(errors)
+
+
+def _place(program: Program, motion: int) -> Location:
+    """Where a motion stands in the text: its first axis word."""
+    row = int(program.sites.row[motion])
+    words = program.sites.begin[motion, :3]
+    words = words[words >= 0]
+    column = int(words.min() - program.text.starts[row]) if len(words) else 0
+    return program.text.place(row, max(column, 0))
