@@ -122,6 +122,33 @@ def test_one_mistake_is_one_error_at_its_place(tmp_path, case):
     assert error.at.source == lines[error.at.line - 1].replace("LINK", BEAM)
 
 
+def test_actuators_are_named_apart_and_there_is_one(tmp_path):
+    slide = "{type: actuator, joint: prismatic, axis: x}"
+    text = "robot:\n  name: a\n  chains:\n    x: {elements: [%s]}"
+    assert "two actuators of chain 'x'" in refused(tmp_path, text % f"{slide}, {slide}")[0].message
+    assert "no chain has an actuator" in refused(tmp_path, text % "{type: transform}")[0].message
+
+
+def test_every_missing_key_of_a_mapping_is_told(tmp_path):
+    errors = refused(
+        tmp_path, MACHINE.replace("LINK", "beam: {nu: 0.3, section: {type: round, diameter_mm: 1}}")
+    )
+    keys = [each.message.rsplit(" ", 1)[1] for each in errors if each.at.line == 8]
+    assert keys == ["'length_mm'", "'E_N_per_mm2'"]
+
+
+def test_a_unit_is_missed_even_where_the_key_looks_otherwise_unlike(tmp_path):
+    errors = refused(tmp_path, MACHINE.replace("LINK", BEAM.replace("E_N_per_mm2", "E")))
+    assert [each.rule for each in errors] == ["CC202", "CC202"]
+
+
+def test_keys_that_are_numbers_have_places_too(tmp_path):
+    error = refused(
+        tmp_path, MACHINE.replace("LINK", BEAM) + "control:\n  tool_lengths_mm:\n    1: 5\n    2: x\n"
+    )[0]
+    assert (error.rule, error.at.source) == ("CC204", "    2: x")
+
+
 def test_hints_say_what_was_meant(tmp_path):
     text = MACHINE.replace("LINK", BEAM)
     assert "write home_mm" in refused(tmp_path, text.replace("home_mm", "home"))[0].hint

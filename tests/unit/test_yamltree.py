@@ -73,6 +73,12 @@ def test_positions_of_keys_and_values():
     assert find(tree, ("a", "tag", 0, "zzz")).at.line == 2
 
 
+def test_a_byte_order_mark_shifts_nothing():
+    tree, _ = read_tree(b"\xef\xbb\xbfa: 1\n", "a.yaml")
+    assert find(tree, ("a",)).at.column == 4
+    assert find(tree, ("a",)).at.source == "a: 1"
+
+
 def test_a_missing_value_stands_where_its_key_is():
     tree, _ = read_tree(b"a:\n\n\nb: 1\n", "a.yaml")
     assert find(tree, ("a",)).at.line == 1
