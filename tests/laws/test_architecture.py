@@ -19,7 +19,9 @@ GROUND = {
 }  # fmt: skip
 ENGINES = {"gcode", "statics", "cutting", "gap"}
 SHELVES = {"robots", "dialects", "forces", "effects"}
-JOINTS = {"bench", "course", "job", "moves", "splitting", "twin"}
+JOINTS = {
+    "bench", "columns", "course", "inquiry", "job", "moves", "posture", "splitting", "survey", "twin",
+}  # fmt: skip
 STORIES = {"compensate", "verify", "simulate", "diagnose"}
 FLOORS = (GROUND, ENGINES, JOINTS, STORIES)  # and the doors above
 APART = (ENGINES, STORIES)  # rooms of these floors do not import each other
