@@ -10,15 +10,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from camcomp.datatypes import Floats, Ints
+from camcomp.datatypes import Bools, Floats, Ints
 from camcomp.diagnostics import PhysicsError
 from camcomp.gcode.program import Program
 from camcomp.job import Job
-from camcomp.statics.arm import Arm, arm_of, dexterity, follow
+from camcomp.statics.arm import NEAR_SINGULAR, Arm, arm_of, dexterity, follow
 from camcomp.statics.target import Correction, correct
 
 SINGULAR = 1e-4  # dexterity: drives turn 10 000 times as far as the tip needs
-NEAR_SINGULAR = 0.02  # an upright wrist reaches it when it is bent by about 5 deg
 LARGE_TURN = 0.3  # rad between two end points: worth a closer look
 
 
@@ -39,10 +38,8 @@ def check_posture(program: Program, job: Job, line: Ints, tip: Floats, rho: Floa
         return []
     lines = ", ".join(str(n) for n in near[:10]) + (" ..." if len(near) > 10 else "")
     worst = int(np.argmin(room))
-    return [
-        f"near a singular configuration at source lines {lines}: nearest at line {line[worst]}, "
-        f"dexterity {room[worst]:.4f}; drives move fast and errors of the drives grow there"
-    ]
+    text = f"near a singular configuration at source lines {lines}: nearest at line {line[worst]}, "
+    return [text + f"dexterity {room[worst]:.4f}; drives move fast there, and their errors grow"]
 
 
 def _flips(job: Job, arm: Arm, line: Ints, tip: Floats, rho: Floats) -> Ints:
@@ -66,7 +63,7 @@ def _refuse(program: Program, rule: str, text: str, lines: Ints) -> None:
     raise first
 
 
-def whole_pose(job: Job, on: Floats, target: Floats, force: Floats, state: Correction) -> Correction:
+def whole_pose(job: Job, on: Bools, target: Floats, force: Floats, state: Correction) -> Correction:
     """The state with joint commands that bring tip and orientation to the target, for machines with six actuators.
 
     Words X Y Z can carry the correction of the tip only, and leave the platform tilted under load; the joint table can

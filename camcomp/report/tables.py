@@ -12,6 +12,7 @@ from camcomp.job import Job
 
 CHUNK = 20_000
 DECIMALS = 6
+DECIMALS_RAD = 9  # 2 m of reach make 2 nm of it
 
 
 def actuator_columns(job: Job) -> tuple[list[str], list[str], list[str]]:
@@ -54,12 +55,15 @@ def paths_csv(result: Compensated, trajectories: Trajectories) -> bytes:
 def _csv(head: Sequence[str], line: np.ndarray, values: Floats) -> bytes:
     """A table whose first column is the source line. Values that do not exist stand as empty cells."""
     values = values + 0.0  # no minus zero
-    row = "%d" + f",%.{DECIMALS}f" * values.shape[1] + "\n"
+    decimals = [DECIMALS_RAD if name.endswith("_rad") else DECIMALS for name in head[1:]]
+    row = "%d" + "".join(f",%.{each}f" for each in decimals) + "\n"
     parts = [",".join(head) + "\n"]
     for a in range(0, len(line), CHUNK):
         block = np.column_stack((line[a : a + CHUNK], values[a : a + CHUNK]))
         parts.append((row * len(block)) % tuple(block.ravel().tolist()))
-    text = "".join(parts).replace("-0.000000,", "0.000000,").replace("-0.000000\n", "0.000000\n")
+    text = "".join(parts)
+    for zero in sorted({f"{0.0:.{each}f}" for each in decimals}):
+        text = text.replace(f"-{zero},", f"{zero},").replace(f"-{zero}\n", f"{zero}\n")
     return text.replace("nan", "").encode("ascii")
 
 

@@ -14,6 +14,7 @@ from camcomp.statics.description import Actuator, Chain, Parallelogram, Passive,
 from camcomp.statics.rotation import exp_rotation
 
 Array = NDArray[np.float64]
+NEAR_SINGULAR = 0.02  # dexterity; an upright wrist reaches it when it is bent by about 5 deg
 LENGTH = 1000.0  # mm, scales rotations against translations: about the reach of an arm
 
 

@@ -12,7 +12,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from camcomp.statics.arm import NEAR_SINGULAR, arm_of, dexterity
 from camcomp.statics.machine import Machine
+from camcomp.statics.point import MAX_ITERATIONS, SINGULAR
 from camcomp.statics.solve import FREE, HOLD, POSE, TARGET, State, solve
 
 Array = NDArray[np.float64]
@@ -38,7 +40,7 @@ class Correction:
     iterations: NDArray[np.int64]
 
     @staticmethod
-    def of(state: State, iterations: NDArray[np.int64]) -> "Correction":
+    def of(state: State, iterations: NDArray[np.int64]) -> Correction:
         """The part of a solver state that a correction is."""
         return Correction(
             state.commanded, state.rho_nominal, state.rho, state.drive, state.tilt, state.status, iterations
@@ -57,13 +59,24 @@ def correct(
     """
     if method == "newton":
         state = solve(machine, POSE if pose else TARGET, aim, force=force, wrench=wrench)
-        return Correction.of(state, state.passes)
+        return Correction.of(replace(state, status=_why(machine, state)), state.passes)
     if method in ("stiffness", "fixed-point"):
         return _iterate(machine, aim, force, wrench, method)
     if method == "linear":
         commanded = aim - np.einsum("nij,nj->ni", tip_compliance(machine, aim), force)
         return settle(machine, commanded, force, wrench, aim)[1]
     raise ValueError(f"method '{method}' is none of {', '.join(METHODS)}")
+
+
+def _why(machine: Machine, state: State) -> NDArray[np.int64]:
+    """Status (n,), where an arm that did not converge near a singular configuration is called singular."""
+    stuck = np.flatnonzero(state.status == MAX_ITERATIONS)
+    arm = arm_of(machine.nominal) if len(stuck) else None
+    if arm is None:
+        return state.status
+    status = state.status.copy()
+    status[stuck[dexterity(arm, state.rho_nominal[stuck]) < NEAR_SINGULAR]] = SINGULAR
+    return status
 
 
 def settle(
