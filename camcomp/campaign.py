@@ -43,10 +43,7 @@ def twin_of(config: Config) -> Twin:
     """The forward model of a config, its `effects:` included."""
     job = Job(config)
     machine = job.machine
-    causes = tuple(
-        Cause(each.effect, shelf.load("effects", each.effect), each.target, dict(each.values)) for each in config.effects
-    )
-    return Twin(machine.robot, machine.nominal, job.frame.origin, job.frame.rotation, causes)
+    return Twin(machine.robot, machine.nominal, job.frame.origin, job.frame.rotation, job.causes)
 
 
 def open_campaign(path: str | FilePath) -> Campaign:

@@ -6,7 +6,7 @@ bends, solve again at the division points, write, and put the written program th
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -17,10 +17,13 @@ from camcomp.gcode.rewrite import Output, Rewritten, rewrite
 from camcomp.job import Job
 from camcomp.moves import refuse_unsolved, row_layout
 from camcomp.posture import check_posture, whole_pose
+from camcomp.response import Travel, aim_at, respond
 from camcomp.splitting import Nodes, divide, second_derivative, trial_nodes
-from camcomp.statics.target import Correction, correct, settle
+from camcomp.statics.target import Correction, settle
 
 MAX_ROUNDS = 6
+RAPID_FEED = 10_000.0  # mm/min, for the time that rapids take
+COARSE_MM, FINE_MM = 8.0, 0.5  # distance of trial points on straight lines, without and with effects
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +72,7 @@ class Compensated:
         worst = float(np.nanmax(size)) if len(size) else 0.0
         if not worst <= tolerance_um * (1.0 + 1e-9):
             out.append(("CC601", f"{worst:.3f} um are left, more than the tolerance of {tolerance_um:g} um"))
-        for a, name in enumerate(job.machine.actuators):
+        for a, name in enumerate(job.real_machine.actuators):
             low, high = job.machine.limits[a]
             value = self.state.rho[:, a]
             over = np.flatnonzero((value < low) | (value > high))
@@ -93,7 +96,7 @@ def trajectories(result: Compensated, job: Job) -> Trajectories:
     """The trajectories of the original program that a compensation does not need itself."""
     target = job.frame.to_machine(result.rows.target)
     force = job.frame.vectors(result.rows.force)
-    alone, _ = settle(job.machine, target, np.zeros_like(force))
+    alone, _ = settle(job.real_machine, target, np.zeros_like(force))
     loaded, _ = settle(job.perfect_machine, target, force)
     return Trajectories(job.frame.to_program(alone), job.frame.to_program(loaded))
 
@@ -109,7 +112,8 @@ def compensate(program: Program, job: Job, *, method: str, tolerance_um: float, 
     tolerance = np.full(len(track.motion), budget)
 
     angle = np.where(np.isnan(path.angle), 0.0, path.angle)[track.motion] * (track.u1 - track.u0)
-    trial = trial_nodes(track.length, angle, feeding & (track.length > 0.0))
+    spacing = FINE_MM if job.causes else COARSE_MM  # a screw's error has waves of a few mm
+    trial = trial_nodes(track.length, angle, feeding & (track.length > 0.0), spacing)
     aimed = _aim(program, job, track, trial, corrected, method)
     bend = second_derivative(trial, aimed.commanded)
     for _ in range(MAX_ROUNDS):
@@ -117,15 +121,20 @@ def compensate(program: Program, job: Job, *, method: str, tolerance_um: float, 
         solved = _aim(program, job, track, nodes, corrected, method)
         rows = _rows(program, job, track, nodes, solved.commanded + shift, corrected)
         written = rewrite(program, _output(rows), resolution_mm=resolution, version=version)
-        after = _check(job, track, rows, written, feeding)
+        points = _points(job, track, rows, feeding)
+        after = _see(job, points, written.end)
+        turning = _takes_up_play(job, points, after.state.rho)
+        points = replace(points, judged=points.judged & ~turning)
         worst = np.zeros(len(tolerance))
-        np.maximum.at(worst, after.piece, np.linalg.norm(after.error, axis=1))
+        np.maximum.at(worst, points.piece[points.judged], np.linalg.norm(after.error[points.judged], axis=1))
         missed = worst > 1e-3 * tolerance_um
         if not missed.any():
             break
         tolerance = np.where(missed, tolerance * np.clip(0.9e-3 * tolerance_um / worst, 0.3, 0.9), tolerance)
-    plain = _before(job, track, rows, after)
-    return _assemble(program, job, track, rows, written, plain, after, int(aimed.iterations.max(initial=0)), method)
+    before = _see_original(job, points)
+    warnings = _warnings(rows, after.error, turning)
+    iterations = int(aimed.iterations.max(initial=0))
+    return _assemble(program, job, track, rows, written, points, before, after, iterations, method, warnings)
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,15 +143,27 @@ class _Aimed:
     iterations: Ints
 
 
+def _travel(job: Job, track: Track, piece: Ints, w: Floats) -> Travel:
+    """Force and time of points in the order of travel. Rapids go at RAPID_FEED where the time matters."""
+    feed = track.path.feed[track.motion]
+    feed = np.where(np.isnan(feed), job.config.process.feed_mm_per_min or np.nan, feed)
+    rapid = (track.path.kind[track.motion] == RAPID) | ~(feed > 0.0)
+    minutes = track.length / np.where(rapid, RAPID_FEED, feed)
+    start = np.cumsum(minutes) - minutes
+    cut = minutes * track.cutting
+    worn = np.cumsum(cut) - cut
+    force = job.frame.vectors(track.force(piece, w))
+    return Travel(force, 60.0 * (start[piece] + w * minutes[piece]), worn[piece] + w * cut[piece])
+
+
 def _aim(program: Program, job: Job, track: Track, nodes: Nodes, corrected: Bools, method: str) -> _Aimed:
     """Modified targets at nodes, program frame; nodes of uncorrected pieces stay as programmed."""
     target = track.points(nodes.piece, nodes.w)
     on = corrected[nodes.piece]
-    force = job.frame.vectors(track.force(nodes.piece[on], nodes.w[on]))
-    result = correct(job.machine, job.frame.to_machine(target[on]), force, method=method)
+    result = aim_at(job, target[on], _travel(job, track, nodes.piece[on], nodes.w[on]), method)
     refuse_unsolved(program, track, nodes.piece[on], target[on], result.status)
     out = target.copy()
-    out[on] = job.frame.to_program(result.commanded)
+    out[on] = result.commanded
     iterations = np.zeros(len(target), np.int64)
     iterations[on] = result.iterations
     return _Aimed(out, iterations)
@@ -163,9 +184,10 @@ def _rows(program: Program, job: Job, track: Track, nodes: Nodes, commanded: Flo
     joining = np.concatenate(((k == 0)[keep], np.ones(len(extra), np.bool_)))
     free = track.points(extra, np.ones(len(extra)))
     if len(extra):  # behind the cut, without its force
-        result = correct(job.machine, job.frame.to_machine(free), np.zeros((len(extra), 3)))
+        unloaded = replace(_travel(job, track, extra, np.ones(len(extra))), force=np.zeros((len(extra), 3)))
+        result = aim_at(job, free, unloaded, "newton")
         refuse_unsolved(program, track, extra, free, result.status)
-        free = job.frame.to_program(result.commanded)
+        free = result.commanded
     end = np.concatenate((commanded[keep], free))
     order = np.lexsort((joining & (w > 0.0), w, piece))
     piece, w, joining, end = piece[order], w[order], joining[order], end[order]
@@ -208,58 +230,93 @@ def _output(rows: Rows) -> Output:
 
 
 @dataclass(frozen=True, eq=False)
-class _Checked:
-    """Errors along the feed motions of the corrected program, and its loaded end points."""
+class _Points:
+    """Where a corrected program is looked at, in the order of travel: its end points and the middles of its lines."""
 
-    piece: Ints  # (k,)
+    row: Ints  # (k,) end point that the point belongs to
+    end: Bools  # (k,) it is that end point; otherwise the middle of the line before it
+    piece: Ints
     w: Floats
-    error: Floats  # (k, 3) mm, program frame
-    state: Correction  # at the end points
+    target: Floats  # (k, 3) mm programmed tip
+    travel: Travel
+    judged: Bools  # (k,) counted in before and after: feed motions, no joining lines
+
+    def along(self, ends: Floats) -> Floats:
+        """Points (k, 3) of the straight lines between end points (N, 3)."""
+        start = np.concatenate((ends[:1], ends[:-1]))
+        return np.where(self.end[:, None], ends[self.row], 0.5 * (start + ends)[self.row])
 
 
-def _check(job: Job, track: Track, rows: Rows, written: Rewritten, feeding: Bools) -> _Checked:
-    """Puts the program as written through the full model: its end points, and the middles of its straight lines."""
-    tip, state = settle(job.machine, job.frame.to_machine(written.end), job.frame.vectors(rows.force))
-    error = job.frame.to_program(tip) - rows.target
+def _points(job: Job, track: Track, rows: Rows, feeding: Bools) -> _Points:
+    n = len(rows.piece)
     cut = feeding[rows.piece] & ~rows.joining
-    previous = np.concatenate(([False], rows.piece[1:] == rows.piece[:-1])) & cut
-    inner = np.flatnonzero(cut)
-    start_w = np.where(previous, np.concatenate(([0.0], rows.w[:-1])), 0.0)[inner]
-    middle_w = 0.5 * (start_w + rows.w[inner])
-    piece = rows.piece[inner]
-    start = np.concatenate((written.end[:1], written.end[:-1]))[inner]
-    middle = 0.5 * (start + written.end[inner])
-    moving = track.length[piece] > 0.0
-    force = track.force(piece[moving], middle_w[moving])
-    middle_tip, _ = settle(job.machine, job.frame.to_machine(middle[moving]), job.frame.vectors(force))
-    between = job.frame.to_program(middle_tip) - track.points(piece[moving], middle_w[moving])
-    return _Checked(
-        np.concatenate((piece, piece[moving])),
-        np.concatenate((rows.w[inner], middle_w[moving])),
-        np.concatenate((error[inner], between)),
-        state,
-    )
+    begins = np.concatenate(([True], rows.piece[1:] != rows.piece[:-1])) | np.concatenate(([True], rows.joining[:-1]))
+    start = np.where(begins, 0.0, np.concatenate(([0.0], rows.w[:-1])))
+    inner = np.flatnonzero(cut & (track.length[rows.piece] > 0.0))
+    row = np.concatenate((np.arange(n), inner))
+    end = np.concatenate((np.ones(n, np.bool_), np.zeros(len(inner), np.bool_)))
+    order = np.lexsort((end, row))
+    row, end = row[order], end[order]
+    piece = rows.piece[row]
+    w = np.where(end, rows.w[row], 0.5 * (start + rows.w)[row])
+    travel = _travel(job, track, piece, w)
+    force = np.where(end[:, None], job.frame.vectors(rows.force)[row], travel.force)  # joining lines know better
+    return _Points(row, end, piece, w, track.points(piece, w), replace(travel, force=force), cut[row])
 
 
 @dataclass(frozen=True, eq=False)
-class _Plain:
-    nominal: Floats  # (N, m)
-    tip: Floats  # (N, 3) program frame
-    error: Floats  # (k, 3)
+class _Seen:
+    """A program put through the full model: errors (k, 3) mm at the points, tips (N, 3) and states at the end points."""
+
+    error: Floats
+    tip: Floats
+    state: Correction
 
 
-def _before(job: Job, track: Track, rows: Rows, after: _Checked) -> _Plain:
-    """The original program through the full model, at the end points and where the corrected one was checked."""
-    tip, state = settle(job.machine, job.frame.to_machine(rows.target), job.frame.vectors(rows.force))
-    target = track.points(after.piece, after.w)
-    force = job.frame.vectors(track.force(after.piece, after.w))
-    cut_tip, _ = settle(job.machine, job.frame.to_machine(target), force)
-    return _Plain(state.rho_nominal, job.frame.to_program(tip), job.frame.to_program(cut_tip) - target)
+def _see(job: Job, points: _Points, ends: Floats) -> _Seen:
+    """The loaded machine along straight lines between commanded end points (N, 3), program frame."""
+    told = points.along(ends)
+    tip, state = respond(job, told, points.travel, points.target)
+    at = {each.name: getattr(state, each.name)[points.end] for each in fields(state)}
+    return _Seen(tip - points.target, tip[points.end], Correction(**at))
+
+
+def _see_original(job: Job, points: _Points) -> _Seen:
+    """The original program through the full model, at the same points."""
+    tip, state = respond(job, points.target, points.travel)
+    at = {each.name: getattr(state, each.name)[points.end] for each in fields(state)}
+    return _Seen(tip - points.target, tip[points.end], Correction(**at))
+
+
+def _takes_up_play(job: Job, points: _Points, rho: Floats) -> Bools:
+    """Points (k,) of lines in which an actuator turns round: the play or wind-up of its drive is taken up in them."""
+    if not any(cause.hook("on_drive") for cause in job.causes):
+        return np.zeros(len(points.row), np.bool_)
+    way = np.sign(np.diff(rho, axis=0, prepend=rho[:1]))
+    for k in range(1, len(way)):  # standing still keeps the direction
+        way[k] = np.where(way[k] == 0.0, way[k - 1], way[k])
+    turns = np.concatenate((np.zeros((1, way.shape[1]), np.bool_), way[1:] * way[:-1] < 0.0)).any(axis=1)
+    turns |= np.concatenate((turns[1:], [False]))  # rho turns at an end point: the line before has the peak in it
+    return turns[points.row]
+
+
+def _warnings(rows: Rows, error: Floats, turning: Bools) -> list[str]:
+    out = []
+    joins = int(rows.joining.sum())
+    if joins:
+        out.append(f"{joins} joining lines where the cutting force jumps; they are not part of before and after")
+    if turning.any():
+        most = 1e3 * float(np.nanmax(np.linalg.norm(error[turning], axis=1)))
+        out.append(
+            f"{int(turning.sum())} points lie in lines in which a drive turns round and takes up its play; up to "
+            f"{most:.2f} um are left there, and they are not part of before and after"
+        )
+    return out
 
 
 def _assemble(
-    program: Program, job: Job, track: Track, rows: Rows, written: Rewritten, plain: _Plain, after: _Checked,
-    iterations: int, method: str,
+    program: Program, job: Job, track: Track, rows: Rows, written: Rewritten, points: _Points, before: _Seen,
+    after: _Seen, iterations: int, method: str, warnings: list[str],
 ) -> Compensated:  # fmt: skip
     s = track.s0[rows.piece] + rows.w * track.length[rows.piece]
     feed = program.path.feed[rows.motion]
@@ -268,12 +325,10 @@ def _assemble(
     step = np.diff(s, prepend=0.0)
     moving = (rows.kind != RAPID) & (speed > 0.0)
     t = np.cumsum(np.where(moving, step / np.where(moving, speed, 1.0) * 60.0, 0.0))
-    warnings = list(program.warnings)
-    joins = int(rows.joining.sum())
-    if joins:
-        warnings.append(f"{joins} joining lines where the cutting force jumps; they are not part of before and after")
+    nominal = before.state.rho_nominal
     target, force = job.frame.to_machine(rows.target), job.frame.vectors(rows.force)
-    warnings += check_posture(program, job, program.path.line[rows.motion], target, plain.nominal)
+    warnings = [*program.warnings, *warnings]
+    warnings += check_posture(program, job, program.path.line[rows.motion], target, nominal)
     state = after.state if method == "linear" else whole_pose(job, rows.corrected, target, force, after.state)
-    return Compensated(program, written, rows, s, t, plain.nominal, state, plain.tip, plain.error, after.error,
-                       iterations, method, warnings)  # fmt: skip
+    return Compensated(program, written, rows, s, t, nominal, state, before.tip, before.error[points.judged],
+                       after.error[points.judged], iterations, method, warnings)  # fmt: skip

@@ -14,6 +14,7 @@ from camcomp.cutting.cut import Cut
 from camcomp.cutting.track import Conditions
 from camcomp.datatypes import Floats
 from camcomp.diagnostics import ConfigError
+from camcomp.gap.effect import Cause
 from camcomp.spec import Config
 from camcomp.statics.build import build_robot, held_orientation, rotation_of
 from camcomp.statics.description import Robot
@@ -60,6 +61,24 @@ class Job:
     def perfect_machine(self) -> Machine:
         """The same machine with perfect chains."""
         return self._build(self._robots[1], self._robots[1])
+
+    @cached_property
+    def causes(self) -> tuple[Cause, ...]:
+        """The effects of the config, in its order."""
+        return tuple(
+            Cause(each.effect, shelf.load("effects", each.effect), each.target, dict(each.values))
+            for each in self.config.effects
+        )
+
+    @cached_property
+    def real_machine(self) -> Machine:
+        """The machine with its chain errors and with what the effects of the config change in it."""
+        robot, nominal = self._robots
+        names = tuple(each.name for each in robot.actuators)
+        for cause in self.causes:
+            if (hook := cause.hook("on_robot")) is not None:
+                robot = hook(robot, cause.aimed(names), cause.values)
+        return self.machine if robot is self._robots[0] else self._build(robot, nominal)
 
     @cached_property
     def _robots(self) -> tuple[Robot, Robot]:

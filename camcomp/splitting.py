@@ -27,9 +27,10 @@ class Nodes:
     first: Ints
 
 
-def trial_nodes(length: Floats, angle: Floats, divide: np.ndarray) -> Nodes:
-    """At least three nodes where `divide`, one every 8 mm of length (p,) or 15 degrees of arc (p,); two elsewhere."""
-    count = np.where(divide, 3 + np.ceil(length / 8.0) * (length > 2.0) + np.ceil(np.abs(angle) / 0.26), 2)
+def trial_nodes(length: Floats, angle: Floats, divide: np.ndarray, spacing: float = 8.0) -> Nodes:
+    """At least three nodes where `divide`, one every `spacing` mm of length (p,) and 15 degrees of arc (p,); two elsewhere."""
+    along = np.ceil(length / spacing) * (length > 0.25 * spacing)
+    count = np.where(divide, 3 + along + np.ceil(np.abs(angle) / 0.26), 2)
     return _spread(count.astype(np.int64))
 
 

@@ -96,6 +96,9 @@ def solve(
     start_tip = machine.nominal.start_reference + start_R @ tool
     aim = near if aim is None else np.ascontiguousarray(aim, float)
     R_aim = _per_point(machine.nominal.held_rotation if aim_rotation is None else aim_rotation, n, (3, 3))
+    # the control aims with the tool it knows; the kernels have one tool, the real one
+    longer = tool - machine.nominal.tool
+    near = near + R_aim @ longer
     f = _per_point(force, n, (3,))
     w = _per_point(wrench, n, (6,))
     r = np.zeros((n, m)) if rho is None else np.array(rho, float).reshape(n, m)
@@ -115,6 +118,7 @@ def solve(
         )  # fmt: skip
 
     _in_pieces(work, n)
+    commanded = commanded - R_cmd @ longer
     bad = status != point.OK
     for a in (tip, drive, commanded, r):
         a[bad] = np.nan

@@ -20,7 +20,7 @@ GROUND = {
 ENGINES = {"gcode", "statics", "cutting", "gap"}
 SHELVES = {"robots", "dialects", "forces", "effects"}
 JOINTS = {
-    "bench", "columns", "course", "inquiry", "job", "moves", "posture", "splitting", "survey", "twin",
+    "bench", "columns", "course", "inquiry", "job", "moves", "posture", "response", "splitting", "survey", "twin",
 }  # fmt: skip
 STORIES = {"compensate", "verify", "simulate", "diagnose"}
 FLOORS = (GROUND, ENGINES, JOINTS, STORIES)  # and the doors above

@@ -1,0 +1,111 @@
+"""What the whole machine does with commanded tips: control, drives, loaded structure, tool, workpiece.
+
+Without effects in the config this is the loaded equilibrium alone. With effects the same hooks act in the same order as
+in the twin, on a sequence of points in the order of travel; their correction is found by seed eq. (5) on top of the
+exact solution of the structure. Effects of the sensors change no part and are left out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from camcomp.datatypes import Floats
+from camcomp.gap.effect import Load, Motion
+from camcomp.gap.memory import direction
+from camcomp.job import Job
+from camcomp.statics.solve import FREE, solve
+from camcomp.statics.target import Correction, correct, settle
+
+SETTLED_MM = 2e-6  # the correction of effects ends here
+MAX_STEPS = 12
+
+
+@dataclass(frozen=True, eq=False)
+class Travel:
+    """n points in the order of travel: force (n, 3) N of the cut in the machine frame, when, and after how much cutting."""
+
+    force: Floats
+    time: Floats  # (n,) s
+    cut_min: Floats  # (n,) minutes
+
+    def take(self, rows: np.ndarray) -> Travel:
+        """Some of the points, still in order."""
+        return Travel(self.force[rows], self.time[rows], self.cut_min[rows])
+
+
+def respond(job: Job, commanded: Floats, travel: Travel, nominal_of: Floats | None = None) -> tuple[Floats, Correction]:
+    """Loaded tips (n, 3) of commanded tips (n, 3), both in the program frame, and the states of the machine.
+
+    nominal_of (n, 3): tips whose inverse kinematics go into rho_nominal of the states; the commanded ones by default.
+    """
+    told = job.frame.to_machine(commanded)
+    aim = None if nominal_of is None else job.frame.to_machine(nominal_of)
+    if not job.causes:
+        tip, state = settle(job.real_machine, told, travel.force, None, aim)
+        return job.frame.to_program(tip), state
+    control = solve(job.real_machine, FREE, told, check=False)
+    motion = _motion(job, control.rho_nominal, travel)
+    error = np.zeros_like(motion.encoder)
+    load = _load(job, motion, travel.force)
+    for cause in job.causes:
+        if (hook := cause.hook("on_drive")) is not None:
+            error = hook(error, motion, cause.which(job.real_machine.actuators), cause.values)
+    carriage = motion.encoder + error
+    state = solve(job.real_machine, FREE, told, force=load.force, wrench=load.wrench, rho=carriage)
+    drive, tip = state.drive, state.tip
+    for cause in job.causes:
+        if (hook := cause.hook("on_drive_force")) is not None:
+            drive = drive + hook(np.zeros_like(drive), motion, cause.which(job.real_machine.actuators), cause.values)
+        if (hook := cause.hook("on_pose")) is not None:
+            tip = hook(tip, load, motion, cause.values)
+    tip = job.frame.to_program(tip)
+    for cause in job.causes:
+        if (hook := cause.hook("on_workpiece")) is not None:
+            tip = hook(tip, cause.values)
+    nominal = control.rho_nominal if aim is None else solve(job.real_machine, FREE, aim, check=False).rho_nominal
+    state = replace(state, commanded=told, rho=control.rho_nominal, rho_nominal=nominal, drive=drive)
+    return tip, Correction.of(state, state.passes)
+
+
+def aim_at(job: Job, target: Floats, travel: Travel, method: str) -> Correction:
+    """Commands that bring the loaded tips to the targets (n, 3); `commanded` of the result is in the program frame."""
+    load = Load(travel.force, np.zeros((len(target), 6)))
+    if job.causes:
+        nominal = solve(job.real_machine, FREE, job.frame.to_machine(target), check=False).rho_nominal
+        load = _load(job, _motion(job, nominal, travel), travel.force)
+    found = correct(job.real_machine, job.frame.to_machine(target), load.force, load.wrench, method)
+    commanded = job.frame.to_program(found.commanded)
+    if job.causes and method != "linear":
+        for _ in range(MAX_STEPS):
+            tip, state = respond(job, commanded, travel, target)
+            left = target - tip
+            commanded = commanded + np.where(np.isfinite(left), left, 0.0)
+            found = replace(found, status=np.where(found.status == 0, state.status, found.status))
+            if not np.abs(left).max(initial=0.0) > SETTLED_MM:
+                break
+    return replace(found, commanded=commanded)
+
+
+def _motion(job: Job, setpoint: Floats, travel: Travel) -> Motion:
+    """The movement that the hooks see, with the encoders where the servos bring them."""
+    stiffness = np.array([np.inf if a.stiffness is None else a.stiffness for a in job.real_machine.robot.actuators])
+    zero = np.zeros_like(setpoint)
+    motion = Motion(travel.time, travel.time, travel.cut_min, None, setpoint, zero, zero, job.real_machine.home, stiffness)
+    encoder = setpoint
+    for cause in job.causes:
+        if (hook := cause.hook("on_servo")) is not None:
+            encoder = hook(encoder, motion, cause.which(job.real_machine.actuators), cause.values)
+    dt = np.diff(travel.time, prepend=travel.time[:1] - 1.0)
+    step = np.diff(encoder, axis=0, prepend=encoder[:1])
+    speed = np.divide(step, dt[:, None], out=np.zeros_like(step), where=dt[:, None] > 0.0)
+    return replace(motion, encoder=encoder, speed=speed, direction=direction(encoder))
+
+
+def _load(job: Job, motion: Motion, force: Floats) -> Load:
+    load = Load(force, np.zeros((len(force), 6)))
+    for cause in job.causes:
+        if (hook := cause.hook("on_load")) is not None:
+            load = hook(load, motion, cause.values)
+    return load
