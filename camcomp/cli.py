@@ -7,8 +7,6 @@
 import os
 import sys
 from importlib import import_module
-from pathlib import Path
-from pkgutil import iter_modules
 
 import click
 
@@ -36,8 +34,8 @@ class _Verbs(click.Group):
     """Commands by file name."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        folder = Path(__file__).parent / "commands"
-        return sorted(each.name for each in iter_modules([str(folder)]) if not each.name.startswith("_"))
+        files = os.listdir(os.path.join(os.path.dirname(__file__), "commands"))
+        return sorted(each[:-3] for each in files if each.endswith(".py") and not each.startswith("_"))
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in self.list_commands(ctx):

@@ -1,5 +1,6 @@
 """YAML files to checked specs and plug-ins. Every mistake of every file is reported at once."""
 
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -74,8 +75,9 @@ def load_experiment(path: Path | str) -> Experiment:
 
 def is_experiment(data: bytes) -> bool:
     """Whether YAML text is an experiment file: it has `runs` and no `robot`."""
-    tree, _ = read_tree(data, "")
-    return _get(tree, "runs") is not None and _get(tree, "robot") is None
+    return bool(re.search(rb"^(\xef\xbb\xbf)?runs\s*:", data, re.MULTILINE)) and not re.search(
+        rb"^robot\s*:", data, re.MULTILINE
+    )
 
 
 def _raise(errors: Sequence[CamcompError]) -> None:
