@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from tests.campaign import runner, table
+from tests.campaign import runner, samples, table
 from tests.campaign.cases import build
 from tests.plants.causes import Cause
 from tests.plants.designs import DESIGNS
@@ -65,6 +65,13 @@ def one(effects, sizes, design, channels, samples, seed, out, truth):
     path = truth or out.with_name(out.name + ".truth.json")
     path.write_text(truth_json(made, plan))
     click.echo(json.dumps(made.record["causes"]), err=True)
+
+
+@main.command("samples")
+@click.option("--out", type=click.Path(path_type=Path), default=runner.ROOT / "samples" / "diagnosis")
+def samples_(out):
+    """Write the shipped sample experiments anew and tell what is true of them."""
+    click.echo(json.dumps(samples.make_all(out), indent=1))
 
 
 if __name__ == "__main__":

@@ -11,6 +11,8 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
+from click.testing import CliRunner
+
 from tests.campaign import absorb
 from tests.campaign.cases import Case
 from tests.campaign.score import score
@@ -20,20 +22,24 @@ ROOT = Path(__file__).resolve().parents[2]
 CONFIG = ROOT / "config" / "orthoglide.yaml"
 
 
-def ask(experiment: Path, without: tuple[str, ...] = ()) -> dict[str, Any]:
-    """The result JSON of `camcomp diagnose`, run in this process; raises what the command raises."""
-    from click.testing import CliRunner
-
+def command() -> Any:
+    """The camcomp command, as the terminal has it."""
     from camcomp.cli import main
 
-    answer = experiment.parent.parent / f"{experiment.parent.name}.json"
-    arguments = ["diagnose", str(experiment), "--json", str(answer)]
-    for effect in without:
-        arguments += ["--without", effect]
-    got = CliRunner().invoke(main, arguments)
-    if not answer.exists():
-        raise RuntimeError(f"exit {got.exit_code}: {got.output.strip()[-400:]} {got.exception!r}")
-    return json.loads(answer.read_text())
+    return main
+
+
+def ask(experiment: Path, without: tuple[str, ...] = ()) -> dict[str, Any]:
+    """The result JSON of `camcomp diagnose`, run in this process; raises when there is none."""
+    with tempfile.TemporaryDirectory() as folder:
+        answer = Path(folder) / "result.json"
+        arguments = ["diagnose", str(experiment), "--json", str(answer)]
+        for effect in without:
+            arguments += ["--without", effect]
+        got = CliRunner().invoke(command(), arguments)
+        if not answer.exists():
+            raise RuntimeError(f"exit {got.exit_code}: {got.output.strip()[-400:]} {got.exception!r}")
+        return json.loads(answer.read_text())
 
 
 def run_case(case: Case) -> dict[str, Any]:
