@@ -99,6 +99,27 @@ RULES: dict[str, Rule] = {
         "expression or parameter",
         "A parameter is not set, an expression is malformed, or its value is known at the machine only.",
     ),
+    "CC124": Rule(
+        "jump, loop or call",
+        "The statement that says where the program goes on is not complete, has no partner, or has a form that camcomp "
+        "does not follow.",
+    ),
+    "CC125": Rule(
+        "subprogram not there",
+        "The program calls a subprogram that stands in another file, so what it moves is not known here.",
+        "put the subprogram into the same file",
+    ),
+    "CC126": Rule(
+        "program without end",
+        "Millions of blocks were executed, or hundreds of thousands without a motion, or calls are nested a hundred "
+        "deep.",
+        "check the condition of the loop",
+    ),
+    "CC127": Rule(
+        "Heidenhain conversational",
+        "Klartext programs have another language than ISO programs, and camcomp does not read it.",
+        "post the program as DIN/ISO (.i), or for another control",
+    ),
     "CC128": Rule("encoding", "The file is marked as UTF-16 and cannot be decoded.", "save it as UTF-8 or ASCII"),
     "CC129": Rule("offset statement", "The words of G10, G52 or G92 do not say which offset to set to what.", ""),
     "CC130": Rule("G53 misused", "A move in machine coordinates is a straight one with absolute words.", ""),
@@ -110,13 +131,30 @@ RULES: dict[str, Rule] = {
         "Axis words stand alone, and no G0 to G3 or cycle is in force (none yet, or G80 ended it).",
         "add G0 or G1",
     ),
+    "CC135": Rule(
+        "unknown statement",
+        "A word of several letters is a statement of a control's own language that camcomp does not follow: it may "
+        "move axes or coordinates.",
+        "check the dialect (--dialect, or control: dialect: in the YAML)",
+    ),
+    "CC136": Rule(
+        "several main programs",
+        "The file holds more than one program that ends by itself. Only the first is executed, so the others would "
+        "stay as they are without a word.",
+        "one file per program",
+    ),
     "CC137": Rule(
         "line cannot be rewritten",
-        "The line does too much at once for its motion to be replaced by several: it changes a mode and stops the "
-        "program in the same block.",
-        "split the line",
+        "The line does too much at once for its motion to be replaced: it changes a mode and stops the program in the "
+        "same block, it taps, or it stores the position where the tool stands.",
     ),
     "CC138": Rule("value out of range", "The number is not finite, negative where it must not be, or too large.", ""),
+    "CC139": Rule(
+        "comma",
+        "Behind a comma, controls expect a corner radius or a chamfer, which changes the geometry; and some people "
+        "write decimal commas.",
+        "post corners as arcs and lines",
+    ),
     # --- CC2xx usage, YAML, config -----------------------------------------------------------------------------
     "CC200": Rule(
         "YAML cannot be read",
@@ -183,6 +221,11 @@ RULES: dict[str, Rule] = {
         "keys that exclude each other",
         "Exactly one of several ways to say the same thing has to be chosen, e.g. a link by its compliance, its "
         "stiffness or its beam section.",
+    ),
+    "CC216": Rule(
+        "optional part missing",
+        "What is asked for needs a package that a plain installation leaves out because it is large.",
+        "pip install 'camcomp[report]'",
     ),
     "CC250": Rule(
         "spindle speed missing",
@@ -257,6 +300,15 @@ RULES: dict[str, Rule] = {
         "The fit draws a straight line through mean slot forces at two or more feeds per tooth.",
         "measure slots at three or more feeds, everything else unchanged",
     ),
+    "CC270": Rule(
+        "set-point not readable",
+        "A line of `camcomp stream` is a JSON object or CSV: x_mm, y_mm, z_mm, fx_N, fy_N, fz_N and, if wanted, t_s.",
+    ),
+    "CC271": Rule(
+        "no program found",
+        "None of the paths, folders and patterns names an NC program.",
+        "programs end in .nc, .ngc, .tap, .gcode, .cnc, .mpf, .ncc or .txt, or are named one by one",
+    ),
     # --- CC3xx physics -----------------------------------------------------------------------------------------
     "CC301": Rule(
         "no convergence",
@@ -317,5 +369,10 @@ RULES: dict[str, Rule] = {
         "not a correction of this program",
         "The moves of the program could not be matched to those of the original, so there is nothing to compare.",
         "name the original from which the program was made",
+    ),
+    "CC605": Rule(
+        "set-points in error",
+        "Some lines of the stream could not be read or solved, or lead an actuator out of its travel. Their answers say "
+        "why.",
     ),
 }

@@ -4,9 +4,11 @@ import math
 from random import Random
 
 from camcomp.gcode.arcs import PLANES
+from camcomp.dialects.rs274 import DIALECT
 from camcomp.gcode.interpret import Interpreter
 from camcomp.gcode.program import Setup
 from camcomp.gcode.text import Text
+from camcomp.gcode.words import read_line
 
 
 class ProgramWriter:
@@ -15,7 +17,7 @@ class ProgramWriter:
     def __init__(self, random: Random, setup: Setup | None = None, exotic: bool = True) -> None:
         self.random = random
         self.exotic = exotic
-        self.engine = Interpreter(Text("x", "", "latin-1", b""), setup or Setup())
+        self.engine = Interpreter(Text("x", "", "latin-1", b""), setup or Setup(), DIALECT)
         self.packed = random.random() < 0.2
         self.lower = random.random() < 0.15
         self.numbered = random.random() < 0.3
@@ -67,7 +69,7 @@ class ProgramWriter:
         text = Text("x", line, "latin-1", b"")
         self.engine.text = text
         self.engine.record._starts = text.starts
-        self.engine.execute(0)
+        self.engine.perform(self.engine.sort(0, read_line(text, 0).words))
         if self.packed:
             line = line.replace(" ", "")
         if self.lower:
@@ -87,7 +89,7 @@ class ProgramWriter:
         return ""
 
     def code(self, code: int) -> str:
-        return "" if self.state.motion == code and self.random.random() < 0.7 else f"G{code:0{self.random.choice([1, 2])}d} "
+        return "" if self.state.motion == 10 * code and self.random.random() < 0.7 else f"G{code:0{self.random.choice([1, 2])}d} "
 
     def straight(self, rapid: bool = False) -> None:
         random, state = self.random, self.state

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camcomp.datatypes import Bools, Floats, Ints, Path
+from camcomp.gcode.dialect import Dialect
 from camcomp.gcode.text import Text
 
 Triple = tuple[float, float, float]
@@ -80,3 +81,6 @@ class Program:
     text: Text
     sites: Sites
     rebases: tuple[Rebase, ...]
+    setup: Setup
+    language: Dialect
+    straight: bool  # no loops, subprograms, parameters: each line was executed at most once, as it stands

@@ -40,6 +40,7 @@ class Recorder:
         self.modes_changed = False
         self.stops = False
         self._fixed: list[int] = []
+        self.cycles: dict[int, tuple[list[tuple[str, list[float]]], bool]] = {}  # by first motion
 
     def __len__(self) -> int:
         return self._count
@@ -126,6 +127,12 @@ class Recorder:
         if code >= 0:
             self.code_stated = self.feed_stated = False
         state.position = end
+
+    def cycle(self, actions: list[tuple[str, list[float]]], tapping: bool) -> None:
+        """The line was a canned cycle: what it did, in order."""
+        if self._count == self._line_first + 1:
+            self._fixed.append(self._line_first)
+        self.cycles[self._line_first] = (list(actions), tapping)
 
     def finish(self) -> tuple[Path, Sites]:
         """All motions as arrays."""

@@ -311,7 +311,7 @@ class Writer:
         if math.isnan(feed):
             raise ValueError(f"Output row of motion {self.k}: a cut in the place of a rapid needs a feed")
         if mode == 93:
-            return mode, feed / length if length > 0.0 else float(self.sites.modal_feed[self.k])
+            return mode, feed / length if length > 1e-6 else float(self.sites.modal_feed[self.k])
         return mode, feed / float(self.path.speed[self.k]) if mode == 95 else feed
 
     def _feed_words(self, feed: float, length: float) -> list[str]:

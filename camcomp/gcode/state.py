@@ -1,35 +1,44 @@
 """State of a control while it executes a program: modes, offsets and where the tool tip stands."""
 
 from camcomp.gcode.codes import OFFSET_NAMES
+from camcomp.gcode.dialect import Dialect
 from camcomp.gcode.program import Setup
+
+_EXTENDED = 300  # G54.1 P1 to P300
 
 
 class State:
     """Mutable; lengths in mm, positions in the program frame (see Path)."""
 
-    def __init__(self, setup: Setup) -> None:
+    def __init__(self, setup: Setup, dialect: Dialect) -> None:
         self.setup = setup
         self.position = [float(each) for each in setup.start_mm]
         self.commanded = [False, False, False]
-        self.work = [[float(each) for each in setup.offsets.get(name, (0.0,) * 3)] for name in OFFSET_NAMES]
+        names = list(OFFSET_NAMES)
+        if dialect.extended_offsets:
+            names += [f"G54.1P{number}" for number in range(1, _EXTENDED + 1)]
+        self.work = [[float(each) for each in setup.offsets.get(name, (0.0,) * 3)] for name in names]
         self.zero = list(self.work[0])  # G54 as it stands at program start
         self.active = 0
-        self.shift = [0.0, 0.0, 0.0]  # G92, G52
+        self.shift = [0.0, 0.0, 0.0]  # G92, and G52 where they share
         self.saved_shift = [0.0, 0.0, 0.0]
+        self.local = [0.0, 0.0, 0.0]  # G52 where it is an offset of its own
         self.tool_offset = [0.0, 0.0, 0.0]
+        self.length_on = False  # G43
         self.tools = dict(setup.tools)
         self.homes = {28: list(setup.home_mm), 30: list(setup.second_home_mm)}
         self.offset = [0.0, 0.0, 0.0]
 
-        self.motion: int | None = None  # 0..3, a cycle (73, 81..89), or None after G80
+        self.motion: int | None = dialect.initial_motion  # code in tenths: 0 to 30, a cycle, or None after G80
         self.plane = 17
         self.relative = False
         self.centre_absolute = False
         self.feed_mode = 94
         self.unit = 1.0  # mm per programmed unit
-        self.retract_to_start = True  # G98
+        self.retract_to_start = dialect.retract_to_start  # G98
         self.feed: float | None = None  # G94: mm/min, G93: 1/min, G95: mm/rev
         self.speed = 0.0
+        self.spindle = 5  # M3, M4 or M5
         self.tool = setup.tool
         self.next_tool = setup.tool
         self.update()
@@ -38,5 +47,6 @@ class State:
         """Recompute the sum of offsets, after one of them has changed."""
         work = self.work[self.active]
         self.offset = [
-            work[axis] + self.shift[axis] + self.tool_offset[axis] - self.zero[axis] for axis in range(3)
+            work[axis] + self.shift[axis] + self.local[axis] + self.tool_offset[axis] - self.zero[axis]
+            for axis in range(3)
         ]

@@ -4,6 +4,7 @@ import re
 from typing import NamedTuple, NoReturn
 
 from camcomp.diagnostics import ProgramError
+from camcomp.gcode.expressions import Expression, ExpressionError, Parser, Spelling
 from camcomp.gcode.text import Text
 
 BLANK = " \t\0\x1a\x0b\x0c"
@@ -20,17 +21,28 @@ class Word(NamedTuple):
     end: int
 
 
-class Block(NamedTuple):
-    """What one line says."""
+class Setting(NamedTuple):
+    """`#1 = ...`: which parameter, to what, and where it stands."""
+
+    target: Expression
+    value: Expression
+    begin: int
+    end: int
+
+
+class Line(NamedTuple):
+    """What one line says. Words whose value is an expression carry 0 until it is executed."""
 
     words: list[Word]
-    deleted: bool  # starts with a block delete character
-    warning: str
+    deleted: bool = False  # starts with a block delete character
+    warning: str = ""
+    expressions: tuple[tuple[int, Expression], ...] = ()  # index of the word, its value
+    settings: tuple[Setting, ...] = ()
 
 
-def refuse(text: Text, index: int, column: int, rule: str, message: str, hint: str | None = None) -> NoReturn:
+def refuse(text: Text, row: int, column: int, rule: str, message: str, hint: str | None = None) -> NoReturn:
     """Raise a ProgramError that points at a character of a line."""
-    raise ProgramError(rule, message, at=text.place(index, column), hint=hint)
+    raise ProgramError(rule, message, at=text.place(row, column), hint=hint)
 
 
 def comment_end(line: str, start: int) -> tuple[int, bool]:
@@ -51,13 +63,34 @@ def comment_end(line: str, start: int) -> tuple[int, bool]:
     return (close + 1, True) if close >= 0 else (len(line), False)
 
 
-def read_line(text: Text, index: int) -> Block:
-    """Words of line `index` in their order. Raises ProgramError with the place of what cannot be read."""
-    line = text.line(index)
+def code_of(line: str) -> str:
+    """The line with its comments blanked, same length."""
+    pieces, k = [], 0
+    while k < len(line):
+        if line[k] == ";":
+            break
+        if line[k] == "(":
+            end, _ = comment_end(line, k)
+            pieces.append(" " * (end - k))
+            k = end
+        else:
+            pieces.append(line[k])
+            k += 1
+    return "".join(pieces).ljust(len(line))
+
+
+def read_line(text: Text, row: int, spelling: Spelling | None = None, start: int = 0) -> Line:
+    """Words of line `row` in their order, from character `start`.
+
+    Raises ProgramError with the place of what cannot be read.
+    """
+    line = text.line(row)
     words: list[Word] = []
+    expressions: list[tuple[int, Expression]] = []
+    settings: list[Setting] = []
     deleted = False
     warning = ""
-    k, n = 0, len(line)
+    k, n = start, len(line)
     match = _WORD.match
     while k < n:
         char = line[k]
@@ -69,7 +102,7 @@ def read_line(text: Text, index: int) -> Block:
             end = found.end()
             rest = line[end:].lstrip(" \t")[:1]
             if rest and (rest in ".,0123456789" or (rest in "+-" and line[end] == rest)):
-                _malformed(text, index, k)
+                _malformed(text, row, k, end)
             words.append(Word(found[1].upper(), float(found[2]), k, end))
             k = end
         elif char == ";":
@@ -78,7 +111,7 @@ def read_line(text: Text, index: int) -> Block:
             k, closed = comment_end(line, k)
             if not closed:
                 warning = "comment is not closed; the rest of the line counts as comment"
-        elif char == "/" and all(each.letter == "N" for each in words):
+        elif char == "/" and all(each.letter == "N" for each in words) and not settings:
             deleted = True
             k += 1
             while k < n and line[k].isdigit() and not words:
@@ -86,31 +119,85 @@ def read_line(text: Text, index: int) -> Block:
         elif char == "%":
             if line.strip(BLANK).startswith("%"):
                 break
-            refuse(text, index, k, "CC107", "'%' stands inside a line")
+            refuse(text, row, k, "CC107", "'%' stands inside a line")
+        elif spelling is not None and char == "#":
+            setting = _setting(text, row, k, spelling)
+            settings.append(setting)
+            k = setting.end
+        elif spelling is not None and char.isascii() and char.isalpha():
+            word, value = _computed(text, row, k, spelling)
+            expressions.append((len(words), value))
+            words.append(word)
+            k = word.end
         else:
-            _unreadable(text, index, k)
-    return Block(words, deleted, warning)
+            _unreadable(text, row, k)
+    return Line(words, deleted, warning, tuple(expressions), tuple(settings))
 
 
-def _malformed(text: Text, index: int, column: int) -> NoReturn:
-    found = _LOOSE.match(text.line(index), column)
+def _setting(text: Text, row: int, column: int, spelling: Spelling) -> Setting:
+    parser = Parser(text.line(row), column, spelling)
+    try:
+        target = parser.parameter()
+        if parser.blank() != "=":
+            parser.fail("'=' is missing")
+        parser.at += 1
+        value = parser.value() if spelling.named else parser.expression(0)
+    except ExpressionError as error:
+        refuse(text, row, error.column, "CC123", error.message)
+    return Setting(target, value, column, parser.at)
+
+
+def _computed(text: Text, row: int, column: int, spelling: Spelling) -> tuple[Word, Expression]:
+    line = text.line(row)
+    parser = Parser(line, column + 1, spelling)
+    if parser.blank() not in ("#", "[", "+", "-") and not _function_follows(line, parser.at, spelling):
+        _unreadable(text, row, column)
+    try:
+        value = parser.value()
+    except ExpressionError as error:
+        refuse(text, row, error.column, "CC123", error.message)
+    return Word(line[column].upper(), 0.0, column, parser.at), value
+
+
+def _function_follows(line: str, at: int, spelling: Spelling) -> bool:
+    end = at
+    while end < len(line) and line[end].isalpha():
+        end += 1
+    name = line[at:end].upper()
+    opens = line[end:].lstrip(" \t")[:1] == spelling.opening
+    return opens and (name in spelling.functions or name == "EXISTS")
+
+
+def _malformed(text: Text, row: int, column: int, end: int) -> NoReturn:
+    line = text.line(row)
+    if line[end:].lstrip(" \t")[:1] == ",":
+        after = line[end:].lstrip(" \t")[1:2].upper()
+        if after in ("R", "C", "A"):
+            refuse(text, row, end, "CC139", f"',{after}' rounds or chamfers a corner")
+    found = _LOOSE.match(line, column)
     piece = found[0] if found else ""
     if "," in piece:
-        refuse(text, index, column, "CC101", f"'{piece}' has a decimal comma")
-    refuse(text, index, column, "CC102", f"'{piece}' is not one number")
+        refuse(text, row, column, "CC101", f"'{piece}' has a decimal comma")
+    refuse(text, row, column, "CC102", f"'{piece}' is not one number")
 
 
-def _unreadable(text: Text, index: int, column: int) -> NoReturn:
-    char = text.line(index)[column]
+def _unreadable(text: Text, row: int, column: int) -> NoReturn:
+    line = text.line(row)
+    char = line[column]
     if char in "#[":
-        refuse(text, index, column, "CC123", "parameters and expressions are not read here")
+        refuse(text, row, column, "CC123", "this dialect has no parameters and expressions")
     if char.isascii() and char.isalpha():
-        rest = text.line(index)[column + 1 :].lstrip(BLANK)
+        rest = line[column + 1 :].lstrip(BLANK)
         if rest[:1] in ("#", "["):
-            refuse(text, index, column, "CC123", "parameters and expressions are not read here")
+            refuse(text, row, column, "CC123", "this dialect has no parameters and expressions")
         if rest[:1] == ",":
-            refuse(text, index, column, "CC101", f"'{char},' has a decimal comma")
-        refuse(text, index, column, "CC103", f"'{char}' has no number")
+            refuse(text, row, column, "CC101", f"'{char},' has a decimal comma")
+        if rest[:1] == "=" or (rest[:1].isalpha() and rest[:1].isascii()):
+            word = re.match(r"[A-Za-z_]+", line[column:])
+            refuse(text, row, column, "CC135", f"'{word[0] if word else char}' is no statement that camcomp knows")
+        refuse(text, row, column, "CC103", f"'{char}' has no number")
     if char.isdigit() or char in ".+-":
-        refuse(text, index, column, "CC103", "number without a letter")
-    refuse(text, index, column, "CC107", f"'{text.readable(char)}' has no meaning here")
+        refuse(text, row, column, "CC103", "number without a letter")
+    if char == ",":
+        refuse(text, row, column, "CC139", "a comma stands for a rounded corner, a chamfer, or a decimal comma")
+    refuse(text, row, column, "CC107", f"'{text.readable(char)}' has no meaning here")

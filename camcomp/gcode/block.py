@@ -1,0 +1,130 @@
+"""The words of one line, sorted by what they do, each checked against the others."""
+
+import math
+from typing import NoReturn
+
+from camcomp.diagnostics import ProgramError
+from camcomp.gcode.codes import CANCELS, GROUPS_M, KNOWN_M, code_name
+from camcomp.gcode.dialect import Dialect
+from camcomp.gcode.program import Rebase, Setup
+from camcomp.gcode.record import Recorder
+from camcomp.gcode.state import State
+from camcomp.gcode.text import Text
+from camcomp.gcode.words import Word
+
+
+class Block:
+    """The words of one line, sorted by what they do."""
+
+    __slots__ = ("axes", "column", "g", "groups", "m", "row", "used", "words")
+
+    def __init__(self, row: int) -> None:
+        self.row = row
+        self.words: dict[str, Word] = {}
+        self.g: list[tuple[int, Word]] = []
+        self.m: list[tuple[int, Word]] = []
+        self.groups: dict[int, tuple[int, Word]] = {}
+        self.axes: list[int] = []
+        self.used: set[str] = set()
+        self.column = 0
+
+    def code(self, group: int) -> int | None:
+        """Code of a modal group that stands in this block."""
+        found = self.groups.get(group)
+        return found[0] if found else None
+
+    def number(self, letter: str) -> float | None:
+        """Value of a word, which thereby counts as used; None when it is not there."""
+        word = self.words.get(letter)
+        if word is None:
+            return None
+        self.used.add(letter)
+        return word.value
+
+
+class BlockReader:
+    """Makes blocks of words; holds what all of the interpreter shares."""
+
+    def __init__(self, text: Text, setup: Setup, dialect: Dialect) -> None:
+        self.text = text
+        self.dialect = dialect
+        self.state = State(setup, dialect)
+        self.record = Recorder(text)
+        self.warnings: list[str] = []
+        self.rebases: list[Rebase] = []
+        self.block = Block(0)
+        self._warned: set[str] = set()
+        self._groups = dialect.groups
+        self._refused = dialect.refused
+
+    def warn(self, message: str, once: bool = False) -> None:
+        """Keep a warning, with the line of the current block."""
+        if once:
+            if message in self._warned:
+                return
+            self._warned.add(message)
+        self.warnings.append(f"{self.text.name}:{self.block.row + 1}: {message}")
+
+    def refuse(self, rule: str, message: str, word: Word | None = None, hint: str | None = None) -> NoReturn:
+        """Raise a ProgramError at a word of the current block."""
+        column = word.begin if word else self.block.column
+        raise ProgramError(rule, message, at=self.text.place(self.block.row, column), hint=hint)
+
+    def sort(self, row: int, words: list[Word]) -> Block:
+        """Block of the words, each letter once and each modal group once."""
+        block = self.block = Block(row)
+        if words and words[0].letter == "N":
+            words = words[1:]
+        if words:
+            block.column = words[0].begin
+        for word in words:
+            letter = word.letter
+            if letter == "G":
+                self._sort_g(block, word)
+            elif letter == "M":
+                self._sort_m(block, word)
+            elif letter == "O":
+                if len(words) > 1:
+                    self.refuse("CC103", "a program number stands alone on its line", word)
+            elif letter == "N":
+                self.refuse("CC104", "a line number stands at the start of its line", word)
+            elif letter in block.words:
+                self.refuse("CC104", f"two {letter} words in one block", word)
+            else:
+                if not math.isfinite(word.value):
+                    self.refuse("CC138", f"{letter} has no finite value", word)
+                block.words[letter] = word
+        block.axes = [axis for axis in range(3) if "XYZ"[axis] in block.words]
+        return block
+
+    def _sort_g(self, block: Block, word: Word) -> None:
+        tenths = word.value * 10.0
+        if not 0.0 <= tenths < 1e6 or abs(tenths - round(tenths)) > 1e-4:
+            self.refuse("CC106", f"G{word.value:g} is not a code", word)
+        code = round(tenths)
+        block.g.append((code, word))
+        if code in self.dialect.passed or code in CANCELS:
+            return
+        if code in self._refused:
+            rule, what = self._refused[code]
+            self.refuse(rule, f"{code_name(code)} is {what}", word)
+        group = self._groups.get(code)
+        if group is None:
+            known = f"{self.dialect.title} as camcomp knows it" if code in self.dialect.without else "camcomp"
+            self.refuse("CC106", f"{code_name(code)} is not a code that {known} has", word)
+        if group in block.groups:
+            other = code_name(block.groups[group][0])
+            self.refuse("CC105", f"{code_name(code)} and {other} exclude each other in one block", word)
+        block.groups[group] = (code, word)
+
+    def _sort_m(self, block: Block, word: Word) -> None:
+        if not 0.0 <= word.value < 1e6 or abs(word.value - round(word.value)) > 1e-4:
+            self.refuse("CC106", f"M{word.value:g} is not a code", word)
+        code = round(word.value)
+        group = GROUPS_M.get(code)
+        for other, _ in block.m:
+            if group is not None and GROUPS_M.get(other) == group:
+                self.refuse("CC105", f"M{code} and M{other} exclude each other in one block", word)
+        if code not in KNOWN_M:
+            self.warn(f"M{code} is passed on; camcomp takes it not to move anything", once=True)
+        block.m.append((code, word))

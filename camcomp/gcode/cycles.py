@@ -1,0 +1,192 @@
+"""Canned cycles as the motions that they stand for, in the order in which LinuxCNC makes them."""
+
+import math
+
+from camcomp.gcode.block import Block
+from camcomp.gcode.motions import Motions
+
+# Depth axis among X, Y, Z by plane.
+_DEPTH = {17: 2, 18: 1, 19: 0}
+_TAPS = (740, 840)
+_WORDS = "RPQLIJK"
+
+
+class Cycles(Motions):
+    """Executes G73, G74 and G81 to G89. `actions` lists what the last cycle did, for writing it out."""
+
+    actions: list[tuple[str, list[float]]]  # (G0 or G1, end point) or (a statement, [])
+
+    def forget_cycle(self) -> None:
+        """The words of a cycle hold while that cycle stays in force."""
+        self._held: dict[str, float] = {}
+
+    def cycle(self, block: Block, code: int) -> None:
+        """Drill, tap or bore, once or several times."""
+        state = self.state
+        name = f"G{code // 10}"
+        if code == 880:
+            self.refuse("CC132", "G88 leaves the retraction to the operator's hand")
+        if state.feed_mode == 93:
+            self.refuse("CC132", f"{name} does not work with G93")
+        feed = self.feed_of(block)
+        depth = _DEPTH[state.plane]
+        start = list(state.position)
+        here = start[depth] - state.offset[depth]
+        self._hold(block, name, here, depth)
+        bottom, level = self._held["Z"] + state.offset[depth], self._held["R"] + state.offset[depth]
+        if level < bottom:
+            self.refuse("CC132", f"the retract plane of {name} lies below its bottom")
+        repeats = self._repeats(block)
+        self.actions = []
+        block.used |= set(_WORDS)
+        first = True
+        for _ in range(repeats):
+            place = self._place(block, depth)
+            if first and start[depth] < level:
+                self._go(block, 0, self._at(state.position, depth, level), feed)
+            entry = state.position[depth]
+            self._go(block, 0, self._at(place, depth, entry), feed, always=repeats == 1 and first)
+            clear = max(entry, level) if state.retract_to_start else level
+            self._go(block, 0, self._at(place, depth, level), feed)
+            self._body(block, code, place, (bottom, level, clear), feed)
+            first = False
+        self.record.cycle(self.actions, tapping=code in _TAPS)
+
+    def _hold(self, block: Block, name: str, here: float, depth: int) -> None:
+        state, held = self.state, self._held
+        unit = state.unit
+        r = block.number("R")
+        if r is not None:
+            held["R"] = r * unit + (here if state.relative else 0.0)
+        elif "R" not in held:
+            self.refuse("CC132", f"{name} has no retract plane R")
+        letter = "XYZ"[depth]
+        z = block.words[letter].value * unit if letter in block.words else None
+        if z is not None:
+            held["Z"] = z + (held["R"] if state.relative else 0.0)
+        elif "Z" not in held:
+            self.refuse("CC132", f"{name} has no depth {letter}")
+        for letter in "PQIJK":
+            value = block.number(letter)
+            if value is not None:
+                held[letter] = value
+
+    def _repeats(self, block: Block) -> int:
+        for letter in self.dialect.repeats:
+            value = block.number(letter)
+            if value is not None:
+                if value != int(value) or not (0 if self.dialect.increments else 1) <= value <= 10000:
+                    self.refuse("CC132", f"{letter} counts repeats, 1 or more", block.words[letter])
+                return int(value)
+        return 1
+
+    def _place(self, block: Block, depth: int) -> list[float]:
+        """Position of the hole; the depth axis is left as it is."""
+        state = self.state
+        place = list(state.position)
+        for axis in block.axes:
+            state.commanded[axis] = True
+            if axis != depth:
+                value = block.words["XYZ"[axis]].value * state.unit
+                place[axis] = place[axis] + value if state.relative else value + state.offset[axis]
+        return place
+
+    @staticmethod
+    def _at(place: list[float], depth: int, height: float) -> list[float]:
+        point = list(place)
+        point[depth] = height
+        return point
+
+    def _go(self, block: Block, code: int, end: list[float], feed: float, always: bool = False) -> None:
+        if end == self.state.position and not always:
+            return
+        self.actions.append((f"G{code}", end))
+        self.record.line_motion(block, self.state, code, end, feed if code else math.nan)
+
+    def _body(
+        self, block: Block, code: int, place: list[float], heights: tuple[float, float, float], feed: float
+    ) -> None:
+        bottom, level, clear = heights
+        depth = _DEPTH[self.state.plane]
+
+        def go(motion: int, height: float) -> None:
+            self._go(block, motion, self._at(place, depth, height), feed)
+
+        if code in (730, 830):
+            self._peck(block, code, place, heights, feed)
+            return
+        if code == 870:
+            self._back_bore(block, place, heights, feed)
+            return
+        go(1, bottom)
+        if code in (820, 860, 890) or code in _TAPS:
+            self._dwell()
+        spindle = self.state.spindle
+        if code in _TAPS:
+            self.actions.append(("M4" if code == 840 else "M3", []))
+        if code == 860:
+            self.actions.append(("M5", []))
+        if code in (850, 890) or code in _TAPS:
+            go(1, level)
+        if code in _TAPS:
+            self.actions.append((f"M{spindle}", []))
+        go(0, clear)
+        if code == 860:
+            self.actions.append((f"M{spindle}", []))
+
+    def _dwell(self) -> None:
+        if self._held.get("P"):
+            self.actions.append((f"G4 P{self._held['P']:g}", []))
+
+    def _peck(
+        self, block: Block, code: int, place: list[float], heights: tuple[float, float, float], feed: float
+    ) -> None:
+        bottom, level, clear = heights
+        state = self.state
+        depth = _DEPTH[state.plane]
+        step = abs(self._held.get("Q", 0.0)) * state.unit
+        if step <= 0.0 or (level - bottom) / step > 1e5:
+            self.refuse("CC132", f"G{code // 10} needs its peck depth as Q")
+        # LinuxCNC backs off by 0.01 inch, which is a hundredth of the unit in G20.
+        gap = self.dialect.peck_clearance_mm
+        reached = level - step
+        while reached > bottom:
+            self._go(block, 1, self._at(place, depth, reached), feed)
+            if code == 830:
+                self._go(block, 0, self._at(place, depth, level), feed)
+            self._go(block, 0, self._at(place, depth, min(reached + gap, level) if code == 830 else reached + gap), feed)
+            reached -= step
+        self._go(block, 1, self._at(place, depth, bottom), feed)
+        self._go(block, 0, self._at(place, depth, clear), feed)
+
+    def _back_bore(
+        self, block: Block, place: list[float], heights: tuple[float, float, float], feed: float
+    ) -> None:
+        """G87: down beside the hole with the spindle oriented, then cut upwards."""
+        bottom, level, clear = heights
+        state = self.state
+        depth = _DEPTH[state.plane]
+        if any(letter not in self._held for letter in "IJK"):
+            self.refuse("CC132", "G87 needs I, J and K")
+        sides = [axis for axis in (0, 1, 2) if axis != depth]
+        top = self._held["K"] * state.unit + (bottom if state.relative else state.offset[depth])
+        beside = list(place)
+        for letter, axis in zip("IJ", sides if depth != 1 else sides[::-1], strict=True):
+            beside[axis] += self._held[letter] * state.unit
+        spindle = f"M{state.spindle}"
+
+        def go(code: int, point: list[float], height: float) -> None:
+            self._go(block, code, self._at(point, depth, height), feed)
+
+        go(0, beside, level)
+        self.actions += [("M5", []), ("M19", [])]
+        go(0, beside, bottom)
+        go(0, place, bottom)
+        self.actions.append((spindle, []))
+        go(1, place, top)
+        go(1, place, bottom)
+        self.actions += [("M5", []), ("M19", [])]
+        go(0, beside, bottom)
+        go(0, beside, clear)
+        go(0, place, clear)
+        self.actions.append((spindle, []))

@@ -1,0 +1,39 @@
+"""Which dialect a program is written in: told by the user, or by the marks that each dialect's record lists."""
+
+import re
+
+from camcomp.diagnostics import ProgramError
+from camcomp.gcode.dialect import Dialect
+from camcomp.gcode.text import Text
+from camcomp.shelf import load, members
+
+_LOOKED_AT = 200_000  # characters
+_PLAINTEXT = re.compile(r"^\s*\d*\s*(BEGIN\s+PGM|TOOL\s+(CALL|DEF)|L\s+[XYZ]\s*[+-]|CC\s+X|BLK\s+FORM)", re.MULTILINE | re.IGNORECASE)
+DEFAULT = "rs274"
+_ENOUGH = 4  # weight of marks below which a text could be anything
+
+
+def dialect_of(text: Text, name: str | None = None) -> Dialect:
+    """Record of the dialect called `name`, or of the one that the text looks like; RS274 where nothing tells.
+
+    Raises ProgramError CC127 for Heidenhain conversational programs, ConfigError CC213 for an unknown name.
+    """
+    if name is not None:
+        return _record(name)
+    sample = text.string[:_LOOKED_AT].replace("\r\n", "\n").replace("\r", "\n")
+    if len(_PLAINTEXT.findall(sample)) >= 2:
+        found = _PLAINTEXT.search(sample)
+        row = sample.count("\n", 0, found.start(1)) if found else 0
+        raise ProgramError("CC127", "this is a Heidenhain conversational program", at=text.place(min(row, len(text) - 1)))
+    best, most = _record(DEFAULT), _ENOUGH - 1
+    for member in members("dialects"):
+        record = _record(member)
+        weight = record.weight(sample)
+        if weight > most:
+            best, most = record, weight
+    return best
+
+
+def _record(name: str) -> Dialect:
+    member = load("dialects", name)
+    return getattr(member, "DIALECT", member)

@@ -1,0 +1,52 @@
+"""What distinguishes one control's language from another's, as data; the records stand in camcomp/dialects."""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from camcomp.gcode.codes import GROUPS, REFUSED
+from camcomp.gcode.expressions import Spelling
+
+
+@dataclass(frozen=True)
+class Dialect:
+    """One control's language. Codes count in tenths (G59.1 is 591)."""
+
+    name: str
+    title: str
+    marks: tuple[tuple[str, int], ...] = ()  # regular expression (multi-line, case ignored), weight for detection
+    spelling: Spelling | None = None  # of expressions; None: there are none
+    flow: str = ""  # subprograms, loops, jumps: "o-words", "macro" (Fanuc), or none
+    more: Mapping[int, int] = field(default_factory=dict)  # codes beyond the common ones, with their modal group
+    without: frozenset[int] = frozenset()  # common codes that this control does not have
+    passed: frozenset[int] = frozenset()  # codes that do not change the geometry, nor how other words are read
+    initial_motion: int | None = None
+    retract_to_start: bool = True  # G98 is in force at the start
+    turns: bool = True  # P of an arc counts turns
+    increments: bool = False  # numbers without a point may count increments
+    dwell: str = "P"  # letters that may give the time of G4
+    modal_length: bool = False  # H changes the tool length offset without G43 in its block
+    own_local_frame: bool = False  # G52 and G92 add up instead of sharing one offset
+    extended_offsets: bool = False  # G54.1 P1 ..., G10 L20 sets them
+    relative_offsets: bool = False  # G10 L2 adds to the offset in G91
+    repeats: str = "L"  # letters that may give the number of repeats of a cycle
+    peck_clearance_mm: float = 0.254
+    idle_letters: str = "DN"  # letters that mean nothing for the path wherever they stand
+    comment: tuple[str, str] = ("(", ")")
+    decimals_max: int = 9
+
+    @property
+    def groups(self) -> dict[int, int]:
+        """Modal group of every code that the control has."""
+        return {code: group for code, group in {**GROUPS, **self.more}.items() if code not in self.without}
+
+    @property
+    def refused(self) -> dict[int, tuple[str, str]]:
+        """Codes that are refused, with rule and reason."""
+        own = {**self.more, **dict.fromkeys(self.passed, 0)}
+        return {code: why for code, why in REFUSED.items() if code not in own}
+
+    def weight(self, text: str) -> int:
+        """How much a text looks like this dialect."""
+        flags = re.MULTILINE | re.IGNORECASE
+        return sum(score for pattern, score in self.marks if re.search(pattern, text, flags))

@@ -1,0 +1,166 @@
+"""Which line is executed next: top to bottom, or as O-words and macro statements say."""
+
+from typing import NoReturn
+
+from camcomp.diagnostics import ProgramError
+from camcomp.gcode.block import Block
+from camcomp.gcode.cycles import Cycles
+from camcomp.gcode.expressions import FANUC, Expression, ExpressionError
+from camcomp.gcode.memory import Parameters
+from camcomp.gcode.text import Text
+from camcomp.gcode.trace import Trace
+from camcomp.gcode.words import BLANK, Line, Word, read_line
+
+_MOST_BLOCKS = 5_000_000
+_MOST_IDLE = 200_000  # blocks executed without a motion, by a program that has loops
+_INCREMENTAL_LETTERS = "XYZIJKRQ"
+
+
+class Executor(Cycles):
+    """What executes a block; Flow only says which."""
+
+    straight = True  # no loops, subprograms, parameters: each line was executed at most once, as it stands
+
+    def perform(self, block: Block) -> bool:
+        """Execute a block; True when it ends the program."""
+        raise NotImplementedError
+
+
+class Flow:
+    """Executes lines from top to bottom; the base of dialects with jumps."""
+
+    def __init__(self, reader: "Executor", trace: Trace | None = None) -> None:
+        self.reader = reader
+        self.trace = trace
+        self.text: Text = reader.text
+        self.spelling = reader.dialect.spelling
+        self.memory = Parameters(reader.state, macro=self.spelling is FANUC)
+        if self.spelling is not None:
+            self.memory.spelling = self.spelling
+        self._lines: dict[int, Line] = {}
+        self._blocks = 0
+        self._idle = 0
+        self._motions = 0
+        self._percent = False
+
+    # --- the program as a whole --------------------------------------------------------------------------------
+
+    def run(self) -> None:
+        """Execute from the first line to the program's end."""
+        row, rows = 0, len(self.text)
+        while row < rows:
+            after = self.step(row)
+            if after is None:
+                return
+            row = after
+
+    def step(self, row: int) -> int | None:
+        """Execute line `row`; the row that comes next, None at the end."""
+        line = self.text.line(row)
+        stripped = line.strip(BLANK)
+        if stripped.startswith("%"):
+            if self._percent or len(self.reader.record):
+                return None
+            self._percent = True
+            self._traced(row, Line([]))
+            return row + 1
+        return None if self.execute(row) else row + 1
+
+    def execute(self, row: int) -> bool:
+        """Execute an ordinary line; True when the program ends there."""
+        line = self.parsed(row)
+        self._count(row)
+        reader = self.reader
+        if line.deleted and reader.state.setup.skip_deleted:
+            self._traced(row, Line([]))
+            return False
+        words = self.computed(row, line)
+        if line.settings:
+            self._assign(row, line)
+        self._traced(row, line, words)
+        if not words:
+            return False
+        block = reader.sort(row, words)
+        if line.warning:
+            reader.warn(line.warning)
+        if not (block.g or block.m or block.words):
+            return False
+        return reader.perform(block)
+
+    def _traced(self, row: int, line: Line, words: list[Word] | None = None) -> None:
+        if self.trace is not None:
+            self.trace.line(row, line, words or line.words)
+
+    def _count(self, row: int) -> None:
+        """A program that does not come to an end is refused, not waited for."""
+        self._blocks += 1
+        motions = len(self.reader.record)
+        self._idle = self._idle + 1 if motions == self._motions else 0
+        self._motions = motions
+        if not self.reader.straight and (self._blocks > _MOST_BLOCKS or self._idle > _MOST_IDLE):
+            self.refuse(row, 0, "CC126", "the program comes to no end here")
+
+    # --- lines and expressions ---------------------------------------------------------------------------------
+
+    def refuse(self, row: int, column: int, rule: str, message: str) -> NoReturn:
+        """Raise a ProgramError at a character."""
+        raise ProgramError(rule, message, at=self.text.place(row, column))
+
+    def parsed(self, row: int) -> Line:
+        """Words of a line; read once, however often it is executed."""
+        line = self._lines.get(row)
+        if line is None:
+            line = read_line(self.text, row, self.spelling)
+            if line.expressions or line.settings:
+                self.reader.straight = False
+            if not self.reader.straight:
+                self._lines[row] = line
+        return line
+
+    def value(self, row: int, expression: Expression) -> float:
+        """Value of an expression, now."""
+        self.memory.row = row
+        try:
+            return self.memory.value(expression)
+        except ExpressionError as error:
+            self.refuse(row, error.column, "CC123", error.message)
+
+    def computed(self, row: int, line: Line) -> list[Word]:
+        """The line's words with the values of their expressions, and with increments counted."""
+        words = line.words
+        if line.expressions:
+            words = list(words)
+            for index, expression in line.expressions:
+                words[index] = words[index]._replace(value=self.value(row, expression))
+        if self.reader.dialect.increments:
+            words = self._scaled(row, line, words)
+        return words
+
+    def _scaled(self, row: int, line: Line, words: list[Word]) -> list[Word]:
+        increment = self.reader.state.setup.increment_mm
+        source = self.text.line(row)
+        exact = {index for index, _ in line.expressions}
+        for index, word in enumerate(words):
+            if word.letter not in _INCREMENTAL_LETTERS or index in exact or word.value == 0.0:
+                continue
+            if "." in source[word.begin : word.end]:
+                continue
+            if increment is None:
+                self.reader.block.row = row
+                self.reader.warn("numbers without a point count as mm or inch, not as increments", once=True)
+                return words
+            # In inch, controls count in a tenth of the metric figure: 0.001 mm, 0.0001 inch.
+            inch = self.reader.state.unit != 1.0
+            words = [*words]
+            words[index] = word._replace(value=word.value * (increment / 10.0 if inch else increment))
+        return words
+
+    def _assign(self, row: int, line: Line) -> None:
+        # All values are found before any parameter changes, so `#1=#2 #2=#1` swaps.
+        self.reader.straight = False
+        found = [(each, self.value(row, each.value)) for each in line.settings]
+        for each, value in found:
+            try:
+                self.memory.assign(each.target, value)
+            except ExpressionError as error:
+                self.refuse(row, error.column or each.begin, "CC123", error.message)

@@ -1,0 +1,135 @@
+"""Statements that move the tool tip along one line or arc, or home."""
+
+import math
+
+from camcomp.gcode import arcs
+from camcomp.gcode.block import Block
+from camcomp.gcode.settings import Settings
+
+_LARGEST = 1.0e7  # mm; a machine of ten kilometres is a typing mistake
+_NOTHING = 1.0e-9  # mm; arithmetic leaves that much between equal points
+
+
+class Motions(Settings):
+    """Executes the motion of a block."""
+
+    def target(self, block: Block, machine: bool = False) -> list[float]:
+        """End point in the program frame of the block's axis words; they thereby count as commanded."""
+        state = self.state
+        end = list(state.position)
+        for axis in block.axes:
+            word = block.words["XYZ"[axis]]
+            value = word.value * state.unit
+            if abs(value) > _LARGEST:
+                self.refuse("CC138", f"{word.letter}{word.value:g} is out of every machine's reach", word)
+            if machine:
+                end[axis] = value - state.zero[axis]
+            elif state.relative:
+                end[axis] += value
+                if not state.commanded[axis]:
+                    self.warn(f"{word.letter} starts with a relative move; its start counts as start_mm", once=True)
+            else:
+                end[axis] = value + state.offset[axis]
+            state.commanded[axis] = True
+        return end
+
+    def home(self, block: Block, code: int) -> None:
+        """G28, G30: through the point of the axis words to the reference position."""
+        state = self.state
+        block.number("P")
+        self.record.machine_motion(block, state, -1, self.target(block))
+        end = list(state.position)
+        for axis in block.axes or range(3):
+            end[axis] = state.homes[code][axis] - state.zero[axis]
+            state.commanded[axis] = True
+        self.record.machine_motion(block, state, -1, end, moved=block.axes or [0, 1, 2])
+
+    def move(self, block: Block, motion: int, machine: bool) -> None:
+        """G0, G1, G2 or G3 (code in tenths)."""
+        state = self.state
+        if machine and (motion not in (0, 10) or state.relative):
+            self.refuse("CC130", "G53 works with G0 or G1 and with G90", block.groups[0][1])
+        feed = self.feed_of(block) if motion else math.nan
+        if motion in (20, 30):
+            self._arc(block, motion // 10, feed)
+            return
+        end = self.target(block, machine)
+        if motion and state.feed_mode == 93:
+            length = math.dist(state.position, end)
+            feed *= length if length > _NOTHING else 1.0
+        if machine:
+            self.record.machine_motion(block, state, motion // 10, end, feed=feed)
+        else:
+            self.record.line_motion(block, state, motion // 10, end, feed)
+
+    def feed_of(self, block: Block) -> float:
+        """Feed of a cutting motion: mm/min, or 1/min in G93."""
+        state = self.state
+        if state.feed_mode == 93 and "F" not in block.words:
+            self.refuse("CC110", "G93 needs an F word in every block that cuts")
+        if not state.feed:
+            self.refuse("CC110", "a cutting motion without a feed")
+        if state.feed_mode == 95:
+            if state.speed <= 0.0:
+                self.refuse("CC110", "feed per revolution (G95) without a spindle speed")
+            return state.feed * state.speed
+        return state.feed
+
+    def _turns(self, block: Block) -> int:
+        word = block.words.get("P")
+        if word is None or not self.dialect.turns:
+            return 1
+        block.used.add("P")
+        turns = round(word.value)
+        if abs(turns - word.value) > 1e-3 or not 1 <= turns <= 10000:
+            self.refuse("CC113", "P of an arc is a whole number of turns, 1 or more", word)
+        return turns
+
+    def _arc(self, block: Block, code: int, feed: float) -> None:
+        state = self.state
+        u, v, w = arcs.PLANES[state.plane]
+        unit = state.unit
+        turns = self._turns(block)
+        start3 = list(state.position)
+        end3 = self.target(block)
+        start, end = (start3[u] / unit, start3[v] / unit), (end3[u] / unit, end3[v] / unit)
+        try:
+            if "R" in block.words:
+                centre = self._centre_of_radius(block, start, end, code == 3)
+            else:
+                centre = self._centre_of_words(block, start)
+                arcs.check_radii(start, end, centre, unit != 1.0)
+        except arcs.ArcError as error:
+            self.refuse(error.rule, error.message)
+        angle = arcs.sweep(start, end, centre, code == 3, turns)
+        centre3 = list(start3)
+        centre3[u], centre3[v] = centre[0] * unit, centre[1] * unit
+        if state.feed_mode == 93:
+            radius = math.hypot(start3[u] - centre3[u], start3[v] - centre3[v])
+            feed *= math.hypot(radius * angle, end3[w] - start3[w])
+        self.record.arc_motion(block, state, code, end3, centre3, angle, feed)
+
+    def _centre_of_radius(
+        self, block: Block, start: tuple[float, float], end: tuple[float, float], ccw: bool
+    ) -> tuple[float, float]:
+        u, v, _ = arcs.PLANES[self.state.plane]
+        radius = block.words["R"]
+        block.used.add("R")
+        if any(letter in block.words for letter in "IJK"):
+            self.refuse("CC112", "an arc has both R and I, J, K", radius)
+        if u not in block.axes and v not in block.axes:
+            self.refuse("CC112", "an arc given by R has no end point in its plane", radius)
+        return arcs.centre_of_radius(start, end, radius.value, ccw, self.state.unit != 1.0)
+
+    def _centre_of_words(self, block: Block, start: tuple[float, float]) -> tuple[float, float]:
+        state = self.state
+        plane = arcs.PLANES[state.plane][:2]
+        letters = ["IJK"[axis] for axis in plane]
+        missing = [letter for letter in letters if letter not in block.words]
+        if len(missing) == 2 or (state.centre_absolute and missing):
+            self.refuse("CC112", f"the arc has no centre: {' and '.join(missing)} or R is missing")
+        values = [block.number(letter) or 0.0 for letter in letters]
+        if state.centre_absolute:
+            u, v = (state.offset[axis] / state.unit for axis in plane)
+            return values[0] + u, values[1] + v
+        return start[0] + values[0], start[1] + values[1]

@@ -1,0 +1,172 @@
+"""Statements that move nothing and change what later words mean: units, modes, offsets, feed, tool."""
+
+from camcomp.gcode.block import Block, BlockReader
+from camcomp.gcode.codes import WORK_OFFSETS, code_name
+from camcomp.gcode.program import Rebase
+from camcomp.gcode.words import Word
+
+_MODE_GROUPS = (2, 3, 4, 5, 6, 8, 12)
+
+
+class Settings(BlockReader):
+    """Executes the modes and settings of a block, in the order of RS274/NGC."""
+
+    def modes(self, block: Block) -> None:
+        """Everything modal but the motion code."""
+        state, groups, words = self.state, block.groups, block.words
+        changed = any(group in groups for group in _MODE_GROUPS)
+        self.record.modes_changed = changed or (state.feed_mode == 95 and "S" in words)
+        if 6 in groups:
+            state.unit = 25.4 if groups[6][0] == 200 else 1.0
+        if 5 in groups:
+            mode = groups[5][0] // 10
+            if mode != state.feed_mode:
+                state.feed_mode, state.feed = mode, None
+        if "F" in words:
+            self._feed(words["F"])
+        if "S" in words:
+            state.speed = words["S"].value
+            if state.speed < 0.0:
+                self.refuse("CC138", "negative spindle speed", words["S"])
+        self._tool(block)
+        if 2 in groups:
+            state.plane = groups[2][0] // 10
+        if 8 in groups:
+            self._tool_length(block, groups[8][0])
+        elif "H" in words and self.dialect.modal_length and state.length_on:
+            self._tool_length(block, 430)
+        if 12 in groups:
+            self._work_offset(block, *groups[12])
+        if 3 in groups:
+            state.relative = groups[3][0] == 910
+        if 4 in groups:
+            state.centre_absolute = groups[4][0] == 901
+        if 10 in groups:
+            state.retract_to_start = groups[10][0] == 980
+        state.update()
+
+    def _feed(self, word: Word) -> None:
+        state = self.state
+        if word.value < 0.0 or (word.value == 0.0 and state.feed_mode == 93):
+            self.refuse("CC110", "the feed has to be positive", word)
+        state.feed = word.value if state.feed_mode == 93 else word.value * state.unit
+        self.record.feed_stated = True
+
+    def _whole(self, letter: str, word: Word) -> int:
+        if word.value < 0.0 or word.value != int(word.value):
+            self.refuse("CC133", f"{letter} is a whole number, not negative", word)
+        return int(word.value)
+
+    def _tool(self, block: Block) -> None:
+        state, words = self.state, block.words
+        if "T" in words:
+            state.next_tool = self._whole("T", words["T"])
+        for code, word in block.m:
+            if code == 6:
+                state.tool = state.next_tool
+            elif code == 61:
+                if "Q" not in words:
+                    self.refuse("CC133", "M61 needs the tool number as Q", word)
+                state.tool = self._whole("Q", words["Q"])
+            elif code in (3, 4, 5):
+                state.spindle = code
+
+    def _tool_length(self, block: Block, code: int) -> None:
+        state, words = self.state, block.words
+        state.length_on = code != 490
+        if code == 490:
+            block.number("H")
+            state.tool_offset = [0.0, 0.0, 0.0]
+        elif code == 431:
+            for axis in block.axes:
+                state.tool_offset[axis] = words["XYZ"[axis]].value * state.unit
+        else:
+            number = state.tool
+            if "H" in words:
+                block.used.add("H")
+                number = self._whole("H", words["H"])
+            length = state.tools.get(number, 0.0)
+            if number and number not in state.tools:
+                self.warn(f"tool {number} is not in the tool table; its length offset counts as 0", once=True)
+            state.tool_offset = [0.0, 0.0, length if number else 0.0]
+
+    def _work_offset(self, block: Block, code: int, word: Word) -> None:
+        extended = code == 541 or (code == 540 and self.dialect.extended_offsets and "P" in block.words)
+        if not extended:
+            self.state.active = WORK_OFFSETS[code] - 1
+            return
+        number = block.number("P")
+        if number is None or number != int(number) or not 1 <= number <= len(self.state.work) - 9:
+            self.refuse("CC129", "G54.1 needs the number of the work offset as P", word)
+        self.state.active = 8 + int(number)
+
+    def settings(self, block: Block, code: int) -> None:
+        """A code of group 0 that moves nothing."""
+        state = self.state
+        if code == 40:
+            if not any(block.number(letter) is not None for letter in self.dialect.dwell + "P"):
+                self.refuse("CC131", "G4 has no time", block.groups[0][1])
+        elif code == 100:
+            self._set_offset(block)
+        elif code in (281, 301):
+            state.homes[code // 10] = [state.position[axis] + state.zero[axis] for axis in range(3)]
+            self.rebases.append(Rebase(len(self.record), block.row, (), (0.0, 0.0, 0.0), state.unit))
+        elif code in (520, 920):
+            self._shift(block, code)
+        elif code in (921, 922, 923):
+            if code == 921:
+                state.saved_shift = [0.0, 0.0, 0.0]
+            state.shift = list(state.saved_shift) if code == 923 else [0.0, 0.0, 0.0]
+            self.record.modes_changed = True
+        state.update()
+
+    def _shift(self, block: Block, code: int) -> None:
+        state = self.state
+        if not block.axes:
+            self.refuse("CC129", f"{code_name(code)} without axis words", block.groups[0][1])
+        for axis in block.axes:
+            value = block.words["XYZ"[axis]].value * state.unit
+            if code == 920:
+                state.shift[axis] += state.position[axis] - value - state.offset[axis]
+            elif self.dialect.own_local_frame:
+                state.local[axis] = value
+            else:
+                state.shift[axis] = value
+        if code == 920:
+            self._rebase(block)
+        state.saved_shift = list(state.shift)
+
+    def _rebase(self, block: Block) -> None:
+        base = int(self.text.starts[block.row])
+        axes = []
+        values = [0.0, 0.0, 0.0]
+        for axis in block.axes:
+            word = block.words["XYZ"[axis]]
+            axes.append((axis, base + word.begin, base + word.end))
+            values[axis] = word.value
+        value = (values[0], values[1], values[2])
+        self.rebases.append(Rebase(len(self.record), block.row, tuple(axes), value, self.state.unit))
+
+    def _set_offset(self, block: Block) -> None:
+        state, words = self.state, block.words
+        word = block.groups[0][1]
+        kind, number = block.number("L"), block.number("P")
+        extended = kind == 20 and self.dialect.extended_offsets
+        last = len(state.work) - 9 if extended else 9
+        if kind not in (2, 20) or number is None or number != int(number) or not 0 <= number <= last:
+            self.refuse("CC129", f"of G10, camcomp knows L2 and L20 with P0 to P{last}", word)
+        if block.number("R"):
+            self.refuse("CC118", "G10 with R rotates the coordinates", words["R"])
+        index = int(number) - 1 if number else state.active
+        if extended:
+            index = 8 + int(number)
+        for axis in block.axes:
+            value = words["XYZ"[axis]].value * state.unit
+            if kind == 2 or extended:
+                adds = self.dialect.relative_offsets and state.relative
+                state.work[index][axis] = state.work[index][axis] + value if adds else value
+            else:
+                others = state.shift[axis] + state.local[axis] + state.tool_offset[axis]
+                state.work[index][axis] = state.position[axis] + state.zero[axis] - others - value
+        if kind == 20 and not extended:
+            self._rebase(block)
