@@ -89,7 +89,13 @@ class Flow:
 
     def _traced(self, row: int, line: Line, words: list[Word] | None = None) -> None:
         if self.trace is not None:
+            self.trace.motions = len(self.reader.record)
             self.trace.line(row, line, words or line.words)
+
+    def _remarked(self, row: int) -> None:
+        if self.trace is not None:
+            self.trace.motions = len(self.reader.record)
+            self.trace.remark(row)
 
     def _count(self, row: int) -> None:
         """A program that does not come to an end is refused, not waited for."""

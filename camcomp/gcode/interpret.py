@@ -43,7 +43,7 @@ def read_program(data: bytes, *, name: str, setup: Setup | None = None, dialect:
         rebases=tuple(reader.rebases),
         setup=setup,
         language=language,
-        straight=reader.straight,
+        straight=reader.straight and not reader.record.cycles,
     )
 
 

@@ -57,8 +57,7 @@ class Subprograms(Flow):
         strange = [word for letter, word in values.items() if letter not in known]
         if strange or len([word for word in words if word.letter == "M"]) > 1:
             self.refuse(row, (strange or words)[0].begin, "CC124", f"M{code} stands alone with P and L")
-        if self.trace is not None:
-            self.trace.remark(row)
+        self._remarked(row)
         if code == 97:
             self.refuse(row, words[0].begin, "CC124", "M97 is not followed")
         if code == 99:
@@ -131,8 +130,7 @@ class Macro(Subprograms):
         assert self.spelling is not None
         self._count(row)
         self.reader.straight = False
-        if self.trace is not None:
-            self.trace.remark(row)
+        self._remarked(row)
         parser = Parser(code_of(self.text.line(row)).rstrip("\0 \t\x1a"), end, self.spelling)
         try:
             if keyword == "GOTO":
@@ -208,8 +206,7 @@ class Macro(Subprograms):
         """G65: a subprogram with arguments."""
         self._count(row)
         self.reader.straight = False
-        if self.trace is not None:
-            self.trace.remark(row)
+        self._remarked(row)
         words = [word for word in self.computed(row, self.parsed(row)) if word.letter != "N"]
         values: dict[str, Word] = {}
         for word in words:

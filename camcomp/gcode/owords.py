@@ -107,8 +107,7 @@ class OWords(Subprograms):
             return super().step(row)
         self._count(row)
         self.reader.straight = False
-        if self.trace is not None:
-            self.trace.remark(row)
+        self._remarked(row)
         if self.reader.state.setup.skip_deleted and self.text.line(row).lstrip().startswith("/"):
             return row + 1
         self.memory.row = row

@@ -83,4 +83,4 @@ class Program:
     rebases: tuple[Rebase, ...]
     setup: Setup
     language: Dialect
-    straight: bool  # no loops, subprograms, parameters: each line was executed at most once, as it stands
+    straight: bool  # no loops, subprograms, parameters, cycles: a line means at most one motion, as it stands

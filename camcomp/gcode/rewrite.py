@@ -13,10 +13,12 @@ from camcomp.diagnostics import ProgramError
 from camcomp.gcode.arcplan import Move, Point, plan, turns_of
 from camcomp.gcode.arcs import PLANES
 from camcomp.gcode.edits import Edits
+from camcomp.gcode.flatten import flatten
 from camcomp.gcode.numbers import decimals, plain, significant
 from camcomp.gcode.output import Output, Rewritten
 from camcomp.gcode.program import F, G, P, Program, R, Rebase
 from camcomp.gcode.stamp import stamp_index, stamp_line
+from camcomp.gcode.text import Text
 
 _FEED_SLACK = 1.0e-3
 _SHAPE_WORDS = (0, 1, 2, 3, 4, 5, R, P)  # words that say where a motion goes
@@ -30,13 +32,37 @@ def rewrite(program: Program, out: Output, *, resolution_mm: float, version: str
     machine coordinates and moves before X, Y and Z are all known. Raises ProgramError CC137 where a line does too much
     at once to be written anew.
     """
+    stamp = stamp_line(program.data, version, *program.language.comment)
+    if unchanged(program, out, resolution_mm):
+        data = _stamped(program.text, Edits(), stamp)
+        line = program.path.line[out.motion] + 1
+        return Rewritten(data=data, end=program.path.end[out.motion], line=line)
+    if not program.straight:
+        program = flatten(program, resolution_mm)
     writer = Writer(program, out, resolution_mm)
     writer.run()
-    text = program.text
-    stamp = stamp_line(program.data, version) + text.end_of_line(0)
-    writer.edits.insert(stamp_index(text), stamp, first=True)
-    data = text.encode(writer.edits.apply(text.string))
-    return Rewritten(data=data, end=writer.ends, line=writer.lines + 2)
+    return Rewritten(data=_stamped(program.text, writer.edits, stamp), end=writer.ends, line=writer.lines + 2)
+
+
+def _stamped(text: Text, edits: Edits, stamp: str) -> bytes:
+    edits.insert(stamp_index(text), stamp + text.end_of_line(0), first=True)
+    return text.encode(edits.apply(text.string))
+
+
+def unchanged(program: Program, out: Output, resolution_mm: float) -> bool:
+    """True when `out` asks for the program as it is, within half a resolution and 0.1 % of the feed."""
+    path, half = program.path, 0.5 * resolution_mm * (1.0 + 1e-9)
+    if len(out.motion) != len(path) or (out.motion != np.arange(len(path))).any() or (out.kind != path.kind).any():
+        return False
+    free = path.known & ~path.machine
+    if (np.abs(out.end - path.end)[free] > half).any():
+        return False
+    arcs = free & (path.kind == ARC)
+    bent = np.abs(out.centre - path.centre)[arcs] * (1.0 - path.axis[arcs])
+    if not (bent <= half).all() or (np.abs(out.angle - path.angle)[arcs] > 1e-9).any():
+        return False
+    fed = free & (path.kind != RAPID) & ~np.isnan(out.feed)
+    return bool((np.abs(out.feed - path.feed)[fed] <= _FEED_SLACK * path.feed[fed]).all())
 
 
 class Writer:

@@ -1,0 +1,153 @@
+"""Loops, subprograms, parameters and canned cycles written out as plain code, line by line as they were executed.
+
+A line inside a loop stands for many motions, and no two of them get the same correction; so a program that is to be
+changed has to be written out first. Comments stay; jumps, calls and cycles stay as comments.
+"""
+
+import numpy as np
+
+from camcomp.diagnostics import ProgramError
+from camcomp.gcode.edits import Edits
+from camcomp.gcode.interpret import Interpreter, controller, read_program
+from camcomp.gcode.numbers import decimals, plain
+from camcomp.gcode.program import Program
+from camcomp.gcode.trace import Executed, Trace
+from camcomp.gcode.words import BLANK, Word, code_of
+
+_LENGTHS = "XYZIJKRQ"
+_CYCLE_WORDS = "XYZIJKRPQL"
+_SPARE_DIGITS = 2  # beyond the resolution, so that writing out costs nothing
+
+
+def flatten(program: Program, resolution_mm: float) -> Program:
+    """The same motions as a program without jumps, parameters and cycles.
+
+    Raises ProgramError CC137 where a motion cannot be written as G0 or G1 (tapping), or would end elsewhere.
+    """
+    trace = Trace()
+    reader = Interpreter(program.text, program.setup, program.language)
+    controller(reader, trace).run()
+    string = Printer(program, reader, trace, resolution_mm).run()
+    data = program.text.encode(string)
+    flat = read_program(data, name=program.name, setup=program.setup, dialect=program.dialect)
+    same = len(flat.path) == len(program.path) and bool((flat.path.kind == program.path.kind).all())
+    if not same or np.abs(flat.path.end - program.path.end).max() > 0.5 * resolution_mm:
+        raise ProgramError("CC137", "the program cannot be written out without loops", at=program.text.place(0))
+    return flat
+
+
+class Printer:
+    """Makes the text of the executed lines."""
+
+    def __init__(self, program: Program, reader: Interpreter, trace: Trace, resolution_mm: float) -> None:
+        self.program, self.reader, self.trace = program, reader, trace
+        self.text = program.text
+        self.resolution = resolution_mm
+        self.seen: set[int] = set()
+
+    def run(self) -> str:
+        """The whole text."""
+        lines: list[str] = []
+        for entry in self.trace.entries:
+            lines += (each + self.text.end_of_line(entry.row) for each in self._entry(entry))
+        lines += self._tail()
+        return "".join(lines)
+
+    def _tail(self) -> list[str]:
+        """The `%` that closes the file."""
+        last = self.trace.entries[-1].row
+        for row in range(len(self.text) - 1, last, -1):
+            line = self.text.line(row)
+            if line.strip(BLANK).startswith("%"):
+                return [self.text.string[self.text.starts[row] : self.text.nexts[row]]]
+        return []
+
+    def _digits(self, unit: float) -> int:
+        digits = decimals(self.resolution, unit) + _SPARE_DIGITS
+        return min(digits, self.program.language.decimals_max)
+
+    def _entry(self, entry: Executed) -> list[str]:
+        repeated = entry.row in self.seen
+        self.seen.add(entry.row)
+        if entry.remark:
+            return [] if repeated else self._remark(entry.row)
+        cycle = self.reader.record.cycles.get(entry.motions)
+        if cycle is not None and entry.words:
+            actions, tapping = cycle
+            if tapping:
+                place = self.text.place(entry.row)
+                raise ProgramError("CC137", "a tapping cycle cannot be replaced by straight moves", at=place)
+            changed = self._changed(entry, repeated, cycle=True)
+            head = [changed] if code_of(changed).strip(BLANK) else self._remark(entry.row)
+            return head + self._moves(entry.motions, actions)
+        changed = self._changed(entry, repeated, cycle=False)
+        emptied = bool(entry.line.settings) and not code_of(changed).strip(BLANK)
+        if emptied:
+            return [] if repeated else self._remark(entry.row)
+        return [changed]
+
+    def _remark(self, row: int) -> list[str]:
+        """The line as a comment, with the comments that it had."""
+        line = self.text.line(row)
+        bare = code_of(line)
+        code = bare.strip(BLANK)
+        if not code:
+            return [line.strip(BLANK)] if line.strip(BLANK) else []
+        opening, closing = self.program.language.comment
+        spans = "".join(char if char != blank else " " for char, blank in zip(line, bare, strict=True)).split("  ")
+        remarks = [each.strip(BLANK) for each in spans if each.strip(BLANK)]
+        code = " ".join(code.translate({ord("("): None, ord(")"): None}).split())
+        return [" ".join([f"{opening}{code}{closing}", *remarks])]
+
+    def _changed(self, entry: Executed, repeated: bool, cycle: bool) -> str:
+        """The line with values instead of expressions; without its number when it comes again."""
+        line = self.text.line(entry.row)
+        edits = Edits()
+        unit = self._unit(entry.motions)
+        computed = {index for index, _ in entry.line.expressions}
+        for index, word in enumerate(entry.words):
+            gone = word.letter == "N" and (repeated or index > 0)
+            if cycle:
+                gone = gone or word.letter in _CYCLE_WORDS or (word.letter == "G" and self._is_cycle_code(word))
+            if gone:
+                edits.replace(word.begin, self._behind(line, word.end), "")
+            elif index in computed:
+                point = word.letter in _LENGTHS
+                digits = self._digits(unit) if point else 6
+                edits.replace(word.begin, word.end, word.letter + plain(word.value, digits, point))
+        for setting in entry.line.settings:
+            edits.replace(setting.begin, self._behind(line, setting.end), "")
+        return edits.apply(line)
+
+    @staticmethod
+    def _is_cycle_code(word: Word) -> bool:
+        return 73 <= word.value < 90 or word.value in (98.0, 99.0)
+
+    @staticmethod
+    def _behind(line: str, end: int) -> int:
+        while end < len(line) and line[end] in " \t":
+            end += 1
+        return end
+
+    def _unit(self, motion: int) -> float:
+        sites = self.program.sites
+        return float(sites.unit[min(motion, len(sites.unit) - 1)])
+
+    def _moves(self, motion: int, actions: list[tuple[str, list[float]]]) -> list[str]:
+        """What a cycle did, as G0, G1, G4 and M statements."""
+        sites, path = self.program.sites, self.program.path
+        unit, offset, relative = float(sites.unit[motion]), sites.offset[motion], bool(sites.relative[motion])
+        digits = self._digits(unit)
+        here = [round(float(each), digits) for each in (path.start[motion] - offset) / unit]
+        lines = []
+        for statement, end in actions:
+            if not end:
+                lines.append(statement)
+                continue
+            there = [round(float(each), digits) for each in (np.array(end) - offset) / unit]
+            axes = [axis for axis in range(3) if there[axis] != here[axis]] or [2]
+            values = [there[axis] - here[axis] if relative else there[axis] for axis in axes]
+            words = ["XYZ"[axis] + plain(value, digits) for axis, value in zip(axes, values, strict=True)]
+            lines.append(" ".join([statement, *words]))
+            here = there
+        return lines
