@@ -59,13 +59,20 @@ def _per_point(value: Array | None, n: int, shape: tuple[int, ...]) -> Array:
     return np.ascontiguousarray(np.broadcast_to(np.asarray(value, float), (n, *shape))).copy()
 
 
+def threads() -> int:
+    """Threads of the solver: as many as there are cores for this process, or what CAMCOMP_THREADS says."""
+    limit = os.environ.get("CAMCOMP_THREADS", "")
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return max(1, int(limit)) if limit.isdigit() else cores
+
+
 def _in_pieces(work: Callable[[slice], None], n: int) -> None:
     """Runs work on slices of PIECE points, on every core."""
     pieces = [slice(a, min(a + PIECE, n)) for a in range(0, n, PIECE)]
     if len(pieces) == 1:
         work(pieces[0])
         return
-    with ThreadPoolExecutor(len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else None) as pool:
+    with ThreadPoolExecutor(threads()) as pool:
         list(pool.map(work, pieces))
 
 
