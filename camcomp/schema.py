@@ -47,8 +47,12 @@ def _offer(
     options = list(first or [])
     for member in shelf.members(shelf_name):
         spec: type[BaseModel] = params_of(shelf.load(shelf_name, member))
-        one = _draft07(spec.model_json_schema(by_alias=True, ref_template="#/definitions/{model}"))
-        definitions.update(one.pop("definitions", {}))
+        # Two plug-ins may have classes of one name.
+        template = f"#/definitions/{shelf_name}.{member}.{{model}}"
+        one = _draft07(spec.model_json_schema(by_alias=True, ref_template=template))
+        definitions.update(
+            {f"{shelf_name}.{member}.{key}": each for key, each in one.pop("definitions", {}).items()}
+        )
         one["title"] = member
         one["properties"] = {key: {"const": member}, **shared, **one["properties"]}
         one["required"] = [key, *required, *one.get("required", [])]
