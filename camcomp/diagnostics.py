@@ -38,7 +38,7 @@ class CamcompError(Exception):
         self.rule = rule
         self.message = message
         self.at = at
-        self.hint = hint if hint is not None else RULES[rule].hint
+        self.hint = hint or RULES[rule].hint or f"`camcomp explain {rule}` says more"
         self.others = tuple(others)
 
     def all(self) -> tuple["CamcompError", ...]:

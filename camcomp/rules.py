@@ -31,12 +31,14 @@ RULES: dict[str, Rule] = {
         "number malformed",
         "A number is digits with at most one point and a sign in front, without blanks inside: `X1.2.3` and `X1 0` "
         "are read differently by different controls.",
+        "write the number with digits and one point, e.g. X12.5",
     ),
     "CC103": Rule("letter or number alone", "Every word is a letter followed by its number."),
     "CC104": Rule(
         "word twice in a block",
         "A block may hold each letter once (G and M excepted). Which of two X words counts differs between controls.",
         "delete one of the two, or split the line",
+        "put the letter and its number together, or take the stray sign out",
     ),
     "CC105": Rule(
         "codes exclude each other",
@@ -54,6 +56,7 @@ RULES: dict[str, Rule] = {
         "Two codes in the block want the axis words, or the code with which they stand has no use for them, as in "
         "`G4 X1.5`, which dwells on one control and moves on another.",
         "split the line",
+        "take the character out, or put it into a comment",
     ),
     "CC109": Rule(
         "word not used",
@@ -71,10 +74,12 @@ RULES: dict[str, Rule] = {
         "arc radii differ",
         "Start and end of the arc are not equally far from the centre given by I, J, K, by more than controls allow. "
         "Usual reasons: centres meant absolute (G90.1), a lost line, the wrong plane.",
+        "check I, J, K against the start point, G90.1/G91.1 and the plane (G17, G18, G19)",
     ),
     "CC112": Rule(
         "arc not defined",
         "Centre or radius are missing, contradict each other, or do not lead to the end point.",
+        "give the end point with I and J (G17), I and K (G18), J and K (G19), or with R",
     ),
     "CC113": Rule("turns of an arc", "P in an arc block counts turns: a whole number, 1 or more."),
     "CC114": Rule(
@@ -82,6 +87,7 @@ RULES: dict[str, Rule] = {
         "With G41 or G42 the control offsets the path by a radius that the program does not contain, so the point "
         "where the tool touches is not known here.",
         "post the program with the tool's centre line (G40)",
+        "write P with a whole number, 1 or more, or leave it out",
     ),
     "CC115": Rule(
         "rotary or extra axis",
@@ -98,6 +104,9 @@ RULES: dict[str, Rule] = {
     "CC123": Rule(
         "expression or parameter",
         "A parameter is not set, an expression is malformed, or its value is known at the machine only.",
+        "run the threading part without camcomp",
+        "take the probing out; camcomp needs to know where every move ends",
+        "replace the expression by its value",
     ),
     "CC124": Rule(
         "jump, loop or call",
@@ -130,6 +139,8 @@ RULES: dict[str, Rule] = {
         "no motion code in force",
         "Axis words stand alone, and no G0 to G3 or cycle is in force (none yet, or G80 ended it).",
         "add G0 or G1",
+        "write G53 G0 or G53 G1 with absolute words",
+        "write the time as P, e.g. G4 P0.5",
     ),
     "CC135": Rule(
         "unknown statement",
@@ -154,6 +165,7 @@ RULES: dict[str, Rule] = {
         "Behind a comma, controls expect a corner radius or a chamfer, which changes the geometry; and some people "
         "write decimal commas.",
         "post corners as arcs and lines",
+        "check the number and the units (G20, G21)",
     ),
     # --- CC2xx usage, YAML, config -----------------------------------------------------------------------------
     "CC200": Rule(
@@ -347,6 +359,7 @@ RULES: dict[str, Rule] = {
         "output is the input",
         "An output names the file that is being read. The input is never overwritten.",
         "choose another name for the output",
+        "check the folder, its rights and the space on the disk",
     ),
     "CC503": Rule("input or output failed", "The operating system refused a file or stream.", "check disk and rights"),
     # --- CC6xx checks ------------------------------------------------------------------------------------------
