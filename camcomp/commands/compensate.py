@@ -8,7 +8,7 @@ import click
 from camcomp import __version__
 from camcomp.config import load_config
 from camcomp.diagnostics import CheckFailed
-from camcomp.files import STANDARD, write_all
+from camcomp.files import STANDARD, display_name, read_bytes, write_all
 
 
 @click.command()
@@ -18,6 +18,7 @@ from camcomp.files import STANDARD, write_all
 @click.option("--joints", metavar="OUT.csv", help="Actuator coordinates and drive forces at every end point.")
 @click.option("--summary", "summary_file", metavar="OUT.json", help="Figures of the run.")
 @click.option("--paths", metavar="OUT.csv", help="The five trajectories: target, errors, force, both, adjusted.")
+@click.option("--report", metavar="OUT.html", help="What was done and why, as one page with plots.")
 @click.option(
     "--method",
     type=click.Choice(["newton", "stiffness", "fixed-point", "linear"]),
@@ -31,6 +32,7 @@ def command(
     joints: str | None,
     summary_file: str | None,
     paths: str | None,
+    report: str | None,
     method: str | None,
     tolerance_um: float | None,
 ) -> None:
@@ -40,6 +42,10 @@ def command(
     output. Exit code 1: everything is written, but a check failed, or the program was compensated before.
     """
     config = load_config(configs)
+    if report:
+        from camcomp.report.page import plot_library
+
+        plot_library()  # a missing library is told before the work, not after it
     from camcomp.compensate import compensate, trajectories
     from camcomp.gcode.stamp import is_stamped
     from camcomp.job import Job
@@ -56,7 +62,7 @@ def command(
     )
     figures = tables.summary(result, job)
     outputs: dict[str, bytes] = {}
-    if output or not (joints or summary_file or paths):
+    if output or not (joints or summary_file or paths or report):
         outputs[output or STANDARD] = result.written.data
     if joints:
         outputs[joints] = tables.joint_csv(result, job)
@@ -64,9 +70,15 @@ def command(
         outputs[paths] = tables.paths_csv(result, trajectories(result, job))
     if summary_file:
         outputs[summary_file] = (json.dumps(figures, indent=2) + "\n").encode()
+    failed = result.failed_checks(job, tolerance)
+    if report:
+        from camcomp.report.compensation import Input, compensation_html
+
+        inputs = [Input("program", source.name, source.data)]
+        inputs += [Input("configuration", display_name(each), read_bytes(each)) for each in configs if each != STANDARD]
+        outputs[report] = compensation_html(result, job, figures, failed=failed, tolerance_um=tolerance, inputs=inputs)
     write_all(outputs, inputs=(program, *configs))
     _tell(figures)
-    failed = result.failed_checks(job, tolerance)
     if failed:
         first, *rest = (CheckFailed(rule, text) for rule, text in failed)
         first.others = tuple(rest)

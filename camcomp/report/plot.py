@@ -1,0 +1,109 @@
+"""Figures as data for plotly.js: traces, axes, thinning. Colours are names of the page's variables, one set per theme."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from camcomp.datatypes import Bools, Floats, Ints
+
+MOST = 3000  # points kept of a long curve
+# Curves differ by dash as well as by colour, so that a print in grey can be read.
+STYLES = tuple(
+    (f"var(--c{i + 1})", dash) for i, dash in enumerate(("solid", "dash", "dot", "dashdot", "longdash", "longdashdot"))
+)
+INK = "var(--ink)"
+# From small to large; blue to yellow with rising lightness, which every kind of sight can order.
+SCALE = [[0, "var(--m0)"], [0.5, "var(--m1)"], [1, "var(--m2)"]]
+
+Json = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Figure:
+    """One plot of a page. label: what a screen reader says; caption: what everybody reads below it.
+
+    exaggerate: base curve and shifts of the plot whose deviations a slider enlarges (see assets/page.js).
+    """
+
+    name: str
+    title: str
+    caption: str
+    label: str
+    traces: Sequence[Json] = ()
+    layout: Mapping[str, Any] = field(default_factory=dict)
+    height: int = 340
+    exaggerate: Json | None = None
+
+    def as_json(self) -> Json:
+        """What the script of the page needs."""
+        out: Json = {"name": self.name, "traces": list(self.traces), "layout": dict(self.layout), "height": self.height}
+        return out | ({"exaggerate": self.exaggerate} if self.exaggerate else {})
+
+
+def numbers(values: Floats, decimals: int = 5) -> list[float | None]:
+    """Values for JSON; what is not finite becomes null, which plotly draws as a gap."""
+    rounded = np.round(np.asarray(values, float), decimals) + 0.0
+    return [value if np.isfinite(value) else None for value in rounded.tolist()]
+
+
+def thin(values: Floats, most: int = MOST) -> Ints:
+    """Indices (k,) of at most about `most` rows of values (n, c): the least and greatest of every column per section."""
+    n, columns = values.shape
+    if n <= most:
+        return np.arange(n)
+    sections = max(most // (2 * columns + 2), 1)
+    kept = {0, n - 1}
+    filled = np.where(np.isfinite(values), values, 0.0)
+    bounds = np.linspace(0, n, sections + 1).astype(int)
+    for a, b in pairwise(bounds.tolist()):
+        part = filled[a:b]
+        kept.update((a, b - 1, *(a + part.argmin(axis=0)), *(a + part.argmax(axis=0))))
+    return np.array(sorted(int(i) for i in kept))
+
+
+def broken(rows: Ints, hidden: Bools) -> tuple[Ints, Bools]:
+    """Indices of `rows` with a repeated one wherever a hidden move lies between two, and which of them are gaps."""
+    count = np.cumsum(hidden)
+    gap = np.flatnonzero(np.diff(count[rows]) > 0) + 1
+    return np.insert(rows, gap, rows[gap]), np.insert(np.zeros(len(rows), np.bool_), gap, True)
+
+
+def gapped(values: Floats, index: Ints, gap: Bools, decimals: int = 5) -> list[float | None]:
+    """Values at `index`, null where a gap is."""
+    return numbers(np.where(gap, np.nan, values[index]), decimals)
+
+
+def line(name: str, x: Sequence[Any], y: Sequence[Any], style: int, *, hover: str = "", **more: Any) -> Json:
+    """A curve in the `style`-th colour and dash."""
+    color, dash = STYLES[style % len(STYLES)]
+    out: Json = {"type": "scatter", "mode": "lines", "name": name, "x": x, "y": y}
+    out["line"] = {"color": color, "dash": dash, "width": 2}
+    if hover:
+        out["hovertemplate"] = hover
+    return out | more
+
+
+def level(name: str, x: Sequence[float], y: float) -> Json:
+    """A horizontal line for a limit or a noise floor."""
+    style = {"color": INK, "dash": "dot", "width": 1.5}
+    return {"type": "scatter", "mode": "lines", "name": name, "x": list(x), "y": [y] * len(x), "line": style}
+
+
+def axis(title: str, **more: Any) -> Json:
+    """An axis with a title."""
+    return {"title": {"text": title}, **more}
+
+
+def brief(value: float, digits: int = 3) -> str:
+    """A number for people: so many significant digits, no exponent from 1e-4 to 1e6."""
+    if value == 0.0 or not np.isfinite(value):
+        return "0" if value == 0.0 else "–"
+    if 1e-4 <= abs(value) < 1e6:
+        places = max(digits - 1 - int(np.floor(np.log10(abs(value)))), 0)
+        return f"{value:.{places}f}"
+    return f"{value:.{digits - 1}e}"

@@ -1,0 +1,111 @@
+"""The compensation report as a file: what stands in it, and what must not."""
+
+import json
+import re
+import sys
+from hashlib import sha256
+from html import unescape
+
+import numpy as np
+import pytest
+
+from camcomp.cli import run
+from camcomp.report import page as page_module
+from tests.commandline import ROOT, table
+
+PROGRAM = ROOT / "samples/groove-circle-2.nc"
+CONFIG = ROOT / "config/orthoglide-1deg.yaml"
+
+
+def text_of(html):
+    """Words of the page, without scripts and styles."""
+    body = re.sub(r"<(script|style)[ >].*?</\1>", " ", html, flags=re.S)
+    return unescape(re.sub(r"<[^>]*>", " ", body)).replace("\u00a0", " ")
+
+
+def figures_of(html):
+    data = re.search(r'<script type="application/json" id="figures">(.*?)</script>', html, re.S)[1]
+    return {each["name"]: each for each in json.loads(data)}
+
+
+def compensate(folder, *more, program=PROGRAM, config=CONFIG, code=0):
+    out = folder / "r.html"
+    words = ["compensate", program, "--config", config, "-o", folder / "out.nc", "--report", out, *more]
+    assert run([str(each) for each in words]) == code
+    return out.read_text(encoding="utf-8") if code == 0 else ""
+
+
+def test_equal_inputs_give_equal_bytes_wherever_they_lie(report, tmp_path, monkeypatch):
+    (tmp_path / "elsewhere").mkdir()
+    program, config = tmp_path / "elsewhere" / PROGRAM.name, tmp_path / CONFIG.name
+    program.write_bytes(PROGRAM.read_bytes())
+    config.write_bytes(CONFIG.read_bytes())
+    monkeypatch.chdir(tmp_path)
+    again = compensate(tmp_path, program=f"elsewhere/{PROGRAM.name}", config=config)
+    assert again == report.read_text(encoding="utf-8")
+    assert str(tmp_path) not in again
+
+
+def test_figures_agree_with_the_tables(report, tmp_path):
+    joints, summary = tmp_path / "j.csv", tmp_path / "s.json"
+    words = ["compensate", PROGRAM, "--config", CONFIG, "--joints", joints, "--summary", summary]
+    assert run([str(each) for each in words]) == 0
+    columns, figures = table(joints), figures_of(report.read_text(encoding="utf-8"))
+    drive = figures["drive-slides"]["traces"]
+    for trace, name in zip(drive, "xyz", strict=True):
+        drawn = np.array(trace["y"], float)
+        assert trace["name"] == name
+        assert np.nanmax(np.abs(drawn)) == pytest.approx(np.abs(columns[f"act_{name}_N"]).max(), rel=1e-4)
+    for trace, axis in zip(figures["shift"]["traces"], "xyz", strict=True):
+        drawn = {round(v, 1) for v in trace["y"] if v is not None}
+        assert drawn <= {round(1e3 * v, 1) for v in columns[f"{axis}c_mm"] - columns[f"{axis}_mm"]}
+    worst = np.nanmax(np.array(figures["error"]["traces"][0]["y"], float))
+    before = json.loads(summary.read_text())["before"]["max_um"]
+    assert worst == pytest.approx(before, rel=0.02)
+    assert f"{before:.0f} µm" in text_of(report.read_text(encoding="utf-8"))
+
+
+def test_rapids_are_gaps(report):
+    shift = figures_of(report.read_text(encoding="utf-8"))["shift"]["traces"][0]
+    assert shift["x"][0] is not None and shift["x"].count(None) == shift["y"].count(None)
+    trajectories = figures_of(report.read_text(encoding="utf-8"))["trajectories"]["exaggerate"]
+    z = [v for v in trajectories["base"]["z"] if v is not None]
+    assert set(np.round(z, 6)) == {0.0, 5.0}
+
+
+def test_every_file_stands_there_with_its_fingerprint(report):
+    words = text_of(report.read_text(encoding="utf-8"))
+    for path in (PROGRAM, CONFIG, report.parent / "out.nc"):
+        assert sha256(path.read_bytes()).hexdigest() in words
+    assert "orthoglide-1deg.yaml:17" in words and "[1, 0, 0]" in words
+
+
+def test_names_and_comments_cannot_become_markup(tmp_path):
+    config = tmp_path / "m.yaml"
+    evil = "</script><script>alert(1)</script><b>"
+    text = CONFIG.read_text().replace("Orthoglide, chains turned by 1 degree", f'"{evil}"')
+    config.write_text(text)
+    html = compensate(tmp_path, config=config)
+    assert "alert(1)</script>" not in html and "&lt;/script&gt;&lt;script&gt;alert(1)" in html
+
+
+def test_a_failed_check_is_the_verdict(tmp_path):
+    config = tmp_path / "m.yaml"
+    config.write_text(CONFIG.read_text().replace("home_mm: -300,", "home_mm: -300, limits_mm: [-1, 1],"))
+    compensate(tmp_path, config=config, code=1)
+    html = (tmp_path / "r.html").read_text(encoding="utf-8")
+    assert 'class="verdict bad"' in html and "actuator x leaves its travel" in text_of(html)
+
+
+def test_without_the_plot_library_a_clear_refusal(tmp_path, monkeypatch, capsys):
+    page_module.plot_library.cache_clear()
+    monkeypatch.setitem(sys.modules, "plotly.offline", None)
+    compensate(tmp_path, code=2)
+    assert "pip install 'camcomp[report]'" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_report_alone_writes_no_program_to_the_terminal(tmp_path, capsysbinary):
+    words = ["compensate", PROGRAM, "--config", CONFIG, "--report", "-"]
+    assert run([str(each) for each in words]) == 0
+    assert capsysbinary.readouterr().out.startswith(b"<!doctype html>")
