@@ -33,12 +33,15 @@ RULES: dict[str, Rule] = {
         "are read differently by different controls.",
         "write the number with digits and one point, e.g. X12.5",
     ),
-    "CC103": Rule("letter or number alone", "Every word is a letter followed by its number."),
+    "CC103": Rule(
+        "letter or number alone",
+        "Every word is a letter followed by its number.",
+        "put the letter and its number together, or take the stray sign out",
+    ),
     "CC104": Rule(
         "word twice in a block",
         "A block may hold each letter once (G and M excepted). Which of two X words counts differs between controls.",
         "delete one of the two, or split the line",
-        "put the letter and its number together, or take the stray sign out",
     ),
     "CC105": Rule(
         "codes exclude each other",
@@ -50,13 +53,16 @@ RULES: dict[str, Rule] = {
         "camcomp does not know the code, so it cannot know whether it changes the geometry of what follows.",
         "check the dialect (--dialect, or control: dialect: in the YAML)",
     ),
-    "CC107": Rule("unknown character", "The character has no meaning at this place of a program."),
+    "CC107": Rule(
+        "unknown character",
+        "The character has no meaning at this place of a program.",
+        "take the character out, or put it into a comment",
+    ),
     "CC108": Rule(
         "axis words without a clear user",
         "Two codes in the block want the axis words, or the code with which they stand has no use for them, as in "
         "`G4 X1.5`, which dwells on one control and moves on another.",
         "split the line",
-        "take the character out, or put it into a comment",
     ),
     "CC109": Rule(
         "word not used",
@@ -81,31 +87,42 @@ RULES: dict[str, Rule] = {
         "Centre or radius are missing, contradict each other, or do not lead to the end point.",
         "give the end point with I and J (G17), I and K (G18), J and K (G19), or with R",
     ),
-    "CC113": Rule("turns of an arc", "P in an arc block counts turns: a whole number, 1 or more."),
+    "CC113": Rule(
+        "turns of an arc",
+        "P in an arc block counts turns: a whole number, 1 or more.",
+        "write P with a whole number, 1 or more, or leave it out",
+    ),
     "CC114": Rule(
         "cutter radius compensation",
         "With G41 or G42 the control offsets the path by a radius that the program does not contain, so the point "
         "where the tool touches is not known here.",
         "post the program with the tool's centre line (G40)",
-        "write P with a whole number, 1 or more, or leave it out",
     ),
     "CC115": Rule(
         "rotary or extra axis",
         "A, B, C, U, V or W moves an axis that the machine of the configuration does not have.",
         "post the program for three axes",
     ),
-    "CC116": Rule("polar coordinates", "G16 and polar words are not followed.", "post in Cartesian coordinates"),
+    "CC116": Rule(
+        "polar coordinates", "G16 and polar words are not followed.", "post in Cartesian coordinates"
+    ),
     "CC117": Rule("scaling or mirroring", "G51 is not followed.", "post at full scale, without mirroring"),
     "CC118": Rule("rotated coordinates", "G68 and rotated work offsets are not followed.", "post unrotated"),
     "CC119": Rule("splines", "Spline and NURBS moves are not followed.", "post lines and arcs"),
-    "CC120": Rule("spindle-synchronous motion", "Threading follows the spindle, not the feed.", ""),
-    "CC121": Rule("probing", "Where a probing move ends is known at the machine only.", ""),
+    "CC120": Rule(
+        "spindle-synchronous motion",
+        "Threading follows the spindle, not the feed.",
+        "run the threading part without camcomp",
+    ),
+    "CC121": Rule(
+        "probing",
+        "Where a probing move ends is known at the machine only.",
+        "take the probing out; camcomp needs to know where every move ends",
+    ),
     "CC122": Rule("turning", "Lathe modes are not followed: camcomp is for milling.", ""),
     "CC123": Rule(
         "expression or parameter",
         "A parameter is not set, an expression is malformed, or its value is known at the machine only.",
-        "run the threading part without camcomp",
-        "take the probing out; camcomp needs to know where every move ends",
         "replace the expression by its value",
     ),
     "CC124": Rule(
@@ -129,18 +146,24 @@ RULES: dict[str, Rule] = {
         "Klartext programs have another language than ISO programs, and camcomp does not read it.",
         "post the program as DIN/ISO (.i), or for another control",
     ),
-    "CC128": Rule("encoding", "The file is marked as UTF-16 and cannot be decoded.", "save it as UTF-8 or ASCII"),
-    "CC129": Rule("offset statement", "The words of G10, G52 or G92 do not say which offset to set to what.", ""),
-    "CC130": Rule("G53 misused", "A move in machine coordinates is a straight one with absolute words.", ""),
-    "CC131": Rule("dwell without a time", "G4 needs its time as P.", ""),
+    "CC128": Rule(
+        "encoding", "The file is marked as UTF-16 and cannot be decoded.", "save it as UTF-8 or ASCII"
+    ),
+    "CC129": Rule(
+        "offset statement", "The words of G10, G52 or G92 do not say which offset to set to what.", ""
+    ),
+    "CC130": Rule(
+        "G53 misused",
+        "A move in machine coordinates is a straight one with absolute words.",
+        "write G53 G0 or G53 G1 with absolute words",
+    ),
+    "CC131": Rule("dwell without a time", "G4 needs its time as P.", "write the time as P, e.g. G4 P0.5"),
     "CC132": Rule("canned cycle", "A word that the cycle needs is missing or makes no sense.", ""),
     "CC133": Rule("tool statement", "T, H, M6, M61 or G43 has a word that is missing or makes no sense.", ""),
     "CC134": Rule(
         "no motion code in force",
         "Axis words stand alone, and no G0 to G3 or cycle is in force (none yet, or G80 ended it).",
         "add G0 or G1",
-        "write G53 G0 or G53 G1 with absolute words",
-        "write the time as P, e.g. G4 P0.5",
     ),
     "CC135": Rule(
         "unknown statement",
@@ -159,13 +182,16 @@ RULES: dict[str, Rule] = {
         "The line does too much at once for its motion to be replaced: it changes a mode and stops the program in the "
         "same block, it taps, or it stores the position where the tool stands.",
     ),
-    "CC138": Rule("value out of range", "The number is not finite, negative where it must not be, or too large.", ""),
+    "CC138": Rule(
+        "value out of range",
+        "The number is not finite, negative where it must not be, or too large.",
+        "check the number and the units (G20, G21)",
+    ),
     "CC139": Rule(
         "comma",
         "Behind a comma, controls expect a corner radius or a chamfer, which changes the geometry; and some people "
         "write decimal commas.",
         "post corners as arcs and lines",
-        "check the number and the units (G20, G21)",
     ),
     # --- CC2xx usage, YAML, config -----------------------------------------------------------------------------
     "CC200": Rule(
@@ -354,14 +380,19 @@ RULES: dict[str, Rule] = {
     # --- CC4xx logs, experiments -------------------------------------------------------------------------------
     # --- CC5xx input and output --------------------------------------------------------------------------------
     "CC500": Rule("file cannot be read", "The file is not there, or may not be read.", "check the path"),
-    "CC501": Rule("file cannot be written", "The folder is not there, is full, or may not be written to."),
+    "CC501": Rule(
+        "file cannot be written",
+        "The folder is not there, is full, or may not be written to.",
+        "check the folder, its rights and the space on the disk",
+    ),
     "CC502": Rule(
         "output is the input",
         "An output names the file that is being read. The input is never overwritten.",
         "choose another name for the output",
-        "check the folder, its rights and the space on the disk",
     ),
-    "CC503": Rule("input or output failed", "The operating system refused a file or stream.", "check disk and rights"),
+    "CC503": Rule(
+        "input or output failed", "The operating system refused a file or stream.", "check disk and rights"
+    ),
     # --- CC6xx checks ------------------------------------------------------------------------------------------
     "CC601": Rule(
         "residual over tolerance",
