@@ -33,6 +33,8 @@ def atoms_of(actuators: Sequence[str], without: Sequence[str] = ()) -> list[Atom
         if name == "none" or name in without:
             continue
         effect = shelf.load("effects", name)
+        if getattr(effect, "ARM_ONLY", False):
+            continue
         if effect.TARGET in ("actuator", "either"):
             found += [Atom(name, a, effect) for a in actuators]
         if effect.TARGET in ("machine", "either"):
