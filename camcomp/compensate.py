@@ -17,11 +17,12 @@ from camcomp.gcode.rewrite import Output, Rewritten, rewrite
 from camcomp.job import Job
 from camcomp.moves import refuse_unsolved, row_layout
 from camcomp.posture import check_posture, whole_pose
-from camcomp.response import Travel, aim_at, respond
+from camcomp.response import Travel, aim_at, respond, with_memory
 from camcomp.splitting import Nodes, divide, second_derivative, trial_nodes
 from camcomp.statics.target import Correction, settle
 
-MAX_ROUNDS = 6
+MAX_ROUNDS, EFFECT_ROUNDS = 6, 2  # finer lines do not help against the play of a drive
+TURN_LINES = 2  # lines on either side of a reversal in which a drive takes up its play
 RAPID_FEED = 10_000.0  # mm/min, for the time that rapids take
 COARSE_MM, FINE_MM = 8.0, 0.5  # distance of trial points on straight lines, without and with effects
 
@@ -116,7 +117,7 @@ def compensate(program: Program, job: Job, *, method: str, tolerance_um: float, 
     trial = trial_nodes(track.length, angle, feeding & (track.length > 0.0), spacing)
     aimed = _aim(program, job, track, trial, corrected, method)
     bend = second_derivative(trial, aimed.commanded)
-    for _ in range(MAX_ROUNDS):
+    for _ in range(EFFECT_ROUNDS if job.causes else MAX_ROUNDS):
         nodes, shift = divide(trial, bend, tolerance)
         solved = _aim(program, job, track, nodes, corrected, method)
         rows = _rows(program, job, track, nodes, solved.commanded + shift, corrected)
@@ -290,14 +291,18 @@ def _see_original(job: Job, points: _Points) -> _Seen:
 
 def _takes_up_play(job: Job, points: _Points, rho: Floats) -> Bools:
     """Points (k,) of lines in which an actuator turns round: the play or wind-up of its drive is taken up in them."""
-    if not any(cause.hook("on_drive") for cause in job.causes):
+    if not job.causes:
         return np.zeros(len(points.row), np.bool_)
-    way = np.sign(np.diff(rho, axis=0, prepend=rho[:1]))
+    memory = with_memory(job, rho, points.travel.take(points.end))
+    way = np.sign(np.diff(rho, axis=0, prepend=rho[:1]))[:, memory]
     for k in range(1, len(way)):  # standing still keeps the direction
         way[k] = np.where(way[k] == 0.0, way[k - 1], way[k])
     turns = np.concatenate((np.zeros((1, way.shape[1]), np.bool_), way[1:] * way[:-1] < 0.0)).any(axis=1)
-    turns |= np.concatenate((turns[1:], [False]))  # rho turns at an end point: the line before has the peak in it
-    return turns[points.row]
+    near = turns.copy()
+    for shift in range(1, TURN_LINES + 1):
+        near[shift:] |= turns[:-shift]
+        near[:-shift] |= turns[shift:]
+    return near[points.row]
 
 
 def _warnings(rows: Rows, error: Floats, turning: Bools) -> list[str]:

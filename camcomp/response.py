@@ -11,15 +11,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from camcomp.datatypes import Floats
+from camcomp.datatypes import Bools, Floats
 from camcomp.gap.effect import Load, Motion
 from camcomp.gap.memory import direction
 from camcomp.job import Job
 from camcomp.statics.solve import FREE, solve
 from camcomp.statics.target import Correction, correct, settle
 
-SETTLED_MM = 2e-6  # the correction of effects ends here
-MAX_STEPS = 12
+SETTLED_MM = 2e-5  # the correction of effects ends here
+MAX_STEPS = 6
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,6 +86,18 @@ def aim_at(job: Job, target: Floats, travel: Travel, method: str) -> Correction:
             if not np.abs(left).max(initial=0.0) > SETTLED_MM:
                 break
     return replace(found, commanded=commanded)
+
+
+def with_memory(job: Job, rho: Floats, travel: Travel) -> Bools:
+    """Actuators (m,) whose carriage depends on the way they came: play, wind-up by friction."""
+    motion = _motion(job, rho, travel)
+    out = np.zeros(rho.shape[1], np.bool_)
+    for cause in job.causes:
+        if (hook := cause.hook("on_drive")) is not None:
+            which = cause.which(job.real_machine.actuators)
+            moved, still = (hook(np.zeros_like(rho), m, which, cause.values) for m in (motion, replace(motion, ordered=False)))
+            out |= np.abs(moved - still).max(axis=0, initial=0.0) > 0.0
+    return out
 
 
 def _motion(job: Job, setpoint: Floats, travel: Travel) -> Motion:
