@@ -122,12 +122,10 @@ class Bench:
         reading = self.read(k, causes) if causes else self.nominal[k]
         return thinned(self.observed(k) - self.channels(reading), self.runs[k].thin)
 
-    def column(self, k: int, causes: Sequence[Cause], before: Cause, after: Cause, step: float) -> Floats:
-        """Change (n, c) of run k's channels per unit of coordinate when `before` becomes `after` among the causes."""
-        others = [c for c in causes if c is not before]
-        a = self.channels(self.read(k, [*others, before])) if before in causes else self.channels(self.read(k, others))
-        b = self.channels(self.read(k, [*others, after]))
-        return thinned((b - a) / step, self.runs[k].thin)
+    def gap(self, k: int, causes: Sequence[Cause] = ()) -> Floats:
+        """Measured minus model (n, c) in run k, thinned, with the model's own encoders: the gap as a user sees it."""
+        reading, _ = self.twin.sense(self.runs[k].course, causes, solved=self.solved[k], slopes=self.slopes[k])
+        return thinned(self.observed(k) - self.channels(reading), self.runs[k].thin)
 
 
 def thinned(values: Floats, factor: int) -> Floats:

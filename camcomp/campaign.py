@@ -8,7 +8,6 @@ from pathlib import Path as FilePath
 
 import numpy as np
 
-from camcomp import shelf
 from camcomp.bench import Run
 from camcomp.config import load_config, load_experiment
 from camcomp.course import Course, course_of_program
@@ -16,14 +15,13 @@ from camcomp.cutting.track import lay_track
 from camcomp.datatypes import Floats
 from camcomp.diagnostics import ConfigError, Location
 from camcomp.files import display_name, read_bytes
-from camcomp.gap.effect import Cause
 from camcomp.gap.observation import Measured
 from camcomp.gap.timeline import fit_to_log, schedule
 from camcomp.job import Job
 from camcomp.programs import open_program
 from camcomp.spec import Config, Experiment
 from camcomp.spec import Run as RunSpec
-from camcomp.twin import Twin
+from camcomp.twin import Twin, twin_of
 
 MOST_ROWS = 3000  # rows of a run beyond which neighbours are averaged
 
@@ -39,18 +37,11 @@ class Campaign:
     notes: tuple[str, ...]
 
 
-def twin_of(config: Config) -> Twin:
-    """The forward model of a config, its `effects:` included."""
-    job = Job(config)
-    machine = job.machine
-    return Twin(machine.robot, machine.nominal, job.frame.origin, job.frame.rotation, job.causes)
-
-
 def open_campaign(path: str | FilePath) -> Campaign:
     """Reads an experiment file with everything it names. Raises ConfigError, ProgramError, FileError, PhysicsError."""
     experiment = load_experiment(path)
     config = load_config(experiment.config)
-    twin = twin_of(config)
+    twin = twin_of(Job(config))
     notes: list[str] = []
     runs = [open_run(spec, config, twin, notes) for spec in experiment.runs]
     order = sorted(range(len(runs)), key=lambda k: experiment.runs[k].started_s)

@@ -15,6 +15,7 @@ from camcomp.diagnostics import PhysicsError
 from camcomp.course import Course, travel_direction
 from camcomp.gap.effect import Cause, Load, Motion
 from camcomp.gap.pieces import Places
+from camcomp.job import Job
 from camcomp.statics.description import Robot
 from camcomp.statics.machine import Machine, build_machine
 from camcomp.statics.solve import FREE, STATUS, solve
@@ -267,6 +268,12 @@ class Twin:
         lever = self.nominal.tool  # platform axes; its tilt under load is of second order here
         d_wrench = d_wrench + np.concatenate([d_force, np.cross(lever, d_force)], axis=1)
         return d_rho, d_wrench
+
+
+def twin_of(job: Job) -> Twin:
+    """The forward model of a config, its `effects:` included. Raises ConfigError CC205."""
+    machine = job.machine
+    return Twin(machine.robot, machine.nominal, job.frame.origin, job.frame.rotation, job.causes)
 
 
 def _interpolate(course: Course, at: Floats, values: Floats) -> Floats:

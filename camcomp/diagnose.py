@@ -1,0 +1,287 @@
+"""Where logs and model differ, which effect is the cause, how far the gap shrinks with it, and what to measure next.
+
+Reads like the question: put the runs on the bench, open the inquiry, survey the causes, look at what is left, try the
+answer on runs it has not seen.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from camcomp.bench import Bench, Run, thinned
+from camcomp.columns import atoms_of
+from camcomp.datatypes import Floats
+from camcomp.gap import where
+from camcomp.gap.effect import Cause
+from camcomp.gap.evidence import estimate
+from camcomp.gap.search import Fitted, total
+from camcomp.gap.shrink import shrinkage
+from camcomp.gap.whiten import effective_rows
+from camcomp.inquiry import Inquiry, open_inquiry
+from camcomp.survey import Survey, leftover, survey
+from camcomp.twin import Twin
+
+UNKNOWN_LOG10 = -6.0  # chance below which a leftover is no accident
+UNKNOWN_RMS = 0.35  # size of a leftover, in units of the noise, below which no model error is called a cause
+UNKNOWN_SHARE = 0.10  # share of the explained gap that a leftover has to exceed: causes are never modelled perfectly
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis:
+    """The result as a mapping of the result file, and what a report may want to draw."""
+
+    result: dict[str, Any]
+    inquiry: Inquiry
+    survey: Survey
+
+
+def diagnose(twin: Twin, runs: Sequence[Run], *, holdout: Sequence[str] = (), without: Sequence[str] = ()) -> Diagnosis:
+    """The diagnosis of an experiment; `without` names effects that the library is to do without."""
+    used = [run for run in runs if run.name not in holdout] or list(runs)
+    bench = Bench(twin, used)
+    inquiry = open_inquiry(bench, atoms_of(twin.actuators, without))
+    found = survey(inquiry)
+    best = found.fits[found.verdict.best]
+    gap = gap_of(inquiry)
+    strange = unknown(inquiry, best, found)
+    word = "unknown" if strange else found.verdict.word
+    causes = _causes(inquiry, found, strange)
+    result: dict[str, Any] = {
+        "verdict": word,
+        "gap": gap,
+        "where": _where(inquiry, found, best, causes, strange),
+        "causes": causes,
+        "alternatives": _alternatives(inquiry, found) if word == "ambiguous" else [],
+        "shrinkage": _shrinkage(twin, runs, holdout, inquiry, best),
+        "next_experiment": None,
+    }
+    return Diagnosis(result, inquiry, found)
+
+
+# -- the gap ----------------------------------------------------------------------------------------------------------
+
+
+def _main_channels(inquiry: Inquiry) -> slice:
+    """The channels in which the gap is stated: the tip, or else the encoders, or else the drive forces."""
+    m = len(inquiry.bench.actuators)
+    for part in (slice(0, 3), slice(3, 3 + m), slice(3 + m, 3 + 2 * m)):
+        if any(np.isfinite(r[:, part]).any() for r in inquiry.residuals):
+            return part
+    return slice(3 + 2 * m, 6 + 2 * m)
+
+
+def gap_of(inquiry: Inquiry) -> dict[str, float]:
+    """Size of the gap over all runs, and of its noise, um."""
+    part = _main_channels(inquiry)
+    gaps = [inquiry.bench.gap(k)[:, part] for k in range(len(inquiry.residuals))]
+    size = np.concatenate([np.sqrt(np.sum(gap**2, axis=1)) for gap in gaps])
+    size = size[np.isfinite(size)] * 1e3
+    noise = np.sqrt(np.nansum(np.nanmean(inquiry.noise.sigma[:, part] ** 2, axis=0))) * 1e3
+    return {
+        "rms_um": round(float(np.sqrt(np.mean(size**2))), 3),
+        "p95_um": round(float(np.quantile(size, 0.95)), 3),
+        "max_um": round(float(size.max()), 3),
+        "noise_floor_um": round(float(noise), 3),
+    }
+
+
+def _run_gaps(inquiry: Inquiry) -> list[where.RunGap]:
+    part = _main_channels(inquiry)
+    m = len(inquiry.bench.actuators)
+    out = []
+    for k, run in enumerate(inquiry.bench.runs):
+        gap = inquiry.bench.gap(k)[:, part]
+        noise = inquiry.noise.sigma[k, part]
+        thin = float(np.mean([1.0 / effective_rows(inquiry.noise, c, 1) for c in range(part.start, part.stop)]))
+        line = thinned(run.measured.line[:, None], run.thin)[:, 0]
+        if part.start == 0:
+            slope = thinned(inquiry.bench.row_slopes(k).reshape(-1, 3 * m), run.thin).reshape(-1, 3, m)
+            clean = np.where(np.isfinite(gap), gap, 0.0)
+            drives = np.einsum("nij,nj->ni", np.linalg.pinv(slope), clean)
+        else:
+            drives = gap if gap.shape[1] == m else np.zeros((len(gap), m))
+        out.append(where.RunGap(run.name, gap, np.where(np.isfinite(noise), noise, 1.0), thin, inquiry.times[k], line, drives))
+    return out
+
+
+# -- causes -----------------------------------------------------------------------------------------------------------
+
+
+def unknown(inquiry: Inquiry, best: Fitted, found: Survey) -> bool:
+    """Whether what the best causes leave is an effect that the library does not have."""
+    left = found.leftover
+    explained = signal_rms(inquiry, best)
+    return left.log10_chance < UNKNOWN_LOG10 and left.rms > max(UNKNOWN_RMS, UNKNOWN_SHARE * explained)
+
+
+def signal_rms(inquiry: Inquiry, f: Fitted) -> float:
+    """Size of what the members explain, in units of the noise, pooled over white rows."""
+    if not f.members:
+        return 0.0
+    index = inquiry.member_columns(f.members)
+    energy = float(f.theta @ total(f.grams).A[np.ix_(index, index)] @ f.theta)
+    return float(np.sqrt(max(energy, 0.0) / total(f.grams).rows))
+
+
+def _energies(inquiry: Inquiry, f: Fitted) -> list[float]:
+    """White energy of each member's own signal."""
+    A, out, at = total(f.grams).A, [], 0
+    for i in f.members:
+        index = list(inquiry.atoms.columns[i])
+        theta = f.theta[at : at + len(index)]
+        at += len(index)
+        out.append(float(theta @ A[np.ix_(index, index)] @ theta))
+    return out
+
+
+def _causes(inquiry: Inquiry, found: Survey, strange: bool) -> list[dict[str, Any]]:
+    best = found.fits[found.verdict.best]
+    energy = _energies(inquiry, best)
+    left = found.leftover.rms**2 * total(best.grams).rows if strange else 0.0
+    whole = sum(energy) + left
+    out = []
+    causes = inquiry.causes(best.members, best.theta, best.extra)
+    for j, i in enumerate(best.members):
+        atom = inquiry.columns.atoms[i]
+        out.append({
+            "effect": atom.name,
+            "target": atom.target,
+            "probability": round(min(found.verdict.inclusion.get(i, 0.0), 1.0), 4),
+            "share": round(energy[j] / whole, 4) if whole > 0 else 0.0,
+            "parameters": _parameters(inquiry, best, j, causes[j]),
+        })  # fmt: skip
+    out.sort(key=lambda c: (-c["probability"], -c["share"]))
+    if strange:
+        label = found.leftover.labels[0][0] if found.leftover.labels else ""
+        target = label.split(":")[1] if ":" in label and label.split(":")[1] in inquiry.bench.actuators else None
+        out.append({
+            "effect": "unknown", "target": target, "probability": round(1.0 - 10.0 ** max(found.leftover.log10_chance, -6.0), 4),
+            "share": round(left / whole, 4) if whole > 0 else 1.0, "parameters": {},
+        })  # fmt: skip
+    return out
+
+
+def _parameters(inquiry: Inquiry, f: Fitted, j: int, cause: Cause) -> dict[str, Any]:
+    """Values with 95 % intervals; intervals of derived values by evaluating them at draws of the fit."""
+    rng = np.random.default_rng(0)
+    root = np.linalg.cholesky(f.covariance + 1e-18 * np.eye(len(f.theta)))
+    draws = f.theta + rng.standard_normal((400, len(f.theta))) @ root.T
+    samples = [inquiry.causes(f.members, d, f.extra)[j].values for d in draws]
+    out = {}
+    for name, value in cause.values.items():
+        low, high = np.quantile([s[name] for s in samples], [0.025, 0.975])
+        out[name] = {"value": _round(value), "ci95": [_round(min(low, value)), _round(max(high, value))]}
+    return out
+
+
+def _round(value: float) -> float:
+    return float(f"{value:.6g}")
+
+
+def _alternatives(inquiry: Inquiry, found: Survey) -> list[list[dict[str, Any]]]:
+    sets = [found.fits[found.verdict.best], *(found.fits[j] for j in found.verdict.rivals)]
+    return [
+        [{"effect": inquiry.columns.atoms[i].name, "target": inquiry.columns.atoms[i].target} for i in f.members] for f in sets
+    ]
+
+
+# -- where ------------------------------------------------------------------------------------------------------------
+
+
+def _where(inquiry: Inquiry, found: Survey, best: Fitted, causes: Sequence[dict[str, Any]], strange: bool) -> dict[str, Any]:
+    gaps = _run_gaps(inquiry)
+    part = _main_channels(inquiry)
+    names = ["x", "y", "z"] if part.start == 0 else list(inquiry.bench.actuators)
+    at = where.axes(gaps, names)
+    return {
+        "stage": _stage(inquiry, best, found, strange),
+        "axes": {axis: at.get(axis, 0.0) for axis in "xyz"},
+        "actuators": where.actuators(gaps, inquiry.bench.actuators),
+        "lines": where.lines(gaps),
+        "intervals": where.intervals(gaps),
+        "drivers": _drivers(inquiry, found, strange),
+    }
+
+
+def _stage(inquiry: Inquiry, best: Fitted, found: Survey, strange: bool) -> str:
+    """The stage of the largest cause; of an unknown one, the stage of the channel that shows it."""
+    energy = _energies(inquiry, best)
+    left = found.leftover.rms**2 * total(best.grams).rows if strange else 0.0
+    if strange and left > max(energy, default=0.0):
+        kind = found.leftover.kind
+        label = found.leftover.labels[0][0] if found.leftover.labels else ""
+        if kind == "encoder":
+            return "control"
+        if kind == "dyno":
+            return "process"
+        return "structure" if label.startswith("force") else "drive"
+    if energy:
+        return str(inquiry.columns.atoms[best.members[int(np.argmax(energy))]].effect.STAGE)
+    stage = {"control": slice(3, 3 + len(inquiry.bench.actuators)), "structure": slice(0, 3)}
+    size = {}
+    for name, part in stage.items():
+        white = [np.nanmean((r[:, part] / inquiry.noise.sigma[k, part]) ** 2) for k, r in enumerate(inquiry.residuals)
+                 if np.isfinite(r[:, part]).any()]  # fmt: skip
+        size[name] = float(np.mean(white)) if white else 0.0
+    return max(size, key=lambda each: size[each])
+
+
+def _drivers(inquiry: Inquiry, found: Survey, strange: bool) -> list[dict[str, Any]]:
+    """What the gap depends on; with an unknown cause, what the rest depends on."""
+    left = found.leftover if strange else leftover(inquiry, next(f for f in found.fits if not f.members)) if any(
+        not f.members for f in found.fits) else found.leftover  # fmt: skip
+    return [{"covariate": name, "share": round(share, 4)} for name, share in left.labels[:6] if share > 0.02]
+
+
+# -- shrinkage --------------------------------------------------------------------------------------------------------
+
+
+def _shrinkage(twin: Twin, runs: Sequence[Run], holdout: Sequence[str], inquiry: Inquiry, best: Fitted) -> dict[str, Any]:
+    """Named runs are judged with the fit of the others; without names every run is held out once."""
+    members = best.members
+    if holdout:
+        seen = Bench(twin, [run for run in runs if run.name in holdout])
+        thetas = [best.theta] * len(seen.runs)
+    else:
+        seen = inquiry.bench
+        thetas = [_theta_without(inquiry, best, k) for k in range(len(seen.runs))]
+    part = _main_channels(inquiry)
+    squares: list[list[Floats]] = []
+    for count in range(len(members) + 1):
+        order = _by_energy(inquiry, best)[:count]
+        per_run = []
+        for k in range(len(seen.runs)):
+            every = inquiry.causes(members, thetas[k], best.extra)
+            gap = seen.gap(k, [every[j] for j in order])[:, part]
+            per_run.append(np.sum(gap**2, axis=1))
+        squares.append(per_run)
+    times = [thinned(run.course.time[:, None], run.thin)[:, 0] for run in seen.runs]
+    whole = shrinkage(squares[0], squares[-1], times)
+    steps = []
+    for count, j in enumerate(_by_energy(inquiry, best), start=1):
+        atom = inquiry.columns.atoms[members[j]]
+        rms = shrinkage(squares[0], squares[count], times).after
+        steps.append({"effect": atom.name, "target": atom.target, "after_rms_um": round(rms, 3)})
+    return {
+        "holdout": [run.name for run in seen.runs],
+        "before_rms_um": round(whole.before, 3),
+        "after_rms_um": round(whole.after, 3),
+        "ratio": round(whole.ratio, 4),
+        "ci95": [round(whole.low, 4), round(whole.high, 4)],
+        "steps": steps,
+    }
+
+
+def _by_energy(inquiry: Inquiry, f: Fitted) -> list[int]:
+    return list(np.argsort([-e for e in _energies(inquiry, f)]))
+
+
+def _theta_without(inquiry: Inquiry, f: Fitted, k: int) -> Floats:
+    """The members' coordinates fitted without run k, about the fit to all runs."""
+    if len(f.grams) == 1 or not f.members:
+        return f.theta
+    index = inquiry.member_columns(f.members)
+    rest = total(f.grams) - f.grams[k]
+    return inquiry._bounded(f.members, estimate(rest, inquiry.prior, index)[0][index])

@@ -1,0 +1,162 @@
+"""The search for causes on one inquiry: which sets are tried, in which order, and how they are ranked."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from camcomp.datatypes import Floats
+from camcomp.gap.evidence import Gram, estimate
+from camcomp.gap.leftover import Leftover, score_test
+from camcomp.gap.search import Fitted, Members, Scale, extensions, pairs, predictive, probabilities, total
+from camcomp.gap.verdict import Verdict, judge
+from camcomp.inquiry import Inquiry
+
+SINGLES, PAIRS, TRIPLES = 6, 6, 3
+TEMPERATURE = 1.5  # what evidence is divided by before it becomes a probability; calibrated on the truth plants
+SAME_FIT = 4.0  # chi-square by which two sets may differ and still be the same answer
+
+
+@dataclass(frozen=True, eq=False)
+class Survey:
+    """Sets of causes that were fitted, their probabilities, the verdict, and what the best of them leaves."""
+
+    fits: tuple[Fitted, ...]
+    probability: Floats
+    verdict: Verdict
+    leftover: Leftover
+
+
+def survey(inquiry: Inquiry) -> Survey:
+    """Tries no cause, single causes, pairs and triples; re-fits those that look best."""
+    every = [i for i in range(len(inquiry.columns.atoms)) if visible(inquiry, i)]
+    null = inquiry.refit(())
+    at_null = Scale(total(null.grams), inquiry.prior, inquiry.atoms)
+    done: dict[Members, Fitted] = {(): null}
+
+    def fit(members: Members, near: Fitted | None = None) -> Fitted:
+        if members not in done:
+            theta = None
+            if near is not None:
+                index = inquiry.member_columns(members)
+                theta = estimate(total(near.grams), inquiry.prior, index)[0][index]
+            done[members] = inquiry.refit(members, theta)
+        return done[members]
+
+    def value(f: Fitted) -> float:
+        return f.log_evidence + inquiry.atoms.prior(f.members)
+
+    singles = extensions(at_null, (), every)
+    for _, members in singles[:SINGLES]:
+        fit(members)
+    for members in _same_name(inquiry, singles[0][1], every):
+        fit(members)
+    ones = sorted((f for m, f in done.items() if len(m) == 1), key=value, reverse=True)
+    found: list[tuple[float, Members, Fitted | None]] = [(v, m, None) for v, m in pairs(at_null, every)[:PAIRS]]
+    for f in ones[:3]:
+        scale = Scale(total(f.grams), inquiry.prior, inquiry.atoms)
+        found += [(v, m, f) for v, m in extensions(scale, f.members, every)[:4]]
+    best_one = max(value(f) for f in done.values())
+    _fit_best(found, fit, PAIRS, best_one)
+    twos = sorted((f for m, f in done.items() if len(m) == 2), key=value, reverse=True)
+    found = []
+    for f in twos[:2]:
+        scale = Scale(total(f.grams), inquiry.prior, inquiry.atoms)
+        found += [(v, m, f) for v, m in extensions(scale, f.members, every)[:3]]
+    _fit_best(found, fit, TRIPLES, max(value(f) for f in done.values()))
+    fits = tuple(sorted(done.values(), key=value, reverse=True))
+    probability = probabilities(fits, inquiry.atoms, TEMPERATURE)
+    fits, probability = _prune(inquiry, fits, probability)
+    same = _same(inquiry, fits, probability)
+    verdict = judge(fits, probability, same)
+    return Survey(fits, probability, verdict, leftover(inquiry, fits[verdict.best]))
+
+
+def visible(inquiry: Inquiry, i: int) -> bool:
+    """Whether an effect of three scales would show at all in the channels present."""
+    energy = sum(float((W[:, list(inquiry.atoms.columns[i])] ** 2).sum()) for W in inquiry.white)
+    return energy * 9.0 > 1.0
+
+
+def _same_name(inquiry: Inquiry, members: Members, every: list[int]) -> list[Members]:
+    """The leader's effect at its other targets: right effect, wrong actuator, is the mistake to exclude first."""
+    names = {inquiry.columns.atoms[i].name for i in members}
+    return [(i,) for i in every if inquiry.columns.atoms[i].name in names]
+
+
+def _fit_best(found, fit, count: int, best: float) -> None:  # type: ignore[no-untyped-def]
+    tried: set[Members] = set()
+    for v, members, near in sorted(found, key=lambda each: -each[0]):
+        if members in tried or v < best - 12.0 or len(tried) >= count:
+            continue
+        tried.add(members)
+        fit(members, near)
+
+
+def _prune(inquiry: Inquiry, fits: tuple[Fitted, ...], probability: Floats) -> tuple[tuple[Fitted, ...], Floats]:
+    """Scores the leaders on runs not used for fitting; a set that predicts worse than the same set less a member goes."""
+    if len(inquiry.bench.runs) < 2:
+        return fits, probability
+    keep = list(range(len(fits)))
+    for j in list(np.argsort(-probability)[:4]):
+        f = fits[j]
+        if not f.members or probability[j] < 0.02:
+            continue
+        smaller = [tuple(x for x in f.members if x != i) for i in f.members]
+        scores = predictive(f.grams, inquiry.prior, inquiry.atoms, [f.members, *smaller])
+        if scores[0] < scores[1:].max():
+            keep.remove(j)
+    kept = tuple(fits[j] for j in keep)
+    return kept, probability[keep] / probability[keep].sum()
+
+
+def _same(inquiry: Inquiry, fits: tuple[Fitted, ...], probability: Floats) -> list[tuple[Members, Members]]:
+    """Pairs of the leader and a set of its size that fits as well, whatever the priors say of them."""
+    best = fits[int(np.argmax(probability))]
+    found = []
+    for f in fits:
+        if f is best or len(f.members) != len(best.members) or not best.members:
+            continue
+        if misfit(inquiry, f) - misfit(inquiry, best) < SAME_FIT and _plausible(inquiry, f):
+            found.append((best.members, f.members))
+    return found
+
+
+def misfit(inquiry: Inquiry, f: Fitted) -> float:
+    """Chi-square left when the members are free and everything else stays within tolerance, penalties included."""
+    data: Gram = total(f.grams)
+    index = inquiry.member_columns(f.members)
+    mean, _ = estimate(data, inquiry.prior, index)
+    return data.c - float(data.b @ mean)
+
+
+def _plausible(inquiry: Inquiry, f: Fitted) -> bool:
+    parameters = [p for i in f.members for p in inquiry.columns.atoms[i].parameters]
+    return all(abs(t) < 8.0 and (p.sign == 0 or t > 0) for t, p in zip(f.theta, parameters, strict=True))
+
+
+def leftover(inquiry: Inquiry, f: Fitted) -> Leftover:
+    """Score test on what the set leaves, about its own fit."""
+    index = inquiry.member_columns(f.members)
+    white, residual = about(inquiry, f)
+    return score_test(
+        white, inquiry.white_patterns, residual, inquiry.dictionary.labels, inquiry.dictionary.kind, inquiry.prior, index
+    )
+
+
+def about(inquiry: Inquiry, f: Fitted) -> tuple[list[Floats], list[Floats]]:
+    """White columns and residual (absolute coordinates) linearised at the fit."""
+    if not f.members:
+        return inquiry.white, inquiry.white_residual
+    index = inquiry.member_columns(f.members)
+    causes = inquiry.causes(f.members, f.theta, f.extra)
+    moved = inquiry._columns_at(f.members, f.theta, dict(f.extra))[: len(index)]
+    white, residual = [], []
+    for k in range(len(inquiry.bench.runs)):
+        W = inquiry.white[k].copy()
+        W[:, index] = inquiry.whitened(k, np.stack([m[k] for m in moved], axis=2))
+        r = inquiry.whitened(k, inquiry.bench.residual(k, causes)[:, :, None])[:, 0]
+        white.append(W)
+        residual.append(r + W[:, index] @ f.theta)
+    return white, residual
+
+
