@@ -75,7 +75,8 @@ def figure_trajectories(result: Compensated, found: Trajectories) -> Figure:
         {a: gapped((points - target)[:, i], index, gap, 6) for i, a in enumerate(AXES)} for _, points in named
     ]
     off = [1e3 * float(np.nanmax(np.linalg.norm(points - target, axis=1)[~hidden], initial=0.0)) for _, points in named]
-    drawn = target[~hidden] if (~hidden).any() else target
+    cutting = ~hidden & rows.force.any(axis=1)
+    drawn = target[cutting] if cutting.any() else target[~hidden]
     extent = float(np.ptp(drawn, axis=0).max())
     first = float(np.clip(0.12 * extent / max(1e-3 * max(off), 1e-9), 1.0, 1e4))
     words = ", ".join(f"{name} {brief(value)} µm" for (name, _), value in zip(named[1:], off[1:], strict=True))

@@ -72,12 +72,12 @@ def test_the_slider_enlarges_true_deviations(page):
 
 def test_the_plane_is_chosen(page):
     page.run(
-        "const p = document.getElementById('trajectories-p'); p.value = 'XZ'; p.dispatchEvent(new Event('change'))"
+        "const p = document.getElementById('trajectories-p'); p.value = 'YZ'; p.dispatchEvent(new Event('change'))"
     )
     titles = page.run(
         "return ['xaxis', 'yaxis'].map(a => document.getElementById('trajectories-plot').layout[a].title.text)"
     )
-    assert titles == ["x in mm", "z in mm"]
+    assert titles == ["y in mm", "z in mm"]
     assert np.nanmax(curves(page, "trajectories-plot")[0][1]) > 4  # the retract of the program
 
 
