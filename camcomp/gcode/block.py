@@ -4,7 +4,7 @@ import math
 from typing import NoReturn
 
 from camcomp.diagnostics import ProgramError
-from camcomp.gcode.codes import CANCELS, GROUPS_M, KNOWN_M, code_name
+from camcomp.gcode.codes import CANCELS, GROUPS_M, KNOWN_M, SAVES, code_name
 from camcomp.gcode.dialect import Dialect
 from camcomp.gcode.program import Rebase, Setup
 from camcomp.gcode.record import Recorder
@@ -112,6 +112,11 @@ class BlockReader:
         if group is None:
             known = f"{self.dialect.title} as camcomp knows it" if code in self.dialect.without else "camcomp"
             self.refuse("CC106", f"{code_name(code)} is not a code that {known} has", word)
+        if group == 1 and group in block.groups and 800 in (code, block.groups[1][0]):
+            # `G0 G80` ends a cycle and goes on with G0.
+            if code != 800:
+                block.groups[1] = (code, word)
+            return
         if group in block.groups:
             other = code_name(block.groups[group][0])
             self.refuse("CC105", f"{code_name(code)} and {other} exclude each other in one block", word)
@@ -121,6 +126,8 @@ class BlockReader:
         if not 0.0 <= word.value < 1e6 or abs(word.value - round(word.value)) > 1e-4:
             self.refuse("CC106", f"M{word.value:g} is not a code", word)
         code = round(word.value)
+        if code in SAVES:
+            self.refuse("CC135", f"M{code} saves or restores modes, which camcomp does not follow", word)
         group = GROUPS_M.get(code)
         for other, _ in block.m:
             if group is not None and GROUPS_M.get(other) == group:

@@ -35,12 +35,13 @@ REFUSED: dict[int, tuple[str, str]] = {
     **dict.fromkeys((50, 51, 52, 53, 62, 63), ("CC119", "splines")),
     **dict.fromkeys((330, 331, 760), ("CC120", "spindle-synchronous motion")),
     **dict.fromkeys((310, 380, 382, 383, 384, 385), ("CC121", "probing")),
-    **dict.fromkeys((70, 960), ("CC122", "a turning mode")),
+    **dict.fromkeys((70, 960, 700, 710, 711, 712, 720, 721, 722), ("CC122", "for turning")),
 }
 CANCELS = frozenset((150, 500, 690, 691))  # of those, the codes that switch the mode off
 
 PLAIN_M = frozenset((0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 30, 48, 49, 60))
-KNOWN_M = PLAIN_M | frozenset((19, 50, 51, 52, 53, 61, 62, 63, 64, 65, 66, 67, 68, 70, 71, 72, 73, 98, 99))
+KNOWN_M = PLAIN_M | frozenset((19, 50, 51, 52, 53, 61, 62, 63, 64, 65, 66, 67, 68, 98, 99))
+SAVES = frozenset((70, 71, 72, 73))
 STOPS = frozenset((0, 1, 2, 30, 60))
 ENDS = frozenset((2, 30))
 GROUPS_M: dict[int, int] = {

@@ -26,13 +26,17 @@ class Cycles(Motions):
         name = f"G{code // 10}"
         if code == 880:
             self.refuse("CC132", "G88 leaves the retraction to the operator's hand")
+        if code in _TAPS and state.plane != 17:
+            self.refuse("CC132", f"{name} taps in G17 only")
         if state.feed_mode == 93:
             self.refuse("CC132", f"{name} does not work with G93")
         feed = self.feed_of(block)
         depth = _DEPTH[state.plane]
         start = list(state.position)
-        here = start[depth] - state.offset[depth]
-        self._hold(block, name, here, depth)
+        # A series of one cycle refers to the height at which it began.
+        self._held.setdefault("start", start[depth] - state.offset[depth])
+        self._hold(block, name, self._held["start"], depth)
+        initial = self._held["start"] + state.offset[depth]
         bottom, level = self._held["Z"] + state.offset[depth], self._held["R"] + state.offset[depth]
         if level < bottom:
             self.refuse("CC132", f"the retract plane of {name} lies below its bottom")
@@ -44,9 +48,8 @@ class Cycles(Motions):
             place = self._place(block, depth)
             if first and start[depth] < level:
                 self._go(block, 0, self._at(state.position, depth, level), feed)
-            entry = state.position[depth]
-            self._go(block, 0, self._at(place, depth, entry), feed, always=repeats == 1 and first)
-            clear = max(entry, level) if state.retract_to_start else level
+            self._go(block, 0, self._at(place, depth, state.position[depth]), feed, always=repeats == 1 and first)
+            clear = max(initial, level) if state.retract_to_start else level
             self._go(block, 0, self._at(place, depth, level), feed)
             self._body(block, code, place, (bottom, level, clear), feed)
             first = False
@@ -126,8 +129,10 @@ class Cycles(Motions):
             self.actions.append(("M4" if code == 840 else "M3", []))
         if code == 860:
             self.actions.append(("M5", []))
-        if code in (850, 890) or code in _TAPS:
+        if code == 850:
             go(1, level)
+        elif code == 890 or code in _TAPS:
+            go(1, clear)
         if code in _TAPS:
             self.actions.append((f"M{spindle}", []))
         go(0, clear)

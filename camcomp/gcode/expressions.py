@@ -183,6 +183,8 @@ class Parser:
             return ("parameter", self.number(), column)
         if char == "#":
             return ("parameter", self.parameter(), column)
+        if char.isalpha() and self.spelling.named:
+            return ("parameter", self.function(), column)
         return ("parameter", self.group(), column)
 
     def function(self) -> Expression:

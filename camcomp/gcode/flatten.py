@@ -72,7 +72,8 @@ class Printer:
         if entry.remark:
             return [] if repeated else self._remark(entry.row)
         cycle = self.reader.record.cycles.get(entry.motions)
-        if cycle is not None and entry.words:
+        # A line that moves nothing has the same count of motions before it as the cycle that follows.
+        if cycle is not None and self.program.sites.row[entry.motions] == entry.row:
             actions, tapping = cycle
             if tapping:
                 place = self.text.place(entry.row)

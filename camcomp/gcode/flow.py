@@ -41,27 +41,35 @@ class Flow:
         self._blocks = 0
         self._idle = 0
         self._motions = 0
-        self._percent = False
+        self.rows = self._end_of_tape()
 
     # --- the program as a whole --------------------------------------------------------------------------------
 
     def run(self) -> None:
         """Execute from the first line to the program's end."""
-        row, rows = 0, len(self.text)
-        while row < rows:
+        row = 0
+        while row < self.rows:
             after = self.step(row)
             if after is None:
                 return
             row = after
 
+    def _end_of_tape(self) -> int:
+        """Rows that count: where the first line is a `%`, those before the next one."""
+        begun = False
+        for row in range(len(self.text)):
+            stripped = self.text.line(row).strip(BLANK)
+            if stripped.startswith("%"):
+                if begun:
+                    return row
+                begun = True
+            elif stripped and not begun:
+                break
+        return len(self.text)
+
     def step(self, row: int) -> int | None:
         """Execute line `row`; the row that comes next, None at the end."""
-        line = self.text.line(row)
-        stripped = line.strip(BLANK)
-        if stripped.startswith("%"):
-            if self._percent or len(self.reader.record):
-                return None
-            self._percent = True
+        if self.text.line(row).lstrip(BLANK).startswith("%"):
             self._traced(row, Line([]))
             return row + 1
         return None if self.execute(row) else row + 1

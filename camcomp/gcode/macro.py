@@ -25,7 +25,7 @@ class Subprograms(Flow):
         self._returns: list[tuple[int, int, int]] = []  # row of the call, row of the program, passes left
         self._called: set[int] = set()
         if re.search(r"M[ \t]*0*9[789]|G[ \t]*65", self.text.string, re.IGNORECASE):
-            for row in range(len(self.text)):
+            for row in range(self.rows):
                 found = _PROGRAM.match(self.text.line(row))
                 if found:
                     self._programs.setdefault(int(found[1]), row)
@@ -122,7 +122,7 @@ class Macro(Subprograms):
 
     def _program_rows(self, row: int) -> tuple[int, int]:
         """First row of the program around `row`, and of the one behind it."""
-        starts = [0, *sorted(self._programs.values()), len(self.text)]
+        starts = [0, *sorted(self._programs.values()), self.rows]
         first = max(each for each in starts if each <= row)
         return first, min(each for each in starts if each > row)
 

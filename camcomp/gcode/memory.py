@@ -4,6 +4,8 @@ from camcomp.gcode.expressions import FANUC, Expression, ExpressionError, Memory
 from camcomp.gcode.state import State
 
 LOCAL = 30  # #1 to #30 belong to the subprogram in RS274, #1 to #33 in Fanuc
+_LAST = 5602  # parameters of RS274
+_DEBUG = 5599  # switches messages on and off
 _MACHINE_ONLY = "its value is known at the machine only"
 
 
@@ -43,7 +45,7 @@ class Parameters(Memory):
 
     def set(self, number: int, value: float) -> None:
         """Give `#number` a value."""
-        if number < 1 or number >= (1000 if self.macro else 5061):
+        if number < 1 or (number >= (1000 if self.macro else 5061) and number != _DEBUG):
             raise ExpressionError(f"parameter #{number} cannot be set: it belongs to the control", 0)
         store = self.frames[-1].numbered if self._local(number) else self.common
         store[number] = value
@@ -151,7 +153,7 @@ class Parameters(Memory):
             raise ExpressionError("EXISTS asks for a parameter", expression[-1])
         number = index_of(expression[1], self, self.spelling, expression[-1])
         if not self.macro:
-            return number > 0
+            return 0 < number <= _LAST
         return number in (self.frames[-1].numbered if self._local(number) else self.common)
 
     def assign(self, target: Expression, value: float) -> None:

@@ -16,6 +16,7 @@ _STATEMENT = re.compile(
     re.IGNORECASE,
 )
 _DYNAMIC = re.compile(r"[ \t\0]*(?:N[ \t]*\d+[ \t]*)?O[ \t]*[#\[]", re.IGNORECASE)
+_NAMED = re.compile(r"[ \t\0]*O[ \t]*<[^>]*>[ \t\0]*(\(|;|$)", re.IGNORECASE)
 _DEEPEST = 100
 
 
@@ -51,7 +52,7 @@ class OWords(Subprograms):
 
     def _scan(self) -> None:
         opened: dict[str, list[int]] = {}
-        for row in range(len(self.text)):
+        for row in range(self.rows):
             line = self.text.line(row)
             if "o" not in line and "O" not in line:
                 continue
@@ -102,9 +103,12 @@ class OWords(Subprograms):
         """Execute line `row`; the row that comes next, None at the end."""
         statement = self._statements.get(row)
         if statement is None:
-            if _DYNAMIC.match(self.text.line(row)):
-                self.refuse(row, 0, "CC124", "labels that are computed are not followed")
-            return super().step(row)
+            if _NAMED.match(self.text.line(row)):
+                self._remarked(row)
+                return row + 1
+            if not _DYNAMIC.match(self.text.line(row)):
+                return super().step(row)
+            statement = self._computed_call(row)
         self._count(row)
         self.reader.straight = False
         self._remarked(row)
@@ -112,6 +116,20 @@ class OWords(Subprograms):
             return row + 1
         self.memory.row = row
         return getattr(self, f"_do_{statement.keyword}")(row, statement)
+
+    def _computed_call(self, row: int) -> Statement:
+        """`o[#1] call`: the label is the value of an expression."""
+        assert self.spelling is not None
+        code = code_of(self.text.line(row)).rstrip()
+        parser = Parser(code, re.match(r"[^oO]*[oO]", code).end(), self.spelling)  # type: ignore[union-attr]
+        try:
+            label = parser.value()
+        except ExpressionError as error:
+            self.refuse(row, error.column, "CC124", error.message)
+        parser.blank()
+        if code[parser.at : parser.at + 4].lower() != "call":
+            self.refuse(row, parser.at, "CC124", "only a call may have a label that is computed")
+        return Statement(f"{self.value(row, label):.0f}", "call", parser.at + 4)
 
     def _groups(self, row: int, statement: Statement) -> list[float]:
         """Values of the bracketed groups behind the keyword."""
@@ -154,7 +172,8 @@ class OWords(Subprograms):
 
     def _return(self, row: int, statement: Statement) -> int:
         values = self._groups(row, statement)
-        if not self._calls or self._calls[-1].name != statement.label:
+        strange = statement.keyword == "endsub" and self._calls and self._calls[-1].name != statement.label
+        if not self._calls or strange:
             self.refuse(row, 0, "CC124", f"o{statement.label} {statement.keyword} stands outside its subroutine")
         self.memory.set_named("_value", values[0] if values else 0.0)
         self.memory.set_named("_value_returned", float(bool(values)))

@@ -2,6 +2,7 @@
 
 from camcomp.gcode.block import Block, BlockReader
 from camcomp.gcode.codes import WORK_OFFSETS, code_name
+from camcomp.gcode.expressions import RS274
 from camcomp.gcode.program import Rebase
 from camcomp.gcode.words import Word
 
@@ -122,7 +123,7 @@ class Settings(BlockReader):
 
     def _shift(self, block: Block, code: int) -> None:
         state = self.state
-        if not block.axes:
+        if not block.axes and not any(letter in block.words for letter in "ABCUVW"):
             self.refuse("CC129", f"{code_name(code)} without axis words", block.groups[0][1])
         for axis in block.axes:
             value = block.words["XYZ"[axis]].value * state.unit
@@ -147,14 +148,25 @@ class Settings(BlockReader):
         value = (values[0], values[1], values[2])
         self.rebases.append(Rebase(len(self.record), block.row, tuple(axes), value, self.state.unit))
 
+    def _set_tool(self, block: Block, number: float) -> None:
+        """G10 L1: an entry of the tool table; it counts from the next G43 on."""
+        block.number("R")  # tool radius
+        if number != int(number) or number < 1:
+            self.refuse("CC133", "P of G10 L1 is a tool number", block.words["P"])
+        if "Z" in block.words:
+            self.state.tools[int(number)] = block.words["Z"].value * self.state.unit
+
     def _set_offset(self, block: Block) -> None:
         state, words = self.state, block.words
         word = block.groups[0][1]
         kind, number = block.number("L"), block.number("P")
+        if kind == 1 and number is not None and set(block.words) <= {"L", "P", "Z", "R"} and self.dialect.spelling is RS274:
+            self._set_tool(block, number)
+            return
         extended = kind == 20 and self.dialect.extended_offsets
         last = len(state.work) - 9 if extended else 9
         if kind not in (2, 20) or number is None or number != int(number) or not 0 <= number <= last:
-            self.refuse("CC129", f"of G10, camcomp knows L2 and L20 with P0 to P{last}", word)
+            self.refuse("CC129", f"of G10, camcomp knows L1, L2 and L20 with P0 to P{last}", word)
         if block.number("R"):
             self.refuse("CC118", "G10 with R rotates the coordinates", words["R"])
         index = int(number) - 1 if number else state.active

@@ -198,6 +198,8 @@ def _unreadable(text: Text, row: int, column: int) -> NoReturn:
         refuse(text, row, column, "CC103", f"'{char}' has no number")
     if char.isdigit() or char in ".+-":
         refuse(text, row, column, "CC103", "number without a letter")
+    if char in "@^":
+        refuse(text, row, column, "CC116", f"'{char}' is a polar coordinate")
     if char == ",":
         refuse(text, row, column, "CC139", "a comma stands for a rounded corner, a chamfer, or a decimal comma")
     refuse(text, row, column, "CC107", f"'{text.readable(char)}' has no meaning here")

@@ -14,10 +14,10 @@ PRINTED = 0.5001e-4  # half of the last digit that rs274 prints, in the active u
 
 def moving(run: Run) -> list[Motion]:
     """Canonical motions without the empty feeds that rs274 prints for a `G1 F100` without axis words."""
-    kept, last = [], None
+    kept, last = [], (0.0, 0.0, 0.0)
     for each in run.motions:
         place = tuple((each.end[a] + each.offset[a]) * each.unit for a in range(3))
-        still = each.kind in ("FEED", "TRAVERSE") and last is not None and math.dist(place, last) < 2e-3 * each.unit
+        still = each.kind in ("FEED", "TRAVERSE") and math.dist(place, last) < 2e-3 * each.unit
         if not still:
             kept.append(each)
         last = place
@@ -30,8 +30,6 @@ def difference(program: Program, run: Run) -> str:
     local = (path.end - sites.offset) / sites.unit[:, None]
     still = np.linalg.norm(path.end - path.start, axis=1) < 2e-3 * sites.unit
     still &= path.kind != ARC
-    # The first motion may go nowhere too; rs274 then prints it, and it is kept on both sides.
-    still[:1] = False
     ours = np.flatnonzero(~still)
     theirs = moving(run)
     if len(ours) != len(theirs):
@@ -57,7 +55,7 @@ def difference(program: Program, run: Run) -> str:
             if turns != other.turns or sites.plane[k] != other.plane:
                 return f"{where}: turns {turns}, plane {sites.plane[k]}"
         if kind != "TRAVERSE" and sites.feed_mode[k] != 95:
-            feed = path.feed[k] / sites.unit[k]
-            if abs(feed - other.feed) > 1e-4 + 1e-4 * feed:
+            feed = path.feed[k]
+            if abs(feed - other.feed) > 25.4e-4 + 1e-4 * feed:
                 return f"{where}: feed {feed}, rs274 {other.feed}"
     return ""

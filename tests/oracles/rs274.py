@@ -36,7 +36,7 @@ class Motion:
     end: tuple[float, float, float]
     unit: float
     offset: tuple[float, float, float]  # work offset + G92 + tool, in units
-    feed: float  # units/min
+    feed: float  # mm/min (G95: mm/rev), by the unit in force when it was set
     feed_mode: str
     plane: int = 17
     centre: tuple[float, float] = (0.0, 0.0)  # in the order of the plane
@@ -109,7 +109,7 @@ def _parse(stdout: str, stderr: str) -> Run:
         elif name == "USE_TOOL_LENGTH_OFFSET":
             tool = [each * unit for each in _numbers(arguments)[:3]]
         elif name == "SET_FEED_RATE":
-            feed = float(arguments)
+            feed = float(arguments) * unit
         elif name == "SET_FEED_MODE":
             feed_mode = arguments
         elif name == "SET_SPINDLE_SPEED":
