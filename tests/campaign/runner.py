@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import json
 import os
 import tempfile
@@ -10,8 +12,6 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
-
-from click.testing import CliRunner
 
 from tests.campaign import absorb
 from tests.campaign.cases import Case
@@ -22,11 +22,14 @@ ROOT = Path(__file__).resolve().parents[2]
 CONFIG = ROOT / "config" / "orthoglide.yaml"
 
 
-def command() -> Any:
-    """The camcomp command, as the terminal has it."""
-    from camcomp.cli import main
+def invoke(arguments: list[str]) -> tuple[int, str]:
+    """Exit code and everything printed by one camcomp command, run in this process."""
+    from camcomp.cli import run as camcomp
 
-    return main
+    said = io.StringIO()
+    with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
+        code = camcomp(arguments)
+    return code, said.getvalue()
 
 
 def ask(experiment: Path, without: tuple[str, ...] = ()) -> dict[str, Any]:
@@ -36,9 +39,9 @@ def ask(experiment: Path, without: tuple[str, ...] = ()) -> dict[str, Any]:
         arguments = ["diagnose", str(experiment), "--json", str(answer)]
         for effect in without:
             arguments += ["--without", effect]
-        got = CliRunner().invoke(command(), arguments)
+        code, said = invoke(arguments)
         if not answer.exists():
-            raise RuntimeError(f"exit {got.exit_code}: {got.output.strip()[-400:]} {got.exception!r}")
+            raise RuntimeError(f"exit {code}: {said.strip()[-400:]}")
         return json.loads(answer.read_text())
 
 
@@ -67,7 +70,8 @@ def run(cases: list[Case], results: Path, processes: int = 2) -> list[dict[str, 
     if results.exists():
         for line in results.read_text().splitlines():
             row = json.loads(line)
-            rows[row["name"]] = row
+            if "failed" not in row:
+                rows[row["name"]] = row
     todo = [c for c in cases if c.name not in rows]
     os.environ.setdefault("NUMBA_NUM_THREADS", "1")
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
