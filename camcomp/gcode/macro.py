@@ -11,6 +11,7 @@ from camcomp.gcode.words import Word, code_of
 _PROGRAM = re.compile(r"[ \t\0]*[O:][ \t]*(\d+)[ \t\0]*(?:\(|;|$)", re.IGNORECASE)
 _NUMBER = re.compile(r"[ \t\0]*/?\d?[ \t]*N[ \t]*(\d+)", re.IGNORECASE)
 _JUMP = re.compile(r"[ \t\0]*/?(?:N[ \t]*\d+[ \t]*)?(IF|WHILE|DO|END|GOTO)(?![A-Z])", re.IGNORECASE)
+_END = re.compile(r"M[ \t]*0*(?:2|30)(?!\d)", re.IGNORECASE)
 # Parameters that the arguments of G65 become.
 _ARGUMENTS = dict(zip("ABCIJKDEFHMQRSTUVWXYZ", (*range(1, 10), 11, 13, *range(17, 27)), strict=True))
 _DEEPEST = 100
@@ -24,11 +25,16 @@ class Subprograms(Flow):
         self._programs: dict[int, int] = {}
         self._returns: list[tuple[int, int, int]] = []  # row of the call, row of the program, passes left
         self._called: set[int] = set()
-        if re.search(r"M[ \t]*0*9[789]|G[ \t]*65", self.text.string, re.IGNORECASE):
-            for row in range(self.rows):
-                found = _PROGRAM.match(self.text.line(row))
-                if found:
-                    self._programs.setdefault(int(found[1]), row)
+        if re.search(r"M[ \t]*0*9[789]", self.text.string, re.IGNORECASE):
+            self._find_programs()
+
+    def _find_programs(self) -> None:
+        if "O" not in self.text.string and "o" not in self.text.string and ":" not in self.text.string:
+            return
+        for row in range(self.rows):
+            found = _PROGRAM.match(self.text.line(row))
+            if found:
+                self._programs.setdefault(int(found[1]), row)
 
     def step(self, row: int) -> int | None:
         """Execute line `row`; the row that comes next, None at the end."""
@@ -106,7 +112,18 @@ class Macro(Subprograms):
     def __init__(self, reader: Executor, trace: Trace | None = None) -> None:
         super().__init__(reader, trace)
         self._framed: set[int] = set()
-        self._loops: list[tuple[int, int]] = []
+        self._find_programs()
+
+    def run(self) -> None:
+        """Execute from the first line to the program's end."""
+        super().run()
+        first = min(self._programs.values(), default=0)
+        for number, row in self._programs.items():
+            if row == first or row in self._called:
+                continue
+            _, last = self._program_rows(row)
+            if any(_END.search(code_of(self.text.line(other))) for other in range(row, last)):
+                self.refuse(row, 0, "CC136", f"O{number} is a program of its own, and is not called")
 
     def step(self, row: int) -> int | None:
         """Execute line `row`; the row that comes next, None at the end."""

@@ -172,8 +172,9 @@ def _malformed(text: Text, row: int, column: int, end: int) -> NoReturn:
     line = text.line(row)
     if line[end:].lstrip(" \t")[:1] == ",":
         after = line[end:].lstrip(" \t")[1:2].upper()
-        if after in ("R", "C", "A"):
-            refuse(text, row, end, "CC139", f"',{after}' rounds or chamfers a corner")
+        if not after.isdigit():
+            what = "rounds or chamfers a corner" if after in ("R", "C", "A") else "has no meaning here"
+            refuse(text, row, end, "CC139", f"',{after}' {what}")
     found = _LOOSE.match(line, column)
     piece = found[0] if found else ""
     if "," in piece:
@@ -192,9 +193,9 @@ def _unreadable(text: Text, row: int, column: int) -> NoReturn:
             refuse(text, row, column, "CC123", "this dialect has no parameters and expressions")
         if rest[:1] == ",":
             refuse(text, row, column, "CC101", f"'{char},' has a decimal comma")
-        if rest[:1] == "=" or (rest[:1].isalpha() and rest[:1].isascii()):
-            word = re.match(r"[A-Za-z_]+", line[column:])
-            refuse(text, row, column, "CC135", f"'{word[0] if word else char}' is no statement that camcomp knows")
+        word = re.match(r"[A-Za-z_]+", line[column:])
+        if word is not None and (len(word[0]) > 1 or rest[:1] == "="):
+            refuse(text, row, column, "CC135", f"'{word[0]}' is no statement that camcomp knows")
         refuse(text, row, column, "CC103", f"'{char}' has no number")
     if char.isdigit() or char in ".+-":
         refuse(text, row, column, "CC103", "number without a letter")

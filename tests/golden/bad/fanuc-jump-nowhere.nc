@@ -1,0 +1,4 @@
+(CC124 fanuc)
+G0 X1
+GOTO 99
+M30

@@ -1,0 +1,4 @@
+(CC124 fanuc)
+G0 X1
+END 1
+M30
