@@ -154,7 +154,9 @@ def _travel(job: Job, track: Track, piece: Ints, w: Floats) -> Travel:
     cut = minutes * track.cutting
     worn = np.cumsum(cut) - cut
     force = job.frame.vectors(track.force(piece, w))
-    return Travel(force, 60.0 * (start[piece] + w * minutes[piece]), worn[piece] + w * cut[piece])
+    behind = np.concatenate((track.corner[1:], [True]))
+    stop = (w == 0.0) & track.corner[piece] | (w == 1.0) & behind[piece]
+    return Travel(force, 60.0 * (start[piece] + w * minutes[piece]), worn[piece] + w * cut[piece], stop)
 
 
 def _aim(program: Program, job: Job, track: Track, nodes: Nodes, corrected: Bools, method: str) -> _Aimed:

@@ -20,19 +20,29 @@ from camcomp.statics.target import Correction, correct, settle
 
 SETTLED_MM = 2e-5  # the correction of effects ends here
 MAX_STEPS = 6
+REST_S = 60.0
 
 
 @dataclass(frozen=True, eq=False)
 class Travel:
-    """n points in the order of travel: force (n, 3) N of the cut in the machine frame, when, and after how much cutting."""
+    """n points in the order of travel: force (n, 3) N of the cut in the machine frame, when, after how much cutting.
+
+    stop: the control comes to rest there, and the drives with it.
+    """
 
     force: Floats
     time: Floats  # (n,) s
     cut_min: Floats  # (n,) minutes
+    stop: Bools
 
     def take(self, rows: np.ndarray) -> Travel:
         """Some of the points, still in order."""
-        return Travel(self.force[rows], self.time[rows], self.cut_min[rows])
+        return Travel(self.force[rows], self.time[rows], self.cut_min[rows], self.stop[rows])
+
+    @property
+    def rested(self) -> Floats:
+        """Times (n,) s with a pause of REST_S on the way to every stop, so that a servo has no lag there."""
+        return self.time + REST_S * np.cumsum(self.stop)
 
 
 def respond(job: Job, commanded: Floats, travel: Travel, nominal_of: Floats | None = None) -> tuple[Floats, Correction]:
@@ -95,8 +105,9 @@ def with_memory(job: Job, rho: Floats, travel: Travel) -> Bools:
     for cause in job.causes:
         if (hook := cause.hook("on_drive")) is not None:
             which = cause.which(job.real_machine.actuators)
-            moved, still = (hook(np.zeros_like(rho), m, which, cause.values) for m in (motion, replace(motion, ordered=False)))
-            out |= np.abs(moved - still).max(axis=0, initial=0.0) > 0.0
+            moved = hook(np.zeros_like(rho), motion, which, cause.values)
+            for other in (replace(motion, ordered=False), replace(motion, direction=-motion.direction)):
+                out |= (hook(np.zeros_like(rho), other, which, cause.values) != moved).any(axis=0)
     return out
 
 
@@ -104,12 +115,12 @@ def _motion(job: Job, setpoint: Floats, travel: Travel) -> Motion:
     """The movement that the hooks see, with the encoders where the servos bring them."""
     stiffness = np.array([np.inf if a.stiffness is None else a.stiffness for a in job.real_machine.robot.actuators])
     zero = np.zeros_like(setpoint)
-    motion = Motion(travel.time, travel.time, travel.cut_min, None, setpoint, zero, zero, job.real_machine.home, stiffness)
+    motion = Motion(travel.rested, travel.time, travel.cut_min, None, setpoint, zero, zero, job.real_machine.home, stiffness)
     encoder = setpoint
     for cause in job.causes:
         if (hook := cause.hook("on_servo")) is not None:
             encoder = hook(encoder, motion, cause.which(job.real_machine.actuators), cause.values)
-    dt = np.diff(travel.time, prepend=travel.time[:1] - 1.0)
+    dt = np.diff(travel.rested, prepend=travel.time[:1] - 1.0)
     step = np.diff(encoder, axis=0, prepend=encoder[:1])
     speed = np.divide(step, dt[:, None], out=np.zeros_like(step), where=dt[:, None] > 0.0)
     return replace(motion, encoder=encoder, speed=speed, direction=direction(encoder))

@@ -55,6 +55,7 @@ class Track:
     fade0: Floats  # (p, 3) N, what the corner's force adds at the start of the piece, program frame
     fade1: Floats  # (p, 3) N, at its end
     jump: Bools  # the force jumps at the start of the piece
+    corner: Bools  # the tip cannot pass the start of the piece without a stop
 
     def u(self, piece: Ints, w: Floats) -> Floats:
         """Fraction of the motion at fraction w of the piece."""
@@ -134,16 +135,19 @@ def lay_track(path: Path, conditions: Conditions, length: Floats | None = None) 
     real = np.flatnonzero((piece_length > 0.0) | rapid)
     a, b = real[:-1], real[1:]
     cosine = np.clip(np.sum(last[a] * first[b], axis=1), -1.0, 1.0)
-    smooth = cutting[a] & cutting[b] & (cosine >= np.cos(JOIN_ANGLE))
+    straight_on = ~rapid[a] & ~rapid[b] & (cosine >= np.cos(JOIN_ANGLE))
+    corner = np.ones(n, np.bool_)
+    corner[b] = ~straight_on
+    smooth = cutting[a] & cutting[b] & straight_on
     jump[b] = ~smooth & (np.linalg.norm(own0[b] - own1[a], axis=1) > NO_FORCE)
     a, b = a[smooth], b[smooth]
     bisector = last[a] + first[b]
     bisector /= np.linalg.norm(bisector, axis=1, keepdims=True)
-    corner = 0.5 * (force(a, np.ones(len(a)), bisector) + force(b, np.zeros(len(b)), bisector))
-    fade1[a] = corner - own1[a]
-    fade0[b] = corner - own0[b]
+    shared = 0.5 * (force(a, np.ones(len(a)), bisector) + force(b, np.zeros(len(b)), bisector))
+    fade1[a] = shared - own1[a]
+    fade0[b] = shared - own0[b]
     _carry_over((piece_length > 0.0) | rapid, own1 + fade1, fade0, fade1)
-    return Track(path, conditions, motion, u0, u1, cutting, piece_length, s0, fade0, fade1, jump)
+    return Track(path, conditions, motion, u0, u1, cutting, piece_length, s0, fade0, fade1, jump, corner)
 
 
 def _carry_over(moves: Bools, end_force: Floats, fade0: Floats, fade1: Floats) -> None:
