@@ -153,7 +153,7 @@ def test_the_loop_closes(tmp_path):
             ["compensate", str(tmp_path / "in.nc"), "--config", str(config), "-o", str(out)]
         )
         assert code == 0, said
-        state = rerun(made, [out.read_text()])[0]
+        state = rerun(made, out.read_text(), program)
         return _path_error(state, made, program)
 
     before, after = left(runner.CONFIG), left(better)
@@ -163,7 +163,7 @@ def test_the_loop_closes(tmp_path):
 
 def _path_error(state, made, program):
     """rms distance (mm) of the cut tips from the programmed circle or polygon, by its nearest programmed sample."""
-    want = rerun(made, [program])[0]
+    want = rerun(made, program, program)
     cut, wanted = state.tip[state.cuts], want.programmed[want.cuts]
     dense = np.concatenate(
         [a + np.linspace(0, 1, 40)[:, None] * (b - a) for a, b in itertools.pairwise(wanted)]

@@ -313,11 +313,11 @@ def truth_json(made: Made, plan_: Plan) -> str:
     return json.dumps({**made.record, "noise": noise}, indent=1)
 
 
-def rerun(made: Made, programs: list[str], cutting: bool = True) -> list[State]:
-    """The same machine executes other programs (corrected ones); states at 500 even times, noise-free."""
-    runs = [Run(Timeline(read(text)), cutting, made.runs[-1].started_s + 600.0) for text in programs]
-    times = [even(r, 500) for r in runs]
-    return observe_all(runs, made.truth, times)
+def rerun(made: Made, program: str, groove: str) -> State:
+    """The same machine executes a corrected program of `groove`; its state at 500 even times, noise-free."""
+    began = made.runs[-1].started_s + 600.0
+    run = Run(Timeline(read(program)), True, began, made.runs[-1].cut_before_min, Timeline(read(groove)))
+    return observe_all([run], made.truth, [even(run, 500)])[0]
 
 
 __all__ = ["CHANNELS", "ORIGIN", "Made", "Noise", "Plan", "make", "rerun", "size", "truth_json", "write"]

@@ -21,6 +21,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from tests.plants import drives, energy, foreign
 from tests.plants.legs import Legs, orthoglide
@@ -83,12 +84,17 @@ class Truth:
 
 @dataclass(frozen=True)
 class Run:
-    """One executed program on the common clock; cut_before: minutes of cutting done by earlier runs."""
+    """One executed program on the common clock; cut_before: minutes of cutting done by earlier runs.
+
+    surface: the groove that is really cut, when the executed program is a corrected one: the cutting force follows the
+    direction of the groove, not that of the chords which lead the drives there.
+    """
 
     timeline: Timeline
     cutting: bool
     started_s: float
     cut_before_min: float = 0.0
+    surface: Timeline | None = None
 
 
 @dataclass
@@ -125,8 +131,28 @@ def _cut_minutes(run: Run, t: np.ndarray) -> np.ndarray:
     return run.cut_before_min + np.interp(t, grid, done)
 
 
-def simulate(run: Run, truth: Truth, t: np.ndarray, busy: list[tuple[float, float]]) -> State:
-    """The run at controller times t (n,), noise-free; busy: intervals of the common clock in which the machine moves."""
+def _along(surface: Timeline, tip: np.ndarray) -> np.ndarray:
+    """Feed direction (n, 3) of the surface at its points nearest to tip (n, 3)."""
+    dense = surface.sample(np.linspace(0.0, surface.log_end, 20001)[1:-1])
+    return dense["along"][cKDTree(dense["tip"]).query(tip)[1]]
+
+
+def simulate(
+    run: Run,
+    truth: Truth,
+    t: np.ndarray,
+    busy: list[tuple[float, float]],
+    cutting_at: np.ndarray | None = None,
+) -> State:
+    """The run at controller times t (n,), noise-free; busy: intervals of the common clock in which the machine moves.
+
+    cutting_at: for a run with a surface, where the tool is known to cut (n, 3); found here when it is missing.
+    """
+    if run.surface is not None and cutting_at is None:
+        for _ in range(2):  # where the tool cuts decides the force, and the force moves the tool
+            cutting_at = simulate(
+                run, truth, t, busy, run.timeline.sample(t)["tip"] if cutting_at is None else cutting_at
+            ).tip
     legs, line = truth.legs(), run.timeline
     grid = np.arange(line.begin[0], line.log_end + 0.1, drives.STEP)
     c = _setpoints(line, grid)
@@ -151,9 +177,12 @@ def simulate(run: Run, truth: Truth, t: np.ndarray, busy: list[tuple[float, floa
     carriage = carriage + truth.growth_mm_per_K * warm[:, None]
 
     cuts = here["cuts"] & run.cutting
-    right = np.cross(here["along"], [0.0, 0.0, 1.0])
+    along = here["along"]
+    if run.surface is not None and cutting_at is not None:
+        along = _along(run.surface, cutting_at)
+    right = np.cross(along, [0.0, 0.0, 1.0])
     size = truth.force_factor * (1 + truth.wear_per_min * _cut_minutes(run, t)) * cuts
-    force = size[:, None] * (right * TRIPLE[0] + here["along"] * TRIPLE[1] + np.array([0, 0, TRIPLE[2]]))
+    force = size[:, None] * (right * TRIPLE[0] + along * TRIPLE[1] + np.array([0, 0, TRIPLE[2]]))
     velocity = (_setpoints(line, t + 1e-4) - _setpoints(line, t - 1e-4)) / 2e-4
     state = State(
         t, common, here["tip"], here["along"], here["speed"], here["line"], cuts, setpoint, encoder, carriage,
