@@ -296,10 +296,11 @@ def _takes_up_play(job: Job, points: _Points, rho: Floats) -> Bools:
     if not job.causes:
         return np.zeros(len(points.row), np.bool_)
     memory = with_memory(job, rho, points.travel.take(points.end))
-    way = np.sign(np.diff(rho, axis=0, prepend=rho[:1]))[:, memory]
+    way: Floats = np.sign(np.diff(rho, axis=0, prepend=rho[:1]))[:, memory]
     for k in range(1, len(way)):  # standing still keeps the direction
         way[k] = np.where(way[k] == 0.0, way[k - 1], way[k])
-    turns = np.concatenate((np.zeros((1, way.shape[1]), np.bool_), way[1:] * way[:-1] < 0.0)).any(axis=1)
+    turns: Bools = np.zeros(len(way), np.bool_)
+    turns[1:] = (way[1:] * way[:-1] < 0.0).any(axis=1)
     near = turns.copy()
     for shift in range(1, TURN_LINES + 1):
         near[shift:] |= turns[:-shift]

@@ -53,8 +53,8 @@ def respond(job: Job, commanded: Floats, travel: Travel, nominal_of: Floats | No
     told = job.frame.to_machine(commanded)
     aim = None if nominal_of is None else job.frame.to_machine(nominal_of)
     if not job.causes:
-        tip, state = settle(job.real_machine, told, travel.force, None, aim)
-        return job.frame.to_program(tip), state
+        loaded, settled = settle(job.real_machine, told, travel.force, None, aim)
+        return job.frame.to_program(loaded), settled
     control = solve(job.real_machine, FREE, told, check=False)
     motion = _motion(job, control.rho_nominal, travel)
     error = np.zeros_like(motion.encoder)

@@ -22,6 +22,7 @@ def camcomp(*words, cwd=None, stdin=b""):
         cwd=cwd or ROOT,
         env=environment,
         timeout=300,
+        check=False,
     )
 
 

@@ -52,13 +52,14 @@ def spring(given: spec.Spring) -> Link:
     if given.beam is not None:
         b = given.beam
         A, Iy, Iz, J = b.section.moments()
-        return Link(np.linalg.inv(beam_compliance(b.length_mm, b.E_N_per_mm2, b.shear_modulus, A, Iy, Iz, J)))
+        C = beam_compliance(b.length_mm, b.E_N_per_mm2, b.shear_modulus, A, Iy, Iz, J)
+        return Link(np.asarray(np.linalg.inv(C), float))
     if given.compliance is not None:
         C = np.asarray(given.compliance, float)
     else:
-        d = given.compliance_diagonal
-        assert d is not None  # exactly one notation is given: checked when the file was read
-        C = np.diag([*d.translation_mm_per_N, *d.rotation_rad_per_Nmm])
+        c = given.compliance_diagonal
+        assert c is not None  # exactly one notation is given: checked when the file was read
+        C = np.diag([*c.translation_mm_per_N, *c.rotation_rad_per_Nmm])
     active = tuple(int(i) for i in np.flatnonzero(np.diag(C) > 0.0))
     K = np.zeros((6, 6))
     K[np.ix_(active, active)] = np.linalg.inv(C[np.ix_(active, active)])
