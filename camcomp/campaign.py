@@ -47,7 +47,7 @@ def open_campaign(path: str | FilePath) -> Campaign:
     order = sorted(range(len(runs)), key=lambda k: experiment.runs[k].started_s)
     worn = 0.0
     for k in order:
-        runs[k] = replace(runs[k], course=replace(runs[k].course, cut_before_min=worn))
+        runs[k] = replace(runs[k], course=replace(runs[k].course, cut_before_min=worn, kept={}))
         worn += runs[k].course.cut_min
     return Campaign(experiment, config, twin, tuple(runs), tuple(notes))
 

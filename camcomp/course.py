@@ -1,7 +1,8 @@
 """One run as the twin sees it: where the set-points are in time, and where in the program every row of a log stands."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -41,6 +42,7 @@ class Course:
     temperature: Floats | None  # (n,) deg C at the rows
     timeline: Timeline | None
     cut_before_min: float = 0.0
+    kept: dict[Any, Any] = field(default_factory=dict)  # what the twin has worked out for this course before
 
     @property
     def cut_min(self) -> float:

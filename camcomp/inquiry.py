@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from camcomp.gap.search import Atoms, Fitted, Members, Scale, total
 from camcomp.gap.whiten import Noise, fit_noise
 
 TIMING_S = 0.0015  # how fast a real drive settles after its acceleration has stepped
+STRAIGHT = 0.3  # chi-square that the bend of the model may cost before it is followed
 PATTERN_SCALE = 30.0  # um or N: what a pattern may amount to when the noise is measured beside it
 
 
@@ -39,6 +41,11 @@ class Inquiry:
     def prior(self) -> Prior:
         """Prior of the columns."""
         return self.columns.prior
+
+    @cached_property
+    def base_grams(self) -> tuple[Gram, ...]:
+        """Per run, at nominal."""
+        return self.grams(self.white_residual, self.white)
 
     def grams(self, residual: Sequence[Floats], white: Sequence[Floats]) -> tuple[Gram, ...]:
         """Per run."""
@@ -66,7 +73,7 @@ class Inquiry:
         """Gauss-Newton through the twin from theta, or from the linear answer."""
         shapes = {i: dict(self.shapes[i]) for i in members if i in self.shapes}
         index = self.member_columns(members)
-        grams = self.grams(self.white_residual, self.white)
+        grams = self.base_grams
         if not members:
             return Fitted((), np.zeros(0), np.zeros((0, 0)), Scale(total(grams), self.prior, self.atoms)(()), 0.0, grams)
         if theta is None:
@@ -77,16 +84,26 @@ class Inquiry:
         for step in range(passes):
             causes = self.causes(members, theta, shapes)
             now = [self.bench.residual(k, causes) for k in range(len(self.bench.runs))]
+            if step == 0 and not shapes and self._straight(now, index, theta):
+                grams = self.base_grams
+                mean, full = estimate(total(grams), self.prior, index)
+                theta, covariance = self._bounded(members, mean[index]), full[np.ix_(index, index)]
+                break
             moved = self._columns_at(members, theta, shapes)
             white = []
             left = []
+            grams_here = []
             for k in range(len(self.bench.runs)):
                 W = self.white[k].copy()
                 W[:, index] = self.whitened(k, np.stack([m[k] for m in moved[: len(index)]], axis=2))
-                r = self.whitened(k, now[k][:, :, None])[:, 0]
-                left.append(r + W[:, index] @ theta)
+                r = self.whitened(k, now[k][:, :, None])[:, 0] + W[:, index] @ theta
+                left.append(r)
                 white.append(W)
-            grams = self.grams(left, white)
+                A = self.base_grams[k].A.copy()
+                A[:, index] = W.T @ W[:, index]
+                A[index, :] = A[:, index].T
+                grams_here.append(Gram(A, W.T @ r, float(r @ r), len(r)))
+            grams = tuple(grams_here)
             mean, full = estimate(total(grams), self.prior, index)
             covariance = full[np.ix_(index, index)]
             self._move_shapes(members, theta, shapes, left, white, moved[len(index) :], mean)
@@ -98,6 +115,14 @@ class Inquiry:
                 break
         evidence = Scale(total(grams), self.prior, self.atoms)(members)
         return Fitted(members, theta, covariance, evidence, 0.0, grams, shapes)
+
+    def _straight(self, now: Sequence[Floats], index: Sequence[int], theta: Floats) -> bool:
+        """Whether the columns at nominal predict the residuals at theta to well within the noise."""
+        bend = 0.0
+        for k, r in enumerate(now):
+            exact = self.whitened(k, r[:, :, None])[:, 0]
+            bend += float(np.sum((exact - self.white_residual[k] + self.white[k][:, index] @ theta) ** 2))
+        return bend < STRAIGHT
 
     def _bounded(self, members: Members, theta: Floats) -> Floats:
         parameters = [p for i in members for p in self.columns.atoms[i].parameters]

@@ -51,7 +51,7 @@ def survey(inquiry: Inquiry) -> Survey:
     for members in _same_name(inquiry, singles[0][1], every):
         fit(members)
     ones = sorted((f for m, f in done.items() if len(m) == 1), key=value, reverse=True)
-    found: list[tuple[float, Members, Fitted | None]] = [(v, m, None) for v, m in pairs(at_null, every)[:PAIRS]]
+    found: list[tuple[float, Members, Fitted | None]] = [(v, m, None) for v, m in pairs(at_null, every, PAIRS)]
     for f in ones[:3]:
         scale = Scale(total(f.grams), inquiry.prior, inquiry.atoms)
         found += [(v, m, f) for v, m in extensions(scale, f.members, every)[:4]]

@@ -5,8 +5,9 @@ nowhere else. The loaded equilibrium is solved at the nodes of a course; between
 first derivatives carry on.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -22,6 +23,7 @@ from camcomp.statics.solve import FREE, STATUS, solve
 
 _RHO_STEP = 1e-3  # mm or 1e-3 mrad of drive, to first order linear within 1e-6
 _FORCE_STEP = 1.0  # N
+_SLOPES = ("tip_rho", "tip_wrench", "drive_rho", "drive_wrench")
 _MOMENT_STEP = 100.0  # N mm
 
 
@@ -34,7 +36,6 @@ class Reading:
     drive: Floats
     dyno: Floats
     motion: Motion
-    carriage: Floats  # (n, m) where the carriages stand
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,6 +69,7 @@ class Twin:
     origin: Floats
     rotation: Floats
     causes: tuple[Cause, ...] = ()
+    machines: dict[tuple, Machine] = field(default_factory=dict)
 
     @property
     def actuators(self) -> tuple[str, ...]:
@@ -122,52 +124,52 @@ class Twin:
         """
         causes = (*self.causes, *causes)
         # control, drive
-        grid = self._grid_motion(course, causes)
-        error = np.zeros_like(grid.encoder)
+        grid, rows = self._motions(course, causes)
+        carriage = grid.encoder
         for cause in causes:
             if (hook := cause.hook("on_drive")) is not None:
-                error = hook(error, grid, cause.which(self.actuators), cause.values)
-        carriage = grid.encoder + error
+                error = hook(np.zeros_like(carriage), grid, cause.which(self.actuators), cause.values)
+                carriage = carriage + error
         seen = course.time
         for cause in causes:
             if (hook := cause.hook("on_clock")) is not None:
                 seen = hook(seen, cause.values)
-        rows = self._rows(course, grid, course.time, course.row_rho)
+        late = seen is not course.time
         encoder = rows.encoder
-        ahead = np.zeros_like(encoder)
+        ahead = None
         if measured is not None:
             ahead = np.where(np.isfinite(measured), measured - encoder, 0.0)
-        late = seen is not course.time
-        at_tip = self._rows(course, grid, seen, None) if late else rows
-        gap = carriage - course.grid_rho  # carriage minus set-point
-        gap_row = _interpolate(course, course.time, gap) + ahead
-        place = course.place(course.time)
+        at_tip = _at(course, grid, seen, None) if late else rows
+        moved = carriage is not course.grid_rho
+        gap = carriage - course.grid_rho if moved else None  # carriage minus set-point
+        gap_row = _gap_at(course, course.time, gap, ahead)
+        gap_tip = _gap_at(course, seen, gap, ahead) if late else gap_row
+        place = _place(course)
         place_tip = course.place(seen) if late else place
-        gap_tip = _interpolate(course, seen, gap) + ahead if late else gap_row
         # structure
         robot, key = self.edited(causes)
-        nodes = self._nodes(course, grid)
-        node_load = self._load(causes, nodes, course.node_force)
         if solved is None or slopes is None or solved.key != key:
-            shift = _piece_means(course, gap) if solved is None or slopes is None else solved.shift
-            load = node_load if solved is None or slopes is None else Load(solved.force, solved.wrench)
-            solved = self.structure(course, build_machine(robot, self.nominal), key, shift, load)
-        load = self._load(causes, rows, place.of(course.node_force))
+            if solved is None or slopes is None:
+                shift = _piece_means(course, gap) if gap is not None else np.zeros((course.pieces, len(self.actuators)))
+                load = self._load(causes, _at(course, grid, course.node_time, course.node_rho), course.node_force)
+            else:
+                shift, load = solved.shift, Load(solved.force, solved.wrench)
+            solved = self.structure(course, self._machine(robot, key), key, shift, load)
+        load = self._load(causes, rows, _kept(course, "force", lambda: place.of(course.node_force)))
         load_tip = self._load(causes, at_tip, place_tip.of(course.node_force)) if late else load
-        drive = place.of(solved.drive)
-        tip = place_tip.of(solved.tip)
+        drive, tip = place.of(solved.drive), place_tip.of(solved.tip)
         if slopes is not None:
+            at_rows = _slopes_at(course, slopes, place, "rows")
             d_rho, d_wrench = self._differences(solved, place, gap_row, load)
-            drive = drive + _apply(place.of(slopes.drive_rho), d_rho) + _apply(place.of(slopes.drive_wrench), d_wrench)
+            drive = drive + _apply(at_rows.drive_rho, d_rho) + _apply(at_rows.drive_wrench, d_wrench)
             if late:
+                at_rows = _slopes_at(course, slopes, place_tip, None)
                 d_rho, d_wrench = self._differences(solved, place_tip, gap_tip, load_tip)
-            tip = tip + _apply(place_tip.of(slopes.tip_rho), d_rho) + _apply(place_tip.of(slopes.tip_wrench), d_wrench)
-        effort = np.zeros_like(grid.encoder)
+            tip = tip + _apply(at_rows.tip_rho, d_rho) + _apply(at_rows.tip_wrench, d_wrench)
         for cause in causes:
             if (hook := cause.hook("on_drive_force")) is not None:
-                effort = hook(effort, grid, cause.which(self.actuators), cause.values)
-        if effort.any():
-            drive = drive + _interpolate(course, course.time, effort)
+                effort = hook(np.zeros_like(grid.encoder), grid, cause.which(self.actuators), cause.values)
+                drive = drive + _interpolate(course, course.time, effort)
         # tool, workpiece, sensor
         for cause in causes:
             if (hook := cause.hook("on_pose")) is not None:
@@ -176,7 +178,7 @@ class Twin:
         for cause in causes:
             if (hook := cause.hook("on_workpiece")) is not None:
                 tip = hook(tip, cause.values)
-        reading = Reading(tip, encoder, drive, load.force, rows, course.row_rho + gap_row)
+        reading = Reading(tip, encoder, drive, load.force, rows)
         for cause in causes:
             if (hook := cause.hook("on_reading")) is not None:
                 reading = hook(reading, rows, cause.values)
@@ -196,8 +198,8 @@ class Twin:
     def slopes(self, course: Course, causes: Sequence[Cause], solved: Solved) -> Slopes:
         """Derivatives of the structure at the nodes, by differences of its own solution."""
         causes = (*self.causes, *causes)
-        robot, key = self.edited(causes)
-        machine = build_machine(robot, self.nominal)
+        machine = self._machine(*self.edited(causes))
+        key = solved.key
         m = len(self.actuators)
         tips, drives = [], []
         for j in range(m):
@@ -216,7 +218,25 @@ class Twin:
 
     # -- pieces of the path -------------------------------------------------------------------------------------------
 
-    def _grid_motion(self, course: Course, causes: Sequence[Cause]) -> Motion:
+    def _machine(self, robot: Robot, key: tuple) -> Machine:
+        """The packed machine; runs of one experiment ask for the same one after each other."""
+        if key not in self.machines:
+            if len(self.machines) > 4:
+                self.machines.clear()
+            self.machines[key] = build_machine(robot, self.nominal)
+        return self.machines[key]
+
+    def _motions(self, course: Course, causes: Sequence[Cause]) -> tuple[Motion, Motion]:
+        """Motion on the fine grid and at the rows; the same for all causes that leave the control alone."""
+        servo = [cause for cause in causes if cause.hook("on_servo") is not None]
+
+        def make() -> tuple[Motion, Motion]:
+            grid = self._grid_motion(course, servo)
+            return grid, _at(course, grid, course.time, course.row_rho)
+
+        return make() if servo else _kept(course, "motions", make)
+
+    def _grid_motion(self, course: Course, servo: Sequence[Cause]) -> Motion:
         stiffness = np.array([np.inf if a.stiffness is None else a.stiffness for a in self.robot.actuators])
         home = np.array([a.home for a in self.robot.actuators])
         t = course.grid
@@ -228,30 +248,10 @@ class Twin:
         zero = np.zeros_like(course.grid_rho)
         motion = Motion(t, course.started + t, worn, temperature, course.grid_rho, zero, zero, home, stiffness, course.ordered)
         encoder = course.grid_rho
-        for cause in causes:
-            if (hook := cause.hook("on_servo")) is not None:
-                encoder = hook(encoder, motion, cause.which(self.actuators), cause.values)
+        for cause in servo:
+            encoder = cause.hook("on_servo")(encoder, motion, cause.which(self.actuators), cause.values)
         speed = np.gradient(encoder, t, axis=0) if course.ordered and len(t) > 1 else zero
         return replace(motion, encoder=encoder, speed=speed, direction=travel_direction(course, encoder))
-
-    def _rows(self, course: Course, grid: Motion, at: Floats, rho: Floats | None) -> Motion:
-        """The grid's motion at other times (n,); rho: set-points there when they are known exactly."""
-        late = grid.encoder - course.grid_rho
-        setpoint = _interpolate(course, at, course.grid_rho) if rho is None else rho
-        temperature = None if grid.temperature is None else _interpolate(course, at, grid.temperature[:, None])[:, 0]
-        return replace(
-            grid,
-            time=at,
-            common=course.started + at,
-            cut_min=_interpolate(course, at, grid.cut_min[:, None])[:, 0],
-            temperature=temperature,
-            encoder=setpoint + _interpolate(course, at, late) if late.any() else setpoint,
-            speed=_interpolate(course, at, grid.speed),
-            direction=_interpolate(course, at, grid.direction),
-        )
-
-    def _nodes(self, course: Course, grid: Motion) -> Motion:
-        return self._rows(course, grid, course.node_time, course.node_rho)
 
     def _load(self, causes: Sequence[Cause], motion: Motion, force: Floats) -> Load:
         load = Load(force, np.zeros((len(force), 6)))
@@ -274,6 +274,49 @@ def twin_of(job: Job) -> Twin:
     """The forward model of a config, its `effects:` included. Raises ConfigError CC205."""
     machine = job.machine
     return Twin(machine.robot, machine.nominal, job.frame.origin, job.frame.rotation, job.causes)
+
+
+def _kept(course: Course, name: object, make: Callable[[], Any]) -> Any:
+    if name not in course.kept:
+        course.kept[name] = make()
+    return course.kept[name]
+
+
+def _place(course: Course) -> Places:
+    return _kept(course, "place", lambda: course.place(course.time))
+
+
+def _slopes_at(course: Course, slopes: Slopes, place: Places, name: str | None) -> Slopes:
+    def make() -> Slopes:
+        return Slopes(*(place.of(getattr(slopes, each)) for each in _SLOPES))
+
+    return make() if name is None else _kept(course, (name, id(slopes)), make)
+
+
+def _at(course: Course, grid: Motion, at: Floats, rho: Floats | None) -> Motion:
+    """The grid's motion at other times (n,); rho: set-points there when they are known exactly."""
+    setpoint = _interpolate(course, at, course.grid_rho) if rho is None else rho
+    if grid.encoder is not course.grid_rho:
+        setpoint = setpoint + _interpolate(course, at, grid.encoder - course.grid_rho)
+    temperature = None if grid.temperature is None else _interpolate(course, at, grid.temperature[:, None])[:, 0]
+    return replace(
+        grid,
+        time=at,
+        common=course.started + at,
+        cut_min=_interpolate(course, at, grid.cut_min[:, None])[:, 0],
+        temperature=temperature,
+        encoder=setpoint,
+        speed=_interpolate(course, at, grid.speed),
+        direction=_interpolate(course, at, grid.direction),
+    )
+
+
+def _gap_at(course: Course, at: Floats, gap: Floats | None, ahead: Floats | None) -> Floats:
+    """Carriage minus set-point (n, m) at times (n,): the model's own, and what the logged encoders add."""
+    if gap is None:
+        return np.zeros_like(course.row_rho) if ahead is None else ahead
+    own = _interpolate(course, at, gap)
+    return own if ahead is None else own + ahead
 
 
 def _interpolate(course: Course, at: Floats, values: Floats) -> Floats:

@@ -13,7 +13,7 @@ STAGE = "structure"
 TARGET = "actuator"
 SOURCE = "assembly error of Klimchik et al. (ARK 2012): about 1 degree around the actuated axis"
 PARAMETERS = (
-    Parameter("roll_deg", "deg", 0.0, -20.0, 20.0, 0.4, 0.002, "assembly without fixtures: 0.1 to 1 degree"),
+    Parameter("roll_deg", "deg", 0.0, -20.0, 20.0, 0.4, 0.0006, "assembly without fixtures: 0.1 to 1 degree"),
 )
 
 

@@ -8,7 +8,7 @@ STAGE = "process"
 TARGET = "machine"
 SOURCE = "definition; scatter of specific cutting forces between batches (Altintas: Manufacturing automation)"
 PARAMETERS = (
-    Parameter("factor", "1", 1.0, 0.02, 20.0, 0.3, 0.01, "specific cutting forces are known to 10 to 50 %", log=True),
+    Parameter("factor", "1", 1.0, 0.02, 20.0, 0.3, 0.002, "specific cutting forces are known to 10 to 50 %", log=True),
 )
 
 

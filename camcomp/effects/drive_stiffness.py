@@ -10,7 +10,7 @@ STAGE = "structure"
 TARGET = "actuator"
 SOURCE = "definition: factor on the spring of the actuator"
 PARAMETERS = (
-    Parameter("factor", "1", 1.0, 0.02, 20.0, 0.4, 0.012, "axial stiffness of feed drives is known to -50 .. +100 %", log=True),
+    Parameter("factor", "1", 1.0, 0.02, 20.0, 0.4, 0.004, "axial stiffness of feed drives is known to -50 .. +100 %", log=True),
 )
 
 

@@ -9,7 +9,7 @@ STAGE = "drive"
 TARGET = "actuator"
 SOURCE = "force balance of the carriage; turn-round of the force after Dahl 1968"
 PARAMETERS = (
-    Parameter("force_N", "N", 0.0, 0.0, 2000.0, 60.0, 0.5, "guides and seals of feed drives: 5 to 300 N", sign=1),
+    Parameter("force_N", "N", 0.0, 0.0, 2000.0, 60.0, 0.2, "guides and seals of feed drives: 5 to 300 N", sign=1),
 )
 
 

@@ -10,7 +10,7 @@ STAGE = "structure"
 TARGET = "machine"
 SOURCE = "definition"
 PARAMETERS = (
-    Parameter("weight_N", "N", 0.0, 0.0, 5000.0, 30.0, 0.3, "spindles and platforms of 0.5 to 10 kg", sign=1),
+    Parameter("weight_N", "N", 0.0, 0.0, 5000.0, 30.0, 0.1, "spindles and platforms of 0.5 to 10 kg", sign=1),
 )
 
 

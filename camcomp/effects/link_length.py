@@ -13,7 +13,7 @@ STAGE = "structure"
 TARGET = "actuator"
 SOURCE = "definition: the link that the actuator drives, lengthened along itself"
 PARAMETERS = (
-    Parameter("length_mm", "mm", 0.0, -10.0, 10.0, 0.1, 0.001, "links made to 0.02 to 0.3 mm"),
+    Parameter("length_mm", "mm", 0.0, -10.0, 10.0, 0.1, 0.0003, "links made to 0.02 to 0.3 mm"),
 )
 
 

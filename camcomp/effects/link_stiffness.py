@@ -10,7 +10,7 @@ STAGE = "structure"
 TARGET = "machine"
 SOURCE = "definition: one factor on every six-dof link spring"
 PARAMETERS = (
-    Parameter("factor", "1", 1.0, 0.02, 20.0, 0.4, 0.012, "beam theory leaves out joints: -50 .. +50 %", log=True),
+    Parameter("factor", "1", 1.0, 0.02, 20.0, 0.4, 0.003, "beam theory leaves out joints: -50 .. +50 %", log=True),
 )
 
 

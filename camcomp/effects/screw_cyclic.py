@@ -10,7 +10,8 @@ from camcomp.gap.effect import Motion, Parameter
 STAGE = "drive"
 TARGET = "actuator"
 SOURCE = "carriage minus encoder = amplitude sin(2 pi (encoder - home) / pitch + phase); v2pi of ISO 3408-3"
-_PITCHES = tuple(float(each) for each in np.geomspace(1.0, 40.0, 160))
+# even in frequency: neighbours differ by a quarter turn over 100 mm
+_PITCHES = tuple(float(1.0 / f) for f in np.linspace(1.0, 1.0 / 40.0, 130))
 PARAMETERS = (
     Parameter("amplitude_mm", "mm", 0.0, 0.0, 0.3, 0.005, 0.0001, "wobble of ball screws: 1 to 10 um", sign=1),
     Parameter("pitch_mm", "mm", 5.0, 0.5, 100.0, 1.0, 0.0, "screws of feed drives: 1 to 40 mm per turn"),
@@ -18,8 +19,8 @@ PARAMETERS = (
 )
 # The effect is linear in its two components, which is what a fit needs; the scan finds the pitch.
 FITTED = (
-    Parameter("sine_mm", "mm", 0.0, -0.3, 0.3, 0.004, 0.0001, "as the amplitude"),
-    Parameter("cosine_mm", "mm", 0.0, -0.3, 0.3, 0.004, 0.0001, "as the amplitude"),
+    Parameter("sine_mm", "mm", 0.0, -0.3, 0.3, 0.004, 0.00005, "as the amplitude"),
+    Parameter("cosine_mm", "mm", 0.0, -0.3, 0.3, 0.004, 0.00005, "as the amplitude"),
     Parameter("pitch_mm", "mm", 5.0, 0.5, 100.0, 1.0, 0.0, "as above", scan=_PITCHES),
 )
 
@@ -36,5 +37,8 @@ def on_drive(error: Floats, motion: Motion, which: Floats, p: Mapping[str, float
     amplitude = p["amplitude_mm"]
     if amplitude == 0.0:
         return error
-    phase = 2.0 * np.pi * (motion.encoder - motion.home) / p["pitch_mm"] + p["phase_rad"]
-    return error + which * amplitude * np.sin(phase)
+    out = error.copy()
+    for j in np.flatnonzero(which):
+        phase = 2.0 * np.pi * (motion.encoder[:, j] - motion.home[j]) / p["pitch_mm"] + p["phase_rad"]
+        out[:, j] += amplitude * np.sin(phase)
+    return out

@@ -9,7 +9,7 @@ STAGE = "drive"
 TARGET = "actuator"
 SOURCE = "definition: carriage minus encoder = ppm 1e-6 (encoder - home); classes of ISO 3408-3"
 PARAMETERS = (
-    Parameter("error_ppm", "ppm", 0.0, -20000.0, 20000.0, 150.0, 3.0, "ISO 3408-3, classes 5 to 10: 23 to 210 um per 300 mm"),
+    Parameter("error_ppm", "ppm", 0.0, -20000.0, 20000.0, 150.0, 1.0, "ISO 3408-3, classes 5 to 10: 23 to 210 um per 300 mm"),
 )
 
 

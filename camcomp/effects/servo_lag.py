@@ -12,7 +12,7 @@ STAGE = "control"
 TARGET = "either"
 SOURCE = "first-order position loop, tau = 1/kv (Gross, Hamann, Wiegaertner: Electrical feed drives in automation)"
 PARAMETERS = (
-    Parameter("time_constant_ms", "ms", 0.0, 0.0, 100.0, 3.0, 0.02, "loop gains kv of 100 to 2000 1/s", sign=1),
+    Parameter("time_constant_ms", "ms", 0.0, 0.0, 100.0, 3.0, 0.005, "loop gains kv of 100 to 2000 1/s", sign=1),
 )
 
 

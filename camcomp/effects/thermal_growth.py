@@ -13,7 +13,7 @@ SOURCE = "linear expansion; first-order warm-up where no temperature is logged"
 REFERENCE_C = 20.0
 WARM_UP_K = 10.0  # rise that an unlogged warm-up ends at; only its product with the growth shows
 PARAMETERS = (
-    Parameter("growth_mm_per_K", "mm/K", 0.0, -0.1, 0.1, 0.004, 0.00005, "steel, 11.5e-6 per K, 100 to 500 mm free length"),
+    Parameter("growth_mm_per_K", "mm/K", 0.0, -0.1, 0.1, 0.004, 0.000015, "steel, 11.5e-6 per K, 100 to 500 mm free length"),
     Parameter(
         "warm_up_s", "s", 3600.0, 60.0, 1e5, 1.0, 0.0, "feed drives warm up in 10 minutes to 3 hours",
         scan=(300.0, 900.0, 1800.0, 3600.0, 7200.0, 14400.0),

@@ -9,7 +9,7 @@ STAGE = "sensor"
 TARGET = "machine"
 SOURCE = "definition: a row's tip is the one that the machine had offset_s earlier"
 PARAMETERS = (
-    Parameter("offset_s", "s", 0.0, -1.0, 1.0, 0.006, 0.00002, "unsynchronised loggers: 0.5 to 20 ms"),
+    Parameter("offset_s", "s", 0.0, -1.0, 1.0, 0.006, 0.000005, "unsynchronised loggers: 0.5 to 20 ms"),
 )
 
 

@@ -12,7 +12,7 @@ STAGE = "tool"
 TARGET = "machine"
 SOURCE = "definition"
 PARAMETERS = (
-    Parameter("length_mm", "mm", 0.0, -20.0, 20.0, 0.1, 0.001, "tool setting: 0.02 to 0.5 mm"),
+    Parameter("length_mm", "mm", 0.0, -20.0, 20.0, 0.1, 0.0003, "tool setting: 0.02 to 0.5 mm"),
 )
 
 

@@ -8,7 +8,7 @@ STAGE = "process"
 TARGET = "machine"
 SOURCE = "linear middle part of the wear curve (ISO 8688-2)"
 PARAMETERS = (
-    Parameter("growth_per_min", "1/min", 0.0, 0.0, 20.0, 0.2, 0.002, "tool lives of 5 to 60 minutes", sign=1),
+    Parameter("growth_per_min", "1/min", 0.0, 0.0, 20.0, 0.2, 0.0005, "tool lives of 5 to 60 minutes", sign=1),
 )
 
 

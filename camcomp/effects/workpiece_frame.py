@@ -12,10 +12,10 @@ TARGET = "machine"
 SOURCE = "rigid displacement of the workpiece, in the axes of its stated frame"
 _SHIFT = "probing and clamping: 0.05 to 0.5 mm"
 PARAMETERS = (
-    Parameter("shift_x_mm", "mm", 0.0, -50.0, 50.0, 0.15, 0.001, _SHIFT),
-    Parameter("shift_y_mm", "mm", 0.0, -50.0, 50.0, 0.15, 0.001, _SHIFT),
-    Parameter("shift_z_mm", "mm", 0.0, -50.0, 50.0, 0.15, 0.001, _SHIFT),
-    Parameter("rotation_deg", "deg", 0.0, -90.0, 90.0, 0.1, 0.0005, "edge finding: 0.1 to 2 mrad"),
+    Parameter("shift_x_mm", "mm", 0.0, -50.0, 50.0, 0.15, 0.0003, _SHIFT),
+    Parameter("shift_y_mm", "mm", 0.0, -50.0, 50.0, 0.15, 0.0003, _SHIFT),
+    Parameter("shift_z_mm", "mm", 0.0, -50.0, 50.0, 0.15, 0.0003, _SHIFT),
+    Parameter("rotation_deg", "deg", 0.0, -90.0, 90.0, 0.1, 0.00015, "edge finding: 0.1 to 2 mrad"),
 )
 
 

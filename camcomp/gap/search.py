@@ -11,7 +11,7 @@ import numpy as np
 from scipy.special import logsumexp
 
 from camcomp.datatypes import Floats
-from camcomp.gap.evidence import TOLERANCES, Base, Gram, Prior, base, log_bayes
+from camcomp.gap.evidence import TOLERANCES, Base, Gram, Prior, base, log_bayes, log_bayes_pairs
 
 Members = tuple[int, ...]
 SIZES = (0.5, 0.35, 0.12, 0.03)  # prior probability of 0, 1, 2 and 3 causes
@@ -94,14 +94,22 @@ def extensions(scale: Scale, members: Members, candidates: Sequence[int]) -> lis
     return sorted(found, reverse=True)
 
 
-def pairs(scale: Scale, candidates: Sequence[int]) -> list[tuple[float, Members]]:
-    """All sets of two, best first."""
-    found = [
-        (scale(two) + scale.atoms.prior(two), two)
-        for two in combinations(sorted(candidates), 2)
-        if not scale.atoms.exclusive(*two)
-    ]
-    return sorted(found, reverse=True)
+def pairs(scale: Scale, candidates: Sequence[int], most: int) -> list[tuple[float, Members]]:
+    """The best sets of two, best first: screened at the stated tolerances, then scored."""
+    two = [each for each in combinations(sorted(candidates), 2) if not scale.atoms.exclusive(*each)]
+    single = [len(scale.atoms.columns[a]) == len(scale.atoms.columns[b]) == 1 for a, b in two]
+    at = scale.bases[TOLERANCES.index(1.0)]
+    rough = np.empty(len(two))
+    fast = np.flatnonzero(single)
+    if len(fast):
+        first = np.array([scale.atoms.columns[two[k][0]][0] for k in fast])
+        second = np.array([scale.atoms.columns[two[k][1]][0] for k in fast])
+        rough[fast] = log_bayes_pairs(at, scale.prior, first, second)
+    for k in np.flatnonzero(~np.array(single, bool)):
+        rough[k] = log_bayes(at, scale.prior, [scale.atoms.columns[i] for i in two[k]])
+    rough += [scale.atoms.prior(each) for each in two]
+    best = [two[k] for k in np.argsort(-rough)[:most]]
+    return sorted(((scale(each) + scale.atoms.prior(each), each) for each in best), reverse=True)
 
 
 def probabilities(fits: Sequence[Fitted], atoms: Atoms, temperature: float = 1.0) -> Floats:
