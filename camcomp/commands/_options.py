@@ -1,5 +1,8 @@
 """Options that several verbs share."""
 
+from collections.abc import Callable
+from typing import Any
+
 import click
 
 config_option = click.option(
@@ -10,3 +13,21 @@ config_option = click.option(
     required=True,
     help="Machine file (YAML); may be given several times, later files override earlier ones key by key.",
 )
+quiet_option = click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
+_FORMATS = {
+    "json": ("OUT.json", "What was found, as JSON."),
+    "sarif": ("OUT.sarif", "What was found, as SARIF 2.1.0 for code hosts."),
+    "junit": ("OUT.xml", "What was found, as JUnit XML for CI servers."),
+}
+
+
+def findings_options(*names: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Options for machine-readable findings: json, sarif, junit, each with a file or - for standard output."""
+
+    def add(function: Callable[..., Any]) -> Callable[..., Any]:
+        for name in reversed(names):
+            metavar, text = _FORMATS[name]
+            function = click.option(f"--{name}", f"{name}_file", metavar=metavar, help=text)(function)
+        return function
+
+    return add

@@ -6,12 +6,20 @@ import json
 import sys
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from camcomp import __version__
-from camcomp.commands._options import config_option
+from camcomp.commands._options import config_option, findings_options, quiet_option
 from camcomp.config import load_config
+from camcomp.diagnostics import CheckFailed
+from camcomp.report.findings import Case, findings_of_messages
+from camcomp.report.outputs import findings_files
+from camcomp.terminal import say
+
+if TYPE_CHECKING:
+    from camcomp.batch import Status
 
 SUMMARY = "camcomp-batch.json"
 
@@ -25,6 +33,8 @@ SUMMARY = "camcomp-batch.json"
 @click.option("--joints", is_flag=True, help="Write a joint table beside every program.")
 @click.option("--method", type=click.Choice(["newton", "stiffness", "fixed-point", "linear"]), help="As in compensate.")
 @click.option("--tolerance-um", type=click.FloatRange(min=0, min_open=True), help="Bound of the error left.")
+@findings_options("sarif", "junit")
+@quiet_option
 def command(
     paths: tuple[str, ...],
     configs: tuple[str, ...],
@@ -34,6 +44,9 @@ def command(
     joints: bool,
     method: str | None,
     tolerance_um: float | None,
+    sarif_file: str | None,
+    junit_file: str | None,
+    quiet: bool,
 ) -> int:
     """Compensate many programs at once.
 
@@ -59,16 +72,25 @@ def command(
     statuses = []
     for status in batch.run_batch(plan, programs, pool):
         statuses.append(status)
-        _tell(status, len(statuses), len(programs))
+        if not quiet or status.exit_code:
+            _tell(status, len(statuses), len(programs))
     figures = batch.summary(statuses)
     plan.output.mkdir(parents=True, exist_ok=True)
     write_all({plan.output / SUMMARY: (json.dumps(figures, indent=2) + "\n").encode()})
+    cases = [_case(each) for each in sorted(statuses, key=lambda each: each.source)]
+    write_all(findings_files("batch", cases, sarif_file=sarif_file, junit_file=junit_file))
     counts = ", ".join(f"{count} {name}" for name, count in figures["counts"].items() if count)
-    print(f"{figures['programs']} programs: {counts}", file=sys.stderr)
+    say(f"{figures['programs']} programs: {counts}", quiet=quiet)
     return figures["exit_code"]
 
 
-def _tell(status, number: int, total: int) -> None:  # type: ignore[no-untyped-def]
+def _case(status: Status) -> Case:
+    check = status.exit_code == CheckFailed.exit_code
+    findings = findings_of_messages(status.messages, status.source, check=check)
+    return Case(status.source, findings, status.status)
+
+
+def _tell(status: Status, number: int, total: int) -> None:
     text = f"[{number}/{total}] {status.status}: {status.source}"
     if status.figures:
         before, after = (status.figures[each]["max_um"] for each in ("before", "after"))

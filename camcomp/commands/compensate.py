@@ -1,14 +1,15 @@
 """camcomp compensate."""
 
 import json
-import sys
 
 import click
 
 from camcomp import __version__
+from camcomp.commands._options import quiet_option
 from camcomp.config import load_config
 from camcomp.diagnostics import CheckFailed
 from camcomp.files import STANDARD, display_name, read_bytes, write_all
+from camcomp.terminal import say, working
 
 
 @click.command()
@@ -25,6 +26,8 @@ from camcomp.files import STANDARD, display_name, read_bytes, write_all
     help="How the target is found; default: what the machine file says, newton.",
 )
 @click.option("--tolerance-um", type=click.FloatRange(min=0, min_open=True), help="Bound of the error left.")
+@click.option("--dry-run", is_flag=True, help="Do everything but write.")
+@quiet_option
 def command(
     program: str,
     configs: tuple[str, ...],
@@ -35,6 +38,8 @@ def command(
     report: str | None,
     method: str | None,
     tolerance_um: float | None,
+    dry_run: bool,
+    quiet: bool,
 ) -> None:
     """Write the deflection of the machine back into an NC program.
 
@@ -57,9 +62,9 @@ def command(
     if is_stamped(source.data):
         raise CheckFailed("CC603", f"{source.name} was compensated before")
     tolerance = tolerance_um or config.compensation.tolerance_um
-    result = compensate(
-        source, job, method=method or config.compensation.method, tolerance_um=tolerance, version=__version__
-    )
+    how = method or config.compensation.method
+    with working(f"compensating {source.name}", quiet=quiet):
+        result = compensate(source, job, method=how, tolerance_um=tolerance, version=__version__)
     figures = tables.summary(result, job)
     outputs: dict[str, bytes] = {}
     if output or not (joints or summary_file or paths or report):
@@ -76,16 +81,22 @@ def command(
 
         inputs = [Input("program", source.name, source.data)]
         inputs += [Input("configuration", display_name(each), read_bytes(each)) for each in configs if each != STANDARD]
-        outputs[report] = compensation_html(result, job, figures, failed=failed, tolerance_um=tolerance, inputs=inputs)
-    write_all(outputs, inputs=(program, *configs))
-    _tell(figures)
+        with working("checking what was written, for the report", quiet=quiet):
+            outputs[report] = compensation_html(
+                result, job, figures, failed=failed, tolerance_um=tolerance, inputs=inputs
+            )
+    if not dry_run:
+        write_all(outputs, inputs=(program, *configs))
+    say(*_told(figures), quiet=quiet)
+    if dry_run:
+        say(*(f"would write {name}: {len(data)} bytes" for name, data in outputs.items()), quiet=quiet)
     if failed:
         first, *rest = (CheckFailed(rule, text) for rule, text in failed)
         first.others = tuple(rest)
         raise first
 
 
-def _tell(figures: dict) -> None:
+def _told(figures: dict) -> list[str]:
     before, after = figures["before"], figures["after"]
     lines = [
         f"{figures['segments_in']} motions in, {figures['points']} end points out ({figures['method']})",
@@ -95,8 +106,7 @@ def _tell(figures: dict) -> None:
         f"largest drive force {_either(figures, 'actuator_force_max_N', 'actuator_torque_max_Nmm')}",
         f"platform tilt left {figures['platform_tilt_max_mrad']:.2f} mrad",
     ]
-    lines += [f"warning: {each}" for each in figures["warnings"]]
-    print("\n".join(lines), file=sys.stderr)
+    return lines + [f"warning: {each}" for each in figures["warnings"]]
 
 
 def _either(figures: dict, *keys: str) -> str:

@@ -1,15 +1,18 @@
 """camcomp validate."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
 import click
 
+from camcomp.commands._options import findings_options, quiet_option
 from camcomp.config import check_config, is_experiment, load_config, load_experiment
 from camcomp.diagnostics import CamcompError, raise_all
-from camcomp.files import display_name, read_bytes
+from camcomp.files import STANDARD, display_name, read_bytes, write_all
+from camcomp.report.findings import WARNING, Case, Finding, findings_of
+from camcomp.report.outputs import findings_files
 
 T = TypeVar("T")
 
@@ -19,7 +22,16 @@ T = TypeVar("T")
 @click.option(
     "--config", "configs", metavar="FILE", multiple=True, help="Machine whose control reads the programs."
 )
-def command(files: tuple[str, ...], configs: tuple[str, ...]) -> None:
+@findings_options("json", "sarif", "junit")
+@quiet_option
+def command(
+    files: tuple[str, ...],
+    configs: tuple[str, ...],
+    json_file: str | None,
+    sarif_file: str | None,
+    junit_file: str | None,
+    quiet: bool,
+) -> None:
     """Check YAML files and NC programs; report every error at once.
 
     Of an NC program the first mistake is told, since what follows it cannot be read for sure. A file of overrides is
@@ -27,29 +39,41 @@ def command(files: tuple[str, ...], configs: tuple[str, ...]) -> None:
     Everything that does not end in .yaml or .yml is read as an NC program.
     """
     errors: list[CamcompError] = []
+    cases: list[Case] = []
+    silent = quiet or STANDARD in (json_file, sarif_file, junit_file)
     for file in files:
-        kind = _collect(errors, partial(_check, file, configs))
-        if kind is not None:
-            click.echo(f"{display_name(file)}: ok ({kind})")
+        found: list[CamcompError] = []
+        checked = _collect(found, partial(_check, file, configs))
+        name = display_name(file)
+        kind, warnings = checked or ("", ())
+        if checked and not silent:
+            click.echo(f"{name}: ok ({kind})")
+        if not quiet:
+            for each in warnings:
+                click.echo(f"{name}: warning: {each}", err=True)
+        notes = [Finding(WARNING, each, name) for each in warnings]
+        cases.append(Case(name, [*(f for each in found for f in findings_of(each, name)), *notes], kind))
+        errors += found
+    outputs = findings_files("validate", cases, json_file=json_file, sarif_file=sarif_file, junit_file=junit_file)
+    write_all(outputs, inputs=(*files, *configs))
     raise_all(errors)
 
 
-def _check(file: str, configs: tuple[str, ...]) -> str:
+def _check(file: str, configs: tuple[str, ...]) -> tuple[str, Sequence[str]]:
+    """What the file is, and warnings about it."""
     if Path(file).suffix.lower() not in (".yaml", ".yml"):
         return _check_program(file, configs)
     if is_experiment(read_bytes(file)):
-        return _check_experiment(file)
+        return _check_experiment(file), ()
     check_config([file])
-    return "configuration"
+    return "configuration", ()
 
 
-def _check_program(file: str, configs: tuple[str, ...]) -> str:
+def _check_program(file: str, configs: tuple[str, ...]) -> tuple[str, Sequence[str]]:
     from camcomp.programs import open_program  # NumPy and the reader: only when there is a program
 
     program = open_program(file, load_config(configs) if configs else None)
-    for warning in program.warnings:
-        click.echo(f"{display_name(file)}: warning: {warning}", err=True)
-    return f"program, {program.dialect}, {len(program.path)} motions"
+    return f"program, {program.dialect}, {len(program.path)} motions", program.warnings
 
 
 def _check_experiment(file: str) -> str:

@@ -20,12 +20,12 @@ CONFIG = ROOT / "config/orthoglide-1deg.yaml"
 
 def text_of(html):
     """Words of the page, without scripts and styles."""
-    body = re.sub(r"<(script|style)[ >].*?</\1>", " ", html, flags=re.S)
+    body = re.sub(r"<(script|style)[ >].*?</\1>", " ", html, flags=re.DOTALL)
     return unescape(re.sub(r"<[^>]*>", " ", body)).replace("\u00a0", " ")
 
 
 def figures_of(html):
-    data = re.search(r'<script type="application/json" id="figures">(.*?)</script>', html, re.S)[1]
+    data = re.search(r'<script type="application/json" id="figures">(.*?)</script>', html, re.DOTALL)[1]
     return {each["name"]: each for each in json.loads(data)}
 
 

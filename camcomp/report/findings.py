@@ -1,0 +1,100 @@
+"""What was found wrong, file by file, in the terms of the machine-readable reports."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path, PurePath
+from typing import Any
+
+from camcomp.diagnostics import CamcompError, CheckFailed
+from camcomp.files import STANDARD
+
+WARNING = "warning"  # rule of what is only a warning; warnings have no ids of their own
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing said about one place. line and column count from 1; 0 = the file as a whole; file None = no file."""
+
+    rule: str
+    message: str
+    file: str | None = None
+    line: int = 0
+    column: int = 0
+    source: str = ""
+    check: bool = False  # the work was finished, and a check said no
+
+    @property
+    def level(self) -> str:
+        """`error` or `warning`."""
+        return WARNING if self.rule == WARNING else "error"
+
+
+@dataclass(frozen=True)
+class Case:
+    """One file that was looked at. note: what it is, when it is sound."""
+
+    name: str
+    findings: Sequence[Finding] = field(default_factory=tuple)
+    note: str = ""
+
+    @property
+    def errors(self) -> list[Finding]:
+        """Findings that are more than warnings."""
+        return [each for each in self.findings if each.level == "error"]
+
+
+def findings_of(error: CamcompError, file: str | None = None) -> list[Finding]:
+    """An error and those found with it; those without a place belong to `file`."""
+    out = []
+    for each in error.all():
+        check = isinstance(each, CheckFailed)
+        if each.at:
+            at = each.at
+            out.append(Finding(each.rule, each.message, at.file, at.line, at.column, at.source, check))
+        else:
+            out.append(Finding(each.rule, each.message, file, check=check))
+    return out
+
+
+def findings_of_messages(messages: Sequence[Mapping[str, Any]], file: str, *, check: bool) -> list[Finding]:
+    """The messages of one program of a batch; check: its outputs are written, and a check said no."""
+    return [
+        Finding(
+            each.get("rule") or "CC-BUG", each["message"], file, int(each.get("line") or 0), int(each.get("column") or 0),
+            check=check,
+        )
+        for each in messages
+    ]  # fmt: skip
+
+
+def as_json(cases: Sequence[Case]) -> dict[str, Any]:
+    """Cases as a mapping for JSON."""
+    return {
+        "ok": not any(case.errors for case in cases),
+        "files": [
+            {
+                "file": case.name,
+                "ok": not case.errors,
+                "note": case.note,
+                "findings": [
+                    {"rule": f.rule, "level": f.level, "message": f.message, "file": f.file, "line": f.line or None,
+                     "column": f.column or None}
+                    for f in case.findings
+                ],
+            }
+            for case in cases
+        ],
+    }  # fmt: skip
+
+
+def relative(file: str) -> str | None:
+    """The file seen from the working folder, with / between folders; None for standard input."""
+    if file in (STANDARD, "<stdin>"):
+        return None
+    try:
+        return PurePath(os.path.relpath(file)).as_posix()
+    except ValueError:  # another drive
+        return Path(file).resolve().as_posix()
