@@ -23,6 +23,7 @@ DIALECT = Dialect(
     without=frozenset((281, 301, 431, 901, 911, 591, 592, 593, 921, 922, 923, 611)),
     passed=frozenset((50, 51, 80, 110, 230, 600, 620, 630, 670, 1130, 1870)),
     turns=False,
+    writes_turns=False,
     increments=True,
     dwell="PXU",
     modal_length=True,

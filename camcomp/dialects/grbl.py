@@ -9,5 +9,6 @@ DIALECT = Dialect(
     without=frozenset((520, 730, 740, 810, 820, 830, 840, 850, 860, 870, 880, 890, 950, 591, 592, 593, 922, 923, 901)),
     initial_motion=0,
     turns=False,
+    writes_turns=False,
     idle_letters="DNT",
 )

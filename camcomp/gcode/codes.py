@@ -23,7 +23,9 @@ GROUPS: dict[int, int] = {
 }
 
 CYCLES = frozenset((730, 810, 820, 830, 840, 850, 860, 870, 880, 890))
-AXIS_USERS = frozenset((100, 280, 300, 520, 920))  # of group 0: take the axis words away from the motion code
+HOMES = frozenset((280, 300, 740, 750))  # 74 and 75: Sinumerik
+MACHINE_MOVES = frozenset((530, 1530))
+AXIS_USERS = frozenset((100, 280, 300, 520, 740, 750, 920))  # of group 0: take the axis words away from the motion code
 WORK_OFFSETS = {540: 1, 550: 2, 560: 3, 570: 4, 580: 5, 590: 6, 591: 7, 592: 8, 593: 9}
 OFFSET_NAMES = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
 

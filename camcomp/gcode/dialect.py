@@ -23,15 +23,18 @@ class Dialect:
     initial_motion: int | None = None
     retract_to_start: bool = True  # G98 is in force at the start
     turns: bool = True  # P of an arc counts turns
+    writes_turns: bool = True  # and may be written for arcs that are made
     increments: bool = False  # numbers without a point may count increments
     dwell: str = "P"  # letters that may give the time of G4
     modal_length: bool = False  # H changes the tool length offset without G43 in its block
     own_local_frame: bool = False  # G52 and G92 add up instead of sharing one offset
     extended_offsets: bool = False  # G54.1 P1 ..., G10 L20 sets them
+    more_offsets: Mapping[int, str] = field(default_factory=dict)  # codes and names of further work offsets
     relative_offsets: bool = False  # G10 L2 adds to the offset in G91
     repeats: str = "L"  # letters that may give the number of repeats of a cycle
     peck_clearance_mm: float = 0.254
     idle_letters: str = "DN"  # letters that mean nothing for the path wherever they stand
+    brackets_comment: bool = True  # `(...)` is a comment
     comment: tuple[str, str] = ("(", ")")
     decimals_max: int = 9
 

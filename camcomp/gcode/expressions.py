@@ -121,6 +121,13 @@ class Parser:
             self.at += 1
         return self.line[self.at : self.at + 1].upper()
 
+    def behind(self) -> int:
+        """Index behind what was read, without the blanks that were skipped after it."""
+        at = self.at
+        while at > 0 and self.line[at - 1] in " \t":
+            at -= 1
+        return at
+
     def value(self) -> Expression:
         """What may stand behind a letter: a number, a parameter, a function, a group, with a sign."""
         char, column = self.blank(), self.at
@@ -290,7 +297,8 @@ def evaluate(expression: Expression, memory: Memory, spelling: Spelling) -> floa
         if kind == "atan":
             y, x = evaluate(expression[1], memory, spelling), evaluate(expression[2], memory, spelling)
             return math.degrees(math.atan2(y, x))
-        result = float(spelling.functions[expression[1]](evaluate(expression[2], memory, spelling)))
+        argument = evaluate(expression[2], memory, spelling)
+        result = float(spelling.functions[expression[1]](0.0 if math.isnan(argument) else argument))
     except (ValueError, OverflowError):
         raise ExpressionError(f"{expression[1]} has no value there", column) from None
     return result
@@ -308,6 +316,11 @@ _EQUAL = 1e-4  # within which LinuxCNC takes two numbers as equal
 
 
 def _operate(symbol: str, a: float, b: float, column: int, spelling: Spelling) -> float:
+    if spelling is FANUC and (math.isnan(a) or math.isnan(b)):
+        # A vacant variable equals only a vacant one; everything else takes it as zero.
+        if symbol in ("EQ", "NE"):
+            return float((math.isnan(a) and math.isnan(b)) == (symbol == "EQ"))
+        a, b = (0.0 if math.isnan(each) else each for each in (a, b))
     same = abs(a - b) < _EQUAL if spelling is RS274 else a == b
     compare = {
         "EQ": same,

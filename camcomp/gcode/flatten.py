@@ -62,6 +62,9 @@ class Printer:
                 return [self.text.string[self.text.starts[row] : self.text.nexts[row]]]
         return []
 
+    def _code(self, line: str) -> str:
+        return code_of(line, self.program.language.brackets_comment)
+
     def _digits(self, unit: float) -> int:
         digits = decimals(self.resolution, unit) + _SPARE_DIGITS
         return min(digits, self.program.language.decimals_max)
@@ -79,10 +82,10 @@ class Printer:
                 place = self.text.place(entry.row)
                 raise ProgramError("CC137", "a tapping cycle cannot be replaced by straight moves", at=place)
             changed = self._changed(entry, repeated, cycle=True)
-            head = [changed] if code_of(changed).strip(BLANK) else self._remark(entry.row)
+            head = [changed] if self._code(changed).strip(BLANK) else self._remark(entry.row)
             return head + self._moves(entry.motions, actions)
         changed = self._changed(entry, repeated, cycle=False)
-        emptied = bool(entry.line.settings) and not code_of(changed).strip(BLANK)
+        emptied = bool(entry.line.settings) and not self._code(changed).strip(BLANK)
         if emptied:
             return [] if repeated else self._remark(entry.row)
         return [changed]
@@ -90,14 +93,15 @@ class Printer:
     def _remark(self, row: int) -> list[str]:
         """The line as a comment, with the comments that it had."""
         line = self.text.line(row)
-        bare = code_of(line)
+        bare = self._code(line)
         code = bare.strip(BLANK)
         if not code:
             return [line.strip(BLANK)] if line.strip(BLANK) else []
         opening, closing = self.program.language.comment
         spans = "".join(char if char != blank else " " for char, blank in zip(line, bare, strict=True)).split("  ")
         remarks = [each.strip(BLANK) for each in spans if each.strip(BLANK)]
-        code = " ".join(code.translate({ord("("): None, ord(")"): None}).split())
+        if opening == "(":
+            code = " ".join(code.translate({ord("("): None, ord(")"): None}).split())
         return [" ".join([f"{opening}{code}{closing}", *remarks])]
 
     def _changed(self, entry: Executed, repeated: bool, cycle: bool) -> str:
@@ -105,20 +109,37 @@ class Printer:
         line = self.text.line(entry.row)
         edits = Edits()
         unit = self._unit(entry.motions)
-        computed = {index for index, _ in entry.line.expressions}
+        computed = {entry.line.words[index].begin for index, _ in entry.line.expressions}
+        executed = {word.begin for word in entry.words}
+        vacant = [word for word in entry.line.words if word.begin not in executed]
+        for word in vacant:
+            edits.replace(word.begin, self._behind(line, word.end), "")
         for index, word in enumerate(entry.words):
             gone = word.letter == "N" and (repeated or index > 0)
             if cycle:
                 gone = gone or word.letter in _CYCLE_WORDS or (word.letter == "G" and self._is_cycle_code(word))
             if gone:
                 edits.replace(word.begin, self._behind(line, word.end), "")
-            elif index in computed:
-                point = word.letter in _LENGTHS
-                digits = self._digits(unit) if point else 6
-                edits.replace(word.begin, word.end, word.letter + plain(word.value, digits, point))
+            elif word.begin in computed or word.mode:
+                edits.replace(word.begin, word.end, self._number(entry, word, line, unit))
         for setting in entry.line.settings:
             edits.replace(setting.begin, self._behind(line, setting.end), "")
         return edits.apply(line)
+
+    def _number(self, entry: Executed, word: Word, line: str, unit: float) -> str:
+        """The word with its value in the modes in force."""
+        point = word.letter in _LENGTHS
+        value = word.value
+        if word.mode and word.letter in "XYZIJK":
+            sites, path, k = self.program.sites, self.program.path, entry.motions
+            axis = "XYZIJK".index(word.letter) % 3
+            place = (path.end if word.letter in "XYZ" else path.centre)[k, axis]
+            relative = sites.relative[k] if word.letter in "XYZ" else not sites.centre_absolute[k]
+            value = float(place - (path.start[k, axis] if relative else sites.offset[k, axis])) / unit
+        address = line[word.begin : word.end].split("=")[0]
+        long = len(address.strip()) > 1 and "=" in line[word.begin : word.end]
+        number = plain(value, self._digits(unit) if point else 6, point)
+        return f"{address}={number}" if long else word.letter + number
 
     @staticmethod
     def _is_cycle_code(word: Word) -> bool:

@@ -1,5 +1,6 @@
 """Which line is executed next: top to bottom, or as O-words and macro statements say."""
 
+import math
 from typing import NoReturn
 
 from camcomp.diagnostics import ProgramError
@@ -7,9 +8,10 @@ from camcomp.gcode.block import Block
 from camcomp.gcode.cycles import Cycles
 from camcomp.gcode.expressions import FANUC, Expression, ExpressionError
 from camcomp.gcode.memory import Parameters
+from camcomp.gcode.siemens import read_siemens_line
 from camcomp.gcode.text import Text
 from camcomp.gcode.trace import Trace
-from camcomp.gcode.words import BLANK, Line, Word, read_line
+from camcomp.gcode.words import BLANK, Line, Word, code_of, read_line
 
 _MOST_BLOCKS = 5_000_000
 _MOST_IDLE = 200_000  # blocks executed without a motion, by a program that has loops
@@ -63,7 +65,7 @@ class Flow:
                 if begun:
                     return row
                 begun = True
-            elif stripped and not begun:
+            elif stripped and not begun and code_of(stripped).strip(BLANK):
                 break
         return len(self.text)
 
@@ -124,12 +126,15 @@ class Flow:
         """Words of a line; read once, however often it is executed."""
         line = self._lines.get(row)
         if line is None:
-            line = read_line(self.text, row, self.spelling)
-            if line.expressions or line.settings:
+            line = self._read(row)
+            if line.expressions or line.settings or any(word.mode for word in line.words):
                 self.reader.straight = False
             if not self.reader.straight:
                 self._lines[row] = line
         return line
+
+    def _read(self, row: int) -> Line:
+        return read_line(self.text, row, self.spelling)
 
     def value(self, row: int, expression: Expression) -> float:
         """Value of an expression, now."""
@@ -146,6 +151,8 @@ class Flow:
             words = list(words)
             for index, expression in line.expressions:
                 words[index] = words[index]._replace(value=self.value(row, expression))
+            # A word whose variable is vacant is as good as not there (Fanuc).
+            words = [word for word in words if not math.isnan(word.value)]
         if self.reader.dialect.increments:
             words = self._scaled(row, line, words)
         return words
@@ -153,9 +160,9 @@ class Flow:
     def _scaled(self, row: int, line: Line, words: list[Word]) -> list[Word]:
         increment = self.reader.state.setup.increment_mm
         source = self.text.line(row)
-        exact = {index for index, _ in line.expressions}
+        exact = {line.words[index].begin for index, _ in line.expressions}
         for index, word in enumerate(words):
-            if word.letter not in _INCREMENTAL_LETTERS or index in exact or word.value == 0.0:
+            if word.letter not in _INCREMENTAL_LETTERS or word.begin in exact or word.value == 0.0:
                 continue
             if "." in source[word.begin : word.end]:
                 continue
@@ -178,3 +185,10 @@ class Flow:
                 self.memory.assign(each.target, value)
             except ExpressionError as error:
                 self.refuse(row, error.column or each.begin, "CC123", error.message)
+
+
+class Siemens(Flow):
+    """Sinumerik: another spelling of lines; jumps and loops are refused when they are read."""
+
+    def _read(self, row: int) -> Line:
+        return read_siemens_line(self.text, row)

@@ -5,9 +5,9 @@ One block at a time, in the order of execution of RS274/NGC: modes first, then s
 
 from camcomp.diagnostics import ProgramError
 from camcomp.gcode.block import Block
-from camcomp.gcode.codes import AXIS_USERS, CYCLES, ENDS, PLAIN_M, STOPS, code_name
+from camcomp.gcode.codes import AXIS_USERS, CYCLES, ENDS, HOMES, MACHINE_MOVES, PLAIN_M, STOPS, code_name
 from camcomp.gcode.detect import dialect_of
-from camcomp.gcode.flow import Executor, Flow
+from camcomp.gcode.flow import Executor, Flow, Siemens
 from camcomp.gcode.macro import Macro
 from camcomp.gcode.owords import OWords
 from camcomp.gcode.program import Program, Setup
@@ -56,9 +56,9 @@ class Interpreter(Executor):
         zero_code = block.code(0)
         motion = self._motion_of(block, zero_code)
         self.modes(block)
-        if zero_code in (280, 300):
+        if zero_code in HOMES:
             self.home(block, zero_code // 10)
-        elif zero_code is not None and zero_code != 530:
+        elif zero_code is not None and zero_code not in MACHINE_MOVES:
             self.settings(block, zero_code)
         m_codes = [code for code, _ in block.m]
         self._spare_axes(block)
@@ -67,7 +67,7 @@ class Interpreter(Executor):
             if motion in CYCLES:
                 self.cycle(block, motion)
             else:
-                self.move(block, motion, machine=zero_code == 530)
+                self.move(block, motion, machine=zero_code in MACHINE_MOVES)
         self._leftovers(block, m_codes)
         self.record.end_line()
         if any(code in ENDS for code in m_codes):
@@ -128,5 +128,5 @@ class Interpreter(Executor):
 
 def controller(reader: Interpreter, trace: Trace | None = None) -> Flow:
     """What decides which line comes next, in the dialect of the reader."""
-    kinds: dict[str, type[Flow]] = {"o-words": OWords, "macro": Macro}
+    kinds: dict[str, type[Flow]] = {"o-words": OWords, "macro": Macro, "sinumerik": Siemens}
     return kinds.get(reader.dialect.flow, Flow)(reader, trace)

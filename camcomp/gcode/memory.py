@@ -1,5 +1,7 @@
 """Parameters of a running program: its own, and those that show the control's state."""
 
+import math
+
 from camcomp.gcode.expressions import FANUC, Expression, ExpressionError, Memory, evaluate, index_of
 from camcomp.gcode.state import State
 
@@ -37,10 +39,11 @@ class Parameters(Memory):
         store = self.frames[-1].numbered if self._local(number) else self.common
         if number in store:
             return store[number]
+        if self.macro and (number == 0 or self._local(number)):
+            return math.nan  # vacant
         value = self._fanuc(number) if self.macro else self._rs274(number)
         if value is None:
-            why = _MACHINE_ONLY if number >= 1000 else "it was never set"
-            raise ExpressionError(f"parameter #{number}: {why}", 0)
+            raise ExpressionError(f"parameter #{number}: {_MACHINE_ONLY}", 0)
         return value
 
     def set(self, number: int, value: float) -> None:
@@ -48,7 +51,10 @@ class Parameters(Memory):
         if number < 1 or (number >= (1000 if self.macro else 5061) and number != _DEBUG):
             raise ExpressionError(f"parameter #{number} cannot be set: it belongs to the control", 0)
         store = self.frames[-1].numbered if self._local(number) else self.common
-        store[number] = value
+        if math.isnan(value):
+            store.pop(number, None)
+        else:
+            store[number] = value
 
     def _rs274(self, number: int) -> float | None:
         state = self.state

@@ -24,7 +24,7 @@ class Motions(Settings):
                 self.refuse("CC138", f"{word.letter}{word.value:g} is out of every machine's reach", word)
             if machine:
                 end[axis] = value - state.zero[axis]
-            elif state.relative:
+            elif word.mode == "IC" or (state.relative and word.mode != "AC"):
                 end[axis] += value
                 if not state.commanded[axis]:
                     self.warn(f"{word.letter} starts with a relative move; its start counts as start_mm", once=True)
@@ -37,12 +37,14 @@ class Motions(Settings):
         """G28, G30: through the point of the axis words to the reference position."""
         state = self.state
         block.number("P")
-        self.record.machine_motion(block, state, -1, self.target(block))
+        # Codes of group 0 that approach a fixed point directly take the axis words as a list of axes only.
+        if code in (28, 30):
+            self.record.machine_motion(block, state, -1, self.target(block))
         end = list(state.position)
         for axis in block.axes or range(3):
-            end[axis] = state.homes[code][axis] - state.zero[axis]
+            end[axis] = state.homes[30 if code == 30 else 28][axis] - state.zero[axis]
             state.commanded[axis] = True
-        self.record.machine_motion(block, state, -1, end, moved=block.axes or [0, 1, 2])
+        self.record.machine_motion(block, state, -2, end, moved=block.axes or [0, 1, 2])
 
     def move(self, block: Block, motion: int, machine: bool) -> None:
         """G0, G1, G2 or G3 (code in tenths)."""
@@ -80,8 +82,8 @@ class Motions(Settings):
         if word is None or not self.dialect.turns:
             return 1
         block.used.add("P")
-        turns = round(word.value)
-        if abs(turns - word.value) > 1e-3 or not 1 <= turns <= 10000:
+        turns = round(word.value) + (word.mode == "TURN")
+        if abs(round(word.value) - word.value) > 1e-3 or not 1 <= turns <= 10000:
             self.refuse("CC113", "P of an arc is a whole number of turns, 1 or more", word)
         return turns
 
@@ -128,8 +130,10 @@ class Motions(Settings):
         missing = [letter for letter in letters if letter not in block.words]
         if len(missing) == 2 or (state.centre_absolute and missing):
             self.refuse("CC112", f"the arc has no centre: {' and '.join(missing)} or R is missing")
-        values = [block.number(letter) or 0.0 for letter in letters]
-        if state.centre_absolute:
-            u, v = (state.offset[axis] / state.unit for axis in plane)
-            return values[0] + u, values[1] + v
-        return start[0] + values[0], start[1] + values[1]
+        centre = []
+        for axis, letter, here in zip(plane, letters, start, strict=True):
+            value = block.number(letter) or 0.0
+            mode = block.words[letter].mode if letter in block.words else ""
+            absolute = mode == "AC" or (state.centre_absolute and mode != "IC")
+            centre.append(value + state.offset[axis] / state.unit if absolute else value + here)
+        return centre[0], centre[1]

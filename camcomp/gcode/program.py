@@ -46,7 +46,7 @@ class Sites:
     offset: Floats  # (n, 3) mm from a local value to the program frame
     relative: Bools  # (n,) G91
     centre_absolute: Bools  # (n,) G90.1
-    code: NDArray[np.int8]  # (n,) 0..3, the motion code in force; -1 where the statement needs none (G28)
+    code: NDArray[np.int8]  # (n,) 0..3, the motion code in force; -1 and -2 where the statement needs none (G28)
     plane: NDArray[np.int8]  # (n,) 17, 18 or 19
     feed_mode: NDArray[np.int8]  # (n,) 93, 94 or 95
     modal_feed: Floats  # (n,) feed in force: mm/min in G94, mm/rev in G95, 1/min in G93; NaN: none

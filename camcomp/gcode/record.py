@@ -69,7 +69,7 @@ class Recorder:
         feed: float = math.nan,
         moved: Sequence[int] | None = None,
     ) -> None:
-        """A move in machine coordinates; code -1 where it needs no motion code (G28)."""
+        """A move in machine coordinates; code -1 on the way home, -2 at home (G28), where no motion code is needed."""
         axes = block.axes if moved is None else moved
         kind = LINE if code == 1 else RAPID
         self._add(block, state, kind, code, end, _NO_CENTRE, 0.0, feed, True, axes)

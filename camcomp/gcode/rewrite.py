@@ -11,7 +11,7 @@ import numpy as np
 from camcomp.datatypes import ARC, RAPID
 from camcomp.diagnostics import ProgramError
 from camcomp.gcode.arcplan import Move, Point, plan, turns_of
-from camcomp.gcode.arcs import PLANES
+from camcomp.gcode.arcs import PLANES, ArcError, centre_of_radius
 from camcomp.gcode.edits import Edits
 from camcomp.gcode.flatten import flatten
 from camcomp.gcode.numbers import decimals, plain, significant
@@ -73,6 +73,7 @@ class Writer:
         self.text, self.sites, self.path = program.text, program.sites, program.path
         self.edits = Edits()
         self.resolution = resolution_mm
+        self.turns = program.language.writes_turns
         self.half = 0.5 * resolution_mm * (1.0 + 1e-9)
         self.position: Point = self.path.start[0].tolist()
         self.code: int | None = None  # motion code in force in the output
@@ -153,8 +154,9 @@ class Writer:
             self._feed_on_line(math.nan, 0.0)
         for axis in range(3):
             if self.sites.moved[k, axis]:
-                home = self.sites.code[k] < 0
-                if self.relative and not self.path.machine[k] and not home:
+                # Of G28, the point on the way (code -1) obeys G91; home does not, and neither does G53.
+                obeys = self.sites.code[k] == -1 or not self.path.machine[k]
+                if self.relative and obeys:
                     self.position[axis] += end[axis] - start[axis]
                 else:
                     self.position[axis] = float(end[axis])
@@ -180,7 +182,7 @@ class Writer:
         if kind == ARC:
             plane = int(self.sites.plane[self.k])
             end = self._landing(moves[0].end, new)
-            moves = plan(self.position, moves[0], end, plane, self.resolution, self.unit)
+            moves = plan(self.position, moves[0], end, plane, self.resolution, self.unit, self.turns)
         at_line = 0
         if not new and self.sites.stops[self.k]:
             at_line = len(moves) - 1
@@ -243,7 +245,6 @@ class Writer:
         k = self.k
         start, end = self.position, self._landing(move.end, new=False)
         self._code_on_line(self._code_of(move))
-        kept = True
         for axis in range(3):
             stays = start[axis]
             if self.begin[axis] >= 0:
@@ -251,14 +252,13 @@ class Writer:
                 stays = stays + programmed - float(self.path.start[k, axis]) if self.relative else programmed
             if end[axis] == stays:
                 continue
-            kept = False
             number = self._number(self._value(end, axis))
             if self.begin[axis] >= 0:
                 self._replace(axis, number)
             else:
                 self.fresh.append("XYZ"[axis] + number)
         if move.kind == ARC:
-            self._centre_on_line(move, start, kept)
+            self._centre_on_line(move, start, end)
         elif self.path.kind[k] == ARC:
             for word in (3, 4, 5, R, P):
                 self._remove(word)
@@ -280,14 +280,24 @@ class Writer:
         turns = turns_of(move.angle)
         return words + ([f"P{turns}"] if turns > 1 else [])
 
-    def _centre_on_line(self, move: Move, start: Point, kept: bool) -> None:
+    def _radius_holds(self, move: Move, start: Point, end: Point, plane: tuple[int, int]) -> bool:
+        """Whether the R word of the line leads to the centre that is wanted."""
+        number = self.text.string[self.begin[R] + 1 : self.finish[R]].rpartition("=")[2].lstrip("rR ")
+        a, b = ((point[plane[0]] / self.unit, point[plane[1]] / self.unit) for point in (start, end))
+        try:
+            centre = centre_of_radius(a, b, float(number), move.angle > 0.0, self.unit != 1.0)
+        except (ArcError, ValueError):
+            return False
+        return all(
+            abs(found * self.unit - move.centre[axis]) <= self.half for found, axis in zip(centre, plane, strict=True)
+        )
+
+    def _centre_on_line(self, move: Move, start: Point, end: Point) -> None:
         k = self.k
         u, v, _ = PLANES[int(self.sites.plane[k])]
         was_arc = int(self.path.kind[k]) == ARC
         if self.begin[R] >= 0:
-            moved = max(abs(start[axis] - self.path.start[k, axis]) for axis in (u, v))
-            off = max(abs(move.centre[axis] - self.path.centre[k, axis]) for axis in (u, v))
-            if kept and moved <= 1e-9 and off <= self.half:
+            if self._radius_holds(move, start, end, (u, v)):
                 return
             self._remove(R)
         for axis in sorted((u, v)):
@@ -304,7 +314,9 @@ class Writer:
             else:
                 self.fresh.append("IJK"[axis] + number)
         turns = turns_of(move.angle)
-        if self.begin[P] >= 0 and turns != turns_of(float(self.path.angle[k])):
+        if self.begin[P] >= 0 and turns == 1:
+            self._remove(P)
+        elif self.begin[P] >= 0 and turns != turns_of(float(self.path.angle[k])):
             self._replace(P, str(turns))
         elif self.begin[P] < 0 and turns > 1:
             self.fresh.append(f"P{turns}")

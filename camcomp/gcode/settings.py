@@ -1,11 +1,12 @@
 """Statements that move nothing and change what later words mean: units, modes, offsets, feed, tool."""
 
 from camcomp.gcode.block import Block, BlockReader
-from camcomp.gcode.codes import WORK_OFFSETS, code_name
+from camcomp.gcode.codes import code_name
 from camcomp.gcode.expressions import RS274
 from camcomp.gcode.program import Rebase
 from camcomp.gcode.words import Word
 
+_INCH = (200, 700, 7000)
 _MODE_GROUPS = (2, 3, 4, 5, 6, 8, 12)
 
 
@@ -18,14 +19,15 @@ class Settings(BlockReader):
         changed = any(group in groups for group in _MODE_GROUPS)
         self.record.modes_changed = changed or (state.feed_mode == 95 and "S" in words)
         if 6 in groups:
-            state.unit = 25.4 if groups[6][0] == 200 else 1.0
+            state.unit = 25.4 if groups[6][0] in _INCH else 1.0
         if 5 in groups:
             mode = groups[5][0] // 10
             if mode != state.feed_mode:
                 state.feed_mode, state.feed = mode, None
-        if "F" in words:
+        dwells = block.code(0) == 40
+        if "F" in words and not (dwells and "F" in self.dialect.dwell):
             self._feed(words["F"])
-        if "S" in words:
+        if "S" in words and not (dwells and "S" in self.dialect.dwell):
             state.speed = words["S"].value
             if state.speed < 0.0:
                 self.refuse("CC138", "negative spindle speed", words["S"])
@@ -94,7 +96,7 @@ class Settings(BlockReader):
     def _work_offset(self, block: Block, code: int, word: Word) -> None:
         extended = code == 541 or (code == 540 and self.dialect.extended_offsets and "P" in block.words)
         if not extended:
-            self.state.active = WORK_OFFSETS[code] - 1
+            self.state.active = self.state.offset_index[code]
             return
         number = block.number("P")
         if number is None or number != int(number) or not 1 <= number <= len(self.state.work) - 9:

@@ -1,6 +1,6 @@
 """State of a control while it executes a program: modes, offsets and where the tool tip stands."""
 
-from camcomp.gcode.codes import OFFSET_NAMES
+from camcomp.gcode.codes import OFFSET_NAMES, WORK_OFFSETS
 from camcomp.gcode.dialect import Dialect
 from camcomp.gcode.program import Setup
 
@@ -17,6 +17,10 @@ class State:
         names = list(OFFSET_NAMES)
         if dialect.extended_offsets:
             names += [f"G54.1P{number}" for number in range(1, _EXTENDED + 1)]
+        first = len(names)
+        names += list(dialect.more_offsets.values())
+        self.offset_index = {code: number - 1 for code, number in WORK_OFFSETS.items()}
+        self.offset_index.update((code, first + k) for k, code in enumerate(dialect.more_offsets))
         self.work = [[float(each) for each in setup.offsets.get(name, (0.0,) * 3)] for name in names]
         self.zero = list(self.work[0])  # G54 as it stands at program start
         self.active = 0

@@ -19,6 +19,7 @@ class Word(NamedTuple):
     value: float
     begin: int
     end: int
+    mode: str = ""  # AC or IC: absolute or relative, whatever G90 or G91 say; TURN: full circles beyond the arc
 
 
 class Setting(NamedTuple):
@@ -63,13 +64,13 @@ def comment_end(line: str, start: int) -> tuple[int, bool]:
     return (close + 1, True) if close >= 0 else (len(line), False)
 
 
-def code_of(line: str) -> str:
-    """The line with its comments blanked, same length."""
+def code_of(line: str, brackets: bool = True) -> str:
+    """The line with its comments blanked, same length; `brackets`: `(...)` is a comment."""
     pieces, k = [], 0
     while k < len(line):
         if line[k] == ";":
             break
-        if line[k] == "(":
+        if line[k] == "(" and brackets:
             end, _ = comment_end(line, k)
             pieces.append(" " * (end - k))
             k = end
@@ -144,7 +145,7 @@ def _setting(text: Text, row: int, column: int, spelling: Spelling) -> Setting:
         value = parser.value() if spelling.named else parser.expression(0)
     except ExpressionError as error:
         refuse(text, row, error.column, "CC123", error.message)
-    return Setting(target, value, column, parser.at)
+    return Setting(target, value, column, parser.behind())
 
 
 def _computed(text: Text, row: int, column: int, spelling: Spelling) -> tuple[Word, Expression]:
@@ -156,7 +157,7 @@ def _computed(text: Text, row: int, column: int, spelling: Spelling) -> tuple[Wo
         value = parser.value()
     except ExpressionError as error:
         refuse(text, row, error.column, "CC123", error.message)
-    return Word(line[column].upper(), 0.0, column, parser.at), value
+    return Word(line[column].upper(), 0.0, column, parser.behind()), value
 
 
 def _function_follows(line: str, at: int, spelling: Spelling) -> bool:

@@ -1,0 +1,327 @@
+"""Lines of Sinumerik programs as words: `X=IC(3)`, `CR=5`, `I=AC(10)`, R parameters, statements of several letters.
+
+Where an address of several letters means what a letter means elsewhere, it becomes that letter (CR is R, TURN is P),
+so that everything behind the reader is the same for all dialects.
+"""
+
+import re
+from typing import NoReturn
+
+from camcomp.gcode.expressions import SINUMERIK, Expression, ExpressionError, Parser
+from camcomp.gcode.text import Text
+from camcomp.gcode.words import BLANK, Line, Setting, Word, refuse
+
+_NAME = re.compile(r"[A-Za-z_][A-Za-z_]*[0-9]*")
+_NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)")
+_LABEL = re.compile(r"[ \t]*(?:N[0-9]+[ \t]+)?([A-Za-z_][A-Za-z0-9_]+):(?!=)")
+_QUOTED = re.compile(r'"[^"]*"')
+
+# Statements without influence on the path, with or without brackets behind them.
+IGNORED = frozenset(
+    [
+        "MSG",
+        "STOPRE",
+        "CYCLE832",
+        "WORKPIECE",
+        "TRAFOOF",
+        "SOFT",
+        "BRISK",
+        "DRIVE",
+        "FFWON",
+        "FFWOF",
+        "COMPOF",
+        "COMPON",
+        "COMPCURV",
+        "COMPCAD",
+        "COMPSURF",
+        "CFC",
+        "CFTCP",
+        "CFIN",
+        "CUTCONOF",
+        "CUTCONON",
+        "WALIMON",
+        "WALIMOF",
+        "DIAMOF",
+        "DIAMCYCOF",
+        "KONT",
+        "NORM",
+        "ORIWKS",
+        "ORIMKS",
+        "ORIAXES",
+        "ORIVECT",
+        "UPATH",
+        "SPATH",
+        "DISPLOF",
+        "DISPLON",
+        "SAVE",
+        "EXTERN",
+        "DYNNORM",
+        "DYNPOS",
+        "DYNROUGH",
+        "DYNSEMIFIN",
+        "DYNFINISH",
+        "DYNPREC",
+        "FNORM",
+        "RTLION",
+        "RTLIOF",
+        "PUTFTOCF",
+        "FTOCON",
+        "FTOCOF",
+        "G0EXT",
+        "GROUP_BEGIN",
+        "GROUP_END",
+        "TOFFOF",
+        "CDOF",
+        "CPRECOF",
+        "PTPG0",
+        "CP",
+        "BLSYNC",
+        "ADISPOS",
+        "ADIS",
+        "FIFOCTRL",
+        "STARTFIFO",
+        "STOPFIFO",
+        "LIMS",
+    ]
+)
+# Statements that may stand alone, to switch something off; with words behind them they change coordinates.
+RESETS = frozenset(["TRANS", "ROT", "SCALE", "MIRROR", "CYCLE800", "MCALL", "SUPAOF", "ROTS", "CROT"])
+MACHINE = frozenset(("SUPA",))
+_ADDRESSES = {"CR": "R", "TURN": "P"}
+_FLOW = frozenset(
+    [
+        "IF",
+        "ELSE",
+        "ENDIF",
+        "WHILE",
+        "ENDWHILE",
+        "FOR",
+        "ENDFOR",
+        "LOOP",
+        "ENDLOOP",
+        "REPEAT",
+        "REPEATB",
+        "UNTIL",
+        "GOTO",
+        "GOTOF",
+        "GOTOB",
+        "GOTOC",
+        "GOTOS",
+        "CASE",
+        "CALL",
+        "PCALL",
+        "DEF",
+        "PROC",
+        "RET",
+    ]
+)
+
+
+def code_end(line: str) -> int:
+    """Index at which the comment of a line starts."""
+    quoted = False
+    for k, char in enumerate(line):
+        if char == '"':
+            quoted = not quoted
+        elif char == ";" and not quoted:
+            return k
+    return len(line)
+
+
+class SiemensLine:
+    """Reader of one line."""
+
+    def __init__(self, text: Text, row: int) -> None:
+        self.text, self.row = text, row
+        self.line = text.line(row)
+        self.end = code_end(self.line)
+        self.at = 0
+        self.words: list[Word] = []
+        self.expressions: list[tuple[int, Expression]] = []
+        self.settings: list[Setting] = []
+        self.deleted = False
+
+    def read(self) -> Line:
+        """Words of the line. Raises ProgramError with the place of what cannot be read."""
+        code = self.line[: self.end]
+        if code.strip(BLANK).startswith("%"):
+            return Line([])
+        label = _LABEL.match(code)
+        if label:
+            self.at = label.end()
+        while self.at < self.end:
+            char = self.line[self.at]
+            if char in BLANK:
+                self.at += 1
+            elif char == "/" and not self.words:
+                self.deleted = True
+                self.at += 1
+                while self.line[self.at : self.at + 1].isdigit():
+                    self.at += 1
+            elif char == ":" and not self.words:
+                self.at += 1
+                self._skip_digits()
+            elif char.isascii() and (char.isalpha() or char == "_"):
+                self._statement()
+            else:
+                self._refuse(
+                    "CC107" if not char.isdigit() and char not in ".+-" else "CC103", self._why(char)
+                )
+        return Line(self.words, self.deleted, "", tuple(self.expressions), tuple(self.settings))
+
+    def _why(self, char: str) -> str:
+        if char.isdigit() or char in ".+-":
+            return "number without a letter"
+        return f"'{self.text.readable(char)}' has no meaning here"
+
+    def _skip_digits(self) -> None:
+        while self.line[self.at : self.at + 1].isdigit():
+            self.at += 1
+
+    def _refuse(self, rule: str, message: str, column: int | None = None) -> NoReturn:
+        refuse(self.text, self.row, self.at if column is None else column, rule, message)
+
+    def _next(self, at: int) -> str:
+        while at < self.end and self.line[at] in " \t":
+            at += 1
+        return self.line[at] if at < self.end else ""
+
+    def _statement(self) -> None:
+        start = self.at
+        found = _NAME.match(self.line, start, self.end)
+        assert found is not None
+        name = found[0].upper()
+        letters = name.rstrip("0123456789")
+        assigned = self._next(found.end()) == "=" and self.line[found.end() :].lstrip()[1:2] != "="
+        if len(letters) == 1 and assigned and letters == "R" and name != "R":
+            self._parameter(start)
+        elif assigned:
+            self._assigned(start, found.end(), name, letters)
+        elif len(letters) == 1:
+            self._plain(start, letters)
+        elif letters in IGNORED or name in IGNORED:
+            self.at = found.end()
+            self._skip_group()
+        elif name in MACHINE:
+            self.words.append(Word("G", 53.0, start, found.end()))
+            self.at = found.end()
+        elif name in RESETS:
+            self._reset(start, found.end(), name)
+        elif name in _FLOW or letters in _FLOW:
+            self._refuse("CC124", f"{name}: jumps, loops and variables are not followed")
+        else:
+            self._refuse("CC135", f"'{found[0]}' is no statement that camcomp knows")
+
+    def _plain(self, start: int, letter: str) -> None:
+        """A letter and its number."""
+        at = start + 1
+        while at < self.end and self.line[at] in " \t":
+            at += 1
+        found = _NUMBER.match(self.line, at, self.end)
+        if found is None:
+            self._refuse("CC103", f"'{letter}' has no number")
+        rest = self.line[found.end() : self.end].lstrip(" \t")[:1]
+        if rest and rest in ".,0123456789":
+            rule = "CC101" if rest == "," else "CC102"
+            self._refuse(rule, f"'{self.line[start : found.end()]}{rest}' is not one number")
+        if letter == "L":
+            self._refuse("CC125", f"subprogram L{found[0]} is not followed")
+        self.words.append(Word(letter, float(found[0]), start, found.end()))
+        self.at = found.end()
+
+    def _parameter(self, start: int) -> None:
+        parser = Parser(self.line[: self.end], start, SINUMERIK)
+        try:
+            target = parser.parameter()
+            if parser.blank() != "=":
+                parser.fail("'=' is missing")
+            parser.at += 1
+            value = parser.expression(0)
+        except ExpressionError as error:
+            refuse(self.text, self.row, error.column, "CC123", error.message)
+        self.settings.append(Setting(target, value, start, parser.behind()))
+        self.at = parser.at
+
+    def _assigned(self, start: int, name_end: int, name: str, letters: str) -> None:
+        """`X=...`, `CR=...`, `T="..."`, `S1=...`."""
+        equals = self.line.index("=", name_end)
+        quoted = _QUOTED.match(self.line, equals + 1 + self._blanks(equals + 1))
+        if quoted and letters == "T":
+            self.at = quoted.end()
+            return
+        letter = _ADDRESSES.get(name)
+        if letter is None and len(name) == 1:
+            letter = name
+        if letter is None and name in ("S1", "M1", "F1"):
+            letter = name[0]
+        if name in ("SPOS", "SPOSA", "ADIS", "ADISPOS", "FFWON", "OVR", "FP"):
+            letter = ""
+        if letter is None:
+            known = (
+                "CC116" if name in ("AP", "RP") else "CC112" if name in ("AR", "I1", "J1", "K1") else "CC135"
+            )
+            self._refuse(known, f"'{name}=' is not followed")
+        value, mode, end = self._value(equals + 1)
+        self.at = end
+        if not letter:
+            return
+        mode = name if name == "TURN" else mode
+        if value[0] == "number":
+            self.words.append(Word(letter, float(value[1]), start, end, mode))
+            return
+        self.expressions.append((len(self.words), value))
+        self.words.append(Word(letter, 0.0, start, end, mode))
+
+    def _blanks(self, at: int) -> int:
+        count = 0
+        while at + count < self.end and self.line[at + count] in " \t":
+            count += 1
+        return count
+
+    def _value(self, at: int) -> tuple[Expression, str, int]:
+        """Expression behind `=`, whether absolute (AC) or relative (IC), and where it ends."""
+        at += self._blanks(at)
+        mode = self.line[at : at + 2].upper()
+        parser = Parser(self.line[: self.end], at, SINUMERIK)
+        try:
+            if mode in ("AC", "IC") and self._next(at + 2) == "(":
+                parser.at = at + 2
+                value = parser.group()
+            else:
+                mode = ""
+                value = parser.expression(0)
+        except ExpressionError as error:
+            refuse(self.text, self.row, error.column, "CC123", error.message)
+        if value[0] == "negative" and value[1][0] == "number":
+            value = ("number", -value[1][1], value[2])
+        return value, mode, parser.behind()
+
+    def _reset(self, start: int, end: int, name: str) -> None:
+        self.at = end
+        rest = self.line[end : self.end].strip(BLANK)
+        if rest in ("", "()"):
+            self.at = self.end
+            return
+        rule = {"MCALL": "CC132", "SCALE": "CC117", "MIRROR": "CC117"}.get(name, "CC118")
+        self._refuse(rule, f"{name} with values is not followed", start)
+
+    def _skip_group(self) -> None:
+        """Pass what stands in brackets behind a statement."""
+        at = self.at + self._blanks(self.at)
+        if self.line[at : at + 1] != "(":
+            return
+        depth, quoted = 0, False
+        for k in range(at, self.end):
+            char = self.line[k]
+            quoted = quoted != (char == '"')
+            if not quoted:
+                depth += (char == "(") - (char == ")")
+            if depth == 0:
+                self.at = k + 1
+                return
+        self._refuse("CC123", "')' is missing", at)
+
+
+def read_siemens_line(text: Text, row: int) -> Line:
+    """Words of line `row` of a Sinumerik program."""
+    return SiemensLine(text, row).read()
