@@ -11,11 +11,11 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from camcomp.cutting.track import Track, lay_track
-from camcomp.datatypes import LINE, RAPID, Bools, Floats, Ints
+from camcomp.datatypes import ARC, LINE, RAPID, Bools, Floats, Ints, Path
 from camcomp.gcode.program import Program
 from camcomp.gcode.rewrite import Output, Rewritten, rewrite
 from camcomp.job import Job
-from camcomp.moves import refuse_unsolved, row_layout
+from camcomp.moves import corrected_pieces, refuse_unsolved, row_layout, travel_of
 from camcomp.posture import check_posture, whole_pose
 from camcomp.response import Travel, aim_at, respond, with_memory
 from camcomp.splitting import Nodes, divide, second_derivative, trial_nodes
@@ -23,7 +23,6 @@ from camcomp.statics.target import Correction, settle
 
 MAX_ROUNDS, EFFECT_ROUNDS = 6, 2  # finer lines do not help against the play of a drive
 TURN_LINES = 2  # lines on either side of a reversal in which a drive takes up its play
-RAPID_FEED = 10_000.0  # mm/min, for the time that rapids take
 COARSE_MM, FINE_MM = 8.0, 0.5  # distance of trial points on straight lines, without and with effects
 
 
@@ -106,7 +105,7 @@ def compensate(program: Program, job: Job, *, method: str, tolerance_um: float, 
     """The corrected program. Raises PhysicsError where the machine cannot do what is asked."""
     track = lay_track(program.path, job.conditions)
     path, resolution = program.path, job.config.control.resolution_mm
-    corrected = row_layout(path, track).corrected
+    corrected = corrected_pieces(path, track)
     feeding = corrected & (path.kind[track.motion] != RAPID)
     rounding = 0.5 * np.sqrt(3.0) * resolution
     budget = max(1e-3 * tolerance_um - rounding, 0.1e-3 * tolerance_um)
@@ -117,18 +116,20 @@ def compensate(program: Program, job: Job, *, method: str, tolerance_um: float, 
     trial = trial_nodes(track.length, angle, feeding & (track.length > 0.0), spacing)
     aimed = _aim(program, job, track, trial, corrected, method)
     bend = second_derivative(trial, aimed.commanded)
+    kept = _kept(track, trial, aimed.commanded, 0.5 * resolution)
+    tolerance[kept] = np.inf
     for _ in range(EFFECT_ROUNDS if job.causes else MAX_ROUNDS):
         nodes, shift = divide(trial, bend, tolerance)
         solved = _aim(program, job, track, nodes, corrected, method)
-        rows = _rows(program, job, track, nodes, solved.commanded + shift, corrected)
-        written = rewrite(program, _output(rows), resolution_mm=resolution, version=version)
+        rows = _rows(program, job, track, nodes, solved.commanded + shift, kept)
+        written = rewrite(program, _output(path, rows), resolution_mm=resolution, version=version)
         points = _points(job, track, rows, feeding)
         after = _see(job, points, written.end)
         turning = _takes_up_play(job, points, after.state.rho)
         points = replace(points, judged=points.judged & ~turning)
         worst = np.zeros(len(tolerance))
         np.maximum.at(worst, points.piece[points.judged], np.linalg.norm(after.error[points.judged], axis=1))
-        missed = worst > 1e-3 * tolerance_um
+        missed = (worst > 1e-3 * tolerance_um) & ~kept
         if not missed.any():
             break
         tolerance = np.where(missed, tolerance * np.clip(0.9e-3 * tolerance_um / worst, 0.3, 0.9), tolerance)
@@ -144,26 +145,11 @@ class _Aimed:
     iterations: Ints
 
 
-def _travel(job: Job, track: Track, piece: Ints, w: Floats) -> Travel:
-    """Force and time of points in the order of travel. Rapids go at RAPID_FEED where the time matters."""
-    feed = track.path.feed[track.motion]
-    feed = np.where(np.isnan(feed), job.config.process.feed_mm_per_min or np.nan, feed)
-    rapid = (track.path.kind[track.motion] == RAPID) | ~(feed > 0.0)
-    minutes = track.length / np.where(rapid, RAPID_FEED, feed)
-    start = np.cumsum(minutes) - minutes
-    cut = minutes * track.cutting
-    worn = np.cumsum(cut) - cut
-    force = job.frame.vectors(track.force(piece, w))
-    behind = np.concatenate((track.corner[1:], [True]))
-    stop = (w == 0.0) & track.corner[piece] | (w == 1.0) & behind[piece]
-    return Travel(force, 60.0 * (start[piece] + w * minutes[piece]), worn[piece] + w * cut[piece], stop)
-
-
 def _aim(program: Program, job: Job, track: Track, nodes: Nodes, corrected: Bools, method: str) -> _Aimed:
     """Modified targets at nodes, program frame; nodes of uncorrected pieces stay as programmed."""
     target = track.points(nodes.piece, nodes.w)
     on = corrected[nodes.piece]
-    result = aim_at(job, target[on], _travel(job, track, nodes.piece[on], nodes.w[on]), method)
+    result = aim_at(job, target[on], travel_of(job, track, nodes.piece[on], nodes.w[on]), method)
     refuse_unsolved(program, track, nodes.piece[on], target[on], result.status)
     out = target.copy()
     out[on] = result.commanded
@@ -172,14 +158,23 @@ def _aim(program: Program, job: Job, track: Track, nodes: Nodes, corrected: Bool
     return _Aimed(out, iterations)
 
 
-def _rows(program: Program, job: Job, track: Track, nodes: Nodes, commanded: Floats, corrected: Bools) -> Rows:
+def _kept(track: Track, nodes: Nodes, commanded: Floats, half: float) -> Bools:
+    """Pieces (p,) that stay as programmed, arcs as arcs: whole motions whose correction would be rounded away."""
+    moved = np.abs(commanded - track.points(nodes.piece, nodes.w)).max(axis=1)
+    most = np.zeros(len(track.motion))
+    np.maximum.at(most, nodes.piece, moved)
+    return (most <= half) & (np.bincount(track.motion)[track.motion] == 1)
+
+
+def _rows(program: Program, job: Job, track: Track, nodes: Nodes, commanded: Floats, kept: Bools) -> Rows:
     """End points of the corrected program: the nodes but the first of each piece, and joining lines at jumps."""
     path = program.path
     k = np.arange(len(nodes.w)) - nodes.first[nodes.piece]
-    n = len(track.motion)
     kind = path.kind[track.motion]
-    layout = row_layout(path, track)
-    leading, trailing = layout.leading, layout.trailing
+    start, stop = commanded[nodes.first[:-1]], commanded[nodes.first[1:] - 1]
+    step = np.linalg.norm(start - np.concatenate((start[:1], stop[:-1])), axis=1)
+    layout = row_layout(path, track, step, job.config.control.resolution_mm)
+    corrected, leading, trailing = layout.corrected, layout.leading, layout.trailing
     keep = (k > 0) | leading[nodes.piece]
     extra = np.flatnonzero(trailing)
     piece = np.concatenate((nodes.piece[keep], extra))
@@ -187,7 +182,7 @@ def _rows(program: Program, job: Job, track: Track, nodes: Nodes, commanded: Flo
     joining = np.concatenate(((k == 0)[keep], np.ones(len(extra), np.bool_)))
     free = track.points(extra, np.ones(len(extra)))
     if len(extra):  # behind the cut, without its force
-        unloaded = replace(_travel(job, track, extra, np.ones(len(extra))), force=np.zeros((len(extra), 3)))
+        unloaded = replace(travel_of(job, track, extra, np.ones(len(extra))), force=np.zeros((len(extra), 3)))
         result = aim_at(job, free, unloaded, "newton")
         refuse_unsolved(program, track, extra, free, result.status)
         free = result.commanded
@@ -200,8 +195,9 @@ def _rows(program: Program, job: Job, track: Track, nodes: Nodes, commanded: Flo
     force[trailing_row] = 0.0
     rows_kind = np.where(kind[piece] == RAPID, RAPID, LINE)
     passed = ~corrected[piece]
-    whole = np.bincount(piece, minlength=n) == 1
-    rows_kind = np.where(passed & whole[piece], kind[piece], rows_kind)
+    whole = (passed | kept[piece]) & ~joining & (np.bincount(piece, minlength=len(kind)) == 1)[piece]
+    rows_kind = np.where(whole, kind[piece], rows_kind)
+    end[whole] = target[whole]
     rows = Rows(piece, track.motion[piece], w, rows_kind, joining, ~passed, force, target, end, np.empty(len(piece)))
     return replace(rows, feed=_feeds(program, track, rows))
 
@@ -215,18 +211,18 @@ def _feeds(program: Program, track: Track, rows: Rows) -> Floats:
     programmed = (rows.w - w0) * track.length[rows.piece]
     commanded = np.linalg.norm(rows.end - start, axis=1)
     scale = np.divide(commanded, programmed, out=np.ones(len(feed)), where=programmed > 1e-6)
-    plain = rows.joining | (rows.kind == RAPID) | ~rows.corrected | (programmed < 0.01)
+    plain = rows.joining | (rows.kind != LINE) | ~rows.corrected | (programmed < 0.01)
     return np.where(plain, feed, feed * np.clip(scale, 0.2, 5.0))
 
 
-def _output(rows: Rows) -> Output:
-    n = len(rows.piece)
+def _output(path: Path, rows: Rows) -> Output:
+    arc = rows.kind == ARC
     return Output(
         motion=rows.motion,
         kind=rows.kind.astype(np.int8),
         end=rows.end,
-        centre=np.full((n, 3), np.nan),
-        angle=np.zeros(n),
+        centre=np.where(arc[:, None], path.centre[rows.motion], np.nan),
+        angle=np.where(arc, path.angle[rows.motion], 0.0),
         feed=rows.feed,
         joining=rows.joining,
     )
@@ -234,7 +230,7 @@ def _output(rows: Rows) -> Output:
 
 @dataclass(frozen=True, eq=False)
 class _Points:
-    """Where a corrected program is looked at, in the order of travel: its end points and the middles of its lines."""
+    """Where a corrected program is looked at, in the order of travel: its end points and the middles of its moves."""
 
     row: Ints  # (k,) end point that the point belongs to
     end: Bools  # (k,) it is that end point; otherwise the middle of the line before it
@@ -243,11 +239,13 @@ class _Points:
     target: Floats  # (k, 3) mm programmed tip
     travel: Travel
     judged: Bools  # (k,) counted in before and after: feed motions, no joining lines
+    arc: Bools  # (k,) in the middle of an arc that stays as programmed
 
     def along(self, ends: Floats) -> Floats:
-        """Points (k, 3) of the straight lines between end points (N, 3)."""
+        """Points (k, 3) of the moves between end points (N, 3)."""
         start = np.concatenate((ends[:1], ends[:-1]))
-        return np.where(self.end[:, None], ends[self.row], 0.5 * (start + ends)[self.row])
+        lines = np.where(self.end[:, None], ends[self.row], 0.5 * (start + ends)[self.row])
+        return np.where(self.arc[:, None], self.target, lines)
 
 
 def _points(job: Job, track: Track, rows: Rows, feeding: Bools) -> _Points:
@@ -262,9 +260,10 @@ def _points(job: Job, track: Track, rows: Rows, feeding: Bools) -> _Points:
     row, end = row[order], end[order]
     piece = rows.piece[row]
     w = np.where(end, rows.w[row], 0.5 * (start + rows.w)[row])
-    travel = _travel(job, track, piece, w)
+    travel = travel_of(job, track, piece, w)
     force = np.where(end[:, None], job.frame.vectors(rows.force)[row], travel.force)  # joining lines know better
-    return _Points(row, end, piece, w, track.points(piece, w), replace(travel, force=force), cut[row])
+    arc = ~end & (rows.kind[row] == ARC)
+    return _Points(row, end, piece, w, track.points(piece, w), replace(travel, force=force), cut[row], arc)
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,10 +13,13 @@ from camcomp.cutting.track import Track
 from camcomp.datatypes import RAPID, Bools, Floats, Ints, Path
 from camcomp.diagnostics import Location, PhysicsError, raise_all
 from camcomp.gcode.program import Program
+from camcomp.job import Job
+from camcomp.response import Travel
 from camcomp.statics.solve import STATUS
 
 RULES = {2: "CC301", 3: "CC302", 4: "CC303", 5: "CC304"}
 MOST_ERRORS = 20
+RAPID_FEED = 10_000.0  # mm/min, for the time that rapids take
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,18 +31,24 @@ class Layout:
     trailing: Bools
 
 
-def row_layout(path: Path, track: Track) -> Layout:
+def row_layout(path: Path, track: Track, step: Floats, resolution: float) -> Layout:
     """Corrected pieces and joining lines of a track.
 
-    A joining line stands in front of the piece behind the jump; in front of a rapid or an uncorrected move it stands
+    step (p,) mm: how far the commanded tip jumps at the start of each piece; a jump below the resolution needs no line. A
+    joining line stands in front of the piece behind the jump; in front of a rapid or an uncorrected move it stands
     behind the cut instead, because only feed lines can join.
     """
-    corrected = path.known[track.motion] & ~path.machine[track.motion]
+    corrected = corrected_pieces(path, track)
     feed = corrected & (path.kind[track.motion] != RAPID)
-    wanted = track.jump & np.concatenate(([False], corrected[:-1]))
+    wanted = track.jump & np.concatenate(([False], corrected[:-1])) & (step > resolution)
     leading = wanted & feed
     trailing = np.concatenate((wanted[1:] & ~leading[1:], [False])) & feed
     return Layout(corrected, leading, trailing)
+
+
+def corrected_pieces(path: Path, track: Track) -> Bools:
+    """Pieces (p,) whose tips are known and not given in machine coordinates."""
+    return path.known[track.motion] & ~path.machine[track.motion]
 
 
 def refuse_unsolved(program: Program, track: Track, piece: Ints, target: Floats, status: Ints) -> None:
@@ -68,3 +77,18 @@ def _place(program: Program, motion: int) -> Location:
     words = words[words >= 0]
     column = int(words.min() - program.text.starts[row]) if len(words) else 0
     return program.text.place(row, max(column, 0))
+
+
+def travel_of(job: Job, track: Track, piece: Ints, w: Floats) -> Travel:
+    """Force and time of points in the order of travel. Rapids go at RAPID_FEED where the time matters."""
+    feed = track.path.feed[track.motion]
+    feed = np.where(np.isnan(feed), job.config.process.feed_mm_per_min or np.nan, feed)
+    rapid = (track.path.kind[track.motion] == RAPID) | ~(feed > 0.0)
+    minutes = track.length / np.where(rapid, RAPID_FEED, feed)
+    start = np.cumsum(minutes) - minutes
+    cut = minutes * track.cutting
+    worn = np.cumsum(cut) - cut
+    force = job.frame.vectors(track.force(piece, w))
+    behind = np.concatenate((track.corner[1:], [True]))
+    stop = (w == 0.0) & track.corner[piece] | (w == 1.0) & behind[piece]
+    return Travel(force, 60.0 * (start[piece] + w * minutes[piece]), worn[piece] + w * cut[piece], stop)

@@ -18,11 +18,12 @@ from camcomp.diagnostics import CheckFailed
 from camcomp.gcode.program import Program
 from camcomp.gcode.stamp import is_stamped
 from camcomp.job import Job
-from camcomp.moves import Layout, refuse_unsolved, row_layout
-from camcomp.statics.target import correct, settle
+from camcomp.moves import Layout, corrected_pieces, refuse_unsolved, row_layout, travel_of
+from camcomp.response import aim_at, respond
 
 PER_SECTION = 4  # points looked at within each straight move or section of an arc
 ARC_STEP = 0.1  # rad, section of an arc
+MATCH_PASSES = 20  # tip and force settle on a place of the path; on a circle of 1 mm it takes ten
 NEAR_MM = 5.0  # a matched end may be this far from where it is expected
 
 
@@ -69,8 +70,10 @@ class Verified:
 def verify(corrected: Program, original: Program, job: Job) -> Verified:
     """Residual of a corrected program. Raises CheckFailed CC604 when it is not one of this original."""
     track = lay_track(original.path, job.conditions)
-    layout = row_layout(original.path, track)
-    expected = _expected_ends(original, job, track, layout.corrected)
+    corrected_ones = corrected_pieces(original.path, track)
+    begin, expected = (_expected(original, job, track, corrected_ones, w) for w in (0.0, 1.0))
+    step = np.linalg.norm(begin - np.concatenate((begin[:1], expected[:-1])), axis=1)
+    layout = row_layout(original.path, track, step, job.config.control.resolution_mm)
     first, last, joins = _match(corrected, track, expected, layout, is_stamped(corrected.data))
     feeding = np.flatnonzero(layout.corrected & (original.path.kind[track.motion] != RAPID) & (track.length > 0.0))
     piece, move, f = _samples(corrected.path, feeding, first[feeding], last[feeding])
@@ -94,16 +97,15 @@ def _samples(path: Path, pieces: Ints, first: Ints, last: Ints) -> tuple[Ints, I
     return np.repeat(piece, count), np.repeat(move, count), k / np.repeat(count, count)
 
 
-def _expected_ends(program: Program, job: Job, track: Track, corrected: Bools) -> Floats:
-    """Commanded tip (p, 3) at the end of every piece, as compensate would have it."""
+def _expected(program: Program, job: Job, track: Track, corrected: Bools, w: float) -> Floats:
+    """Commanded tip (p, 3) at fraction w of every piece, as compensate would have it."""
     pieces = np.arange(len(track.motion))
-    one = np.ones(len(pieces))
-    out = track.points(pieces, one)
+    at = np.full(len(pieces), w)
+    out = track.points(pieces, at)
     on = np.flatnonzero(corrected)
-    force = job.frame.vectors(track.force(on, one[on]))
-    result = correct(job.machine, job.frame.to_machine(out[on]), force)
+    result = aim_at(job, out[on], travel_of(job, track, on, at[on]), "newton")
     refuse_unsolved(program, track, on, out[on], result.status)
-    out[on] = job.frame.to_program(result.commanded)
+    out[on] = result.commanded
     return out
 
 
@@ -156,10 +158,9 @@ def _fraction(path: Path, piece: Ints, move: Ints, f: Floats) -> Floats:
 
 def _residual(job: Job, track: Track, piece: Ints, commanded: Floats, w: Floats) -> tuple[Floats, Floats]:
     """Distance (k,) mm of the loaded tip from the programmed path, and the fraction of the nearest point."""
-    for _ in range(4):
-        force = job.frame.vectors(track.force(piece, w))
-        tip, _ = settle(job.machine, job.frame.to_machine(commanded), force)
-        gap = job.frame.to_program(tip) - track.points(piece, w)
+    for _ in range(MATCH_PASSES):
+        tip, _ = respond(job, commanded, travel_of(job, track, piece, w))
+        gap = tip - track.points(piece, w)
         along = np.sum(gap * pathgeometry.tangents(track.path, track.motion[piece], track.u(piece, w)), axis=1)
         better = np.clip(w + along / track.length[piece], 0.0, 1.0)
         if np.abs((better - w) * track.length[piece]).max(initial=0.0) < 1e-7:
@@ -170,9 +171,8 @@ def _residual(job: Job, track: Track, piece: Ints, commanded: Floats, w: Floats)
 
 def _convergence(job: Job, track: Track, piece: Ints, w: Floats) -> Floats:
     """What the solver leaves (k,) mm: the exact command of the nearest point, put through the model again."""
-    target = job.frame.to_machine(track.points(piece, w))
-    force = job.frame.vectors(track.force(piece, w))
-    tip, _ = settle(job.machine, correct(job.machine, target, force).commanded, force)
+    target, travel = track.points(piece, w), travel_of(job, track, piece, w)
+    tip, _ = respond(job, aim_at(job, target, travel, "newton").commanded, travel)
     return np.linalg.norm(tip - target, axis=1)
 
 
