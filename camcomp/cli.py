@@ -16,7 +16,8 @@ from camcomp.diagnostics import CamcompError, FileError, format_error
 # One line per verb, so that `camcomp --help` imports none of them; a test keeps the table and the commands equal.
 VERBS = {
     "batch": "Compensate many programs at once.",
-    "canon": "Print what a program was understood to do, motion by motion.",
+    "canon": "Print what a program was understood to do, one line per motion.",
+    "compare": "Compare two logs or joint tables of one program.",
     "compensate": "Write the deflection of the machine back into an NC program.",
     "config": "Show what several YAML files make together.",
     "diagnose": "Find out why a machine and its model differ.",

@@ -379,6 +379,17 @@ RULES: dict[str, Rule] = {
     ),
     # --- CC4xx logs, experiments -------------------------------------------------------------------------------
     # --- CC5xx input and output --------------------------------------------------------------------------------
+    "CC450": Rule(
+        "table not readable",
+        "A CSV table has one row of column names and then rows of numbers; cells may be empty.",
+        "decimal points, commas between cells",
+    ),
+    "CC451": Rule(
+        "tables cannot be compared",
+        "Two tables are compared where they have columns in common and a common way to find the place: path length and "
+        "source line, time, or the number of the row.",
+        "choose another --by",
+    ),
     "CC500": Rule("file cannot be read", "The file is not there, or may not be read.", "check the path"),
     "CC501": Rule(
         "file cannot be written",
@@ -418,5 +429,10 @@ RULES: dict[str, Rule] = {
         "set-points in error",
         "Some lines of the stream could not be read or solved, or lead an actuator out of its travel. Their answers say "
         "why.",
+    ),
+    "CC606": Rule(
+        "tables differ",
+        "Somewhere a column differs by more than the --tolerance that was asked for.",
+        "the output of compare says where",
     ),
 }
