@@ -25,6 +25,7 @@ DIALECT = Dialect(
     turns=False,
     writes_turns=False,
     increments=True,
+    machine_moves_rapid=True,
     dwell="PXU",
     modal_length=True,
     own_local_frame=True,

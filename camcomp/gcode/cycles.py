@@ -33,6 +33,8 @@ class Cycles(Motions):
         feed = self.feed_of(block)
         depth = _DEPTH[state.plane]
         start = list(state.position)
+        if self._held.setdefault("plane", state.plane) != state.plane:
+            self.refuse("CC132", f"the plane changes while {name} is in force")
         # A series of one cycle refers to the height at which it began.
         self._held.setdefault("start", start[depth] - state.offset[depth])
         self._hold(block, name, self._held["start"], depth)

@@ -51,16 +51,17 @@ class Motions(Settings):
         state = self.state
         if machine and (motion not in (0, 10) or state.relative):
             self.refuse("CC130", "G53 works with G0 or G1 and with G90", block.groups[0][1])
-        feed = self.feed_of(block) if motion else math.nan
+        rapid = machine and self.dialect.machine_moves_rapid
+        feed = self.feed_of(block) if motion and not rapid else math.nan
         if motion in (20, 30):
             self._arc(block, motion // 10, feed)
             return
         end = self.target(block, machine)
-        if motion and state.feed_mode == 93:
+        if motion and not rapid and state.feed_mode == 93:
             length = math.dist(state.position, end)
             feed *= length if length > _NOTHING else 1.0
         if machine:
-            self.record.machine_motion(block, state, motion // 10, end, feed=feed)
+            self.record.machine_motion(block, state, -2 if rapid else motion // 10, end, feed=feed)
         else:
             self.record.line_motion(block, state, motion // 10, end, feed)
 

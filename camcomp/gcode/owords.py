@@ -251,11 +251,18 @@ class OWords(Subprograms):
     def _loop_around(self, row: int, statement: Statement) -> tuple[int, int]:
         for start in range(row - 1, -1, -1):
             other = self._statements.get(start)
-            if other and other.label == statement.label and other.keyword in ("while", "do", "repeat"):
+            if other and other.label == statement.label and other.keyword in ("while", "do"):
                 end = self._partner.get(start, -1)
                 if end > row:
+                    self._nothing_between(row, end, statement)
                     return start, end
         self.refuse(row, 0, "CC124", f"o{statement.label} {statement.keyword} stands outside a loop")
+
+    def _nothing_between(self, row: int, end: int, statement: Statement) -> None:
+        """LinuxCNC looks for the next line of that label, and takes a second `break` on its way for the loop's end."""
+        for other in range(row + 1, end):
+            if other in self._statements and self._statements[other].label == statement.label:
+                self.refuse(row, 0, "CC124", f"another o{statement.label} line stands between this one and the loop's end")
 
     def execute(self, row: int) -> bool:
         """Execute an ordinary line; True when the program ends there."""

@@ -5,15 +5,16 @@ import re
 
 from camcomp.gcode.text import Text
 
-_STAMP = re.compile(r"^[ \t]*[(;][ \t]*camcomp [0-9][^ )]* sha256:[0-9a-f]{64}\b", re.MULTILINE)
+_STAMP = re.compile(rb"(?:^|[\r\n])[ \t]*[(;][ \t]*camcomp [0-9][^ )]* sha256:[0-9a-f]{64}(?![0-9a-f])")
+_MARKS = (b"\xef\xbb\xbf", b"\xff\xfe", b"\xfe\xff")
 
 
 def is_stamped(data: bytes) -> bool:
     """True when the program was written by camcomp, whatever else was done to it since."""
-    if not data.startswith((b"\xff\xfe", b"\xfe\xff")):
-        return _STAMP.search(data.decode("latin-1").replace("\r", "\n")) is not None
-    string = data[2:].decode("utf-16-le" if data.startswith(b"\xff") else "utf-16-be", "replace")
-    return _STAMP.search(string.replace("\r", "\n")) is not None
+    for mark in _MARKS:
+        data = data.removeprefix(mark)
+    # The stamp is ASCII, so without its zero bytes UTF-16 of either order reads like ASCII.
+    return _STAMP.search(data.replace(b"\0", b"")) is not None
 
 
 def stamp_line(data: bytes, version: str, opening: str = "(", closing: str = ")") -> str:
