@@ -314,10 +314,11 @@ class Writer:
             else:
                 self.fresh.append("IJK"[axis] + number)
         turns = turns_of(move.angle)
-        if self.begin[P] >= 0 and turns == 1:
-            self._remove(P)
-        elif self.begin[P] >= 0 and turns != turns_of(float(self.path.angle[k])):
-            self._replace(P, str(turns))
+        if self.begin[P] >= 0 and turns != turns_of(float(self.path.angle[k])):
+            if turns > 1:
+                self._replace(P, str(turns))
+            else:
+                self._remove(P)
         elif self.begin[P] < 0 and turns > 1:
             self.fresh.append(f"P{turns}")
 
