@@ -77,7 +77,8 @@ def command(
         outputs[summary_file] = (json.dumps(figures, indent=2) + "\n").encode()
     failed = result.failed_checks(job, tolerance)
     if report:
-        from camcomp.report.compensation import Input, compensation_html
+        from camcomp.report.compensation import compensation_html
+        from camcomp.report.inputs import Input
 
         inputs = [Input("program", source.name, source.data)]
         inputs += [Input("configuration", display_name(each), read_bytes(each)) for each in configs if each != STANDARD]

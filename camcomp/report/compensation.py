@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from hashlib import sha256
 from pathlib import PurePath
 
 import numpy as np
@@ -24,6 +22,7 @@ from camcomp.report.compensation_figures import (
     figure_trajectories,
     figures_actuators,
 )
+from camcomp.report.inputs import Input, inputs_section
 from camcomp.report.page import Page, Section, Table, render
 from camcomp.report.plot import brief
 from camcomp.verify import LineResult, Verified, verify
@@ -33,15 +32,6 @@ BUDGET = (
     "Solver: what the iteration itself leaves. Rounding: half the last digit written, in the worst case. "
     "End points: error at the ends of the moves. Chords: what the straight lines between them add."
 )
-
-
-@dataclass(frozen=True)
-class Input:
-    """A file that went in: what it is, its name (the page shows it without folder), its bytes."""
-
-    role: str
-    name: str
-    data: bytes
 
 
 def compensation_html(
@@ -79,7 +69,7 @@ def compensation_html(
     if any_feed:
         sections += _plots(result, found, job, course, checked, tolerance_um)
         sections.append(Section("lines", "Line by line", tables=[_lines(course, job, checked)]))
-    sections += [_machine(job), _inputs(inputs, result)]
+    sections += [_machine(job), inputs_section(inputs, result.written.data)]
     page = Page(
         title=f"{name} on {job.config.robot.name}",
         subtitle=f"Compensation report: method {result.method}, {figures['points']} end points from "
@@ -172,10 +162,3 @@ def _machine(job: Job) -> Section:
     text = [f"{job.config.robot.name}; source: {source}" if source else job.config.robot.name]
     return Section("machine", "Machine", text=text, tables=[table])
 
-
-def _inputs(inputs: Sequence[Input], result: Compensated) -> Section:
-    rows = [[each.role, PurePath(each.name).name, f"{len(each.data)}", sha256(each.data).hexdigest()] for each in inputs]
-    out = result.written.data
-    rows.append(["corrected program", "", str(len(out)), sha256(out).hexdigest()])
-    table = Table("Files and their fingerprints", ("what", "name", "bytes", "SHA-256"), rows)
-    return Section("inputs", "Inputs and output", tables=[table])

@@ -122,7 +122,7 @@ def figure_error(course: Course, tolerance_um: float) -> Figure:
         "What the straight lines between the end points add is part of the error budget below.",
         f"Plot of the tip error along the path: {words}.",
         curves,
-        {"xaxis": axis("path length in mm"), "yaxis": axis("error in µm", type="log", exponentformat="power")},
+        {"xaxis": axis("path length in mm"), "yaxis": axis("error in µm", type="log", dtick=1, exponentformat="power")},
     )
 
 
@@ -241,6 +241,6 @@ def figure_budget(checked: Verified, tolerance_um: float) -> Figure:
         f"Read back from the text of the corrected program, largest value of each part: {words}.",
         f"Bar chart of the parts of the error that is left: {words}.",
         [bars, limit],
-        {"xaxis": axis("error in µm", type="log", range=span, exponentformat="power"), "yaxis": axis("")},
+        {"xaxis": axis("error in µm", type="log", dtick=1, range=span, exponentformat="power"), "yaxis": axis("")},
         height=300,
     )

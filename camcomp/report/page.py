@@ -57,6 +57,7 @@ class Page:
     good: bool
     cards: Sequence[tuple[str, str, str]]
     sections: Sequence[Section] = field(default_factory=tuple)
+    word: str = ""  # before the verdict; default Passed or Attention
 
 
 @cache
@@ -85,12 +86,13 @@ def render(page: Page) -> bytes:
     ]
     links = "".join(f'<li><a href="#{s.name}">{escape(s.title)}</a></li>' for s in page.sections)
     kind, word = ("good", "Passed") if page.good else ("bad", "Attention")
+    word = page.word or word
     body = [
         '<body><a class="skip" href="#main">Skip to the report</a>',
         '<header><div class="bar"><p class="brand">camcomp</p>',
         '<button type="button" id="theme" aria-pressed="false">Dark colours</button></div>',
         f'<h1>{escape(page.title)}</h1><p class="subtitle">{escape(page.subtitle)}</p>',
-        f'<p class="verdict {kind}"><strong>{word}.</strong> {escape(page.verdict)}</p>',
+        f'<p class="verdict {kind}"><strong>{escape(word)}.</strong> {escape(page.verdict)}</p>',
         '<dl class="cards">',
         *(
             f"<div><dt>{escape(what)}</dt><dd>{escape(value)}<small>{escape(remark)}</small></dd></div>"
@@ -146,8 +148,10 @@ def _figure(figure: Figure) -> str:
 
 def _table(table: Table) -> str:
     if table.sortable:
+        kinds = [' class="n"' if isinstance(cell, tuple) else "" for cell in table.rows[0]]
         heads = "".join(
-            f'<th scope="col" aria-sort="none"><button type="button">{escape(h)}</button></th>' for h in table.heads
+            f'<th scope="col"{kind} aria-sort="none"><button type="button">{escape(h)}</button></th>'
+            for h, kind in zip(table.heads, kinds, strict=True)
         )
     else:
         heads = "".join(f'<th scope="col">{escape(h)}</th>' for h in table.heads)

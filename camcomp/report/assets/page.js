@@ -40,7 +40,7 @@
     const grid = style.getPropertyValue("--grid").trim();
     const layout = coloured(spec.layout, style);
     const base = {
-      autosize: true, height: spec.height, margin: { l: 70, r: 20, t: 10, b: 50 }, hovermode: "closest",
+      autosize: true, height: spec.height, margin: { l: 70, r: 20, t: 34, b: 50 }, hovermode: "closest",
       paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
       font: { color: ink, family: getComputedStyle(document.body).fontFamily, size: 13 },
       modebar: { bgcolor: "rgba(0,0,0,0)", color: grid, activecolor: ink },

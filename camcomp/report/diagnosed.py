@@ -1,0 +1,69 @@
+"""From a diagnosis to what its report draws: the gap of every run before and after, and the signals of rival causes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from camcomp.bench import Bench, Run, thinned
+from camcomp.datatypes import Floats
+from camcomp.diagnose import Diagnosis, _main_channels, _theta_without
+from camcomp.gap.observation import channel_names
+from camcomp.gap.search import Fitted
+from camcomp.inquiry import Inquiry
+from camcomp.report.diagnosis_figures import cause_name
+from camcomp.report.runview import Rival, RunView
+from camcomp.twin import Twin
+
+MICRO = 1e3  # mm -> um
+
+
+def views_of(done: Diagnosis, twin: Twin, runs: Sequence[Run], holdout: Sequence[str]) -> list[RunView]:
+    """Runs of the fit in their order, then those named in `holdout`.
+
+    Without names every run is judged with causes fitted without it.
+    """
+    inquiry = done.inquiry
+    best = done.survey.fits[done.survey.verdict.best]
+    out = []
+    for k in range(len(inquiry.bench.runs)):
+        theta = best.theta if holdout else _theta_without(inquiry, best, k)
+        out.append(_view(inquiry, inquiry.bench, k, best, theta, held_out=not holdout and len(inquiry.bench.runs) > 1))
+    unseen = [run for run in runs if run.name in holdout and run.name not in {each.name for each in inquiry.bench.runs}]
+    if unseen:
+        bench = Bench(twin, unseen)
+        out += [_view(inquiry, bench, k, best, best.theta, held_out=True) for k in range(len(unseen))]
+    return out
+
+
+def rivals_of(done: Diagnosis) -> list[Rival]:
+    """Sets of causes that the data cannot tell apart, the best one first; none when there is only one."""
+    found, inquiry = done.survey, done.inquiry
+    if done.result["verdict"] != "ambiguous":
+        return []
+    part = _main_channels(inquiry)
+    out = []
+    for fit in (found.fits[found.verdict.best], *(found.fits[j] for j in found.verdict.rivals)):
+        causes = inquiry.causes(fit.members, fit.theta, fit.extra)
+        names = [cause_name({"effect": each.name, "target": each.target}) for each in causes]
+        signals = tuple(
+            MICRO * (inquiry.bench.gap(k) - inquiry.bench.gap(k, causes))[:, part] for k in range(len(inquiry.bench.runs))
+        )
+        out.append(Rival(" and ".join(names), signals))
+    return out
+
+
+def _view(inquiry: Inquiry, bench: Bench, k: int, fit: Fitted, theta: Floats, *, held_out: bool) -> RunView:
+    part, run = _main_channels(inquiry), bench.runs[k]
+    causes = inquiry.causes(fit.members, theta, fit.extra)
+    before = bench.gap(k)
+    after = bench.gap(k, causes) if causes else before
+    return RunView(
+        run.name,
+        held_out,
+        thinned(run.course.time[:, None], run.thin)[:, 0],
+        thinned(run.measured.line[:, None], run.thin)[:, 0],
+        thinned(bench.nominal[k].tip, run.thin),
+        MICRO * before[:, part],
+        MICRO * after[:, part],
+        tuple(each.replace("_", " ") for each in channel_names(bench.actuators)[part]),
+    )

@@ -1,0 +1,135 @@
+"""The diagnosis report: what it says, what it draws, and that all of it stands in a real browser."""
+
+import json
+import re
+from html import unescape
+
+import numpy as np
+import pytest
+
+from camcomp.report.diagnosis import diagnosis_html, verdict_text
+from camcomp.report.inputs import Input
+from camcomp.report.runview import Rival, likeness, rms, spectrum
+from tests.report.browser import needs_browser
+from tests.report.diagnoses import result, rivals, run_view, views
+
+VERDICTS = ("none", "identified", "ambiguous", "unknown")
+
+
+def html_of(verdict, **more):
+    made = diagnosis_html(
+        result(verdict), views(), title="e.yaml", machine="Orthoglide",
+        rivals=rivals() if verdict == "ambiguous" else (), **more,
+    )  # fmt: skip
+    return made.decode()
+
+
+def words(html):
+    body = re.sub(r"<(script|style)[ >].*?</\1>", " ", html, flags=re.DOTALL)
+    return re.sub(r"\s+", " ", unescape(re.sub(r"<[^>]*>", " ", body)).replace("\u00a0", " "))
+
+
+def figures(html):
+    data = re.search(r'<script type="application/json" id="figures">(.*?)</script>', html, re.DOTALL)[1]
+    return {each["name"]: each for each in json.loads(data)}
+
+
+@pytest.mark.parametrize(
+    ("verdict", "told"),
+    [
+        ("none", "nothing to explain"),
+        ("identified", "backlash (x) and gravity explain the gap. On runs that the fit has not seen the gap goes from 14.1 µm"),
+        ("ambiguous", "cannot tell apart: backlash (x); or friction (x) and gravity."),
+        ("unknown", "no effect of the library explains. gravity is identified. The rest depends on reversal:x, velocity:y."),
+    ],
+)
+def test_the_verdict_is_a_sentence(verdict, told):
+    assert told in verdict_text(result(verdict))
+
+
+def test_causes_with_intervals_next_experiment_and_notes():
+    text = words(html_of("ambiguous", notes=["run b has no temperature"]))
+    assert "backlash x 97.0 % 90.0 % width_mm = 0.02130 (0.01917 to 0.02343)" in text
+    assert "Mill the circle in air at 2000 mm/min. It separates backlash(x) and friction(x)." in text
+    assert "run b has no temperature" in text
+    assert "Ratio after to before 0.250 95 % interval 0.100 to 0.300" in text
+
+
+def test_held_out_runs_are_drawn_the_worst_first():
+    drawn = figures(html_of("identified"))
+    assert [name for name in drawn if name.startswith("time-")] == ["time-1", "time-2"]
+    first = drawn["time-1"]["traces"]
+    assert [each["name"] for each in first] == ["before", "with the causes found", "noise floor"]
+    assert max(first[0]["y"]) == pytest.approx(np.nanmax(views()[1].sizes[0]), abs=1e-3)
+    assert max(first[1]["y"]) == pytest.approx(np.nanmax(views()[1].sizes[1]), abs=1e-3)
+    assert set(first[2]["y"]) == {0.87}
+    path = drawn["path-1"]["traces"][0]["x"]
+    assert path[-1] == pytest.approx(2 * np.pi * 25, rel=1e-4)
+    ladder = drawn["ladder"]["traces"][0]
+    assert ladder["y"] == ["+ gravity", "+ backlash (x)", "as it was"] and ladder["x"][-1] == 14.1
+
+
+def test_without_held_out_runs_those_of_the_fit_are_drawn_and_called_so():
+    html = diagnosis_html(result("identified"), [run_view("c", False)], title="e", machine="m").decode()
+    assert "Run c: gap along the time" in words(html) and "This run was used for the fit." in words(html)
+
+
+def test_the_map_has_one_scale_for_before_and_after():
+    before, after = figures(html_of("identified"))["map"]["traces"]
+    assert before["marker"]["cmax"] == after["marker"]["cmax"] > 0
+    assert before["x"] == after["x"] and max(before["marker"]["color"]) > 5 * np.mean(after["marker"]["color"])
+
+
+def test_a_result_without_gap_draws_no_ladder_and_no_causes():
+    drawn = figures(html_of("none"))
+    assert "ladder" not in drawn and "causes-plot" not in drawn and "time-1" in drawn
+
+
+def test_rows_without_measurement_are_gaps():
+    view = run_view("a", True)
+    view.before[100:200] = np.nan
+    drawn = figures(diagnosis_html(result("none"), [view], title="e", machine="m").decode())
+    assert drawn["time-1"]["traces"][0]["y"].count(None) == 100
+
+
+def test_inputs_stand_without_their_folders():
+    html = html_of("identified", inputs=[Input("log", "/home/me/a.csv", b"1")])
+    assert "/home/me" not in html and "log a.csv 1 6b86b273ff34fce1" in words(html)
+
+
+def test_a_spectrum_finds_the_frequency_and_amplitude():
+    view = run_view("a", True, size=20.0, frequency=1.25)
+    frequency, amplitude = spectrum(view.time, view.before)
+    assert frequency[amplitude.argmax()] == pytest.approx(1.25, abs=0.05)
+    assert amplitude.max() == pytest.approx(20.0, rel=0.1)
+    holes = view.before.copy()
+    holes[::7] = np.nan
+    assert spectrum(view.time, holes)[1].max() == pytest.approx(20.0, rel=0.1)
+    assert len(spectrum(view.time[:10], view.before[:10])[0]) == 0
+    assert len(spectrum(np.zeros(100), view.before[:100])[0]) == 0
+
+
+def test_likeness():
+    one = np.array([[1.0, 0.0], [np.nan, 0.0]])
+    assert likeness(Rival("a", (one,)), Rival("b", (-3 * one,))) == pytest.approx(1.0)
+    assert likeness(Rival("a", (one,)), Rival("b", (one[:, ::-1],))) == 0.0
+    assert rms(np.array([np.nan, 3.0, -3.0])) == 3.0 and rms(np.array([np.nan])) == 0.0
+
+
+@needs_browser
+@pytest.mark.parametrize("verdict", VERDICTS)
+def test_in_a_browser(browser, tmp_path, verdict):
+    path = tmp_path / "d.html"
+    path.write_text(html_of(verdict), encoding="utf-8")
+    browser.console()
+    browser.open(path)
+    drawn = browser.run(
+        "return [...document.querySelectorAll('.plot')].map(p => [p.id, p.dataset.drawn,"
+        " p.querySelectorAll('path.js-line, .bars path, path.point').length])"
+    )
+    assert len(drawn) == {"none": 7, "identified": 9, "ambiguous": 10, "unknown": 9}[verdict]
+    for name, done, marks in drawn:
+        assert done == "yes" and marks, name
+    assert browser.console() == []
+    labels = browser.run("return [...document.querySelectorAll('.plot')].map(p => p.ariaLabel)")
+    assert len(set(labels)) == len(labels) and all(len(each) > 30 for each in labels)
