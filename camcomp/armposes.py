@@ -137,7 +137,7 @@ class ArmBench:
             here = frame.tips(hung.point, hung.rotation)
             measured = frame.to_machine(campaign.tip)
             X = np.empty((*here.shape, len(columns)))
-            for j, column in enumerate(columns):
+            for j in range(len(columns)):
                 step = _SHARE_OF_SCALE
                 moved = combined(columns, {**amounts, j: amounts.get(j, 0.0) + step})
                 X[:, :, j] = (self.tips(k, moved, frame) - here) / step
@@ -155,7 +155,7 @@ class ArmBench:
             about = here.mean(axis=0)
             N = nuisance_columns(here, hung.rotation, about)
             gap = (at.to_machine(campaign.tip) - here).ravel()
-            at = at.moved(np.linalg.lstsq(N.reshape(-1, 9), gap, rcond=1e-8)[0], about)
+            at = at.moved(np.asarray(np.linalg.lstsq(N.reshape(-1, 9), gap, rcond=1e-8)[0], float), about)
         return at
 
     def gap(self, k: int, causes: Sequence[Cause]) -> Floats:

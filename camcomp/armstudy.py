@@ -89,8 +89,8 @@ def merged(runs: Sequence[Poses]) -> list[Poses]:
         own = [r for r in runs if r.label == label]
         heats = [r.temperature for r in own]
         heat = None if any(h is None for h in heats) else np.concatenate([h for h in heats if h is not None])
-        every = Poses(label, *(np.concatenate([getattr(r, f) for r in own]) for f in ("q", "tip", "time")), heat,
-                      np.concatenate([r.run for r in own]))  # fmt: skip
+        q, tip, time, run = (np.concatenate([getattr(r, f) for r in own]) for f in ("q", "tip", "time", "run"))
+        every = Poses(label, q, tip, time, heat, run)
         n = len(every.q)
         if n < 12:
             raise ValueError(f"campaign '{label}' has {n} poses; its frames alone need more")

@@ -13,6 +13,10 @@ import click
 from camcomp import __version__
 from camcomp.diagnostics import CamcompError, FileError, format_error
 
+# Matrices here are small: threads of the linear algebra wait for each other longer than they compute, most of all on a
+# machine that does other things too. It has to be said before numpy is imported; a user's own setting stands.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 # One line per verb, so that `camcomp --help` imports none of them; a test keeps the table and the commands equal.
 VERBS = {
     "batch": "Compensate many programs at once.",
@@ -23,6 +27,7 @@ VERBS = {
     "diagnose": "Find out why a machine and its model differ.",
     "effects": "List what can make a machine differ from its model.",
     "explain": "Say what a rule id of an error message means.",
+    "import": "Turn recordings of others into logs and an experiment file.",
     "init": "Start a project: a machine file, a program, a README.",
     "schema": "Print the JSON schema of the YAML files.",
     "simulate": "Write the log that the modelled machine would produce.",

@@ -379,6 +379,28 @@ RULES: dict[str, Rule] = {
     ),
     # --- CC4xx logs, experiments -------------------------------------------------------------------------------
     # --- CC5xx input and output --------------------------------------------------------------------------------
+    "CC420": Rule(
+        "too little to study",
+        "Logs without a program are studied as static poses of an arm (joint angles and measured tips) or as axes "
+        "(set-points or drive forces with encoders). What is there is too little for either.",
+        "see the README for the columns of a log",
+    ),
+    "CC421": Rule(
+        "column not found",
+        "A column that the log needs has no counterpart in the table under any usual name.",
+        "name it with --column",
+    ),
+    "CC422": Rule("cell is not a number", "Cells of a table are numbers or empty.", "delete units and words"),
+    "CC423": Rule(
+        "recording not readable",
+        "A recording of one axis is a MATLAB file with t in s, qg and qm in m and, for forces, vir and gtau.",
+        "write a log CSV instead: t_s, cmd_x_mm, act_x_mm, act_x_N",
+    ),
+    "CC424": Rule(
+        "name of a run",
+        "Runs are called by their files, without folder and suffix. Each name has to be there once.",
+        "rename a file",
+    ),
     "CC450": Rule(
         "table not readable",
         "A CSV table has one row of column names and then rows of numbers; cells may be empty.",

@@ -15,7 +15,10 @@ def diagnose_experiment(path: str | Path, without: Sequence[str] = ()) -> dict[s
     """The result mapping of an experiment file, ready for JSON. Raises CamcompError."""
     from camcomp.campaign import open_campaign
     from camcomp.diagnose import diagnose
+    from camcomp.unprogrammed import study_of
 
+    if (study := study_of(path, without)) is not None:
+        return study
     campaign = open_campaign(path)
     return diagnose(campaign.twin, campaign.runs, holdout=campaign.experiment.holdout, without=without).result
 

@@ -1,27 +1,48 @@
-"""Coulomb friction at the guide: the drive has to push harder along its travel, which winds up its spring."""
+"""Friction at the guide: the drive has to push harder along its travel, which winds up its spring."""
 
 from collections.abc import Mapping
 
+import numpy as np
+
 from camcomp.datatypes import Floats
 from camcomp.gap.effect import Motion, Parameter
+from camcomp.gap.memory import PRESLIDING_MM, direction
 
 STAGE = "drive"
 TARGET = "actuator"
-SOURCE = "force balance of the carriage; turn-round of the force after Dahl 1968"
-PARAMETERS = (
+SOURCE = "force balance of the carriage; turn-round of the force after Dahl 1968; viscous part by the speed of the encoder"
+FITTED = (
     Parameter("force_N", "N", 0.0, 0.0, 2000.0, 60.0, 0.2, "guides and seals of feed drives: 5 to 300 N", sign=1),
 )
+# Known where drive forces are logged; the other channels hardly see them.
+_MORE = (
+    Parameter(
+        "viscous_Ns_per_mm", "Ns/mm", 0.0, 0.0, 100.0, 0.2, 0.002, "grease and seals: 0.01 to 1 N s/mm", sign=1
+    ),
+    Parameter("asymmetry_Ns_per_mm", "Ns/mm", 0.0, -100.0, 100.0, 0.05, 0.001, "viscous forward minus mean of both ways"),
+    Parameter("presliding_mm", "mm", PRESLIDING_MM, 1e-4, 1.0, 0.005, 0.001, "rolling guides: 1 to 100 um"),
+)
+PARAMETERS = FITTED + _MORE
+
+
+def _pull(motion: Motion, p: Mapping[str, float]) -> Floats | None:
+    """Force (n, m) of the guides against the travel, N; None where there is none."""
+    force, viscous = p["force_N"], p.get("viscous_Ns_per_mm", 0.0)
+    lopsided = p.get("asymmetry_Ns_per_mm", 0.0)
+    if force == 0.0 and viscous == 0.0 and lopsided == 0.0:
+        return None
+    length = p.get("presliding_mm", PRESLIDING_MM)
+    turned = motion.direction if length == PRESLIDING_MM or not motion.ordered else direction(motion.encoder, length)
+    return force * turned + viscous * motion.speed + lopsided * np.abs(motion.speed)
 
 
 def on_drive(error: Floats, motion: Motion, which: Floats, p: Mapping[str, float]) -> Floats:
     """Carriage minus encoder (n, m), mm: the spring gives way against the travel."""
-    force = p["force_N"]
-    if force == 0.0:
-        return error
-    return error - which * (force / motion.stiffness) * motion.direction
+    pull = _pull(motion, p)
+    return error if pull is None else error - which * pull / motion.stiffness
 
 
 def on_drive_force(effort: Floats, motion: Motion, which: Floats, p: Mapping[str, float]) -> Floats:
     """Force of the drive on its carriage (n, m), N: more by the friction, along the travel."""
-    force = p["force_N"]
-    return effort if force == 0.0 else effort + which * force * motion.direction
+    pull = _pull(motion, p)
+    return effort if pull is None else effort + which * pull
