@@ -145,13 +145,13 @@ def _following(
                 "acceleration_us2": _value(1e6 * c[1], 1.96e6 * float(np.sqrt(C[1, 1]))),
             }
             last = lag
-    _close(found, channel, "servo_lag", last, data, table, columns, test, gaps)
+    _close(found, channel, "servo_lag", last, data, table, columns, test, gaps, moves)
     found.following = channel
 
 
 def _close(
     found: _Axis, channel: _Channel, effect: str, last: Floats, data: Series, table: Any, columns: list[Any],
-    test: list[int], values: list[Floats],
+    test: list[int], values: list[Floats], moves: list[Travel],
 ) -> None:  # fmt: skip
     """Leftovers of the channel; where runs are held out, what is left there takes the place of withheld blocks."""
     c = solve(table(channel.runs, *columns), data.y)
@@ -160,7 +160,7 @@ def _close(
     channel.last = last
     if test:
         base = solve(table(channel.runs, *columns[:1]), data.y)
-        seen = series([np.arange(len(values[k])) * 1e-3 for k in test], [values[k] for k in test])
+        seen = series([moves[k].time for k in test], [values[k] for k in test])
         squares = [(seen.y - table(test, *cols) @ w) ** 2 for cols, w in ((columns[:1], base), (columns, c))]
         channel.first, channel.last = (
             np.array([s[seen.block == b].mean() for b in range(len(seen.others))]) for s in squares
@@ -201,7 +201,7 @@ def _force(
             found.causes.append(_friction(found, data, table(train, *columns), length, _sure(g.log_ratio, data), before, last))
             found.details["force"]["asymmetry_z"] = round(more.z, 2)
     _refused(found, data, table, train, columns, last, length)
-    _close(found, channel, "friction", last, data, table, columns, test, forces)
+    _close(found, channel, "friction", last, data, table, columns, test, forces, moves)
     found.force = channel
     line = ripple([moves[k] for k in train], channel.left)
     if line is not None and line.share > LEAST_RIPPLE:

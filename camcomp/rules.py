@@ -265,6 +265,12 @@ RULES: dict[str, Rule] = {
         "What is asked for needs a package that a plain installation leaves out because it is large.",
         "pip install 'camcomp[report]'",
     ),
+    "CC240": Rule(
+        "robot description not usable",
+        "A URDF describes a tree of links. camcomp takes one chain of hinges and slides from it, with masses and centres; "
+        "macros, coupled and floating joints and closed chains it does not take.",
+        "write the chain by hand; camcomp init shows the keys",
+    ),
     "CC250": Rule(
         "spindle speed missing",
         "Milling force models need the feed per tooth, which is feed over teeth and spindle speed; a speed of zero "

@@ -6,7 +6,7 @@ import click
 
 from camcomp import __version__
 from camcomp.diagnostics import FileError
-from camcomp.files import shipped, write_all
+from camcomp.files import display_name, read_bytes, shipped, write_all
 
 _README = f"""# A camcomp project
 
@@ -35,13 +35,23 @@ _KEYS = """
 
 @click.command()
 @click.argument("directory", metavar="DIR", type=click.Path(file_okay=False, path_type=Path))
-def command(directory: Path) -> None:
+@click.option("--from-urdf", "urdf", metavar="FILE", help="Arm whose geometry and masses the machine file takes.")
+@click.option("--tip", metavar="LINK", help="Link of the URDF that carries the tool; default: the end of the chain.")
+def command(directory: Path, urdf: str | None, tip: str | None) -> None:
     """Start a project: a machine file, a program, a README.
 
     DIR is made when it is not there. Nothing in it is overwritten.
     """
+    machine = shipped("config/orthoglide.yaml").read_bytes() + _KEYS.encode()
+    if urdf is not None:
+        from camcomp.urdf import machine_yaml, read_urdf
+
+        arm = read_urdf(read_bytes(urdf), display_name(urdf), tip)
+        machine = machine_yaml(arm, Path(urdf).name).encode()
+        for note in arm.notes:
+            click.echo(note, err=True)
     outputs: dict[Path, bytes] = {
-        directory / "machine.yaml": shipped("config/orthoglide.yaml").read_bytes() + _KEYS.encode(),
+        directory / "machine.yaml": machine,
         directory / "groove.nc": shipped("samples/groove-circle-50.nc").read_bytes(),
         directory / "camcomp.schema.json": shipped("config/camcomp.schema.json").read_bytes(),
         directory / "README.md": _README.encode(),

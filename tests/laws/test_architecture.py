@@ -20,9 +20,9 @@ GROUND = {
 ENGINES = {"gcode", "statics", "cutting", "gap"}
 SHELVES = {"robots", "dialects", "forces", "effects"}
 JOINTS = {
-    "bench", "columns", "course", "inquiry", "job", "moves", "posture", "response", "splitting", "survey", "twin",
+    "armposes", "bench", "columns", "course", "inquiry", "job", "moves", "posture", "response", "splitting", "survey", "twin",
 }  # fmt: skip
-STORIES = {"compensate", "verify", "simulate", "diagnose", "stream"}
+STORIES = {"armstudy", "axisstudy", "compensate", "verify", "simulate", "diagnose", "stream"}
 FLOORS = (GROUND, ENGINES, JOINTS, STORIES)  # and the doors above
 APART = (ENGINES, STORIES)  # rooms of these floors do not import each other
 
