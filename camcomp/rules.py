@@ -137,7 +137,7 @@ RULES: dict[str, Rule] = {
     ),
     "CC126": Rule(
         "program without end",
-        "Millions of blocks were executed, or hundreds of thousands without a motion, or calls are nested a hundred "
+        "A million blocks were executed, or a hundred thousand without a motion, or calls are nested a hundred "
         "deep.",
         "check the condition of the loop",
     ),

@@ -6,6 +6,7 @@ from typing import NoReturn
 from camcomp.diagnostics import ProgramError
 from camcomp.gcode.codes import CANCELS, GROUPS_M, KNOWN_M, SAVES, code_name
 from camcomp.gcode.dialect import Dialect
+from camcomp.gcode.naming import named
 from camcomp.gcode.program import Rebase, Setup
 from camcomp.gcode.record import Recorder
 from camcomp.gcode.state import State
@@ -111,15 +112,15 @@ class BlockReader:
         group = self._groups.get(code)
         if group is None:
             known = f"{self.dialect.title} as camcomp knows it" if code in self.dialect.without else "camcomp"
-            self.refuse("CC106", f"{code_name(code)} is not a code that {known} has", word)
+            self.refuse("CC106", f"{named(code_name(code))} is not a code that {known} has", word)
         if group == 1 and group in block.groups and 800 in (code, block.groups[1][0]):
             # `G0 G80` ends a cycle and goes on with G0.
             if code != 800:
                 block.groups[1] = (code, word)
             return
         if group in block.groups:
-            other = code_name(block.groups[group][0])
-            self.refuse("CC105", f"{code_name(code)} and {other} exclude each other in one block", word)
+            other = named(code_name(block.groups[group][0]))
+            self.refuse("CC105", f"{named(code_name(code))} and {other} exclude each other in one block", word)
         block.groups[group] = (code, word)
 
     def _sort_m(self, block: Block, word: Word) -> None:
@@ -131,7 +132,7 @@ class BlockReader:
         group = GROUPS_M.get(code)
         for other, _ in block.m:
             if group is not None and GROUPS_M.get(other) == group:
-                self.refuse("CC105", f"M{code} and M{other} exclude each other in one block", word)
+                self.refuse("CC105", f"{named(f'M{code}')} and {named(f'M{other}')} exclude each other in one block", word)
         if code not in KNOWN_M:
             self.warn(f"M{code} is passed on; camcomp takes it not to move anything", once=True)
         block.m.append((code, word))

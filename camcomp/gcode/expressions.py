@@ -8,8 +8,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NoReturn
 
-from camcomp.diagnostics import ProgramError
-
 
 class ExpressionError(Exception):
     """Message and character at which an expression goes wrong; the reader knows the line."""
@@ -292,7 +290,10 @@ def evaluate(expression: Expression, memory: Memory, spelling: Spelling) -> floa
     if kind == "operator":
         left = evaluate(expression[2], memory, spelling)
         right = evaluate(expression[3], memory, spelling)
-        return _operate(expression[1], left, right, column, spelling)
+        result = _operate(expression[1], left, right, column, spelling)
+        if not math.isfinite(result):
+            raise ExpressionError(f"{expression[1]} has no value there", column)
+        return result
     try:
         if kind == "atan":
             y, x = evaluate(expression[1], memory, spelling), evaluate(expression[2], memory, spelling)
@@ -364,11 +365,14 @@ def _operate(symbol: str, a: float, b: float, column: int, spelling: Spelling) -
         rest = math.fmod(a, b)
         # LinuxCNC keeps the result of MOD positive.
         return rest + abs(b) if rest < 0.0 and spelling is RS274 else rest
-    except (ValueError, OverflowError):
+    except (ValueError, OverflowError, ZeroDivisionError):
         raise ExpressionError(f"{symbol} has no value there", column) from None
 
 
-def located(error: ExpressionError, text: object, row: int) -> ProgramError:
-    """The error with its place in the program."""
-    place = text.place(row, error.column)  # type: ignore[attr-defined]
-    return ProgramError("CC123", error.message, at=place)
+def parameters_of(expression: Expression) -> list[Expression]:
+    """What stands behind the sigil of every parameter in an expression, without columns."""
+    found = [expression[1][:2]] if expression[0] == "parameter" else []
+    for each in expression[1:-1]:
+        if isinstance(each, tuple):
+            found += parameters_of(each)
+    return found

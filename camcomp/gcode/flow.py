@@ -6,15 +6,15 @@ from typing import NoReturn
 from camcomp.diagnostics import ProgramError
 from camcomp.gcode.block import Block
 from camcomp.gcode.cycles import Cycles
-from camcomp.gcode.expressions import FANUC, Expression, ExpressionError
+from camcomp.gcode.expressions import FANUC, Expression, ExpressionError, parameters_of
 from camcomp.gcode.memory import Parameters
 from camcomp.gcode.siemens import read_siemens_line
 from camcomp.gcode.text import Text
 from camcomp.gcode.trace import Trace
 from camcomp.gcode.words import BLANK, Line, Word, code_of, read_line
 
-_MOST_BLOCKS = 5_000_000
-_MOST_IDLE = 200_000  # blocks executed without a motion, by a program that has loops
+_MOST_BLOCKS = 1_000_000  # executed by a program that has loops
+_MOST_IDLE = 100_000  # of them in a row that move nothing
 _INCREMENTAL_LETTERS = "XYZIJKRQ"
 
 
@@ -160,6 +160,9 @@ class Flow:
     def _scaled(self, row: int, line: Line, words: list[Word]) -> list[Word]:
         increment = self.reader.state.setup.increment_mm
         source = self.text.line(row)
+        # In inch, controls count in a tenth of the metric figure: 0.001 mm, 0.0001 inch.
+        stated = [word.value for word in words if word.letter == "G" and word.value in (20.0, 21.0)]
+        inch = stated[0] == 20.0 if stated else self.reader.state.unit != 1.0
         exact = {line.words[index].begin for index, _ in line.expressions}
         for index, word in enumerate(words):
             if word.letter not in _INCREMENTAL_LETTERS or word.begin in exact or word.value == 0.0:
@@ -170,8 +173,6 @@ class Flow:
                 self.reader.block.row = row
                 self.reader.warn("numbers without a point count as mm or inch, not as increments", once=True)
                 return words
-            # In inch, controls count in a tenth of the metric figure: 0.001 mm, 0.0001 inch.
-            inch = self.reader.state.unit != 1.0
             words = [*words]
             words[index] = word._replace(value=word.value * (increment / 10.0 if inch else increment))
         return words
@@ -191,4 +192,10 @@ class Siemens(Flow):
     """Sinumerik: another spelling of lines; jumps and loops are refused when they are read."""
 
     def _read(self, row: int) -> Line:
-        return read_siemens_line(self.text, row)
+        line = read_siemens_line(self.text, row)
+        values = [each.value for each in line.settings] + [value for _, value in line.expressions]
+        for each in line.settings:
+            # Whether `R1=2 R2=R1` takes the new value or the old one is nothing to guess.
+            if any(each.target[1][:2] == used for value in values for used in parameters_of(value)):
+                self.refuse(row, each.begin, "CC123", "a parameter is set and used in one block")
+        return line

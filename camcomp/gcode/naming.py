@@ -1,0 +1,40 @@
+"""What codes are called, from pygcode; the only place that imports it, and only when a message needs a name.
+
+pygcode knows RS274/NGC. It is asked for names and modal groups and for nothing else: it rounds what it writes and
+misreads numbers that are not quite as it expects.
+"""
+
+import warnings
+from functools import cache
+
+
+@cache
+def _class_of(word: str) -> type | None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        from pygcode import Word
+        from pygcode.exceptions import GCodeParameterError, GCodeWordStrError
+        from pygcode.gcodes import word_gcode_class
+    try:
+        return word_gcode_class(Word(word))
+    except (GCodeParameterError, GCodeWordStrError, ValueError):
+        return None
+
+
+def name_of(word: str) -> str:
+    """`arc move (clockwise)` of `G2`; empty for a code that pygcode does not know."""
+    found = _class_of(word)
+    text = (found.__doc__ or "").strip().splitlines() if found is not None else []
+    return text[0].rpartition(": ")[2].strip().lower() if text else ""
+
+
+def modal_group_of(word: str) -> int | None:
+    """Modal group of a code as pygcode has it, in the numbering of RS274/NGC; None: not modal, or not known."""
+    found = _class_of(word)
+    return getattr(found, "modal_group", None)
+
+
+def named(word: str) -> str:
+    """`G2 (arc move (clockwise))`, or the word alone."""
+    name = name_of(word)
+    return f"{word} ({name})" if name else word
