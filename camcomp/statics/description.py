@@ -8,7 +8,9 @@ a changed copy.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -125,7 +127,7 @@ class Robot:
         """Actuators in chain order; their order is that of every actuator array."""
         return tuple(e for c in self.chains for e in c.elements if isinstance(e, Actuator))
 
-    def edit(self, change: type[Element], by, chain: str | None = None) -> Robot:
+    def edit(self, change: type[Any], by: Callable[[Any], Element], chain: str | None = None) -> Robot:
         """Copy with every element of class `change` (of one chain, or of all) replaced by `by(element)`."""
         chains = tuple(
             replace(c, elements=tuple(by(e) if isinstance(e, change) else e for e in c.elements))
@@ -135,6 +137,6 @@ class Robot:
         )
         return replace(self, chains=chains)
 
-    def edit_chain(self, chain: str, **fields) -> Robot:
+    def edit_chain(self, chain: str, **fields: Any) -> Robot:
         """Copy with fields of one chain replaced."""
         return replace(self, chains=tuple(replace(c, **fields) if c.name == chain else c for c in self.chains))
