@@ -8,8 +8,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-
 from camcomp.course import Course
 from camcomp.datatypes import Floats
 from camcomp.gap.effect import Cause, Parameter

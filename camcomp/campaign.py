@@ -19,7 +19,7 @@ from camcomp.gap.observation import Measured
 from camcomp.gap.timeline import fit_to_log, schedule
 from camcomp.job import Job
 from camcomp.programs import open_program
-from camcomp.spec import Config, Experiment
+from camcomp.spec import Experiment
 from camcomp.spec import Run as RunSpec
 from camcomp.twin import Twin, twin_of
 
@@ -31,7 +31,7 @@ class Campaign:
     """An experiment ready for the bench. notes: what the reader should know about the logs."""
 
     experiment: Experiment
-    config: Config
+    job: Job
     twin: Twin
     runs: tuple[Run, ...]
     notes: tuple[str, ...]
@@ -41,26 +41,26 @@ def open_campaign(path: str | FilePath) -> Campaign:
     """Reads an experiment file with everything it names. Raises ConfigError, ProgramError, FileError, PhysicsError."""
     experiment = load_experiment(path)
     config = load_config(experiment.config)
-    twin = twin_of(Job(config))
+    job = Job(config)
+    twin = twin_of(job)
     notes: list[str] = []
-    runs = [open_run(spec, config, twin, notes) for spec in experiment.runs]
+    runs = [open_run(spec, job, twin, notes) for spec in experiment.runs]
     order = sorted(range(len(runs)), key=lambda k: experiment.runs[k].started_s)
     worn = 0.0
     for k in order:
         runs[k] = replace(runs[k], course=replace(runs[k].course, cut_before_min=worn, kept={}))
         worn += runs[k].course.cut_min
-    return Campaign(experiment, config, twin, tuple(runs), tuple(notes))
+    return Campaign(experiment, job, twin, tuple(runs), tuple(notes))
 
 
-def open_run(spec: RunSpec, config: Config, twin: Twin, notes: list[str]) -> Run:
+def open_run(spec: RunSpec, job: Job, twin: Twin, notes: list[str]) -> Run:
     """One run of an experiment."""
     measured = read_log(spec.log, twin)
     if spec.program is None:
         raise ConfigError("CC402", f"run '{spec.name}' has no program")
-    program = open_program(spec.program, config)
-    job = Job(config)
+    program = open_program(spec.program, job.config)
     conditions = job.conditions if spec.cutting else replace(job.conditions, model=None)
-    timeline = schedule(program.path, config.control.acceleration_mm_per_s2)
+    timeline = schedule(program.path, job.config.control.acceleration_mm_per_s2)
     fit = fit_to_log(timeline, measured.time, measured.line)
     track = lay_track(program.path, conditions)
     temperature = _filled(measured.time, measured.temperature)

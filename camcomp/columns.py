@@ -6,6 +6,7 @@ tolerance what every healthy machine has of it.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -23,6 +24,7 @@ RUN_OFFSET_N = 0.3
 CLOCK_JITTER_S = 1e-5
 CLOCK_RATE = 1e-5
 SPRING_LOG = 0.003  # one link's spring against its stated value
+_EDIT = 0.05  # step of the allowances' differences
 FORCE_TURN_RAD = 0.002  # direction of the cutting force in the plane of the work
 
 
@@ -160,21 +162,27 @@ def _allowances(bench: Bench) -> list[tuple[str, float, list[Floats], bool]]:
     """What is always a little wrong with any model and is no effect of the library: each chain's own springs."""
     found: list[tuple[str, float, list[Floats], bool]] = []
     edits: list[tuple[str, Callable[[Robot], Robot]]] = []
-    f = float(np.exp(0.05))
     for chain in bench.twin.robot.chains:
-        name = chain.name
         if any(isinstance(e, Link) for e in chain.elements):
-            edits.append((f"links.{name}", lambda robot, name=name: robot.edit(  # type: ignore[misc]
-                Link, lambda e: replace(e, stiffness=e.stiffness * f), name)))
+            edits.append((f"links.{chain.name}", partial(_stiffer_links, chain=chain.name)))
         if any(isinstance(e, Parallelogram) for e in chain.elements):
-            edits.append((f"bars.{name}", lambda robot, name=name: robot.edit(  # type: ignore[misc]
-                Parallelogram, lambda e: replace(e, bar_stiffness=e.bar_stiffness * f), name)))
+            edits.append((f"bars.{chain.name}", partial(_stiffer_bars, chain=chain.name)))
     if len(edits) <= 12:
         for label, edit in edits:
-            found.append((f"spring.{label}", SPRING_LOG, _difference(bench, _Edit(edit), 0.05), True))
+            found.append((f"spring.{label}", SPRING_LOG, _difference(bench, _Edit(edit), _EDIT), True))
     if any(np.abs(run.course.node_force).max(initial=0.0) > 0 for run in bench.runs):
-        found.append(("force.direction", FORCE_TURN_RAD, _difference(bench, _Turn(), 0.05), True))
+        found.append(("force.direction", FORCE_TURN_RAD, _difference(bench, _Turn(), _EDIT), True))
     return found
+
+
+def _stiffer_links(robot: Robot, chain: str) -> Robot:
+    f = float(np.exp(_EDIT))
+    return robot.edit(Link, lambda e: replace(e, stiffness=e.stiffness * f), chain)
+
+
+def _stiffer_bars(robot: Robot, chain: str) -> Robot:
+    f = float(np.exp(_EDIT))
+    return robot.edit(Parallelogram, lambda e: replace(e, bar_stiffness=e.bar_stiffness * f), chain)
 
 
 class _Edit:
@@ -190,12 +198,12 @@ class _Edit:
 
 
 class _Turn:
-    """The cutting force turned by 0.05 rad about machine z."""
+    """The cutting force turned by _EDIT rad about machine z."""
 
     PARAMETERS = ()
 
     def on_load(self, load: Load, motion: object, p: Mapping[str, float]) -> Load:
-        c, s = np.cos(0.05), np.sin(0.05)
+        c, s = np.cos(_EDIT), np.sin(_EDIT)
         return Load(load.force @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]), load.wrench)
 
 
@@ -212,7 +220,7 @@ def grounds(bench: Bench) -> list[Ground]:
     """What patterns are made of, per run, at the rows that are kept after thinning."""
     out = []
     for k, run in enumerate(bench.runs):
-        reading, place = bench.nominal[k], run.course.place(run.course.time)
+        reading = bench.nominal[k]
         keep = _middle_rows(run)
         tip = reading.tip
         velocity = np.gradient(tip, run.course.time, axis=0) if run.course.ordered and len(tip) > 2 else np.zeros_like(tip)
@@ -223,8 +231,7 @@ def grounds(bench: Bench) -> list[Ground]:
             temperature=None if motion.temperature is None else motion.temperature[keep],
         )
         present = {n: run.measured.has(n) for n in ("tip", "encoder", "drive", "dyno")}
-        slope = bench.twin.rotation.T @ place.of(bench.slopes[k].tip_rho)
-        out.append(Ground(motion, slope[keep], reading.drive[keep], reading.dyno[keep], tip[keep], velocity[keep], present))
+        out.append(Ground(motion, reading.drive[keep], reading.dyno[keep], tip[keep], velocity[keep], present))
     return out
 
 
@@ -233,6 +240,6 @@ def _middle_rows(run: Run) -> np.ndarray:
     return np.arange(n) * run.thin + run.thin // 2
 
 
-def patterns(bench: Bench) -> Dictionary:
-    """Generic patterns for all runs."""
-    return dictionary(grounds(bench), bench.actuators, 6 + 2 * len(bench.actuators))
+def patterns(bench: Bench) -> list[Dictionary]:
+    """Generic patterns for all runs, by kind of channel."""
+    return dictionary(grounds(bench), bench.actuators)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from camcomp.bench import Bench, Run, thinned
-from camcomp.columns import atoms_of
+from camcomp.columns import RUN_OFFSET_MM, atoms_of
 from camcomp.datatypes import Floats
 from camcomp.gap import where
 from camcomp.gap.effect import Cause
@@ -20,12 +20,10 @@ from camcomp.gap.search import Fitted, total
 from camcomp.gap.shrink import shrinkage
 from camcomp.gap.whiten import effective_rows
 from camcomp.inquiry import Inquiry, open_inquiry
+from camcomp.job import Job
+from camcomp.planner import Proposal, propose
 from camcomp.survey import Survey, leftover, survey
 from camcomp.twin import Twin
-
-UNKNOWN_LOG10 = -6.0  # chance below which a leftover is no accident
-UNKNOWN_RMS = 0.35  # size of a leftover, in units of the noise, below which no model error is called a cause
-UNKNOWN_SHARE = 0.10  # share of the explained gap that a leftover has to exceed: causes are never modelled perfectly
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,9 +33,12 @@ class Diagnosis:
     result: dict[str, Any]
     inquiry: Inquiry
     survey: Survey
+    proposal: Proposal | None
 
 
-def diagnose(twin: Twin, runs: Sequence[Run], *, holdout: Sequence[str] = (), without: Sequence[str] = ()) -> Diagnosis:
+def diagnose(
+    job: Job, twin: Twin, runs: Sequence[Run], *, holdout: Sequence[str] = (), without: Sequence[str] = ()
+) -> Diagnosis:
     """The diagnosis of an experiment; `without` names effects that the library is to do without."""
     used = [run for run in runs if run.name not in holdout] or list(runs)
     bench = Bench(twin, used)
@@ -45,7 +46,7 @@ def diagnose(twin: Twin, runs: Sequence[Run], *, holdout: Sequence[str] = (), wi
     found = survey(inquiry)
     best = found.fits[found.verdict.best]
     gap = gap_of(inquiry)
-    strange = unknown(inquiry, best, found)
+    strange = found.strange
     word = "unknown" if strange else found.verdict.word
     causes = _causes(inquiry, found, strange)
     result: dict[str, Any] = {
@@ -57,7 +58,28 @@ def diagnose(twin: Twin, runs: Sequence[Run], *, holdout: Sequence[str] = (), wi
         "shrinkage": _shrinkage(twin, runs, holdout, inquiry, best),
         "next_experiment": None,
     }
-    return Diagnosis(result, inquiry, found)
+    proposal = _next(inquiry, found, word, job)
+    if proposal is not None:
+        result["next_experiment"] = {
+            "action": proposal.candidate.action,
+            "separates": list(proposal.separates),
+            "gain": round(proposal.gain, 4),
+        }
+    return Diagnosis(result, inquiry, found, proposal)
+
+
+def _next(inquiry: Inquiry, found: Survey, word: str, job: Job) -> Proposal | None:
+    """What separates the answer from its rivals: those that explain alike, or else those that are not yet excluded."""
+    if word == "none":
+        return None
+    best = found.verdict.best
+    close = [best, *found.verdict.rivals]
+    if len(close) == 1:
+        close += [j for j in np.argsort(-found.probability) if j != best and found.probability[j] > 0.02][:3]
+    p = found.probability[close]
+    if found.verdict.rivals:
+        p = np.maximum(p, 0.1 * p.max())  # alike by construction: their prior is no reason to leave them untested
+    return propose(inquiry, [found.fits[j] for j in close], p / p.sum(), job)
 
 
 # -- the gap ----------------------------------------------------------------------------------------------------------
@@ -78,7 +100,8 @@ def gap_of(inquiry: Inquiry) -> dict[str, float]:
     gaps = [inquiry.bench.gap(k)[:, part] for k in range(len(inquiry.residuals))]
     size = np.concatenate([np.sqrt(np.sum(gap**2, axis=1)) for gap in gaps])
     size = size[np.isfinite(size)] * 1e3
-    noise = np.sqrt(np.nansum(np.nanmean(inquiry.noise.sigma[:, part] ** 2, axis=0))) * 1e3
+    repeats = RUN_OFFSET_MM if part.start == 0 else 0.0  # what one run differs from the next belongs to the floor
+    noise = np.sqrt(np.nansum(np.nanmean(inquiry.noise.sigma[:, part] ** 2, axis=0) + repeats**2)) * 1e3
     return {
         "rms_um": round(float(np.sqrt(np.mean(size**2))), 3),
         "p95_um": round(float(np.quantile(size, 0.95)), 3),
@@ -107,22 +130,6 @@ def _run_gaps(inquiry: Inquiry) -> list[where.RunGap]:
 
 
 # -- causes -----------------------------------------------------------------------------------------------------------
-
-
-def unknown(inquiry: Inquiry, best: Fitted, found: Survey) -> bool:
-    """Whether what the best causes leave is an effect that the library does not have."""
-    left = found.leftover
-    explained = signal_rms(inquiry, best)
-    return left.log10_chance < UNKNOWN_LOG10 and left.rms > max(UNKNOWN_RMS, UNKNOWN_SHARE * explained)
-
-
-def signal_rms(inquiry: Inquiry, f: Fitted) -> float:
-    """Size of what the members explain, in units of the noise, pooled over white rows."""
-    if not f.members:
-        return 0.0
-    index = inquiry.member_columns(f.members)
-    energy = float(f.theta @ total(f.grams).A[np.ix_(index, index)] @ f.theta)
-    return float(np.sqrt(max(energy, 0.0) / total(f.grams).rows))
 
 
 def _energies(inquiry: Inquiry, f: Fitted) -> list[float]:
@@ -284,4 +291,4 @@ def _theta_without(inquiry: Inquiry, f: Fitted, k: int) -> Floats:
         return f.theta
     index = inquiry.member_columns(f.members)
     rest = total(f.grams) - f.grams[k]
-    return inquiry._bounded(f.members, estimate(rest, inquiry.prior, index)[0][index])
+    return inquiry._bounded(f.members, estimate(rest, inquiry.prior, index, f.factor)[0][index])

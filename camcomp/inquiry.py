@@ -1,7 +1,7 @@
 """The state of one diagnosis: columns, white rows, and re-fits of sets of causes through the twin."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -26,13 +26,13 @@ class Inquiry:
 
     bench: Bench
     columns: Columns
-    dictionary: Dictionary
+    dictionaries: list[Dictionary]
     inflate: list[Floats]
     times: list[Floats]
     residuals: list[Floats]
     noise: Noise
     white: list[Floats]  # per run (w, k)
-    white_patterns: list[Floats]
+    white_patterns: list[list[Floats]]  # per run, per kind (rows of the kind, p)
     white_residual: list[Floats]
     shapes: dict[int, dict[str, float]]
     atoms: Atoms
@@ -75,7 +75,8 @@ class Inquiry:
         index = self.member_columns(members)
         grams = self.base_grams
         if not members:
-            return Fitted((), np.zeros(0), np.zeros((0, 0)), Scale(total(grams), self.prior, self.atoms)(()), 0.0, grams)
+            scale = Scale(total(grams), self.prior, self.atoms)
+            return Fitted((), np.zeros(0), np.zeros((0, 0)), scale(()), grams, {}, scale.factor(()))
         if theta is None:
             theta = estimate(total(grams), self.prior, index)[0][index]
         theta = self._bounded(members, theta)
@@ -113,8 +114,11 @@ class Inquiry:
             size = float(change @ np.linalg.solve(covariance + 1e-18 * np.eye(len(index)), change))
             if size < 0.05 and step > 0:
                 break
-        evidence = Scale(total(grams), self.prior, self.atoms)(members)
-        return Fitted(members, theta, covariance, evidence, 0.0, grams, shapes)
+        scale = Scale(total(grams), self.prior, self.atoms)
+        factor = scale.factor(members)
+        mean, full = estimate(total(grams), self.prior, index, factor)
+        theta, covariance = self._bounded(members, mean[index]), full[np.ix_(index, index)]
+        return Fitted(members, theta, covariance, scale(members), grams, shapes, factor)
 
     def _straight(self, now: Sequence[Floats], index: Sequence[int], theta: Floats) -> bool:
         """Whether the columns at nominal predict the residuals at theta to well within the noise."""
@@ -138,7 +142,9 @@ class Inquiry:
         """Columns of the members' parameters at theta, then those of their shapes; per run (n, c)."""
         here = self.causes(members, theta, shapes)
         base = [self.bench.channels(self.bench.read(k, here)) for k in range(len(self.bench.runs))]
-        out, extra, at = [], [], 0
+        out: list[list[Floats]] = []
+        extra: list[list[Floats]] = []
+        at = 0
         for who, i in enumerate(members):
             atom = self.columns.atoms[i]
             own = {p.name: float(theta[at + j]) * p.scale for j, p in enumerate(atom.parameters)}
@@ -231,15 +237,15 @@ def open_inquiry(bench: Bench, atoms: Sequence[Atom]) -> Inquiry:
     return inquiry
 
 
-def _whiten(bench: Bench, columns: Columns, words: Dictionary, inflate: list[Floats], times: list[Floats],
+def _whiten(bench: Bench, columns: Columns, words: list[Dictionary], inflate: list[Floats], times: list[Floats],
             residuals: list[Floats], noise: Noise, shapes: dict[int, dict[str, float]]) -> Inquiry:  # fmt: skip
     white, white_patterns, white_residual = [], [], []
     for k in range(len(bench.runs)):
         present = np.isfinite(inflate[k])
-        clean = lambda block, mask=present: np.where(mask[:, :, None], block, 0.0)  # noqa: E731
+        clean = lambda block, mask=present: np.where(mask[:, :, None], block, 0.0)
         white.append(noise.rows(k, clean(columns.blocks[k]), inflate[k], times[k]))
-        white_patterns.append(noise.rows(k, clean(words.blocks[k]), inflate[k], times[k]))
-        white_residual.append(noise.rows(k, clean(residuals[k][:, :, None]), inflate[k], times[k])[:, 0])
+        white_patterns.append([noise.rows(k, w.blocks[k], inflate[k], times[k], w.first) for w in words])
+        white_residual.append(noise.rows(k, residuals[k][:, :, None], inflate[k], times[k])[:, 0])
     return Inquiry(bench, columns, words, inflate, times, residuals, noise, white, white_patterns, white_residual,
                    shapes, atoms_prior(columns))  # fmt: skip
 
@@ -262,12 +268,12 @@ def atoms_prior(columns: Columns) -> Atoms:
 
 
 def measure_noise(
-    bench: Bench, columns: Columns, words: Dictionary, extra: Sequence[Floats], times: Sequence[Floats],
+    bench: Bench, columns: Columns, dictionaries: Sequence[Dictionary], extra: Sequence[Floats], times: Sequence[Floats],
     residuals: Sequence[Floats], start: Noise | None = None,
 ) -> tuple[Noise, list[Floats]]:  # fmt: skip
     """Noise beside everything that could be there: all effects, nuisances and patterns at once, softly."""
     runs = range(len(bench.runs))
-    k, p = len(columns.names), len(words.labels)
+    k, p = len(columns.names), sum(len(words.labels) for words in dictionaries)
     first = [_differences(residuals[r], times[r]) for r in runs]
     sigma = np.array(first)
     ordered = [run.course.ordered for run in bench.runs]
@@ -275,27 +281,57 @@ def measure_noise(
         np.where(columns.atom >= 0, 1.0 / 9.0, columns.prior.precision(1.0) / 9.0), np.full(p, 1.0 / PATTERN_SCALE**2)
     ])  # fmt: skip
     noise = start or Noise(np.zeros((sigma.shape[1], 3)), sigma, np.ones(sigma.shape[1]))
-    everything = [np.concatenate([columns.blocks[r], words.blocks[r], residuals[r][:, :, None]], axis=2) for r in runs]
+    both = [np.concatenate([columns.blocks[r], residuals[r][:, :, None]], axis=2) for r in runs]
     for r in runs:
-        everything[r][~np.isfinite(residuals[r])] = 0.0
+        both[r][~np.isfinite(residuals[r])] = 0.0
     inflate: list[Floats] = []
     for _ in range(1 if start else 2):
         inflate = [np.sqrt(1.0 + (extra[r] / noise.sigma[r]) ** 2) for r in runs]
+        # columns first, then patterns kind by kind, residual last; patterns of two kinds share no row
         A = np.zeros((k + p + 1, k + p + 1))
-        for r in runs:
-            D = noise.rows(r, everything[r], inflate[r], times[r])
-            A += D.T @ D
+        at = k
+        for words in dictionaries:
+            index = np.concatenate([np.arange(k), np.arange(at, at + len(words.labels)), [k + p]])
+            part = slice(words.first, words.first + words.blocks[0].shape[1])
+            for r in runs:
+                block = np.concatenate([both[r][:, part, :-1], words.blocks[r], both[r][:, part, -1:]], axis=2)
+                D = noise.rows(r, block, inflate[r], times[r], words.first)
+                A[np.ix_(index, index)] += D.T @ D
+            at += len(words.labels)
         M = A[:-1, :-1] + np.diag(precision)
         size = 1.0 / np.sqrt(np.diag(M))
         half = np.linalg.cholesky(size[:, None] * M * size + 1e-10 * np.eye(len(size)))
         a = size * np.linalg.solve(half.T, np.linalg.solve(half, size * A[:-1, -1]))
         left = []
         for r in runs:
-            gap = everything[r][:, :, -1] - everything[r][:, :, :-1] @ a
+            gap = both[r][:, :, -1] - both[r][:, :, :-1] @ a[:k]
+            at = k
+            for words in dictionaries:
+                part = slice(words.first, words.first + words.blocks[r].shape[1])
+                gap[:, part] -= words.blocks[r] @ a[at : at + len(words.labels)]
+                at += len(words.labels)
             left.append(np.where(np.isfinite(residuals[r]), gap, np.nan))
         noise = fit_noise(left, inflate, list(times), ordered)
+        noise = replace(noise, sigma=noise.sigma * _spent(A, M, size, half, k, dictionaries, residuals))
     inflate = [np.sqrt(1.0 + (extra[r] / noise.sigma[r]) ** 2) for r in runs]
     return noise, inflate
+
+
+def _spent(
+    A: Floats, M: Floats, size: Floats, half: Floats, k: int, dictionaries: Sequence[Dictionary], residuals: Sequence[Floats]
+) -> Floats:
+    """By how much (c,) the leftover of a fit is too small for the noise: patterns have followed the noise, too."""
+    shrink = np.linalg.solve(half, size[:, None] * A[:-1, :-1])
+    used = np.einsum("ij,ij->j", np.linalg.solve(half, np.diag(size)), shrink)  # diagonal of M^-1 A
+    out = np.ones(residuals[0].shape[1])
+    at = k
+    for words in dictionaries:
+        part = slice(words.first, words.first + words.blocks[0].shape[1])
+        rows = sum(int(np.isfinite(r[:, part]).sum()) for r in residuals)
+        spent = float(used[at : at + len(words.labels)].sum())
+        out[part] = 1.0 / np.sqrt(max(1.0 - spent / max(rows, 1), 0.3))
+        at += len(words.labels)
+    return out
 
 
 def _differences(residual: Floats, time: Floats) -> Floats:

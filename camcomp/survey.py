@@ -1,18 +1,23 @@
 """The search for causes on one inquiry: which sets are tried, in which order, and how they are ranked."""
 
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 
 from camcomp.datatypes import Floats
 from camcomp.gap.evidence import Gram, estimate
-from camcomp.gap.leftover import Leftover, score_test
+from camcomp.gap.leftover import Leftover, Projected, project, score_test, unknown_evidence
 from camcomp.gap.search import Fitted, Members, Scale, extensions, pairs, predictive, probabilities, total
 from camcomp.gap.verdict import Verdict, judge
 from camcomp.inquiry import Inquiry
 
 SINGLES, PAIRS, TRIPLES = 6, 6, 3
 TEMPERATURE = 1.5  # what evidence is divided by before it becomes a probability; calibrated on the truth plants
+UNKNOWN_LOG10 = -6.0  # chance below which a leftover is no accident
+UNKNOWN_RMS = 0.35  # size of a leftover, in units of the noise, below which no model error is called a cause
+UNKNOWN_SHARE = 0.10  # share of what is explained that a leftover has to exceed: no cause is modelled perfectly
+NUISANCE_RMS = 0.25  # size of a cause, in units of the noise of the channel that shows it best, below which it is none
 SAME_FIT = 4.0  # chi-square by which two sets may differ and still be the same answer
 
 
@@ -24,6 +29,8 @@ class Survey:
     probability: Floats
     verdict: Verdict
     leftover: Leftover
+    strange: bool  # what is left is an effect that the library does not have
+    explained: float  # size of what the best set explains, in units of the noise
 
 
 def survey(inquiry: Inquiry) -> Survey:
@@ -64,17 +71,70 @@ def survey(inquiry: Inquiry) -> Survey:
         found += [(v, m, f) for v, m in extensions(scale, f.members, every)[:3]]
     _fit_best(found, fit, TRIPLES, max(value(f) for f in done.values()))
     fits = tuple(sorted(done.values(), key=value, reverse=True))
+    fits = tuple(f for f in fits if _matters(inquiry, f))
     probability = probabilities(fits, inquiry.atoms, TEMPERATURE)
     fits, probability = _prune(inquiry, fits, probability)
     same = _same(inquiry, fits, probability)
     verdict = judge(fits, probability, same)
-    return Survey(fits, probability, verdict, leftover(inquiry, fits[verdict.best]))
+    best = fits[verdict.best]
+    left, size = leftover(inquiry, best), signal_rms(inquiry, best)
+    strange = left.log10_chance < UNKNOWN_LOG10 and left.rms > max(UNKNOWN_RMS, UNKNOWN_SHARE * size)
+    if strange:
+        members = _known_part(inquiry, best)
+        if members != best.members:
+            best = fit(members)
+            fits, probability = (best, *(f for f in fits if f is not best)), np.concatenate([[1.0], np.zeros(len(fits) - (best in fits))])
+            verdict = Verdict("identified", 0, (), {i: 1.0 for i in members})
+            left, size = leftover(inquiry, best), signal_rms(inquiry, best)
+    return Survey(fits, probability, verdict, left, strange, size)
+
+
+def _known_part(inquiry: Inquiry, best: Fitted) -> Members:
+    """The members of the best set that are still causes when an unknown effect may take their place."""
+    white, residual = about(inquiry, best)
+    data = total(inquiry.grams(residual, white))
+    scale = Scale(data, inquiry.prior, inquiry.atoms)
+    found = []
+    for count in range(len(best.members) + 1):
+        for members in combinations(best.members, count):
+            evidence = unknown_evidence(_projected(inquiry, white, residual, members, best.factor))
+            value = max(evidence.values(), default=0.0) + scale(members) + inquiry.atoms.prior(members)
+            found.append((value, members))
+    return max(found)[1]
+
+
+def signal_rms(inquiry: Inquiry, f: Fitted) -> float:
+    """Size of what the members explain, in units of the noise, pooled over white rows."""
+    if not f.members:
+        return 0.0
+    index, data = inquiry.member_columns(f.members), total(f.grams)
+    energy = float(f.theta @ data.A[np.ix_(index, index)] @ f.theta)
+    return float(np.sqrt(max(energy, 0.0) / data.rows))
 
 
 def visible(inquiry: Inquiry, i: int) -> bool:
     """Whether an effect of three scales would show at all in the channels present."""
     energy = sum(float((W[:, list(inquiry.atoms.columns[i])] ** 2).sum()) for W in inquiry.white)
     return energy * 9.0 > 1.0
+
+
+def _matters(inquiry: Inquiry, f: Fitted) -> bool:
+    """Whether every member shows in some kind of channel by more than what is always a little wrong."""
+    at = 0
+    for i in f.members:
+        index = list(inquiry.atoms.columns[i])
+        theta, at = f.theta[at : at + len(index)], at + len(index)
+        largest = 0.0
+        for kind in range(len(inquiry.dictionaries)):
+            energy = rows = 0.0
+            for W, parts in zip(inquiry.white, inquiry.white_patterns, strict=True):
+                first = sum(len(each) for each in parts[:kind])
+                signal = W[first : first + len(parts[kind]), index] @ theta
+                energy, rows = energy + float(signal @ signal), rows + len(signal)
+            largest = max(largest, energy / max(rows, 1.0))
+        if largest < NUISANCE_RMS**2:
+            return False
+    return True
 
 
 def _same_name(inquiry: Inquiry, members: Members, every: list[int]) -> list[Members]:
@@ -125,7 +185,7 @@ def misfit(inquiry: Inquiry, f: Fitted) -> float:
     """Chi-square left when the members are free and everything else stays within tolerance, penalties included."""
     data: Gram = total(f.grams)
     index = inquiry.member_columns(f.members)
-    mean, _ = estimate(data, inquiry.prior, index)
+    mean, _ = estimate(data, inquiry.prior, index, 1.0)
     return data.c - float(data.b @ mean)
 
 
@@ -134,13 +194,16 @@ def _plausible(inquiry: Inquiry, f: Fitted) -> bool:
     return all(abs(t) < 8.0 and (p.sign == 0 or t > 0) for t, p in zip(f.theta, parameters, strict=True))
 
 
+def _projected(inquiry: Inquiry, white: list[Floats], residual: list[Floats], members: Members, factor: float) -> Projected:
+    return project(
+        white, inquiry.white_patterns, residual, [w.labels for w in inquiry.dictionaries],
+        [w.kind for w in inquiry.dictionaries], inquiry.prior, inquiry.member_columns(members), max(factor, 1.0),
+    )  # fmt: skip
+
+
 def leftover(inquiry: Inquiry, f: Fitted) -> Leftover:
-    """Score test on what the set leaves, about its own fit."""
-    index = inquiry.member_columns(f.members)
-    white, residual = about(inquiry, f)
-    return score_test(
-        white, inquiry.white_patterns, residual, inquiry.dictionary.labels, inquiry.dictionary.kind, inquiry.prior, index
-    )
+    """Score test on what the set leaves."""
+    return score_test(_projected(inquiry, *about(inquiry, f), f.members, f.factor))
 
 
 def about(inquiry: Inquiry, f: Fitted) -> tuple[list[Floats], list[Floats]]:

@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from camcomp.course import Course, travel_direction
 from camcomp.datatypes import Floats
 from camcomp.diagnostics import PhysicsError
-from camcomp.course import Course, travel_direction
 from camcomp.gap.effect import Cause, Load, Motion
 from camcomp.gap.pieces import Places
 from camcomp.job import Job

@@ -20,7 +20,7 @@ def diagnose_experiment(path: str | Path, without: Sequence[str] = ()) -> dict[s
     if (study := study_of(path, without)) is not None:
         return study
     campaign = open_campaign(path)
-    return diagnose(campaign.twin, campaign.runs, holdout=campaign.experiment.holdout, without=without).result
+    return diagnose(campaign.job, campaign.twin, campaign.runs, holdout=campaign.experiment.holdout, without=without).result
 
 
 @click.command()

@@ -20,7 +20,7 @@ from camcomp.datatypes import Floats, Ints
 
 WIDTHS = np.array([0.1, 0.3, 1.0, 3.0])
 _WEIGHTS = np.log([0.15, 0.3, 0.35, 0.2])
-TOLERANCES = (0.5, 1.0, 2.0, 4.0)  # by how much the tolerances may be off, all together
+TOLERANCES = (0.2, 0.5, 1.0, 2.0, 4.0)  # by how much the tolerances may be off, all together
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +47,8 @@ def gram(D: Floats, r: Floats) -> Gram:
 @dataclass(frozen=True, eq=False)
 class Prior:
     """For every column (k,): tolerance = narrow size (inf = free nuisance), scale = wide size, sign; flexible (k,) bool
-    = its tolerance is one of those that may be off together."""
+    = its tolerance is one of those that may be off together.
+    """
 
     tolerance: Floats
     scale: Floats

@@ -9,33 +9,38 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.polynomial import legendre
 
 from camcomp.datatypes import Floats
 from camcomp.gap.effect import Motion
 
-_DEGREES = 5
+_KNOTS = 12  # hats along the travel of an actuator
+_PLACES = 20  # hats along an axis of the workpiece: a bump of a tenth of the travel is still seen
 _RELAX_MM = (0.5, 3.0)
+KINDS = ("tip", "encoder", "drive", "dyno")
 
 
 @dataclass(frozen=True, eq=False)
 class Ground:
-    """What patterns of one run are made of: rows (n), slopes of the tip by carriage (n, 3, m), model drive force (n, m),
-    model force (n, 3), tip path (n, 3) program frame and its rate (n, 3) mm/s, present: channels that were measured."""
+    """What patterns of one run are made of: motion at its rows (n), model drive force (n, m), model force (n, 3), rate of
+    the tip (n, 3) mm/s in the program frame, and which channels were measured.
+    """
 
     motion: Motion
-    slope: Floats
     drive: Floats
     force: Floats
-    tip: Floats
+    tip: Floats  # (n, 3) mm, program frame
     velocity: Floats
     present: dict[str, bool]
 
 
-def _bounds(values: Sequence[Floats]) -> tuple[Floats, Floats]:
-    everything = np.concatenate(values)
-    low, high = everything.min(axis=0), everything.max(axis=0)
-    return low, np.maximum(high - low, 1e-9)
+@dataclass(frozen=True, eq=False)
+class Dictionary:
+    """Patterns of one kind of channel. labels (p,): covariate; blocks: per run (n, c, p), c channels from `first` on."""
+
+    kind: str
+    first: int
+    labels: tuple[str, ...]
+    blocks: tuple[Floats, ...]
 
 
 def _reversal(motion: Motion, length: float, j: int) -> Floats:
@@ -48,101 +53,147 @@ def _reversal(motion: Motion, length: float, j: int) -> Floats:
         return np.where(np.isfinite(last), 2.0 * np.exp(-(travelled - last) / length) * sign, 0.0)
 
 
-def covariates(grounds: Sequence[Ground], actuators: Sequence[str]) -> dict[str, list[list[Floats]]]:
-    """Per covariate label: per run: functions (n,), of size about one, that depend on it."""
-    low, span = _bounds([g.motion.encoder for g in grounds])
-    fast = np.maximum(np.max([np.abs(g.motion.speed).max(axis=0) for g in grounds], axis=0), 1e-9)
-    strong = np.maximum(np.max([np.abs(g.drive).max(axis=0) for g in grounds], axis=0), 1e-9)
+@dataclass(frozen=True, eq=False)
+class _Sizes:
+    """What makes covariates dimensionless, over all runs."""
+
+    low: Floats
+    span: Floats
+    fast: Floats
+    strong: Floats
+    start: float
+    length: float
+
+
+def _sizes(grounds: Sequence[Ground]) -> _Sizes:
+    position = np.concatenate([g.motion.encoder for g in grounds])
+    low = position.min(axis=0)
     start = min(float(g.motion.common.min()) for g in grounds)
-    length = max(max(float(g.motion.common.max()) for g in grounds) - start, 1e-9)
-    out: dict[str, list[list[Floats]]] = {}
+    return _Sizes(
+        low,
+        np.maximum(position.max(axis=0) - low, 1e-9),
+        np.maximum(np.max([np.abs(g.motion.speed).max(axis=0) for g in grounds], axis=0), 1e-9),
+        np.maximum(np.max([np.abs(g.drive).max(axis=0) for g in grounds], axis=0), 1e-9),
+        start,
+        max(max(float(g.motion.common.max()) for g in grounds) - start, 1e-9),
+    )
 
-    def put(label: str, functions: Sequence[Floats]) -> None:
-        out.setdefault(label, []).append(list(functions))
 
-    for g in grounds:
-        m = g.motion
-        t = 2.0 * (m.common - start) / length - 1.0
-        for j, a in enumerate(actuators):
-            x = 2.0 * (m.encoder[:, j] - low[j]) / span[j] - 1.0
-            put(f"position:{a}", [legendre.legval(x, np.eye(_DEGREES + 1)[d]) for d in range(_DEGREES + 1)])
-            v = m.speed[:, j] / fast[j]
-            put(f"velocity:{a}", [v, v * np.abs(v), np.abs(v)])
-            put(f"reversal:{a}", [m.direction[:, j], *(_reversal(m, each, j) for each in _RELAX_MM)])
-            d = g.drive[:, j] / strong[j]
-            put(f"force:{a}", [d, d * np.abs(d)])
-            put(f"time:{a}", [np.ones_like(t), t, 0.5 * (3 * t**2 - 1)])
-            if m.ordered and len(m.time) > 2:
-                acceleration = np.gradient(m.speed[:, j], m.time)
-                put(f"acceleration:{a}", [acceleration / max(np.abs(acceleration).max(), 1e-9)])
-            if m.temperature is not None:
-                put(f"temperature:{a}", [(m.temperature - 20.0) / 10.0])
+def _of_actuator(g: Ground, size: _Sizes, j: int, knots: int) -> dict[str, list[Floats]]:
+    """Functions (n,) of about size one of what actuator j does, by covariate."""
+    m = g.motion
+    x = (m.encoder[:, j] - size.low[j]) / size.span[j]
+    v = m.speed[:, j] / size.fast[j]
+    d = g.drive[:, j] / size.strong[j]
+    out = {
+        "position": hats(x, knots),
+        "velocity": [v, v * np.abs(v), np.abs(v)],
+        "reversal": [m.direction[:, j], *(_reversal(m, each, j) for each in _RELAX_MM)],
+        "force": [d, d * np.abs(d)],
+    }
+    if m.ordered and len(m.time) > 2:
+        push = np.gradient(m.speed[:, j], m.time)
+        out["acceleration"] = [push / max(float(np.abs(push).max()), 1e-9)]
     return out
 
 
-def directions(ground: Ground) -> list[Floats]:
+def hats(x: Floats, knots: int) -> list[Floats]:
+    """Piecewise linear functions (n,) that are 1 at one knot and 0 at the others, for x (n,) in 0 .. 1."""
+    return [np.maximum(1.0 - np.abs(x * (knots - 1) - n), 0.0) for n in range(knots)]
+
+
+def _of_time(g: Ground, size: _Sizes) -> dict[str, list[Floats]]:
+    t = 2.0 * (g.motion.common - size.start) / size.length - 1.0
+    own = g.motion.time - g.motion.time[0]
+    u = 2.0 * own / max(float(own[-1]), 1e-9) - 1.0
+    out = {"time": [np.ones_like(t), t, 0.5 * (3 * t**2 - 1), u, 0.5 * (3 * u**2 - 1)]}
+    if g.motion.temperature is not None:
+        out["temperature"] = [(g.motion.temperature - 20.0) / 10.0]
+    return out
+
+
+def _of_direction(g: Ground) -> list[Floats]:
     """Functions (n,) of the feed direction in the plane of the workpiece."""
-    speed = np.linalg.norm(ground.velocity, axis=1)
-    moving = speed > 1e-3 * max(speed.max(), 1e-9)
-    angle = np.arctan2(ground.velocity[:, 1], ground.velocity[:, 0])
+    speed = np.linalg.norm(g.velocity, axis=1)
+    moving = speed > 1e-3 * max(float(speed.max()), 1e-9)
+    angle = np.arctan2(g.velocity[:, 1], g.velocity[:, 0])
     return [np.where(moving, f(k * angle), 0.0) for k in (1, 2) for f in (np.cos, np.sin)]
 
 
-@dataclass(frozen=True, eq=False)
-class Dictionary:
-    """labels (p,): covariate of every pattern; kind (p,): channel it moves; blocks: per run (n, c, p), unit size."""
+class _Store:
+    """Collects patterns of one kind; those that are zero in every run are left out."""
 
-    labels: tuple[str, ...]
-    kind: tuple[str, ...]
-    blocks: tuple[Floats, ...]
+    def __init__(self, kind: str, first: int, width: int, runs: int) -> None:
+        self.kind, self.first, self.width = kind, first, width
+        self.labels: list[str] = []
+        self.columns: list[list[Floats]] = [[] for _ in range(runs)]
 
-
-def dictionary(grounds: Sequence[Ground], actuators: Sequence[str], channels: int) -> Dictionary:
-    """All patterns of the channels that were measured, in mm and N (1 um, 1 N each)."""
-    m = len(actuators)
-    parts = covariates(grounds, actuators)
-    labels: list[str] = []
-    kinds: list[str] = []
-    columns: list[list[Floats]] = [[] for _ in grounds]
-
-    def add(label: str, kind: str, values: Sequence[Floats]) -> None:
-        if max(float(np.abs(v).max(initial=0.0)) for v in values) == 0.0:
+    def put(self, label: str, channel: int, per_run: Sequence[Floats], size: float) -> None:
+        if max(float(np.abs(v).max(initial=0.0)) for v in per_run) < 1e-12:
             return
-        labels.append(label)
-        kinds.append(kind)
-        for store, value in zip(columns, values, strict=True):
-            store.append(value)
+        self.labels.append(label)
+        for store, values in zip(self.columns, per_run, strict=True):
+            column = np.zeros((len(values), self.width))
+            column[:, channel] = size * values
+            store.append(column)
 
-    any_of = {name: any(g.present[name] for g in grounds) for name in grounds[0].present}
-    for label, per_run in parts.items():
-        j = list(actuators).index(label.split(":")[1])
-        for i in range(len(per_run[0])):
-            f = [functions[i] for functions in per_run]
-            if any_of["tip"]:
-                add(label, "tip", [_tip(g.slope[:, :, j] * v[:, None] * 1e-3, channels) for g, v in zip(grounds, f, strict=True)])
-            if any_of["encoder"] and not label.startswith("force"):
-                add(label, "encoder", [_one(v * 1e-3, 3 + j, channels) for v in f])
-            if any_of["drive"]:
-                add(label, "drive", [_one(v, 3 + m + j, channels) for v in f])
+    def done(self) -> Dictionary:
+        blocks = tuple(np.stack(c, axis=2) if c else np.zeros((0, self.width, 0)) for c in self.columns)
+        return Dictionary(self.kind, self.first, tuple(self.labels), blocks)
+
+
+def dictionary(grounds: Sequence[Ground], actuators: Sequence[str]) -> list[Dictionary]:
+    """All patterns of the channels that were measured; unit size is 1 um or 1 N."""
+    size, m = _sizes(grounds), len(actuators)
+    rows = sum(len(g.tip) for g in grounds)
+    knots_of, places_of = (int(np.clip(rows / r, 4, most)) for r, most in ((250, _KNOTS), (150, _PLACES)))
+    found = {name: any(g.present[name] for g in grounds) for name in KINDS}
+    stores = {
+        "tip": _Store("tip", 0, 3, len(grounds)),
+        "encoder": _Store("encoder", 3, m, len(grounds)),
+        "drive": _Store("drive", 3 + m, m, len(grounds)),
+        "dyno": _Store("dyno", 3 + 2 * m, 3, len(grounds)),
+    }
+    for j, a in enumerate(actuators):
+        for kind, knots in (("tip", knots_of), ("encoder", 5), ("drive", knots_of)):
+            if not found[kind]:
+                continue
+            per_run = [_of_actuator(g, size, j, knots) for g in grounds]
+            for name in per_run[0]:
+                if kind == "encoder" and name == "force":
+                    continue
+                for i in range(len(per_run[0][name])):
+                    values = [functions[name][i] for functions in per_run]
+                    # a carriage that strays, strays in any direction: the tip is given all three axes
+                    for channel in range(3) if kind == "tip" else (j,):
+                        stores[kind].put(f"{name}:{a}", channel, values, 1.0 if kind == "drive" else 1e-3)
+    times = [_of_time(g, size) for g in grounds]
+    names = {"tip": "xyz", "encoder": actuators, "drive": actuators, "dyno": "xyz"}
+    for kind in KINDS:
+        if not found[kind]:
+            continue
+        for channel, axis in enumerate(names[kind]):
+            for name in times[0]:
+                for i in range(len(times[0][name])):
+                    values = [functions[name][i] for functions in times]
+                    stores[kind].put(f"{name}:{axis}", channel, values, 1e-3 if kind in ("tip", "encoder") else 1.0)
+    places = np.concatenate([g.tip for g in grounds])
+    low, span = places.min(axis=0), np.ptp(places, axis=0)
     for axis, name in enumerate("xyz"):
-        turns = [directions(g) for g in grounds]
+        if not found["tip"] or span[axis] < 1e-3:
+            continue
+        per_place = [hats((g.tip[:, axis] - low[axis]) / span[axis], places_of) for g in grounds]
+        for i in range(places_of):
+            for channel in range(3):
+                stores["tip"].put(f"position:{name}", channel, [each[i] for each in per_place], 1e-3)
+    turns = [_of_direction(g) for g in grounds]
+    for axis, name in enumerate("xyz"):
         for i in range(len(turns[0])):
-            if any_of["tip"]:
-                add(f"direction:{name}", "tip", [_one(t[i] * 1e-3, axis, channels) for t in turns])
-        if any_of["dyno"]:
-            add(f"force:{name}", "dyno", [_one(g.force[:, axis] / 100.0, 3 + 2 * m + axis, channels) for g in grounds])
-            add(f"time:{name}", "dyno", [_one(g.force[:, axis] / 100.0 * g.motion.common / 60.0, 3 + 2 * m + axis, channels) for g in grounds])
-    blocks = tuple(np.stack(store, axis=2) if store else np.zeros((0, channels, 0)) for store in columns)
-    return Dictionary(tuple(labels), tuple(kinds), blocks)
-
-
-def _tip(values: Floats, channels: int) -> Floats:
-    out = np.zeros((len(values), channels))
-    out[:, :3] = values
-    return out
-
-
-def _one(values: Floats, channel: int, channels: int) -> Floats:
-    out = np.zeros((len(values), channels))
-    out[:, channel] = values
-    return out
+            values = [t[i] for t in turns]
+            if found["tip"]:
+                stores["tip"].put(f"direction:{name}", axis, values, 1e-3)
+            if found["dyno"]:
+                stores["dyno"].put(f"direction:{name}", axis, values, 1.0)
+        if found["dyno"]:
+            stores["dyno"].put(f"force:{name}", axis, [g.force[:, axis] / 100.0 for g in grounds], 1.0)
+    return [store.done() for kind, store in stores.items() if found[kind]]

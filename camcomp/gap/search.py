@@ -25,9 +25,9 @@ class Fitted:
     theta: Floats
     covariance: Floats
     log_evidence: float
-    held_out: float  # gain in log predictive density of runs left out, against the same set less its weakest member
     grams: tuple[Gram, ...]  # per run, about the fit, in absolute coordinates
     extra: Mapping[int, Mapping[str, float]] = field(default_factory=dict)  # scanned shapes by atom
+    factor: float = 1.0  # the tolerances, as far off as the data have them
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,9 +64,16 @@ class Scale:
 
     def __call__(self, members: Members) -> float:
         """Log evidence of a set."""
-        sets = [self.atoms.columns[i] for i in members]
-        values = [b.log_evidence + (log_bayes(b, self.prior, sets) if sets else 0.0) for b in self.bases]
+        values = self._by_tolerance(members)
         return float(logsumexp(values) - np.log(len(values)))
+
+    def factor(self, members: Members) -> float:
+        """How far off the tolerances most likely are, given a set."""
+        return TOLERANCES[int(np.argmax(self._by_tolerance(members)))]
+
+    def _by_tolerance(self, members: Members) -> list[float]:
+        sets = [self.atoms.columns[i] for i in members]
+        return [b.log_evidence + (log_bayes(b, self.prior, sets) if sets else 0.0) for b in self.bases]
 
 
 def predictive(grams: Sequence[Gram], prior: Prior, atoms: Atoms, sets: Sequence[Members]) -> Floats:

@@ -14,7 +14,8 @@ ALIKE = 3.0  # log odds within which two sets are told apart by nobody
 @dataclass(frozen=True, eq=False)
 class Verdict:
     """word: none | identified | ambiguous | unknown. best: index of the leading set. rivals: indices of sets that explain
-    the data alike. inclusion: probability of every atom that any fitted set has."""
+    the data alike. inclusion: probability of every atom that any fitted set has.
+    """
 
     word: str
     best: int
@@ -23,7 +24,7 @@ class Verdict:
 
 
 def judge(fits: Sequence[Fitted], probability: Floats, twins: Sequence[tuple[Members, Members]]) -> Verdict:
-    """fits with their probabilities; twins: pairs of sets that the data cannot tell apart whatever their prior."""
+    """Fits with their probabilities; twins: pairs of sets that the data cannot tell apart whatever their prior."""
     order = np.argsort(-probability)
     best = int(order[0])
     leader = fits[best]

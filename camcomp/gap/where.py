@@ -20,7 +20,8 @@ _BIN_S = 0.4
 @dataclass(frozen=True, eq=False)
 class RunGap:
     """One run: gap (n, 3) mm of the tip (or (n, m) of the encoders), noise (3 or m,) mm, rows per independent one,
-    time (n,), line (n,) (NaN unknown), drives: the gap as motion of the carriages (n, m)."""
+    time (n,), line (n,) (NaN unknown), drives: the gap as motion of the carriages (n, m).
+    """
 
     name: str
     gap: Floats

@@ -26,22 +26,21 @@ class Noise:
     sigma: Floats
     innovation: Floats
 
-    def rows(self, run: int, values: Floats, inflate: Floats, time: Floats) -> Floats:
-        """White rows (w, k) of values (n, c, k): channel by channel, missing rows left out.
+    def rows(self, run: int, values: Floats, inflate: Floats, time: Floats, first: int = 0) -> Floats:
+        """White rows (w, k) of values (n, c, k), channels from `first` on: channel by channel, missing rows left out.
 
-        inflate (n, c) >= 1: by how much a row is less certain than its channel. time (n,) s.
+        inflate (n, all channels) >= 1: by how much a row is less certain than its channel. time (n,) s.
         """
-        n, c, _ = values.shape
         out = []
-        for j in range(c):
+        for j in range(first, first + values.shape[1]):
             present = np.isfinite(inflate[:, j])
             if not present.any() or not np.isfinite(self.sigma[run, j]):
                 continue
-            scaled = values[present, j] / (self.sigma[run, j] * inflate[present, j])[:, None]
+            scaled = values[present, j - first] / (self.sigma[run, j] * inflate[present, j])[:, None]
             out.append(self._filter(scaled, starts(time, present), j))
         return np.concatenate(out) if out else np.zeros((0, values.shape[2]))
 
-    def _filter(self, x: Floats, fresh: Floats, channel: int) -> Floats:
+    def _filter(self, x: Floats, fresh: Bools, channel: int) -> Floats:
         phi, share = self.phi[channel], self.innovation[channel]
         white = x.copy()
         for lag in range(1, ORDER + 1):
@@ -111,7 +110,7 @@ def _yule_walker(correlation: Floats) -> tuple[Floats, float]:
     toeplitz = correlation[np.abs(np.subtract.outer(np.arange(ORDER), np.arange(ORDER)))] + 1e-3 * np.eye(ORDER)
     phi = np.linalg.solve(toeplitz, correlation[1:])
     left = float(1.0 - phi @ correlation[1:])
-    return phi, float(np.sqrt(max(left, 0.02)))
+    return np.asarray(phi, float), float(np.sqrt(max(left, 0.02)))
 
 
 def effective_rows(noise: Noise, channel: int, n: int) -> float:
