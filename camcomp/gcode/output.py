@@ -5,7 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from camcomp.datatypes import LINE, Bools, Floats, Ints, Path, frozen
+from camcomp.datatypes import ARC, LINE, RAPID, Bools, Floats, Ints, Path, frozen
+
+FEED_SLACK = 1.0e-3  # relative difference of a feed that is not worth an F word
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +51,22 @@ class Output:
             feed=np.full(n, np.nan),
             joining=np.zeros(n, bool),
         )
+
+    def repeats(self, path: Path, resolution_mm: float) -> bool:
+        """Whether this asks for the path as it is, within half a resolution and FEED_SLACK of the feed."""
+        half = 0.5 * resolution_mm * (1.0 + 1e-9)
+        n = len(path)
+        if len(self.motion) != n or (self.motion != np.arange(n)).any() or (self.kind != path.kind).any():
+            return False
+        free = path.known & ~path.machine
+        if (np.abs(self.end - path.end)[free] > half).any():
+            return False
+        arcs = free & (path.kind == ARC)
+        bent = np.abs(self.centre - path.centre)[arcs] * (1.0 - path.axis[arcs])
+        if not (bent <= half).all() or (np.abs(self.angle - path.angle)[arcs] > 1e-9).any():
+            return False
+        fed = free & (path.kind != RAPID) & ~np.isnan(self.feed)
+        return bool((np.abs(self.feed - path.feed)[fed] <= FEED_SLACK * path.feed[fed]).all())
 
     @classmethod
     def lines(cls, motion: Ints, end: Floats) -> "Output":

@@ -14,15 +14,12 @@ from camcomp.gcode.arcplan import Move, Point, plan, turns_of
 from camcomp.gcode.arcs import PLANES, ArcError, centre_of_radius
 from camcomp.gcode.edits import Edits
 from camcomp.gcode.flatten import flatten
-from camcomp.gcode.numbers import decimals, plain, significant
+from camcomp.gcode.lineedit import BLANKS, LineEditor
+from camcomp.gcode.numbers import decimals, plain
 from camcomp.gcode.output import Output, Rewritten
-from camcomp.gcode.program import F, G, P, Program, R, Rebase
+from camcomp.gcode.program import P, Program, R, Rebase
 from camcomp.gcode.stamp import stamp_index, stamp_line
 from camcomp.gcode.text import Text
-
-_FEED_SLACK = 1.0e-3
-_SHAPE_WORDS = (0, 1, 2, 3, 4, 5, R, P)  # words that say where a motion goes
-_BLANKS = " \t"
 
 
 def rewrite(program: Program, out: Output, *, resolution_mm: float, version: str) -> Rewritten:
@@ -33,7 +30,7 @@ def rewrite(program: Program, out: Output, *, resolution_mm: float, version: str
     at once to be written anew.
     """
     stamp = stamp_line(program.data, version, *program.language.comment)
-    if unchanged(program, out, resolution_mm):
+    if out.repeats(program.path, resolution_mm):
         data = _stamped(program.text, Edits(), stamp)
         line = program.path.line[out.motion] + 1
         return Rewritten(data=data, end=program.path.end[out.motion], line=line)
@@ -49,39 +46,16 @@ def _stamped(text: Text, edits: Edits, stamp: str) -> bytes:
     return text.encode(edits.apply(text.string))
 
 
-def unchanged(program: Program, out: Output, resolution_mm: float) -> bool:
-    """True when `out` asks for the program as it is, within half a resolution and 0.1 % of the feed."""
-    path, half = program.path, 0.5 * resolution_mm * (1.0 + 1e-9)
-    if len(out.motion) != len(path) or (out.motion != np.arange(len(path))).any() or (out.kind != path.kind).any():
-        return False
-    free = path.known & ~path.machine
-    if (np.abs(out.end - path.end)[free] > half).any():
-        return False
-    arcs = free & (path.kind == ARC)
-    bent = np.abs(out.centre - path.centre)[arcs] * (1.0 - path.axis[arcs])
-    if not (bent <= half).all() or (np.abs(out.angle - path.angle)[arcs] > 1e-9).any():
-        return False
-    fed = free & (path.kind != RAPID) & ~np.isnan(out.feed)
-    return bool((np.abs(out.feed - path.feed)[fed] <= _FEED_SLACK * path.feed[fed]).all())
-
-
-class Writer:
+class Writer(LineEditor):
     """Goes through the motions in order and collects the edits."""
 
     def __init__(self, program: Program, out: Output, resolution_mm: float) -> None:
-        self.program, self.out = program, out
-        self.text, self.sites, self.path = program.text, program.sites, program.path
-        self.edits = Edits()
-        self.resolution = resolution_mm
+        super().__init__(program, resolution_mm)
+        self.out = out
         self.turns = program.language.writes_turns
-        self.half = 0.5 * resolution_mm * (1.0 + 1e-9)
-        self.position: Point = self.path.start[0].tolist()
-        self.code: int | None = None  # motion code in force in the output
-        self.feed: tuple[int, float] | None = None  # feed mode and value in force in the output
         self.inserted = 0  # new lines so far
         self.ends = np.empty((len(out.motion), 3))
         self.lines = np.empty(len(out.motion), np.int64)
-        self.k = 0
 
     def run(self) -> None:
         """Fill `edits`, `ends` (N, 3) and `lines` (N,), which counts from 0 and without the stamp."""
@@ -101,18 +75,7 @@ class Writer:
 
     def _motion(self, k: int, first: int, last: int) -> None:
         sites, path, out = self.sites, self.path, self.out
-        self.k = k
-        self.row = int(sites.row[k])
-        self.begin, self.finish = sites.begin[k].tolist(), sites.finish[k].tolist()
-        self.unit, self.offset = float(sites.unit[k]), sites.offset[k].tolist()
-        self.relative = bool(sites.relative[k])
-        self.digits = decimals(self.resolution, self.unit)
-        self.fresh: list[str] = []  # words to append to the line
-        # What the text stated since the previous motion is in force, or is about to be.
-        if sites.code_stated[k]:
-            self.code = None if self.begin[G] >= 0 else int(sites.code[k])
-        if sites.feed_stated[k]:
-            self.feed = None if self.begin[F] >= 0 else self._programmed_feed()
+        self.open(k)
         if not path.known[k] or path.machine[k] or sites.code[k] < 0:
             self._pass(first, last)
             return
@@ -163,15 +126,6 @@ class Writer:
         self._append()
         self.ends[first:last] = self.position
         self.lines[first:last] = self.row + self.inserted
-
-    def _strip(self) -> None:
-        """Take the motion out of its line; what else the line says stays."""
-        gone = [*_SHAPE_WORDS, G] + ([F] if self.sites.feed_mode[self.k] == 93 else [])
-        for word in gone:
-            self._remove(word)
-        if self.begin[F] >= 0 and self.sites.feed_mode[self.k] != 93:
-            self.feed = self._programmed_feed()
-        self.code = None
 
     # --- one row -----------------------------------------------------------------------------------------------
 
@@ -228,7 +182,7 @@ class Writer:
             words += self._centre_words(move)
         if move.kind != RAPID:
             words += self._feed_words(float(self.out.feed[row]), self._length(move, start, end))
-        slash = "/" if self.text.line(self.row).lstrip(_BLANKS).startswith("/") else ""
+        slash = "/" if self.text.line(self.row).lstrip(BLANKS).startswith("/") else ""
         string = slash + self._gap().join(map(self._cased, words))
         eol = self.text.end_of_line(self.row)
         if before:
@@ -321,106 +275,6 @@ class Writer:
                 self._remove(P)
         elif self.begin[P] < 0 and turns > 1:
             self.fresh.append(f"P{turns}")
-
-    # --- feed and motion code ----------------------------------------------------------------------------------
-
-    def _code_of(self, move: Move) -> int:
-        if move.kind == ARC:
-            return 3 if move.angle > 0.0 else 2
-        return 0 if move.kind == RAPID else 1
-
-    def _code_on_line(self, code: int) -> None:
-        if self.begin[G] >= 0:
-            if code != self.sites.code[self.k]:
-                width = self.finish[G] - self.begin[G] - 1
-                self._replace(G, f"{code:0{min(width, 2)}d}")
-        elif self.code != code:
-            first = min(self.begin[word] for word in (*_SHAPE_WORDS, F) if self.begin[word] >= 0)
-            self.edits.insert(first, self._cased(f"G{code}") + self._gap())
-        self.code = code
-
-    def _programmed_feed(self) -> tuple[int, float] | None:
-        mode, feed = int(self.sites.feed_mode[self.k]), float(self.sites.modal_feed[self.k])
-        return None if math.isnan(feed) else (mode, feed)
-
-    def _wanted_feed(self, feed: float, length: float) -> tuple[int, float]:
-        """Feed mode and value (G94 mm/min, G95 mm/rev, G93 1/min) for a tip speed in mm/min."""
-        mode = int(self.sites.feed_mode[self.k])
-        feed = float(self.path.feed[self.k]) if math.isnan(feed) else feed
-        if math.isnan(feed):
-            raise ValueError(f"Output row of motion {self.k}: a cut in the place of a rapid needs a feed")
-        if mode == 93:
-            return mode, feed / length if length > 1e-6 else float(self.sites.modal_feed[self.k])
-        return mode, feed / float(self.path.speed[self.k]) if mode == 95 else feed
-
-    def _feed_words(self, feed: float, length: float) -> list[str]:
-        """F word for a new line, where the feed in force is another one."""
-        mode, value = self._wanted_feed(feed, length)
-        held = self.feed[1] if mode != 93 and self.feed is not None and self.feed[0] == mode else math.inf
-        if abs(value - held) <= _FEED_SLACK * held and held < math.inf:
-            return []
-        self.feed = None if mode == 93 else (mode, value)
-        return ["F" + significant(value if mode == 93 else value / self.unit)]
-
-    def _feed_on_line(self, feed: float, length: float) -> None:
-        if self.begin[F] < 0:
-            self.fresh += self._feed_words(feed, length)
-            return
-        mode, programmed = int(self.sites.feed_mode[self.k]), float(self.sites.modal_feed[self.k])
-        value = self._wanted_feed(feed, length)[1]
-        if abs(value - programmed) <= _FEED_SLACK * programmed:
-            value = programmed
-        else:
-            self._replace(F, significant(value if mode == 93 else value / self.unit))
-        self.feed = None if mode == 93 else (mode, value)
-
-    def _length(self, move: Move, start: Point, end: Point) -> float:
-        if move.kind != ARC:
-            return math.dist(start, end)
-        u, v, w = PLANES[int(self.sites.plane[self.k])]
-        radius = math.hypot(start[u] - move.centre[u], start[v] - move.centre[v])
-        return math.hypot(radius * move.angle, end[w] - start[w])
-
-    # --- numbers and words -------------------------------------------------------------------------------------
-
-    def _value(self, point: Point, axis: int) -> float:
-        """Number of the word that leads to `point` from the present position."""
-        base = self.position[axis] if self.relative else self.offset[axis]
-        return round((point[axis] - base) / self.unit, self.digits)
-
-    def _number(self, value: float) -> str:
-        return plain(value, self.digits)
-
-    def _cased(self, word: str) -> str:
-        lower = any(self.begin[each] >= 0 and self.text.string[self.begin[each]].islower() for each in _SHAPE_WORDS)
-        return word.lower() if lower else word
-
-    def _gap(self) -> str:
-        """What stands between the words of this line: nothing in packed lines, else a blank."""
-        string, starts = self.text.string, [each for each in self.begin if each >= 0]
-        line = int(self.text.starts[self.row])
-        packed = any(each > line and string[each - 1].isdigit() for each in starts)
-        return "" if packed else " "
-
-    def _replace(self, word: int, new: str) -> None:
-        self.edits.replace(self.begin[word] + 1, self.finish[word], new)
-
-    def _remove(self, word: int) -> None:
-        begin = self.begin[word]
-        if begin < 0:
-            return
-        floor = int(self.text.starts[self.row])
-        while begin > floor and self.text.string[begin - 1] in _BLANKS:
-            begin -= 1
-        self.edits.replace(begin, self.finish[word], "")
-
-    def _append(self) -> None:
-        """Add the new words behind the last word of the motion."""
-        if self.fresh:
-            last = max(self.finish[word] for word in (*_SHAPE_WORDS, G) if self.finish[word] >= 0)
-            gap = self._gap()
-            self.edits.insert(last, "".join(gap + self._cased(word) for word in self.fresh))
-            self.fresh = []
 
     # --- statements that depend on the position ----------------------------------------------------------------
 

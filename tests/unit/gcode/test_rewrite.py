@@ -1,0 +1,185 @@
+"""How lines are changed: words, feeds, motion codes, new lines, and what is refused."""
+
+import numpy as np
+import pytest
+
+from camcomp.datatypes import LINE, RAPID
+from camcomp.diagnostics import ProgramError
+from camcomp.gcode.interpret import read_program
+from camcomp.gcode.output import Output
+from camcomp.gcode.rewrite import rewrite
+
+
+def written(text, rows, resolution=1e-3, dialect="rs274"):
+    """Lines of the output without stamp; rows: (motion, kind, end, feed, joining)."""
+    program = read_program(text.encode(), name="in.nc", dialect=dialect)
+    n = len(rows)
+    out = Output(
+        motion=np.array([row[0] for row in rows]),
+        kind=np.array([row[1] for row in rows], np.int8),
+        end=np.array([row[2] for row in rows], float),
+        centre=np.full((n, 3), np.nan),
+        angle=np.zeros(n),
+        feed=np.array([row[3] if len(row) > 3 else np.nan for row in rows], float),
+        joining=np.array([row[4] if len(row) > 4 else False for row in rows]),
+    )
+    result = rewrite(program, out, resolution_mm=resolution, version="1")
+    again = read_program(result.data, name="out.nc", dialect=dialect).path
+    last = {int(line): k for k, line in enumerate(again.line)}
+    assert np.allclose(again.end[[last[int(line)] for line in result.line]], result.end, atol=1e-7)
+    lines = result.data.decode().splitlines()
+    return [line for line in lines if "camcomp" not in line]
+
+
+START = (0, RAPID, (0, 0, 0))
+
+
+def test_only_the_words_that_differ_are_replaced():
+    text = "G0 X0 Y0 Z0\nN7 G1  X10.000 (a)  Y+2 F100 M8 ; b\n"
+    assert written(text, [START, (1, LINE, (10.0004, 2.5, 0))])[1] == "N7 G1  X10.000 (a)  Y2.5 F100 M8 ; b"
+
+
+def test_words_that_are_missing_come_behind_the_last_one():
+    text = "G0 X0 Y0 Z0\nG1 X10 F100 M8\nG1X11M9\n"
+    rows = [START, (1, LINE, (10, 0, 0.5)), (2, LINE, (11, 0.25, 0.5))]
+    assert written(text, rows)[1:] == ["G1 X10 Z0.5 F100 M8", "G1X11Y0.25M9"]
+
+
+def test_a_displaced_axis_is_brought_back():
+    text = "G0 X0 Y0 Z0\nG1 X10 F100\nX20\n"
+    rows = [START, (1, LINE, (10, 1, 0)), (2, LINE, (20, 0, 0))]
+    assert written(text, rows)[1:] == ["G1 X10 Y1.0 F100", "X20 Y0.0"]
+
+
+def test_new_lines_follow_without_number_and_modal():
+    text = "G0 X0 Y0 Z0\r\nN20 G01 X10 F100\r\nN30 X20\r\n"
+    rows = [START, (1, LINE, (5, 0, 0)), (1, LINE, (7, 1, 0)), (1, LINE, (10, 0, 0)), (2, LINE, (20, 0, 0))]
+    assert written(text, rows)[1:] == ["N20 G01 X5.0 F100", "X7.0 Y1.0", "X10.0 Y0.0", "N30 X20"]
+
+
+def test_joining_rows_come_first_with_their_own_code_and_feed():
+    text = "G0 X0 Y0 Z0\nG1 X10 F100\nG0 Z5\n"
+    rows = [START, (1, LINE, (0.1, 0, 0), 50, True), (1, LINE, (10, 0, 0)), (1, LINE, (10.1, 0, 0), 100, True)]
+    assert written(text, [*rows, (2, RAPID, (10.1, 0, 5))])[1:] == ["G1 X0.1 F50", "G1 X10 F100", "X10.1", "G0 Z5"]
+
+
+def test_feed_is_restored_for_the_next_line_that_relies_on_it():
+    text = "G0 X0 Y0 Z0\nG1 X10 F100\nX20\nX30\n"
+    rows = [START, (1, LINE, (10, 0, 0), 80), (2, LINE, (20, 0, 0)), (3, LINE, (30, 0, 0), 100.05)]
+    assert written(text, rows)[1:] == ["G1 X10 F80", "X20 F100", "X30"]
+
+
+def test_feed_stated_on_a_line_of_its_own_is_known():
+    text = "G0 X0 Y0 Z0\nF100\nG0 X1\nG1 X10\n"
+    rows = [START, (1, RAPID, (1, 0, 0)), (2, LINE, (10, 0, 0.5))]
+    assert written(text, rows)[3] == "G1 X10 Z0.5"
+
+
+def test_an_arc_that_becomes_lines_leaves_nothing_behind():
+    text = "G0 X0 Y0 Z0\nG03 X10 Y0 I5 J0 F100\nX20 I5\nG1 X30\n"
+    rows = [START, (1, LINE, (5, -5, 0)), (1, LINE, (10, 0, 0)), (2, LINE, (15, -5, 0)), (2, LINE, (20, 0, 0))]
+    lines = written(text, [*rows, (3, LINE, (30, 0, 0))])
+    assert lines[1:] == ["G01 X5.0 Y-5.0 F100", "X10.0 Y0.0", "X15.0 Y-5.0", "X20.0 Y0.0", "G1 X30"]
+
+
+def test_modal_arc_after_lines_gets_its_code_back():
+    text = "G0 X0 Y0 Z0\nG3 X10 Y0 I5 J0 F100\nX20 I5\n"
+    program = read_program(text.encode(), name="in.nc")
+    same = Output.same(program.path)
+    out = Output(
+        motion=np.array([0, 1, 1, 2]), kind=np.array([0, 1, 1, 2], np.int8),
+        end=np.array([(0, 0, 0), (5, -5, 0), (10, 0, 0), (20, 0, 0)], float), centre=same.centre[[0, 1, 1, 2]],
+        angle=same.angle[[0, 1, 1, 2]], feed=same.feed[[0, 1, 1, 2]], joining=np.zeros(4, bool),
+    )  # fmt: skip
+    data = rewrite(program, out, resolution_mm=1e-3, version="1").data
+    assert data.decode().splitlines()[-1] == "G3 X20 I5"
+    assert read_program(data, name="out.nc").path.angle[-1] == pytest.approx(program.path.angle[-1])
+
+
+def test_relative_rounding_does_not_add_up():
+    n = 300
+    text = "G0 X0 Y0 Z0\nG91 F100\n" + "G1 X0.1\n" * n
+    step = 0.1 + 0.00037
+    rows = [START] + [(k, LINE, (k * step, 0, 0)) for k in range(1, n + 1)]
+    lines = written(text, rows)
+    total = sum(float(line.split("X")[1]) for line in lines if line.startswith("G1 X"))
+    assert total == pytest.approx(n * step, abs=0.51e-3)
+
+
+def test_a_stop_stays_behind_all_that_its_line_does():
+    text = "G0 X0 Y0 Z0\nG1 X10 F100 M0\nX20\n"
+    rows = [START, (1, LINE, (5, 0, 0)), (1, LINE, (10, 1, 0)), (2, LINE, (20, 1, 0))]
+    assert written(text, rows)[1:] == ["G1 X5.0 F100", "X10 Y1.0 F100 M0".replace("X10", "G1 X10"), "X20"]
+
+
+def test_rows_before_a_line_that_changes_modes_come_behind_its_modes():
+    text = "G0 X0 Y0 Z0\nN5 G91 G1 X10 F100 (note)\nX1\n"
+    rows = [START, (1, LINE, (0.5, 0, 0), 100, True), (1, LINE, (10, 0, 0)), (2, LINE, (11, 0, 0))]
+    assert written(text, rows)[1:] == ["N5 G91 F100 (note)", "G1 X0.5", "X9.5", "X1"]
+
+
+def test_g92_states_where_the_tool_stands_now():
+    text = "G0 X10 Y0 Z0\nG92 X0 Y5\nG0 X1\n"
+    rows = [(0, RAPID, (10.25, 0, 0)), (1, RAPID, (11, 0, 0))]
+    assert written(text, rows) == ["G0 X10.25 Y0 Z0", "G92 X0.25 Y5", "G0 X1"]
+
+
+def test_lines_that_may_be_skipped_are_skipped_together():
+    text = "G0 X0 Y0 Z0\n/G1 X10 F100\nG0 X0\n"
+    rows = [START, (1, LINE, (5, 0, 0)), (1, LINE, (10, 1, 0)), (2, RAPID, (0, 0, 0))]
+    assert written(text, rows)[1:] == ["/G1 X5.0 F100", "/X10.0 Y1.0", "G0 X0 Y0.0"]
+
+
+def test_lower_case_and_packed_lines_keep_their_look():
+    text = "g0x0y0z0\ng1x10f100\n"
+    rows = [START, (1, LINE, (5, 0, 0)), (1, LINE, (10, 1, 0))]
+    assert written(text, rows)[1:] == ["g1x5.0f100", "x10.0y1.0"]
+
+
+def test_inch_words_have_finer_decimals():
+    text = "G20 G0 X0 Y0 Z0\nG1 X1 F10\n"
+    rows = [START, (1, LINE, (25.4321, 0, 0))]
+    assert written(text, rows, resolution=1e-3)[1] == "G1 X1.00126 F10"
+
+
+def test_last_line_without_end_of_line():
+    assert written("G0 X0 Y0 Z0\nG1 X9 F1", [START, (1, LINE, (5, 0, 0)), (1, LINE, (9, 0, 0))])[1:] == [
+        "G1 X5.0 F1",
+        "X9.0",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("text", "moves"),
+    [
+        ("G0 X0 Y0 Z0\nG91 G1 X10 F100 M0\n", [(1, LINE, (1, 0, 0), 100, True), (1, LINE, (10, 0, 0))]),
+        ("G0 X0 Y0 Z0\nG1 X10 F100\nG28.1\n", [(1, LINE, (10, 1, 0))]),
+    ],
+)
+def test_what_cannot_be_rewritten_is_refused(text, moves):
+    with pytest.raises(ProgramError) as caught:
+        written(text, [START, *moves])
+    assert caught.value.rule == "CC137" and caught.value.at.line > 1
+
+
+def test_tapping_passes_unchanged_and_is_not_replaced():
+    text = "G0 X0 Y0 Z5\nM3 S100 F100\nG84 X1 Y1 Z-2 R1\nM2\n"
+    program = read_program(text.encode(), name="in.nc")
+    same = Output.same(program.path)
+    assert rewrite(program, same, resolution_mm=1e-3, version="1").data.endswith(text.encode())
+    out = Output(
+        motion=same.motion, kind=same.kind, end=same.end + 0.1, centre=same.centre, angle=same.angle, feed=same.feed,
+        joining=same.joining,
+    )  # fmt: skip
+    with pytest.raises(ProgramError, match="tapping"):
+        rewrite(program, out, resolution_mm=1e-3, version="1")
+
+
+def test_a_motion_without_a_row_is_a_mistake_of_the_caller():
+    with pytest.raises(ValueError, match="no row for motion 1"):
+        written("G0 X0 Y0 Z0\nG1 X1 F1\nX2\n", [(0, RAPID, (1, 0, 0)), (2, LINE, (2, 0, 0))])
+
+
+def test_a_cut_in_the_place_of_a_rapid_needs_a_feed():
+    with pytest.raises(ValueError, match="needs a feed"):
+        written("G0 X0 Y0 Z0\nG0 X5\n", [START, (1, LINE, (5, 1, 0))])
