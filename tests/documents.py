@@ -1,0 +1,125 @@
+"""Runs a Markdown document as a reader would: files are typed in, commands are given, and what is promised is compared.
+
+A block with `title=NAME` is a file. In a ```console block a line `$ command` is run by bash; the lines below it are what it
+must print, in order, `...` standing for anything within a line or for any number of lines. `# exit N` behind a command is
+the exit code that it must end with, else 0.
+"""
+
+import os
+import re
+import subprocess
+import sys
+from dataclasses import dataclass, field
+from pathlib import Path
+
+ROOT = Path(__file__).parent.parent
+_FENCE = re.compile(r"^```(\w*)([^\n]*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+
+
+@dataclass
+class Command:
+    """A command of a document, where it stands, what it promises."""
+
+    text: str
+    line: int
+    code: int = 0
+    promised: list[str] = field(default_factory=list)
+
+
+@dataclass
+class TypedFile:
+    """A file that the reader is told to make."""
+
+    name: str
+    text: str
+
+
+def steps(document):
+    """Commands and files of Markdown text in their order."""
+    out = []
+    for block in _FENCE.finditer(document):
+        language, info, body = block.groups()
+        title = re.search(r"title=(\S+)", info)
+        first = document.count("\n", 0, block.start(3)) + 1
+        if title:
+            out.append(TypedFile(title[1], body))
+        elif language == "console":
+            for number, line in enumerate(body.splitlines(), first):
+                if line.startswith("$ "):
+                    text, _, code = line[2:].partition("  # exit ")
+                    out.append(Command(text, number, int(code or 0)))
+                else:
+                    assert out and isinstance(out[-1], Command), f"line {number}: output without a command"
+                    out[-1].promised.append(line)
+    return out
+
+
+def text_blocks(document):
+    """Contents of ```text blocks without a title, by the line at which they begin."""
+    return {
+        document.count("\n", 0, block.start(3)) + 1: block[3]
+        for block in _FENCE.finditer(document)
+        if block[1] == "text" and "title=" not in block[2]
+    }
+
+
+def missing(promised, printed):
+    """The first promised line that is not printed where it should be, or None."""
+    lines, at, loose = printed.splitlines(), 0, False
+    for promise in promised:
+        if promise.strip() == "...":
+            loose = True
+            continue
+        pattern = re.compile(".*".join(re.escape(part) for part in promise.rstrip().split("...")))
+        span = range(at, len(lines)) if loose else range(at, min(at + 1, len(lines)))
+        found = next((i for i in span if pattern.fullmatch(lines[i].rstrip())), None)
+        if found is None:
+            return promise
+        at, loose = found + 1, False
+    return None
+
+
+class Reader:
+    """Somebody at a shell in `folder`, with this camcomp and nothing else installed by pip than what they install."""
+
+    def __init__(self, folder, tools):
+        self.folder = folder
+        tools.mkdir()
+        script = tools / "camcomp"
+        script.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m camcomp "$@"\n')
+        pip = tools / "pip"
+        pip.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m pip "$@"\n')
+        for each in (script, pip):
+            each.chmod(0o755)
+        self.environment = {
+            **os.environ,
+            "PATH": f"{tools}{os.pathsep}{os.environ['PATH']}",
+            "PYTHONPATH": f"{ROOT}{os.pathsep}{tools / 'site'}",
+            # `pip install .` as it stands in the text, without a network and without touching this environment.
+            "PIP_TARGET": str(tools / "site"),
+            "PIP_NO_DEPS": "1",
+            "PIP_NO_INDEX": "1",
+            "PIP_NO_BUILD_ISOLATION": "0",  # pip reads this one the other way round
+            "PIP_DISABLE_PIP_VERSION_CHECK": "1",
+            "PIP_QUIET": "1",
+            "PIP_ROOT_USER_ACTION": "ignore",
+        }
+
+    def give(self, command):
+        """Run a command; what it printed, errors included, in the order of writing."""
+        done = subprocess.run(
+            ["bash", "-eo", "pipefail", "-c", command.text], check=False, cwd=self.folder, env=self.environment,
+            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=600,
+        )  # fmt: skip
+        assert done.returncode == command.code, f"line {command.line}: `{command.text}`\n{done.stdout}"
+        return done.stdout
+
+    def follow(self, document, skip=lambda text: False):
+        """Do everything that a document says."""
+        for step in steps(document):
+            if isinstance(step, TypedFile):
+                (self.folder / step.name).write_text(step.text, encoding="utf-8")
+            elif not skip(step.text):
+                printed = self.give(step)
+                lost = missing(step.promised, printed)
+                assert lost is None, f"line {step.line}: `{step.text}` does not print `{lost}`, but\n{printed}"

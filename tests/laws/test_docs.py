@@ -1,0 +1,123 @@
+"""What the documents say is true: their commands run, and print what they promise."""
+
+import re
+import shutil
+
+import pytest
+
+from camcomp import reference, shelf
+from camcomp.cli import VERBS
+from tests.documents import ROOT, Command, Reader, TypedFile, missing, steps, text_blocks
+
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+HOWTOS = sorted((ROOT / "samples/howto").glob("*.md"))
+
+
+@pytest.fixture
+def reader(tmp_path):
+    (tmp_path / "folder").mkdir()
+    return Reader(tmp_path / "folder", tmp_path / "tools")
+
+
+@pytest.mark.parametrize("path", HOWTOS, ids=lambda path: path.stem)
+def test_a_howto_is_followed(path, reader):
+    reader.follow(path.read_text(encoding="utf-8"))
+
+
+def test_every_shelf_has_a_howto():
+    assert [path.stem for path in HOWTOS] == ["dialect", "effect", "force-model", "machine"]
+
+
+def test_the_readme_is_followed(reader):
+    """Its commands run in a copy of the checkout; setting up and testing are what is happening anyway."""
+    for name in ("config", "samples"):
+        shutil.copytree(ROOT / name, reader.folder / name)
+    printed = []
+    for step in steps(README):
+        parts = [part for part in step.text.split(" && ") if "venv .venv" not in part and "pip install" not in part]
+        step.text = " && ".join(parts).replace(".venv/bin/", "")
+        if step.text and "-m pytest" not in step.text:
+            printed.append(reader.give(step))
+            lost = missing(step.promised, printed[-1])
+            assert lost is None, f"line {step.line}: `{step.text}` does not print `{lost}`"
+    assert len(printed) >= 2
+    files = [path.read_text(encoding="utf-8") for path in reader.folder.rglob("*") if path.suffix in (".nc", ".csv", ".json")]
+    told = {line: text for line, text in text_blocks(README).items() if "camcomp/cli.py" not in text}
+    assert told
+    for line, text in told.items():
+        promised = ["...", *text.splitlines()]
+        assert any(missing(promised, each) is None for each in (*printed, *files)), f"README.md:{line} is not what comes out"
+
+
+def test_links_of_documents_lead_somewhere():
+    for path in (ROOT / "README.md", *(ROOT / "samples").rglob("*.md")):
+        for target in re.findall(r"\]\(([^)#]+)[^)]*\)", path.read_text(encoding="utf-8")):
+            if "://" not in target:
+                assert (path.parent / target).exists(), f"{path.name}: {target}"
+
+
+def test_the_readme_knows_every_command():
+    unnamed = [name for name in VERBS if f"`{name}" not in README and f"`camcomp {name}" not in README]
+    assert unnamed == []
+
+
+@pytest.mark.parametrize("name", sorted(reference.pages()))
+def test_reference_pages_are_up_to_date(name):
+    assert (reference.FOLDER / name).read_text(encoding="utf-8") == reference.pages()[name], (
+        "run `python -m camcomp.reference`"
+    )
+
+
+def test_the_reference_leaves_nothing_out():
+    pages = reference.pages()
+    for verb in VERBS:
+        assert f"## camcomp {verb}\n" in pages["commands.md"]
+    assert "`--report` OUT.html" in pages["commands.md"] and "## camcomp config show" in pages["commands.md"]
+    for shelf_name in shelf.SHELVES:
+        for member in shelf.members(shelf_name):
+            assert f"`{member}`" in pages["library.md"], member
+    for path in (ROOT / "config/materials").glob("*.yaml"):
+        assert f"`{path.stem}`" in pages["library.md"]
+    assert "`orthoglide-1deg.yaml`" in pages["library.md"]
+
+
+# --- the reader itself ------------------------------------------------------------------------------------------------
+
+DOCUMENT = """
+```text title=a.txt
+hello
+```
+```console
+$ cat a.txt
+hello
+$ false  # exit 1
+```
+"""
+
+
+def test_a_document_is_files_and_commands():
+    assert steps(DOCUMENT) == [TypedFile("a.txt", "hello\n"), Command("cat a.txt", 6, 0, ["hello"]), Command("false", 8, 1)]
+
+
+def test_the_reader_notices_what_is_not_so(reader):
+    reader.follow(DOCUMENT)
+    with pytest.raises(AssertionError, match="does not print `goodbye`"):
+        reader.follow(DOCUMENT.replace("\nhello\n$", "\ngoodbye\n$"))
+    with pytest.raises(AssertionError, match="line 8: `false`"):
+        reader.follow(DOCUMENT.replace("  # exit 1", ""))
+
+
+@pytest.mark.parametrize(
+    ("promised", "printed", "lost"),
+    [
+        (["a", "b"], "a\nb\nc", None),
+        (["a", "c"], "a\nb\nc", "c"),
+        (["a", "...", "c"], "a\nb\nc", None),
+        (["x ... z"], "x y z", None),
+        (["a."], "ab", "a."),
+        (["...", "a", "b"], "z\na\nx\nb", "b"),
+        (["a"], "", "a"),
+    ],
+)
+def test_promises(promised, printed, lost):
+    assert missing(promised, printed) == lost
