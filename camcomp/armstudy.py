@@ -16,7 +16,7 @@ import numpy as np
 from camcomp.armposes import ArmBench, Column, Poses, combined, visible
 from camcomp.datatypes import Floats
 from camcomp.gap.effect import Cause
-from camcomp.gap.grouping import Step, Taken, odds, rms, take
+from camcomp.gap.grouping import LEAST_SHARE, Step, Taken, odds, rms, take
 from camcomp.gap.leftovers import shares, turns
 from camcomp.gap.withheld import Block, Discrepancy, Evidence, fit_discrepancy, regions, without_nuisance
 from camcomp.statics.arm import jacobian
@@ -42,6 +42,7 @@ class Found:
     covariance: Floats  # (k, k)
     discrepancy: Discrepancy
     evidence: Evidence
+    linear: tuple[Block, ...]
     rest: tuple[Floats, ...]  # (n, 3) mm per campaign, machine frame
 
     def causes(self, groups: Sequence[str] | None = None) -> list[Cause]:
@@ -66,6 +67,9 @@ def study(
     bench = ArmBench(robot, tuple(causes), campaigns)
     found = investigate(bench, without)
     held = merged([r for r, name in zip(runs, names, strict=True) if name in holdout])
+    judge = ArmBench(robot, tuple(causes), held) if held else None
+    if judge is not None and (kept := holding(found, judge)) < len(found.taken.steps):
+        found = fitted(bench, found.columns, found.groups, found.linear, found.discrepancy, shortened(found, kept))
     gaps = [bench.gap(k, ()) for k in range(len(campaigns))]
     floor = 1e3 * np.sqrt(3.0) * found.discrepancy.noise
     left = 1e3 * _size(found.rest)
@@ -76,7 +80,7 @@ def study(
         "where": _where(bench, gaps, found, strange),
         "causes": _causes(bench, found, gaps, strange),
         "alternatives": [],
-        "shrinkage": _shrinkage(robot, causes, held, found, [n for n in names if not holdout or n in holdout]),
+        "shrinkage": _shrinkage(judge, found, [n for n in names if not holdout or n in holdout]),
         "next_experiment": None,
     }
     return result
@@ -112,6 +116,14 @@ def investigate(bench: ArmBench, without: Sequence[str] = ()) -> Found:
         groups.setdefault(column.effect, []).append(j)
     discrepancy = _discrepancy(linear)
     taken = take(Evidence.of(_parts(linear), discrepancy), groups)
+    return fitted(bench, columns, groups, linear, discrepancy, taken)
+
+
+def fitted(
+    bench: ArmBench, columns: Sequence[Column], groups: dict[str, list[int]], linear: Sequence[Block],
+    discrepancy: Discrepancy, taken: Taken,
+) -> Found:  # fmt: skip
+    """Amplitudes of the groups taken, by the model itself instead of its derivative at nominal."""
     amount = np.zeros(len(columns))
     covariance = np.zeros((len(columns), len(columns)))
     widths = taken.widths.copy()
@@ -123,12 +135,12 @@ def investigate(bench: ArmBench, without: Sequence[str] = ()) -> Found:
         amount, covariance = evidence.fit(widths)
         amount[widths == 0.0] = 0.0
         on = np.flatnonzero(widths)
-        chosen = [columns[j] for j in on]
+        chosen = [columns[int(j)] for j in on]
         exact = bench.blocks(chosen, {i: float(amount[j]) for i, j in enumerate(on)})
         linear = [_put(b, e, on) for b, e in zip(linear, exact, strict=True)]
         evidence = Evidence.of(linear, discrepancy)
     rest = tuple(bench.gap(k, combined(columns, dict(enumerate(amount)))) for k in range(len(linear)))
-    return Found(tuple(columns), groups, taken, amount, covariance, discrepancy, evidence, rest)
+    return Found(tuple(columns), groups, taken, amount, covariance, discrepancy, evidence, tuple(linear), rest)
 
 
 def _put(block: Block, exact: Block, on: np.ndarray) -> Block:
@@ -286,18 +298,15 @@ def _drivers(bench: ArmBench, found: Found) -> list[dict[str, Any]]:
     return [{"covariate": name, "share": round(share, 4)} for name, share in every_share[:6] if share > 0.02]
 
 
-def _shrinkage(
-    robot: Robot, causes: Sequence[Cause], held: Sequence[Poses], found: Found, names: list[str]
-) -> dict[str, Any]:
+def _shrinkage(bench: ArmBench | None, found: Found, names: list[str]) -> dict[str, Any]:
     """On held-out runs with their frames fitted again; without such runs, every block is withheld once."""
     groups = [s.group for s in found.taken.steps]
-    if held:
-        bench = ArmBench(robot, tuple(causes), held)
-        stages = [[bench.gap(k, found.causes(groups[:i])) for k in range(len(held))] for i in range(len(groups) + 1)]
+    if bench is not None:
+        stages = _stages(bench, found)
         size = [_size(parts) for parts in stages]
         first = [(g**2).sum(axis=1) for g in stages[0]]
         last = [(g**2).sum(axis=1) for g in stages[-1]]
-        low, high = _interval(first, last, [c.features for c in held])
+        low, high = _interval(first, last, [c.features for c in bench.campaigns])
     else:
         size = [rms(s.squares) for s in (found.taken.none, *found.taken.steps)]
         low, high = _resampled(found.taken.none.squares, (found.taken.steps or (found.taken.none,))[-1].squares)
@@ -313,6 +322,34 @@ def _shrinkage(
             {"effect": g, "target": None, "after_rms_um": _round(1e3 * s)} for g, s in zip(groups, size[1:], strict=True)
         ],
     }
+
+
+def _stages(bench: ArmBench, found: Found) -> list[list[Floats]]:
+    """Gaps of campaigns with the first 0, 1, ... groups, frames fitted again."""
+    groups = [s.group for s in found.taken.steps]
+    return [
+        [bench.gap(k, found.causes(groups[:i])) for k in range(len(bench.campaigns))] for i in range(len(groups) + 1)
+    ]
+
+
+def holding(found: Found, judge: ArmBench) -> int:
+    """How many groups, in their order, make a campaign that was held out smaller by LEAST_SHARE each.
+
+    A veto only: what does not hold there is no cause, however well it explains the postures it was fitted on.
+    """
+    size = [_size(parts) for parts in _stages(judge, found)]
+    for i in range(len(found.taken.steps)):
+        if size[i + 1] > (1.0 - LEAST_SHARE) * size[i]:
+            return i
+    return len(found.taken.steps)
+
+
+def shortened(found: Found, count: int) -> Taken:
+    """The first groups only."""
+    widths = np.zeros(len(found.columns))
+    for step in found.taken.steps[:count]:
+        widths[found.groups[step.group]] = step.width
+    return replace(found.taken, steps=found.taken.steps[:count], widths=widths)
 
 
 def _interval(first: Sequence[Floats], last: Sequence[Floats], features: Sequence[Floats]) -> tuple[float, float]:

@@ -1,0 +1,127 @@
+"""A measured arm: the sample that travels with camcomp, and the whole data set where CAMCOMP_DATA says it is."""
+
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from camcomp.armposes import ArmBench, Poses
+from camcomp.armstudy import investigate, merged
+from camcomp.config import load_config
+from camcomp.gap.withheld import without_nuisance
+from camcomp.statics.build import build_robot
+from tests.commandline import ROOT, camcomp, table
+
+DATA = Path(os.environ.get("CAMCOMP_DATA", "/nowhere")) / "ipa_ur10"
+WHOLE = pytest.mark.skipif(not DATA.is_dir(), reason="the whole data set is not here: CAMCOMP_DATA")
+GEOMETRY, GRAVITY = "link_geometry", "gravity_compliance"
+
+
+def diagnosed(experiment, tmp_path):
+    done = camcomp("diagnose", experiment, "--json", tmp_path / "out.json")
+    assert done.returncode == 0, done.stderr.decode()
+    return json.loads((tmp_path / "out.json").read_text())
+
+
+def effects(result):
+    return list(dict.fromkeys(c["effect"] for c in result["causes"]))
+
+
+def check(result, floor, least):
+    assert result["verdict"] == "unknown"
+    assert effects(result)[:2] == [GEOMETRY, GRAVITY]
+    assert effects(result)[-1] == "unknown"
+    assert "joint_offset" not in effects(result)
+    shrunk = result["shrinkage"]
+    assert floor[0] < shrunk["after_rms_um"] < floor[1]
+    assert shrunk["ci95"][0] < shrunk["ratio"] < shrunk["ci95"][1]
+    assert shrunk["ratio"] > least
+    assert [s["effect"] for s in shrunk["steps"]] == [GEOMETRY, GRAVITY]
+    assert shrunk["steps"][0]["after_rms_um"] > 1.05 * shrunk["steps"][1]["after_rms_um"]
+    drivers = [d["covariate"] for d in result["where"]["drivers"]]
+    assert drivers[0] == "position:shoulder_lift"
+    shares = [c["share"] for c in result["causes"]]
+    assert 0.9 < sum(shares) < 1.1
+
+
+def test_sample(tmp_path):
+    result = diagnosed("samples/ur10/experiment.yaml", tmp_path)
+    assert result["verdict"] == "unknown"
+    assert effects(result)[:2] == [GEOMETRY, GRAVITY]
+    assert "joint_offset" not in effects(result)
+    assert result["shrinkage"]["holdout"] == ["series_B"]
+    assert 400 < result["shrinkage"]["after_rms_um"] < 520
+    compliance = next(c for c in result["causes"] if c["effect"] == GRAVITY and c["target"] == "shoulder_lift")
+    low, high = compliance["parameters"]["compliance_rad_per_Nmm"]["ci95"]
+    assert 3e-9 < low < 1.03e-8 < high < 2e-8  # what all poses of both campaigns say
+
+
+def test_without_the_true_effects_they_are_not_made_up_from_offsets(tmp_path):
+    done = camcomp(
+        "diagnose", "samples/ur10/experiment.yaml", "--json", tmp_path / "o.json", "--without", GEOMETRY,
+        "--without", GRAVITY, "--without", "link_length", "--without", "screw_pitch",
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr.decode()
+    result = json.loads((tmp_path / "o.json").read_text())
+    assert effects(result) == ["unknown"]  # offsets alone do not hold on postures they were not fitted on
+
+
+@WHOLE
+@pytest.mark.parametrize("held", ["measurements_joint_configurations", "measurements_grid"])
+def test_whole_campaigns(tmp_path, held):
+    tables = [DATA / "Series_A/measurements_grid.csv", DATA / "Series_B/measurements_joint_configurations.csv"]
+    done = camcomp("import", *tables, "--config", "config/ur10.yaml", "-o", tmp_path / "x", "--holdout", held)
+    assert done.returncode == 0, done.stderr.decode()
+    log = table(tmp_path / "x" / "measurements_grid.csv")
+    assert len(log["t_s"]) == 11911
+    assert log["x_mm"][0] == pytest.approx(2361.9831)
+    assert log["act_wrist_1_rad"][1] == pytest.approx(-0.218756)
+    check(diagnosed(tmp_path / "x" / "experiment.yaml", tmp_path), (400, 480), 0.4)
+
+
+def campaigns():
+    config = load_config([ROOT / "config/ur10.yaml"])
+    robot = build_robot(config.robot, [0.0, 0.0, 0.0])[0]
+    runs = []
+    for name in ("series_A", "series_B"):
+        log = table(ROOT / f"samples/ur10/{name}.csv")
+        q = np.stack([log[f"act_{a.name}_rad"] for a in robot.actuators], axis=1)
+        tip = np.stack([log[f"{axis}_mm"] for axis in "xyz"], axis=1)
+        runs.append(Poses(name, q, tip, log["t_s"], None, np.full(len(q), name)))
+    return robot, runs
+
+
+def test_plain_least_squares_of_everything_overfits_where_camcomp_does_not():
+    robot, runs = campaigns()
+    bench = ArmBench(robot, (), runs)
+    found = investigate(ArmBench(robot, (), merged(runs[:1])))
+    mine = rms(bench.gap(1, found.causes()))
+    linear = bench.blocks(found.columns)
+    plain = {}
+    # every column of the shelf, and the first two harmonics of every joint as calibrations like to add
+    wide = [np.concatenate([b.X, harmonics(b, found.columns, r.q)], axis=2) for b, r in zip(linear, runs, strict=True)]
+    for name, X in (("shelf", [b.X for b in linear]), ("shelf and harmonics", wide)):
+        A = np.concatenate([X[0], linear[0].N], axis=2).reshape(-1, X[0].shape[2] + 9)
+        size = np.linalg.norm(A, axis=0) + 1e-12
+        c = np.linalg.lstsq(A / size, linear[0].r.ravel(), rcond=1e-10)[0] / size
+        left = without_nuisance(linear[1].r - X[1] @ c[: X[1].shape[2]], linear[1].N)
+        inside = linear[0].r.ravel() - A @ c
+        plain[name] = (float(np.sqrt((inside**2).sum() / len(runs[0].q))), rms(left))
+    assert plain["shelf and harmonics"][0] < rms(bench.gap(0, found.causes()))  # closer where it was fitted
+    for inside, outside in plain.values():
+        assert outside > 1.1 * inside
+        assert outside > 1.05 * mine  # and worse where it was not
+
+
+def harmonics(block, columns, q):
+    joints = [j for j, c in enumerate(columns) if c.effect == "joint_offset"]
+    names = ["shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3"]
+    angle = [q[:, names.index(columns[j].target)] for j in joints]
+    waves = [block.X[:, :, j] * f(k * a)[:, None] for j, a in zip(joints, angle, strict=True) for k in (1, 2) for f in (np.sin, np.cos)]
+    return np.stack(waves, axis=2)
+
+
+def rms(gap):
+    return float(np.sqrt((gap**2).sum(axis=1).mean()))
