@@ -1,7 +1,7 @@
 """Fanuc 0i/30i milling and controls that follow it (Haas, Mitsubishi, Mazak EIA): custom macro B, M98/M99, G65."""
 
 from camcomp.gcode.dialect import Dialect
-from camcomp.gcode.expressions import FANUC
+from camcomp.gcode.spelling import FANUC
 
 DIALECT = Dialect(
     name="fanuc",

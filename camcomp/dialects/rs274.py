@@ -1,7 +1,7 @@
 """LinuxCNC and its ancestor RS274/NGC: the reference; read like LinuxCNC 2.9 does."""
 
 from camcomp.gcode.dialect import Dialect
-from camcomp.gcode.expressions import RS274
+from camcomp.gcode.spelling import RS274
 
 DIALECT = Dialect(
     name="rs274",

@@ -1,7 +1,7 @@
 """Siemens Sinumerik 840D milling: `CR=`, `I=AC()`, `X=IC()`, R parameters; no jumps, frames and standard cycles."""
 
 from camcomp.gcode.dialect import Dialect
-from camcomp.gcode.expressions import SINUMERIK
+from camcomp.gcode.spelling import SINUMERIK
 
 _SETTABLE = {5000: "G500", **{10 * number: f"G{number}" for number in range(505, 600)}}
 

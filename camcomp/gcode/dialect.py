@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from camcomp.gcode.codes import GROUPS, REFUSED
-from camcomp.gcode.expressions import Spelling
+from camcomp.gcode.spelling import Spelling
 
 
 @dataclass(frozen=True)

@@ -6,9 +6,10 @@ from typing import NoReturn
 from camcomp.diagnostics import ProgramError
 from camcomp.gcode.block import Block
 from camcomp.gcode.cycles import Cycles
-from camcomp.gcode.expressions import FANUC, Expression, ExpressionError, parameters_of
+from camcomp.gcode.expressions import Expression, ExpressionError, parameters_of
 from camcomp.gcode.memory import Parameters
 from camcomp.gcode.siemens import read_siemens_line
+from camcomp.gcode.spelling import FANUC
 from camcomp.gcode.text import Text
 from camcomp.gcode.trace import Trace
 from camcomp.gcode.words import BLANK, Line, Word, code_of, read_line

@@ -2,7 +2,8 @@
 
 import math
 
-from camcomp.gcode.expressions import FANUC, Expression, ExpressionError, Memory, evaluate, index_of
+from camcomp.gcode.expressions import Expression, ExpressionError, Memory, evaluate, index_of
+from camcomp.gcode.spelling import FANUC
 from camcomp.gcode.state import State
 
 LOCAL = 30  # #1 to #30 belong to the subprogram in RS274, #1 to #33 in Fanuc

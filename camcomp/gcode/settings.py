@@ -2,8 +2,8 @@
 
 from camcomp.gcode.block import Block, BlockReader
 from camcomp.gcode.codes import code_name
-from camcomp.gcode.expressions import RS274
 from camcomp.gcode.program import Rebase
+from camcomp.gcode.spelling import RS274
 from camcomp.gcode.words import Word
 
 _INCH = (200, 700, 7000)

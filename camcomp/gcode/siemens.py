@@ -7,7 +7,8 @@ so that everything behind the reader is the same for all dialects.
 import re
 from typing import NoReturn
 
-from camcomp.gcode.expressions import SINUMERIK, Expression, ExpressionError, Parser
+from camcomp.gcode.expressions import Expression, ExpressionError, Parser
+from camcomp.gcode.spelling import SINUMERIK
 from camcomp.gcode.text import Text
 from camcomp.gcode.words import BLANK, Line, Setting, Word, refuse
 

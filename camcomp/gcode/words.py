@@ -4,7 +4,8 @@ import re
 from typing import NamedTuple, NoReturn
 
 from camcomp.diagnostics import ProgramError
-from camcomp.gcode.expressions import Expression, ExpressionError, Parser, Spelling
+from camcomp.gcode.expressions import Expression, ExpressionError, Parser
+from camcomp.gcode.spelling import Spelling
 from camcomp.gcode.text import Text
 
 BLANK = " \t\0\x1a\x0b\x0c"

@@ -4,7 +4,8 @@ import math
 
 import pytest
 
-from camcomp.gcode.expressions import FANUC, RS274, SINUMERIK, ExpressionError, Memory, Parser, evaluate
+from camcomp.gcode.expressions import ExpressionError, Memory, Parser, evaluate
+from camcomp.gcode.spelling import FANUC, RS274, SINUMERIK
 
 
 class Store(Memory):
