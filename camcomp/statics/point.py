@@ -277,7 +277,7 @@ def solve_point(mode, P, rigid, tool, R_aim, tip_aim, force, wrench, rho, y, x, 
                 if not lu_solve(M, B):
                     return SINGULAR, passes
                 dt[3:] = B[:3, 0]
-                dt[:3] = e + pull @ B[:3, 0]
+                dt[:3] = e + pull @ B[:3, 0].copy()
                 if mode == TARGET:
                     cap = min(1.0, LARGEST_STEP / max(1e-300, np.max(np.abs(B[3:, 0]))))
                     tip_cmd += cap * B[3:, 0]
@@ -402,7 +402,7 @@ def approach(rigid, start_R, start_tip, tool, R_to, tip_to, rho, y):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def solve_many(
-    mode, P, rigid, joint_var, tool, start_R, start_tip, R_aim, near, aim, force, wrench, rho, follow, check,
+    mode, P, rigid, joint_var, tool, start_R, start_tip, R_near, R_aim, near, aim, force, wrench, rho, follow, check,
     rho_nominal, tip_cmd, R_cmd, tip, R, drive, status, passes, x_all, F_all,
 ):  # fmt: skip
     """Points one after the other, each started from the one before; falls back to a cold start, then to load steps.
@@ -422,10 +422,10 @@ def solve_many(
         y_before = y.copy()
         code = OUT_OF_REACH
         if warm and np.max(np.abs(near[i] - near[i - 1])) < 20.0:
-            code, _ = rigid_kinematics(rigid, R_aim[i], near[i] - _mul(R_aim[i], tool), rho_nominal[i], y)
+            code, _ = rigid_kinematics(rigid, R_near[i], near[i] - _mul(R_near[i], tool), rho_nominal[i], y)
         if code != OK:
             warm = False
-            code = approach(rigid, start_R, start_tip, tool, R_aim[i], near[i], rho_nominal[i], y)
+            code = approach(rigid, start_R, start_tip, tool, R_near[i], near[i], rho_nominal[i], y)
         if code != OK:
             status[i] = code
             y[:] = y_before
@@ -442,14 +442,14 @@ def solve_many(
                     R_cmd[i] = R_cmd[i - 1] if mode == POSE else R_aim[i]
                 else:
                     tip_cmd[i] = near[i]
-                    R_cmd[i] = R_aim[i]
+                    R_cmd[i] = R_near[i]
             y_now = y.copy()
             if (mode == TARGET or mode == POSE) and attempt == 0:
                 rigid_kinematics(rigid, R_cmd[i], tip_cmd[i] - _mul(R_cmd[i], tool), rho[i], y_now)
             steps = 8 if attempt == 2 else 1
             if attempt > 0:
                 to_structure(joint_var, y, rho[i], x, F, P)
-                R[i] = R_aim[i]
+                R[i] = R_near[i]
             else:
                 R[i] = R[i - 1]
             p = near[i] - _mul(R[i], tool)

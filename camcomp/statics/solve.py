@@ -106,6 +106,8 @@ def solve(
     # the control aims with the tool it knows; the kernels have one tool, the real one
     longer = tool - machine.nominal.tool
     near = near + R_aim @ longer
+    # a clamped pose need not be one that the rigid machine can take
+    R_near = _per_point(machine.nominal.held_rotation, n, (3, 3)) if mode == CLAMP else R_aim
     f = _per_point(force, n, (3,))
     w = _per_point(wrench, n, (6,))
     r = np.zeros((n, m)) if rho is None else np.array(rho, float).reshape(n, m)
@@ -119,7 +121,7 @@ def solve(
     def work(s: slice) -> None:
         k = s if keep else slice(0, 0)
         point.solve_many(
-            mode, machine.elastic, machine.rigid, machine.joint_var, tool, start_R, start_tip, R_aim[s], near[s],
+            mode, machine.elastic, machine.rigid, machine.joint_var, tool, start_R, start_tip, R_near[s], R_aim[s], near[s],
             aim[s], f[s], w[s], r[s], rho is None, check, nominal[s], commanded[s], R_cmd[s], tip[s], R[s], drive[s], status[s],
             passes[s], x[k], F[k],
         )  # fmt: skip
