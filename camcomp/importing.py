@@ -114,10 +114,11 @@ def read_axis(
     Raises ConfigError CC423 where something is missing.
     """
     from scipy.io import loadmat
+    from scipy.io.matlab import MatReadError
 
     try:
         found = {key: np.ravel(value) for key, value in loadmat(io.BytesIO(data)).items() if not key.startswith("__")}
-    except (ValueError, NotImplementedError, OSError) as error:
+    except (ValueError, TypeError, NotImplementedError, OSError, MatReadError) as error:
         raise ConfigError("CC423", f"not a MATLAB file that can be read: {error}", at=Location(name, 1, 1)) from error
     missing = [key for key in ("t", "qg", "qm") if key not in found]
     if missing:

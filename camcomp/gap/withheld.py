@@ -20,6 +20,7 @@ from scipy.linalg import cho_solve, cholesky, solve_triangular
 from camcomp.datatypes import Floats
 
 WIDTHS = (0.3, 1.0, 3.0)  # of the amplitudes of a group, in units of their scales
+CLEAR = 5.0  # log likelihood by which a discrepancy has to be better than noise alone
 FREE = 1e-6  # precision of nuisances, mm and rad: 1 m
 
 
@@ -44,6 +45,8 @@ def fit_discrepancy(features: Sequence[Floats], rest: Sequence[Floats]) -> Discr
     """Process that makes the leftovers rest, each (n, 3) mm, most likely; by a grid, refined once."""
     size = float(np.sqrt(np.mean(np.concatenate([r.ravel() for r in rest]) ** 2)))
     best, grid = None, [(s, ln, w) for s in (0.5, 0.8) for ln in (0.15, 0.3, 0.6) for w in (0.35, 0.6, 0.9)]
+    rows = sum(r.size for r in rest)
+    plain = -0.5 * rows - rows * float(np.log(size))  # nothing but noise
     tried: dict[tuple[float, float, float], float] = {}
     for _ in range(2):
         for s, ln, w in grid:
@@ -62,7 +65,10 @@ def fit_discrepancy(features: Sequence[Floats], rest: Sequence[Floats]) -> Discr
         assert best is not None
         _, s, ln, w = best
         grid = [(s * a, ln * b, w * c) for a in (0.8, 1.0, 1.25) for b in (0.7, 1.0, 1.4) for c in (0.8, 1.0, 1.25)]
-    return Discrepancy(size * best[1], best[2], size * best[3])  # type: ignore[index]
+    assert best is not None
+    if best[0] < plain + CLEAR:  # poses so far apart that a process and noise look the same
+        return Discrepancy(0.0, 1.0, size)
+    return Discrepancy(size * best[1], best[2], size * best[3])
 
 
 @dataclass(frozen=True, eq=False)
