@@ -26,6 +26,7 @@ DIALECT = Dialect(
         710: 6,
         7000: 6,
         7100: 6,
+        **dict.fromkeys((4500, 4510), 18),
         740: 0,
         750: 0,
         1530: 0,
@@ -34,7 +35,6 @@ DIALECT = Dialect(
     },
     without=frozenset((100, 200, 210, 280, 300, 281, 301, 520, 920, 921, 922, 923, 980, 990, 901, 911, 431, 430, 490))
     | frozenset((591, 592, 593, 580, 590, 610, 611, 730, 810, 820, 830, 840, 850, 860, 870, 880, 890, 800)),
-    passed=frozenset((4500, 4510)),
     more_offsets=_SETTABLE,
     writes_turns=False,
     dwell="FS",

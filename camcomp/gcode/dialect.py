@@ -26,6 +26,7 @@ class Dialect:
     writes_turns: bool = True  # and may be written for arcs that are made
     increments: bool = False  # numbers without a point may count increments
     machine_moves_rapid: bool = False  # G53 moves at rapid speed, whatever motion code is in force
+    home_beside_motion: bool = False  # `G0 G28 Z0`: the axis words are those of G28
     dwell: str = "P"  # letters that may give the time of G4
     modal_length: bool = False  # H changes the tool length offset without G43 in its block
     own_local_frame: bool = False  # G52 and G92 add up instead of sharing one offset

@@ -61,6 +61,7 @@ class Interpreter(Executor):
         elif zero_code is not None and zero_code not in MACHINE_MOVES:
             self.settings(block, zero_code)
         m_codes = [code for code, _ in block.m]
+        self._alone(block)
         self._spare_axes(block)
         if motion is not None:
             self.record.stops = any(code in STOPS for code in m_codes)
@@ -86,7 +87,8 @@ class Interpreter(Executor):
             self.record.code_stated = True
         dynamic = block.code(8) == 431
         if zero_code in AXIS_USERS or dynamic:
-            if explicit not in (None, 800) and block.axes:
+            homes = zero_code in (280, 300) and explicit in (0, 10) and self.dialect.home_beside_motion
+            if explicit not in (None, 800) and block.axes and not homes:
                 first = code_name(431 if dynamic else zero_code or 0)
                 self.refuse("CC108", f"{first} and {code_name(explicit or 0)} both want the axis words")
             return None
@@ -104,6 +106,12 @@ class Interpreter(Executor):
         if state.motion is None:
             self.refuse("CC134", "axis words without a motion code in force")
         return state.motion
+
+    def _alone(self, block: Block) -> None:
+        """Codes that are passed on do not say what axis words beside them mean."""
+        for code, word in block.g:
+            if code in self.dialect.passed and block.axes:
+                self.refuse("CC108", f"axis words with {code_name(code)}", word)
 
     def _spare_axes(self, block: Block) -> None:
         """Words for axes that camcomp does not follow: they may stay where they are, and not more."""

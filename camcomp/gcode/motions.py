@@ -37,6 +37,11 @@ class Motions(Settings):
         """G28, G30: through the point of the axis words to the reference position."""
         state = self.state
         block.number("P")
+        spare = [block.words[letter] for letter in "ABCUVW" if letter in block.words]
+        if spare and not block.axes:
+            if spare[0].letter in "UVW":
+                self.refuse("CC115", f"{spare[0].letter} is no axis of the machine", spare[0])
+            return
         # Codes of group 0 that approach a fixed point directly take the axis words as a list of axes only.
         if code in (28, 30):
             self.record.machine_motion(block, state, -1, self.target(block))
@@ -128,6 +133,8 @@ class Motions(Settings):
         state = self.state
         plane = arcs.PLANES[state.plane][:2]
         letters = ["IJK"[axis] for axis in plane]
+        # A zero for the third letter, as some posts write it, says nothing.
+        block.used |= {letter for letter in "IJK" if letter in block.words and block.words[letter].value == 0.0}
         missing = [letter for letter in letters if letter not in block.words]
         if len(missing) == 2 or (state.centre_absolute and missing):
             self.refuse("CC112", f"the arc has no centre: {' and '.join(missing)} or R is missing")

@@ -83,6 +83,19 @@ def test_what_cannot_be_followed_is_refused(text, rule):
         assert refused(text) == rule
 
 
+def test_home_beside_a_motion_code():
+    assert ends("G90 G0 X5. Y5. Z5.\nG0 G28 G91 Z0.\nX1.\n")[1:] == [(5, 5, 5), (5, 5, 0), (6, 5, 0)]
+
+
+def test_only_the_rotary_axis_goes_home():
+    assert ends("G0 X5. Y5. Z5.\nG28 A0\nX1.\n") == [(5, 5, 5), (1, 5, 5)]
+
+
+def test_a_zero_for_the_third_centre_letter_is_taken():
+    assert ends("G0 X0 Y0 Z0\nG2 X10 Y0 I5 J0 K0 F100\n", "rs274")[-1] == (10, 0, 0)
+    assert refused("G2 X10 Y0 I5 J0 K1 F100\n", "rs274") == "CC109"
+
+
 def siemens(text):
     return ends(text, "sinumerik")
 
