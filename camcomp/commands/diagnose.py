@@ -4,35 +4,65 @@ import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
+from camcomp.commands._options import quiet_option
 from camcomp.files import STANDARD, write_all
+from camcomp.terminal import working
+
+if TYPE_CHECKING:
+    from camcomp.campaign import Campaign
+    from camcomp.diagnose import Diagnosis
 
 
 def diagnose_experiment(path: str | Path, without: Sequence[str] = ()) -> dict[str, Any]:
     """The result mapping of an experiment file, ready for JSON. Raises CamcompError."""
+    return examine(path, without)[0]
+
+
+def examine(
+    path: str | Path, without: Sequence[str] = ()
+) -> "tuple[dict[str, Any], Diagnosis | None, Campaign | None]":
+    """The result, and what it was drawn from; nothing of that for logs that have a study of their own."""
     from camcomp.campaign import open_campaign
     from camcomp.diagnose import diagnose
     from camcomp.unprogrammed import study_of
 
     if (study := study_of(path, without)) is not None:
-        return study
+        return study, None, None
     campaign = open_campaign(path)
-    return diagnose(campaign.job, campaign.twin, campaign.runs, holdout=campaign.experiment.holdout, without=without).result
+    done = diagnose(campaign.job, campaign.twin, campaign.runs, holdout=campaign.experiment.holdout, without=without)
+    return done.result, done, campaign
 
 
 @click.command()
 @click.argument("experiment")
 @click.option("--json", "json_file", metavar="OUT.json", help="The result; - is standard output.")
+@click.option("--report", metavar="OUT.html", help="What was found and why, as one page with plots.")
 @click.option("--without", multiple=True, metavar="EFFECT", help="Take an effect out of the library; repeatable.")
-def command(experiment: str, json_file: str | None, without: tuple[str, ...]) -> None:
+@quiet_option
+def command(
+    experiment: str, json_file: str | None, report: str | None, without: tuple[str, ...], quiet: bool
+) -> None:
     """Find out why a machine and its model differ.
 
     EXPERIMENT is a YAML file that names the config under judgement and the runs with their programs and logs.
     """
-    result = diagnose_experiment(experiment, without)
-    text = json.dumps(result, indent=1, allow_nan=False) + "\n"
-    write_all({json_file or STANDARD: text.encode()}, inputs=(experiment,))
+    if report:
+        from camcomp.report.page import plot_library
+
+        plot_library()  # a missing library is told before the work, not after it
+    with working(f"diagnosing {experiment}", quiet=quiet):
+        result, done, campaign = examine(experiment, without)
+    outputs: dict[str, bytes] = {}
+    if json_file or not report:
+        outputs[json_file or STANDARD] = (json.dumps(result, indent=1, allow_nan=False) + "\n").encode()
+    if report:
+        from camcomp.report.diagnosed import report_of
+
+        with working("drawing the report", quiet=quiet):
+            outputs[report] = report_of(experiment, result, done, campaign)
+    write_all(outputs, inputs=(experiment,))
     sys.stdout.flush()

@@ -3,18 +3,50 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import PurePath
+from typing import Any
 
 from camcomp.bench import Bench, Run, thinned
+from camcomp.campaign import Campaign
+from camcomp.config import load_config, load_experiment
 from camcomp.datatypes import Floats
 from camcomp.diagnose import Diagnosis, _main_channels, _theta_without
+from camcomp.files import read_bytes
 from camcomp.gap.observation import channel_names
 from camcomp.gap.search import Fitted
 from camcomp.inquiry import Inquiry
+from camcomp.report.diagnosis import diagnosis_html
 from camcomp.report.diagnosis_figures import cause_name
+from camcomp.report.inputs import Input
 from camcomp.report.runview import Rival, RunView
 from camcomp.twin import Twin
 
 MICRO = 1e3  # mm -> um
+
+
+def report_of(path: str, result: dict[str, Any], done: Diagnosis | None, campaign: Campaign | None) -> bytes:
+    """The report of an experiment file. Without `done` (studies of logs that have no program) no runs are drawn."""
+    experiment = load_experiment(path)
+    inputs = [Input("experiment", str(path), read_bytes(path))]
+    inputs += [Input("configuration", each, read_bytes(each)) for each in experiment.config]
+    for run in experiment.runs:
+        if run.program is not None:
+            inputs.append(Input(f"program of {run.name}", run.program, read_bytes(run.program)))
+        inputs.append(Input(f"log of {run.name}", run.log, read_bytes(run.log)))
+    views: list[RunView] = []
+    rivals: list[Rival] = []
+    if done is not None and campaign is not None:
+        views = views_of(done, campaign.twin, campaign.runs, experiment.holdout)
+        rivals = rivals_of(done)
+    return diagnosis_html(
+        result,
+        views,
+        title=PurePath(path).name,
+        machine=load_config(experiment.config).robot.name,
+        inputs=inputs,
+        notes=campaign.notes if campaign is not None else (),
+        rivals=rivals,
+    )
 
 
 def views_of(done: Diagnosis, twin: Twin, runs: Sequence[Run], holdout: Sequence[str]) -> list[RunView]:

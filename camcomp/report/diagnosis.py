@@ -114,7 +114,7 @@ def _cards(result: Mapping[str, Any]) -> list[tuple[str, str, str]]:
         ("Gap", f"{brief(gap['rms_um'])} µm", f"rms; 95 % below {brief(gap['p95_um'])} µm, max {brief(gap['max_um'])} µm"),
         ("Noise floor", f"{brief(gap['noise_floor_um'])} µm", "what no model can explain"),
         ("Gap on unseen runs", f"{brief(shrink['after_rms_um'])} µm", f"was {brief(shrink['before_rms_um'])} µm"),
-        ("Ratio after to before", f"{shrink['ratio']:.3f}", f"95 % interval {low:.3f} to {high:.3f}"),
+        ("Part of the gap removed", f"{100 * shrink['ratio']:.1f} %", f"95 % interval {100 * low:.1f} to {100 * high:.1f} %"),
         ("Stage", str(result["where"]["stage"]), "where in the machine"),
     ]
 
@@ -151,8 +151,8 @@ def _shrinkage(result: Mapping[str, Any]) -> str:
     shrink = result["shrinkage"]
     low, high = shrink["ci95"]
     return (
-        f"Judged on {_and(shrink['holdout'])}, each with causes fitted without it. What remains is {shrink['ratio']:.3f} of "
-        f"the gap (95 % interval {low:.3f} to {high:.3f})."
+        f"Judged on {_and(shrink['holdout'])}, with causes fitted without what is judged. {100 * shrink['ratio']:.1f} % of the "
+        f"gap goes (95 % interval {100 * low:.1f} to {100 * high:.1f} %)."
     )
 
 

@@ -127,7 +127,7 @@ def figure_shares(where: Mapping[str, Any]) -> Figure | None:
         "shares",
         "By axis and actuator, and what it depends on",
         "Share of the gap's energy above the noise by axis of the workpiece and, read as motion of the carriages, by "
-        "actuator; below, the share of what is said by each quantity that the gap depends on.",
+        "actuator; below, how much of the gap follows each quantity. These may overlap.",
         f"Bar chart of shares of the gap: {words}.",
         [bars],
         {"xaxis": axis("share in %", range=[0, 115]), "yaxis": axis("")},

@@ -51,8 +51,8 @@ def result(verdict):
         "causes": causes,
         "alternatives": sets if verdict == "ambiguous" else [],
         "shrinkage": {
-            "holdout": ["a", "b"], "before_rms_um": 14.1, "after_rms_um": after, "ratio": round(after / 14.1, 4),
-            "ci95": [0.1, 0.3], "steps": steps,
+            "holdout": ["a", "b"], "before_rms_um": 14.1, "after_rms_um": after, "ratio": round(1 - after / 14.1, 4),
+            "ci95": [0.7, 0.9], "steps": steps,
         },
         "next_experiment": None
         if verdict in ("none", "identified")

@@ -2,14 +2,17 @@
 
 import json
 import re
+from hashlib import sha256
 from html import unescape
 
 import numpy as np
 import pytest
 
+from camcomp.cli import run
 from camcomp.report.diagnosis import diagnosis_html, verdict_text
 from camcomp.report.inputs import Input
 from camcomp.report.runview import Rival, likeness, rms, spectrum
+from tests.commandline import ROOT
 from tests.report.browser import needs_browser
 from tests.report.diagnoses import result, rivals, run_view, views
 
@@ -52,7 +55,9 @@ def test_causes_with_intervals_next_experiment_and_notes():
     assert "backlash x 97.0 % 90.0 % width_mm = 0.02130 (0.01917 to 0.02343)" in text
     assert "Mill the circle in air at 2000 mm/min. It separates backlash(x) and friction(x)." in text
     assert "run b has no temperature" in text
-    assert "Ratio after to before 0.250 95 % interval 0.100 to 0.300" in text
+    # 14.1 um become 3.525 um: three quarters are gone
+    assert "Part of the gap removed 75.0 % 95 % interval 70.0 to 90.0 %" in text
+    assert "75.0 % of the gap goes (95 % interval 70.0 to 90.0 %)." in text
 
 
 def test_held_out_runs_are_drawn_the_worst_first():
@@ -114,6 +119,32 @@ def test_likeness():
     assert likeness(Rival("a", (one,)), Rival("b", (-3 * one,))) == pytest.approx(1.0)
     assert likeness(Rival("a", (one,)), Rival("b", (one[:, ::-1],))) == 0.0
     assert rms(np.array([np.nan, 3.0, -3.0])) == 3.0 and rms(np.array([np.nan])) == 0.0
+
+
+@pytest.fixture(scope="session")
+def diagnosed(tmp_path_factory):
+    """A sample experiment as a newcomer runs it: (result, page)."""
+    folder = tmp_path_factory.mktemp("diagnosed")
+    experiment = ROOT / "samples/diagnosis/clear/experiment.yaml"
+    words = ["diagnose", experiment, "--json", folder / "r.json", "--report", folder / "r.html"]
+    assert run([str(each) for each in words]) == 0
+    return json.loads((folder / "r.json").read_text()), (folder / "r.html").read_text(encoding="utf-8")
+
+
+def test_runs_that_are_drawn_shrink_as_the_result_says(diagnosed):
+    found, html = diagnosed
+    maps = figures(html)["map"]["traces"]
+    drawn = [np.sqrt(np.mean(np.square(np.array(each["marker"]["color"], float)))) for each in maps]
+    shrink = found["shrinkage"]
+    assert drawn == pytest.approx([shrink["before_rms_um"], shrink["after_rms_um"]], rel=0.02)
+    assert f"{100 * (1 - shrink['after_rms_um'] / shrink['before_rms_um']):.1f} % of the gap goes" in words(html)
+
+
+def test_a_diagnosis_names_all_its_files(diagnosed):
+    text = words(diagnosed[1])
+    for path in sorted((ROOT / "samples/diagnosis/clear").iterdir()):
+        assert sha256(path.read_bytes()).hexdigest() in text, path.name
+    assert str(ROOT) not in diagnosed[1] and "Identified. backlash (y) explains the gap." in text
 
 
 @needs_browser
