@@ -18,28 +18,28 @@ _LABEL = re.compile(r"[ \t]*(?:N[0-9]+[ \t]+)?([A-Za-z_][A-Za-z0-9_]+):(?!=)")
 _QUOTED = re.compile(r'"[^"]*"')
 
 # Statements without influence on the path, with or without brackets behind them.
-IGNORED = frozenset(  # noqa: SIM905
+IGNORED = frozenset(
     """
     MSG STOPRE CYCLE832 WORKPIECE TRAFOOF SOFT BRISK DRIVE FFWON FFWOF COMPOF COMPON COMPCURV COMPCAD
     COMPSURF CFC CFTCP CFIN CUTCONOF CUTCONON WALIMON WALIMOF DIAMOF DIAMCYCOF KONT NORM ORIWKS ORIMKS
     ORIAXES ORIVECT UPATH SPATH DISPLOF DISPLON SAVE EXTERN DYNNORM DYNPOS DYNROUGH DYNSEMIFIN DYNFINISH
     DYNPREC FNORM RTLION RTLIOF PUTFTOCF FTOCON FTOCOF G0EXT GROUP_BEGIN GROUP_END TOFFOF CDOF CPRECOF PTPG0
     CP BLSYNC ADISPOS ADIS FIFOCTRL STARTFIFO STOPFIFO LIMS SETMS
-    """.split()
+    """.split()  # noqa: SIM905
 )
 # Statements that may stand alone, to switch something off; with words behind them they change coordinates.
-RESETS = frozenset(  # noqa: SIM905
+RESETS = frozenset(
     """
     TRANS ROT SCALE MIRROR CYCLE800 MCALL SUPAOF ROTS CROT
-    """.split()
+    """.split()  # noqa: SIM905
 )
 MACHINE = frozenset(("SUPA",))
 _ADDRESSES = {"CR": "R", "TURN": "P"}
-_FLOW = frozenset(  # noqa: SIM905
+_FLOW = frozenset(
     """
     IF ELSE ENDIF WHILE ENDWHILE FOR ENDFOR LOOP ENDLOOP REPEAT REPEATB UNTIL GOTO GOTOF GOTOB GOTOC GOTOS
     CASE CALL PCALL DEF PROC RET
-    """.split()
+    """.split()  # noqa: SIM905
 )
 
 
