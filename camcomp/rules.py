@@ -384,6 +384,34 @@ RULES: dict[str, Rule] = {
         "choose start angles nearer to the work, move the workpiece, or turn the tool about its axis (tool.turn_deg)",
     ),
     # --- CC4xx logs, experiments -------------------------------------------------------------------------------
+    "CC400": Rule(
+        "log without rows",
+        "The log is no table with a header and at least one row.",
+        "write a CSV file with one header row",
+    ),
+    "CC401": Rule(
+        "column missing in a log",
+        "A log needs `t_s`, and what is not named as the README says is not read.",
+        "name the columns as in the README: t_s, line, x_mm, cmd_x_mm, act_x_mm, act_x_N, fx_N, temp_C, ...",
+    ),
+    "CC402": Rule(
+        "run without program",
+        "A run may lack its program only where the log has set-points, or actuator coordinates with the measured tip.",
+        "name the program of the run, or log cmd_<actuator>_mm",
+    ),
+    "CC403": Rule(
+        "cell of a log", "A cell of a log is a number or empty.", "correct the cell, or leave it empty"
+    ),
+    "CC410": Rule(
+        "measured point out of reach",
+        "The control could not have gone where the run says: the model and the logs do not belong together.",
+        "check the config of the experiment, the workpiece origin and the units of the log",
+    ),
+    "CC411": Rule(
+        "run cannot be simulated",
+        "The loaded equilibrium of the model was not found at a point of the run.",
+        "check the force and stiffness values of the config",
+    ),
     # --- CC5xx input and output --------------------------------------------------------------------------------
     "CC420": Rule(
         "too little to study",
