@@ -101,12 +101,19 @@ def trajectories(result: Compensated, job: Job) -> Trajectories:
     return Trajectories(job.frame.to_program(alone), job.frame.to_program(loaded))
 
 
-def compensate(program: Program, job: Job, *, method: str, tolerance_um: float, version: str) -> Compensated:
-    """The corrected program. Raises PhysicsError where the machine cannot do what is asked."""
+def compensate(
+    program: Program, job: Job, *, method: str, tolerance_um: float, version: str, context: tuple[int, int] = (0, 0)
+) -> Compensated:
+    """The corrected program. Raises PhysicsError where the machine cannot do what is asked.
+
+    context: how many of the first and of the last motions are only there because their neighbours depend on them; they
+    are not divided, and their errors do not count.
+    """
     track = lay_track(program.path, job.conditions)
     path, resolution = program.path, job.config.control.resolution_mm
     corrected = corrected_pieces(path, track)
     feeding = corrected & (path.kind[track.motion] != RAPID)
+    feeding &= (track.motion >= context[0]) & (track.motion < len(path) - context[1])
     rounding = 0.5 * np.sqrt(3.0) * resolution
     budget = max(1e-3 * tolerance_um - rounding, 0.1e-3 * tolerance_um)
     tolerance = np.full(len(track.motion), budget)
@@ -132,7 +139,7 @@ def compensate(program: Program, job: Job, *, method: str, tolerance_um: float, 
         missed = (worst > 1e-3 * tolerance_um) & ~kept
         if not missed.any():
             break
-        tolerance = np.where(missed, tolerance * np.clip(0.9e-3 * tolerance_um / worst, 0.3, 0.9), tolerance)
+        tolerance = np.where(missed, tolerance * np.clip(0.9e-3 * tolerance_um / np.maximum(worst, 1e-12), 0.3, 0.9), tolerance)
     before = _see_original(job, points)
     warnings = _warnings(rows, after.error, turning)
     iterations = int(aimed.iterations.max(initial=0))
