@@ -159,7 +159,7 @@ def _causes(inquiry: Inquiry, found: Survey, strange: bool) -> list[dict[str, An
             "share": round(energy[j] / whole, 4) if whole > 0 else 0.0,
             "parameters": _parameters(inquiry, best, j, causes[j]),
         })  # fmt: skip
-    out.sort(key=lambda c: (-c["probability"], -c["share"]))
+    out.sort(key=lambda c: (c["probability"], c["share"]), reverse=True)
     if strange:
         label = found.leftover.labels[0][0] if found.leftover.labels else ""
         target = label.split(":")[1] if ":" in label and label.split(":")[1] in inquiry.bench.actuators else None

@@ -312,7 +312,8 @@ def measure_noise(
                 at += len(words.labels)
             left.append(np.where(np.isfinite(residuals[r]), gap, np.nan))
         noise = fit_noise(left, inflate, list(times), ordered)
-        noise = replace(noise, sigma=noise.sigma * _spent(A, M, size, half, k, dictionaries, residuals))
+        spent = _spent(A, M, size, np.asarray(half, float), k, dictionaries, residuals)
+        noise = replace(noise, sigma=np.multiply(noise.sigma, spent))
     inflate = [np.sqrt(1.0 + (extra[r] / noise.sigma[r]) ** 2) for r in runs]
     return noise, inflate
 

@@ -3,8 +3,8 @@
 import math
 from random import Random
 
-from camcomp.gcode.arcs import PLANES
 from camcomp.dialects.rs274 import DIALECT
+from camcomp.gcode.arcs import PLANES
 from camcomp.gcode.interpret import Interpreter
 from camcomp.gcode.program import Setup
 from camcomp.gcode.text import Text
@@ -26,7 +26,7 @@ class ProgramWriter:
     def program(self, length: int) -> str:
         """Text with `length` statements."""
         random = self.random
-        for first in ("G21 G90 G17 G94", "G0 X%s Y%s Z%s" % tuple(self.number(20) for _ in range(3)), "F300 S2000"):
+        for first in ("G21 G90 G17 G94", "G0 X{} Y{} Z{}".format(*(self.number(20) for _ in range(3))), "F300 S2000"):
             self.put(first)
         for _ in range(length):
             roll = random.random()

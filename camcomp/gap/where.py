@@ -55,7 +55,7 @@ def _energy(run: RunGap) -> Floats:
     return np.nansum(run.gap**2, axis=1)
 
 
-def _chance(run: RunGap, rows: Floats) -> float:
+def _chance(run: RunGap, rows: np.ndarray) -> float:
     """Chance that noise alone makes these rows as large."""
     normal = run.gap[rows] / run.noise
     count = np.isfinite(normal).sum() / run.thin

@@ -16,7 +16,7 @@ import math
 import numpy as np
 from numba import njit
 
-from camcomp.statics.pack import FIXED, PRISMATIC, REVOLUTE, SPRING, WEIGHT
+from camcomp.statics.pack import FIXED, PRISMATIC, REVOLUTE, SPRING
 from camcomp.statics.rotation import (
     cross_matrix,
     exp_rotation,

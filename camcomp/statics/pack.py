@@ -34,7 +34,7 @@ class Packed(NamedTuple):
     vector: NDArray[np.float64]  # (e, 3) translation, joint axis, or centre of a weight
     var: NDArray[np.int64]  # (e,) first variable, -1 none
     sign: NDArray[np.float64]  # (e,) coefficient of the variable in a joint
-    count: NDArray[np.int64]  # (e,) number of spring directions
+    count: NDArray[np.int64]  # type: ignore[assignment]  # (e,) number of spring directions
     comp: NDArray[np.int64]  # (e, 6) which of the six
     stiffness: NDArray[np.float64]  # (e, 6, 6) spring; of one hinged bar if swing >= 0
     swing: NDArray[np.int64]  # (e,) variable of the swing angle the spring's stiffness depends on, -1 none
@@ -53,15 +53,15 @@ class Packed(NamedTuple):
     turns: NDArray[np.bool_]  # (c, max nvar) the variable is an angle
 
 
-def _rows(chain: Chain, rigid: bool, actuator_index: dict[str, int]):
+def _rows(chain: Chain, rigid: bool, actuator_index: dict[str, int]) -> tuple[list[dict], list[float]]:
     """Element rows of one chain as dicts, and the start values of its variables."""
     rows: list[dict] = []
     start: list[float] = []
 
-    def fixed(translation, rotation):
+    def fixed(translation: NDArray[np.float64], rotation: NDArray[np.float64]) -> None:
         rows.append({"kind": FIXED, "vector": translation, "rotation": rotation})
 
-    def error(six):
+    def error(six: NDArray[np.float64]) -> None:
         if np.any(six != 0.0):
             fixed(six[:3], exp_rotation(np.asarray(six[3:], float)))
 
@@ -105,9 +105,8 @@ def _rows(chain: Chain, rigid: bool, actuator_index: dict[str, int]):
                 start.extend([0.0] * 5)
             fixed(np.zeros(3), own.T)
             rows.append({"kind": REVOLUTE, "vector": e.hinge, "var": swing, "sign": -1.0})
-        elif isinstance(e, Weight):
-            if not rigid:
-                rows.append({"kind": WEIGHT, "vector": e.centre, "force": e.force})
+        elif isinstance(e, Weight) and not rigid:
+            rows.append({"kind": WEIGHT, "vector": e.centre, "force": e.force})
     if not rigid:
         error(chain.end_error)
     fixed(np.zeros(3), chain.frame.T)

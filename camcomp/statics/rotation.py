@@ -15,7 +15,7 @@ SMALL_ANGLE = 0.2  # below it the closed forms lose digits and the series are ex
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _coefficients(angle_sq):
-    """a = sin t / t, b = (1 - cos t)/t^2, c = (t - sin t)/t^3, and b'/t, c'/t for the angle t."""
+    """Factors a = sin t / t, b = (1 - cos t)/t^2, c = (t - sin t)/t^3, and b'/t, c'/t for the angle t."""
     if angle_sq < SMALL_ANGLE * SMALL_ANGLE:
         t2 = angle_sq
         a = 1.0 - t2 / 6.0 * (1.0 - t2 / 20.0 * (1.0 - t2 / 42.0 * (1.0 - t2 / 72.0)))

@@ -78,7 +78,8 @@ def run(
         (root / "tool.tbl").write_text(table or "T99 P99 Z0 D0\n")
         command = [str(binary()), "-g", "-v", "rs274.var", "-t", "tool.tbl", "program.ngc"]
         done = subprocess.run(
-            command, cwd=folder, stdin=subprocess.DEVNULL, capture_output=True, text=True, errors="replace", timeout=60
+            command, cwd=folder, stdin=subprocess.DEVNULL, capture_output=True, text=True, errors="replace", timeout=60,
+            check=False,
         )
     return _parse(done.stdout, done.stderr)
 
