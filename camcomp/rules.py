@@ -392,7 +392,7 @@ RULES: dict[str, Rule] = {
     "CC401": Rule(
         "column missing in a log",
         "A log needs `t_s`, and what is not named as the README says is not read.",
-        "name the columns as in the README: t_s, line, x_mm, cmd_x_mm, act_x_mm, act_x_N, fx_N, temp_C, ...",
+        "name the columns as in the README: t_s, line, x_mm, cmd_x_mm, act_x_mm, act_x_N, fx_N, temp_C",
     ),
     "CC402": Rule(
         "run without program",
