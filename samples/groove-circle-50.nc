@@ -2,7 +2,7 @@
 (circular groove, diameter 50 mm, cut counter-clockwise)
 (the program origin is the centre of the circle, on the floor of the groove)
 N10 G21 G90 G17 G94
-N20 T1 M6
+(the tool is in the spindle)
 N30 S8000 M3
 N40 G0 X25 Y0 Z5
 N50 G1 Z0 F300
