@@ -8,6 +8,7 @@ from pathlib import Path as FilePath
 
 import numpy as np
 
+from camcomp import pathgeometry
 from camcomp.bench import Run
 from camcomp.config import load_config, load_experiment
 from camcomp.course import Course, course_of_program
@@ -18,6 +19,7 @@ from camcomp.files import display_name, read_bytes
 from camcomp.gap.observation import Measured
 from camcomp.gap.timeline import fit_to_log, schedule
 from camcomp.job import Job
+from camcomp.logcheck import check_places, check_program, check_rows
 from camcomp.programs import open_program
 from camcomp.spec import Experiment
 from camcomp.spec import Run as RunSpec
@@ -55,13 +57,15 @@ def open_campaign(path: str | FilePath) -> Campaign:
 
 def open_run(spec: RunSpec, job: Job, twin: Twin, notes: list[str]) -> Run:
     """One run of an experiment."""
-    measured = read_log(spec.log, twin)
+    measured, log = read_log(spec.log, twin), display_name(spec.log)
+    check_rows(log, measured)
     if spec.program is None:
         raise ConfigError("CC402", f"run '{spec.name}' has no program")
     program = open_program(spec.program, job.config)
     conditions = job.conditions if spec.cutting else replace(job.conditions, model=None)
     timeline = schedule(program.path, job.config.control.acceleration_mm_per_s2)
     fit = fit_to_log(timeline, measured.time, measured.line)
+    check_program(log, spec.name, measured, fit.rows)
     track = lay_track(program.path, conditions)
     temperature = _filled(measured.time, measured.temperature)
     course: Course = course_of_program(
@@ -69,6 +73,8 @@ def open_run(spec: RunSpec, job: Job, twin: Twin, notes: list[str]) -> Run:
         vectors=job.frame.vectors, inverse=twin.inverse,
         setpoints=measured.setpoint if measured.has("setpoint") else None, temperature=temperature,
     )  # fmt: skip
+    k, share = fit.timeline.locate(measured.time)
+    check_places(log, spec.name, measured, course, pathgeometry.points(program.path, fit.timeline.index[k], share))
     thin = int(np.ceil(len(measured.time) / MOST_ROWS))
     return Run(spec.name, course, measured, spec.clamping, spec.clock, thin)
 
@@ -92,6 +98,8 @@ def read_log(path: str, twin: Twin) -> Measured:
             if cell.strip():
                 try:
                     table[i, j] = float(cell)
+                    if np.isinf(table[i, j]):
+                        raise ValueError
                 except ValueError:
                     at = Location(name, i + 2, 1 + sum(len(each) + 1 for each in row[:j]), ",".join(row))
                     raise ConfigError("CC403", f"'{cell}' in column {header[j]} is not a number", at=at) from None

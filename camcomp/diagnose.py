@@ -22,7 +22,7 @@ from camcomp.gap.whiten import effective_rows
 from camcomp.inquiry import Inquiry, open_inquiry
 from camcomp.job import Job
 from camcomp.planner import Proposal, propose
-from camcomp.survey import Survey, leftover, survey
+from camcomp.survey import Survey, leftovers, survey
 from camcomp.twin import Twin
 
 
@@ -46,13 +46,12 @@ def diagnose(
     found = survey(inquiry)
     best = found.fits[found.verdict.best]
     gap = gap_of(inquiry)
-    strange = found.strange
-    word = "unknown" if strange else found.verdict.word
-    causes = _causes(inquiry, found, strange)
+    word = "unknown" if found.strange else found.verdict.word
+    causes = _causes(inquiry, found)
     result: dict[str, Any] = {
         "verdict": word,
         "gap": gap,
-        "where": _where(inquiry, found, best, causes, strange),
+        "where": _where(inquiry, found, best),
         "causes": causes,
         "alternatives": _alternatives(inquiry, found) if word == "ambiguous" else [],
         "shrinkage": _shrinkage(twin, runs, holdout, inquiry, best),
@@ -101,7 +100,10 @@ def gap_of(inquiry: Inquiry) -> dict[str, float]:
     size = np.concatenate([np.sqrt(np.sum(gap**2, axis=1)) for gap in gaps])
     size = size[np.isfinite(size)] * 1e3
     repeats = RUN_OFFSET_MM if part.start == 0 else 0.0  # what one run differs from the next belongs to the floor
-    noise = np.sqrt(np.nansum(np.nanmean(inquiry.noise.sigma[:, part] ** 2, axis=0) + repeats**2)) * 1e3
+    sigma = np.nanmean(inquiry.noise.sigma[:, part] ** 2, axis=0)
+    if part.start == 0:
+        sigma = sigma - inquiry.background.colour().excess ** 2
+    noise = np.sqrt(np.nansum(np.maximum(sigma, 0.0) + repeats**2)) * 1e3
     return {
         "rms_um": round(float(np.sqrt(np.mean(size**2))), 3),
         "p95_um": round(float(np.quantile(size, 0.95)), 3),
@@ -143,12 +145,12 @@ def _energies(inquiry: Inquiry, f: Fitted) -> list[float]:
     return out
 
 
-def _causes(inquiry: Inquiry, found: Survey, strange: bool) -> list[dict[str, Any]]:
+def _causes(inquiry: Inquiry, found: Survey) -> list[dict[str, Any]]:
     best = found.fits[found.verdict.best]
     energy = _energies(inquiry, best)
-    left = found.leftover.rms**2 * total(best.grams).rows if strange else 0.0
+    left = found.left[found.strange].energy if found.strange else 0.0
     whole = sum(energy) + left
-    out = []
+    out: list[dict[str, Any]] = []
     causes = inquiry.causes(best.members, best.theta, best.extra)
     for j, i in enumerate(best.members):
         atom = inquiry.columns.atoms[i]
@@ -159,12 +161,12 @@ def _causes(inquiry: Inquiry, found: Survey, strange: bool) -> list[dict[str, An
             "share": round(energy[j] / whole, 4) if whole > 0 else 0.0,
             "parameters": _parameters(inquiry, best, j, causes[j]),
         })  # fmt: skip
-    out.sort(key=lambda c: (c["probability"], c["share"]), reverse=True)
-    if strange:
-        label = found.leftover.labels[0][0] if found.leftover.labels else ""
+    out.sort(key=lambda c: (-c["probability"], -c["share"]))
+    if found.strange:
+        label = _first_label(found)
         target = label.split(":")[1] if ":" in label and label.split(":")[1] in inquiry.bench.actuators else None
         out.append({
-            "effect": "unknown", "target": target, "probability": round(1.0 - 10.0 ** max(found.leftover.log10_chance, -6.0), 4),
+            "effect": "unknown", "target": target, "probability": 1.0,
             "share": round(left / whole, 4) if whole > 0 else 1.0, "parameters": {},
         })  # fmt: skip
     return out
@@ -177,10 +179,19 @@ def _parameters(inquiry: Inquiry, f: Fitted, j: int, cause: Cause) -> dict[str, 
     draws = f.theta + rng.standard_normal((400, len(f.theta))) @ root.T
     samples = [inquiry.causes(f.members, d, f.extra)[j].values for d in draws]
     out = {}
+    idle = _idle_shapes(inquiry, cause)
     for name, value in cause.values.items():
+        if name in idle:
+            continue
         low, high = np.quantile([s[name] for s in samples], [0.025, 0.975])
         out[name] = {"value": _round(value), "ci95": [_round(min(low, value)), _round(max(high, value))]}
     return out
+
+
+def _idle_shapes(inquiry: Inquiry, cause: Cause) -> set[str]:
+    """Scanned parameters that nothing depends on here: a warm-up time where temperatures are logged."""
+    logged = all(run.course.temperature is not None for run in inquiry.bench.runs)
+    return {p.name for p in cause.effect.PARAMETERS if p.scan and p.unit == "s"} if logged else set()
 
 
 def _round(value: float) -> float:
@@ -197,49 +208,53 @@ def _alternatives(inquiry: Inquiry, found: Survey) -> list[list[dict[str, Any]]]
 # -- where ------------------------------------------------------------------------------------------------------------
 
 
-def _where(inquiry: Inquiry, found: Survey, best: Fitted, causes: Sequence[dict[str, Any]], strange: bool) -> dict[str, Any]:
+def _where(inquiry: Inquiry, found: Survey, best: Fitted) -> dict[str, Any]:
     gaps = _run_gaps(inquiry)
     part = _main_channels(inquiry)
     names = ["x", "y", "z"] if part.start == 0 else list(inquiry.bench.actuators)
     at = where.axes(gaps, names)
     return {
-        "stage": _stage(inquiry, best, found, strange),
+        "stage": _stage(inquiry, best, found),
         "axes": {axis: at.get(axis, 0.0) for axis in "xyz"},
         "actuators": where.actuators(gaps, inquiry.bench.actuators),
         "lines": where.lines(gaps),
         "intervals": where.intervals(gaps),
-        "drivers": _drivers(inquiry, found, strange),
+        "drivers": _drivers(inquiry, found),
     }
 
 
-def _stage(inquiry: Inquiry, best: Fitted, found: Survey, strange: bool) -> str:
+def _stage(inquiry: Inquiry, best: Fitted, found: Survey) -> str:
     """The stage of the largest cause; of an unknown one, the stage of the channel that shows it."""
     energy = _energies(inquiry, best)
-    left = found.leftover.rms**2 * total(best.grams).rows if strange else 0.0
-    if strange and left > max(energy, default=0.0):
-        kind = found.leftover.kind
-        label = found.leftover.labels[0][0] if found.leftover.labels else ""
-        if kind == "encoder":
-            return "control"
-        if kind == "dyno":
-            return "process"
-        return "structure" if label.startswith("force") else "drive"
+    left = found.left[found.strange].energy if found.strange else 0.0
+    if found.strange and left > max(energy, default=0.0):
+        stage = {"encoder": "control", "dyno": "process"}.get(found.strange)
+        return stage or ("structure" if _first_label(found).startswith("force") else "drive")
     if energy:
         return str(inquiry.columns.atoms[best.members[int(np.argmax(energy))]].effect.STAGE)
-    stage = {"control": slice(3, 3 + len(inquiry.bench.actuators)), "structure": slice(0, 3)}
+    parts = {"control": slice(3, 3 + len(inquiry.bench.actuators)), "structure": slice(0, 3)}
     size = {}
-    for name, part in stage.items():
+    for name, part in parts.items():
         white = [np.nanmean((r[:, part] / inquiry.noise.sigma[k, part]) ** 2) for k, r in enumerate(inquiry.residuals)
                  if np.isfinite(r[:, part]).any()]  # fmt: skip
         size[name] = float(np.mean(white)) if white else 0.0
     return max(size, key=lambda each: size[each])
 
 
-def _drivers(inquiry: Inquiry, found: Survey, strange: bool) -> list[dict[str, Any]]:
+def _first_label(found: Survey) -> str:
+    labels = found.left[found.strange].labels if found.strange else ()
+    return labels[0][0] if labels else ""
+
+
+def _drivers(inquiry: Inquiry, found: Survey) -> list[dict[str, Any]]:
     """What the gap depends on; with an unknown cause, what the rest depends on."""
-    left = found.leftover if strange else leftover(inquiry, next(f for f in found.fits if not f.members)) if any(
-        not f.members for f in found.fits) else found.leftover  # fmt: skip
-    return [{"covariate": name, "share": round(share, 4)} for name, share in left.labels[:6] if share > 0.02]
+    if found.strange:
+        labels = found.left[found.strange].labels
+    else:
+        null = inquiry.refit(())
+        at_null = leftovers(inquiry, null)
+        labels = max(at_null.values(), key=lambda each: each.energy).labels if at_null else ()
+    return [{"covariate": name, "share": round(share, 4)} for name, share in labels[:6] if share > 0.02]
 
 
 # -- shrinkage --------------------------------------------------------------------------------------------------------

@@ -1,7 +1,7 @@
 """The state of one diagnosis: columns, white rows, and re-fits of sets of causes through the twin."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -13,11 +13,11 @@ from camcomp.gap.effect import Cause
 from camcomp.gap.evidence import Gram, Prior, estimate, gram
 from camcomp.gap.patterns import Dictionary
 from camcomp.gap.search import Atoms, Fitted, Members, Scale, total
-from camcomp.gap.whiten import Noise, fit_noise
+from camcomp.gap.whiten import Noise
+from camcomp.noise import Background, inflation, measure_noise
+from camcomp.scan import beside, best_shape
 
-TIMING_S = 0.0015  # how fast a real drive settles after its acceleration has stepped
 STRAIGHT = 0.3  # chi-square that the bend of the model may cost before it is followed
-PATTERN_SCALE = 30.0  # um or N: what a pattern may amount to when the noise is measured beside it
 
 
 @dataclass(eq=False)
@@ -30,12 +30,17 @@ class Inquiry:
     inflate: list[Floats]
     times: list[Floats]
     residuals: list[Floats]
-    noise: Noise
+    background: Background
     white: list[Floats]  # per run (w, k)
     white_patterns: list[list[Floats]]  # per run, per kind (rows of the kind, p)
     white_residual: list[Floats]
     shapes: dict[int, dict[str, float]]
     atoms: Atoms
+
+    @property
+    def noise(self) -> Noise:
+        """Noise of the channels."""
+        return self.background.noise
 
     @property
     def prior(self) -> Prior:
@@ -192,34 +197,6 @@ class Inquiry:
             shapes[i][p.name] = float(np.clip(old + np.clip(s, -most * old, most * old), p.low, p.high))
 
 
-def inflation(bench: Bench) -> list[Floats]:
-    """Per run (n, c) >= 1: rows just after a step of the acceleration count less; NaN where no value.
-
-    In units of the channel's own noise, which is not known yet: here the extra standard deviation in mm or N.
-    """
-    out = []
-    for k, run in enumerate(bench.runs):
-        observed = bench.observed(k)
-        extra = np.zeros_like(observed)
-        t = run.course.time
-        if run.course.ordered and len(t) > 4:
-            usual = float(np.median(np.diff(t)))
-            window = max(1.5 * usual, 0.02)
-            grid = run.course.grid
-            push = np.gradient(np.gradient(run.course.grid_rho, grid, axis=0), grid, axis=0)
-            steps = np.linspace(-window, 0.5 * usual, 21)
-            around = [np.column_stack([np.interp(t + d, grid, v) for v in push.T]) for d in steps]
-            change = np.ptp(np.stack(around), axis=0)  # (n, m)
-            place = run.course.place(t)
-            slope = np.abs(bench.twin.rotation.T @ place.of(bench.slopes[k].tip_rho))
-            m = len(bench.actuators)
-            extra[:, :3] = TIMING_S**2 * np.einsum("nij,nj->ni", slope, change)
-            extra[:, 3 : 3 + m] = TIMING_S**2 * change
-        extra = np.where(np.isfinite(observed), extra, np.nan)
-        out.append(thinned(extra, run.thin))
-    return out
-
-
 def open_inquiry(bench: Bench, atoms: Sequence[Atom]) -> Inquiry:
     """Columns, noise and white rows for a bench and the atoms that may be causes."""
     columns = build(bench, atoms, {})
@@ -228,17 +205,18 @@ def open_inquiry(bench: Bench, atoms: Sequence[Atom]) -> Inquiry:
     times = [thinned(run.course.time[:, None], run.thin)[:, 0] for run in bench.runs]
     residuals = [bench.residual(k) for k in range(len(bench.runs))]
     shapes: dict[int, dict[str, float]] = {i: shape_default(a) for i, a in enumerate(atoms) if a.shapes}
-    noise, inflate = measure_noise(bench, columns, words, extra, times, residuals)
-    inquiry = _whiten(bench, columns, words, inflate, times, residuals, noise, shapes)
+    background = measure_noise(bench, columns, words, extra, times, residuals)
+    inquiry = _whiten(bench, columns, words, background, times, residuals, shapes)
     if any(a.shapes for a in atoms):
-        scan_shapes(inquiry)
-        noise, inflate = measure_noise(bench, inquiry.columns, words, extra, times, residuals, noise)
-        inquiry = _whiten(bench, inquiry.columns, words, inflate, times, residuals, noise, inquiry.shapes)
+        columns = _scan(inquiry)
+        background = measure_noise(bench, columns, words, extra, times, residuals, background.noise)
+        inquiry = _whiten(bench, columns, words, background, times, residuals, inquiry.shapes)
     return inquiry
 
 
-def _whiten(bench: Bench, columns: Columns, words: list[Dictionary], inflate: list[Floats], times: list[Floats],
-            residuals: list[Floats], noise: Noise, shapes: dict[int, dict[str, float]]) -> Inquiry:  # fmt: skip
+def _whiten(bench: Bench, columns: Columns, words: list[Dictionary], background: Background, times: list[Floats],
+            residuals: list[Floats], shapes: dict[int, dict[str, float]]) -> Inquiry:  # fmt: skip
+    noise, inflate = background.noise, background.inflate
     white, white_patterns, white_residual = [], [], []
     for k in range(len(bench.runs)):
         present = np.isfinite(inflate[k])
@@ -246,7 +224,7 @@ def _whiten(bench: Bench, columns: Columns, words: list[Dictionary], inflate: li
         white.append(noise.rows(k, clean(columns.blocks[k]), inflate[k], times[k]))
         white_patterns.append([noise.rows(k, w.blocks[k], inflate[k], times[k], w.first) for w in words])
         white_residual.append(noise.rows(k, residuals[k][:, :, None], inflate[k], times[k])[:, 0])
-    return Inquiry(bench, columns, words, inflate, times, residuals, noise, white, white_patterns, white_residual,
+    return Inquiry(bench, columns, words, inflate, times, residuals, background, white, white_patterns, white_residual,
                    shapes, atoms_prior(columns))  # fmt: skip
 
 
@@ -267,141 +245,17 @@ def atoms_prior(columns: Columns) -> Atoms:
     return Atoms(tuple(tuple(columns.of(i)) for i in range(len(columns.atoms))), np.array(weight), exclusive)
 
 
-def measure_noise(
-    bench: Bench, columns: Columns, dictionaries: Sequence[Dictionary], extra: Sequence[Floats], times: Sequence[Floats],
-    residuals: Sequence[Floats], start: Noise | None = None,
-) -> tuple[Noise, list[Floats]]:  # fmt: skip
-    """Noise beside everything that could be there: all effects, nuisances and patterns at once, softly."""
-    runs = range(len(bench.runs))
-    k, p = len(columns.names), sum(len(words.labels) for words in dictionaries)
-    first = [_differences(residuals[r], times[r]) for r in runs]
-    sigma = np.array(first)
-    ordered = [run.course.ordered for run in bench.runs]
-    precision = np.concatenate([
-        np.where(columns.atom >= 0, 1.0 / 9.0, columns.prior.precision(1.0) / 9.0), np.full(p, 1.0 / PATTERN_SCALE**2)
-    ])  # fmt: skip
-    noise = start or Noise(np.zeros((sigma.shape[1], 3)), sigma, np.ones(sigma.shape[1]))
-    both = [np.concatenate([columns.blocks[r], residuals[r][:, :, None]], axis=2) for r in runs]
-    for r in runs:
-        both[r][~np.isfinite(residuals[r])] = 0.0
-    inflate: list[Floats] = []
-    for _ in range(1 if start else 2):
-        inflate = [np.sqrt(1.0 + (extra[r] / noise.sigma[r]) ** 2) for r in runs]
-        # columns first, then patterns kind by kind, residual last; patterns of two kinds share no row
-        A = np.zeros((k + p + 1, k + p + 1))
-        at = k
-        for words in dictionaries:
-            index = np.concatenate([np.arange(k), np.arange(at, at + len(words.labels)), [k + p]])
-            part = slice(words.first, words.first + words.blocks[0].shape[1])
-            for r in runs:
-                block = np.concatenate([both[r][:, part, :-1], words.blocks[r], both[r][:, part, -1:]], axis=2)
-                D = noise.rows(r, block, inflate[r], times[r], words.first)
-                A[np.ix_(index, index)] += D.T @ D
-            at += len(words.labels)
-        M = A[:-1, :-1] + np.diag(precision)
-        size = 1.0 / np.sqrt(np.diag(M))
-        half = np.linalg.cholesky(size[:, None] * M * size + 1e-10 * np.eye(len(size)))
-        a = size * np.linalg.solve(half.T, np.linalg.solve(half, size * A[:-1, -1]))
-        left = []
-        for r in runs:
-            gap = both[r][:, :, -1] - both[r][:, :, :-1] @ a[:k]
-            at = k
-            for words in dictionaries:
-                part = slice(words.first, words.first + words.blocks[r].shape[1])
-                gap[:, part] -= words.blocks[r] @ a[at : at + len(words.labels)]
-                at += len(words.labels)
-            left.append(np.where(np.isfinite(residuals[r]), gap, np.nan))
-        noise = fit_noise(left, inflate, list(times), ordered)
-        spent = _spent(A, M, size, np.asarray(half, float), k, dictionaries, residuals)
-        noise = replace(noise, sigma=np.multiply(noise.sigma, spent))
-    inflate = [np.sqrt(1.0 + (extra[r] / noise.sigma[r]) ** 2) for r in runs]
-    return noise, inflate
-
-
-def _spent(
-    A: Floats, M: Floats, size: Floats, half: Floats, k: int, dictionaries: Sequence[Dictionary], residuals: Sequence[Floats]
-) -> Floats:
-    """By how much (c,) the leftover of a fit is too small for the noise: patterns have followed the noise, too."""
-    shrink = np.linalg.solve(half, size[:, None] * A[:-1, :-1])
-    used = np.einsum("ij,ij->j", np.linalg.solve(half, np.diag(size)), shrink)  # diagonal of M^-1 A
-    out = np.ones(residuals[0].shape[1])
-    at = k
-    for words in dictionaries:
-        part = slice(words.first, words.first + words.blocks[0].shape[1])
-        rows = sum(int(np.isfinite(r[:, part]).sum()) for r in residuals)
-        spent = float(used[at : at + len(words.labels)].sum())
-        out[part] = 1.0 / np.sqrt(max(1.0 - spent / max(rows, 1), 0.3))
-        at += len(words.labels)
-    return out
-
-
-def _differences(residual: Floats, time: Floats) -> Floats:
-    """Rough noise (c,) from second differences, which smooth gaps do not enter."""
-    out = np.full(residual.shape[1], np.nan)
-    for j in range(residual.shape[1]):
-        x = residual[np.isfinite(residual[:, j]), j]
-        if len(x) > 4:
-            bend = np.abs(np.diff(x, 2))
-            out[j] = max(float(np.median(bend)) / 0.6745 / np.sqrt(6.0), 1e-9)
-            if out[j] <= 1e-9:
-                out[j] = max(float(np.sqrt(np.mean(bend**2) / 6.0)), 1e-7)
-    return out
-
-
-def scan_shapes(inquiry: Inquiry) -> None:
-    """Chooses the scanned shapes (pitches, time constants) that explain most of what the other columns leave."""
-    data = total(inquiry.grams(inquiry.white_residual, inquiry.white))
+def _scan(inquiry: Inquiry) -> Columns:
+    """Columns with the scanned shapes (pitches, time constants) that explain most of what the others leave."""
     own = [c for i in inquiry.shapes for c in inquiry.atoms.columns[i]]
-    others = np.array([c for c in range(len(inquiry.columns.names)) if c not in set(own)])
-    precision = np.where(inquiry.columns.atom >= 0, 1.0 / 9.0, inquiry.prior.precision(1.0))[others]
-    M = data.A[np.ix_(others, others)] + np.diag(precision)
-    size = 1.0 / np.sqrt(np.diag(M))
-    L = np.linalg.cholesky(size[:, None] * M * size + 1e-12 * np.eye(len(size)))
-    a = size * np.linalg.solve(L.T, np.linalg.solve(L, size * data.b[others]))
-    rest = [r - W[:, others] @ a for r, W in zip(inquiry.white_residual, inquiry.white, strict=True)]
+    others = np.setdiff1d(np.arange(len(inquiry.columns.names)), own)
+    rest = beside(inquiry.base_grams, inquiry.white, inquiry.white_residual, inquiry.columns, others)
     changed: dict[int, list[Floats]] = {}
-    y = np.concatenate(rest)
     for i in inquiry.shapes:
-        atom = inquiry.columns.atoms[i]
-        tried = [{**shape_default(atom), atom.shapes[0].name: value} for value in atom.shapes[0].scan]
-        quick = [quick_columns(inquiry.bench, atom, shape) for shape in tried]
-        if quick[0] is None:
+        best = best_shape(inquiry.bench, inquiry.columns.atoms[i], rest, inquiry.whitened)
+        if best is None:
             continue
-        d = len(atom.parameters)
-        white = np.concatenate([
-            inquiry.whitened(k, np.stack([c[k] for q in quick if q for c in q], axis=2)) for k in range(len(inquiry.bench.runs))
-        ])  # fmt: skip
-        h = white.T @ y
-        gains = []
-        for v in range(len(tried)):
-            own_columns = white[:, v * d : v * d + d]
-            G = own_columns.T @ own_columns
-            G += (1e-9 * np.trace(G) + 1e-12) * np.eye(d)
-            gains.append(float(h[v * d : v * d + d] @ np.linalg.solve(G, h[v * d : v * d + d])))
-        best = tried[int(np.argmax(gains))]
         inquiry.shapes[i] = best
-        for c, per_run in zip(inquiry.atoms.columns[i], atom_columns(inquiry.bench, atom, best), strict=True):
-            changed[c] = per_run
-    inquiry.columns = inquiry.columns.with_blocks(changed)
-
-
-def quick_columns(bench: Bench, atom: Atom, shape: Mapping[str, float]) -> list[list[Floats]] | None:
-    """Columns of an effect that moves carriages only, straight from its hook; None for any other effect."""
-    if hasattr(atom.effect, "on_drive") and not any(
-        hasattr(atom.effect, h) for h in ("on_servo", "on_robot", "on_load", "on_pose", "on_workpiece", "on_clock")
-    ):
-        out = []
-        for p in atom.parameters:
-            cause = cause_of(atom, {**shape, p.name: p.scale})
-            per_run = []
-            for k, run in enumerate(bench.runs):
-                motion = bench.nominal[k].motion
-                moved = atom.effect.on_drive(np.zeros_like(motion.encoder), motion, cause.which(bench.actuators), cause.values)
-                values = np.zeros_like(bench.observed(k))
-                slope = bench.row_slopes(k)
-                values[:, :3] = np.einsum("nij,nj->ni", slope, moved)
-                per_run.append(thinned(values, run.thin))
-            out.append(per_run)
-        return out
-    return None
-
+        columns = atom_columns(inquiry.bench, inquiry.columns.atoms[i], best)
+        changed.update(zip(inquiry.atoms.columns[i], columns, strict=True))
+    return inquiry.columns.with_blocks(changed)

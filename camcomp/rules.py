@@ -402,6 +402,31 @@ RULES: dict[str, Rule] = {
     "CC403": Rule(
         "cell of a log", "A cell of a log is a number or empty.", "correct the cell, or leave it empty"
     ),
+    "CC404": Rule(
+        "log measures nothing",
+        "At least one of the channels tip, encoders, drive forces and dynamometer has to hold numbers.",
+        "check the names of the columns",
+    ),
+    "CC405": Rule(
+        "time runs backward",
+        "Rows of a log follow each other in time. Rows of equal time, or two runs in one file, cannot be put in order.",
+        "one file per run, one row per sample",
+    ),
+    "CC406": Rule(
+        "log of another program",
+        "The log's source lines or places are not those of the program that the run names.",
+        "check program and log of the run, and the workpiece origin of the config",
+    ),
+    "CC407": Rule(
+        "log in another unit",
+        "The values fit the program when they are read in another unit. A unit is never guessed silently.",
+        "convert the column to the unit that its name ends in",
+    ),
+    "CC408": Rule(
+        "axes of a log swapped",
+        "The values fit the program when columns are exchanged or change sign.",
+        "correct the header, or the sign, of the log",
+    ),
     "CC410": Rule(
         "measured point out of reach",
         "The control could not have gone where the run says: the model and the logs do not belong together.",

@@ -1,11 +1,14 @@
 """The search for causes on one inquiry: which sets are tried, in which order, and how they are ranked."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
 
+from camcomp.bench import thinned
 from camcomp.datatypes import Floats
+from camcomp.gap.colour import covariate
 from camcomp.gap.evidence import Gram, estimate
 from camcomp.gap.leftover import Leftover, Projected, project, score_test, unknown_evidence
 from camcomp.gap.search import Fitted, Members, Scale, extensions, pairs, predictive, probabilities, total
@@ -16,8 +19,10 @@ SINGLES, PAIRS, TRIPLES = 6, 6, 3
 TEMPERATURE = 1.5  # what evidence is divided by before it becomes a probability; calibrated on the truth plants
 UNKNOWN_LOG10 = -6.0  # chance below which a leftover is no accident
 UNKNOWN_RMS = 0.35  # size of a leftover, in units of the noise, below which no model error is called a cause
-UNKNOWN_SHARE = 0.10  # share of what is explained that a leftover has to exceed: no cause is modelled perfectly
+UNKNOWN_SHARE = 0.15  # share of what is explained that a leftover has to exceed: no cause is modelled perfectly
 NUISANCE_RMS = 0.25  # size of a cause, in units of the noise of the channel that shows it best, below which it is none
+ROUGHLY = 0.05  # share of an unknown effect's evidence that a known cause has to add beside it
+UNKNOWN_COLOUR = 0.8  # size of what a sensor cannot have made, in units of what it can
 SAME_FIT = 4.0  # chi-square by which two sets may differ and still be the same answer
 
 
@@ -28,9 +33,8 @@ class Survey:
     fits: tuple[Fitted, ...]
     probability: Floats
     verdict: Verdict
-    leftover: Leftover
-    strange: bool  # what is left is an effect that the library does not have
-    explained: float  # size of what the best set explains, in units of the noise
+    left: Mapping[str, Leftover]  # per kind of channel
+    strange: str | None  # the kind in which an effect shows that the library does not have
 
 
 def survey(inquiry: Inquiry) -> Survey:
@@ -77,16 +81,46 @@ def survey(inquiry: Inquiry) -> Survey:
     same = _same(inquiry, fits, probability)
     verdict = judge(fits, probability, same)
     best = fits[verdict.best]
-    left, size = leftover(inquiry, best), signal_rms(inquiry, best)
-    strange = left.log10_chance < UNKNOWN_LOG10 and left.rms > max(UNKNOWN_RMS, UNKNOWN_SHARE * size)
-    if strange:
+    left = leftovers(inquiry, best)
+    if (coloured := colour_left(inquiry)) is not None:
+        # noise that is none stays whatever the causes are; the causes were judged against it, and stand
+        return Survey(fits, probability, verdict, {**left, "tip": coloured}, "tip")
+    if strangest(inquiry, best, left) is not None:
         members = _known_part(inquiry, best)
         if members != best.members:
             best = fit(members)
-            fits, probability = (best, *(f for f in fits if f is not best)), np.concatenate([[1.0], np.zeros(len(fits) - (best in fits))])
-            verdict = Verdict("identified", 0, (), {i: 1.0 for i in members})
-            left, size = leftover(inquiry, best), signal_rms(inquiry, best)
-    return Survey(fits, probability, verdict, left, strange, size)
+            fits = (best, *(f for f in fits if f is not best))
+            probability = np.concatenate([[1.0], np.zeros(len(fits) - 1)])
+            verdict = Verdict("identified", 0, (), dict.fromkeys(members, 1.0))
+            left = leftovers(inquiry, best)
+    return Survey(fits, probability, verdict, left, strangest(inquiry, best, left))
+
+
+def colour_left(inquiry: Inquiry) -> Leftover | None:
+    """The noise of the tip as a leftover, where it cannot be that of a sensor."""
+    found = inquiry.background.colour()
+    if found.ratio < UNKNOWN_COLOUR:
+        return None
+    m = len(inquiry.bench.actuators)
+    rest = [r[:, :3] for r in inquiry.background.rest]
+    drives = []
+    for k, run in enumerate(inquiry.bench.runs):
+        slope = thinned(inquiry.bench.row_slopes(k).reshape(-1, 3 * m), run.thin).reshape(-1, 3, m)
+        drives.append(np.einsum("nij,nj->ni", np.linalg.pinv(slope), np.where(np.isfinite(rest[k]), rest[k], 0.0)))
+    label = covariate(rest, inquiry.times, drives, inquiry.bench.actuators, found.excess)
+    rows = sum(int(np.isfinite(r).sum()) for r in rest)
+    return Leftover("tip", -300.0, found.ratio, rows, ((label, 1.0),))
+
+
+def strangest(inquiry: Inquiry, f: Fitted, left: Mapping[str, Leftover]) -> str | None:
+    """The kind of channel in which an effect shows that the library does not have, None where there is none."""
+    explained = signal_rms(inquiry, f)
+    found = {
+        kind: each.energy
+        for kind, each in left.items()
+        if each.log10_chance < UNKNOWN_LOG10 and each.rms > max(UNKNOWN_RMS, UNKNOWN_SHARE * explained[kind])
+    }
+    return max(found, key=lambda kind: found[kind]) if found else None
 
 
 def _known_part(inquiry: Inquiry, best: Fitted) -> Members:
@@ -95,21 +129,31 @@ def _known_part(inquiry: Inquiry, best: Fitted) -> Members:
     data = total(inquiry.grams(residual, white))
     scale = Scale(data, inquiry.prior, inquiry.atoms)
     found = []
+    nothing = 0.0
     for count in range(len(best.members) + 1):
         for members in combinations(best.members, count):
-            evidence = unknown_evidence(_projected(inquiry, white, residual, members, best.factor))
-            value = max(evidence.values(), default=0.0) + scale(members) + inquiry.atoms.prior(members)
+            evidence = max(unknown_evidence(_projected(inquiry, white, residual, members)).values(), default=0.0)
+            nothing = evidence if not members else nothing
+            # Patterns follow an unknown effect only roughly; a cause is not kept for what they miss.
+            value = evidence + scale(members) + inquiry.atoms.prior(members) - ROUGHLY * nothing * len(members)
             found.append((value, members))
     return max(found)[1]
 
 
-def signal_rms(inquiry: Inquiry, f: Fitted) -> float:
-    """Size of what the members explain, in units of the noise, pooled over white rows."""
-    if not f.members:
-        return 0.0
-    index, data = inquiry.member_columns(f.members), total(f.grams)
-    energy = float(f.theta @ data.A[np.ix_(index, index)] @ f.theta)
-    return float(np.sqrt(max(energy, 0.0) / data.rows))
+def signal_rms(inquiry: Inquiry, f: Fitted, members: Members | None = None) -> dict[str, float]:
+    """Size of what the members (or some of them) explain, per kind of channel, in units of the noise."""
+    index = inquiry.member_columns(f.members)
+    mine = set(inquiry.member_columns(f.members if members is None else members))
+    theta = np.array([t if c in mine else 0.0 for c, t in zip(index, f.theta, strict=True)])
+    out = {}
+    for kind, words in enumerate(inquiry.dictionaries):
+        energy = rows = 0.0
+        for W, parts in zip(inquiry.white, inquiry.white_patterns, strict=True):
+            first = sum(len(each) for each in parts[:kind])
+            signal = W[first : first + len(parts[kind]), index] @ theta
+            energy, rows = energy + float(signal @ signal), rows + len(signal)
+        out[words.kind] = float(np.sqrt(energy / max(rows, 1.0)))
+    return out
 
 
 def visible(inquiry: Inquiry, i: int) -> bool:
@@ -120,21 +164,7 @@ def visible(inquiry: Inquiry, i: int) -> bool:
 
 def _matters(inquiry: Inquiry, f: Fitted) -> bool:
     """Whether every member shows in some kind of channel by more than what is always a little wrong."""
-    at = 0
-    for i in f.members:
-        index = list(inquiry.atoms.columns[i])
-        theta, at = f.theta[at : at + len(index)], at + len(index)
-        largest = 0.0
-        for kind in range(len(inquiry.dictionaries)):
-            energy = rows = 0.0
-            for W, parts in zip(inquiry.white, inquiry.white_patterns, strict=True):
-                first = sum(len(each) for each in parts[:kind])
-                signal = W[first : first + len(parts[kind]), index] @ theta
-                energy, rows = energy + float(signal @ signal), rows + len(signal)
-            largest = max(largest, energy / max(rows, 1.0))
-        if largest < NUISANCE_RMS**2:
-            return False
-    return True
+    return all(max(signal_rms(inquiry, f, (i,)).values(), default=0.0) > NUISANCE_RMS for i in f.members)
 
 
 def _same_name(inquiry: Inquiry, members: Members, every: list[int]) -> list[Members]:
@@ -194,16 +224,19 @@ def _plausible(inquiry: Inquiry, f: Fitted) -> bool:
     return all(abs(t) < 8.0 and (p.sign == 0 or t > 0) for t, p in zip(f.theta, parameters, strict=True))
 
 
-def _projected(inquiry: Inquiry, white: list[Floats], residual: list[Floats], members: Members, factor: float) -> Projected:
+def _projected(inquiry: Inquiry, white: list[Floats], residual: list[Floats], members: Members) -> Projected:
     return project(
         white, inquiry.white_patterns, residual, [w.labels for w in inquiry.dictionaries],
-        [w.kind for w in inquiry.dictionaries], inquiry.prior, inquiry.member_columns(members), max(factor, 1.0),
+        [w.kind for w in inquiry.dictionaries], inquiry.prior, inquiry.member_columns(members),
     )  # fmt: skip
 
 
-def leftover(inquiry: Inquiry, f: Fitted) -> Leftover:
-    """Score test on what the set leaves."""
-    return score_test(_projected(inquiry, *about(inquiry, f), f.members, f.factor))
+def leftovers(inquiry: Inquiry, f: Fitted) -> dict[str, Leftover]:
+    """Score test on what the set leaves, per kind of channel."""
+    rows = {
+        words.kind: sum(len(parts[k]) for parts in inquiry.white_patterns) for k, words in enumerate(inquiry.dictionaries)
+    }
+    return score_test(_projected(inquiry, *about(inquiry, f), f.members), rows)
 
 
 def about(inquiry: Inquiry, f: Fitted) -> tuple[list[Floats], list[Floats]]:

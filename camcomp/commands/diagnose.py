@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from camcomp.commands._options import quiet_option
-from camcomp.files import STANDARD, write_all
+from camcomp.files import STANDARD, read_bytes, write_all
 from camcomp.terminal import working
+from camcomp.writeback import with_causes
 
 if TYPE_CHECKING:
     from camcomp.campaign import Campaign
@@ -41,10 +42,18 @@ def examine(
 @click.argument("experiment")
 @click.option("--json", "json_file", metavar="OUT.json", help="The result; - is standard output.")
 @click.option("--report", metavar="OUT.html", help="What was found and why, as one page with plots.")
+@click.option("--write-config", "config_file", metavar="OUT.yaml", help="The machine file with the causes as effects.")
+@click.option("--next-program", metavar="OUT.nc", help="NC program of the proposed next experiment.")
 @click.option("--without", multiple=True, metavar="EFFECT", help="Take an effect out of the library; repeatable.")
 @quiet_option
 def command(
-    experiment: str, json_file: str | None, report: str | None, without: tuple[str, ...], quiet: bool
+    experiment: str,
+    json_file: str | None,
+    report: str | None,
+    config_file: str | None,
+    next_program: str | None,
+    without: tuple[str, ...],
+    quiet: bool,
 ) -> None:
     """Find out why a machine and its model differ.
 
@@ -57,12 +66,22 @@ def command(
     with working(f"diagnosing {experiment}", quiet=quiet):
         result, done, campaign = examine(experiment, without)
     outputs: dict[str, bytes] = {}
-    if json_file or not report:
+    if json_file or not (report or config_file or next_program):
         outputs[json_file or STANDARD] = (json.dumps(result, indent=1, allow_nan=False) + "\n").encode()
     if report:
         from camcomp.report.diagnosed import report_of
 
         with working("drawing the report", quiet=quiet):
             outputs[report] = report_of(experiment, result, done, campaign)
-    write_all(outputs, inputs=(experiment,))
+    inputs: tuple[str, ...] = (experiment,)
+    if config_file:
+        from camcomp.config import load_experiment
+
+        # The last file wins key by key, so only there are the causes sure to count.
+        machine = load_experiment(experiment).config[-1]
+        inputs = (experiment, *load_experiment(experiment).config)
+        outputs[config_file] = with_causes(read_bytes(machine).decode("utf-8-sig"), result["causes"]).encode()
+    if next_program and done is not None and done.proposal is not None:
+        outputs[next_program] = done.proposal.candidate.program.encode()
+    write_all(outputs, inputs=inputs)
     sys.stdout.flush()

@@ -20,7 +20,8 @@ from camcomp.datatypes import Floats, Ints
 
 WIDTHS = np.array([0.1, 0.3, 1.0, 3.0])
 _WEIGHTS = np.log([0.15, 0.3, 0.35, 0.2])
-TOLERANCES = (0.2, 0.5, 1.0, 2.0, 4.0)  # by how much the tolerances may be off, all together
+TOLERANCES = (0.2, 0.5, 1.0, 2.0)  # by how much the tolerances may be off, all together
+TOLERANCE_LOG = (0.0, 0.0, 0.0, -6.0)  # and the log odds of it: an effect is not to hide in them
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,7 +138,7 @@ def log_bayes_pairs(at: Base, prior: Prior, first: Ints, second: Ints) -> Floats
     post0, post1 = c00 * h[:, None, 0] + c01 * h[:, None, 1], c01 * h[:, None, 0] + c11 * h[:, None, 1]
     fit = 0.5 * (post0 * h[:, None, 0] + post1 * h[:, None, 1]) - 0.5 * (mean * h).sum(axis=1)[:, None]
     volume = 0.5 * np.log(wide).sum(axis=2) - 0.5 * np.log(det) - 0.5 * np.log(narrow).sum(axis=1)[:, None]
-    volume -= 0.5 * np.log(np.maximum(np.linalg.det(inverse), 1e-300))[:, None]
+    volume += 0.5 * np.log(np.maximum(np.linalg.det(inverse), 1e-300))[:, None]
     signs = prior.sign[i]
     for k, (mid, var) in enumerate(((post0, c00), (post1, c11))):
         chance = log_ndtr(mid / np.sqrt(np.maximum(var, 1e-300))) + np.log(2.0)

@@ -5,7 +5,7 @@ amplitudes are estimated and their joint size compared with chance. Source: Rao'
 share of the gap keeps the imperfection of a rightly named cause from passing for another one.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,15 +20,21 @@ _AMPLITUDES = (1.0, 3.0, 10.0, 30.0, 100.0)  # um or N
 
 @dataclass(frozen=True, eq=False)
 class Leftover:
-    """score: log10 of the chance that noise looks like this (negative); rms: size in units of the noise, pooled over
-    channels; labels: covariates with their share of the leftover, largest first; channel: where most of it shows.
+    """What the patterns of one kind of channel carry. log10_chance: log10 of the chance that noise looks like this;
+    rms: size in units of the kind's noise, rows: how many the kind has; labels: covariates with the share of it that each
+    carries alone, largest first.
     """
 
-    log10_chance: float
-    z: float
-    rms: float
-    labels: tuple[tuple[str, float], ...]
     kind: str
+    log10_chance: float
+    rms: float
+    rows: int
+    labels: tuple[tuple[str, float], ...]
+
+    @property
+    def energy(self) -> float:
+        """Of all rows, in units of the noise."""
+        return self.rms**2 * self.rows
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,26 +88,26 @@ def project(
     )
 
 
-def score_test(left: Projected) -> Leftover:
-    """Joint size of all patterns against chance."""
-    P, h = left.P, left.h
-    if not len(h):
-        return Leftover(0.0, 0.0, 0.0, (), "tip")
-    scale = np.sqrt(np.maximum(np.diag(P), 1e-30))
-    usable = np.diag(P) > 1e-6 * np.maximum(left.own, 1e-30)
-    value, vector = np.linalg.eigh((P / scale[:, None] / scale)[np.ix_(usable, usable)])
-    keep = value > 1e-3
-    z = (vector[:, keep] / np.sqrt(value[keep])).T @ (h[usable] / scale[usable])
-    dof, total = int(keep.sum()), float(z @ z)
-    shares = _shares(P, h, left.labels)
-    kind = _kind(P, h, left.labels, left.kinds, shares[0][0] if shares else "")
-    return Leftover(
-        float(chi2.logsf(total, max(dof, 1)) / np.log(10.0)),
-        (total - dof) / np.sqrt(2.0 * max(dof, 1)),
-        float(np.sqrt(max(total - dof, 0.0) / left.rows)),
-        shares,
-        kind,
-    )
+def score_test(left: Projected, rows: Mapping[str, int]) -> dict[str, Leftover]:
+    """Size of the patterns of every kind against chance; rows: white rows per kind."""
+    out = {}
+    for kind in dict.fromkeys(left.kinds):
+        mine = np.flatnonzero(np.array(left.kinds) == kind)
+        P, h = left.P[np.ix_(mine, mine)], left.h[mine]
+        usable = np.diag(P) > 1e-6 * np.maximum(left.own[mine], 1e-30)
+        scale = np.sqrt(np.maximum(np.diag(P)[usable], 1e-30))
+        value, vector = np.linalg.eigh(P[np.ix_(usable, usable)] / scale[:, None] / scale)
+        keep = value > 1e-3
+        z = (vector[:, keep] / np.sqrt(value[keep])).T @ (h[usable] / scale)
+        dof, total = max(int(keep.sum()), 1), float(z @ z)
+        out[kind] = Leftover(
+            kind,
+            float(chi2.logsf(total, dof) / np.log(10.0)),
+            float(np.sqrt(max(total - dof, 0.0) / rows[kind])),
+            rows[kind],
+            _shares(P, h, [left.labels[i] for i in mine]),
+        )
+    return out
 
 
 def unknown_evidence(left: Projected) -> dict[str, float]:
@@ -137,13 +143,3 @@ def _shares(P: Floats, h: Floats, labels: Sequence[str]) -> tuple[tuple[str, flo
         return ()
     ranked = sorted(energy.items(), key=lambda each: -each[1])
     return tuple((name, min(value / whole, 1.0)) for name, value in ranked if value > 0.0)
-
-
-def _kind(P: Floats, h: Floats, labels: Sequence[str], kinds: Sequence[str], label: str) -> str:
-    best, most = "tip", -1.0
-    for kind in dict.fromkeys(kinds):
-        index = np.array([i for i, (a, b) in enumerate(zip(labels, kinds, strict=True)) if a == label and b == kind], int)
-        value = _explained(P, h, index)
-        if value > most:
-            best, most = kind, value
-    return best

@@ -172,11 +172,11 @@ def dictionary(grounds: Sequence[Ground], actuators: Sequence[str]) -> list[Dict
     for kind in KINDS:
         if not found[kind]:
             continue
-        for channel, letter in enumerate(names[kind]):
+        for channel, axis_name in enumerate(names[kind]):
             for name in times[0]:
                 for i in range(len(times[0][name])):
                     values = [functions[name][i] for functions in times]
-                    stores[kind].put(f"{name}:{letter}", channel, values, 1e-3 if kind in ("tip", "encoder") else 1.0)
+                    stores[kind].put(f"{name}:{axis_name}", channel, values, 1e-3 if kind in ("tip", "encoder") else 1.0)
     places = np.concatenate([g.tip for g in grounds])
     low, span = places.min(axis=0), np.ptp(places, axis=0)
     for axis, name in enumerate("xyz"):

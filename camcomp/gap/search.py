@@ -11,7 +11,16 @@ import numpy as np
 from scipy.special import logsumexp
 
 from camcomp.datatypes import Floats
-from camcomp.gap.evidence import TOLERANCES, Base, Gram, Prior, base, log_bayes, log_bayes_pairs
+from camcomp.gap.evidence import (
+    TOLERANCE_LOG,
+    TOLERANCES,
+    Base,
+    Gram,
+    Prior,
+    base,
+    log_bayes,
+    log_bayes_pairs,
+)
 
 Members = tuple[int, ...]
 SIZES = (0.5, 0.35, 0.12, 0.03)  # prior probability of 0, 1, 2 and 3 causes
@@ -73,7 +82,10 @@ class Scale:
 
     def _by_tolerance(self, members: Members) -> list[float]:
         sets = [self.atoms.columns[i] for i in members]
-        return [b.log_evidence + (log_bayes(b, self.prior, sets) if sets else 0.0) for b in self.bases]
+        return [
+            b.log_evidence + odds + (log_bayes(b, self.prior, sets) if sets else 0.0)
+            for b, odds in zip(self.bases, TOLERANCE_LOG, strict=True)
+        ]
 
 
 def predictive(grams: Sequence[Gram], prior: Prior, atoms: Atoms, sets: Sequence[Members]) -> Floats:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
-from camcomp.datatypes import Floats
+from camcomp.datatypes import Floats, Ints
 
 _FALSE = 0.05
 _BIN_S = 0.4
@@ -55,7 +55,7 @@ def _energy(run: RunGap) -> Floats:
     return np.nansum(run.gap**2, axis=1)
 
 
-def _chance(run: RunGap, rows: np.ndarray) -> float:
+def _chance(run: RunGap, rows: Ints) -> float:
     """Chance that noise alone makes these rows as large."""
     normal = run.gap[rows] / run.noise
     count = np.isfinite(normal).sum() / run.thin

@@ -13,9 +13,10 @@ def test_format_has_place_rule_source_caret_and_hint():
 
 
 def test_without_a_place_or_source_only_the_message_is_shown():
-    assert d.format_error(d.ConfigError("CC201", "text")) == "camcomp: error[CC201]: text"
+    more = "\n  hint: `camcomp explain CC201` says more"
+    assert d.format_error(d.ConfigError("CC201", "text")) == "camcomp: error[CC201]: text" + more
     bare = d.ConfigError("CC201", "text", at=d.Location("a", 1, 1))
-    assert d.format_error(bare) == "a:1:1: error[CC201]: text"
+    assert d.format_error(bare) == "a:1:1: error[CC201]: text" + more
 
 
 def test_color_changes_nothing_but_escapes():

@@ -1,0 +1,68 @@
+"""Shapes that nothing shows while an effect is absent (pitches, time constants): tried one by one against a leftover."""
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+from camcomp.bench import Atom, Bench, cause_of, thinned
+from camcomp.columns import Columns, shape_default
+from camcomp.datatypes import Floats, Ints
+from camcomp.gap.evidence import Gram
+from camcomp.gap.search import total
+
+_OTHER_HOOKS = ("on_servo", "on_robot", "on_load", "on_pose", "on_workpiece", "on_clock")
+
+
+def beside(
+    grams: Sequence[Gram], white: Sequence[Floats], residual: Sequence[Floats], columns: Columns, others: Ints
+) -> list[Floats]:
+    """White residual per run with the columns `others` softly fitted and taken out."""
+    data = total(grams)
+    precision = np.where(columns.atom >= 0, 1.0 / 9.0, columns.prior.precision(1.0))[others]
+    M = data.A[np.ix_(others, others)] + np.diag(precision)
+    size = 1.0 / np.sqrt(np.diag(M))
+    L = np.linalg.cholesky(size[:, None] * M * size + 1e-12 * np.eye(len(size)))
+    a = size * np.linalg.solve(L.T, np.linalg.solve(L, size * data.b[others]))
+    return [r - W[:, others] @ a for r, W in zip(residual, white, strict=True)]
+
+
+def best_shape(
+    bench: Bench, atom: Atom, rest: Sequence[Floats], whitened: Callable[[int, Floats], Floats]
+) -> dict[str, float] | None:
+    """The scanned shape whose columns explain most of `rest` (white, per run); None where the effect is not scanned."""
+    tried = [{**shape_default(atom), atom.shapes[0].name: value} for value in atom.shapes[0].scan]
+    quick = [quick_columns(bench, atom, shape) for shape in tried]
+    found = [each for each in quick if each is not None]
+    if len(found) < len(tried):
+        return None
+    d = len(atom.parameters)
+    white = np.concatenate([
+        whitened(k, np.stack([c[k] for each in found for c in each], axis=2)) for k in range(len(bench.runs))
+    ])  # fmt: skip
+    h = white.T @ np.concatenate(rest)
+    gains = []
+    for v in range(len(tried)):
+        own = white[:, v * d : v * d + d]
+        G = own.T @ own
+        G += (1e-9 * np.trace(G) + 1e-12) * np.eye(d)
+        gains.append(float(h[v * d : v * d + d] @ np.linalg.solve(G, h[v * d : v * d + d])))
+    return tried[int(np.argmax(gains))]
+
+
+def quick_columns(bench: Bench, atom: Atom, shape: Mapping[str, float]) -> list[list[Floats]] | None:
+    """Columns of an effect that moves carriages only, straight from its hook; None for any other effect."""
+    if hasattr(atom.effect, "on_drive") and not any(hasattr(atom.effect, h) for h in _OTHER_HOOKS):
+        out = []
+        for p in atom.parameters:
+            cause = cause_of(atom, {**shape, p.name: p.scale})
+            per_run = []
+            for k, run in enumerate(bench.runs):
+                motion = bench.nominal[k].motion
+                moved = atom.effect.on_drive(np.zeros_like(motion.encoder), motion, cause.which(bench.actuators), cause.values)
+                values = np.zeros_like(bench.observed(k))
+                slope = bench.row_slopes(k)
+                values[:, :3] = np.einsum("nij,nj->ni", slope, moved)
+                per_run.append(thinned(values, run.thin))
+            out.append(per_run)
+        return out
+    return None

@@ -1,0 +1,128 @@
+"""Laws over every member of the effects shelf: nothing at nominal, something away from it, and only where it says."""
+
+import numpy as np
+import pytest
+
+from camcomp import shelf
+from camcomp.gap.effect import HOOKS, STAGES, Cause, Load, Motion, nominal
+from camcomp.statics.description import Actuator, Chain, Link, Parallelogram, Passive, Robot
+
+CONTRACT = {
+    "servo_lag", "backlash", "friction", "joint_offset", "screw_pitch", "screw_cyclic", "thermal_growth", "drive_stiffness",
+    "link_stiffness", "chain_error", "link_length", "gravity", "cutting_force", "tool_length", "tool_deflection", "tool_wear",
+    "workpiece_frame", "time_sync",
+}  # fmt: skip
+NAMES = [
+    name
+    for name in shelf.members("effects")
+    if name != "none" and not getattr(shelf.load("effects", name), "ARM_ONLY", False)
+]
+ACTUATORS = ("x", "y", "z")
+
+
+def robot():
+    x, y, z = np.eye(3)
+    elements = (
+        Actuator("?", False, x, 1e4, -300.0), Link(1e4 * np.eye(6)), Passive(True, z),
+        Parallelogram(310.0 * x, y, z, 80.0, 1e4 * np.eye(6)), Passive(True, z),
+    )  # fmt: skip
+    chains = []
+    for k, name in enumerate(ACTUATORS):
+        drive = Actuator(name, False, x, 1e4, -300.0)
+        chains.append(Chain(name, (drive, *elements[1:]), np.roll(np.eye(3), k, axis=0)))
+    return Robot("three legs", tuple(chains), np.array([0.0, 0.0, -100.0]))
+
+
+def motion():
+    t = np.linspace(0.0, 2.0, 201)
+    encoder = -350.0 + 20.0 * np.column_stack([np.sin(3 * t), np.cos(3 * t), np.sin(5 * t)])
+    speed = np.gradient(encoder, t, axis=0)
+    return Motion(t, 100.0 + t, t / 60.0, 22.0 + t, encoder, speed, np.sign(speed), np.full(3, -300.0), np.full(3, 1e4))
+
+
+def inputs(hook):
+    m = motion()
+    n = len(m.time)
+    load = Load(np.tile([200.0, -10.0, -25.0], (n, 1)), np.zeros((n, 6)))
+    which = np.array([1.0, 0.0, 0.0])
+    tip = m.encoder.copy()
+    return {
+        "on_servo": (tip, m, which), "on_drive": (np.zeros((n, 3)), m, which), "on_drive_force": (np.zeros((n, 3)), m, which),
+        "on_robot": (robot(), ("x",)), "on_load": (load, m), "on_pose": (tip, load, m), "on_workpiece": (tip,),
+        "on_clock": (m.time,), "on_reading": ({"tip": tip}, m),
+    }[hook]  # fmt: skip
+
+
+def hooks(effect):
+    return [each for each in HOOKS if hasattr(effect, each)]
+
+
+def away(effect):
+    """Parameters one typical size from nominal; shapes and phases stay."""
+    values = nominal(effect)
+    fitted = getattr(effect, "FITTED", effect.PARAMETERS)
+    out = {p.name: p.nominal if p.scan else p.value(p.scale) for p in fitted}
+    return {**values, **(effect.public(out) if hasattr(effect, "public") else out)}
+
+
+def same(a, b):
+    if isinstance(a, Load):
+        return same(a.force, b.force) and same(a.wrench, b.wrench)
+    if isinstance(a, Robot):
+        return a is b
+    if isinstance(a, dict):
+        return a.keys() == b.keys() and all(same(a[k], b[k]) for k in a)
+    return np.array_equal(a, b)
+
+
+def test_the_library_has_what_the_contract_asks_for():
+    assert set(NAMES) >= CONTRACT
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_effect_says_what_it_is(name):
+    effect = shelf.load("effects", name)
+    assert effect.STAGE in STAGES and effect.TARGET in ("actuator", "machine", "either")
+    assert effect.__doc__ and effect.SOURCE and hooks(effect)
+    for p in effect.PARAMETERS:
+        assert p.low <= p.nominal <= p.high and p.scale > 0 and p.source and p.unit
+    for p in getattr(effect, "FITTED", effect.PARAMETERS):
+        assert p.tolerance < 0.2 * p.scale, f"{p.name}: what every machine has is no finding"
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_at_nominal_every_hook_returns_its_input_bit_for_bit(name):
+    effect = shelf.load("effects", name)
+    for hook in hooks(effect):
+        given = inputs(hook)
+        assert same(getattr(effect, hook)(*given, nominal(effect)), given[0]), hook
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_away_from_nominal_some_hook_changes_something_finite(name):
+    effect = shelf.load("effects", name)
+    changed = False
+    for hook in hooks(effect):
+        given = inputs(hook)
+        got = getattr(effect, hook)(*given, away(effect))
+        changed |= not same(got, given[0])
+        if isinstance(got, np.ndarray):
+            assert got.shape == given[0].shape and np.isfinite(got).all()
+    assert changed
+
+
+@pytest.mark.parametrize("name", [n for n in NAMES if shelf.load("effects", n).TARGET != "machine"])
+@pytest.mark.parametrize("hook", ["on_servo", "on_drive", "on_drive_force"])
+def test_an_effect_of_one_actuator_leaves_the_others_alone(name, hook):
+    effect = shelf.load("effects", name)
+    if not hasattr(effect, hook):
+        pytest.skip("hook not used")
+    given = inputs(hook)
+    got = getattr(effect, hook)(*given, away(effect))
+    assert np.array_equal(got[:, 1:], given[0][:, 1:])
+    assert not np.array_equal(got[:, 0], given[0][:, 0])
+
+
+def test_a_common_target_acts_on_every_actuator():
+    cause = Cause("servo_lag", shelf.load("effects", "servo_lag"), None, {})
+    assert cause.which(ACTUATORS).tolist() == [1.0, 1.0, 1.0] and cause.aimed(ACTUATORS) == ACTUATORS
