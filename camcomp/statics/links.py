@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from camcomp.statics.rotation import cross_matrix
+
 Array = NDArray[np.float64]
 
 
@@ -45,3 +47,25 @@ def hinged_bar_stiffness(bar_stiffness: Array, arm: Array, hinge: Array) -> Arra
     K = 0.5 * (K + K.T)
     K[np.abs(K) < 1e-12 * np.abs(bar_stiffness)] = 0.0
     return K
+
+
+def swinging_pair(bar: Array, half: Array) -> tuple[Array, Array]:
+    """Stiffness of two hinged bars at +-half of a cross-bar that keeps its orientation while the arm swings by q.
+
+    bar (6, 6): stiffness of one bar (hinged_bar_stiffness) in the arm's frame, whose y is the hinge; half (3,) mm: half
+    the cross-bar in the same frame at q = 0. Returns (K, by_swing): K (6, 6) constant, by_swing (4, 6, 6) what is added
+    times cos^2 q, cos q sin q, cos q, sin q. It is 2 (bar + E^T B E) with E = -[r(q)],
+    r(q) = Ry(-q) half and B the translational block of the bar; r = cos q A + sin q S + C is quadratic after E.
+    """
+    x, y, z = half
+    A, S, C = (cross_matrix(v) for v in ((x, 0.0, z), (-z, 0.0, x), (0.0, y, 0.0)))
+    B = bar[:3, :3]
+
+    def pair(one: Array, other: Array) -> Array:
+        return 2.0 * (one.T @ B @ other + other.T @ B @ one) / (2.0 if one is other else 1.0)
+
+    K = 2.0 * bar
+    K[3:, 3:] += pair(C, C) + pair(S, S)  # sin^2 = 1 - cos^2
+    by_swing = np.zeros((4, 6, 6))
+    by_swing[:, 3:, 3:] = pair(A, A) - pair(S, S), pair(A, S), pair(A, C), pair(S, C)
+    return K, by_swing

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camcomp.statics.description import Robot
-from camcomp.statics.kernel import jacobian, new_slots, walk
-from camcomp.statics.pack import END_COMPLIANCE, LENGTH, PRISMATIC, REVOLUTE, Packed, pack
+from camcomp.statics.layout import Packed
+from camcomp.statics.pack import pack
 
 Array = NDArray[np.float64]
 
@@ -22,12 +22,18 @@ class Machine:
     nominal: Robot
     elastic: Packed
     rigid: Packed
-    joint_var: NDArray[np.int64]  # (c, rigid variables) -> variable of the elastic chain
+    joint_var: NDArray[np.int64]  # (c, rigid variables) -> entry in z of the elastic chain, -1 none
+    start_y: Array  # (c, rigid variables) nominal joint coordinates at the start pose
 
     @property
     def actuators(self) -> tuple[str, ...]:
         """Names of the actuators, in the order of every actuator array."""
         return tuple(a.name for a in self.robot.actuators)
+
+    @property
+    def start_pose(self) -> Array:
+        """(12,) nominal platform at the start: rotation row by row, position."""
+        return np.concatenate((self.nominal.start_rotation.ravel(), self.nominal.start_reference))
 
     @property
     def limits(self) -> Array:
@@ -54,34 +60,8 @@ def build_machine(robot: Robot, nominal: Robot | None = None) -> Machine:
     if m not in (3, 6):
         raise ValueError(f"{m} actuators; a machine needs three (tip position) or six (tip pose)")
     nominal = robot if nominal is None else nominal
-    elastic = pack(robot, rigid=False)
-    rigid = pack(nominal, rigid=True)
-    joint_var = np.full((len(robot.chains), rigid.start.shape[1]), -1, np.int64)
-    for c in range(len(robot.chains)):
-        joints = [_joints(P, c) for P in (rigid, elastic)]
-        for a, b in zip(*joints, strict=True):
-            joint_var[c, a] = b
-        elastic.end_compliance[c] = END_COMPLIANCE if _has_rigid_direction(elastic, c) else 0.0
-    return Machine(robot, nominal, elastic, rigid, joint_var)
-
-
-def _joints(P: Packed, c: int) -> list[int]:
-    """Variables of the joints of chain c, base to end, each once."""
-    seen: list[int] = []
-    for e in range(P.first[c], P.first[c + 1]):
-        if P.kind[e] in (PRISMATIC, REVOLUTE) and P.var[e] not in seen:
-            seen.append(int(P.var[e]))
-    return seen
-
-
-def _has_rigid_direction(P: Packed, c: int) -> bool:
-    """True if some end motion of chain c is held by no spring and no joint at the start pose."""
-    slots = new_slots(P, c)
-    J = np.zeros((6, P.nvar[c]))
-    _, p = walk(P, c, P.start[c], slots)
-    jacobian(J, p, slots)
-    J[3:] *= LENGTH
-    size = np.linalg.norm(J, axis=0)
-    return bool(np.linalg.matrix_rank(J[:, size > 0] / size[size > 0], tol=1e-9) < 6)
-
-
+    elastic, rigid = pack(robot, rigid=False), pack(nominal, rigid=True)
+    joint_var = np.full(rigid.start.shape, -1, np.int64)
+    for row, own, other in zip(joint_var, rigid.joints, elastic.joints, strict=True):
+        row[own] = other
+    return Machine(robot, nominal, elastic.packed, rigid.packed, joint_var, rigid.start)

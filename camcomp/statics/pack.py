@@ -1,12 +1,13 @@
-"""Packs a Robot into flat arrays that the compiled solver walks through element by element."""
+"""Packs a Robot into the flat arrays that the compiled solver walks through element by element."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from camcomp.statics import layout as lay
 from camcomp.statics.description import (
     Actuator,
     Chain,
@@ -17,146 +18,231 @@ from camcomp.statics.description import (
     Transform,
     Weight,
 )
-from camcomp.statics.links import hinged_bar_stiffness
+from camcomp.statics.layout import LENGTH, Packed
+from camcomp.statics.links import hinged_bar_stiffness, swinging_pair
 from camcomp.statics.rotation import exp_rotation
 
-FIXED, PRISMATIC, REVOLUTE, SPRING, WEIGHT = 0, 1, 2, 3, 4
-RIGID_STIFFNESS = 1e9  # N/mm or N mm/rad times 1e4: 300 N move a "rigid" drive by 0.3 nm
-END_COMPLIANCE = 1e-9  # mm/N, given to the end of a chain that has a rigid direction, so that its wrench is defined
-LENGTH = 100.0  # mm, scales rotations against translations
+Array = NDArray[np.float64]
+RIGID_STIFFNESS = 1e9  # N/mm; N mm/rad times 1e4: 300 N move a "rigid" drive by 0.3 nm
+END_COMPLIANCE = 1e-9  # mm/N, given to the end of a chain whose springs leave it a rigid direction
 
 
-class Packed(NamedTuple):
-    """Flat element arrays; e = element, c = chain, variables of a chain are numbered along it."""
+@dataclass
+class _Rows:
+    """Elements of one chain while they are collected: integers, floats, and per variable (is spring, angle, start)."""
 
-    kind: NDArray[np.int64]  # (e,)
-    rotation: NDArray[np.float64]  # (e, 3, 3) of a FIXED element
-    vector: NDArray[np.float64]  # (e, 3) translation, joint axis, or centre of a weight
-    var: NDArray[np.int64]  # (e,) first variable, -1 none
-    sign: NDArray[np.float64]  # (e,) coefficient of the variable in a joint
-    count: NDArray[np.int64]  # type: ignore[assignment]  # (e,) number of spring directions
-    comp: NDArray[np.int64]  # (e, 6) which of the six
-    stiffness: NDArray[np.float64]  # (e, 6, 6) spring; of one hinged bar if swing >= 0
-    swing: NDArray[np.int64]  # (e,) variable of the swing angle the spring's stiffness depends on, -1 none
-    hinge: NDArray[np.float64]  # (e, 3)
-    offset: NDArray[np.float64]  # (e, 3) half cross-bar in cross-bar axes, mm
-    joint_stiffness: NDArray[np.float64]  # (e,)
-    rest: NDArray[np.float64]  # (e,)
-    act: NDArray[np.int64]  # (e,) actuator index, -1 none
-    force: NDArray[np.float64]  # (e, 3) weight, machine axes
-    first: NDArray[np.int64]  # (c + 1,) element ranges of the chains
-    nvar: NDArray[np.int64]  # (c,)
-    end_compliance: NDArray[np.float64]  # (c,) mm/N
-    start: NDArray[np.float64]  # (c, max nvar) variables at the start pose
-    act_var: NDArray[np.int64]  # (m,) variable of the actuator
-    act_chain: NDArray[np.int64]  # (m,)
-    turns: NDArray[np.bool_]  # (c, max nvar) the variable is an angle
+    ints: list[NDArray[np.int64]] = field(default_factory=list)
+    floats: list[Array] = field(default_factory=list)
+    variables: list[tuple[bool, bool, float]] = field(default_factory=list)
+    slots: list[int] = field(default_factory=list)  # variable of each slot
+    joints: list[int] = field(default_factory=list)  # variable of each joint, base to end, each once
+    place: tuple[Array, Array] = field(default_factory=lambda: (np.zeros(3), np.eye(3)))  # at the start pose
+    twists: list[Array] = field(default_factory=list)  # (6,) of each spring direction about the origin, at the start pose
+    _pending: tuple[Array, Array] = field(default_factory=lambda: (np.zeros(3), np.eye(3)))
+
+    def add(self, kind: int, **ints: int) -> tuple[NDArray[np.int64], Array]:
+        """Appends an element behind what was shifted so far; returns its two rows."""
+        self.flush()
+        row, values = np.full(lay.ELEMENT_INTS, 0, np.int64), np.zeros(lay.ELEMENT_FLOATS)
+        row[[lay.KIND, lay.SLOT, lay.SWING, lay.ACT]] = kind, len(self.slots), -1, -1
+        self.ints.append(row)
+        self.floats.append(values)
+        return row, values
+
+    def shift(self, translation: Array, rotation: Array) -> None:
+        """Rigid displacement; neighbours are merged."""
+        (p, Q), (at, R) = self._pending, self.place
+        self._pending = p + Q @ translation, Q @ rotation
+        self.place = at + R @ translation, R @ rotation
+
+    def flush(self) -> None:
+        """Writes the pending displacement as an element, if it is any."""
+        (p, Q), self._pending = self._pending, (np.zeros(3), np.eye(3))
+        if np.array_equal(Q, np.eye(3)) and not p.any():
+            return
+        _, values = self.add(lay.SHIFT if np.array_equal(Q, np.eye(3)) else lay.FIXED)
+        values[:9], values[lay.VECTOR : lay.VECTOR + 3] = Q.ravel(), p
+
+    def variable(self, spring: bool, angle: bool, start: float) -> int:
+        """Index of a new variable of the chain."""
+        self.variables.append((spring, angle, start))
+        return len(self.variables) - 1
+
+    def joint(
+        self, revolute: bool, axis: Array, variable: int, sign: float = 1.0
+    ) -> tuple[NDArray[np.int64], Array]:
+        """A joint along any axis; the solver knows coordinate axes, others are turned onto x and back."""
+        k = int(np.argmax(np.abs(axis)))
+        aligned = np.count_nonzero(axis) == 1
+        turn = np.eye(3) if aligned else _x_onto(axis)
+        self.shift(np.zeros(3), turn)
+        row, values = self.add(lay.REVOLUTE if revolute else lay.PRISMATIC)
+        row[[lay.VAR, lay.AXIS]] = variable, k if aligned else 0
+        values[lay.SIGN] = sign * (np.sign(axis[k]) if aligned else 1.0)
+        self.slots.append(variable)
+        if variable not in self.joints:
+            self.joints.append(variable)
+        spring, _, start = self.variables[variable]
+        if spring:
+            self._twist(axis @ turn, revolute)
+        at, R = self.place
+        step = sign * start * (axis @ turn)
+        self.place = (at, R @ exp_rotation(step)) if revolute else (at + R @ step, R)
+        self.shift(np.zeros(3), turn.T)
+        return row, values
+
+    def _twist(self, axis: Array, angle: bool) -> None:
+        at, R = self.place
+        a = R @ axis
+        self.twists.append(np.concatenate((np.cross(at, a), a * LENGTH) if angle else (a, np.zeros(3))))
+
+    def spring(self, K: Array, active: tuple[int, ...]) -> tuple[NDArray[np.int64], Array]:
+        """A spring of up to six directions."""
+        row, values = self.add(lay.SPRING)
+        used = [self.variable(True, k >= 3, 0.0) for k in active]
+        row[lay.VAR], row[lay.COUNT] = used[0] if used else 0, len(active)
+        row[lay.COMP : lay.COMP + len(active)] = active
+        values[lay.MATRIX :] = np.stack([_compact(K, active), *np.zeros((4, 6, 6))]).ravel()
+        self.slots += used
+        for k in active:
+            self._twist(np.eye(3)[k % 3], k >= 3)
+        return row, values
+
+    def leaves_rigid_direction(self) -> bool:
+        """True if some motion of the end is resisted by no spring of the chain, at the start pose."""
+        J = np.array(self.twists).reshape(len(self.twists), 6)
+        size = np.linalg.norm(J, axis=1)
+        return bool(np.linalg.matrix_rank(J[size > 0] / size[size > 0, None], tol=1e-9) < 6)
 
 
-def _rows(chain: Chain, rigid: bool, actuator_index: dict[str, int]) -> tuple[list[dict], list[float]]:
-    """Element rows of one chain as dicts, and the start values of its variables."""
-    rows: list[dict] = []
-    start: list[float] = []
+def _compact(K: Array, active: tuple[int, ...]) -> Array:
+    """Rows and columns `active` of K (6, 6), moved to the front of a (6, 6) matrix of zeros."""
+    out = np.zeros((6, 6))
+    out[: len(active), : len(active)] = K[np.ix_(active, active)]
+    return out
 
-    def fixed(translation: NDArray[np.float64], rotation: NDArray[np.float64]) -> None:
-        rows.append({"kind": FIXED, "vector": translation, "rotation": rotation})
 
-    def error(six: NDArray[np.float64]) -> None:
-        if np.any(six != 0.0):
-            fixed(six[:3], exp_rotation(np.asarray(six[3:], float)))
+def _x_onto(axis: Array) -> Array:
+    """Rotation (3, 3) whose first column is the unit vector `axis`."""
+    other = np.eye(3)[int(np.argmin(np.abs(axis)))]
+    y = np.cross(other, axis)
+    y /= np.linalg.norm(y)
+    return np.column_stack((axis, y, np.cross(axis, y)))
 
-    fixed(np.zeros(3), chain.frame)
-    if not rigid:
-        error(chain.base_error)
+
+def _collect(chain: Chain, rigid: bool, actuator_index: dict[str, int]) -> _Rows:
+    rows = _Rows()
+
+    def error(six: Array) -> None:
+        if not rigid and np.any(six != 0.0):
+            rows.shift(six[:3], exp_rotation(six[3:]))
+
+    rows.shift(np.zeros(3), chain.frame)
+    error(chain.base_error)
     for e in chain.elements:
         if isinstance(e, Transform):
-            fixed(e.translation, e.rotation)
+            rows.shift(e.translation, e.rotation)
         elif isinstance(e, Actuator):
-            k = 0.0 if rigid else (RIGID_STIFFNESS * (1e4 if e.revolute else 1.0) if e.stiffness is None else e.stiffness)
-            rows.append(
-                {"kind": REVOLUTE if e.revolute else PRISMATIC, "vector": e.axis, "var": len(start), "sign": 1.0,
-                 "joint_stiffness": k, "act": actuator_index[e.name]}
-            )
-            start.append(e.home if e.start is None else e.start)
+            start = e.home if e.start is None else e.start
+            row, values = rows.joint(e.revolute, e.axis, rows.variable(not rigid, e.revolute, start))
+            row[lay.ACT] = actuator_index[e.name]
+            if not rigid:
+                rigid_drive = RIGID_STIFFNESS * (1e4 if e.revolute else 1.0)
+                values[lay.STIFFNESS] = rigid_drive if e.stiffness is None else e.stiffness
         elif isinstance(e, Passive):
-            rows.append(
-                {"kind": REVOLUTE if e.revolute else PRISMATIC, "vector": e.axis, "var": len(start), "sign": 1.0,
-                 "joint_stiffness": 0.0 if rigid else e.stiffness, "rest": e.rest}
-            )
-            start.append(e.start)
+            _, values = rows.joint(e.revolute, e.axis, rows.variable(False, e.revolute, e.start))
+            if not rigid:
+                values[lay.STIFFNESS], values[lay.REST] = e.stiffness, e.rest
         elif isinstance(e, Link):
             if not rigid:
-                K = np.zeros((6, 6))
-                K[np.ix_(e.active, e.active)] = e.stiffness[np.ix_(e.active, e.active)]
-                rows.append({"kind": SPRING, "var": len(start), "stiffness": K, "active": e.active})
-                start.extend([0.0] * len(e.active))
+                rows.spring(e.stiffness, e.active)
         elif isinstance(e, Parallelogram):
-            swing = len(start)
-            along = e.arm / np.linalg.norm(e.arm)
-            own = np.column_stack((along, e.hinge, np.cross(along, e.hinge)))  # the arm's frame: x along it, y the hinge
-            rows.append({"kind": REVOLUTE, "vector": e.hinge, "var": swing, "sign": 1.0})
-            start.append(e.start)
-            fixed(e.arm, own)
-            if not rigid:
-                y = np.array([0.0, 1.0, 0.0])
-                K = hinged_bar_stiffness(e.bar_stiffness, np.array([np.linalg.norm(e.arm), 0.0, 0.0]), y)
-                rows.append({"kind": SPRING, "var": len(start), "stiffness": K, "active": (0, 1, 3, 4, 5),
-                             "swing": swing, "hinge": y, "offset": 0.5 * e.width * (own.T @ e.crossbar)})
-                start.extend([0.0] * 5)
-            fixed(np.zeros(3), own.T)
-            rows.append({"kind": REVOLUTE, "vector": e.hinge, "var": swing, "sign": -1.0})
+            _parallelogram(rows, e, rigid)
         elif isinstance(e, Weight) and not rigid:
-            rows.append({"kind": WEIGHT, "vector": e.centre, "force": e.force})
+            _, values = rows.add(lay.WEIGHT)
+            values[lay.VECTOR : lay.VECTOR + 3], values[lay.FORCE : lay.FORCE + 3] = e.centre, e.force
+    error(chain.end_error)
+    rows.shift(np.zeros(3), chain.frame.T)
+    rows.flush()
+    return rows
+
+
+def _parallelogram(rows: _Rows, e: Parallelogram, rigid: bool) -> None:
+    length = float(np.linalg.norm(e.arm))
+    along = e.arm / length
+    own = np.column_stack((along, e.hinge, np.cross(along, e.hinge)))  # the arm's frame: x along it, y the hinge
+    swing = rows.variable(False, True, e.start)
+    rows.joint(True, e.hinge, swing)
+    rows.shift(e.arm, own)
     if not rigid:
-        error(chain.end_error)
-    fixed(np.zeros(3), chain.frame.T)
-    return rows, start
+        bar = hinged_bar_stiffness(e.bar_stiffness, np.array([length, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]))
+        K, by_swing = swinging_pair(bar, 0.5 * e.width * (own.T @ e.crossbar))
+        active = (0, 1, 3, 4, 5)  # the swing itself is a joint
+        row, values = rows.spring(K, active)
+        row[lay.SWING] = swing
+        values[lay.MATRIX :] = np.stack([_compact(part, active) for part in (K, *by_swing)]).ravel()
+    rows.shift(np.zeros(3), own.T)
+    rows.joint(True, e.hinge, swing, -1.0)
 
 
-def pack(robot: Robot, *, rigid: bool) -> Packed:
+@dataclass(frozen=True)
+class Model:
+    """A packed machine and what belongs to it: z (c, n) at the start pose, and per chain the entries of its joints."""
+
+    packed: Packed
+    start: Array
+    joints: tuple[NDArray[np.int64], ...]
+
+
+def pack(robot: Robot, *, rigid: bool) -> Model:
     """Flat arrays of the robot; rigid = perfect chains without springs, errors or weights (the control's model)."""
-    index = {a.name: i for i, a in enumerate(robot.actuators)}
-    table: list[dict] = []
-    starts, first, nvar = [], [0], []
-    for chain in robot.chains:
-        rows, start = _rows(chain, rigid, index)
-        table += rows
-        first.append(len(table))
-        nvar.append(len(start))
-        starts.append(start)
-    n = len(table)
-    m = len(index)
-    out = Packed(
-        kind=np.array([r["kind"] for r in table], np.int64),
-        rotation=np.array([r.get("rotation", np.eye(3)) for r in table], float).reshape(n, 3, 3),
-        vector=np.array([r.get("vector", np.zeros(3)) for r in table], float).reshape(n, 3),
-        var=np.array([r.get("var", -1) for r in table], np.int64),
-        sign=np.array([r.get("sign", 0.0) for r in table], float),
-        count=np.array([len(r.get("active", ())) for r in table], np.int64),
-        comp=np.array([(tuple(r.get("active", ())) + (0,) * 6)[:6] for r in table], np.int64).reshape(n, 6),
-        stiffness=np.array([r.get("stiffness", np.zeros((6, 6))) for r in table], float).reshape(n, 6, 6),
-        swing=np.array([r.get("swing", -1) for r in table], np.int64),
-        hinge=np.array([r.get("hinge", np.zeros(3)) for r in table], float).reshape(n, 3),
-        offset=np.array([r.get("offset", np.zeros(3)) for r in table], float).reshape(n, 3),
-        joint_stiffness=np.array([r.get("joint_stiffness", 0.0) for r in table], float),
-        rest=np.array([r.get("rest", 0.0) for r in table], float),
-        act=np.array([r.get("act", -1) for r in table], np.int64),
-        force=np.array([r.get("force", np.zeros(3)) for r in table], float).reshape(n, 3),
-        first=np.array(first, np.int64),
-        nvar=np.array(nvar, np.int64),
-        end_compliance=np.zeros(len(robot.chains)),
-        start=np.array([s + [0.0] * (max(nvar) - len(s)) for s in starts], float).reshape(len(nvar), max(nvar)),
-        act_var=np.zeros(m, np.int64),
-        act_chain=np.zeros(m, np.int64),
-        turns=np.zeros((len(nvar), max(nvar)), np.bool_),
-    )
-    for c in range(len(robot.chains)):
-        for e in range(first[c], first[c + 1]):
-            if out.act[e] >= 0:
-                out.act_var[out.act[e]] = out.var[e]
-                out.act_chain[out.act[e]] = c
-            if out.kind[e] == REVOLUTE:
-                out.turns[c, out.var[e]] = True
-            for i in range(out.count[e]):
-                out.turns[c, out.var[e] + i] = out.comp[e, i] >= 3
+    names = [a.name for a in robot.actuators]
+    index = {name: i for i, name in enumerate(names)}
+    collected = [_collect(chain, rigid, index) for chain in robot.chains]
+    wrench = 0 if rigid else 6
+    longest = max(len(rows.variables) for rows in collected) + wrench
+    chain = np.zeros((len(collected), lay.CHAIN_INTS), np.int64)
+    actuator = np.zeros((len(names), lay.ACTUATOR_INTS), np.int64)
+    start, scale = np.zeros((len(collected), longest)), np.zeros((len(collected), longest))
+    slot_var: list[int] = []
+    joints = []
+    element = 0
+    for c, rows in enumerate(collected):
+        place = _places([spring for spring, _, _ in rows.variables], wrench)
+        for v, (_, angle, value) in enumerate(rows.variables):
+            start[c, place[v]] = value
+            scale[c, place[v]] = LENGTH if angle else 1.0
+        acts = [e.name for e in robot.chains[c].elements if isinstance(e, Actuator)]
+        chain[c] = (
+            element, element + len(rows.ints), len(slot_var), len(rows.slots), sum(s for s, _, _ in rows.variables),
+            len(rows.variables) + wrench, index[acts[0]] if acts else 0, len(acts),
+        )  # fmt: skip
+        for row in rows.ints:
+            if row[lay.KIND] in (lay.PRISMATIC, lay.REVOLUTE, lay.SPRING):
+                row[lay.VAR] = place[row[lay.VAR]]
+            if row[lay.SWING] >= 0:
+                row[lay.SWING] = place[row[lay.SWING]]
+            if row[lay.ACT] >= 0:
+                actuator[row[lay.ACT]] = c, row[lay.VAR], element
+            element += 1
+        slot_var += [place[v] for v in rows.slots]
+        joints.append(np.array([place[v] for v in rows.joints], np.int64))
+    rigid_ends = [0.0 if rigid or not rows.leaves_rigid_direction() else END_COMPLIANCE for rows in collected]
+    ints = [row for rows in collected for row in rows.ints]
+    floats = [row for rows in collected for row in rows.floats]
+    packed = Packed(
+        np.array(ints, np.int64).reshape(len(ints), lay.ELEMENT_INTS),
+        np.array(floats).reshape(len(ints), lay.ELEMENT_FLOATS),
+        np.array(slot_var, np.int64), chain, actuator, np.array(rigid_ends), scale,
+    )  # fmt: skip
+    return Model(packed, start, tuple(joints))
+
+
+def _places(springs: list[bool], wrench: int) -> list[int]:
+    """Entry in z of each variable: springs first, then the wrench, then the free joints."""
+    count = sum(springs)
+    out, spring, free = [], 0, count + wrench
+    for is_spring in springs:
+        out.append(spring if is_spring else free)
+        spring, free = (spring + 1, free) if is_spring else (spring, free + 1)
     return out

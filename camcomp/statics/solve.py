@@ -1,4 +1,4 @@
-"""The machine's answers for arrays of points: inverse kinematics, loaded pose, holding force, stiffness.
+"""The machine's answers for arrays of points: inverse kinematics, loaded pose, holding force.
 
 Arrays over points, machine frame, mm, N, rad. Long arrays are solved in pieces of fixed size on all cores; the pieces
 start cold, so results do not depend on the number of cores.
@@ -14,18 +14,20 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from camcomp.statics import point
+from camcomp.statics import point, rigid, sweep
+from camcomp.statics.layout import SPRINGS, new_memory, new_work
 from camcomp.statics.machine import Machine
+from camcomp.statics.rotation import rotation_vectors
 
 Array = NDArray[np.float64]
 PIECE = 256
 FREE, HOLD, TARGET, CLAMP, POSE = point.FREE, point.HOLD, point.TARGET, point.CLAMP, point.POSE
 STATUS = {
-    point.OK: "solved",
-    point.MAX_ITERATIONS: "no convergence",
-    point.OUT_OF_REACH: "out of reach",
-    point.SINGULAR: "singular configuration",
-    point.UNSTABLE: "not stable (buckling)",
+    rigid.OK: "solved",
+    rigid.MAX_ITERATIONS: "no convergence",
+    rigid.OUT_OF_REACH: "out of reach",
+    rigid.SINGULAR: "singular configuration",
+    rigid.UNSTABLE: "not stable (buckling)",
 }
 
 
@@ -36,7 +38,9 @@ class State:
     tip (n, 3) loaded tool tip; rotation (n, 3, 3) platform; tilt (n, 3) its rotation vector against the nominal
     orientation, rad; commanded (n, 3) tip the control is told; rho (n, m) actuator coordinates that go with it;
     rho_nominal (n, m) inverse kinematics of the point asked for; drive (n, m) force of each drive on its carriage;
-    force (n, 3) at the tip; status, passes (n,) int; x, F: internal states, empty unless asked for.
+    force (n, 3) at the tip; status, passes (n,) int; x (n, c, nz), F (n, c, 6): internal states and wrenches of the
+    chains, empty unless asked for; commanded_rotation (n, 3, 3); wrench (n, 6): sum of the chains' wrenches, the whole
+    load at the platform reference (the answer of CLAMP, and of HOLD with six actuators).
     """
 
     tip: Array
@@ -51,6 +55,8 @@ class State:
     passes: NDArray[np.int64]
     x: Array
     F: Array
+    commanded_rotation: Array
+    wrench: Array
 
 
 def _per_point(value: Array | None, n: int, shape: tuple[int, ...]) -> Array:
@@ -66,7 +72,7 @@ def threads() -> int:
     return max(1, int(limit)) if limit.isdigit() else cores
 
 
-def _in_pieces(work: Callable[[slice], None], n: int) -> None:
+def in_pieces(work: Callable[[slice], None], n: int) -> None:
     """Runs work on slices of PIECE points, on every core."""
     pieces = [slice(a, min(a + PIECE, n)) for a in range(0, n, PIECE)]
     if len(pieces) == 1:
@@ -97,47 +103,39 @@ def solve(
     """
     near = np.ascontiguousarray(near, float)
     n, m = len(near), len(machine.actuators)
-    nc, nv = machine.elastic.start.shape
-    start_R = machine.nominal.start_rotation
     tool = np.ascontiguousarray(machine.robot.tool, float)
-    start_tip = machine.nominal.start_reference + start_R @ tool
     aim = near if aim is None else np.ascontiguousarray(aim, float)
     R_aim = _per_point(machine.nominal.held_rotation if aim_rotation is None else aim_rotation, n, (3, 3))
-    # the control aims with the tool it knows; the kernels have one tool, the real one
-    longer = tool - machine.nominal.tool
-    near = near + R_aim @ longer
     # a clamped pose need not be one that the rigid machine can take
     R_near = _per_point(machine.nominal.held_rotation, n, (3, 3)) if mode == CLAMP else R_aim
-    f = _per_point(force, n, (3,))
-    w = _per_point(wrench, n, (6,))
+    # the control aims with the tool it knows; the kernels have one tool, the real one
+    longer = tool - machine.nominal.tool
+    near = near + R_near @ longer
+    f, w = _per_point(force, n, (3,)), _per_point(wrench, n, (6,))
     r = np.zeros((n, m)) if rho is None else np.array(rho, float).reshape(n, m)
-    nominal, drive = np.zeros((n, m)), np.full((n, m), np.nan)
-    commanded, tip = near.copy(), np.full((n, 3), np.nan)
-    R_cmd, R = R_aim.copy(), R_aim.copy()
+    nominal, drive, tip, total = (np.full((n, k), np.nan) for k in (m, m, 3, 6))
+    goal, pose = np.full((n, 12), np.nan), np.full((n, 12), np.nan)
     status, passes = np.zeros(n, np.int64), np.zeros(n, np.int64)
-    kept = n if keep else 0
-    x, F = np.zeros((kept, nc, nv)), np.zeros((kept, nc, 6))
+    kept = np.zeros((n if keep else 0, *machine.elastic.scale.shape))
 
     def work(s: slice) -> None:
-        k = s if keep else slice(0, 0)
-        point.solve_many(
-            mode, machine.elastic, machine.rigid, machine.joint_var, tool, start_R, start_tip, R_near[s], R_aim[s], near[s],
-            aim[s], f[s], w[s], r[s], rho is None, check, nominal[s], commanded[s], R_cmd[s], tip[s], R[s], drive[s], status[s],
-            passes[s], x[k], F[k],
+        sweep.solve_many(
+            mode, machine.elastic, machine.rigid, machine.joint_var, tool, machine.start_pose, machine.start_y,
+            rho is None, check, R_near[s].reshape(-1, 9),
+            R_aim[s].reshape(-1, 9), near[s], aim[s], f[s], w[s], r[s], nominal[s], goal[s], pose[s],
+            tip[s], drive[s], total[s], status[s], passes[s], kept[s] if keep else kept,
+            new_memory(machine.elastic, machine.rigid), new_work(machine.elastic, machine.rigid),
         )  # fmt: skip
 
-    _in_pieces(work, n)
-    commanded = commanded - R_cmd @ longer
-    bad = status != point.OK
-    for a in (tip, drive, commanded, r):
+    in_pieces(work, n)
+    bad = status != rigid.OK
+    for a in (tip, drive, total, goal, pose, r):
         a[bad] = np.nan
-    return State(tip, R, rotation_vectors(R @ R_aim.transpose(0, 2, 1)), commanded, r, nominal, drive, f, status,
-                 passes, x, F)  # fmt: skip
-
-
-def rotation_vectors(R: Array) -> Array:
-    """Rotation vectors (n, 3) rad of small rotations R (n, 3, 3)."""
-    w = 0.5 * np.stack((R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]), axis=1)
-    s = np.linalg.norm(w, axis=1)
-    angle = np.arctan2(s, 0.5 * (np.trace(R, axis1=1, axis2=2) - 1.0))
-    return w * np.where(s > 1e-12, angle / np.maximum(s, 1e-300), 1.0)[:, None]
+    if mode == HOLD:
+        f[bad] = np.nan
+    nominal[status == rigid.OUT_OF_REACH] = np.nan
+    R, R_cmd = pose[:, :9].reshape(n, 3, 3), goal[:, :9].reshape(n, 3, 3)
+    tilt, commanded = rotation_vectors(R @ R_aim.transpose(0, 2, 1)), goal[:, 9:] + R_cmd @ machine.nominal.tool
+    f0 = machine.elastic.chain[:, SPRINGS]
+    F = np.stack([kept[:, c, k : k + 6] for c, k in enumerate(f0)], axis=1)
+    return State(tip, R, tilt, commanded, r, nominal, drive, f, status, passes, kept, F, R_cmd, total)

@@ -1,4 +1,4 @@
-"""Cartesian stiffness of every chain and of the machine, loaded and unloaded, and the linear assembly displacement.
+"""Cartesian stiffness of every chain and of the machine, loaded and unloaded, and what moves the tip.
 
 Loaded: derivative of the wrench by the pose at the solved equilibrium, with all Hessian terms (Pashkevich, Klimchik,
 Chablat, Mech. Mach. Theory 46 (2011) 662-679). Unloaded: the same where nothing is strained. Assembly: Klimchik et al.
@@ -12,11 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from camcomp.statics.kernel import new_slots, walk
+from camcomp.statics.gradients import ends_many, gradients_many
+from camcomp.statics.layout import new_work
 from camcomp.statics.machine import Machine, build_machine
-from camcomp.statics.point import load_stiffness, machine_stiffness
-from camcomp.statics.rotation import log_rotation
-from camcomp.statics.solve import FREE, State, solve
+from camcomp.statics.rotation import rotation_vectors
+from camcomp.statics.solve import FREE, State, in_pieces, solve
 
 Array = NDArray[np.float64]
 
@@ -33,25 +33,52 @@ class Stiffness:
     by_rho: Array
 
 
+@dataclass(frozen=True)
+class TipSensitivity:
+    """Derivatives at n loaded points with the actuators given: of the tip (mm) and of the drive forces (N or N mm).
+
+    By the actuator coordinates (n, 3 or m, m), by the force at the tip (n, 3 or m, 3), by a wrench at the platform
+    reference (n, 3 or m, 6).
+    """
+
+    by_rho: Array
+    by_force: Array
+    by_wrench: Array
+    drive_by_rho: Array
+    drive_by_force: Array
+    drive_by_wrench: Array
+
+
+def _gradients(machine: Machine, state: State) -> tuple[Array, Array, Array, Array, Array]:
+    """Chains, total, by_rho, tip_by, drive_by of gradients_many; NaN in rows that are not solved or singular."""
+    n, m = state.rho.shape
+    if len(state.x) != n:
+        raise ValueError("the state has to be solved with keep=True")
+    c = state.x.shape[1]
+    out = tuple(
+        np.full((n, *shape), np.nan) for shape in ((c, 6, 6), (6, 6), (6, m), (3, m + 9), (m, m + 9))
+    )
+    tool = np.ascontiguousarray(machine.robot.tool, float)
+    pose = np.concatenate((state.rotation.reshape(n, 9), state.tip - state.rotation @ tool), axis=1)
+    solved = (state.status == 0).astype(np.int64)
+
+    def work(s: slice) -> None:
+        gradients_many(
+            machine.elastic, tool, state.x[s], state.rho[s], pose[s], state.force[s], solved[s], *(a[s] for a in out),
+            new_work(machine.elastic, machine.rigid),
+        )  # fmt: skip
+
+    in_pieces(work, n)
+    return out  # type: ignore[return-value]
+
+
 def loaded_stiffness(machine: Machine, state: State) -> Stiffness:
     """Stiffness at solved points, d(wrench)/d(pose) with the actuators held. `state` has to be solved with keep=True.
 
     Raises ValueError when the state does not hold its inner variables.
     """
-    n, m = state.rho.shape
-    if len(state.x) != n:
-        raise ValueError("the state has to be solved with keep=True")
-    c = state.x.shape[1]
-    chains, by_rho = np.full((n, c, 6, 6), np.nan), np.full((n, 6, m), np.nan)
-    for i in np.flatnonzero(state.status == 0):
-        K, K_rho = np.zeros((c, 6, 6)), np.zeros((6, m))
-        R = np.ascontiguousarray(state.rotation[i])
-        reference = state.tip[i] - R @ machine.robot.tool
-        if machine_stiffness(
-            machine.elastic, state.x[i], state.rho[i], state.F[i], R, reference, K, K_rho, np.zeros((m, 6)), np.zeros((m, m))
-        ):
-            chains[i], by_rho[i] = K, -K_rho
-    return Stiffness(chains, chains.sum(axis=1), by_rho)
+    chains, _, by_rho, _, _ = _gradients(machine, state)
+    return Stiffness(chains, chains.sum(axis=1), -by_rho)
 
 
 def unloaded_stiffness(machine: Machine, tips: Array) -> Stiffness:
@@ -60,32 +87,29 @@ def unloaded_stiffness(machine: Machine, tips: Array) -> Stiffness:
     return loaded_stiffness(perfect, solve(perfect, FREE, tips, check=False, keep=True))
 
 
+def tip_sensitivity(machine: Machine, state: State) -> TipSensitivity:
+    """What moves the tip and the drive forces at points solved with keep=True, to first order; exact at the loaded point."""
+    m = state.rho.shape[1]
+    tip, drive = _gradients(machine, state)[3:]
+    parts = [(a[..., :m], a[..., m : m + 3], a[..., m + 3 :]) for a in (tip, drive)]
+    return TipSensitivity(*parts[0], *parts[1])
+
+
 def tip_compliance(machine: Machine, state: State) -> Array:
     """Displacement of the tip (n, 3, 3) mm/N per force at the tip, at solved points."""
-    K = loaded_stiffness(machine, state).machine
-    out = np.full((len(K), 3, 3), np.nan)
-    tool = np.ascontiguousarray(machine.robot.tool)
-    for i in np.flatnonzero(state.status == 0):
-        R = np.ascontiguousarray(state.rotation[i])
-        lever = R @ tool
-        turn = np.cross(np.eye(3), lever)  # rows: unit rotation x lever
-        to_tip = np.hstack((np.eye(3), turn.T))  # tip motion per platform twist
-        out[i] = to_tip @ np.linalg.solve(K[i] - load_stiffness(R, tool, state.force[i]), to_tip.T)
-    return out
+    return tip_sensitivity(machine, state).by_force
 
 
 def chain_shifts(machine: Machine, tips: Array) -> Array:
     """Shift (n, c, 6) of every free chain's end by its own geometric error at tips (n, 3): eps_i of eq. (6)."""
-    P = build_machine(machine.robot, machine.nominal).elastic
     perfect = build_machine(machine.nominal, machine.nominal)
     state = solve(perfect, FREE, tips, check=False, keep=True)
-    out = np.zeros((len(tips), len(machine.robot.chains), 6))
-    for i in range(len(tips)):
-        for c in range(out.shape[1]):
-            R0, p0 = walk(perfect.elastic, c, state.x[i, c], new_slots(perfect.elastic, c))
-            R1, p1 = walk(P, c, state.x[i, c], new_slots(P, c))
-            out[i, c] = np.concatenate((p1 - p0, log_rotation(R1 @ R0.T)))
-    return out
+    ends = []
+    for model in (perfect, build_machine(machine.robot, machine.nominal)):
+        ends.append(np.zeros((*state.x.shape[:2], 12)))
+        ends_many(model.elastic, state.x, ends[-1], new_work(model.elastic, model.rigid))
+    R0, R1 = (e[..., :9].reshape(*e.shape[:2], 3, 3) for e in ends)
+    return np.concatenate((ends[1][..., 9:] - ends[0][..., 9:], rotation_vectors(R1 @ R0.swapaxes(-1, -2))), axis=-1)
 
 
 def assembly_shift(stiffness: Array, shifts: Array) -> tuple[Array, Array]:
