@@ -7,9 +7,9 @@ With the end held at pose t and the platform pulling it with the wrench F, a cha
 k = spring forces, zero for free passive joints; C = compliance given to an end that springs leave rigid. Linearised,
 with A = d(k - J^T F)/dx, in the order spring coordinates, wrench, free joints:
 
-    [ A_ss  -J_s^T  A_sq ] [dx_s]   [ J^T F + weights - k ]      every pivot of the elimination without exchanges is
-    [ J_s     C     J_q  ] [dF  ] = [ t - g - C F         ]      positive exactly when the chain is stable with its
-    [ A_qs  -J_q^T  A_qq ] [dx_q]   [ J^T F + weights - k ]      end held (inertia of the bordered matrix)
+    [ A_ss  -J_s^T  A_sq ] [dx_s]   [ J^T F + weights - k ]      Stable with its end held exactly if the elimination
+    [ J_s     C     J_q  ] [dF  ] = [ t - g - C F         ]      meets as many negative pivots among the coordinates
+    [ A_qs  -J_q^T  A_qq ] [dx_q]   [ J^T F + weights - k ]      as among the wrench (inertia of the bordered matrix).
 
 Source: Pashkevich, Klimchik, Chablat, Mech. Mach. Theory 46 (2011) 662-679, loaded stiffness.
 """
@@ -50,11 +50,17 @@ from camcomp.statics.layout import (
 )
 from camcomp.statics.vectors import log_product, part
 
+SMALLEST_PIVOT = 1e-6  # of a spring, relative to its stiffness; Newton's method makes good for it in the next pass
+
 
 @inner
 def add_springs(P, c, z, rho, W, M, full):
-    """Subtracts the spring forces of chain c from the residual; if full, adds their derivatives to M."""
+    """Subtracts the spring forces of chain c from the residual; if full, adds their derivatives to M.
+
+    The last column of M keeps the stiffness alone of each spring coordinate: what its pivot is measured with.
+    """
     n = P.chain[c, SIZE]
+    alone = n + 1 + P.chain[c, ACTS]
     for e in range(P.chain[c, FIRST], P.chain[c, LAST]):
         kind = P.element[e, KIND]
         v = P.element[e, VAR]
@@ -64,6 +70,7 @@ def add_springs(P, c, z, rho, W, M, full):
             W.residual[v] -= k * (z[v] - (rho[a] if a >= 0 else P.value[e, REST]))
             if full:
                 M[v, v] += k
+                M[v, alone] = k
                 if a >= 0:
                     M[v, n + 1 + a - P.chain[c, ACT_FIRST]] = k
         elif kind == SPRING:
@@ -88,6 +95,8 @@ def add_springs(P, c, z, rho, W, M, full):
                     W.residual[v + i] -= k * z[v + j]
                     if full:
                         M[v + i, v + j] += k
+                        if i == j:
+                            M[v + i, alone] = k
 
 
 @inner
@@ -156,21 +165,29 @@ def evaluate(P, c, z, rho, pose, W, full):
 def factor(M, f0, n, acts):
     """Gaussian elimination of M (n, n + 1 + acts) without exchanges, the columns from n on carried along.
 
-    Leaves the multipliers below the diagonal. f0: first wrench row. Returns the smallest pivot relative to the same
-    entry before its block was reached: positive = stable, 0 = singular.
+    Leaves the multipliers below the diagonal. f0: first wrench row. Returns the smallest pivot of a coordinate, for
+    springs relative to the spring alone, for free joints to the same entry before their block was reached; negative if the
+    chain is not stable with its end held, 0 if singular.
     """
     q0 = f0 + 6
     margin = 1.0
+    falling = 0  # motions that release energy, less those that the held end forbids
     width = n + 1 + acts
     for j in range(n):
-        if j == 0 or j == q0:  # what the pivots of the springs and of the free joints are measured with
-            for i in range(j, n if j else f0):
+        if j == q0:
+            for i in range(j, n):
                 M[i, width] = abs(M[i, i])
         pivot = M[j, j]
         if j < f0 or j >= q0:
-            margin = min(margin, pivot / M[j, width])
-        elif not pivot > 0.0:
-            margin = min(margin, -1.0)
+            least = SMALLEST_PIVOT * M[j, width]
+            if abs(pivot) < least and j < f0:  # no exchanges: a spring that its load just cancels is nudged off zero
+                pivot = least
+                M[j, j] = least
+            margin = min(margin, abs(pivot) / M[j, width])
+            if pivot < 0.0:
+                falling += 1
+        elif pivot < 0.0:
+            falling -= 1
         if not abs(pivot) > 0.0 or not math.isfinite(pivot):
             return 0.0
         for i in range(j + 1, n):
@@ -179,7 +196,7 @@ def factor(M, f0, n, acts):
                 M[i, j] = factor
                 for k in range(j + 1, width):
                     M[i, k] -= factor * M[j, k]
-    return margin
+    return margin if falling == 0 else -1.0
 
 
 @inner

@@ -35,6 +35,8 @@ def inner(function: Callable[..., Any]) -> Any:
     Constants among its arguments count as plain numbers: numba would compile the function anew for every one of them,
     which takes half as long again.
     """
+    if numba.config.DISABLE_JIT:  # for the debugger
+        return function
     dispatcher = _numba(no_cpython_wrapper=True, **_OPTIONS)(function)
     template = dispatcher.get_call_template
 
@@ -51,6 +53,8 @@ def entry(function: Callable[..., Any]) -> Callable[..., Any]:
     Where nothing can be cached (no writable folder) it is compiled anew in every process. While compiling, the search for
     unreachable objects rests: it takes a sixth of the time and finds nothing.
     """
+    if numba.config.DISABLE_JIT:
+        return function
     try:
         dispatcher = _numba(cache=True, **_OPTIONS)(function)
         file = dispatcher._cache._cache_file
