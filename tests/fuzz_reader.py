@@ -1,21 +1,33 @@
 """Throws mutated programs at the reader and the writer: python -m tests.fuzz_reader --count 1000000 --seed 1
 
-Every input has to end in a path or in a ProgramError with a place, and soon. Inputs that are refused at a place in the
-code where none was refused before, or that are accepted with a new set of motion kinds, join the corpus. Accepted
-programs are also written, unchanged and moved, and read again. Not part of the test run.
+Every input has to end in a path or in a ProgramError with a place, and soon. Accepted programs are also written,
+unchanged and moved, and read again. One input in a hundred goes through `camcomp canon` and one in five hundred through
+`camcomp compensate` and `verify`, which have to end in an exit code of the contract. Not part of the test run.
+
+Guided by coverage: one input in ten (--trace) runs under a line tracer, and joins the corpus when it passes from one
+line of the reader to another as none did before. So does every input that is refused at a place in the code where none
+was refused before, or that is accepted with a new set of motion kinds. The corpus can be kept (--corpus) for a later
+run to start from. Failures are counted by kind (failed, too slow, wrong exit code), and one input of each is kept.
 """
 
 import argparse
+import contextlib
 import faulthandler
+import hashlib
+import io
 import json
 import signal
 import sys
+import tempfile
 import time
+from collections import Counter
 from pathlib import Path
 from random import Random
+from typing import Self
 
 import numpy as np
 
+from camcomp.cli import run
 from camcomp.diagnostics import ProgramError, format_error
 from camcomp.gcode import flow
 from camcomp.gcode.interpret import read_program
@@ -34,6 +46,8 @@ TOKENS = (  # noqa: SIM905
     "endif sub endsub call repeat endrepeat do break continue return GOTO10 WHILE[#1LT3]DO1 END1 IF[#1EQ#0]THEN CR=5 "
     "X=IC(1) I=AC(2) TURN=2 MSG(\"a\") SUPA R1=2 @1 ^2 99999999999 0.0000001 \r \n \r\n \t \0 \x1a \xff \xd6"
 ).split(" ")
+READER = str(ROOT.parent / "camcomp" / "gcode")
+SLOWEST = 10  # s
 DIALECTS = (None, None, "rs274", "rs274", "fanuc", "grbl", "sinumerik")
 
 
@@ -123,57 +137,136 @@ def attempt(data: bytes, random: Random) -> str:
     return f"ok {program.dialect} {sorted(set(path.kind.tolist()))} {program.straight}"
 
 
+class Edges:
+    """Passages from line to line of the reader that any input has made."""
+
+    def __init__(self) -> None:
+        self.seen: set[tuple[int, int, int]] = set()
+        self._codes: dict[object, int] = {}  # also keeps them, so that none takes another's number
+
+    def __enter__(self) -> Self:
+        self.before = len(self.seen)
+        sys.settrace(self._call)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        sys.settrace(None)
+
+    @property
+    def grew(self) -> bool:
+        """Whether the last input went a new way."""
+        return len(self.seen) > self.before
+
+    def _call(self, frame, event, argument):
+        if not frame.f_code.co_filename.startswith(READER):
+            return None
+        code = self._codes.setdefault(frame.f_code, len(self._codes))
+        last = 0
+
+        def line(frame, event, argument):
+            nonlocal last
+            self.seen.add((code, last, frame.f_lineno))
+            last = frame.f_lineno
+            return line
+
+        return line
+
+
+def commands(data: bytes, random: Random, folder: Path) -> None:
+    """The same through the command line: nothing but exit codes of the contract, and never a traceback."""
+    source, out = folder / "in.nc", folder / "out.nc"
+    source.write_bytes(data)
+    out.unlink(missing_ok=True)
+    calls = [(["canon", str(source)], (0, 3))]
+    if random.random() < 0.2:
+        config = ["--config", str(ROOT.parent / "config/cartesian.yaml")]
+        calls.append((["compensate", str(source), *config, "-o", str(out)], (0, 1, 3, 4)))
+        calls.append((["verify", str(out), "--against", str(source), *config], (0, 1)))
+    for call, allowed in calls:
+        if call[0] == "verify" and not out.exists():
+            continue
+        said = io.StringIO()
+        with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(said):
+            code = run(call)
+        if code not in allowed:
+            raise AssertionError(f"exit code {code} of {call[0]}: {said.getvalue()}")
+        if "Traceback" in said.getvalue():
+            raise AssertionError(f"a traceback of {call[0]}: {said.getvalue()}")
+
+
 def too_long(number: int, frame: object) -> None:
     """A hang, for the one who looks on."""
-    raise TimeoutError("more than 10 s")
+    raise TimeoutError(f"more than {SLOWEST} s")
+
+
+def options() -> argparse.Namespace:
+    """What the user wants."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--count", type=int, default=10_000)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--trace", type=float, default=0.1, help="share of inputs that runs under the tracer")
+    parser.add_argument("--corpus", type=Path, help="folder with inputs to start from; new ones are added")
+    parser.add_argument("--keep", type=Path, default=Path("out/fuzz"), help="folder for inputs that fail")
+    return parser.parse_args()
 
 
 def main() -> int:
     """Run, report, and keep every input that fails."""
-    options = argparse.ArgumentParser(description=__doc__)
-    options.add_argument("--count", type=int, default=10_000)
-    options.add_argument("--seed", type=int, default=0)
-    options.add_argument("--keep", type=Path, default=Path("out/fuzz"))
-    chosen = options.parse_args()
+    chosen = options()
     faulthandler.enable()
     signal.signal(signal.SIGALRM, too_long)
     # The limits that stop endless loops, lowered so that the run is spent on other things.
     flow._MOST_BLOCKS, flow._MOST_IDLE = 5_000, 2_000
-    random = Random(chosen.seed)
-    seeds, seen, failures, slowest = corpus(), {}, 0, 0.0
-    started = time.monotonic()
-    for number in range(chosen.count):
-        data = mutate(random, seeds)
-        state = random.getstate()
-        signal.alarm(10)
-        begun = time.monotonic()
-        try:
-            result = attempt(data, random)
-        except (Exception, RecursionError) as error:  # noqa: BLE001
-            failures += 1
-            result = f"FAILED {type(error).__name__} {place_of(error)}"
-            if result not in seen:
-                chosen.keep.mkdir(parents=True, exist_ok=True)
-                (chosen.keep / f"{chosen.seed}-{number}.nc").write_bytes(data)
-                (chosen.keep / f"{chosen.seed}-{number}.json").write_text(json.dumps(state))
-                print(f"{number}: {result}: {str(error)[:600]}\n  {data!r}"[:3000], flush=True)
-        finally:
-            signal.alarm(0)
-        slowest = max(slowest, time.monotonic() - begun)
-        if result not in seen:
-            seen[result] = 0
-            if not result.startswith("FAILED") and len(data) < 3000:
+    random, edges, seeds = Random(chosen.seed), Edges(), corpus()
+    if chosen.corpus:
+        chosen.corpus.mkdir(parents=True, exist_ok=True)
+        seeds += [each.read_bytes() for each in sorted(chosen.corpus.iterdir())]
+    seen: Counter[str] = Counter()
+    kinds: Counter[str] = Counter()
+    slowest, started = 0.0, time.monotonic()
+
+    def report(number: int) -> None:
+        failures = ", ".join(f"{count} {kind}" for kind, count in sorted(kinds.items())) or "0 failures"
+        accepted = sum(count for result, count in seen.items() if result.startswith("ok"))
+        print(
+            f"{number} inputs, {number / (time.monotonic() - started):.0f}/s, {accepted} accepted, {len(seen)} outcomes, "
+            f"{len(edges.seen)} edges, corpus {len(seeds)}, slowest {slowest:.2f} s, {failures}", flush=True,
+        )  # fmt: skip
+
+    with tempfile.TemporaryDirectory() as folder:
+        for number in range(chosen.count):
+            data = mutate(random, seeds)
+            traced = random.random() < chosen.trace
+            state = random.getstate()
+            signal.alarm(SLOWEST)
+            begun = time.monotonic()
+            try:
+                with edges if traced else contextlib.nullcontext():
+                    result = attempt(data, random)
+                if random.random() < 0.01:
+                    commands(data, random, Path(folder))
+            except (Exception, RecursionError) as error:  # noqa: BLE001
+                kind = "too slow" if isinstance(error, TimeoutError) else "failed"
+                kinds["wrong exit code" if str(error).startswith("exit code") else kind] += 1
+                result = f"FAILED {type(error).__name__} {place_of(error)}"
+                if result not in seen:
+                    chosen.keep.mkdir(parents=True, exist_ok=True)
+                    (chosen.keep / f"{chosen.seed}-{number}.nc").write_bytes(data)
+                    (chosen.keep / f"{chosen.seed}-{number}.json").write_text(json.dumps(state))
+                    print(f"{number}: {result}: {str(error)[:600]}\n  {data!r}"[:3000], flush=True)
+            finally:
+                signal.alarm(0)
+            slowest = max(slowest, time.monotonic() - begun)
+            new = result not in seen or (traced and edges.grew)
+            if new and not result.startswith("FAILED") and len(data) < 3000:
                 seeds.append(data)
-        seen[result] += 1
-        if number % 20_000 == 19_999:
-            rate = (number + 1) / (time.monotonic() - started)
-            print(f"{number + 1} inputs, {rate:.0f}/s, {len(seen)} outcomes, {failures} failures", flush=True)
-    accepted = sum(count for result, count in seen.items() if result.startswith("ok"))
-    print(
-        f"{chosen.count} inputs, {accepted} accepted, {len(seen)} different outcomes, corpus {len(seeds)}, "
-        f"slowest {slowest:.2f} s, {failures} failures"
-    )
-    return 1 if failures else 0
+                if chosen.corpus:
+                    (chosen.corpus / f"{hashlib.sha256(data).hexdigest()[:16]}.nc").write_bytes(data)
+            seen[result] += 1
+            if number % 20_000 == 19_999:
+                report(number + 1)
+    report(chosen.count)
+    return 1 if kinds else 0
 
 
 if __name__ == "__main__":

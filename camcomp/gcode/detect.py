@@ -8,7 +8,7 @@ from camcomp.gcode.text import Text
 from camcomp.shelf import load, members
 
 _LOOKED_AT = 200_000  # characters
-_PLAINTEXT = re.compile(r"^\s*\d*\s*(BEGIN\s+PGM|TOOL\s+(CALL|DEF)|L\s+[XYZ]\s*[+-]|CC\s+X|BLK\s+FORM)", re.MULTILINE | re.IGNORECASE)
+_PLAINTEXT = re.compile(r"^[ \t]*+\d*[ \t]*+(BEGIN[ \t]++PGM|TOOL[ \t]++(CALL|DEF)|L[ \t]++[XYZ][ \t]*+[+-]|CC[ \t]++X|BLK[ \t]++FORM)", re.MULTILINE | re.IGNORECASE)
 DEFAULT = "rs274"
 _ENOUGH = 4  # weight of marks below which a text could be anything
 

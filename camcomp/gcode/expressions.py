@@ -23,11 +23,15 @@ class ExpressionError(Exception):
 Expression = tuple
 
 
+_DEEPEST = 100  # values in one expression
+
+
 class Parser:
     """Recursive descent over one line; `at` is the next character."""
 
     def __init__(self, line: str, at: int, spelling: Spelling) -> None:
         self.line, self.at, self.spelling = line, at, spelling
+        self.depth = 0
 
     def fail(self, message: str) -> NoReturn:
         """Raise ExpressionError here."""
@@ -49,6 +53,9 @@ class Parser:
     def value(self) -> Expression:
         """What may stand behind a letter: a number, a parameter, a function, a group, with a sign."""
         char, column = self.blank(), self.at
+        self.depth += 1
+        if self.depth > _DEEPEST:
+            self.fail("the expression is too long")
         if char in ("-", "+") and char:
             self.at += 1
             inner = self.value()
@@ -107,7 +114,7 @@ class Parser:
         if char.isdigit():
             return ("parameter", self.number(), column)
         if char == "#":
-            return ("parameter", self.parameter(), column)
+            return ("parameter", self.value(), column)
         if char.isalpha() and self.spelling.named:
             return ("parameter", self.function(), column)
         return ("parameter", self.group(), column)

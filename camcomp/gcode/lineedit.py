@@ -3,8 +3,8 @@
 import math
 
 from camcomp.datatypes import ARC, RAPID
-from camcomp.gcode.arcplan import Move, Point
-from camcomp.gcode.arcs import PLANES
+from camcomp.gcode.arcplan import Move, Point, turns_of
+from camcomp.gcode.arcs import PLANES, sweep
 from camcomp.gcode.edits import Edits
 from camcomp.gcode.numbers import decimals, plain, significant
 from camcomp.gcode.output import FEED_SLACK
@@ -110,7 +110,10 @@ class LineEditor:
             return math.dist(start, end)
         u, v, w = PLANES[int(self.sites.plane[self.k])]
         radius = math.hypot(start[u] - move.centre[u], start[v] - move.centre[v])
-        return math.hypot(radius * move.angle, end[w] - start[w])
+        # The sweep that the control will see: it differs from the one asked for where the arc starts elsewhere.
+        a, b, c = ((point[u], point[v]) for point in (start, end, move.centre))
+        angle = sweep(a, b, c, move.angle > 0.0, turns_of(move.angle))
+        return math.hypot(radius * angle, end[w] - start[w])
 
     # --- numbers and words -------------------------------------------------------------------------------------
 

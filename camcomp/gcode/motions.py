@@ -112,8 +112,10 @@ class Motions(Settings):
         angle = arcs.sweep(start, end, centre, code == 3, turns)
         centre3 = list(start3)
         centre3[u], centre3[v] = centre[0] * unit, centre[1] * unit
+        radius = math.hypot(start3[u] - centre3[u], start3[v] - centre3[v])
+        if radius * min(abs(angle), math.tau) > _LARGEST:
+            self.refuse("CC138", f"an arc of radius {radius:g} mm is out of every machine's reach")
         if state.feed_mode == 93:
-            radius = math.hypot(start3[u] - centre3[u], start3[v] - centre3[v])
             feed *= math.hypot(radius * angle, end3[w] - start3[w])
         self.record.arc_motion(block, state, code, end3, centre3, angle, feed)
 

@@ -183,3 +183,16 @@ def test_a_motion_without_a_row_is_a_mistake_of_the_caller():
 def test_a_cut_in_the_place_of_a_rapid_needs_a_feed():
     with pytest.raises(ValueError, match="needs a feed"):
         written("G0 X0 Y0 Z0\nG0 X5\n", [START, (1, LINE, (5, 1, 0))])
+
+
+def test_inverse_time_feed_counts_the_arc_that_the_control_makes():
+    program = read_program(b"G0 X1 Y0 Z0\nG93 G3 X0 Y1 I-1 J0 F100\n", name="in.nc")
+    same = Output.same(program.path)
+    late = np.array([(np.cos(0.05), np.sin(0.05), 0), (0, 1, 0)])  # the arc is not begun where it was programmed
+    out = Output(
+        motion=same.motion, kind=same.kind, end=late, centre=same.centre, angle=same.angle, feed=same.feed,
+        joining=same.joining,
+    )  # fmt: skip
+    after = read_program(rewrite(program, out, resolution_mm=1e-2, version="1").data, name="out.nc").path
+    assert after.kind[1] == 2 and after.angle[1] == pytest.approx(np.pi / 2 - 0.05, abs=1e-3)
+    assert after.feed[1] == pytest.approx(program.path.feed[1], rel=2e-3)
