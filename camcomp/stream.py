@@ -16,7 +16,8 @@ from camcomp.diagnostics import PhysicsError
 from camcomp.job import Job
 from camcomp.moves import RULES
 from camcomp.response import Travel, aim_at, respond
-from camcomp.statics.solve import POSE, STATUS, TARGET, State, solve
+from camcomp.statics.single import PointSolver
+from camcomp.statics.solve import POSE, STATUS, TARGET
 
 
 class Point(NamedTuple):
@@ -42,14 +43,15 @@ class Stream:
         self._origin, self._rotation = job.frame.origin, job.frame.rotation
         self._names = self._machine.actuators
         self._low, self._high = job.machine.limits.T
-        self._whole = len(self._names) == 6
         self._hooked = any(cause.hook(name) for cause in job.causes for name in _HOOKS)
         self._before: tuple[Floats, Floats] | None = None
+        self._tip = PointSolver(self._machine, TARGET)
+        self._pose = PointSolver(self._machine, POSE) if len(self._names) == 6 else None
         start = self._machine.nominal
         tip = start.start_reference + start.start_rotation @ np.asarray(start.tool, float)
-        self._solve(TARGET, tip, np.zeros(3))
-        if self._whole:
-            self._solve(POSE, tip, np.zeros(3))
+        for solver in (self._tip, self._pose):
+            if solver is not None:
+                _refuse(solver.solve(tip))
 
     def correct(self, tip: Sequence[float], force: Sequence[float]) -> Point:
         """What to command so that the loaded tip is where it is wanted.
@@ -61,21 +63,18 @@ class Stream:
         if self._hooked:
             return self._with_effects(np.array(tip, float), load)
         target = self._origin + self._rotation @ np.array(tip, float)
-        solved = self._solve(TARGET, target, load)
-        commanded = (solved.commanded[0] - self._origin) @ self._rotation
-        if self._whole:
-            solved = self._solve(POSE, target, load)
-        return self._point(commanded, solved.rho_nominal[0], solved.rho[0], solved.drive[0])
+        _refuse(self._tip.solve(target, force=load))
+        commanded = (self._tip.commanded - self._origin) @ self._rotation
+        solved = self._tip
+        if self._pose is not None:
+            solved = self._pose
+            _refuse(solved.solve(target, force=load))
+        return self._point(commanded, solved.rho_nominal.copy(), solved.rho.copy(), solved.drive.copy())
 
     def _point(self, commanded: Floats, nominal: Floats, rho: Floats, drive: Floats) -> Point:
         out = (rho < self._low) | (rho > self._high)
         beyond = tuple(np.array(self._names)[out].tolist()) if out.any() else ()
         return Point(commanded, nominal, rho, drive, beyond)
-
-    def _solve(self, mode: int, target: Floats, load: Floats) -> State:
-        state = solve(self._machine, mode, target[None], force=load[None])
-        _refuse(int(state.status[0]))
-        return state
 
     def _with_effects(self, tip: Floats, load: Floats) -> Point:
         """The set-point behind the one before, so that there is a direction of travel."""

@@ -19,7 +19,7 @@ from numba.core.types import unliteral
 SOURCES = ("compiled", "layout", "vectors", "kernel", "chain", "rigid", "point", "sweep", "gradients")
 # Nothing is allocated, raised or handed to Python inside: what numba would build for that costs time to compile.
 _OPTIONS = {"nogil": True, "error_model": "numpy", "_nrt": False, "no_cfunc_wrapper": True}
-_numba: Any = numba.njit  # its annotations leave out options that it has
+_numba: Any = numba  # its annotations leave out what it has
 
 
 @functools.cache
@@ -35,9 +35,9 @@ def inner(function: Callable[..., Any]) -> Any:
     Constants among its arguments count as plain numbers: numba would compile the function anew for every one of them,
     which takes half as long again.
     """
-    if numba.config.DISABLE_JIT:  # for the debugger
+    if _numba.config.DISABLE_JIT:  # for the debugger
         return function
-    dispatcher = _numba(no_cpython_wrapper=True, **_OPTIONS)(function)
+    dispatcher = _numba.njit(no_cpython_wrapper=True, **_OPTIONS)(function)
     template = dispatcher.get_call_template
 
     def plain(args: Any, kws: Any) -> Any:
@@ -53,14 +53,14 @@ def entry(function: Callable[..., Any]) -> Callable[..., Any]:
     Where nothing can be cached (no writable folder) it is compiled anew in every process. While compiling, the search for
     unreachable objects rests: it takes a sixth of the time and finds nothing.
     """
-    if numba.config.DISABLE_JIT:
+    if _numba.config.DISABLE_JIT:
         return function
     try:
-        dispatcher = _numba(cache=True, **_OPTIONS)(function)
+        dispatcher = _numba.njit(cache=True, **_OPTIONS)(function)
         file = dispatcher._cache._cache_file
         file._source_stamp = (file._source_stamp, digest())
     except RuntimeError:  # numba finds no place for its cache
-        dispatcher = _numba(**_OPTIONS)(function)
+        dispatcher = _numba.njit(**_OPTIONS)(function)
 
     @functools.wraps(function)
     def call(*args: Any) -> Any:
