@@ -1,11 +1,12 @@
 """The search for causes on one inquiry: which sets are tried, in which order, and how they are ranked."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
 
+from camcomp.alike import Likeness, likeness, stand_ins
 from camcomp.bench import thinned
 from camcomp.datatypes import Floats
 from camcomp.gap.colour import covariate
@@ -78,7 +79,8 @@ def survey(inquiry: Inquiry) -> Survey:
     fits = tuple(f for f in fits if _matters(inquiry, f))
     probability = probabilities(fits, inquiry.atoms, TEMPERATURE)
     fits, probability = _prune(inquiry, fits, probability)
-    same = _same(inquiry, fits, probability)
+    design = likeness(inquiry)
+    fits, probability, same = _with_stand_ins(inquiry, design, fits, probability, fit)
     verdict = judge(fits, probability, same)
     best = fits[verdict.best]
     left = leftovers(inquiry, best)
@@ -94,6 +96,24 @@ def survey(inquiry: Inquiry) -> Survey:
             verdict = Verdict("identified", 0, (), dict.fromkeys(members, 1.0))
             left = leftovers(inquiry, best)
     return Survey(fits, probability, verdict, left, strangest(inquiry, best, left))
+
+
+def _with_stand_ins(
+    inquiry: Inquiry, design: Likeness, fits: tuple[Fitted, ...], probability: Floats, fit: Callable[[Members], Fitted]
+) -> tuple[tuple[Fitted, ...], Floats, list[tuple[Members, Members]]]:
+    """The fits with those sets added that do the same as the leader by their structure, and all pairs that are alike."""
+    best = fits[int(np.argmax(probability))]
+    same = _same(inquiry, fits, probability)
+    for members in stand_ins(design, best.members, best.theta):
+        other = fit(members)
+        if not _plausible(inquiry, other):
+            continue
+        same.append((best.members, members))
+        if all(f.members != members for f in fits):
+            fits = (*fits, other)
+    if len(fits) > len(probability):
+        probability = probabilities(fits, inquiry.atoms, TEMPERATURE)
+    return fits, probability, same
 
 
 def colour_left(inquiry: Inquiry) -> Leftover | None:
