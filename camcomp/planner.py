@@ -179,7 +179,7 @@ def _whitened(inquiry: Inquiry, bench: Bench, values: Floats) -> dict[str, Float
     m = len(bench.actuators)
     known = np.isfinite(inquiry.noise.sigma)
     sigma = np.where(known, inquiry.noise.sigma, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
-    usual = np.repeat(np.array(_USUAL_NOISE), (3, m, m, 3))
+    usual = np.repeat(np.array(_USUAL_NOISE), [3, m, m, 3])
     noise = replace(inquiry.noise, sigma=np.where(known.any(axis=0), sigma, usual)[None, :])
     inflate = np.sqrt(1.0 + (inflation(bench)[0] / noise.sigma) ** 2)
     time = bench.runs[0].course.time
@@ -237,7 +237,8 @@ def _run(inquiry: Inquiry, candidate: Candidate, job: Job) -> Run:
     path = read_program(candidate.program.encode(), name="candidate").path
     timeline = schedule(path, job.config.control.acceleration_mm_per_s2)
     last = timeline.end + candidate.stay_s
-    usual = float(np.median([np.median(np.diff(t)) for t in inquiry.times if len(t) > 1] or [0.02]))
+    steps = [float(np.median(np.diff(t))) for t in inquiry.times if len(t) > 1]
+    usual = float(np.median(steps)) if steps else 0.02
     time = np.arange(0.0, last, max(usual, last / _ROWS))
     conditions = job.conditions if candidate.cutting else replace(job.conditions, model=None)
     course = course_of_program(
