@@ -264,15 +264,7 @@ def about(inquiry: Inquiry, f: Fitted) -> tuple[list[Floats], list[Floats]]:
     if not f.members:
         return inquiry.white, inquiry.white_residual
     index = inquiry.member_columns(f.members)
-    causes = inquiry.causes(f.members, f.theta, f.extra)
-    moved = inquiry._columns_at(f.members, f.theta, dict(f.extra))[: len(index)]
-    white, residual = [], []
-    for k in range(len(inquiry.bench.runs)):
-        W = inquiry.white[k].copy()
-        W[:, index] = inquiry.whitened(k, np.stack([m[k] for m in moved], axis=2))
-        r = inquiry.whitened(k, inquiry.bench.residual(k, causes)[:, :, None])[:, 0]
-        white.append(W)
-        residual.append(r + W[:, index] @ f.theta)
-    return white, residual
-
-
+    white = [W.copy() for W in inquiry.white]
+    for W, own in zip(white, f.white, strict=True):
+        W[:, index] = own
+    return white, list(f.residual)
