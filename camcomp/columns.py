@@ -19,7 +19,7 @@ from camcomp.gap.observation import channel_names
 from camcomp.gap.patterns import Dictionary, Ground, dictionary
 from camcomp.statics.description import Link, Parallelogram, Robot
 
-RUN_OFFSET_MM = 0.0008  # repeatability of a run
+RUN_OFFSET_MM = 0.001  # repeatability of a run
 RUN_OFFSET_N = 0.3
 CLOCK_JITTER_S = 1e-5
 CLOCK_RATE = 1e-5
@@ -131,7 +131,7 @@ def _nuisances(bench: Bench) -> list[tuple[str, float, list[Floats], bool]]:
             one = zero[r].copy()
             one[:, c] = 1.0
             size = RUN_OFFSET_MM if c < 3 else RUN_OFFSET_N
-            found.append((f"offset.{run.name}.{channel_names(bench.actuators)[c]}", size, only(r, one), True))
+            found.append((f"offset.{run.name}.{channel_names(bench.actuators)[c]}", size, only(r, one), c >= 3))
     clock = Atom("time_sync", None, shelf.load("effects", "time_sync"))
     frame = Atom("workpiece_frame", None, shelf.load("effects", "workpiece_frame"))
     if any(run.measured.has("tip") for run in bench.runs):

@@ -24,6 +24,7 @@ UNKNOWN_SHARE = 0.15  # share of what is explained that a leftover has to exceed
 NUISANCE_RMS = 0.25  # size of a cause, in units of the noise of the channel that shows it best, below which it is none
 ROUGHLY = 0.05  # share of an unknown effect's evidence that a known cause has to add beside it
 UNKNOWN_COLOUR = 0.8  # size of what a sensor cannot have made, in units of what it can
+WORSE = 2.0  # log density by which a cause has to harm the prediction of other runs before it goes
 SAME_FIT = 4.0  # chi-square by which two sets may differ and still be the same answer
 
 
@@ -213,7 +214,8 @@ def _prune(inquiry: Inquiry, fits: tuple[Fitted, ...], probability: Floats) -> t
             continue
         smaller = [tuple(x for x in f.members if x != i) for i in f.members]
         scores = predictive(f.grams, inquiry.prior, inquiry.atoms, [f.members, *smaller])
-        if scores[0] < scores[1:].max():
+        print('PRUNE',f.members,scores-scores[0])
+        if scores[0] < scores[1:].max() - WORSE:
             keep.remove(j)
     kept = tuple(fits[j] for j in keep)
     return kept, probability[keep] / probability[keep].sum()
