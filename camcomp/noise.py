@@ -77,7 +77,7 @@ def measure_noise(
     sizes = [np.full(len(words.labels), FAINT) for words in dictionaries]
     ordered = [run.course.ordered for run in bench.runs]
     rough = np.array([roughness(residuals[r]) for r in runs])
-    noise = start or Noise(rough, np.zeros(rough.shape[1]), np.zeros(rough.shape[1]))
+    noise = start or Noise(rough, np.zeros_like(rough), np.zeros_like(rough))
     inflate: list[Floats] = []
     left: list[Floats] = []
     for step in range(PASSES):

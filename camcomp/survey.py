@@ -214,7 +214,6 @@ def _prune(inquiry: Inquiry, fits: tuple[Fitted, ...], probability: Floats) -> t
             continue
         smaller = [tuple(x for x in f.members if x != i) for i in f.members]
         scores = predictive(f.grams, inquiry.prior, inquiry.atoms, [f.members, *smaller])
-        print('PRUNE',f.members,scores-scores[0])
         if scores[0] < scores[1:].max() - WORSE:
             keep.remove(j)
     kept = tuple(fits[j] for j in keep)

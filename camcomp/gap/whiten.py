@@ -23,7 +23,7 @@ _REGULAR = 1.6  # a step longer than this many usual steps is a gap
 
 @dataclass(frozen=True, eq=False)
 class Noise:
-    """sigma (runs, c) size of one row; slow (c,) share of the variance that remembers; memory (c,) from row to row."""
+    """Per run and channel (runs, c): sigma size of one row, slow share of the variance that remembers, memory from row to row."""
 
     sigma: Floats
     slow: Floats
@@ -40,8 +40,9 @@ class Noise:
             if not present.any() or not np.isfinite(self.sigma[run, j]):
                 continue
             scaled = values[present, j - first] / (self.sigma[run, j] * inflate[present, j])[:, None]
-            if self.slow[j] > 0.0:
-                scaled = _innovations(scaled, starts(time, present), float(self.slow[j]), float(self.memory[j]))
+            slow, memory = float(self.slow[run, j]), float(self.memory[run, j])
+            if slow > 0.0:
+                scaled = _innovations(scaled, starts(time, present), slow, memory)
             out.append(scaled)
         return np.concatenate(out) if out else np.zeros((0, values.shape[2]))
 
@@ -92,9 +93,9 @@ def fit_noise(
     """Noise of what no model explains: residuals, inflate (n, c) and times (n,) per run. Robust against 2 % outliers."""
     channels = residuals[0].shape[1]
     sigma = np.full((len(residuals), channels), np.nan)
-    slow, memory = np.zeros(channels), np.zeros(channels)
+    slow, memory = np.zeros_like(sigma), np.zeros_like(sigma)
     for j in range(channels):
-        covariance, weight = np.zeros(LAGS + 1), 0.0
+        covariance, rows = np.zeros((len(residuals), LAGS + 1)), np.zeros(len(residuals))
         for r, (residual, grow) in enumerate(zip(residuals, inflate, strict=True)):
             present = np.isfinite(residual[:, j]) & np.isfinite(grow[:, j])
             if present.sum() < 2:
@@ -105,14 +106,17 @@ def fit_noise(
             if not ordered[r] or present.sum() < 40:
                 continue
             x = np.clip(x / sigma[r, j], -4.0, 4.0)
-            fresh = starts(times[r], present)
-            group = np.cumsum(fresh)
+            group = np.cumsum(starts(times[r], present))
             for lag in range(LAGS + 1):
                 same = group[lag:] == group[: len(group) - lag]
-                covariance[lag] += float((x[lag:] * x[: len(x) - lag])[same].sum())
-            weight += len(x)
-        if weight > 0 and covariance[0] > 0:
-            slow[j], memory[j] = _slow_part(covariance[1:] / covariance[0], weight)
+                covariance[r, lag] = float((x[lag:] * x[: len(x) - lag])[same].sum())
+            rows[r] = len(x)
+        every = covariance.sum(axis=0)
+        for r in range(len(residuals)):
+            # a run borrows from the others as much as it has of its own
+            mine = covariance[r] + every * (rows[r] / max(rows.sum(), 1.0))
+            if rows[r] > 0 and mine[0] > 0:
+                slow[r, j], memory[r, j] = _slow_part(mine[1:] / mine[0], 2.0 * rows[r])
     known = np.isfinite(sigma)
     for j in range(channels):
         if known[:, j].any():  # a run too short to tell borrows from the others
@@ -142,5 +146,5 @@ def _slow_part(correlation: Floats, rows: float) -> tuple[float, float]:
 
 def effective_rows(noise: Noise, channel: int, n: int) -> float:
     """How many independent rows n correlated ones are worth for a mean."""
-    slow, memory = float(noise.slow[channel]), float(noise.memory[channel])
-    return n / (1.0 + 2.0 * slow * max(memory, 0.0) / (1.0 - memory))
+    slow, memory = noise.slow[:, channel], np.maximum(noise.memory[:, channel], 0.0)
+    return n / float(np.mean(1.0 + 2.0 * slow * memory / (1.0 - memory)))
