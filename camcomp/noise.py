@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -25,10 +26,10 @@ class Background:
     inflate: list[Floats]
     rest: list[Floats]
 
-    def colour(self) -> Colour:
-        """Whether the tip's noise can be that of a sensor."""
-        rough = np.array([roughness(r[:, :3]) for r in self.rest])
-        return colour(self.noise.sigma[:, :3], rough)
+    def colour(self, part: slice = slice(0, 3)) -> Colour:
+        """Whether the noise of some channels, the tip's by default, can be that of a sensor."""
+        rough = np.array([roughness(r[:, part]) for r in self.rest])
+        return colour(self.noise.sigma[:, part], rough)
 
 
 def inflation(bench: Bench) -> list[Floats]:
@@ -142,7 +143,7 @@ def _solve(grams: Sequence[Floats], k: int, free: Floats, sizes: Sequence[Floats
     a = half.T @ (half @ h)
     variance = np.sum(half**2, axis=0)
     ends = np.cumsum([k, *p])
-    parts = [slice(i, j) for i, j in zip(ends, ends[1:], strict=False)]
+    parts = [slice(int(i), int(j)) for i, j in pairwise(ends)]
     used = 1.0 - variance * own
     return _Fit(a[:k], [a[s] for s in parts], [variance[s] for s in parts], [float(used[s].sum()) for s in parts])
 

@@ -18,9 +18,9 @@ from camcomp.inquiry import Inquiry
 
 SINGLES, PAIRS, TRIPLES = 6, 6, 3
 TEMPERATURE = 1.5  # what evidence is divided by before it becomes a probability; calibrated on the truth plants
-UNKNOWN_LOG10 = -6.0  # chance below which a leftover is no accident
-UNKNOWN_RMS = 0.35  # size of a leftover, in units of the noise, below which no model error is called a cause
-UNKNOWN_SHARE = 0.15  # share of what is explained that a leftover has to exceed: no cause is modelled perfectly
+UNKNOWN_LOG10 = -10.0  # chance below which a leftover is no accident
+UNKNOWN_RMS = 0.25  # size of a leftover, in units of the noise, below which no model error is called a cause
+UNKNOWN_SHARE = 0.1  # share of what is explained that a leftover has to exceed: no cause is modelled perfectly
 NUISANCE_RMS = 0.25  # size of a cause, in units of the noise of the channel that shows it best, below which it is none
 ROUGHLY = 0.05  # share of an unknown effect's evidence that a known cause has to add beside it
 UNKNOWN_COLOUR = 0.8  # size of what a sensor cannot have made, in units of what it can
@@ -87,7 +87,7 @@ def survey(inquiry: Inquiry) -> Survey:
     left = leftovers(inquiry, best)
     if (coloured := colour_left(inquiry)) is not None:
         # noise that is none stays whatever the causes are; the causes were judged against it, and stand
-        return Survey(fits, probability, verdict, {**left, "tip": coloured}, "tip")
+        return Survey(fits, probability, verdict, {**left, coloured.kind: coloured}, coloured.kind)
     if strangest(inquiry, best, left) is not None:
         members = _known_part(inquiry, best)
         if members != best.members:
@@ -118,19 +118,23 @@ def _with_stand_ins(
 
 
 def colour_left(inquiry: Inquiry) -> Leftover | None:
-    """The noise of the tip as a leftover, where it cannot be that of a sensor."""
-    found = inquiry.background.colour()
-    if found.ratio < UNKNOWN_COLOUR:
-        return None
+    """The noise of tip or encoders as a leftover, where it cannot be that of a sensor."""
     m = len(inquiry.bench.actuators)
-    rest = [r[:, :3] for r in inquiry.background.rest]
-    drives = []
-    for k, run in enumerate(inquiry.bench.runs):
-        slope = thinned(inquiry.bench.row_slopes(k).reshape(-1, 3 * m), run.thin).reshape(-1, 3, m)
-        drives.append(np.einsum("nij,nj->ni", np.linalg.pinv(slope), np.where(np.isfinite(rest[k]), rest[k], 0.0)))
-    label = covariate(rest, inquiry.times, drives, inquiry.bench.actuators, found.excess)
+    parts = {"tip": slice(0, 3), "encoder": slice(3, 3 + m)}
+    found = {kind: inquiry.background.colour(part) for kind, part in parts.items()}
+    kind = max(found, key=lambda each: found[each].ratio)
+    if found[kind].ratio < UNKNOWN_COLOUR:
+        return None
+    rest = [r[:, parts[kind]] for r in inquiry.background.rest]
+    drives = [np.where(np.isfinite(r), r, 0.0) for r in rest]
+    if kind == "tip":
+        for k, run in enumerate(inquiry.bench.runs):
+            slope = thinned(inquiry.bench.row_slopes(k).reshape(-1, 3 * m), run.thin).reshape(-1, 3, m)
+            drives[k] = np.einsum("nij,nj->ni", np.linalg.pinv(slope), drives[k])
+    names = "xyz" if kind == "tip" else inquiry.bench.actuators
+    label = covariate(rest, inquiry.times, drives, names, inquiry.bench.actuators, found[kind].excess)
     rows = sum(int(np.isfinite(r).sum()) for r in rest)
-    return Leftover("tip", -300.0, found.ratio, rows, ((label, 1.0),))
+    return Leftover(kind, -300.0, found[kind].ratio, rows, ((label, 1.0),))
 
 
 def strangest(inquiry: Inquiry, f: Fitted, left: Mapping[str, Leftover]) -> str | None:
