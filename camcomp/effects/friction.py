@@ -11,7 +11,7 @@ from camcomp.gap.memory import PRESLIDING_MM, direction
 STAGE = "drive"
 TARGET = "actuator"
 SOURCE = "force balance of the carriage; turn-round of the force after Dahl 1968; viscous part by the speed of the encoder"
-_LENGTH = (1e-4, 1.0, 0.005, 0.001, "rolling guides: 1 to 100 um, and what the drive spring winds up on the way")
+_LENGTH = (1e-4, 1.0, 0.005, 0.0005, "rolling guides: 1 to 100 um, and what the drive spring winds up on the way")
 FITTED = (
     Parameter("force_N", "N", 0.0, 0.0, 2000.0, 60.0, 0.2, "guides and seals of feed drives: 5 to 300 N", sign=1),
     Parameter("presliding_mm", "mm", PRESLIDING_MM, *_LENGTH, scan=(0.001, 0.003, 0.008, 0.02, 0.06)),
