@@ -17,9 +17,10 @@ from camcomp.datatypes import ARC, LINE, RAPID, Bools, Floats, Ints, Path
 from camcomp.gcode.program import Program
 from camcomp.gcode.rewrite import Output, Rewritten, rewrite
 from camcomp.job import Job
-from camcomp.moves import corrected_pieces, refuse_unsolved, row_layout, travel_of
+from camcomp.moves import WITHIN_RAPID, corrected_pieces, refuse_unsolved, row_layout, travel_of
 from camcomp.posture import check_posture, whole_pose
-from camcomp.response import Travel, aim_at, respond, with_memory
+from camcomp.response import Travel, aim_at, respond, winds_up
+from camcomp.reversals import cut_at_reversals
 from camcomp.splitting import Nodes, second_derivative, trial_nodes
 from camcomp.statics.target import Correction, settle
 
@@ -116,8 +117,9 @@ def compensate(
     context: how many of the first and of the last motions are only there because their neighbours depend on them; they
     are not divided, and their errors do not count.
     """
-    track = lay_track(program.path, job.conditions)
     path, resolution = program.path, job.config.control.resolution_mm
+    spacing = FINE_MM if job.causes else COARSE_MM  # a screw's error has waves of a few mm
+    track, turning = cut_at_reversals(job, lay_track(path, job.conditions), spacing)
     corrected = corrected_pieces(path, track)
     feeding = corrected & (path.kind[track.motion] != RAPID)
     feeding &= (track.motion >= context[0]) & (track.motion < len(path) - context[1])
@@ -125,13 +127,11 @@ def compensate(
     budget = max(1e-3 * tolerance_um - rounding, 0.1e-3 * tolerance_um)
     tolerance = np.full(len(track.motion), budget)
 
-    angle = np.where(np.isnan(path.angle), 0.0, path.angle)[track.motion] * (track.u1 - track.u0)
-    spacing = FINE_MM if job.causes else COARSE_MM  # a screw's error has waves of a few mm
-    trial = trial_nodes(track.length, angle, feeding & (track.length > 0.0), spacing)
+    trial = trial_nodes(track.length, track.angle, feeding & ~turning & (track.length > 0.0), spacing)
     aimed = _aim(program, job, track, trial, corrected, method)
     second = second_derivative(trial, aimed.commanded)
     kept = _kept(track, trial, aimed.commanded, 0.5 * resolution)
-    tolerance[kept] = np.inf
+    tolerance[kept | turning] = np.inf
     wanted = job.config.compensation.arcs if arcs is None else arcs
     able = feeding & ~kept & (wanted and not job.causes)  # what drives leave over has waves that no arc follows
     bend = Bend.of(track, trial, aimed.commanded, second, tolerance, able)
@@ -148,8 +148,8 @@ def compensate(
         written = rewrite(program, _output(path, rows), resolution_mm=resolution, version=version)
         points = _points(job, track, rows, feeding)
         after = _see(job, points, written.end, replace(rows.arcs, centre=written.centre))
-        turning = _takes_up_play(job, points, after.state.rho)
-        points = replace(points, judged=points.judged & ~turning)
+        winding = _winds_up(job, points, after.state.rho)
+        points = replace(points, judged=points.judged & ~winding)
         worst = np.zeros(len(tolerance))
         np.maximum.at(worst, points.piece[points.judged], np.linalg.norm(after.error[points.judged], axis=1))
         missed = (worst > 1e-3 * tolerance_um) & ~kept
@@ -163,7 +163,7 @@ def compensate(
         tolerance[straighten] = budget
         tolerance = np.where(missed, tolerance * np.clip(0.9e-3 * tolerance_um / np.maximum(worst, 1e-12), 0.3, 0.9), tolerance)
     before = _see_original(job, points)
-    warnings = _warnings(rows, after.error, turning)
+    warnings = _warnings(rows, after.error, winding)
     iterations = int(aimed.iterations.max(initial=0))
     return _assemble(program, job, track, rows, written, points, before, after, iterations, method, warnings)
 
@@ -176,14 +176,22 @@ class _Aimed:
 
 def _aim(program: Program, job: Job, track: Track, nodes: Nodes, corrected: Bools, method: str) -> _Aimed:
     """Modified targets at nodes, program frame; nodes of uncorrected pieces stay as programmed."""
-    target = track.points(nodes.piece, nodes.w)
     on = corrected[nodes.piece]
-    result = aim_at(job, target[on], travel_of(job, track, nodes.piece[on], nodes.w[on]), method)
-    refuse_unsolved(program, track, nodes.piece[on], target[on], result.status)
-    out = target.copy()
-    out[on] = result.commanded
-    iterations = np.zeros(len(target), np.int64)
-    iterations[on] = result.iterations
+    piece, w = nodes.piece[on], nodes.w[on]
+    rapids = np.flatnonzero(corrected & (track.path.kind[track.motion] == RAPID) & (track.length > 0.0))
+    if not job.causes:
+        rapids = rapids[:0]
+    between = np.repeat(rapids, len(WITHIN_RAPID))  # drives remember where they turned round
+    order = np.lexsort((np.concatenate((w, np.tile(WITHIN_RAPID, len(rapids)))), np.concatenate((piece, between))))
+    asked = np.argsort(order, kind="stable")[: len(piece)]
+    piece, w = np.concatenate((piece, between))[order], np.concatenate((w, np.tile(WITHIN_RAPID, len(rapids))))[order]
+    target = track.points(piece, w)
+    result = aim_at(job, target, travel_of(job, track, piece, w), method)
+    refuse_unsolved(program, track, piece, target, result.status)
+    out = track.points(nodes.piece, nodes.w)
+    out[on] = result.commanded[asked]
+    iterations = np.zeros(len(out), np.int64)
+    iterations[on] = result.iterations[asked]
     return _Aimed(out, iterations)
 
 
@@ -298,6 +306,7 @@ class _Points:
     travel: Travel
     judged: Bools  # (k,) counted in before and after: feed motions, no joining lines
     kept: Bools  # (k,) between the ends of an arc that stays as programmed
+    before: Floats | None  # (3,) where the first move starts, if that is known
 
     @property
     def end(self) -> Bools:
@@ -306,7 +315,8 @@ class _Points:
 
     def along(self, ends: Floats, arcs: Arcs) -> Floats:
         """Points (k, 3) of the moves between end points (N, 3)."""
-        start = np.concatenate((ends[:1], ends[:-1]))[self.row]
+        first = ends[:1] if self.before is None else self.before[None]
+        start = np.concatenate((first, ends[:-1]))[self.row]
         out = arcfit.along(start, ends[self.row], arcs.take(self.row), self.axis, self.fraction)
         return np.where(self.kept[:, None], self.target, np.where(self.end[:, None], ends[self.row], out))
 
@@ -318,8 +328,10 @@ def _points(job: Job, track: Track, rows: Rows, feeding: Bools) -> _Points:
     start = np.where(begins, 0.0, np.concatenate(([0.0], rows.w[:-1])))
     inner = np.flatnonzero(cut & (track.length[rows.piece] > 0.0))
     bent = inner[rows.arcs.on[inner]]
-    row = np.concatenate((np.arange(n), inner, bent, bent))
+    rapid = np.flatnonzero((rows.kind == RAPID) & rows.corrected) if job.causes else inner[:0]
+    row = np.concatenate((np.arange(n), inner, bent, bent, np.repeat(rapid, len(WITHIN_RAPID))))
     fraction = np.repeat([1.0, 0.5, 0.25, 0.75], [n, len(inner), len(bent), len(bent)])
+    fraction = np.concatenate((fraction, np.tile(WITHIN_RAPID, len(rapid))))
     order = np.lexsort((fraction, row))
     row, fraction = row[order], fraction[order]
     end = fraction == 1.0
@@ -329,7 +341,9 @@ def _points(job: Job, track: Track, rows: Rows, feeding: Bools) -> _Points:
     force = np.where(end[:, None], job.frame.vectors(rows.force)[row], travel.force)  # joining lines know better
     kept = ~end & ((rows.kind == ARC) & ~rows.arcs.on)[row]
     axis = track.path.axis[track.motion[piece]]
-    return _Points(row, fraction, axis, piece, w, track.points(piece, w), replace(travel, force=force), cut[row], kept)
+    travel = replace(travel, force=force)
+    before = track.path.start[0] if n and track.path.known[0] else None
+    return _Points(row, fraction, axis, piece, w, track.points(piece, w), travel, cut[row], kept, before)
 
 
 @dataclass(frozen=True, eq=False)
@@ -344,23 +358,23 @@ class _Seen:
 def _see(job: Job, points: _Points, ends: Floats, arcs: Arcs) -> _Seen:
     """The loaded machine along the moves between commanded end points (N, 3), program frame."""
     told = points.along(ends, arcs)
-    tip, state = respond(job, told, points.travel, points.target)
+    tip, state = respond(job, told, points.travel, points.target, before=points.before)
     at = {each.name: getattr(state, each.name)[points.end] for each in fields(state)}
     return _Seen(tip - points.target, tip[points.end], Correction(**at))
 
 
 def _see_original(job: Job, points: _Points) -> _Seen:
     """The original program through the full model, at the same points."""
-    tip, state = respond(job, points.target, points.travel)
+    tip, state = respond(job, points.target, points.travel, before=points.before)
     at = {each.name: getattr(state, each.name)[points.end] for each in fields(state)}
     return _Seen(tip - points.target, tip[points.end], Correction(**at))
 
 
-def _takes_up_play(job: Job, points: _Points, rho: Floats) -> Bools:
-    """Points (k,) of lines in which an actuator turns round: the play or wind-up of its drive is taken up in them."""
+def _winds_up(job: Job, points: _Points, rho: Floats) -> Bools:
+    """Points (k,) of lines in which an actuator turns round and its drive winds up against friction."""
     if not job.causes:
         return np.zeros(len(points.row), np.bool_)
-    memory = with_memory(job, rho, points.travel.take(points.end))
+    memory = winds_up(job, rho, points.travel.take(points.end))
     way: Floats = np.sign(np.diff(rho, axis=0, prepend=rho[:1]))[:, memory]
     for k in range(1, len(way)):  # standing still keeps the direction
         way[k] = np.where(way[k] == 0.0, way[k - 1], way[k])
@@ -373,15 +387,15 @@ def _takes_up_play(job: Job, points: _Points, rho: Floats) -> Bools:
     return near[points.row]
 
 
-def _warnings(rows: Rows, error: Floats, turning: Bools) -> list[str]:
+def _warnings(rows: Rows, error: Floats, winding: Bools) -> list[str]:
     out = []
     joins = int(rows.joining.sum())
     if joins:
         out.append(f"{joins} joining lines where the cutting force jumps; they are not part of before and after")
-    if turning.any():
-        most = 1e3 * float(np.nanmax(np.linalg.norm(error[turning], axis=1)))
+    if winding.any():
+        most = 1e3 * float(np.nanmax(np.linalg.norm(error[winding], axis=1)))
         out.append(
-            f"{int(turning.sum())} points lie in lines in which a drive turns round and takes up its play; up to "
+            f"{int(winding.sum())} points lie in lines in which a drive turns round and winds up; up to "
             f"{most:.2f} um are left there, and they are not part of before and after"
         )
     return out
