@@ -20,7 +20,7 @@ GROUND = {
 ENGINES = {"gcode", "statics", "cutting", "gap"}
 SHELVES = {"robots", "dialects", "forces", "effects"}
 JOINTS = {
-    "armposes", "bench", "columns", "course", "inquiry", "job", "moves", "noise", "planner", "posture", "response",
+    "arcfit", "armposes", "bench", "columns", "course", "inquiry", "job", "moves", "noise", "planner", "posture", "response",
     "scan", "splitting", "survey", "twin",
 }  # fmt: skip
 STORIES = {"armstudy", "axisstudy", "compensate", "verify", "simulate", "diagnose", "stream"}
