@@ -86,6 +86,8 @@ class Interpreter(Executor):
             state.motion = None if explicit == 800 else explicit
             self.record.code_stated = True
         dynamic = block.code(8) == 431
+        if dynamic and zero_code in AXIS_USERS and block.axes:
+            self.refuse("CC108", f"{code_name(431)} and {code_name(zero_code or 0)} both want the axis words")
         if zero_code in AXIS_USERS or dynamic:
             homes = zero_code in (280, 300) and explicit in (0, 10) and self.dialect.home_beside_motion
             if explicit not in (None, 800) and block.axes and not homes:
