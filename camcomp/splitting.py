@@ -60,6 +60,8 @@ def divide(
     second (k, 3): x'' at the trial nodes. least (p,): |x''|^(1/2) counts as at least that much. The ends of a piece are
     included and never shifted.
     """
+    if not len(tolerance):
+        return nodes, np.zeros((0, 3))
     floor = np.zeros(len(tolerance)) if least is None else least
     g = np.maximum(np.sqrt(np.linalg.norm(second, axis=1)), floor[nodes.piece])
     dw = np.diff(nodes.w)
