@@ -94,7 +94,8 @@ def measure_noise(
             left.append(np.where(np.isfinite(residuals[r]), gap, np.nan))
         noise = fit_noise(left, inflate, list(times), ordered)
         noise = replace(noise, sigma=noise.sigma * _spent(fit, dictionaries, residuals))
-        if step < PASSES - 1:
+        # with one run nothing has happened twice, and smooth is all that anything can be called
+        if step < PASSES - 1 and len(bench.runs) > 1:
             sizes = [
                 _learnt(words, G, k, free, fit.patterns[d], fit.spread[d], sizes[d], step == 0)
                 for d, (words, G) in enumerate(zip(dictionaries, grams, strict=True))

@@ -11,6 +11,7 @@ from camcomp.gap.effect import Parameter
 from camcomp.gap.evidence import Gram
 from camcomp.gap.search import total
 
+_FINER = 17  # values between the neighbours of the best
 _OTHER_HOOKS = ("on_servo", "on_robot", "on_load", "on_pose", "on_workpiece", "on_clock")
 
 
@@ -31,10 +32,26 @@ def best_shape(
     bench: Bench, atom: Atom, rest: Sequence[Floats], whitened: Callable[[int, Floats], Floats]
 ) -> dict[str, float] | None:
     """The scanned shape whose columns explain most of `rest` (white, per run); None where the effect is not scanned."""
-    tried = [{**shape_default(atom), atom.shapes[0].name: value} for value in atom.shapes[0].scan]
-    quick = [quick_columns(bench, atom, shape) for shape in tried]
+    p = atom.shapes[0]
+    values = np.asarray(p.scan)
+    gains = _gains(bench, atom, p, values, rest, whitened)
+    if gains is None:
+        return None
+    best = int(np.argmax(gains))
+    # between its neighbours the gain has one peak, and a large effect off its peak leaves what looks like noise
+    near = np.geomspace(values[max(best - 1, 0)], values[min(best + 1, len(values) - 1)], _FINER)
+    finer = _gains(bench, atom, p, near, rest, whitened)
+    value = near[int(np.argmax(finer))] if finer is not None and finer.max() > gains[best] else values[best]
+    return {**shape_default(atom), p.name: float(value)}
+
+
+def _gains(
+    bench: Bench, atom: Atom, p: Parameter, values: Floats, rest: Sequence[Floats], whitened: Callable[[int, Floats], Floats]
+) -> Floats | None:
+    """Chi-square (v,) that the columns of an effect explain with each value of a shape; None where it is not scanned."""
+    quick = [quick_columns(bench, atom, {**shape_default(atom), p.name: float(value)}) for value in values]
     found = [each for each in quick if each is not None]
-    if len(found) < len(tried):
+    if len(found) < len(values):
         return None
     d = len(atom.parameters)
     white = np.concatenate([
@@ -42,12 +59,12 @@ def best_shape(
     ])  # fmt: skip
     h = white.T @ np.concatenate(rest)
     gains = []
-    for v in range(len(tried)):
+    for v in range(len(values)):
         own = white[:, v * d : v * d + d]
         G = own.T @ own
         G += (1e-9 * np.trace(G) + 1e-12) * np.eye(d)
         gains.append(float(h[v * d : v * d + d] @ np.linalg.solve(G, h[v * d : v * d + d])))
-    return tried[int(np.argmax(gains))]
+    return np.array(gains)
 
 
 def reach(p: Parameter, value: float) -> float:

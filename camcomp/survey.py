@@ -20,6 +20,7 @@ SINGLES, PAIRS, TRIPLES = 6, 6, 3
 TEMPERATURE = 1.5  # what evidence is divided by before it becomes a probability; calibrated on the truth plants
 UNKNOWN_LOG10 = -10.0  # chance below which a leftover is no accident
 UNKNOWN_RMS = 0.25  # size of a leftover, in units of the noise, below which no model error is called a cause
+RUNS = 6  # runs that this holds for
 UNKNOWN_SHARE = 0.1  # share of what is explained that a leftover has to exceed: no cause is modelled perfectly
 NUISANCE_RMS = 0.25  # size of a cause, in units of the noise of the channel that shows it best, below which it is none
 ROUGHLY = 0.05  # share of an unknown effect's evidence that a known cause has to add beside it
@@ -140,10 +141,12 @@ def colour_left(inquiry: Inquiry) -> Leftover | None:
 def strangest(inquiry: Inquiry, f: Fitted, left: Mapping[str, Leftover]) -> str | None:
     """The kind of channel in which an effect shows that the library does not have, None where there is none."""
     explained = signal_rms(inquiry, f)
+    # one run cannot show that something happens again
+    least = UNKNOWN_RMS * np.sqrt(RUNS / min(len(inquiry.bench.runs), RUNS))
     found = {
         kind: each.energy
         for kind, each in left.items()
-        if each.log10_chance < UNKNOWN_LOG10 and each.rms > max(UNKNOWN_RMS, UNKNOWN_SHARE * explained[kind])
+        if each.log10_chance < UNKNOWN_LOG10 and each.rms > max(least, UNKNOWN_SHARE * explained[kind])
     }
     return max(found, key=lambda kind: found[kind]) if found else None
 
