@@ -13,7 +13,8 @@ from camcomp.gap.colour import Colour, colour
 from camcomp.gap.patterns import Dictionary
 from camcomp.gap.whiten import Noise, fit_noise
 
-PASSES = 4
+PASSES = 3  # fits with patterns
+SURE = 4.0  # standard deviations by which a pattern has to exceed chance before it is more than noise
 TIMING_S = 0.0015  # how fast a real drive settles after its acceleration has stepped
 FAINT = 0.03  # um or N: what a pattern amounts to where nothing depends on it
 
@@ -76,12 +77,14 @@ def measure_noise(
         both[r][~np.isfinite(residuals[r])] = 0.0
     free = np.where(columns.atom >= 0, 1.0 / 9.0, columns.prior.precision(1.0) / 9.0)
     sizes = [np.full(len(words.labels), FAINT) for words in dictionaries]
+    kinds = [slice(words.first, words.first + words.blocks[0].shape[1]) for words in dictionaries]
     ordered = [run.course.ordered for run in bench.runs]
     rough = np.array([roughness(residuals[r]) for r in runs])
     noise = start or Noise(rough, np.zeros_like(rough), np.zeros_like(rough))
     inflate: list[Floats] = []
     left: list[Floats] = []
-    for step in range(PASSES):
+    learn = 0 if start else 1  # patterns are judged against noise whose colour is known
+    for step in range(learn + PASSES):
         inflate = [np.sqrt(1.0 + (extra[r] / noise.sigma[r]) ** 2) for r in runs]
         grams = [_joint(noise, words, both, inflate, times) for words in dictionaries]
         fit = _solve(grams, k, free, sizes)
@@ -92,12 +95,12 @@ def measure_noise(
                 part = slice(words.first, words.first + words.blocks[r].shape[1])
                 gap[:, part] -= words.blocks[r] @ a
             left.append(np.where(np.isfinite(residuals[r]), gap, np.nan))
-        noise = fit_noise(left, inflate, list(times), ordered)
+        noise = fit_noise(left, inflate, list(times), ordered, kinds)
         noise = replace(noise, sigma=noise.sigma * _spent(fit, dictionaries, residuals))
         # with one run nothing has happened twice, and smooth is all that anything can be called
-        if step < PASSES - 1 and len(bench.runs) > 1:
+        if learn <= step < learn + PASSES - 1 and len(bench.runs) > 1:
             sizes = [
-                _learnt(words, G, k, free, fit.patterns[d], fit.spread[d], sizes[d], step == 0)
+                _learnt(words, G, k, free, fit.patterns[d], fit.spread[d], sizes[d], step == learn)
                 for d, (words, G) in enumerate(zip(dictionaries, grams, strict=True))
             ]
     inflate = [np.sqrt(1.0 + (extra[r] / noise.sigma[r]) ** 2) for r in runs]
@@ -162,7 +165,9 @@ def _learnt(
         mine = np.flatnonzero(labels == name)
         if first:
             P, h = rest[np.ix_(mine, mine)], rest[mine, -1]
-            square = max(float(h @ h - np.trace(P)), 0.0) / max(float(np.sum(P**2)), 1e-300)
+            scatter = max(float(np.sum(P**2)), 1e-300)
+            beyond = float(h @ h - np.trace(P))
+            square = beyond / scatter if beyond > SURE * np.sqrt(2.0 * scatter) else 0.0
         else:
             told = len(mine) - float(np.sum(variance[mine] / size[mine] ** 2))  # amplitudes that the data determine
             square = float(np.sum(amplitude[mine] ** 2)) / max(told, 1e-9)

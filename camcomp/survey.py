@@ -19,9 +19,9 @@ from camcomp.inquiry import Inquiry
 SINGLES, PAIRS, TRIPLES = 6, 6, 3
 TEMPERATURE = 1.5  # what evidence is divided by before it becomes a probability; calibrated on the truth plants
 UNKNOWN_LOG10 = -10.0  # chance below which a leftover is no accident
-UNKNOWN_RMS = 0.25  # size of a leftover, in units of the noise, below which no model error is called a cause
+UNKNOWN_RMS = 0.18  # size of a leftover, in units of the noise, below which no model error is called a cause
 RUNS = 6  # runs that this holds for
-UNKNOWN_SHARE = 0.1  # share of what is explained that a leftover has to exceed: no cause is modelled perfectly
+UNKNOWN_SHARE = 0.12  # share of what is explained that a leftover has to exceed: no cause is modelled perfectly
 NUISANCE_RMS = 0.25  # size of a cause, in units of the noise of the channel that shows it best, below which it is none
 ROUGHLY = 0.05  # share of an unknown effect's evidence that a known cause has to add beside it
 UNKNOWN_COLOUR = 0.8  # size of what a sensor cannot have made, in units of what it can
@@ -86,7 +86,7 @@ def survey(inquiry: Inquiry) -> Survey:
     verdict = judge(fits, probability, same)
     best = fits[verdict.best]
     left = leftovers(inquiry, best)
-    if (coloured := colour_left(inquiry)) is not None:
+    if (coloured := colour_left(inquiry, left)) is not None:
         # noise that is none stays whatever the causes are; the causes were judged against it, and stand
         return Survey(fits, probability, verdict, {**left, coloured.kind: coloured}, coloured.kind)
     if strangest(inquiry, best, left) is not None:
@@ -118,8 +118,11 @@ def _with_stand_ins(
     return fits, probability, same
 
 
-def colour_left(inquiry: Inquiry) -> Leftover | None:
-    """The noise of tip or encoders as a leftover, where it cannot be that of a sensor."""
+def colour_left(inquiry: Inquiry, left: Mapping[str, Leftover]) -> Leftover | None:
+    """The noise of tip or encoders as a leftover, where it cannot be that of a sensor.
+
+    left: what the patterns say of the leftover; a line in the spectrum is time's, of anything else they know more.
+    """
     m = len(inquiry.bench.actuators)
     parts = {"tip": slice(0, 3), "encoder": slice(3, 3 + m)}
     found = {kind: inquiry.background.colour(part) for kind, part in parts.items()}
@@ -135,7 +138,8 @@ def colour_left(inquiry: Inquiry) -> Leftover | None:
     names = "xyz" if kind == "tip" else inquiry.bench.actuators
     label = covariate(rest, inquiry.times, drives, names, inquiry.bench.actuators, found[kind].excess)
     rows = sum(int(np.isfinite(r).sum()) for r in rest)
-    return Leftover(kind, -300.0, found[kind].ratio, rows, ((label, 1.0),))
+    known = left[kind].labels if kind in left and not label.startswith("time") else ()
+    return Leftover(kind, -300.0, found[kind].ratio, rows, known or ((label, 1.0),))
 
 
 def strangest(inquiry: Inquiry, f: Fitted, left: Mapping[str, Leftover]) -> str | None:

@@ -15,6 +15,7 @@ from scipy.stats import chi2
 from camcomp.datatypes import Floats, Ints
 from camcomp.gap.evidence import Prior
 
+_TOLD = 0.01  # share of its information that a direction keeps beside the others, below which it tells of the noise's colour
 _AMPLITUDES = (1.0, 3.0, 10.0, 30.0, 100.0)  # um or N
 
 
@@ -97,7 +98,7 @@ def score_test(left: Projected, rows: Mapping[str, int]) -> dict[str, Leftover]:
         usable = np.diag(P) > 1e-6 * np.maximum(left.own[mine], 1e-30)
         scale = np.sqrt(np.maximum(np.diag(P)[usable], 1e-30))
         value, vector = np.linalg.eigh(P[np.ix_(usable, usable)] / scale[:, None] / scale)
-        keep = value > 1e-3
+        keep = value > _TOLD
         z = (vector[:, keep] / np.sqrt(value[keep])).T @ (h[usable] / scale)
         dof, total = max(int(keep.sum()), 1), float(z @ z)
         out[kind] = Leftover(

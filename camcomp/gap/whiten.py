@@ -88,14 +88,18 @@ def starts(time: Floats, present: Bools) -> Bools:
 
 
 def fit_noise(
-    residuals: Sequence[Floats], inflate: Sequence[Floats], times: Sequence[Floats], ordered: Sequence[bool]
-) -> Noise:
-    """Noise of what no model explains: residuals, inflate (n, c) and times (n,) per run. Robust against 2 % outliers."""
+    residuals: Sequence[Floats], inflate: Sequence[Floats], times: Sequence[Floats], ordered: Sequence[bool],
+    kinds: Sequence[slice] = (),
+) -> Noise:  # fmt: skip
+    """Noise of what no model explains: residuals, inflate (n, c) and times (n,) per run. Robust against 2 % outliers.
+
+    kinds: channels that one sensor measures.
+    """
     channels = residuals[0].shape[1]
     sigma = np.full((len(residuals), channels), np.nan)
     slow, memory = np.zeros_like(sigma), np.zeros_like(sigma)
+    covariance, rows = np.zeros((len(residuals), channels, LAGS + 1)), np.zeros((len(residuals), channels))
     for j in range(channels):
-        covariance, rows = np.zeros((len(residuals), LAGS + 1)), np.zeros(len(residuals))
         for r, (residual, grow) in enumerate(zip(residuals, inflate, strict=True)):
             present = np.isfinite(residual[:, j]) & np.isfinite(grow[:, j])
             if present.sum() < 2:
@@ -109,14 +113,16 @@ def fit_noise(
             group = np.cumsum(starts(times[r], present))
             for lag in range(LAGS + 1):
                 same = group[lag:] == group[: len(group) - lag]
-                covariance[r, lag] = float((x[lag:] * x[: len(x) - lag])[same].sum())
-            rows[r] = len(x)
-        every = covariance.sum(axis=0)
-        for r in range(len(residuals)):
-            # a run borrows from the others as much as it has of its own
-            mine = covariance[r] + every * (rows[r] / max(rows.sum(), 1.0))
-            if rows[r] > 0 and mine[0] > 0:
-                slow[r, j], memory[r, j] = _slow_part(mine[1:] / mine[0], 2.0 * rows[r])
+                covariance[r, j, lag] = float((x[lag:] * x[: len(x) - lag])[same].sum())
+            rows[r, j] = len(x)
+    for r, j in zip(*np.nonzero(rows > 0), strict=True):
+        # one run of one channel says little: what its sensor does in its other axes and the channel in other runs helps
+        own = np.zeros(channels)
+        own[next((part for part in kinds if part.start <= j < part.stop), slice(j, j + 1))] = 0.5
+        own[j] = 1.0
+        others = covariance[:, j].sum(axis=0) * (0.5 * rows[r, j] / rows[:, j].sum())
+        mine = own @ covariance[r] + others
+        slow[r, j], memory[r, j] = _slow_part(mine[1:] / mine[0], float(own @ rows[r]) + 0.5 * rows[r, j])
     known = np.isfinite(sigma)
     for j in range(channels):
         if known[:, j].any():  # a run too short to tell borrows from the others
