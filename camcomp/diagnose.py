@@ -60,6 +60,9 @@ def diagnose(
         "next_experiment": None,
         "equivalent": [[_named(inquiry, i) for i in group] for group in classes(likeness(inquiry))],
     }
+    if word != "unknown":  # noise is measured before causes are known, and no more can be noise than they leave
+        floor = min(gap["noise_floor_um"], result["shrinkage"]["ceiling_rms_um"])
+        gap["noise_floor_um"] = result["shrinkage"]["noise_floor_um"] = floor
     proposal = _next(inquiry, found, word, job)
     if proposal is not None:
         result["next_experiment"] = {

@@ -9,7 +9,7 @@ import numpy as np
 from camcomp.bench import Bench, thinned
 from camcomp.columns import Columns
 from camcomp.datatypes import Floats
-from camcomp.gap.colour import Colour, colour
+from camcomp.gap.colour import SMOOTH, Colour, colour
 from camcomp.gap.patterns import Dictionary
 from camcomp.gap.whiten import Noise, fit_noise
 
@@ -85,6 +85,8 @@ def measure_noise(
     left: list[Floats] = []
     learn = 0 if start else 1  # patterns are judged against noise whose colour is known
     for step in range(learn + PASSES):
+        if step == learn:  # of what is smoother than any sensor's noise, patterns have the first claim
+            noise = replace(noise, sigma=np.fmin(noise.sigma, SMOOTH * rough))
         inflate = [np.sqrt(1.0 + (extra[r] / noise.sigma[r]) ** 2) for r in runs]
         grams = [_joint(noise, words, both, inflate, times) for words in dictionaries]
         fit = _solve(grams, k, free, sizes)

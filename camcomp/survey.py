@@ -24,6 +24,7 @@ RUNS = 6  # runs that this holds for
 UNKNOWN_SHARE = 0.12  # share of what is explained that a leftover has to exceed: no cause is modelled perfectly
 NUISANCE_RMS = 0.25  # size of a cause, in units of the noise of the channel that shows it best, below which it is none
 ROUGHLY = 0.05  # share of an unknown effect's evidence that a known cause has to add beside it
+MINOR = 0.25  # size of a known cause, in units of an unknown one, below which it is not named beside it
 UNKNOWN_COLOUR = 0.8  # size of what a sensor cannot have made, in units of what it can
 WORSE = 2.0  # log density by which a cause has to harm the prediction of other runs before it goes
 SAME_FIT = 4.0  # chi-square by which two sets may differ and still be the same answer
@@ -86,17 +87,21 @@ def survey(inquiry: Inquiry) -> Survey:
     verdict = judge(fits, probability, same)
     best = fits[verdict.best]
     left = leftovers(inquiry, best)
-    if (coloured := colour_left(inquiry, left)) is not None:
-        # noise that is none stays whatever the causes are; the causes were judged against it, and stand
-        return Survey(fits, probability, verdict, {**left, coloured.kind: coloured}, coloured.kind)
-    if strangest(inquiry, best, left) is not None:
+    # noise that is none stays whatever the causes are
+    coloured = colour_left(inquiry, left)
+    if coloured is not None or strangest(inquiry, best, left) is not None:
         members = _known_part(inquiry, best)
+        # beside something large and unknown, something small and known is most likely a part of it
+        large = 1.0 if coloured is not None else max(each.rms for each in left.values())
+        members = tuple(i for i in members if max(signal_rms(inquiry, best, (i,)).values()) > MINOR * large)
         if members != best.members:
             best = fit(members)
             fits = (best, *(f for f in fits if f is not best))
             probability = np.concatenate([[1.0], np.zeros(len(fits) - 1)])
             verdict = Verdict("identified", 0, (), dict.fromkeys(members, 1.0))
             left = leftovers(inquiry, best)
+    if coloured is not None:
+        return Survey(fits, probability, verdict, {**left, coloured.kind: coloured}, coloured.kind)
     return Survey(fits, probability, verdict, left, strangest(inquiry, best, left))
 
 
