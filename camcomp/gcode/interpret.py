@@ -131,12 +131,22 @@ class Interpreter(Executor):
                 self.refuse("CC108", f"axis words with {code_name(code)}", word)
 
     def _spare_axes(self, block: Block) -> None:
-        """Words for axes that camcomp does not follow: they may stay where they are, and not more."""
+        """Words for axes that camcomp does not follow: they may stay where they are, and tables may turn alone."""
+        table, offset = self.state.table, block.code(0) in (100, 520, 920)
         for letter in "ABCUVW":
             word = block.words.get(letter)
-            if word is None or letter in block.used or word.value == 0.0:
+            if word is None or letter in block.used:
                 continue
-            self.refuse("CC115", f"{letter} moves an axis that the machine does not have", word)
+            place = word.value
+            if letter in table and self.state.relative:
+                place += table[letter]
+            if letter not in table and word.value != 0.0:
+                self.refuse("CC115", f"{letter} moves an axis that the machine does not have", word)
+            if place == table.get(letter, 0.0):
+                continue
+            if offset or block.axes or self.state.motion not in (0, 10):
+                self.refuse("CC115", f"{letter} turns while something else happens; it may only turn alone", word)
+            table[letter] = place
 
     def _leftovers(self, block: Block, m_codes: list[int]) -> None:
         free = any(code not in PLAIN_M for code in m_codes) or any(code in self.dialect.passed for code, _ in block.g)
