@@ -19,12 +19,13 @@ from camcomp.files import display_name, read_bytes
 from camcomp.gap.observation import Measured
 from camcomp.gap.timeline import fit_to_log, schedule
 from camcomp.job import Job
-from camcomp.logcheck import check_places, check_program, check_rows
+from camcomp.logcheck import check_forces, check_length, check_places, check_program, check_rows
 from camcomp.programs import open_program
 from camcomp.spec import Experiment
 from camcomp.spec import Run as RunSpec
 from camcomp.twin import Twin, twin_of
 
+STEADY_S = 15.0  # half the width of a temperature's local straight line
 MOST_ROWS = 3000  # rows of a run beyond which neighbours are averaged
 
 
@@ -64,45 +65,82 @@ def open_run(spec: RunSpec, job: Job, twin: Twin, notes: list[str]) -> Run:
     program = open_program(spec.program, job.config)
     conditions = job.conditions if spec.cutting else replace(job.conditions, model=None)
     timeline = schedule(program.path, job.config.control.acceleration_mm_per_s2)
+    check_length(log, spec.name, measured, timeline.end)
     fit = fit_to_log(timeline, measured.time, measured.line)
     check_program(log, spec.name, measured, fit.rows)
     track = lay_track(program.path, conditions)
-    temperature = _filled(measured.time, measured.temperature)
+    temperature = steadied(measured.time, measured.temperature)
     course: Course = course_of_program(
         spec.name, fit.timeline, track, measured.time, started=spec.started_s, to_machine=twin.to_machine,
         vectors=job.frame.vectors, inverse=twin.inverse,
         setpoints=measured.setpoint if measured.has("setpoint") else None, temperature=temperature,
     )  # fmt: skip
     k, share = fit.timeline.locate(measured.time)
-    check_places(log, spec.name, measured, course, pathgeometry.points(program.path, fit.timeline.index[k], share))
+    rotary = all(a.revolute for a in twin.robot.actuators)
+    check_places(log, spec.name, measured, course, pathgeometry.points(program.path, fit.timeline.index[k], share), rotary)
+    check_forces(log, spec.name, measured, course.place(measured.time).of(course.node_force))
     thin = int(np.ceil(len(measured.time) / MOST_ROWS))
     return Run(spec.name, course, measured, spec.clamping, spec.clock, thin)
 
 
-def _filled(time: Floats, values: Floats) -> Floats | None:
+def steadied(time: Floats, values: Floats) -> Floats | None:
+    """Temperatures (n,) without the noise of their sensor, which a growth would turn into motion: local straight lines.
+
+    Machines warm in minutes, so half a minute (and no more than a quarter of the run) is straight.
+    """
     known = np.isfinite(values)
-    return np.interp(time, time[known], values[known]) if known.any() else None
+    if not known.any():
+        return None
+    every = np.interp(time, time[known], values[known])
+    n = len(time)
+    step = float(np.median(np.diff(time))) if n > 1 else 0.0
+    reach = int(min(STEADY_S / step if step > 0 else 0.0, n / 8))
+    if reach < 2:
+        return every
+    near = np.arange(-reach, reach + 1)
+    weight = 1.0 - (near / (reach + 1.0)) ** 2
+    sums = [np.convolve(np.ones(n), (weight * near**k)[::-1], "same") for k in range(3)]
+    first, second = (np.convolve(every, (weight * near**k)[::-1], "same") for k in range(2))
+    return np.asarray((sums[2] * first - sums[1] * second) / (sums[2] * sums[0] - sums[1] ** 2), float)
+
+
+def _table(name: str, text: str) -> tuple[list[str], Floats]:
+    """Column names and numbers of a CSV text, NaN where a cell is empty. Raises ConfigError CC400, CC401, CC403."""
+    try:
+        rows = [(at, row) for at, row in enumerate(csv.reader(io.StringIO(text)), 1) if any(cell.strip() for cell in row)]
+    except csv.Error as error:
+        raise ConfigError("CC400", f"the log is no table: {error}", at=Location(name, 1, 1)) from error
+    if len(rows) < 2:
+        raise ConfigError("CC400", "the log has no rows", at=Location(name, 1, 1))
+    header = [cell.strip() for cell in rows[0][1]]
+    if len(header) == 1 and ";" in header[0]:
+        raise ConfigError("CC400", "cells are separated by commas, not by semicolons", at=Location(name, 1, 1, header[0]))
+    if twice := next((each for each in header if each and header.count(each) > 1), None):
+        at = 1 + sum(len(each) + 1 for each in rows[0][1][: header.index(twice, header.index(twice) + 1)])
+        raise ConfigError("CC401", f"column {twice} is there twice", at=Location(name, 1, at, ",".join(rows[0][1])))
+    table = np.full((len(rows) - 1, len(header)), np.nan)
+    for i, (line, row) in enumerate(rows[1:]):
+        for j, cell in enumerate(row):
+            if not cell.strip():
+                continue
+            at = 1 + sum(len(each) + 1 for each in row[:j])
+            if j >= len(header):
+                message = f"the row has {len(row)} cells and the header {len(header)}"
+                raise ConfigError("CC403", message, at=Location(name, line, at, ",".join(row)))
+            try:
+                table[i, j] = float(cell)
+                if np.isinf(table[i, j]):
+                    raise ValueError
+            except ValueError:
+                message = f"'{cell}' in column {header[j]} is not a number"
+                raise ConfigError("CC403", message, at=Location(name, line, at, ",".join(row))) from None
+    return header, table
 
 
 def read_log(path: str, twin: Twin) -> Measured:
     """A log CSV. Raises ConfigError CC400 (not a table), CC401 (column), CC403 (cell)."""
     name = display_name(path)
-    text = read_bytes(path).decode("utf-8-sig", errors="replace")
-    rows = [row for row in csv.reader(io.StringIO(text)) if row and any(cell.strip() for cell in row)]
-    if len(rows) < 2:
-        raise ConfigError("CC400", "the log has no rows", at=Location(name, 1, 1))
-    header = [cell.strip() for cell in rows[0]]
-    table = np.full((len(rows) - 1, len(header)), np.nan)
-    for i, row in enumerate(rows[1:]):
-        for j, cell in enumerate(row[: len(header)]):
-            if cell.strip():
-                try:
-                    table[i, j] = float(cell)
-                    if np.isinf(table[i, j]):
-                        raise ValueError
-                except ValueError:
-                    at = Location(name, i + 2, 1 + sum(len(each) + 1 for each in row[:j]), ",".join(row))
-                    raise ConfigError("CC403", f"'{cell}' in column {header[j]} is not a number", at=at) from None
+    header, table = _table(name, read_bytes(path).decode("utf-8-sig", errors="replace"))
 
     def column(label: str) -> Floats:
         return table[:, header.index(label)] if label in header else np.full(len(table), np.nan)
@@ -115,7 +153,8 @@ def read_log(path: str, twin: Twin) -> Measured:
     names = twin.actuators
     time = column("t_s")
     if not np.isfinite(time).all():
-        raise ConfigError("CC401", "the log needs a column t_s with a number in every row", at=Location(name, 1, 1))
+        row = int(np.argmin(np.isfinite(time))) + 2 if "t_s" in header else 1
+        raise ConfigError("CC401", "the log needs a column t_s with a number in every row", at=Location(name, row, 1))
     return Measured(
         time,
         column("line"),

@@ -10,17 +10,19 @@ from typing import Any
 
 import numpy as np
 
-from camcomp.bench import Bench, Run, thinned
-from camcomp.columns import RUN_OFFSET_MM, atoms_of
+from camcomp.alike import classes, likeness
+from camcomp.bench import Bench, Run
+from camcomp.columns import atoms_of
 from camcomp.datatypes import Floats
 from camcomp.gap import where
 from camcomp.gap.effect import Cause
 from camcomp.gap.evidence import estimate
 from camcomp.gap.search import Fitted, total
-from camcomp.gap.shrink import shrinkage
-from camcomp.gap.whiten import effective_rows
+from camcomp.heldout import shrinkage_of
 from camcomp.inquiry import Inquiry, open_inquiry
+from camcomp.intervals import joint_covariance
 from camcomp.job import Job
+from camcomp.locate import channel_axes, gap_of, main_channels, patterns_of, run_gaps
 from camcomp.planner import Proposal, propose
 from camcomp.survey import Survey, leftovers, survey
 from camcomp.twin import Twin
@@ -56,6 +58,7 @@ def diagnose(
         "alternatives": _alternatives(inquiry, found) if word == "ambiguous" else [],
         "shrinkage": _shrinkage(twin, runs, holdout, inquiry, best),
         "next_experiment": None,
+        "equivalent": [[_named(inquiry, i) for i in group] for group in classes(likeness(inquiry))],
     }
     proposal = _next(inquiry, found, word, job)
     if proposal is not None:
@@ -63,6 +66,7 @@ def diagnose(
             "action": proposal.candidate.action,
             "separates": list(proposal.separates),
             "gain": round(proposal.gain, 4),
+            "minutes": round(proposal.candidate.minutes, 1),
         }
     return Diagnosis(result, inquiry, found, proposal)
 
@@ -79,56 +83,6 @@ def _next(inquiry: Inquiry, found: Survey, word: str, job: Job) -> Proposal | No
     if found.verdict.rivals:
         p = np.maximum(p, 0.1 * p.max())  # alike by construction: their prior is no reason to leave them untested
     return propose(inquiry, [found.fits[j] for j in close], p / p.sum(), job)
-
-
-# -- the gap ----------------------------------------------------------------------------------------------------------
-
-
-def _main_channels(inquiry: Inquiry) -> slice:
-    """The channels in which the gap is stated: the tip, or else the encoders, or else the drive forces."""
-    m = len(inquiry.bench.actuators)
-    for part in (slice(0, 3), slice(3, 3 + m), slice(3 + m, 3 + 2 * m)):
-        if any(np.isfinite(r[:, part]).any() for r in inquiry.residuals):
-            return part
-    return slice(3 + 2 * m, 6 + 2 * m)
-
-
-def gap_of(inquiry: Inquiry) -> dict[str, float]:
-    """Size of the gap over all runs, and of its noise, um."""
-    part = _main_channels(inquiry)
-    gaps = [inquiry.bench.gap(k)[:, part] for k in range(len(inquiry.residuals))]
-    size = np.concatenate([np.sqrt(np.sum(gap**2, axis=1)) for gap in gaps])
-    size = size[np.isfinite(size)] * 1e3
-    repeats = RUN_OFFSET_MM if part.start == 0 else 0.0  # what one run differs from the next belongs to the floor
-    sigma = np.nanmean(inquiry.noise.sigma[:, part] ** 2, axis=0)
-    if part.start == 0:
-        sigma = sigma - inquiry.background.colour().excess ** 2
-    noise = np.sqrt(np.nansum(np.maximum(sigma, 0.0) + repeats**2)) * 1e3
-    return {
-        "rms_um": round(float(np.sqrt(np.mean(size**2))), 3),
-        "p95_um": round(float(np.quantile(size, 0.95)), 3),
-        "max_um": round(float(size.max()), 3),
-        "noise_floor_um": round(float(noise), 3),
-    }
-
-
-def _run_gaps(inquiry: Inquiry) -> list[where.RunGap]:
-    part = _main_channels(inquiry)
-    m = len(inquiry.bench.actuators)
-    out = []
-    for k, run in enumerate(inquiry.bench.runs):
-        gap = inquiry.bench.gap(k)[:, part]
-        noise = inquiry.noise.sigma[k, part]
-        thin = float(np.mean([1.0 / effective_rows(inquiry.noise, c, 1) for c in range(part.start, part.stop)]))
-        line = thinned(run.measured.line[:, None], run.thin)[:, 0]
-        if part.start == 0:
-            slope = thinned(inquiry.bench.row_slopes(k).reshape(-1, 3 * m), run.thin).reshape(-1, 3, m)
-            clean = np.where(np.isfinite(gap), gap, 0.0)
-            drives = np.einsum("nij,nj->ni", np.linalg.pinv(slope), clean)
-        else:
-            drives = gap if gap.shape[1] == m else np.zeros((len(gap), m))
-        out.append(where.RunGap(run.name, gap, np.where(np.isfinite(noise), noise, 1.0), thin, inquiry.times[k], line, drives))
-    return out
 
 
 # -- causes -----------------------------------------------------------------------------------------------------------
@@ -152,6 +106,7 @@ def _causes(inquiry: Inquiry, found: Survey) -> list[dict[str, Any]]:
     whole = sum(energy) + left
     out: list[dict[str, Any]] = []
     causes = inquiry.causes(best.members, best.theta, best.extra)
+    covariance = joint_covariance(inquiry, best) if best.members else np.zeros((0, 0))
     for j, i in enumerate(best.members):
         atom = inquiry.columns.atoms[i]
         out.append({
@@ -159,7 +114,7 @@ def _causes(inquiry: Inquiry, found: Survey) -> list[dict[str, Any]]:
             "target": atom.target,
             "probability": round(min(found.verdict.inclusion.get(i, 0.0), 1.0), 4),
             "share": round(energy[j] / whole, 4) if whole > 0 else 0.0,
-            "parameters": _parameters(inquiry, best, j, causes[j]),
+            "parameters": _parameters(inquiry, best, covariance, j, causes[j]),
         })  # fmt: skip
     out.sort(key=lambda c: (-c["probability"], -c["share"]))
     if found.strange:
@@ -172,19 +127,37 @@ def _causes(inquiry: Inquiry, found: Survey) -> list[dict[str, Any]]:
     return out
 
 
-def _parameters(inquiry: Inquiry, f: Fitted, j: int, cause: Cause) -> dict[str, Any]:
-    """Values with 95 % intervals; intervals of derived values by evaluating them at draws of the fit."""
-    rng = np.random.default_rng(0)
-    root = np.linalg.cholesky(f.covariance + 1e-18 * np.eye(len(f.theta)))
-    draws = f.theta + rng.standard_normal((400, len(f.theta))) @ root.T
-    samples = [inquiry.causes(f.members, d, f.extra)[j].values for d in draws]
-    out = {}
+def _parameters(inquiry: Inquiry, f: Fitted, covariance: Floats, j: int, cause: Cause) -> dict[str, Any]:
+    """Values with 95 % intervals; those of derived values follow the slopes of what they are derived from."""
     idle = _idle_shapes(inquiry, cause)
+    kinds = {p.name: p for p in cause.effect.PARAMETERS}
+    d = len(f.theta)
+    shapes = inquiry.shapes_of(f.members)
+
+    def at(step: Floats) -> dict[str, float]:
+        extra = {i: dict(values) for i, values in f.extra.items()}
+        for (i, p), change in zip(shapes, step[d:], strict=True):
+            extra[i][p.name] += change
+        values = inquiry.causes(f.members, f.theta + step[:d], extra)[j].values
+        return {name: float(np.log(value)) if kinds[name].log else value for name, value in values.items()}
+
+    # small steps inwards: a parameter on its bound still has a slope
+    steps = 1e-3 * np.sqrt(np.diag(covariance)) * np.concatenate([np.where(f.theta < 0, -1.0, 1.0), np.ones(len(shapes))])
+    here, out = at(np.zeros(len(steps))), {}
+    moved = [at(row) for row in np.diag(steps)]
     for name, value in cause.values.items():
         if name in idle:
             continue
-        low, high = np.quantile([s[name] for s in samples], [0.025, 0.975])
-        out[name] = {"value": _round(value), "ci95": [_round(min(low, value)), _round(max(high, value))]}
+        change = np.array([each[name] - here[name] for each in moved])
+        if name == "phase_rad":
+            change = np.angle(np.exp(1j * change))
+        slope = change / steps
+        half = 1.96 * float(np.sqrt(slope @ covariance @ slope))
+        ends = [here[name] - half, here[name] + half]
+        low, high = np.exp(ends) if kinds[name].log else ends
+        if name != "phase_rad":
+            low, high = max(low, kinds[name].low), min(high, kinds[name].high)
+        out[name] = {"value": _round(value), "ci95": [_round(low), _round(high)]}
     return out
 
 
@@ -200,19 +173,19 @@ def _round(value: float) -> float:
 
 def _alternatives(inquiry: Inquiry, found: Survey) -> list[list[dict[str, Any]]]:
     sets = [found.fits[found.verdict.best], *(found.fits[j] for j in found.verdict.rivals)]
-    return [
-        [{"effect": inquiry.columns.atoms[i].name, "target": inquiry.columns.atoms[i].target} for i in f.members] for f in sets
-    ]
+    return [[_named(inquiry, i) for i in f.members] for f in sets]
+
+
+def _named(inquiry: Inquiry, i: int) -> dict[str, Any]:
+    return {"effect": inquiry.columns.atoms[i].name, "target": inquiry.columns.atoms[i].target}
 
 
 # -- where ------------------------------------------------------------------------------------------------------------
 
 
 def _where(inquiry: Inquiry, found: Survey, best: Fitted) -> dict[str, Any]:
-    gaps = _run_gaps(inquiry)
-    part = _main_channels(inquiry)
-    names = ["x", "y", "z"] if part.start == 0 else list(inquiry.bench.actuators)
-    at = where.axes(gaps, names)
+    gaps = run_gaps(inquiry)
+    at = where.axes(gaps, channel_axes(inquiry))
     return {
         "stage": _stage(inquiry, best, found),
         "axes": {axis: at.get(axis, 0.0) for axis in "xyz"},
@@ -220,6 +193,7 @@ def _where(inquiry: Inquiry, found: Survey, best: Fitted) -> dict[str, Any]:
         "lines": where.lines(gaps),
         "intervals": where.intervals(gaps),
         "drivers": _drivers(inquiry, found),
+        **patterns_of(inquiry, gaps),
     }
 
 
@@ -262,38 +236,14 @@ def _drivers(inquiry: Inquiry, found: Survey) -> list[dict[str, Any]]:
 
 def _shrinkage(twin: Twin, runs: Sequence[Run], holdout: Sequence[str], inquiry: Inquiry, best: Fitted) -> dict[str, Any]:
     """Named runs are judged with the fit of the others; without names every run is held out once."""
-    members = best.members
     if holdout:
         seen = Bench(twin, [run for run in runs if run.name in holdout])
         thetas = [best.theta] * len(seen.runs)
     else:
         seen = inquiry.bench
         thetas = [_theta_without(inquiry, best, k) for k in range(len(seen.runs))]
-    part = _main_channels(inquiry)
-    squares: list[list[Floats]] = []
-    for count in range(len(members) + 1):
-        order = _by_energy(inquiry, best)[:count]
-        per_run = []
-        for k in range(len(seen.runs)):
-            every = inquiry.causes(members, thetas[k], best.extra)
-            gap = seen.gap(k, [every[j] for j in order])[:, part]
-            per_run.append(np.sum(gap**2, axis=1))
-        squares.append(per_run)
-    times = [thinned(run.course.time[:, None], run.thin)[:, 0] for run in seen.runs]
-    whole = shrinkage(squares[0], squares[-1], times)
-    steps = []
-    for count, j in enumerate(_by_energy(inquiry, best), start=1):
-        atom = inquiry.columns.atoms[members[j]]
-        rms = shrinkage(squares[0], squares[count], times).after
-        steps.append({"effect": atom.name, "target": atom.target, "after_rms_um": round(rms, 3)})
-    return {
-        "holdout": [run.name for run in seen.runs],
-        "before_rms_um": round(whole.before, 3),
-        "after_rms_um": round(whole.after, 3),
-        "ratio": round(whole.ratio, 4),
-        "ci95": [round(whole.low, 4), round(whole.high, 4)],
-        "steps": steps,
-    }
+    floor = gap_of(inquiry)["noise_floor_um"]
+    return shrinkage_of(inquiry, best, seen, thetas, _by_energy(inquiry, best), main_channels(inquiry), floor)
 
 
 def _by_energy(inquiry: Inquiry, f: Fitted) -> list[int]:

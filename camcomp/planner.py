@@ -1,50 +1,44 @@
 """Which experiment to do next: the one that best separates the causes that are still alike, per minute of machine time.
 
-Every candidate is a small NC program (or a further channel on a program already run). Its logs are foreseen by the
-twin for each rival; the gain is the fall of the entropy between the rivals. Source: expected information gain over
-hypotheses at their fitted sizes (Chaloner and Verdinelli, Statistical Science 10, 1995), with the evidence of the
-diagnosis itself as posterior.
+The twin foresees the logs of every candidate for each rival at its fitted size. What tells two rivals apart there, after
+all that may differ anyway (the fit's own uncertainty, what every healthy machine has, the new run's offset and clock)
+and less what no model gets right, gives the odds that the candidate is expected to produce; its gain is the expected fall of the entropy, in bits.
+Source: expected information gain over hypotheses (Chaloner and Verdinelli, Statistical Science 10, 1995).
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations, pairwise
 from typing import Any
 
 import numpy as np
 
+from camcomp.alike import HIDDEN, LARGE
 from camcomp.bench import Bench, Run
-from camcomp.columns import RUN_OFFSET_MM, atom_columns, shape_default
+from camcomp.candidates import CHANNELS, Candidate, candidates, site_of
+from camcomp.columns import build
 from camcomp.course import course_of_program
 from camcomp.cutting.track import lay_track
 from camcomp.datatypes import Floats
 from camcomp.diagnostics import CamcompError
-from camcomp.gap.evidence import Gram
+from camcomp.gap.evidence import estimate
 from camcomp.gap.observation import Measured
-from camcomp.gap.search import Fitted, Scale, total
+from camcomp.gap.search import Fitted, total
 from camcomp.gap.timeline import schedule
 from camcomp.gcode.interpret import read_program
 from camcomp.inquiry import Inquiry
 from camcomp.job import Job
+from camcomp.noise import inflation
 
-_STEP_S = 0.02
-_SETUP_MIN = 1.0
-_NEW_CHANNEL_MIN = 5.0
-_LATER_MIN = 60.0
-_WORTH = 0.02  # bits below which an experiment is not worth proposing
-_CHANNELS = ("tip", "encoder", "drive", "dyno")
-_NEEDS = {"encoder": "the encoders", "drive": "the drive forces", "dyno": "the force on the tool with a dynamometer"}
-
-
-@dataclass(frozen=True, eq=False)
-class Candidate:
-    """A feasible experiment. program: NC text; channels: what it logs; minutes: what it costs."""
-
-    action: str
-    program: str
-    cutting: bool
-    channels: tuple[str, ...]
-    started: float
-    minutes: float
+_WORTH = 0.1  # bits below which an experiment is not worth proposing
+_NEARLY = 0.9
+_DRAWS = 64
+_SEED = 20120624
+_TEMPERATURE = 1.5  # what evidence is divided by before it becomes a probability, as in the survey
+_STRETCH = 2.5  # by how much a new place may be nearer to a singular pose
+_ROWS = 2500  # of a foreseen log
+_WARMS_K = 5.0  # by how much a temperature may still drift
+_USUAL_NOISE = (0.002, 0.0005, 1.0, 2.0)  # mm, mm, N, N: tip, encoders, drives, dynamometer, where never measured
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,23 +51,54 @@ class Proposal:
 
 
 def propose(inquiry: Inquiry, rivals: Sequence[Fitted], probability: Floats, job: Job) -> Proposal | None:
-    """The best next experiment between fitted sets of causes; None where nothing is left to separate."""
+    """The best next experiment between fitted sets of causes; None where nothing is left to separate.
+
+    Of those that settle nearly all that any of them can settle, the one with the most gain per minute: half an answer
+    that is cheap only asks for the next experiment.
+    """
+    found = ranked(inquiry, rivals, probability, job)
+    most = max((each.gain for each in found), default=0.0)
+    return next((each for each in found if each.gain >= _NEARLY * most), None)
+
+
+def ranked(inquiry: Inquiry, rivals: Sequence[Fitted], probability: Floats, job: Job) -> list[Proposal]:
+    """All experiments that are worth it, by gain per minute."""
     if len(rivals) < 2:
-        return None
-    before = _entropy(probability)
-    best: Proposal | None = None
-    for candidate in candidates(inquiry, job):
-        try:
-            extra = foresee(inquiry, rivals, candidate, job)
-        except (CamcompError, ValueError):
-            continue  # out of reach, or a force model that does not know the cut
-        after = sum(
-            p * _entropy(_posterior(inquiry, rivals, probability, extra, k)) for k, p in enumerate(probability) if p > 1e-3
-        )
-        gain = max(float(before - after), 0.0)
-        if best is None or gain / candidate.minutes > best.gain / best.candidate.minutes:
-            best = Proposal(candidate, gain, _names(inquiry, rivals))
-    return best if best is not None and best.gain > _WORTH else None
+        return []
+    names = _names(inquiry, rivals)
+    found = []
+    laid: dict[Any, _Laid | None] = {}
+    for candidate in candidates(site_of(inquiry.bench)):
+        if any(effect not in names for effect, *_ in candidate.knows):
+            continue
+        body = candidate.program.split("G54\n", 1)[-1]
+        key = (body, candidate.cutting, candidate.started, "encoder" in candidate.channels)
+        if key not in laid:
+            laid[key] = _try(inquiry, candidate, rivals, job)
+        here = laid[key]
+        if here is None:
+            continue
+        gain = expected_gain(_odds(inquiry, rivals, candidate, here), probability)
+        if gain > _WORTH:
+            found.append(Proposal(candidate, gain, names))
+    return sorted(found, key=lambda each: -each.gain / each.candidate.minutes)
+
+
+def expected_gain(apart: Floats, probability: Floats) -> float:
+    """Expected fall of the entropy, bits. apart (r, r): chi-square by which rival j misses the mean log of rival i."""
+    rng = np.random.default_rng(_SEED)
+    after = 0.0
+    for i, p in enumerate(probability):
+        scatter = np.sqrt(apart[i]) * rng.standard_normal((_DRAWS, len(probability)))
+        logs = np.log(np.maximum(probability, 1e-12)) - (0.5 * apart[i] + scatter) / _TEMPERATURE
+        weight = np.exp(logs - logs.max(axis=1, keepdims=True))
+        after += p * float(np.mean([_entropy(w / w.sum()) for w in weight]))
+    return max(_entropy(probability) - float(after), 0.0)
+
+
+def _entropy(p: Floats) -> float:
+    p = p[p > 1e-12]
+    return float(-(p * np.log2(p)).sum())
 
 
 def _names(inquiry: Inquiry, rivals: Sequence[Fitted]) -> tuple[str, ...]:
@@ -82,140 +107,157 @@ def _names(inquiry: Inquiry, rivals: Sequence[Fitted]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(inquiry.columns.atoms[i].name for s in sets for i in sorted(s - common)))
 
 
-def _entropy(p: Floats) -> float:
-    p = p[p > 1e-12]
-    return float(-(p * np.log2(p)).sum())
+# -- foreseeing ---------------------------------------------------------------------------------------------------------
 
 
-def _posterior(inquiry: Inquiry, rivals: Sequence[Fitted], probability: Floats, extra: Gram, truth: int) -> Floats:
-    """Probabilities of the rivals once the candidate's logs are in, if `truth` is what the machine has."""
-    logs = []
-    for f, p in zip(rivals, probability, strict=True):
-        index = inquiry.member_columns(rivals[truth].members)
-        theta = np.zeros(extra.A.shape[0])
-        theta[index] = rivals[truth].theta
-        new = Gram(extra.A, extra.A @ theta, float(theta @ extra.A @ theta), extra.rows)
-        known = total(f.grams)
-        gain = Scale(known + new, inquiry.prior, inquiry.atoms)(f.members) - Scale(known, inquiry.prior, inquiry.atoms)(f.members)
-        logs.append(np.log(max(p, 1e-12)) + gain)
-    weight = np.exp(np.array(logs) - max(logs))
-    return weight / weight.sum()
+@dataclass(frozen=True, eq=False)
+class _Laid:
+    """A candidate with every channel logged. Per kind of channel: white rows (w, r) of what each rival lets one expect, and
+    white columns (w, k) of all that may differ; spread: covariance (k, k) of their amplitudes per rival.
+    """
+
+    signals: dict[str, Floats]
+    columns: dict[str, Floats]
+    spread: list[Floats]
 
 
-def foresee(inquiry: Inquiry, rivals: Sequence[Fitted], candidate: Candidate, job: Job) -> Gram:
-    """White columns of the rivals' causes in the candidate's logs, the new run's own offset taken out."""
-    run = _lay(inquiry, candidate, job)
+def _try(inquiry: Inquiry, candidate: Candidate, rivals: Sequence[Fitted], job: Job) -> _Laid | None:
+    try:
+        return _lay(inquiry, candidate, rivals, job)
+    except (CamcompError, ValueError):
+        return None  # out of reach, or a force model that does not know the cut
+
+
+def _lay(inquiry: Inquiry, candidate: Candidate, rivals: Sequence[Fitted], job: Job) -> _Laid:
+    run = _run(inquiry, candidate, job)
     bench = Bench(inquiry.bench.twin, [run])
-    k = len(inquiry.columns.names)
-    c = bench.observed(0).shape[1]
-    block = np.zeros((len(run.course.time), c, k + 3))
-    for i in sorted({i for f in rivals for i in f.members}):
-        atom = inquiry.columns.atoms[i]
-        shape = next((f.extra[i] for f in rivals if i in f.extra), inquiry.shapes.get(i, shape_default(atom)))
-        for column, per_run in zip(inquiry.atoms.columns[i], atom_columns(bench, atom, shape), strict=True):
-            block[:, :, column] = per_run[0]
-    for axis in range(3):
-        block[:, axis, k + axis] = RUN_OFFSET_MM
-    sigma = np.nanmean(inquiry.noise.sigma, axis=0)
-    usual = np.concatenate([np.full(3, 0.002), np.full((c - 6) // 2, 0.0005), np.full((c - 6) // 2, 1.0), np.full(3, 2.0)])
-    noise = replace(inquiry.noise, sigma=np.where(np.isfinite(sigma), sigma, usual)[None, :])
-    inflate = np.where(np.isfinite(bench.observed(0)), 1.0, np.nan)
-    white = noise.rows(0, block, inflate, run.course.time)
-    A = white.T @ white
-    own = A[k:, k:] + np.eye(3)
-    A = A[:k, :k] - A[:k, k:] @ np.linalg.solve(own, A[k:, :k])
-    return Gram(A, np.zeros(k), 0.0, len(white))
+    if _transmission(bench) > _STRETCH * _transmission(inquiry.bench):
+        raise ValueError("too near a singular pose for the model to be trusted")
+    nominal = bench.channels(bench.nominal[0])
+    changes = [bench.channels(bench.read(0, inquiry.causes(f.members, f.theta, f.extra))) - nominal for f in rivals]
+    alone = _whitened(inquiry, bench, np.stack(changes, axis=2))
+    if not candidate.knows and all(not _seen(alone[k], i, j, alone[k][:, i] - alone[k][:, j]) for k in alone for i, j in _pairs(rivals)):
+        raise ValueError("nothing to see")
+    shapes = {**inquiry.shapes, **{i: shape for f in rivals for i, shape in f.extra.items()}}
+    columns = build(bench, inquiry.columns.atoms, shapes)
+    known = {name: i for i, name in enumerate(inquiry.columns.names)}
+    mine = [i for i, name in enumerate(columns.names) if name in known]
+    theirs = [known[columns.names[i]] for i in mine]
+    block = columns.blocks[0]
+    signals, spread = [], []
+    for f, change in zip(rivals, changes, strict=True):
+        index = inquiry.member_columns(f.members)
+        mean, covariance = estimate(total(f.grams), inquiry.prior, index, f.factor)
+        mean[index] = 0.0  # the members act through the twin itself
+        size = np.diag(np.minimum(columns.prior.tolerance, 1.0) ** 2)
+        # a fit is no better than the model it was made with
+        own = np.zeros(len(mean))
+        own[index] = (HIDDEN / LARGE * f.theta) ** 2
+        size[np.ix_(mine, mine)] = (covariance + np.diag(own))[np.ix_(theirs, theirs)]
+        signals.append(change + block[:, :, mine] @ mean[theirs])
+        spread.append(size)
+    return _Laid(_whitened(inquiry, bench, np.stack(signals, axis=2)), _whitened(inquiry, bench, block), spread)
 
 
-def _lay(inquiry: Inquiry, candidate: Candidate, job: Job) -> Run:
+def _pairs(rivals: Sequence[Fitted]) -> list[tuple[int, int]]:
+    return list(combinations(range(len(rivals)), 2))
+
+
+def _seen(signals: Floats, i: int, j: int, left: Floats) -> float:
+    """Chi-square of white rows left (w,) beyond what no model gets right of signals (w, r), however many rows there are."""
+    own = np.maximum(signals[:, i] ** 2, signals[:, j] ** 2) / LARGE**2
+    return max(float((left**2).sum()) - HIDDEN**2 * (len(left) + float(own.sum())), 0.0)
+
+
+def _transmission(bench: Bench) -> float:
+    """Largest motion of the tip per motion of the drives."""
+    return float(max(np.linalg.norm(bench.row_slopes(k), 2, axis=(1, 2)).max() for k in range(len(bench.runs))))
+
+
+def _whitened(inquiry: Inquiry, bench: Bench, values: Floats) -> dict[str, Floats]:
+    """White rows (w, k) of values (n, c, k), per kind of channel."""
+    m = len(bench.actuators)
+    known = np.isfinite(inquiry.noise.sigma)
+    sigma = np.where(known, inquiry.noise.sigma, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
+    usual = np.repeat(np.array(_USUAL_NOISE), [3, m, m, 3])
+    noise = replace(inquiry.noise, sigma=np.where(known.any(axis=0), sigma, usual)[None, :])
+    inflate = np.sqrt(1.0 + (inflation(bench)[0] / noise.sigma) ** 2)
+    time = bench.runs[0].course.time
+    ends = np.cumsum((0, 3, m, m, 3))
+    present = {k: np.isfinite(inflate[:, a:b]).any() for k, a, b in zip(CHANNELS, ends[:-1], ends[1:], strict=True)}
+    return {
+        k: noise.rows(0, values[:, a:b], inflate, time, a) for k, a, b in zip(CHANNELS, ends[:-1], ends[1:], strict=True) if present[k]
+    }
+
+
+def _odds(inquiry: Inquiry, rivals: Sequence[Fitted], candidate: Candidate, laid: _Laid) -> Floats:
+    """Chi-square (r, r) by which rival j misses what rival i lets one expect, after all that may differ anyway."""
+    kinds = [k for k in candidate.channels if k in laid.signals]
+    columns = np.concatenate([laid.columns[k] for k in kinds])
+    signals = np.concatenate([laid.signals[k] for k in kinds])
+    ends = np.cumsum([0, *(len(laid.signals[k]) for k in kinds)])
+    out = np.zeros((len(rivals), len(rivals)))
+    for j in range(len(rivals)):
+        half = _root(laid.spread[j])
+        D = columns @ half
+        M = D.T @ D + np.eye(D.shape[1])
+        for i in range(len(rivals)):
+            if i == j:
+                continue
+            gap = signals[:, i] - signals[:, j]
+            move = np.linalg.solve(M, D.T @ gap)
+            left = gap - D @ move
+            seen = [_seen(signals[a:b], i, j, left[a:b]) for a, b in pairwise(ends)]
+            out[i, j] = sum(seen) + float(move @ move)
+            out[i, j] += _by_other_means(inquiry, rivals[i], rivals[j], candidate)
+    return out
+
+
+def _root(covariance: Floats) -> Floats:
+    """A square root (k, k) of a covariance that may be singular."""
+    size = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    value, vector = np.linalg.eigh(covariance / size[:, None] / size)
+    return np.asarray(size[:, None] * vector * np.sqrt(np.maximum(value, 0.0)), float)
+
+
+def _by_other_means(inquiry: Inquiry, truth: Fitted, other: Fitted, candidate: Candidate) -> float:
+    """Chi-square between the values that two rivals give a parameter that the candidate measures directly."""
+    out = 0.0
+    for effect, name, deviation in candidate.knows:
+        values = [
+            sum(c.values.get(name, 0.0) for c in inquiry.causes(f.members, f.theta, f.extra) if c.name == effect) for f in (truth, other)
+        ]
+        out += ((values[0] - values[1]) / deviation) ** 2
+    return out
+
+
+def _run(inquiry: Inquiry, candidate: Candidate, job: Job) -> Run:
+    """The candidate on the bench with every channel that it could log; what it does log is picked later."""
     twin = inquiry.bench.twin
     path = read_program(candidate.program.encode(), name="candidate").path
     timeline = schedule(path, job.config.control.acceleration_mm_per_s2)
-    time = np.arange(0.0, timeline.end, _STEP_S)
+    last = timeline.end + candidate.stay_s
+    steps = [float(np.median(np.diff(t))) for t in inquiry.times if len(t) > 1]
+    usual = float(np.median(steps)) if steps else 0.02
+    time = np.arange(0.0, last, max(usual, last / _ROWS))
     conditions = job.conditions if candidate.cutting else replace(job.conditions, model=None)
-    warm = inquiry.bench.runs[0].course.temperature
     course = course_of_program(
         "candidate", timeline, lay_track(path, conditions), time, started=candidate.started, to_machine=twin.to_machine,
-        vectors=job.frame.vectors, inverse=twin.inverse, temperature=None if warm is None else np.full(len(time), warm[-1]),
+        vectors=job.frame.vectors, inverse=twin.inverse, temperature=_temperature(inquiry, candidate.started + time),
     )  # fmt: skip
     n, m = len(time), len(twin.actuators)
-    width = {"tip": 3, "encoder": m, "drive": m, "dyno": 3}
-    data: dict[str, Any] = {
-        name: np.zeros((n, w)) if name in candidate.channels else np.full((n, w), np.nan) for name, w in width.items()
-    }
     nan = np.full(n, np.nan)
-    measured = Measured(time=time, line=nan, setpoint=np.full((n, m), np.nan), temperature=nan, **data)
-    if measured.has("encoder"):
-        measured = replace(measured, encoder=course.row_rho)
+    encoder = course.row_rho if "encoder" in candidate.channels else np.full((n, m), np.nan)
+    measured = Measured(time, nan, np.zeros((n, 3)), np.full((n, m), np.nan), encoder, np.zeros((n, m)), np.zeros((n, 3)), nan)
     return Run("candidate", course, measured, None, None)
 
 
-def candidates(inquiry: Inquiry, job: Job) -> Iterator[Candidate]:
-    """Feasible experiments about the place where the machine has worked so far, cheap ones first."""
-    runs = inquiry.bench.runs
-    tips = np.concatenate([inquiry.bench.nominal[k].tip for k in range(len(runs))])
-    low, high = np.quantile(tips, 0.02, axis=0), np.quantile(tips, 0.98, axis=0)
-    centre = 0.5 * (low + high)
-    radius = float(np.clip(0.5 * np.min((high - low)[:2]), 5.0, 40.0))
-    feed = _usual_feed(runs)
-    end = max(run.course.started + float(run.course.time[-1]) for run in runs)
-    have = tuple(c for c in _CHANNELS if any(run.measured.has(c) for run in runs))
-    minutes = 2.0 * np.pi * radius / feed + _SETUP_MIN
-
-    def circle(turn: int, at: Floats, f: float, plane: str = "G17") -> str:
-        return circle_program(at, radius, f, turn, plane)
-
-    soon = end + 60.0
-    yield Candidate("circle, counter-clockwise", circle(1, centre, feed), True, have, soon, minutes)
-    yield Candidate("circle in the reverse direction, clockwise", circle(-1, centre, feed), True, have, soon, minutes)
-    yield Candidate("circle at four times the feed", circle(1, centre, 4 * feed), True, have, soon, minutes)
-    yield Candidate("circle in the air, without cutting", circle(1, centre, feed), False, have, soon, minutes)
-    yield Candidate("circle in the XZ plane, in the air", circle(1, centre, feed, "G18"), False, have, soon, minutes)
-    for sign in (1.0, -1.0):
-        there = centre + sign * np.array([60.0, 60.0, 0.0])
-        where = "+60" if sign > 0 else "-60"
-        yield Candidate(f"circle in the air at another place, X and Y {where} mm", circle(1, there, feed), False, have, soon, minutes)
-    up = centre + np.array([0.0, 0.0, 60.0])
-    yield Candidate("circle in the air 60 mm higher", circle(1, up, feed), False, have, soon, minutes)
-    for axis, name in enumerate("XYZ"):
-        yield Candidate(
-            f"single-axis ladder along {name}, up and down, in the air", ladder_program(centre, radius, feed, axis), False, have,
-            soon, 4.0 * radius / feed + _SETUP_MIN,
-        )  # fmt: skip
-    for channel in _CHANNELS[1:]:
-        if channel not in have:
-            yield Candidate(
-                f"circle, counter-clockwise, and log {_NEEDS[channel]} as well", circle(1, centre, feed), True, (*have, channel),
-                soon, minutes + _NEW_CHANNEL_MIN,
-            )  # fmt: skip
-    yield Candidate(
-        "the same circle again after one hour of running", circle(1, centre, feed), True, have, end + 60.0 * _LATER_MIN,
-        minutes + _LATER_MIN,
-    )  # fmt: skip
-
-
-def _usual_feed(runs: Sequence[Run]) -> float:
-    feeds = [float(np.median(run.course.timeline.feed)) * 60.0 for run in runs if run.course.timeline is not None]
-    return float(np.median(feeds)) if feeds else 1000.0
-
-
-def circle_program(centre: Floats, radius: float, feed: float, turn: int, plane: str = "G17") -> str:
-    """NC text of one full circle; turn +1 counter-clockwise, -1 clockwise, seen from the plane's positive axis."""
-    x, y, z = (float(v) for v in centre)
-    word = "G3" if turn > 0 else "G2"
-    offset = f"I{-radius:.4f} J0" if plane == "G17" else f"I{-radius:.4f} K0"
-    return (
-        f"(experiment proposed by camcomp)\nG21 G90 {plane} G54\nG0 X{x + radius:.4f} Y{y:.4f} Z{z:.4f}\n"
-        f"{word} X{x + radius:.4f} Y{y:.4f} Z{z:.4f} {offset} F{feed:.0f}\nM2\n"
-    )
-
-
-def ladder_program(centre: Floats, reach: float, feed: float, axis: int) -> str:
-    """NC text of five steps up and five down along one axis."""
-    letter = "XYZ"[axis]
-    start = centre.copy()
-    start[axis] -= reach
-    x, y, z = (float(v) for v in start)
-    stops = [start[axis] + 2.0 * reach * i / 5.0 for i in (1, 2, 3, 4, 5, 4, 3, 2, 1, 0)]
-    moves = "".join(f"G1 {letter}{s:.4f} F{feed:.0f}\n" for s in stops)
-    return f"(experiment proposed by camcomp)\nG21 G90 G17 G54\nG0 X{x:.4f} Y{y:.4f} Z{z:.4f}\n{moves}M2\n"
+def _temperature(inquiry: Inquiry, common: Floats) -> Floats | None:
+    """Temperatures (n,) expected at common times, s: the drift so far goes on, but not by more than some kelvin."""
+    courses = [run.course for run in inquiry.bench.runs]
+    if any(c.temperature is None for c in courses):
+        return None
+    t = np.concatenate([c.started + c.time for c in courses])
+    warm = np.concatenate([c.temperature for c in courses if c.temperature is not None])
+    slope = np.polyfit(t - t.mean(), warm, 1)[0] if np.ptp(t) > 0 else 0.0
+    return warm[int(np.argmax(t))] + np.clip(slope * (common - t.max()), -_WARMS_K, _WARMS_K)

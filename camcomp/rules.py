@@ -428,6 +428,11 @@ RULES: dict[str, Rule] = {
         "The values fit the program when columns are exchanged or change sign.",
         "correct the header, or the sign, of the log",
     ),
+    "CC409": Rule(
+        "log too short",
+        "A run of a program has at least ten rows; fewer say nothing about their own noise.",
+        "log the whole run, some hundred rows",
+    ),
     "CC410": Rule(
         "measured point out of reach",
         "The control could not have gone where the run says: the model and the logs do not belong together.",

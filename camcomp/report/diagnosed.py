@@ -10,11 +10,12 @@ from camcomp.bench import Bench, Run, thinned
 from camcomp.campaign import Campaign
 from camcomp.config import load_config, load_experiment
 from camcomp.datatypes import Floats
-from camcomp.diagnose import Diagnosis, _main_channels, _theta_without
+from camcomp.diagnose import Diagnosis, _theta_without
 from camcomp.files import read_bytes
 from camcomp.gap.observation import channel_names
 from camcomp.gap.search import Fitted
 from camcomp.inquiry import Inquiry
+from camcomp.locate import main_channels
 from camcomp.report.answer import cause_name
 from camcomp.report.diagnosis import diagnosis_html
 from camcomp.report.inputs import Input
@@ -72,7 +73,7 @@ def rivals_of(done: Diagnosis) -> list[Rival]:
     found, inquiry = done.survey, done.inquiry
     if done.result["verdict"] != "ambiguous":
         return []
-    part = _main_channels(inquiry)
+    part = main_channels(inquiry)
     out = []
     for fit in (found.fits[found.verdict.best], *(found.fits[j] for j in found.verdict.rivals)):
         causes = inquiry.causes(fit.members, fit.theta, fit.extra)
@@ -85,7 +86,7 @@ def rivals_of(done: Diagnosis) -> list[Rival]:
 
 
 def _view(inquiry: Inquiry, bench: Bench, k: int, fit: Fitted, theta: Floats, *, held_out: bool) -> RunView:
-    part, run = _main_channels(inquiry), bench.runs[k]
+    part, run = main_channels(inquiry), bench.runs[k]
     causes = inquiry.causes(fit.members, theta, fit.extra)
     before = bench.gap(k)
     after = bench.gap(k, causes) if causes else before

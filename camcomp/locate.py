@@ -1,0 +1,96 @@
+"""The gap of every run as the place-finding engines want it, and what they find: sizes, directions, periods, places."""
+
+from typing import Any
+
+import numpy as np
+
+from camcomp.bench import thinned
+from camcomp.columns import RUN_OFFSET_MM
+from camcomp.datatypes import Floats
+from camcomp.gap import where
+from camcomp.gap.cycles import Line, frequencies, screws
+from camcomp.gap.whiten import effective_rows
+from camcomp.inquiry import Inquiry
+
+
+def main_channels(inquiry: Inquiry) -> slice:
+    """The channels in which the gap is stated: the tip, or else the encoders, or else the drive forces."""
+    m = len(inquiry.bench.actuators)
+    for part in (slice(0, 3), slice(3, 3 + m), slice(3 + m, 3 + 2 * m)):
+        if any(np.isfinite(r[:, part]).any() for r in inquiry.residuals):
+            return part
+    return slice(3 + 2 * m, 6 + 2 * m)
+
+
+def gap_of(inquiry: Inquiry) -> dict[str, float]:
+    """Size of the gap over all runs, and of its noise, um."""
+    part = main_channels(inquiry)
+    gaps = [inquiry.bench.gap(k)[:, part] for k in range(len(inquiry.residuals))]
+    # an axis that nobody measured is no reason to do without the others
+    size = np.concatenate([np.where(np.isfinite(g).any(axis=1), np.sqrt(np.nansum(g**2, axis=1)), np.nan) for g in _together(gaps)])
+    size = size[np.isfinite(size)] * 1e3
+    repeats = RUN_OFFSET_MM if part.start == 0 else 0.0  # what one run differs from the next belongs to the floor
+    sigma = np.nanmean(inquiry.noise.sigma[:, part] ** 2, axis=0)
+    if part.start == 0:
+        sigma = sigma - inquiry.background.colour().excess ** 2
+    noise = np.sqrt(np.nansum(np.maximum(sigma, 0.0) + repeats**2)) * 1e3
+    return {
+        "rms_um": round(float(np.sqrt(np.mean(size**2))), 3),
+        "p95_um": round(float(np.quantile(size, 0.95)), 3),
+        "max_um": round(float(size.max()), 3),
+        "noise_floor_um": round(float(noise), 3),
+    }
+
+
+def _together(gaps: list[Floats]) -> list[Floats]:
+    """Gaps with rows blanked where a channel that the run has is missing."""
+    out = []
+    for g in gaps:
+        known = np.isfinite(g)
+        whole = np.all(known | ~np.any(known, axis=0), axis=1)
+        out.append(np.where(np.reshape(whole, (-1, 1)), g, np.nan))
+    return out
+
+
+def run_gaps(inquiry: Inquiry) -> list[where.RunGap]:
+    """Every run's gap in the main channels, with where the machine was and how it moved."""
+    part = main_channels(inquiry)
+    m = len(inquiry.bench.actuators)
+    out = []
+    for k, run in enumerate(inquiry.bench.runs):
+        gap = inquiry.bench.gap(k)[:, part]
+        noise = inquiry.noise.sigma[k, part]
+        thin = float(np.mean([1.0 / effective_rows(inquiry.noise, c, 1) for c in range(part.start, part.stop)]))
+        line = thinned(run.measured.line[:, None], run.thin)[:, 0]
+        if part.start == 0:
+            slope = thinned(inquiry.bench.row_slopes(k).reshape(-1, 3 * m), run.thin).reshape(-1, 3, m)
+            clean = np.where(np.isfinite(gap), gap, 0.0)
+            drives = np.einsum("nij,nj->ni", np.linalg.pinv(slope), clean)
+        else:
+            drives = gap if gap.shape[1] == m else np.zeros((len(gap), m))
+        motion = inquiry.bench.nominal[k].motion
+        tip, position, direction = (thinned(v, run.thin) for v in (inquiry.bench.nominal[k].tip, motion.encoder, motion.direction))
+        noise = np.where(np.isfinite(noise), np.hypot(noise, RUN_OFFSET_MM if part.start == 0 else 0.0), 1.0)
+        out.append(where.RunGap(run.name, gap, noise, thin, inquiry.times[k], line, drives, tip, position, direction))
+    return out
+
+
+def channel_axes(inquiry: Inquiry) -> list[str]:
+    """Names of the main channels: x, y, z of the tip, or the actuators."""
+    return ["x", "y", "z"] if main_channels(inquiry).start == 0 else list(inquiry.bench.actuators)
+
+
+def patterns_of(inquiry: Inquiry, gaps: list[where.RunGap]) -> dict[str, Any]:
+    """What the gap does with the direction of travel, the turns of the screws, time, and the place in the workspace."""
+    actuators = inquiry.bench.actuators
+    return {
+        "travel": where.travel(gaps, actuators),
+        "screws": [_line(each, "actuator", "period_mm") for each in screws(gaps, actuators)],
+        "frequencies": [_line(each, "axis", "hertz") for each in frequencies(gaps, channel_axes(inquiry))],
+        "places": where.places(gaps),
+    }
+
+
+def _line(line: Line, whose: str, at: str) -> dict[str, Any]:
+    size = round(1e3 * line.amplitude, 3)
+    return {whose: line.name, at: round(line.at, 4), "amplitude_um": size, "share": round(line.share, 4)}

@@ -1,0 +1,130 @@
+"""Causes that no log can tell apart: known before the data, reported together, and told apart by the advice that follows."""
+
+import shutil
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from camcomp.alike import classes, likeness, stand_ins
+from camcomp.bench import Bench
+from camcomp.campaign import open_campaign
+from camcomp.columns import atoms_of
+from camcomp.commands.diagnose import examine
+from camcomp.inquiry import open_inquiry
+from tests.campaign.cases import EQUAL
+from tests.diagnosis.conftest import plan_of
+from tests.plants.more import add_run
+
+LATE = plan_of(("servo_lag", None), design="both-ways", channels="tip", ratio=6.0)
+LONG = plan_of(("tool_length", None), design="both-ways", channels="no-forces", ratio=8.0)
+
+
+def named(causes):
+    return [(c["effect"], c["target"]) for c in causes]
+
+
+def alternatives(result):
+    return {frozenset(named(one)) for one in result["alternatives"]}
+
+
+def design_of(path):
+    campaign = open_campaign(path)
+    return likeness(open_inquiry(Bench(campaign.twin, campaign.runs), atoms_of(campaign.twin.actuators)))
+
+
+def groups(design):
+    atoms = design.inquiry.columns.atoms
+    return [{(atoms[i].name, atoms[i].target) for i in group} for group in classes(design)]
+
+
+def follow(workshop, plan, tmp_path):
+    """Does what the answer advises; the result after it."""
+    path, made = workshop.made(plan)
+    candidate = workshop.answer(plan)[1].proposal.candidate
+    folder = tmp_path / "again"
+    shutil.copytree(path.parent, folder)
+    without = ()
+    if candidate.knows:
+        [(effect, _, _)] = candidate.knows
+        truth = made.truth
+        entries = {
+            "tool_length": f"  - {{effect: tool_length, length_mm: {truth.tool_mm:.5f}}}\n",
+            "joint_offset": "".join(
+                f"  - {{effect: joint_offset, target: {a}, offset_mm: {value:.5f}}}\n"
+                for a, value in zip("xyz", truth.offset_mm, strict=True)
+            ),
+        }
+        config = folder / "machine.yaml"
+        config.write_text(config.read_text() + "\neffects:\n" + entries[effect])
+        without = (effect,)
+    else:
+        channels = "no-forces" if plan.channels == "tip" and "encoder" in candidate.channels else plan.channels
+        add_run(
+            folder, made, plan, candidate.program, cutting=candidate.cutting, channels=channels, started_s=round(candidate.started, 1)
+        )
+    return examine(folder / "experiment.yaml", without)[0]
+
+
+def test_the_classes_are_known_without_residuals(workshop):
+    """The same runs and channels with another fault, or none, have the same classes."""
+    design = workshop.answer(LATE)[1].inquiry
+    there = groups(likeness(design))
+    assert {("servo_lag", None), ("time_sync", None)} in there
+    assert {("tool_length", None), ("workpiece_frame", None)} in there
+    for a in "xyz":
+        assert any({("joint_offset", a), ("link_length", a)} <= group for group in there)
+    assert groups(likeness(replace(design, white_residual=[0.0 * r for r in design.white_residual]))) == there
+
+
+def test_an_encoder_tells_a_lag_from_a_late_clock_before_anything_is_measured(workshop):
+    there = groups(likeness(workshop.answer(LONG)[1].inquiry))
+    assert not any(("servo_lag", None) in group for group in there)
+
+
+def test_a_member_in_its_own_direction_is_what_counts(workshop):
+    """A workpiece that is turned and shifted in its plane is no long tool; one that is lifted is."""
+    inquiry = workshop.answer(LONG)[1].inquiry
+    design, atoms = likeness(inquiry), inquiry.columns.atoms
+    frame = next(i for i, a in enumerate(atoms) if a.name == "workpiece_frame")
+    tool = next(i for i, a in enumerate(atoms) if a.name == "tool_length")
+    assert (tool,) in stand_ins(design, (frame,), np.array([0.0, 0.0, 1.0, 0.0]))
+    assert (tool,) not in stand_ins(design, (frame,), np.array([1.0, 0.5, 0.0, 0.3]))
+
+
+def test_a_late_tip_without_encoders_is_lag_or_clock_and_encoders_tell(workshop, tmp_path):
+    result = workshop.answer(LATE)[0]
+    assert result["verdict"] == "ambiguous"
+    assert alternatives(result) >= {frozenset({("servo_lag", None)}), frozenset({("time_sync", None)})}
+    following = result["next_experiment"]
+    assert "encoders" in following["action"] and set(following["separates"]) >= {"servo_lag", "time_sync"}
+    after = follow(workshop, LATE, tmp_path)
+    assert after["verdict"] == "identified" and named(after["causes"]) == [("servo_lag", None)]
+
+
+def swapped(one, true, other):
+    return frozenset({*(one - {true}), other})
+
+
+def test_a_long_tool_is_a_lifted_workpiece_until_somebody_measures_the_tool(workshop, tmp_path):
+    result = workshop.answer(LONG)[0]
+    assert result["verdict"] == "ambiguous"
+    tool, frame = ("tool_length", None), ("workpiece_frame", None)
+    assert tool in named(result["causes"])
+    assert swapped(frozenset(named(result["causes"])), tool, frame) in alternatives(result)
+    assert "presetter" in result["next_experiment"]["action"]
+    after = follow(workshop, LONG, tmp_path)
+    assert not {tool, frame} & {*named(after["causes"]), *(m for one in alternatives(after) for m in one)}
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("ratio", [3.0, 10.0])
+@pytest.mark.parametrize(("true", "other", "design", "channels"), EQUAL)
+def test_every_equal_pair_is_told_apart_by_following_the_advice(workshop, tmp_path, true, other, design, channels, ratio):
+    plan = plan_of(true, design=design, channels=channels, ratio=ratio, samples=150)
+    result = workshop.answer(plan)[0]
+    assert result["verdict"] == "ambiguous"
+    assert {frozenset({true}), frozenset({other})} <= alternatives(result)
+    after = follow(workshop, plan, tmp_path)
+    taken_out = "--without " + true[0] in result["next_experiment"]["action"]
+    assert after["verdict"] == "none" if taken_out else named(after["causes"]) == [true]
