@@ -25,6 +25,7 @@ _RHO_STEP = 1e-3  # mm or 1e-3 mrad of drive, to first order linear within 1e-6
 _FORCE_STEP = 1.0  # N
 _SLOPES = ("tip_rho", "tip_wrench", "drive_rho", "drive_wrench")
 _MOMENT_STEP = 100.0  # N mm
+_SAME_LOAD = 1e-3  # share of the load by which a changed machine's may differ from that it was solved with
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,13 +149,15 @@ class Twin:
         place_tip = course.place(seen) if late else place
         # structure
         robot, key = self.edited(causes)
-        if solved is None or slopes is None or solved.key != key:
-            if solved is None or slopes is None:
-                shift = _piece_means(course, gap) if gap is not None else np.zeros((course.pieces, len(self.actuators)))
-                load = self._load(causes, _at(course, grid, course.node_time, course.node_rho), course.node_force)
-            else:
-                shift, load = solved.shift, Load(solved.force, solved.wrench)
-            solved = self.structure(course, self._machine(robot, key), key, shift, load)
+        known = solved if slopes is not None else None
+        if known is None:
+            shift = _piece_means(course, gap) if gap is not None else np.zeros((course.pieces, len(self.actuators)))
+        else:
+            shift = known.shift
+        load = self._node_load(course, grid, causes, known, key)
+        if known is None or known.key != key or load.force is not known.force:
+            known = self.structure(course, self._machine(robot, key), key, shift, load)
+        solved = known
         load = self._load(causes, rows, _kept(course, "force", lambda: place.of(course.node_force)))
         load_tip = self._load(causes, at_tip, place_tip.of(course.node_force)) if late else load
         drive, tip = place.of(solved.drive), place_tip.of(solved.tip)
@@ -183,6 +186,21 @@ class Twin:
             if (hook := cause.hook("on_reading")) is not None:
                 reading = hook(reading, rows, cause.values)
         return reading, solved
+
+    def _node_load(self, course: Course, grid: Motion, causes: Sequence[Cause], known: Solved | None, key: tuple) -> Load:
+        """Load to solve the nodes with: that of the structure known so far where slopes may carry on from it.
+
+        Slopes are those of the unchanged machine; a changed one gives way by its own, so its nodes are solved under the load.
+        """
+        loading = any(cause.hook("on_load") is not None for cause in causes[len(self.causes) :])
+        if known is not None and (not loading or key == self.edited(self.causes)[1]):
+            return Load(known.force, known.wrench)
+        load = self._load(causes, _at(course, grid, course.node_time, course.node_rho), course.node_force)
+        if known is None:
+            return load
+        size = _SAME_LOAD * max(float(np.abs(load.force).max(initial=0.0)), float(np.abs(load.wrench).max(initial=0.0)))
+        near = np.abs(load.force - known.force).max(initial=0.0) <= size and np.abs(load.wrench - known.wrench).max(initial=0.0) <= size
+        return Load(known.force, known.wrench) if near and known.key == key else load
 
     def structure(self, course: Course, machine: Machine, key: tuple, shift: Floats, load: Load) -> Solved:
         """Loaded equilibrium at the nodes. Raises PhysicsError CC411 when a node cannot be solved."""

@@ -59,5 +59,5 @@ def test_the_option_writes_the_file_and_the_next_program(tmp_path):
     assert "(experiment proposed by camcomp)" in program.read_text()
     code, said = runner.invoke(["validate", str(config)])
     assert code == 0, said
-    code, said = runner.invoke(["compensate", str(program), "--config", str(config), "-o", str(tmp_path / "out.nc")])
+    code, said = runner.invoke(["simulate", str(program), "--config", str(config), "-o", str(tmp_path / "out.csv")])
     assert code == 0, said
