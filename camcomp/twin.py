@@ -125,7 +125,11 @@ class Twin:
         """
         causes = (*self.causes, *causes)
         # control, drive
+        robot, key = self.edited(causes)
         grid, rows = self._motions(course, causes)
+        if robot is not self.robot:
+            springs = _springs(robot)
+            grid, rows = replace(grid, stiffness=springs), replace(rows, stiffness=springs)
         carriage = grid.encoder
         for cause in causes:
             if (hook := cause.hook("on_drive")) is not None:
@@ -148,7 +152,6 @@ class Twin:
         place = _place(course)
         place_tip = course.place(seen) if late else place
         # structure
-        robot, key = self.edited(causes)
         known = solved if slopes is not None else None
         if known is None:
             shift = _piece_means(course, gap) if gap is not None else np.zeros((course.pieces, len(self.actuators)))
@@ -255,7 +258,6 @@ class Twin:
         return make() if servo else _kept(course, "motions", make)
 
     def _grid_motion(self, course: Course, servo: Sequence[Cause]) -> Motion:
-        stiffness = np.array([np.inf if a.stiffness is None else a.stiffness for a in self.robot.actuators])
         home = np.array([a.home for a in self.robot.actuators])
         t = course.grid
         temperature = course.temperature
@@ -264,7 +266,7 @@ class Twin:
         dt = np.diff(t, prepend=t[:1])
         worn = course.cut_before_min + np.cumsum(dt * course.grid_cut) / 60.0
         zero = np.zeros_like(course.grid_rho)
-        motion = Motion(t, course.started + t, worn, temperature, course.grid_rho, zero, zero, home, stiffness, course.ordered)
+        motion = Motion(t, course.started + t, worn, temperature, course.grid_rho, zero, zero, home, _springs(self.robot), course.ordered)
         encoder = course.grid_rho
         for cause in servo:
             encoder = cause.hook("on_servo")(encoder, motion, cause.which(self.actuators), cause.values)
@@ -286,6 +288,11 @@ class Twin:
         lever = self.nominal.tool  # platform axes; its tilt under load is of second order here
         d_wrench = d_wrench + np.concatenate([d_force, np.cross(lever, d_force)], axis=1)
         return d_rho, d_wrench
+
+
+def _springs(robot: Robot) -> Floats:
+    """Stiffness (m,) of the drives; inf = rigid."""
+    return np.array([np.inf if a.stiffness is None else a.stiffness for a in robot.actuators])
 
 
 def twin_of(job: Job) -> Twin:
