@@ -10,18 +10,22 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
+from camcomp import arcfit
+from camcomp.arcfit import Arcs, Bend
 from camcomp.cutting.track import Track, lay_track
 from camcomp.datatypes import ARC, LINE, RAPID, Bools, Floats, Ints, Path
 from camcomp.gcode.program import Program
 from camcomp.gcode.rewrite import Output, Rewritten, rewrite
 from camcomp.job import Job
-from camcomp.moves import corrected_pieces, refuse_unsolved, row_layout, travel_of
+from camcomp.moves import WITHIN_RAPID, corrected_pieces, refuse_unsolved, row_layout, travel_of
 from camcomp.posture import check_posture, whole_pose
-from camcomp.response import Travel, aim_at, respond, with_memory
-from camcomp.splitting import Nodes, divide, second_derivative, trial_nodes
+from camcomp.response import Travel, aim_at, respond, winds_up
+from camcomp.reversals import cut_at_reversals
+from camcomp.splitting import Nodes, second_derivative, trial_nodes
 from camcomp.statics.target import Correction, settle
 
-MAX_ROUNDS, EFFECT_ROUNDS = 6, 2  # finer lines do not help against the play of a drive
+MAX_ROUNDS, EFFECT_ROUNDS, ARC_ROUNDS = 6, 2, 4  # finer lines do not help against the play of a drive
+STUCK = 0.95  # of the miss is left by a finer division that is no use, as where an arc passes the vertical
 TURN_LINES = 2  # lines on either side of a reversal in which a drive takes up its play
 COARSE_MM, FINE_MM = 8.0, 0.5  # distance of trial points on straight lines, without and with effects
 
@@ -40,6 +44,7 @@ class Rows:
     target: Floats  # (N, 3) mm programmed tip
     end: Floats  # (N, 3) mm commanded tip, program frame
     feed: Floats  # (N,) mm/min
+    arcs: Arcs  # (N,) circles of corrected arcs that come out as arcs
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,15 +107,19 @@ def trajectories(result: Compensated, job: Job) -> Trajectories:
 
 
 def compensate(
-    program: Program, job: Job, *, method: str, tolerance_um: float, version: str, context: tuple[int, int] = (0, 0)
-) -> Compensated:
+    program: Program, job: Job, *, method: str, tolerance_um: float, version: str, context: tuple[int, int] = (0, 0),
+    arcs: bool | None = None,
+) -> Compensated:  # fmt: skip
     """The corrected program. Raises PhysicsError where the machine cannot do what is asked.
+
+    arcs: programmed arcs come out as arcs where those are fewer than lines; None asks the machine file.
 
     context: how many of the first and of the last motions are only there because their neighbours depend on them; they
     are not divided, and their errors do not count.
     """
-    track = lay_track(program.path, job.conditions)
     path, resolution = program.path, job.config.control.resolution_mm
+    spacing = FINE_MM if job.causes else COARSE_MM  # a screw's error has waves of a few mm
+    track, turning = cut_at_reversals(job, lay_track(path, job.conditions), spacing)
     corrected = corrected_pieces(path, track)
     feeding = corrected & (path.kind[track.motion] != RAPID)
     feeding &= (track.motion >= context[0]) & (track.motion < len(path) - context[1])
@@ -118,30 +127,43 @@ def compensate(
     budget = max(1e-3 * tolerance_um - rounding, 0.1e-3 * tolerance_um)
     tolerance = np.full(len(track.motion), budget)
 
-    angle = np.where(np.isnan(path.angle), 0.0, path.angle)[track.motion] * (track.u1 - track.u0)
-    spacing = FINE_MM if job.causes else COARSE_MM  # a screw's error has waves of a few mm
-    trial = trial_nodes(track.length, angle, feeding & (track.length > 0.0), spacing)
+    trial = trial_nodes(track.length, track.angle, feeding & ~turning & (track.length > 0.0), spacing)
     aimed = _aim(program, job, track, trial, corrected, method)
-    bend = second_derivative(trial, aimed.commanded)
+    second = second_derivative(trial, aimed.commanded)
     kept = _kept(track, trial, aimed.commanded, 0.5 * resolution)
-    tolerance[kept] = np.inf
-    for _ in range(EFFECT_ROUNDS if job.causes else MAX_ROUNDS):
-        nodes, shift = divide(trial, bend, tolerance)
-        solved = _aim(program, job, track, nodes, corrected, method)
-        rows = _rows(program, job, track, nodes, solved.commanded + shift, kept)
+    tolerance[kept | turning] = np.inf
+    wanted = job.config.compensation.arcs if arcs is None else arcs
+    able = feeding & ~kept & (wanted and not job.causes)  # what drives leave over has waves that no arc follows
+    bend = Bend.of(track, trial, aimed.commanded, second, tolerance, able)
+    tolerance[bend.use] = max(budget - np.sqrt(0.5) * resolution, 0.1 * budget)  # the centre is rounded, too
+    last = np.full(len(tolerance), np.inf)
+    for round_ in range(EFFECT_ROUNDS if job.causes else MAX_ROUNDS):
+        nodes, shift = bend.divided(trial, tolerance)
+        if (gone := bend.pointless(nodes)).any():
+            bend.use &= ~gone
+            tolerance[gone] = budget
+            nodes, shift = bend.divided(trial, tolerance)
+        commanded, circles = _bent(program, job, track, nodes, shift, corrected, method, bend)
+        rows = _rows(program, job, track, nodes, commanded, kept, circles)
         written = rewrite(program, _output(path, rows), resolution_mm=resolution, version=version)
         points = _points(job, track, rows, feeding)
-        after = _see(job, points, written.end)
-        turning = _takes_up_play(job, points, after.state.rho)
-        points = replace(points, judged=points.judged & ~turning)
+        after = _see(job, points, written.end, replace(rows.arcs, centre=written.centre))
+        winding = _winds_up(job, points, after.state.rho)
+        points = replace(points, judged=points.judged & ~winding)
         worst = np.zeros(len(tolerance))
         np.maximum.at(worst, points.piece[points.judged], np.linalg.norm(after.error[points.judged], axis=1))
         missed = (worst > 1e-3 * tolerance_um) & ~kept
-        if not missed.any():
+        stuck = missed & (worst >= STUCK * last)
+        straighten = missed & bend.use & (stuck | (round_ >= ARC_ROUNDS - 1))
+        missed &= ~stuck & ~straighten
+        if not (missed | straighten).any():
             break
+        last = np.where(straighten, np.inf, worst)
+        bend.use &= ~straighten
+        tolerance[straighten] = budget
         tolerance = np.where(missed, tolerance * np.clip(0.9e-3 * tolerance_um / np.maximum(worst, 1e-12), 0.3, 0.9), tolerance)
     before = _see_original(job, points)
-    warnings = _warnings(rows, after.error, turning)
+    warnings = _warnings(rows, after.error, winding)
     iterations = int(aimed.iterations.max(initial=0))
     return _assemble(program, job, track, rows, written, points, before, after, iterations, method, warnings)
 
@@ -154,15 +176,43 @@ class _Aimed:
 
 def _aim(program: Program, job: Job, track: Track, nodes: Nodes, corrected: Bools, method: str) -> _Aimed:
     """Modified targets at nodes, program frame; nodes of uncorrected pieces stay as programmed."""
-    target = track.points(nodes.piece, nodes.w)
     on = corrected[nodes.piece]
-    result = aim_at(job, target[on], travel_of(job, track, nodes.piece[on], nodes.w[on]), method)
-    refuse_unsolved(program, track, nodes.piece[on], target[on], result.status)
-    out = target.copy()
-    out[on] = result.commanded
-    iterations = np.zeros(len(target), np.int64)
-    iterations[on] = result.iterations
+    piece, w = nodes.piece[on], nodes.w[on]
+    rapids = np.flatnonzero(corrected & (track.path.kind[track.motion] == RAPID) & (track.length > 0.0))
+    if not job.causes:
+        rapids = rapids[:0]
+    between = np.repeat(rapids, len(WITHIN_RAPID))  # drives remember where they turned round
+    order = np.lexsort((np.concatenate((w, np.tile(WITHIN_RAPID, len(rapids)))), np.concatenate((piece, between))))
+    asked = np.argsort(order, kind="stable")[: len(piece)]
+    piece, w = np.concatenate((piece, between))[order], np.concatenate((w, np.tile(WITHIN_RAPID, len(rapids))))[order]
+    target = track.points(piece, w)
+    result = aim_at(job, target, travel_of(job, track, piece, w), method)
+    refuse_unsolved(program, track, piece, target, result.status)
+    out = track.points(nodes.piece, nodes.w)
+    out[on] = result.commanded[asked]
+    iterations = np.zeros(len(out), np.int64)
+    iterations[on] = result.iterations[asked]
     return _Aimed(out, iterations)
+
+
+def _bent(
+    program: Program, job: Job, track: Track, nodes: Nodes, shift: Floats, corrected: Bools, method: str, bend: Bend
+) -> tuple[Floats, Arcs]:
+    """Commanded tips (k, 3) at nodes, and the circles of the moves that lead there as arcs. Turns off what cannot bend."""
+    both, middle = arcfit.middles(nodes, bend.use)
+    solved = _aim(program, job, track, both, corrected, method).commanded
+    commanded = solved[~middle] + shift
+    circles = Arcs.none(len(commanded))
+    to = np.flatnonzero((np.diff(nodes.piece, prepend=-1) == 0) & bend.use[nodes.piece])
+    if len(to):
+        motion = track.motion[nodes.piece[to]]
+        flat = arcfit.FLATTEST * job.config.control.resolution_mm
+        found, wrong = arcfit.through(
+            commanded[to - 1], solved[middle], commanded[to], track.path.axis[motion], track.path.angle[motion], flat
+        )
+        circles.centre[to], circles.angle[to] = found.centre, found.angle
+        bend.use[nodes.piece[to[wrong]]] = False
+    return commanded, circles
 
 
 def _kept(track: Track, nodes: Nodes, commanded: Floats, half: float) -> Bools:
@@ -173,7 +223,9 @@ def _kept(track: Track, nodes: Nodes, commanded: Floats, half: float) -> Bools:
     return (most <= half) & (np.bincount(track.motion)[track.motion] == 1)
 
 
-def _rows(program: Program, job: Job, track: Track, nodes: Nodes, commanded: Floats, kept: Bools) -> Rows:
+def _rows(
+    program: Program, job: Job, track: Track, nodes: Nodes, commanded: Floats, kept: Bools, circles: Arcs
+) -> Rows:
     """End points of the corrected program: the nodes but the first of each piece, and joining lines at jumps."""
     path = program.path
     k = np.arange(len(nodes.w)) - nodes.first[nodes.piece]
@@ -194,8 +246,9 @@ def _rows(program: Program, job: Job, track: Track, nodes: Nodes, commanded: Flo
         refuse_unsolved(program, track, extra, free, result.status)
         free = result.commanded
     end = np.concatenate((commanded[keep], free))
+    circles = circles.take(np.flatnonzero(keep)).followed_by(len(extra))
     order = np.lexsort((joining & (w > 0.0), w, piece))
-    piece, w, joining, end = piece[order], w[order], joining[order], end[order]
+    piece, w, joining, end, circles = piece[order], w[order], joining[order], end[order], circles.take(order)
     trailing_row = joining & (w > 0.0)
     target = track.points(piece, w)
     force = track.force(piece, w)
@@ -203,9 +256,9 @@ def _rows(program: Program, job: Job, track: Track, nodes: Nodes, commanded: Flo
     rows_kind = np.where(kind[piece] == RAPID, RAPID, LINE)
     passed = ~corrected[piece]
     whole = (passed | kept[piece]) & ~joining & (np.bincount(piece, minlength=len(kind)) == 1)[piece]
-    rows_kind = np.where(whole, kind[piece], rows_kind)
-    end[whole] = target[whole]
-    rows = Rows(piece, track.motion[piece], w, rows_kind, joining, ~passed, force, target, end, np.empty(len(piece)))
+    rows_kind = np.where(circles.on, ARC, np.where(whole, kind[piece], rows_kind))
+    end[whole & ~circles.on] = target[whole & ~circles.on]
+    rows = Rows(piece, track.motion[piece], w, rows_kind, joining, ~passed, force, target, end, np.empty(len(piece)), circles)
     return replace(rows, feed=_feeds(program, track, rows))
 
 
@@ -216,20 +269,22 @@ def _feeds(program: Program, track: Track, rows: Rows) -> Floats:
     same = np.concatenate(([False], (rows.piece[1:] == rows.piece[:-1])))
     w0 = np.where(same, np.concatenate(([0.0], rows.w[:-1])), 0.0)
     programmed = (rows.w - w0) * track.length[rows.piece]
-    commanded = np.linalg.norm(rows.end - start, axis=1)
+    commanded = arcfit.lengths(start, rows.end, rows.arcs, program.path.axis[rows.motion])
     scale = np.divide(commanded, programmed, out=np.ones(len(feed)), where=programmed > 1e-6)
-    plain = rows.joining | (rows.kind != LINE) | ~rows.corrected | (programmed < 0.01)
+    plain = rows.joining | ((rows.kind != LINE) & ~rows.arcs.on) | ~rows.corrected | (programmed < 0.01)
     return np.where(plain, feed, feed * np.clip(scale, 0.2, 5.0))
 
 
 def _output(path: Path, rows: Rows) -> Output:
-    arc = rows.kind == ARC
+    arc, bent = rows.kind == ARC, rows.arcs.on
+    centre = np.where(bent[:, None], rows.arcs.centre, path.centre[rows.motion])
+    angle = np.where(bent, rows.arcs.angle, path.angle[rows.motion])
     return Output(
         motion=rows.motion,
         kind=rows.kind.astype(np.int8),
         end=rows.end,
-        centre=np.where(arc[:, None], path.centre[rows.motion], np.nan),
-        angle=np.where(arc, path.angle[rows.motion], 0.0),
+        centre=np.where(arc[:, None], centre, np.nan),
+        angle=np.where(arc, angle, 0.0),
         feed=rows.feed,
         joining=rows.joining,
     )
@@ -237,22 +292,33 @@ def _output(path: Path, rows: Rows) -> Output:
 
 @dataclass(frozen=True, eq=False)
 class _Points:
-    """Where a corrected program is looked at, in the order of travel: its end points and the middles of its moves."""
+    """Where a corrected program is looked at, in the order of travel.
+
+    End points, and between them the middles of lines and the quarters of arcs.
+    """
 
     row: Ints  # (k,) end point that the point belongs to
-    end: Bools  # (k,) it is that end point; otherwise the middle of the line before it
+    fraction: Floats  # (k,) of the move to it, 1 at its end
+    axis: Floats  # (k, 3) of arcs
     piece: Ints
     w: Floats
     target: Floats  # (k, 3) mm programmed tip
     travel: Travel
     judged: Bools  # (k,) counted in before and after: feed motions, no joining lines
-    arc: Bools  # (k,) in the middle of an arc that stays as programmed
+    kept: Bools  # (k,) between the ends of an arc that stays as programmed
+    before: Floats | None  # (3,) where the first move starts, if that is known
 
-    def along(self, ends: Floats) -> Floats:
+    @property
+    def end(self) -> Bools:
+        """Which ones are end points."""
+        return self.fraction == 1.0
+
+    def along(self, ends: Floats, arcs: Arcs) -> Floats:
         """Points (k, 3) of the moves between end points (N, 3)."""
-        start = np.concatenate((ends[:1], ends[:-1]))
-        lines = np.where(self.end[:, None], ends[self.row], 0.5 * (start + ends)[self.row])
-        return np.where(self.arc[:, None], self.target, lines)
+        first = ends[:1] if self.before is None else self.before[None]
+        start = np.concatenate((first, ends[:-1]))[self.row]
+        out = arcfit.along(start, ends[self.row], arcs.take(self.row), self.axis, self.fraction)
+        return np.where(self.kept[:, None], self.target, np.where(self.end[:, None], ends[self.row], out))
 
 
 def _points(job: Job, track: Track, rows: Rows, feeding: Bools) -> _Points:
@@ -261,16 +327,23 @@ def _points(job: Job, track: Track, rows: Rows, feeding: Bools) -> _Points:
     begins = np.concatenate(([True], rows.piece[1:] != rows.piece[:-1])) | np.concatenate(([True], rows.joining[:-1]))
     start = np.where(begins, 0.0, np.concatenate(([0.0], rows.w[:-1])))
     inner = np.flatnonzero(cut & (track.length[rows.piece] > 0.0))
-    row = np.concatenate((np.arange(n), inner))
-    end = np.concatenate((np.ones(n, np.bool_), np.zeros(len(inner), np.bool_)))
-    order = np.lexsort((end, row))
-    row, end = row[order], end[order]
+    bent = inner[rows.arcs.on[inner]]
+    rapid = np.flatnonzero((rows.kind == RAPID) & rows.corrected) if job.causes else inner[:0]
+    row = np.concatenate((np.arange(n), inner, bent, bent, np.repeat(rapid, len(WITHIN_RAPID))))
+    fraction = np.repeat([1.0, 0.5, 0.25, 0.75], [n, len(inner), len(bent), len(bent)])
+    fraction = np.concatenate((fraction, np.tile(WITHIN_RAPID, len(rapid))))
+    order = np.lexsort((fraction, row))
+    row, fraction = row[order], fraction[order]
+    end = fraction == 1.0
     piece = rows.piece[row]
-    w = np.where(end, rows.w[row], 0.5 * (start + rows.w)[row])
+    w = np.where(end, rows.w[row], start[row] + fraction * (rows.w - start)[row])
     travel = travel_of(job, track, piece, w)
     force = np.where(end[:, None], job.frame.vectors(rows.force)[row], travel.force)  # joining lines know better
-    arc = ~end & (rows.kind[row] == ARC)
-    return _Points(row, end, piece, w, track.points(piece, w), replace(travel, force=force), cut[row], arc)
+    kept = ~end & ((rows.kind == ARC) & ~rows.arcs.on)[row]
+    axis = track.path.axis[track.motion[piece]]
+    travel = replace(travel, force=force)
+    before = track.path.start[0] if n and track.path.known[0] else None
+    return _Points(row, fraction, axis, piece, w, track.points(piece, w), travel, cut[row], kept, before)
 
 
 @dataclass(frozen=True, eq=False)
@@ -282,26 +355,26 @@ class _Seen:
     state: Correction
 
 
-def _see(job: Job, points: _Points, ends: Floats) -> _Seen:
-    """The loaded machine along straight lines between commanded end points (N, 3), program frame."""
-    told = points.along(ends)
-    tip, state = respond(job, told, points.travel, points.target)
+def _see(job: Job, points: _Points, ends: Floats, arcs: Arcs) -> _Seen:
+    """The loaded machine along the moves between commanded end points (N, 3), program frame."""
+    told = points.along(ends, arcs)
+    tip, state = respond(job, told, points.travel, points.target, before=points.before)
     at = {each.name: getattr(state, each.name)[points.end] for each in fields(state)}
     return _Seen(tip - points.target, tip[points.end], Correction(**at))
 
 
 def _see_original(job: Job, points: _Points) -> _Seen:
     """The original program through the full model, at the same points."""
-    tip, state = respond(job, points.target, points.travel)
+    tip, state = respond(job, points.target, points.travel, before=points.before)
     at = {each.name: getattr(state, each.name)[points.end] for each in fields(state)}
     return _Seen(tip - points.target, tip[points.end], Correction(**at))
 
 
-def _takes_up_play(job: Job, points: _Points, rho: Floats) -> Bools:
-    """Points (k,) of lines in which an actuator turns round: the play or wind-up of its drive is taken up in them."""
+def _winds_up(job: Job, points: _Points, rho: Floats) -> Bools:
+    """Points (k,) of lines in which an actuator turns round and its drive winds up against friction."""
     if not job.causes:
         return np.zeros(len(points.row), np.bool_)
-    memory = with_memory(job, rho, points.travel.take(points.end))
+    memory = winds_up(job, rho, points.travel.take(points.end))
     way: Floats = np.sign(np.diff(rho, axis=0, prepend=rho[:1]))[:, memory]
     for k in range(1, len(way)):  # standing still keeps the direction
         way[k] = np.where(way[k] == 0.0, way[k - 1], way[k])
@@ -314,15 +387,15 @@ def _takes_up_play(job: Job, points: _Points, rho: Floats) -> Bools:
     return near[points.row]
 
 
-def _warnings(rows: Rows, error: Floats, turning: Bools) -> list[str]:
+def _warnings(rows: Rows, error: Floats, winding: Bools) -> list[str]:
     out = []
     joins = int(rows.joining.sum())
     if joins:
         out.append(f"{joins} joining lines where the cutting force jumps; they are not part of before and after")
-    if turning.any():
-        most = 1e3 * float(np.nanmax(np.linalg.norm(error[turning], axis=1)))
+    if winding.any():
+        most = 1e3 * float(np.nanmax(np.linalg.norm(error[winding], axis=1)))
         out.append(
-            f"{int(turning.sum())} points lie in lines in which a drive turns round and takes up its play; up to "
+            f"{int(winding.sum())} points lie in lines in which a drive turns round and winds up; up to "
             f"{most:.2f} um are left there, and they are not part of before and after"
         )
     return out

@@ -19,6 +19,7 @@ from camcomp.statics.solve import STATUS
 
 RULES = {2: "CC301", 3: "CC302", 4: "CC303", 5: "CC304"}
 MOST_ERRORS = 20
+WITHIN_RAPID = np.arange(1, 8) / 8.0  # where a rapid is looked at when drives remember how they came
 RAPID_FEED = 10_000.0  # mm/min, for the time that rapids take
 
 

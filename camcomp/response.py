@@ -7,13 +7,14 @@ exact solution of the structure. Effects of the sensors change no part and are l
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
 from camcomp.datatypes import Bools, Floats
 from camcomp.gap.effect import Load, Motion
-from camcomp.gap.memory import direction
+from camcomp.gap.memory import direction, ways
 from camcomp.job import Job
 from camcomp.statics.solve import FREE, solve
 from camcomp.statics.target import Correction, correct, settle
@@ -21,6 +22,8 @@ from camcomp.statics.target import Correction, correct, settle
 SETTLED_MM = 2e-5  # the correction of effects ends here
 MAX_STEPS = 6
 REST_S = 60.0
+AHEAD_MM = 2.0  # more than any play
+LEAST_MM = 2e-4  # a drive that comes back by less than this is not led through its play
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,11 +48,19 @@ class Travel:
         return self.time + REST_S * np.cumsum(self.stop)
 
 
-def respond(job: Job, commanded: Floats, travel: Travel, nominal_of: Floats | None = None) -> tuple[Floats, Correction]:
+def respond(
+    job: Job, commanded: Floats, travel: Travel, nominal_of: Floats | None = None, *, before: Floats | None = None
+) -> tuple[Floats, Correction]:
     """Loaded tips (n, 3) of commanded tips (n, 3), both in the program frame, and the states of the machine.
 
     nominal_of (n, 3): tips whose inverse kinematics go into rho_nominal of the states; the commanded ones by default.
+    before (3,): commanded tip from which the first one was reached; what drives remember depends on it.
     """
+    if before is not None and job.causes and len(commanded):
+        rows = np.concatenate(([0], np.arange(len(commanded))))
+        other = None if nominal_of is None else nominal_of[rows]
+        tip, found = respond(job, np.concatenate((before[None], commanded)), travel.take(rows), other)
+        return tip[1:], Correction(**{each.name: getattr(found, each.name)[1:] for each in fields(found)})
     told = job.frame.to_machine(commanded)
     aim = None if nominal_of is None else job.frame.to_machine(nominal_of)
     if not job.causes:
@@ -81,13 +92,10 @@ def respond(job: Job, commanded: Floats, travel: Travel, nominal_of: Floats | No
 
 def aim_at(job: Job, target: Floats, travel: Travel, method: str) -> Correction:
     """Commands that bring the loaded tips to the targets (n, 3); `commanded` of the result is in the program frame."""
-    load = Load(travel.force, np.zeros((len(target), 6)))
-    if job.causes:
-        nominal = solve(job.real_machine, FREE, job.frame.to_machine(target), check=False).rho_nominal
-        load = _load(job, _motion(job, nominal, travel), travel.force)
-    found = correct(job.real_machine, job.frame.to_machine(target), load.force, load.wrench, method)
+    found = without_drives(job, target, travel, method)
     commanded = job.frame.to_program(found.commanded)
     if job.causes and method != "linear":
+        commanded = commanded + _through_play(job, found, travel)
         for _ in range(MAX_STEPS):
             tip, state = respond(job, commanded, travel, target)
             left = target - tip
@@ -98,16 +106,71 @@ def aim_at(job: Job, target: Floats, travel: Travel, method: str) -> Correction:
     return replace(found, commanded=commanded)
 
 
-def with_memory(job: Job, rho: Floats, travel: Travel) -> Bools:
-    """Actuators (m,) whose carriage depends on the way they came: play, wind-up by friction."""
+def without_drives(job: Job, target: Floats, travel: Travel, method: str = "newton") -> Correction:
+    """Commands, machine frame, that bring the loaded tips to the targets (n, 3) if carriages go where they are told.
+
+    Their `rho` is where the carriages have to be, whatever the drives in front of them do.
+    """
+    load = Load(travel.force, np.zeros((len(target), 6)))
+    if job.causes:
+        nominal = solve(job.real_machine, FREE, job.frame.to_machine(target), check=False).rho_nominal
+        load = _load(job, _motion(job, nominal, travel), travel.force)
+    return correct(job.real_machine, job.frame.to_machine(target), load.force, load.wrench, method)
+
+
+def _through_play(job: Job, found: Correction, travel: Travel) -> Floats:
+    """Way (n, 3) mm of the commanded tips that takes every drive through its play as soon as its carriage turns round.
+
+    Eq. (5) alone would creep through it, by what is left to correct at every step.
+    """
+    solved = found.status == 0
+    carriage = found.rho[solved]
+    sense = ways(carriage, LEAST_MM)
+    motion = _motion(job, carriage + AHEAD_MM * sense, travel.take(np.flatnonzero(solved)))
+    lag = np.zeros_like(carriage)
+    for cause in job.causes:
+        if (hook := cause.hook("on_drive")) is not None:
+            which = cause.which(job.real_machine.actuators)
+            lag += hook(np.zeros_like(lag), motion, which, cause.values)
+            lag -= hook(np.zeros_like(lag), replace(motion, ordered=False, direction=np.zeros_like(lag)), which, cause.values)
+    out = np.zeros((len(solved), 3))
+    if lag.any():
+        lag[sense == 0.0] = 0.0
+        out[solved] = _tip_way(job, found.commanded[solved], -lag)
+    return out
+
+
+def _tip_way(job: Job, tip: Floats, by: Floats) -> Floats:
+    """Way (n, 3) mm of the tip, program frame, that moves the actuators by `by` (n, m), to first order."""
+    h = 1e-3
+    rates = [
+        (solve(job.real_machine, FREE, tip + h * axis, check=False).rho_nominal
+         - solve(job.real_machine, FREE, tip - h * axis, check=False).rho_nominal) / (2.0 * h)
+        for axis in np.eye(3)
+    ]  # fmt: skip
+    way = np.einsum("nkm,nm->nk", np.linalg.pinv(np.stack(rates, axis=2)), by)
+    return way @ job.frame.rotation
+
+
+def plays(job: Job, rho: Floats, travel: Travel) -> Bools:
+    """Actuators (m,) whose carriage stands still while its drive takes up its play."""
+    return _changes(job, rho, travel, lambda motion: replace(motion, ordered=False))
+
+
+def winds_up(job: Job, rho: Floats, travel: Travel) -> Bools:
+    """Actuators (m,) whose carriage depends on the sense of travel by more than a play: wind-up by friction."""
+    return _changes(job, rho, travel, lambda motion: replace(motion, direction=-motion.direction))
+
+
+def _changes(job: Job, rho: Floats, travel: Travel, change: Callable[[Motion], Motion]) -> Bools:
+    """Actuators (m,) whose carriage goes elsewhere after a change of what the hooks see of the movement."""
     motion = _motion(job, rho, travel)
     out = np.zeros(rho.shape[1], np.bool_)
     for cause in job.causes:
         if (hook := cause.hook("on_drive")) is not None:
             which = cause.which(job.real_machine.actuators)
-            moved = hook(np.zeros_like(rho), motion, which, cause.values)
-            for other in (replace(motion, ordered=False), replace(motion, direction=-motion.direction)):
-                out |= (hook(np.zeros_like(rho), other, which, cause.values) != moved).any(axis=0)
+            out |= (hook(np.zeros_like(rho), motion, which, cause.values)
+                    != hook(np.zeros_like(rho), change(motion), which, cause.values)).any(axis=0)  # fmt: skip
     return out
 
 

@@ -89,7 +89,7 @@ RULES: dict[str, Rule] = {
     ),
     "CC113": Rule(
         "turns of an arc",
-        "P in an arc block counts turns: a whole number, 1 or more.",
+        "P in an arc block counts turns: a whole number, 1 to 1000.",
         "write P with a whole number, 1 or more, or leave it out",
     ),
     "CC114": Rule(

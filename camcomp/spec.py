@@ -152,6 +152,9 @@ class Compensation(Spec):
 
     method: Literal["newton", "stiffness", "fixed-point", "linear"] = "newton"
     tolerance_um: Positive = 1.0
+    arcs: bool = Field(
+        False, description="programmed arcs come out as arcs (G2, G3) where those are fewer than straight lines"
+    )
 
 
 class Config(Spec):

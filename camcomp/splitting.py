@@ -52,12 +52,18 @@ def second_derivative(nodes: Nodes, x: Floats) -> Floats:
     return np.where((count < 3)[:, None], 0.0, second)
 
 
-def divide(nodes: Nodes, second: Floats, tolerance: Floats) -> tuple[Nodes, Floats]:
+def divide(
+    nodes: Nodes, second: Floats, tolerance: Floats, least: Floats | None = None
+) -> tuple[Nodes, Floats]:
     """Division points of every piece for a tolerance (p,) mm, and the shift (k, 3) mm that shares the miss.
 
-    second (k, 3): x'' at the trial nodes. The ends of a piece are included and never shifted.
+    second (k, 3): x'' at the trial nodes. least (p,): |x''|^(1/2) counts as at least that much. The ends of a piece are
+    included and never shifted.
     """
-    g = np.sqrt(np.linalg.norm(second, axis=1))
+    if not len(tolerance):
+        return nodes, np.zeros((0, 3))
+    floor = np.zeros(len(tolerance)) if least is None else least
+    g = np.maximum(np.sqrt(np.linalg.norm(second, axis=1)), floor[nodes.piece])
     dw = np.diff(nodes.w)
     area = np.concatenate(([0.0], np.cumsum(np.where(dw > 0.0, 0.5 * (g[1:] + g[:-1]) * dw, 0.0))))
     start = area[nodes.first[:-1]]
@@ -75,7 +81,7 @@ def divide(nodes: Nodes, second: Floats, tolerance: Floats) -> tuple[Nodes, Floa
     w = np.where(inner, np.clip(w, 0.0, 1.0), np.where(k == 0, 0.0, 1.0))
     key, at = nodes.w + 2.0 * nodes.piece, w + 2.0 * out.piece
     bend = np.stack([np.interp(at, key, second[:, j]) for j in range(3)], axis=1)
-    size = np.linalg.norm(bend, axis=1)
+    size = np.maximum(np.linalg.norm(bend, axis=1), floor[out.piece] ** 2)
     miss = (total[out.piece] / np.maximum(n - slack, 1.0)) ** 2 / SHARE  # |x''| h^2 / SHARE, the same at every step
     shift = np.where((inner & (size > 0.0))[:, None], -bend * (miss / np.maximum(size, 1e-300))[:, None], 0.0)
     return Nodes(out.piece, w, out.first), shift

@@ -18,7 +18,7 @@ from camcomp.diagnostics import CheckFailed
 from camcomp.gcode.program import Program
 from camcomp.gcode.stamp import is_stamped
 from camcomp.job import Job
-from camcomp.moves import Layout, corrected_pieces, refuse_unsolved, row_layout, travel_of
+from camcomp.moves import WITHIN_RAPID, Layout, corrected_pieces, refuse_unsolved, row_layout, travel_of
 from camcomp.response import aim_at, respond
 
 PER_SECTION = 4  # points looked at within each straight move or section of an arc
@@ -75,11 +75,13 @@ def verify(corrected: Program, original: Program, job: Job) -> Verified:
     step = np.linalg.norm(begin - np.concatenate((begin[:1], expected[:-1])), axis=1)
     layout = row_layout(original.path, track, step, job.config.control.resolution_mm)
     first, last, joins = _match(corrected, track, expected, layout, is_stamped(corrected.data))
-    feeding = np.flatnonzero(layout.corrected & (original.path.kind[track.motion] != RAPID) & (track.length > 0.0))
-    piece, move, f = _samples(corrected.path, feeding, first[feeding], last[feeding])
+    moving = np.flatnonzero(layout.corrected & (track.length > 0.0))
+    piece, move, f = _samples(corrected.path, moving, first[moving], last[moving])
     commanded = pathgeometry.points(corrected.path, move, f)
     residual, w = _residual(job, track, piece, commanded, _fraction(corrected.path, piece, move, f))
-    vertex = f == 1.0
+    # Rapids and starts are only there because drives remember them.
+    judged = (f > 0.0) & (original.path.kind[track.motion[piece]] != RAPID)
+    piece, residual, w, vertex = piece[judged], residual[judged], w[judged], f[judged] == 1.0
     convergence = _convergence(job, track, piece[vertex], w[vertex])
     lines = _per_line(original, job, track, piece, vertex, residual, convergence)
     return Verified(residual, lines, joins)
@@ -91,10 +93,11 @@ def _samples(path: Path, pieces: Ints, first: Ints, last: Ints) -> tuple[Ints, I
     move = np.concatenate([none, *(np.arange(a, b) for a, b in zip(first, last, strict=True))])
     piece = np.repeat(pieces, last - first)
     sections = np.ceil(np.abs(np.where(path.kind[move] == ARC, path.angle[move], 0.0)) / ARC_STEP)
-    count = PER_SECTION * np.maximum(sections, 1).astype(np.int64)
-    begin = np.cumsum(count) - count
-    k = np.arange(count.sum()) - np.repeat(begin, count) + 1
-    return np.repeat(piece, count), np.repeat(move, count), k / np.repeat(count, count)
+    count = np.where(path.kind[move] == RAPID, len(WITHIN_RAPID) + 1, PER_SECTION * np.maximum(sections, 1).astype(np.int64))
+    points = count + 1
+    begin = np.cumsum(points) - points
+    k = np.arange(points.sum()) - np.repeat(begin, points)
+    return np.repeat(piece, points), np.repeat(move, points), k / np.repeat(count, points)
 
 
 def _expected(program: Program, job: Job, track: Track, corrected: Bools, w: float) -> Floats:

@@ -70,12 +70,12 @@ def _ends(points: np.ndarray, vertex: np.ndarray, at: int, level: int, tolerance
         window *= 2
 
 
-def groove(radius, config="config/orthoglide-1deg.yaml", tolerance_um=1.0):
+def groove(radius, config="config/orthoglide-1deg.yaml", tolerance_um=1.0, arcs=False):
     """Lines of camcomp for a sample groove (named by its diameter or radius), and the fewest by two ways of counting."""
     settings = load_config((str(shipped(config)),))
     job = Job(settings)
     program = open_program(str(shipped(f"samples/groove-circle-{radius}.nc")), settings)
-    result = compensate(program, job, method="newton", tolerance_um=tolerance_um, version="0")
+    result = compensate(program, job, method="newton", tolerance_um=tolerance_um, version="0", arcs=arcs)
     arc = int(np.flatnonzero(program.path.kind == ARC)[0])
     lines = int(((result.rows.motion == arc) & ~result.rows.joining).sum())
     assert 1e3 * np.linalg.norm(result.after, axis=1).max() <= tolerance_um

@@ -26,6 +26,7 @@ from camcomp.terminal import say, working
     help="How the target is found; default: what the machine file says, newton.",
 )
 @click.option("--tolerance-um", type=click.FloatRange(min=0, min_open=True), help="Bound of the error left.")
+@click.option("--arcs/--no-arcs", default=None, help="Arcs come out as arcs where those are fewer than straight lines.")
 @click.option("--dry-run", is_flag=True, help="Do everything but write.")
 @quiet_option
 def command(
@@ -38,6 +39,7 @@ def command(
     report: str | None,
     method: str | None,
     tolerance_um: float | None,
+    arcs: bool | None,
     dry_run: bool,
     quiet: bool,
 ) -> None:
@@ -64,7 +66,7 @@ def command(
     tolerance = tolerance_um or config.compensation.tolerance_um
     how = method or config.compensation.method
     with working(f"compensating {source.name}", quiet=quiet):
-        result = compensate(source, job, method=how, tolerance_um=tolerance, version=__version__)
+        result = compensate(source, job, method=how, tolerance_um=tolerance, version=__version__, arcs=arcs)
     figures = tables.summary(result, job)
     outputs: dict[str, bytes] = {}
     if output or not (joints or summary_file or paths or report):

@@ -10,7 +10,7 @@ import click
 
 from camcomp.commands._options import quiet_option
 from camcomp.files import STANDARD, read_bytes, write_all
-from camcomp.terminal import working
+from camcomp.terminal import say, working
 from camcomp.writeback import machine_file, with_causes
 
 if TYPE_CHECKING:
@@ -100,3 +100,6 @@ def command(
             outputs[next_program] = done.proposal.candidate.program.encode()
     write_all(outputs, inputs=inputs)
     sys.stdout.flush()
+    from camcomp.report.answer import answer_lines
+
+    say(*answer_lines(result), quiet=quiet)

@@ -9,7 +9,7 @@ or where a cut starts or ends, the force jumps.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -57,6 +57,12 @@ class Track:
     jump: Bools  # the force jumps at the start of the piece
     corner: Bools  # the tip cannot pass the start of the piece without a stop
 
+    @property
+    def angle(self) -> Floats:
+        """(p,) rad, part of the arc; 0 where the motion is none."""
+        angle = self.path.angle[self.motion]
+        return np.where(np.isnan(angle), 0.0, angle) * (self.u1 - self.u0)
+
     def u(self, piece: Ints, w: Floats) -> Floats:
         """Fraction of the motion at fraction w of the piece."""
         return np.where(w == 1.0, self.u1[piece], self.u0[piece] + w * (self.u1[piece] - self.u0[piece]))
@@ -64,6 +70,23 @@ class Track:
     def points(self, piece: Ints, w: Floats) -> Floats:
         """Programmed tip (k, 3) mm at fraction w (k,) of piece (k,)."""
         return pathgeometry.points(self.path, self.motion[piece], self.u(piece, w))
+
+    def cut(self, piece: Ints, w: Floats) -> Track:
+        """The same track with pieces cut at fractions w (k,), inside, of pieces (k,): the load of a piece fades linearly."""
+        n = len(self.motion)
+        of = np.concatenate((np.arange(n), piece))
+        begin = np.concatenate((np.zeros(n), w))
+        order = np.lexsort((begin, of))
+        of, begin = of[order], begin[order]
+        end = np.where(np.append(of[1:] == of[:-1], False), np.append(begin[1:], 1.0), 1.0)
+        inner = begin > 0.0
+        a, b = self.fade0[of], self.fade1[of]
+        return replace(
+            self, motion=self.motion[of], u0=self.u(of, begin), u1=self.u(of, end), cutting=self.cutting[of],
+            length=(end - begin) * self.length[of], s0=self.s0[of] + begin * self.length[of],
+            fade0=a + begin[:, None] * (b - a), fade1=a + end[:, None] * (b - a), jump=self.jump[of] & ~inner,
+            corner=self.corner[of] & ~inner,
+        )  # fmt: skip
 
     def force(self, piece: Ints, w: Floats) -> Floats:
         """Cutting force on the tool (k, 3) N, program frame."""

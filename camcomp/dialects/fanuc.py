@@ -15,6 +15,7 @@ DIALECT = Dialect(
         (r"^[^(;\n]*\bg[ \t]*+0?5(\.1)?[ \t]*+[pq][ \t]*+\d", 6),
         (r"^[ \t]*+(n\d+[ \t]*+)?(if[ \t]*+\[.*\][ \t]*+(goto|then)|while[ \t]*+\[.*\][ \t]*+do[ \t]*+\d|goto[ \t]*+\d)", 10),
         (r"^[^(;\n]*\bg[ \t]*+91[ \t]*+g[ \t]*+28\b|\bg[ \t]*+28[ \t]*+g[ \t]*+91\b", 2),
+        (r"^[^(;\n]*\bg[ \t]*+0?0[ \t]*+(g[ \t]*+9[01][ \t]*+)?g[ \t]*+28\b", 6),
         (r"^[^(;\n]*\bg[ \t]*+43[ \t]*+(z[^ \n]{1,20} )?h[ \t]*+\d", 1),
     ),
     spelling=FANUC,
@@ -33,6 +34,7 @@ DIALECT = Dialect(
     extended_offsets=True,
     relative_offsets=True,
     repeats="KL",
+    cycles_apart=True,
     peck_clearance_mm=1.0,
     decimals_max=4,
 )

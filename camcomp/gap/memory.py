@@ -1,10 +1,13 @@
 """What remembers: lag, play and the direction of travel, as sweeps over ordered instants."""
 
+from itertools import pairwise
+
 import numpy as np
 from numba import njit
 
 from camcomp.datatypes import Floats
 
+STILL = 1e-9  # mm or rad, round-off of two solutions of the same point
 PRESLIDING_MM = 0.005  # rolling guides take 1 to 20 um to turn their friction round (Armstrong-Helouvry 1994)
 
 
@@ -63,3 +66,44 @@ def direction(x: Floats, distance: float = PRESLIDING_MM) -> Floats:
     Source: Dahl 1968 with exponent 1. Holds while: rate-independent friction.
     """
     return _direction(np.ascontiguousarray(x), distance)
+
+
+def ways(x: Floats, least: float) -> Floats:
+    """Sense (n, m) in which x (n, m) was travelling when it arrived: +1, -1, 0 before the first move.
+
+    A reversal counts from the extremum on, and only when at least `least` of way back follow it.
+    """
+    out = np.zeros_like(x)
+    for j in range(x.shape[1]):
+        turns, first = turning_points(x[:, j], least)
+        sense = first
+        for a, b in pairwise([*turns, len(x) - 1]):
+            out[a + 1 : b + 1, j] = sense
+            sense = -sense
+    return out
+
+
+def turning_points(x: Floats, least: float) -> tuple[list[int], float]:
+    """Indices where x (n,) begins to travel at least `least` one way, and the sense of the first; ([], 0) if it never does."""
+    steps = np.diff(x)
+    moving = np.flatnonzero(np.abs(steps) > STILL)
+    if not len(moving):
+        return [], 0.0
+    inner = moving[1:][steps[moving[1:]] * steps[moving[:-1]] < 0.0]  # local extrema, in order
+    low = high = 0
+    sense, turns, first = 0.0, [], 0.0
+    for i in [*inner.tolist(), len(x) - 1]:
+        if x[i] > x[high]:
+            high = i
+        if x[i] < x[low]:
+            low = i
+        if sense <= 0.0 and x[i] - x[low] >= least:
+            turns.append(low)
+            sense, high = 1.0, i
+        elif sense >= 0.0 and x[high] - x[i] >= least:
+            turns.append(high)
+            sense, low = -1.0, i
+        else:
+            continue
+        first = first or sense
+    return turns, first

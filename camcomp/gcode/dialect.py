@@ -34,6 +34,7 @@ class Dialect:
     more_offsets: Mapping[int, str] = field(default_factory=dict)  # codes and names of further work offsets
     relative_offsets: bool = False  # G10 L2 adds to the offset in G91
     repeats: str = "L"  # letters that may give the number of repeats of a cycle
+    cycles_apart: bool = False  # G80 leaves the motion code in force that was so before the cycle
     peck_clearance_mm: float = 0.254
     idle_letters: str = "DN"  # letters that mean nothing for the path wherever they stand
     brackets_comment: bool = True  # `(...)` is a comment

@@ -44,6 +44,7 @@ class Printer:
         self.text = program.text
         self.resolution = resolution_mm
         self.seen: set[int] = set()
+        self.code: float | None = None  # motion code outside of cycles
 
     def run(self) -> str:
         """The whole text."""
@@ -114,7 +115,13 @@ class Printer:
         vacant = [word for word in entry.line.words if word.begin not in executed]
         for word in vacant:
             edits.replace(word.begin, self._behind(line, word.end), "")
+        stated = [word.value for word in entry.words if word.letter == "G" and word.value in (0.0, 1.0, 2.0, 3.0)]
+        self.code = stated[-1] if stated else self.code
+        apart = self.program.language.cycles_apart and not stated and self.code is not None
         for index, word in enumerate(entry.words):
+            if apart and word.letter == "G" and word.value == 80.0:  # the moves of the cycle brought their own code
+                edits.replace(word.begin, word.end, f"G{self.code:.0f}")
+                continue
             gone = word.letter == "N" and (repeated or index > 0)
             if cycle:
                 gone = gone or word.letter in _CYCLE_WORDS or (word.letter == "G" and self._is_cycle_code(word))

@@ -3,6 +3,8 @@
 One block at a time, in the order of execution of RS274/NGC: modes first, then settings, then the motion, then a stop.
 """
 
+import re
+
 from camcomp.diagnostics import ProgramError
 from camcomp.gcode.block import Block
 from camcomp.gcode.codes import AXIS_USERS, CYCLES, ENDS, HOMES, MACHINE_MOVES, PLAIN_M, STOPS, code_name
@@ -13,8 +15,13 @@ from camcomp.gcode.owords import OWords
 from camcomp.gcode.program import Program, Setup
 from camcomp.gcode.text import Text
 from camcomp.gcode.trace import Trace
+from camcomp.gcode.words import code_of
 
 _NO_AXES = frozenset((40, 921, 922, 923, 281, 301))
+
+# A program without motions may still do something, but a subroutine may only seem to do nothing.
+_IDLE = re.compile(r"%|\b[NO:]\d+(?!.*\bsub\b)|\bM0?2\b|\bM30\b|[\0\x1a]", re.IGNORECASE)
+_SUBROUTINE = re.compile(r".*\bsub\b", re.IGNORECASE)
 
 
 def read_program(data: bytes, *, name: str, setup: Setup | None = None, dialect: str | None = None) -> Program:
@@ -31,7 +38,10 @@ def read_program(data: bytes, *, name: str, setup: Setup | None = None, dialect:
     controller(reader).run()
     path, sites = reader.record.finish()
     if len(path) == 0:
-        raise ProgramError("CC100", "the program moves nothing", at=text.place(0))
+        lines = [_IDLE.sub("", code_of(text.line(row))).strip() for row in range(len(text.starts))]
+        if not any(lines) or any(_SUBROUTINE.match(each) for each in lines):
+            raise ProgramError("CC100", "the program moves nothing", at=text.place(0))
+        reader.warnings.append("the program moves nothing")
     return Program(
         data=data,
         name=name,
@@ -83,9 +93,16 @@ class Interpreter(Executor):
         if explicit is not None:
             if explicit not in CYCLES or explicit != state.motion:
                 self.forget_cycle()
-            state.motion = None if explicit == 800 else explicit
-            self.record.code_stated = True
+            if explicit == 800:
+                state.motion = state.outside_cycles if self.dialect.cycles_apart else None
+            else:
+                state.motion = explicit
+                self.record.code_stated = True
+            if explicit not in CYCLES and explicit != 800:
+                state.outside_cycles = explicit
         dynamic = block.code(8) == 431
+        if dynamic and zero_code in AXIS_USERS and block.axes:
+            self.refuse("CC108", f"{code_name(431)} and {code_name(zero_code or 0)} both want the axis words")
         if zero_code in AXIS_USERS or dynamic:
             homes = zero_code in (280, 300) and explicit in (0, 10) and self.dialect.home_beside_motion
             if explicit not in (None, 800) and block.axes and not homes:

@@ -7,6 +7,7 @@ from camcomp.gcode.block import Block
 from camcomp.gcode.settings import Settings
 
 _LARGEST = 1.0e7  # mm; a machine of ten kilometres is a typing mistake
+_MOST_TURNS = 1000
 _NOTHING = 1.0e-9  # mm; arithmetic leaves that much between equal points
 
 
@@ -89,8 +90,8 @@ class Motions(Settings):
             return 1
         block.used.add("P")
         turns = round(word.value) + (word.mode == "TURN")
-        if abs(round(word.value) - word.value) > 1e-3 or not 1 <= turns <= 10000:
-            self.refuse("CC113", "P of an arc is a whole number of turns, 1 or more", word)
+        if abs(round(word.value) - word.value) > 1e-3 or not 1 <= turns <= _MOST_TURNS:
+            self.refuse("CC113", f"P of an arc is a whole number of turns, 1 to {_MOST_TURNS}", word)
         return turns
 
     def _arc(self, block: Block, code: int, feed: float) -> None:

@@ -90,3 +90,4 @@ class Rewritten:
     data: bytes  # stamped
     end: Floats  # (N, 3) mm, program frame: where the words, rounded as they are, lead
     line: Ints  # (N,) line of the output, from 1
+    centre: Floats  # (N, 3) mm, of rows that came out as arcs, as rounded; else NaN

@@ -33,12 +33,13 @@ def rewrite(program: Program, out: Output, *, resolution_mm: float, version: str
     if out.repeats(program.path, resolution_mm):
         data = _stamped(program.text, Edits(), stamp)
         line = program.path.line[out.motion] + 1
-        return Rewritten(data=data, end=program.path.end[out.motion], line=line)
+        return Rewritten(data=data, end=program.path.end[out.motion], line=line, centre=program.path.centre[out.motion])
     if not program.straight:
         program = flatten(program, resolution_mm)
     writer = Writer(program, out, resolution_mm)
     writer.run()
-    return Rewritten(data=_stamped(program.text, writer.edits, stamp), end=writer.ends, line=writer.lines + 2)
+    data = _stamped(program.text, writer.edits, stamp)
+    return Rewritten(data=data, end=writer.ends, line=writer.lines + 2, centre=writer.centres)
 
 
 def _stamped(text: Text, edits: Edits, stamp: str) -> bytes:
@@ -56,6 +57,7 @@ class Writer(LineEditor):
         self.inserted = 0  # new lines so far
         self.ends = np.empty((len(out.motion), 3))
         self.lines = np.empty(len(out.motion), np.int64)
+        self.centres = np.full((len(out.motion), 3), np.nan)
 
     def run(self) -> None:
         """Fill `edits`, `ends` (N, 3) and `lines` (N,), which counts from 0 and without the stamp."""
@@ -137,6 +139,8 @@ class Writer(LineEditor):
             plane = int(self.sites.plane[self.k])
             end = self._landing(moves[0].end, new)
             moves = plan(self.position, moves[0], end, plane, self.resolution, self.unit, self.turns)
+            if moves[-1].kind == ARC:
+                self.centres[row] = self._centre_said(moves[0])
         at_line = 0
         if not new and self.sites.stops[self.k]:
             at_line = len(moves) - 1
@@ -227,6 +231,14 @@ class Writer(LineEditor):
     def _centre_value(self, move: Move, axis: int) -> float:
         base = self.offset[axis] if self.sites.centre_absolute[self.k] else self.position[axis]
         return round((move.centre[axis] - base) / self.unit, self.digits)
+
+    def _centre_said(self, move: Move) -> Point:
+        """Centre of an arc from the present position as its words will say it."""
+        out = list(move.centre)
+        for axis in PLANES[int(self.sites.plane[self.k])][:2]:
+            base = self.offset[axis] if self.sites.centre_absolute[self.k] else self.position[axis]
+            out[axis] = base + self._centre_value(move, axis) * self.unit
+        return out
 
     def _centre_words(self, move: Move) -> list[str]:
         u, v, _ = PLANES[int(self.sites.plane[self.k])]

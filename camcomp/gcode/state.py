@@ -34,6 +34,7 @@ class State:
         self.offset = [0.0, 0.0, 0.0]
 
         self.motion: int | None = dialect.initial_motion  # code in tenths: 0 to 30, a cycle, or None after G80
+        self.outside_cycles = self.motion  # the last one that is no cycle
         self.plane = 17
         self.relative = False
         self.centre_absolute = False

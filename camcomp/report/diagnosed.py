@@ -16,8 +16,8 @@ from camcomp.gap.observation import channel_names
 from camcomp.gap.search import Fitted
 from camcomp.inquiry import Inquiry
 from camcomp.locate import main_channels
+from camcomp.report.answer import cause_name
 from camcomp.report.diagnosis import diagnosis_html
-from camcomp.report.diagnosis_figures import cause_name
 from camcomp.report.inputs import Input
 from camcomp.report.runview import Rival, RunView
 from camcomp.twin import Twin

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from camcomp.report.answer import cause_name, parameter_text, together, verdict_text
 from camcomp.report.diagnosis_figures import (
-    cause_name,
     figure_causes,
     figure_ladder,
     figure_map,
@@ -79,34 +79,6 @@ def diagnosis_html(
     return render(page)
 
 
-def verdict_text(result: Mapping[str, Any]) -> str:
-    """The answer in a sentence or two."""
-    gap, shrink = result["gap"], result["shrinkage"]
-    told = (
-        f"On runs that the fit has not seen the gap goes from {brief(shrink['before_rms_um'])} µm to "
-        f"{brief(shrink['after_rms_um'])} µm (rms); the noise floor is {brief(gap['noise_floor_um'])} µm."
-    )
-    known = [cause_name(each) for each in result["causes"] if each["effect"] != "unknown"]
-    if result["verdict"] == "none":
-        return (
-            f"Measurement and model differ by {brief(gap['rms_um'])} µm (rms), which is the noise floor of "
-            f"{brief(gap['noise_floor_um'])} µm: there is nothing to explain."
-        )
-    if result["verdict"] == "identified":
-        return f"{_and(known)} {'explain' if len(known) > 1 else 'explains'} the gap. {told}"
-    if result["verdict"] == "ambiguous":
-        sets = [_and([cause_name(each) for each in one]) for one in result["alternatives"]]
-        return f"These runs cannot tell apart: {'; or '.join(sets)}. {told}"
-    rest = f" {_and(known)} {'are' if len(known) > 1 else 'is'} identified." if known else ""
-    drivers = ", ".join(each["covariate"] for each in result["where"]["drivers"][:3])
-    what = f" The rest depends on {drivers}." if drivers else ""
-    return f"Something is at work that no effect of the library explains.{rest}{what} {told}"
-
-
-def _and(names: Sequence[str]) -> str:
-    return ", ".join(names[:-1]) + " and " + names[-1] if len(names) > 1 else "".join(names)
-
-
 def _cards(result: Mapping[str, Any]) -> list[tuple[str, str, str]]:
     gap, shrink = result["gap"], result["shrinkage"]
     low, high = shrink["ci95"]
@@ -126,7 +98,7 @@ def _causes(result: Mapping[str, Any]) -> Section:
     rows = []
     for i, cause in enumerate(causes, 1):
         parameters = cause.get("parameters") or {}
-        values = "; ".join(_parameter(name, each) for name, each in parameters.items())
+        values = "; ".join(parameter_text(name, each) for name, each in parameters.items())
         probability = cause.get("probability")
         rows.append([
             str(i), cause["effect"], cause.get("target") or "–",
@@ -136,13 +108,8 @@ def _causes(result: Mapping[str, Any]) -> Section:
     return Section("causes", "Causes", figures=[figure_causes(causes)], tables=[Table("Causes by probability", heads, rows)])
 
 
-def _parameter(name: str, each: Mapping[str, Any]) -> str:
-    low, high = each["ci95"]
-    return f"{name} = {brief(each['value'], 4)} ({brief(low, 4)} to {brief(high, 4)})"
-
-
 def _apart(result: Mapping[str, Any], rivals: Sequence[Rival], views: Sequence[RunView]) -> Section:
-    items = [_and([cause_name(each) for each in one]) for one in result["alternatives"]]
+    items = [together([cause_name(each) for each in one]) for one in result["alternatives"]]
     figure = figure_rivals(rivals, views)
     return Section("apart", "What cannot be told apart, and why", [ALIKE], [figure] if figure else [], items=items)
 
@@ -151,13 +118,13 @@ def _shrinkage(result: Mapping[str, Any]) -> str:
     shrink = result["shrinkage"]
     low, high = shrink["ci95"]
     return (
-        f"Judged on {_and(shrink['holdout'])}, with causes fitted without what is judged. {100 * shrink['ratio']:.1f} % of the "
+        f"Judged on {together(shrink['holdout'])}, with causes fitted without what is judged. {100 * shrink['ratio']:.1f} % of the "
         f"gap goes (95 % interval {100 * low:.1f} to {100 * high:.1f} %)."
     )
 
 
 def _next(proposal: Mapping[str, Any]) -> Section:
-    separates = _and([str(each) for each in proposal["separates"]])
+    separates = together([str(each) for each in proposal["separates"]])
     text = [str(proposal["action"])]
     if separates:
         text.append(f"It separates {separates}. Expected gain: {proposal['gain']:.2f} (0: none, 1: the question is settled).")

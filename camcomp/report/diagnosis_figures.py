@@ -7,15 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from camcomp.report.answer import cause_name
 from camcomp.report.plot import INK, SCALE, STYLES, Figure, Json, axis, brief, level, line, numbers, thin
 from camcomp.report.runview import Rival, RunView, likeness, rms, spectrum
 
 MAP_POINTS = 4000
-
-
-def cause_name(cause: Mapping[str, Any]) -> str:
-    """`effect (target)`."""
-    return f"{cause['effect']} ({cause['target']})" if cause.get("target") else str(cause["effect"])
 
 
 def figure_ladder(result: Mapping[str, Any]) -> Figure:

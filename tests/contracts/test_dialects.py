@@ -109,3 +109,18 @@ def test_detection_and_its_override():
         for other in NAMES:
             assert dialect_of(Text.read(sample.encode(), "x"), other).name == other
     assert dialect_of(Text.read(b"G21 G90\nG0 X1 Y2 Z3\nM30\n", "x")).name == "rs274"
+
+
+@pytest.mark.parametrize(
+    ("text", "name"),
+    [
+        # Headers as CAM posts write them: a word in a comment is no statement.
+        ("(T1  D=6. CR=0. TAPER=118deg - ZMIN=-2.5 - flat end mill)\nG90 G94\n(2D Pocket1)\n(R1=5, CYCLE81)\nG0 X1\n", "rs274"),
+        ("(T=\"MILL\", MSG(A))\nG0 X1\n", "rs274"),
+        ("%\n(O2201);\nN3 G00 G91 G28 Z0.0;\nG00 G90 G54 X0.5 Y-2.25;\n", "fanuc"),
+        ("G0 X1 Y2\nG3 X2 Y3 CR=5\n", "sinumerik"),
+        ("MSG(\"POCKET\")\nG0 X=IC(1) ; (note)\n", "sinumerik"),
+    ],
+)
+def test_detection(text, name):
+    assert dialect_of(Text.read(text.encode(), "x"), None).name == name

@@ -69,7 +69,7 @@ def test_an_installed_camcomp_needs_no_checkout(built, tmp_path):
     config = site / "camcomp/data/config/cartesian.yaml"
     program, out = tmp_path / "p.nc", tmp_path / "out.nc"
     program.write_text("G21 G90 G17 G94\nS8000 M3\nG0 X0 Y0 Z5\nG1 X10 F600\nM30\n")
-    # Compiling the solver in a new place takes a minute; a line or two are solved sooner without.
+    # Compiling the solver in a new place takes long; a line or two are solved sooner without.
     paths["NUMBA_DISABLE_JIT"] = "1"
     call(command, "compensate", program, "--config", config, "-o", out, cwd=tmp_path, **paths)
     assert b"camcomp" in out.read_bytes()

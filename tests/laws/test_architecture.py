@@ -20,8 +20,8 @@ GROUND = {
 ENGINES = {"gcode", "statics", "cutting", "gap"}
 SHELVES = {"robots", "dialects", "forces", "effects"}
 JOINTS = {
-    "alike", "armposes", "bench", "candidates", "columns", "course", "heldout", "inquiry", "job", "locate",
-    "logcheck", "moves", "noise", "planner", "posture", "response", "scan", "splitting", "survey", "twin",
+    "alike", "arcfit", "armposes", "bench", "candidates", "columns", "course", "heldout", "inquiry", "job", "locate",
+    "logcheck", "moves", "noise", "planner", "posture", "response", "reversals", "scan", "splitting", "survey", "twin",
 }  # fmt: skip
 STORIES = {"armstudy", "axisstudy", "compensate", "verify", "simulate", "diagnose", "stream"}
 FLOORS = (GROUND, ENGINES, JOINTS, STORIES)  # and the doors above

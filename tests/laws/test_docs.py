@@ -24,6 +24,12 @@ def test_a_howto_is_followed(path, reader):
     reader.follow(path.read_text(encoding="utf-8"))
 
 
+def test_the_tutorial_is_followed(reader):
+    for name in ("config", "samples"):
+        shutil.copytree(ROOT / name, reader.folder / name)
+    reader.follow((ROOT / "samples/tutorial.md").read_text(encoding="utf-8"))
+
+
 def test_every_shelf_has_a_howto():
     assert [path.stem for path in HOWTOS] == ["dialect", "effect", "force-model", "machine"]
 

@@ -1,10 +1,14 @@
 """Subprograms, Fanuc macros and Sinumerik lines beyond the golden programs."""
 
+import numpy as np
 import pytest
 
+from camcomp.datatypes import LINE, RAPID
 from camcomp.diagnostics import ProgramError
 from camcomp.gcode.interpret import read_program
+from camcomp.gcode.output import Output
 from camcomp.gcode.program import Setup
+from camcomp.gcode.rewrite import rewrite
 
 
 def ends(text, dialect="fanuc", **setup):
@@ -131,3 +135,21 @@ def test_work_offsets():
 )  # fmt: skip
 def test_sinumerik_refusals(text, rule):
     assert refused(text, "sinumerik") == rule
+
+
+def test_g80_leaves_the_motion_code_from_before_the_cycle():
+    text = "O1\nG90 G0 X0 Y0 Z50. F100\nG1 Z20.\nG99 G81 X5. Z-3. R2.\nX10.\nG80 Z25.\nG0 Z30.\nM30\n"
+    program = read_program(text.encode(), name="in.nc", dialect="fanuc")
+    last = program.path
+    assert last.kind[-2:].tolist() == [LINE, RAPID] and last.end[-2].tolist() == [10.0, 0.0, 25.0]
+    same = Output.same(last)
+    moved = Output(
+        motion=same.motion, kind=same.kind, end=same.end + 0.01, centre=same.centre, angle=same.angle, feed=same.feed,
+        joining=same.joining,
+    )  # fmt: skip
+    written = rewrite(program, moved, resolution_mm=1e-3, version="1")
+    after = read_program(written.data, name="out.nc", dialect="fanuc").path
+    assert after.kind.tolist() == last.kind.tolist()
+    np.testing.assert_allclose(after.end, last.end + 0.01, atol=1e-9)
+    with pytest.raises(ProgramError, match="without a motion code"):
+        read_program(text.replace("O1\n", "").encode(), name="in.ngc", dialect="rs274")

@@ -196,3 +196,14 @@ def test_inverse_time_feed_counts_the_arc_that_the_control_makes():
     after = read_program(rewrite(program, out, resolution_mm=1e-2, version="1").data, name="out.nc").path
     assert after.kind[1] == 2 and after.angle[1] == pytest.approx(np.pi / 2 - 0.05, abs=1e-3)
     assert after.feed[1] == pytest.approx(program.path.feed[1], rel=2e-3)
+
+
+def test_a_program_without_motions_passes_and_one_without_statements_does_not():
+    text = b"G21 G90\nT1 M6 (drill)\nS1000 M3\nG10 L2 P1 X1\nM30\n"
+    program = read_program(text, name="in.nc")
+    assert len(program.path) == 0 and program.warnings == ("the program moves nothing",)
+    assert rewrite(program, Output.same(program.path), resolution_mm=1e-3, version="1").data.endswith(text)
+    for nothing in (b"", b"%\n(no more)\nN10 M30\n%\n", b"o100 sub\nG1 X1 F100\no100 endsub\nM2\n", b"o<a> sub\nT1\no<a> endsub\n"):
+        with pytest.raises(ProgramError) as caught:
+            read_program(nothing, name="in.nc")
+        assert caught.value.rule == "CC100"

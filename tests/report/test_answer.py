@@ -1,0 +1,24 @@
+"""What a diagnosis says on the terminal: the same as its JSON, in words."""
+
+import json
+
+from tests.commandline import camcomp
+
+
+def test_the_answer_is_told_on_standard_error_and_nothing_else_on_standard_output(tmp_path):
+    out = tmp_path / "o.json"
+    done = camcomp("diagnose", "samples/diagnosis/clear/experiment.yaml", "--json", out)
+    assert done.returncode == 0 and done.stdout == b""
+    told, result = done.stderr.decode().splitlines(), json.loads(out.read_text())
+    cause = result["causes"][0]
+    assert told[0].startswith(f"identified: {cause['effect']} ({cause['target']}) explains the gap")
+    assert told[1].startswith(f"  {cause['effect']} ({cause['target']}): ")
+    name, value = next(iter(cause["parameters"].items()))
+    assert told[2].strip().startswith(f"{name} = {value['value']:.4g}"[:12])
+    assert any(f"{100 * result['shrinkage']['ratio']:.0f} %" in line for line in told if "unseen" in line)
+
+
+def test_quiet_is_quiet():
+    done = camcomp("diagnose", "samples/diagnosis/clear/experiment.yaml", "--json", "-", "--quiet")
+    assert done.returncode == 0 and done.stderr == b""
+    assert json.loads(done.stdout)["verdict"] == "identified"
