@@ -14,8 +14,9 @@ from camcomp import arcfit
 from camcomp.arcfit import Arcs, Bend
 from camcomp.cutting.track import Track, lay_track
 from camcomp.datatypes import ARC, LINE, RAPID, Bools, Floats, Ints, Path
+from camcomp.gcode.output import Output, Part, Rewritten
 from camcomp.gcode.program import Program
-from camcomp.gcode.rewrite import Output, Rewritten, rewrite
+from camcomp.gcode.rewrite import rewrite
 from camcomp.job import Job
 from camcomp.moves import WITHIN_RAPID, corrected_pieces, refuse_unsolved, row_layout, travel_of
 from camcomp.posture import check_posture, whole_pose
@@ -106,22 +107,23 @@ def trajectories(result: Compensated, job: Job) -> Trajectories:
 
 
 def compensate(
-    program: Program, job: Job, *, method: str, tolerance_um: float, version: str, context: tuple[int, int] = (0, 0),
+    program: Program, job: Job, *, method: str, tolerance_um: float, version: str, part: Part | None = None,
     arcs: bool | None = None,
 ) -> Compensated:  # fmt: skip
     """The corrected program. Raises PhysicsError where the machine cannot do what is asked.
 
     arcs: programmed arcs come out as arcs where those are fewer than lines; None asks the machine file.
 
-    context: how many of the first and of the last motions are only there because their neighbours depend on them; they
-    are not divided, and their errors do not count.
+    part: the motions to be corrected and written, when the program is a part of a longer one. The others are only there
+    because their neighbours depend on them: they are not divided, and their errors do not count.
     """
     path, resolution = program.path, job.config.control.resolution_mm
     spacing = FINE_MM if job.causes else COARSE_MM  # a screw's error has waves of a few mm
     track, turning = cut_at_reversals(job, lay_track(path, job.conditions), spacing)
     corrected = corrected_pieces(path, track)
     feeding = corrected & (path.kind[track.motion] != RAPID)
-    feeding &= (track.motion >= context[0]) & (track.motion < len(path) - context[1])
+    if part is not None:
+        feeding &= (track.motion >= part.first) & (track.motion < part.last)
     rounding = 0.5 * np.sqrt(3.0) * resolution
     budget = max(1e-3 * tolerance_um - rounding, 0.1e-3 * tolerance_um)
     tolerance = np.full(len(track.motion), budget)
@@ -143,8 +145,8 @@ def compensate(
             tolerance[gone] = budget
             nodes, shift = bend.divided(trial, tolerance)
         commanded, circles = _bent(program, job, track, nodes, shift, corrected, method, bend)
-        rows = _rows(program, job, track, nodes, commanded, kept, circles, begins=context[0] == 0)
-        written = rewrite(program, _output(path, rows), resolution_mm=resolution, version=version)
+        rows = _rows(program, job, track, nodes, commanded, kept, circles, begins=part is None or part.first == 0)
+        written = rewrite(program, _output(path, rows), resolution_mm=resolution, version=version, part=part)
         points = _points(job, track, rows, feeding)
         after = _see(job, points, written.end, replace(rows.arcs, centre=written.centre))
         worst = np.zeros(len(tolerance))

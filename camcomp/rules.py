@@ -522,4 +522,10 @@ RULES: dict[str, Rule] = {
         "Somewhere a column differs by more than the --tolerance that was asked for.",
         "the output of compare says where",
     ),
+    "CC607": Rule(
+        "interpolation",
+        "Long programs are corrected by interpolation between exact solutions. Points of it, solved exactly at the end, "
+        "differ by more than they may; the outputs stand, and are not to be used.",
+        "cut the program into parts of less than 1 MB, which are solved point by point, and report the case",
+    ),
 }
