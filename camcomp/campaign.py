@@ -4,6 +4,7 @@ import csv
 import io
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from difflib import get_close_matches
 from pathlib import Path as FilePath
 
 import numpy as np
@@ -59,6 +60,7 @@ def open_campaign(path: str | FilePath) -> Campaign:
 def open_run(spec: RunSpec, job: Job, twin: Twin, notes: list[str]) -> Run:
     """One run of an experiment."""
     measured, log = read_log(spec.log, twin), display_name(spec.log)
+    notes += unread(spec.log, twin)
     check_rows(log, measured)
     if spec.program is None:
         raise ConfigError("CC402", f"run '{spec.name}' has no program")
@@ -102,6 +104,23 @@ def steadied(time: Floats, values: Floats) -> Floats | None:
     sums = [np.convolve(np.ones(n), (weight * near**k)[::-1], "same") for k in range(3)]
     first, second = (np.convolve(every, (weight * near**k)[::-1], "same") for k in range(2))
     return np.asarray((sums[2] * first - sums[1] * second) / (sums[2] * sums[0] - sums[1] ** 2), float)
+
+
+def unread(path: str, twin: Twin) -> list[str]:
+    """Notes on columns of a log that are not read, each with the name that may have been meant."""
+    header = [cell.strip() for cell in read_bytes(path).decode("utf-8-sig", errors="replace").split("\n", 1)[0].split(",")]
+    known = ["t_s", "line", "x_mm", "y_mm", "z_mm", "fx_N", "fy_N", "fz_N", "temp_C"]
+    for a in twin.robot.actuators:
+        length, effort = ("rad", "Nmm") if a.revolute else ("mm", "N")
+        known += [f"cmd_{a.name}_{length}", f"act_{a.name}_{length}", f"act_{a.name}_{effort}"]
+    lower = {name.lower(): name for name in known}
+    out = []
+    for each in header:
+        if each and each not in known:
+            close = get_close_matches(each.lower(), lower, n=1) or [n for n in lower if n.startswith(f"{each.lower()}_")][:1]
+            meant = f"; did you mean {lower[close[0]]}?" if close and lower[close[0]] not in header else ""
+            out.append(f"{display_name(path)}: column {each} is not read{meant}")
+    return out
 
 
 def _table(name: str, text: str) -> tuple[list[str], Floats]:

@@ -14,19 +14,19 @@ from camcomp import arcfit
 from camcomp.arcfit import Arcs, Bend
 from camcomp.cutting.track import Track, lay_track
 from camcomp.datatypes import ARC, LINE, RAPID, Bools, Floats, Ints, Path
+from camcomp.gcode.output import Output, Part, Rewritten
 from camcomp.gcode.program import Program
-from camcomp.gcode.rewrite import Output, Rewritten, rewrite
+from camcomp.gcode.rewrite import rewrite
 from camcomp.job import Job
 from camcomp.moves import WITHIN_RAPID, corrected_pieces, refuse_unsolved, row_layout, travel_of
 from camcomp.posture import check_posture, whole_pose
-from camcomp.response import Travel, aim_at, respond, winds_up
+from camcomp.response import Travel, aim_at, respond
 from camcomp.reversals import cut_at_reversals
 from camcomp.splitting import Nodes, second_derivative, trial_nodes
 from camcomp.statics.target import Correction, settle
 
-MAX_ROUNDS, EFFECT_ROUNDS, ARC_ROUNDS = 6, 2, 4  # finer lines do not help against the play of a drive
+MAX_ROUNDS, ARC_ROUNDS = 6, 4
 STUCK = 0.95  # of the miss is left by a finer division that is no use, as where an arc passes the vertical
-TURN_LINES = 2  # lines on either side of a reversal in which a drive takes up its play
 COARSE_MM, FINE_MM = 8.0, 0.5  # distance of trial points on straight lines, without and with effects
 
 
@@ -107,22 +107,23 @@ def trajectories(result: Compensated, job: Job) -> Trajectories:
 
 
 def compensate(
-    program: Program, job: Job, *, method: str, tolerance_um: float, version: str, context: tuple[int, int] = (0, 0),
+    program: Program, job: Job, *, method: str, tolerance_um: float, version: str, part: Part | None = None,
     arcs: bool | None = None,
 ) -> Compensated:  # fmt: skip
     """The corrected program. Raises PhysicsError where the machine cannot do what is asked.
 
     arcs: programmed arcs come out as arcs where those are fewer than lines; None asks the machine file.
 
-    context: how many of the first and of the last motions are only there because their neighbours depend on them; they
-    are not divided, and their errors do not count.
+    part: the motions to be corrected and written, when the program is a part of a longer one. The others are only there
+    because their neighbours depend on them: they are not divided, and their errors do not count.
     """
     path, resolution = program.path, job.config.control.resolution_mm
     spacing = FINE_MM if job.causes else COARSE_MM  # a screw's error has waves of a few mm
     track, turning = cut_at_reversals(job, lay_track(path, job.conditions), spacing)
     corrected = corrected_pieces(path, track)
     feeding = corrected & (path.kind[track.motion] != RAPID)
-    feeding &= (track.motion >= context[0]) & (track.motion < len(path) - context[1])
+    if part is not None:
+        feeding &= (track.motion >= part.first) & (track.motion < part.last)
     rounding = 0.5 * np.sqrt(3.0) * resolution
     budget = max(1e-3 * tolerance_um - rounding, 0.1e-3 * tolerance_um)
     tolerance = np.full(len(track.motion), budget)
@@ -137,19 +138,17 @@ def compensate(
     bend = Bend.of(track, trial, aimed.commanded, second, tolerance, able)
     tolerance[bend.use] = max(budget - np.sqrt(0.5) * resolution, 0.1 * budget)  # the centre is rounded, too
     last = np.full(len(tolerance), np.inf)
-    for round_ in range(EFFECT_ROUNDS if job.causes else MAX_ROUNDS):
+    for round_ in range(MAX_ROUNDS):
         nodes, shift = bend.divided(trial, tolerance)
         if (gone := bend.pointless(nodes)).any():
             bend.use &= ~gone
             tolerance[gone] = budget
             nodes, shift = bend.divided(trial, tolerance)
         commanded, circles = _bent(program, job, track, nodes, shift, corrected, method, bend)
-        rows = _rows(program, job, track, nodes, commanded, kept, circles)
-        written = rewrite(program, _output(path, rows), resolution_mm=resolution, version=version)
+        rows = _rows(program, job, track, nodes, commanded, kept, circles, begins=part is None or part.first == 0)
+        written = rewrite(program, _output(path, rows), resolution_mm=resolution, version=version, part=part)
         points = _points(job, track, rows, feeding)
         after = _see(job, points, written.end, replace(rows.arcs, centre=written.centre))
-        winding = _winds_up(job, points, after.state.rho)
-        points = replace(points, judged=points.judged & ~winding)
         worst = np.zeros(len(tolerance))
         np.maximum.at(worst, points.piece[points.judged], np.linalg.norm(after.error[points.judged], axis=1))
         missed = (worst > 1e-3 * tolerance_um) & ~kept
@@ -163,7 +162,7 @@ def compensate(
         tolerance[straighten] = budget
         tolerance = np.where(missed, tolerance * np.clip(0.9e-3 * tolerance_um / np.maximum(worst, 1e-12), 0.3, 0.9), tolerance)
     before = _see_original(job, points)
-    warnings = _warnings(rows, after.error, winding)
+    warnings = _warnings(rows)
     iterations = int(aimed.iterations.max(initial=0))
     return _assemble(program, job, track, rows, written, points, before, after, iterations, method, warnings)
 
@@ -224,14 +223,15 @@ def _kept(track: Track, nodes: Nodes, commanded: Floats, half: float) -> Bools:
 
 
 def _rows(
-    program: Program, job: Job, track: Track, nodes: Nodes, commanded: Floats, kept: Bools, circles: Arcs
+    program: Program, job: Job, track: Track, nodes: Nodes, commanded: Floats, kept: Bools, circles: Arcs, *, begins: bool
 ) -> Rows:
     """End points of the corrected program: the nodes but the first of each piece, and joining lines at jumps."""
     path = program.path
     k = np.arange(len(nodes.w)) - nodes.first[nodes.piece]
     kind = path.kind[track.motion]
     start, stop = commanded[nodes.first[:-1]], commanded[nodes.first[1:] - 1]
-    step = np.linalg.norm(start - np.concatenate((start[:1], stop[:-1])), axis=1)
+    before = path.start[:1] if begins else start[:1]
+    step = np.linalg.norm(start - np.concatenate((before, stop[:-1])), axis=1)
     layout = row_layout(path, track, step, job.config.control.resolution_mm)
     corrected, leading, trailing = layout.corrected, layout.leading, layout.trailing
     keep = (k > 0) | leading[nodes.piece]
@@ -265,7 +265,7 @@ def _rows(
 def _feeds(program: Program, track: Track, rows: Rows) -> Floats:
     """Feed of every row so that the tip keeps its programmed speed: scaled by commanded over programmed length."""
     feed = program.path.feed[rows.motion]
-    start = np.concatenate((rows.end[:1], rows.end[:-1]))
+    start = np.concatenate((program.path.start[:1], rows.end[:-1]))
     same = np.concatenate(([False], (rows.piece[1:] == rows.piece[:-1])))
     w0 = np.where(same, np.concatenate(([0.0], rows.w[:-1])), 0.0)
     programmed = (rows.w - w0) * track.length[rows.piece]
@@ -370,35 +370,9 @@ def _see_original(job: Job, points: _Points) -> _Seen:
     return _Seen(tip - points.target, tip[points.end], Correction(**at))
 
 
-def _winds_up(job: Job, points: _Points, rho: Floats) -> Bools:
-    """Points (k,) of lines in which an actuator turns round and its drive winds up against friction."""
-    if not job.causes:
-        return np.zeros(len(points.row), np.bool_)
-    memory = winds_up(job, rho, points.travel.take(points.end))
-    way: Floats = np.sign(np.diff(rho, axis=0, prepend=rho[:1]))[:, memory]
-    for k in range(1, len(way)):  # standing still keeps the direction
-        way[k] = np.where(way[k] == 0.0, way[k - 1], way[k])
-    turns: Bools = np.zeros(len(way), np.bool_)
-    turns[1:] = (way[1:] * way[:-1] < 0.0).any(axis=1)
-    near = turns.copy()
-    for shift in range(1, TURN_LINES + 1):
-        near[shift:] |= turns[:-shift]
-        near[:-shift] |= turns[shift:]
-    return near[points.row]
-
-
-def _warnings(rows: Rows, error: Floats, winding: Bools) -> list[str]:
-    out = []
+def _warnings(rows: Rows) -> list[str]:
     joins = int(rows.joining.sum())
-    if joins:
-        out.append(f"{joins} joining lines where the cutting force jumps; they are not part of before and after")
-    if winding.any():
-        most = 1e3 * float(np.nanmax(np.linalg.norm(error[winding], axis=1)))
-        out.append(
-            f"{int(winding.sum())} points lie in lines in which a drive turns round and winds up; up to "
-            f"{most:.2f} um are left there, and they are not part of before and after"
-        )
-    return out
+    return [f"{joins} joining lines where the cutting force jumps; they are not part of before and after"] if joins else []
 
 
 def _assemble(

@@ -1,10 +1,13 @@
 """The only disk access: bytes in, bytes out, `-` for the standard streams, several outputs all or none."""
 
 import os
+import shutil
 import sys
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
+from typing import BinaryIO, cast
 
 from camcomp.diagnostics import FileError
 
@@ -17,6 +20,19 @@ def read_bytes(path: str | Path) -> bytes:
         return sys.stdin.buffer.read()
     try:
         return Path(path).read_bytes()
+    except OSError as error:
+        raise FileError("CC500", f"cannot read {path}: {error.strerror}") from error
+
+
+def open_source(path: str | Path) -> BinaryIO:
+    """A file to be read from the begin as often as wanted; standard input is put aside on disk. Raises FileError CC500."""
+    if str(path) == STANDARD:
+        aside = cast(BinaryIO, tempfile.TemporaryFile())  # noqa: SIM115 - the caller closes it
+        shutil.copyfileobj(sys.stdin.buffer, aside)
+        aside.seek(0)
+        return aside
+    try:
+        return Path(path).open("rb")
     except OSError as error:
         raise FileError("CC500", f"cannot read {path}: {error.strerror}") from error
 
@@ -72,6 +88,17 @@ def _refuse_clashes(targets: Mapping[str, Path], inputs: Sequence[str | Path]) -
 
 
 def _write_beside(target: Path, data: bytes) -> str:
+    file, temporary = _open_beside(target)
+    try:
+        with file:
+            file.write(data)
+    except BaseException:
+        os.unlink(temporary)
+        raise
+    return temporary
+
+
+def _open_beside(target: Path) -> tuple[BinaryIO, str]:
     if target.is_dir():
         raise IsADirectoryError(21, "is a directory", str(target))
     try:
@@ -79,13 +106,48 @@ def _write_beside(target: Path, data: bytes) -> str:
     except OSError as error:  # name the file asked for, not the temporary one
         raise OSError(error.errno, error.strerror, str(target)) from error
     try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(data)
         os.chmod(temporary, target.stat().st_mode & 0o7777 if target.exists() else 0o666 & ~_umask())
+        return os.fdopen(handle, "w+b"), temporary
     except BaseException:
         os.unlink(temporary)
         raise
-    return temporary
+
+
+@contextmanager
+def writing(paths: Sequence[str], *, inputs: Sequence[str | Path] = (), keep: bool = True) -> Iterator[dict[str, BinaryIO]]:
+    """Open files to be filled bit by bit; they take the place of `paths` when the block ends well, or none of them does.
+
+    "-" goes to standard output at the end. keep: false writes nothing in the end. Raises FileError as write_all does.
+    """
+    targets = {path: Path(path).resolve() for path in paths if path != STANDARD}
+    _refuse_clashes(targets, inputs)
+    files: dict[str, BinaryIO] = {}
+    made: list[tuple[str, Path]] = []
+    try:
+        for path, target in targets.items():
+            files[path], temporary = _open_beside(target)
+            made.append((temporary, target))
+        if STANDARD in paths:
+            files[STANDARD] = cast(BinaryIO, tempfile.TemporaryFile())  # noqa: SIM115 - closed below
+        yield files
+        for path in targets:
+            files[path].close()
+        while made and keep:
+            os.replace(*made[0])
+            made.pop(0)
+        if STANDARD in files and keep:
+            files[STANDARD].seek(0)
+            shutil.copyfileobj(files[STANDARD], sys.stdout.buffer)
+            sys.stdout.buffer.flush()
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        raise FileError("CC501", f"cannot write {error.filename2 or error.filename}: {error.strerror}") from error
+    finally:
+        for file in files.values():
+            file.close()
+        for temporary, _ in made:
+            os.unlink(temporary)
 
 
 def _umask() -> int:

@@ -30,10 +30,11 @@ def gap_of(inquiry: Inquiry) -> dict[str, float]:
     size = np.concatenate([np.where(np.isfinite(g).any(axis=1), np.sqrt(np.nansum(g**2, axis=1)), np.nan) for g in _together(gaps)])
     size = size[np.isfinite(size)] * 1e3
     repeats = RUN_OFFSET_MM if part.start == 0 else 0.0  # what one run differs from the next belongs to the floor
-    sigma = np.nanmean(inquiry.noise.sigma[:, part] ** 2, axis=0)
+    seen = np.isfinite(inquiry.noise.sigma[:, part])
+    sigma = np.where(seen, inquiry.noise.sigma[:, part] ** 2, 0.0).sum(axis=0) / np.maximum(seen.sum(axis=0), 1)
     if part.start == 0:
         sigma = sigma - inquiry.background.colour().excess ** 2
-    noise = np.sqrt(np.nansum(np.maximum(sigma, 0.0) + repeats**2)) * 1e3
+    noise = np.sqrt(np.sum(np.maximum(sigma, 0.0) + repeats**2, where=seen.any(axis=0))) * 1e3
     return {
         "rms_um": round(float(np.sqrt(np.mean(size**2))), 3),
         "p95_um": round(float(np.quantile(size, 0.95)), 3),

@@ -72,7 +72,7 @@ def ranked(inquiry: Inquiry, rivals: Sequence[Fitted], probability: Floats, job:
         if any(effect not in names for effect, *_ in candidate.knows):
             continue
         body = candidate.program.split("G54\n", 1)[-1]
-        key = (body, candidate.cutting, candidate.started, "encoder" in candidate.channels)
+        key = (body, candidate.cutting, candidate.started, "encoder" in candidate.channels, bool(candidate.knows))
         if key not in laid:
             laid[key] = _try(inquiry, candidate, rivals, job)
         here = laid[key]

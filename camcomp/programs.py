@@ -23,6 +23,7 @@ def setup_of(config: Config) -> Setup:
         second_home_mm=places.get("G30", (0.0, 0.0, 0.0)),
         tool=control.tool_number,
         increment_mm=control.input_increment_mm,
+        table_axes=frozenset(control.table_axes),
         skip_deleted=control.block_delete,
     )
 
@@ -32,9 +33,14 @@ def open_program(path: str | Path, config: Config | None = None) -> Program:
 
     Raises FileError when there is no such file, ProgramError with every mistake in it.
     """
+    return program_of(read_bytes(path), display_name(path), config)
+
+
+def program_of(data: bytes, name: str, config: Config | None = None) -> Program:
+    """A program from its bytes, read with the control of `config`. Raises ProgramError with every mistake in it."""
     setup = setup_of(config) if config else Setup()
     dialect = config.control.dialect if config else None
-    return read_program(read_bytes(path), name=display_name(path), setup=setup, dialect=dialect)
+    return read_program(data, name=name, setup=setup, dialect=dialect)
 
 
 def _triple(values: list[float]) -> tuple[float, float, float]:

@@ -25,6 +25,7 @@ _RHO_STEP = 1e-3  # mm or 1e-3 mrad of drive, to first order linear within 1e-6
 _FORCE_STEP = 1.0  # N
 _SLOPES = ("tip_rho", "tip_wrench", "drive_rho", "drive_wrench")
 _MOMENT_STEP = 100.0  # N mm
+_SAME_LOAD = 1e-3  # share of the load by which a changed machine's may differ from that it was solved with
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +125,11 @@ class Twin:
         """
         causes = (*self.causes, *causes)
         # control, drive
+        robot, key = self.edited(causes)
         grid, rows = self._motions(course, causes)
+        if robot is not self.robot:
+            springs = _springs(robot)
+            grid, rows = replace(grid, stiffness=springs), replace(rows, stiffness=springs)
         carriage = grid.encoder
         for cause in causes:
             if (hook := cause.hook("on_drive")) is not None:
@@ -147,14 +152,15 @@ class Twin:
         place = _place(course)
         place_tip = course.place(seen) if late else place
         # structure
-        robot, key = self.edited(causes)
-        if solved is None or slopes is None or solved.key != key:
-            if solved is None or slopes is None:
-                shift = _piece_means(course, gap) if gap is not None else np.zeros((course.pieces, len(self.actuators)))
-                load = self._load(causes, _at(course, grid, course.node_time, course.node_rho), course.node_force)
-            else:
-                shift, load = solved.shift, Load(solved.force, solved.wrench)
-            solved = self.structure(course, self._machine(robot, key), key, shift, load)
+        known = solved if slopes is not None else None
+        if known is None:
+            shift = _piece_means(course, gap) if gap is not None else np.zeros((course.pieces, len(self.actuators)))
+        else:
+            shift = known.shift
+        load = self._node_load(course, grid, causes, known, key)
+        if known is None or known.key != key or load.force is not known.force:
+            known = self.structure(course, self._machine(robot, key), key, shift, load)
+        solved = known
         load = self._load(causes, rows, _kept(course, "force", lambda: place.of(course.node_force)))
         load_tip = self._load(causes, at_tip, place_tip.of(course.node_force)) if late else load
         drive, tip = place.of(solved.drive), place_tip.of(solved.tip)
@@ -183,6 +189,21 @@ class Twin:
             if (hook := cause.hook("on_reading")) is not None:
                 reading = hook(reading, rows, cause.values)
         return reading, solved
+
+    def _node_load(self, course: Course, grid: Motion, causes: Sequence[Cause], known: Solved | None, key: tuple) -> Load:
+        """Load to solve the nodes with: that of the structure known so far where slopes may carry on from it.
+
+        Slopes are those of the unchanged machine; a changed one gives way by its own, so its nodes are solved under the load.
+        """
+        loading = any(cause.hook("on_load") is not None for cause in causes[len(self.causes) :])
+        if known is not None and (not loading or key == self.edited(self.causes)[1]):
+            return Load(known.force, known.wrench)
+        load = self._load(causes, _at(course, grid, course.node_time, course.node_rho), course.node_force)
+        if known is None:
+            return load
+        size = _SAME_LOAD * max(float(np.abs(load.force).max(initial=0.0)), float(np.abs(load.wrench).max(initial=0.0)))
+        near = np.abs(load.force - known.force).max(initial=0.0) <= size and np.abs(load.wrench - known.wrench).max(initial=0.0) <= size
+        return Load(known.force, known.wrench) if near and known.key == key else load
 
     def structure(self, course: Course, machine: Machine, key: tuple, shift: Floats, load: Load) -> Solved:
         """Loaded equilibrium at the nodes. Raises PhysicsError CC411 when a node cannot be solved."""
@@ -237,7 +258,6 @@ class Twin:
         return make() if servo else _kept(course, "motions", make)
 
     def _grid_motion(self, course: Course, servo: Sequence[Cause]) -> Motion:
-        stiffness = np.array([np.inf if a.stiffness is None else a.stiffness for a in self.robot.actuators])
         home = np.array([a.home for a in self.robot.actuators])
         t = course.grid
         temperature = course.temperature
@@ -246,7 +266,7 @@ class Twin:
         dt = np.diff(t, prepend=t[:1])
         worn = course.cut_before_min + np.cumsum(dt * course.grid_cut) / 60.0
         zero = np.zeros_like(course.grid_rho)
-        motion = Motion(t, course.started + t, worn, temperature, course.grid_rho, zero, zero, home, stiffness, course.ordered)
+        motion = Motion(t, course.started + t, worn, temperature, course.grid_rho, zero, zero, home, _springs(self.robot), course.ordered)
         encoder = course.grid_rho
         for cause in servo:
             encoder = cause.hook("on_servo")(encoder, motion, cause.which(self.actuators), cause.values)
@@ -268,6 +288,11 @@ class Twin:
         lever = self.nominal.tool  # platform axes; its tilt under load is of second order here
         d_wrench = d_wrench + np.concatenate([d_force, np.cross(lever, d_force)], axis=1)
         return d_rho, d_wrench
+
+
+def _springs(robot: Robot) -> Floats:
+    """Stiffness (m,) of the drives; inf = rigid."""
+    return np.array([np.inf if a.stiffness is None else a.stiffness for a in robot.actuators])
 
 
 def twin_of(job: Job) -> Twin:

@@ -8,7 +8,7 @@ from camcomp import __version__
 from camcomp.commands._options import quiet_option
 from camcomp.config import load_config
 from camcomp.diagnostics import CheckFailed
-from camcomp.files import STANDARD, display_name, read_bytes, write_all
+from camcomp.files import STANDARD, display_name, open_source, read_bytes, write_all
 from camcomp.terminal import say, working
 
 
@@ -16,7 +16,7 @@ from camcomp.terminal import say, working
 @click.argument("program")
 @click.option("--config", "configs", metavar="FILE", multiple=True, required=True, help="Machine; later files win.")
 @click.option("-o", "--output", metavar="OUT.nc", help="Corrected program; - is standard output.")
-@click.option("--joints", metavar="OUT.csv", help="Actuator coordinates and drive forces at every end point.")
+@click.option("--joints", metavar="OUT.csv", help="Actuator coordinates and drive forces at every end point; .parquet too.")
 @click.option("--summary", "summary_file", metavar="OUT.json", help="Figures of the run.")
 @click.option("--paths", metavar="OUT.csv", help="The five trajectories: target, errors, force, both, adjusted.")
 @click.option("--report", metavar="OUT.html", help="What was done and why, as one page with plots.")
@@ -53,18 +53,34 @@ def command(
         from camcomp.report.page import plot_library
 
         plot_library()  # a missing library is told before the work, not after it
-    from camcomp.compensate import compensate, trajectories
     from camcomp.gcode.stamp import is_stamped
     from camcomp.job import Job
-    from camcomp.programs import open_program
-    from camcomp.report import tables
+    from camcomp.longprogram import Wanted, compensate_long
 
     job = Job(config)
-    source = open_program(program, config)
+    tolerance = tolerance_um or config.compensation.tolerance_um
+    how, name = method or config.compensation.method, display_name(program)
+    with open_source(program) as file:
+        done = None
+        if not (paths or report):
+            standard = None if output or joints or summary_file else STANDARD
+            with working(f"compensating {name}", quiet=quiet):
+                done = compensate_long(
+                    file, name, job, method=how, tolerance_um=tolerance, version=__version__, dry_run=dry_run, arcs=arcs,
+                    wanted=Wanted(output or standard, joints, summary_file), inputs=(program, *configs),
+                )  # fmt: skip
+        if done is not None:
+            _finish(done.figures, done.sizes if dry_run else {}, done.failed, quiet)
+            return
+        data = file.read()
+    from camcomp.compensate import compensate, trajectories
+    from camcomp.programs import program_of
+    from camcomp.report import tables
+    from camcomp.report.jointtable import joint_bytes
+
+    source = program_of(data, name, config)
     if is_stamped(source.data):
         raise CheckFailed("CC603", f"{source.name} was compensated before")
-    tolerance = tolerance_um or config.compensation.tolerance_um
-    how = method or config.compensation.method
     with working(f"compensating {source.name}", quiet=quiet):
         result = compensate(source, job, method=how, tolerance_um=tolerance, version=__version__, arcs=arcs)
     figures = tables.summary(result, job)
@@ -72,7 +88,7 @@ def command(
     if output or not (joints or summary_file or paths or report):
         outputs[output or STANDARD] = result.written.data
     if joints:
-        outputs[joints] = tables.joint_csv(result, job)
+        outputs[joints] = joint_bytes(result, job, joints)
     if paths:
         outputs[paths] = tables.paths_csv(result, trajectories(result, job))
     if summary_file:
@@ -90,9 +106,13 @@ def command(
             )
     if not dry_run:
         write_all(outputs, inputs=(program, *configs))
+    _finish(figures, {each: len(made) for each, made in outputs.items()} if dry_run else {}, failed, quiet)
+
+
+def _finish(figures: dict, sizes: dict[str, int], failed: list[tuple[str, str]], quiet: bool) -> None:
+    """Says what was done, or would have been, and raises the checks that failed."""
     say(*_told(figures), quiet=quiet)
-    if dry_run:
-        say(*(f"would write {name}: {len(data)} bytes" for name, data in outputs.items()), quiet=quiet)
+    say(*(f"would write {name}: {size} bytes" for name, size in sizes.items()), quiet=quiet)
     if failed:
         first, *rest = (CheckFailed(rule, text) for rule, text in failed)
         first.others = tuple(rest)
@@ -109,6 +129,11 @@ def _told(figures: dict) -> list[str]:
         f"largest drive force {_either(figures, 'actuator_force_max_N', 'actuator_torque_max_Nmm')}",
         f"platform tilt left {figures['platform_tilt_max_mrad']:.2f} mrad",
     ]
+    if checked := figures.get("interpolation"):
+        lines.append(
+            f"interpolated between {checked['exact_solutions']} exact solutions; {checked['checked']} points checked: "
+            f"{checked['worst_um']:.4f} um at most, allowed {checked['bound_um']:g} um"
+        )
     return lines + [f"warning: {each}" for each in figures["warnings"]]
 
 

@@ -11,7 +11,7 @@ import click
 from camcomp.commands._options import quiet_option
 from camcomp.files import STANDARD, read_bytes, write_all
 from camcomp.terminal import say, working
-from camcomp.writeback import with_causes
+from camcomp.writeback import machine_file, with_causes
 
 if TYPE_CHECKING:
     from camcomp.campaign import Campaign
@@ -36,6 +36,17 @@ def examine(
     campaign = open_campaign(path)
     done = diagnose(campaign.job, campaign.twin, campaign.runs, holdout=campaign.experiment.holdout, without=without)
     return done.result, done, campaign
+
+
+def _machine_with_causes(configs: Sequence[str], result: dict[str, Any], target: str) -> str:
+    """Text of the machine file with the causes in it."""
+    texts = [read_bytes(each).decode("utf-8-sig") for each in configs]
+    k = machine_file(texts)
+    note = f"found by camcomp diagnose, verdict {result['verdict']}"
+    if result["verdict"] == "ambiguous":
+        note += f": the likeliest of {len(result['alternatives'])} sets that explain the data alike"
+    to = Path.cwd() if target == STANDARD else Path(target).absolute().parent
+    return with_causes(texts[k], result["causes"], folder=str(Path(configs[k]).absolute().parent), moved_to=str(to), note=note)
 
 
 @click.command()
@@ -65,6 +76,8 @@ def command(
         plot_library()  # a missing library is told before the work, not after it
     with working(f"diagnosing {experiment}", quiet=quiet):
         result, done, campaign = examine(experiment, without)
+    for each in campaign.notes if campaign is not None else ():
+        click.echo(f"note: {each}", err=True)
     outputs: dict[str, bytes] = {}
     if json_file or not (report or config_file or next_program):
         outputs[json_file or STANDARD] = (json.dumps(result, indent=1, allow_nan=False) + "\n").encode()
@@ -77,12 +90,14 @@ def command(
     if config_file:
         from camcomp.config import load_experiment
 
-        # The last file wins key by key, so only there are the causes sure to count.
-        machine = load_experiment(experiment).config[-1]
-        inputs = (experiment, *load_experiment(experiment).config)
-        outputs[config_file] = with_causes(read_bytes(machine).decode("utf-8-sig"), result["causes"]).encode()
-    if next_program and done is not None and done.proposal is not None:
-        outputs[next_program] = done.proposal.candidate.program.encode()
+        configs = load_experiment(experiment).config
+        inputs = (experiment, *configs)
+        outputs[config_file] = _machine_with_causes(configs, result, config_file).encode()
+    if next_program and done is not None:
+        if done.proposal is None:
+            click.echo("nothing is left to separate: no next experiment, no program", err=True)
+        else:
+            outputs[next_program] = done.proposal.candidate.program.encode()
     write_all(outputs, inputs=inputs)
     sys.stdout.flush()
     from camcomp.report.answer import answer_lines

@@ -18,6 +18,7 @@ _TREND = 4  # terms of the polynomial that is taken out with the sines
 _LEAST_TURNS = 2.5  # periods on the travel below which a line is a trend
 _PER_PERIOD = 2.5  # rows a period needs
 _STANDS_OUT = 0.2  # share of what the trend leaves
+_AT_ONCE = 1_000_000  # values held in memory
 _AGREE = 0.6  # by how much both directions may differ, in units of their sum
 
 
@@ -43,14 +44,16 @@ def _spectrum(y: Floats, x: Floats, frequencies: Floats, trend: Floats) -> tuple
     """Energy (f,) that sines of x at each frequency explain of y (n,) beside the trend, and the energy there is."""
     Q, _ = np.linalg.qr(trend)
     rest = y - Q @ (Q.T @ y)
-    out = np.empty(len(frequencies))
-    for i, f in enumerate(frequencies):
-        waves = np.column_stack([np.sin(2 * np.pi * f * x), np.cos(2 * np.pi * f * x)])
-        waves = waves - Q @ (Q.T @ waves)
-        M = waves.T @ waves
-        b = waves.T @ rest
-        out[i] = float(b @ np.linalg.solve(M + 1e-9 * np.trace(M) * np.eye(2) + 1e-30 * np.eye(2), b))
-    return out, float(rest @ rest)
+    found = [np.zeros(0)]
+    for part in np.array_split(frequencies, max(len(frequencies) * len(x) // _AT_ONCE, 1)):
+        turn = 2.0 * np.pi * x[:, None] * part
+        waves = np.stack([np.sin(turn), np.cos(turn)], axis=2)  # (n, f, 2)
+        waves = waves - np.tensordot(Q, np.tensordot(Q, waves, axes=(0, 0)), axes=(1, 0))
+        M = np.einsum("nfi,nfj->fij", waves, waves)
+        M = M + (1e-9 * np.trace(M, axis1=1, axis2=2)[:, None, None] + 1e-30) * np.eye(2)
+        b = np.einsum("nfi,n->fi", waves, rest)
+        found.append(np.einsum("fi,fi->f", b, np.linalg.solve(M, b[:, :, None])[:, :, 0]))
+    return np.concatenate(found), float(rest @ rest)
 
 
 def _log_chance(explained: Floats, energy: float, rows: float) -> Floats:

@@ -1,7 +1,7 @@
 """Where the gap lies: shares by axis, actuator, source line and time, and what the gap depends on.
 
 Energies are those of the difference between log and model less what noise of the same size would have; lines and
-intervals count where they stand out of the run's own noise (false discovery rate 5 %, autocorrelation respected).
+intervals count where they stand out of the run's own noise (false discovery rate 1 %, autocorrelation respected).
 Source: Benjamini and Hochberg 1995; effective sample size by the noise's autoregression.
 """
 
@@ -13,7 +13,7 @@ from scipy.stats import chi2
 
 from camcomp.datatypes import Floats, Ints
 
-_FALSE = 0.05
+_FALSE = 0.01
 _BIN_S = 0.4
 _CLOSE_MM = 3.0  # behind a reversal
 
@@ -100,12 +100,15 @@ def intervals(runs: Sequence[RunGap], most: int = 12) -> list[dict[str, object]]
     """Stretches of time where the gap stands out of the noise, neighbours joined, by share of its energy."""
     whole = sum(float(_energy(r).sum()) for r in runs)
     found = []
+    pieces = []
     for run in runs:
-        if len(run.time) < 2:
-            continue
-        bins = np.floor((run.time - run.time[0]) / _BIN_S).astype(int)
-        groups = [np.flatnonzero(bins == b) for b in np.unique(bins)]
-        real = discoveries([_chance(run, rows) for rows in groups])
+        if len(run.time) > 1:
+            bins = np.floor((run.time - run.time[0]) / _BIN_S).astype(int)
+            pieces.append((run, [np.flatnonzero(bins == b) for b in np.unique(bins)]))
+    every = discoveries([_chance(run, rows) for run, groups in pieces for rows in groups]) if pieces else []
+    at = 0
+    for run, groups in pieces:
+        real, at = every[at : at + len(groups)], at + len(groups)
         open_rows: list[np.ndarray] = []
         for rows, ok in [*zip(groups, real, strict=True), (np.zeros(0, int), False)]:
             if ok:

@@ -64,7 +64,7 @@ class BlockReader:
             if message in self._warned:
                 return
             self._warned.add(message)
-        self.warnings.append(f"{self.text.name}:{self.block.row + 1}: {message}")
+        self.warnings.append(f"{self.text.name}:{self.text.place(self.block.row).line}: {message}")
 
     def refuse(self, rule: str, message: str, word: Word | None = None, hint: str | None = None) -> NoReturn:
         """Raise a ProgramError at a word of the current block."""

@@ -42,7 +42,8 @@ class LineEditor:
         if sites.code_stated[k]:
             self.code = None if self.begin[G] >= 0 else int(sites.code[k])
         if sites.feed_stated[k]:
-            self.feed = None if self.begin[F] >= 0 else self._programmed_feed()
+            cuts = self.path.kind[k] != RAPID  # the F word of a rapid stays as it is
+            self.feed = None if self.begin[F] >= 0 and cuts else self._programmed_feed()
 
     def _strip(self) -> None:
         """Take the motion out of its line; what else the line says stays."""

@@ -83,11 +83,30 @@ class Output:
         )
 
 
+@dataclass(frozen=True)
+class Standing:
+    """What the control holds somewhere in the output: tool tip, motion code, feed mode and value; None: not known."""
+
+    position: tuple[float, float, float]  # mm, program frame
+    code: int | None = None
+    feed: tuple[int, float] | None = None
+
+
+@dataclass(frozen=True)
+class Part:
+    """The motions first to last - 1 of a program, to be written behind other output. The others keep their lines."""
+
+    first: int
+    last: int
+    before: Standing
+
+
 @dataclass(frozen=True, eq=False)
 class Rewritten:
     """The program as written, N rows as in Output."""
 
-    data: bytes  # stamped
+    data: bytes  # stamped, unless it is a part
     end: Floats  # (N, 3) mm, program frame: where the words, rounded as they are, lead
     line: Ints  # (N,) line of the output, from 1
     centre: Floats  # (N, 3) mm, of rows that came out as arcs, as rounded; else NaN
+    behind: Standing | None = None  # of a part

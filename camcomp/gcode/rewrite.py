@@ -16,19 +16,24 @@ from camcomp.gcode.edits import Edits
 from camcomp.gcode.flatten import flatten
 from camcomp.gcode.lineedit import BLANKS, LineEditor
 from camcomp.gcode.numbers import decimals, plain
-from camcomp.gcode.output import Output, Rewritten
+from camcomp.gcode.output import Output, Part, Rewritten, Standing
 from camcomp.gcode.program import P, Program, R, Rebase
 from camcomp.gcode.stamp import stamp_index, stamp_line
 from camcomp.gcode.text import Text
 
 
-def rewrite(program: Program, out: Output, *, resolution_mm: float, version: str) -> Rewritten:
+def rewrite(program: Program, out: Output, *, resolution_mm: float, version: str, part: Part | None = None) -> Rewritten:
     """The program with the moves of `out`, rounded to `resolution_mm`, and stamped.
 
     A motion with one row that ends where it was programmed (within half a resolution) keeps its bytes, as do moves in
     machine coordinates and moves before X, Y and Z are all known. Raises ProgramError CC137 where a line does too much
-    at once to be written anew.
+    at once to be written anew. part: only these motions are written, and there is no stamp.
     """
+    if part is not None:
+        writer = Writer(program, out, resolution_mm)
+        behind = writer.run_part(part)
+        data = program.text.encode(writer.edits.apply(program.text.string))
+        return Rewritten(data=data, end=writer.ends, line=writer.lines + 1, centre=writer.centres, behind=behind)
     stamp = stamp_line(program.data, version, *program.language.comment)
     if out.repeats(program.path, resolution_mm):
         data = _stamped(program.text, Edits(), stamp)
@@ -72,6 +77,19 @@ class Writer(LineEditor):
             self._motion(k, bounds[k], bounds[k + 1])
         for each in rebases:
             self._rebase(each)
+
+    def run_part(self, part: Part) -> Standing:
+        """Fill `edits` for some motions, and `ends` (N, 3) for all rows; what the control holds behind them."""
+        bounds = np.searchsorted(self.out.motion, np.arange(len(self.path) + 1)).tolist()
+        self.ends[:] = self.out.end
+        self.lines[:] = 0
+        if bounds[part.first]:
+            self.ends[bounds[part.first] - 1] = part.before.position
+        self.position, self.code, self.feed = [*part.before.position], part.before.code, part.before.feed
+        for k in range(part.first, part.last):
+            self._motion(k, bounds[k], bounds[k + 1])
+        x, y, z = map(float, self.position)
+        return Standing((x, y, z), self.code, self.feed)
 
     # --- one motion --------------------------------------------------------------------------------------------
 

@@ -26,12 +26,20 @@ def actuator_columns(job: Job) -> tuple[list[str], list[str], list[str]]:
     return nominal, commanded, force
 
 
+def joint_columns(job: Job) -> list[str]:
+    """Column names of the joint table."""
+    head = ["line", "s_mm", "t_s", "x_mm", "y_mm", "z_mm", "xc_mm", "yc_mm", "zc_mm", "fx_N", "fy_N", "fz_N"]
+    return head + [name for trio in zip(*actuator_columns(job), strict=True) for name in trio]
+
+
+def decimals_of(names: Sequence[str]) -> list[int]:
+    """Decimals of the columns of a table."""
+    return [DECIMALS_RAD if name.endswith("_rad") else DECIMALS for name in names]
+
+
 def joint_csv(result: Compensated, job: Job) -> bytes:
     """One row per end point of every motion of the corrected program."""
-    nominal, commanded, force = actuator_columns(job)
-    head = ["line", "s_mm", "t_s", "x_mm", "y_mm", "z_mm", "xc_mm", "yc_mm", "zc_mm", "fx_N", "fy_N", "fz_N"]
-    head += [c for trio in zip(nominal, commanded, force, strict=True) for c in trio]
-    m = len(nominal)
+    head, m = joint_columns(job), len(job.machine.actuators)
     actuators = np.stack((result.nominal, result.state.rho, result.state.drive), axis=2).reshape(-1, 3 * m)
     values = np.column_stack(
         (result.s, result.t, result.rows.target, result.written.end, job.frame.vectors(result.rows.force), actuators)
@@ -55,7 +63,7 @@ def paths_csv(result: Compensated, trajectories: Trajectories) -> bytes:
 def _csv(head: Sequence[str], line: np.ndarray, values: Floats) -> bytes:
     """A table whose first column is the source line. Values that do not exist stand as empty cells."""
     values = values + 0.0  # no minus zero
-    decimals = [DECIMALS_RAD if name.endswith("_rad") else DECIMALS for name in head[1:]]
+    decimals = decimals_of(head[1:])
     row = "%d" + "".join(f",%.{each}f" for each in decimals) + "\n"
     parts = [",".join(head) + "\n"]
     for a in range(0, len(line), CHUNK):

@@ -7,11 +7,8 @@ import numpy as np
 import pytest
 
 from camcomp.alike import classes, likeness, stand_ins
-from camcomp.bench import Bench
-from camcomp.campaign import open_campaign
-from camcomp.columns import atoms_of
 from camcomp.commands.diagnose import examine
-from camcomp.inquiry import open_inquiry
+from camcomp.planner import propose
 from tests.campaign.cases import EQUAL
 from tests.diagnosis.conftest import plan_of
 from tests.plants.more import add_run
@@ -28,20 +25,14 @@ def alternatives(result):
     return {frozenset(named(one)) for one in result["alternatives"]}
 
 
-def design_of(path):
-    campaign = open_campaign(path)
-    return likeness(open_inquiry(Bench(campaign.twin, campaign.runs), atoms_of(campaign.twin.actuators)))
-
-
 def groups(design):
     atoms = design.inquiry.columns.atoms
     return [{(atoms[i].name, atoms[i].target) for i in group} for group in classes(design)]
 
 
-def follow(workshop, plan, tmp_path):
-    """Does what the answer advises; the result after it."""
+def follow(workshop, plan, tmp_path, candidate):
+    """Does what a candidate says; the result after it."""
     path, made = workshop.made(plan)
-    candidate = workshop.answer(plan)[1].proposal.candidate
     folder = tmp_path / "again"
     shutil.copytree(path.parent, folder)
     without = ()
@@ -98,7 +89,7 @@ def test_a_late_tip_without_encoders_is_lag_or_clock_and_encoders_tell(workshop,
     assert alternatives(result) >= {frozenset({("servo_lag", None)}), frozenset({("time_sync", None)})}
     following = result["next_experiment"]
     assert "encoders" in following["action"] and set(following["separates"]) >= {"servo_lag", "time_sync"}
-    after = follow(workshop, LATE, tmp_path)
+    after = follow(workshop, LATE, tmp_path, workshop.answer(LATE)[1].proposal.candidate)
     assert after["verdict"] == "identified" and named(after["causes"]) == [("servo_lag", None)]
 
 
@@ -112,8 +103,11 @@ def test_a_long_tool_is_a_lifted_workpiece_until_somebody_measures_the_tool(work
     tool, frame = ("tool_length", None), ("workpiece_frame", None)
     assert tool in named(result["causes"])
     assert swapped(frozenset(named(result["causes"])), tool, frame) in alternatives(result)
-    assert "presetter" in result["next_experiment"]["action"]
-    after = follow(workshop, LONG, tmp_path)
+    inquiry, job = workshop.answer(LONG)[1].inquiry, workshop.answer(LONG)[2].job
+    pair = [inquiry.refit((i,)) for i, a in enumerate(inquiry.columns.atoms) if (a.name, a.target) in (tool, frame)]
+    candidate = propose(inquiry, pair, np.array([0.5, 0.5]), job).candidate
+    assert "presetter" in candidate.action
+    after = follow(workshop, LONG, tmp_path, candidate)
     assert not {tool, frame} & {*named(after["causes"]), *(m for one in alternatives(after) for m in one)}
 
 
@@ -125,6 +119,6 @@ def test_every_equal_pair_is_told_apart_by_following_the_advice(workshop, tmp_pa
     result = workshop.answer(plan)[0]
     assert result["verdict"] == "ambiguous"
     assert {frozenset({true}), frozenset({other})} <= alternatives(result)
-    after = follow(workshop, plan, tmp_path)
+    after = follow(workshop, plan, tmp_path, workshop.answer(plan)[1].proposal.candidate)
     taken_out = "--without " + true[0] in result["next_experiment"]["action"]
     assert after["verdict"] == "none" if taken_out else named(after["causes"]) == [true]

@@ -1,7 +1,8 @@
-"""Imports go one way: doors, stories, joints, engines, ground; what stands on one floor of engines or stories keeps apart.
+"""Imports go one way: doors, bulk, stories, joints, engines, ground; rooms on one floor of engines or stories keep apart.
 
 Ground: nouns and small tools. Engines: numerics and text, each in its folder. Joints: what several stories share to
-bring engines together. Stories: one verb each. Doors: terminal, disk, YAML, reports. Shelves: plug-ins, which use
+bring engines together. Stories: one verb each. Bulk: compensation of long programs, which falls back to the
+story. Doors: terminal, disk, YAML, reports. Shelves: plug-ins, which use
 engines and ground and which nobody imports by name; camcomp/shelf.py finds them.
 """
 
@@ -24,7 +25,8 @@ JOINTS = {
     "logcheck", "moves", "noise", "planner", "posture", "response", "reversals", "scan", "splitting", "survey", "twin",
 }  # fmt: skip
 STORIES = {"armstudy", "axisstudy", "compensate", "verify", "simulate", "diagnose", "stream"}
-FLOORS = (GROUND, ENGINES, JOINTS, STORIES)  # and the doors above
+BULK = {"bulk"}
+FLOORS = (GROUND, ENGINES, JOINTS, STORIES, BULK)  # and the doors above
 APART = (ENGINES, STORIES)  # rooms of these floors do not import each other
 
 

@@ -1,6 +1,6 @@
 """Causes into a machine file: comments stay, effects already there stay, what is unknown stays out."""
 
-from camcomp.writeback import with_causes
+from camcomp.writeback import machine_file, with_causes
 
 TEXT = """# a machine
 robot:
@@ -32,3 +32,26 @@ def test_what_is_written_reads_back():
 
     tree = YAML(typ="safe").load(with_causes(TEXT, CAUSES))
     assert tree["effects"] == [{"effect": "gravity", "weight_N": 20}, {"effect": "backlash", "target": "x", "width_mm": 0.012}]
+
+
+def test_the_file_whose_effects_count_gains_the_causes():
+    machine, override, effects = "robot:\n  name: m\n", "tool:\n  length_mm: 3\n", "effects:\n  - {effect: gravity, weight_N: 1}\n"
+    assert machine_file([machine, override]) == 0
+    assert machine_file([machine, effects, override]) == 1
+    assert machine_file([override]) == 0
+
+
+def test_a_relative_file_is_still_found_from_another_folder():
+    text = "process:\n  force: {model: table, file: ../forces/a.csv}   # measured\n"
+    out = with_causes(text, CAUSES, folder="/a/config", moved_to="/b")
+    assert "file: ../a/forces/a.csv" in out and "# measured" in out
+    assert "file: ../forces/a.csv" in with_causes(text, CAUSES, folder="/a/config", moved_to="/a/config")
+
+
+def test_nothing_found_changes_nothing():
+    assert with_causes(TEXT, CAUSES[1:]) == TEXT
+
+
+def test_a_note_stands_above_the_causes():
+    lines = with_causes(TEXT, CAUSES, note="found by someone").splitlines()
+    assert lines[lines.index("  # found by someone") + 1].strip() == "- effect: backlash"

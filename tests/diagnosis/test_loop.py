@@ -1,0 +1,61 @@
+"""The loop closes: diagnose, write the causes into the machine file, compensate with it, and the broken machine cuts true."""
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+from camcomp.commands.diagnose import _machine_with_causes
+from tests.campaign import runner
+from tests.diagnosis.conftest import plan_of
+from tests.diagnosis.test_where import SCREW
+from tests.plants.experiments import rerun
+from tests.plants.motion import Timeline, read
+
+PAIR = plan_of(("drive_stiffness", "y"), ("cutting_force", None), ratio=30.0, seed=42)
+
+
+def path_error(state, program):
+    """rms distance (mm) of the cut tips from the programmed path, its ends left out."""
+    line = Timeline(read(program))
+    dense = line.sample(np.linspace(0.0, line.log_end, 20_000))["tip"]
+    cut = state.tip[state.cuts]
+    return float(np.sqrt(np.mean(cKDTree(dense).query(cut[len(cut) // 50 : -len(cut) // 50])[0] ** 2)))
+
+
+@pytest.mark.parametrize("plan", [SCREW, PAIR], ids=["single", "pair"])
+def test_the_corrected_program_shrinks_the_error_as_predicted(workshop, tmp_path, plan):
+    path, made = workshop.made(plan)
+    result, better = workshop.answer(plan)[0], tmp_path / "better.yaml"
+    better.write_text(_machine_with_causes([str(path.parent / "machine.yaml")], result, str(better)))
+    assert "# found by camcomp diagnose" in better.read_text()
+    program = next(p for p, r in zip(made.programs, made.runs, strict=True) if r.cutting and "G3" in p)
+    (tmp_path / "in.nc").write_text(program)
+
+    def left(config):
+        out = tmp_path / "out.nc"
+        code, said = runner.invoke(["compensate", str(tmp_path / "in.nc"), "--config", str(config), "-o", str(out)])
+        assert code == 0, said
+        return path_error(rerun(made, out.read_text(), program), program)
+
+    before, after = left(runner.CONFIG), left(better)
+    assert before > 0.008
+    shrinkage = result["shrinkage"]
+    assert 1.0 - after / before > shrinkage["ratio"] - 0.05  # that ratio has the noise of the tracker in it
+    assert 1e3 * after < 1.5 * shrinkage["after_rms_um"]
+
+
+def test_the_option_writes_the_file_and_the_next_program(tmp_path):
+    sample = runner.ROOT / "samples" / "diagnosis" / "ambiguous" / "experiment.yaml"
+    config, program = tmp_path / "machine.yaml", tmp_path / "next.nc"
+    code, said = runner.invoke(["diagnose", str(sample), "--write-config", str(config), "--next-program", str(program)])
+    assert code == 0, said
+    text = config.read_text()
+    for line in runner.CONFIG.read_text().splitlines():
+        if "#" in line:
+            assert line.split("#", 1)[1] in text, line
+    assert "likeliest of 2 sets" in text and "- effect: servo_lag" in text
+    assert "(experiment proposed by camcomp)" in program.read_text()
+    code, said = runner.invoke(["validate", str(config)])
+    assert code == 0, said
+    code, said = runner.invoke(["simulate", str(program), "--config", str(config), "-o", str(tmp_path / "out.csv")])
+    assert code == 0, said

@@ -1,0 +1,104 @@
+"""An effect of a user's own, in one file, announced by an entry point: listed, fitted, and compensated like ours."""
+
+import json
+import sys
+from importlib.metadata import EntryPoint
+
+import numpy as np
+import pytest
+
+from camcomp import shelf
+from tests.campaign import runner
+from tests.plants import designs
+
+SOURCE = '''
+"""The spindle leans: the tip moves along machine x with the height at which it works."""
+
+import numpy as np
+
+from camcomp.gap.effect import Parameter
+
+STAGE = "tool"
+TARGET = "machine"
+SOURCE = "definition"
+PARAMETERS = (
+    Parameter("lean_mm_per_mm", "1", 0.0, -0.1, 0.1, 2e-3, 2e-6, "spindles are square to 0.1 to 5 mrad"),
+)
+
+
+def on_pose(tip, load, motion, p):
+    """Tip (n, 3), machine frame."""
+    lean = p["lean_mm_per_mm"]
+    return tip if lean == 0.0 else tip + lean * (tip[:, 2:3] + 173.0) * np.array([1.0, 0.0, 0.0])
+'''
+LEAN = 0.004
+
+
+@pytest.fixture
+def own(tmp_path, monkeypatch):
+    """The user's package is installed."""
+    (tmp_path / "leaning_spindle.py").write_text(SOURCE)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    points = [EntryPoint("leaning_spindle", "leaning_spindle", "camcomp.effects")]
+    theirs = shelf.entry_points
+
+    def entry_points(group, name=None):
+        mine = [each for each in points if each.group == group and name in (None, each.name)]
+        return [*mine, *(theirs(group=group) if name is None else theirs(group=group, name=name))]
+
+    monkeypatch.setattr(shelf, "entry_points", entry_points)
+    yield
+    sys.modules.pop("leaning_spindle", None)
+
+
+def slope(feed):
+    """A square whose corners lie at two heights."""
+    lines = ["G21 G90 G17 G54", "G0 X-20 Y-20 Z0"]
+    lines += [f"G1 X20 Z15 F{feed}", f"G1 Y20 Z0 F{feed}", f"G1 X-20 Z15 F{feed}", f"G1 Y-20 Z0 F{feed}", "M2"]
+    return "\n".join(lines) + "\n"
+
+
+def test_it_is_listed_fitted_and_compensated(own, tmp_path):
+    code, said = runner.invoke(["effects", "--json"])
+    assert code == 0
+    [mine] = [e for e in json.loads(said) if e["effect"] == "leaning_spindle"]
+    assert mine["stage"] == "tool" and mine["parameters"][0]["name"] == "lean_mm_per_mm"
+    # the machine that has it, with the tracker's noise
+    leaning = tmp_path / "leaning.yaml"
+    leaning.write_text(f"effects: [{{effect: leaning_spindle, lean_mm_per_mm: {LEAN}}}]\n")
+    runs = {"slope": slope(900), "fast": slope(2400), "circle": designs.circle(20.0, 900.0, True, plunge=False)}
+    rng = np.random.default_rng(3)
+    text = f"config: [{runner.CONFIG}]\nruns:\n"
+    for k, (name, program) in enumerate(runs.items()):
+        nc, log = tmp_path / f"{name}.nc", tmp_path / f"{name}.csv"
+        nc.write_text(program)
+        line = ["simulate", str(nc), "--config", str(runner.CONFIG), "--config", str(leaning), "--step-s", "0.06"]
+        code, said = runner.invoke([*line, "-o", str(log)])
+        assert code == 0, said
+        head, *rows = log.read_text().splitlines()
+        values = np.array([[float(v) for v in row.split(",")] for row in rows])
+        values[:, 2:5] += 0.0015 * rng.standard_normal((len(values), 3))
+        values[:, 8:11] += 0.0005 * rng.standard_normal((len(values), 3))
+        values[:, 11:17] += rng.standard_normal((len(values), 6))
+        log.write_text(head + "\n" + "\n".join(",".join(f"{v:.5f}" for v in row) for row in values) + "\n")
+        text += f"  - {{name: {name}, program: {name}.nc, log: {name}.csv, cutting: true, started_s: {100 * k}}}\n"
+    (tmp_path / "experiment.yaml").write_text(text)
+    out, better = tmp_path / "result.json", tmp_path / "better.yaml"
+    code, said = runner.invoke(
+        ["diagnose", str(tmp_path / "experiment.yaml"), "--json", str(out), "--write-config", str(better)]
+    )
+    assert code == 0, said
+    result = json.loads(out.read_text())
+    assert [(c["effect"], c["target"]) for c in result["causes"]] == [("leaning_spindle", None)]
+    assert result["causes"][0]["parameters"]["lean_mm_per_mm"]["value"] == pytest.approx(LEAN, rel=0.03)
+    # the program corrected with what was found is right on the machine that has it, and the plain one is not
+    corrected = tmp_path / "corrected.nc"
+    code, said = runner.invoke(["compensate", str(tmp_path / "slope.nc"), "--config", str(better), "-o", str(corrected)])
+    assert code == 0, said
+    truth = ["--config", str(runner.CONFIG), "--config", str(leaning)]
+    line = ["verify", str(corrected), "--against", str(tmp_path / "slope.nc"), *truth, "--tolerance-um", "5"]
+    code, said = runner.invoke(line)
+    assert code == 0, said
+    code, said = runner.invoke(["compensate", str(tmp_path / "slope.nc"), "--config", str(runner.CONFIG), "-o", str(corrected)])
+    assert code == 0, said
+    assert runner.invoke(line)[0] == 1
