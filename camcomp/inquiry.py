@@ -14,7 +14,7 @@ from camcomp.gap.evidence import Gram, Prior, estimate, gram
 from camcomp.gap.patterns import Dictionary
 from camcomp.gap.search import Atoms, Fitted, Members, Scale, total
 from camcomp.gap.whiten import Noise
-from camcomp.noise import Background, inflation, measure_noise
+from camcomp.noise import Background, first_noise, inflation, measure_noise
 from camcomp.scan import beside, best_shape, reach
 from camcomp.twin import Reading
 
@@ -251,13 +251,11 @@ def open_inquiry(bench: Bench, atoms: Sequence[Atom]) -> Inquiry:
     times = [thinned(run.course.time[:, None], run.thin)[:, 0] for run in bench.runs]
     residuals = [bench.residual(k) for k in range(len(bench.runs))]
     shapes: dict[int, dict[str, float]] = {i: shape_default(a) for i, a in enumerate(atoms) if a.shapes}
+    if shapes:
+        # shapes first: what has the wrong one would pass for noise
+        columns = _scan(_whiten(bench, columns, [], first_noise(extra, residuals), times, residuals, shapes))
     background = measure_noise(bench, columns, words, extra, times, residuals)
-    inquiry = _whiten(bench, columns, words, background, times, residuals, shapes)
-    if any(a.shapes for a in atoms):
-        columns = _scan(inquiry)
-        background = measure_noise(bench, columns, words, extra, times, residuals, background.noise)
-        inquiry = _whiten(bench, columns, words, background, times, residuals, inquiry.shapes)
-    return inquiry
+    return _whiten(bench, columns, words, background, times, residuals, shapes)
 
 
 def _whiten(bench: Bench, columns: Columns, words: list[Dictionary], background: Background, times: list[Floats],

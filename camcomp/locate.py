@@ -61,6 +61,9 @@ def run_gaps(inquiry: Inquiry) -> list[where.RunGap]:
     for k, run in enumerate(inquiry.bench.runs):
         gap = inquiry.bench.gap(k)[:, part]
         noise = inquiry.noise.sigma[k, part]
+        if part.start == 0:  # what no sensor makes belongs to the gap
+            found = inquiry.background.colour()
+            noise = np.where(found.excess > 0, np.minimum(noise, found.floor), noise)
         thin = float(np.mean([1.0 / effective_rows(inquiry.noise, c, 1) for c in range(part.start, part.stop)]))
         line = thinned(run.measured.line[:, None], run.thin)[:, 0]
         if part.start == 0:

@@ -14,6 +14,7 @@ from camcomp.gap.patterns import Dictionary
 from camcomp.gap.whiten import Noise, fit_noise
 
 PASSES = 3  # fits with patterns
+WORSE = 1.1  # growth from pass to pass that noise may have
 SURE = 4.0  # standard deviations by which a pattern has to exceed chance before it is more than noise
 TIMING_S = 0.0015  # how fast a real drive settles after its acceleration has stepped
 FAINT = 0.03  # um or N: what a pattern amounts to where nothing depends on it
@@ -61,9 +62,16 @@ def inflation(bench: Bench) -> list[Floats]:
     return out
 
 
+def first_noise(extra: Sequence[Floats], residuals: Sequence[Floats]) -> Background:
+    """White noise as rough as the residuals (n, c) per run: all there is to go by before anything is explained."""
+    rough = np.array([roughness(r) for r in residuals])
+    inflate = [np.sqrt(1.0 + (e / s) ** 2) for e, s in zip(extra, rough, strict=True)]
+    return Background(Noise(rough, np.zeros_like(rough), np.zeros_like(rough)), inflate, list(residuals))
+
+
 def measure_noise(
     bench: Bench, columns: Columns, dictionaries: Sequence[Dictionary], extra: Sequence[Floats], times: Sequence[Floats],
-    residuals: Sequence[Floats], start: Noise | None = None,
+    residuals: Sequence[Floats],
 ) -> Background:  # fmt: skip
     """Noise beside everything that could be there: all effects and nuisances softly, patterns as far as they are real.
 
@@ -79,16 +87,16 @@ def measure_noise(
     sizes = [np.full(len(words.labels), FAINT) for words in dictionaries]
     kinds = [slice(words.first, words.first + words.blocks[0].shape[1]) for words in dictionaries]
     ordered = [run.course.ordered for run in bench.runs]
-    rough = np.array([roughness(residuals[r]) for r in runs])
-    noise = start or Noise(rough, np.zeros_like(rough), np.zeros_like(rough))
+    noise = first_noise(extra, residuals).noise
+    rough = noise.sigma
     inflate: list[Floats] = []
     left: list[Floats] = []
-    learn = 0 if start else 1  # patterns are judged against noise whose colour is known
+    learn = 1  # patterns are judged against noise whose colour is known
     for step in range(learn + PASSES):
-        if step == learn:  # of what is smoother than any sensor's noise, patterns have the first claim
-            noise = replace(noise, sigma=np.fmin(noise.sigma, SMOOTH * rough))
-        inflate = [np.sqrt(1.0 + (extra[r] / noise.sigma[r]) ** 2) for r in runs]
-        grams = [_joint(noise, words, both, inflate, times) for words in dictionaries]
+        # of what is smoother than any sensor's noise, patterns have the first claim
+        judged = replace(noise, sigma=np.fmin(noise.sigma, SMOOTH * rough)) if step == learn else noise
+        inflate = [np.sqrt(1.0 + (extra[r] / judged.sigma[r]) ** 2) for r in runs]
+        grams = [_joint(judged, words, both, inflate, times) for words in dictionaries]
         fit = _solve(grams, k, free, sizes)
         left = []
         for r in runs:
@@ -97,8 +105,10 @@ def measure_noise(
                 part = slice(words.first, words.first + words.blocks[r].shape[1])
                 gap[:, part] -= words.blocks[r] @ a
             left.append(np.where(np.isfinite(residuals[r]), gap, np.nan))
-        noise = fit_noise(left, inflate, list(times), ordered, kinds)
+        before, noise = noise, fit_noise(left, inflate, list(times), ordered, kinds)
         noise = replace(noise, sigma=noise.sigma * _spent(fit, dictionaries, residuals))
+        if step > 0:
+            noise = _not_worse(noise, before)
         # with one run nothing has happened twice, and smooth is all that anything can be called
         if learn <= step < learn + PASSES - 1 and len(bench.runs) > 1:
             sizes = [
@@ -175,6 +185,12 @@ def _learnt(
             square = float(np.sum(amplitude[mine] ** 2)) / max(told, 1e-9)
         out[mine] = max(np.sqrt(square), FAINT)
     return out
+
+
+def _not_worse(noise: Noise, before: Noise) -> Noise:
+    """The noise, and the one before it where that is less: slow noise would take a lasting force for itself, pass by pass."""
+    worse = noise.sigma > WORSE * before.sigma
+    return Noise(*(np.where(worse, getattr(before, n), getattr(noise, n)) for n in ("sigma", "slow", "memory")))
 
 
 def _spent(fit: _Fit, dictionaries: Sequence[Dictionary], residuals: Sequence[Floats]) -> Floats:

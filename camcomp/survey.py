@@ -24,6 +24,7 @@ RUNS = 6  # runs that this holds for
 UNKNOWN_SHARE = 0.12  # share of what is explained that a leftover has to exceed: no cause is modelled perfectly
 NUISANCE_RMS = 0.25  # size of a cause, in units of the noise of the channel that shows it best, below which it is none
 ROUGHLY = 0.05  # share of an unknown effect's evidence that a known cause has to add beside it
+MOSTLY = 0.3  # size of a leftover, in units of what the causes explain, below which the causes are not questioned
 MINOR = 0.25  # size of a known cause, in units of an unknown one, below which it is not named beside it
 UNKNOWN_COLOUR = 0.8  # size of what a sensor cannot have made, in units of what it can
 WORSE = 2.0  # log density by which a cause has to harm the prediction of other runs before it goes
@@ -90,7 +91,7 @@ def survey(inquiry: Inquiry) -> Survey:
     # noise that is none stays whatever the causes are
     coloured = colour_left(inquiry, left)
     if coloured is not None or strangest(inquiry, best, left) is not None:
-        members = _known_part(inquiry, best)
+        members = best.members if coloured is None and _mostly(inquiry, best, left) else _known_part(inquiry, best)
         # beside something large and unknown, something small and known is most likely a part of it
         large = 1.0 if coloured is not None else max(each.rms for each in left.values())
         members = tuple(i for i in members if max(signal_rms(inquiry, best, (i,)).values()) > MINOR * large)
@@ -158,6 +159,12 @@ def strangest(inquiry: Inquiry, f: Fitted, left: Mapping[str, Leftover]) -> str 
         if each.log10_chance < UNKNOWN_LOG10 and each.rms > max(least, UNKNOWN_SHARE * explained[kind])
     }
     return max(found, key=lambda kind: found[kind]) if found else None
+
+
+def _mostly(inquiry: Inquiry, f: Fitted, left: Mapping[str, Leftover]) -> bool:
+    """Whether a set explains so much of every kind of channel that what is left is a flaw of it, not something in its place."""
+    explained = signal_rms(inquiry, f)
+    return all(each.rms < MOSTLY * explained[kind] or each.rms < UNKNOWN_RMS for kind, each in left.items())
 
 
 def _known_part(inquiry: Inquiry, best: Fitted) -> Members:
