@@ -20,10 +20,12 @@ from camcomp.gcode.stamp import is_stamped
 from camcomp.job import Job
 from camcomp.moves import WITHIN_RAPID, Layout, corrected_pieces, refuse_unsolved, row_layout, travel_of
 from camcomp.response import aim_at, respond
+from camcomp.splitting import trial_nodes
 
 PER_SECTION = 4  # points looked at within each straight move or section of an arc
 ARC_STEP = 0.1  # rad, section of an arc
 MATCH_PASSES = 20  # tip and force settle on a place of the path; on a circle of 1 mm it takes ten
+LARGEST_STEP = 0.05  # of a piece, in one pass
 NEAR_MM = 5.0  # a matched end may be this far from where it is expected
 
 
@@ -74,7 +76,8 @@ def verify(corrected: Program, original: Program, job: Job) -> Verified:
     begin, expected = (_expected(original, job, track, corrected_ones, w) for w in (0.0, 1.0))
     step = np.linalg.norm(begin - np.concatenate((begin[:1], expected[:-1])), axis=1)
     layout = row_layout(original.path, track, step, job.config.control.resolution_mm)
-    first, last, joins = _match(corrected, track, expected, layout, is_stamped(corrected.data))
+    reach = _reach(original, job, track, corrected_ones)
+    first, last, joins = _match(corrected, track, expected, reach, layout, is_stamped(corrected.data))
     moving = np.flatnonzero(layout.corrected & (track.length > 0.0))
     piece, move, f = _samples(corrected.path, moving, first[moving], last[moving])
     commanded = pathgeometry.points(corrected.path, move, f)
@@ -112,7 +115,21 @@ def _expected(program: Program, job: Job, track: Track, corrected: Bools, w: flo
     return out
 
 
-def _match(corrected: Program, track: Track, expected: Floats, layout: Layout, stamped: bool) -> tuple[Ints, Ints, int]:
+def _reach(program: Program, job: Job, track: Track, corrected: Bools) -> Floats:
+    """Length (p,) mm of the commanded path of every piece; where the correction is large, a small arc grows or shrinks."""
+    angle = np.where(program.path.kind == ARC, np.abs(program.path.angle), 0.0)[track.motion] * (track.u1 - track.u0)
+    nodes = trial_nodes(track.length, angle, corrected & (angle > 0.0))
+    points = track.points(nodes.piece, nodes.w)
+    on = corrected[nodes.piece]
+    points[on] = aim_at(job, points[on], travel_of(job, track, nodes.piece[on], nodes.w[on]), "newton").commanded
+    step = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    inside = np.diff(nodes.piece) == 0
+    return np.bincount(nodes.piece[1:][inside], step[inside], len(corrected))
+
+
+def _match(
+    corrected: Program, track: Track, expected: Floats, reach: Floats, layout: Layout, stamped: bool
+) -> tuple[Ints, Ints, int]:
     """Moves [first, last) of the corrected program that belong to every piece, and the number of joining lines."""
     end = corrected.path.end
     step = pathgeometry.lengths(corrected.path)
@@ -125,13 +142,13 @@ def _match(corrected: Program, track: Track, expected: Floats, layout: Layout, s
         left = n - i - 1
         stop, walked = at, 0.0
         best, found = np.inf, -1
-        limit = 1.3 * track.length[i] + NEAR_MM
+        limit = 1.3 * max(track.length[i], reach[i]) + NEAR_MM
         while stop < moves - left:
             walked += step[stop]
             if walked > limit and stop > at:
                 break
             off = float(np.linalg.norm(end[stop] - expected[i]))
-            score = off + 0.1 * abs(walked - track.length[i])
+            score = off + 0.1 * min(abs(walked - track.length[i]), abs(walked - reach[i]))
             if score < best - 1e-9:
                 best, found = score, stop
             stop += 1
@@ -161,15 +178,23 @@ def _fraction(path: Path, piece: Ints, move: Ints, f: Floats) -> Floats:
 
 def _residual(job: Job, track: Track, piece: Ints, commanded: Floats, w: Floats) -> tuple[Floats, Floats]:
     """Distance (k,) mm of the loaded tip from the programmed path, and the fraction of the nearest point."""
+    last_w, last_along = w, np.full(len(w), np.nan)
+    nearest, best = np.full(len(w), np.inf), w
     for _ in range(MATCH_PASSES):
         tip, _ = respond(job, commanded, travel_of(job, track, piece, w))
         gap = tip - track.points(piece, w)
+        size = np.linalg.norm(gap, axis=1)
+        best, nearest = np.where(size < nearest, w, best), np.fmin(size, nearest)
         along = np.sum(gap * pathgeometry.tangents(track.path, track.motion[piece], track.u(piece, w)), axis=1)
-        better = np.clip(w + along / track.length[piece], 0.0, 1.0)
+        # With the place the force turns, and the tip with the force; on small arcs further than the place, so by secant.
+        change = along - last_along
+        slope = np.divide(w - last_w, -change, out=1.0 / track.length[piece], where=np.abs(change) > 1e-12)
+        step = np.clip(along * slope, -LARGEST_STEP, LARGEST_STEP)
+        better = np.clip(w + step, 0.0, 1.0)
         if np.abs((better - w) * track.length[piece]).max(initial=0.0) < 1e-7:
             break
-        w = better
-    return np.linalg.norm(gap, axis=1), w
+        last_w, last_along, w = w, along, better
+    return nearest, best
 
 
 def _convergence(job: Job, track: Track, piece: Ints, w: Floats) -> Floats:

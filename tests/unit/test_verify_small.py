@@ -1,0 +1,37 @@
+"""verify finds its way on arcs that are smaller than their correction."""
+
+import numpy as np
+import pytest
+
+from camcomp.compensate import compensate
+from camcomp.config import load_config
+from camcomp.files import shipped
+from camcomp.gcode.interpret import read_program
+from camcomp.job import Job
+from camcomp.verify import verify
+
+SMALL = (
+    "G21 G90 G17 G94\nG0 X10 Y0 Z0\nG1 X11 F300\nG2 X11.02 Y0 I0.01 J0\nG2 X11.3 Y0.2 R0.3\nG2 X11.3 Y0.2 I0.3\nG3 X11.3 Y0.2 I0.05 P2\n"
+    "G1 X20 F500\nM2\n"
+)
+
+
+@pytest.mark.parametrize("config", ["config/cartesian.yaml", "config/orthoglide-1deg.yaml"])
+def test_small_arcs_are_matched_and_judged(config):
+    job = Job(load_config((str(shipped(config)),)))
+    program = read_program(SMALL.encode(), name="in.nc")
+    result = compensate(program, job, method="newton", tolerance_um=1.0, version="0")
+    after = read_program(result.written.data, name="out.nc")
+    checked = verify(after, program, job)
+    assert 1e3 * np.linalg.norm(result.after, axis=1).max() <= 1.0
+    assert 1e3 * checked.residual.max() <= 1.0
+    counts = {each.line: each.moves for each in checked.lines}
+    rows = result.rows
+    for line, moves in counts.items():
+        assert moves == ((program.path.line[rows.motion] == line) & ~rows.joining).sum()
+
+
+def test_what_was_not_corrected_is_seen():
+    job = Job(load_config((str(shipped("config/orthoglide-1deg.yaml")),)))
+    program = read_program(SMALL.encode(), name="in.nc")
+    assert 1e3 * verify(program, program, job).residual.max() > 300.0
