@@ -143,7 +143,7 @@ def compensate(
             tolerance[gone] = budget
             nodes, shift = bend.divided(trial, tolerance)
         commanded, circles = _bent(program, job, track, nodes, shift, corrected, method, bend)
-        rows = _rows(program, job, track, nodes, commanded, kept, circles)
+        rows = _rows(program, job, track, nodes, commanded, kept, circles, begins=context[0] == 0)
         written = rewrite(program, _output(path, rows), resolution_mm=resolution, version=version)
         points = _points(job, track, rows, feeding)
         after = _see(job, points, written.end, replace(rows.arcs, centre=written.centre))
@@ -221,14 +221,15 @@ def _kept(track: Track, nodes: Nodes, commanded: Floats, half: float) -> Bools:
 
 
 def _rows(
-    program: Program, job: Job, track: Track, nodes: Nodes, commanded: Floats, kept: Bools, circles: Arcs
+    program: Program, job: Job, track: Track, nodes: Nodes, commanded: Floats, kept: Bools, circles: Arcs, *, begins: bool
 ) -> Rows:
     """End points of the corrected program: the nodes but the first of each piece, and joining lines at jumps."""
     path = program.path
     k = np.arange(len(nodes.w)) - nodes.first[nodes.piece]
     kind = path.kind[track.motion]
     start, stop = commanded[nodes.first[:-1]], commanded[nodes.first[1:] - 1]
-    step = np.linalg.norm(start - np.concatenate((start[:1], stop[:-1])), axis=1)
+    before = path.start[:1] if begins else start[:1]
+    step = np.linalg.norm(start - np.concatenate((before, stop[:-1])), axis=1)
     layout = row_layout(path, track, step, job.config.control.resolution_mm)
     corrected, leading, trailing = layout.corrected, layout.leading, layout.trailing
     keep = (k > 0) | leading[nodes.piece]
@@ -262,7 +263,7 @@ def _rows(
 def _feeds(program: Program, track: Track, rows: Rows) -> Floats:
     """Feed of every row so that the tip keeps its programmed speed: scaled by commanded over programmed length."""
     feed = program.path.feed[rows.motion]
-    start = np.concatenate((rows.end[:1], rows.end[:-1]))
+    start = np.concatenate((program.path.start[:1], rows.end[:-1]))
     same = np.concatenate(([False], (rows.piece[1:] == rows.piece[:-1])))
     w0 = np.where(same, np.concatenate(([0.0], rows.w[:-1])), 0.0)
     programmed = (rows.w - w0) * track.length[rows.piece]

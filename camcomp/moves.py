@@ -37,14 +37,14 @@ def row_layout(path: Path, track: Track, step: Floats, resolution: float) -> Lay
 
     step (p,) mm: how far the commanded tip jumps at the start of each piece; a jump below the resolution needs no line. A
     joining line stands in front of the piece behind the jump; in front of a rapid or an uncorrected move it stands
-    behind the cut instead, because only feed lines can join. A move in machine coordinates ends uncorrected, so the feed
-    line behind it needs one too.
+    behind the cut instead, because only feed lines can join. The program starts uncorrected, and a move in machine
+    coordinates ends so; the feed line behind them needs one too.
     """
     corrected = corrected_pieces(path, track)
     feed = corrected & (path.kind[track.motion] != RAPID)
     wanted = track.jump & np.concatenate(([False], corrected[:-1])) & (step > resolution)
-    behind_machine_move = np.concatenate(([False], path.machine[track.motion][:-1])) & (step > resolution)
-    leading = (wanted | behind_machine_move) & feed
+    behind_uncorrected = np.concatenate(([True], ~corrected[:-1])) & (step > resolution)
+    leading = (wanted | behind_uncorrected) & feed
     trailing = np.concatenate((wanted[1:] & ~leading[1:], [False])) & feed
     return Layout(corrected, leading, trailing)
 

@@ -74,7 +74,7 @@ def verify(corrected: Program, original: Program, job: Job) -> Verified:
     track = lay_track(original.path, job.conditions)
     corrected_ones = corrected_pieces(original.path, track)
     begin, expected = (_expected(original, job, track, corrected_ones, w) for w in (0.0, 1.0))
-    step = np.linalg.norm(begin - np.concatenate((begin[:1], expected[:-1])), axis=1)
+    step = np.linalg.norm(begin - np.concatenate((original.path.start[:1], expected[:-1])), axis=1)
     layout = row_layout(original.path, track, step, job.config.control.resolution_mm)
     reach = _reach(original, job, track, corrected_ones)
     first, last, joins = _match(corrected, track, expected, reach, layout, is_stamped(corrected.data))
@@ -124,7 +124,7 @@ def _reach(program: Program, job: Job, track: Track, corrected: Bools) -> Floats
     points[on] = aim_at(job, points[on], travel_of(job, track, nodes.piece[on], nodes.w[on]), "newton").commanded
     step = np.linalg.norm(np.diff(points, axis=0), axis=1)
     inside = np.diff(nodes.piece) == 0
-    return np.bincount(nodes.piece[1:][inside], step[inside], len(corrected))
+    return np.bincount(nodes.piece[1:][inside], step[inside], len(corrected)).astype(np.float64)
 
 
 def _match(

@@ -1,0 +1,35 @@
+"""Programs whose first motion cuts: the machine stands uncorrected at its start."""
+
+import numpy as np
+import pytest
+
+from camcomp.compensate import compensate
+from camcomp.config import load_config
+from camcomp.files import shipped
+from camcomp.gcode.interpret import read_program
+from camcomp.job import Job
+from camcomp.verify import verify
+
+TEXT = "G21 G90\nG1 X10 Y10 Z0 F100\nX20 Y12\nG0 Z5\nM2\n"
+
+
+def job_of(*configs):
+    return Job(load_config(tuple(str(shipped(each)) for each in configs)))
+
+
+def test_without_a_force_nothing_changes():
+    program = read_program(TEXT.encode(), name="in.nc")
+    job = job_of("config/cartesian.yaml", "config/no-force.yaml")
+    result = compensate(program, job, method="newton", tolerance_um=1.0, version="0")
+    assert result.written.data.split(b"\n", 1)[1] == TEXT.encode()
+
+
+@pytest.mark.parametrize("config", ["config/cartesian.yaml", "config/orthoglide-1deg.yaml"])
+def test_the_first_cut_is_led_onto_its_corrected_path(config):
+    program, job = read_program(TEXT.encode(), name="in.nc"), job_of(config)
+    result = compensate(program, job, method="newton", tolerance_um=1.0, version="0")
+    assert result.rows.joining[0] and not result.rows.joining[1]
+    assert 1e3 * np.linalg.norm(result.after, axis=1).max() <= 1.0
+    after = read_program(result.written.data, name="out.nc")
+    assert 1e3 * verify(after, program, job).residual.max() <= 1.0
+    assert after.path.feed[1] == pytest.approx(100.0, rel=0.02)
