@@ -15,6 +15,7 @@ from camcomp.gap.observation import Measured, stack
 from camcomp.twin import Reading, Slopes, Solved, Twin
 
 _SHARE_OF_SCALE = 0.05  # step of a difference
+_KEPT = 12  # changed machines whose structures are kept per run
 
 
 @dataclass(frozen=True)
@@ -73,6 +74,7 @@ class Bench:
     slopes: list[Slopes] = field(default_factory=list)
     nominal: list[Reading] = field(default_factory=list)
     _row_slopes: dict[int, Floats] = field(default_factory=dict)
+    _changed: dict[tuple, Solved] = field(default_factory=dict)  # structures of changed machines, by run and change
 
     def __post_init__(self) -> None:
         for run in self.runs:
@@ -94,9 +96,20 @@ class Bench:
     def read(self, k: int, causes: Sequence[Cause]) -> Reading:
         """Readings of run k with causes on top of the config."""
         run = self.runs[k]
-        return self.twin.sense(
-            run.course, causes, solved=self.solved[k], slopes=self.slopes[k], measured=self._encoders(run)
-        )[0]
+        return self._sense(k, causes, self._encoders(run))
+
+    def _sense(self, k: int, causes: Sequence[Cause], encoders: Floats | None) -> Reading:
+        """Readings of run k; the structure of a machine that was asked for lately is not solved again."""
+        key = (k, self.twin.edited((*self.twin.causes, *causes))[1])
+        solved = self._changed.get(key, self.solved[k])
+        reading, used = self.twin.sense(
+            self.runs[k].course, causes, solved=solved, slopes=self.slopes[k], measured=encoders
+        )
+        if used is not self.solved[k]:
+            if len(self._changed) >= _KEPT * len(self.runs):
+                self._changed.pop(next(iter(self._changed)))
+            self._changed[key] = used
+        return reading
 
     def row_slopes(self, k: int) -> Floats:
         """Derivative (n, 3, m) of the tip in the program frame by the carriages, at every row of run k."""
@@ -117,12 +130,15 @@ class Bench:
 
     def residual(self, k: int, causes: Sequence[Cause] = ()) -> Floats:
         """Measured minus model (n, c) in run k, thinned."""
-        reading = self.read(k, causes) if causes else self.nominal[k]
+        return self.difference(k, self.read(k, causes) if causes else self.nominal[k])
+
+    def difference(self, k: int, reading: Reading) -> Floats:
+        """Measured minus a reading (n, c) of run k, thinned."""
         return thinned(self.observed(k) - self.channels(reading), self.runs[k].thin)
 
     def gap(self, k: int, causes: Sequence[Cause] = ()) -> Floats:
         """Measured minus model (n, c) in run k, thinned, with the model's own encoders: the gap as a user sees it."""
-        reading, _ = self.twin.sense(self.runs[k].course, causes, solved=self.solved[k], slopes=self.slopes[k])
+        reading = self._sense(k, causes, None)
         return thinned(self.observed(k) - self.channels(reading), self.runs[k].thin)
 
 

@@ -26,6 +26,7 @@ from camcomp.spec import Experiment
 from camcomp.spec import Run as RunSpec
 from camcomp.twin import Twin, twin_of
 
+STEADY_S = 15.0  # half the width of a temperature's local straight line
 MOST_ROWS = 3000  # rows of a run beyond which neighbours are averaged
 
 
@@ -70,7 +71,7 @@ def open_run(spec: RunSpec, job: Job, twin: Twin, notes: list[str]) -> Run:
     fit = fit_to_log(timeline, measured.time, measured.line)
     check_program(log, spec.name, measured, fit.rows)
     track = lay_track(program.path, conditions)
-    temperature = _filled(measured.time, measured.temperature)
+    temperature = steadied(measured.time, measured.temperature)
     course: Course = course_of_program(
         spec.name, fit.timeline, track, measured.time, started=spec.started_s, to_machine=twin.to_machine,
         vectors=job.frame.vectors, inverse=twin.inverse,
@@ -84,9 +85,25 @@ def open_run(spec: RunSpec, job: Job, twin: Twin, notes: list[str]) -> Run:
     return Run(spec.name, course, measured, spec.clamping, spec.clock, thin)
 
 
-def _filled(time: Floats, values: Floats) -> Floats | None:
+def steadied(time: Floats, values: Floats) -> Floats | None:
+    """Temperatures (n,) without the noise of their sensor, which a growth would turn into motion: local straight lines.
+
+    Machines warm in minutes, so half a minute (and no more than a quarter of the run) is straight.
+    """
     known = np.isfinite(values)
-    return np.interp(time, time[known], values[known]) if known.any() else None
+    if not known.any():
+        return None
+    every = np.interp(time, time[known], values[known])
+    n = len(time)
+    step = float(np.median(np.diff(time))) if n > 1 else 0.0
+    reach = int(min(STEADY_S / step if step > 0 else 0.0, n / 8))
+    if reach < 2:
+        return every
+    near = np.arange(-reach, reach + 1)
+    weight = 1.0 - (near / (reach + 1.0)) ** 2
+    sums = [np.convolve(np.ones(n), (weight * near**k)[::-1], "same") for k in range(3)]
+    first, second = (np.convolve(every, (weight * near**k)[::-1], "same") for k in range(2))
+    return np.asarray((sums[2] * first - sums[1] * second) / (sums[2] * sums[0] - sums[1] ** 2), float)
 
 
 def unread(path: str, twin: Twin) -> list[str]:

@@ -19,7 +19,7 @@ from camcomp.gap.observation import channel_names
 from camcomp.gap.patterns import Dictionary, Ground, dictionary
 from camcomp.statics.description import Link, Parallelogram, Robot
 
-RUN_OFFSET_MM = 0.0008  # repeatability of a run
+RUN_OFFSET_MM = 0.001  # repeatability of a run
 RUN_OFFSET_N = 0.3
 CLOCK_JITTER_S = 1e-5
 CLOCK_RATE = 1e-5
@@ -131,7 +131,7 @@ def _nuisances(bench: Bench) -> list[tuple[str, float, list[Floats], bool]]:
             one = zero[r].copy()
             one[:, c] = 1.0
             size = RUN_OFFSET_MM if c < 3 else RUN_OFFSET_N
-            found.append((f"offset.{run.name}.{channel_names(bench.actuators)[c]}", size, only(r, one), True))
+            found.append((f"offset.{run.name}.{channel_names(bench.actuators)[c]}", size, only(r, one), c >= 3))
     clock = Atom("time_sync", None, shelf.load("effects", "time_sync"))
     frame = Atom("workpiece_frame", None, shelf.load("effects", "workpiece_frame"))
     if any(run.measured.has("tip") for run in bench.runs):
@@ -169,9 +169,9 @@ def _allowances(bench: Bench) -> list[tuple[str, float, list[Floats], bool]]:
             edits.append((f"bars.{chain.name}", partial(_stiffer_bars, chain=chain.name)))
     if len(edits) <= 12:
         for label, edit in edits:
-            found.append((f"spring.{label}", SPRING_LOG, _difference(bench, _Edit(edit), _EDIT), True))
+            found.append((f"spring.{label}", SPRING_LOG, _difference(bench, f"spring.{label}", _Edit(edit), _EDIT), True))
     if any(np.abs(run.course.node_force).max(initial=0.0) > 0 for run in bench.runs):
-        found.append(("force.direction", FORCE_TURN_RAD, _difference(bench, _Turn(), _EDIT), True))
+        found.append(("force.direction", FORCE_TURN_RAD, _difference(bench, "force.direction", _Turn(), _EDIT), True))
     return found
 
 
@@ -207,8 +207,8 @@ class _Turn:
         return Load(load.force @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]), load.wrench)
 
 
-def _difference(bench: Bench, effect: object, step: float) -> list[Floats]:
-    cause = Cause(type(effect).__name__ + str(id(effect)), effect, None, {})
+def _difference(bench: Bench, name: str, effect: object, step: float) -> list[Floats]:
+    cause = Cause(name, effect, None, {})  # the name tells one changed machine from another
     out = []
     for k, run in enumerate(bench.runs):
         change = bench.channels(bench.read(k, [cause])) - bench.channels(bench.nominal[k])

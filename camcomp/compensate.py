@@ -19,14 +19,13 @@ from camcomp.gcode.rewrite import Output, Rewritten, rewrite
 from camcomp.job import Job
 from camcomp.moves import WITHIN_RAPID, corrected_pieces, refuse_unsolved, row_layout, travel_of
 from camcomp.posture import check_posture, whole_pose
-from camcomp.response import Travel, aim_at, respond, winds_up
+from camcomp.response import Travel, aim_at, respond
 from camcomp.reversals import cut_at_reversals
 from camcomp.splitting import Nodes, second_derivative, trial_nodes
 from camcomp.statics.target import Correction, settle
 
-MAX_ROUNDS, EFFECT_ROUNDS, ARC_ROUNDS = 6, 2, 4  # finer lines do not help against the play of a drive
+MAX_ROUNDS, ARC_ROUNDS = 6, 4
 STUCK = 0.95  # of the miss is left by a finer division that is no use, as where an arc passes the vertical
-TURN_LINES = 2  # lines on either side of a reversal in which a drive takes up its play
 COARSE_MM, FINE_MM = 8.0, 0.5  # distance of trial points on straight lines, without and with effects
 
 
@@ -137,7 +136,7 @@ def compensate(
     bend = Bend.of(track, trial, aimed.commanded, second, tolerance, able)
     tolerance[bend.use] = max(budget - np.sqrt(0.5) * resolution, 0.1 * budget)  # the centre is rounded, too
     last = np.full(len(tolerance), np.inf)
-    for round_ in range(EFFECT_ROUNDS if job.causes else MAX_ROUNDS):
+    for round_ in range(MAX_ROUNDS):
         nodes, shift = bend.divided(trial, tolerance)
         if (gone := bend.pointless(nodes)).any():
             bend.use &= ~gone
@@ -148,8 +147,6 @@ def compensate(
         written = rewrite(program, _output(path, rows), resolution_mm=resolution, version=version)
         points = _points(job, track, rows, feeding)
         after = _see(job, points, written.end, replace(rows.arcs, centre=written.centre))
-        winding = _winds_up(job, points, after.state.rho)
-        points = replace(points, judged=points.judged & ~winding)
         worst = np.zeros(len(tolerance))
         np.maximum.at(worst, points.piece[points.judged], np.linalg.norm(after.error[points.judged], axis=1))
         missed = (worst > 1e-3 * tolerance_um) & ~kept
@@ -163,7 +160,7 @@ def compensate(
         tolerance[straighten] = budget
         tolerance = np.where(missed, tolerance * np.clip(0.9e-3 * tolerance_um / np.maximum(worst, 1e-12), 0.3, 0.9), tolerance)
     before = _see_original(job, points)
-    warnings = _warnings(rows, after.error, winding)
+    warnings = _warnings(rows)
     iterations = int(aimed.iterations.max(initial=0))
     return _assemble(program, job, track, rows, written, points, before, after, iterations, method, warnings)
 
@@ -370,35 +367,9 @@ def _see_original(job: Job, points: _Points) -> _Seen:
     return _Seen(tip - points.target, tip[points.end], Correction(**at))
 
 
-def _winds_up(job: Job, points: _Points, rho: Floats) -> Bools:
-    """Points (k,) of lines in which an actuator turns round and its drive winds up against friction."""
-    if not job.causes:
-        return np.zeros(len(points.row), np.bool_)
-    memory = winds_up(job, rho, points.travel.take(points.end))
-    way: Floats = np.sign(np.diff(rho, axis=0, prepend=rho[:1]))[:, memory]
-    for k in range(1, len(way)):  # standing still keeps the direction
-        way[k] = np.where(way[k] == 0.0, way[k - 1], way[k])
-    turns: Bools = np.zeros(len(way), np.bool_)
-    turns[1:] = (way[1:] * way[:-1] < 0.0).any(axis=1)
-    near = turns.copy()
-    for shift in range(1, TURN_LINES + 1):
-        near[shift:] |= turns[:-shift]
-        near[:-shift] |= turns[shift:]
-    return near[points.row]
-
-
-def _warnings(rows: Rows, error: Floats, winding: Bools) -> list[str]:
-    out = []
+def _warnings(rows: Rows) -> list[str]:
     joins = int(rows.joining.sum())
-    if joins:
-        out.append(f"{joins} joining lines where the cutting force jumps; they are not part of before and after")
-    if winding.any():
-        most = 1e3 * float(np.nanmax(np.linalg.norm(error[winding], axis=1)))
-        out.append(
-            f"{int(winding.sum())} points lie in lines in which a drive turns round and winds up; up to "
-            f"{most:.2f} um are left there, and they are not part of before and after"
-        )
-    return out
+    return [f"{joins} joining lines where the cutting force jumps; they are not part of before and after"] if joins else []
 
 
 def _assemble(

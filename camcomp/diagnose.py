@@ -20,6 +20,7 @@ from camcomp.gap.evidence import estimate
 from camcomp.gap.search import Fitted, total
 from camcomp.heldout import shrinkage_of
 from camcomp.inquiry import Inquiry, open_inquiry
+from camcomp.intervals import joint_covariance
 from camcomp.job import Job
 from camcomp.locate import channel_axes, gap_of, main_channels, patterns_of, run_gaps
 from camcomp.planner import Proposal, propose
@@ -105,6 +106,7 @@ def _causes(inquiry: Inquiry, found: Survey) -> list[dict[str, Any]]:
     whole = sum(energy) + left
     out: list[dict[str, Any]] = []
     causes = inquiry.causes(best.members, best.theta, best.extra)
+    covariance = joint_covariance(inquiry, best) if best.members else np.zeros((0, 0))
     for j, i in enumerate(best.members):
         atom = inquiry.columns.atoms[i]
         out.append({
@@ -112,7 +114,7 @@ def _causes(inquiry: Inquiry, found: Survey) -> list[dict[str, Any]]:
             "target": atom.target,
             "probability": round(min(found.verdict.inclusion.get(i, 0.0), 1.0), 4),
             "share": round(energy[j] / whole, 4) if whole > 0 else 0.0,
-            "parameters": _parameters(inquiry, best, j, causes[j]),
+            "parameters": _parameters(inquiry, best, covariance, j, causes[j]),
         })  # fmt: skip
     out.sort(key=lambda c: (-c["probability"], -c["share"]))
     if found.strange:
@@ -125,19 +127,37 @@ def _causes(inquiry: Inquiry, found: Survey) -> list[dict[str, Any]]:
     return out
 
 
-def _parameters(inquiry: Inquiry, f: Fitted, j: int, cause: Cause) -> dict[str, Any]:
-    """Values with 95 % intervals; intervals of derived values by evaluating them at draws of the fit."""
-    rng = np.random.default_rng(0)
-    root = np.linalg.cholesky(f.covariance + 1e-18 * np.eye(len(f.theta)))
-    draws = f.theta + rng.standard_normal((400, len(f.theta))) @ root.T
-    samples = [inquiry.causes(f.members, d, f.extra)[j].values for d in draws]
-    out = {}
+def _parameters(inquiry: Inquiry, f: Fitted, covariance: Floats, j: int, cause: Cause) -> dict[str, Any]:
+    """Values with 95 % intervals; those of derived values follow the slopes of what they are derived from."""
     idle = _idle_shapes(inquiry, cause)
+    kinds = {p.name: p for p in cause.effect.PARAMETERS}
+    d = len(f.theta)
+    shapes = inquiry.shapes_of(f.members)
+
+    def at(step: Floats) -> dict[str, float]:
+        extra = {i: dict(values) for i, values in f.extra.items()}
+        for (i, p), change in zip(shapes, step[d:], strict=True):
+            extra[i][p.name] += change
+        values = inquiry.causes(f.members, f.theta + step[:d], extra)[j].values
+        return {name: float(np.log(value)) if kinds[name].log else value for name, value in values.items()}
+
+    # small steps inwards: a parameter on its bound still has a slope
+    steps = 1e-3 * np.sqrt(np.diag(covariance)) * np.concatenate([np.where(f.theta < 0, -1.0, 1.0), np.ones(len(shapes))])
+    here, out = at(np.zeros(len(steps))), {}
+    moved = [at(row) for row in np.diag(steps)]
     for name, value in cause.values.items():
         if name in idle:
             continue
-        low, high = np.quantile([s[name] for s in samples], [0.025, 0.975])
-        out[name] = {"value": _round(value), "ci95": [_round(min(low, value)), _round(max(high, value))]}
+        change = np.array([each[name] - here[name] for each in moved])
+        if name == "phase_rad":
+            change = np.angle(np.exp(1j * change))
+        slope = change / steps
+        half = 1.96 * float(np.sqrt(slope @ covariance @ slope))
+        ends = [here[name] - half, here[name] + half]
+        low, high = np.exp(ends) if kinds[name].log else ends
+        if name != "phase_rad":
+            low, high = max(low, kinds[name].low), min(high, kinds[name].high)
+        out[name] = {"value": _round(value), "ci95": [_round(low), _round(high)]}
     return out
 
 

@@ -9,14 +9,17 @@ import numpy as np
 from camcomp.bench import Atom, Bench, cause_of, step_of, thinned
 from camcomp.columns import Columns, atom_columns, build, patterns, shape_default
 from camcomp.datatypes import Floats
-from camcomp.gap.effect import Cause
+from camcomp.gap.effect import Cause, Parameter
 from camcomp.gap.evidence import Gram, Prior, estimate, gram
 from camcomp.gap.patterns import Dictionary
 from camcomp.gap.search import Atoms, Fitted, Members, Scale, total
 from camcomp.gap.whiten import Noise
 from camcomp.noise import Background, inflation, measure_noise
-from camcomp.scan import beside, best_shape
+from camcomp.scan import beside, best_shape, reach
+from camcomp.twin import Reading
 
+BENT = 0.1  # share of its own change by which the model may miss a straight line before all columns are worked out anew
+SETTLED = 0.05  # chi-square that one more pass may cost
 STRAIGHT = 0.3  # chi-square that the bend of the model may cost before it is followed
 
 
@@ -85,53 +88,70 @@ class Inquiry:
         if theta is None:
             theta = estimate(total(grams), self.prior, index)[0][index]
         theta = self._bounded(members, theta)
-        covariance = np.zeros((len(index), len(index)))
-        white = list(self.white)
+        white = [W[:, index] for W in self.white]
+        left = list(self.white_residual)
+        bent = False
+        passes += 3 if shapes else 0
         for step in range(passes):
             causes = self.causes(members, theta, shapes)
-            now = [self.bench.residual(k, causes) for k in range(len(self.bench.runs))]
-            if step == 0 and not shapes and self._straight(now, index, theta):
+            readings = [self.bench.read(k, causes) for k in range(len(self.bench.runs))]
+            now = [self.whitened(k, self.bench.difference(k, r)[:, :, None])[:, 0] for k, r in enumerate(readings)]
+            bend, size = self._bend(now, index, theta)
+            if step == 0 and not shapes and bend < STRAIGHT:
                 grams = self.base_grams
-                mean, full = estimate(total(grams), self.prior, index)
-                theta, covariance = self._bounded(members, mean[index]), full[np.ix_(index, index)]
+                theta = self._bounded(members, estimate(total(grams), self.prior, index)[0][index])
                 break
-            moved = self._columns_at(members, theta, shapes)
-            white = []
-            left = []
-            grams_here = []
-            for k in range(len(self.bench.runs)):
-                W = self.white[k].copy()
-                W[:, index] = self.whitened(k, np.stack([m[k] for m in moved[: len(index)]], axis=2))
-                r = self.whitened(k, now[k][:, :, None])[:, 0] + W[:, index] @ theta
-                left.append(r)
-                white.append(W)
-                A = self.base_grams[k].A.copy()
-                A[:, index] = W.T @ W[:, index]
-                A[index, :] = A[:, index].T
-                grams_here.append(Gram(A, W.T @ r, float(r @ r), len(r)))
-            grams = tuple(grams_here)
+            bent = bent or (step == 0 and bend > BENT**2 * size)
+            moved = self._columns_at(members, theta, shapes, readings, bent)
+            white = [self._stacked(k, [m[k] for m in moved], index) for k in range(len(self.bench.runs))]
+            left = [r + W @ theta for r, W in zip(now, white, strict=True)]
+            grams = self._grams_at(index, white, left)
             mean, full = estimate(total(grams), self.prior, index)
-            covariance = full[np.ix_(index, index)]
-            self._move_shapes(members, theta, shapes, left, white, moved[len(index) :], mean)
             after = self._bounded(members, mean[index])
             change = after - theta
             theta = after
-            size = float(change @ np.linalg.solve(covariance + 1e-18 * np.eye(len(index)), change))
-            if size < 0.05 and step > 0:
+            size = float(change @ np.linalg.solve(full[np.ix_(index, index)] + 1e-18 * np.eye(len(index)), change))
+            if shapes and step < passes - 1:
+                size = self._move_shapes(members, theta, shapes, left, white, mean)
+            if step > 0 and size < SETTLED:
                 break
         scale = Scale(total(grams), self.prior, self.atoms)
         factor = scale.factor(members)
         mean, full = estimate(total(grams), self.prior, index, factor)
         theta, covariance = self._bounded(members, mean[index]), full[np.ix_(index, index)]
-        return Fitted(members, theta, covariance, scale(members), grams, shapes, factor)
+        return Fitted(
+            members, theta, covariance, scale(members), grams, shapes, factor, tuple(white), tuple(left)
+        )
 
-    def _straight(self, now: Sequence[Floats], index: Sequence[int], theta: Floats) -> bool:
-        """Whether the columns at nominal predict the residuals at theta to well within the noise."""
-        bend = 0.0
-        for k, r in enumerate(now):
-            exact = self.whitened(k, r[:, :, None])[:, 0]
-            bend += float(np.sum((exact - self.white_residual[k] + self.white[k][:, index] @ theta) ** 2))
-        return bend < STRAIGHT
+    def _stacked(self, k: int, moved: Sequence[Floats | None], index: Sequence[int]) -> Floats:
+        """White columns (w, d) of run k: those that were worked out anew, and the nominal ones of the others."""
+        W = self.white[k][:, index].copy()
+        new = [j for j, m in enumerate(moved) if m is not None]
+        if new:
+            W[:, new] = self.whitened(k, np.stack([m for m in moved if m is not None], axis=2))
+        return W
+
+    def _grams_at(self, index: Sequence[int], white: Sequence[Floats], left: Sequence[Floats]) -> tuple[Gram, ...]:
+        """Per run, with the columns `index` replaced by white (w, d) and the residual by left (w,)."""
+        out = []
+        for k, (own, r) in enumerate(zip(white, left, strict=True)):
+            W = self.white[k]
+            A = self.base_grams[k].A.copy()
+            cross = W.T @ own
+            cross[index] = own.T @ own
+            A[:, index], A[index, :] = cross, cross.T
+            b = W.T @ r
+            b[index] = own.T @ r
+            out.append(Gram(A, b, float(r @ r), len(r)))
+        return tuple(out)
+
+    def _bend(self, now: Sequence[Floats], index: Sequence[int], theta: Floats) -> tuple[float, float]:
+        """Chi-square by which the columns at nominal miss the white residuals at theta, and that of their own change."""
+        bend = size = 0.0
+        for r, nominal, W in zip(now, self.white_residual, self.white, strict=True):
+            change = W[:, index] @ theta
+            bend, size = bend + float(np.sum((r - nominal + change) ** 2)), size + float(change @ change)
+        return bend, size
 
     def _bounded(self, members: Members, theta: Floats) -> Floats:
         parameters = [p for i in members for p in self.columns.atoms[i].parameters]
@@ -143,58 +163,84 @@ class Inquiry:
                 out[j] = 1e-3 * p.tolerance / p.scale
         return out
 
-    def _columns_at(self, members: Members, theta: Floats, shapes: Mapping[int, Mapping[str, float]]) -> list[list[Floats]]:
-        """Columns of the members' parameters at theta, then those of their shapes; per run (n, c)."""
-        here = self.causes(members, theta, shapes)
-        base = [self.bench.channels(self.bench.read(k, here)) for k in range(len(self.bench.runs))]
-        out: list[list[Floats]] = []
-        extra: list[list[Floats]] = []
+    def _columns_at(
+        self, members: Members, theta: Floats, shapes: Mapping[int, Mapping[str, float]], readings: Sequence[Reading],
+        bent: bool,
+    ) -> list[Sequence[Floats | None]]:  # fmt: skip
+        """Columns of the members' parameters at theta, per run (n, c).
+
+        None where the nominal column will do: changed structures cost most and bend least.
+        """
+        out: list[Sequence[Floats | None]] = []
         at = 0
-        for who, i in enumerate(members):
+        for i in members:
             atom = self.columns.atoms[i]
-            own = {p.name: float(theta[at + j]) * p.scale for j, p in enumerate(atom.parameters)}
-            shape = dict(shapes.get(i, shape_default(atom)))
-            for p in (*atom.parameters, *atom.shapes):
-                if p.scan:
-                    step = 1e-4 * shape[p.name]
-                    changed = {**shape, **own, p.name: shape[p.name] + step}
-                    unit = 1.0 / step
-                else:
-                    step = step_of(p)
-                    if p.coordinate(p.value(own[p.name] + step)) < own[p.name] + 0.5 * step:
-                        step = -step
-                    changed = {**shape, **own, p.name: own[p.name] + step}
-                    unit = p.scale / step
-                other = [*here[:who], cause_of(atom, changed), *here[who + 1 :]]
-                per_run = [
-                    thinned((self.bench.channels(self.bench.read(k, other)) - base[k]) * unit, run.thin)
-                    for k, run in enumerate(self.bench.runs)
-                ]
-                (extra if p.scan else out).append(per_run)
+            for j, p in enumerate(atom.parameters):
+                if hasattr(atom.effect, "on_robot") and not bent:
+                    out.append([None] * len(readings))
+                    continue
+                step, here = step_of(p), float(theta[at + j]) * p.scale
+                if p.coordinate(p.value(here + step)) < here + 0.5 * step:
+                    step = -step
+                changed = theta.copy()
+                changed[at + j] += step / p.scale
+                out.append(self._slope(self.causes(members, changed, shapes), readings, step / p.scale))
             at += len(atom.parameters)
-        return [*out, *extra]
+        return out
+
+    def _slope(self, causes: Sequence[Cause], readings: Sequence[Reading], step: float) -> list[Floats]:
+        """Change of the channels per unit, per run (n, c), from readings to those with other causes."""
+        out = []
+        for k, (reading, run) in enumerate(zip(readings, self.bench.runs, strict=True)):
+            change = self.bench.channels(self.bench.read(k, causes)) - self.bench.channels(reading)
+            out.append(thinned(change / step, run.thin))
+        return out
+
+    def shape_columns(self, members: Members, theta: Floats, shapes: Mapping[int, Mapping[str, float]]) -> list[Floats]:
+        """White columns (w, s) per run of the members' shapes, in their own units."""
+        causes = self.causes(members, theta, shapes)
+        readings = [self.bench.read(k, causes) for k in range(len(self.bench.runs))]
+        moved = []
+        for i, p in self.shapes_of(members):
+            step = 1e-4 * shapes[i][p.name]
+            changed = {**shapes, i: {**shapes[i], p.name: shapes[i][p.name] + step}}
+            moved.append(self._slope(self.causes(members, theta, changed), readings, step))
+        return [self.whitened(k, np.stack([m[k] for m in moved], axis=2)) for k in range(len(readings))]
+
+    def shapes_of(self, members: Members) -> list[tuple[int, Parameter]]:
+        """(atom, shape) of a set in order."""
+        return [(i, p) for i in members for p in self.columns.atoms[i].shapes]
+
+    def row_places(self, k: int) -> Floats:
+        """Where in the time of run k each white row (w,) lies, 0 to 1."""
+        t = self.times[k]
+        at = (t - t[0]) / max(float(t[-1] - t[0]), 1e-12)
+        return self.noise.rows_of(k, at, self.inflate[k])
 
     def _move_shapes(
         self, members: Members, theta: Floats, shapes: dict[int, dict[str, float]], left: Sequence[Floats],
-        white: Sequence[Floats], moved: Sequence[Sequence[Floats]], mean: Floats,
-    ) -> None:  # fmt: skip
-        """One Gauss-Newton step of the scanned shapes against what the linear fit leaves, at most 2 % (40 % of a time)."""
-        if not moved:
-            return
-        names = [(i, p) for i in members for p in self.columns.atoms[i].shapes]
-        D = [
-            self.whitened(k, np.stack([m[k] for m in moved], axis=2)) for k in range(len(self.bench.runs))
-        ]
-        index = self.member_columns(members)
-        A = np.concatenate([np.concatenate([W[:, index], d], axis=1) for W, d in zip(white, D, strict=True)])
-        rest = np.concatenate([r - W @ mean + W[:, index] @ mean[index] for r, W in zip(left, white, strict=True)])
+        white: Sequence[Floats], mean: Floats,
+    ) -> float:  # fmt: skip
+        """One Gauss-Newton step of the scanned shapes at their best amplitudes, within reach of the scan.
+
+        By how much chi-square it moves the model; shapes that the data do not ask to move stay.
+        """
+        names, index = self.shapes_of(members), self.member_columns(members)
+        others = mean.copy()
+        others[index] = 0.0
+        D = self.shape_columns(members, theta, shapes)
+        A = np.concatenate([np.concatenate([W, d], axis=1) for W, d in zip(white, D, strict=True)])
+        rest = np.concatenate([r - W @ others for r, W in zip(left, self.white, strict=True)])
         rest = rest - A[:, : len(index)] @ theta
         size = np.linalg.norm(A, axis=0) + 1e-12
         step = np.linalg.lstsq(A / size, rest, rcond=1e-8)[0] / size
-        for (i, p), s in zip(names, step[len(index) :], strict=True):
-            most = 0.02 if p.unit == "mm" else 0.4
-            old = shapes[i][p.name]
-            shapes[i][p.name] = float(np.clip(old + np.clip(s, -most * old, most * old), p.low, p.high))
+        most = np.array([reach(p, shapes[i][p.name]) * shapes[i][p.name] for i, p in names])
+        step *= min(1.0, float(np.min(most / np.maximum(np.abs(step[len(index) :]), 1e-300))))
+        moves = float(np.sum((A @ step) ** 2))
+        if moves > SETTLED:
+            for (i, p), s in zip(names, step[len(index) :], strict=True):
+                shapes[i][p.name] = float(np.clip(shapes[i][p.name] + s, p.low, p.high))
+        return moves
 
 
 def open_inquiry(bench: Bench, atoms: Sequence[Atom]) -> Inquiry:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -12,8 +13,9 @@ from camcomp.gap.colour import Colour, colour
 from camcomp.gap.patterns import Dictionary
 from camcomp.gap.whiten import Noise, fit_noise
 
+PASSES = 4
 TIMING_S = 0.0015  # how fast a real drive settles after its acceleration has stepped
-PATTERN_SCALE = 30.0  # um or N: what a pattern may amount to when the noise is measured beside it
+FAINT = 0.03  # um or N: what a pattern amounts to where nothing depends on it
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,10 +26,10 @@ class Background:
     inflate: list[Floats]
     rest: list[Floats]
 
-    def colour(self) -> Colour:
-        """Whether the tip's noise can be that of a sensor."""
-        rough = np.array([roughness(r[:, :3]) for r in self.rest])
-        return colour(self.noise.sigma[:, :3], rough)
+    def colour(self, part: slice = slice(0, 3)) -> Colour:
+        """Whether the noise of some channels, the tip's by default, can be that of a sensor."""
+        rough = np.array([roughness(r[:, part]) for r in self.rest])
+        return colour(self.noise.sigma[:, part], rough)
 
 
 def inflation(bench: Bench) -> list[Floats]:
@@ -62,67 +64,118 @@ def measure_noise(
     bench: Bench, columns: Columns, dictionaries: Sequence[Dictionary], extra: Sequence[Floats], times: Sequence[Floats],
     residuals: Sequence[Floats], start: Noise | None = None,
 ) -> Background:  # fmt: skip
-    """Noise beside everything that could be there: all effects, nuisances and patterns at once, softly."""
+    """Noise beside everything that could be there: all effects and nuisances softly, patterns as far as they are real.
+
+    What repeats wherever a pattern says so is no noise; what does not is, however smooth. So the noise has first claim,
+    and the size of every pattern is learnt from what it explains beyond it (empirical Bayes, MacKay 1992).
+    """
     runs = range(len(bench.runs))
-    k, p = len(columns.names), sum(len(words.labels) for words in dictionaries)
-    first = [roughness(residuals[r]) for r in runs]
-    sigma = np.array(first)
-    ordered = [run.course.ordered for run in bench.runs]
-    precision = np.concatenate([
-        np.where(columns.atom >= 0, 1.0 / 9.0, columns.prior.precision(1.0) / 9.0), np.full(p, 1.0 / PATTERN_SCALE**2)
-    ])  # fmt: skip
-    noise = start or Noise(np.zeros((sigma.shape[1], 3)), sigma, np.ones(sigma.shape[1]))
+    k = len(columns.names)
     both = [np.concatenate([columns.blocks[r], residuals[r][:, :, None]], axis=2) for r in runs]
     for r in runs:
         both[r][~np.isfinite(residuals[r])] = 0.0
+    free = np.where(columns.atom >= 0, 1.0 / 9.0, columns.prior.precision(1.0) / 9.0)
+    sizes = [np.full(len(words.labels), FAINT) for words in dictionaries]
+    ordered = [run.course.ordered for run in bench.runs]
+    rough = np.array([roughness(residuals[r]) for r in runs])
+    noise = start or Noise(rough, np.zeros_like(rough), np.zeros_like(rough))
     inflate: list[Floats] = []
     left: list[Floats] = []
-    for _ in range(1 if start else 2):
+    for step in range(PASSES):
         inflate = [np.sqrt(1.0 + (extra[r] / noise.sigma[r]) ** 2) for r in runs]
-        # columns first, then patterns kind by kind, residual last; patterns of two kinds share no row
-        A = np.zeros((k + p + 1, k + p + 1))
-        at = k
-        for words in dictionaries:
-            index = np.concatenate([np.arange(k), np.arange(at, at + len(words.labels)), [k + p]])
-            part = slice(words.first, words.first + words.blocks[0].shape[1])
-            for r in runs:
-                block = np.concatenate([both[r][:, part, :-1], words.blocks[r], both[r][:, part, -1:]], axis=2)
-                D = noise.rows(r, block, inflate[r], times[r], words.first)
-                A[np.ix_(index, index)] += D.T @ D
-            at += len(words.labels)
-        M = A[:-1, :-1] + np.diag(precision)
-        size: Floats = 1.0 / np.sqrt(np.diag(M))
-        half: Floats = np.asarray(np.linalg.cholesky(size[:, None] * M * size + 1e-10 * np.eye(len(size))), float)
-        a = size * np.linalg.solve(half.T, np.linalg.solve(half, size * A[:-1, -1]))
+        grams = [_joint(noise, words, both, inflate, times) for words in dictionaries]
+        fit = _solve(grams, k, free, sizes)
         left = []
         for r in runs:
-            gap = both[r][:, :, -1] - both[r][:, :, :-1] @ a[:k]
-            at = k
-            for words in dictionaries:
+            gap = both[r][:, :, -1] - both[r][:, :, :-1] @ fit.columns
+            for words, a in zip(dictionaries, fit.patterns, strict=True):
                 part = slice(words.first, words.first + words.blocks[r].shape[1])
-                gap[:, part] -= words.blocks[r] @ a[at : at + len(words.labels)]
-                at += len(words.labels)
+                gap[:, part] -= words.blocks[r] @ a
             left.append(np.where(np.isfinite(residuals[r]), gap, np.nan))
         noise = fit_noise(left, inflate, list(times), ordered)
-        noise = replace(noise, sigma=noise.sigma * _spent(A, M, size, half, k, dictionaries, residuals))
+        noise = replace(noise, sigma=noise.sigma * _spent(fit, dictionaries, residuals))
+        if step < PASSES - 1:
+            sizes = [
+                _learnt(words, G, k, free, fit.patterns[d], fit.spread[d], sizes[d], step == 0)
+                for d, (words, G) in enumerate(zip(dictionaries, grams, strict=True))
+            ]
     inflate = [np.sqrt(1.0 + (extra[r] / noise.sigma[r]) ** 2) for r in runs]
     return Background(noise, inflate, left)
 
 
-def _spent(
-    A: Floats, M: Floats, size: Floats, half: Floats, k: int, dictionaries: Sequence[Dictionary], residuals: Sequence[Floats]
+@dataclass(frozen=True, eq=False)
+class _Fit:
+    """Amplitudes of the columns and, kind by kind, of the patterns; their variances; how many free numbers they are."""
+
+    columns: Floats
+    patterns: list[Floats]
+    spread: list[Floats]
+    used: list[float]
+
+
+def _joint(
+    noise: Noise, words: Dictionary, both: Sequence[Floats], inflate: Sequence[Floats], times: Sequence[Floats]
 ) -> Floats:
-    """By how much (c,) the leftover of a fit is too small for the noise: patterns have followed the noise, too."""
-    shrink = np.linalg.solve(half, size[:, None] * A[:-1, :-1])
-    used = np.einsum("ij,ij->j", np.linalg.solve(half, np.diag(size)), shrink)  # diagonal of M^-1 A
-    out = np.ones(residuals[0].shape[1])
+    """Gram matrix of columns, patterns of one kind and residual, in this order, over the kind's white rows."""
+    part = slice(words.first, words.first + words.blocks[0].shape[1])
+    out = np.zeros((1, 1))
+    for r, every in enumerate(both):
+        block = np.concatenate([every[:, part, :-1], words.blocks[r], every[:, part, -1:]], axis=2)
+        D = noise.rows(r, block, inflate[r], times[r], words.first)
+        out = out + D.T @ D
+    return out
+
+
+def _solve(grams: Sequence[Floats], k: int, free: Floats, sizes: Sequence[Floats]) -> _Fit:
+    """Columns and patterns at once; patterns of two kinds share no row."""
+    p = [len(s) for s in sizes]
+    M, h = np.diag(np.concatenate([free, *(1.0 / s**2 for s in sizes)])), np.zeros(k + sum(p))
+    own = np.zeros(k + sum(p))
     at = k
-    for words in dictionaries:
+    for G, count in zip(grams, p, strict=True):
+        index = np.concatenate([np.arange(k), np.arange(at, at + count)])
+        M[np.ix_(index, index)] += G[:-1, :-1]
+        h[index] += G[:-1, -1]
+        at += count
+    own = np.concatenate([np.zeros(k), *(1.0 / s**2 for s in sizes)])
+    scale = 1.0 / np.sqrt(np.diag(M))
+    half = np.linalg.solve(np.linalg.cholesky(scale[:, None] * M * scale + 1e-10 * np.eye(len(scale))), np.diag(scale))
+    a = half.T @ (half @ h)
+    variance = np.sum(half**2, axis=0)
+    ends = np.cumsum([k, *p])
+    parts = [slice(int(i), int(j)) for i, j in pairwise(ends)]
+    used = 1.0 - variance * own
+    return _Fit(a[:k], [a[s] for s in parts], [variance[s] for s in parts], [float(used[s].sum()) for s in parts])
+
+
+def _learnt(
+    words: Dictionary, G: Floats, k: int, free: Floats, amplitude: Floats, variance: Floats, size: Floats, first: bool
+) -> Floats:
+    """Sizes (p,) of the patterns, one per covariate: from what they explain beside the columns, then from the joint fit."""
+    labels = np.array(words.labels)
+    out = np.full(len(labels), FAINT)
+    if first:
+        half = np.linalg.solve(np.linalg.cholesky(G[:k, :k] + np.diag(free)), G[:k, k:])
+        rest = G[k:, k:] - half.T @ half
+    for name in dict.fromkeys(words.labels):
+        mine = np.flatnonzero(labels == name)
+        if first:
+            P, h = rest[np.ix_(mine, mine)], rest[mine, -1]
+            square = max(float(h @ h - np.trace(P)), 0.0) / max(float(np.sum(P**2)), 1e-300)
+        else:
+            told = len(mine) - float(np.sum(variance[mine] / size[mine] ** 2))  # amplitudes that the data determine
+            square = float(np.sum(amplitude[mine] ** 2)) / max(told, 1e-9)
+        out[mine] = max(np.sqrt(square), FAINT)
+    return out
+
+
+def _spent(fit: _Fit, dictionaries: Sequence[Dictionary], residuals: Sequence[Floats]) -> Floats:
+    """By how much (c,) the leftover of a fit is too small for the noise: patterns have followed the noise, too."""
+    out = np.ones(residuals[0].shape[1])
+    for words, used in zip(dictionaries, fit.used, strict=True):
         part = slice(words.first, words.first + words.blocks[0].shape[1])
         rows = sum(int(np.isfinite(r[:, part]).sum()) for r in residuals)
-        spent = float(used[at : at + len(words.labels)].sum())
-        out[part] = 1.0 / np.sqrt(max(1.0 - spent / max(rows, 1), 0.3))
-        at += len(words.labels)
+        out[part] = 1.0 / np.sqrt(max(1.0 - used / max(rows, 1), 0.3))
     return out
 
 

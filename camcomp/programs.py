@@ -23,6 +23,7 @@ def setup_of(config: Config) -> Setup:
         second_home_mm=places.get("G30", (0.0, 0.0, 0.0)),
         tool=control.tool_number,
         increment_mm=control.input_increment_mm,
+        table_axes=frozenset(control.table_axes),
         skip_deleted=control.block_delete,
     )
 

@@ -7,7 +7,6 @@ exact solution of the structure. Effects of the sensors change no part and are l
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -20,7 +19,7 @@ from camcomp.statics.solve import FREE, solve
 from camcomp.statics.target import Correction, correct, settle
 
 SETTLED_MM = 2e-5  # the correction of effects ends here
-MAX_STEPS = 6
+MAX_STEPS = 12
 REST_S = 60.0
 AHEAD_MM = 2.0  # more than any play
 LEAST_MM = 2e-4  # a drive that comes back by less than this is not led through its play
@@ -153,24 +152,25 @@ def _tip_way(job: Job, tip: Floats, by: Floats) -> Floats:
 
 
 def plays(job: Job, rho: Floats, travel: Travel) -> Bools:
-    """Actuators (m,) whose carriage stands still while its drive takes up its play."""
-    return _changes(job, rho, travel, lambda motion: replace(motion, ordered=False))
+    """Actuators (m,) whose carriage stands still while its drive turns round: play, or wind-up against friction."""
+    return _differs(job, rho, travel, ordered=True)
 
 
 def winds_up(job: Job, rho: Floats, travel: Travel) -> Bools:
-    """Actuators (m,) whose carriage depends on the sense of travel by more than a play: wind-up by friction."""
-    return _changes(job, rho, travel, lambda motion: replace(motion, direction=-motion.direction))
+    """Actuators (m,) whose drive winds up against friction, over some way of the carriage."""
+    return _differs(job, rho, travel, ordered=False)
 
 
-def _changes(job: Job, rho: Floats, travel: Travel, change: Callable[[Motion], Motion]) -> Bools:
-    """Actuators (m,) whose carriage goes elsewhere after a change of what the hooks see of the movement."""
+def _differs(job: Job, rho: Floats, travel: Travel, *, ordered: bool) -> Bools:
+    """Actuators (m,) whose carriage depends on the movement, or on its sense alone."""
     motion = _motion(job, rho, travel)
+    poses = replace(motion, ordered=False)
+    other = motion if ordered else replace(poses, direction=-motion.direction)
     out = np.zeros(rho.shape[1], np.bool_)
     for cause in job.causes:
         if (hook := cause.hook("on_drive")) is not None:
-            which = cause.which(job.real_machine.actuators)
-            out |= (hook(np.zeros_like(rho), motion, which, cause.values)
-                    != hook(np.zeros_like(rho), change(motion), which, cause.values)).any(axis=0)  # fmt: skip
+            which, still = cause.which(job.real_machine.actuators), np.zeros_like(rho)
+            out |= (hook(still, poses, which, cause.values) != hook(still, other, which, cause.values)).any(axis=0)
     return out
 
 

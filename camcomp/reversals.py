@@ -16,10 +16,11 @@ from camcomp.datatypes import RAPID, Bools, Floats, Ints
 from camcomp.gap.memory import turning_points
 from camcomp.job import Job
 from camcomp.moves import corrected_pieces, travel_of
-from camcomp.response import LEAST_MM, plays, without_drives
+from camcomp.response import LEAST_MM, plays, winds_up, without_drives
 from camcomp.splitting import trial_nodes
 
 STANDING_MM = 2e-4  # way that the carriage should have gone at the end of such a line
+WINDING_MM = (2e-3, 6e-3, 0.015, 0.04)  # ways over which friction turns round, where the correction bends most
 
 
 def cut_at_reversals(job: Job, track: Track, spacing: float) -> tuple[Track, Bools]:
@@ -39,16 +40,19 @@ def cut_at_reversals(job: Job, track: Track, spacing: float) -> tuple[Track, Boo
     if not np.isfinite(carriage).all():  # told later, with the line
         return track, none
     feed = track.path.kind[track.motion] != RAPID
-    lines = {
-        line
-        for j in np.flatnonzero(plays(job, carriage, travel))
-        for k in turning_points(carriage[:, j], LEAST_MM)[0]
-        if feed[piece[k]] and (line := _line_behind(piece, w, carriage[:, j], k)) is not None
-    }
-    cuts = sorted({(i, at) for i, *ends in lines for at in ends if 0.0 < at < 1.0})
+    memory, friction = plays(job, carriage, travel), winds_up(job, carriage, travel)
+    lines: set[tuple[int, float, float]] = set()
+    cuts: set[tuple[int, float]] = set()
+    for j in np.flatnonzero(memory):
+        for k in turning_points(carriage[:, j], LEAST_MM)[0]:
+            if not feed[piece[k]] or k + 1 == len(w) or piece[k + 1] != piece[k]:
+                continue  # it turns round on its way to another piece
+            begin, *ends = _fractions(piece, w, carriage[:, j], k, (STANDING_MM, *(WINDING_MM if friction[j] else ())))
+            lines.add((int(piece[k]), begin, ends[0]))
+            cuts.update((int(piece[k]), at) for at in (begin, *ends) if 0.0 < at < 1.0)
     if not cuts:
         return track, none
-    divided = track.cut(np.array([i for i, _ in cuts]), np.array([at for _, at in cuts]))
+    divided = track.cut(np.array([i for i, _ in sorted(cuts)]), np.array([at for _, at in sorted(cuts)]))
     middle = 0.5 * (divided.u0 + divided.u1)
     out = np.zeros(len(middle), np.bool_)
     for i, a, b in lines:
@@ -57,25 +61,14 @@ def cut_at_reversals(job: Job, track: Track, spacing: float) -> tuple[Track, Boo
     return divided, out
 
 
-def _line_behind(piece: Ints, w: Floats, x: Floats, k: int) -> tuple[int, float, float] | None:
-    """Piece and fractions between which the drive that turns round at node k takes up its play, from a parabola.
-
-    None where it does so on its way to another piece.
-    """
-    if k + 1 == len(w) or piece[k + 1] != piece[k]:
-        return None
+def _fractions(piece: Ints, w: Floats, x: Floats, k: int, ways: tuple[float, ...]) -> list[float]:
+    """Where in its piece the drive turns round near node k, and where it has come back by each of `ways`; by a parabola."""
     inner = k > 0 and piece[k - 1] == piece[k]
     first = k - 1 if inner else k
-    last = min(first + 2, len(w) - 1)
-    if piece[last] != piece[k]:
-        last = k + 1
-    a, b, _ = np.polyfit(w[first : last + 1] - w[k], x[first : last + 1], 2) if last == first + 2 else (0.0, *_line(w, x, k))
+    last = first + 2 if first + 2 < len(w) and piece[first + 2] == piece[k] else k + 1
+    degree = last - first
+    a, b = [0.0, *np.polyfit(w[first : last + 1] - w[k], x[first : last + 1], degree)][-3:-1]
     begin = float(np.clip(-b / (2.0 * a), w[first] - w[k], w[last] - w[k])) if inner and a != 0.0 else 0.0
-    slope = 0.0 if inner else abs(b)
-    way = 2.0 * STANDING_MM / max(slope + math.sqrt(slope**2 + 4.0 * abs(a) * STANDING_MM), 1e-12)
+    slope, curve = (0.0 if inner else abs(b)), 4.0 * abs(a)
     start = max(w[k] + begin, 0.0)
-    return int(piece[k]), start, min(start + way, 1.0)
-
-
-def _line(w: Floats, x: Floats, k: int) -> tuple[float, float]:
-    return (x[k + 1] - x[k]) / (w[k + 1] - w[k]), x[k]
+    return [start, *(min(start + 2.0 * way / max(slope + math.sqrt(slope**2 + curve * way), 1e-12), 1.0) for way in ways)]

@@ -100,8 +100,9 @@ RULES: dict[str, Rule] = {
     ),
     "CC115": Rule(
         "rotary or extra axis",
-        "A, B, C, U, V or W moves an axis that the machine of the configuration does not have.",
-        "post the program for three axes",
+        "A, B, C, U, V or W moves an axis that the machine of the configuration does not have, or a rotary table turns "
+        "while X, Y or Z move. Turned alone, a table leaves the tool and its correction where they are.",
+        "post the program for three axes, or name tables that only position the workpiece in control.table_axes",
     ),
     "CC116": Rule(
         "polar coordinates", "G16 and polar words are not followed.", "post in Cartesian coordinates"

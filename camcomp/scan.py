@@ -7,6 +7,7 @@ import numpy as np
 from camcomp.bench import Atom, Bench, cause_of, thinned
 from camcomp.columns import Columns, shape_default
 from camcomp.datatypes import Floats, Ints
+from camcomp.gap.effect import Parameter
 from camcomp.gap.evidence import Gram
 from camcomp.gap.search import total
 
@@ -49,19 +50,30 @@ def best_shape(
     return tried[int(np.argmax(gains))]
 
 
+def reach(p: Parameter, value: float) -> float:
+    """Share of its value by which a shape may move in one step: half way to the next value that was scanned."""
+    gaps = np.abs(np.log(np.asarray(p.scan)[np.asarray(p.scan) > 0] / value))
+    return float(np.clip(0.5 * np.sort(gaps[gaps > 1e-9])[:2].max(initial=0.0), 0.005, 0.4))
+
+
 def quick_columns(bench: Bench, atom: Atom, shape: Mapping[str, float]) -> list[list[Floats]] | None:
     """Columns of an effect that moves carriages only, straight from its hook; None for any other effect."""
     if hasattr(atom.effect, "on_drive") and not any(hasattr(atom.effect, h) for h in _OTHER_HOOKS):
         out = []
         for p in atom.parameters:
             cause = cause_of(atom, {**shape, p.name: p.scale})
+            which = cause.which(bench.actuators)
+            effort = cause.hook("on_drive_force")
             per_run = []
             for k, run in enumerate(bench.runs):
                 motion = bench.nominal[k].motion
-                moved = atom.effect.on_drive(np.zeros_like(motion.encoder), motion, cause.which(bench.actuators), cause.values)
+                moved = atom.effect.on_drive(np.zeros_like(motion.encoder), motion, which, cause.values)
                 values = np.zeros_like(bench.observed(k))
                 slope = bench.row_slopes(k)
                 values[:, :3] = np.einsum("nij,nj->ni", slope, moved)
+                if effort is not None:
+                    m = len(bench.actuators)
+                    values[:, 3 + m : 3 + 2 * m] = effort(np.zeros_like(moved), motion, which, cause.values)
                 per_run.append(thinned(values, run.thin))
             out.append(per_run)
         return out

@@ -137,6 +137,10 @@ class Control(Spec):
     reference_positions_mm: dict[Literal["G28", "G30"], Vector] = Field(
         default_factory=dict, description="machine coordinates to which G28 and G30 go"
     )
+    table_axes: list[Literal["A", "B", "C"]] = Field(
+        default_factory=list,
+        description="rotary axes that turn the workpiece between cuts: lines that move nothing else pass unchanged",
+    )
     block_delete: bool = Field(
         False, description="the switch is on: lines that start with / are not executed"
     )

@@ -18,12 +18,13 @@ from camcomp.inquiry import Inquiry
 
 SINGLES, PAIRS, TRIPLES = 6, 6, 3
 TEMPERATURE = 1.5  # what evidence is divided by before it becomes a probability; calibrated on the truth plants
-UNKNOWN_LOG10 = -6.0  # chance below which a leftover is no accident
-UNKNOWN_RMS = 0.35  # size of a leftover, in units of the noise, below which no model error is called a cause
-UNKNOWN_SHARE = 0.15  # share of what is explained that a leftover has to exceed: no cause is modelled perfectly
+UNKNOWN_LOG10 = -10.0  # chance below which a leftover is no accident
+UNKNOWN_RMS = 0.25  # size of a leftover, in units of the noise, below which no model error is called a cause
+UNKNOWN_SHARE = 0.1  # share of what is explained that a leftover has to exceed: no cause is modelled perfectly
 NUISANCE_RMS = 0.25  # size of a cause, in units of the noise of the channel that shows it best, below which it is none
 ROUGHLY = 0.05  # share of an unknown effect's evidence that a known cause has to add beside it
 UNKNOWN_COLOUR = 0.8  # size of what a sensor cannot have made, in units of what it can
+WORSE = 2.0  # log density by which a cause has to harm the prediction of other runs before it goes
 SAME_FIT = 4.0  # chi-square by which two sets may differ and still be the same answer
 
 
@@ -86,7 +87,7 @@ def survey(inquiry: Inquiry) -> Survey:
     left = leftovers(inquiry, best)
     if (coloured := colour_left(inquiry)) is not None:
         # noise that is none stays whatever the causes are; the causes were judged against it, and stand
-        return Survey(fits, probability, verdict, {**left, "tip": coloured}, "tip")
+        return Survey(fits, probability, verdict, {**left, coloured.kind: coloured}, coloured.kind)
     if strangest(inquiry, best, left) is not None:
         members = _known_part(inquiry, best)
         if members != best.members:
@@ -117,19 +118,23 @@ def _with_stand_ins(
 
 
 def colour_left(inquiry: Inquiry) -> Leftover | None:
-    """The noise of the tip as a leftover, where it cannot be that of a sensor."""
-    found = inquiry.background.colour()
-    if found.ratio < UNKNOWN_COLOUR:
-        return None
+    """The noise of tip or encoders as a leftover, where it cannot be that of a sensor."""
     m = len(inquiry.bench.actuators)
-    rest = [r[:, :3] for r in inquiry.background.rest]
-    drives = []
-    for k, run in enumerate(inquiry.bench.runs):
-        slope = thinned(inquiry.bench.row_slopes(k).reshape(-1, 3 * m), run.thin).reshape(-1, 3, m)
-        drives.append(np.einsum("nij,nj->ni", np.linalg.pinv(slope), np.where(np.isfinite(rest[k]), rest[k], 0.0)))
-    label = covariate(rest, inquiry.times, drives, inquiry.bench.actuators, found.excess)
+    parts = {"tip": slice(0, 3), "encoder": slice(3, 3 + m)}
+    found = {kind: inquiry.background.colour(part) for kind, part in parts.items()}
+    kind = max(found, key=lambda each: found[each].ratio)
+    if found[kind].ratio < UNKNOWN_COLOUR:
+        return None
+    rest = [r[:, parts[kind]] for r in inquiry.background.rest]
+    drives = [np.where(np.isfinite(r), r, 0.0) for r in rest]
+    if kind == "tip":
+        for k, run in enumerate(inquiry.bench.runs):
+            slope = thinned(inquiry.bench.row_slopes(k).reshape(-1, 3 * m), run.thin).reshape(-1, 3, m)
+            drives[k] = np.einsum("nij,nj->ni", np.linalg.pinv(slope), drives[k])
+    names = "xyz" if kind == "tip" else inquiry.bench.actuators
+    label = covariate(rest, inquiry.times, drives, names, inquiry.bench.actuators, found[kind].excess)
     rows = sum(int(np.isfinite(r).sum()) for r in rest)
-    return Leftover("tip", -300.0, found.ratio, rows, ((label, 1.0),))
+    return Leftover(kind, -300.0, found[kind].ratio, rows, ((label, 1.0),))
 
 
 def strangest(inquiry: Inquiry, f: Fitted, left: Mapping[str, Leftover]) -> str | None:
@@ -213,7 +218,7 @@ def _prune(inquiry: Inquiry, fits: tuple[Fitted, ...], probability: Floats) -> t
             continue
         smaller = [tuple(x for x in f.members if x != i) for i in f.members]
         scores = predictive(f.grams, inquiry.prior, inquiry.atoms, [f.members, *smaller])
-        if scores[0] < scores[1:].max():
+        if scores[0] < scores[1:].max() - WORSE:
             keep.remove(j)
     kept = tuple(fits[j] for j in keep)
     return kept, probability[keep] / probability[keep].sum()
@@ -264,15 +269,7 @@ def about(inquiry: Inquiry, f: Fitted) -> tuple[list[Floats], list[Floats]]:
     if not f.members:
         return inquiry.white, inquiry.white_residual
     index = inquiry.member_columns(f.members)
-    causes = inquiry.causes(f.members, f.theta, f.extra)
-    moved = inquiry._columns_at(f.members, f.theta, dict(f.extra))[: len(index)]
-    white, residual = [], []
-    for k in range(len(inquiry.bench.runs)):
-        W = inquiry.white[k].copy()
-        W[:, index] = inquiry.whitened(k, np.stack([m[k] for m in moved], axis=2))
-        r = inquiry.whitened(k, inquiry.bench.residual(k, causes)[:, :, None])[:, 0]
-        white.append(W)
-        residual.append(r + W[:, index] @ f.theta)
-    return white, residual
-
-
+    white = [W.copy() for W in inquiry.white]
+    for W, own in zip(white, f.white, strict=True):
+        W[:, index] = own
+    return white, list(f.residual)

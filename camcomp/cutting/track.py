@@ -1,6 +1,7 @@
 """The path cut into pieces of one kind of load, and the cutting force at any point of a piece.
 
-A piece is a motion, or the part of a motion on one side of the stock's top. Rapids and air moves carry no force, and
+A piece is a motion, or the part of a motion on one side of the stock's top, or of the point where an arc passes the
+vertical and the direction across the tool turns over. Rapids and air moves carry no force, and
 plunges none unless the force model says otherwise. Where two cutting pieces meet at less than JOIN_ANGLE the corner
 takes the force of the bisecting direction and the difference fades linearly along the pieces; where they meet at more,
 or where a cut starts or ends, the force jumps.
@@ -21,6 +22,7 @@ from camcomp.datatypes import ARC, RAPID, Bools, Floats, Ints, Path
 JOIN_ANGLE = np.radians(5.0)
 PLUNGE_SINE = 1e-6
 NO_FORCE = 1e-9  # N
+BESIDE = 1e-5  # rad: how far beside the ends of an upright arc its direction is taken; at the vertical it has none
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +92,7 @@ class Track:
 
     def force(self, piece: Ints, w: Floats) -> Floats:
         """Cutting force on the tool (k, 3) N, program frame."""
-        tangent = pathgeometry.tangents(self.path, self.motion[piece], self.u(piece, w))
+        tangent = pathgeometry.tangents(self.path, self.motion[piece], _beside(self, piece, w))
         out = _force(self.path, self.conditions, self.cutting, self.motion, self.s0, self.length, piece, w, tangent,
                      self.points(piece, w))  # fmt: skip
         return out + (1.0 - w)[:, None] * self.fade0[piece] + w[:, None] * self.fade1[piece]
@@ -132,13 +134,14 @@ def _force(
 def lay_track(path: Path, conditions: Conditions, length: Floats | None = None) -> Track:
     """Pieces of a path with the loads at their corners. Raises what the force model raises."""
     length = pathgeometry.lengths(path) if length is None else length
-    motion, u0, u1 = _pieces(path, conditions)
+    motion, u0, u1, over = _pieces(path, conditions)
     n = len(motion)
     piece_length = length[motion] * (u1 - u0)
     s0 = np.concatenate(([0.0], np.cumsum(length)))[motion] + length[motion] * u0
     middle = 0.5 * (u0 + u1)
-    first = pathgeometry.tangents(path, motion, u0)
-    last = pathgeometry.tangents(path, motion, u1)
+    margin = np.minimum(_margin(path, conditions, motion), 0.25 * (u1 - u0))
+    first = pathgeometry.tangents(path, motion, u0 + margin)
+    last = pathgeometry.tangents(path, motion, u1 - margin)
     axis = np.asarray(conditions.tool_axis, float)
     feeding = (path.kind[motion] != RAPID) & path.known[motion] & ~path.machine[motion] & (piece_length > 0.0)
     sine = np.maximum(lateral(first, axis), lateral(pathgeometry.tangents(path, motion, middle), axis))
@@ -161,7 +164,7 @@ def lay_track(path: Path, conditions: Conditions, length: Floats | None = None) 
     straight_on = ~rapid[a] & ~rapid[b] & (cosine >= np.cos(JOIN_ANGLE))
     corner = np.ones(n, np.bool_)
     corner[b] = ~straight_on
-    smooth = cutting[a] & cutting[b] & straight_on
+    smooth = cutting[a] & cutting[b] & straight_on & ~over[b]
     jump[b] = ~smooth & (np.linalg.norm(own0[b] - own1[a], axis=1) > NO_FORCE)
     a, b = a[smooth], b[smooth]
     bisector = last[a] + first[b]
@@ -180,24 +183,47 @@ def _carry_over(moves: Bools, end_force: Floats, fade0: Floats, fade1: Floats) -
     fade0[still] = fade1[still] = end_force[before[still]]
 
 
-def _pieces(path: Path, conditions: Conditions) -> tuple[Ints, Floats, Floats]:
-    """Every motion once, or in parts where a feed motion crosses the stock's top."""
+def _margin(path: Path, conditions: Conditions, motion: Ints) -> Floats:
+    """How far from the ends, as a fraction of the motion, the direction of an upright arc is taken; else 0."""
+    upright = (path.kind[motion] == ARC) & (np.abs(path.axis[motion] @ np.asarray(conditions.tool_axis, float)) < 0.999)
+    angle = np.where(upright, np.maximum(np.abs(path.angle[motion]), 4.0 * BESIDE), 1.0)
+    return np.where(upright, BESIDE / angle, 0.0)
+
+
+def _beside(track: Track, piece: Ints, w: Floats) -> Floats:
+    """Fraction of the motion at which the direction at fraction w of the piece is taken."""
+    u0, u1 = track.u0[piece], track.u1[piece]
+    margin = np.minimum(_margin(track.path, track.conditions, track.motion[piece]), 0.25 * (u1 - u0))
+    return np.clip(track.u(piece, w), u0 + margin, u1 - margin)
+
+
+def _overturns(path: Path, conditions: Conditions) -> list[tuple[int, float]]:
+    """Arcs and fractions at which the feed is along the tool axis: the radius vector is square to it."""
+    axis = np.asarray(conditions.tool_axis, float)
+    level = np.abs(path.axis @ axis) < 1e-3
+    out = []
+    for i in np.flatnonzero((path.kind == ARC) & level & path.known & ~path.machine):
+        radius = path.start[i] - path.centre[i]
+        radius = radius - (radius @ path.axis[i]) * path.axis[i]
+        phase = np.arctan2(np.cross(path.axis[i], radius) @ axis, radius @ axis)
+        angle = float(path.angle[i])
+        low, high = sorted((0.0, angle))
+        k = np.arange(np.ceil((low - phase) / np.pi - 0.5), np.floor((high - phase) / np.pi - 0.5) + 1.0)
+        out += [(int(i), float(u)) for u in np.sort((phase + (k + 0.5) * np.pi) / angle)]
+    return [(i, u) for i, u in out if 1e-6 < u < 1.0 - 1e-6]
+
+
+def _pieces(path: Path, conditions: Conditions) -> tuple[Ints, Floats, Floats, Bools]:
+    """Every motion once, or in parts where a feed motion crosses the stock's top or an arc passes the vertical.
+
+    The last result says which parts begin at the vertical.
+    """
     n = len(path)
-    whole = np.arange(n), np.zeros(n), np.ones(n)
-    if conditions.stock_top_mm is None or conditions.model is None or n == 0:
+    whole = np.arange(n), np.zeros(n), np.ones(n), np.zeros(n, np.bool_)
+    if conditions.model is None or n == 0:
         return whole
-    u = np.linspace(0.0, 1.0, 65)
-    moves = np.flatnonzero((path.kind != RAPID) & path.known & ~path.machine)
-    below = (path.start[moves, 2] < conditions.stock_top_mm, path.end[moves, 2] < conditions.stock_top_mm)
-    flat = np.abs(path.axis[moves, 2]) == 1.0  # an arc in the XY plane climbs steadily, if at all
-    crossing = moves[(below[0] != below[1]) | ((path.kind[moves] == ARC) & ~flat)]
-    cuts: list[tuple[int, float]] = []
-    for i in crossing:
-        row = np.full(len(u), i)
-        height = pathgeometry.points(path, row, u)[:, 2] - conditions.stock_top_mm
-        for k in np.flatnonzero((height[:-1] < 0.0) != (height[1:] < 0.0)):
-            cuts.append((int(i), _crossing(path, int(i), u[k], u[k + 1], conditions.stock_top_mm)))
-    cuts = [(i, at) for i, at in cuts if 1e-9 < at < 1.0 - 1e-9]
+    over = _overturns(path, conditions)
+    cuts = sorted({*over, *_crossings(path, conditions.stock_top_mm)})
     if not cuts:
         return whole
     motion = np.concatenate((whole[0], [i for i, _ in cuts]))
@@ -207,7 +233,26 @@ def _pieces(path: Path, conditions: Conditions) -> tuple[Ints, Floats, Floats]:
     u1 = np.ones(len(u0))
     same = motion[1:] == motion[:-1]
     u1[:-1][same] = u0[1:][same]
-    return motion, u0, u1
+    begins = {*over}
+    return motion, u0, u1, np.array([(int(i), float(u)) in begins for i, u in zip(motion, u0, strict=True)], np.bool_)
+
+
+def _crossings(path: Path, top: float | None) -> list[tuple[int, float]]:
+    """Feed motions and fractions at which they cross the stock's top."""
+    if top is None:
+        return []
+    u = np.linspace(0.0, 1.0, 65)
+    moves = np.flatnonzero((path.kind != RAPID) & path.known & ~path.machine)
+    below = (path.start[moves, 2] < top, path.end[moves, 2] < top)
+    flat = np.abs(path.axis[moves, 2]) == 1.0  # an arc in the XY plane climbs steadily, if at all
+    crossing = moves[(below[0] != below[1]) | ((path.kind[moves] == ARC) & ~flat)]
+    cuts: list[tuple[int, float]] = []
+    for i in crossing:
+        row = np.full(len(u), i)
+        height = pathgeometry.points(path, row, u)[:, 2] - top
+        for k in np.flatnonzero((height[:-1] < 0.0) != (height[1:] < 0.0)):
+            cuts.append((int(i), _crossing(path, int(i), u[k], u[k + 1], top)))
+    return [(i, at) for i, at in cuts if 1e-9 < at < 1.0 - 1e-9]
 
 
 def _crossing(path: Path, motion: int, a: float, b: float, height: float) -> float:

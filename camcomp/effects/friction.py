@@ -6,13 +6,15 @@ import numpy as np
 
 from camcomp.datatypes import Floats
 from camcomp.gap.effect import Motion, Parameter
-from camcomp.gap.memory import PRESLIDING_MM, direction
+from camcomp.gap.memory import PRESLIDING_MM, held_back
 
 STAGE = "drive"
 TARGET = "actuator"
-SOURCE = "force balance of the carriage; turn-round of the force after Dahl 1968; viscous part by the speed of the encoder"
+SOURCE = "force balance of the carriage; turn-round of the force after Dahl 1968, on the carriage's way; viscous by the speed of the encoder"
+_LENGTH = (1e-4, 1.0, 0.005, 0.0005, "rolling guides: 1 to 100 um")
 FITTED = (
     Parameter("force_N", "N", 0.0, 0.0, 2000.0, 60.0, 0.2, "guides and seals of feed drives: 5 to 300 N", sign=1),
+    Parameter("presliding_mm", "mm", PRESLIDING_MM, *_LENGTH, scan=(0.001, 0.003, 0.008, 0.02, 0.06)),
 )
 # Known where drive forces are logged; the other channels hardly see them.
 _MORE = (
@@ -20,9 +22,8 @@ _MORE = (
         "viscous_Ns_per_mm", "Ns/mm", 0.0, 0.0, 100.0, 0.2, 0.002, "grease and seals: 0.01 to 1 N s/mm", sign=1
     ),
     Parameter("asymmetry_Ns_per_mm", "Ns/mm", 0.0, -100.0, 100.0, 0.05, 0.001, "viscous forward minus mean of both ways"),
-    Parameter("presliding_mm", "mm", PRESLIDING_MM, 1e-4, 1.0, 0.005, 0.001, "rolling guides: 1 to 100 um"),
 )
-PARAMETERS = FITTED + _MORE
+PARAMETERS = (FITTED[0], *_MORE, FITTED[1])
 
 
 def _pull(motion: Motion, p: Mapping[str, float]) -> Floats | None:
@@ -32,7 +33,7 @@ def _pull(motion: Motion, p: Mapping[str, float]) -> Floats | None:
     if force == 0.0 and viscous == 0.0 and lopsided == 0.0:
         return None
     length = p.get("presliding_mm", PRESLIDING_MM)
-    turned = motion.direction if length == PRESLIDING_MM or not motion.ordered else direction(motion.encoder, length)
+    turned = held_back(motion.encoder, motion.stiffness, force, length) if motion.ordered else motion.direction
     return force * turned + viscous * motion.speed + lopsided * np.abs(motion.speed)
 
 

@@ -9,7 +9,7 @@ from camcomp.gap.effect import Motion, Parameter
 
 STAGE = "drive"
 TARGET = "actuator"
-SOURCE = "carriage minus encoder = amplitude sin(2 pi (encoder - home) / pitch + phase); v2pi of ISO 3408-3"
+SOURCE = "carriage minus encoder = amplitude sin(2 pi encoder / pitch + phase); v2pi of ISO 3408-3"
 # even in frequency: neighbours differ by a quarter turn over 100 mm
 _PITCHES = tuple(float(1.0 / f) for f in np.linspace(1.0, 1.0 / 40.0, 130))
 PARAMETERS = (
@@ -39,6 +39,6 @@ def on_drive(error: Floats, motion: Motion, which: Floats, p: Mapping[str, float
         return error
     out = error.copy()
     for j in np.flatnonzero(which):
-        phase = 2.0 * np.pi * (motion.encoder[:, j] - motion.home[j]) / p["pitch_mm"] + p["phase_rad"]
+        phase = 2.0 * np.pi * motion.encoder[:, j] / p["pitch_mm"] + p["phase_rad"]
         out[:, j] += amplitude * np.sin(phase)
     return out

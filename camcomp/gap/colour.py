@@ -19,7 +19,7 @@ LINE_SHARE = 0.4  # of the energy within one line of the spectrum: a vibration
 
 @dataclass(frozen=True, eq=False)
 class Colour:
-    """excess (3,): standard deviation beyond what a sensor explains; floor (3,): what a sensor explains, both in mm."""
+    """excess (c,): standard deviation beyond what a sensor explains; floor (c,): what a sensor explains, both in mm."""
 
     excess: Floats
     floor: Floats
@@ -32,11 +32,14 @@ class Colour:
 
 
 def colour(sigma: Floats, rough: Floats) -> Colour:
-    """From sizes and roughnesses (runs, 3) of the three tip axes; NaN where nothing was measured."""
+    """From sizes and roughnesses (runs, c) of channels of one kind; NaN where nothing was measured.
+
+    Over runs by energy: what shakes in two runs of six is there.
+    """
     known = np.isfinite(sigma).all(axis=1) & np.isfinite(rough).all(axis=1)
     if not known.any():
-        return Colour(np.zeros(3), np.zeros(3))
-    size, grain = np.median(sigma[known], axis=0), np.median(rough[known], axis=0)
+        return Colour(np.zeros(sigma.shape[1]), np.zeros(sigma.shape[1]))
+    size, grain = np.sqrt(np.mean(sigma[known] ** 2, axis=0)), np.sqrt(np.mean(rough[known] ** 2, axis=0))
     ratio = size / np.maximum(grain, 1e-12)
     smooth = max(SMOOTH, ALIKE * float(ratio.min()))
     most = np.minimum(smooth * grain, LOPSIDED * float(size.min()))
@@ -58,17 +61,17 @@ def line_share(x: Floats, time: Floats) -> tuple[float, float]:
     return float(near / max(power.sum(), 1e-300)), peak / (len(y) * step)
 
 
-def covariate(rest: Sequence[Floats], times: Sequence[Floats], drives: Sequence[Floats], actuators: Sequence[str],
-              excess: Floats) -> str:  # fmt: skip
+def covariate(rest: Sequence[Floats], times: Sequence[Floats], drives: Sequence[Floats], names: Sequence[str],
+              actuators: Sequence[str], excess: Floats) -> str:  # fmt: skip
     """What the excess depends on: time where it is a line at one frequency, else the motion of one actuator.
 
-    rest: per run what no model explains (n, 3); drives: the same as motion of the carriages (n, m).
+    rest: per run what no model explains (n, c) in channels `names`; drives: the same as motion of the carriages (n, m).
     """
     axis = int(np.argmax(excess))
     lines = [line_share(r[:, axis], t) for r, t in zip(rest, times, strict=True)]
     share, frequency = (np.array(each) for each in zip(*lines, strict=True))
     heard = frequency[share > 0]
     if np.median(share) > LINE_SHARE and len(heard) and np.std(heard) < 0.1 * np.mean(heard):
-        return f"time:{'xyz'[axis]}"
+        return f"time:{names[axis]}"
     energy = sum(np.nansum(d**2, axis=0) for d in drives)
     return f"velocity:{actuators[int(np.argmax(energy))]}"

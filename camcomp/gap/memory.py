@@ -68,6 +68,43 @@ def direction(x: Floats, distance: float = PRESLIDING_MM) -> Floats:
     return _direction(np.ascontiguousarray(x), distance)
 
 
+@njit(cache=True)
+def _held(x, stiffness, force, distance):  # type: ignore[no-untyped-def]  # pragma: no cover
+    out = np.zeros_like(x)
+    for j in range(x.shape[1]):
+        k = stiffness[j]
+        carriage = x[0, j]
+        state = 0.0
+        for i in range(1, x.shape[0]):
+            pull = k * (x[i, j] - carriage) - force * state if np.isfinite(k) else x[i, j] - carriage
+            if pull != 0.0:
+                sense = 1.0 if pull > 0.0 else -1.0
+                way = abs(pull)
+                turned = sense * state - 1.0
+                if np.isfinite(k):  # Newton from the left on a convex, falling function
+                    way = 0.0
+                    for _ in range(50):
+                        fade = turned * np.exp(-way / distance)
+                        left = sense * k * (x[i, j] - carriage) - k * way - force * (1.0 + fade)
+                        step = left / (k - force * fade / distance)
+                        way += step
+                        if step < 1e-9:
+                            break
+                state = sense * (1.0 + turned * np.exp(-way / distance))
+                carriage += sense * way
+            out[i, j] = state
+    return out
+
+
+def held_back(x: Floats, stiffness: Floats, force: float, distance: float = PRESLIDING_MM) -> Floats:
+    """Friction over its Coulomb force (n, m), -1 to 1, of carriages that encoders x (n, m) pull through springs (m,).
+
+    Dahl's law on the way of the carriage, not of the encoder: until the spring has turned round by 2 force/stiffness the
+    carriage hardly moves. distance mm; force N; stiffness inf = rigid. 0 before the first move.
+    """
+    return _held(np.ascontiguousarray(x), np.ascontiguousarray(stiffness, dtype=float), force, distance)
+
+
 def ways(x: Floats, least: float) -> Floats:
     """Sense (n, m) in which x (n, m) was travelling when it arrived: +1, -1, 0 before the first move.
 

@@ -15,6 +15,7 @@ from camcomp.gap.effect import Motion
 
 _KNOTS = 12  # hats along the travel of an actuator
 _PLACES = 20  # hats along an axis of the workpiece: a bump of a tenth of the travel is still seen
+_MOMENTS = 24  # hats along the time of all runs
 _RELAX_MM = (0.5, 3.0)
 KINDS = ("tip", "encoder", "drive", "dyno")
 
@@ -177,6 +178,15 @@ def dictionary(grounds: Sequence[Ground], actuators: Sequence[str]) -> list[Dict
                 for i in range(len(times[0][name])):
                     values = [functions[name][i] for functions in times]
                     stores[kind].put(f"{name}:{axis_name}", channel, values, 1e-3 if kind in ("tip", "encoder") else 1.0)
+    if found["tip"]:
+        # what happens at a moment: hats over the time in which something was measured, one run after the other
+        spent = [g.motion.time - g.motion.time[0] for g in grounds]
+        begin = np.concatenate([[0.0], np.cumsum([float(t[-1]) for t in spent])])
+        knots = int(np.clip(rows / 100, 4, _MOMENTS))
+        moments = [hats((b + t) / max(float(begin[-1]), 1e-9), knots) for b, t in zip(begin, spent, strict=False)]
+        for i in range(knots):
+            for channel, axis_name in enumerate("xyz"):
+                stores["tip"].put(f"time:{axis_name}", channel, [each[i] for each in moments], 1e-3)
     places = np.concatenate([g.tip for g in grounds])
     low, span = places.min(axis=0), np.ptp(places, axis=0)
     for axis, name in enumerate("xyz"):

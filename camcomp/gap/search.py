@@ -37,6 +37,8 @@ class Fitted:
     grams: tuple[Gram, ...]  # per run, about the fit, in absolute coordinates
     extra: Mapping[int, Mapping[str, float]] = field(default_factory=dict)  # scanned shapes by atom
     factor: float = 1.0  # the tolerances, as far off as the data have them
+    white: tuple[Floats, ...] = ()  # per run (w, d), the members' columns at the fit
+    residual: tuple[Floats, ...] = ()  # per run (w,), in absolute coordinates
 
 
 @dataclass(frozen=True, eq=False)

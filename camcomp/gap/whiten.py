@@ -1,30 +1,33 @@
-"""Noise of every channel as an autoregression, and rows made white by it.
+"""Noise of every channel as white noise plus a slow part, and rows made white by it.
 
 A block is one run: residuals (n, c) over c channels, NaN where a channel has no value. Rows next to a gap start afresh.
-Source of the fit: Yule-Walker, pooled over runs after scaling each run by its own size.
+The slow part is a first-order autoregression, so that ten parameters cannot follow what two explain; whitening is the
+exact innovations form (Kalman 1960). Source of the fit: autocorrelations, pooled over runs after scaling each run by its
+own size.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 
 from camcomp.datatypes import Bools, Floats
 
-ORDER = 3
+LAGS = 30
+_MEMORIES = np.array([-0.5, -0.2, 0.2, 0.4, 0.5, 0.6, 0.7, 0.75, 0.8, 0.85, 0.9, 0.93, 0.95, 0.97, 0.98, 0.99])
+_MOST_SLOW = 0.98  # share of the slow part: some of every reading is new
+_SURE = 8.0  # sum of squared autocorrelations over their variance that a slow part has to explain
 _REGULAR = 1.6  # a step longer than this many usual steps is a gap
 
 
 @dataclass(frozen=True, eq=False)
 class Noise:
-    """phi (c, ORDER) autoregression of every channel; sigma (runs, c) size of one row; innovation (c,) share that is new.
+    """Per run and channel (runs, c): sigma size of one row, slow share of the variance that remembers, memory from row to row."""
 
-    The marginal standard deviation of channel c in run r is sigma[r, c], of its innovations sigma[r, c] innovation[c].
-    """
-
-    phi: Floats
     sigma: Floats
-    innovation: Floats
+    slow: Floats
+    memory: Floats
 
     def rows(self, run: int, values: Floats, inflate: Floats, time: Floats, first: int = 0) -> Floats:
         """White rows (w, k) of values (n, c, k), channels from `first` on: channel by channel, missing rows left out.
@@ -37,21 +40,40 @@ class Noise:
             if not present.any() or not np.isfinite(self.sigma[run, j]):
                 continue
             scaled = values[present, j - first] / (self.sigma[run, j] * inflate[present, j])[:, None]
-            out.append(self._filter(scaled, starts(time, present), j))
+            slow, memory = float(self.slow[run, j]), float(self.memory[run, j])
+            if slow > 0.0:
+                scaled = _innovations(scaled, starts(time, present), slow, memory)
+            out.append(scaled)
         return np.concatenate(out) if out else np.zeros((0, values.shape[2]))
 
-    def _filter(self, x: Floats, fresh: Bools, channel: int) -> Floats:
-        phi, share = self.phi[channel], self.innovation[channel]
-        white = x.copy()
-        for lag in range(1, ORDER + 1):
-            white[lag:] -= phi[lag - 1] * x[:-lag]
-        white /= share
-        # the first rows after a gap have no past: their own size is all there is to scale them by
-        for lag in range(ORDER):
-            at = np.flatnonzero(fresh) + lag
-            at = at[at < len(x)]
-            white[at] = x[at]
-        return white
+    def rows_of(self, run: int, value: Floats, inflate: Floats) -> Floats:
+        """Value (n,) of every white row (w,) of all channels, in the order of `rows`."""
+        out = [
+            value[np.isfinite(inflate[:, j])]
+            for j in range(inflate.shape[1])
+            if np.isfinite(inflate[:, j]).any() and np.isfinite(self.sigma[run, j])
+        ]
+        return np.concatenate(out) if out else np.zeros(0)
+
+
+@njit(cache=True)
+def _innovations(x, fresh, slow, memory):  # type: ignore[no-untyped-def]  # pragma: no cover
+    n, k = x.shape
+    out = np.empty((n, k))
+    expected = np.zeros(k)
+    unsure = slow
+    for t in range(n):
+        if fresh[t]:
+            expected[:] = 0.0
+            unsure = slow
+        whole = unsure + 1.0 - slow
+        gain, scale = unsure / whole, 1.0 / np.sqrt(whole)
+        for j in range(k):
+            surprise = x[t, j] - expected[j]
+            out[t, j] = surprise * scale
+            expected[j] = memory * (expected[j] + gain * surprise)
+        unsure = memory * memory * unsure * (1.0 - gain) + slow * (1.0 - memory * memory)
+    return out
 
 
 def starts(time: Floats, present: Bools) -> Bools:
@@ -71,9 +93,9 @@ def fit_noise(
     """Noise of what no model explains: residuals, inflate (n, c) and times (n,) per run. Robust against 2 % outliers."""
     channels = residuals[0].shape[1]
     sigma = np.full((len(residuals), channels), np.nan)
-    phi, innovation = np.zeros((channels, ORDER)), np.ones(channels)
+    slow, memory = np.zeros_like(sigma), np.zeros_like(sigma)
     for j in range(channels):
-        covariance, weight = np.zeros(ORDER + 1), 0.0
+        covariance, rows = np.zeros((len(residuals), LAGS + 1)), np.zeros(len(residuals))
         for r, (residual, grow) in enumerate(zip(residuals, inflate, strict=True)):
             present = np.isfinite(residual[:, j]) & np.isfinite(grow[:, j])
             if present.sum() < 2:
@@ -84,19 +106,22 @@ def fit_noise(
             if not ordered[r] or present.sum() < 40:
                 continue
             x = np.clip(x / sigma[r, j], -4.0, 4.0)
-            fresh = starts(times[r], present)
-            group = np.cumsum(fresh)
-            for lag in range(ORDER + 1):
+            group = np.cumsum(starts(times[r], present))
+            for lag in range(LAGS + 1):
                 same = group[lag:] == group[: len(group) - lag]
-                covariance[lag] += float((x[lag:] * x[: len(x) - lag])[same].sum())
-            weight += len(x)
-        if weight > 0 and covariance[0] > 0:
-            phi[j], innovation[j] = _yule_walker(covariance / covariance[0])
+                covariance[r, lag] = float((x[lag:] * x[: len(x) - lag])[same].sum())
+            rows[r] = len(x)
+        every = covariance.sum(axis=0)
+        for r in range(len(residuals)):
+            # a run borrows from the others as much as it has of its own
+            mine = covariance[r] + every * (rows[r] / max(rows.sum(), 1.0))
+            if rows[r] > 0 and mine[0] > 0:
+                slow[r, j], memory[r, j] = _slow_part(mine[1:] / mine[0], 2.0 * rows[r])
     known = np.isfinite(sigma)
     for j in range(channels):
         if known[:, j].any():  # a run too short to tell borrows from the others
             sigma[known[:, j], j] = np.maximum(sigma[known[:, j], j], 0.3 * np.median(sigma[known[:, j], j]))
-    return Noise(phi, sigma, innovation)
+    return Noise(sigma, slow, memory)
 
 
 def robust_size(x: Floats) -> float:
@@ -106,14 +131,20 @@ def robust_size(x: Floats) -> float:
     return rms if rms < 1.5 * middle or middle == 0.0 else 1.5 * middle
 
 
-def _yule_walker(correlation: Floats) -> tuple[Floats, float]:
-    toeplitz = correlation[np.abs(np.subtract.outer(np.arange(ORDER), np.arange(ORDER)))] + 1e-3 * np.eye(ORDER)
-    phi = np.linalg.solve(toeplitz, correlation[1:])
-    left = float(1.0 - phi @ correlation[1:])
-    return np.asarray(phi, float), float(np.sqrt(max(left, 0.02)))
+def _slow_part(correlation: Floats, rows: float) -> tuple[float, float]:
+    """Share and memory of the slow part from autocorrelations (LAGS,) at lags 1, 2, ... of that many rows."""
+    lag = np.arange(1, LAGS + 1)
+    best = (0.0, 0.0, 0.0)
+    for memory in _MEMORIES:
+        shape = memory**lag
+        share = float(np.clip(correlation @ shape / (shape @ shape), 0.0, _MOST_SLOW))
+        gain = float(np.sum(correlation**2) - np.sum((correlation - share * shape) ** 2))
+        if gain > best[0]:
+            best = (gain, share, float(memory))
+    return (best[1], best[2]) if rows * best[0] > _SURE else (0.0, 0.0)
 
 
 def effective_rows(noise: Noise, channel: int, n: int) -> float:
     """How many independent rows n correlated ones are worth for a mean."""
-    gain = 1.0 - noise.phi[channel].sum()
-    return n * float(np.clip(gain**2 / noise.innovation[channel] ** 2, 1e-3, 1.0))
+    slow, memory = noise.slow[:, channel], np.maximum(noise.memory[:, channel], 0.0)
+    return n / float(np.mean(1.0 + 2.0 * slow * memory / (1.0 - memory)))

@@ -19,9 +19,9 @@ from camcomp.gcode.words import code_of
 
 _NO_AXES = frozenset((40, 921, 922, 923, 281, 301))
 
-# A program without motions may still do something, but a subroutine may only seem to do nothing.
-_IDLE = re.compile(r"%|\b[NO:]\d+(?!.*\bsub\b)|\bM0?2\b|\bM30\b|[\0\x1a]", re.IGNORECASE)
-_SUBROUTINE = re.compile(r".*\bsub\b", re.IGNORECASE)
+# What is said in vain, and what would move if it were executed: it stands behind the end, or in a subroutine.
+_IDLE = re.compile(r"%|\b[NO:]\d+|\bM0?2\b|\bM30\b|[\0\x1a]", re.IGNORECASE)
+_MOVES = re.compile(r"(?!.*G[ \t]*0*(4|10|52|92)(?!\d)).*[XYZ][ \t]*[-+.\d\[#=]", re.IGNORECASE)
 
 
 def read_program(data: bytes, *, name: str, setup: Setup | None = None, dialect: str | None = None) -> Program:
@@ -39,7 +39,7 @@ def read_program(data: bytes, *, name: str, setup: Setup | None = None, dialect:
     path, sites = reader.record.finish()
     if len(path) == 0:
         lines = [_IDLE.sub("", code_of(text.line(row))).strip() for row in range(len(text.starts))]
-        if not any(lines) or any(_SUBROUTINE.match(each) for each in lines):
+        if not any(lines) or any(_MOVES.match(each) for each in lines):
             raise ProgramError("CC100", "the program moves nothing", at=text.place(0))
         reader.warnings.append("the program moves nothing")
     return Program(
@@ -131,12 +131,22 @@ class Interpreter(Executor):
                 self.refuse("CC108", f"axis words with {code_name(code)}", word)
 
     def _spare_axes(self, block: Block) -> None:
-        """Words for axes that camcomp does not follow: they may stay where they are, and not more."""
+        """Words for axes that camcomp does not follow: they may stay where they are, and tables may turn alone."""
+        table, offset = self.state.table, block.code(0) in (100, 520, 920)
         for letter in "ABCUVW":
             word = block.words.get(letter)
-            if word is None or letter in block.used or word.value == 0.0:
+            if word is None or letter in block.used:
                 continue
-            self.refuse("CC115", f"{letter} moves an axis that the machine does not have", word)
+            place = word.value
+            if letter in table and self.state.relative:
+                place += table[letter]
+            if letter not in table and word.value != 0.0:
+                self.refuse("CC115", f"{letter} moves an axis that the machine does not have", word)
+            if place == table.get(letter, 0.0):
+                continue
+            if offset or block.axes or self.state.motion not in (0, 10):
+                self.refuse("CC115", f"{letter} turns while something else happens; it may only turn alone", word)
+            table[letter] = place
 
     def _leftovers(self, block: Block, m_codes: list[int]) -> None:
         free = any(code not in PLAIN_M for code in m_codes) or any(code in self.dialect.passed for code, _ in block.g)

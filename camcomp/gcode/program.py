@@ -29,6 +29,7 @@ class Setup:
     second_home_mm: Triple = ZERO  # G30
     tool: int = 0  # in the spindle
     increment_mm: float | None = None  # what a number without a point counts, on a control that has it so
+    table_axes: frozenset[str] = frozenset()  # A, B, C that turn the workpiece and only position it
     skip_deleted: bool = False  # the block delete switch: lines that start with `/` are not executed
 
 

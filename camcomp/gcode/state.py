@@ -32,6 +32,7 @@ class State:
         self.tools = dict(setup.tools)
         self.homes = {28: list(setup.home_mm), 30: list(setup.second_home_mm)}
         self.offset = [0.0, 0.0, 0.0]
+        self.table = dict.fromkeys(setup.table_axes, 0.0)  # deg
 
         self.motion: int | None = dialect.initial_motion  # code in tenths: 0 to 30, a cycle, or None after G80
         self.outside_cycles = self.motion  # the last one that is no cycle

@@ -68,8 +68,8 @@ def score(result: dict[str, Any], truth: dict[str, Any]) -> dict[str, Any]:
             out["oracle"] = 1 - after / before
             out["shrinkage"] = 1 - shrinkage["after_rms_um"] / shrinkage["before_rms_um"]
             if shrinkage.get("ci95"):
-                ends = sorted(1 - v for v in shrinkage["ci95"])
-                out["shrinkage_inside"] = bool(ends[0] <= out["oracle"] <= ends[1])
+                low, high = shrinkage["ci95"]
+                out["shrinkage_inside"] = bool(low <= out["oracle"] <= high)
     following = result.get("next_experiment")
     out["next"] = following["action"] if following else None
     return out

@@ -20,7 +20,7 @@ GROUND = {
 ENGINES = {"gcode", "statics", "cutting", "gap"}
 SHELVES = {"robots", "dialects", "forces", "effects"}
 JOINTS = {
-    "alike", "arcfit", "armposes", "bench", "candidates", "columns", "course", "heldout", "inquiry", "job", "locate",
+    "alike", "arcfit", "armposes", "bench", "candidates", "columns", "course", "heldout", "inquiry", "intervals", "job", "locate",
     "logcheck", "moves", "noise", "planner", "posture", "response", "reversals", "scan", "splitting", "survey", "twin",
 }  # fmt: skip
 STORIES = {"armstudy", "axisstudy", "compensate", "verify", "simulate", "diagnose", "stream"}

@@ -77,11 +77,16 @@ def run(
         table = "".join(f"T{n} P{n} Z{z / 25.4:.9f} D0\n" for n, z in (tools or {}).items())
         (root / "tool.tbl").write_text(table or "T99 P99 Z0 D0\n")
         command = [str(binary()), "-g", "-v", "rs274.var", "-t", "tool.tbl", "program.ngc"]
-        done = subprocess.run(
-            command, cwd=folder, stdin=subprocess.DEVNULL, capture_output=True, text=True, errors="replace", timeout=60,
-            check=False,
-        )
-    return _parse(done.stdout, done.stderr)
+        for _ in range(3):
+            done = subprocess.run(
+                command, cwd=folder, stdin=subprocess.DEVNULL, capture_output=True, text=True, errors="replace", timeout=120,
+                check=False,
+            )
+            if done.returncode >= 0:
+                break  # on a busy machine a signal ends it now and then, whatever the program
+    result = _parse(done.stdout, done.stderr)
+    result.error = result.error and f"{result.error} (exit {done.returncode})"
+    return result
 
 
 def _numbers(arguments: str) -> list[float]:

@@ -158,3 +158,17 @@ def test_the_machine_file_asks_for_arcs():
     assert (compensate(program, Job(settings), method="newton", tolerance_um=1.0, version="0").rows.kind == ARC).sum() == 0
     on = settings.model_copy(update={"compensation": settings.compensation.model_copy(update={"arcs": True})})
     assert (compensate(program, Job(on), method="newton", tolerance_um=1.0, version="0").rows.kind == ARC).any()
+
+
+@pytest.mark.parametrize("config", ["config/cartesian.yaml", "config/orthoglide-1deg.yaml"])
+@pytest.mark.parametrize(
+    "words", ["G18 G3 X10 Z0 I-10 K0", "G18 G2 X-10 Z0 R10", "G19 G3 Y0 Z0 J-6 K8", "G19 G2 Y-20 Z0 R-10.5"], ids=str
+)
+def test_where_an_upright_arc_passes_the_vertical_it_is_led_from_one_force_to_the_other(words, config):
+    straight, _, _ = check(f"{HEAD}{words} F600\nG1 X12\nM2\n", config)
+    assert 1e3 * np.linalg.norm(straight.after, axis=1).max() <= 1.0
+    inside = straight.rows.joining & (straight.rows.motion == 1)
+    assert inside.any()
+    program = straight.program
+    after = read_program(straight.written.data, name="out.nc")
+    assert 1e3 * verify(after, program, Job(load_config((str(shipped(config)),)))).residual.max() <= 1.0

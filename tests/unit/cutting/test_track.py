@@ -1,5 +1,7 @@
 """Where the cutting force acts along a path, and where it jumps."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -87,3 +89,15 @@ def test_depth_is_the_programmed_height_under_the_top_of_the_stock():
     track = lay_track(path_of(("line", (10, 0, -2)), start=(0, 0, -2)), Conditions(model=model, stock_top_mm=1.0))
     force_at(track, 0, 0.5)
     np.testing.assert_allclose(seen[-1], [3.0])
+
+
+def test_an_upright_arc_is_cut_where_its_feed_turns_over():
+    # half a turn in the XZ plane, from the lowest point over the vertical to the highest
+    path = path_of(("arc", (0, 0, 20), (0, 0, 10), -np.pi), start=(0, 0, 0))
+    track = lay_track(replace(path, axis=np.array([[0.0, 1.0, 0.0]])), conditions())
+    assert track.motion.tolist() == [0, 0] and track.u1[0] == pytest.approx(0.5)
+    assert track.jump.tolist() == [False, True]
+    before, after = force_at(track, 0, 1.0), force_at(track, 1, 0.0)
+    np.testing.assert_allclose(before[:2], -after[:2])
+    assert before[2] == after[2] == -25.0
+    np.testing.assert_allclose(before, force_at(track, 0, 0.5))

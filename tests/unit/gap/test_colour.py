@@ -33,7 +33,7 @@ def test_a_vibration_of_one_axis_is_none_and_depends_on_time():
         r[:, 1] += 0.01 * np.sin(2 * np.pi * 1.5 * t + k)
     found = of(rest)
     assert found.ratio > 1.5 and np.argmax(found.excess) == 1
-    assert covariate(rest, [t] * 4, rest, ("x", "y", "z"), found.excess) == "time:y"
+    assert covariate(rest, [t] * 4, rest, "xyz", ("x", "y", "z"), found.excess) == "time:y"
 
 
 def test_the_line_of_a_sine_is_found_at_its_frequency():

@@ -203,7 +203,7 @@ def test_a_program_without_motions_passes_and_one_without_statements_does_not():
     program = read_program(text, name="in.nc")
     assert len(program.path) == 0 and program.warnings == ("the program moves nothing",)
     assert rewrite(program, Output.same(program.path), resolution_mm=1e-3, version="1").data.endswith(text)
-    for nothing in (b"", b"%\n(no more)\nN10 M30\n%\n", b"o100 sub\nG1 X1 F100\no100 endsub\nM2\n", b"o<a> sub\nT1\no<a> endsub\n"):
+    for nothing in (b"", b"%\n(no more)\nN10 M30\n%\n", b"o100 sub\nG1 X1 F100\no100 endsub\nM2\n", b"T1\nM2\nG0 X1\n"):
         with pytest.raises(ProgramError) as caught:
             read_program(nothing, name="in.nc")
         assert caught.value.rule == "CC100"
