@@ -137,7 +137,7 @@ def compensate(
     able = feeding & ~kept & (wanted and not job.causes)  # what drives leave over has waves that no arc follows
     bend = Bend.of(track, trial, aimed.commanded, second, tolerance, able)
     tolerance[bend.use] = max(budget - np.sqrt(0.5) * resolution, 0.1 * budget)  # the centre is rounded, too
-    last = np.full(len(tolerance), np.inf)
+    last, last_count = np.full(len(tolerance), np.inf), np.zeros(len(tolerance), np.int64)
     for round_ in range(MAX_ROUNDS):
         nodes, shift = bend.divided(trial, tolerance)
         if (gone := bend.pointless(nodes)).any():
@@ -152,12 +152,13 @@ def compensate(
         worst = np.zeros(len(tolerance))
         np.maximum.at(worst, points.piece[points.judged], np.linalg.norm(after.error[points.judged], axis=1))
         missed = (worst > 1e-3 * tolerance_um) & ~kept
-        stuck = missed & (worst >= STUCK * last)
+        count = np.diff(nodes.first)
+        stuck = missed & (worst >= STUCK * last) & (count > last_count)
         straighten = missed & bend.use & (stuck | (round_ >= ARC_ROUNDS - 1))
         missed &= ~stuck & ~straighten
         if not (missed | straighten).any():
             break
-        last = np.where(straighten, np.inf, worst)
+        last, last_count = np.where(straighten, np.inf, worst), count
         bend.use &= ~straighten
         tolerance[straighten] = budget
         tolerance = np.where(missed, tolerance * np.clip(0.9e-3 * tolerance_um / np.maximum(worst, 1e-12), 0.3, 0.9), tolerance)

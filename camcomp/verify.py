@@ -25,6 +25,9 @@ from camcomp.splitting import trial_nodes
 PER_SECTION = 4  # points looked at within each straight move or section of an arc
 ARC_STEP = 0.1  # rad, section of an arc
 MATCH_PASSES = 20  # tip and force settle on a place of the path; on a circle of 1 mm it takes ten
+ALONG = 180  # sections of a piece to measure the path that ought to be commanded
+UNEVEN = 0.02  # change of a piece's length by the correction from which that is worth while
+PROBE = 1e-4  # fraction of a piece
 LARGEST_STEP = 0.05  # of a piece, in one pass
 NEAR_MM = 5.0  # a matched end may be this far from where it is expected
 
@@ -81,7 +84,7 @@ def verify(corrected: Program, original: Program, job: Job) -> Verified:
     moving = np.flatnonzero(layout.corrected & (track.length > 0.0))
     piece, move, f = _samples(corrected.path, moving, first[moving], last[moving])
     commanded = pathgeometry.points(corrected.path, move, f)
-    residual, w = _residual(job, track, piece, commanded, _fraction(corrected.path, piece, move, f))
+    residual, w = _residual(job, track, piece, commanded, _fraction(job, track, reach, corrected.path, piece, move, f))
     # Rapids and starts are only there because drives remember them.
     judged = (f > 0.0) & (original.path.kind[track.motion[piece]] != RAPID)
     piece, residual, w, vertex = piece[judged], residual[judged], w[judged], f[judged] == 1.0
@@ -164,8 +167,8 @@ def _match(
     return first, last, joins
 
 
-def _fraction(path: Path, piece: Ints, move: Ints, f: Floats) -> Floats:
-    """First guess (k,) of the fraction of each piece: by commanded length."""
+def _fraction(job: Job, track: Track, reach: Floats, path: Path, piece: Ints, move: Ints, f: Floats) -> Floats:
+    """First guess (k,) of the fraction of each piece: by the length of the path that ought to be commanded."""
     length = pathgeometry.lengths(path)
     before = np.cumsum(length) - length
     run = before[move] + f * length[move]
@@ -173,24 +176,42 @@ def _fraction(path: Path, piece: Ints, move: Ints, f: Floats) -> Floats:
     start, stop = np.full(n, np.inf), np.zeros(n)
     np.minimum.at(start, piece, before[move])
     np.maximum.at(stop, piece, run)
-    return np.clip((run - start[piece]) / np.maximum(stop - start, 1e-300)[piece], 0.0, 1.0)
+    share = np.clip((run - start[piece]) / np.maximum(stop - start, 1e-300)[piece], 0.0, 1.0)
+    moves = np.zeros(n, np.int64)
+    np.maximum.at(moves, piece, move)
+    first = np.full(n, len(length))
+    np.minimum.at(first, piece, move)
+    # One move goes evenly, and so do many where the correction is small against the piece.
+    uneven = np.flatnonzero((moves > first) & (np.abs(reach - track.length)[:n] > UNEVEN * track.length[:n]))
+    w = np.linspace(0.0, 1.0, ALONG + 1)
+    at, along = np.repeat(uneven, len(w)), np.tile(w, len(uneven))
+    aimed = aim_at(job, track.points(at, along), travel_of(job, track, at, along), "newton").commanded.reshape(-1, len(w), 3)
+    for i, curve in zip(uneven, aimed, strict=True):
+        way = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(curve, axis=0), axis=1))))
+        on = piece == i
+        share[on] = np.interp(share[on] * way[-1], way, w)
+    return share
 
 
 def _residual(job: Job, track: Track, piece: Ints, commanded: Floats, w: Floats) -> tuple[Floats, Floats]:
     """Distance (k,) mm of the loaded tip from the programmed path, and the fraction of the nearest point."""
-    last_w, last_along = w, np.full(len(w), np.nan)
-    nearest, best = np.full(len(w), np.inf), w
-    for _ in range(MATCH_PASSES):
+    def seen(w: Floats) -> tuple[Floats, Floats]:
+        """Distance from the place, and how far the tip lies ahead of it, mm."""
         tip, _ = respond(job, commanded, travel_of(job, track, piece, w))
         gap = tip - track.points(piece, w)
-        size = np.linalg.norm(gap, axis=1)
+        tangent = pathgeometry.tangents(track.path, track.motion[piece], track.u(piece, w))
+        return np.linalg.norm(gap, axis=1), np.sum(gap * tangent, axis=1)
+
+    # With the place the force turns, and the tip with the force; on small arcs further than the place, so by secant.
+    last_w = np.where(w < 0.5, w + PROBE, w - PROBE)
+    nearest, last_along = seen(last_w)
+    best = last_w
+    for _ in range(MATCH_PASSES):
+        size, along = seen(w)
         best, nearest = np.where(size < nearest, w, best), np.fmin(size, nearest)
-        along = np.sum(gap * pathgeometry.tangents(track.path, track.motion[piece], track.u(piece, w)), axis=1)
-        # With the place the force turns, and the tip with the force; on small arcs further than the place, so by secant.
         change = along - last_along
         slope = np.divide(w - last_w, -change, out=1.0 / track.length[piece], where=np.abs(change) > 1e-12)
-        step = np.clip(along * slope, -LARGEST_STEP, LARGEST_STEP)
-        better = np.clip(w + step, 0.0, 1.0)
+        better = np.clip(w + np.clip(along * slope, -LARGEST_STEP, LARGEST_STEP), 0.0, 1.0)
         if np.abs((better - w) * track.length[piece]).max(initial=0.0) < 1e-7:
             break
         last_w, last_along, w = w, along, better

@@ -26,6 +26,7 @@ RUNGS = ((4, 2), (5, 4, 2, 0), (5, 5, 3, 1), (6, 6, 4, 2))  # degree in position
 SHIFT_STEPS = 4
 EVEN = 1.1127756842787055 ** -np.arange(1.0, 7.0)  # multiples fill the cube evenly; the root of x^7 = x + 1
 WIDER = 1.02  # force range, so that it is not left for nothing
+_ZERO = np.zeros(3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +93,7 @@ class Tiles:
     size: float
     keys: Ints
     values: Ints
-    centre: Floats  # (t, 3)
+    centre: Floats  # (t, 3) from Field.corner
     half: Floats  # (t,)
     rung: Ints  # (t,)
     first: Ints  # (t,) where its coefficients begin
@@ -104,9 +105,13 @@ class Tiles:
 class Field:
     """A machine's correction, loaded tip, tilt, drives and joints by interpolation. Machine frame."""
 
-    def __init__(self, machine: Machine, force: Floats) -> None:
-        """Force (n, 3) N: forces that will occur, or some of them. Machines of up to three actuators."""
+    def __init__(self, machine: Machine, force: Floats, middle: Floats = _ZERO) -> None:
+        """Force (n, 3) N: forces that will occur, or some of them. Machines of up to three actuators.
+
+        middle (3,) mm: centre of a cube; programs lie round their origin, and so in the fewest cubes.
+        """
         self.machine = machine
+        self.corner = middle - 0.5 * CELL
         self.solved = 0  # exact solutions so far
         self.worst = 0.0  # mm, largest error at test points of the tiles in use
         self._set_range(force)
@@ -124,8 +129,9 @@ class Field:
             np.zeros((0, len(self.machine.actuators), 3)),
         )  # fmt: skip
 
-    def prepare(self, tips: Floats, force: Floats) -> None:
-        """Makes the tiles for points (n, 3) and forces (n, 3) that are going to be asked for."""
+    def prepare(self, tips: Floats, force: Floats) -> Floats:
+        """Makes the tiles for points (n, 3) and forces (n, 3) that are going to be asked for; the points as look_up wants them."""
+        tips = tips - self.corner
         if len(force) and ((force < self.low - 1e-9).any() or (force > self.high + 1e-9).any()):
             self._set_range(np.concatenate((force, [self.low, self.high])))
         room = np.empty(len(tips), np.int64)
@@ -133,8 +139,9 @@ class Field:
             t = self.tiles
             count = missing_cells(t.keys, t.values, t.size, tips, room)
             if not count:
-                return
+                break
             self._build(np.unique(room[:count]))
+        return tips
 
     def packed(self) -> tuple:
         """Arguments of the compiled look-up: cells, tiles, bases. The terms of a basis are the first ones of the largest."""
@@ -262,7 +269,8 @@ class Field:
     def _at(self, samples: Floats, centre: Floats, half: float) -> tuple[Floats, Floats, Ints]:
         """Tips and forces of samples in an order in which neighbours lie near each other, and the order."""
         order = _snake(samples)
-        return centre + half * samples[order, :3], self.force_mid + self.force_half * samples[order, 3:], order
+        tips = self.corner + centre + half * samples[order, :3]
+        return tips, self.force_mid + self.force_half * samples[order, 3:], order
 
     def _append(self, centre: Floats, half: float, rung: int, both: Floats, alone: Floats) -> int:
         t, basis = self.tiles, self.bases[rung]

@@ -215,16 +215,16 @@ class PlainCorrector:
         """Answers (n, .) as in look_up, machine frame, for points of moves, program frame; nominal joints, tiles (n,)."""
         target, force = self.job.frame.to_machine(target), self.job.frame.vectors(force)
         if self.field is None:
-            self.field = Field(self.machine, force)
+            self.field = Field(self.machine, force, self.job.frame.origin)
         known = self.field
-        known.prepare(target, force)
+        near = known.prepare(target, force)
         n, m = len(target), len(self.machine.actuators)
         answer, nominal = np.empty((n, 9 + 2 * m if every else BASIC)), np.empty((n if every else 0, m))
         tile = np.empty(n, np.int64)
         packed = known.packed()
 
         def work(a: int) -> None:
-            look_up(a, min(a + SLICE, n), m, every, target, force, answer, nominal, tile, *packed)
+            look_up(a, min(a + SLICE, n), m, every, near, force, answer, nominal, tile, *packed)
 
         with ThreadPoolExecutor(threads()) as pool:
             list(pool.map(work, range(0, n, SLICE)))

@@ -166,6 +166,8 @@ def lay_track(path: Path, conditions: Conditions, length: Floats | None = None) 
     corner[b] = ~straight_on
     smooth = cutting[a] & cutting[b] & straight_on & ~over[b]
     jump[b] = ~smooth & (np.linalg.norm(own0[b] - own1[a], axis=1) > NO_FORCE)
+    if len(real) and real[0] > 0:  # moves without length stand before the first cut
+        jump[real[0]] = bool(np.linalg.norm(own0[real[0]]) > NO_FORCE)
     a, b = a[smooth], b[smooth]
     bisector = last[a] + first[b]
     bisector /= np.linalg.norm(bisector, axis=1, keepdims=True)

@@ -54,6 +54,12 @@ def jacobian(arm: Arm, q: Array) -> Array:
     return np.stack(columns, axis=1)
 
 
+def joint_lines(arm: Arm, q: Array) -> tuple[Array, Array, Array, Array]:
+    """Axes (m, 3) and points on them (m, 3) of all joints at q (m,), then the platform's rotation and position."""
+    R, p, joints = _walk(arm, q)
+    return np.array([axis for axis, _, _ in joints]), np.array([at for _, at, _ in joints]), R @ arm.chain.frame.T, p
+
+
 def _walk(arm: Arm, q: Array) -> tuple[Array, Array, list[tuple[Array, Array, bool]]]:
     R, p = arm.chain.frame.copy(), np.zeros(3)
     joints = []

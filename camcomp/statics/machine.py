@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from camcomp.statics.arm import arm_of
+from camcomp.statics.closedform import ClosedForm, closed_form
 from camcomp.statics.description import Robot
 from camcomp.statics.layout import Packed
 from camcomp.statics.pack import pack
@@ -34,6 +37,12 @@ class Machine:
     def start_pose(self) -> Array:
         """(12,) nominal platform at the start: rotation row by row, position."""
         return np.concatenate((self.nominal.start_rotation.ravel(), self.nominal.start_reference))
+
+    @cached_property
+    def closed_form(self) -> ClosedForm | None:
+        """Inverse kinematics in closed form, where the control's arm has one."""
+        arm = arm_of(self.nominal)
+        return None if arm is None else closed_form(arm)
 
     @property
     def limits(self) -> Array:

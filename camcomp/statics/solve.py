@@ -65,6 +65,13 @@ def _per_point(value: Array | None, n: int, shape: tuple[int, ...]) -> Array:
     return np.ascontiguousarray(np.broadcast_to(np.asarray(value, float), (n, *shape))).copy()
 
 
+def _start(machine: Machine, rotation: Array, reference: Array) -> tuple[Array, Array]:
+    """Pose and joint coordinates from which the numeric inverse kinematics begins: the first point, if in closed form."""
+    if machine.closed_form is not None and (q := machine.closed_form.near(rotation, reference)) is not None:
+        return np.concatenate((rotation.ravel(), reference)), q[None]
+    return machine.start_pose, machine.start_y
+
+
 def threads() -> int:
     """Threads of the solver: as many as there are cores for this process, or what CAMCOMP_THREADS says."""
     limit = os.environ.get("CAMCOMP_THREADS", "")
@@ -119,8 +126,9 @@ def solve(
     kept = np.zeros((n if keep else 0, *machine.elastic.scale.shape))
 
     def work(s: slice) -> None:
+        start, start_y = _start(machine, R_near[s.start], near[s.start] - R_near[s.start] @ tool)
         sweep.solve_many(
-            mode, machine.elastic, machine.rigid, machine.joint_var, tool, machine.start_pose, machine.start_y,
+            mode, machine.elastic, machine.rigid, machine.joint_var, tool, start, start_y,
             rho is None, check, R_near[s].reshape(-1, 9),
             R_aim[s].reshape(-1, 9), near[s], aim[s], f[s], w[s], r[s], nominal[s], goal[s], pose[s],
             tip[s], drive[s], total[s], status[s], passes[s], kept[s] if keep else kept,

@@ -42,20 +42,3 @@ def test_the_corrected_program_shrinks_the_error_as_predicted(workshop, tmp_path
     shrinkage = result["shrinkage"]
     assert 1.0 - after / before > shrinkage["ratio"] - 0.05  # that ratio has the noise of the tracker in it
     assert 1e3 * after < 1.5 * shrinkage["after_rms_um"]
-
-
-def test_the_option_writes_the_file_and_the_next_program(tmp_path):
-    sample = runner.ROOT / "samples" / "diagnosis" / "ambiguous" / "experiment.yaml"
-    config, program = tmp_path / "machine.yaml", tmp_path / "next.nc"
-    code, said = runner.invoke(["diagnose", str(sample), "--write-config", str(config), "--next-program", str(program)])
-    assert code == 0, said
-    text = config.read_text()
-    for line in runner.CONFIG.read_text().splitlines():
-        if "#" in line:
-            assert line.split("#", 1)[1] in text, line
-    assert "likeliest of 2 sets" in text and "- effect: servo_lag" in text
-    assert "(experiment proposed by camcomp)" in program.read_text()
-    code, said = runner.invoke(["validate", str(config)])
-    assert code == 0, said
-    code, said = runner.invoke(["simulate", str(program), "--config", str(config), "-o", str(tmp_path / "out.csv")])
-    assert code == 0, said

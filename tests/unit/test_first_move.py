@@ -33,3 +33,12 @@ def test_the_first_cut_is_led_onto_its_corrected_path(config):
     after = read_program(result.written.data, name="out.nc")
     assert 1e3 * verify(after, program, job).residual.max() <= 1.0
     assert after.path.feed[1] == pytest.approx(100.0, rel=0.02)
+
+
+def test_a_first_move_without_length_does_not_hide_the_start_of_the_cut():
+    program = read_program(TEXT.replace("X10 Y10", "X0 Y0").encode(), name="in.nc")
+    job = job_of("config/cartesian.yaml")
+    result = compensate(program, job, method="newton", tolerance_um=1.0, version="0")
+    assert 1e3 * np.linalg.norm(result.after, axis=1).max() <= 1.0
+    after = read_program(result.written.data, name="out.nc")
+    assert 1e3 * verify(after, program, job).residual.max() <= 1.0

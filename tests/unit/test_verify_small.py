@@ -8,6 +8,7 @@ from camcomp.config import load_config
 from camcomp.files import shipped
 from camcomp.gcode.interpret import read_program
 from camcomp.job import Job
+from camcomp.programs import open_program, setup_of
 from camcomp.verify import verify
 
 SMALL = (
@@ -35,3 +36,15 @@ def test_what_was_not_corrected_is_seen():
     job = Job(load_config((str(shipped("config/orthoglide-1deg.yaml")),)))
     program = read_program(SMALL.encode(), name="in.nc")
     assert 1e3 * verify(program, program, job).residual.max() > 300.0
+
+
+@pytest.mark.parametrize("machine", ["puu", "delta", "orthoglide-1deg", "kuka-kr210"])
+@pytest.mark.parametrize("sample", ["groove-circle-2.nc", "groove-circle-50.nc"])
+def test_verify_and_compensate_agree_on_every_machine(machine, sample):
+    """On REF-PUU the force moves the tip by more than the radius of the small circle, and further than the place itself."""
+    config = load_config((str(shipped(f"config/{machine}.yaml")),))
+    job, program = Job(config), open_program(shipped(f"samples/{sample}"), config)
+    result = compensate(program, job, method="newton", tolerance_um=1.0, version="0")
+    after = read_program(result.written.data, name="out.nc", setup=setup_of(config))
+    assert 1e3 * np.linalg.norm(result.after, axis=1).max() <= 1.0
+    assert 1e3 * verify(after, program, job).residual.max() <= 1.0

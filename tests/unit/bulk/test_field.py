@@ -16,10 +16,10 @@ FORCE = np.array([[215.0, -10.0, -25.0], [-215.0, 200.0, 0.0]])
 
 def ask(known, target, force):
     """(correction, shift, tilt, drives, change of joints), nominal joints, tiles."""
-    known.prepare(target, force)
+    near = known.prepare(target, force)
     n, m = len(target), len(known.machine.actuators)
     answer, nominal, tile = np.full((n, 9 + 2 * m), np.nan), np.full((n, m), np.nan), np.empty(n, np.int64)
-    look_up(0, n, m, True, target, force, answer, nominal, tile, *known.packed())
+    look_up(0, n, m, True, near, force, answer, nominal, tile, *known.packed())
     return np.split(answer, [3, 6, 9, 9 + m], axis=1), nominal, tile
 
 
@@ -57,7 +57,7 @@ def test_slopes_and_rates_are_derivatives(orthoglide):
     centre = np.array([[-60.0, -60.0, -160.0]])
     known = Field(orthoglide, FORCE)
     _, _, tile = ask(known, centre, FORCE[:1])
-    at = known.tiles.centre[tile[0]]
+    at = known.corner + known.tiles.centre[tile[0]]
     for axis in range(3):
         step = 0.01 * np.eye(3)[axis]
         pair = np.stack((at - step, at + step))

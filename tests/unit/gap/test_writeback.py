@@ -39,6 +39,7 @@ def test_the_file_whose_effects_count_gains_the_causes():
     assert machine_file([machine, override]) == 0
     assert machine_file([machine, effects, override]) == 1
     assert machine_file([override]) == 0
+    assert machine_file([effects, machine, effects]) == 2 and machine_file([machine, machine]) == 1
 
 
 def test_a_relative_file_is_still_found_from_another_folder():

@@ -1,0 +1,209 @@
+"""Speed as a table: `python -m pytest tests/benchmarks/test_speed.py -m benchmarks -s`.
+
+Ratios within one run on the same machine, wall time of whole processes including start-up; processor time beside it,
+which other work on the machine changes less. Only what a busy machine cannot change is asserted.
+"""
+
+import json
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.optimize import root
+
+from camcomp.config import load_config
+from camcomp.files import shipped
+from camcomp.job import Job
+from camcomp.statics.solve import TARGET, solve
+from tests.benchmarks.programs import write
+
+pytestmark = pytest.mark.benchmarks
+
+MILLION, SHARE = 1_000_000, 100_000
+MACHINE = ["--config", str(shipped("config/orthoglide-1deg.yaml"))]
+NOTHING = ["--config", str(shipped("config/orthoglide.yaml")), "--config", str(shipped("config/no-force.yaml"))]
+PYGCODE = """
+import sys
+from pygcode import Line, Machine
+machine = Machine()
+for text in open(sys.argv[1]):
+    if not text.startswith("%"):
+        machine.process_block(Line(text).block)
+"""
+TOLD: list[str] = []
+
+
+@pytest.fixture(scope="module", autouse=True)
+def table(request):
+    yield
+    told = Path("/proc/cpuinfo").read_text().splitlines()
+    model = next((line.split(":")[1].strip() for line in told if line.startswith("model name")), "?")
+    head = f"{len(os.sched_getaffinity(0))} cores of {model}, load {os.getloadavg()[0]:.1f}, Python {sys.version.split()[0]}"
+    with request.config.pluginmanager.getplugin("capturemanager").global_and_fixture_disabled():
+        print("\n" + "\n".join([head, *TOLD]))
+
+
+def tell(what, figure):
+    TOLD.append(f"{what:72s} {figure}")
+
+
+def spent(*args):
+    """Wall time, processor time (s) and peak memory (MB) of a process that has to end well."""
+    begin = time.perf_counter()
+    process = subprocess.Popen([sys.executable, *map(str, args)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    _, status, usage = os.wait4(process.pid, 0)
+    process.returncode = status
+    assert status == 0
+    return np.array([time.perf_counter() - begin, usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024.0])
+
+
+def compensate(program, *options):
+    return spent("-m", "camcomp", "compensate", program, "--quiet", *options)
+
+
+@pytest.fixture(scope="module")
+def programs(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("long")
+    for count in (SHARE, MILLION, 10 * MILLION):
+        write(folder / f"{count}.nc", count)
+    return folder
+
+
+def against(other, own):
+    return f"{other[0] / own[0]:.1f} (by processor time {other[1] / own[1]:.1f})"
+
+
+def test_a_million_lines(programs, tmp_path):
+    reader = tmp_path / "reader.py"
+    reader.write_text(PYGCODE)
+    out, made, summary = tmp_path / "out.nc", [], tmp_path / "s.json"
+    small, large = programs / f"{SHARE}.nc", programs / f"{MILLION}.nc"
+    compensate(small, *MACHINE, "-o", out)  # compiled code is on disk from here on
+    for _ in range(3):
+        made.append(
+            [
+                10.0 * spent(reader, small),
+                compensate(large, *MACHINE, "-o", out, "--summary", summary),
+                compensate(large, *NOTHING, "-o", out),
+                compensate(large, *MACHINE, "-o", out, "--joints", tmp_path / "j.csv"),
+                compensate(small, *MACHINE, "-o", out),
+                *([compensate(large, *MACHINE, "-o", out, "--joints", tmp_path / "j.parquet")] if parquet() else []),
+            ]
+        )
+    pygcode, own, floor, joints, tenth, *more = np.median(np.array(made), axis=0)
+    figures = json.loads(summary.read_text())["interpolation"]
+    tell("1 000 000 lines, compensate -o", f"{own[0]:.1f} s wall, {own[1]:.1f} s processor, {own[2]:.0f} MB")
+    tell("  pygcode merely reading them (from 100 000)", f"{pygcode[0]:.0f} s wall, {pygcode[1]:.0f} s processor")
+    tell("  times faster than pygcode (wanted: 16)", against(pygcode, own))
+    tell("  times the own read-write floor, zero correction (wanted: 2 at most)", f"{own[0] / floor[0]:.2f}")
+    tell("  times faster than pygcode, with --joints as CSV (wanted: 8)", against(pygcode, joints))
+    for each in more:
+        tell("  times faster than pygcode, with --joints as Parquet", against(pygcode, each))
+    tell("  1 000 000 lines over 100 000 (start-up included)", f"{own[0] / tenth[0]:.1f}")
+    tell("  largest of 1000 sampled differences to the exact solver", f"{figures['worst_um']:.4f} um of {figures['bound_um']}")
+    assert figures["worst_um"] <= figures["bound_um"] and own[2] < 1000.0 and joints[2] < 1000.0
+
+
+def parquet():
+    try:
+        import pyarrow.parquet  # noqa: F401
+    except ImportError:
+        return False
+    return True
+
+
+def test_ten_million_lines(programs, tmp_path):
+    few = compensate(programs / f"{MILLION}.nc", *MACHINE, "-o", tmp_path / "out.nc")
+    many = compensate(programs / f"{10 * MILLION}.nc", *MACHINE, "-o", tmp_path / "out.nc")
+    tell("10 000 000 lines", f"{many[0]:.0f} s wall, {many[2]:.0f} MB")
+    tell("  over 1 000 000 lines (wanted: 10.5 at most)", f"{many[0] / few[0]:.1f} (by processor time {many[1] / few[1]:.1f})")
+    assert many[2] < 1000.0 and many[2] < 1.2 * few[2] and many[1] < 12.0 * few[1]
+
+
+def test_a_point():
+    """Against what a researcher would write: the residual in numpy, one point at a time, scipy.optimize.root."""
+    from tests.benchmarks.researcher import Researcher
+
+    job = Job(load_config([shipped("config/orthoglide-1deg.yaml")]))
+    machine = job.real_machine
+    angle = np.linspace(0.0, 6.0, 4000)
+    tips = job.frame.to_machine(np.stack((25 * np.cos(angle), 25 * np.sin(angle), np.zeros(4000)), axis=1))
+    force = np.tile(job.frame.vectors(np.array([[215.0, -10.0, -25.0]])), (4000, 1))
+    solve(machine, TARGET, tips, force=force)
+    begin = time.perf_counter()
+    exact = solve(machine, TARGET, tips, force=force)
+    own = (time.perf_counter() - begin) / len(tips)
+    theirs = Researcher()
+    x, count = None, 6
+    times = []
+    for tip, load, wanted in zip(tips[:count], force, exact.commanded, strict=False):
+        begin = time.perf_counter()
+        x, commanded = theirs.commanded(tip, load, x, root)
+        times.append(time.perf_counter() - begin)
+        assert np.abs(commanded - wanted).max() < 1e-4
+    tell("exact solution of a point, on both cores", f"{1e6 * own:.0f} us")
+    tell("  times faster than scipy.optimize.root, point by point (wanted: 1000)", f"{np.median(times[1:]) / own:.0f}")
+
+
+def test_a_stream():
+    """Set-points along a circle: compute inside, and the round trip through two pipes."""
+    point = "{:.4f},{:.4f},0,{:.3f},{:.3f},-25"
+    angle = np.linspace(0.0, 12.0, 5000)
+    lines = [point.format(25 * np.cos(a), 25 * np.sin(a), 215 * np.cos(a), 215 * np.sin(a)) for a in angle]
+    command = [sys.executable, "-m", "camcomp", "stream", *MACHINE]
+    with subprocess.Popen(command, stdin=-1, stdout=-1, stderr=-1, bufsize=0) as process:
+        answers = os.fdopen(os.dup(process.stdout.fileno()), "rb")
+        answers.readline()
+        trip = []
+        for line in lines:
+            begin = time.perf_counter()
+            process.stdin.write(line.encode() + b"\n")
+            answers.readline()
+            trip.append(1e6 * (time.perf_counter() - begin))
+        process.stdin.close()
+        said = process.stderr.read().decode().strip()
+        answers.close()
+    tell("stream, inside (wanted: half within 100 us, 99.9 % within 1000 us)", said.partition("compute: ")[2])
+    tell("stream, round trip through two pipes", "median {:.0f} us, 99.9 % {:.0f} us".format(*np.percentile(trip, (50, 99.9))))
+
+
+def test_a_directory(tmp_path, monkeypatch):
+    """Ten programs of some thousand lines, by one worker and by two, each with one core to itself."""
+    monkeypatch.setenv("CAMCOMP_THREADS", "1")
+    folder = tmp_path / "in"
+    folder.mkdir()
+    for k in range(10):
+        write(folder / f"{k}.nc", 4000 + k)
+    made = []
+    for turn in range(3):
+        for jobs in (1, 2):
+            made.append(spent("-m", "camcomp", "batch", folder, *MACHINE, "--output-dir", tmp_path / f"out-{turn}-{jobs}", "--jobs", jobs, "--quiet"))
+    one, two = np.median(np.array(made).reshape(3, 2, 3), axis=0)
+    tell("batch of 10 programs, two workers over one (wanted: 1.8)", f"{one[0] / two[0]:.2f}, {one[0]:.1f} s and {two[0]:.1f} s")
+
+
+def test_starting():
+    made = np.median([[spent("-c", "pass"), spent("-m", "camcomp", "--help")] for _ in range(9)], axis=0)
+    tell("camcomp --help over python -c pass (wanted: 6 at most)", f"{made[1, 0] / made[0, 0]:.1f} ({1e3 * made[1, 0]:.0f} ms)")
+
+
+def test_cold_caches(tmp_path):
+    """First run of a fresh installation: everything is compiled."""
+    program, cold = shipped("samples/groove-circle-50.nc"), dict(os.environ, NUMBA_CACHE_DIR=str(tmp_path / "cache"))
+    took = []
+    for _ in range(2):
+        begin = time.perf_counter()
+        command = [sys.executable, "-m", "camcomp", "compensate", str(program), *MACHINE, "-o", str(tmp_path / "o.nc"), "-q"]
+        subprocess.run(command, check=True, env=cold)
+        took.append(time.perf_counter() - begin)
+    tell("sample groove, first run with cold caches, and the second one", f"{took[0]:.1f} s, {took[1]:.1f} s")
+
+
+def test_a_diagnosis():
+    experiment = min(Path(shipped("samples/diagnosis")).rglob("experiment.yaml"))
+    took = spent("-m", "camcomp", "diagnose", experiment, "--quiet")
+    tell(f"diagnosis of samples/diagnosis/{experiment.parent.name}", f"{took[0]:.1f} s wall, {took[1]:.1f} s processor")

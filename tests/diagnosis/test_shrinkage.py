@@ -1,0 +1,42 @@
+"""How far the gap shrinks: between the noise floor and the ceiling, step by step, and with what was re-fitted named."""
+
+import shutil
+from dataclasses import replace
+
+import numpy as np
+
+from camcomp.commands.diagnose import examine
+from tests.diagnosis.test_loop import PAIR
+from tests.diagnosis.test_poor_input import PLAN
+from tests.diagnosis.test_where import SCREW
+from tests.plants.more import add_run
+
+
+def test_steps_lead_from_the_gap_to_near_the_floor_and_the_ceiling_is_no_worse(workshop):
+    for plan in (SCREW, PAIR):
+        result = workshop.answer(plan)[0]
+        found = result["shrinkage"]
+        sizes = [found["before_rms_um"], *(step["after_rms_um"] for step in found["steps"])]
+        assert len(found["steps"]) == len([c for c in result["causes"] if c["effect"] != "unknown"])
+        assert sizes == sorted(sizes, reverse=True) and sizes[-1] == found["after_rms_um"]
+        assert found["noise_floor_um"] == result["gap"]["noise_floor_um"]
+        assert found["ceiling_ratio"] >= found["ratio"] - 0.002
+        assert found["ceiling_rms_um"] < 1.6 * found["noise_floor_um"]
+        assert found["refitted"] == []
+
+
+def test_the_frame_of_another_clamping_is_refitted_on_the_held_out_run_and_named(workshop, tmp_path):
+    path, made = workshop.made(PLAN)
+    folder = tmp_path / "experiment"
+    shutil.copytree(path.parent, folder)
+    moved = replace(made.truth, shift_mm=made.truth.shift_mm + np.array([0.2, -0.1, 0.05]))
+    program = made.programs[0]
+    add_run(folder, made, PLAN, program, cutting=True, channels="all", started_s=9000.0, truth=moved)
+    file = folder / "experiment.yaml"
+    text = file.read_text().replace("started_s: 9000.0}", "started_s: 9000.0, clamping: second}")
+    file.write_text(text + "holdout: [run-3]\n")
+    found = examine(file)[0]["shrinkage"]
+    assert found["holdout"] == ["run-3"]
+    assert found["refitted"] == ["workpiece frame of run-3 (clamping second)"]
+    assert found["before_rms_um"] < 40.0  # the 230 um of the clamping are no part of the gap
+    assert found["ratio"] > 0.5
