@@ -12,6 +12,7 @@ from camcomp.datatypes import Floats
 from camcomp.gap.search import Fitted
 from camcomp.inquiry import Inquiry
 
+FORMULA = 0.005  # share of its size by which an effect's formula itself is off: no guide turns round as Dahl wrote
 BLOCKS = (6, 24, 96)  # per run
 
 
@@ -50,4 +51,5 @@ def joint_covariance(inquiry: Inquiry, f: Fitted) -> Floats:
     unit = np.concatenate([np.ones(d), reach])
     out = C[np.ix_(mine, mine)] * np.outer(wider * unit, wider * unit)
     healthy = np.concatenate([inquiry.prior.tolerance[index], np.zeros(s)])
-    return np.asarray(out + np.diag(healthy**2), float)
+    formula = np.concatenate([FORMULA * f.theta, np.zeros(s)])
+    return np.asarray(out + np.diag(healthy**2 + formula**2), float)
