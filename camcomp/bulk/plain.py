@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from camcomp.bulk.fastwrite import ROOM, write_rows
-from camcomp.bulk.field import Field
+from camcomp.bulk.field import Field, Tiles
 from camcomp.bulk.kernel import BASIC, look_up
 from camcomp.bulk.loads import Edge, Loads, joints_at, loads_of
 from camcomp.bulk.runs import NotInPieces, PlainRun
@@ -67,6 +67,7 @@ class Answers:
     rest: Floats  # (N, 3 + 2 m) tilt, drives, change of the joints
     nominal: Floats  # (N, m)
     tile: Ints  # (N,) negative: solved by itself
+    tiles: Tiles  # that are counted by `tile`
 
 
 @dataclass(frozen=True, eq=False)
@@ -208,11 +209,14 @@ class PlainCorrector:
         return vectors @ self.job.frame.rotation
 
     def _answers(self, rows: Rows) -> Answers:
-        answer, nominal, tile = self.ask(rows.move, rows.target, rows.force, every=True)
-        return Answers(answer[:, :3], answer[:, 3:6], answer[:, 6:], nominal, tile)
+        answer, nominal, tile, tiles = self.ask(rows.move, rows.target, rows.force, every=True)
+        return Answers(answer[:, :3], answer[:, 3:6], answer[:, 6:], nominal, tile, tiles)
 
-    def ask(self, move: Ints, target: Floats, force: Floats, every: bool) -> tuple[Floats, Floats, Ints]:
-        """Answers (n, .) as in look_up, machine frame, for points of moves, program frame; nominal joints, tiles (n,)."""
+    def ask(self, move: Ints, target: Floats, force: Floats, every: bool) -> tuple[Floats, Floats, Ints, Tiles]:
+        """Answers (n, .) as in look_up, machine frame, for points of moves, program frame; nominal joints, tiles (n,).
+
+        A wider range of forces makes new tiles, so those that the numbers count go with them.
+        """
         target, force = self.job.frame.to_machine(target), self.job.frame.vectors(force)
         if self.field is None:
             self.field = Field(self.machine, force, self.job.frame.origin)
@@ -232,7 +236,7 @@ class PlainCorrector:
         if len(lost):
             self.exact += len(lost)
             answer[lost], nominal[lost if every else []] = self._solved(move[lost], target[lost], force[lost], every)
-        return answer, nominal, tile
+        return answer, nominal, tile, known.tiles
 
     def _commanded(self, rows: Rows, answers: Answers) -> tuple[Floats, Bools]:
         """Tips (N, 3) to be commanded, and which rows (N,) stay as programmed: what would be rounded away is left out."""
@@ -243,23 +247,20 @@ class PlainCorrector:
         kept = single & (np.abs(moved).max(axis=1) <= 0.5 * self.resolution)
         return rows.target + np.where(kept[:, None], 0.0, moved), kept
 
-    def _error_of(self, off: Floats, tile: Ints) -> Floats:
+    def _error_of(self, off: Floats, tile: Ints, tiles: Tiles) -> Floats:
         """Errors (n, 3) of tips that are commanded `off` (n, 3) mm beside the right place, machine frame."""
-        known = self.field
-        assert known is not None
         out = off.copy()
         on = tile >= 0
-        out[on] = np.einsum("nij,nj->ni", known.tiles.slope[tile[on]], off[on])
+        out[on] = np.einsum("nij,nj->ni", tiles.slope[tile[on]], off[on])
         return out
 
     def joints(self, done: Done) -> Floats:
         """Joints (N, m) of the written end points: those of the exact command, and the step that rounding makes."""
-        known, m, frame = self.field, len(self.machine.actuators), self.job.frame
-        assert known is not None
+        m, frame = len(self.machine.actuators), self.job.frame
         tile, off = done.answers.tile, frame.vectors(done.written - done.commanded + done.rows.shift)
         out = done.answers.nominal + done.answers.rest[:, 3 + m :]
         on = tile >= 0
-        out[on] += np.einsum("nij,nj->ni", known.tiles.rates[tile[on]], off[on])
+        out[on] += np.einsum("nij,nj->ni", done.answers.tiles.rates[tile[on]], off[on])
         if not on.all():
             told = frame.to_machine(done.written[~on])
             out[~on] = solve(self.machine, FREE, told, check=False).rho_nominal
@@ -287,8 +288,8 @@ class PlainCorrector:
         middle = 0.5 * (w + np.where(same, rows.w[at - 1], 0.0))
         start = run.plain.start[move]
         target = start + middle[:, None] * (run.plain.end[move] - start)
-        answer, _, tile = self.ask(move, target, loads.at(move, middle), every=False)
-        return _Middles(at, move, target + self._back(answer[:, :3]), answer[:, 3:6], tile)
+        answer, _, tile, tiles = self.ask(move, target, loads.at(move, middle), every=False)
+        return _Middles(at, move, target + self._back(answer[:, :3]), answer[:, 3:6], tile, tiles)
 
     def _halfway(self, ends: Floats, first: Floats) -> Floats:
         return 0.5 * (ends + np.concatenate((first[None], ends[:-1])))
@@ -300,7 +301,8 @@ class PlainCorrector:
         R = self.job.frame.rotation
         off = (written - commanded + rows.shift)[judged]
         told = self._halfway(written, first)[middles.rows] - middles.wanted
-        ends, between = self._error_of(off @ R.T, answers.tile[judged]), self._error_of(told @ R.T, middles.tile)
+        ends = self._error_of(off @ R.T, answers.tile[judged], answers.tiles)
+        between = self._error_of(told @ R.T, middles.tile, middles.tiles)
         return np.concatenate((ends, between)) @ R
 
     # --- writing -------------------------------------------------------------------------------------------------
@@ -347,3 +349,4 @@ class _Middles:
     wanted: Floats  # (k, 3) mm to be commanded there, program frame
     unloaded: Floats  # (k, 3) mm, machine frame
     tile: Ints  # (k,)
+    tiles: Tiles

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import BinaryIO
 
@@ -59,15 +60,19 @@ class Bulk:
         source.seek(0)
         self._carry = Carry(np.array(self.setup.start_mm, float), np.array(self.setup.start_mm, float))
         self._corrector = PlainCorrector(self.job, self.tolerance_um)
+        self._told: Future[None] = Future()
+        self._told.set_result(None)
         self.totals = Totals(self.job, digest.hexdigest(), size)
         top = self.job.conditions.stock_top_mm if self.job.conditions.model else None
         self._runs = Runs(
             source, self.name, self.setup, self.job.config.control.dialect, np.nan if top is None else top
         )
         self._stamp: str | None = f"camcomp {self.version} sha256:{digest.hexdigest()}"
-        for data in self._pieces():
-            self.totals.lines_out += data.count(b"\n")
-            sink(data)
+        with ThreadPoolExecutor(1) as self._beside:
+            for data in self._pieces():
+                self.totals.lines_out += data.count(b"\n")
+                sink(data)
+            self._told.result()
         self.totals.finish(self._corrector, self._runs.warnings)
         return self.totals
 
@@ -117,12 +122,19 @@ class Bulk:
             done = self._corrector.correct(run, *edges, self._carry)
         except Unsolved as error:
             self._refuse(run, error)
-        self._tell(self.totals.plain(run, done, self._corrector))
+        self._tell(lambda: self.totals.plain(run, done, self._corrector))
         return done.data
 
-    def _tell(self, batch: Batch) -> None:
-        if self.on_rows is not None:
-            self.on_rows(batch)
+    def _tell(self, batch: Callable[[], Batch]) -> None:
+        """Adds up a piece and passes its rows on, beside the work on the next piece; one piece at a time, in order."""
+
+        def tell() -> None:
+            rows = batch()
+            if self.on_rows is not None:
+                self.on_rows(rows)
+
+        self._told.result()
+        self._told = self._beside.submit(tell)
 
     def _refuse(self, run: PlainRun, error: Unsolved) -> None:
         errors: list[PhysicsError] = []
@@ -166,7 +178,7 @@ class Bulk:
         own = (result.rows.motion >= part.first) & (result.rows.motion < part.last)
         assert result.written.behind is not None
         self._carry.take(result.written.behind, result.rows.end[np.flatnonzero(own)[-1]])
-        self._tell(self.totals.odd(result, own, run.motions))
+        self._tell(lambda: self.totals.odd(result, own, run.motions))
         return result.written.data[len(head) : len(result.written.data) - len(tail)]
 
 

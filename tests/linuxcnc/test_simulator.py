@@ -1,5 +1,6 @@
 """The HAL component of samples/linuxcnc in LinuxCNC's own simulator, without a screen, joints read back through HAL."""
 
+import fcntl
 import json
 import os
 import shutil
@@ -7,6 +8,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -46,6 +48,14 @@ def machine(folder):
     (folder / "tool.tbl").write_text("")
 
 
+@contextmanager
+def alone():
+    """There can be one LinuxCNC on a machine at a time; other runs of this test wait."""
+    with open(Path(tempfile.gettempdir()) / f"camcomp-linuxcnc-{os.getuid()}.lock", "w", encoding="utf-8") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        yield
+
+
 def simulate(folder):
     """What it saw, and what LinuxCNC printed."""
     task, answer = folder / "task.json", folder / "answer.json"
@@ -55,7 +65,7 @@ def simulate(folder):
         env["RTAPI_UID"] = "65534"
         folder.chmod(0o777)
     command = ["linuxcnc", str(folder / "machine.ini")]
-    with subprocess.Popen(
+    with alone(), subprocess.Popen(
         command, cwd=folder, env=env, stdout=-1, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL, start_new_session=True
     ) as process:
         try:
