@@ -17,6 +17,8 @@ PASSES = 3  # fits with patterns
 WORSE = 1.1  # growth from pass to pass that noise may have
 SURE = 4.0  # standard deviations by which a pattern has to exceed chance before it is more than noise
 TIMING_S = 0.0015  # how fast a real drive settles after its acceleration has stepped
+MIDDLE = 0.4549  # median of a squared standard normal number
+PLAIN = 0.3  # share of the noise at rest by which jitter has to add to it at speed
 FAINT = 0.03  # um or N: what a pattern amounts to where nothing depends on it
 
 
@@ -40,6 +42,7 @@ def inflation(bench: Bench) -> list[Floats]:
     In units of the channel's own noise, which is not known yet: here the extra standard deviation in mm or N.
     """
     out = []
+    unsteady = jitter(bench)
     for k, run in enumerate(bench.runs):
         observed = bench.observed(k)
         extra = np.zeros_like(observed)
@@ -57,9 +60,50 @@ def inflation(bench: Bench) -> list[Floats]:
             m = len(bench.actuators)
             extra[:, :3] = TIMING_S**2 * np.einsum("nij,nj->ni", slope, change)
             extra[:, 3 : 3 + m] = TIMING_S**2 * change
+            if unsteady > 0.0:
+                extra[:, :3] = np.hypot(extra[:, :3], unsteady * np.abs(_speed(bench, k)))
         extra = np.where(np.isfinite(observed), extra, np.nan)
         out.append(thinned(extra, run.thin))
     return out
+
+
+def jitter(bench: Bench) -> float:
+    """Standard deviation, s, of the instants at which the tip was really read, from noise that grows with the speed.
+
+    Fourth differences leave noise alone; its size where an axis is fast is held against that where it is slow, by medians.
+    0 unless it is plain to see.
+    """
+    found = []
+    for k, run in enumerate(bench.runs):
+        t = run.course.time
+        if not run.course.ordered or len(t) < 60:
+            continue
+        speed = np.abs(_speed(bench, k))
+        gap = (bench.observed(k) - bench.channels(bench.nominal[k]))[:, :3]
+        rough = np.diff(gap, 4, axis=0) ** 2 / 70.0
+        for rows, v in zip(rough.T, speed[2:-2].T, strict=True):
+            present = np.isfinite(rows)
+            if present.sum() < 60:
+                continue
+            slow, fast = np.quantile(v[present], (1.0 / 3.0, 2.0 / 3.0))
+            low, high = present & (v <= slow), present & (v >= fast)
+            more = float(np.median(v[high] ** 2) - np.median(v[low] ** 2))
+            rest, push = float(np.median(rows[low])), float(np.median(rows[high]))
+            if fast > 2.0 * slow and more > 0.0 and rest > 0.0:
+                found.append(((push - rest) / MIDDLE / more, more / rest))
+    if not found:
+        return 0.0
+    gain, reach = np.array(found).T
+    order = np.argsort(gain)  # the axes that would see it best have the most to say
+    at = np.searchsorted(np.cumsum(reach[order] ** 2), 0.5 * np.sum(reach**2))
+    variance = float(gain[order][at])
+    return float(np.sqrt(variance)) if variance * MIDDLE * float(reach.max()) > PLAIN else 0.0
+
+
+def _speed(bench: Bench, k: int) -> Floats:
+    """Velocity (n, 3) of the modelled tip in run k, mm/s."""
+    t = bench.runs[k].course.time
+    return np.gradient(bench.channels(bench.nominal[k])[:, :3], t, axis=0)
 
 
 def first_noise(extra: Sequence[Floats], residuals: Sequence[Floats]) -> Background:

@@ -9,6 +9,7 @@ from camcomp.gcode.arcs import PLANES
 from camcomp.gcode.program import Program
 from tests.oracles.rs274 import Motion, Run
 
+STILL = 2.37e-3  # shorter is no motion, in the active unit; no multiple of what programs step by
 PRINTED = 0.5001e-4  # half of the last digit that rs274 prints, in the active unit
 
 
@@ -17,7 +18,7 @@ def moving(run: Run) -> list[Motion]:
     kept, last = [], (0.0, 0.0, 0.0)
     for each in run.motions:
         place = tuple((each.end[a] + each.offset[a]) * each.unit for a in range(3))
-        still = each.kind in ("FEED", "TRAVERSE") and math.dist(place, last) < 2e-3 * each.unit
+        still = each.kind in ("FEED", "TRAVERSE") and math.dist(place, last) < STILL * each.unit
         if not still:
             kept.append(each)
         last = place
@@ -28,7 +29,7 @@ def difference(program: Program, run: Run) -> str:
     """Empty when every motion agrees to the digits printed, else what is different."""
     path, sites = program.path, program.sites
     local = (path.end - sites.offset) / sites.unit[:, None]
-    still = np.linalg.norm(path.end - path.start, axis=1) < 2e-3 * sites.unit
+    still = np.linalg.norm(path.end - path.start, axis=1) < STILL * sites.unit
     still &= path.kind != ARC
     ours = np.flatnonzero(~still)
     theirs = moving(run)

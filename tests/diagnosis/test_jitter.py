@@ -1,0 +1,24 @@
+"""Logs whose rows were not read when they say: noise that grows with the speed is noise."""
+
+from dataclasses import replace
+
+import pytest
+
+from camcomp.bench import Bench
+from camcomp.campaign import open_campaign
+from camcomp.noise import jitter
+from tests.diagnosis.conftest import plan_of
+
+
+@pytest.mark.parametrize("unsteady", [3e-4, 1e-3])
+def test_jitter_is_measured(workshop, unsteady):
+    plan = plan_of(design="six", samples=250)
+    plan = replace(plan, noise=replace(plan.noise, jitter_s=unsteady))
+    campaign = open_campaign(workshop.made(plan)[0])
+    assert jitter(Bench(campaign.twin, campaign.runs)) == pytest.approx(unsteady, rel=0.25)
+
+
+def test_jitter_is_no_effect(workshop):
+    plan = plan_of(design="six", samples=250)
+    plan = replace(plan, noise=replace(plan.noise, jitter_s=3e-4))
+    assert workshop.answer(plan)[0]["verdict"] == "none"
