@@ -17,6 +17,7 @@ PASSES = 3  # fits with patterns
 WORSE = 1.1  # growth from pass to pass that noise may have
 SURE = 4.0  # standard deviations by which a pattern has to exceed chance before it is more than noise
 TIMING_S = 0.0015  # how fast a real drive settles after its acceleration has stepped
+UNSTEADY_S = 0.002  # more jitter than any log has
 MIDDLE = 0.4549  # median of a squared standard normal number
 PLAIN = 0.3  # share of the noise at rest by which jitter has to add to it at speed
 FAINT = 0.03  # um or N: what a pattern amounts to where nothing depends on it
@@ -89,14 +90,14 @@ def jitter(bench: Bench) -> float:
             low, high = present & (v <= slow), present & (v >= fast)
             more = float(np.median(v[high] ** 2) - np.median(v[low] ** 2))
             rest, push = float(np.median(rows[low])), float(np.median(rows[high]))
-            if fast > 2.0 * slow and more > 0.0 and rest > 0.0:
+            if fast > 2.0 * slow and more > 0.0 and 0.0 < rest < (UNSTEADY_S * fast) ** 2:
                 found.append(((push - rest) / MIDDLE / more, more / rest))
     if not found:
         return 0.0
     gain, reach = np.array(found).T
     order = np.argsort(gain)  # the axes that would see it best have the most to say
     at = np.searchsorted(np.cumsum(reach[order] ** 2), 0.5 * np.sum(reach**2))
-    variance = float(gain[order][at])
+    variance = min(float(gain[order][at]), UNSTEADY_S**2)
     return float(np.sqrt(variance)) if variance * MIDDLE * float(reach.max()) > PLAIN else 0.0
 
 

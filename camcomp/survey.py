@@ -23,6 +23,7 @@ UNKNOWN_RMS = 0.18  # size of a leftover, in units of the noise, below which no 
 RUNS = 6  # runs that this holds for
 UNKNOWN_SHARE = 0.12  # share of what is explained that a leftover has to exceed: no cause is modelled perfectly
 NUISANCE_RMS = 0.25  # size of a cause, in units of the noise of the channel that shows it best, below which it is none
+SLIGHT = 0.06  # of the largest member
 ROUGHLY = 0.05  # share of an unknown effect's evidence that a known cause has to add beside it
 MOSTLY = 0.3  # size of a leftover, in units of what the causes explain, below which the causes are not questioned
 MINOR = 0.25  # size of a known cause, in units of an unknown one, below which it is not named beside it
@@ -207,8 +208,12 @@ def visible(inquiry: Inquiry, i: int) -> bool:
 
 
 def _matters(inquiry: Inquiry, f: Fitted) -> bool:
-    """Whether every member shows in some kind of channel by more than what is always a little wrong."""
-    return all(max(signal_rms(inquiry, f, (i,)).values(), default=0.0) > NUISANCE_RMS for i in f.members)
+    """Whether every member shows in some kind of channel by more than what is always a little wrong.
+
+    What lies below the noise beside something many times larger is most likely a fault in how that one is modelled.
+    """
+    sizes = [max(signal_rms(inquiry, f, (i,)).values(), default=0.0) for i in f.members]
+    return all(each > (NUISANCE_RMS if each > SLIGHT * max(sizes) else 1.0) for each in sizes)
 
 
 def _same_name(inquiry: Inquiry, members: Members, every: list[int]) -> list[Members]:

@@ -15,7 +15,7 @@ def test_jitter_is_measured(workshop, unsteady):
     plan = plan_of(design="six", samples=250)
     plan = replace(plan, noise=replace(plan.noise, jitter_s=unsteady))
     campaign = open_campaign(workshop.made(plan)[0])
-    assert jitter(Bench(campaign.twin, campaign.runs)) == pytest.approx(unsteady, rel=0.25)
+    assert jitter(Bench(campaign.twin, campaign.runs)) == pytest.approx(unsteady, rel=0.35)
 
 
 def test_jitter_is_no_effect(workshop):
