@@ -10,7 +10,7 @@ from camcomp import pathgeometry
 from camcomp.cutting.track import Track
 from camcomp.datatypes import Floats
 from camcomp.gap.memory import direction
-from camcomp.gap.pieces import Pieces, Places, cut, direct
+from camcomp.gap.pieces import Pieces, Places, cut
 from camcomp.gap.timeline import Timeline
 
 STEP_S = 0.001  # grid of what has memory: 0.2 um of interpolation at 1500 mm/s2
@@ -100,36 +100,6 @@ def course_of_program(
     return Course(
         name, time, started, True, tip, load, rho, _node_times(timeline, pieces.motion[piece], share), grid, grid_rho, grid_cut,
         where.piece, len(pieces.motion), place, row_rho, temperature, timeline,
-    )  # fmt: skip
-
-
-def course_of_poses(
-    name: str,
-    time: Floats,
-    rho: Floats,
-    tip: Floats,
-    *,
-    started: float,
-    force: Floats | None = None,
-    ordered: bool = False,
-    temperature: Floats | None = None,
-) -> Course:
-    """Course without a program: rows are poses at set-points rho (n, m), near the tips (n, 3) in the machine frame."""
-    n = len(rho)
-    load = np.zeros((n, 3)) if force is None else force
-
-    def place(at: Floats) -> Places:
-        if not ordered:
-            return direct(n)
-        i = np.clip(np.searchsorted(time, at, side="right") - 1, 0, max(n - 2, 0))
-        t = np.clip((at - time[i]) / np.maximum(time[np.minimum(i + 1, n - 1)] - time[i], 1e-12), 0.0, 1.0)
-        j = np.minimum(i + 1, n - 1)
-        return Places(np.where(t > 0.5, j, i), np.column_stack([i, j]), np.column_stack([1.0 - t, t]))
-
-    cuts = (np.abs(load).sum(axis=1) > 1e-9).astype(float)
-    return Course(
-        name, time, started, ordered, tip, load, rho, time, time, rho, cuts, np.arange(n), n, place, rho, temperature,
-        None,
     )  # fmt: skip
 
 

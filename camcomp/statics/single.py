@@ -87,10 +87,6 @@ class PointSolver:
         self.commanded += command[9:]
         return int(self._status[0])
 
-    def forget(self) -> None:
-        """The next point starts cold, as the first one did."""
-        self._memory.warm[0] = 0
-
     @property
     def status(self) -> int:
         """Status of the present point, one of camcomp.statics.solve.STATUS."""

@@ -105,15 +105,7 @@ def test_shipped_samples_are_what_the_plant_makes(tmp_path):
                 assert old == new
 
 
-SWAPPED = pytest.param(
-    spoil.swapped,
-    marks=pytest.mark.xfail(
-        reason="exchanged tracker axes were answered with a confident cause", strict=False
-    ),
-)
-
-
-@pytest.mark.parametrize("how", [spoil.metres, spoil.inches, SWAPPED, spoil.exchanged])
+@pytest.mark.parametrize("how", [spoil.metres, spoil.inches, spoil.swapped, spoil.exchanged])
 def test_logs_that_cannot_be_right_are_refused(tmp_path, how):
     plan = Plan(39, (Cause("backlash", "x", 5),), (6.0,), "four", samples=80)
     path = write(make(plan), plan, tmp_path / "experiment", runner.CONFIG)
@@ -144,7 +136,7 @@ def test_a_drifting_clock_is_not_taken_for_a_broken_machine(tmp_path):
 
 
 @pytest.mark.xfail(
-    reason="diagnose cannot write a machine file yet: the option --write-config is missing", strict=False
+    reason="causes and values are right, yet this measure of the path says 0.39 mm; not understood", strict=True
 )
 def test_the_loop_closes(tmp_path):
     """diagnose, write the cause into the machine file, compensate, and let the broken machine run the new program."""
