@@ -12,7 +12,7 @@ from tests.plants.machine import Run, Truth, observe
 from tests.plants.motion import Timeline, read
 
 Y = np.array([0.0, 1.0, 0.0])
-PROGRAM = designs.circle(25.0, 1200.0, False, plunge=False)
+PROGRAM = designs.circle(25.0, 1200.0, False)  # its corrected plunge slants and yet does not cut
 SETS = {
     "elastic": (
         [

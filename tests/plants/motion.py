@@ -101,7 +101,7 @@ class Timeline:
         self.log_end = float(self.begin[last + 1])
 
     def sample(self, t: np.ndarray) -> dict[str, np.ndarray]:
-        """At times t (n,): tip (n, 3) mm, along (n, 3) unit feed direction, speed (n,) mm/s, line (n,), cuts (n,) bool.
+        """At times t (n,): tip (n, 3) mm, along (n, 3) unit feed direction, speed (n,) mm/s, line (n,), feeds, cuts (n,) bool.
 
         cuts: the motion is a feed move that travels in the XY plane; a plunge does not.
         """
@@ -133,5 +133,5 @@ class Timeline:
                 along[rows, :2] = turn
                 along[rows, 2] = (m.end[2] - m.start[2]) / self.length[k]
             flat[rows] = m.feed and float(np.hypot(*along[rows][0, :2])) > 1e-6
-        line = np.array([m.line for m in self.moves])[i]
-        return {"tip": tip, "along": along, "speed": speed, "line": line, "cuts": flat}
+        line, feeds = (np.array([getattr(m, name) for m in self.moves])[i] for name in ("line", "feed"))
+        return {"tip": tip, "along": along, "speed": speed, "line": line, "feeds": feeds, "cuts": flat}
