@@ -11,7 +11,8 @@ import pytest
 from tests.campaign import runner, samples, spoil
 from tests.campaign.score import score
 from tests.plants.causes import Cause
-from tests.plants.experiments import Plan, make, path_error, rerun, write
+from tests.plants.experiments import Plan, make, rerun, write
+from tests.plants.measure import path_error
 
 # Minutes of machine time.
 pytestmark = pytest.mark.campaign

@@ -6,7 +6,8 @@ from camcomp.commands.diagnose import _machine_with_causes
 from tests.campaign import runner
 from tests.diagnosis.conftest import plan_of
 from tests.diagnosis.test_where import SCREW
-from tests.plants.experiments import path_error, rerun
+from tests.plants.experiments import rerun
+from tests.plants.measure import path_error
 
 PAIR = plan_of(("drive_stiffness", "y"), ("cutting_force", None), ratio=30.0, seed=42)
 

@@ -1,7 +1,6 @@
 """A corrected program on the truth machine that has the very errors named in the machine file: the cut must be true."""
 
 import json
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -9,6 +8,7 @@ import pytest
 from tests.campaign import runner
 from tests.plants import designs
 from tests.plants.machine import Run, Truth, observe
+from tests.plants.measure import misses
 from tests.plants.motion import Timeline, read
 
 Y = np.array([0.0, 1.0, 0.0])
@@ -58,25 +58,12 @@ SETS = {
 }
 
 
-def distance(points, program):
-    """Distances (n,) mm of points (n, 3) from the programmed path, by a dense polygon of it."""
-    line = Timeline(read(program))
-    dense = line.sample(np.linspace(0, line.log_end, 4000))["tip"]
-    out = np.full(len(points), np.inf)
-    for a, b in pairwise(dense):
-        d = b - a
-        share = np.clip((points - a) @ d / max(float(d @ d), 1e-30), 0, 1)
-        out = np.minimum(out, np.linalg.norm(points - a - share[:, None] * d, axis=1))
-    return out
-
-
-def cut(text, truth):
-    """Tips (n, 3) that cut, clear of the joining lines at the ends of the groove."""
+def missed(text, truth):
+    """Distances (n,) mm of the tips from the groove while the machine executes `text`."""
     line = Timeline(read(text))
     t = np.linspace(0.05, line.log_end - 0.05, 300)
-    state = observe(Run(line, True, 0.0, surface=Timeline(read(PROGRAM))), truth, t, [(0.0, line.log_end)])
-    ends = np.linalg.norm(state.programmed - [25.0, 0, 0], axis=1) < 2.5
-    return state.tip[state.cuts & ~ends]
+    run = Run(line, True, 0.0, surface=Timeline(read(PROGRAM)))
+    return misses(observe(run, truth, t, [(0.0, line.log_end)]), PROGRAM)
 
 
 @pytest.mark.parametrize("name", sorted(SETS))
@@ -88,8 +75,8 @@ def test_the_broken_machine_cuts_true(tmp_path, name):
     line = ["compensate", str(tmp_path / "in.nc"), "--config", str(runner.CONFIG)]
     code, said = runner.invoke([*line, "--config", str(tmp_path / "effects.yaml"), "-o", str(out)])
     assert code == 0, said
-    assert distance(cut(PROGRAM, truth), PROGRAM).max() > 0.3
-    left = distance(cut(out.read_text(), truth), PROGRAM)
+    assert missed(PROGRAM, truth).max() > 0.3
+    left = missed(out.read_text(), truth)
     assert (
         left.max() < 1.2e-3
     )  # the bound of the splitting is 1 um; the nearest sampled direction adds a little
@@ -102,5 +89,5 @@ def test_a_machine_with_other_errors_does_not(tmp_path):
         ["compensate", str(tmp_path / "in.nc"), "--config", str(runner.CONFIG), "-o", str(out)]
     )
     assert code == 0, said
-    assert distance(cut(out.read_text(), Truth()), PROGRAM).max() < 1.2e-3
-    assert distance(cut(out.read_text(), SETS["elastic"][1]), PROGRAM).max() > 0.05
+    assert missed(out.read_text(), Truth()).max() < 1.2e-3
+    assert missed(out.read_text(), SETS["elastic"][1]).max() > 0.05

@@ -13,7 +13,6 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from tests.plants.causes import Cause
 from tests.plants.designs import Planned, plan
@@ -321,14 +320,4 @@ def rerun(made: Made, program: str, groove: str) -> State:
     return observe_all([run], made.truth, [even(run, 500)])[0]
 
 
-def path_error(state: State, program: str) -> float:
-    """rms distance (mm) of the cut tips from the programmed path, its ends left out."""
-    line = Timeline(read(program))
-    dense = line.sample(np.linspace(0.0, line.log_end, 20_000))["tip"]
-    cut = state.tip[state.cuts]
-    return float(np.sqrt(np.mean(cKDTree(dense).query(cut[len(cut) // 50 : -len(cut) // 50])[0] ** 2)))
-
-
-__all__ = [
-    "CHANNELS", "ORIGIN", "Made", "Noise", "Plan", "make", "path_error", "rerun", "size", "truth_json", "write",
-]  # fmt: skip
+__all__ = ["CHANNELS", "ORIGIN", "Made", "Noise", "Plan", "make", "rerun", "size", "truth_json", "write"]
