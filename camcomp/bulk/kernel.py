@@ -130,23 +130,23 @@ def contract(W, first, C, n, outputs, out):
 
 @njit(cache=True, nogil=True)
 def path_force(t, axis, components, out):
-    """Fills out (3,) with the force of components (Fr, Ft, Fz) for the unit feed direction t; False on a plunge."""
+    """Fills out (3,) with the force of components (Fr, Ft, Fz) for the unit feed direction t; its sine to the tool axis."""
     along = t[0] * axis[0] + t[1] * axis[1] + t[2] * axis[2]
     x, y, z = t[0] - along * axis[0], t[1] - along * axis[1], t[2] - along * axis[2]
     size = np.sqrt(x * x + y * y + z * z)
     if not size > 1e-6:
         out[:] = 0.0
-        return False
+        return size
     x, y, z = x / size, y / size, z / size
     right = (y * axis[2] - z * axis[1], z * axis[0] - x * axis[2], x * axis[1] - y * axis[0])
     out[0] = components[0] * right[0] + components[1] * x + components[2] * axis[0]
     out[1] = components[0] * right[1] + components[1] * y + components[2] * axis[1]
     out[2] = components[0] * right[2] + components[1] * z + components[2] * axis[2]
-    return True
+    return size
 
 
 @njit(cache=True, nogil=True)
-def lay_loads(kind, start, end, axis, components, join_cosine, f0, f1, jump, length):
+def lay_loads(kind, start, end, axis, components, join_cosine, plunge_sine, f0, f1, jump, length):
     """Forces at the start and the end of moves (n,), where they jump, and the lengths: track.py for constant components.
 
     A feed move without length keeps the force before it.
@@ -172,11 +172,12 @@ def lay_loads(kind, start, end, axis, components, join_cosine, f0, f1, jump, len
                 f1[i, k] = f0[i, k]
             continue
         cuts = False
-        own[:] = 0.0
         if size > 0.0:
             t /= size
             if kind[i] != RAPID:
-                cuts = path_force(t, axis, components, own)
+                cuts = path_force(t, axis, components, own) > plunge_sine
+        if not cuts:
+            own[:] = 0.0
         f0[i] = own
         f1[i] = own
         if before >= 0:
