@@ -178,7 +178,9 @@ def _motion(job: Job, setpoint: Floats, travel: Travel) -> Motion:
     """The movement that the hooks see, with the encoders where the servos bring them."""
     stiffness = np.array([np.inf if a.stiffness is None else a.stiffness for a in job.real_machine.robot.actuators])
     zero = np.zeros_like(setpoint)
-    motion = Motion(travel.rested, travel.time, travel.cut_min, None, setpoint, zero, zero, job.real_machine.home, stiffness)
+    warm = job.config.process.temperature_C
+    heat = None if warm is None else np.full(len(setpoint), warm)
+    motion = Motion(travel.rested, travel.time, travel.cut_min, heat, setpoint, zero, zero, job.real_machine.home, stiffness)
     encoder = setpoint
     for cause in job.causes:
         if (hook := cause.hook("on_servo")) is not None:

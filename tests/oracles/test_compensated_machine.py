@@ -76,12 +76,17 @@ SETS = {
 }
 
 
-def missed(text, truth):
-    """Distances (n,) mm of the tips from the groove while the machine executes `text`."""
+def executed(text, truth, began=0.0):
+    """State of the machine, in motion since time 0, that executes `text` from `began` (s) on."""
     line = Timeline(read(text), looks_ahead=True)
     t = np.linspace(0.05, line.log_end - 0.05, 300)
-    run = Run(line, True, 0.0, surface=Timeline(read(PROGRAM)))
-    return misses(observe(run, truth, t, [(0.0, line.log_end)]), PROGRAM)
+    run = Run(line, True, began, surface=Timeline(read(PROGRAM)))
+    return observe(run, truth, t, [(0.0, began + line.log_end)])
+
+
+def missed(text, truth, began=0.0):
+    """Distances (n,) mm of the tips from the groove while the machine executes `text`."""
+    return misses(executed(text, truth, began), PROGRAM)
 
 
 @pytest.mark.parametrize("name", sorted(SETS))
@@ -110,3 +115,19 @@ def test_a_machine_with_other_errors_does_not(tmp_path):
     assert code == 0, said
     assert missed(out.read_text(), Truth()).max() < 1.2e-3
     assert missed(out.read_text(), SETS["elastic"][1]).max() > 0.05
+
+
+@pytest.mark.parametrize("stated", [True, False])
+def test_a_warm_machine_cuts_true_at_its_temperature(tmp_path, stated):
+    truth, began = Truth(growth_mm_per_K=np.array([0, 0, 0.006])), 7200.0
+    effects = [{"effect": "thermal_growth", "target": "z", "growth_mm_per_K": 0.006}]
+    temperature = float(executed(PROGRAM, truth, began).temperature.mean())
+    process = {"process": {"temperature_C": temperature}} if stated else {}
+    (tmp_path / "warm.yaml").write_text(json.dumps({"effects": effects, **process}))
+    (tmp_path / "in.nc").write_text(PROGRAM)
+    out = tmp_path / "out.nc"
+    line = ["compensate", str(tmp_path / "in.nc"), "--config", str(runner.CONFIG)]
+    code, said = runner.invoke([*line, "--config", str(tmp_path / "warm.yaml"), "-o", str(out)])
+    assert code == 0, said
+    assert ("temperature_C" in said) is not stated
+    assert (missed(out.read_text(), truth, began).max() < 1.2e-3) == stated
