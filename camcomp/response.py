@@ -12,7 +12,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from camcomp.datatypes import Bools, Floats
-from camcomp.gap.effect import Load, Motion
+from camcomp.gap.effect import Load, Motion, driven
 from camcomp.gap.memory import direction, ways
 from camcomp.job import Job
 from camcomp.statics.solve import FREE, solve
@@ -67,11 +67,8 @@ def respond(
         return job.frame.to_program(loaded), settled
     control = solve(job.real_machine, FREE, told, check=False)
     motion = _motion(job, control.rho_nominal, travel)
-    error = np.zeros_like(motion.encoder)
     load = _load(job, motion, travel.force)
-    for cause in job.causes:
-        if (hook := cause.hook("on_drive")) is not None:
-            error = hook(error, motion, cause.which(job.real_machine.actuators), cause.values)
+    error, motion = driven(job.causes, job.real_machine.actuators, motion)
     carriage = motion.encoder + error
     state = solve(job.real_machine, FREE, told, force=load.force, wrench=load.wrench, rho=carriage)
     drive, tip = state.drive, state.tip
@@ -126,12 +123,9 @@ def _through_play(job: Job, found: Correction, travel: Travel) -> Floats:
     carriage = found.rho[solved]
     sense = ways(carriage, LEAST_MM)
     motion = _motion(job, carriage + AHEAD_MM * sense, travel.take(np.flatnonzero(solved)))
-    lag = np.zeros_like(carriage)
-    for cause in job.causes:
-        if (hook := cause.hook("on_drive")) is not None:
-            which = cause.which(job.real_machine.actuators)
-            lag += hook(np.zeros_like(lag), motion, which, cause.values)
-            lag -= hook(np.zeros_like(lag), replace(motion, ordered=False, direction=np.zeros_like(lag)), which, cause.values)
+    still = replace(motion, ordered=False, direction=np.zeros_like(carriage))
+    lag, standing = (driven(job.causes, job.real_machine.actuators, each)[0] for each in (motion, still))
+    lag = lag - standing
     out = np.zeros((len(solved), 3))
     if lag.any():
         lag[sense == 0.0] = 0.0

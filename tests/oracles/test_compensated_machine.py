@@ -79,7 +79,7 @@ SETS = {
 def executed(text, truth, began=0.0):
     """State of the machine, in motion since time 0, that executes `text` from `began` (s) on."""
     line = Timeline(read(text), looks_ahead=True)
-    t = np.linspace(0.05, line.log_end - 0.05, 300)
+    t = np.linspace(0.05, line.log_end - 0.05, 600)
     run = Run(line, True, began, surface=Timeline(read(PROGRAM)))
     return observe(run, truth, t, [(0.0, began + line.log_end)])
 
@@ -115,6 +115,25 @@ def test_a_machine_with_other_errors_does_not(tmp_path):
     assert code == 0, said
     assert missed(out.read_text(), Truth()).max() < 1.2e-3
     assert missed(out.read_text(), SETS["elastic"][1]).max() > 0.05
+
+
+def test_a_drive_with_play_and_friction_is_led_through_both(tmp_path):
+    """Friction holds back the carriage behind the play. Its turn-round here is Maxwell's, there Dahl's: some um stay."""
+    truth = Truth(play_mm=0.04 * Y, friction_N=150.0 * Y)
+    effects = [
+        {"effect": "friction", "target": "y", "force_N": 150, "presliding_mm": 0.0028},
+        {"effect": "backlash", "target": "y", "width_mm": 0.04},
+    ]
+    (tmp_path / "effects.yaml").write_text(json.dumps({"effects": effects}))
+    (tmp_path / "in.nc").write_text(PROGRAM)
+    left = []
+    for config in ([], ["--config", str(tmp_path / "effects.yaml")]):
+        line = ["compensate", str(tmp_path / "in.nc"), "--config", str(runner.CONFIG), *config]
+        code, said = runner.invoke([*line, "-o", str(tmp_path / "out.nc")])
+        assert code == 0, said
+        left.append(missed((tmp_path / "out.nc").read_text(), truth))
+    assert np.sqrt(np.mean(left[0] ** 2)) > 0.03 and np.sqrt(np.mean(left[1] ** 2)) < 1e-3
+    assert left[1].max() < 4e-3
 
 
 @pytest.mark.parametrize("stated", [True, False])

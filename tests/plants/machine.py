@@ -197,7 +197,7 @@ def simulate(
     if np.any(truth.friction_N > 0):
         pulled = energy.settle(legs, state.carriage, state.force, weight=truth.weight_N).drive
         stiff = 1e4 * truth.drive_factor
-        where = e + _fine(grid, t, state.carriage - encoder - pulled / stiff)
+        where = behind + _fine(grid, t, state.carriage - nut - pulled / stiff)
         friction = on_grid(
             np.stack(
                 [_friction(where[:, i], truth.friction_N[i], truth.slip_mm, stiff[i]) for i in range(3)], 1
