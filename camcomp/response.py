@@ -19,7 +19,7 @@ from camcomp.statics.solve import FREE, solve
 from camcomp.statics.target import Correction, correct, settle
 
 SETTLED_MM = 2e-5  # the correction of effects ends here
-MAX_STEPS = 12
+MAX_STEPS = 50  # friction that turns round in a soft drive leaves up to nine tenths per step
 REST_S = 60.0
 AHEAD_MM = 2.0  # more than any play
 LEAST_MM = 2e-4  # a drive that comes back by less than this is not led through its play
