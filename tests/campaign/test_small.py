@@ -14,7 +14,7 @@ from tests.plants.causes import Cause
 from tests.plants.experiments import Plan, make, rerun, write
 from tests.plants.measure import path_error
 
-# Minutes of machine time.
+# Minutes of machine time; what is not reached yet is an expected failure.
 pytestmark = pytest.mark.campaign
 SAMPLES = 150
 
@@ -135,9 +135,24 @@ def test_a_drifting_clock_is_not_taken_for_a_broken_machine(tmp_path):
     assert result["verdict"] != "identified" or not blamed, (result["verdict"], blamed)
 
 
-def test_the_loop_closes(tmp_path):
-    """diagnose, write the cause into the machine file, compensate, and let the broken machine run the new program."""
-    causes = (Cause("drive_stiffness", "y", 5), Cause("joint_offset", "z", 8))
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [
+        (("drive_stiffness", "y"), ("joint_offset", "z")),
+        (("backlash", "x"), ("friction", "x")),
+        pytest.param(
+            ("chain_error", "x"),
+            ("screw_cyclic", "z"),
+            marks=pytest.mark.xfail(
+                reason="beside a screw that is off by 0.09 mm diagnose calls the chain unknown (velocity:z)",
+                strict=True,
+            ),
+        ),
+    ],
+)
+def test_the_loop_closes(tmp_path, one, other):
+    """diagnose, write the causes into the machine file, compensate, and let the broken machine run the new program."""
+    causes = (Cause(*one, 5), Cause(*other, 8))
     plan = Plan(42, causes, (30.0, 30.0), samples=SAMPLES)
     made = make(plan)
     path = write(made, plan, tmp_path / "experiment", runner.CONFIG)
