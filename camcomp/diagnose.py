@@ -29,6 +29,8 @@ from camcomp.remainder import firm_prior, leftovers
 from camcomp.survey import Survey, survey
 from camcomp.twin import Twin
 
+RIVALS = 8  # sets that one experiment is asked to tell from the answer
+
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
@@ -83,7 +85,7 @@ def _next(inquiry: Inquiry, found: Survey, word: str, job: Job) -> Proposal | No
     if found.strange:
         return explore(inquiry, found.left[found.strange].labels, job)
     best = found.verdict.best
-    close = [best, *found.verdict.rivals]
+    close = [best, *sorted(found.verdict.rivals, key=lambda j: -found.probability[j])[:RIVALS]]
     if len(close) == 1:
         close += [j for j in np.argsort(-found.probability) if j != best and found.probability[j] > 0.02][:3]
     p = found.probability[close]

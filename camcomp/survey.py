@@ -25,12 +25,9 @@ from camcomp.remainder import (
 )
 
 SINGLES, PAIRS, TRIPLES = 6, 6, 3
-TEMPERATURE = (
-    1.5  # what evidence is divided by before it becomes a probability; calibrated on the truth plants
-)
-NUISANCE_RMS = (
-    0.25  # size of a cause, in units of the noise of the channel that shows it best, below which it is none
-)
+TEMPERATURE = 1.5  # what evidence is divided by before it becomes a probability; calibrated on the truth plants
+NUISANCE_RMS = 0.25  # size of a cause, in units of the noise of the channel that shows it best, below which it is none
+CANCELLING = 8.0  # size of a member, in units of the whole set, above which the set lives on differences of its members
 SLIGHT = 0.06  # of the largest member
 MINOR = 0.25  # size of a known cause, in units of an unknown one, below which it is not named beside it
 WORSE = 2.0  # log density by which a cause has to harm the prediction of other runs before it goes
@@ -88,7 +85,7 @@ def survey(inquiry: Inquiry) -> Survey:
         found += [(v, m, f) for v, m in extensions(scale, f.members, every)[:3]]
     _fit_best(found, fit, TRIPLES, max(value(f) for f in done.values()))
     fits = tuple(sorted(done.values(), key=value, reverse=True))
-    fits = tuple(f for f in fits if _matters(inquiry, f))
+    fits = tuple(f for f in fits if _matters(inquiry, f) and not _cancels(inquiry, f))
     probability = probabilities(fits, inquiry.atoms, TEMPERATURE)
     fits, probability = _prune(inquiry, fits, probability)
     design = likeness(inquiry)
@@ -144,7 +141,7 @@ def _with_stand_ins(
     same = _same(inquiry, fits, probability)
     for members in stand_ins(design, best.members, best.theta):
         other = fit(members)
-        if not _plausible(inquiry, other):
+        if not _plausible(inquiry, other) or _cancels(inquiry, other):
             continue
         same.append((best.members, members))
         if all(f.members != members for f in fits):
@@ -167,6 +164,13 @@ def _matters(inquiry: Inquiry, f: Fitted) -> bool:
     """
     sizes = [max(signal_rms(inquiry, f, (i,)).values(), default=0.0) for i in f.members]
     return all(each > (NUISANCE_RMS if each > SLIGHT * max(sizes) else 1.0) for each in sizes)
+
+
+def _cancels(inquiry: Inquiry, f: Fitted) -> bool:
+    """Whether members undo each other nearly: by chance that hardly happens, but a fit of what is unknown seeks it."""
+    whole = signal_rms(inquiry, f)
+    each = [signal_rms(inquiry, f, (i,)) for i in f.members]
+    return any(one[kind] > max(1.0, CANCELLING * whole[kind]) for one in each for kind in whole)
 
 
 def _same_name(inquiry: Inquiry, members: Members, every: list[int]) -> list[Members]:
