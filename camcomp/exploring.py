@@ -12,7 +12,9 @@ import numpy as np
 from camcomp.candidates import candidates, site_of
 from camcomp.inquiry import Inquiry
 from camcomp.job import Job
-from camcomp.planner import NEARLY, WORTH, Proposal, feasible
+from camcomp.planner import WORTH, Proposal, feasible
+
+ENOUGH = 0.6  # share of the best gain from which on the shorter experiment is the better one
 
 
 def explore(inquiry: Inquiry, labels: Sequence[tuple[str, float]], job: Job) -> Proposal | None:
@@ -32,5 +34,5 @@ def explore(inquiry: Inquiry, labels: Sequence[tuple[str, float]], job: Job) -> 
         if gain > WORTH:
             found.append(Proposal(candidate, gain, ("unknown",)))
     most = max((each.gain for each in found), default=0.0)
-    ranked = sorted(found, key=lambda each: (each.gain < NEARLY * most, -each.gain / each.candidate.minutes))
+    ranked = sorted(found, key=lambda each: (each.gain < ENOUGH * most, -each.gain / each.candidate.minutes))
     return next((each for each in ranked if feasible(inquiry, each.candidate, job)), None)

@@ -31,7 +31,7 @@ from camcomp.job import Job
 from camcomp.noise import inflation
 
 WORTH = 0.1  # bits below which an experiment is not worth proposing
-NEARLY = 0.9
+_NEARLY = 0.9
 _DRAWS = 64
 _SEED = 20120624
 _TEMPERATURE = 1.5  # what evidence is divided by before it becomes a probability, as in the survey
@@ -58,7 +58,7 @@ def propose(inquiry: Inquiry, rivals: Sequence[Fitted], probability: Floats, job
     """
     found = ranked(inquiry, rivals, probability, job)
     most = max((each.gain for each in found), default=0.0)
-    return next((each for each in found if each.gain >= NEARLY * most), None)
+    return next((each for each in found if each.gain >= _NEARLY * most), None)
 
 
 def ranked(inquiry: Inquiry, rivals: Sequence[Fitted], probability: Floats, job: Job) -> list[Proposal]:

@@ -164,14 +164,16 @@ def known_part(inquiry: Inquiry, best: Fitted) -> Members:
     prior = steady_prior(inquiry, best)
     alone = base(total(inquiry.grams(residual, white)), prior, 1.0)
     found = []
+    nothing = 0.0
     for count in range(len(best.members) + 1):
         for members in combinations(best.members, count):
             evidence = max(unknown_evidence(_projected(inquiry, prior, white, residual, members)).values(), default=0.0)
+            nothing = evidence if not members else nothing
             sets = [inquiry.atoms.columns[i] for i in members]
             known = log_bayes(alone, prior, sets) if sets else 0.0
-            # Patterns follow an unknown effect only roughly; a cause is not kept for what they miss.
-            value = evidence + known + inquiry.atoms.prior(members) - ROUGHLY * evidence * len(members)
-            found.append((value, members))
+            # Patterns follow an unknown effect only roughly; a cause is not kept for what they miss, unless it leaves nothing.
+            rough = ROUGHLY * nothing * len(members) if evidence > ROUGHLY * nothing else 0.0
+            found.append((evidence + known + inquiry.atoms.prior(members) - rough, members))
     return max(found)[1]
 
 
