@@ -23,7 +23,8 @@ def test_what_differs_from_run_to_run_is_not_taken_for_something_that_lasts(work
 def test_a_known_cause_is_named_beside_an_unknown_one(workshop):
     result = workshop.answer(plan_of(("drive_stiffness", "y"), ("clamp_slip", None), design="six", samples=150))[0]
     assert result["verdict"] == "unknown"
-    assert [(c["effect"], c["target"]) for c in result["causes"]][0] == ("drive_stiffness", "y")
+    first = result["causes"][0]
+    assert (first["effect"], first["target"]) == ("drive_stiffness", "y")
     assert len(result["causes"]) == 2
 
 
