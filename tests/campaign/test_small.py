@@ -14,7 +14,7 @@ from tests.plants.causes import Cause
 from tests.plants.experiments import Plan, make, rerun, write
 from tests.plants.measure import path_error
 
-# Minutes of machine time; what is not reached yet is an expected failure.
+# Minutes of machine time.
 pytestmark = pytest.mark.campaign
 SAMPLES = 150
 
@@ -140,14 +140,7 @@ def test_a_drifting_clock_is_not_taken_for_a_broken_machine(tmp_path):
     [
         (("drive_stiffness", "y"), ("joint_offset", "z")),
         (("backlash", "x"), ("friction", "x")),
-        pytest.param(
-            ("chain_error", "x"),
-            ("screw_cyclic", "z"),
-            marks=pytest.mark.xfail(
-                reason="beside a screw that is off by 0.09 mm diagnose calls the chain unknown (velocity:z)",
-                strict=True,
-            ),
-        ),
+        (("chain_error", "x"), ("screw_cyclic", "z")),
     ],
 )
 def test_the_loop_closes(tmp_path, one, other):
