@@ -126,7 +126,9 @@ def _shrinkage(result: Mapping[str, Any]) -> str:
 def _next(proposal: Mapping[str, Any]) -> Section:
     separates = together([str(each) for each in proposal["separates"]])
     text = [str(proposal["action"])]
-    if separates:
+    if "unknown" in proposal["separates"]:
+        text.append(f"It changes what the unknown effect may depend on, and nothing else. Expected gain: {proposal['gain']:.2f} bits.")
+    elif separates:
         text.append(f"It separates {separates}. Expected gain: {proposal['gain']:.2f} (0: none, 1: the question is settled).")
     return Section("next", "Next experiment", text)
 
