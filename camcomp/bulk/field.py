@@ -25,6 +25,7 @@ RATIO = 1.4  # exact solutions per coefficient
 RUNGS = ((4, 2), (5, 4, 2, 0), (5, 5, 3, 1), (6, 6, 4, 2))  # degree in position, by degree in force; tried in this order
 SHIFT_STEPS = 4
 EVEN = 1.1127756842787055 ** -np.arange(1.0, 7.0)  # multiples fill the cube evenly; the root of x^7 = x + 1
+NARROW = 6.0  # a force component so many times smaller than the largest needs a degree less in position
 WIDER = 1.02  # force range, so that it is not left for nothing
 _ZERO = np.zeros(3)
 
@@ -44,16 +45,13 @@ class Basis:
     alone: Floats  # (TESTS, np)
 
     @staticmethod
-    def of(degrees: tuple[int, ...], loaded: bool) -> Basis:
-        """The basis of these degrees; without loads there are no terms of the force."""
-        if not loaded:
-            degrees = degrees[:1]
+    def of(degrees: tuple[int, ...], narrow: Ints) -> Basis:
+        """The basis of these degrees; every power of a force component takes `narrow` (3,) of them away."""
         a, b = exponents(max(degrees)), exponents(len(degrees) - 1)
-        count = np.array([int((a.sum(axis=1) <= degrees[power]).sum()) for power in b.sum(axis=1)])
+        degree = np.array(degrees)[b.sum(axis=1)] - b @ narrow
+        count = (a.sum(axis=1) <= degree[:, None]).sum(axis=1)
         k = int(RATIO * count.sum())
         points = np.cos(np.pi * (np.arange(1, k + TESTS + 1)[:, None] * EVEN % 1.0))
-        if not loaded:
-            points[:, 3:] = 0.0
         both, alone = _products(points, a, b, count)
         return Basis(
             a, b, count, (max(degrees), len(degrees) - 1), points, _pseudoinverse(both[TESTS:]),
@@ -119,10 +117,11 @@ class Field:
     def _set_range(self, force: Floats) -> None:
         low, high = np.minimum(force.min(axis=0), 0.0), np.maximum(force.max(axis=0), 0.0)
         self.low, self.high = low * WIDER, high * WIDER
-        self._loaded = bool((self.high > self.low).any())
-        self.bases = [Basis.of(degrees, self._loaded) for degrees in RUNGS]
         self.force_mid = 0.5 * (self.low + self.high)
         self.force_half = np.maximum(0.5 * (self.high - self.low), 1e-9)
+        share = self.force_half / max(1e-3, self.force_half.max())
+        self._narrow = (-np.log(share) / np.log(NARROW)).astype(int)
+        self.bases = [Basis.of(RUNGS[0], self._narrow)]
         self.tiles = Tiles(
             CELL, np.full(1 << 12, -1, np.int64), np.zeros(1 << 12, np.int64), np.zeros((0, 3)), np.zeros(0),
             np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0), np.zeros((0, 3, 3)),
@@ -152,7 +151,7 @@ class Field:
             count[rung, : len(each.count)] = each.count
         return (
             t.size, t.keys, t.values, t.centre, t.half, t.rung, t.first, t.W, self.force_mid, self.force_half,
-            most.position, most.force, shape, count,
+            shape, count,
         )  # fmt: skip
 
     def _build(self, cells: Ints) -> None:
@@ -192,7 +191,10 @@ class Field:
         known = np.zeros((0, 0))
         unloaded = np.zeros((0, 0))
         m = len(self.machine.actuators)
-        for rung, basis in enumerate(self.bases):
+        for rung, degrees in enumerate(RUNGS):
+            if rung == len(self.bases):
+                self.bases.append(Basis.of(degrees, self._narrow))
+            basis = self.bases[rung]
             more = self._aimed(basis.samples[len(known) :], centre, half, check=rung == 0)
             if more is None:
                 return None

@@ -20,15 +20,15 @@ from camcomp.datatypes import RAPID
 MISSING, SPLIT, EXACT = -3, -1, -2  # what a cell can be besides a tile
 LEVELS = 6
 BIAS = 1 << 17  # cells are counted from here; 2**18 of them per axis
+LANES = 4  # points that are looked up together
 MOST = 8  # highest degree that the evaluation has room for
 BASIC = 6  # outputs that are always asked for: correction (3), shift (3); then tilt (3), drives (m), change of the joints (m)
 
 
 def exponents(degree: int) -> np.ndarray:
-    """Exponents (t, 3) of all products up to a total degree, lower degrees first."""
-    span = range(degree + 1)
-    rows = [(i, j, k) for i in span for j in span for k in span if i + j + k <= degree]
-    return np.array(sorted(rows, key=sum), np.int64)
+    """Exponents (t, 3) of all products up to a total degree, lower degrees first, in the order of `terms`."""
+    rows = [(i, total - k - i, k) for total in range(degree + 1) for k in range(total + 1) for i in range(total - k + 1)]
+    return np.array(rows, np.int64)
 
 
 @njit(cache=True, nogil=True)
@@ -87,9 +87,12 @@ def missing_cells(keys, values, size, points, out):
     return n
 
 
-@njit(cache=True, nogil=True, fastmath=True)
-def terms(degree, exps, u, v, w, T, out):
-    """Fills out (t,) with the products of Chebyshev polynomials at u, v, w; T (3, MOST + 1) is room to work in."""
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=True)
+def terms(degree, u, v, w, T, out, lane):
+    """Fills out[lane] (t,) with the products of Chebyshev polynomials at u, v, w up to a total degree, lower degrees first.
+
+    T (MOST + 4, MOST + 1) is room to work in: polynomials of u, v and w, and behind them products of those of u and v.
+    """
     T[0, 0] = 1.0
     T[1, 0] = 1.0
     T[2, 0] = 1.0
@@ -100,32 +103,58 @@ def terms(degree, exps, u, v, w, T, out):
         T[0, d] = 2.0 * u * T[0, d - 1] - T[0, d - 2]
         T[1, d] = 2.0 * v * T[1, d - 1] - T[1, d - 2]
         T[2, d] = 2.0 * w * T[2, d - 1] - T[2, d - 2]
-    for t in range(exps.shape[0]):
-        out[t] = T[0, exps[t, 0]] * T[1, exps[t, 1]] * T[2, exps[t, 2]]
+    n = 0
+    for total in range(degree + 1):
+        for i in range(total + 1):
+            T[3 + total, i] = T[0, i] * T[1, total - i]
+        for k in range(total + 1):
+            for i in range(total - k + 1):
+                out[lane, n] = T[2, k] * T[3 + total - k, i]
+                n += 1
 
 
-@njit(cache=True, nogil=True, fastmath=True)
-def products(A, B, count, out):
-    """Fills out with the products of force terms B and position terms A that belong together; their number."""
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=True)
+def products(A, B, count, out, lane):
+    """Fills out[lane] with the products of force terms B[lane] and position terms A[lane] that belong together; their number."""
     n = 0
     for b in range(count.shape[0]):
-        force = B[b]
-        row = out[n : n + count[b]]
+        force = B[lane, b]
+        row = out[lane, n : n + count[b]]
         for a in range(row.shape[0]):
-            row[a] = force * A[a]
+            row[a] = force * A[lane, a]
         n += count[b]
     return n
 
 
-@njit(cache=True, nogil=True, fastmath=True)
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=True)
 def contract(W, first, C, n, outputs, out):
-    """Fills out (outputs,) with the sums over n terms C; coefficients from `first` on, output by output."""
-    for o in range(outputs):
-        w = W[first + o * n : first + (o + 1) * n]  # with an index from 0 on, the loop runs in vectors
-        total = 0.0
+    """Fills out (LANES, outputs) with the sums over n terms C (LANES, n or more); coefficients from `first` on, output by output.
+
+    Four points and three outputs at once: every number fetched serves several products, which then set the pace.
+    """
+    c0, c1, c2, c3 = C[0, :n], C[1, :n], C[2, :n], C[3, :n]  # with indices from 0 on, the loop runs in vectors
+    for o in range(0, outputs, 3):
+        o1, o2 = min(o + 1, outputs - 1), min(o + 2, outputs - 1)
+        u = W[first + o * n : first + (o + 1) * n]
+        v = W[first + o1 * n : first + (o1 + 1) * n]
+        w = W[first + o2 * n : first + (o2 + 1) * n]
+        u0 = u1 = u2 = u3 = v0 = v1 = v2 = v3 = w0 = w1 = w2 = w3 = 0.0
         for j in range(n):
-            total += w[j] * C[j]
-        out[o] = total
+            u0 += c0[j] * u[j]
+            u1 += c1[j] * u[j]
+            u2 += c2[j] * u[j]
+            u3 += c3[j] * u[j]
+            v0 += c0[j] * v[j]
+            v1 += c1[j] * v[j]
+            v2 += c2[j] * v[j]
+            v3 += c3[j] * v[j]
+            w0 += c0[j] * w[j]
+            w1 += c1[j] * w[j]
+            w2 += c2[j] * w[j]
+            w3 += c3[j] * w[j]
+        out[0, o], out[1, o], out[2, o], out[3, o] = u0, u1, u2, u3
+        out[0, o1], out[1, o1], out[2, o1], out[3, o1] = v0, v1, v2, v3
+        out[0, o2], out[1, o2], out[2, o2], out[3, o2] = w0, w1, w2, w3
 
 
 @njit(cache=True, nogil=True)
@@ -202,42 +231,46 @@ def lay_loads(kind, start, end, axis, components, join_cosine, f0, f1, jump, len
         cut_before = cuts
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def look_up(a, b, m, every, target, force, answer, nominal, tile_of, size, keys, values, centre, half, rung, first, W, mid, wide,
-            position, power, shape, count):  # fmt: skip
+            shape, count):  # fmt: skip
     """Answers (n, 9 + 2 m) at targets (n, 3) under forces (n, 3) for rows a to b; tile_of (n,), negative: there is none.
 
     every: all outputs and nominal joints (n, m); otherwise correction and shift only. From `size` on: Field.packed.
     """
-    room = np.empty((3, MOST + 1))
-    A = np.empty(position.shape[0])
-    B = np.empty(power.shape[0])
-    C = np.empty(A.shape[0] * B.shape[0])
+    room = np.empty((MOST + 4, MOST + 1))
+    A = np.zeros((LANES, shape[:, 2].max()))
+    B = np.zeros((LANES, count.shape[1]))
+    C = np.zeros((LANES, A.shape[1] * B.shape[1]))
     outputs = 9 + 2 * m if every else BASIC
-    out = np.zeros(outputs)
-    tile = -1
-    h = -1.0
-    c = np.zeros(3)
-    for i in range(a, b):
-        p, f = target[i], force[i]
-        if not max(abs(p[0] - c[0]), abs(p[1] - c[1]), abs(p[2] - c[2])) < h:
-            tile, _ = find_tile(keys, values, size, p[0], p[1], p[2])
-            h = -1.0
-            if tile >= 0:
-                c[:] = centre[tile]
-                h = half[tile]
+    out = np.zeros((LANES, outputs))
+    i = a
+    while i < b:
+        tile, _ = find_tile(keys, values, size, target[i, 0], target[i, 1], target[i, 2])
         tile_of[i] = tile
         if tile < 0:
+            i += 1
             continue
-        r = rung[tile]
+        r, h, c = rung[tile], half[tile], centre[tile]
         along, across, inner, outer = shape[r]
-        terms(along, position[:inner], (p[0] - c[0]) / h, (p[1] - c[1]) / h, (p[2] - c[2]) / h, room, A)
-        terms(across, power[:outer], (f[0] - mid[0]) / wide[0], (f[1] - mid[1]) / wide[1], (f[2] - mid[2]) / wide[2], room, B)
-        n = products(A, B, count[r, :outer], C)
+        lanes = n = 0
+        while lanes < LANES and i + lanes < b:  # the points behind it that lie in the same tile
+            f = force[i + lanes]
+            x, y, z = target[i + lanes, 0] - c[0], target[i + lanes, 1] - c[1], target[i + lanes, 2] - c[2]
+            if lanes > 0 and not max(abs(x), abs(y), abs(z)) < h:
+                break
+            terms(along, x / h, y / h, z / h, room, A, lanes)
+            terms(across, (f[0] - mid[0]) / wide[0], (f[1] - mid[1]) / wide[1], (f[2] - mid[2]) / wide[2], room, B, lanes)
+            n = products(A, B, count[r, :outer], C, lanes)
+            lanes += 1
         contract(W, first[tile], C, n, outputs, out)
-        for k in range(outputs):
-            answer[i, k] = out[k]
+        for lane in range(lanes):
+            tile_of[i + lane] = tile
+            for k in range(outputs):
+                answer[i + lane, k] = out[lane, k]
         if every:
             contract(W, first[tile] + outputs * n, A, inner, m, out)
-            for k in range(m):
-                nominal[i, k] = out[k]
+            for lane in range(lanes):
+                for k in range(m):
+                    nominal[i + lane, k] = out[lane, k]
+        i += lanes
