@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from camcomp.bulk.kernel import BIAS, EXACT, LEVELS, MOST, SPLIT, exponents, find_slot, missing_cells
+from camcomp.bulk.kernel import BIAS, EXACT, LEVELS, MOST, SPLIT, exponents, missing_cells, put_cells
 from camcomp.datatypes import Floats, Ints
 from camcomp.statics.machine import Machine
 from camcomp.statics.solve import FREE, TARGET, solve
@@ -165,22 +165,18 @@ class Field:
             tile = self._fit(centre[n], half[n])
             value[n] = tile if tile is not None else EXACT if level[n] == LEVELS - 1 else SPLIT
         keys, values = self._room(len(cells))
-        for key, each in zip(cells, value, strict=True):
-            slot = find_slot(keys, key)
-            keys[slot], values[slot] = key, each
+        put_cells(keys, values, cells, value)
         self.tiles = replace(self.tiles, keys=keys, values=values)
 
     def _room(self, more: int) -> tuple[Ints, Ints]:
         """The hash table, with room for more cells."""
         keys, values = self.tiles.keys, self.tiles.values
-        used = np.flatnonzero(keys != -1)
-        if 2 * (len(used) + more) < len(keys):
+        used = int((keys != -1).sum())
+        if 2 * (used + more) < len(keys):
             return keys, values
-        wide = 4 * max(len(keys), len(used) + more)
+        wide = 4 * max(len(keys), used + more)
         new_keys, new_values = np.full(wide, -1, np.int64), np.zeros(wide, np.int64)
-        for slot in used:
-            at = find_slot(new_keys, keys[slot])
-            new_keys[at], new_values[at] = keys[slot], values[slot]
+        put_cells(new_keys, new_values, keys, values)
         return new_keys, new_values
 
     def _fit(self, centre: Floats, half: float) -> int | None:

@@ -12,10 +12,15 @@ lower degrees only, `count` of them: the first ones.
 # mypy: disallow-untyped-defs=False, disallow-incomplete-defs=False
 # numba infers the types of these functions; written by hand they would only be repeated.
 
-import numpy as np
-from numba import njit
+import math
+from functools import partial
+from typing import Any
 
-from camcomp.datatypes import RAPID
+import numpy as np
+
+from camcomp.datatypes import RAPID, Floats, Ints
+from camcomp.statics.compiled import entry, inner
+from camcomp.statics.vectors import cross, dot, part, plus
 
 MISSING, SPLIT, EXACT = -3, -1, -2  # what a cell can be besides a tile
 LEVELS = 6
@@ -25,26 +30,29 @@ MOST = 8  # highest degree that the evaluation has room for
 BASIC = 6  # outputs that are always asked for: correction (3), shift (3); then tilt (3), drives (m), change of the joints (m)
 
 
+fast = partial(inner, fastmath=True)
+
+
 def exponents(degree: int) -> np.ndarray:
     """Exponents (t, 3) of all products up to a total degree, lower degrees first, in the order of `terms`."""
     rows = [(i, total - k - i, k) for total in range(degree + 1) for k in range(total + 1) for i in range(total - k + 1)]
     return np.array(rows, np.int64)
 
 
-@njit(cache=True, nogil=True)
+@inner
 def cell_key(level, x, y, z, size):
     """Number of the cell of a level that holds a point; -1 when it lies out of every range."""
     s = size / (1 << level)
-    i = int(np.floor(x / s)) + BIAS
-    j = int(np.floor(y / s)) + BIAS
-    k = int(np.floor(z / s)) + BIAS
+    i = math.floor(x / s) + BIAS
+    j = math.floor(y / s) + BIAS
+    k = math.floor(z / s) + BIAS
     top = 2 * BIAS
     if i < 0 or j < 0 or k < 0 or i >= top or j >= top or k >= top:
         return -1
     return (((level * top) + i) * top + j) * top + k
 
 
-@njit(cache=True, nogil=True)
+@inner
 def find_slot(keys, key):
     """Slot of a key in an open hash table, or the empty slot where it would go."""
     n = keys.shape[0]
@@ -57,7 +65,17 @@ def find_slot(keys, key):
     return slot
 
 
-@njit(cache=True, nogil=True)
+@entry
+def put_cells(keys, values, new_keys, new_values):
+    """Puts cells (n,) with their values into a hash table with room for them; keys of -1 are none."""
+    for i in range(new_keys.shape[0]):
+        if new_keys[i] != -1:
+            slot = find_slot(keys, new_keys[i])
+            keys[slot] = new_keys[i]
+            values[slot] = new_values[i]
+
+
+@inner
 def find_tile(keys, values, size, x, y, z):
     """(tile, key of the last cell looked at): tile >= 0, or EXACT, or MISSING."""
     key = -1
@@ -73,7 +91,7 @@ def find_tile(keys, values, size, x, y, z):
     return EXACT, key
 
 
-@njit(cache=True, nogil=True)
+@entry
 def missing_cells(keys, values, size, points, out):
     """Keys of cells that points (n, 3) need and that are not there, with repetitions only in part; the number of them."""
     n = 0
@@ -87,7 +105,7 @@ def missing_cells(keys, values, size, points, out):
     return n
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=True)
+@fast
 def terms(degree, u, v, w, T, out, lane):
     """Fills out[lane] (t,) with the products of Chebyshev polynomials at u, v, w up to a total degree, lower degrees first.
 
@@ -113,7 +131,7 @@ def terms(degree, u, v, w, T, out, lane):
                 n += 1
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=True)
+@fast
 def products(A, B, count, out, lane):
     """Fills out[lane] with the products of force terms B[lane] and position terms A[lane] that belong together; their number."""
     n = 0
@@ -126,7 +144,7 @@ def products(A, B, count, out, lane):
     return n
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=True)
+@fast
 def contract(W, first, C, n, outputs, out):
     """Fills out (LANES, outputs) with the sums over n terms C (LANES, n or more); coefficients from `first` on, output by output.
 
@@ -157,43 +175,44 @@ def contract(W, first, C, n, outputs, out):
         out[0, o2], out[1, o2], out[2, o2], out[3, o2] = w0, w1, w2, w3
 
 
-@njit(cache=True, nogil=True)
-def path_force(t, axis, components, out):
-    """Fills out (3,) with the force of components (Fr, Ft, Fz) for the unit feed direction t; False on a plunge."""
-    along = t[0] * axis[0] + t[1] * axis[1] + t[2] * axis[2]
-    x, y, z = t[0] - along * axis[0], t[1] - along * axis[1], t[2] - along * axis[2]
-    size = np.sqrt(x * x + y * y + z * z)
+@inner
+def path_force(t, axis, components):
+    """Force (3,) of components (Fr, Ft, Fz) for the unit feed direction t; zero and False on a plunge."""
+    across = plus(t, axis, -dot(t, axis))
+    size = math.sqrt(dot(across, across))
     if not size > 1e-6:
-        out[:] = 0.0
-        return False
-    x, y, z = x / size, y / size, z / size
-    right = (y * axis[2] - z * axis[1], z * axis[0] - x * axis[2], x * axis[1] - y * axis[0])
-    out[0] = components[0] * right[0] + components[1] * x + components[2] * axis[0]
-    out[1] = components[0] * right[1] + components[1] * y + components[2] * axis[1]
-    out[2] = components[0] * right[2] + components[1] * z + components[2] * axis[2]
-    return True
+        return (0.0, 0.0, 0.0), False
+    x = (across[0] / size, across[1] / size, across[2] / size)
+    right = cross(x, axis)
+    a, b, c = components[0], components[1], components[2]
+    return (
+        a * right[0] + b * x[0] + c * axis[0],
+        a * right[1] + b * x[1] + c * axis[1],
+        a * right[2] + b * x[2] + c * axis[2],
+    ), True
 
 
-@njit(cache=True, nogil=True)
+@inner
+def set_row(out, i, v):
+    """Fills row i of out (n, 3)."""
+    out[i, 0], out[i, 1], out[i, 2] = v
+
+
+@entry
 def lay_loads(kind, start, end, axis, components, join_cosine, f0, f1, jump, length):
     """Forces at the start and the end of moves (n,), where they jump, and the lengths: track.py for constant components.
 
     A feed move without length keeps the force before it.
     """
-    n = kind.shape[0]
     before = -1  # the last move that counts
-    t = np.zeros(3)
-    last = np.zeros(3)
-    middle = np.zeros(3)
-    own = np.zeros(3)
-    own_before = np.zeros(3)
+    axis, components = part(axis, 0), part(components, 0)
+    zero = (0.0, 0.0, 0.0)
+    last = own_before = zero
     cut_before = False
-    corner = np.zeros(3)
-    for i in range(n):
+    for i in range(kind.shape[0]):
         jump[i] = False
-        for k in range(3):
-            t[k] = end[i, k] - start[i, k]
-        size = np.sqrt(t[0] * t[0] + t[1] * t[1] + t[2] * t[2])
+        t = plus(part(end[i], 0), part(start[i], 0), -1.0)
+        size = math.sqrt(dot(t, t))
         length[i] = size
         if not size > 0.0 and kind[i] != RAPID:
             for k in range(3):
@@ -201,49 +220,50 @@ def lay_loads(kind, start, end, axis, components, join_cosine, f0, f1, jump, len
                 f1[i, k] = f0[i, k]
             continue
         cuts = False
-        own[:] = 0.0
+        own = zero
         if size > 0.0:
-            t /= size
+            t = (t[0] / size, t[1] / size, t[2] / size)
             if kind[i] != RAPID:
-                cuts = path_force(t, axis, components, own)
-        f0[i] = own
-        f1[i] = own
+                own, cuts = path_force(t, axis, components)
+        set_row(f0, i, own)
+        set_row(f1, i, own)
         if before >= 0:
-            cosine = last[0] * t[0] + last[1] * t[1] + last[2] * t[2]
-            if cuts and cut_before and cosine >= join_cosine:
-                for k in range(3):
-                    middle[k] = last[k] + t[k]
-                middle /= np.sqrt(middle[0] * middle[0] + middle[1] * middle[1] + middle[2] * middle[2])
-                path_force(middle, axis, components, corner)
-                f1[before] = corner
-                f0[i] = corner
+            if cuts and cut_before and dot(last, t) >= join_cosine:
+                middle = plus(last, t, 1.0)
+                size = math.sqrt(dot(middle, middle))
+                corner, _ = path_force((middle[0] / size, middle[1] / size, middle[2] / size), axis, components)
+                set_row(f1, before, corner)
+                set_row(f0, i, corner)
                 for j in range(before + 1, i):  # moves without length in between
-                    f0[j] = corner
-                    f1[j] = corner
+                    set_row(f0, j, corner)
+                    set_row(f1, j, corner)
             else:
-                change = 0.0
-                for k in range(3):
-                    change += (own[k] - own_before[k]) ** 2
-                jump[i] = np.sqrt(change) > 1e-9
+                change = plus(own, own_before, -1.0)
+                jump[i] = math.sqrt(dot(change, change)) > 1e-9
         before = i
-        last[:] = t
-        own_before[:] = own
+        last = t
+        own_before = own
         cut_before = cuts
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def look_up(a, b, m, every, target, force, answer, nominal, tile_of, size, keys, values, centre, half, rung, first, W, mid, wide,
-            shape, count):  # fmt: skip
+def look_up(
+    a: int, b: int, m: int, every: bool, target: Floats, force: Floats, answer: Floats, nominal: Floats, tile_of: Ints, *packed: Any
+) -> None:  # fmt: skip
     """Answers (n, 9 + 2 m) at targets (n, 3) under forces (n, 3) for rows a to b; tile_of (n,), negative: there is none.
 
-    every: all outputs and nominal joints (n, m); otherwise correction and shift only. From `size` on: Field.packed.
+    every: all outputs and nominal joints (n, m); otherwise correction and shift only. packed: those of a Field.
     """
-    room = np.empty((MOST + 4, MOST + 1))
-    A = np.zeros((LANES, shape[:, 2].max()))
-    B = np.zeros((LANES, count.shape[1]))
-    C = np.zeros((LANES, A.shape[1] * B.shape[1]))
-    outputs = 9 + 2 * m if every else BASIC
-    out = np.zeros((LANES, outputs))
+    *_, shape, count = packed
+    outputs, along, across = 9 + 2 * m if every else BASIC, shape[:, 2].max(), count.shape[1]
+    room = (np.empty((MOST + 4, MOST + 1)), *(np.zeros((LANES, n)) for n in (along, across, along * across, outputs)))
+    look_up_rows(a, b, m, every, target, force, answer, nominal, tile_of, *packed, *room)
+
+
+@entry
+def look_up_rows(a, b, m, every, target, force, answer, nominal, tile_of, size, keys, values, centre, half, rung, first, W, mid, wide,
+                 shape, count, T, A, B, C, out):  # fmt: skip
+    """look_up with room to work in, T for `terms`, the others (LANES, most terms or outputs), finite."""
+    outputs = out.shape[1]
     i = a
     while i < b:
         tile, _ = find_tile(keys, values, size, target[i, 0], target[i, 1], target[i, 2])
@@ -259,8 +279,8 @@ def look_up(a, b, m, every, target, force, answer, nominal, tile_of, size, keys,
             x, y, z = target[i + lanes, 0] - c[0], target[i + lanes, 1] - c[1], target[i + lanes, 2] - c[2]
             if lanes > 0 and not max(abs(x), abs(y), abs(z)) < h:
                 break
-            terms(along, x / h, y / h, z / h, room, A, lanes)
-            terms(across, (f[0] - mid[0]) / wide[0], (f[1] - mid[1]) / wide[1], (f[2] - mid[2]) / wide[2], room, B, lanes)
+            terms(along, x / h, y / h, z / h, T, A, lanes)
+            terms(across, (f[0] - mid[0]) / wide[0], (f[1] - mid[1]) / wide[1], (f[2] - mid[2]) / wide[2], T, B, lanes)
             n = products(A, B, count[r, :outer], C, lanes)
             lanes += 1
         contract(W, first[tile], C, n, outputs, out)
