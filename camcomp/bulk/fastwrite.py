@@ -43,9 +43,10 @@ def put_decimal(out, at, value, digits, point):
         out[at] = 46
         at += 1
     if digits > 0:
-        for k in range(digits - 1, -1, -1):
-            out[at] = 48 + tail // _TENS[k] % 10
-            at += 1
+        for k in range(digits - 1, -1, -1):  # from behind: to divide by ten, which is known, is quick
+            out[at + k] = 48 + tail % 10
+            tail //= 10
+        at += digits
     elif point:
         out[at] = 48
         at += 1
@@ -59,9 +60,9 @@ def put_int(out, at, value):
     while n < 18 and value >= _TENS[n]:
         n += 1
     for k in range(n - 1, -1, -1):
-        out[at] = 48 + value // _TENS[k] % 10
-        at += 1
-    return at
+        out[at + k] = 48 + value % 10
+        value //= 10
+    return at + n
 
 
 @inner

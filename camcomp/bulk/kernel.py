@@ -294,3 +294,13 @@ def look_up_rows(a, b, m, every, target, force, answer, nominal, tile_of, size, 
                 for k in range(m):
                     nominal[i + lane, k] = out[lane, k]
         i += lanes
+
+
+@entry
+def follow(slopes, tile, off, out):
+    """Fills out (n, k) with the slopes (t, k, 3) of their tiles times off (n, 3); rows without a tile stay as they are."""
+    for i in range(tile.shape[0]):
+        if tile[i] >= 0:
+            v, M = part(off[i], 0), slopes[tile[i]]
+            for k in range(M.shape[0]):
+                out[i, k] = dot(part(M[k], 0), v)
