@@ -106,28 +106,29 @@ def missing_cells(keys, values, size, points, out):
 
 
 @fast
-def terms(degree, u, v, w, T, out, lane):
-    """Fills out[lane] (t,) with the products of Chebyshev polynomials at u, v, w up to a total degree, lower degrees first.
+def terms(degree, U, at, T, out):
+    """Fills out (LANES, t) with the products of Chebyshev polynomials of three rows of U (6, LANES) from `at` on, up to a
+    total degree, lower degrees first.
 
-    T (MOST + 4, MOST + 1) is room to work in: polynomials of u, v and w, and behind them products of those of u and v.
+    T (MOST + 4, MOST + 1, LANES) is room to work in: polynomials of the rows, and behind them products of the first two.
     """
-    T[0, 0] = 1.0
-    T[1, 0] = 1.0
-    T[2, 0] = 1.0
-    T[0, 1] = u
-    T[1, 1] = v
-    T[2, 1] = w
+    for lane in range(LANES):
+        for k in range(3):
+            T[k, 0, lane] = 1.0
+            T[k, 1, lane] = U[at + k, lane]
     for d in range(2, degree + 1):
-        T[0, d] = 2.0 * u * T[0, d - 1] - T[0, d - 2]
-        T[1, d] = 2.0 * v * T[1, d - 1] - T[1, d - 2]
-        T[2, d] = 2.0 * w * T[2, d - 1] - T[2, d - 2]
+        for k in range(3):
+            for lane in range(LANES):
+                T[k, d, lane] = 2.0 * U[at + k, lane] * T[k, d - 1, lane] - T[k, d - 2, lane]
     n = 0
     for total in range(degree + 1):
         for i in range(total + 1):
-            T[3 + total, i] = T[0, i] * T[1, total - i]
+            for lane in range(LANES):
+                T[3 + total, i, lane] = T[0, i, lane] * T[1, total - i, lane]
         for k in range(total + 1):
             for i in range(total - k + 1):
-                out[lane, n] = T[2, k] * T[3 + total - k, i]
+                for lane in range(LANES):
+                    out[lane, n] = T[2, k, lane] * T[3 + total - k, i, lane]
                 n += 1
 
 
@@ -255,14 +256,14 @@ def look_up(
     """
     *_, shape, count = packed
     outputs, along, across = 9 + 2 * m if every else BASIC, shape[:, 2].max(), count.shape[1]
-    room = (np.empty((MOST + 4, MOST + 1)), *(np.zeros((LANES, n)) for n in (along, across, along * across, outputs)))
+    room = (np.empty((MOST + 4, MOST + 1, LANES)), np.zeros((6, LANES)), *(np.zeros((LANES, n)) for n in (along, across, along * across, outputs)))
     look_up_rows(a, b, m, every, target, force, answer, nominal, tile_of, *packed, *room)
 
 
 @entry
 def look_up_rows(a, b, m, every, target, force, answer, nominal, tile_of, size, keys, values, centre, half, rung, first, W, mid, wide,
-                 shape, count, T, A, B, C, out):  # fmt: skip
-    """look_up with room to work in, T for `terms`, the others (LANES, most terms or outputs), finite."""
+                 shape, count, T, U, A, B, C, out):  # fmt: skip
+    """look_up with room to work in, T and U as in `terms`, the others (LANES, most terms or outputs), finite."""
     outputs = out.shape[1]
     i = a
     while i < b:
@@ -279,10 +280,14 @@ def look_up_rows(a, b, m, every, target, force, answer, nominal, tile_of, size, 
             x, y, z = target[i + lanes, 0] - c[0], target[i + lanes, 1] - c[1], target[i + lanes, 2] - c[2]
             if lanes > 0 and not max(abs(x), abs(y), abs(z)) < h:
                 break
-            terms(along, x / h, y / h, z / h, T, A, lanes)
-            terms(across, (f[0] - mid[0]) / wide[0], (f[1] - mid[1]) / wide[1], (f[2] - mid[2]) / wide[2], T, B, lanes)
-            n = products(A, B, count[r, :outer], C, lanes)
+            U[0, lanes], U[1, lanes], U[2, lanes] = x / h, y / h, z / h
+            for k in range(3):
+                U[3 + k, lanes] = (f[k] - mid[k]) / wide[k]
             lanes += 1
+        terms(along, U, 0, T, A)
+        terms(across, U, 3, T, B)
+        for lane in range(lanes):
+            n = products(A, B, count[r, :outer], C, lane)
         contract(W, first[tile], C, n, outputs, out)
         for lane in range(lanes):
             tile_of[i + lane] = tile
