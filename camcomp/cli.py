@@ -76,7 +76,9 @@ def cli() -> None:
 def main(args: list[str] | None = None) -> None:
     """Run the command line and leave the process with the exit code of the contract."""
     gc.set_threshold(50_000)  # imports alone make a tenth as much; looking through them again and again took 0.2 s
-    sys.exit(run(sys.argv[1:] if args is None else args))
+    code = run(sys.argv[1:] if args is None else args)
+    gc.freeze()  # nor does the interpreter have to look through everything once more when it ends
+    sys.exit(code)
 
 
 def run(args: list[str]) -> int:
