@@ -12,6 +12,7 @@ from importlib import import_module
 import click
 
 from camcomp import __version__
+from camcomp.collector import collect_seldom
 from camcomp.diagnostics import CamcompError, FileError, format_error
 
 # Matrices here are small: threads of the linear algebra wait for each other longer than they compute, most of all on a
@@ -75,9 +76,9 @@ def cli() -> None:
 
 def main(args: list[str] | None = None) -> None:
     """Run the command line and leave the process with the exit code of the contract."""
-    gc.set_threshold(50_000)  # imports alone make a tenth as much; looking through them again and again took 0.2 s
+    collect_seldom()
     code = run(sys.argv[1:] if args is None else args)
-    gc.freeze()  # nor does the interpreter have to look through everything once more when it ends
+    gc.freeze()  # the interpreter need not look through everything once more when it ends
     sys.exit(code)
 
 
