@@ -32,7 +32,8 @@ _BY_HAND = (
 @dataclass(frozen=True, eq=False)
 class Candidate:
     """A feasible experiment. program: NC text; channels: what it logs; minutes: what it costs; stay_s: how long it is
-    logged after the last motion; knows: parameters (effect, name) that it measures by other means, with their deviation.
+    logged after the last motion; knows: parameters (effect, name) that it measures by other means, with their deviation;
+    varies: covariates that it changes while the others stay as they were.
     """
 
     action: str
@@ -43,6 +44,7 @@ class Candidate:
     minutes: float
     stay_s: float = 0.0
     knows: tuple[tuple[str, str, float], ...] = ()
+    varies: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,19 +83,20 @@ def candidates(site: Site) -> Iterator[Candidate]:
     have, soon = site.channels, site.end + 60.0
 
     def circle(action: str, turn: int = 1, cutting: bool = True, at: Sequence[float] = (0.0, 0.0, 0.0), faster: float = 1.0,
-               wider: float = 1.0, plane: str = "G17") -> Candidate:  # fmt: skip
+               wider: float = 1.0, plane: str = "G17", varies: tuple[str, ...] = ()) -> Candidate:  # fmt: skip
         text = circle_program(action, site.centre + np.array(at), wider * site.radius, faster * site.feed, turn, plane)
         minutes = _SETUP_MIN + (site.minutes - _SETUP_MIN) * wider / faster
-        return Candidate(action, text, cutting, have, soon, minutes)
+        return Candidate(action, text, cutting, have, soon, minutes, varies=varies)
 
     usual = circle("circle, counter-clockwise")
-    yield circle("circle in the reverse direction, clockwise", turn=-1)
-    yield circle("circle at another feed, four times as fast", faster=4.0)
-    yield circle("circle at another feed, half as fast", faster=0.5)
-    yield circle("circle in the air, without cutting", cutting=False)
+    yield circle("circle in the reverse direction, clockwise", turn=-1, varies=("reversal", "direction"))
+    yield circle("circle at another feed, four times as fast", faster=4.0, varies=("velocity", "acceleration"))
+    yield circle("circle at another feed, half as fast", faster=0.5, varies=("velocity", "acceleration"))
+    yield circle("circle in the air, without cutting", cutting=False, varies=("force",))
     yield circle("circle of twice the radius, in the air", cutting=False, wider=2.0)
     for x, y, z in ((60, 60, 0), (-40, -40, 0), (-60, -60, 0), (60, -60, 0), (0, 0, 60)):
-        yield circle(f"circle in the air at another place, off by X{x} Y{y} Z{z} mm", cutting=False, at=(x, y, z))
+        action = f"circle in the air at another place, off by X{x} Y{y} Z{z} mm"
+        yield circle(action, cutting=False, at=(x, y, z), varies=("position",))
     yield circle("circle in another plane (XZ), in the air", cutting=False, plane="G18")
     for axis, name in enumerate("XYZ"):
         action = f"single-axis ladder along {name}, up and down, in the air"
@@ -113,12 +116,12 @@ def candidates(site: Site) -> Iterator[Candidate]:
     action = "dwell: stand still for 15 minutes and log"
     yield Candidate(
         action, dwell_program(action, site.centre, site.feed, _DWELL_S), False, have, soon, _DWELL_S / 60.0 + _SETUP_MIN,
-        stay_s=_DWELL_S,
+        stay_s=_DWELL_S, varies=("time", "temperature"),
     )  # fmt: skip
     later = "repeat later: the same circle after one hour of running"
     yield replace(
         usual, action=later, program=circle_program(later, site.centre, site.radius, site.feed, 1),
-        started=site.end + 60.0 * _LATER_MIN, minutes=usual.minutes + _LATER_MIN,
+        started=site.end + 60.0 * _LATER_MIN, minutes=usual.minutes + _LATER_MIN, varies=("time", "temperature"),
     )  # fmt: skip
 
 

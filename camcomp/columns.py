@@ -6,13 +6,13 @@ tolerance what every healthy machine has of it.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 
 from camcomp import shelf
 from camcomp.bench import Atom, Bench, Run, cause_of, step_of, thinned
-from camcomp.datatypes import Floats
+from camcomp.datatypes import Floats, Ints
 from camcomp.gap.effect import Cause, Load
 from camcomp.gap.evidence import Prior
 from camcomp.gap.observation import channel_names
@@ -57,6 +57,12 @@ class Columns:
     def of(self, atom: int) -> list[int]:
         """Columns of an atom."""
         return [int(i) for i in np.flatnonzero(self.atom == atom)]
+
+    @cached_property
+    def run_offsets(self) -> Ints:
+        """Columns by which the measured tip of one run may differ from that of the next."""
+        firm = (self.prior.flexible == 0) & np.isfinite(self.prior.tolerance)
+        return np.flatnonzero(firm & np.array([n.startswith("offset.") for n in self.names], bool))
 
     def with_blocks(self, changed: Mapping[int, Sequence[Floats]]) -> "Columns":
         """A copy with some columns (index -> per run (n, c)) replaced."""

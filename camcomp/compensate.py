@@ -163,7 +163,7 @@ def compensate(
         tolerance[straighten] = budget
         tolerance = np.where(missed, tolerance * np.clip(0.9e-3 * tolerance_um / np.maximum(worst, 1e-12), 0.3, 0.9), tolerance)
     before = _see_original(job, points)
-    warnings = _warnings(rows)
+    warnings = _warnings(job, rows)
     iterations = int(aimed.iterations.max(initial=0))
     return _assemble(program, job, track, rows, written, points, before, after, iterations, method, warnings)
 
@@ -371,9 +371,13 @@ def _see_original(job: Job, points: _Points) -> _Seen:
     return _Seen(tip - points.target, tip[points.end], Correction(**at))
 
 
-def _warnings(rows: Rows) -> list[str]:
+def _warnings(job: Job, rows: Rows) -> list[str]:
     joins = int(rows.joining.sum())
-    return [f"{joins} joining lines where the cutting force jumps; they are not part of before and after"] if joins else []
+    out = [f"{joins} joining lines where the cutting force jumps; they are not part of before and after"] if joins else []
+    if job.config.process.temperature_C is None:
+        warm = dict.fromkeys(cause.name for cause in job.causes if getattr(cause.effect, "WARMS", False))
+        out += [f"{name}: without process: temperature_C the machine counts as warming up from 20 deg C" for name in warm]
+    return out
 
 
 def _assemble(

@@ -14,6 +14,7 @@ from camcomp.alike import classes, likeness
 from camcomp.bench import Bench, Run
 from camcomp.columns import atoms_of
 from camcomp.datatypes import Floats
+from camcomp.exploring import explore
 from camcomp.gap import where
 from camcomp.gap.effect import Cause
 from camcomp.gap.evidence import estimate
@@ -24,8 +25,11 @@ from camcomp.intervals import joint_covariance
 from camcomp.job import Job
 from camcomp.locate import channel_axes, gap_of, main_channels, patterns_of, run_gaps
 from camcomp.planner import Proposal, propose
-from camcomp.survey import Survey, leftovers, survey
+from camcomp.remainder import firm_prior, leftovers
+from camcomp.survey import Survey, survey
 from camcomp.twin import Twin
+
+RIVALS = 8  # sets that one experiment is asked to tell from the answer
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,8 +82,10 @@ def _next(inquiry: Inquiry, found: Survey, word: str, job: Job) -> Proposal | No
     """What separates the answer from its rivals: those that explain alike, or else those that are not yet excluded."""
     if word == "none":
         return None
+    if found.strange:
+        return explore(inquiry, found.left[found.strange].labels, job)
     best = found.verdict.best
-    close = [best, *found.verdict.rivals]
+    close = [best, *sorted(found.verdict.rivals, key=lambda j: -found.probability[j])[:RIVALS]]
     if len(close) == 1:
         close += [j for j in np.argsort(-found.probability) if j != best and found.probability[j] > 0.02][:3]
     p = found.probability[close]
@@ -229,7 +235,7 @@ def _drivers(inquiry: Inquiry, found: Survey) -> list[dict[str, Any]]:
         labels = found.left[found.strange].labels
     else:
         null = inquiry.refit(())
-        at_null = leftovers(inquiry, null)
+        at_null = leftovers(inquiry, null, firm_prior(inquiry))
         labels = max(at_null.values(), key=lambda each: each.energy).labels if at_null else ()
     return [{"covariate": name, "share": round(share, 4)} for name, share in labels[:6] if share > 0.02]
 

@@ -30,7 +30,7 @@ from camcomp.inquiry import Inquiry
 from camcomp.job import Job
 from camcomp.noise import inflation
 
-_WORTH = 0.1  # bits below which an experiment is not worth proposing
+WORTH = 0.1  # bits below which an experiment is not worth proposing
 _NEARLY = 0.9
 _DRAWS = 64
 _SEED = 20120624
@@ -79,7 +79,7 @@ def ranked(inquiry: Inquiry, rivals: Sequence[Fitted], probability: Floats, job:
         if here is None:
             continue
         gain = expected_gain(_odds(inquiry, rivals, candidate, here), probability)
-        if gain > _WORTH:
+        if gain > WORTH:
             found.append(Proposal(candidate, gain, names))
     return sorted(found, key=lambda each: -each.gain / each.candidate.minutes)
 
@@ -128,11 +128,24 @@ def _try(inquiry: Inquiry, candidate: Candidate, rivals: Sequence[Fitted], job: 
         return None  # out of reach, or a force model that does not know the cut
 
 
-def _lay(inquiry: Inquiry, candidate: Candidate, rivals: Sequence[Fitted], job: Job) -> _Laid:
-    run = _run(inquiry, candidate, job)
-    bench = Bench(inquiry.bench.twin, [run])
+def feasible(inquiry: Inquiry, candidate: Candidate, job: Job) -> bool:
+    """Whether the machine can do a candidate, at a place where its model is to be trusted."""
+    try:
+        _on_bench(inquiry, candidate, job)
+    except (CamcompError, ValueError):
+        return False
+    return True
+
+
+def _on_bench(inquiry: Inquiry, candidate: Candidate, job: Job) -> Bench:
+    bench = Bench(inquiry.bench.twin, [_run(inquiry, candidate, job)])
     if _transmission(bench) > _STRETCH * _transmission(inquiry.bench):
         raise ValueError("too near a singular pose for the model to be trusted")
+    return bench
+
+
+def _lay(inquiry: Inquiry, candidate: Candidate, rivals: Sequence[Fitted], job: Job) -> _Laid:
+    bench = _on_bench(inquiry, candidate, job)
     nominal = bench.channels(bench.nominal[0])
     changes = [bench.channels(bench.read(0, inquiry.causes(f.members, f.theta, f.extra))) - nominal for f in rivals]
     alone = _whitened(inquiry, bench, np.stack(changes, axis=2))

@@ -12,14 +12,14 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from camcomp.datatypes import Bools, Floats
-from camcomp.gap.effect import Load, Motion
+from camcomp.gap.effect import Load, Motion, driven
 from camcomp.gap.memory import direction, ways
 from camcomp.job import Job
 from camcomp.statics.solve import FREE, solve
 from camcomp.statics.target import Correction, correct, settle
 
 SETTLED_MM = 2e-5  # the correction of effects ends here
-MAX_STEPS = 12
+MAX_STEPS = 50  # friction that turns round in a soft drive leaves up to nine tenths per step
 REST_S = 60.0
 AHEAD_MM = 2.0  # more than any play
 LEAST_MM = 2e-4  # a drive that comes back by less than this is not led through its play
@@ -67,11 +67,8 @@ def respond(
         return job.frame.to_program(loaded), settled
     control = solve(job.real_machine, FREE, told, check=False)
     motion = _motion(job, control.rho_nominal, travel)
-    error = np.zeros_like(motion.encoder)
     load = _load(job, motion, travel.force)
-    for cause in job.causes:
-        if (hook := cause.hook("on_drive")) is not None:
-            error = hook(error, motion, cause.which(job.real_machine.actuators), cause.values)
+    error, motion = driven(job.causes, job.real_machine.actuators, motion)
     carriage = motion.encoder + error
     state = solve(job.real_machine, FREE, told, force=load.force, wrench=load.wrench, rho=carriage)
     drive, tip = state.drive, state.tip
@@ -126,12 +123,9 @@ def _through_play(job: Job, found: Correction, travel: Travel) -> Floats:
     carriage = found.rho[solved]
     sense = ways(carriage, LEAST_MM)
     motion = _motion(job, carriage + AHEAD_MM * sense, travel.take(np.flatnonzero(solved)))
-    lag = np.zeros_like(carriage)
-    for cause in job.causes:
-        if (hook := cause.hook("on_drive")) is not None:
-            which = cause.which(job.real_machine.actuators)
-            lag += hook(np.zeros_like(lag), motion, which, cause.values)
-            lag -= hook(np.zeros_like(lag), replace(motion, ordered=False, direction=np.zeros_like(lag)), which, cause.values)
+    still = replace(motion, ordered=False, direction=np.zeros_like(carriage))
+    lag, standing = (driven(job.causes, job.real_machine.actuators, each)[0] for each in (motion, still))
+    lag = lag - standing
     out = np.zeros((len(solved), 3))
     if lag.any():
         lag[sense == 0.0] = 0.0
@@ -178,7 +172,9 @@ def _motion(job: Job, setpoint: Floats, travel: Travel) -> Motion:
     """The movement that the hooks see, with the encoders where the servos bring them."""
     stiffness = np.array([np.inf if a.stiffness is None else a.stiffness for a in job.real_machine.robot.actuators])
     zero = np.zeros_like(setpoint)
-    motion = Motion(travel.rested, travel.time, travel.cut_min, None, setpoint, zero, zero, job.real_machine.home, stiffness)
+    warm = job.config.process.temperature_C
+    heat = None if warm is None else np.full(len(setpoint), warm)
+    motion = Motion(travel.rested, travel.time, travel.cut_min, heat, setpoint, zero, zero, job.real_machine.home, stiffness)
     encoder = setpoint
     for cause in job.causes:
         if (hook := cause.hook("on_servo")) is not None:

@@ -45,9 +45,12 @@ def cut_at_reversals(job: Job, track: Track, spacing: float) -> tuple[Track, Boo
     cuts: set[tuple[int, float]] = set()
     for j in np.flatnonzero(memory):
         for k in turning_points(carriage[:, j], LEAST_MM)[0]:
+            k += int(k + 1 < len(w) and piece[k + 1] != piece[k])  # it turns round where the next piece starts
             if not feed[piece[k]] or k + 1 == len(w) or piece[k + 1] != piece[k]:
-                continue  # it turns round on its way to another piece
+                continue
             begin, *ends = _fractions(piece, w, carriage[:, j], k, (STANDING_MM, *(WINDING_MM if friction[j] else ())))
+            if not _short(track, int(piece[k]), begin, ends[0]):
+                continue  # a line that is not divided cannot stand for it
             lines.add((int(piece[k]), begin, ends[0]))
             cuts.update((int(piece[k]), at) for at in (begin, *ends) if 0.0 < at < 1.0)
     if not cuts:
@@ -59,6 +62,12 @@ def cut_at_reversals(job: Job, track: Track, spacing: float) -> tuple[Track, Boo
         u = track.u(np.array([i, i]), np.array([a, b]))
         out |= (divided.motion == track.motion[i]) & (u[0] < middle) & (middle < u[1])
     return divided, out
+
+
+def _short(track: Track, piece: int, begin: float, end: float) -> bool:
+    """Whether this part of a piece may be one line: less than the whole, and without a bend that other drives go round."""
+    a, b, c = track.points(np.full(3, piece), np.array([begin, 0.5 * (begin + end), end]))
+    return (begin > 0.0 or end < 1.0) and float(np.linalg.norm(b - 0.5 * (a + c))) <= 5.0 * STANDING_MM
 
 
 def _fractions(piece: Ints, w: Floats, x: Floats, k: int, ways: tuple[float, ...]) -> list[float]:

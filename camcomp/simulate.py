@@ -39,9 +39,10 @@ def simulate(job: Job, path: Path, step_s: float, *, cutting: bool = True, start
     if timeline.end - time[-1] > 1e-9:
         time = np.append(time, timeline.end)
     conditions = job.conditions if cutting else replace(job.conditions, model=None)
+    warm = job.config.process.temperature_C
     course = course_of_program(
         "simulation", timeline, lay_track(path, conditions), time, started=started_s, to_machine=twin.to_machine,
-        vectors=job.frame.vectors, inverse=twin.inverse,
+        vectors=job.frame.vectors, inverse=twin.inverse, temperature=None if warm is None else np.full(len(time), warm),
     )  # fmt: skip
     _, solved = twin.sense(course)
     slopes = twin.slopes(course, (), solved)

@@ -115,6 +115,9 @@ class Process(Spec):
     feed_mm_per_min: Positive | None = Field(None, description="used where the program has no F")
     depth_mm: Positive | None = Field(None, description="axial depth of cut")
     width_mm: Positive | None = Field(None, description="radial width of cut")
+    temperature_C: float | None = Field(
+        None, description="of the drives during the cut; without it they warm up from 20 when the program starts"
+    )
 
 
 class Control(Spec):

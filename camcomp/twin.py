@@ -14,7 +14,7 @@ import numpy as np
 from camcomp.course import Course, travel_direction
 from camcomp.datatypes import Floats
 from camcomp.diagnostics import PhysicsError
-from camcomp.gap.effect import Cause, Load, Motion
+from camcomp.gap.effect import Cause, Load, Motion, driven
 from camcomp.gap.pieces import Places
 from camcomp.job import Job
 from camcomp.statics.description import Robot
@@ -130,11 +130,8 @@ class Twin:
         if robot is not self.robot:
             springs = _springs(robot)
             grid, rows = replace(grid, stiffness=springs), replace(rows, stiffness=springs)
-        carriage = grid.encoder
-        for cause in causes:
-            if (hook := cause.hook("on_drive")) is not None:
-                error = hook(np.zeros_like(carriage), grid, cause.which(self.actuators), cause.values)
-                carriage = carriage + error
+        error, guided = driven(causes, self.actuators, grid)
+        carriage = grid.encoder + error if error.any() else grid.encoder
         seen = course.time
         for cause in causes:
             if (hook := cause.hook("on_clock")) is not None:
@@ -174,7 +171,7 @@ class Twin:
             tip = tip + _apply(at_rows.tip_rho, d_rho) + _apply(at_rows.tip_wrench, d_wrench)
         for cause in causes:
             if (hook := cause.hook("on_drive_force")) is not None:
-                effort = hook(np.zeros_like(grid.encoder), grid, cause.which(self.actuators), cause.values)
+                effort = hook(np.zeros_like(grid.encoder), guided, cause.which(self.actuators), cause.values)
                 drive = drive + _interpolate(course, course.time, effort)
         # tool, workpiece, sensor
         for cause in causes:

@@ -178,11 +178,11 @@ def contract(W, first, C, n, outputs, out):
 
 @inner
 def path_force(t, axis, components):
-    """Force (3,) of components (Fr, Ft, Fz) for the unit feed direction t; zero and False on a plunge."""
+    """Force (3,) of components (Fr, Ft, Fz) for the unit feed direction t, and the sine of t to the tool axis."""
     across = plus(t, axis, -dot(t, axis))
     size = math.sqrt(dot(across, across))
     if not size > 1e-6:
-        return (0.0, 0.0, 0.0), False
+        return (0.0, 0.0, 0.0), size
     x = (across[0] / size, across[1] / size, across[2] / size)
     right = cross(x, axis)
     a, b, c = components[0], components[1], components[2]
@@ -190,7 +190,7 @@ def path_force(t, axis, components):
         a * right[0] + b * x[0] + c * axis[0],
         a * right[1] + b * x[1] + c * axis[1],
         a * right[2] + b * x[2] + c * axis[2],
-    ), True
+    ), size
 
 
 @inner
@@ -200,7 +200,7 @@ def set_row(out, i, v):
 
 
 @entry
-def lay_loads(kind, start, end, axis, components, join_cosine, f0, f1, jump, length):
+def lay_loads(kind, start, end, axis, components, join_cosine, plunge_sine, f0, f1, jump, length):
     """Forces at the start and the end of moves (n,), where they jump, and the lengths: track.py for constant components.
 
     A feed move without length keeps the force before it.
@@ -220,12 +220,15 @@ def lay_loads(kind, start, end, axis, components, join_cosine, f0, f1, jump, len
                 f0[i, k] = f1[before, k] if before >= 0 else 0.0
                 f1[i, k] = f0[i, k]
             continue
-        cuts = False
         own = zero
+        cuts = False
         if size > 0.0:
             t = (t[0] / size, t[1] / size, t[2] / size)
             if kind[i] != RAPID:
-                own, cuts = path_force(t, axis, components)
+                own, sine = path_force(t, axis, components)
+                cuts = sine > plunge_sine
+        if not cuts:
+            own = zero
         set_row(f0, i, own)
         set_row(f1, i, own)
         if before >= 0:

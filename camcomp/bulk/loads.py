@@ -9,7 +9,7 @@ import numpy as np
 
 from camcomp.bulk.kernel import lay_loads
 from camcomp.bulk.runs import NotInPieces, PlainRun
-from camcomp.cutting.track import JOIN_ANGLE, Conditions, lay_track
+from camcomp.cutting.track import JOIN_ANGLE, PLUNGE_SINE, Conditions, lay_track
 from camcomp.datatypes import LINE, RAPID, Bools, Floats, Ints, Path
 
 
@@ -53,7 +53,7 @@ def loads_of(run: PlainRun, before: Edge | None, after: Edge | None, c: Conditio
     first, last, length = np.empty(start.shape), np.empty(start.shape), np.empty(len(kind))
     jump = np.zeros(len(kind) + 1, np.bool_)
     axis = np.asarray(c.tool_axis, float)
-    lay_loads(kind, start, end, axis, constant, float(np.cos(JOIN_ANGLE)), first, last, jump, length)
+    lay_loads(kind, start, end, axis, constant, float(np.cos(JOIN_ANGLE)), PLUNGE_SINE, first, last, jump, length)
     f0, f1 = first[own], last[own]
 
     def at(move: Ints, w: Floats) -> Floats:

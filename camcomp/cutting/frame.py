@@ -10,9 +10,7 @@ from numpy.typing import ArrayLike
 
 from camcomp.datatypes import Floats
 
-# Sine of the angle between feed and tool axis below which a motion is a plunge; coordinates written with 1e-4 mm
-# leave directions of short motions uncertain by more than this.
-PLUNGE_SINE = 1e-6
+ALONG_SINE = 1e-6  # of the angle between feed and tool axis; below it the feed has no direction across the tool
 
 
 def lateral(tangent: ArrayLike, tool_axis: ArrayLike) -> Floats:
@@ -26,7 +24,7 @@ def path_frame(tangent: ArrayLike, tool_axis: ArrayLike) -> tuple[Floats, Floats
     axis = np.asarray(tool_axis, float)
     across = _across(np.asarray(tangent, float), axis)
     length = np.linalg.norm(across, axis=-1, keepdims=True)
-    plunge = length <= PLUNGE_SINE
+    plunge = length <= ALONG_SINE
     e_t = np.where(plunge, _substitute(axis), across / np.where(plunge, 1.0, length))
     e_z = np.broadcast_to(axis, e_t.shape).copy()
     return np.cross(e_t, e_z), e_t, e_z

@@ -20,7 +20,7 @@ from camcomp.cutting.frame import lateral, to_vector
 from camcomp.datatypes import ARC, RAPID, Bools, Floats, Ints, Path
 
 JOIN_ANGLE = np.radians(5.0)
-PLUNGE_SINE = 1e-6
+PLUNGE_SINE = 5e-3  # of the angle between feed and tool axis: corrected plunges slant by some 1e-4, rounded short ones too
 NO_FORCE = 1e-9  # N
 BESIDE = 1e-5  # rad: how far beside the ends of an upright arc its direction is taken; at the vertical it has none
 

@@ -33,7 +33,8 @@ def _pull(motion: Motion, p: Mapping[str, float]) -> Floats | None:
     if force == 0.0 and viscous == 0.0 and lopsided == 0.0:
         return None
     length = p.get("presliding_mm", PRESLIDING_MM)
-    turned = held_back(motion.encoder, motion.stiffness, force, length) if motion.ordered else motion.direction
+    nut = motion.encoder if motion.nut is None else motion.nut
+    turned = held_back(nut, motion.stiffness, force, length) if motion.ordered else motion.direction
     return force * turned + viscous * motion.speed + lopsided * np.abs(motion.speed)
 
 

@@ -10,6 +10,7 @@ from camcomp.gap.effect import Motion, Parameter
 STAGE = "drive"
 TARGET = "either"
 SOURCE = "linear expansion; first-order warm-up where no temperature is logged"
+WARMS = True  # compensate asks for the machine's temperature
 REFERENCE_C = 20.0
 WARM_UP_K = 10.0  # rise that an unlogged warm-up ends at; only its product with the growth shows
 PARAMETERS = (

@@ -19,11 +19,12 @@ and at least one hook. `p` maps parameter names to values; `which` (m,) is 1.0 f
     on_clock(time, p)                            (n,) row time -> time at which the tip stood where the row says
     on_reading(channels, motion, p)              dict of measured channels by column name
 
-The twin calls them in the order of the signal path, effects in the order of the config.
+The twin calls them in the order of the signal path, effects in the order of the config. Of those on the drive the ones
+with a force of their own come last: guides hold back the carriage, behind the screw and its play.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -93,6 +94,7 @@ class Motion:
     home: Floats  # (m,)
     stiffness: Floats  # (m,) of the drives, N/mm or N mm/rad; inf = rigid
     ordered: bool = True
+    nut: Floats | None = None  # (n, m) encoder and what the screw makes of it, for guides; None: as the encoder
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,6 +125,19 @@ class Cause:
     def hook(self, name: str) -> Any:
         """The hook called `name`, or None."""
         return getattr(self.effect, name, None)
+
+
+def driven(causes: Sequence[Cause], actuators: tuple[str, ...], motion: Motion) -> tuple[Floats, Motion]:
+    """Carriage minus encoder (n, m), and the motion as the guides see it, with the nut where play and screw leave it."""
+    error = np.zeros_like(motion.encoder)
+    drives = [cause for cause in causes if cause.hook("on_drive") is not None]
+    for guide in (False, True):
+        if guide:
+            motion = replace(motion, nut=motion.encoder + error)
+        for cause in drives:
+            if (cause.hook("on_drive_force") is not None) == guide:
+                error = cause.hook("on_drive")(error, motion, cause.which(actuators), cause.values)
+    return error, motion
 
 
 def nominal(effect: Any) -> dict[str, float]:

@@ -204,6 +204,10 @@ def dictionary(grounds: Sequence[Ground], actuators: Sequence[str]) -> list[Dict
                 stores["tip"].put(f"direction:{name}", axis, values, 1e-3)
             if found["dyno"]:
                 stores["dyno"].put(f"direction:{name}", axis, values, 1.0)
+        pushes = [g.force[:, axis] / 100.0 for g in grounds]
+        if found["tip"]:
+            for channel in range(3):
+                stores["tip"].put(f"force:{name}", channel, pushes, 1e-3)
         if found["dyno"]:
-            stores["dyno"].put(f"force:{name}", axis, [g.force[:, axis] / 100.0 for g in grounds], 1.0)
+            stores["dyno"].put(f"force:{name}", axis, pushes, 1.0)
     return [store.done() for kind, store in stores.items() if found[kind]]

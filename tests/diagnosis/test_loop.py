@@ -1,25 +1,15 @@
 """The loop closes: diagnose, write the causes into the machine file, compensate with it, and the broken machine cuts true."""
 
-import numpy as np
 import pytest
-from scipy.spatial import cKDTree
 
 from camcomp.commands.diagnose import _machine_with_causes
 from tests.campaign import runner
 from tests.diagnosis.conftest import plan_of
 from tests.diagnosis.test_where import SCREW
 from tests.plants.experiments import rerun
-from tests.plants.motion import Timeline, read
+from tests.plants.measure import path_error
 
 PAIR = plan_of(("drive_stiffness", "y"), ("cutting_force", None), ratio=30.0, seed=42)
-
-
-def path_error(state, program):
-    """rms distance (mm) of the cut tips from the programmed path, its ends left out."""
-    line = Timeline(read(program))
-    dense = line.sample(np.linspace(0.0, line.log_end, 20_000))["tip"]
-    cut = state.tip[state.cuts]
-    return float(np.sqrt(np.mean(cKDTree(dense).query(cut[len(cut) // 50 : -len(cut) // 50])[0] ** 2)))
 
 
 @pytest.mark.parametrize("plan", [SCREW, PAIR], ids=["single", "pair"])

@@ -21,8 +21,8 @@ GROUND = {
 ENGINES = {"gcode", "statics", "cutting", "gap"}
 SHELVES = {"robots", "dialects", "forces", "effects"}
 JOINTS = {
-    "alike", "arcfit", "armposes", "bench", "candidates", "columns", "course", "heldout", "inquiry", "intervals", "job", "locate",
-    "logcheck", "moves", "noise", "planner", "posture", "response", "reversals", "scan", "splitting", "survey", "twin",
+    "alike", "arcfit", "armposes", "bench", "candidates", "columns", "course", "exploring", "heldout", "inquiry", "intervals", "job",
+    "locate", "logcheck", "moves", "noise", "planner", "posture", "remainder", "response", "reversals", "scan", "splitting", "survey", "twin",
 }  # fmt: skip
 STORIES = {"armstudy", "axisstudy", "compensate", "verify", "simulate", "diagnose", "stream"}
 BULK = {"bulk"}

@@ -1,7 +1,6 @@
 """A corrected program on the truth machine that has the very errors named in the machine file: the cut must be true."""
 
 import json
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -9,10 +8,11 @@ import pytest
 from tests.campaign import runner
 from tests.plants import designs
 from tests.plants.machine import Run, Truth, observe
+from tests.plants.measure import misses
 from tests.plants.motion import Timeline, read
 
 Y = np.array([0.0, 1.0, 0.0])
-PROGRAM = designs.circle(25.0, 1200.0, False, plunge=False)
+PROGRAM = designs.circle(25.0, 1200.0, False)  # its corrected plunge slants and yet does not cut
 SETS = {
     "elastic": (
         [
@@ -55,28 +55,38 @@ SETS = {
             rotation_deg=0.2,
         ),
     ),
+    "control": (
+        [
+            {"effect": "servo_lag", "target": "x", "time_constant_ms": 1.0},
+            {
+                "effect": "screw_cyclic",
+                "target": "z",
+                "amplitude_mm": 0.03,
+                "pitch_mm": 8.0,
+                "phase_rad": 1.0,
+            },
+        ],
+        Truth(
+            lag_ms=np.array([1.0, 0, 0]),
+            cyclic_mm=np.array([0, 0, 0.03]),
+            cyclic_pitch_mm=np.array([5.0, 5.0, 8.0]),
+            cyclic_phase=np.array([0, 0, 1.0]),
+        ),
+    ),
 }
 
 
-def distance(points, program):
-    """Distances (n,) mm of points (n, 3) from the programmed path, by a dense polygon of it."""
-    line = Timeline(read(program))
-    dense = line.sample(np.linspace(0, line.log_end, 4000))["tip"]
-    out = np.full(len(points), np.inf)
-    for a, b in pairwise(dense):
-        d = b - a
-        share = np.clip((points - a) @ d / max(float(d @ d), 1e-30), 0, 1)
-        out = np.minimum(out, np.linalg.norm(points - a - share[:, None] * d, axis=1))
-    return out
+def executed(text, truth, began=0.0):
+    """State of the machine, in motion since time 0, that executes `text` from `began` (s) on."""
+    line = Timeline(read(text), looks_ahead=True)
+    t = np.linspace(0.05, line.log_end - 0.05, 600)
+    run = Run(line, True, began, surface=Timeline(read(PROGRAM)))
+    return observe(run, truth, t, [(0.0, began + line.log_end)])
 
 
-def cut(text, truth):
-    """Tips (n, 3) that cut, clear of the joining lines at the ends of the groove."""
-    line = Timeline(read(text))
-    t = np.linspace(0.05, line.log_end - 0.05, 300)
-    state = observe(Run(line, True, 0.0, surface=Timeline(read(PROGRAM))), truth, t, [(0.0, line.log_end)])
-    ends = np.linalg.norm(state.programmed - [25.0, 0, 0], axis=1) < 2.5
-    return state.tip[state.cuts & ~ends]
+def missed(text, truth, began=0.0):
+    """Distances (n,) mm of the tips from the groove while the machine executes `text`."""
+    return misses(executed(text, truth, began), PROGRAM)
 
 
 @pytest.mark.parametrize("name", sorted(SETS))
@@ -87,9 +97,10 @@ def test_the_broken_machine_cuts_true(tmp_path, name):
     out = tmp_path / "out.nc"
     line = ["compensate", str(tmp_path / "in.nc"), "--config", str(runner.CONFIG)]
     code, said = runner.invoke([*line, "--config", str(tmp_path / "effects.yaml"), "-o", str(out)])
-    assert code == 0, said
-    assert distance(cut(PROGRAM, truth), PROGRAM).max() > 0.3
-    left = distance(cut(out.read_text(), truth), PROGRAM)
+    behind_stops = name == "control" and "CC601" in said  # within 0.1 mm of a stop no line can follow the lag
+    assert code == 0 or behind_stops, said
+    assert missed(PROGRAM, truth).max() > 0.3
+    left = missed(out.read_text(), truth)
     assert (
         left.max() < 1.2e-3
     )  # the bound of the splitting is 1 um; the nearest sampled direction adds a little
@@ -102,5 +113,40 @@ def test_a_machine_with_other_errors_does_not(tmp_path):
         ["compensate", str(tmp_path / "in.nc"), "--config", str(runner.CONFIG), "-o", str(out)]
     )
     assert code == 0, said
-    assert distance(cut(out.read_text(), Truth()), PROGRAM).max() < 1.2e-3
-    assert distance(cut(out.read_text(), SETS["elastic"][1]), PROGRAM).max() > 0.05
+    assert missed(out.read_text(), Truth()).max() < 1.2e-3
+    assert missed(out.read_text(), SETS["elastic"][1]).max() > 0.05
+
+
+def test_a_drive_with_play_and_friction_is_led_through_both(tmp_path):
+    """Friction holds back the carriage behind the play. Its turn-round here is Maxwell's, there Dahl's: some um stay."""
+    truth = Truth(play_mm=0.04 * Y, friction_N=150.0 * Y)
+    effects = [
+        {"effect": "friction", "target": "y", "force_N": 150, "presliding_mm": 0.0028},
+        {"effect": "backlash", "target": "y", "width_mm": 0.04},
+    ]
+    (tmp_path / "effects.yaml").write_text(json.dumps({"effects": effects}))
+    (tmp_path / "in.nc").write_text(PROGRAM)
+    left = []
+    for config in ([], ["--config", str(tmp_path / "effects.yaml")]):
+        line = ["compensate", str(tmp_path / "in.nc"), "--config", str(runner.CONFIG), *config]
+        code, said = runner.invoke([*line, "-o", str(tmp_path / "out.nc")])
+        assert code == 0, said
+        left.append(missed((tmp_path / "out.nc").read_text(), truth))
+    assert np.sqrt(np.mean(left[0] ** 2)) > 0.03 and np.sqrt(np.mean(left[1] ** 2)) < 1e-3
+    assert left[1].max() < 4e-3
+
+
+@pytest.mark.parametrize("stated", [True, False])
+def test_a_warm_machine_cuts_true_at_its_temperature(tmp_path, stated):
+    truth, began = Truth(growth_mm_per_K=np.array([0, 0, 0.006])), 7200.0
+    effects = [{"effect": "thermal_growth", "target": "z", "growth_mm_per_K": 0.006}]
+    temperature = float(executed(PROGRAM, truth, began).temperature.mean())
+    process = {"process": {"temperature_C": temperature}} if stated else {}
+    (tmp_path / "warm.yaml").write_text(json.dumps({"effects": effects, **process}))
+    (tmp_path / "in.nc").write_text(PROGRAM)
+    out = tmp_path / "out.nc"
+    line = ["compensate", str(tmp_path / "in.nc"), "--config", str(runner.CONFIG)]
+    code, said = runner.invoke([*line, "--config", str(tmp_path / "warm.yaml"), "-o", str(out)])
+    assert code == 0, said
+    assert ("temperature_C" in said) is not stated
+    assert (missed(out.read_text(), truth, began).max() < 1.2e-3) == stated

@@ -314,9 +314,10 @@ def truth_json(made: Made, plan_: Plan) -> str:
 
 
 def rerun(made: Made, program: str, groove: str) -> State:
-    """The same machine executes a corrected program of `groove`; its state at 500 even times, noise-free."""
+    """The same machine executes a corrected program of `groove` without stops at its chords; 500 even times, noise-free."""
     began = made.runs[-1].started_s + 600.0
-    run = Run(Timeline(read(program)), True, began, made.runs[-1].cut_before_min, Timeline(read(groove)))
+    line = Timeline(read(program), looks_ahead=True)
+    run = Run(line, True, began, made.runs[-1].cut_before_min, Timeline(read(groove)))
     return observe_all([run], made.truth, [even(run, 500)])[0]
 
 

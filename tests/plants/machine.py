@@ -86,8 +86,8 @@ class Truth:
 class Run:
     """One executed program on the common clock; cut_before: minutes of cutting done by earlier runs.
 
-    surface: the groove that is really cut, when the executed program is a corrected one: the cutting force follows the
-    direction of the groove, not that of the chords which lead the drives there.
+    surface: the program that was corrected, when the executed one is its correction: where the tool cuts, and which way
+    the cutting force points, is a matter of the groove, not of the chords which lead the drives there.
     """
 
     timeline: Timeline
@@ -131,10 +131,11 @@ def _cut_minutes(run: Run, t: np.ndarray) -> np.ndarray:
     return run.cut_before_min + np.interp(t, grid, done)
 
 
-def _along(surface: Timeline, tip: np.ndarray) -> np.ndarray:
-    """Feed direction (n, 3) of the surface at its points nearest to tip (n, 3)."""
+def _groove(surface: Timeline, tip: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Feed direction (n, 3) of the surface at its points nearest to tip (n, 3), and whether it is cut there (n,)."""
     dense = surface.sample(np.linspace(0.0, surface.log_end, 20001)[1:-1])
-    return dense["along"][cKDTree(dense["tip"]).query(tip)[1]]
+    nearest = cKDTree(dense["tip"]).query(tip)[1]
+    return dense["along"][nearest], dense["cuts"][nearest]
 
 
 def simulate(
@@ -176,10 +177,11 @@ def simulate(
     carriage = nut + truth.pitch_ppm * 1e-6 * (nut - HOME) + truth.cyclic_mm * cyclic + truth.offset_mm
     carriage = carriage + truth.growth_mm_per_K * warm[:, None]
 
-    cuts = here["cuts"] & run.cutting
-    along = here["along"]
+    along, cuts = here["along"], here["cuts"]
     if run.surface is not None and cutting_at is not None:
-        along = _along(run.surface, cutting_at)
+        along, cuts = _groove(run.surface, cutting_at)
+        cuts &= here["feeds"]
+    cuts = cuts & run.cutting
     right = np.cross(along, [0.0, 0.0, 1.0])
     size = truth.force_factor * (1 + truth.wear_per_min * _cut_minutes(run, t)) * cuts
     force = size[:, None] * (right * TRIPLE[0] + along * TRIPLE[1] + np.array([0, 0, TRIPLE[2]]))
@@ -195,7 +197,7 @@ def simulate(
     if np.any(truth.friction_N > 0):
         pulled = energy.settle(legs, state.carriage, state.force, weight=truth.weight_N).drive
         stiff = 1e4 * truth.drive_factor
-        where = e + _fine(grid, t, state.carriage - encoder - pulled / stiff)
+        where = behind + _fine(grid, t, state.carriage - nut - pulled / stiff)
         friction = on_grid(
             np.stack(
                 [_friction(where[:, i], truth.friction_N[i], truth.slip_mm, stiff[i]) for i in range(3)], 1

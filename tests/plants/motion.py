@@ -1,7 +1,7 @@
 """Programs in time for the truth plants: a reader for plain G-code and the speed profile of the reference controller.
 
-Every line is run with a trapezoidal speed (1500 mm/s² up and down) and an exact stop at its end; t = 0 is the start of the
-first feed move.  The reader knows what the plants' own programs and corrected ones contain: G0-G3 in the XY plane, I and J
+Every line is run with a trapezoidal speed (1500 mm/s² up and down) and an exact stop at its end, or, where the control looks
+ahead, only where the path bends by more than 5°; t = 0 is the start of the first feed move.  The reader knows what the plants' own programs and corrected ones contain: G0-G3 in the XY plane, I and J
 relative to the start, absolute millimetres, modal words, comments, N words.  Anything else is an error, never a guess.
 """
 
@@ -9,11 +9,13 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 ACCELERATION = 1500.0  # mm/s²
 RAPID = 200.0  # mm/s, never logged
+SMOOTH = np.cos(np.deg2rad(5.0))  # of the bend that a control that looks ahead passes without a stop
 _WORD = re.compile(r"([A-Z])\s*([-+]?(?:\d+\.?\d*|\.\d+))")
 _HARMLESS_G = {17, 21, 40, 49, 54, 64, 80, 90, 94, 91.1}
 
@@ -37,6 +39,23 @@ class Move:
             return float(np.linalg.norm(self.end - self.start))
         radius = float(np.hypot(*(self.start[:2] - self.centre)))
         return float(np.hypot(radius * self.sweep, self.end[2] - self.start[2]))
+
+    def at(self, share: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Points and unit directions (n, 3) at shares (n,) of the way."""
+        chord = self.end - self.start
+        tip, along = self.start + share[:, None] * chord, np.tile(chord / self.length, (len(share), 1))
+        if self.sweep != 0.0:
+            out = self.start[:2] - self.centre
+            c, d = np.cos(share * self.sweep), np.sin(share * self.sweep)
+            arm = np.stack([c * out[0] - d * out[1], d * out[0] + c * out[1]], 1)
+            tip[:, :2] = self.centre + arm
+            along[:, :2] = np.stack([-arm[:, 1], arm[:, 0]], 1) * self.sweep / self.length
+        return tip, along
+
+    def leads_into(self, other: Move) -> bool:
+        """Whether both are feed moves and the path goes on smoothly."""
+        here, there = self.at(np.ones(1))[1][0], other.at(np.zeros(1))[1][0]
+        return self.feed and other.feed and float(here @ there) > SMOOTH
 
 
 def read(text: str, start: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> list[Move]:
@@ -86,52 +105,49 @@ def read(text: str, start: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> list
 class Timeline:
     """Where the program is at any time of the controller's clock (s)."""
 
-    def __init__(self, moves: list[Move], acceleration: float = ACCELERATION) -> None:
-        """Plans every move on its own: exact stop at every end."""
+    def __init__(
+        self, moves: list[Move], acceleration: float = ACCELERATION, *, looks_ahead: bool = False
+    ) -> None:
+        """Plans runs of moves from stop to stop; without looking ahead every move is one."""
         self.moves, self.acceleration = moves, acceleration
-        self.length = np.array([m.length for m in moves])
-        self.speed = np.array([m.speed for m in moves])
-        self.peak = np.minimum(self.speed, np.sqrt(self.length * acceleration))
+        length = np.array([m.length for m in moves])
+        goes_on = [looks_ahead and a.leads_into(b) for a, b in pairwise(moves)]
+        self.run = np.cumsum([0, *(not each for each in goes_on)])  # (moves,) the run of each
+        self.reached = np.concatenate([[0.0], np.cumsum(length)])
+        self.length = np.bincount(self.run, length)
+        speed = self.length / np.bincount(self.run, length / [m.speed for m in moves])
+        self.peak = np.minimum(speed, np.sqrt(self.length * acceleration))
         self.ramp = self.peak / acceleration
         self.took = self.ramp + self.length / self.peak
-        first = next(i for i, m in enumerate(moves) if m.feed)
-        last = max(i for i, m in enumerate(moves) if m.feed)
+        feeds = np.flatnonzero([m.feed for m in moves])
         self.begin = np.concatenate([[0.0], np.cumsum(self.took)])
-        self.begin -= self.begin[first]
-        self.log_end = float(self.begin[last + 1])
+        self.begin -= self.begin[self.run[feeds[0]]]
+        self.log_end = float(self.begin[self.run[feeds[-1]] + 1])
 
     def sample(self, t: np.ndarray) -> dict[str, np.ndarray]:
-        """At times t (n,): tip (n, 3) mm, along (n, 3) unit feed direction, speed (n,) mm/s, line (n,), cuts (n,) bool.
+        """At times t (n,): tip (n, 3) mm, along (n, 3) unit feed direction, speed (n,) mm/s, line (n,), feeds, cuts (n,) bool.
 
         cuts: the motion is a feed move that travels in the XY plane; a plunge does not.
         """
-        i = np.clip(np.searchsorted(self.begin, t, side="right") - 1, 0, len(self.moves) - 1)
-        u = np.clip(t - self.begin[i], 0.0, self.took[i])
-        ramp, took, peak, a = self.ramp[i], self.took[i], self.peak[i], self.acceleration
-        left = took - u
+        k = np.clip(np.searchsorted(self.begin, t, side="right") - 1, 0, len(self.length) - 1)
+        u = np.clip(t - self.begin[k], 0.0, self.took[k])
+        ramp, peak, a = self.ramp[k], self.peak[k], self.acceleration
+        left = self.took[k] - u
         s = np.where(
             u < ramp,
             0.5 * a * u**2,
-            np.where(left < ramp, self.length[i] - 0.5 * a * left**2, peak * (u - ramp / 2)),
+            np.where(left < ramp, self.length[k] - 0.5 * a * left**2, peak * (u - ramp / 2)),
         )
         speed = np.minimum(peak, a * np.minimum(u, left))
+        first = np.searchsorted(self.run, k)
+        way = self.reached[first] + s
+        last = np.searchsorted(self.run, k, side="right") - 1
+        i = np.clip(np.searchsorted(self.reached, way, side="right") - 1, first, last)
         tip, along = np.zeros((len(t), 3)), np.zeros((len(t), 3))
         flat = np.zeros(len(t), bool)
-        for k in np.unique(i):
-            m, rows = self.moves[k], i == k
-            share = (s[rows] / self.length[k])[:, None]
-            if m.sweep == 0.0:
-                tip[rows] = m.start + share * (m.end - m.start)
-                along[rows] = (m.end - m.start) / self.length[k]
-            else:
-                out = m.start[:2] - m.centre
-                c, d = np.cos(share * m.sweep), np.sin(share * m.sweep)
-                arm = np.concatenate([c * out[0] - d * out[1], d * out[0] + c * out[1]], 1)
-                tip[rows, :2] = m.centre + arm
-                tip[rows, 2] = m.start[2] + share[:, 0] * (m.end[2] - m.start[2])
-                turn = np.stack([-arm[:, 1], arm[:, 0]], 1) * m.sweep / self.length[k]
-                along[rows, :2] = turn
-                along[rows, 2] = (m.end[2] - m.start[2]) / self.length[k]
-            flat[rows] = m.feed and float(np.hypot(*along[rows][0, :2])) > 1e-6
-        line = np.array([m.line for m in self.moves])[i]
-        return {"tip": tip, "along": along, "speed": speed, "line": line, "cuts": flat}
+        for j in np.unique(i):
+            move, rows = self.moves[j], i == j
+            tip[rows], along[rows] = move.at((way[rows] - self.reached[j]) / move.length)
+            flat[rows] = move.feed and float(np.hypot(*along[rows][0, :2])) > 1e-6
+        line, feeds = (np.array([getattr(m, name) for m in self.moves])[i] for name in ("line", "feed"))
+        return {"tip": tip, "along": along, "speed": speed, "line": line, "feeds": feeds, "cuts": flat}

@@ -13,11 +13,11 @@ from tests.plants.legs import orthoglide
 FORCE = np.array([215.0, -10.0, -25.0])
 
 
-def done(tmp_path, effect):
+def done(tmp_path, effect, sample="samples/groove-circle-50.nc", machine="orthoglide"):
     (tmp_path / "effects.yaml").write_text(f"effects: [{effect}]\n")
-    config = load_config(["config/orthoglide.yaml", tmp_path / "effects.yaml"])
+    config = load_config([f"config/{machine}.yaml", tmp_path / "effects.yaml"])
     job = Job(config)
-    program = open_program("samples/groove-circle-50.nc", config)
+    program = open_program(str(sample), config)
     return compensate(program, job, method="newton", tolerance_um=1.0, version="0"), job
 
 
@@ -56,6 +56,31 @@ def test_the_plant_with_the_effect_follows_the_program(tmp_path, effect):
     assert np.linalg.norm(tips - target, axis=1).max() < 1.1e-3
     plain = np.linalg.norm(result.before, axis=1).max()
     assert plain > 0.5
+
+
+@pytest.mark.parametrize(
+    "effects",
+    [
+        "{effect: friction, target: y, force_N: 208.5, presliding_mm: 0.006}",
+        "{effect: friction, target: x, force_N: 300, presliding_mm: 0.003}, {effect: drive_stiffness, target: x, factor: 0.45}",
+    ],
+)
+def test_friction_is_turned_round_from_the_first_line_on(tmp_path, effects):
+    """Where the program begins with the cut, too, and without finer lines on the rest of the circle."""
+    program = tmp_path / "in.nc"
+    program.write_text("G21 G90 G17 G94\nG0 X25 Y0 Z0\nG3 X25 Y0 I-25 J0 F1000\nM2\n")
+    result, _ = done(tmp_path, effects, program)
+    assert np.linalg.norm(result.after, axis=1).max() < 1e-3
+    assert len(result.rows.piece) < 320
+
+
+@pytest.mark.parametrize("machine", ["cartesian", "orthoglide"])
+def test_a_drive_that_turned_round_may_stand_while_others_go_round_a_bend(tmp_path, machine):
+    lines = "G21 G90 G17 G94\nG0 X0 Y0 Z0\nG1 X10 F600\nG19 G3 Y0 Z0 J-6 K8\nG3 Y0 Z0 J-0.6 K0.8\nG1 X0\nM2\n"
+    (tmp_path / "in.nc").write_text(lines)
+    effect = "{effect: backlash, target: x, width_mm: 0.04}"
+    result, _ = done(tmp_path, effect, tmp_path / "in.nc", machine)
+    assert np.linalg.norm(result.after, axis=1).max() < 1e-3
 
 
 @pytest.mark.parametrize(("axis", "width"), [(0, 0.02), (1, 0.1), (2, 0.05)])

@@ -176,6 +176,7 @@ def test_work_above_and_below_the_stock_top(tmp_path):
         ["G53 G0 Z20", "G1 X10 Y5 Z0"],  # from an uncorrected place back onto the path
         ["G0 X30", "G28 Z0", "G0 X20 Y0", "G1 Z0"],
         ["X20 Y0 Z-0.5", "X20 Y0 Z-0.5", "M8", "X20 Y0 Z-0.5", "X20 Y0"],  # moves without length
+        ["X20 Y0 Z5", "X20.003 Y0.002 Z0", "X20.03 Y0 Z-1", "X20 Y0.1 Z0"],  # plunges that slant, and ramps
         ["G55", "G1 X1 Y1", "G54 X2", "G20", "X0.5 Y0.5 F20", "G21", "F300"],
         ["G91", "X1", "X1 Y1", "G90", "G93", "X5 F30", "X6 F31", "G94 F300"],
         ["G1 X15 Y0 F300.2", "M8", "X14 F300.4", "M9", "X13 F300.3"],  # feeds that differ by less than is written

@@ -39,6 +39,11 @@ def test_rapids_and_plunges_carry_no_force_and_the_cut_starts_and_ends_with_a_ju
     assert not force_at(track, 1, 0.5).any()
 
 
+def test_a_corrected_plunge_slants_and_is_one_and_a_ramp_is_none():
+    path = path_of(("line", (0.003, -0.002, -5)), ("line", (0.053, -0.002, -10)))
+    assert lay_track(path, conditions()).cutting.tolist() == [False, True]
+
+
 def test_a_model_may_load_plunges():
     track = lay_track(path_of(("line", (0, 0, -5))), conditions(plunges=True))
     assert track.cutting.all()

@@ -1,0 +1,221 @@
+"""What a set of causes leaves: how much, what it depends on, and whether it is an effect that the library does not have."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+
+from camcomp.bench import thinned
+from camcomp.datatypes import Floats, Ints
+from camcomp.gap.colour import covariate
+from camcomp.gap.evidence import Prior, base, estimate, log_bayes
+from camcomp.gap.leftover import Leftover, Projected, project, score_test, unknown_evidence
+from camcomp.gap.search import Fitted, Members, total
+from camcomp.inquiry import Inquiry
+
+UNKNOWN_LOG10 = -10.0  # chance below which a leftover is no accident
+UNKNOWN_RMS = 0.18  # size of a leftover, in units of the noise, below which no model error is called a cause
+RUNS = 6  # runs that this holds for
+UNKNOWN_SHARE = 0.12  # share of what is explained that a leftover has to exceed: no cause is modelled perfectly
+ROUGHLY = 0.05  # share of the evidence for an unknown effect that a known cause has to add beside it
+MOSTLY = 0.3  # size of a leftover, in units of what the causes explain, below which the causes are not questioned
+SURPRISE = 0.3  # size of what a set does not foretell of a run, in units of the noise, below which all is well
+FEW = 4  # runs
+CONFIRMED = 0.3  # share of what a run shows beyond noise that a cause beside an unknown one has to foretell of it
+FAINT = 0.1  # what a run shows beyond noise, in units of the noise's energy, below which there is nothing to foretell
+STRAINED = 2.5  # offsets of runs, in units of what repeats, above which they are no repeatability
+UNKNOWN_COLOUR = 0.8  # size of what a sensor cannot have made, in units of what it can
+
+
+def leftovers(inquiry: Inquiry, f: Fitted, prior: Prior) -> dict[str, Leftover]:
+    """Score test on what the set leaves, per kind of channel; prior: of everything beside the set."""
+    rows = {
+        words.kind: sum(len(parts[k]) for parts in inquiry.white_patterns)
+        for k, words in enumerate(inquiry.dictionaries)
+    }
+    return score_test(_projected(inquiry, prior, *about(inquiry, f), f.members), rows)
+
+
+def about(inquiry: Inquiry, f: Fitted) -> tuple[list[Floats], list[Floats]]:
+    """White columns and residual (absolute coordinates) linearised at the fit."""
+    if not f.members:
+        return inquiry.white, inquiry.white_residual
+    index = inquiry.member_columns(f.members)
+    white = [W.copy() for W in inquiry.white]
+    for W, own in zip(white, f.white, strict=True):
+        W[:, index] = own
+    return white, list(f.residual)
+
+
+def steady_prior(inquiry: Inquiry, f: Fitted) -> Prior:
+    """The prior that a set's leftover is judged with: runs repeat as well as they do, and what would need more is no accident.
+
+    Offsets of runs that are within reason stay free within it. Where they are not, or where the set does not foretell a
+    run from the others, they would hide what differs from run to run, and are held at nought.
+    """
+    offsets = inquiry.columns.run_offsets
+    size = _strain(inquiry, f)[offsets]
+    if len(size) and (np.sqrt(np.mean(size**2)) > STRAINED or _surprised(inquiry, f)):
+        return _held(inquiry.prior, offsets)
+    return inquiry.prior
+
+
+def _surprised(inquiry: Inquiry, f: Fitted) -> bool:
+    """Whether tips go where a set fitted to the other runs does not let one expect; with few runs no fit is that sure."""
+    if len(inquiry.bench.runs) < FEW:
+        return False
+    least = max(SURPRISE, UNKNOWN_SHARE * signal_rms(inquiry, f).get("tip", 0.0))
+    return _unforetold(inquiry, f, f.members).get("tip", 0.0) > least**2
+
+
+def firm_prior(inquiry: Inquiry) -> Prior:
+    """The prior to describe an unknown effect with: everything else is as stated, and no tolerance stretches to follow it."""
+    return _held(inquiry.prior, np.flatnonzero(np.isfinite(inquiry.prior.tolerance)))
+
+
+def _strain(inquiry: Inquiry, f: Fitted) -> Floats:
+    """Every column (k,) beside a set in units of its tolerance; 0 where it is free."""
+    index = inquiry.member_columns(f.members)
+    out = estimate(total(f.grams), inquiry.prior, index, 1.0)[0] / inquiry.prior.tolerance
+    out[index] = 0.0
+    return out
+
+
+def _held(prior: Prior, columns: Ints) -> Prior:
+    tolerance = prior.tolerance.copy()
+    tolerance[columns] *= 1e-3
+    return replace(prior, tolerance=tolerance)
+
+
+def _projected(
+    inquiry: Inquiry, prior: Prior, white: list[Floats], residual: list[Floats], members: Members
+) -> Projected:
+    return project(
+        white, inquiry.white_patterns, residual, [w.labels for w in inquiry.dictionaries],
+        [w.kind for w in inquiry.dictionaries], prior, inquiry.member_columns(members),
+    )  # fmt: skip
+
+
+def signal_rms(inquiry: Inquiry, f: Fitted, members: Members | None = None) -> dict[str, float]:
+    """Size of what the members (or some of them) explain, per kind of channel, in units of the noise."""
+    index = inquiry.member_columns(f.members)
+    mine = set(inquiry.member_columns(f.members if members is None else members))
+    theta = np.array([t if c in mine else 0.0 for c, t in zip(index, f.theta, strict=True)])
+    out = {}
+    for kind, words in enumerate(inquiry.dictionaries):
+        energy = rows = 0.0
+        for W, parts in zip(inquiry.white, inquiry.white_patterns, strict=True):
+            first = sum(len(each) for each in parts[:kind])
+            signal = W[first : first + len(parts[kind]), index] @ theta
+            energy, rows = energy + float(signal @ signal), rows + len(signal)
+        out[words.kind] = float(np.sqrt(energy / max(rows, 1.0)))
+    return out
+
+
+def strangest(inquiry: Inquiry, f: Fitted, left: Mapping[str, Leftover]) -> str | None:
+    """The kind of channel in which an effect shows that the library does not have, None where there is none."""
+    explained = signal_rms(inquiry, f)
+    # one run cannot show that something happens again
+    least = UNKNOWN_RMS * np.sqrt(RUNS / min(len(inquiry.bench.runs), RUNS))
+    found = {
+        kind: each.energy
+        for kind, each in left.items()
+        if each.log10_chance < UNKNOWN_LOG10 and each.rms > max(least, UNKNOWN_SHARE * explained[kind])
+    }
+    return max(found, key=lambda kind: found[kind]) if found else None
+
+
+def colour_left(inquiry: Inquiry, left: Mapping[str, Leftover]) -> Leftover | None:
+    """The noise of tip or encoders as a leftover, where it cannot be that of a sensor.
+
+    left: what the patterns say of the leftover; a line in the spectrum is time's, of anything else they know more.
+    """
+    m = len(inquiry.bench.actuators)
+    parts = {"tip": slice(0, 3), "encoder": slice(3, 3 + m)}
+    found = {kind: inquiry.background.colour(part) for kind, part in parts.items()}
+    kind = max(found, key=lambda each: found[each].ratio)
+    if found[kind].ratio < UNKNOWN_COLOUR:
+        return None
+    rest = [r[:, parts[kind]] for r in inquiry.background.rest]
+    drives = [np.where(np.isfinite(r), r, 0.0) for r in rest]
+    if kind == "tip":
+        for k, run in enumerate(inquiry.bench.runs):
+            slope = thinned(inquiry.bench.row_slopes(k).reshape(-1, 3 * m), run.thin).reshape(-1, 3, m)
+            drives[k] = np.einsum("nij,nj->ni", np.linalg.pinv(slope), drives[k])
+    names = "xyz" if kind == "tip" else inquiry.bench.actuators
+    label = covariate(rest, inquiry.times, drives, names, inquiry.bench.actuators, found[kind].excess)
+    rows = sum(int(np.isfinite(r).sum()) for r in rest)
+    known = left[kind].labels if kind in left and not label.startswith("time") else ()
+    return Leftover(kind, -300.0, found[kind].ratio, rows, known or ((label, 1.0),))
+
+
+def mostly(inquiry: Inquiry, f: Fitted, left: Mapping[str, Leftover]) -> bool:
+    """Whether a set explains so much of every kind of channel that what is left is a flaw of it, not something in its place."""
+    if steady_prior(inquiry, f) is not inquiry.prior:
+        return False  # a cause that some runs do not show
+    explained = signal_rms(inquiry, f)
+    return all(each.rms < MOSTLY * explained[kind] or each.rms < UNKNOWN_RMS for kind, each in left.items())
+
+
+def known_part(inquiry: Inquiry, best: Fitted) -> Members:
+    """The members of the best set that are still causes when an unknown effect may take their place."""
+    white, residual = about(inquiry, best)
+    prior = steady_prior(inquiry, best)
+    alone = base(total(inquiry.grams(residual, white)), prior, 1.0)
+    found = []
+    nothing = 0.0
+    for count in range(len(best.members) + 1):
+        for members in combinations(best.members, count):
+            evidence = max(unknown_evidence(_projected(inquiry, prior, white, residual, members)).values(), default=0.0)
+            nothing = evidence if not members else nothing
+            sets = [inquiry.atoms.columns[i] for i in members]
+            known = log_bayes(alone, prior, sets) if sets else 0.0
+            # Patterns follow an unknown effect only roughly; a cause is not kept for what they miss, unless it leaves nothing.
+            rough = ROUGHLY * nothing * len(members) if evidence > ROUGHLY * nothing else 0.0
+            found.append((evidence + known + inquiry.atoms.prior(members) - rough, members))
+    return max(found)[1]
+
+
+def confirmed(inquiry: Inquiry, f: Fitted) -> Members:
+    """The members that foretell, fitted to the other runs, what a run shows: all that counts beside an unknown effect.
+
+    In the runs that they were fitted to, any few effects follow an unknown one for some way.
+    """
+    members = f.members
+    while members and len(inquiry.bench.runs) > 1:
+        now = _unforetold(inquiry, f, members)
+        gains = []
+        for i in members:
+            without = _unforetold(inquiry, f, tuple(each for each in members if each != i))
+            gains.append(max((without[kind] - now[kind]) / max(without[kind], FAINT) for kind in now))
+        if min(gains) >= CONFIRMED:
+            break
+        least = members[int(np.argmin(gains))]
+        members = tuple(each for each in members if each != least)
+    return members
+
+
+def _unforetold(inquiry: Inquiry, f: Fitted, members: Members) -> dict[str, float]:
+    """Energy per row that members of a set leave of runs that they were not fitted to, per kind of channel.
+
+    Beyond noise, beyond what runs differ by anyway, and beyond what the doubt about the members' amplitudes makes.
+    """
+    index, offsets = inquiry.member_columns(members), inquiry.columns.run_offsets
+    free = np.flatnonzero(np.isinf(inquiry.prior.tolerance))
+    whole = total(f.grams)
+    energy = dict.fromkeys((words.kind for words in inquiry.dictionaries), 0.0)
+    rows = dict.fromkeys(energy, 0)
+    for g, W, r, parts in zip(f.grams, *about(inquiry, f), inquiry.white_patterns, strict=True):
+        mean, covariance = estimate(whole - g, inquiry.prior, index)
+        rest = r - W[:, index] @ mean[index]
+        if len(free):  # frames and clocks that are a run's own
+            rest = rest - W[:, free] @ np.linalg.lstsq(W[:, free], rest, rcond=None)[0]
+        doubt = np.sum((W[:, index] @ covariance[np.ix_(index, index)]) * W[:, index], axis=1)
+        doubt += np.sum((W[:, offsets] * inquiry.prior.tolerance[offsets]) ** 2, axis=1)
+        at = 0
+        for kind, part in zip(energy, parts, strict=True):
+            mine = slice(at, at + len(part))
+            energy[kind] += float(np.sum(rest[mine] ** 2 - doubt[mine]))
+            rows[kind], at = rows[kind] + len(part), at + len(part)
+    return {kind: energy[kind] / max(rows[kind], 1) - 1.0 for kind in energy}
