@@ -4,6 +4,7 @@
 130 interrupted · 141 the reader of our output went away.
 """
 
+import gc
 import os
 import sys
 from importlib import import_module
@@ -11,6 +12,7 @@ from importlib import import_module
 import click
 
 from camcomp import __version__
+from camcomp.collector import collect_seldom
 from camcomp.diagnostics import CamcompError, FileError, format_error
 
 # Matrices here are small: threads of the linear algebra wait for each other longer than they compute, most of all on a
@@ -74,7 +76,10 @@ def cli() -> None:
 
 def main(args: list[str] | None = None) -> None:
     """Run the command line and leave the process with the exit code of the contract."""
-    sys.exit(run(sys.argv[1:] if args is None else args))
+    collect_seldom()
+    code = run(sys.argv[1:] if args is None else args)
+    gc.freeze()  # the interpreter need not look through everything once more when it ends
+    sys.exit(code)
 
 
 def run(args: list[str]) -> int:

@@ -40,9 +40,9 @@ class Stream:
     def __init__(self, job: Job) -> None:
         """Builds the machine and solves one point, so that the first set-point does not wait for compilation."""
         self._job, self._machine = job, job.real_machine
-        self._origin, self._rotation = job.frame.origin, job.frame.rotation
+        self._origin, self._rotation = job.frame.origin.tolist(), job.frame.rotation.tolist()
         self._names = self._machine.actuators
-        self._low, self._high = job.machine.limits.T
+        self._travel = job.machine.limits.tolist()
         self._hooked = any(cause.hook(name) for cause in job.causes for name in _HOOKS)
         self._before: tuple[Floats, Floats] | None = None
         self._tip = PointSolver(self._machine, TARGET)
@@ -59,21 +59,24 @@ class Stream:
         tip (3,) mm in the program frame, force (3,) N on the tool in machine axes. Machines with six actuators get joint
         coordinates that also hold the orientation, as in the joint table of `compensate`. Raises PhysicsError.
         """
-        load = np.array(force, float)
         if self._hooked:
-            return self._with_effects(np.array(tip, float), load)
-        target = self._origin + self._rotation @ np.array(tip, float)
-        _refuse(self._tip.solve(target, force=load))
-        commanded = (self._tip.commanded - self._origin) @ self._rotation
+            return self._with_effects(np.array(tip, float), np.array(force, float))
+        # three numbers are faster one by one than as arrays
+        (x, y, z), (u, v, w), ((a, b, c), (d, e, f), (g, h, i)) = tip, self._origin, self._rotation
+        target = (u + a * x + b * y + c * z, v + d * x + e * y + f * z, w + g * x + h * y + i * z)
+        _refuse(self._tip.solve(target, force))
+        x, y, z = self._tip.commanded
+        x, y, z = x - u, y - v, z - w
+        commanded = np.array((a * x + d * y + g * z, b * x + e * y + h * z, c * x + f * y + i * z))
         solved = self._tip
         if self._pose is not None:
             solved = self._pose
-            _refuse(solved.solve(target, force=load))
+            _refuse(solved.solve(target, force))
         return self._point(commanded, solved.rho_nominal.copy(), solved.rho.copy(), solved.drive.copy())
 
     def _point(self, commanded: Floats, nominal: Floats, rho: Floats, drive: Floats) -> Point:
-        out = (rho < self._low) | (rho > self._high)
-        beyond = tuple(np.array(self._names)[out].tolist()) if out.any() else ()
+        travel = zip(rho.tolist(), self._travel, self._names, strict=True)
+        beyond = tuple([name for at, (low, high), name in travel if at < low or at > high])
         return Point(commanded, nominal, rho, drive, beyond)
 
     def _with_effects(self, tip: Floats, load: Floats) -> Point:

@@ -6,6 +6,7 @@ import os
 from dataclasses import dataclass, field
 from functools import lru_cache
 
+from camcomp.collector import collect_seldom
 from camcomp.spec import Config
 
 BUG = 70
@@ -41,6 +42,7 @@ def work(task: Task) -> Outcome:
     """Compensates a program on one core. Never raises."""
     from camcomp.diagnostics import CamcompError, format_error
 
+    collect_seldom()
     os.environ["CAMCOMP_THREADS"] = "1"  # the solver asks; the cores belong to the other workers
     try:
         return _compensate(task)

@@ -9,12 +9,12 @@ so does a number that this reader could read differently from it in the last bit
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
 from camcomp.datatypes import LINE, RAPID, Floats, Ints
+from camcomp.statics.compiled import entry
 
 # Columns of Plain.begin and Plain.finish.
 X, Y, Z, F, G = range(5)
@@ -50,20 +50,23 @@ class Plain(NamedTuple):
         return Plain(*(each[a:b] for each in self))  # type: ignore[arg-type]
 
 
-@njit(cache=True, nogil=True)
-def scan(data, at, stop, last, code, feed, code_stated, feed_stated, position, unit, offset, pointed, top, out, limit):
+def scan(*args: Any) -> tuple:
+    """scan_lines with room to work in."""
+    return scan_lines(*args, np.empty(5, np.int64), np.empty(5, np.int64), np.zeros(5))
+
+
+@entry
+def scan_lines(data, at, stop, last, code, feed, code_stated, feed_stated, position, unit, offset, pointed, top, out, limit,
+               begin, finish, value):  # fmt: skip
     """Reads plain lines from index `at` of the bytes `data` (up to `stop`) into `out`, at most `limit` motions.
 
     last: the file ends at `stop`. code: 0, 1 or -1 (none of them in force), feed in force (0: none), position (3,) mm,
     unit mm, offset (3,) mm. pointed: numbers without a point are odd. top: so is a cut from one side of
     this height to the other, mm; NaN: there is none. Returns (motions, rows, index, reason, code, feed,
-    code_stated, feed_stated); `position` is moved along.
+    code_stated, feed_stated); `position` is moved along. begin, finish, value (5,): room to work in.
     """
     n = 0
     row = 0
-    begin = np.empty(5, np.int64)
-    finish = np.empty(5, np.int64)
-    value = np.zeros(5)
     while at < stop:
         if n == limit:
             return n, row, at, FULL, code, feed, code_stated, feed_stated

@@ -9,11 +9,13 @@ caller carries these on.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
-from numba import njit
 
 from camcomp.bulk.fastread import F, G
 from camcomp.datatypes import RAPID, Floats, Ints
+from camcomp.statics.compiled import entry, inner
 
 FEED_SLACK = 1.0e-3
 ROOM = 128  # bytes that a row needs at most, beside its line
@@ -22,7 +24,7 @@ _LARGEST = 9.0e9  # a larger number with nine decimals does not fit into 64 bits
 _TENS = 10 ** np.arange(18)
 
 
-@njit(cache=True, nogil=True)
+@inner
 def put_decimal(out, at, value, digits, point):
     """Writes `value` rounded to `digits` decimals as numbers.plain does; the index behind it."""
     scaled = np.rint(value * _TENS[digits])
@@ -41,28 +43,29 @@ def put_decimal(out, at, value, digits, point):
         out[at] = 46
         at += 1
     if digits > 0:
-        for k in range(digits - 1, -1, -1):
-            out[at] = 48 + tail // _TENS[k] % 10
-            at += 1
+        for k in range(digits - 1, -1, -1):  # from behind: to divide by ten, which is known, is quick
+            out[at + k] = 48 + tail % 10
+            tail //= 10
+        at += digits
     elif point:
         out[at] = 48
         at += 1
     return at
 
 
-@njit(cache=True, nogil=True)
+@inner
 def put_int(out, at, value):
     """Writes a whole number that is not negative; the index behind it."""
     n = 1
     while n < 18 and value >= _TENS[n]:
         n += 1
     for k in range(n - 1, -1, -1):
-        out[at] = 48 + value // _TENS[k] % 10
-        at += 1
-    return at
+        out[at + k] = 48 + value % 10
+        value //= 10
+    return at + n
 
 
-@njit(cache=True, nogil=True)
+@inner
 def put_feed(out, at, value):
     """Writes a feed with six significant digits, as numbers.significant does."""
     if not value > 0.0:
@@ -72,7 +75,7 @@ def put_feed(out, at, value):
     return put_decimal(out, at, value, min(max(digits, 0), 17), False)
 
 
-@njit(cache=True, nogil=True)
+@inner
 def copy(out, at, data, begin, finish):
     """Copies bytes; the index behind them."""
     for k in range(begin, finish):
@@ -81,7 +84,7 @@ def copy(out, at, data, begin, finish):
     return at
 
 
-@njit(cache=True, nogil=True)
+@inner
 def put_eol(out, at, data, begin, finish):
     """Copies an end of line, or writes LF where there is none to copy; the index behind it."""
     if begin == finish:
@@ -90,22 +93,25 @@ def put_eol(out, at, data, begin, finish):
     return copy(out, at, data, begin, finish)
 
 
-@njit(cache=True, nogil=True)
-def write_rows(data, text_at, text_end, lines, begin, finish, kind, programmed, code_stated, feed_stated, program_feed,
-               first, joining, wanted, feed, position, state, unit, offset, digits, half, out, written):  # fmt: skip
+def write_rows(*args: Any) -> int:
+    """write_lines with room to work in."""
+    return write_lines(*args, np.empty(3), np.empty(3), np.empty(3, np.bool_))
+
+
+@entry
+def write_lines(data, text_at, text_end, lines, begin, finish, kind, programmed, code_stated, feed_stated, program_feed,
+                first, joining, wanted, feed, position, state, unit, offset, digits, half, out, written, value, goes, fresh):  # fmt: skip
     """The bytes text_at..text_end of `data`, which hold n motions, with N rows in their place.
 
     lines (n, 3), begin and finish (n, 5), kind (n,), programmed (n, 3) mm, program_feed (n,): see
     fastread.Plain.
     first (n + 1,): rows of every motion. joining (N,), wanted (N, 3) mm, feed (N,) mm/min (NaN: as programmed).
     position (3,) mm and state (2,) = motion code in force (-1 unknown), feed in force (NaN unknown):
-    carried on. Fills out (bytes) and written (N, 3) mm. Returns the number of bytes.
+    carried on. Fills out (bytes) and written (N, 3) mm. Returns the number of bytes. value,
+    goes, fresh (3,): room to work in.
     """
     at = 0
     copied = text_at
-    value = np.empty(3)
-    goes = np.empty(3)
-    fresh = np.empty(3, np.bool_)
     for i in range(lines.shape[0]):
         # the words of the line, and how its letters stand
         first_word = -1
@@ -255,7 +261,7 @@ def csv_rows(line: Ints, values: Floats, decimals: Ints) -> bytes:
     return out[: put_rows(line, np.ascontiguousarray(values), decimals, out)].tobytes()
 
 
-@njit(cache=True, nogil=True)
+@entry
 def put_rows(line, values, decimals, out):
     """Fills out with the text; the number of bytes."""
     at = 0

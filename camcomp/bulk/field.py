@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from camcomp.bulk.kernel import BIAS, EXACT, LEVELS, MOST, SPLIT, exponents, find_slot, missing_cells
+from camcomp.bulk.kernel import BIAS, EXACT, LEVELS, MOST, SPLIT, exponents, missing_cells, put_cells
 from camcomp.datatypes import Floats, Ints
 from camcomp.statics.machine import Machine
 from camcomp.statics.solve import FREE, TARGET, solve
@@ -25,6 +25,7 @@ RATIO = 1.4  # exact solutions per coefficient
 RUNGS = ((4, 2), (5, 4, 2, 0), (5, 5, 3, 1), (6, 6, 4, 2))  # degree in position, by degree in force; tried in this order
 SHIFT_STEPS = 4
 EVEN = 1.1127756842787055 ** -np.arange(1.0, 7.0)  # multiples fill the cube evenly; the root of x^7 = x + 1
+NARROW = 6.0  # a force component so many times smaller than the largest needs a degree less in position
 WIDER = 1.02  # force range, so that it is not left for nothing
 _ZERO = np.zeros(3)
 
@@ -44,16 +45,13 @@ class Basis:
     alone: Floats  # (TESTS, np)
 
     @staticmethod
-    def of(degrees: tuple[int, ...], loaded: bool) -> Basis:
-        """The basis of these degrees; without loads there are no terms of the force."""
-        if not loaded:
-            degrees = degrees[:1]
+    def of(degrees: tuple[int, ...], narrow: Ints) -> Basis:
+        """The basis of these degrees; every power of a force component takes `narrow` (3,) of them away."""
         a, b = exponents(max(degrees)), exponents(len(degrees) - 1)
-        count = np.array([int((a.sum(axis=1) <= degrees[power]).sum()) for power in b.sum(axis=1)])
+        degree = np.array(degrees)[b.sum(axis=1)] - b @ narrow
+        count = (a.sum(axis=1) <= degree[:, None]).sum(axis=1)
         k = int(RATIO * count.sum())
         points = np.cos(np.pi * (np.arange(1, k + TESTS + 1)[:, None] * EVEN % 1.0))
-        if not loaded:
-            points[:, 3:] = 0.0
         both, alone = _products(points, a, b, count)
         return Basis(
             a, b, count, (max(degrees), len(degrees) - 1), points, _pseudoinverse(both[TESTS:]),
@@ -119,10 +117,11 @@ class Field:
     def _set_range(self, force: Floats) -> None:
         low, high = np.minimum(force.min(axis=0), 0.0), np.maximum(force.max(axis=0), 0.0)
         self.low, self.high = low * WIDER, high * WIDER
-        self._loaded = bool((self.high > self.low).any())
-        self.bases = [Basis.of(degrees, self._loaded) for degrees in RUNGS]
         self.force_mid = 0.5 * (self.low + self.high)
         self.force_half = np.maximum(0.5 * (self.high - self.low), 1e-9)
+        share = self.force_half / max(1e-3, self.force_half.max())
+        self._narrow = (-np.log(share) / np.log(NARROW)).astype(int)
+        self.bases = [Basis.of(RUNGS[0], self._narrow)]
         self.tiles = Tiles(
             CELL, np.full(1 << 12, -1, np.int64), np.zeros(1 << 12, np.int64), np.zeros((0, 3)), np.zeros(0),
             np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0), np.zeros((0, 3, 3)),
@@ -152,7 +151,7 @@ class Field:
             count[rung, : len(each.count)] = each.count
         return (
             t.size, t.keys, t.values, t.centre, t.half, t.rung, t.first, t.W, self.force_mid, self.force_half,
-            most.position, most.force, shape, count,
+            shape, count,
         )  # fmt: skip
 
     def _build(self, cells: Ints) -> None:
@@ -166,22 +165,18 @@ class Field:
             tile = self._fit(centre[n], half[n])
             value[n] = tile if tile is not None else EXACT if level[n] == LEVELS - 1 else SPLIT
         keys, values = self._room(len(cells))
-        for key, each in zip(cells, value, strict=True):
-            slot = find_slot(keys, key)
-            keys[slot], values[slot] = key, each
+        put_cells(keys, values, cells, value)
         self.tiles = replace(self.tiles, keys=keys, values=values)
 
     def _room(self, more: int) -> tuple[Ints, Ints]:
         """The hash table, with room for more cells."""
         keys, values = self.tiles.keys, self.tiles.values
-        used = np.flatnonzero(keys != -1)
-        if 2 * (len(used) + more) < len(keys):
+        used = int((keys != -1).sum())
+        if 2 * (used + more) < len(keys):
             return keys, values
-        wide = 4 * max(len(keys), len(used) + more)
+        wide = 4 * max(len(keys), used + more)
         new_keys, new_values = np.full(wide, -1, np.int64), np.zeros(wide, np.int64)
-        for slot in used:
-            at = find_slot(new_keys, keys[slot])
-            new_keys[at], new_values[at] = keys[slot], values[slot]
+        put_cells(new_keys, new_values, keys, values)
         return new_keys, new_values
 
     def _fit(self, centre: Floats, half: float) -> int | None:
@@ -192,7 +187,10 @@ class Field:
         known = np.zeros((0, 0))
         unloaded = np.zeros((0, 0))
         m = len(self.machine.actuators)
-        for rung, basis in enumerate(self.bases):
+        for rung, degrees in enumerate(RUNGS):
+            if rung == len(self.bases):
+                self.bases.append(Basis.of(degrees, self._narrow))
+            basis = self.bases[rung]
             more = self._aimed(basis.samples[len(known) :], centre, half, check=rung == 0)
             if more is None:
                 return None

@@ -12,39 +12,47 @@ lower degrees only, `count` of them: the first ones.
 # mypy: disallow-untyped-defs=False, disallow-incomplete-defs=False
 # numba infers the types of these functions; written by hand they would only be repeated.
 
-import numpy as np
-from numba import njit
+import math
+from functools import partial
+from typing import Any
 
-from camcomp.datatypes import RAPID
+import numpy as np
+
+from camcomp.datatypes import RAPID, Floats, Ints
+from camcomp.statics.compiled import entry, inner
+from camcomp.statics.vectors import cross, dot, part, plus
 
 MISSING, SPLIT, EXACT = -3, -1, -2  # what a cell can be besides a tile
 LEVELS = 6
 BIAS = 1 << 17  # cells are counted from here; 2**18 of them per axis
+LANES = 4  # points that are looked up together
 MOST = 8  # highest degree that the evaluation has room for
 BASIC = 6  # outputs that are always asked for: correction (3), shift (3); then tilt (3), drives (m), change of the joints (m)
 
 
+fast = partial(inner, fastmath=True)
+
+
 def exponents(degree: int) -> np.ndarray:
-    """Exponents (t, 3) of all products up to a total degree, lower degrees first."""
-    span = range(degree + 1)
-    rows = [(i, j, k) for i in span for j in span for k in span if i + j + k <= degree]
-    return np.array(sorted(rows, key=sum), np.int64)
+    """Exponents (t, 3) of all products up to a total degree, lower degrees first, in the order of `terms`."""
+    rows = [(i, total - k - i, k) for total in range(degree + 1) for k in range(total + 1) for i in range(total - k + 1)]
+    return np.array(rows, np.int64)
 
 
-@njit(cache=True, nogil=True)
+@inner
 def cell_key(level, x, y, z, size):
     """Number of the cell of a level that holds a point; -1 when it lies out of every range."""
     s = size / (1 << level)
-    i = int(np.floor(x / s)) + BIAS
-    j = int(np.floor(y / s)) + BIAS
-    k = int(np.floor(z / s)) + BIAS
+    i = math.floor(x / s) + BIAS
+    j = math.floor(y / s) + BIAS
+    k = math.floor(z / s) + BIAS
     top = 2 * BIAS
     if i < 0 or j < 0 or k < 0 or i >= top or j >= top or k >= top:
         return -1
     return (((level * top) + i) * top + j) * top + k
 
 
-@njit(cache=True, nogil=True)
+@inner
 def find_slot(keys, key):
     """Slot of a key in an open hash table, or the empty slot where it would go."""
     n = keys.shape[0]
@@ -57,7 +65,17 @@ def find_slot(keys, key):
     return slot
 
 
-@njit(cache=True, nogil=True)
+@entry
+def put_cells(keys, values, new_keys, new_values):
+    """Puts cells (n,) with their values into a hash table with room for them; keys of -1 are none."""
+    for i in range(new_keys.shape[0]):
+        if new_keys[i] != -1:
+            slot = find_slot(keys, new_keys[i])
+            keys[slot] = new_keys[i]
+            values[slot] = new_values[i]
+
+
+@inner
 def find_tile(keys, values, size, x, y, z):
     """(tile, key of the last cell looked at): tile >= 0, or EXACT, or MISSING."""
     key = -1
@@ -73,7 +91,7 @@ def find_tile(keys, values, size, x, y, z):
     return EXACT, key
 
 
-@njit(cache=True, nogil=True)
+@entry
 def missing_cells(keys, values, size, points, out):
     """Keys of cells that points (n, 3) need and that are not there, with repetitions only in part; the number of them."""
     n = 0
@@ -87,158 +105,210 @@ def missing_cells(keys, values, size, points, out):
     return n
 
 
-@njit(cache=True, nogil=True, fastmath=True)
-def terms(degree, exps, u, v, w, T, out):
-    """Fills out (t,) with the products of Chebyshev polynomials at u, v, w; T (3, MOST + 1) is room to work in."""
-    T[0, 0] = 1.0
-    T[1, 0] = 1.0
-    T[2, 0] = 1.0
-    T[0, 1] = u
-    T[1, 1] = v
-    T[2, 1] = w
+@fast
+def terms(degree, U, at, T, out):
+    """Fills out (LANES, t) with the products of Chebyshev polynomials of three rows of U (6, LANES) from `at` on, up to a
+    total degree, lower degrees first.
+
+    T (MOST + 4, MOST + 1, LANES) is room to work in: polynomials of the rows, and behind them products of the first two.
+    """
+    for lane in range(LANES):
+        for k in range(3):
+            T[k, 0, lane] = 1.0
+            T[k, 1, lane] = U[at + k, lane]
     for d in range(2, degree + 1):
-        T[0, d] = 2.0 * u * T[0, d - 1] - T[0, d - 2]
-        T[1, d] = 2.0 * v * T[1, d - 1] - T[1, d - 2]
-        T[2, d] = 2.0 * w * T[2, d - 1] - T[2, d - 2]
-    for t in range(exps.shape[0]):
-        out[t] = T[0, exps[t, 0]] * T[1, exps[t, 1]] * T[2, exps[t, 2]]
+        for k in range(3):
+            for lane in range(LANES):
+                T[k, d, lane] = 2.0 * U[at + k, lane] * T[k, d - 1, lane] - T[k, d - 2, lane]
+    n = 0
+    for total in range(degree + 1):
+        for i in range(total + 1):
+            for lane in range(LANES):
+                T[3 + total, i, lane] = T[0, i, lane] * T[1, total - i, lane]
+        for k in range(total + 1):
+            for i in range(total - k + 1):
+                for lane in range(LANES):
+                    out[lane, n] = T[2, k, lane] * T[3 + total - k, i, lane]
+                n += 1
 
 
-@njit(cache=True, nogil=True, fastmath=True)
-def products(A, B, count, out):
-    """Fills out with the products of force terms B and position terms A that belong together; their number."""
+@fast
+def products(A, B, count, out, lane):
+    """Fills out[lane] with the products of force terms B[lane] and position terms A[lane] that belong together; their number."""
     n = 0
     for b in range(count.shape[0]):
-        force = B[b]
-        row = out[n : n + count[b]]
+        force = B[lane, b]
+        row = out[lane, n : n + count[b]]
         for a in range(row.shape[0]):
-            row[a] = force * A[a]
+            row[a] = force * A[lane, a]
         n += count[b]
     return n
 
 
-@njit(cache=True, nogil=True, fastmath=True)
+@fast
 def contract(W, first, C, n, outputs, out):
-    """Fills out (outputs,) with the sums over n terms C; coefficients from `first` on, output by output."""
-    for o in range(outputs):
-        w = W[first + o * n : first + (o + 1) * n]  # with an index from 0 on, the loop runs in vectors
-        total = 0.0
+    """Fills out (LANES, outputs) with the sums over n terms C (LANES, n or more); coefficients from `first` on, output by output.
+
+    Four points and three outputs at once: every number fetched serves several products, which then set the pace.
+    """
+    c0, c1, c2, c3 = C[0, :n], C[1, :n], C[2, :n], C[3, :n]  # with indices from 0 on, the loop runs in vectors
+    for o in range(0, outputs, 3):
+        o1, o2 = min(o + 1, outputs - 1), min(o + 2, outputs - 1)
+        u = W[first + o * n : first + (o + 1) * n]
+        v = W[first + o1 * n : first + (o1 + 1) * n]
+        w = W[first + o2 * n : first + (o2 + 1) * n]
+        u0 = u1 = u2 = u3 = v0 = v1 = v2 = v3 = w0 = w1 = w2 = w3 = 0.0
         for j in range(n):
-            total += w[j] * C[j]
-        out[o] = total
+            u0 += c0[j] * u[j]
+            u1 += c1[j] * u[j]
+            u2 += c2[j] * u[j]
+            u3 += c3[j] * u[j]
+            v0 += c0[j] * v[j]
+            v1 += c1[j] * v[j]
+            v2 += c2[j] * v[j]
+            v3 += c3[j] * v[j]
+            w0 += c0[j] * w[j]
+            w1 += c1[j] * w[j]
+            w2 += c2[j] * w[j]
+            w3 += c3[j] * w[j]
+        out[0, o], out[1, o], out[2, o], out[3, o] = u0, u1, u2, u3
+        out[0, o1], out[1, o1], out[2, o1], out[3, o1] = v0, v1, v2, v3
+        out[0, o2], out[1, o2], out[2, o2], out[3, o2] = w0, w1, w2, w3
 
 
-@njit(cache=True, nogil=True)
-def path_force(t, axis, components, out):
-    """Fills out (3,) with the force of components (Fr, Ft, Fz) for the unit feed direction t; its sine to the tool axis."""
-    along = t[0] * axis[0] + t[1] * axis[1] + t[2] * axis[2]
-    x, y, z = t[0] - along * axis[0], t[1] - along * axis[1], t[2] - along * axis[2]
-    size = np.sqrt(x * x + y * y + z * z)
+@inner
+def path_force(t, axis, components):
+    """Force (3,) of components (Fr, Ft, Fz) for the unit feed direction t, and the sine of t to the tool axis."""
+    across = plus(t, axis, -dot(t, axis))
+    size = math.sqrt(dot(across, across))
     if not size > 1e-6:
-        out[:] = 0.0
-        return size
-    x, y, z = x / size, y / size, z / size
-    right = (y * axis[2] - z * axis[1], z * axis[0] - x * axis[2], x * axis[1] - y * axis[0])
-    out[0] = components[0] * right[0] + components[1] * x + components[2] * axis[0]
-    out[1] = components[0] * right[1] + components[1] * y + components[2] * axis[1]
-    out[2] = components[0] * right[2] + components[1] * z + components[2] * axis[2]
-    return size
+        return (0.0, 0.0, 0.0), size
+    x = (across[0] / size, across[1] / size, across[2] / size)
+    right = cross(x, axis)
+    a, b, c = components[0], components[1], components[2]
+    return (
+        a * right[0] + b * x[0] + c * axis[0],
+        a * right[1] + b * x[1] + c * axis[1],
+        a * right[2] + b * x[2] + c * axis[2],
+    ), size
 
 
-@njit(cache=True, nogil=True)
+@inner
+def set_row(out, i, v):
+    """Fills row i of out (n, 3)."""
+    out[i, 0], out[i, 1], out[i, 2] = v
+
+
+@entry
 def lay_loads(kind, start, end, axis, components, join_cosine, plunge_sine, f0, f1, jump, length):
     """Forces at the start and the end of moves (n,), where they jump, and the lengths: track.py for constant components.
 
     A feed move without length keeps the force before it.
     """
-    n = kind.shape[0]
     before = -1  # the last move that counts
-    t = np.zeros(3)
-    last = np.zeros(3)
-    middle = np.zeros(3)
-    own = np.zeros(3)
-    own_before = np.zeros(3)
+    axis, components = part(axis, 0), part(components, 0)
+    zero = (0.0, 0.0, 0.0)
+    last = own_before = zero
     cut_before = False
-    corner = np.zeros(3)
-    for i in range(n):
+    for i in range(kind.shape[0]):
         jump[i] = False
-        for k in range(3):
-            t[k] = end[i, k] - start[i, k]
-        size = np.sqrt(t[0] * t[0] + t[1] * t[1] + t[2] * t[2])
+        t = plus(part(end[i], 0), part(start[i], 0), -1.0)
+        size = math.sqrt(dot(t, t))
         length[i] = size
         if not size > 0.0 and kind[i] != RAPID:
             for k in range(3):
                 f0[i, k] = f1[before, k] if before >= 0 else 0.0
                 f1[i, k] = f0[i, k]
             continue
+        own = zero
         cuts = False
         if size > 0.0:
-            t /= size
+            t = (t[0] / size, t[1] / size, t[2] / size)
             if kind[i] != RAPID:
-                cuts = path_force(t, axis, components, own) > plunge_sine
+                own, sine = path_force(t, axis, components)
+                cuts = sine > plunge_sine
         if not cuts:
-            own[:] = 0.0
-        f0[i] = own
-        f1[i] = own
+            own = zero
+        set_row(f0, i, own)
+        set_row(f1, i, own)
         if before >= 0:
-            cosine = last[0] * t[0] + last[1] * t[1] + last[2] * t[2]
-            if cuts and cut_before and cosine >= join_cosine:
-                for k in range(3):
-                    middle[k] = last[k] + t[k]
-                middle /= np.sqrt(middle[0] * middle[0] + middle[1] * middle[1] + middle[2] * middle[2])
-                path_force(middle, axis, components, corner)
-                f1[before] = corner
-                f0[i] = corner
+            if cuts and cut_before and dot(last, t) >= join_cosine:
+                middle = plus(last, t, 1.0)
+                size = math.sqrt(dot(middle, middle))
+                corner, _ = path_force((middle[0] / size, middle[1] / size, middle[2] / size), axis, components)
+                set_row(f1, before, corner)
+                set_row(f0, i, corner)
                 for j in range(before + 1, i):  # moves without length in between
-                    f0[j] = corner
-                    f1[j] = corner
+                    set_row(f0, j, corner)
+                    set_row(f1, j, corner)
             else:
-                change = 0.0
-                for k in range(3):
-                    change += (own[k] - own_before[k]) ** 2
-                jump[i] = np.sqrt(change) > 1e-9
+                change = plus(own, own_before, -1.0)
+                jump[i] = math.sqrt(dot(change, change)) > 1e-9
         before = i
-        last[:] = t
-        own_before[:] = own
+        last = t
+        own_before = own
         cut_before = cuts
 
 
-@njit(cache=True, nogil=True)
-def look_up(a, b, m, every, target, force, answer, nominal, tile_of, size, keys, values, centre, half, rung, first, W, mid, wide,
-            position, power, shape, count):  # fmt: skip
+def look_up(
+    a: int, b: int, m: int, every: bool, target: Floats, force: Floats, answer: Floats, nominal: Floats, tile_of: Ints, *packed: Any
+) -> None:  # fmt: skip
     """Answers (n, 9 + 2 m) at targets (n, 3) under forces (n, 3) for rows a to b; tile_of (n,), negative: there is none.
 
-    every: all outputs and nominal joints (n, m); otherwise correction and shift only. From `size` on: Field.packed.
+    every: all outputs and nominal joints (n, m); otherwise correction and shift only. packed: those of a Field.
     """
-    room = np.empty((3, MOST + 1))
-    A = np.empty(position.shape[0])
-    B = np.empty(power.shape[0])
-    C = np.empty(A.shape[0] * B.shape[0])
-    outputs = 9 + 2 * m if every else BASIC
-    out = np.zeros(outputs)
-    tile = -1
-    h = -1.0
-    c = np.zeros(3)
-    for i in range(a, b):
-        p, f = target[i], force[i]
-        if not max(abs(p[0] - c[0]), abs(p[1] - c[1]), abs(p[2] - c[2])) < h:
-            tile, _ = find_tile(keys, values, size, p[0], p[1], p[2])
-            h = -1.0
-            if tile >= 0:
-                c[:] = centre[tile]
-                h = half[tile]
+    *_, shape, count = packed
+    outputs, along, across = 9 + 2 * m if every else BASIC, shape[:, 2].max(), count.shape[1]
+    room = (np.empty((MOST + 4, MOST + 1, LANES)), np.zeros((6, LANES)), *(np.zeros((LANES, n)) for n in (along, across, along * across, outputs)))
+    look_up_rows(a, b, m, every, target, force, answer, nominal, tile_of, *packed, *room)
+
+
+@entry
+def look_up_rows(a, b, m, every, target, force, answer, nominal, tile_of, size, keys, values, centre, half, rung, first, W, mid, wide,
+                 shape, count, T, U, A, B, C, out):  # fmt: skip
+    """look_up with room to work in, T and U as in `terms`, the others (LANES, most terms or outputs), finite."""
+    outputs = out.shape[1]
+    i = a
+    while i < b:
+        tile, _ = find_tile(keys, values, size, target[i, 0], target[i, 1], target[i, 2])
         tile_of[i] = tile
         if tile < 0:
+            i += 1
             continue
-        r = rung[tile]
+        r, h, c = rung[tile], half[tile], centre[tile]
         along, across, inner, outer = shape[r]
-        terms(along, position[:inner], (p[0] - c[0]) / h, (p[1] - c[1]) / h, (p[2] - c[2]) / h, room, A)
-        terms(across, power[:outer], (f[0] - mid[0]) / wide[0], (f[1] - mid[1]) / wide[1], (f[2] - mid[2]) / wide[2], room, B)
-        n = products(A, B, count[r, :outer], C)
+        lanes = n = 0
+        while lanes < LANES and i + lanes < b:  # the points behind it that lie in the same tile
+            f = force[i + lanes]
+            x, y, z = target[i + lanes, 0] - c[0], target[i + lanes, 1] - c[1], target[i + lanes, 2] - c[2]
+            if lanes > 0 and not max(abs(x), abs(y), abs(z)) < h:
+                break
+            U[0, lanes], U[1, lanes], U[2, lanes] = x / h, y / h, z / h
+            for k in range(3):
+                U[3 + k, lanes] = (f[k] - mid[k]) / wide[k]
+            lanes += 1
+        terms(along, U, 0, T, A)
+        terms(across, U, 3, T, B)
+        for lane in range(lanes):
+            n = products(A, B, count[r, :outer], C, lane)
         contract(W, first[tile], C, n, outputs, out)
-        for k in range(outputs):
-            answer[i, k] = out[k]
+        for lane in range(lanes):
+            tile_of[i + lane] = tile
+            for k in range(outputs):
+                answer[i + lane, k] = out[lane, k]
         if every:
             contract(W, first[tile] + outputs * n, A, inner, m, out)
-            for k in range(m):
-                nominal[i, k] = out[k]
+            for lane in range(lanes):
+                for k in range(m):
+                    nominal[i + lane, k] = out[lane, k]
+        i += lanes
+
+
+@entry
+def follow(slopes, tile, off, out):
+    """Fills out (n, k) with the slopes (t, k, 3) of their tiles times off (n, 3); rows without a tile stay as they are."""
+    for i in range(tile.shape[0]):
+        if tile[i] >= 0:
+            v, M = part(off[i], 0), slopes[tile[i]]
+            for k in range(M.shape[0]):
+                out[i, k] = dot(part(M[k], 0), v)

@@ -9,7 +9,7 @@ import numpy as np
 
 from camcomp.bulk.fastwrite import ROOM, write_rows
 from camcomp.bulk.field import Field, Tiles
-from camcomp.bulk.kernel import BASIC, look_up
+from camcomp.bulk.kernel import BASIC, follow, look_up
 from camcomp.bulk.loads import Edge, Loads, joints_at, loads_of
 from camcomp.bulk.runs import NotInPieces, PlainRun
 from camcomp.datatypes import LINE, RAPID, Bools, Floats, Ints
@@ -91,6 +91,10 @@ class Unsolved(Exception):
         self.move, self.target, self.status = move, target, status
 
 
+def _sizes(vectors: Floats) -> Floats:
+    return np.asarray(np.sqrt(np.einsum("ni,ni->n", vectors, vectors)))
+
+
 class PlainCorrector:
     """Corrects runs of plain lines of one program."""
 
@@ -114,6 +118,9 @@ class PlainCorrector:
     def correct(self, run: PlainRun, before: Edge | None, after: Edge | None, carry: Carry) -> Done:
         """The run corrected and written; `carry` is moved along. Raises Unsolved, NotInPieces."""
         loads = loads_of(run, before, after, self.job.conditions, self._constant)
+        if self.field is None:
+            force = self.job.frame.vectors(np.concatenate((loads.first, loads.last)))
+            self.field = Field(self.machine, force, self.job.frame.origin)
         lead, trail = joints_at(loads, run.plain.kind, before, after)
         tolerance = np.full(run.motions, self.budget)
         hard = (loads.length > EASY_MM) & (run.plain.kind == LINE)
@@ -128,7 +135,7 @@ class PlainCorrector:
                     continue
             middles = self._middles(run, loads, rows)
             told = self._halfway(commanded, carry.commanded)[middles.rows] - middles.wanted
-            bent = (np.linalg.norm(told, axis=1) > self.budget) & ~hard[middles.move]
+            bent = (_sizes(told) > self.budget) & ~hard[middles.move]
             if bent.any() and left > 1:
                 hard[middles.move[bent]] = True
                 continue
@@ -138,7 +145,7 @@ class PlainCorrector:
             error = self._after(rows, judged, answers, middles, commanded, written, carry.written)
             worst = np.zeros(run.motions)
             at = np.concatenate((rows.move[judged], middles.move))
-            np.maximum.at(worst, at, np.linalg.norm(error, axis=1))
+            np.maximum.at(worst, at, _sizes(error))
             missed = worst > self.tolerance
             if not missed.any() or left == 1:
                 break
@@ -194,7 +201,7 @@ class PlainCorrector:
         """Takes joining lines out that would be shorter than the resolution; whether there were any."""
         joins = np.flatnonzero(rows.joining)
         previous = np.concatenate((carry.commanded[None], commanded[:-1]))[joins]
-        small = np.linalg.norm(commanded[joins] - previous, axis=1) <= self.resolution
+        small = _sizes(commanded[joins] - previous) <= self.resolution
         front = rows.w[joins] == 0.0
         lead[rows.move[joins[small & front]]] = False
         trail[rows.move[joins[small & ~front]]] = False
@@ -218,9 +225,8 @@ class PlainCorrector:
         A wider range of forces makes new tiles, so those that the numbers count go with them.
         """
         target, force = self.job.frame.to_machine(target), self.job.frame.vectors(force)
-        if self.field is None:
-            self.field = Field(self.machine, force, self.job.frame.origin)
         known = self.field
+        assert known is not None
         near = known.prepare(target, force)
         n, m = len(target), len(self.machine.actuators)
         answer, nominal = np.empty((n, 9 + 2 * m if every else BASIC)), np.empty((n if every else 0, m))
@@ -250,20 +256,19 @@ class PlainCorrector:
     def _error_of(self, off: Floats, tile: Ints, tiles: Tiles) -> Floats:
         """Errors (n, 3) of tips that are commanded `off` (n, 3) mm beside the right place, machine frame."""
         out = off.copy()
-        on = tile >= 0
-        out[on] = np.einsum("nij,nj->ni", tiles.slope[tile[on]], off[on])
+        follow(tiles.slope, tile, off, out)
         return out
 
     def joints(self, done: Done) -> Floats:
         """Joints (N, m) of the written end points: those of the exact command, and the step that rounding makes."""
         m, frame = len(self.machine.actuators), self.job.frame
         tile, off = done.answers.tile, frame.vectors(done.written - done.commanded + done.rows.shift)
-        out = done.answers.nominal + done.answers.rest[:, 3 + m :]
-        on = tile >= 0
-        out[on] += np.einsum("nij,nj->ni", done.answers.tiles.rates[tile[on]], off[on])
-        if not on.all():
-            told = frame.to_machine(done.written[~on])
-            out[~on] = solve(self.machine, FREE, told, check=False).rho_nominal
+        out = np.zeros((len(tile), m))
+        follow(done.answers.tiles.rates, tile, off, out)
+        out += done.answers.nominal + done.answers.rest[:, 3 + m :]
+        lost = np.flatnonzero(tile < 0)
+        if len(lost):
+            out[lost] = solve(self.machine, FREE, frame.to_machine(done.written[lost]), check=False).rho_nominal
         return out
 
     def _solved(self, move: Ints, target: Floats, force: Floats, every: bool) -> tuple[Floats, Floats]:
@@ -333,9 +338,9 @@ class PlainCorrector:
         same = np.concatenate(([False], rows.move[1:] == rows.move[:-1]))
         w0 = np.where(same, np.concatenate(([0.0], rows.w[:-1])), 0.0)
         way = run.plain.end[rows.move] - run.plain.start[rows.move]
-        programmed = (rows.w - w0) * np.sqrt(np.einsum("ni,ni->n", way, way))
+        programmed = (rows.w - w0) * _sizes(way)
         step = commanded - start
-        size = np.sqrt(np.einsum("ni,ni->n", step, step))
+        size = _sizes(step)
         scale = np.divide(size, programmed, out=np.ones(len(feed)), where=programmed > 1e-6)
         return np.where(rows.joining | kept | (programmed < 0.01), feed, feed * np.clip(scale, 0.2, 5.0))
 

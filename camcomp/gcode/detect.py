@@ -9,6 +9,7 @@ from camcomp.shelf import load, members
 
 _LOOKED_AT = 200_000  # characters
 _PLAINTEXT = re.compile(r"^[ \t]*+\d*[ \t]*+(BEGIN[ \t]++PGM|TOOL[ \t]++(CALL|DEF)|L[ \t]++[XYZ][ \t]*+[+-]|CC[ \t]++X|BLK[ \t]++FORM)", re.MULTILINE | re.IGNORECASE)
+_PLAIN_LINES = re.compile(r"^(?:[ \t]*+(?:[NXYZF][ \t]*+[-+.\d]++|G[ \t]*+0?[01](?![\d.])))++[ \t]*+\n", re.MULTILINE | re.IGNORECASE)
 DEFAULT = "rs274"
 _ENOUGH = 4  # weight of marks below which a text could be anything
 
@@ -25,6 +26,7 @@ def dialect_of(text: Text, name: str | None = None) -> Dialect:
         found = _PLAINTEXT.search(sample)
         row = sample.count("\n", 0, found.start(1)) if found else 0
         raise ProgramError("CC127", "this is a Heidenhain conversational program", at=text.place(min(row, len(text) - 1)))
+    sample = _PLAIN_LINES.sub("", sample)  # most of a program; every control reads them, so no mark is in them
     best, most = _record(DEFAULT), _ENOUGH - 1
     for member in members("dialects"):
         record = _record(member)

@@ -29,15 +29,17 @@ def digest() -> str:
     return hashlib.sha256(b"".join((folder / f"{name}.py").read_bytes() for name in SOURCES)).hexdigest()
 
 
-def inner(function: Callable[..., Any]) -> Any:
+def inner(function: Callable[..., Any], *, fastmath: bool = False) -> Any:
     """Compiles a function that only compiled functions call. It allocates nothing, needs no interpreter lock, never raises.
+
+    fastmath: sums may be formed in any order, and so in vectors.
 
     Constants among its arguments count as plain numbers: numba would compile the function anew for every one of them,
     which takes half as long again.
     """
     if _numba.config.DISABLE_JIT:  # for the debugger
         return function
-    dispatcher = _numba.njit(no_cpython_wrapper=True, **_OPTIONS)(function)
+    dispatcher = _numba.njit(no_cpython_wrapper=True, fastmath=fastmath, **_OPTIONS)(function)
     template = dispatcher.get_call_template
 
     def plain(args: Any, kws: Any) -> Any:
@@ -45,6 +47,22 @@ def inner(function: Callable[..., Any]) -> Any:
 
     dispatcher.get_call_template = plain
     return dispatcher
+
+
+def _load_lightly(cache: Any) -> None:
+    """Lets compiled code be loaded without what numba imports in front of it, a quarter of a second of declarations.
+
+    They serve compiling only: code that allocates nothing refers to none of them. Where there is nothing to load, numba
+    goes its own way.
+    """
+    whole = cache.load_overload
+
+    def load(signature: Any, context: Any) -> Any:
+        with cache._guard_against_spurious_io_errors():
+            found = cache._load_overload(signature, context)
+        return whole(signature, context) if found is None else found
+
+    cache.load_overload = load
 
 
 def entry(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -59,12 +77,13 @@ def entry(function: Callable[..., Any]) -> Callable[..., Any]:
         dispatcher = _numba.njit(cache=True, **_OPTIONS)(function)
         file = dispatcher._cache._cache_file
         file._source_stamp = (file._source_stamp, digest())
+        _load_lightly(dispatcher._cache)
     except RuntimeError:  # numba finds no place for its cache
         dispatcher = _numba.njit(**_OPTIONS)(function)
 
     @functools.wraps(function)
     def call(*args: Any) -> Any:
-        if dispatcher.signatures:
+        if dispatcher.overloads:  # not its `signatures`, which makes a list every time
             return dispatcher(*args)
         resting = gc.isenabled()
         gc.disable()
@@ -76,3 +95,14 @@ def entry(function: Callable[..., Any]) -> Callable[..., Any]:
 
     call.dispatcher = dispatcher  # type: ignore[attr-defined]
     return call
+
+
+def direct(function: Callable[..., Any], args: tuple[Any, ...]) -> Callable[..., Any]:
+    """An entry function for arguments of exactly the types of `args`, with which it has been called before.
+
+    It is the machine code without numba's search for it, which takes longer than small work does.
+    """
+    dispatcher: Any = getattr(function, "dispatcher", None)
+    if dispatcher is None:
+        return function
+    return dispatcher.overloads[tuple(map(dispatcher.typeof_pyval, args))].entry_point

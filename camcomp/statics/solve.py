@@ -82,10 +82,12 @@ def threads() -> int:
 def in_pieces(work: Callable[[slice], None], n: int) -> None:
     """Runs work on slices of PIECE points, on every core."""
     pieces = [slice(a, min(a + PIECE, n)) for a in range(0, n, PIECE)]
-    if len(pieces) == 1:
-        work(pieces[0])
+    workers = min(threads(), len(pieces))
+    if workers < 2:
+        for piece in pieces:
+            work(piece)
         return
-    with ThreadPoolExecutor(threads()) as pool:
+    with ThreadPoolExecutor(workers) as pool:
         list(pool.map(work, pieces))
 
 

@@ -1,5 +1,6 @@
 """Compiled reading and writing of plain lines: the same as the interpreter and the writer of whole programs."""
 
+import numba
 import numpy as np
 import pytest
 
@@ -106,20 +107,30 @@ def test_a_line_cut_off_by_the_buffer_is_left_for_the_next_one(cut):
 # --- numbers ----------------------------------------------------------------------------------------------------------
 
 
+@numba.njit
+def decimal(out, value, digits):
+    return put_decimal(out, 0, value, digits, True)
+
+
+@numba.njit
+def feed(out, value):
+    return put_feed(out, 0, value)
+
+
 @pytest.mark.parametrize("digits", [0, 1, 3, 4, 6])
 def test_numbers_are_written_as_the_writer_writes_them(digits):
     rng = np.random.default_rng(digits)
     for value in [0.0, -0.0, 1.0, -1.5, 100.0, 0.00004, -0.00004, 12345.6789, *rng.uniform(-2000, 2000, 200)]:
         value = round(value, digits)
         out = np.zeros(64, np.uint8)
-        assert out[: put_decimal(out, 0, value, digits, True)].tobytes().decode() == plain(value, digits)
+        assert out[: decimal(out, value, digits)].tobytes().decode() == plain(value, digits)
 
 
 def test_feeds_are_written_as_the_writer_writes_them():
     rng = np.random.default_rng(1)
     for value in [600.0, 0.5, 1234.5, 99999.94, 1e-3, *10.0 ** rng.uniform(-2, 5, 200)]:
         out = np.zeros(64, np.uint8)
-        assert out[: put_feed(out, 0, value)].tobytes().decode() == significant(value)
+        assert out[: feed(out, value)].tobytes().decode() == significant(value)
 
 
 # --- writing ----------------------------------------------------------------------------------------------------------

@@ -53,6 +53,20 @@ def test_every_answer_is_the_exact_one_within_the_promise(orthoglide):
     assert known.worst <= ALLOWED
 
 
+def test_neighbours_asked_together_get_what_each_gets_alone(orthoglide):
+    """Several points of a tile share one pass through its coefficients; where a tile ends, fewer do."""
+    rng, way = np.random.default_rng(4), np.linspace(0.0, 1.0, 97)[:, None]
+    target = np.array([-60.0, -70.0, -170.0]) + way * np.array([40.0, 30.0, 5.0])
+    force = rng.uniform(FORCE.min(axis=0), FORCE.max(axis=0), (97, 3))
+    known = Field(orthoglide, FORCE)
+    together = ask(known, target, force)
+    assert len(np.unique(together[2])) >= 3
+    for k in range(97):
+        alone = ask(known, target[k : k + 1], force[k : k + 1])
+        assert all((a[0] == b[k]).all() for a, b in zip(alone[0], together[0], strict=True))
+        assert (alone[1][0] == together[1][k]).all() and alone[2][0] == together[2][k]
+
+
 def test_slopes_and_rates_are_derivatives(orthoglide):
     centre = np.array([[-60.0, -60.0, -160.0]])
     known = Field(orthoglide, FORCE)
