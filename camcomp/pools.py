@@ -28,6 +28,7 @@ def on_this_machine(tasks: Iterable[Task], jobs: int) -> Iterator[Outcome]:
         yield from map(work, tasks)
         return
     from joblib import Parallel, delayed
+    from joblib.externals.loky import get_reusable_executor
     from joblib.externals.loky.process_executor import TerminatedWorkerError
 
     source = iter(tasks)
@@ -49,6 +50,7 @@ def on_this_machine(tasks: Iterable[Task], jobs: int) -> Iterator[Outcome]:
             left = list(open_tasks.values())
             yield from run([delayed(work)(task) for task in left], jobs)
             yield from run(taken(), jobs)
+            get_reusable_executor().shutdown(wait=True, kill_workers=True)  # nothing is left to do: no farewells
             return
         except TerminatedWorkerError:
             continue

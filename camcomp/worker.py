@@ -6,7 +6,7 @@ import os
 from dataclasses import dataclass, field
 from functools import lru_cache
 
-from camcomp.collector import collect_seldom
+from camcomp.collector import collect_seldom, keep_what_lives
 from camcomp.spec import Config
 
 BUG = 70
@@ -71,7 +71,15 @@ def _compensate(task: Task) -> Outcome:
     failed = result.failed_checks(job, task.tolerance_um)
     messages = [{"rule": rule, "message": text, "text": f"{task.name}: error[{rule}]: {text}"} for rule, text in failed]
     joints = tables.joint_csv(result, job) if task.joints else None
-    return Outcome(task.key, int(bool(failed)), messages, result.written.data, joints, tables.summary(result, job))
+    outcome = Outcome(task.key, int(bool(failed)), messages, result.written.data, joints, tables.summary(result, job))
+    _settle()
+    return outcome
+
+
+@lru_cache(maxsize=1)
+def _settle() -> None:
+    """Once: modules, machine and compiled code are there."""
+    keep_what_lives()
 
 
 class _Once:
