@@ -23,12 +23,13 @@ from camcomp.heldout import shrinkage_of
 from camcomp.inquiry import Inquiry, open_inquiry
 from camcomp.intervals import joint_covariance
 from camcomp.job import Job
-from camcomp.locate import channel_axes, gap_of, main_channels, patterns_of, run_gaps
+from camcomp.locate import channel_axes, gap_of, main_channels, patterns_of, rest_by_actuator, run_gaps
 from camcomp.planner import Proposal, propose
 from camcomp.remainder import firm_prior, leftovers
 from camcomp.survey import Survey, survey
 from camcomp.twin import Twin
 
+MOST = 0.6  # share of what is unknown from which on it is one actuator's
 RIVALS = 8  # sets that one experiment is asked to tell from the answer
 
 
@@ -127,8 +128,8 @@ def _causes(inquiry: Inquiry, found: Survey) -> list[dict[str, Any]]:
         })  # fmt: skip
     out.sort(key=lambda c: (-c["probability"], -c["share"]))
     if found.strange:
-        label = _first_label(found)
-        target = label.split(":")[1] if ":" in label and label.split(":")[1] in inquiry.bench.actuators else None
+        shares = rest_by_actuator(inquiry, best, found.strange)
+        target = next((name for name, share in shares.items() if share > MOST), None)
         out.append({
             "effect": "unknown", "target": target, "probability": 1.0,
             "share": round(left / whole, 4) if whole > 0 else 1.0, "parameters": {},

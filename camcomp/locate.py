@@ -9,6 +9,7 @@ from camcomp.columns import RUN_OFFSET_MM
 from camcomp.datatypes import Floats
 from camcomp.gap import where
 from camcomp.gap.cycles import Line, frequencies, screws
+from camcomp.gap.search import Fitted
 from camcomp.gap.whiten import effective_rows
 from camcomp.inquiry import Inquiry
 
@@ -77,6 +78,26 @@ def run_gaps(inquiry: Inquiry) -> list[where.RunGap]:
         noise = np.where(np.isfinite(noise), np.hypot(noise, RUN_OFFSET_MM if part.start == 0 else 0.0), 1.0)
         out.append(where.RunGap(run.name, gap, noise, thin, inquiry.times[k], line, drives, tip, position, direction))
     return out
+
+
+def rest_by_actuator(inquiry: Inquiry, f: Fitted, kind: str) -> dict[str, float]:
+    """Energy that a set leaves in one kind of channel by actuator, as shares; that of the tip read as motion of the carriages."""
+    names = inquiry.bench.actuators
+    m = len(names)
+    energy = np.zeros(m)
+    causes = inquiry.causes(f.members, f.theta, f.extra)
+    for k, run in enumerate(inquiry.bench.runs):
+        rest = inquiry.bench.difference(k, inquiry.bench.read(k, causes))
+        rest = np.where(np.isfinite(rest), rest, 0.0)
+        if kind == "tip":
+            slope = thinned(inquiry.bench.row_slopes(k).reshape(-1, 3 * m), run.thin).reshape(-1, 3, m)
+            rest = np.einsum("nij,nj->ni", np.linalg.pinv(slope), rest[:, :3])
+        elif kind in ("encoder", "drive"):
+            rest = rest[:, 3:][:, :m] if kind == "encoder" else rest[:, 3 + m :][:, :m]
+        else:
+            return {}
+        energy += np.sum(rest**2, axis=0)
+    return where.shares(dict(zip(names, energy.tolist(), strict=True)))
 
 
 def channel_axes(inquiry: Inquiry) -> list[str]:

@@ -23,6 +23,7 @@ MOSTLY = 0.3  # size of a leftover, in units of what the causes explain, below w
 SURPRISE = 0.3  # size of what a set does not foretell of a run, in units of the noise, below which all is well
 FEW = 4  # runs
 CONFIRMED = 0.3  # share of what a run shows beyond noise that a cause beside an unknown one has to foretell of it
+BELIED = 0.15  # share of it by which no run may get worse
 FAINT = 0.1  # what a run shows beyond noise, in units of the noise's energy, below which there is nothing to foretell
 STRAINED = 2.5  # offsets of runs, in units of what repeats, above which they are no repeatability
 UNKNOWN_COLOUR = 0.8  # size of what a sensor cannot have made, in units of what it can
@@ -66,7 +67,8 @@ def _surprised(inquiry: Inquiry, f: Fitted) -> bool:
     if len(inquiry.bench.runs) < FEW:
         return False
     least = max(SURPRISE, UNKNOWN_SHARE * signal_rms(inquiry, f).get("tip", 0.0))
-    return _unforetold(inquiry, f, f.members).get("tip", 0.0) > least**2
+    left = _unforetold(inquiry, f, f.members)
+    return "tip" in left and float(np.mean(left["tip"])) > least**2
 
 
 def firm_prior(inquiry: Inquiry) -> Prior:
@@ -185,10 +187,7 @@ def confirmed(inquiry: Inquiry, f: Fitted) -> Members:
     members = f.members
     while members and len(inquiry.bench.runs) > 1:
         now = _unforetold(inquiry, f, members)
-        gains = []
-        for i in members:
-            without = _unforetold(inquiry, f, tuple(each for each in members if each != i))
-            gains.append(max((without[kind] - now[kind]) / max(without[kind], FAINT) for kind in now))
+        gains = [_gain(_unforetold(inquiry, f, tuple(each for each in members if each != i)), now) for i in members]
         if min(gains) >= CONFIRMED:
             break
         least = members[int(np.argmin(gains))]
@@ -196,16 +195,26 @@ def confirmed(inquiry: Inquiry, f: Fitted) -> Members:
     return members
 
 
-def _unforetold(inquiry: Inquiry, f: Fitted, members: Members) -> dict[str, float]:
-    """Energy per row that members of a set leave of runs that they were not fitted to, per kind of channel.
+def _gain(before: Mapping[str, Floats], after: Mapping[str, Floats]) -> float:
+    """Share of the energy that a member foretells in the kind of channel that it foretells best; 0 if a run belies it."""
+    gains = [0.0]
+    for kind, each in before.items():
+        whole = max(float(np.mean(each)), FAINT)
+        change = each - after[kind]
+        if min(change) > -BELIED * whole:
+            gains.append(float(np.mean(change)) / whole)
+    return max(gains)
+
+
+def _unforetold(inquiry: Inquiry, f: Fitted, members: Members) -> dict[str, Floats]:
+    """Energy per row (runs,) that members of a set leave of runs that they were not fitted to, per kind of channel.
 
     Beyond noise, beyond what runs differ by anyway, and beyond what the doubt about the members' amplitudes makes.
     """
     index, offsets = inquiry.member_columns(members), inquiry.columns.run_offsets
     free = np.flatnonzero(np.isinf(inquiry.prior.tolerance))
     whole = total(f.grams)
-    energy = dict.fromkeys((words.kind for words in inquiry.dictionaries), 0.0)
-    rows = dict.fromkeys(energy, 0)
+    out: dict[str, list[float]] = {words.kind: [] for words in inquiry.dictionaries}
     for g, W, r, parts in zip(f.grams, *about(inquiry, f), inquiry.white_patterns, strict=True):
         mean, covariance = estimate(whole - g, inquiry.prior, index)
         rest = r - W[:, index] @ mean[index]
@@ -213,9 +222,9 @@ def _unforetold(inquiry: Inquiry, f: Fitted, members: Members) -> dict[str, floa
             rest = rest - W[:, free] @ np.linalg.lstsq(W[:, free], rest, rcond=None)[0]
         doubt = np.sum((W[:, index] @ covariance[np.ix_(index, index)]) * W[:, index], axis=1)
         doubt += np.sum((W[:, offsets] * inquiry.prior.tolerance[offsets]) ** 2, axis=1)
+        energy = rest**2 - doubt - 1.0
         at = 0
-        for kind, part in zip(energy, parts, strict=True):
-            mine = slice(at, at + len(part))
-            energy[kind] += float(np.sum(rest[mine] ** 2 - doubt[mine]))
-            rows[kind], at = rows[kind] + len(part), at + len(part)
-    return {kind: energy[kind] / max(rows[kind], 1) - 1.0 for kind in energy}
+        for kind, part in zip(out, parts, strict=True):
+            out[kind].append(float(np.mean(energy[at : at + len(part)])) if len(part) else 0.0)
+            at += len(part)
+    return {kind: np.array(each) for kind, each in out.items()}
