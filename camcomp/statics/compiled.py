@@ -52,9 +52,11 @@ def inner(function: Callable[..., Any], *, fastmath: bool = False) -> Any:
 def _load_lightly(cache: Any) -> None:
     """Lets compiled code be loaded without what numba imports in front of it, a quarter of a second of declarations.
 
-    They serve compiling only: code that allocates nothing refers to none of them. Where there is nothing to load, numba
-    goes its own way.
+    They serve compiling only: code that allocates nothing refers to none of them. Where there is nothing to load, or a
+    numba is built otherwise, it goes its own way.
     """
+    if not (hasattr(cache, "_load_overload") and hasattr(cache, "_guard_against_spurious_io_errors")):
+        return
     whole = cache.load_overload
 
     def load(signature: Any, context: Any) -> Any:
