@@ -8,7 +8,6 @@ import json
 import os
 import tempfile
 import time
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
@@ -75,12 +74,9 @@ def run(cases: list[Case], results: Path, processes: int = 2) -> list[dict[str, 
     todo = [c for c in cases if c.name not in rows]
     os.environ.setdefault("NUMBA_NUM_THREADS", "1")
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    with (
-        results.open("a") as out,
-        ProcessPoolExecutor(processes, mp_context=get_context("spawn"), max_tasks_per_child=200) as pool,
-    ):
-        for future in as_completed([pool.submit(run_case, c) for c in todo]):
-            row = future.result()
+    # not concurrent.futures: in Python 3.11 its pool stands still when all workers have done their share at once
+    with results.open("a") as out, get_context("spawn").Pool(processes, maxtasksperchild=200) as pool:
+        for row in pool.imap_unordered(run_case, todo):
             rows[row["name"]] = row
             out.write(json.dumps(row) + "\n")
             out.flush()
