@@ -20,6 +20,10 @@ from camcomp.files import shipped
 from camcomp.job import Job
 from camcomp.statics.solve import TARGET, solve
 from tests.benchmarks.programs import write
+from tests.campaign.runner import CONFIG
+from tests.plants.causes import Cause
+from tests.plants.experiments import Plan, make
+from tests.plants.experiments import write as write_experiment
 
 pytestmark = pytest.mark.benchmarks
 
@@ -217,3 +221,11 @@ def test_a_diagnosis():
     experiment = min(Path(shipped("samples/diagnosis")).rglob("experiment.yaml"))
     took = spent("-m", "camcomp", "diagnose", experiment, "--quiet")
     tell(f"diagnosis of samples/diagnosis/{experiment.parent.name}", f"{took[0]:.1f} s wall, {took[1]:.1f} s processor")
+
+
+@pytest.mark.parametrize("rows", [500, 13_333])
+def test_a_diagnosis_of_six_runs(tmp_path, rows):
+    """As the campaign makes them, and with eight times 10 000 rows in all."""
+    plan = Plan(777, (Cause("drive_stiffness", "y", 778),), (3.0,), samples=rows)
+    took = spent("-m", "camcomp", "diagnose", write_experiment(make(plan), plan, tmp_path / "experiment", CONFIG), "--quiet")
+    tell(f"diagnosis of six runs of {rows} rows", f"{took[0]:.1f} s wall, {took[1]:.1f} s processor")
