@@ -21,7 +21,20 @@ def read_bytes(path: str | Path) -> bytes:
     try:
         return Path(path).read_bytes()
     except OSError as error:
-        raise FileError("CC500", f"cannot read {path}: {error.strerror}") from error
+        raise _unread(path, error) from error
+
+
+def _unread(path: str | Path, error: OSError) -> FileError:
+    """What a user needs to put it right: a folder holds the file meant, and a mistyped name has a neighbour."""
+    from difflib import get_close_matches  # only a failure needs it
+
+    wanted, hint = Path(path), None
+    if isinstance(error, IsADirectoryError):
+        hint = "this is a folder: name a file in it"
+    elif isinstance(error, FileNotFoundError) and wanted.parent.is_dir():
+        close = get_close_matches(wanted.name, sorted(each.name for each in wanted.parent.iterdir()), n=1)
+        hint = f"did you mean {wanted.parent / close[0]}?" if close else None
+    return FileError("CC500", f"cannot read {path}: {error.strerror}", hint=hint)
 
 
 def open_source(path: str | Path) -> BinaryIO:
@@ -34,7 +47,7 @@ def open_source(path: str | Path) -> BinaryIO:
     try:
         return Path(path).open("rb")
     except OSError as error:
-        raise FileError("CC500", f"cannot read {path}: {error.strerror}") from error
+        raise _unread(path, error) from error
 
 
 def display_name(path: str | Path) -> str:

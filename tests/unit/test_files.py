@@ -14,6 +14,19 @@ def test_a_missing_file_is_an_error_of_its_own(tmp_path):
     assert (caught.value.rule, caught.value.exit_code) == ("CC500", 5)
 
 
+def test_a_folder_or_a_mistyped_name_gets_a_hint_of_its_own(tmp_path):
+    (tmp_path / "groove.nc").write_bytes(b"")
+    with pytest.raises(FileError) as folder:
+        files.read_bytes(tmp_path)
+    with pytest.raises(FileError) as mistyped:
+        files.open_source(tmp_path / "grove.nc")
+    with pytest.raises(FileError) as strange:
+        files.read_bytes(tmp_path / "experiment.yaml")
+    assert "folder" in folder.value.hint
+    assert mistyped.value.hint == f"did you mean {tmp_path / 'groove.nc'}?"
+    assert strange.value.hint == "check the path"
+
+
 def test_write_all_writes_and_leaves_nothing_else(tmp_path):
     files.write_all({tmp_path / "a": b"1", tmp_path / "b": b"2"})
     assert {each.name: each.read_bytes() for each in tmp_path.iterdir()} == {"a": b"1", "b": b"2"}
