@@ -8,7 +8,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from camcomp.course import Course
+import numpy as np
+
+from camcomp.course import Course, beside_jumps
 from camcomp.datatypes import Floats
 from camcomp.gap.effect import Cause, Parameter
 from camcomp.gap.observation import Measured, stack
@@ -124,9 +126,10 @@ class Bench:
         return stack(reading.tip, reading.encoder, reading.drive, reading.dyno)
 
     def observed(self, k: int) -> Floats:
-        """Channels (n, c) as measured in run k; NaN where missing."""
+        """Channels (n, c) as measured in run k; NaN where missing, and in what the force moves where the force jumps."""
         m = self.runs[k].measured
-        return stack(m.tip, m.encoder, m.drive, m.dyno)
+        loaded = np.where(beside_jumps(self.runs[k].course), np.nan, 0.0)[:, None]
+        return stack(m.tip + loaded, m.encoder, m.drive + loaded, m.dyno + loaded)
 
     def residual(self, k: int, causes: Sequence[Cause] = ()) -> Floats:
         """Measured minus model (n, c) in run k, thinned."""

@@ -5,16 +5,19 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from camcomp import pathgeometry
 from camcomp.cutting.track import Track
 from camcomp.datatypes import Floats
 from camcomp.gap.memory import direction
-from camcomp.gap.pieces import Pieces, Places, cut
+from camcomp.gap.pieces import NODES, Pieces, Places, cut
 from camcomp.gap.timeline import Timeline
 
 STEP_S = 0.001  # grid of what has memory: 0.2 um of interpolation at 1500 mm/s2
 MOST_STEPS = 40000
+ABRUPT_S = 0.010  # clocks of logs, the lag of a control and the build-up of a chip: a jump of the force is no better known
+_JUMP = 0.1  # of the largest force in the run; the turn of an arc or of a fine polygon stays beneath
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +52,21 @@ class Course:
         """Minutes of cutting in this run."""
         dt = np.diff(self.grid, prepend=self.grid[:1])
         return float((dt * self.grid_cut).sum() / 60.0)
+
+
+def beside_jumps(course: Course) -> NDArray[np.bool_]:
+    """Rows (n,) within ABRUPT_S of an instant at which the modelled force jumps (corner, entry, exit).
+
+    On which side of the jump such a row was taken nobody knows, and the machine springs by up to a millimetre there.
+    """
+    near = np.zeros(len(course.time), dtype=bool)
+    size = np.linalg.norm(course.node_force, axis=1).max(initial=0.0)
+    if not course.ordered or size == 0.0:
+        return near
+    jump = np.linalg.norm(np.diff(course.node_force, axis=0), axis=1) > _JUMP * size
+    seam = np.arange(1, len(course.node_force)) % NODES == 0
+    at = np.sort(course.node_time[1:][jump & seam])
+    return np.searchsorted(at, course.time - ABRUPT_S) < np.searchsorted(at, course.time + ABRUPT_S, side="right")
 
 
 def course_of_program(
