@@ -63,9 +63,10 @@ def beside_jumps(course: Course) -> NDArray[np.bool_]:
     size = np.linalg.norm(course.node_force, axis=1).max(initial=0.0)
     if not course.ordered or size == 0.0:
         return near
-    jump = np.linalg.norm(np.diff(course.node_force, axis=0), axis=1) > _JUMP * size
-    seam = np.arange(1, len(course.node_force)) % NODES == 0
-    at = np.sort(course.node_time[1:][jump & seam])
+    before = np.concatenate([np.zeros((1, 3)), course.node_force[NODES - 1 :: NODES]])  # the machine is idle before and after
+    after = np.concatenate([course.node_force[::NODES], np.zeros((1, 3))])
+    start = np.append(course.node_time[::NODES], course.node_time[-1])
+    at = np.sort(start[np.linalg.norm(after - before, axis=1) > _JUMP * size])
     return np.searchsorted(at, course.time - ABRUPT_S) < np.searchsorted(at, course.time + ABRUPT_S, side="right")
 
 

@@ -1,5 +1,6 @@
 """The gap of every run as the place-finding engines want it, and what they find: sizes, directions, periods, places."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,7 @@ from camcomp.columns import RUN_OFFSET_MM
 from camcomp.datatypes import Floats
 from camcomp.gap import where
 from camcomp.gap.cycles import Line, frequencies, screws
+from camcomp.gap.effect import Cause
 from camcomp.gap.search import Fitted
 from camcomp.gap.whiten import effective_rows
 from camcomp.inquiry import Inquiry
@@ -23,13 +25,18 @@ def main_channels(inquiry: Inquiry) -> slice:
     return slice(3 + 2 * m, 6 + 2 * m)
 
 
-def gap_of(inquiry: Inquiry) -> dict[str, float]:
-    """Size of the gap over all runs, and of its noise, um."""
+def gap_sizes(inquiry: Inquiry, causes: Sequence[Cause] = ()) -> Floats:
+    """Length (n,), um, of what causes leave of the gap, at all rows of all runs where it is known."""
     part = main_channels(inquiry)
-    gaps = [inquiry.bench.gap(k)[:, part] for k in range(len(inquiry.residuals))]
+    gaps = [inquiry.bench.gap(k, causes)[:, part] for k in range(len(inquiry.residuals))]
     # an axis that nobody measured is no reason to do without the others
     size = np.concatenate([np.where(np.isfinite(g).any(axis=1), np.sqrt(np.nansum(g**2, axis=1)), np.nan) for g in _together(gaps)])
-    size = size[np.isfinite(size)] * 1e3
+    return np.asarray(size[np.isfinite(size)] * 1e3)
+
+
+def gap_of(inquiry: Inquiry) -> dict[str, float]:
+    """Size of the gap over all runs, and of its noise, um."""
+    part, size = main_channels(inquiry), gap_sizes(inquiry)
     repeats = RUN_OFFSET_MM if part.start == 0 else 0.0  # what one run differs from the next belongs to the floor
     seen = np.isfinite(inquiry.noise.sigma[:, part])
     sigma = np.where(seen, inquiry.noise.sigma[:, part] ** 2, 0.0).sum(axis=0) / np.maximum(seen.sum(axis=0), 1)

@@ -13,6 +13,7 @@ from camcomp.gap.evidence import Prior, base, estimate, log_bayes
 from camcomp.gap.leftover import Leftover, Projected, project, score_test, unknown_evidence
 from camcomp.gap.search import Fitted, Members, total
 from camcomp.inquiry import Inquiry
+from camcomp.locate import gap_of, gap_sizes, main_channels
 
 UNKNOWN_LOG10 = -10.0  # chance below which a leftover is no accident
 UNKNOWN_RMS = 0.18  # size of a leftover, in units of the noise, below which no model error is called a cause
@@ -158,6 +159,21 @@ def mostly(inquiry: Inquiry, f: Fitted, left: Mapping[str, Leftover]) -> bool:
         return False  # a cause that some runs do not show
     explained = signal_rms(inquiry, f)
     return all(each.rms < MOSTLY * explained[kind] or each.rms < UNKNOWN_RMS for kind, each in left.items())
+
+
+def idle(inquiry: Inquiry, f: Fitted, most: float = 0.0) -> bool:
+    """Whether a set's causes, put into the machine by themselves, leave the tip where it was.
+
+    A fit has help from all that is always a little wrong; causes that take more from there than they give explain
+    nothing. most: share of the gap's energy beyond noise that they have to take away.
+    """
+    stated = gap_of(inquiry)
+    noise = stated["noise_floor_um"] ** 2
+    whole = stated["rms_um"] ** 2 - noise
+    if main_channels(inquiry).start != 0 or not f.members or whole < noise:
+        return False
+    left = float(np.mean(gap_sizes(inquiry, inquiry.causes(f.members, f.theta, f.extra)) ** 2)) - noise
+    return left > (1.0 - most) * whole
 
 
 def known_part(inquiry: Inquiry, best: Fitted) -> Members:

@@ -16,6 +16,7 @@ from camcomp.remainder import (
     colour_left,
     confirmed,
     firm_prior,
+    idle,
     known_part,
     leftovers,
     mostly,
@@ -31,6 +32,7 @@ CANCELLING = 8.0  # size of a member, in units of the whole set, above which the
 SLIGHT = 0.06  # of the largest member
 MINOR = 0.25  # size of a known cause, in units of an unknown one, below which it is not named beside it
 WORSE = 2.0  # log density by which a cause has to harm the prediction of other runs before it goes
+HALF = 0.5  # share of the tip's gap beyond noise that causes have to take away to be its explanation
 SAME_FIT = 4.0  # chi-square by which two sets may differ and still be the same answer
 
 
@@ -93,12 +95,16 @@ def survey(inquiry: Inquiry) -> Survey:
     verdict = judge(fits, probability, same)
     best = fits[verdict.best]
     left = leftovers(inquiry, best, steady_prior(inquiry, best))
+    if left and idle(inquiry, best, HALF):
+        return _nothing_known(inquiry, fits, null)
     # noise that is none stays whatever the causes are
     coloured = colour_left(inquiry, left)
     if coloured is None and strangest(inquiry, best, left) is None:
         return Survey(fits, probability, verdict, left, None)
     members = best.members if coloured is None and mostly(inquiry, best, left) else known_part(inquiry, best)
     known, left = _beside_unknown(inquiry, members, fit, coloured is not None)
+    if left and idle(inquiry, known):
+        return _nothing_known(inquiry, fits, null)
     if known.members != best.members:
         fits = (known, *(f for f in fits if f is not known))
         probability = np.concatenate([[1.0], np.zeros(len(fits) - 1)])
@@ -106,6 +112,14 @@ def survey(inquiry: Inquiry) -> Survey:
     if coloured is not None:
         return Survey(fits, probability, verdict, {**left, coloured.kind: coloured}, coloured.kind)
     return Survey(fits, probability, verdict, left, strangest(inquiry, known, left))
+
+
+def _nothing_known(inquiry: Inquiry, fits: tuple[Fitted, ...], null: Fitted) -> Survey:
+    """All of the gap is unknown."""
+    left = leftovers(inquiry, null, firm_prior(inquiry))
+    fits = (null, *(f for f in fits if f is not null))
+    sure = np.array([1.0] + [0.0] * (len(fits) - 1))
+    return Survey(fits, sure, Verdict("identified", 0, (), {}), left, max(left, key=lambda kind: left[kind].energy))
 
 
 def _beside_unknown(
