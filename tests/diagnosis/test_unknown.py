@@ -1,14 +1,19 @@
 """Effects that the library does not have, some of which a few of its members could follow for a while."""
 
+from dataclasses import replace
+
 import pytest
 
 from camcomp.commands.diagnose import examine
+from camcomp.remainder import idle
+from camcomp.survey import survey
 from tests.diagnosis.conftest import plan_of
 from tests.plants.causes import Cause
 from tests.plants.experiments import Plan
 
 GROWTH = plan_of(("spindle_growth", None), design="six", samples=150)
 CREEP = plan_of(("creep", "x"), design="six", samples=150)
+SOFT = plan_of(("drive_stiffness", "y"), design="six", samples=150)
 CROSSTALK = plan_of(("force_crosstalk", "y"), design="six", samples=150, seed=62)
 
 
@@ -44,3 +49,16 @@ def test_members_that_undo_each_other_explain_nothing(workshop):
     result = examine(workshop.made(plan)[0], without=("link_stiffness",))[0]
     assert result["verdict"] == "unknown"
     assert "tool_length" not in [cause["effect"] for cause in result["causes"]]
+
+
+def test_causes_that_leave_the_gap_where_it_was_explain_nothing(workshop, monkeypatch):
+    _, diagnosis, _ = workshop.answer(SOFT)
+    best = diagnosis.survey.fits[diagnosis.survey.verdict.best]
+    assert not idle(diagnosis.inquiry, best, 0.5)
+    assert idle(diagnosis.inquiry, replace(best, theta=0.1 * best.theta), 0.5)
+    assert not idle(diagnosis.inquiry, replace(best, theta=0.1 * best.theta))
+    assert idle(diagnosis.inquiry, replace(best, theta=-best.theta))
+    monkeypatch.setattr("camcomp.survey.idle", lambda *_: True)
+    found = survey(diagnosis.inquiry)
+    assert found.strange == "tip"
+    assert found.fits[found.verdict.best].members == ()
