@@ -17,6 +17,7 @@ from camcomp.gap.timeline import Timeline
 STEP_S = 0.001  # grid of what has memory: 0.2 um of interpolation at 1500 mm/s2
 MOST_STEPS = 40000
 ABRUPT_S = 0.010  # clocks of logs, the lag of a control and the build-up of a chip: a jump of the force is no better known
+_MOST = 0.1  # of a run's rows; those of grooves are one in a hundred
 _JUMP = 0.1  # of the largest force in the run; the turn of an arc or of a fine polygon stays beneath
 
 
@@ -57,7 +58,8 @@ class Course:
 def beside_jumps(course: Course) -> NDArray[np.bool_]:
     """Rows (n,) within ABRUPT_S of an instant at which the modelled force jumps (corner, entry, exit).
 
-    On which side of the jump such a row was taken nobody knows, and the machine springs by up to a millimetre there.
+    On which side of the jump such a row was taken nobody knows, and the machine springs by up to a millimetre there. None
+    where they are too many: short lines with corners between them leave no other rows to judge by.
     """
     near = np.zeros(len(course.time), dtype=bool)
     size = np.linalg.norm(course.node_force, axis=1).max(initial=0.0)
@@ -67,7 +69,8 @@ def beside_jumps(course: Course) -> NDArray[np.bool_]:
     after = np.concatenate([course.node_force[::NODES], np.zeros((1, 3))])
     start = np.append(course.node_time[::NODES], course.node_time[-1])
     at = np.sort(start[np.linalg.norm(after - before, axis=1) > _JUMP * size])
-    return np.searchsorted(at, course.time - ABRUPT_S) < np.searchsorted(at, course.time + ABRUPT_S, side="right")
+    found = np.searchsorted(at, course.time - ABRUPT_S) < np.searchsorted(at, course.time + ABRUPT_S, side="right")
+    return found if found.mean() < _MOST else near
 
 
 def course_of_program(

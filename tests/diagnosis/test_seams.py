@@ -5,12 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from camcomp.cli import run as camcomp
 from camcomp.commands.diagnose import examine
 from tests.campaign import runner
 from tests.diagnosis.conftest import plan_of
 from tests.plants.experiments import make, write
 
 SOON_S, EARLY_S = 0.008, 0.0002
+START = "G21 G90 G17 G94\nS8000 M3\nG0 X0 Y0 Z4\nG1 Z0 F300\n"
 
 
 def stamped_early(made):
@@ -36,3 +38,25 @@ def test_rows_on_the_wrong_side_of_a_corner_change_no_answer(tmp_path, cause):
     assert result["verdict"] == "identified"
     assert [(each["effect"], each["target"]) for each in result["causes"]] == [cause]
     assert result["gap"]["max_um"] < 8 * result["gap"]["rms_um"]
+
+
+def missing(folder, moves):
+    """Share of the rows of a run whose tip does not count."""
+    folder.mkdir()
+    (folder / "p.nc").write_text(START + "\n".join(moves) + "\nG0 Z20\nM5\nM30\n")
+    assert camcomp(["simulate", str(folder / "p.nc"), "--config", str(runner.CONFIG), "-o", str(folder / "l.csv")]) == 0
+    names, *rows = [line.split(",") for line in (folder / "l.csv").read_text().splitlines()]
+    rng = np.random.default_rng(3)
+    noisy = [[v if n in ("t_s", "line") or not v else f"{float(v) + rng.normal(0, 0.002):.4f}" for n, v in zip(names, row, strict=True)]
+             for row in rows]  # fmt: skip
+    (folder / "l.csv").write_text("\n".join(",".join(row) for row in [names, *noisy]) + "\n")
+    text = f"config: [{runner.CONFIG}]\nruns:\n  - {{name: a, program: p.nc, log: l.csv, cutting: true, started_s: 0}}\n"
+    (folder / "experiment.yaml").write_text(text)
+    _, diagnosis, _ = examine(folder / "experiment.yaml")
+    return float(np.isnan(diagnosis.inquiry.bench.observed(0)[:, 0]).mean())
+
+
+def test_rows_beside_corners_do_not_count_unless_there_are_hardly_others(tmp_path):
+    assert 0.0 < missing(tmp_path / "long", ["G1 X20 F800", "G1 Y20", "G1 X0"]) < 0.05
+    stairs = [f"G1 {'X' if k % 2 else 'Y'}{0.1 * (k + 1) / 2:.2f} F2400" for k in range(400)]
+    assert missing(tmp_path / "stairs", stairs) == 0.0
