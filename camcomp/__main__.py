@@ -1,6 +1,6 @@
 """`python -m camcomp`."""
 
-from camcomp.cli import main
+from camcomp.terminal.cli import main
 
 if __name__ == "__main__":
     main()

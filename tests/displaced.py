@@ -4,8 +4,8 @@ from random import Random
 
 import numpy as np
 
-from camcomp.datatypes import ARC, LINE, RAPID, Path
 from camcomp.gcode.output import Output
+from camcomp.ground.datatypes import ARC, LINE, RAPID, Path
 
 
 def shifted(path: Path, random: Random, size: float = 0.3) -> Output:

@@ -4,15 +4,15 @@ import math
 
 import numpy as np
 
-from camcomp.compensate import compensate
-from camcomp.config import load_config
-from camcomp.cutting.track import lay_track
-from camcomp.datatypes import ARC
-from camcomp.files import shipped
-from camcomp.job import Job
-from camcomp.moves import travel_of
-from camcomp.programs import open_program
-from camcomp.response import aim_at
+from camcomp.compensation.program.compensate import compensate
+from camcomp.compensation.program.moves import travel_of
+from camcomp.ground.datatypes import ARC
+from camcomp.ground.files import shipped
+from camcomp.model.config.load import load_config
+from camcomp.model.control import open_program
+from camcomp.model.cutting.track import lay_track
+from camcomp.model.job import Job
+from camcomp.model.motion.response import aim_at
 
 LEVELS = 4  # steps of a vertex to either side of the curve
 

@@ -27,13 +27,13 @@ from typing import Self
 
 import numpy as np
 
-from camcomp.cli import run
-from camcomp.diagnostics import ProgramError, format_error
 from camcomp.gcode import flow
 from camcomp.gcode.interpret import read_program
 from camcomp.gcode.output import Output
-from camcomp.gcode.program import Setup
 from camcomp.gcode.rewrite import rewrite
+from camcomp.gcode.setup import Setup
+from camcomp.ground.errors import ProgramError, format_error
+from camcomp.terminal.cli import run
 from tests.displaced import divided, shifted
 from tests.nc_writer import ProgramWriter
 
@@ -44,7 +44,7 @@ TOKENS = (  # noqa: SIM905
     "G90 G90.1 G91 G91.1 G92 G92.1 G92.3 G93 G94 G95 G98 G99 G10 L2 L20 P1 P2 P0 X0 X1. Y-2 Z3.5 I1 J-1 K.5 R2 R-2 F100 "
     "S500 T1 M3 M6 M30 M98 M99 N10 O100 # #1 #<a> =[1+2] [ ] ( ) ; % / , . - + = 1e3 nan inf o1 while endwhile if else "
     "endif sub endsub call repeat endrepeat do break continue return GOTO10 WHILE[#1LT3]DO1 END1 IF[#1EQ#0]THEN CR=5 "
-    "X=IC(1) I=AC(2) TURN=2 MSG(\"a\") SUPA R1=2 @1 ^2 99999999999 0.0000001 \r \n \r\n \t \0 \x1a \xff \xd6"
+    'X=IC(1) I=AC(2) TURN=2 MSG("a") SUPA R1=2 @1 ^2 99999999999 0.0000001 \r \n \r\n \t \0 \x1a \xff \xd6'
 ).split(" ")
 READER = str(ROOT.parent / "camcomp" / "gcode")
 SLOWEST = 10  # s

@@ -6,7 +6,7 @@ from random import Random
 from camcomp.dialects.rs274 import DIALECT
 from camcomp.gcode.arcs import PLANES
 from camcomp.gcode.interpret import Interpreter
-from camcomp.gcode.program import Setup
+from camcomp.gcode.setup import Setup
 from camcomp.gcode.text import Text
 from camcomp.gcode.words import read_line
 
@@ -85,11 +85,17 @@ class ProgramWriter:
         if state.feed_mode == 93:
             return f" F{self.random.uniform(1, 50):.2f}"
         if state.feed is None or self.random.random() < 0.1:
-            return f" F{self.random.choice([0.1, 0.25])}" if state.feed_mode == 95 else f" F{self.random.randint(50, 900)}"
+            return (
+                f" F{self.random.choice([0.1, 0.25])}" if state.feed_mode == 95 else f" F{self.random.randint(50, 900)}"
+            )
         return ""
 
     def code(self, code: int) -> str:
-        return "" if self.state.motion == 10 * code and self.random.random() < 0.7 else f"G{code:0{self.random.choice([1, 2])}d} "
+        return (
+            ""
+            if self.state.motion == 10 * code and self.random.random() < 0.7
+            else f"G{code:0{self.random.choice([1, 2])}d} "
+        )
 
     def straight(self, rapid: bool = False) -> None:
         random, state = self.random, self.state
@@ -177,7 +183,9 @@ class ProgramWriter:
 
     def machine(self) -> None:
         random, state = self.random, self.state
-        words = " ".join(a + self.number(20.0 / state.unit) for a in sorted(random.sample("XYZ", random.choice([1, 3]))))
+        words = " ".join(
+            a + self.number(20.0 / state.unit) for a in sorted(random.sample("XYZ", random.choice([1, 3])))
+        )
         if random.random() < 0.5 and not state.relative:
             self.put(f"G53 G0 {words}")
         else:

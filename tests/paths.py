@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from camcomp.datatypes import ARC, LINE, RAPID, Path
+from camcomp.ground.datatypes import ARC, LINE, RAPID, Path
 
 
 def path_of(*moves, start=(0.0, 0.0, 0.0), feed=300.0, speed=8000.0):

@@ -1,6 +1,6 @@
 """Where in a machine an effect with an actuator's name acts."""
 
-from camcomp.statics.description import Actuator, Chain, Robot
+from camcomp.model.statics.description import Actuator, Chain, Robot
 
 
 def place(robot: Robot, actuator: str) -> tuple[Chain, int]:

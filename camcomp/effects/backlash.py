@@ -4,15 +4,17 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from camcomp.datatypes import Floats
-from camcomp.gap.effect import Motion, Parameter
-from camcomp.gap.memory import play
+from camcomp.ground.datatypes import Floats
+from camcomp.model.effect import Motion, Parameter
+from camcomp.model.hysteresis import play
 
 STAGE = "drive"
 TARGET = "actuator"
 SOURCE = "play operator (Krasnoselskii, Pokrovskii: Systems with hysteresis, 1989); reversal value B of ISO 230-2"
 PARAMETERS = (
-    Parameter("width_mm", "mm", 0.0, 0.0, 0.5, 0.02, 0.0001, "worn ball screws: 2 to 50 um (ISO 230-2 reports)", sign=1),
+    Parameter(
+        "width_mm", "mm", 0.0, 0.0, 0.5, 0.02, 0.0001, "worn ball screws: 2 to 50 um (ISO 230-2 reports)", sign=1
+    ),
 )
 
 

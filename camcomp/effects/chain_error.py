@@ -5,9 +5,9 @@ from collections.abc import Mapping
 import numpy as np
 
 from camcomp.effects._aim import place
-from camcomp.gap.effect import Parameter
-from camcomp.statics.description import Actuator, Robot, Transform
-from camcomp.statics.rotation import exp_rotation
+from camcomp.model.effect import Parameter
+from camcomp.model.statics.description import Actuator, Robot, Transform
+from camcomp.model.statics.rotation import exp_rotation
 
 STAGE = "structure"
 TARGET = "actuator"

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from camcomp.gap.effect import Load, Motion, Parameter
+from camcomp.model.effect import Load, Motion, Parameter
 
 STAGE = "process"
 TARGET = "machine"

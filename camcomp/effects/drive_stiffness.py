@@ -3,14 +3,16 @@
 from collections.abc import Mapping
 from dataclasses import replace
 
-from camcomp.gap.effect import Parameter
-from camcomp.statics.description import Actuator, Robot
+from camcomp.model.effect import Parameter
+from camcomp.model.statics.description import Actuator, Robot
 
 STAGE = "structure"
 TARGET = "actuator"
 SOURCE = "definition: factor on the spring of the actuator"
 PARAMETERS = (
-    Parameter("factor", "1", 1.0, 0.02, 20.0, 0.4, 0.004, "axial stiffness of feed drives is known to -50 .. +100 %", log=True),
+    Parameter(
+        "factor", "1", 1.0, 0.02, 20.0, 0.4, 0.004, "axial stiffness of feed drives is known to -50 .. +100 %", log=True
+    ),
 )
 
 

@@ -4,9 +4,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from camcomp.datatypes import Floats
-from camcomp.gap.effect import Motion, Parameter
-from camcomp.gap.memory import PRESLIDING_MM, held_back
+from camcomp.ground.datatypes import Floats
+from camcomp.model.effect import Motion, Parameter
+from camcomp.model.hysteresis import PRESLIDING_MM, held_back
 
 STAGE = "drive"
 TARGET = "actuator"
@@ -18,10 +18,10 @@ FITTED = (
 )
 # Known where drive forces are logged; the other channels hardly see them.
 _MORE = (
+    Parameter("viscous_Ns_per_mm", "Ns/mm", 0.0, 0.0, 100.0, 0.2, 0.002, "grease and seals: 0.01 to 1 N s/mm", sign=1),
     Parameter(
-        "viscous_Ns_per_mm", "Ns/mm", 0.0, 0.0, 100.0, 0.2, 0.002, "grease and seals: 0.01 to 1 N s/mm", sign=1
+        "asymmetry_Ns_per_mm", "Ns/mm", 0.0, -100.0, 100.0, 0.05, 0.001, "viscous forward minus mean of both ways"
     ),
-    Parameter("asymmetry_Ns_per_mm", "Ns/mm", 0.0, -100.0, 100.0, 0.05, 0.001, "viscous forward minus mean of both ways"),
 )
 PARAMETERS = (FITTED[0], *_MORE, FITTED[1])
 

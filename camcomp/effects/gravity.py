@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from camcomp.gap.effect import Load, Motion, Parameter
+from camcomp.model.effect import Load, Motion, Parameter
 
 STAGE = "structure"
 TARGET = "machine"

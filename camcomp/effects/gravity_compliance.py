@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 from dataclasses import replace
 
-from camcomp.gap.effect import Parameter
-from camcomp.statics.description import Actuator, Robot
+from camcomp.model.effect import Parameter
+from camcomp.model.statics.description import Actuator, Robot
 
 STAGE = "structure"
 TARGET = "actuator"

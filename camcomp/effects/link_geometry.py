@@ -8,9 +8,9 @@ from collections.abc import Mapping
 import numpy as np
 
 from camcomp.effects._aim import place
-from camcomp.gap.effect import Parameter
-from camcomp.statics.description import Actuator, Robot, Transform
-from camcomp.statics.rotation import exp_rotation
+from camcomp.model.effect import Parameter
+from camcomp.model.statics.description import Actuator, Robot, Transform
+from camcomp.model.statics.rotation import exp_rotation
 
 STAGE = "structure"
 TARGET = "actuator"
@@ -43,7 +43,8 @@ def on_robot(robot: Robot, actuators: tuple[str, ...], p: Mapping[str, float]) -
     for name in actuators:
         chain, k = place(robot, name)
         end = next(
-            (i for i in range(k + 1, len(chain.elements)) if isinstance(chain.elements[i], Actuator)), len(chain.elements)
+            (i for i in range(k + 1, len(chain.elements)) if isinstance(chain.elements[i], Actuator)),
+            len(chain.elements),
         )
         robot = robot.edit_chain(chain.name, elements=(*chain.elements[:end], error, *chain.elements[end:]))
     return robot

@@ -6,15 +6,13 @@ from dataclasses import replace
 import numpy as np
 
 from camcomp.effects._aim import place
-from camcomp.gap.effect import Parameter
-from camcomp.statics.description import Actuator, Element, Parallelogram, Robot, Transform
+from camcomp.model.effect import Parameter
+from camcomp.model.statics.description import Actuator, Element, Parallelogram, Robot, Transform
 
 STAGE = "structure"
 TARGET = "actuator"
 SOURCE = "definition: the link that the actuator drives, lengthened along itself"
-PARAMETERS = (
-    Parameter("length_mm", "mm", 0.0, -10.0, 10.0, 0.1, 0.0003, "links made to 0.02 to 0.3 mm"),
-)
+PARAMETERS = (Parameter("length_mm", "mm", 0.0, -10.0, 10.0, 0.1, 0.0003, "links made to 0.02 to 0.3 mm"),)
 
 
 def _longer(each: Element, length: float) -> Element | None:

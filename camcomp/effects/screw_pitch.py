@@ -2,14 +2,16 @@
 
 from collections.abc import Mapping
 
-from camcomp.datatypes import Floats
-from camcomp.gap.effect import Motion, Parameter
+from camcomp.ground.datatypes import Floats
+from camcomp.model.effect import Motion, Parameter
 
 STAGE = "drive"
 TARGET = "actuator"
 SOURCE = "definition: carriage minus encoder = ppm 1e-6 (encoder - home); classes of ISO 3408-3"
 PARAMETERS = (
-    Parameter("error_ppm", "ppm", 0.0, -20000.0, 20000.0, 150.0, 1.0, "ISO 3408-3, classes 5 to 10: 23 to 210 um per 300 mm"),
+    Parameter(
+        "error_ppm", "ppm", 0.0, -20000.0, 20000.0, 150.0, 1.0, "ISO 3408-3, classes 5 to 10: 23 to 210 um per 300 mm"
+    ),
 )
 
 

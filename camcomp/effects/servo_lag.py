@@ -4,9 +4,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from camcomp.datatypes import Floats
-from camcomp.gap.effect import Motion, Parameter
-from camcomp.gap.memory import first_order
+from camcomp.ground.datatypes import Floats
+from camcomp.model.effect import Motion, Parameter
+from camcomp.model.hysteresis import first_order
 
 STAGE = "control"
 TARGET = "either"

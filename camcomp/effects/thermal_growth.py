@@ -4,8 +4,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from camcomp.datatypes import Floats
-from camcomp.gap.effect import Motion, Parameter
+from camcomp.ground.datatypes import Floats
+from camcomp.model.effect import Motion, Parameter
 
 STAGE = "drive"
 TARGET = "either"

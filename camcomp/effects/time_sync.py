@@ -2,15 +2,13 @@
 
 from collections.abc import Mapping
 
-from camcomp.datatypes import Floats
-from camcomp.gap.effect import Parameter
+from camcomp.ground.datatypes import Floats
+from camcomp.model.effect import Parameter
 
 STAGE = "sensor"
 TARGET = "machine"
 SOURCE = "definition: a row's tip is the one that the machine had offset_s earlier"
-PARAMETERS = (
-    Parameter("offset_s", "s", 0.0, -1.0, 1.0, 0.006, 0.000005, "unsynchronised loggers: 0.5 to 20 ms"),
-)
+PARAMETERS = (Parameter("offset_s", "s", 0.0, -1.0, 1.0, 0.006, 0.000005, "unsynchronised loggers: 0.5 to 20 ms"),)
 
 
 def on_clock(time: Floats, p: Mapping[str, float]) -> Floats:

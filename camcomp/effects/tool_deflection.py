@@ -4,14 +4,24 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from camcomp.datatypes import Floats
-from camcomp.gap.effect import Load, Motion, Parameter
+from camcomp.ground.datatypes import Floats
+from camcomp.model.effect import Load, Motion, Parameter
 
 STAGE = "tool"
 TARGET = "machine"
 SOURCE = "cantilever, deflection = force L^3 / (3 E I), across the tool axis (machine z)"
 PARAMETERS = (
-    Parameter("compliance_mm_per_N", "mm/N", 0.0, 0.0, 0.05, 1.5e-4, 5e-7, "end mills of 6 to 20 mm: 2e-5 to 1e-3 mm/N", sign=1),
+    Parameter(
+        "compliance_mm_per_N",
+        "mm/N",
+        0.0,
+        0.0,
+        0.05,
+        1.5e-4,
+        5e-7,
+        "end mills of 6 to 20 mm: 2e-5 to 1e-3 mm/N",
+        sign=1,
+    ),
 )
 
 

@@ -5,15 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from camcomp.gap.effect import Parameter
-from camcomp.statics.description import Robot
+from camcomp.model.effect import Parameter
+from camcomp.model.statics.description import Robot
 
 STAGE = "tool"
 TARGET = "machine"
 SOURCE = "definition"
-PARAMETERS = (
-    Parameter("length_mm", "mm", 0.0, -20.0, 20.0, 0.1, 0.0003, "tool setting: 0.02 to 0.5 mm"),
-)
+PARAMETERS = (Parameter("length_mm", "mm", 0.0, -20.0, 20.0, 0.1, 0.0003, "tool setting: 0.02 to 0.5 mm"),)
 
 
 def on_robot(robot: Robot, actuators: tuple[str, ...], p: Mapping[str, float]) -> Robot:

@@ -4,8 +4,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from camcomp.datatypes import Floats
-from camcomp.gap.effect import Parameter
+from camcomp.ground.datatypes import Floats
+from camcomp.model.effect import Parameter
 
 STAGE = "workpiece"
 TARGET = "machine"

@@ -3,9 +3,9 @@
 import numpy as np
 from pydantic import Field
 
-from camcomp.cutting.cut import Cut
-from camcomp.datatypes import Floats
-from camcomp.specbase import Spec
+from camcomp.ground.datatypes import Floats
+from camcomp.model.config.base import Spec
+from camcomp.model.cutting.cut import Cut
 
 SOURCES = (
     "The groove example of Klimchik, Pashkevich, Chablat, Hovland, Compensation of compliance errors in parallel "
@@ -16,7 +16,9 @@ SOURCES = (
 class Params(Spec):
     """Force on the tool in the path frame."""
 
-    Fr_N: float = Field(description="force on the tool to the right of the feed (outward on a counter-clockwise circle)")
+    Fr_N: float = Field(
+        description="force on the tool to the right of the feed (outward on a counter-clockwise circle)"
+    )
     Ft_N: float = Field(description="force on the tool along the feed; negative holds the tool back")
     Fz_N: float = Field(description="force on the tool along its axis, away from the workpiece; negative pulls it down")
 

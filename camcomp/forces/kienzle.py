@@ -4,12 +4,12 @@ from typing import Literal
 
 from pydantic import Field
 
-from camcomp.cutting.average import power_law, to_path
-from camcomp.cutting.conditions import axial_depth, engagement, feed_per_tooth
-from camcomp.cutting.cut import Cut
-from camcomp.datatypes import Floats
-from camcomp.diagnostics import ConfigError
-from camcomp.specbase import Spec
+from camcomp.ground.datatypes import Floats
+from camcomp.ground.errors import ConfigError
+from camcomp.model.config.base import Spec
+from camcomp.model.cutting.average import power_law, to_path
+from camcomp.model.cutting.conditions import axial_depth, engagement, feed_per_tooth
+from camcomp.model.cutting.cut import Cut
 
 SOURCES = (
     "Kienzle's law kc = kc1.1 h^-mc (h in mm), integrated exactly over the engagement. kc falls by about 1 % per degree "

@@ -4,11 +4,11 @@ from typing import Literal
 
 from pydantic import Field
 
-from camcomp.cutting.average import linear_edge, to_path
-from camcomp.cutting.conditions import axial_depth, engagement, feed_per_tooth
-from camcomp.cutting.cut import Cut
-from camcomp.datatypes import Floats
-from camcomp.specbase import Spec
+from camcomp.ground.datatypes import Floats
+from camcomp.model.config.base import Spec
+from camcomp.model.cutting.average import linear_edge, to_path
+from camcomp.model.cutting.conditions import axial_depth, engagement, feed_per_tooth
+from camcomp.model.cutting.cut import Cut
 
 SOURCES = (
     "Y. Altintas, Manufacturing Automation, section 2.7: edge forces linear in the chip thickness, integrated over the "

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from camcomp.cutting.cut import Cut
-from camcomp.datatypes import Floats
-from camcomp.specbase import Spec
+from camcomp.ground.datatypes import Floats
+from camcomp.model.config.base import Spec
+from camcomp.model.cutting.cut import Cut
 
 SOURCES = "A definition: no force."
 

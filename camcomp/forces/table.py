@@ -1,16 +1,16 @@
-"""A measured force along the path, from a CSV file (columns: see camcomp/cutting/forcetable.py)."""
+"""A measured force along the path, from a CSV file (columns: see camcomp/model/cutting/forcetable.py)."""
 
 from functools import lru_cache
 from pathlib import Path
 
 from pydantic import Field
 
-from camcomp.cutting.cut import Cut
-from camcomp.cutting.forcetable import ForceTable, look_up, parse_table
-from camcomp.cutting.frame import to_components
-from camcomp.datatypes import Floats
-from camcomp.diagnostics import FileError
-from camcomp.specbase import Spec
+from camcomp.ground.datatypes import Floats
+from camcomp.ground.errors import FileError
+from camcomp.model.config.base import Spec
+from camcomp.model.cutting.cut import Cut
+from camcomp.model.cutting.forcetable import ForceTable, look_up, parse_table
+from camcomp.model.cutting.frame import to_components
 
 SOURCES = "The user's own measurement; the table is interpolated linearly along the path."
 

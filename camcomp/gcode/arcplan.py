@@ -7,8 +7,8 @@ become a full circle; when it separates them, a full circle would become a tiny 
 import math
 from typing import NamedTuple
 
-from camcomp.datatypes import ARC, LINE
 from camcomp.gcode.arcs import PLANES, SAME_POINT, SPIRAL_INCH, SPIRAL_MM, SPIRAL_RELATIVE, sweep
+from camcomp.ground.datatypes import ARC, LINE
 
 _FULL = 2.0 * math.pi
 _CHORD = 0.05  # rad

@@ -3,15 +3,16 @@
 import math
 from typing import NoReturn
 
-from camcomp.diagnostics import ProgramError
 from camcomp.gcode.codes import CANCELS, GROUPS_M, KNOWN_M, SAVES, code_name
 from camcomp.gcode.dialect import Dialect
 from camcomp.gcode.naming import named
-from camcomp.gcode.program import Rebase, Setup
+from camcomp.gcode.program import Rebase
 from camcomp.gcode.record import Recorder
-from camcomp.gcode.state import State
+from camcomp.gcode.setup import Setup
+from camcomp.gcode.state import ControlState
 from camcomp.gcode.text import Text
 from camcomp.gcode.words import Word
+from camcomp.ground.errors import ProgramError
 
 
 class Block:
@@ -44,12 +45,14 @@ class Block:
 
 
 class BlockReader:
-    """Makes blocks of words; holds what all of the interpreter shares."""
+    """Makes blocks of words; holds what all of the interpreter shares, and says what a flow of lines may ask of it."""
+
+    straight = True  # no loops, subprograms, parameters: each line was executed at most once, as it stands
 
     def __init__(self, text: Text, setup: Setup, dialect: Dialect) -> None:
         self.text = text
         self.dialect = dialect
-        self.state = State(setup, dialect)
+        self.state = ControlState(setup, dialect)
         self.record = Recorder(text)
         self.warnings: list[str] = []
         self.rebases: list[Rebase] = []
@@ -70,6 +73,10 @@ class BlockReader:
         """Raise a ProgramError at a word of the current block."""
         column = word.begin if word else self.block.column
         raise ProgramError(rule, message, at=self.text.place(self.block.row, column), hint=hint)
+
+    def perform(self, block: Block) -> bool:
+        """Execute a block; True when it ends the program."""
+        raise NotImplementedError
 
     def sort(self, row: int, words: list[Word]) -> Block:
         """Block of the words, each letter once and each modal group once."""
@@ -132,7 +139,9 @@ class BlockReader:
         group = GROUPS_M.get(code)
         for other, _ in block.m:
             if group is not None and GROUPS_M.get(other) == group:
-                self.refuse("CC105", f"{named(f'M{code}')} and {named(f'M{other}')} exclude each other in one block", word)
+                self.refuse(
+                    "CC105", f"{named(f'M{code}')} and {named(f'M{other}')} exclude each other in one block", word
+                )
         if code not in KNOWN_M:
             self.warn(f"M{code} is passed on; camcomp takes it not to move anything", once=True)
         block.m.append((code, word))

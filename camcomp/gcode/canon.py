@@ -4,8 +4,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from camcomp.datatypes import ARC, LINE, RAPID, Path
 from camcomp.gcode.numbers import plain
+from camcomp.ground.datatypes import ARC, LINE, RAPID, Path
 
 _KINDS = {RAPID: "rapid", LINE: "line", ARC: "arc"}
 

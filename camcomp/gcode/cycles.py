@@ -8,7 +8,7 @@ from camcomp.gcode.motions import Motions
 # Depth axis among X, Y, Z by plane.
 _DEPTH = {17: 2, 18: 1, 19: 0}
 _TAPS = (740, 840)
-_WORDS = "RPQLIJK"
+_CYCLE_WORDS = "RPQLIJK"
 
 
 class Cycles(Motions):
@@ -44,7 +44,7 @@ class Cycles(Motions):
             self.refuse("CC132", f"the retract plane of {name} lies below its bottom")
         repeats = self._repeats(block)
         self.actions = []
-        block.used |= set(_WORDS)
+        block.used |= set(_CYCLE_WORDS)
         first = True
         for _ in range(repeats):
             place = self._place(block, depth)
@@ -161,14 +161,14 @@ class Cycles(Motions):
             self._go(block, 1, self._at(place, depth, reached), feed)
             if code == 830:
                 self._go(block, 0, self._at(place, depth, level), feed)
-            self._go(block, 0, self._at(place, depth, min(reached + gap, level) if code == 830 else reached + gap), feed)
+            self._go(
+                block, 0, self._at(place, depth, min(reached + gap, level) if code == 830 else reached + gap), feed
+            )
             reached -= step
         self._go(block, 1, self._at(place, depth, bottom), feed)
         self._go(block, 0, self._at(place, depth, clear), feed)
 
-    def _back_bore(
-        self, block: Block, place: list[float], heights: tuple[float, float, float], feed: float
-    ) -> None:
+    def _back_bore(self, block: Block, place: list[float], heights: tuple[float, float, float], feed: float) -> None:
         """G87: down beside the hole with the spindle oriented, then cut upwards."""
         bottom, level, clear = heights
         state = self.state

@@ -2,14 +2,19 @@
 
 import re
 
-from camcomp.diagnostics import ProgramError
 from camcomp.gcode.dialect import Dialect
 from camcomp.gcode.text import Text
-from camcomp.shelf import load, members
+from camcomp.ground.errors import ProgramError
+from camcomp.ground.shelf import load, members
 
 _LOOKED_AT = 200_000  # characters
-_PLAINTEXT = re.compile(r"^[ \t]*+\d*[ \t]*+(BEGIN[ \t]++PGM|TOOL[ \t]++(CALL|DEF)|L[ \t]++[XYZ][ \t]*+[+-]|CC[ \t]++X|BLK[ \t]++FORM)", re.MULTILINE | re.IGNORECASE)
-_PLAIN_LINES = re.compile(r"^(?:[ \t]*+(?:[NXYZF][ \t]*+[-+.\d]++|G[ \t]*+0?[01](?![\d.])))++[ \t]*+\n", re.MULTILINE | re.IGNORECASE)
+_PLAINTEXT = re.compile(
+    r"^[ \t]*+\d*[ \t]*+(BEGIN[ \t]++PGM|TOOL[ \t]++(CALL|DEF)|L[ \t]++[XYZ][ \t]*+[+-]|CC[ \t]++X|BLK[ \t]++FORM)",
+    re.MULTILINE | re.IGNORECASE,
+)
+_PLAIN_LINES = re.compile(
+    r"^(?:[ \t]*+(?:[NXYZF][ \t]*+[-+.\d]++|G[ \t]*+0?[01](?![\d.])))++[ \t]*+\n", re.MULTILINE | re.IGNORECASE
+)
 DEFAULT = "rs274"
 _ENOUGH = 4  # weight of marks below which a text could be anything
 
@@ -25,7 +30,9 @@ def dialect_of(text: Text, name: str | None = None) -> Dialect:
     if len(_PLAINTEXT.findall(sample)) >= 2:
         found = _PLAINTEXT.search(sample)
         row = sample.count("\n", 0, found.start(1)) if found else 0
-        raise ProgramError("CC127", "this is a Heidenhain conversational program", at=text.place(min(row, len(text) - 1)))
+        raise ProgramError(
+            "CC127", "this is a Heidenhain conversational program", at=text.place(min(row, len(text) - 1))
+        )
     sample = _PLAIN_LINES.sub("", sample)  # most of a program; every control reads them, so no mark is in them
     best, most = _record(DEFAULT), _ENOUGH - 1
     for member in members("dialects"):

@@ -6,13 +6,13 @@ changed has to be written out first. Comments stay; jumps, calls and cycles stay
 
 import numpy as np
 
-from camcomp.diagnostics import ProgramError
 from camcomp.gcode.edits import Edits
 from camcomp.gcode.interpret import Interpreter, controller, read_program
 from camcomp.gcode.numbers import decimals, plain
 from camcomp.gcode.program import Program
 from camcomp.gcode.trace import Executed, Trace
 from camcomp.gcode.words import BLANK, Word, code_of
+from camcomp.ground.errors import ProgramError
 
 _LENGTHS = "XYZIJKRQ"
 _CYCLE_WORDS = "XYZIJKRPQL"

@@ -3,9 +3,7 @@
 import math
 from typing import NoReturn
 
-from camcomp.diagnostics import ProgramError
-from camcomp.gcode.block import Block
-from camcomp.gcode.cycles import Cycles
+from camcomp.gcode.block import BlockReader
 from camcomp.gcode.expressions import Expression, ExpressionError, parameters_of
 from camcomp.gcode.memory import Parameters
 from camcomp.gcode.siemens import read_siemens_line
@@ -13,26 +11,17 @@ from camcomp.gcode.spelling import FANUC
 from camcomp.gcode.text import Text
 from camcomp.gcode.trace import Trace
 from camcomp.gcode.words import BLANK, Line, Word, code_of, read_line
+from camcomp.ground.errors import ProgramError
 
 _MOST_BLOCKS = 1_000_000  # executed by a program that has loops
 _MOST_IDLE = 100_000  # of them in a row that move nothing
 _INCREMENTAL_LETTERS = "XYZIJKRQ"
 
 
-class Executor(Cycles):
-    """What executes a block; Flow only says which."""
-
-    straight = True  # no loops, subprograms, parameters: each line was executed at most once, as it stands
-
-    def perform(self, block: Block) -> bool:
-        """Execute a block; True when it ends the program."""
-        raise NotImplementedError
-
-
 class Flow:
     """Executes lines from top to bottom; the base of dialects with jumps."""
 
-    def __init__(self, reader: "Executor", trace: Trace | None = None) -> None:
+    def __init__(self, reader: BlockReader, trace: Trace | None = None) -> None:
         self.reader = reader
         self.trace = trace
         self.text: Text = reader.text

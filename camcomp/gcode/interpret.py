@@ -5,17 +5,20 @@ One block at a time, in the order of execution of RS274/NGC: modes first, then s
 
 import re
 
-from camcomp.diagnostics import ProgramError
 from camcomp.gcode.block import Block
 from camcomp.gcode.codes import AXIS_USERS, CYCLES, ENDS, HOMES, MACHINE_MOVES, PLAIN_M, STOPS, code_name
+from camcomp.gcode.cycles import Cycles
 from camcomp.gcode.detect import dialect_of
-from camcomp.gcode.flow import Executor, Flow, Siemens
+from camcomp.gcode.flow import Flow, Siemens
 from camcomp.gcode.macro import Macro
 from camcomp.gcode.owords import OWords
-from camcomp.gcode.program import Program, Setup
+from camcomp.gcode.program import Program
+from camcomp.gcode.settings import Settings
+from camcomp.gcode.setup import Setup
 from camcomp.gcode.text import Text
 from camcomp.gcode.trace import Trace
 from camcomp.gcode.words import code_of
+from camcomp.ground.errors import ProgramError
 
 _NO_AXES = frozenset((40, 921, 922, 923, 281, 301))
 
@@ -57,7 +60,7 @@ def read_program(data: bytes, *, name: str, setup: Setup | None = None, dialect:
     )
 
 
-class Interpreter(Executor):
+class Interpreter(Settings, Cycles):
     """Executes blocks and records every motion."""
 
     def perform(self, block: Block) -> bool:

@@ -2,13 +2,13 @@
 
 import math
 
-from camcomp.datatypes import ARC, RAPID
 from camcomp.gcode.arcplan import Move, Point, turns_of
 from camcomp.gcode.arcs import PLANES, sweep
 from camcomp.gcode.edits import Edits
 from camcomp.gcode.numbers import decimals, plain, significant
 from camcomp.gcode.output import FEED_SLACK
 from camcomp.gcode.program import F, G, P, Program, R
+from camcomp.ground.datatypes import ARC, RAPID
 
 SHAPE_WORDS = (0, 1, 2, 3, 4, 5, R, P)  # words that say where a motion goes
 BLANKS = " \t"

@@ -2,16 +2,17 @@
 
 import re
 
+from camcomp.gcode.block import BlockReader
 from camcomp.gcode.expressions import Expression, ExpressionError, Parser
-from camcomp.gcode.flow import Executor, Flow
-from camcomp.gcode.memory import Frame
+from camcomp.gcode.flow import Flow
+from camcomp.gcode.memory import CallFrame
 from camcomp.gcode.trace import Trace
 from camcomp.gcode.words import Word, code_of
 
 _PROGRAM = re.compile(r"[ \t\0]*[O:][ \t]*(\d+)[ \t\0]*(?:\(|;|$)", re.IGNORECASE)
 _NUMBER = re.compile(r"[ \t\0]*/?\d?[ \t]*N[ \t]*(\d+)", re.IGNORECASE)
-_JUMP = re.compile(r"[ \t\0]*/?(?:N[ \t]*\d+[ \t]*)?(IF|WHILE|DO|END|GOTO)(?![A-Z])", re.IGNORECASE)
-_END = re.compile(r"M[ \t]*0*(?:2|30)(?!\d)", re.IGNORECASE)
+_JUMP_WORD = re.compile(r"[ \t\0]*/?(?:N[ \t]*\d+[ \t]*)?(IF|WHILE|DO|END|GOTO)(?![A-Z])", re.IGNORECASE)
+_END_CODE = re.compile(r"M[ \t]*0*(?:2|30)(?!\d)", re.IGNORECASE)
 # Parameters that the arguments of G65 become.
 _ARGUMENTS = dict(zip("ABCIJKDEFHMQRSTUVWXYZ", (*range(1, 10), 11, 13, *range(17, 27)), strict=True))
 _DEEPEST = 100
@@ -20,7 +21,7 @@ _DEEPEST = 100
 class Subprograms(Flow):
     """M98 and M99, with the subprograms in the same file."""
 
-    def __init__(self, reader: Executor, trace: Trace | None = None) -> None:
+    def __init__(self, reader: BlockReader, trace: Trace | None = None) -> None:
         super().__init__(reader, trace)
         self._programs: dict[int, int] = {}
         self._returns: list[tuple[int, int, int]] = []  # row of the call, row of the program, passes left
@@ -109,7 +110,7 @@ class Subprograms(Flow):
 class Macro(Subprograms):
     """Fanuc custom macro B."""
 
-    def __init__(self, reader: Executor, trace: Trace | None = None) -> None:
+    def __init__(self, reader: BlockReader, trace: Trace | None = None) -> None:
         super().__init__(reader, trace)
         self._framed: set[int] = set()
         self._find_programs()
@@ -122,13 +123,13 @@ class Macro(Subprograms):
             if row == first or row in self._called:
                 continue
             _, last = self._program_rows(row)
-            if any(_END.search(code_of(self.text.line(other))) for other in range(row, last)):
+            if any(_END_CODE.search(code_of(self.text.line(other))) for other in range(row, last)):
                 self.refuse(row, 0, "CC136", f"O{number} is a program of its own, and is not called")
 
     def step(self, row: int) -> int | None:
         """Execute line `row`; the row that comes next, None at the end."""
         line = self.text.line(row)
-        found = _JUMP.match(line)
+        found = _JUMP_WORD.match(line)
         if found:
             return self._jump(row, found[1].upper(), found.end())
         if "65" in line and "G" in line.upper():
@@ -238,7 +239,7 @@ class Macro(Subprograms):
         if start is None:
             self.refuse(row, words[0].begin, "CC125", "the program that G65 calls is not in this file")
         arguments = {_ARGUMENTS[letter]: word.value for letter, word in values.items() if letter in _ARGUMENTS}
-        self.memory.frames.append(Frame(dict(arguments)))
+        self.memory.frames.append(CallFrame(dict(arguments)))
         self._framed.add(row)
         return self._enter(row, start, int(repeats.value) if repeats else 1)
 

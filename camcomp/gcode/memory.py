@@ -4,7 +4,7 @@ import math
 
 from camcomp.gcode.expressions import Expression, ExpressionError, Memory, evaluate, index_of
 from camcomp.gcode.spelling import FANUC
-from camcomp.gcode.state import State
+from camcomp.gcode.state import ControlState
 
 LOCAL = 30  # #1 to #30 belong to the subprogram in RS274, #1 to #33 in Fanuc
 _LAST = 5602  # parameters of RS274
@@ -12,7 +12,7 @@ _DEBUG = 5599  # switches messages on and off
 _MACHINE_ONLY = "its value is known at the machine only"
 
 
-class Frame:
+class CallFrame:
     """Parameters of one subprogram call."""
 
     def __init__(self, local: dict[int, float] | None = None) -> None:
@@ -23,13 +23,13 @@ class Frame:
 class Parameters(Memory):
     """Values by number and by name. Reading what only the machine knows raises ExpressionError."""
 
-    def __init__(self, state: State, macro: bool) -> None:
+    def __init__(self, state: ControlState, macro: bool) -> None:
         self.state = state
         self.macro = macro  # Fanuc: a parameter that was never set is vacant, not zero
         self.spelling = FANUC
         self.common: dict[int, float] = {}
         self.shared: dict[str, float] = {}
-        self.frames = [Frame()]
+        self.frames = [CallFrame()]
         self.row = 0
 
     def _local(self, number: int) -> bool:
@@ -135,7 +135,9 @@ class Parameters(Memory):
         }
         if name in values:
             return values[name]()
-        if name in ("_task", "_motion_mode", "_current_pocket", "_selected_pocket", "_vmajor", "_vminor") or name[:4] in (
+        if name in ("_task", "_motion_mode", "_current_pocket", "_selected_pocket", "_vmajor", "_vminor") or name[
+            :4
+        ] in (
             "_hal",
             "_ini",
         ):

@@ -3,15 +3,14 @@
 import math
 
 from camcomp.gcode import arcs
-from camcomp.gcode.block import Block
-from camcomp.gcode.settings import Settings
+from camcomp.gcode.block import Block, BlockReader
 
-_LARGEST = 1.0e7  # mm; a machine of ten kilometres is a typing mistake
+LARGEST_MM = 1.0e7  # mm; a machine of ten kilometres is a typing mistake
 _MOST_TURNS = 1000
 _NOTHING = 1.0e-9  # mm; arithmetic leaves that much between equal points
 
 
-class Motions(Settings):
+class Motions(BlockReader):
     """Executes the motion of a block."""
 
     def target(self, block: Block, machine: bool = False) -> list[float]:
@@ -21,7 +20,7 @@ class Motions(Settings):
         for axis in block.axes:
             word = block.words["XYZ"[axis]]
             value = word.value * state.unit
-            if abs(value) > _LARGEST:
+            if abs(value) > LARGEST_MM:
                 self.refuse("CC138", f"{word.letter}{word.value:g} is out of every machine's reach", word)
             if machine:
                 end[axis] = value - state.zero[axis]
@@ -114,7 +113,7 @@ class Motions(Settings):
         centre3 = list(start3)
         centre3[u], centre3[v] = centre[0] * unit, centre[1] * unit
         radius = math.hypot(start3[u] - centre3[u], start3[v] - centre3[v])
-        if radius * min(abs(angle), math.tau) > _LARGEST:
+        if radius * min(abs(angle), math.tau) > LARGEST_MM:
             self.refuse("CC138", f"an arc of radius {radius:g} mm is out of every machine's reach")
         if state.feed_mode == 93:
             feed *= math.hypot(radius * angle, end3[w] - start3[w])

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from camcomp.datatypes import ARC, LINE, RAPID, Bools, Floats, Ints, Path, frozen
+from camcomp.ground.datatypes import ARC, LINE, RAPID, Bools, Floats, Ints, Path, frozen
 
 FEED_SLACK = 1.0e-3  # relative difference of a feed that is not worth an F word
 

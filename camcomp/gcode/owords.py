@@ -3,10 +3,10 @@
 import re
 from typing import NamedTuple
 
+from camcomp.gcode.block import BlockReader
 from camcomp.gcode.expressions import ExpressionError, Parser
-from camcomp.gcode.flow import Executor
 from camcomp.gcode.macro import Subprograms
-from camcomp.gcode.memory import Frame
+from camcomp.gcode.memory import CallFrame
 from camcomp.gcode.trace import Trace
 from camcomp.gcode.words import Line, code_of
 
@@ -38,7 +38,7 @@ class Call(NamedTuple):
 class OWords(Subprograms):
     """Executes a program with O-words. The partner of every statement is found by its label beforehand."""
 
-    def __init__(self, reader: Executor, trace: Trace | None = None) -> None:
+    def __init__(self, reader: BlockReader, trace: Trace | None = None) -> None:
         super().__init__(reader, trace)
         self._statements: dict[int, Statement] = {}
         self._subs: dict[str, int] = {}
@@ -94,7 +94,9 @@ class OWords(Subprograms):
     def _match(self, row: int) -> int:
         partner = self._partner.get(row)
         if partner is None:
-            self.refuse(row, 0, "CC124", f"o{self._statements[row].label} {self._statements[row].keyword} has no partner")
+            self.refuse(
+                row, 0, "CC124", f"o{self._statements[row].label} {self._statements[row].keyword} has no partner"
+            )
         return partner
 
     # --- execution ---------------------------------------------------------------------------------------------
@@ -167,7 +169,7 @@ class OWords(Subprograms):
         if len(self._calls) >= _DEEPEST:
             self.refuse(row, 0, "CC126", "subroutines call each other without end")
         self._calls.append(Call(row + 1, statement.label))
-        self.memory.frames.append(Frame({number + 1: value for number, value in enumerate(values)}))
+        self.memory.frames.append(CallFrame({number + 1: value for number, value in enumerate(values)}))
         return start + 1
 
     def _return(self, row: int, statement: Statement) -> int:
@@ -262,7 +264,9 @@ class OWords(Subprograms):
         """LinuxCNC looks for the next line of that label, and takes a second `break` on its way for the loop's end."""
         for other in range(row + 1, end):
             if other in self._statements and self._statements[other].label == statement.label:
-                self.refuse(row, 0, "CC124", f"another o{statement.label} line stands between this one and the loop's end")
+                self.refuse(
+                    row, 0, "CC124", f"another o{statement.label} line stands between this one and the loop's end"
+                )
 
     def execute(self, row: int) -> bool:
         """Execute an ordinary line; True when the program ends there."""

@@ -7,17 +7,17 @@ from typing import Protocol
 
 import numpy as np
 
-from camcomp.datatypes import ARC, LINE, RAPID, Path, frozen
 from camcomp.gcode.arcs import PLANES
 from camcomp.gcode.program import LETTERS, Sites
-from camcomp.gcode.state import State
+from camcomp.gcode.state import ControlState
 from camcomp.gcode.text import Text
 from camcomp.gcode.words import Word
+from camcomp.ground.datatypes import ARC, LINE, RAPID, Path, frozen
 
 _NO_CENTRE = [math.nan, math.nan, math.nan]
 
 
-class Statement(Protocol):
+class RecordedBlock(Protocol):
     """What the recorder needs of a block."""
 
     row: int
@@ -56,14 +56,14 @@ class Recorder:
         if self._count > self._line_first + 1:
             self._fixed.extend(range(self._line_first, self._count))
 
-    def line_motion(self, block: Statement, state: State, code: int, end: list[float], feed: float) -> None:
+    def line_motion(self, block: RecordedBlock, state: ControlState, code: int, end: list[float], feed: float) -> None:
         """A rapid (code 0) or a straight cut (code 1)."""
         self._add(block, state, LINE if code else RAPID, code, end, _NO_CENTRE, 0.0, feed, False, block.axes)
 
     def machine_motion(
         self,
-        block: Statement,
-        state: State,
+        block: RecordedBlock,
+        state: ControlState,
         code: int,
         end: list[float],
         feed: float = math.nan,
@@ -76,8 +76,8 @@ class Recorder:
 
     def arc_motion(
         self,
-        block: Statement,
-        state: State,
+        block: RecordedBlock,
+        state: ControlState,
         code: int,
         end: list[float],
         centre: list[float],
@@ -89,8 +89,8 @@ class Recorder:
 
     def _add(
         self,
-        block: Statement,
-        state: State,
+        block: RecordedBlock,
+        state: ControlState,
         kind: int,
         code: int,
         end: list[float],

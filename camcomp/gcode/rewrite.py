@@ -8,8 +8,6 @@ import math
 
 import numpy as np
 
-from camcomp.datatypes import ARC, RAPID
-from camcomp.diagnostics import ProgramError
 from camcomp.gcode.arcplan import Move, Point, plan, turns_of
 from camcomp.gcode.arcs import PLANES, ArcError, centre_of_radius
 from camcomp.gcode.edits import Edits
@@ -20,9 +18,13 @@ from camcomp.gcode.output import Output, Part, Rewritten, Standing
 from camcomp.gcode.program import P, Program, R, Rebase
 from camcomp.gcode.stamp import stamp_index, stamp_line
 from camcomp.gcode.text import Text
+from camcomp.ground.datatypes import ARC, RAPID
+from camcomp.ground.errors import ProgramError
 
 
-def rewrite(program: Program, out: Output, *, resolution_mm: float, version: str, part: Part | None = None) -> Rewritten:
+def rewrite(
+    program: Program, out: Output, *, resolution_mm: float, version: str, part: Part | None = None
+) -> Rewritten:
     """The program with the moves of `out`, rounded to `resolution_mm`, and stamped.
 
     A motion with one row that ends where it was programmed (within half a resolution) keeps its bytes, as do moves in

@@ -162,7 +162,12 @@ class Settings(BlockReader):
         state, words = self.state, block.words
         word = block.groups[0][1]
         kind, number = block.number("L"), block.number("P")
-        if kind == 1 and number is not None and set(block.words) <= {"L", "P", "Z", "R"} and self.dialect.spelling is RS274:
+        if (
+            kind == 1
+            and number is not None
+            and set(block.words) <= {"L", "P", "Z", "R"}
+            and self.dialect.spelling is RS274
+        ):
             self._set_tool(block, number)
             return
         extended = kind == 20 and self.dialect.extended_offsets

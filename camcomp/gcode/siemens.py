@@ -12,8 +12,8 @@ from camcomp.gcode.spelling import SINUMERIK
 from camcomp.gcode.text import Text
 from camcomp.gcode.words import BLANK, Line, Setting, Word, refuse
 
-_NAME = re.compile(r"[A-Za-z_][A-Za-z_]*[0-9]*")
-_NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)")
+_SIEMENS_NAME = re.compile(r"[A-Za-z_][A-Za-z_]*[0-9]*")
+_SIEMENS_NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)")
 _LABEL = re.compile(r"[ \t]*(?:N[0-9]+[ \t]+)?([A-Za-z_][A-Za-z0-9_]+):(?!=)")
 _QUOTED = re.compile(r'"[^"]*"')
 
@@ -90,9 +90,7 @@ class SiemensLine:
             elif char.isascii() and (char.isalpha() or char == "_"):
                 self._statement()
             else:
-                self._refuse(
-                    "CC107" if not char.isdigit() and char not in ".+-" else "CC103", self._why(char)
-                )
+                self._refuse("CC107" if not char.isdigit() and char not in ".+-" else "CC103", self._why(char))
         return Line(self.words, self.deleted, "", tuple(self.expressions), tuple(self.settings))
 
     def _why(self, char: str) -> str:
@@ -114,7 +112,7 @@ class SiemensLine:
 
     def _statement(self) -> None:
         start = self.at
-        found = _NAME.match(self.line, start, self.end)
+        found = _SIEMENS_NAME.match(self.line, start, self.end)
         assert found is not None
         name = found[0].upper()
         letters = name.rstrip("0123456789")
@@ -143,7 +141,7 @@ class SiemensLine:
         at = start + 1
         while at < self.end and self.line[at] in " \t":
             at += 1
-        found = _NUMBER.match(self.line, at, self.end)
+        found = _SIEMENS_NUMBER.match(self.line, at, self.end)
         if found is None:
             self._refuse("CC103", f"'{letter}' has no number")
         rest = self.line[found.end() : self.end].lstrip(" \t")[:1]
@@ -183,9 +181,7 @@ class SiemensLine:
         if name in ("SPOS", "SPOSA", "ADIS", "ADISPOS", "FFWON", "OVR", "FP"):
             letter = ""
         if letter is None:
-            known = (
-                "CC116" if name in ("AP", "RP") else "CC112" if name in ("AR", "I1", "J1", "K1") else "CC135"
-            )
+            known = "CC116" if name in ("AP", "RP") else "CC112" if name in ("AR", "I1", "J1", "K1") else "CC135"
             self._refuse(known, f"'{name}=' is not followed")
         value, mode, end = self._value(equals + 1)
         self.at = end

@@ -1,13 +1,13 @@
-"""State of a control while it executes a program: modes, offsets and where the tool tip stands."""
+"""ControlState of a control while it executes a program: modes, offsets and where the tool tip stands."""
 
 from camcomp.gcode.codes import OFFSET_NAMES, WORK_OFFSETS
 from camcomp.gcode.dialect import Dialect
-from camcomp.gcode.program import Setup
+from camcomp.gcode.setup import Setup
 
 _EXTENDED = 300  # G54.1 P1 to P300
 
 
-class State:
+class ControlState:
     """Mutable; lengths in mm, positions in the program frame (see Path)."""
 
     def __init__(self, setup: Setup, dialect: Dialect) -> None:

@@ -10,8 +10,8 @@ from functools import cached_property
 
 import numpy as np
 
-from camcomp.datatypes import Ints
-from camcomp.diagnostics import Location, ProgramError
+from camcomp.ground.datatypes import Ints
+from camcomp.ground.errors import Location, ProgramError
 
 _END = re.compile(r"\r\n|\n|\r")
 _UTF16 = {b"\xff\xfe": "utf-16-le", b"\xfe\xff": "utf-16-be"}

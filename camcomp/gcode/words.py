@@ -3,10 +3,10 @@
 import re
 from typing import NamedTuple, NoReturn
 
-from camcomp.diagnostics import ProgramError
 from camcomp.gcode.expressions import Expression, ExpressionError, Parser
 from camcomp.gcode.spelling import Spelling
 from camcomp.gcode.text import Text
+from camcomp.ground.errors import ProgramError
 
 BLANK = " \t\0\x1a\x0b\x0c"
 _WORD = re.compile(r"([A-Za-z])[ \t]*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))")

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from pathlib import Path, PurePath
 from typing import Any
 
-from camcomp.diagnostics import CamcompError, CheckFailed
-from camcomp.files import STANDARD
+from camcomp.ground.errors import CamcompError, CheckFailed
+from camcomp.ground.files import STANDARD
 
 WARNING = "warning"  # rule of what is only a warning; warnings have no ids of their own
 

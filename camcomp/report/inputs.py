@@ -21,7 +21,9 @@ class Input:
 
 def inputs_section(inputs: Sequence[Input], output: bytes | None = None) -> Section:
     """The section that tells which files were used, and what came out."""
-    rows = [[each.role, PurePath(each.name).name, str(len(each.data)), sha256(each.data).hexdigest()] for each in inputs]
+    rows = [
+        [each.role, PurePath(each.name).name, str(len(each.data)), sha256(each.data).hexdigest()] for each in inputs
+    ]
     if output is not None:
         rows.append(["corrected program", "", str(len(output)), sha256(output).hexdigest()])
     table = Table("Files and their fingerprints", ("what", "name", "bytes", "SHA-256"), rows)

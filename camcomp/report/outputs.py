@@ -14,7 +14,7 @@ def findings_files(
     verb: str, cases: Sequence[Case], *, json_file: str | None = None, sarif_file: str | None = None,
     junit_file: str | None = None,
 ) -> dict[str, bytes]:  # fmt: skip
-    """Contents by file name, for camcomp.files.write_all."""
+    """Contents by file name, for camcomp.ground.files.write_all."""
     out: dict[str, bytes] = {}
     if json_file:
         out[json_file] = (json.dumps(as_json(cases), indent=2, ensure_ascii=False) + "\n").encode()
@@ -23,4 +23,3 @@ def findings_files(
     if junit_file:
         out[junit_file] = junit(f"camcomp {verb}", cases)
     return out
-

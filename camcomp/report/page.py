@@ -16,7 +16,7 @@ from html import escape
 from importlib.resources import files
 
 from camcomp import __version__
-from camcomp.diagnostics import ConfigError
+from camcomp.ground.errors import ConfigError
 from camcomp.report.plot import Figure
 
 # Scripts and styles only from this file, nothing from anywhere else: the browser itself enforces it.

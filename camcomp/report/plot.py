@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from camcomp.datatypes import Bools, Floats, Ints
+from camcomp.ground.datatypes import Bools, Floats, Ints
 
-MOST = 3000  # points kept of a long curve
+MOST_POINTS = 3000  # points kept of a long curve
 # Curves differ by dash as well as by colour, so that a print in grey can be read.
 STYLES = tuple(
     (f"var(--c{i + 1})", dash) for i, dash in enumerate(("solid", "dash", "dot", "dashdot", "longdash", "longdashdot"))
@@ -51,7 +51,7 @@ def numbers(values: Floats, decimals: int = 5) -> list[float | None]:
     return [value if np.isfinite(value) else None for value in rounded.tolist()]
 
 
-def thin(values: Floats, most: int = MOST) -> Ints:
+def thin(values: Floats, most: int = MOST_POINTS) -> Ints:
     """Indices (k,) of at most about `most` rows of values (n, c): the least and greatest of every column per section."""
     n, columns = values.shape
     if n <= most:

@@ -10,8 +10,8 @@ from typing import Any
 from urllib.parse import quote
 
 from camcomp import __version__
+from camcomp.ground.rules import RULES
 from camcomp.report.findings import Case, Finding, relative
-from camcomp.rules import RULES
 
 
 def sarif(cases: Sequence[Case]) -> bytes:

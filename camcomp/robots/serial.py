@@ -16,8 +16,8 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from camcomp.specbase import Limits, Name, Positive, Spec, Vector, Zero
-from camcomp.speclink import Spring
+from camcomp.model.config.base import Limits, Name, Positive, Spec, Vector, Zero
+from camcomp.model.config.links import Spring
 
 STANDARD_GRAVITY = 9.80665  # m/s2
 

@@ -15,10 +15,10 @@ import numpy as np
 import pytest
 from scipy.optimize import root
 
-from camcomp.config import load_config
-from camcomp.files import shipped
-from camcomp.job import Job
-from camcomp.statics.solve import TARGET, solve
+from camcomp.ground.files import shipped
+from camcomp.model.config.load import load_config
+from camcomp.model.job import Job
+from camcomp.model.statics.solve import TARGET, solve
 from tests.benchmarks.programs import write
 from tests.campaign.runner import CONFIG
 from tests.plants.causes import Cause
@@ -108,7 +108,10 @@ def test_a_million_lines(programs, tmp_path):
     for each in more:
         tell("  times faster than pygcode, with --joints as Parquet", against(pygcode, each))
     tell("  1 000 000 lines over 100 000 (start-up included)", f"{own[0] / tenth[0]:.1f}")
-    tell("  largest of 1000 sampled differences to the exact solver", f"{figures['worst_um']:.4f} um of {figures['bound_um']}")
+    tell(
+        "  largest of 1000 sampled differences to the exact solver",
+        f"{figures['worst_um']:.4f} um of {figures['bound_um']}",
+    )
     assert figures["worst_um"] <= figures["bound_um"] and own[2] < 1000.0 and joints[2] < 1000.0
 
 
@@ -124,7 +127,10 @@ def test_ten_million_lines(programs, tmp_path):
     few = compensate(programs / f"{MILLION}.nc", *MACHINE, "-o", tmp_path / "out.nc")
     many = compensate(programs / f"{10 * MILLION}.nc", *MACHINE, "-o", tmp_path / "out.nc")
     tell("10 000 000 lines", f"{many[0]:.0f} s wall, {many[2]:.0f} MB")
-    tell("  over 1 000 000 lines (wanted: 10.5 at most)", f"{many[0] / few[0]:.1f} (by processor time {many[1] / few[1]:.1f})")
+    tell(
+        "  over 1 000 000 lines (wanted: 10.5 at most)",
+        f"{many[0] / few[0]:.1f} (by processor time {many[1] / few[1]:.1f})",
+    )
     assert many[2] < 1000.0 and many[2] < 1.2 * few[2] and many[1] < 12.0 * few[1]
 
 
@@ -178,7 +184,9 @@ def test_a_stream(pause):
         answers.close()
     tell(f"stream, {1e3 * pause:g} ms between set-points", "")
     tell("  inside (wanted: half within 100 us, 99.9 % within 1000 us)", said.partition("compute: ")[2])
-    tell("  round trip through two pipes", "median {:.0f} us, 99.9 % {:.0f} us".format(*np.percentile(trip, (50, 99.9))))
+    tell(
+        "  round trip through two pipes", "median {:.0f} us, 99.9 % {:.0f} us".format(*np.percentile(trip, (50, 99.9)))
+    )
 
 
 def test_a_directory(tmp_path, monkeypatch):
@@ -195,14 +203,33 @@ def test_a_directory(tmp_path, monkeypatch):
     made = []
     for turn in range(3):
         for jobs in (1, 2):
-            made.append(spent("-m", "camcomp", "batch", folder, *MACHINE, "--output-dir", tmp_path / f"out-{turn}-{jobs}", "--jobs", jobs, "--quiet"))
+            made.append(
+                spent(
+                    "-m",
+                    "camcomp",
+                    "batch",
+                    folder,
+                    *MACHINE,
+                    "--output-dir",
+                    tmp_path / f"out-{turn}-{jobs}",
+                    "--jobs",
+                    jobs,
+                    "--quiet",
+                )
+            )
     one, two = np.median(np.array(made).reshape(3, 2, 3), axis=0)
-    tell("batch of 12 programs of 8 000 lines, two workers over one (wanted: 1.8)", f"{one[0] / two[0]:.2f}, {one[0]:.1f} s and {two[0]:.1f} s")
+    tell(
+        "batch of 12 programs of 8 000 lines, two workers over one (wanted: 1.8)",
+        f"{one[0] / two[0]:.2f}, {one[0]:.1f} s and {two[0]:.1f} s",
+    )
 
 
 def test_starting():
     made = np.median([[spent("-c", "pass"), spent("-m", "camcomp", "--help")] for _ in range(9)], axis=0)
-    tell("camcomp --help over python -c pass (wanted: 6 at most)", f"{made[1, 0] / made[0, 0]:.1f} ({1e3 * made[1, 0]:.0f} ms)")
+    tell(
+        "camcomp --help over python -c pass (wanted: 6 at most)",
+        f"{made[1, 0] / made[0, 0]:.1f} ({1e3 * made[1, 0]:.0f} ms)",
+    )
 
 
 def test_cold_caches(tmp_path):
@@ -211,7 +238,17 @@ def test_cold_caches(tmp_path):
     took = []
     for _ in range(2):
         begin = time.perf_counter()
-        command = [sys.executable, "-m", "camcomp", "compensate", str(program), *MACHINE, "-o", str(tmp_path / "o.nc"), "-q"]
+        command = [
+            sys.executable,
+            "-m",
+            "camcomp",
+            "compensate",
+            str(program),
+            *MACHINE,
+            "-o",
+            str(tmp_path / "o.nc"),
+            "-q",
+        ]
         subprocess.run(command, check=True, env=cold)
         took.append(time.perf_counter() - begin)
     tell("sample groove, first run with cold caches, and the second one", f"{took[0]:.1f} s, {took[1]:.1f} s")
@@ -227,5 +264,7 @@ def test_a_diagnosis():
 def test_a_diagnosis_of_six_runs(tmp_path, rows):
     """As the campaign makes them, and with eight times 10 000 rows in all."""
     plan = Plan(777, (Cause("drive_stiffness", "y", 778),), (3.0,), samples=rows)
-    took = spent("-m", "camcomp", "diagnose", write_experiment(make(plan), plan, tmp_path / "experiment", CONFIG), "--quiet")
+    took = spent(
+        "-m", "camcomp", "diagnose", write_experiment(make(plan), plan, tmp_path / "experiment", CONFIG), "--quiet"
+    )
     tell(f"diagnosis of six runs of {rows} rows", f"{took[0]:.1f} s wall, {took[1]:.1f} s processor")

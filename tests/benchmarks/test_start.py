@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from camcomp.files import shipped
+from camcomp.ground.files import shipped
 
 pytestmark = pytest.mark.benchmarks
 

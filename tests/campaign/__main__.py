@@ -49,9 +49,7 @@ def main(context, results, scale, only, ratios, processes, seed, misses):
 @click.option("--samples", default=500)
 @click.option("--seed", default=1)
 @click.option("--out", type=click.Path(path_type=Path), required=True)
-@click.option(
-    "--truth", type=click.Path(path_type=Path), help="Where the answer goes; default OUT.truth.json."
-)
+@click.option("--truth", type=click.Path(path_type=Path), help="Where the answer goes; default OUT.truth.json.")
 def one(effects, sizes, design, channels, samples, seed, out, truth):
     """Write one experiment; the truth goes beside the folder, not into it."""
     causes = []

@@ -23,7 +23,7 @@ CONFIG = ROOT / "config" / "orthoglide.yaml"
 
 def invoke(arguments: list[str]) -> tuple[int, str]:
     """Exit code and everything printed by one camcomp command, run in this process."""
-    from camcomp.cli import run as camcomp
+    from camcomp.terminal.cli import run as camcomp
 
     said = io.StringIO()
     with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):

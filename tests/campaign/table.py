@@ -50,9 +50,7 @@ def render(rows: list[Row]) -> str:
 
     for ratio in (0.3, 1.0, 3.0, 10.0):
         target = "target >= 0.95" if ratio >= 3 else "target >= 0.90" if ratio == 1 else ""
-        lines.append(
-            _rate(f"single, {ratio:g} x noise: first, or class named", pick("single", ratio), _hit, target)
-        )
+        lines.append(_rate(f"single, {ratio:g} x noise: first, or class named", pick("single", ratio), _hit, target))
     both = [r for r in pick("single") if r["ratio"] >= 3]
     lines.append(_rate("single, >= 3 x noise: exactly and only the truth", both, lambda r: r["exact"], ""))
     lines.append(_rate("pairs: both named", pick("pair"), lambda r: r["named"], "target >= 0.85"))
@@ -60,18 +58,12 @@ def render(rows: list[Row]) -> str:
     for ratio, target in ((3.0, "target >= 0.80"), (10.0, "target >= 0.95")):
         for category in ("foreign", "withheld"):
             label = f"{category}, {ratio:g} x noise"
-            lines.append(
-                _rate(f"{label}, not absorbable: unknown", isolable(category, ratio, True), _unknown, target)
-            )
-            lines.append(
-                _rate(f"{label}, absorbable: unknown", isolable(category, ratio, False), _unknown, "")
-            )
+            lines.append(_rate(f"{label}, not absorbable: unknown", isolable(category, ratio, True), _unknown, target))
+            lines.append(_rate(f"{label}, absorbable: unknown", isolable(category, ratio, False), _unknown, ""))
     known = [r for r in done if r["category"] in ("single", "pair", "null")]
     lines.append(_rate("false unknown with the complete library", known, _unknown, "target <= 0.03"))
     equal = pick("equal")
-    lines.append(
-        _rate("equal pairs: one member named alone", equal, lambda r: r["single_member"], "target 0")
-    )
+    lines.append(_rate("equal pairs: one member named alone", equal, lambda r: r["single_member"], "target 0"))
     lines.append(_rate("equal pairs: reported as ambiguous, truth inside", equal, lambda r: r["named"], ""))
     lines.append(_rate("poorer designs, 3 x noise: first, or class named", pick("poor"), _hit, ""))
     lines += ["", *_figures(done)]
@@ -98,9 +90,7 @@ def _figures(done: list[Row]) -> list[str]:
     error = np.abs([x for r in known for x in r["error"]])
     if len(error):
         lines.append(f"size error: median {np.median(error):.3f}, 90 % below {np.quantile(error, 0.9):.3f}")
-    sure = [
-        r for r in done if r.get("probability") is not None and r["category"] in ("single", "pair", "poor")
-    ]
+    sure = [r for r in done if r.get("probability") is not None and r["category"] in ("single", "pair", "poor")]
     if sure:
         p = np.array([r["probability"] for r in sure], float)
         right = np.array([r["first"] for r in sure], float)
@@ -119,13 +109,9 @@ def _figures(done: list[Row]) -> list[str]:
             f", interval holds the oracle: {np.mean(cover or [np.nan]):.3f}, harm rate {harm:.3f}"
         )
     aimed = [r["actuator"] for r in known if "actuator" in r]
-    lines.append(
-        f"actuator with the largest share is the right one: {np.mean(aimed or [np.nan]):.3f} n={len(aimed)}"
-    )
+    lines.append(f"actuator with the largest share is the right one: {np.mean(aimed or [np.nan]):.3f} n={len(aimed)}")
     times = np.array([r["seconds"] for r in done]) if done else np.zeros(1)
-    lines.append(
-        f"seconds per experiment: median {np.median(times):.1f}, 95 % below {np.quantile(times, 0.95):.1f}"
-    )
+    lines.append(f"seconds per experiment: median {np.median(times):.1f}, 95 % below {np.quantile(times, 0.95):.1f}")
     return lines
 
 

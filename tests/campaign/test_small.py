@@ -157,9 +157,7 @@ def test_the_loop_closes(tmp_path, one, other):
 
     def left(config):
         out = tmp_path / "out.nc"
-        code, said = runner.invoke(
-            ["compensate", str(tmp_path / "in.nc"), "--config", str(config), "-o", str(out)]
-        )
+        code, said = runner.invoke(["compensate", str(tmp_path / "in.nc"), "--config", str(config), "-o", str(out)])
         assert code == 0, said
         return path_error(rerun(made, out.read_text(), program), program)
 

@@ -5,7 +5,6 @@ import re
 import numpy as np
 import pytest
 
-from camcomp.diagnostics import ProgramError
 from camcomp.gcode.codes import CANCELS, code_name
 from camcomp.gcode.detect import dialect_of
 from camcomp.gcode.dialect import Dialect
@@ -14,7 +13,8 @@ from camcomp.gcode.output import Output
 from camcomp.gcode.rewrite import rewrite
 from camcomp.gcode.stamp import is_stamped
 from camcomp.gcode.text import Text
-from camcomp.shelf import load, members
+from camcomp.ground.errors import ProgramError
+from camcomp.ground.shelf import load, members
 
 NAMES = members("dialects")
 # What all controls have in common, and how each writes an arc by its radius.
@@ -115,11 +115,14 @@ def test_detection_and_its_override():
     ("text", "name"),
     [
         # Headers as CAM posts write them: a word in a comment is no statement.
-        ("(T1  D=6. CR=0. TAPER=118deg - ZMIN=-2.5 - flat end mill)\nG90 G94\n(2D Pocket1)\n(R1=5, CYCLE81)\nG0 X1\n", "rs274"),
-        ("(T=\"MILL\", MSG(A))\nG0 X1\n", "rs274"),
+        (
+            "(T1  D=6. CR=0. TAPER=118deg - ZMIN=-2.5 - flat end mill)\nG90 G94\n(2D Pocket1)\n(R1=5, CYCLE81)\nG0 X1\n",
+            "rs274",
+        ),
+        ('(T="MILL", MSG(A))\nG0 X1\n', "rs274"),
         ("%\n(O2201);\nN3 G00 G91 G28 Z0.0;\nG00 G90 G54 X0.5 Y-2.25;\n", "fanuc"),
         ("G0 X1 Y2\nG3 X2 Y3 CR=5\n", "sinumerik"),
-        ("MSG(\"POCKET\")\nG0 X=IC(1) ; (note)\n", "sinumerik"),
+        ('MSG("POCKET")\nG0 X=IC(1) ; (note)\n', "sinumerik"),
     ],
 )
 def test_detection(text, name):

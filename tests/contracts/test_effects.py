@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from camcomp import shelf
-from camcomp.gap.effect import HOOKS, STAGES, Cause, Load, Motion, nominal
-from camcomp.statics.description import Actuator, Chain, Link, Parallelogram, Passive, Robot
+from camcomp.ground import shelf
+from camcomp.model.effect import HOOKS, STAGES, Cause, Load, Motion, nominal
+from camcomp.model.statics.description import Actuator, Chain, Link, Parallelogram, Passive, Robot
 
 CONTRACT = {
     "servo_lag", "backlash", "friction", "joint_offset", "screw_pitch", "screw_cyclic", "thermal_growth", "drive_stiffness",

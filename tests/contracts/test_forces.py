@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from camcomp import shelf
-from camcomp.cutting.cut import Cut
-from camcomp.specbase import Spec
+from camcomp.ground import shelf
+from camcomp.model.config.base import Spec
+from camcomp.model.cutting.cut import Cut
 
 N = 6
 EXAMPLES: dict[str, dict[str, Any]] = {

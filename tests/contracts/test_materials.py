@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from camcomp.config import check_config, load_config
-from camcomp.files import shipped
+from camcomp.ground.files import shipped
+from camcomp.model.config.load import check_config, load_config
 
 FILES = sorted(shipped("config/materials").glob("*.yaml"))
 

@@ -25,7 +25,7 @@ class Workshop:
 
     def _answer(self, plan):
         """Everything behind the diagnosis of a plan: (result, diagnosis, campaign)."""
-        from camcomp.commands.diagnose import examine
+        from camcomp.terminal.commands.diagnose import examine
 
         return examine(self.made(plan)[0])
 

@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from camcomp.alike import classes, likeness, stand_ins
-from camcomp.commands.diagnose import examine
-from camcomp.planner import propose
+from camcomp.diagnosis.next_experiment.information_gain import propose
+from camcomp.diagnosis.search.indistinguishable import classes, likeness, stand_ins
+from camcomp.terminal.commands.diagnose import examine
 from tests.campaign.cases import EQUAL
 from tests.diagnosis.conftest import plan_of
 from tests.plants.more import add_run
@@ -26,8 +26,8 @@ def alternatives(result):
 
 
 def groups(design):
-    atoms = design.inquiry.columns.atoms
-    return [{(atoms[i].name, atoms[i].target) for i in group} for group in classes(design)]
+    candidates = design.problem.columns.candidates
+    return [{(candidates[i].name, candidates[i].target) for i in group} for group in classes(design)]
 
 
 def follow(workshop, plan, tmp_path, candidate):
@@ -52,14 +52,20 @@ def follow(workshop, plan, tmp_path, candidate):
     else:
         channels = "no-forces" if plan.channels == "tip" and "encoder" in candidate.channels else plan.channels
         add_run(
-            folder, made, plan, candidate.program, cutting=candidate.cutting, channels=channels, started_s=round(candidate.started, 1)
+            folder,
+            made,
+            plan,
+            candidate.program,
+            cutting=candidate.cutting,
+            channels=channels,
+            started_s=round(candidate.started, 1),
         )
     return examine(folder / "experiment.yaml", without)[0]
 
 
 def test_the_classes_are_known_without_residuals(workshop):
     """The same runs and channels with another fault, or none, have the same classes."""
-    design = workshop.answer(LATE)[1].inquiry
+    design = workshop.answer(LATE)[1].problem
     there = groups(likeness(design))
     assert {("servo_lag", None), ("time_sync", None)} in there
     assert {("tool_length", None), ("workpiece_frame", None)} in there
@@ -69,16 +75,16 @@ def test_the_classes_are_known_without_residuals(workshop):
 
 
 def test_an_encoder_tells_a_lag_from_a_late_clock_before_anything_is_measured(workshop):
-    there = groups(likeness(workshop.answer(LONG)[1].inquiry))
+    there = groups(likeness(workshop.answer(LONG)[1].problem))
     assert not any(("servo_lag", None) in group for group in there)
 
 
 def test_a_member_in_its_own_direction_is_what_counts(workshop):
     """A workpiece that is turned and shifted in its plane is no long tool; one that is lifted is."""
-    inquiry = workshop.answer(LONG)[1].inquiry
-    design, atoms = likeness(inquiry), inquiry.columns.atoms
-    frame = next(i for i, a in enumerate(atoms) if a.name == "workpiece_frame")
-    tool = next(i for i, a in enumerate(atoms) if a.name == "tool_length")
+    problem = workshop.answer(LONG)[1].problem
+    design, candidates = likeness(problem), problem.columns.candidates
+    frame = next(i for i, a in enumerate(candidates) if a.name == "workpiece_frame")
+    tool = next(i for i, a in enumerate(candidates) if a.name == "tool_length")
     assert (tool,) in stand_ins(design, (frame,), np.array([0.0, 0.0, 1.0, 0.0]))
     assert (tool,) not in stand_ins(design, (frame,), np.array([1.0, 0.5, 0.0, 0.3]))
 
@@ -103,9 +109,11 @@ def test_a_long_tool_is_a_lifted_workpiece_until_somebody_measures_the_tool(work
     tool, frame = ("tool_length", None), ("workpiece_frame", None)
     assert tool in named(result["causes"])
     assert swapped(frozenset(named(result["causes"])), tool, frame) in alternatives(result)
-    inquiry, job = workshop.answer(LONG)[1].inquiry, workshop.answer(LONG)[2].job
-    pair = [inquiry.refit((i,)) for i, a in enumerate(inquiry.columns.atoms) if (a.name, a.target) in (tool, frame)]
-    candidate = propose(inquiry, pair, np.array([0.5, 0.5]), job).candidate
+    problem, job = workshop.answer(LONG)[1].problem, workshop.answer(LONG)[2].job
+    pair = [
+        problem.refit((i,)) for i, a in enumerate(problem.columns.candidates) if (a.name, a.target) in (tool, frame)
+    ]
+    candidate = propose(problem, pair, np.array([0.5, 0.5]), job).candidate
     assert "presetter" in candidate.action
     after = follow(workshop, LONG, tmp_path, candidate)
     assert not {tool, frame} & {*named(after["causes"]), *(m for one in alternatives(after) for m in one)}
@@ -114,7 +122,9 @@ def test_a_long_tool_is_a_lifted_workpiece_until_somebody_measures_the_tool(work
 @pytest.mark.campaign
 @pytest.mark.parametrize("ratio", [3.0, 10.0])
 @pytest.mark.parametrize(("true", "other", "design", "channels"), EQUAL)
-def test_every_equal_pair_is_told_apart_by_following_the_advice(workshop, tmp_path, true, other, design, channels, ratio):
+def test_every_equal_pair_is_told_apart_by_following_the_advice(
+    workshop, tmp_path, true, other, design, channels, ratio
+):
     plan = plan_of(true, design=design, channels=channels, ratio=ratio, samples=150)
     result = workshop.answer(plan)[0]
     assert result["verdict"] == "ambiguous"

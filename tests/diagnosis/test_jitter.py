@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import pytest
 
-from camcomp.bench import Bench
-from camcomp.campaign import open_campaign
-from camcomp.noise import jitter
+from camcomp.diagnosis.experiment.open_experiment import open_experiment
+from camcomp.diagnosis.fit.bench import Bench
+from camcomp.diagnosis.fit.noise import jitter
 from tests.diagnosis.conftest import plan_of
 
 
@@ -14,7 +14,7 @@ from tests.diagnosis.conftest import plan_of
 def test_jitter_is_measured(workshop, unsteady):
     plan = plan_of(design="six", samples=250)
     plan = replace(plan, noise=replace(plan.noise, jitter_s=unsteady))
-    campaign = open_campaign(workshop.made(plan)[0])
+    campaign = open_experiment(workshop.made(plan)[0])
     assert jitter(Bench(campaign.twin, campaign.runs)) == pytest.approx(unsteady, rel=0.35)
 
 

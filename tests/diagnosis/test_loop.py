@@ -2,7 +2,7 @@
 
 import pytest
 
-from camcomp.commands.diagnose import _machine_with_causes
+from camcomp.terminal.commands.diagnose import _machine_with_causes
 from tests.campaign import runner
 from tests.diagnosis.conftest import plan_of
 from tests.diagnosis.test_where import SCREW

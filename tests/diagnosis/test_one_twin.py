@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from camcomp import shelf
-from camcomp.bench import Bench
-from camcomp.campaign import open_campaign
-from camcomp.gap.effect import Cause
+from camcomp.diagnosis.experiment.open_experiment import open_experiment
+from camcomp.diagnosis.fit.bench import Bench
+from camcomp.ground import shelf
+from camcomp.model.effect import Cause
 from tests.diagnosis.conftest import plan_of
 
 PLAN = plan_of(("servo_lag", None), design="both-ways", channels="tip", ratio=6.0)  # the one of test_equal
@@ -28,15 +28,15 @@ TOGETHER = {
 
 @pytest.fixture(scope="module")
 def bench(workshop):
-    campaign = open_campaign(workshop.made(PLAN)[0])
+    campaign = open_experiment(workshop.made(PLAN)[0])
     return Bench(campaign.twin, campaign.runs[:1])
 
 
 @pytest.mark.parametrize("name", TOGETHER)
 def test_the_slopes_agree_with_the_solution(bench, name):
-    twin, course, causes = bench.twin, bench.runs[0].course, TOGETHER[name]
-    _, solved = twin.sense(course, causes)
-    exact, _ = twin.sense(course, causes, solved=solved, slopes=twin.slopes(course, causes, solved))
+    twin, run_path, causes = bench.twin, bench.runs[0].run_path, TOGETHER[name]
+    _, solved = twin.sense(run_path, causes)
+    exact, _ = twin.sense(run_path, causes, solved=solved, slopes=twin.slopes(run_path, causes, solved))
     quick = bench.read(0, causes)
     assert np.abs(exact.tip - bench.nominal[0].tip).max() > 0.005
     assert np.linalg.norm(quick.tip - exact.tip, axis=1).max() < 0.5e-3

@@ -7,7 +7,7 @@ from importlib.metadata import EntryPoint
 import numpy as np
 import pytest
 
-from camcomp import shelf
+from camcomp.ground import shelf
 from tests.campaign import runner
 from tests.plants import designs
 
@@ -16,7 +16,7 @@ SOURCE = '''
 
 import numpy as np
 
-from camcomp.gap.effect import Parameter
+from camcomp.model.effect import Parameter
 
 STAGE = "tool"
 TARGET = "machine"
@@ -93,12 +93,16 @@ def test_it_is_listed_fitted_and_compensated(own, tmp_path):
     assert result["causes"][0]["parameters"]["lean_mm_per_mm"]["value"] == pytest.approx(LEAN, rel=0.03)
     # the program corrected with what was found is right on the machine that has it, and the plain one is not
     corrected = tmp_path / "corrected.nc"
-    code, said = runner.invoke(["compensate", str(tmp_path / "slope.nc"), "--config", str(better), "-o", str(corrected)])
+    code, said = runner.invoke(
+        ["compensate", str(tmp_path / "slope.nc"), "--config", str(better), "-o", str(corrected)]
+    )
     assert code == 0, said
     truth = ["--config", str(runner.CONFIG), "--config", str(leaning)]
     line = ["verify", str(corrected), "--against", str(tmp_path / "slope.nc"), *truth, "--tolerance-um", "5"]
     code, said = runner.invoke(line)
     assert code == 0, said
-    code, said = runner.invoke(["compensate", str(tmp_path / "slope.nc"), "--config", str(runner.CONFIG), "-o", str(corrected)])
+    code, said = runner.invoke(
+        ["compensate", str(tmp_path / "slope.nc"), "--config", str(runner.CONFIG), "-o", str(corrected)]
+    )
     assert code == 0, said
     assert runner.invoke(line)[0] == 1

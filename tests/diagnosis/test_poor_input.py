@@ -92,7 +92,11 @@ REFUSED = {  # what happened, rule, place (a regular expression; file:line:colum
     "not a text": (text(bytes(range(256)) * 20), "CC40[0-3]", r"log-1.csv:\d+:\d+"),
     "no time": (without("t_s"), "CC401", r"log-1.csv:1:1"),
     "a time that is none": (cell(5, 0, "nan"), "CC401", r"log-1.csv:6:1"),
-    "a column twice": (each(lambda rows: [[*rows[0], "x_mm"], *([*r, "0"] for r in rows[1:])]), "CC401", r"log-1.csv:1:\d\d+"),
+    "a column twice": (
+        each(lambda rows: [[*rows[0], "x_mm"], *([*r, "0"] for r in rows[1:])]),
+        "CC401",
+        r"log-1.csv:1:\d\d+",
+    ),
     "text in a number": (cell(5, 3, "abc"), "CC403", r"log-1.csv:6:\d+"),
     "infinity": (cell(5, 3, "inf"), "CC403", r"log-1.csv:6:\d+"),
     "a cell too many": (each(lambda rows: [*rows[:5], [*rows[5], "1"], *rows[6:]]), "CC403", r"log-1.csv:6:\d\d+"),

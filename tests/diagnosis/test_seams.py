@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from camcomp.cli import run as camcomp
-from camcomp.commands.diagnose import examine
+from camcomp.terminal.cli import run as camcomp
+from camcomp.terminal.commands.diagnose import examine
 from tests.campaign import runner
 from tests.diagnosis.conftest import plan_of
 from tests.plants.experiments import make, write
@@ -50,10 +50,12 @@ def missing(folder, moves):
     noisy = [[v if n in ("t_s", "line") or not v else f"{float(v) + rng.normal(0, 0.002):.4f}" for n, v in zip(names, row, strict=True)]
              for row in rows]  # fmt: skip
     (folder / "l.csv").write_text("\n".join(",".join(row) for row in [names, *noisy]) + "\n")
-    text = f"config: [{runner.CONFIG}]\nruns:\n  - {{name: a, program: p.nc, log: l.csv, cutting: true, started_s: 0}}\n"
+    text = (
+        f"config: [{runner.CONFIG}]\nruns:\n  - {{name: a, program: p.nc, log: l.csv, cutting: true, started_s: 0}}\n"
+    )
     (folder / "experiment.yaml").write_text(text)
     _, diagnosis, _ = examine(folder / "experiment.yaml")
-    return float(np.isnan(diagnosis.inquiry.bench.observed(0)[:, 0]).mean())
+    return float(np.isnan(diagnosis.problem.bench.observed(0)[:, 0]).mean())
 
 
 def test_rows_beside_corners_do_not_count_unless_there_are_hardly_others(tmp_path):

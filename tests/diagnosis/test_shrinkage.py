@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from camcomp.commands.diagnose import examine
+from camcomp.terminal.commands.diagnose import examine
 from tests.diagnosis.test_loop import PAIR
 from tests.diagnosis.test_poor_input import PLAN
 from tests.diagnosis.test_where import SCREW

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import pytest
 
-from camcomp.commands.diagnose import examine
-from camcomp.remainder import idle
-from camcomp.survey import survey
+from camcomp.diagnosis.search.cause_search import search_causes
+from camcomp.diagnosis.search.unknown import idle
+from camcomp.terminal.commands.diagnose import examine
 from tests.diagnosis.conftest import plan_of
 from tests.plants.causes import Cause
 from tests.plants.experiments import Plan
@@ -18,7 +18,8 @@ CROSSTALK = plan_of(("force_crosstalk", "y"), design="six", samples=150, seed=62
 
 
 @pytest.mark.parametrize(
-    ("plan", "driver"), [(GROWTH, ("time:z", "temperature:z")), (CREEP, ("time:x", "temperature:x")), (CROSSTALK, ("force:z",))]
+    ("plan", "driver"),
+    [(GROWTH, ("time:z", "temperature:z")), (CREEP, ("time:x", "temperature:x")), (CROSSTALK, ("force:z",))],
 )
 def test_what_differs_from_run_to_run_is_not_taken_for_something_that_lasts(workshop, plan, driver):
     result = workshop.answer(plan)[0]
@@ -39,7 +40,9 @@ def test_after_an_unknown_effect_one_thing_is_changed_and_the_rest_left(workshop
     result, diagnosis, _ = workshop.answer(CROSSTALK)
     assert result["next_experiment"]["separates"] == ["unknown"]
     assert 0.1 < result["next_experiment"]["gain"] <= 1.0
-    assert set(diagnosis.proposal.candidate.varies) & {each["covariate"].split(":")[0] for each in result["where"]["drivers"]}
+    assert set(diagnosis.proposal.candidate.varies) & {
+        each["covariate"].split(":")[0] for each in result["where"]["drivers"]
+    }
     assert "M2" in diagnosis.proposal.candidate.program
 
 
@@ -53,12 +56,12 @@ def test_members_that_undo_each_other_explain_nothing(workshop):
 
 def test_causes_that_leave_the_gap_where_it_was_explain_nothing(workshop, monkeypatch):
     _, diagnosis, _ = workshop.answer(SOFT)
-    best = diagnosis.survey.fits[diagnosis.survey.verdict.best]
-    assert not idle(diagnosis.inquiry, best, 0.5)
-    assert idle(diagnosis.inquiry, replace(best, theta=0.1 * best.theta), 0.5)
-    assert not idle(diagnosis.inquiry, replace(best, theta=0.1 * best.theta))
-    assert idle(diagnosis.inquiry, replace(best, theta=-best.theta))
-    monkeypatch.setattr("camcomp.survey.idle", lambda *_: True)
-    found = survey(diagnosis.inquiry)
-    assert found.strange == "tip"
+    best = diagnosis.search.fits[diagnosis.search.verdict.best]
+    assert not idle(diagnosis.problem, best, 0.5)
+    assert idle(diagnosis.problem, replace(best, theta=0.1 * best.theta), 0.5)
+    assert not idle(diagnosis.problem, replace(best, theta=0.1 * best.theta))
+    assert idle(diagnosis.problem, replace(best, theta=-best.theta))
+    monkeypatch.setattr("camcomp.diagnosis.search.cause_search.idle", lambda *_: True)
+    found = search_causes(diagnosis.problem)
+    assert found.unknown_in == "tip"
     assert found.fits[found.verdict.best].members == ()

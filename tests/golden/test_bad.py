@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from camcomp.diagnostics import ProgramError, format_error
 from camcomp.gcode.interpret import read_program
+from camcomp.ground.errors import ProgramError, format_error
 
 FOLDER = Path(__file__).parent / "bad"
 FILES = sorted(FOLDER.iterdir())
@@ -33,7 +33,7 @@ def test_refused_with_rule_place_and_hint(path):
 
 
 def test_every_rule_of_programs_has_a_bad_program():
-    from camcomp.rules import RULES
+    from camcomp.ground.rules import RULES
 
     shown = {announced(path.read_bytes())[0] for path in FILES}
     wanted = {rule for rule in RULES if rule.startswith("CC1")}

@@ -11,12 +11,12 @@ import re
 import numpy as np
 import pytest
 
-from camcomp.cli import run
-from camcomp.datatypes import ARC
 from camcomp.gcode.interpret import read_program
 from camcomp.gcode.output import Output
 from camcomp.gcode.rewrite import rewrite
 from camcomp.gcode.stamp import is_stamped
+from camcomp.ground.datatypes import ARC
+from camcomp.terminal.cli import run
 
 CARTESIAN = "config/cartesian.yaml"
 ORTHOGLIDE = "config/orthoglide-1deg.yaml"

@@ -6,7 +6,7 @@ import pytest
 
 from camcomp.gcode.canon import canonical
 from camcomp.gcode.interpret import read_program
-from camcomp.gcode.program import Setup
+from camcomp.gcode.setup import Setup
 from tests.oracles import compare, rs274
 
 FOLDER = Path(__file__).parent / "programs"

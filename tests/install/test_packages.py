@@ -59,7 +59,19 @@ def test_the_wheel_says_what_it_needs(built):
 
 def test_an_installed_camcomp_needs_no_checkout(built, tmp_path):
     site, project = tmp_path / "site", tmp_path / "project"
-    call(sys.executable, "-m", "pip", "install", "-q", "--no-deps", "--no-index", "--target", site, built[0], cwd=tmp_path)
+    call(
+        sys.executable,
+        "-m",
+        "pip",
+        "install",
+        "-q",
+        "--no-deps",
+        "--no-index",
+        "--target",
+        site,
+        built[0],
+        cwd=tmp_path,
+    )
     paths = {"PYTHONPATH": site, "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}
     where = call(sys.executable, "-c", "import camcomp; print(camcomp.__file__)", cwd=tmp_path, **paths)
     assert where.startswith(str(site))

@@ -1,9 +1,6 @@
-"""Imports go one way: doors, bulk, stories, joints, engines, ground; rooms on one floor of engines or stories keep apart.
+"""Imports go one way, between folders as between files: a folder may use those below it, and nothing runs in a circle.
 
-Ground: nouns and small tools. Engines: numerics and text, each in its folder. Joints: what several stories share to
-bring engines together. Stories: one verb each. Bulk: compensation of long programs, which falls back to the
-story. Doors: terminal, disk, YAML, reports. Shelves: plug-ins, which use
-engines and ground and which nobody imports by name; camcomp/shelf.py finds them.
+Shelves hold plug-ins, which nobody imports by name; camcomp/ground/shelf.py finds them.
 """
 
 import ast
@@ -14,44 +11,33 @@ import pytest
 import camcomp
 
 PACKAGE = Path(camcomp.__file__).parent
-GROUND = {
-    "datatypes", "diagnostics", "pathgeometry", "rules", "se3", "shelf", "spec", "specbase", "speclink", "specrobot", "yamlcheck",
-    "yamltree",
-}  # fmt: skip
-ENGINES = {"gcode", "statics", "cutting", "gap"}
-SHELVES = {"robots", "dialects", "forces", "effects"}
-JOINTS = {
-    "alike", "arcfit", "armposes", "bench", "candidates", "columns", "course", "exploring", "heldout", "inquiry", "intervals", "job",
-    "locate", "logcheck", "moves", "noise", "planner", "posture", "remainder", "response", "reversals", "scan", "splitting", "survey", "twin",
-}  # fmt: skip
-STORIES = {"armstudy", "axisstudy", "compensate", "verify", "simulate", "diagnose", "stream"}
-BULK = {"bulk"}
-FLOORS = (GROUND, ENGINES, JOINTS, STORIES, BULK)  # and the doors above
-APART = (ENGINES, STORIES)  # rooms of these floors do not import each other
+SHELVES = {"dialects", "effects", "forces", "robots"}
+FLOORS = (
+    {"ground"},
+    {"gcode", "report"},
+    {"model", "dialects"},
+    {"compensation", "diagnosis", "effects", "forces", "robots", "plugins"},
+    {"terminal"},
+    {"__main__"},
+)  # rooms of one floor do not import each other
+LONGEST_CHAIN = 16
 
 
 def room(module):
-    """The file or folder of a dotted module below camcomp."""
+    """The top folder of a dotted module below camcomp."""
     return module.split(".")[0]
 
 
 def height(module):
-    """The floor, counted from the ground; a shelf reaches as far down as a joint."""
-    if room(module) in SHELVES:
-        return FLOORS.index(JOINTS)
-    return next((i for i, floor in enumerate(FLOORS) if room(module) in floor), len(FLOORS))
+    """The floor of a module, counted from the ground."""
+    return next(i for i, floor in enumerate(FLOORS) if room(module) in floor)
 
 
 def allowed(module, other):
     """Whether `module` may import `other`."""
     if room(other) in SHELVES:
         return room(module) == room(other) and other.rsplit(".", 1)[-1].startswith("_")
-    if room(module) == room(other):
-        return True
-    if room(module) in SHELVES and room(other) in JOINTS:
-        return False
-    same_floor = any(room(module) in floor and room(other) in floor for floor in APART)
-    return height(other) <= height(module) and not same_floor
+    return room(module) == room(other) or height(other) < height(module)
 
 
 def imports(path):
@@ -126,19 +112,17 @@ def test_there_is_no_cycle():
 @pytest.mark.parametrize(
     ("module", "other"),
     [
-        ("specbase", "statics.solve"),
-        ("gcode.words", "statics.solve"),
-        ("statics.solve", "forces.none"),
+        ("ground.files", "model.job"),
+        ("gcode.words", "model.statics.solve"),
+        ("model.statics.solve", "forces.none"),
         ("forces.none", "forces.constant"),
-        ("forces.none", "compensate"),
-        ("compensate", "verify"),
-        ("compensate", "forces.constant"),
-        ("compensate", "config"),
-        ("gap.effect", "config"),
-        ("config", "effects.none"),
-        ("job", "compensate"),
-        ("effects.none", "twin"),
-        ("cutting.track", "gap.effect"),
+        ("forces.none", "compensation.program.compensate"),
+        ("compensation.program.compensate", "forces.constant"),
+        ("compensation.program.compensate", "diagnosis.diagnose"),
+        ("diagnosis.diagnose", "terminal.progress"),
+        ("model.effect", "diagnosis.fit.bench"),
+        ("report.page", "gcode.text"),
+        ("dialects.grbl", "model.control"),
     ],
 )
 def test_a_planted_violation_is_caught(module, other):
@@ -150,8 +134,8 @@ def test_a_planted_violation_is_caught(module, other):
     [
         ("gcode.words", "gcode.text"),
         ("effects.backlash", "effects._aim"),
-        ("cli", "config"),
-        ("compensate", "gap.effect"),
+        ("terminal.cli", "model.config.load"),
+        ("diagnosis.diagnose", "model.effect"),
     ],
 )
 def test_what_is_allowed_passes(module, other):
@@ -163,9 +147,75 @@ def test_a_planted_cycle_is_caught():
     assert cycle({"a": {"b", "c"}, "b": {"c"}, "c": set()}) == []
 
 
-def test_packages_are_empty_and_files_short():
+def rooms_of(wing, edges):
+    """Imports between the folders inside a wing; files that lie in the wing itself are the room above all of them."""
+    out = {}
+    for module, below in edges.items():
+        for other in below:
+            if room(module) == room(other) == wing and (own := inner(module)) != (far := inner(other)):
+                out.setdefault(own, set()).add(far)
+    return out
+
+
+def inner(module):
+    parts = module.split(".")
+    return parts[1] if len(parts) > 2 else "."
+
+
+@pytest.mark.parametrize("wing", sorted({each for floor in FLOORS for each in floor} - {"__main__"}))
+def test_no_circle_between_the_folders_of_a_wing(wing):
+    assert cycle(rooms_of(wing, graph(PACKAGE))) == []
+
+
+def test_a_planted_circle_between_folders_is_caught():
+    edges = {"model.a.x": {"model.b.y"}, "model.b.z": {"model.a.w"}}
+    assert sorted(cycle(rooms_of("model", edges))) == ["a", "b"]
+
+
+def at_import(path):
+    """Like `imports`, of what runs when the module is imported."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    whole = [each for each in tree.body if isinstance(each, (ast.Import, ast.ImportFrom))]
+    for node in whole:
+        names = (
+            [a.name for a in node.names]
+            if isinstance(node, ast.Import)
+            else [f"{node.module}.{a.name}" for a in node.names]
+        )
+        yield from (module_of(name.removeprefix("camcomp.")) for name in names if name.startswith("camcomp."))
+
+
+def longest(edges):
+    """The longest chain of modules that import one another."""
+    known = {}
+
+    def chain(module):
+        if module not in known:
+            known[module] = [module, *max((chain(other) for other in edges.get(module, ())), key=len, default=[])]
+        return known[module]
+
+    return max((chain(module) for module in edges), key=len)
+
+
+def test_the_chains_of_imports_are_short():
+    files = {path: ".".join(path.relative_to(PACKAGE).with_suffix("").parts) for path in PACKAGE.rglob("*.py")}
+    edges = {name: set(at_import(path)) - {name} for path, name in files.items() if path.name != "__init__.py"}
+    found = longest(edges)
+    assert len(found) <= LONGEST_CHAIN, " -> ".join(found)
+
+
+def test_the_root_holds_folders_only():
+    assert sorted(path.name for path in PACKAGE.glob("*.py")) == ["__init__.py", "__main__.py"]
+
+
+def test_every_folder_says_what_it_is_for():
+    for path in PACKAGE.rglob("__init__.py"):
+        assert ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))), path
+
+
+def test_packages_hold_words_only_and_files_are_short():
     for path in PACKAGE.rglob("*.py"):
         text = path.read_text(encoding="utf-8")
-        if path.name == "__init__.py" and path.parent != PACKAGE:
-            assert not text.strip(), path
+        if path.name == "__init__.py" and path.parent not in (PACKAGE, PACKAGE / "plugins"):
+            assert len(ast.parse(text).body) == 1, f"{path}: code in a folder's own file"
         assert text.count("\n") <= (600 if path.name == "rules.py" else 500), path  # the catalogue is a table

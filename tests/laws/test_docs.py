@@ -5,8 +5,9 @@ import shutil
 
 import pytest
 
-from camcomp import reference, shelf
-from camcomp.cli import VERBS
+from camcomp.ground import shelf
+from camcomp.terminal import reference
+from camcomp.terminal.cli import VERBS
 from tests.documents import ROOT, Command, Reader, TypedFile, missing, steps, text_blocks
 
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -47,12 +48,16 @@ def test_the_readme_is_followed(reader):
             lost = missing(step.promised, printed[-1])
             assert lost is None, f"line {step.line}: `{step.text}` does not print `{lost}`"
     assert len(printed) >= 2
-    files = [path.read_text(encoding="utf-8") for path in reader.folder.rglob("*") if path.suffix in (".nc", ".csv", ".json")]
-    told = {line: text for line, text in text_blocks(README).items() if "camcomp/cli.py" not in text}
+    files = [
+        path.read_text(encoding="utf-8") for path in reader.folder.rglob("*") if path.suffix in (".nc", ".csv", ".json")
+    ]
+    told = {line: text for line, text in text_blocks(README).items() if "camcomp/terminal/" not in text}
     assert told
     for line, text in told.items():
         promised = ["...", *text.splitlines()]
-        assert any(missing(promised, each) is None for each in (*printed, *files)), f"README.md:{line} is not what comes out"
+        assert any(missing(promised, each) is None for each in (*printed, *files)), (
+            f"README.md:{line} is not what comes out"
+        )
 
 
 def test_links_of_documents_lead_somewhere():
@@ -102,7 +107,11 @@ $ false  # exit 1
 
 
 def test_a_document_is_files_and_commands():
-    assert steps(DOCUMENT) == [TypedFile("a.txt", "hello\n"), Command("cat a.txt", 6, 0, ["hello"]), Command("false", 8, 1)]
+    assert steps(DOCUMENT) == [
+        TypedFile("a.txt", "hello\n"),
+        Command("cat a.txt", 6, 0, ["hello"]),
+        Command("false", 8, 1),
+    ]
 
 
 def test_the_reader_notices_what_is_not_so(reader):

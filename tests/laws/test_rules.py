@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 import camcomp
-from camcomp.rules import RULES
+from camcomp.ground.rules import RULES
 
 PACKAGE = Path(camcomp.__file__).parent
 

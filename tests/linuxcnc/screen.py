@@ -38,7 +38,9 @@ def settled():
     for _ in range(200):
         now = [pin(f"joint.{k}.motor-pos-cmd") for k in range(3)]
         still = before is not None and max(abs(a - b) for a, b in zip(before, now, strict=False)) < 1e-6
-        if still and all(abs(pin(f"axis.{each}.eoffset-request") - pin(f"axis.{each}.eoffset")) < 1e-6 for each in "xyz"):
+        if still and all(
+            abs(pin(f"axis.{each}.eoffset-request") - pin(f"axis.{each}.eoffset")) < 1e-6 for each in "xyz"
+        ):
             return now
         before = now
         time.sleep(0.1)

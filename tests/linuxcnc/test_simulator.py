@@ -14,10 +14,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from camcomp.config import load_config
-from camcomp.files import shipped
-from camcomp.job import Job
-from camcomp.stream import Stream
+from camcomp.compensation.set_points.stream import Stream
+from camcomp.ground.files import shipped
+from camcomp.model.config.load import load_config
+from camcomp.model.job import Job
 
 pytestmark = pytest.mark.skipif(
     not (shutil.which("linuxcnc") and shutil.which("halcmd")), reason="LinuxCNC is not installed (linuxcnc-uspace)"
@@ -38,7 +38,7 @@ def machine(folder):
     for path in Path(shipped("samples/linuxcnc")).iterdir():
         shutil.copy(path, folder)
     program = folder / "camcomp"
-    program.write_text(f"#!/bin/sh\nexec {sys.executable} -m camcomp \"$@\"\n")
+    program.write_text(f'#!/bin/sh\nexec {sys.executable} -m camcomp "$@"\n')
     program.chmod(0o755)
     ini = (folder / "machine.ini").read_text()
     ini = ini.replace("DISPLAY = axis", f"DISPLAY = {Path(__file__).with_name('screen.py')}")
@@ -65,9 +65,18 @@ def simulate(folder):
         env["RTAPI_UID"] = "65534"
         folder.chmod(0o777)
     command = ["linuxcnc", str(folder / "machine.ini")]
-    with alone(), subprocess.Popen(
-        command, cwd=folder, env=env, stdout=-1, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL, start_new_session=True
-    ) as process:
+    with (
+        alone(),
+        subprocess.Popen(
+            command,
+            cwd=folder,
+            env=env,
+            stdout=-1,
+            stderr=subprocess.STDOUT,
+            stdin=subprocess.DEVNULL,
+            start_new_session=True,
+        ) as process,
+    ):
         try:
             said, _ = process.communicate(timeout=120)
         except subprocess.TimeoutExpired:

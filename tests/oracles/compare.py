@@ -4,12 +4,16 @@ import math
 
 import numpy as np
 
-from camcomp.datatypes import ARC, RAPID
 from camcomp.gcode.arcs import PLANES
 from camcomp.gcode.program import Program
+from camcomp.ground.datatypes import ARC, RAPID
 from tests.oracles.rs274 import Motion, Run
 
-STILL = (2e-3, 2.37e-3, 1.5e-3)  # shorter is no motion, in the active unit; the others for a motion that is just as long
+STILL = (
+    2e-3,
+    2.37e-3,
+    1.5e-3,
+)  # shorter is no motion, in the active unit; the others for a motion that is just as long
 PRINTED = 0.5001e-4  # half of the last digit that rs274 prints, in the active unit
 
 

@@ -79,7 +79,13 @@ def run(
         command = [str(binary()), "-g", "-v", "rs274.var", "-t", "tool.tbl", "program.ngc"]
         for _ in range(3):
             done = subprocess.run(
-                command, cwd=folder, stdin=subprocess.DEVNULL, capture_output=True, text=True, errors="replace", timeout=120,
+                command,
+                cwd=folder,
+                stdin=subprocess.DEVNULL,
+                capture_output=True,
+                text=True,
+                errors="replace",
+                timeout=120,
                 check=False,
             )
             if done.returncode >= 0:

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from camcomp.config import load_config
-from camcomp.job import Job
-from camcomp.statics.target import correct, settle
+from camcomp.model.config.load import load_config
+from camcomp.model.job import Job
+from camcomp.model.statics.target import correct, settle
 from tests.plants import energy
 from tests.plants.legs import orthoglide, ref_puu
 

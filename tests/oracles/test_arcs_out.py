@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
-from camcomp.compensate import compensate
-from camcomp.config import load_config
-from camcomp.cutting.track import lay_track
-from camcomp.datatypes import ARC
-from camcomp.files import shipped
+from camcomp.compensation.program.compensate import compensate
+from camcomp.compensation.program.moves import travel_of
 from camcomp.gcode.interpret import read_program
-from camcomp.job import Job
-from camcomp.moves import travel_of
-from camcomp.response import aim_at
+from camcomp.ground.datatypes import ARC
+from camcomp.ground.files import shipped
+from camcomp.model.config.load import load_config
+from camcomp.model.cutting.track import lay_track
+from camcomp.model.job import Job
+from camcomp.model.motion.response import aim_at
 from tests.oracles import rs274
 
 pytestmark = rs274.needs_rs274

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from camcomp.config import load_config
-from camcomp.job import Job
-from camcomp.statics.target import correct, settle
+from camcomp.model.config.load import load_config
+from camcomp.model.job import Job
+from camcomp.model.statics.target import correct, settle
 from tests.commandline import compensated
 from tests.plants import kuka, serial
 
@@ -66,7 +66,7 @@ def test_stiffness_and_fixed_point_iterations_end_at_the_same_command(job):
 
 def test_drive_torques_and_tip_motion_are_reciprocal(job):
     """Virtual work: the drives feel a tip force by as much as their turns move the tip, d(drive)/dF = -(d tip/d rho)^T."""
-    from camcomp.statics.solve import FREE, solve
+    from camcomp.model.statics.solve import FREE, solve
 
     tip, force = tips(8, 11), loads(8)
     rho = solve(job.machine, FREE, tip, force=force).rho
@@ -84,7 +84,7 @@ def test_drive_torques_and_tip_motion_are_reciprocal(job):
 
 def test_work_of_the_drives_round_a_loop_is_zero(job):
     """Dead loads and springs store no work: what the drives put in on a closed loop they get back."""
-    from camcomp.statics.solve import FREE, solve
+    from camcomp.model.statics.solve import FREE, solve
 
     phi = np.linspace(0.0, 2 * np.pi, 49)
     ring = np.array([1550.0, 0.0, 900.0]) + 150.0 * np.column_stack((np.cos(phi), np.sin(phi), np.sin(2 * phi)))
@@ -107,9 +107,7 @@ def periodic_slope(values):
 
 
 def test_groove_through_the_command_line(tmp_path):
-    done, joints, _, summary, text = compensated(
-        tmp_path, "samples/groove-circle-50.nc", "config/kuka-kr210.yaml"
-    )
+    done, joints, _, summary, text = compensated(tmp_path, "samples/groove-circle-50.nc", "config/kuka-kr210.yaml")
     assert done.returncode == 0, done.stderr.decode()
     names = [f"A{k}" for k in range(1, 7)]
     rho = np.stack([joints[f"act_{n}_rad"] for n in names], axis=1)

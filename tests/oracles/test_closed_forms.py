@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from camcomp.config import load_config
-from camcomp.job import Job
-from camcomp.statics.description import Actuator, Chain, Link, Parallelogram, Passive, Robot, Transform
-from camcomp.statics.links import beam_compliance
-from camcomp.statics.machine import build_machine
-from camcomp.statics.solve import FREE, HOLD, STATUS, TARGET, solve
-from camcomp.statics.stiffness import assembly_shift, loaded_stiffness, unloaded_stiffness
+from camcomp.model.config.load import load_config
+from camcomp.model.job import Job
+from camcomp.model.statics.description import Actuator, Chain, Link, Parallelogram, Passive, Robot, Transform
+from camcomp.model.statics.links import beam_compliance
+from camcomp.model.statics.machine import build_machine
+from camcomp.model.statics.solve import FREE, HOLD, STATUS, TARGET, solve
+from camcomp.model.statics.stiffness import assembly_shift, loaded_stiffness, unloaded_stiffness
 
 X, Y, Z = np.eye(3)
 CODE = {text: code for code, text in STATUS.items()}

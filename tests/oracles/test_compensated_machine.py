@@ -101,17 +101,13 @@ def test_the_broken_machine_cuts_true(tmp_path, name):
     assert code == 0 or behind_stops, said
     assert missed(PROGRAM, truth).max() > 0.3
     left = missed(out.read_text(), truth)
-    assert (
-        left.max() < 1.2e-3
-    )  # the bound of the splitting is 1 um; the nearest sampled direction adds a little
+    assert left.max() < 1.2e-3  # the bound of the splitting is 1 um; the nearest sampled direction adds a little
 
 
 def test_a_machine_with_other_errors_does_not(tmp_path):
     (tmp_path / "in.nc").write_text(PROGRAM)
     out = tmp_path / "out.nc"
-    code, said = runner.invoke(
-        ["compensate", str(tmp_path / "in.nc"), "--config", str(runner.CONFIG), "-o", str(out)]
-    )
+    code, said = runner.invoke(["compensate", str(tmp_path / "in.nc"), "--config", str(runner.CONFIG), "-o", str(out)])
     assert code == 0, said
     assert missed(out.read_text(), Truth()).max() < 1.2e-3
     assert missed(out.read_text(), SETS["elastic"][1]).max() > 0.05

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from camcomp.config import load_config
-from camcomp.job import Job
-from camcomp.statics.description import Link
-from camcomp.statics.hanging import hang
-from camcomp.statics.target import settle
+from camcomp.model.config.load import load_config
+from camcomp.model.job import Job
+from camcomp.model.statics.description import Link
+from camcomp.model.statics.hanging import hang
+from camcomp.model.statics.target import settle
 from tests.plants import kuka, serial
 
 
@@ -55,7 +55,7 @@ def test_the_general_solver_agrees_where_it_can_go(robot):
     mine = hang(robot, state.rho)
     np.testing.assert_allclose(mine.point + mine.rotation @ robot.tool, loaded, atol=1e-6)
     wrench = np.tile([100.0, -50.0, 30.0, 1e4, 2e4, -1e4], (20, 1))
-    from camcomp.statics.solve import FREE, solve
+    from camcomp.model.statics.solve import FREE, solve
 
     pulled = solve(job.machine, FREE, tip, rho=state.rho, wrench=wrench)
     mine = hang(robot, state.rho, wrench)
@@ -64,7 +64,7 @@ def test_the_general_solver_agrees_where_it_can_go(robot):
 
 
 def test_an_arm_that_cannot_stand_is_refused(robot):
-    from camcomp.statics.description import Actuator
+    from camcomp.model.statics.description import Actuator
 
     limp = robot.edit(Actuator, lambda a: replace(a, stiffness=1e3))
     with pytest.raises(ArithmeticError):

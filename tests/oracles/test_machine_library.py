@@ -5,11 +5,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from camcomp.config import load_config
-from camcomp.files import shipped
-from camcomp.statics.build import build_robot
-from camcomp.statics.machine import Machine, build_machine
-from camcomp.statics.target import correct, settle
+from camcomp.ground.files import shipped
+from camcomp.model.config.load import load_config
+from camcomp.model.statics.build import build_robot
+from camcomp.model.statics.machine import Machine, build_machine
+from camcomp.model.statics.target import correct, settle
 from tests.plants.legs import beam
 from tests.plants.serial import Joint, Link, Shift, Weight
 from tests.plants.serial import settle as minimise

@@ -95,9 +95,7 @@ def test_ref_puu_circle_about_q1(radius, largest):
     tip, force = circle(radius)
     tip = tip - Q1 + REF["Q1"]
     phi = 2 * np.pi * np.arange(24) / 24
-    force = force + 20 * np.stack(
-        [-np.sin(phi), np.cos(phi), 0 * phi], 1
-    )  # the table has the other sign of Ft
+    force = force + 20 * np.stack([-np.sin(phi), np.cos(phi), 0 * phi], 1)  # the table has the other sign of Ft
     legs = ref_puu()
     size = np.linalg.norm(energy.settle(legs, energy.inverse(legs, tip), force).tip - tip, axis=1)
     # the printed range has the moment arm fixed; letting it turn changes tips by up to 0.4 %
@@ -155,9 +153,7 @@ def test_serial_arm_sits_at_the_minimum_of_its_energy():
 
 
 def test_cartesian_machine_yields_force_over_stiffness():
-    found = serial.settle(
-        serial.cartesian((1e4, 2e4, 5e3)), np.array([10.0, -3, 2]), np.array([215.0, -10, -25])
-    )
+    found = serial.settle(serial.cartesian((1e4, 2e4, 5e3)), np.array([10.0, -3, 2]), np.array([215.0, -10, -25]))
     assert found.tip[0] == pytest.approx((10.0215, -3.0005, 1.995), abs=1e-12)
     assert found.drive[0] == pytest.approx((-215, 10, 25))
 

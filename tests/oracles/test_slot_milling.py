@@ -1,7 +1,7 @@
 """Milling forces against numbers from elsewhere, and against a cutter that is turned tooth by tooth.
 
 Measured: slots by a flat end mill of 25 mm, 2 teeth, 6000 rev/min, 3 mm deep, in a material that is not stated; mean forces
-by leekunhwee, ForceCalculation (GitHub, commit 3fda341), in the frame of camcomp.cutting.average, axial force counted
+by leekunhwee, ForceCalculation (GitHub, commit 3fda341), in the frame of camcomp.model.cutting.average, axial force counted
 down the tool.
 """
 
@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from camcomp.cutting.cut import Cut
-from camcomp.cutting.fit import fit_slot
 from camcomp.forces import kienzle, mechanistic
+from camcomp.model.cutting.cut import Cut
+from camcomp.model.cutting.fit import fit_slot
 
 FEED = np.array([300.0, 600.0, 900.0, 1200.0, 1500.0])
 LEFT = np.array([63.0, 107.1, 137.7, 171.3, 210.7])
@@ -83,7 +83,9 @@ def test_kienzle_predicts_the_slots_blindly(kc11: float, mc: float, expected: li
     assert (np.abs(-force[:, 0] / LEFT - 1) < 0.32).all()
 
 
-def turned(clockwise: bool, width: float, side: float, chip_law: Any, teeth: int, depth: float, chip: float) -> np.ndarray:
+def turned(
+    clockwise: bool, width: float, side: float, chip_law: Any, teeth: int, depth: float, chip: float
+) -> np.ndarray:
     """Mean (Fr, Ft, Fz) on the tool: every tooth is put in its place, and pushed by the chip that it meets.
 
     The tool feeds along +x over the work; side +1 has the wall left of the feed, -1 right, width the strip it cuts.

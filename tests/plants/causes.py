@@ -44,9 +44,7 @@ def _scalar(field: str, parameter: str) -> Callable:
 
 def _softer_drive(truth: Truth, which: np.ndarray, a: float, rng: np.random.Generator):
     factor = 1 / (1 + a)
-    return replace(truth, drive_factor=truth.drive_factor * np.where(which > 0, factor, 1.0)), {
-        "factor": factor
-    }
+    return replace(truth, drive_factor=truth.drive_factor * np.where(which > 0, factor, 1.0)), {"factor": factor}
 
 
 def _softer_links(truth: Truth, which: np.ndarray, a: float, rng: np.random.Generator):
@@ -91,9 +89,7 @@ KINDS: dict[str, Kind] = {
     "gravity": Kind(False, False, 10.0, False, 500.0, _scalar("weight_N", "weight_N")),
     "cutting_force": Kind(False, False, 0.03, True, 4.0, _force),
     "tool_length": Kind(False, False, 0.01, True, 5.0, _scalar("tool_mm", "length_mm")),
-    "tool_deflection": Kind(
-        False, False, 5e-5, False, 5e-3, _scalar("deflection_mm_per_N", "compliance_mm_per_N")
-    ),
+    "tool_deflection": Kind(False, False, 5e-5, False, 5e-3, _scalar("deflection_mm_per_N", "compliance_mm_per_N")),
     "tool_wear": Kind(False, False, 0.05, False, 5.0, _scalar("wear_per_min", "growth_per_min")),
     "workpiece_frame": Kind(False, False, 0.01, True, 3.0, _frame),
     "time_sync": Kind(False, False, 1e-3, True, 0.1, _scalar("sync_s", "offset_s")),
@@ -131,9 +127,7 @@ class Cause:
         softer = self.effect in ("drive_stiffness", "link_stiffness", "cutting_force")
         return (-0.5 if softer else -kind.limit if kind.signed else 0.0), kind.limit
 
-    def put(
-        self, truth: Truth, amplitude: float, span_s: tuple[float, float]
-    ) -> tuple[Truth, dict[str, float]]:
+    def put(self, truth: Truth, amplitude: float, span_s: tuple[float, float]) -> tuple[Truth, dict[str, float]]:
         """The truth with this cause in it, and the parameters as a library would name them.
 
         span_s: middle of the experiment on the common clock, for what happens at a moment.

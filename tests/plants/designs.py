@@ -28,9 +28,7 @@ def _frame(body: list[str], first: tuple[float, float, float], plunge: bool, num
     return "\n".join(lines) + "\n"
 
 
-def circle(
-    radius: float, feed: float, clockwise: bool, centre=(0.0, 0.0), z=0.0, plunge=True, numbered=False
-) -> str:
+def circle(radius: float, feed: float, clockwise: bool, centre=(0.0, 0.0), z=0.0, plunge=True, numbered=False) -> str:
     """One full circle from its +x point."""
     x, y = centre
     code = "G2" if clockwise else "G3"
@@ -50,9 +48,7 @@ def zigzag(size: float, rows: int, feed: float, centre=(0.0, 0.0), z=0.0, plunge
     return _frame(body, (xs[0], ys[0], z), plunge, numbered)
 
 
-def rectangle(
-    width: float, height: float, feed: float, centre=(0.0, 0.0), z=0.0, plunge=True, numbered=False
-) -> str:
+def rectangle(width: float, height: float, feed: float, centre=(0.0, 0.0), z=0.0, plunge=True, numbered=False) -> str:
     """Once round, counter-clockwise from the lower left corner."""
     x0, y0, x1, y1 = (
         centre[0] - width / 2,

@@ -91,9 +91,7 @@ def _stores(on: np.ndarray, rest: float, work: float, fast: float, slow: float) 
     return out
 
 
-def warming(
-    t: np.ndarray, busy: list[tuple[float, float]], rise: tuple[float, float], taus: tuple[float, float]
-):
+def warming(t: np.ndarray, busy: list[tuple[float, float]], rise: tuple[float, float], taus: tuple[float, float]):
     """Temperatures above ambient (n, 2) K of screw and frame at common times t (n,), heated in the busy intervals.
 
     Two stores in a row: the screw (fast) gives its heat to the frame (slow), the frame to the room.  rise: steady rise of

@@ -153,9 +153,7 @@ def settle(
     origin = np.einsum("bij,bj->bi", CYCLES[leg], base[:, :3])
     rail = np.zeros((3 * n, 3))
     rail[:, 0] = rho.reshape(-1) - legs.offset
-    back = np.swapaxes(CYCLES, 1, 2)[
-        leg
-    ]  # the leg ends in its local axes, the platform is parallel to the machine
+    back = np.swapaxes(CYCLES, 1, 2)[leg]  # the leg ends in its local axes, the platform is parallel to the machine
     k = passive + len(rows)
     gap = np.zeros((3 * n, 6))
     step = 0

@@ -141,11 +141,7 @@ def severity(a: list[State], b: list[State], noise: Noise, channels: tuple[str, 
 
     def rms(pick) -> float:
         return float(
-            np.sqrt(
-                np.mean(
-                    np.concatenate([((pick(y) - pick(x)) ** 2).sum(1) for x, y in zip(a, b, strict=True)])
-                )
-            )
+            np.sqrt(np.mean(np.concatenate([((pick(y) - pick(x)) ** 2).sum(1) for x, y in zip(a, b, strict=True)])))
         )
 
     if "tip" in channels:
@@ -195,9 +191,7 @@ def make(plan_: Plan) -> Made:
         amplitude = size(plan_, runs, base, cause, ratio)
         truth, parameters = cause.put(truth, amplitude, span)
         clean, _ = cause.put(clean, amplitude, span)
-        listed.append(
-            {"effect": cause.effect, "target": cause.target, "ratio": ratio, "parameters": parameters}
-        )
+        listed.append({"effect": cause.effect, "target": cause.target, "ratio": ratio, "parameters": parameters})
     few = [even(r, 40) for r in runs]
     times = [_times(r, plan_, rng) for r in runs]
     states = observe_all(runs, truth, times)
@@ -280,9 +274,7 @@ def write_log(path: Path, names: list[str], values: np.ndarray, formats: list[st
     with path.open("w") as out:
         out.write(",".join(names) + "\n")
         for row in values:
-            out.write(
-                ",".join("" if np.isnan(v) else f % v for f, v in zip(formats, row, strict=True)) + "\n"
-            )
+            out.write(",".join("" if np.isnan(v) else f % v for f, v in zip(formats, row, strict=True)) + "\n")
 
 
 def write(made: Made, plan_: Plan, folder: Path, config: Path | str) -> Path:

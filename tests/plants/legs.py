@@ -7,9 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 
-def beam(
-    length: float, young: float, shear: float, area: float, iy: float, iz: float, torsion: float
-) -> np.ndarray:
+def beam(length: float, young: float, shear: float, area: float, iy: float, iz: float, torsion: float) -> np.ndarray:
     """Tip stiffness (6, 6) of an Euler-Bernoulli cantilever along local x."""
     k = np.zeros((6, 6))
     k[0, 0] = young * area / length

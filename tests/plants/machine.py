@@ -28,9 +28,7 @@ from tests.plants.legs import Legs, orthoglide
 from tests.plants.motion import Timeline
 
 ORIGIN = np.array([-73.205, -73.205, -173.205])  # program origin in the machine frame
-TRIPLE = np.array(
-    [215.0, -10.0, -25.0]
-)  # force on the tool: right of the feed, along it, along the tool axis
+TRIPLE = np.array([215.0, -10.0, -25.0])  # force on the tool: right of the feed, along it, along the tool axis
 HOME = -300.0
 
 
@@ -199,9 +197,7 @@ def simulate(
         stiff = 1e4 * truth.drive_factor
         where = behind + _fine(grid, t, state.carriage - nut - pulled / stiff)
         friction = on_grid(
-            np.stack(
-                [_friction(where[:, i], truth.friction_N[i], truth.slip_mm, stiff[i]) for i in range(3)], 1
-            )
+            np.stack([_friction(where[:, i], truth.friction_N[i], truth.slip_mm, stiff[i]) for i in range(3)], 1)
         )
         state.carriage = state.carriage - friction / stiff
     found = energy.settle(legs, state.carriage, state.force, weight=truth.weight_N)

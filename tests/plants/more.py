@@ -13,7 +13,15 @@ from tests.plants.motion import Timeline, read
 
 
 def add_run(
-    folder: Path, made: Made, plan: Plan, program: str, *, cutting: bool, channels: str, started_s: float, truth: Truth | None = None
+    folder: Path,
+    made: Made,
+    plan: Plan,
+    program: str,
+    *,
+    cutting: bool,
+    channels: str,
+    started_s: float,
+    truth: Truth | None = None,
 ) -> None:
     """Executes `program` on the machine of `made` (or on what became of it, `truth`) and adds program, log and run."""
     number = len(list(folder.glob("log-*.csv"))) + 1

@@ -105,9 +105,7 @@ def read(text: str, start: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> list
 class Timeline:
     """Where the program is at any time of the controller's clock (s)."""
 
-    def __init__(
-        self, moves: list[Move], acceleration: float = ACCELERATION, *, looks_ahead: bool = False
-    ) -> None:
+    def __init__(self, moves: list[Move], acceleration: float = ACCELERATION, *, looks_ahead: bool = False) -> None:
         """Plans runs of moves from stop to stop; without looking ahead every move is one."""
         self.moves, self.acceleration = moves, acceleration
         length = np.array([m.length for m in moves])

@@ -45,9 +45,7 @@ def rate(w: np.ndarray) -> np.ndarray:
 
 def vector(r: np.ndarray) -> np.ndarray:
     """Rotation vectors (..., 3) of the matrices r (..., 3, 3); angles below pi."""
-    skew = 0.5 * np.stack(
-        [r[..., 2, 1] - r[..., 1, 2], r[..., 0, 2] - r[..., 2, 0], r[..., 1, 0] - r[..., 0, 1]], -1
-    )
+    skew = 0.5 * np.stack([r[..., 2, 1] - r[..., 1, 2], r[..., 0, 2] - r[..., 2, 0], r[..., 1, 0] - r[..., 0, 1]], -1)
     sine = np.linalg.norm(skew, axis=-1)
     cosine = 0.5 * (np.trace(r, axis1=-2, axis2=-1) - 1)
     angle = np.arctan2(sine, cosine)

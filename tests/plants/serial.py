@@ -65,9 +65,7 @@ def _columns(arm: list[Element]) -> int:
     return sum(1 if isinstance(e, Joint) else 6 if isinstance(e, Link) else 0 for e in arm)
 
 
-def _walk(
-    arm: list[Element], q: np.ndarray, z: np.ndarray
-) -> tuple[Walk, list[tuple[float, np.ndarray, int]]]:
+def _walk(arm: list[Element], q: np.ndarray, z: np.ndarray) -> tuple[Walk, list[tuple[float, np.ndarray, int]]]:
     """Chain pose with twists, and (weight, centre (n, 3), number of coordinates before it) of every weight."""
     walk, weights, at, joint = Walk(len(q), z.shape[1]), [], 0, 0
     for e in arm:

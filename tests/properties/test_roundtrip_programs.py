@@ -10,11 +10,11 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from camcomp.datatypes import ARC, RAPID
 from camcomp.gcode.interpret import read_program
 from camcomp.gcode.output import Output
-from camcomp.gcode.program import Setup
 from camcomp.gcode.rewrite import rewrite
+from camcomp.gcode.setup import Setup
+from camcomp.ground.datatypes import ARC, RAPID
 from tests.displaced import arcs_bent, divided, shifted
 from tests.nc_writer import ProgramWriter
 from tests.oracles import compare, rs274

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from camcomp.armposes import ArmBench, Poses
-from camcomp.armstudy import investigate, merged
-from camcomp.config import load_config
-from camcomp.gap.withheld import without_nuisance
-from camcomp.statics.build import build_robot
+from camcomp.diagnosis.arm.discrepancy import without_nuisance
+from camcomp.diagnosis.arm.poses import ArmBench, Poses
+from camcomp.diagnosis.arm.study import investigate, merged
+from camcomp.model.config.load import load_config
+from camcomp.model.statics.build import build_robot
 from tests.commandline import ROOT, camcomp, table
 
 DATA = Path(os.environ.get("CAMCOMP_DATA", "/nowhere")) / "ipa_ur10"
@@ -119,7 +119,12 @@ def harmonics(block, columns, q):
     joints = [j for j, c in enumerate(columns) if c.effect == "joint_offset"]
     names = ["shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3"]
     angle = [q[:, names.index(columns[j].target)] for j in joints]
-    waves = [block.X[:, :, j] * f(k * a)[:, None] for j, a in zip(joints, angle, strict=True) for k in (1, 2) for f in (np.sin, np.cos)]
+    waves = [
+        block.X[:, :, j] * f(k * a)[:, None]
+        for j, a in zip(joints, angle, strict=True)
+        for k in (1, 2)
+        for f in (np.sin, np.cos)
+    ]
     return np.stack(waves, axis=2)
 
 

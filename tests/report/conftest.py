@@ -2,7 +2,7 @@
 
 import pytest
 
-from camcomp.cli import run
+from camcomp.terminal.cli import run
 from tests.commandline import ROOT
 from tests.report.browser import Browser
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from camcomp.report.runview import Rival, RunView
+from camcomp.diagnosis.report.run_view import Rival, RunView
 
 
 def run_view(name, held_out, *, size=20.0, left=2.0, seed=0, frequency=0.5):
@@ -30,13 +30,18 @@ UNKNOWN = {"effect": "unknown", "target": "y", "probability": 0.999, "share": 0.
 
 def result(verdict):
     """A result file with this verdict."""
-    causes = {"none": [], "identified": [BACKLASH, GRAVITY], "ambiguous": [BACKLASH], "unknown": [GRAVITY, UNKNOWN]}[verdict]
+    causes = {"none": [], "identified": [BACKLASH, GRAVITY], "ambiguous": [BACKLASH], "unknown": [GRAVITY, UNKNOWN]}[
+        verdict
+    ]
     steps = [
         {"effect": each["effect"], "target": each["target"], "after_rms_um": 14.1 / (4 * k)}
         for k, each in enumerate((each for each in causes if each["effect"] != "unknown"), 1)
     ]
     after = steps[-1]["after_rms_um"] if steps else 14.1
-    sets = [[{"effect": "backlash", "target": "x"}], [{"effect": "friction", "target": "x"}, {"effect": "gravity", "target": None}]]
+    sets = [
+        [{"effect": "backlash", "target": "x"}],
+        [{"effect": "friction", "target": "x"}, {"effect": "gravity", "target": None}],
+    ]
     return {
         "verdict": verdict,
         "gap": {"rms_um": 14.1, "p95_um": 19.8, "max_um": 21.3, "noise_floor_um": 0.87},
@@ -62,10 +67,17 @@ def result(verdict):
 
 def views():
     """Two held-out runs and one of the fit."""
-    return [run_view("a", True), run_view("b", True, size=30.0, seed=1, frequency=1.25), run_view("c", False, size=90.0, seed=2)]
+    return [
+        run_view("a", True),
+        run_view("b", True, size=30.0, seed=1, frequency=1.25),
+        run_view("c", False, size=90.0, seed=2),
+    ]
 
 
 def rivals():
     """Two sets that do nearly the same."""
     one = [view.before - view.after for view in views()]
-    return [Rival("backlash (x)", tuple(one)), Rival("friction (x) and gravity", tuple(1.1 * each + 0.2 for each in one))]
+    return [
+        Rival("backlash (x)", tuple(one)),
+        Rival("friction (x) and gravity", tuple(1.1 * each + 0.2 for each in one)),
+    ]

@@ -8,7 +8,7 @@ import sys
 import pytest
 from ruamel.yaml import YAML
 
-from camcomp.cli import run
+from camcomp.terminal.cli import run
 from tests.commandline import ROOT
 
 HOOKS = YAML(typ="safe").load((ROOT / ".pre-commit-hooks.yaml").read_text())
@@ -35,7 +35,13 @@ def shell(tmp_path):
     def call(text, folder):
         command = ["bash", "-eo", "pipefail", "-c", text]  # as GitHub runs it
         return subprocess.run(
-            command, check=False, cwd=folder, env={**os.environ, "PATH": path}, capture_output=True, text=True, timeout=600
+            command,
+            check=False,
+            cwd=folder,
+            env={**os.environ, "PATH": path},
+            capture_output=True,
+            text=True,
+            timeout=600,
         )
 
     return call
@@ -69,7 +75,7 @@ def test_a_hook_takes_many_files_and_fails_on_a_bad_one(hook, project, shell):
 
 
 def test_hooks_see_programs_of_every_ending_that_batch_takes():
-    from camcomp.batch import SUFFIXES
+    from camcomp.compensation.batch.programs import SUFFIXES
 
     (pattern,) = [hook["files"] for hook in HOOKS if hook["id"] == "camcomp-programs"]
     assert all(re.search(pattern, f"a/b{suffix}") for suffix in SUFFIXES)

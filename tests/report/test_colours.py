@@ -25,7 +25,9 @@ CURVES = ["ink", "c1", "c2", "c3", "c4", "c5"]
 
 
 def theme(name):
-    block = re.search(re.escape(':root[data-theme="dark"] {' if name == "dark" else ":root {") + r"(.*?)\}", CSS, re.DOTALL)[1]
+    block = re.search(
+        re.escape(':root[data-theme="dark"] {' if name == "dark" else ":root {") + r"(.*?)\}", CSS, re.DOTALL
+    )[1]
     return dict(re.findall(r"--([\w-]+):\s*(#[0-9a-f]{6})", block))
 
 

@@ -10,8 +10,8 @@ from html import unescape
 import numpy as np
 import pytest
 
-from camcomp.cli import run
 from camcomp.report import page as page_module
+from camcomp.terminal.cli import run
 from tests.commandline import ROOT, table
 
 PROGRAM = ROOT / "samples/groove-circle-2.nc"

@@ -8,10 +8,10 @@ from html import unescape
 import numpy as np
 import pytest
 
-from camcomp.cli import run
-from camcomp.report.diagnosis import diagnosis_html, verdict_text
+from camcomp.diagnosis.report.page import diagnosis_html, verdict_text
+from camcomp.diagnosis.report.run_view import Rival, likeness, rms, spectrum
 from camcomp.report.inputs import Input
-from camcomp.report.runview import Rival, likeness, rms, spectrum
+from camcomp.terminal.cli import run
 from tests.commandline import ROOT
 from tests.report.browser import needs_browser
 from tests.report.diagnoses import result, rivals, run_view, views
@@ -41,9 +41,15 @@ def figures(html):
     ("verdict", "told"),
     [
         ("none", "nothing to explain"),
-        ("identified", "backlash (x) and gravity explain the gap. On runs that the fit has not seen the gap goes from 14.1 µm"),
+        (
+            "identified",
+            "backlash (x) and gravity explain the gap. On runs that the fit has not seen the gap goes from 14.1 µm",
+        ),
         ("ambiguous", "cannot tell apart: backlash (x); or friction (x) and gravity."),
-        ("unknown", "no effect of the library explains. gravity is identified. The rest depends on reversal:x, velocity:y."),
+        (
+            "unknown",
+            "no effect of the library explains. gravity is identified. The rest depends on reversal:x, velocity:y.",
+        ),
     ],
 )
 def test_the_verdict_is_a_sentence(verdict, told):

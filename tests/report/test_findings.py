@@ -5,11 +5,11 @@ from xml.etree import ElementTree as xml
 
 import pytest
 
-from camcomp.cli import run
+from camcomp.ground.rules import RULES
 from camcomp.report.findings import Case, Finding, relative
 from camcomp.report.junit import junit
 from camcomp.report.sarif import sarif
-from camcomp.rules import RULES
+from camcomp.terminal.cli import run
 from tests.commandline import ROOT
 
 CARTESIAN = str(ROOT / "config/cartesian.yaml")
@@ -62,7 +62,9 @@ def test_fingerprints_stay_when_lines_are_put_in_above():
 
 
 def test_standard_input_has_no_place_and_a_file_may_have_no_line():
-    log = json.loads(sarif([Case("-", [Finding("CC101", "m", "<stdin>", 1, 1)]), Case("a", [Finding("CC500", "m", "a")])]))
+    log = json.loads(
+        sarif([Case("-", [Finding("CC101", "m", "<stdin>", 1, 1)]), Case("a", [Finding("CC500", "m", "a")])])
+    )
     first, second = log["runs"][0]["results"]
     assert "locations" not in first
     assert second["locations"] == [{"physicalLocation": {"artifactLocation": {"uri": "a", "uriBaseId": "%SRCROOT%"}}}]
@@ -111,7 +113,18 @@ def test_quiet_validate_says_nothing_about_sound_files(shop, capsys):
 
 
 def test_verify_points_at_the_lines_of_the_original(shop):
-    words = ["verify", "good.nc", "--against", "good.nc", "--config", CARTESIAN, "--sarif", "v.sarif", "--junit", "v.xml"]
+    words = [
+        "verify",
+        "good.nc",
+        "--against",
+        "good.nc",
+        "--config",
+        CARTESIAN,
+        "--sarif",
+        "v.sarif",
+        "--junit",
+        "v.xml",
+    ]
     assert run(words) == 1
     (result,) = json.loads((shop / "v.sarif").read_text())["runs"][0]["results"]
     assert result["ruleId"] == "CC601" and "um are left" in result["message"]["text"]

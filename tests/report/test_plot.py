@@ -28,7 +28,9 @@ def test_hidden_moves_are_gaps():
 
 
 def test_numbers_go_into_json():
-    assert json.dumps(numbers(np.array([1 / 3, -1e-9, np.nan, np.inf])), allow_nan=False) == "[0.33333, 0.0, null, null]"
+    assert (
+        json.dumps(numbers(np.array([1 / 3, -1e-9, np.nan, np.inf])), allow_nan=False) == "[0.33333, 0.0, null, null]"
+    )
 
 
 @pytest.mark.parametrize(

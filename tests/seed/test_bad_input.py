@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from camcomp.cli import run
+from camcomp.terminal.cli import run
 
 GOOD = "G21 G90 G17 G94\nG0 X5 Y0 Z5\nG1 Z0 F300\nG1 X9 F600\nM30\n"
 MACHINE = "config/orthoglide-1deg.yaml"
@@ -29,16 +29,20 @@ BAD_MACHINES = {
     "syntax": ("tool: {length_mm: 100\n", None),
     "twice": ("tool: {length_mm: 100}\ntool: {length_mm: 90}\n", None),
     "not positive definite": (
-        ("robot:\n  name: m\n  chains:\n    x:\n      elements:\n"
-        "        - {type: actuator, joint: prismatic, axis: x}\n"
-        "        - type: link\n          stiffness_mm_N_rad:\n"
-        "            - [1, 2, 0, 0, 0, 0]\n            - [2, 1, 0, 0, 0, 0]\n            - [0, 0, 1, 0, 0, 0]\n"
-        "            - [0, 0, 0, 1, 0, 0]\n            - [0, 0, 0, 0, 1, 0]\n            - [0, 0, 0, 0, 0, 1]\n"),
+        (
+            "robot:\n  name: m\n  chains:\n    x:\n      elements:\n"
+            "        - {type: actuator, joint: prismatic, axis: x}\n"
+            "        - type: link\n          stiffness_mm_N_rad:\n"
+            "            - [1, 2, 0, 0, 0, 0]\n            - [2, 1, 0, 0, 0, 0]\n            - [0, 0, 1, 0, 0, 0]\n"
+            "            - [0, 0, 0, 1, 0, 0]\n            - [0, 0, 0, 0, 1, 0]\n            - [0, 0, 0, 0, 0, 1]\n"
+        ),
         None,
     ),
     "negative stiffness": (
-        ("robot:\n  name: m\n  chains:\n    x:\n      elements:\n"
-        "        - {type: actuator, joint: prismatic, axis: x, stiffness_N_per_mm: -5}\n"),
+        (
+            "robot:\n  name: m\n  chains:\n    x:\n      elements:\n"
+            "        - {type: actuator, joint: prismatic, axis: x, stiffness_N_per_mm: -5}\n"
+        ),
         None,
     ),
 }

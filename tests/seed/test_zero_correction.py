@@ -2,7 +2,7 @@
 
 import pytest
 
-from camcomp.cli import run
+from camcomp.terminal.cli import run
 
 RIGID = ["--config", "config/cartesian.yaml", "--config", "config/no-force.yaml"]
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from camcomp import shelf
-from camcomp.gap.effect import Load, Motion
-from camcomp.gap.memory import direction, first_order, play
+from camcomp.ground import shelf
+from camcomp.model.effect import Load, Motion
+from camcomp.model.hysteresis import direction, first_order, play
 
 
 def ramp(speed=1.0, n=401):

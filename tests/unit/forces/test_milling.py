@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from camcomp.cutting.cut import Cut
-from camcomp.diagnostics import ConfigError
 from camcomp.forces import constant, kienzle, mechanistic
+from camcomp.ground.errors import ConfigError
+from camcomp.model.cutting.cut import Cut
 
 COEFFICIENTS: dict[str, Any] = {
     "Ktc_N_per_mm2": 958.86, "Krc_N_per_mm2": 250.86, "Kac_N_per_mm2": 146.36,

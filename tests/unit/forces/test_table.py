@@ -3,10 +3,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from camcomp.cutting.cut import Cut
-from camcomp.cutting.frame import to_vector
-from camcomp.diagnostics import FileError
 from camcomp.forces.table import Params, force
+from camcomp.ground.errors import FileError
+from camcomp.model.cutting.cut import Cut
+from camcomp.model.cutting.frame import to_vector
 
 TANGENT = np.array([[0.0, 1.0, 0.0], [0.6, -0.8, 0.0], [0.0, 0.0, -1.0]])
 # Program x lies along machine y: the workpiece is turned by 90 degrees about z.

@@ -4,14 +4,19 @@ import math
 
 import pytest
 
-from camcomp.datatypes import ARC, LINE
 from camcomp.gcode.arcplan import Move, divide, plan, turns_of
 from camcomp.gcode.arcs import ArcError, centre_of_radius, check_radii, sweep
+from camcomp.ground.datatypes import ARC, LINE
 
 
 @pytest.mark.parametrize(
     ("radius", "ccw", "centre"),
-    [(1.0, True, (1.0, 0.0)), (2.0, True, (1.0, 3**0.5)), (2.0, False, (1.0, -(3**0.5))), (-2.0, True, (1.0, -(3**0.5)))],
+    [
+        (1.0, True, (1.0, 0.0)),
+        (2.0, True, (1.0, 3**0.5)),
+        (2.0, False, (1.0, -(3**0.5))),
+        (-2.0, True, (1.0, -(3**0.5))),
+    ],
 )
 def test_centre_of_radius(radius, ccw, centre):
     found = centre_of_radius((0.0, 0.0), (2.0, 0.0), radius, ccw)

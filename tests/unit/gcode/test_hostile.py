@@ -4,8 +4,8 @@ import time
 
 import pytest
 
-from camcomp.diagnostics import CamcompError, format_error
 from camcomp.gcode.interpret import read_program
+from camcomp.ground.errors import CamcompError, format_error
 
 HOSTILE = {
     "brackets": "G0 X" + "[" * 5000,

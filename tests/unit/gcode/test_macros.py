@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from camcomp.datatypes import LINE, RAPID
-from camcomp.diagnostics import ProgramError
 from camcomp.gcode.interpret import read_program
 from camcomp.gcode.output import Output
-from camcomp.gcode.program import Setup
 from camcomp.gcode.rewrite import rewrite
+from camcomp.gcode.setup import Setup
+from camcomp.ground.datatypes import LINE, RAPID
+from camcomp.ground.errors import ProgramError
 
 
 def ends(text, dialect="fanuc", **setup):

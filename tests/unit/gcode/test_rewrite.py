@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from camcomp.datatypes import LINE, RAPID
-from camcomp.diagnostics import ProgramError
 from camcomp.gcode.interpret import read_program
 from camcomp.gcode.output import Output
 from camcomp.gcode.rewrite import rewrite
+from camcomp.ground.datatypes import LINE, RAPID
+from camcomp.ground.errors import ProgramError
 
 
 def written(text, rows, resolution=1e-3, dialect="rs274"):

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from camcomp.cli import run
-from camcomp.diagnostics import ProgramError
 from camcomp.gcode.interpret import read_program
-from camcomp.gcode.program import Setup
+from camcomp.gcode.setup import Setup
+from camcomp.ground.errors import ProgramError
+from camcomp.terminal.cli import run
 
 HEAD = "G21 G90\nG0 X0 Y0 Z5\n"
 INDEXED = HEAD + "G0 A90\nG1 X10 F100\nG0 Z5\nA180. (turn)\nG91 G0 A-30\nG90 G1 X0 A150\nG28 A0\nG0 A0\nM2\n"
@@ -32,7 +32,16 @@ def test_a_table_that_turns_alone_passes():
 
 @pytest.mark.parametrize(
     "line",
-    ["G0 X1 A90", "G1 A90 Z0 F100", "G92 A45", "G91 G1 X1 A1 F100", "G3 X2 I1 A5 F9", "G81 X1 Z-1 R1 F100\nA7", "B90", "W5"],
+    [
+        "G0 X1 A90",
+        "G1 A90 Z0 F100",
+        "G92 A45",
+        "G91 G1 X1 A1 F100",
+        "G3 X2 I1 A5 F9",
+        "G81 X1 Z-1 R1 F100\nA7",
+        "B90",
+        "W5",
+    ],
 )
 def test_a_table_that_turns_during_something_else_is_refused(line):
     with pytest.raises(ProgramError) as caught:

@@ -2,8 +2,8 @@
 
 import pytest
 
-from camcomp.diagnostics import ProgramError
 from camcomp.gcode.text import Text
+from camcomp.ground.errors import ProgramError
 
 
 @pytest.mark.parametrize(

@@ -5,11 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from camcomp.config import load_config
-from camcomp.diagnostics import ConfigError
+from camcomp.ground.errors import ConfigError
+from camcomp.model.config.load import load_config
+from camcomp.model.statics.arm import arm_of, end_pose
+from camcomp.model.statics.build import build_robot
 from camcomp.robots.serial import Params, chains, turned
-from camcomp.statics.arm import arm_of, end_pose
-from camcomp.statics.build import build_robot
 
 TABLE = [(350.0, -90.0, 449.4, 10.0), (1150.0, 0.0, -20.0, -90.0), (41.0, 37.0, 5.0, 180.0), (0.0, 90.0, -1200.0, 3.0)]
 
@@ -26,9 +26,9 @@ def x_turn(t, a):
 
 def arm(convention, joints):
     given = Params.model_validate({"convention": convention, "joints": joints})
-    from camcomp.specrobot import Robot
+    from camcomp.model.config.robot import RobotSpec
 
-    robot, nominal = build_robot(Robot.model_validate({"name": "arm", "chains": chains(given)}), [0.0, 0.0, 0.0])
+    robot, nominal = build_robot(RobotSpec.model_validate({"name": "arm", "chains": chains(given)}), [0.0, 0.0, 0.0])
     return arm_of(nominal), robot
 
 

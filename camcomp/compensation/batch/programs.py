@@ -1,0 +1,211 @@
+"""Many programs: which there are, which are done already, what became of each."""
+
+from __future__ import annotations
+
+import glob
+import hashlib
+import json
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from camcomp.compensation.batch.worker import Outcome, Task
+from camcomp.ground.errors import CamcompError, ConfigError, FileError, format_error
+from camcomp.ground.files import read_bytes, write_all
+from camcomp.model.config.spec import Config
+
+SUFFIXES = frozenset((".nc", ".ngc", ".ncc", ".tap", ".gcode", ".cnc", ".mpf", ".spf", ".eia", ".min", ".iso"))
+STATE = ".camcomp"  # folder beside the outputs: what each was made from
+DONE, FAILED_CHECK, SKIPPED, ERROR = "done", "check failed", "unchanged", "error"
+
+
+@dataclass(frozen=True)
+class FoundProgram:
+    """A program and its place in the output tree."""
+
+    source: Path
+    relative: Path
+
+
+@dataclass
+class Status:
+    """What became of one program."""
+
+    source: str
+    output: str | None
+    status: str
+    exit_code: int
+    figures: dict = field(default_factory=dict)
+    messages: list[dict] = field(default_factory=list)
+
+
+def find_programs(paths: Sequence[str], output: Path) -> list[FoundProgram]:
+    """Programs of files, folders and patterns, each once, with mirrored places. Raises ConfigError CC271, FileError CC500.
+
+    Folders are searched through for names with the usual endings; the output folder is left out. A pattern mirrors what
+    lies behind its part without wildcards.
+    """
+    found: dict[Path, Path] = {}
+    out = output.resolve()
+    for text in paths:
+        path = Path(text)
+        if path.is_dir():
+            base, files = path, [each for each in path.rglob("*") if each.suffix.lower() in SUFFIXES]
+        elif path.exists() or not glob.has_magic(text):
+            if not path.exists():
+                raise FileError("CC500", f"cannot read {text}: no such file")
+            base, files = path.parent, [path]
+        else:
+            fixed = [part for part in path.parts[: _first_magic(path)]]
+            base = Path(*fixed) if fixed else Path()
+            files = [Path(each) for each in glob.glob(text, recursive=True)]
+        for each in sorted(files):
+            if each.is_file() and not each.resolve().is_relative_to(out):
+                found.setdefault(each.resolve(), each.relative_to(base))
+    if not found:
+        raise ConfigError("CC271", f"no NC program in {', '.join(paths)}")
+    places: dict[Path, Path] = {}
+    for source, relative in found.items():
+        if relative in places:
+            raise FileError("CC502", f"{places[relative]} and {source} would both become {output / relative}")
+        places[relative] = source
+    return [FoundProgram(source, relative) for relative, source in sorted(places.items())]
+
+
+def _first_magic(path: Path) -> int:
+    return next(i for i, part in enumerate(path.parts) if glob.has_magic(part))
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What is the same for every program of a batch."""
+
+    config: Config
+    config_files: tuple[str, ...]
+    output: Path
+    method: str
+    tolerance_um: float
+    joints: bool
+    version: str
+
+    def key_of_config(self) -> str:
+        """Hash of the configuration files, of the tables that they name, and of the options."""
+        digest = hashlib.sha256(repr((self.version, self.method, self.tolerance_um, self.joints)).encode())
+        table = getattr(self.config.process.force.params, "file", None)
+        for each in (*self.config_files, *([table] if table else ())):
+            digest.update(hashlib.sha256(read_bytes(each)).digest())
+        return digest.hexdigest()
+
+
+def run_batch(
+    plan: Plan, programs: Sequence[FoundProgram], pool: Callable[[Iterable[Task]], Iterator[Outcome]]
+) -> Iterator[Status]:
+    """Every program's status, as soon as it is known. Outputs are written here, each with the note that it is done."""
+    config_key = plan.key_of_config()
+    pending: dict[str, FoundProgram] = {}
+    early: list[Status] = []
+
+    def tasks() -> Iterator[Task]:
+        for each in programs:
+            try:
+                data = read_bytes(each.source)
+            except CamcompError as error:
+                early.append(_refused(each, error))
+                continue
+            name = each.relative.as_posix()
+            key = hashlib.sha256(f"{config_key} {name} ".encode() + hashlib.sha256(data).digest()).hexdigest()
+            if (known := _known(plan, each, key)) is not None:
+                early.append(known)
+                continue
+            pending[key] = each
+            yield Task(
+                str(each.source), key, data, plan.config, config_key, plan.method, plan.tolerance_um, plan.joints
+            )
+
+    for outcome in pool(tasks()):
+        while early:
+            yield early.pop(0)
+        yield _keep(plan, pending.pop(outcome.key), outcome)
+    yield from early
+
+
+def _targets(plan: Plan, found: FoundProgram) -> dict[str, Path]:
+    program = plan.output / found.relative
+    targets = {"program": program}
+    if plan.joints:
+        targets["joints"] = program.with_name(program.name + ".joints.csv")
+    return targets
+
+
+def _note(plan: Plan, found: FoundProgram) -> Path:
+    place = plan.output / STATE / found.relative
+    return place.with_name(place.name + ".json")
+
+
+def _known(plan: Plan, found: FoundProgram, key: str) -> Status | None:
+    """The status of an earlier run, when the outputs are still what that run made of the same inputs."""
+    try:
+        note = json.loads(_note(plan, found).read_bytes())
+        if note["key"] != key:
+            return None
+        for name, target in _targets(plan, found).items():
+            if hashlib.sha256(target.read_bytes()).hexdigest() != note["outputs"][name]:
+                return None
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+    return Status(
+        str(found.source),
+        str(plan.output / found.relative),
+        SKIPPED,
+        note["exit_code"],
+        note["figures"],
+        note["messages"],
+    )
+
+
+def _keep(plan: Plan, found: FoundProgram, outcome: Outcome) -> Status:
+    """Writes what a program became."""
+    made = {"program": outcome.program, "joints": outcome.joints}
+    if outcome.program is None:
+        return Status(str(found.source), None, ERROR, outcome.exit_code, outcome.figures, outcome.messages)
+    targets = _targets(plan, found)
+    contents = {target: made[name] or b"" for name, target in targets.items()}
+    note = {
+        "key": outcome.key,
+        "exit_code": outcome.exit_code,
+        "outputs": {name: hashlib.sha256(contents[target]).hexdigest() for name, target in targets.items()},
+        "figures": outcome.figures,
+        "messages": outcome.messages,
+    }
+    try:
+        for target in (*contents, _note(plan, found)):
+            target.parent.mkdir(parents=True, exist_ok=True)
+        write_all(contents, inputs=(found.source, *plan.config_files))
+        write_all({_note(plan, found): (json.dumps(note) + "\n").encode()})
+    except OSError as error:
+        return _refused(found, FileError("CC501", f"cannot write {error.filename}: {error.strerror}"))
+    except CamcompError as error:
+        return _refused(found, error)
+    status = FAILED_CHECK if outcome.exit_code else DONE
+    return Status(
+        str(found.source), str(targets["program"]), status, outcome.exit_code, outcome.figures, outcome.messages
+    )
+
+
+def _refused(found: FoundProgram, error: CamcompError) -> Status:
+    messages = [{"rule": each.rule, "message": each.message, "text": format_error(each)} for each in error.all()]
+    return Status(str(found.source), None, ERROR, error.exit_code, {}, messages)
+
+
+def summary(statuses: Sequence[Status]) -> dict:
+    """The figures of a batch: counts, the exit code, and every program in the order of its name."""
+    ordered = sorted(statuses, key=lambda each: each.source)
+    counts = {name: sum(each.status == name for each in ordered) for name in (DONE, SKIPPED, FAILED_CHECK, ERROR)}
+    worst = {"max_um": max((each.figures["after"]["max_um"] for each in ordered if each.figures), default=0.0)}
+    return {
+        "programs": len(ordered),
+        "counts": counts,
+        "after": worst,
+        "exit_code": max((each.exit_code for each in ordered), default=0),
+        "files": [vars(each) for each in ordered],
+    }

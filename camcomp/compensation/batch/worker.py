@@ -1,0 +1,107 @@
+"""One program of a batch, from bytes to bytes: what a worker process does, on this machine or on another one."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, field
+from functools import lru_cache
+
+from camcomp.ground.garbage import collect_seldom, keep_what_lives
+from camcomp.model.config.spec import Config
+
+BUG = 70
+
+
+@dataclass(frozen=True)
+class Task:
+    """A program with everything that is needed to compensate it."""
+
+    name: str  # for messages
+    key: str  # hash of all that decides the result
+    data: bytes
+    config: Config
+    config_key: str
+    method: str
+    tolerance_um: float
+    joints: bool
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of a task. exit_code as `camcomp compensate` would leave with; 0 and 1 have outputs, others not."""
+
+    key: str
+    exit_code: int
+    messages: list[dict] = field(default_factory=list)  # rule, message, and where: file, line, column
+    program: bytes | None = None
+    joints: bytes | None = None
+    figures: dict = field(default_factory=dict)
+
+
+def work(task: Task) -> Outcome:
+    """Compensates a program on one core. Never raises."""
+    from camcomp.ground.errors import CamcompError, format_error
+
+    collect_seldom()
+    os.environ["CAMCOMP_THREADS"] = "1"  # the solver asks; the cores belong to the other workers
+    try:
+        return _compensate(task)
+    except CamcompError as error:
+        return Outcome(task.key, error.exit_code, [_message(each, format_error(each)) for each in error.all()])
+    except Exception as error:  # noqa: BLE001 - a bug in one program must not take the others with it
+        text = f"internal error: {type(error).__name__}: {error}"
+        return Outcome(task.key, BUG, [{"rule": None, "message": text, "text": f"{task.name}: {text}"}])
+
+
+def _compensate(task: Task) -> Outcome:
+    from camcomp import __version__
+    from camcomp.compensation.program.compensate import compensate
+    from camcomp.compensation.report import tables
+    from camcomp.gcode.interpret import read_program
+    from camcomp.gcode.stamp import is_stamped
+    from camcomp.ground.errors import CheckFailed
+    from camcomp.model.control import setup_of
+
+    if is_stamped(task.data):
+        raise CheckFailed("CC603", f"{task.name} was compensated before")
+    config = task.config
+    program = read_program(task.data, name=task.name, setup=setup_of(config), dialect=config.control.dialect)
+    job = _job(task.config_key, _Once(config))
+    result = compensate(program, job, method=task.method, tolerance_um=task.tolerance_um, version=__version__)
+    failed = result.failed_checks(job, task.tolerance_um)
+    messages = [{"rule": rule, "message": text, "text": f"{task.name}: error[{rule}]: {text}"} for rule, text in failed]
+    joints = tables.joint_csv(result, job) if task.joints else None
+    outcome = Outcome(task.key, int(bool(failed)), messages, result.written.data, joints, tables.summary(result, job))
+    _settle()
+    return outcome
+
+
+@lru_cache(maxsize=1)
+def _settle() -> None:
+    """Once: modules, machine and compiled code are there."""
+    keep_what_lives()
+
+
+class _Once:
+    """A config that does not take part in the comparison of cache keys: its hash does."""
+
+    def __init__(self, config: Config) -> None:
+        self.config = config
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Once)
+
+    def __hash__(self) -> int:
+        return 0
+
+
+@lru_cache(maxsize=2)
+def _job(_key: str, once: _Once):  # type: ignore[no-untyped-def]
+    from camcomp.model.job import Job
+
+    return Job(once.config)
+
+
+def _message(error, text: str) -> dict:  # type: ignore[no-untyped-def]
+    where = {"file": error.at.file, "line": error.at.line, "column": error.at.column} if error.at else {}
+    return {"rule": error.rule, "message": error.message, "text": text, **where}

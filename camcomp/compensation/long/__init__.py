@@ -1,0 +1,1 @@
+"""Programs of a megabyte and more: compiled reading, interpolation with its proof, compiled writing."""

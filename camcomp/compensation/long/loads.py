@@ -1,0 +1,96 @@
+"""The cutting force along a run of straight moves, with the moves next to the run in sight."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from camcomp.compensation.long.kernel import lay_loads
+from camcomp.compensation.long.plain_run import NotInPieces, PlainRun
+from camcomp.ground.datatypes import LINE, RAPID, Bools, Floats, Ints, Path
+from camcomp.model.cutting.track import JOIN_ANGLE, PLUNGE_SINE, Conditions, lay_track
+
+
+@dataclass(frozen=True, eq=False)
+class Edge:
+    """The motion next to a run, as a straight move with the direction that it has at the run's side. Program frame."""
+
+    kind: int
+    start: Floats  # (3,) mm
+    end: Floats
+    corrected: bool = True
+    machine: bool = False  # in machine coordinates
+
+
+@dataclass(frozen=True, eq=False)
+class Loads:
+    """Forces of n moves, program frame."""
+
+    first: Floats  # (n, 3) N at the start of each move
+    last: Floats  # (n, 3) N at its end
+    jump: Bools  # (n + 1,) the force jumps at the start of each move, and behind the last one
+    length: Floats  # (n,) mm
+    at: Callable[[Ints, Floats], Floats]  # (move (k,), fraction (k,)) -> force (k, 3)
+
+
+def loads_of(run: PlainRun, before: Edge | None, after: Edge | None, c: Conditions, constant: Floats | None) -> Loads:
+    """Forces along a run. constant (3,): Fr, Ft, Fz of a model that always gives the same; None: any other model.
+
+    Raises NotInPieces where the stock's top is too near.
+    """
+    n, plain = run.motions, run.plain
+    left, right = ([before] if before else []), ([after] if after else [])
+    kind = np.array([e.kind for e in left] + [0] * n + [e.kind for e in right], np.int8)
+    start, end = np.empty((len(kind), 3)), np.empty((len(kind), 3))
+    own = slice(len(left), len(left) + n)
+    kind[own], start[own], end[own] = plain.kind, plain.start, plain.end
+    for each, row in [(e, 0) for e in left] + [(e, -1) for e in right]:
+        start[row], end[row] = each.start, each.end
+    if constant is None:
+        return _of_model(run, kind, start, end, own, c)
+    first, last, length = np.empty(start.shape), np.empty(start.shape), np.empty(len(kind))
+    jump = np.zeros(len(kind) + 1, np.bool_)
+    axis = np.asarray(c.tool_axis, float)
+    lay_loads(kind, start, end, axis, constant, float(np.cos(JOIN_ANGLE)), PLUNGE_SINE, first, last, jump, length)
+    f0, f1 = first[own], last[own]
+
+    def at(move: Ints, w: Floats) -> Floats:
+        return f0[move] + w[:, None] * (f1[move] - f0[move])
+
+    return Loads(f0, f1, jump[own.start : own.stop + 1], length[own], at)
+
+
+def _of_model(run: PlainRun, kind: np.ndarray, start: Floats, end: Floats, own: slice, c: Conditions) -> Loads:
+    n, plain = len(kind), run.plain
+    feed, line = np.full(n, float(plain.feed[-1])), np.zeros(n, np.int64)
+    feed[own], line[own] = plain.feed, plain.row + run.row0 + 1
+    path = Path(
+        line=line, kind=kind, start=start, end=end, centre=np.full((n, 3), np.nan), axis=np.zeros((n, 3)), angle=np.zeros(n),
+        feed=np.where(kind == RAPID, np.nan, feed), speed=np.full(n, run.state.speed), tool=np.full(n, run.state.tool),
+        known=np.ones(n, np.bool_), machine=np.zeros(n, np.bool_),
+    )  # fmt: skip
+    track = lay_track(path, c)
+    if len(track.motion) != n:  # a neighbour crosses the stock's top within NEAR
+        raise NotInPieces
+
+    def at(move: Ints, w: Floats) -> Floats:
+        return track.force(move + own.start, w)
+
+    moves = np.arange(run.motions)
+    jump = np.append(track.jump, False)[own.start : own.stop + 1]
+    zero, one = np.zeros(len(moves)), np.ones(len(moves))
+    return Loads(at(moves, zero), at(moves, one), jump, track.length[own], at)
+
+
+def joints_at(loads: Loads, kind: np.ndarray, before: Edge | None, after: Edge | None) -> tuple[Bools, Bools]:
+    """Moves (n,) that get a joining line in front, and behind: as row_layout has it, but for the length of the jump."""
+    feed = kind == LINE
+    lead = loads.jump[:-1] & feed
+    lead[0] = feed[0] and before is not None and (loads.jump[0] and before.corrected or before.machine)
+    following = np.append(feed[1:], after is not None and after.kind != RAPID and after.corrected)
+    trail = loads.jump[1:] & ~following & feed
+    if after is None:
+        trail[-1] = False
+    return lead, trail

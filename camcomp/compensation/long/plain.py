@@ -1,0 +1,373 @@
+"""A run of plain lines corrected by interpolation, as compensate.py corrects it exactly, and written."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from camcomp.compensation.long.fastwrite import ROOM, write_rows
+from camcomp.compensation.long.field import Field, Tiles
+from camcomp.compensation.long.kernel import BASIC, follow, look_up
+from camcomp.compensation.long.loads import Edge, Loads, joints_at, loads_of
+from camcomp.compensation.long.plain_run import NotInPieces, PlainRun
+from camcomp.compensation.program.chords import divide, second_derivative, trial_nodes
+from camcomp.gcode.numbers import decimals
+from camcomp.gcode.output import Standing
+from camcomp.ground.datatypes import LINE, RAPID, Bools, Floats, Ints
+from camcomp.model.job import Job
+from camcomp.model.statics.solve import FREE, TARGET, solve, threads
+
+ROUNDS = 5
+EASY_MM = 8.0  # longer lines are divided at trial points; shorter ones when their middle says so
+MODELS = (
+    "none",
+    "constant",
+    "mechanistic",
+    "kienzle",
+)  # whose force does not depend on the way from the program's start
+SLICE = 4096  # rows that a thread takes at once
+
+
+@dataclass
+class Carry:
+    """What one piece of the program leaves for the next; program frame."""
+
+    written: Floats  # (3,) mm where the written program stands
+    commanded: Floats  # (3,) mm the same before rounding
+    code: float = -1.0  # motion code in force in the output, -1: not known
+    feed: float = np.nan  # feed in force, mm/min; NaN: not known
+
+    def standing(self) -> Standing:
+        """The same for the writer of other lines."""
+        x, y, z = self.written.tolist()
+        return Standing(
+            (x, y, z), None if self.code < 0.0 else int(self.code), None if np.isnan(self.feed) else (94, self.feed)
+        )
+
+    def take(self, behind: Standing, commanded: Floats) -> None:
+        """Go on behind other lines."""
+        self.written, self.commanded = np.array(behind.position), commanded.copy()
+        self.code = -1.0 if behind.code is None else float(behind.code)
+        self.feed = behind.feed[1] if behind.feed is not None and behind.feed[0] == 94 else np.nan
+
+
+@dataclass(frozen=True, eq=False)
+class PlainRows:
+    """End points (N,) of the corrected run, in order; program frame."""
+
+    move: Ints
+    w: Floats
+    joining: Bools
+    target: Floats  # (N, 3) mm
+    force: Floats  # (N, 3) N
+    shift: Floats  # (N, 3) mm added to the correction at division points
+
+
+@dataclass(frozen=True, eq=False)
+class Answers:
+    """What the machine says to rows (N,), machine frame."""
+
+    correction: Floats  # (N, 3) mm
+    unloaded: Floats  # (N, 3) mm, loaded tip minus target when the target itself is commanded
+    rest: Floats  # (N, 3 + 2 m) tilt, drives, change of the joints
+    nominal: Floats  # (N, m)
+    tile: Ints  # (N,) negative: solved by itself
+    tiles: Tiles  # that are counted by `tile`
+
+
+@dataclass(frozen=True, eq=False)
+class Done:
+    """A corrected run."""
+
+    data: bytes
+    rows: PlainRows
+    answers: Answers
+    commanded: Floats  # (N, 3) mm before rounding, program frame
+    written: Floats  # (N, 3) mm
+    before: Floats  # (k, 3) mm at the end points and the middles of lines
+    after: Floats
+
+
+class Unsolved(Exception):
+    """Points of a run without a solution: motions (k,), targets (k, 3) mm in the machine frame, the solver's status."""
+
+    def __init__(self, move: Ints, target: Floats, status: Ints) -> None:
+        super().__init__()
+        self.move, self.target, self.status = move, target, status
+
+
+def _sizes(vectors: Floats) -> Floats:
+    return np.asarray(np.sqrt(np.einsum("ni,ni->n", vectors, vectors)))
+
+
+class PlainCorrector:
+    """Corrects runs of plain lines of one program."""
+
+    def __init__(self, job: Job, tolerance_um: float) -> None:
+        """Raises NotInPieces for what needs the program as a whole."""
+        force = job.config.process.force
+        if force.model not in MODELS:
+            raise NotInPieces
+        self.job, self.machine = job, job.real_machine
+        self.resolution = job.config.control.resolution_mm
+        self.tolerance = 1e-3 * tolerance_um
+        self.budget = max(self.tolerance - 0.5 * np.sqrt(3.0) * self.resolution, 0.1 * self.tolerance)
+        self.field: Field | None = None
+        self.exact = 0  # rows that had to be solved one by one
+        self._constant: Floats | None = None
+        if force.model == "none":
+            self._constant = np.zeros(3)
+        elif force.model == "constant" and job.conditions.stock_top_mm is None:
+            self._constant = np.array([force.params.Fr_N, force.params.Ft_N, force.params.Fz_N], float)
+
+    def correct(self, run: PlainRun, before: Edge | None, after: Edge | None, carry: Carry) -> Done:
+        """The run corrected and written; `carry` is moved along. Raises Unsolved, NotInPieces."""
+        loads = loads_of(run, before, after, self.job.conditions, self._constant)
+        if self.field is None:
+            force = self.job.frame.vectors(np.concatenate((loads.first, loads.last)))
+            self.field = Field(self.machine, force, self.job.frame.origin)
+        lead, trail = joints_at(loads, run.plain.kind, before, after)
+        tolerance = np.full(run.motions, self.budget)
+        hard = (loads.length > EASY_MM) & (run.plain.kind == LINE)
+        settled = False
+        for left in range(ROUNDS, 0, -1):
+            rows = self._rows(run, loads, lead, trail, hard, tolerance)
+            answers = self._answers(rows)
+            commanded, kept = self._commanded(rows, answers)
+            if not settled:
+                settled = True
+                if self._drop_small_joints(rows, commanded, carry, lead, trail):
+                    continue
+            middles = self._middles(run, loads, rows)
+            told = self._halfway(commanded, carry.commanded)[middles.rows] - middles.wanted
+            bent = (_sizes(told) > self.budget) & ~hard[middles.move]
+            if bent.any() and left > 1:
+                hard[middles.move[bent]] = True
+                continue
+            trial = replace(carry)
+            data, written = self._write(run, rows, commanded, kept, trial)
+            judged = self._judged(run, rows)
+            error = self._after(rows, judged, answers, middles, commanded, written, carry.written)
+            worst = np.zeros(run.motions)
+            at = np.concatenate((rows.move[judged], middles.move))
+            np.maximum.at(worst, at, _sizes(error))
+            missed = worst > self.tolerance
+            if not missed.any() or left == 1:
+                break
+            hard |= missed
+            shrink = np.clip(0.9 * self.tolerance / np.maximum(worst, 1e-300), 0.3, 0.9)
+            tolerance = np.where(missed, tolerance * shrink, tolerance)
+        carry.__dict__.update(trial.__dict__)
+        unloaded = np.concatenate((answers.unloaded[judged], middles.unloaded))
+        return Done(data, rows, answers, commanded, written, self._back(unloaded), error)
+
+    # --- rows ----------------------------------------------------------------------------------------------------
+
+    def _rows(
+        self, run: PlainRun, loads: Loads, lead: Bools, trail: Bools, hard: Bools, tolerance: Floats
+    ) -> PlainRows:
+        plain, n = run.plain, run.motions
+        move, w, shift = np.flatnonzero(~hard), None, None
+        w, shift = np.ones(len(move)), np.zeros((len(move), 3))
+        which = np.flatnonzero(hard)
+        if len(which):
+            inner = self._divided(run, loads, which, tolerance[which])
+            move, w, shift = (np.concatenate(pair) for pair in zip((move, w, shift), inner, strict=True))
+        a, b = np.flatnonzero(lead), np.flatnonzero(trail)
+        move = np.concatenate((move, a, b))
+        kind = np.concatenate((np.ones(len(w), np.int8), np.zeros(len(a), np.int8), np.full(len(b), 2, np.int8)))
+        w = np.concatenate((w, np.zeros(len(a)), np.ones(len(b))))
+        shift = np.concatenate((shift, np.zeros((len(a) + len(b), 3))))
+        if len(move) > n or len(which):
+            order = np.lexsort((w, kind, move))
+            move, w, kind, shift = move[order], w[order], kind[order], shift[order]
+        target = plain.end[move]
+        force = loads.last[move]
+        inside = np.flatnonzero(w < 1.0)
+        if len(inside):
+            start = plain.start[move[inside]]
+            target[inside] = start + w[inside, None] * (target[inside] - start)
+            force[inside] = loads.at(move[inside], w[inside])
+        force[kind == 2] = 0.0
+        return PlainRows(move, w, kind != 1, target, force, shift)
+
+    def _divided(self, run: PlainRun, loads: Loads, which: Ints, tolerance: Floats) -> tuple[Ints, Floats, Floats]:
+        """Division points of some moves: move, w and shift of each."""
+        start, way = run.plain.start[which], run.plain.end[which] - run.plain.start[which]
+        length = loads.length[which]
+        trial = trial_nodes(length, np.zeros(len(which)), np.ones(len(which), np.bool_))
+        target = start[trial.piece] + trial.w[:, None] * way[trial.piece]
+        force = loads.at(which[trial.piece], trial.w)
+        answer = self.ask(which[trial.piece], target, force, every=False)[0]
+        bend = second_derivative(trial, target + self._back(answer[:, :3]))
+        nodes, shift = divide(trial, bend, tolerance)
+        inner = np.arange(len(nodes.w)) != nodes.first[nodes.piece]
+        return which[nodes.piece[inner]], nodes.w[inner], shift[inner]
+
+    def _drop_small_joints(self, rows: PlainRows, commanded: Floats, carry: Carry, lead: Bools, trail: Bools) -> bool:
+        """Takes joining lines out that would be shorter than the resolution; whether there were any."""
+        joins = np.flatnonzero(rows.joining)
+        previous = np.concatenate((carry.commanded[None], commanded[:-1]))[joins]
+        small = _sizes(commanded[joins] - previous) <= self.resolution
+        front = rows.w[joins] == 0.0
+        lead[rows.move[joins[small & front]]] = False
+        trail[rows.move[joins[small & ~front]]] = False
+        return bool(small.any())
+
+    def _judged(self, run: PlainRun, rows: PlainRows) -> Bools:
+        return (run.plain.kind[rows.move] == LINE) & ~rows.joining
+
+    # --- the machine ---------------------------------------------------------------------------------------------
+
+    def _back(self, vectors: Floats) -> Floats:
+        return vectors @ self.job.frame.rotation
+
+    def _answers(self, rows: PlainRows) -> Answers:
+        answer, nominal, tile, tiles = self.ask(rows.move, rows.target, rows.force, every=True)
+        return Answers(answer[:, :3], answer[:, 3:6], answer[:, 6:], nominal, tile, tiles)
+
+    def ask(self, move: Ints, target: Floats, force: Floats, every: bool) -> tuple[Floats, Floats, Ints, Tiles]:
+        """Answers (n, .) as in look_up, machine frame, for points of moves, program frame; nominal joints, tiles (n,).
+
+        A wider range of forces makes new tiles, so those that the numbers count go with them.
+        """
+        target, force = self.job.frame.to_machine(target), self.job.frame.vectors(force)
+        known = self.field
+        assert known is not None
+        near = known.prepare(target, force)
+        n, m = len(target), len(self.machine.actuators)
+        answer, nominal = np.empty((n, 9 + 2 * m if every else BASIC)), np.empty((n if every else 0, m))
+        tile = np.empty(n, np.int64)
+        packed = known.packed()
+
+        def work(a: int) -> None:
+            look_up(a, min(a + SLICE, n), m, every, near, force, answer, nominal, tile, *packed)
+
+        with ThreadPoolExecutor(threads()) as pool:
+            list(pool.map(work, range(0, n, SLICE)))
+        lost = np.flatnonzero(tile < 0)
+        if len(lost):
+            self.exact += len(lost)
+            answer[lost], nominal[lost if every else []] = self._solved(move[lost], target[lost], force[lost], every)
+        return answer, nominal, tile, known.tiles
+
+    def _commanded(self, rows: PlainRows, answers: Answers) -> tuple[Floats, Bools]:
+        """Tips (N, 3) to be commanded, and which rows (N,) stay as programmed: what would be rounded away is left out."""
+        moved = self._back(answers.correction) + rows.shift
+        single = ~rows.joining
+        single[1:] &= rows.move[1:] != rows.move[:-1]
+        single[:-1] &= rows.move[:-1] != rows.move[1:]
+        kept = single & (np.abs(moved).max(axis=1) <= 0.5 * self.resolution)
+        return rows.target + np.where(kept[:, None], 0.0, moved), kept
+
+    def _error_of(self, off: Floats, tile: Ints, tiles: Tiles) -> Floats:
+        """Errors (n, 3) of tips that are commanded `off` (n, 3) mm beside the right place, machine frame."""
+        out = off.copy()
+        follow(tiles.slope, tile, off, out)
+        return out
+
+    def joints(self, done: Done) -> Floats:
+        """Joints (N, m) of the written end points: those of the exact command, and the step that rounding makes."""
+        m, frame = len(self.machine.actuators), self.job.frame
+        tile, off = done.answers.tile, frame.vectors(done.written - done.commanded + done.rows.shift)
+        out = np.zeros((len(tile), m))
+        follow(done.answers.tiles.rates, tile, off, out)
+        out += done.answers.nominal + done.answers.rest[:, 3 + m :]
+        lost = np.flatnonzero(tile < 0)
+        if len(lost):
+            out[lost] = solve(self.machine, FREE, frame.to_machine(done.written[lost]), check=False).rho_nominal
+        return out
+
+    def _solved(self, move: Ints, target: Floats, force: Floats, every: bool) -> tuple[Floats, Floats]:
+        aimed = solve(self.machine, TARGET, target, force=force)
+        plain = solve(self.machine, FREE, target, force=force)
+        bad = np.where(aimed.status != 0, aimed.status, plain.status)
+        if bad.any():
+            raise Unsolved(move[bad != 0], target[bad != 0], bad[bad != 0])
+        parts = [aimed.commanded - target, plain.tip - target]
+        if not every:
+            return np.concatenate(parts, axis=1), np.empty((0, len(self.machine.actuators)))
+        parts += [aimed.tilt, aimed.drive, aimed.rho - aimed.rho_nominal]
+        return np.concatenate(parts, axis=1), aimed.rho_nominal
+
+    # --- middles of lines ----------------------------------------------------------------------------------------
+
+    def _middles(self, run: PlainRun, loads: Loads, rows: PlainRows) -> _Middles:
+        """The middles of the lines that cut."""
+        at = np.flatnonzero(self._judged(run, rows) & (loads.length[rows.move] > 0.0))
+        move, w = rows.move[at], rows.w[at]
+        same = (at > 0) & (rows.move[at - 1] == move)
+        middle = 0.5 * (w + np.where(same, rows.w[at - 1], 0.0))
+        start = run.plain.start[move]
+        target = start + middle[:, None] * (run.plain.end[move] - start)
+        answer, _, tile, tiles = self.ask(move, target, loads.at(move, middle), every=False)
+        return _Middles(at, move, target + self._back(answer[:, :3]), answer[:, 3:6], tile, tiles)
+
+    def _halfway(self, ends: Floats, first: Floats) -> Floats:
+        return 0.5 * (ends + np.concatenate((first[None], ends[:-1])))
+
+    def _after(
+        self,
+        rows: PlainRows,
+        judged: Bools,
+        answers: Answers,
+        middles: _Middles,
+        commanded: Floats,
+        written: Floats,
+        first: Floats,
+    ) -> Floats:
+        """Errors (k, 3) of the written program, program frame: end points that are judged, then middles."""
+        R = self.job.frame.rotation
+        off = (written - commanded + rows.shift)[judged]
+        told = self._halfway(written, first)[middles.rows] - middles.wanted
+        ends = self._error_of(off @ R.T, answers.tile[judged], answers.tiles)
+        between = self._error_of(told @ R.T, middles.tile, middles.tiles)
+        return np.concatenate((ends, between)) @ R
+
+    # --- writing -------------------------------------------------------------------------------------------------
+
+    def _write(
+        self, run: PlainRun, rows: PlainRows, commanded: Floats, kept: Bools, carry: Carry
+    ) -> tuple[bytes, Floats]:
+        plain, N = run.plain, len(rows.move)
+        first = np.searchsorted(rows.move, np.arange(run.motions + 1))
+        out = np.empty(run.text_end - run.text_at + ROOM * N, np.uint8)
+        written = np.empty((N, 3))
+        position, state = carry.written.copy(), np.array([carry.code, carry.feed])
+        unit = run.state.unit
+        size = write_rows(
+            run.data, run.text_at, run.text_end, plain.line, plain.begin, plain.finish, plain.kind, plain.end,
+            plain.code_stated, plain.feed_stated, plain.feed, first, rows.joining, commanded, self._feeds(run, rows, commanded, kept, carry),
+            position, state, unit, np.array(run.state.offset), decimals(self.resolution, unit), 0.5 * self.resolution * (1.0 + 1e-9),
+            out, written,
+        )  # fmt: skip
+        carry.written, carry.commanded = position, commanded[-1].copy()
+        carry.code, carry.feed = float(state[0]), float(state[1])
+        return out[:size].tobytes(), written
+
+    def _feeds(self, run: PlainRun, rows: PlainRows, commanded: Floats, kept: Bools, carry: Carry) -> Floats:
+        """Feed (N,) so that the tip keeps its programmed speed, as in compensate.py."""
+        feed = np.where(run.plain.kind[rows.move] == RAPID, np.nan, run.plain.feed[rows.move])
+        start = np.concatenate((carry.commanded[None], commanded[:-1]))
+        same = np.concatenate(([False], rows.move[1:] == rows.move[:-1]))
+        w0 = np.where(same, np.concatenate(([0.0], rows.w[:-1])), 0.0)
+        way = run.plain.end[rows.move] - run.plain.start[rows.move]
+        programmed = (rows.w - w0) * _sizes(way)
+        step = commanded - start
+        size = _sizes(step)
+        scale = np.divide(size, programmed, out=np.ones(len(feed)), where=programmed > 1e-6)
+        return np.where(rows.joining | kept | (programmed < 0.01), feed, feed * np.clip(scale, 0.2, 5.0))
+
+
+@dataclass(frozen=True, eq=False)
+class _Middles:
+    """Middles (k,) of lines."""
+
+    rows: Ints  # the end point of the line
+    move: Ints
+    wanted: Floats  # (k, 3) mm to be commanded there, program frame
+    unloaded: Floats  # (k, 3) mm, machine frame
+    tile: Ints  # (k,)
+    tiles: Tiles

@@ -1,0 +1,58 @@
+"""A run of plain lines of a long program: its bytes, its motions, and the control behind it."""
+
+from __future__ import annotations
+
+from copy import deepcopy
+from dataclasses import dataclass
+
+import numpy as np
+
+from camcomp.compensation.long.fastread import Plain
+from camcomp.gcode.state import ControlState
+
+
+class NotInPieces(Exception):
+    """The program has to be read as a whole."""
+
+
+@dataclass(frozen=True, eq=False)
+class PlainRun:
+    """Plain lines: bytes text_at to text_end of `data`."""
+
+    data: np.ndarray
+    text_at: int
+    text_end: int
+    row0: int  # lines of the program before it
+    plain: Plain
+    state: ControlState  # behind it; position, motion and feed as at its end
+
+    @property
+    def motions(self) -> int:
+        """Number of motions."""
+        return len(self.plain.row)
+
+    def before(self, motion: int) -> ControlState:
+        """The control in front of a motion."""
+        state = deepcopy(self.state)
+        state.position = self.plain.start[motion].tolist()
+        state.motion = 10 * int(self.plain.kind[motion])
+        feed = float(self.plain.feed[motion])
+        state.feed = None if np.isnan(feed) else feed
+        return state
+
+    def text_of(self, motion: int) -> bytes:
+        """The line of a motion with its end of line."""
+        a, b, c = self.plain.line[motion]
+        return self.data[a:c].tobytes() if c > b else self.data[a:b].tobytes() + b"\n"
+
+    def text_from(self, motion: int) -> bytes:
+        """The lines from that of a motion on."""
+        return self.data[self.plain.line[motion, 0] : self.text_end].tobytes()
+
+    def text_until(self, motion: int) -> bytes:
+        """The lines up to that of a motion."""
+        return self.data[self.text_at : self.plain.line[motion, 2]].tobytes()
+
+    def row_of(self, motion: int) -> int:
+        """Lines of the program before that of a motion."""
+        return self.row0 + int(self.plain.row[motion])

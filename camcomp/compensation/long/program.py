@@ -1,0 +1,222 @@
+"""Long programs: read, corrected and written piece by piece, in constant memory.
+
+Runs of plain lines are corrected by interpolation between exact solutions (field.py); what stands between them goes,
+with the lines next to it, through the exact way (compensate.py). At the end a random sample of the interpolated rows is
+solved exactly, and the largest difference is part of the result.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import BinaryIO
+
+import numpy as np
+
+from camcomp.compensation.long.loads import Edge
+from camcomp.compensation.long.plain import Carry, PlainCorrector, Unsolved
+from camcomp.compensation.long.plain_run import NotInPieces, PlainRun
+from camcomp.compensation.long.runs import OddRun, Runs
+from camcomp.compensation.long.totals import Batch, Totals
+from camcomp.compensation.program.compensate import compensate
+from camcomp.compensation.program.moves import MOST_ERRORS, RULE_OF_STATUS
+from camcomp.gcode.output import Part
+from camcomp.gcode.setup import Setup
+from camcomp.gcode.stamp import is_stamped, stamp_index
+from camcomp.gcode.text import Text
+from camcomp.ground import path_geometry
+from camcomp.ground.datatypes import LINE, RAPID
+from camcomp.ground.errors import CheckFailed, Location, PhysicsError, raise_all
+from camcomp.model.job import Job
+from camcomp.model.statics.solve import STATUS
+
+HASHED = 1 << 22  # bytes at once
+LINE_OF_STAMP = 256  # bytes
+NEAR = 1e-3  # mm: only the direction of a neighbour matters, and on which side of the stock's top it is
+
+
+@dataclass(eq=False)
+class Bulk:
+    """One long program. `on_rows` gets every batch of rows, in order; `totals` hold the figures at the end."""
+
+    job: Job
+    name: str
+    setup: Setup
+    tolerance_um: float
+    version: str
+    arcs: bool | None = None
+    on_rows: Callable[[Batch], None] | None = None
+
+    def run(self, source: BinaryIO, sink: Callable[[bytes], object]) -> Totals:
+        """Reads the seekable source twice: once for its hash. Raises NotInPieces before or in the middle of writing."""
+        digest, size, rest = hashlib.sha256(), 0, b""
+        while block := source.read(HASHED):
+            digest.update(block)
+            size += len(block)
+            if b"sha256:" in (seen := rest + block) and is_stamped(seen):
+                raise CheckFailed("CC603", f"{self.name} was compensated before")
+            rest = block[-LINE_OF_STAMP:]
+        source.seek(0)
+        self._carry = Carry(np.array(self.setup.start_mm, float), np.array(self.setup.start_mm, float))
+        self._corrector = PlainCorrector(self.job, self.tolerance_um)
+        self._told: Future[None] = Future()
+        self._told.set_result(None)
+        self.totals = Totals(self.job, digest.hexdigest(), size)
+        top = self.job.conditions.stock_top_mm if self.job.conditions.model else None
+        self._runs = Runs(
+            source, self.name, self.setup, self.job.config.control.dialect, np.nan if top is None else top
+        )
+        self._stamp: str | None = f"camcomp {self.version} sha256:{digest.hexdigest()}"
+        with ThreadPoolExecutor(1) as self._beside:
+            for data in self._pieces():
+                self.totals.lines_out += data.count(b"\n")
+                sink(data)
+            self._told.result()
+        self.totals.finish(self._corrector, self._runs.warnings)
+        return self.totals
+
+    # --- order ---------------------------------------------------------------------------------------------------
+
+    def _pieces(self) -> Iterator[bytes]:
+        """The corrected program. A piece waits until the motion behind it is known."""
+        current: _Piece | None = None
+        behind: list[bytes] = []
+        before: _Piece | None = None
+        for item in self._runs:
+            if isinstance(item, bytes) or not item.motions:
+                behind.append(item if isinstance(item, bytes) else _text_of(item))
+                if current is None:
+                    yield from map(self._stamped, behind)
+                    behind = []
+                continue
+            piece = _Piece(item, self._runs)
+            if current is not None:
+                yield self._stamped(self._corrected(current, before, piece))
+                yield from behind
+                behind, before = [], current
+            current = piece
+        if current is not None:
+            yield self._stamped(self._corrected(current, before, None))
+        yield from behind
+
+    def _stamped(self, data: bytes) -> bytes:
+        if self._stamp is None or not data:
+            return data
+        text = Text.read(data[:HASHED], self.name)
+        at, end = stamp_index(text), text.end_of_line(0).encode("latin-1")
+        opening, closing = (each.encode() for each in self._runs.language.comment)
+        stamp, self._stamp = opening + self._stamp.encode() + closing + end, None
+        return data[:at] + stamp + data[at:]
+
+    def _corrected(self, piece: _Piece, before: _Piece | None, after: _Piece | None) -> bytes:
+        if isinstance(piece.run, OddRun):
+            return self._odd(piece.run, before, after)
+        return self._plain(piece.run, before, after)
+
+    # --- plain lines ---------------------------------------------------------------------------------------------
+
+    def _plain(self, run: PlainRun, before: _Piece | None, after: _Piece | None) -> bytes:
+        try:
+            edges = (before.last if before else None, after.first if after else None)
+            done = self._corrector.correct(run, *edges, self._carry)
+        except Unsolved as error:
+            self._refuse(run, error)
+        self._tell(lambda: self.totals.plain(run, done, self._corrector))
+        return done.data
+
+    def _tell(self, batch: Callable[[], Batch]) -> None:
+        """Adds up a piece and passes its rows on, beside the work on the next piece; one piece at a time, in order."""
+
+        def tell() -> None:
+            rows = batch()
+            if self.on_rows is not None:
+                self.on_rows(rows)
+
+        self._told.result()
+        self._told = self._beside.submit(tell)
+
+    def _refuse(self, run: PlainRun, error: Unsolved) -> None:
+        errors: list[PhysicsError] = []
+        seen: set[int] = set()
+        for i, target, status in zip(error.move.tolist(), error.target, error.status, strict=True):
+            if i in seen or len(errors) == MOST_ERRORS:
+                continue
+            seen.add(i)
+            x, y, z = self.job.frame.to_program(target[None])[0]
+            text = f"{STATUS.get(int(status), 'no solution')} at X{x:.4f} Y{y:.4f} Z{z:.4f} (program frame, mm)"
+            source = run.text_of(i).decode("latin-1").rstrip("\r\n")
+            column = int(run.plain.begin[i, :3][run.plain.begin[i, :3] >= 0].min() - run.plain.line[i, 0]) + 1
+            at = Location(self.name, run.row0 + int(run.plain.row[i]) + 1, column, source)
+            errors.append(PhysicsError(RULE_OF_STATUS.get(int(status), "CC301"), text, at=at))
+        raise_all(errors)
+
+    # --- other lines ---------------------------------------------------------------------------------------------
+
+    def _odd(self, run: OddRun, before: _Piece | None, after: _Piece | None) -> bytes:
+        """Through the exact way, with the motions on either side in sight."""
+        head, state, row0 = b"", run.state, run.row0
+        first = behind = 0
+        if before is not None:
+            assert isinstance(before.run, PlainRun)
+            k = before.ends[1]
+            head, state, row0 = before.run.text_from(k), before.run.before(k), before.run.row_of(k)
+            first = before.run.motions - k
+        tail = b""
+        if after is not None:
+            assert isinstance(after.run, PlainRun)
+            tail = after.run.text_until(after.ends[0])
+            behind = after.ends[0] + 1
+        program = self._runs.program(head + run.text + tail, row0, state)
+        part = Part(first, len(program.path) - behind, self._carry.standing())
+        if part.last - part.first != run.motions:
+            raise NotInPieces
+        result = compensate(
+            program,
+            self.job,
+            method="newton",
+            tolerance_um=self.tolerance_um,
+            version=self.version,
+            part=part,
+            arcs=self.arcs,
+        )
+        own = (result.rows.motion >= part.first) & (result.rows.motion < part.last)
+        assert result.written.behind is not None
+        self._carry.take(result.written.behind, result.rows.end[np.flatnonzero(own)[-1]])
+        self._tell(lambda: self.totals.odd(result, own, run.motions))
+        return result.written.data[len(head) : len(result.written.data) - len(tail)]
+
+
+def _text_of(run: PlainRun | OddRun) -> bytes:
+    return run.text if isinstance(run, OddRun) else run.data[run.text_at : run.text_end].tobytes()
+
+
+class _Piece:
+    """A run with what its neighbours need to know of it."""
+
+    def __init__(self, run: PlainRun | OddRun, runs: Runs) -> None:
+        self.run = run
+        if isinstance(run, PlainRun):
+            plain = run.plain
+            real = np.flatnonzero((plain.kind == RAPID) | (plain.start != plain.end).any(axis=1))
+            if not len(real):
+                raise NotInPieces
+            self.ends = (int(real[0]), int(real[-1]))
+            self.first, self.last = (Edge(int(plain.kind[k]), plain.start[k], plain.end[k]) for k in self.ends)
+            return
+        path = runs.program(run.text, run.row0, run.state).path
+        real = np.flatnonzero((path.kind == RAPID) | (path_geometry.lengths(path) > 0.0))
+        if not len(real):
+            raise NotInPieces
+        self.ends = (int(real[0]), int(real[-1]))
+        corrected = path.known & ~path.machine
+        edges = []
+        for k, u in zip(self.ends, (0.0, 1.0), strict=True):
+            way = NEAR * path_geometry.tangents(path, np.array([k]), np.array([u]))[0]
+            point = path.start[k] if u == 0.0 else path.end[k]
+            kind = RAPID if path.kind[k] == RAPID else LINE
+            edges.append(
+                Edge(kind, point - (u * way), point + (1.0 - u) * way, bool(corrected[k]), bool(path.machine[k]))
+            )
+        self.first, self.last = edges

@@ -1,0 +1,246 @@
+"""A long program in pieces: runs of plain lines, read compiled, and what stands between them, read by the interpreter.
+
+Every piece knows the state of the control at its begin, so that it can be corrected and written by itself. Programs that
+jump, loop or call cannot be cut into pieces; they are recognised and left to the reader of whole programs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from copy import deepcopy
+from dataclasses import dataclass, field, replace
+from typing import BinaryIO
+
+import numpy as np
+
+from camcomp.compensation.long.fastread import MORE, Plain, scan
+from camcomp.compensation.long.plain_run import NotInPieces, PlainRun
+from camcomp.gcode.detect import dialect_of
+from camcomp.gcode.interpret import Interpreter, controller
+from camcomp.gcode.program import Program
+from camcomp.gcode.setup import Setup
+from camcomp.gcode.state import ControlState
+from camcomp.gcode.text import Text
+from camcomp.ground.errors import Location, ProgramError
+
+CHUNK_BYTES = 1 << 22  # bytes read at once
+RUN = 1 << 16  # motions of a plain run at most
+PROBE_MOTIONS = 48  # plain motions in a row that make a run of their own
+
+
+@dataclass(frozen=True, eq=False)
+class Piece(Text):
+    """Text of some lines of a program; places are those in the whole program."""
+
+    row0: int = 0
+
+    def place(self, index: int, column: int = 0) -> Location:
+        """Place of a character in the whole program."""
+        return replace(super().place(index, column), line=self.row0 + index + 1)
+
+
+@dataclass(frozen=True, eq=False)
+class OddRun:
+    """Lines for the interpreter."""
+
+    text: bytes
+    row0: int
+    state: ControlState  # in front of it
+    motions: int
+
+
+@dataclass(eq=False)
+class Runs:
+    """Cuts a program into runs. `warnings` grow while it is read."""
+
+    source: BinaryIO
+    name: str
+    setup: Setup
+    dialect: str | None
+    top_mm: float = np.nan  # of the stock: where cutting begins
+    warnings: list[str] = field(default_factory=list)
+    motions: int = 0
+
+    def __post_init__(self) -> None:
+        head = self.source.read(CHUNK_BYTES)
+        if head[:2] in (b"\xff\xfe", b"\xfe\xff") or head[:3] == b"\xef\xbb\xbf":
+            raise NotInPieces
+        self._data = np.frombuffer(head, np.uint8)
+        self._at = 0
+        self._row = 0
+        self._last = len(head) < CHUNK_BYTES
+        self.language = dialect_of(Text.read(head[:200_000], self.name), self.dialect)
+        self._state = ControlState(self.setup, self.language)
+        self._flags = [False, False]  # code stated, feed stated
+        self._tape = False  # the program began with a %
+        self._seen = False  # a line with something in it was read
+        self._told: set[str] = set()
+
+    def __iter__(self) -> Iterator[PlainRun | OddRun | bytes]:
+        """Runs in order; bytes behind the program's end, as they are."""
+        odd = _Odd()
+        ended = False
+        while not ended:
+            row, before = self._row, None if odd.lines else self._state
+            found = self._plain(PROBE_MOTIONS if odd.lines else RUN)
+            if found is not None:
+                if odd.lines and found.motions < PROBE_MOTIONS:
+                    odd.add(found.data[found.text_at : found.text_end].tobytes(), found.motions)
+                    continue
+                if odd.lines:
+                    yield odd.take()
+                yield found
+                continue
+            line = self._next_line()
+            if line is None:
+                break
+            if before is not None:
+                odd.start(row, deepcopy(before))
+            motions, ended = self._interpret(line)
+            odd.add(line, motions)
+        if odd.lines:
+            yield odd.take()
+        if not self.motions:
+            raise ProgramError("CC100", "the program moves nothing", at=Location(self.name, 1, 1))
+        yield from self._rest()
+
+    # --- bytes ---------------------------------------------------------------------------------------------------
+
+    def _more(self) -> bool:
+        """Reads on; what is not used up stays in front."""
+        if self._last:
+            return False
+        fresh = self.source.read(CHUNK_BYTES)
+        self._last = len(fresh) < CHUNK_BYTES
+        self._data = np.frombuffer(self._data[self._at :].tobytes() + fresh, np.uint8)
+        self._at = 0
+        return True
+
+    def _next_line(self) -> bytes | None:
+        while True:
+            rest = self._data[self._at : self._at + (1 << 16)].tobytes()
+            if not rest and self._last:
+                return None
+            ends = [k for k in (rest.find(b"\n"), rest.find(b"\r")) if k >= 0]
+            if ends and (min(ends) + 1 < len(rest) or self._last):
+                end = min(ends) + (2 if rest[min(ends) : min(ends) + 2] == b"\r\n" else 1)
+                break
+            if not self._more():
+                end = len(rest)
+                if len(rest) == 1 << 16:
+                    raise NotInPieces  # a line of 64 KB
+                break
+        self._at += end
+        return rest[:end]
+
+    def _rest(self) -> Iterator[bytes]:
+        while True:
+            yield self._data[self._at :].tobytes()
+            self._at = len(self._data)
+            if not self._more():
+                return
+
+    # --- lines ---------------------------------------------------------------------------------------------------
+
+    def _plain(self, limit: int) -> PlainRun | None:
+        """The plain lines from here on; None when there are no motions in them."""
+        state = self._state
+        if state.relative or state.feed_mode != 94 or not all(state.commanded) or state.motion not in (None, 0, 10):
+            return None
+        room = Plain.room(limit)
+        code = -1 if state.motion is None else state.motion // 10
+        position, offset = np.array(state.position), np.array(state.offset)
+        pointed = self.language.increments
+        begin = self._at
+        coded, fed = self._flags
+        n, rows, at, why, code, feed, coded, fed = scan(
+            self._data, self._at, len(self._data), self._last, code, state.feed or 0.0, coded, fed, position, state.unit, offset,
+            pointed, self.top_mm, room, limit,
+        )  # fmt: skip
+        if why == MORE and n == 0 and self._more():
+            return self._plain(limit)
+        if n == 0 or (why == MORE and n < PROBE_MOTIONS and self._more()):
+            return self._plain(limit) if n else None
+        self._flags = [bool(coded), bool(fed)]
+        state.motion = None if code < 0 else 10 * int(code)
+        state.feed = feed if feed > 0.0 else None
+        state.position = position.tolist()
+        self._at = at
+        row0, self._row = self._row, self._row + rows
+        self.motions += n
+        return PlainRun(self._data, begin, at, row0, room.take(0, n), deepcopy(state))
+
+    def _interpret(self, line: bytes) -> tuple[int, bool]:
+        """Executes a line: its number of motions, and whether the program ends there."""
+        stripped = line.strip(b" \t\0\r\n\x1a\x0b\x0c")
+        row, self._row = self._row, self._row + 1
+        if stripped.startswith(b"%"):
+            if self._tape:
+                return 0, True
+            self._tape = not self._seen
+        self._seen = self._seen or bool(stripped)
+        text = Piece(self.name, line.decode("latin-1"), "latin-1", b"", row)
+        if not len(text):
+            return 0, False
+        reader = self.reader(text, self._state)
+        reader.record.code_stated, reader.record.feed_stated = self._flags
+        after = controller(reader).step(0)
+        self.check(reader)
+        if after not in (None, 1) or (reader.rebases and self.motions):
+            raise NotInPieces  # a jump; or it sets what depends on where the corrected program has led
+        motions = len(reader.record)
+        self._flags = [reader.record.code_stated, reader.record.feed_stated]
+        self.motions += motions
+        return motions, after is None
+
+    def reader(self, text: Text, state: ControlState) -> Interpreter:
+        """An interpreter for some lines, in a state of the control."""
+        reader = Interpreter(text, self.setup, self.language)
+        reader.state = state
+        reader._warned = self._told
+        reader.warnings = self.warnings
+        return reader
+
+    def check(self, reader: Interpreter) -> None:
+        """Raises NotInPieces when a line did what only the reader of whole programs can follow."""
+        if not reader.straight or reader.record.cycles:
+            raise NotInPieces
+
+    def program(self, text: bytes, row0: int, state: ControlState) -> Program:
+        """Some lines as a program of their own, from a state of the control on."""
+        piece = Piece(self.name, text.decode("latin-1"), "latin-1", b"", row0)
+        reader = self.reader(piece, deepcopy(state))
+        reader.warnings = []
+        controller(reader).run()
+        self.check(reader)
+        path, sites = reader.record.finish()
+        return Program(
+            data=text, name=self.name, dialect=self.language.name, path=replace(path, line=path.line + row0), warnings=(),
+            text=piece, sites=sites, rebases=tuple(reader.rebases), setup=self.setup, language=self.language, straight=True,
+        )  # fmt: skip
+
+
+class _Odd:
+    """Collects the lines of an odd run."""
+
+    def __init__(self) -> None:
+        self.lines: list[bytes] = []
+        self._motions = 0
+        self._row0 = 0
+        self._state: ControlState | None = None
+
+    def start(self, row0: int, state: ControlState) -> None:
+        """The first line is going to be line row0; `state` in front of it."""
+        self._row0, self._state = row0, state
+
+    def add(self, lines: bytes, motions: int) -> None:
+        """Lines and what they moved."""
+        self.lines.append(lines)
+        self._motions += motions
+
+    def take(self) -> OddRun:
+        """What was collected."""
+        assert self._state is not None
+        run = OddRun(b"".join(self.lines), self._row0, self._state, self._motions)
+        self.lines, self._motions, self._state = [], 0, None
+        return run

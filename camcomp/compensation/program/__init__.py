@@ -1,0 +1,1 @@
+"""One program as a whole: corrected, divided, rewritten, verified."""

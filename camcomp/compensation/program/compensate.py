@@ -1,0 +1,422 @@
+"""Compensate a program: which tips must be commanded so that the loaded machine cuts what was programmed.
+
+Read, lay the cutting force along the path, solve the modified target at trial points, divide where the correction
+bends, solve again at the division points, write, and put the written program through the full model.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+
+from camcomp.compensation.program import arcs_out
+from camcomp.compensation.program.arcs_out import Arcs, Bend
+from camcomp.compensation.program.chords import Nodes, second_derivative, trial_nodes
+from camcomp.compensation.program.moves import (
+    WITHIN_RAPID,
+    corrected_pieces,
+    refuse_unsolved,
+    row_layout,
+    travel_of,
+)
+from camcomp.compensation.program.posture import check_posture, whole_pose
+from camcomp.compensation.program.reversals import cut_at_reversals
+from camcomp.gcode.output import Output, Part, Rewritten
+from camcomp.gcode.program import Program
+from camcomp.gcode.rewrite import rewrite
+from camcomp.ground.datatypes import ARC, LINE, RAPID, Bools, Floats, Ints, Path
+from camcomp.model.cutting.track import Track, lay_track
+from camcomp.model.job import Job
+from camcomp.model.motion.response import Travel, aim_at, respond
+from camcomp.model.statics.target import Correction, settle
+
+MAX_ROUNDS, ARC_ROUNDS = 6, 4
+STUCK = 0.95  # of the miss is left by a finer division that is no use, as where an arc passes the vertical
+COARSE_MM, FINE_MM = 8.0, 0.5  # distance of trial points on straight lines, without and with effects
+
+
+@dataclass(frozen=True, eq=False)
+class CorrectedRows:
+    """End points (N,) of the motions of the corrected program, in order."""
+
+    piece: Ints
+    motion: Ints
+    w: Floats  # fraction of the piece at the end point
+    kind: Ints
+    joining: Bools
+    corrected: Bools  # False: passes as programmed
+    force: Floats  # (N, 3) N at the end point, program frame
+    target: Floats  # (N, 3) mm programmed tip
+    end: Floats  # (N, 3) mm commanded tip, program frame
+    feed: Floats  # (N,) mm/min
+    arcs: Arcs  # (N,) circles of corrected arcs that come out as arcs
+
+
+@dataclass(frozen=True, eq=False)
+class Compensated:
+    """The corrected program and everything that is known about it; points (N, ...) are its end points."""
+
+    program: Program
+    written: Rewritten
+    rows: CorrectedRows
+    s: Floats  # (N,) mm programmed path length
+    t: Floats  # (N,) s
+    nominal: Floats  # (N, m) inverse kinematics of the programmed tip
+    state: Correction  # loaded machine at the written end points
+    uncorrected: Floats  # (N, 3) loaded tip of the original program, program frame
+    before: Floats  # errors (k, 3) mm of the original program along feed motions
+    after: Floats  # errors (k, 3) mm of the corrected program along feed motions
+    iterations: int
+    method: str
+    warnings: list[str]
+
+    @property
+    def lines(self) -> Ints:
+        """Source line (N,) of every end point."""
+        return self.program.path.line[self.rows.motion]
+
+    def failed_checks(self, job: Job, tolerance_um: float) -> list[tuple[str, str]]:
+        """Rule id and text of every check that the finished program does not pass."""
+        out = []
+        size = 1e3 * np.linalg.norm(self.after, axis=1)
+        worst = float(np.nanmax(size)) if len(size) else 0.0
+        if not worst <= tolerance_um * (1.0 + 1e-9):
+            out.append(("CC601", f"{worst:.3f} um are left, more than the tolerance of {tolerance_um:g} um"))
+        for a, name in enumerate(job.real_machine.actuators):
+            low, high = job.machine.limits[a]
+            value = self.state.rho[:, a]
+            over = np.flatnonzero((value < low) | (value > high))
+            if len(over):
+                lines = ", ".join(str(n) for n in np.unique(self.lines[over])[:10])
+                unit, k = ("deg", 180.0 / np.pi) if job.machine.revolute[a] else ("mm", 1.0)
+                span = f"{k * low:g} to {k * high:g} {unit}"
+                out.append(("CC602", f"actuator {name} leaves its travel {span} at source lines {lines}"))
+        return out
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectories:
+    """Where the original program takes the tip (N, 3) mm, program frame, for one cause at a time: seed Fig. 4."""
+
+    chain_error: Floats  # imperfect chains, no load
+    force: Floats  # perfect chains, cutting force
+
+
+def trajectories(result: Compensated, job: Job) -> Trajectories:
+    """The trajectories of the original program that a compensation does not need itself."""
+    target = job.frame.to_machine(result.rows.target)
+    force = job.frame.vectors(result.rows.force)
+    alone, _ = settle(job.real_machine, target, np.zeros_like(force))
+    loaded, _ = settle(job.perfect_machine, target, force)
+    return Trajectories(job.frame.to_program(alone), job.frame.to_program(loaded))
+
+
+def compensate(
+    program: Program, job: Job, *, method: str, tolerance_um: float, version: str, part: Part | None = None,
+    arcs: bool | None = None,
+) -> Compensated:  # fmt: skip
+    """The corrected program. Raises PhysicsError where the machine cannot do what is asked.
+
+    arcs: programmed arcs come out as arcs where those are fewer than lines; None asks the machine file.
+
+    part: the motions to be corrected and written, when the program is a part of a longer one. The others are only there
+    because their neighbours depend on them: they are not divided, and their errors do not count.
+    """
+    path, resolution = program.path, job.config.control.resolution_mm
+    spacing = FINE_MM if job.causes else COARSE_MM  # a screw's error has waves of a few mm
+    track, turning = cut_at_reversals(job, lay_track(path, job.conditions), spacing)
+    corrected = corrected_pieces(path, track)
+    feeding = corrected & (path.kind[track.motion] != RAPID)
+    if part is not None:
+        feeding &= (track.motion >= part.first) & (track.motion < part.last)
+    rounding = 0.5 * np.sqrt(3.0) * resolution
+    budget = max(1e-3 * tolerance_um - rounding, 0.1e-3 * tolerance_um)
+    tolerance = np.full(len(track.motion), budget)
+
+    trial = trial_nodes(track.length, track.angle, feeding & ~turning & (track.length > 0.0), spacing)
+    aimed = _aim(program, job, track, trial, corrected, method)
+    second = second_derivative(trial, aimed.commanded)
+    kept = _kept(track, trial, aimed.commanded, 0.5 * resolution)
+    tolerance[kept | turning] = np.inf
+    wanted = job.config.compensation.arcs if arcs is None else arcs
+    able = feeding & ~kept & (wanted and not job.causes)  # what drives leave over has waves that no arc follows
+    bend = Bend.of(track, trial, aimed.commanded, second, tolerance, able)
+    tolerance[bend.use] = max(budget - np.sqrt(0.5) * resolution, 0.1 * budget)  # the centre is rounded, too
+    last, last_count = np.full(len(tolerance), np.inf), np.zeros(len(tolerance), np.int64)
+    for round_ in range(MAX_ROUNDS):
+        nodes, shift = bend.divided(trial, tolerance)
+        if (gone := bend.pointless(nodes)).any():
+            bend.use &= ~gone
+            tolerance[gone] = budget
+            nodes, shift = bend.divided(trial, tolerance)
+        commanded, circles = _bent(program, job, track, nodes, shift, corrected, method, bend)
+        rows = _rows(program, job, track, nodes, commanded, kept, circles, begins=part is None or part.first == 0)
+        written = rewrite(program, _output(path, rows), resolution_mm=resolution, version=version, part=part)
+        points = _points(job, track, rows, feeding)
+        after = _see(job, points, written.end, replace(rows.arcs, centre=written.centre))
+        worst = np.zeros(len(tolerance))
+        np.maximum.at(worst, points.piece[points.judged], np.linalg.norm(after.error[points.judged], axis=1))
+        missed = (worst > 1e-3 * tolerance_um) & ~kept
+        count = np.diff(nodes.first)
+        stuck = missed & (worst >= STUCK * last) & (count > last_count)
+        straighten = missed & bend.use & (stuck | (round_ >= ARC_ROUNDS - 1))
+        missed &= ~stuck & ~straighten
+        if not (missed | straighten).any():
+            break
+        last, last_count = np.where(straighten, np.inf, worst), count
+        bend.use &= ~straighten
+        tolerance[straighten] = budget
+        tolerance = np.where(
+            missed, tolerance * np.clip(0.9e-3 * tolerance_um / np.maximum(worst, 1e-12), 0.3, 0.9), tolerance
+        )
+    before = _see_original(job, points)
+    warnings = _warnings(job, rows)
+    iterations = int(aimed.iterations.max(initial=0))
+    return _assemble(program, job, track, rows, written, points, before, after, iterations, method, warnings)
+
+
+@dataclass(frozen=True, eq=False)
+class _Aimed:
+    commanded: Floats  # (k, 3) program frame
+    iterations: Ints
+
+
+def _aim(program: Program, job: Job, track: Track, nodes: Nodes, corrected: Bools, method: str) -> _Aimed:
+    """Modified targets at nodes, program frame; nodes of uncorrected pieces stay as programmed."""
+    on = corrected[nodes.piece]
+    piece, w = nodes.piece[on], nodes.w[on]
+    rapids = np.flatnonzero(corrected & (track.path.kind[track.motion] == RAPID) & (track.length > 0.0))
+    if not job.causes:
+        rapids = rapids[:0]
+    between = np.repeat(rapids, len(WITHIN_RAPID))  # drives remember where they turned round
+    order = np.lexsort((np.concatenate((w, np.tile(WITHIN_RAPID, len(rapids)))), np.concatenate((piece, between))))
+    asked = np.argsort(order, kind="stable")[: len(piece)]
+    piece, w = np.concatenate((piece, between))[order], np.concatenate((w, np.tile(WITHIN_RAPID, len(rapids))))[order]
+    target = track.points(piece, w)
+    result = aim_at(job, target, travel_of(job, track, piece, w), method)
+    refuse_unsolved(program, track, piece, target, result.status)
+    out = track.points(nodes.piece, nodes.w)
+    out[on] = result.commanded[asked]
+    iterations = np.zeros(len(out), np.int64)
+    iterations[on] = result.iterations[asked]
+    return _Aimed(out, iterations)
+
+
+def _bent(
+    program: Program, job: Job, track: Track, nodes: Nodes, shift: Floats, corrected: Bools, method: str, bend: Bend
+) -> tuple[Floats, Arcs]:
+    """Commanded tips (k, 3) at nodes, and the circles of the moves that lead there as arcs. Turns off what cannot bend."""
+    both, middle = arcs_out.middles(nodes, bend.use)
+    solved = _aim(program, job, track, both, corrected, method).commanded
+    commanded = solved[~middle] + shift
+    circles = Arcs.none(len(commanded))
+    to = np.flatnonzero((np.diff(nodes.piece, prepend=-1) == 0) & bend.use[nodes.piece])
+    if len(to):
+        motion = track.motion[nodes.piece[to]]
+        flat = arcs_out.FLATTEST * job.config.control.resolution_mm
+        found, wrong = arcs_out.through(
+            commanded[to - 1], solved[middle], commanded[to], track.path.axis[motion], track.path.angle[motion], flat
+        )
+        circles.centre[to], circles.angle[to] = found.centre, found.angle
+        bend.use[nodes.piece[to[wrong]]] = False
+    return commanded, circles
+
+
+def _kept(track: Track, nodes: Nodes, commanded: Floats, half: float) -> Bools:
+    """Pieces (p,) that stay as programmed, arcs as arcs: whole motions whose correction would be rounded away."""
+    moved = np.abs(commanded - track.points(nodes.piece, nodes.w)).max(axis=1)
+    most = np.zeros(len(track.motion))
+    np.maximum.at(most, nodes.piece, moved)
+    return (most <= half) & (np.bincount(track.motion)[track.motion] == 1)
+
+
+def _rows(
+    program: Program,
+    job: Job,
+    track: Track,
+    nodes: Nodes,
+    commanded: Floats,
+    kept: Bools,
+    circles: Arcs,
+    *,
+    begins: bool,
+) -> CorrectedRows:
+    """End points of the corrected program: the nodes but the first of each piece, and joining lines at jumps."""
+    path = program.path
+    k = np.arange(len(nodes.w)) - nodes.first[nodes.piece]
+    kind = path.kind[track.motion]
+    start, stop = commanded[nodes.first[:-1]], commanded[nodes.first[1:] - 1]
+    before = path.start[:1] if begins else start[:1]
+    step = np.linalg.norm(start - np.concatenate((before, stop[:-1])), axis=1)
+    layout = row_layout(path, track, step, job.config.control.resolution_mm)
+    corrected, leading, trailing = layout.corrected, layout.leading, layout.trailing
+    keep = (k > 0) | leading[nodes.piece]
+    extra = np.flatnonzero(trailing)
+    piece = np.concatenate((nodes.piece[keep], extra))
+    w = np.concatenate((nodes.w[keep], np.ones(len(extra))))
+    joining = np.concatenate(((k == 0)[keep], np.ones(len(extra), np.bool_)))
+    free = track.points(extra, np.ones(len(extra)))
+    if len(extra):  # behind the cut, without its force
+        unloaded = replace(travel_of(job, track, extra, np.ones(len(extra))), force=np.zeros((len(extra), 3)))
+        result = aim_at(job, free, unloaded, "newton")
+        refuse_unsolved(program, track, extra, free, result.status)
+        free = result.commanded
+    end = np.concatenate((commanded[keep], free))
+    circles = circles.take(np.flatnonzero(keep)).followed_by(len(extra))
+    order = np.lexsort((joining & (w > 0.0), w, piece))
+    piece, w, joining, end, circles = piece[order], w[order], joining[order], end[order], circles.take(order)
+    trailing_row = joining & (w > 0.0)
+    target = track.points(piece, w)
+    force = track.force(piece, w)
+    force[trailing_row] = 0.0
+    rows_kind = np.where(kind[piece] == RAPID, RAPID, LINE)
+    passed = ~corrected[piece]
+    whole = (passed | kept[piece]) & ~joining & (np.bincount(piece, minlength=len(kind)) == 1)[piece]
+    rows_kind = np.where(circles.on, ARC, np.where(whole, kind[piece], rows_kind))
+    end[whole & ~circles.on] = target[whole & ~circles.on]
+    rows = CorrectedRows(
+        piece, track.motion[piece], w, rows_kind, joining, ~passed, force, target, end, np.empty(len(piece)), circles
+    )
+    return replace(rows, feed=_feeds(program, track, rows))
+
+
+def _feeds(program: Program, track: Track, rows: CorrectedRows) -> Floats:
+    """Feed of every row so that the tip keeps its programmed speed: scaled by commanded over programmed length."""
+    feed = program.path.feed[rows.motion]
+    start = np.concatenate((program.path.start[:1], rows.end[:-1]))
+    same = np.concatenate(([False], (rows.piece[1:] == rows.piece[:-1])))
+    w0 = np.where(same, np.concatenate(([0.0], rows.w[:-1])), 0.0)
+    programmed = (rows.w - w0) * track.length[rows.piece]
+    commanded = arcs_out.lengths(start, rows.end, rows.arcs, program.path.axis[rows.motion])
+    scale = np.divide(commanded, programmed, out=np.ones(len(feed)), where=programmed > 1e-6)
+    plain = rows.joining | ((rows.kind != LINE) & ~rows.arcs.on) | ~rows.corrected | (programmed < 0.01)
+    return np.where(plain, feed, feed * np.clip(scale, 0.2, 5.0))
+
+
+def _output(path: Path, rows: CorrectedRows) -> Output:
+    arc, bent = rows.kind == ARC, rows.arcs.on
+    centre = np.where(bent[:, None], rows.arcs.centre, path.centre[rows.motion])
+    angle = np.where(bent, rows.arcs.angle, path.angle[rows.motion])
+    return Output(
+        motion=rows.motion,
+        kind=rows.kind.astype(np.int8),
+        end=rows.end,
+        centre=np.where(arc[:, None], centre, np.nan),
+        angle=np.where(arc, angle, 0.0),
+        feed=rows.feed,
+        joining=rows.joining,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Points:
+    """Where a corrected program is looked at, in the order of travel.
+
+    End points, and between them the middles of lines and the quarters of arcs.
+    """
+
+    row: Ints  # (k,) end point that the point belongs to
+    fraction: Floats  # (k,) of the move to it, 1 at its end
+    axis: Floats  # (k, 3) of arcs
+    piece: Ints
+    w: Floats
+    target: Floats  # (k, 3) mm programmed tip
+    travel: Travel
+    judged: Bools  # (k,) counted in before and after: feed motions, no joining lines
+    kept: Bools  # (k,) between the ends of an arc that stays as programmed
+    before: Floats | None  # (3,) where the first move starts, if that is known
+
+    @property
+    def end(self) -> Bools:
+        """Which ones are end points."""
+        return self.fraction == 1.0
+
+    def along(self, ends: Floats, arcs: Arcs) -> Floats:
+        """Points (k, 3) of the moves between end points (N, 3)."""
+        first = ends[:1] if self.before is None else self.before[None]
+        start = np.concatenate((first, ends[:-1]))[self.row]
+        out = arcs_out.along(start, ends[self.row], arcs.take(self.row), self.axis, self.fraction)
+        return np.where(self.kept[:, None], self.target, np.where(self.end[:, None], ends[self.row], out))
+
+
+def _points(job: Job, track: Track, rows: CorrectedRows, feeding: Bools) -> _Points:
+    n = len(rows.piece)
+    cut = feeding[rows.piece] & ~rows.joining
+    begins = np.concatenate(([True], rows.piece[1:] != rows.piece[:-1])) | np.concatenate(([True], rows.joining[:-1]))
+    start = np.where(begins, 0.0, np.concatenate(([0.0], rows.w[:-1])))
+    inner = np.flatnonzero(cut & (track.length[rows.piece] > 0.0))
+    bent = inner[rows.arcs.on[inner]]
+    rapid = np.flatnonzero((rows.kind == RAPID) & rows.corrected) if job.causes else inner[:0]
+    row = np.concatenate((np.arange(n), inner, bent, bent, np.repeat(rapid, len(WITHIN_RAPID))))
+    fraction = np.repeat([1.0, 0.5, 0.25, 0.75], [n, len(inner), len(bent), len(bent)])
+    fraction = np.concatenate((fraction, np.tile(WITHIN_RAPID, len(rapid))))
+    order = np.lexsort((fraction, row))
+    row, fraction = row[order], fraction[order]
+    end = fraction == 1.0
+    piece = rows.piece[row]
+    w = np.where(end, rows.w[row], start[row] + fraction * (rows.w - start)[row])
+    travel = travel_of(job, track, piece, w)
+    force = np.where(end[:, None], job.frame.vectors(rows.force)[row], travel.force)  # joining lines know better
+    kept = ~end & ((rows.kind == ARC) & ~rows.arcs.on)[row]
+    axis = track.path.axis[track.motion[piece]]
+    travel = replace(travel, force=force)
+    before = track.path.start[0] if n and track.path.known[0] else None
+    return _Points(row, fraction, axis, piece, w, track.points(piece, w), travel, cut[row], kept, before)
+
+
+@dataclass(frozen=True, eq=False)
+class _Seen:
+    """A program put through the full model: errors (k, 3) mm at the points, tips (N, 3) and states at the end points."""
+
+    error: Floats
+    tip: Floats
+    state: Correction
+
+
+def _see(job: Job, points: _Points, ends: Floats, arcs: Arcs) -> _Seen:
+    """The loaded machine along the moves between commanded end points (N, 3), program frame."""
+    told = points.along(ends, arcs)
+    tip, state = respond(job, told, points.travel, points.target, before=points.before)
+    at = {each.name: getattr(state, each.name)[points.end] for each in fields(state)}
+    return _Seen(tip - points.target, tip[points.end], Correction(**at))
+
+
+def _see_original(job: Job, points: _Points) -> _Seen:
+    """The original program through the full model, at the same points."""
+    tip, state = respond(job, points.target, points.travel, before=points.before)
+    at = {each.name: getattr(state, each.name)[points.end] for each in fields(state)}
+    return _Seen(tip - points.target, tip[points.end], Correction(**at))
+
+
+def _warnings(job: Job, rows: CorrectedRows) -> list[str]:
+    joins = int(rows.joining.sum())
+    out = (
+        [f"{joins} joining lines where the cutting force jumps; they are not part of before and after"] if joins else []
+    )
+    if job.config.process.temperature_C is None:
+        warm = dict.fromkeys(cause.name for cause in job.causes if getattr(cause.effect, "WARMS", False))
+        out += [
+            f"{name}: without process: temperature_C the machine counts as warming up from 20 deg C" for name in warm
+        ]
+    return out
+
+
+def _assemble(
+    program: Program, job: Job, track: Track, rows: CorrectedRows, written: Rewritten, points: _Points, before: _Seen,
+    after: _Seen, iterations: int, method: str, warnings: list[str],
+) -> Compensated:  # fmt: skip
+    s = track.s0[rows.piece] + rows.w * track.length[rows.piece]
+    feed = program.path.feed[rows.motion]
+    default = job.config.process.feed_mm_per_min or np.nan
+    speed = np.where(np.isnan(feed), default, feed)
+    step = np.diff(s, prepend=0.0)
+    moving = (rows.kind != RAPID) & (speed > 0.0)
+    t = np.cumsum(np.where(moving, step / np.where(moving, speed, 1.0) * 60.0, 0.0))
+    nominal = before.state.rho_nominal
+    target, force = job.frame.to_machine(rows.target), job.frame.vectors(rows.force)
+    warnings = [*program.warnings, *warnings]
+    warnings += check_posture(program, job, program.path.line[rows.motion], target, nominal)
+    state = after.state if method == "linear" else whole_pose(job, rows.corrected, target, force, after.state)
+    return Compensated(program, written, rows, s, t, nominal, state, before.tip, before.error[points.judged],
+                       after.error[points.judged], iterations, method, warnings)  # fmt: skip

@@ -1,0 +1,99 @@
+"""What the moves of a corrected program are: which pieces are corrected, where joining lines stand, what cannot be done.
+
+Shared by the stories that write corrected programs and that check them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from camcomp.gcode.program import Program
+from camcomp.ground.datatypes import RAPID, Bools, Floats, Ints, Path
+from camcomp.ground.errors import Location, PhysicsError, raise_all
+from camcomp.model.cutting.track import Track
+from camcomp.model.job import Job
+from camcomp.model.motion.response import Travel
+from camcomp.model.statics.solve import STATUS
+
+RULE_OF_STATUS = {2: "CC301", 3: "CC302", 4: "CC303", 5: "CC304"}
+MOST_ERRORS = 20
+WITHIN_RAPID = np.arange(1, 8) / 8.0  # where a rapid is looked at when drives remember how they came
+RAPID_FEED = 10_000.0  # mm/min, for the time that rapids take
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """Which pieces (p,) are corrected, and which get a joining line in front of or behind them."""
+
+    corrected: Bools
+    leading: Bools
+    trailing: Bools
+
+
+def row_layout(path: Path, track: Track, step: Floats, resolution: float) -> Layout:
+    """Corrected pieces and joining lines of a track.
+
+    step (p,) mm: how far the commanded tip jumps at the start of each piece; a jump below the resolution needs no line. A
+    joining line stands in front of the piece behind the jump; in front of a rapid or an uncorrected move it stands
+    behind the cut instead, because only feed lines can join. The program starts uncorrected, and a move in machine
+    coordinates ends so; the feed line behind them needs one too.
+    """
+    corrected = corrected_pieces(path, track)
+    feed = corrected & (path.kind[track.motion] != RAPID)
+    wanted = track.jump & np.concatenate(([False], corrected[:-1])) & (step > resolution)
+    behind_uncorrected = np.concatenate(([True], ~corrected[:-1])) & (step > resolution)
+    leading = (wanted | behind_uncorrected) & feed
+    trailing = np.concatenate((wanted[1:] & ~leading[1:], [False])) & feed
+    return Layout(corrected, leading, trailing)
+
+
+def corrected_pieces(path: Path, track: Track) -> Bools:
+    """Pieces (p,) whose tips are known and not given in machine coordinates."""
+    return path.known[track.motion] & ~path.machine[track.motion]
+
+
+def refuse_unsolved(program: Program, track: Track, piece: Ints, target: Floats, status: Ints) -> None:
+    """Raises PhysicsError for every source line with a point that could not be solved."""
+    bad = np.flatnonzero(status != 0)
+    errors: list[PhysicsError] = []
+    seen: set[int] = set()
+    for i in bad:
+        line = int(program.path.line[track.motion[piece[i]]])
+        if line in seen:
+            continue
+        seen.add(line)
+        code = int(status[i])
+        x, y, z = target[i]
+        text = f"{STATUS.get(code, 'no solution')} at X{x:.4f} Y{y:.4f} Z{z:.4f} (program frame, mm)"
+        errors.append(
+            PhysicsError(RULE_OF_STATUS.get(code, "CC301"), text, at=_place(program, int(track.motion[piece[i]])))
+        )
+        if len(errors) == MOST_ERRORS:
+            break
+    raise_all(errors)
+
+
+def _place(program: Program, motion: int) -> Location:
+    """Where a motion stands in the text: its first axis word."""
+    row = int(program.sites.row[motion])
+    words = program.sites.begin[motion, :3]
+    words = words[words >= 0]
+    column = int(words.min() - program.text.starts[row]) if len(words) else 0
+    return program.text.place(row, max(column, 0))
+
+
+def travel_of(job: Job, track: Track, piece: Ints, w: Floats) -> Travel:
+    """Force and time of points in the order of travel. Rapids go at RAPID_FEED where the time matters."""
+    feed = track.path.feed[track.motion]
+    feed = np.where(np.isnan(feed), job.config.process.feed_mm_per_min or np.nan, feed)
+    rapid = (track.path.kind[track.motion] == RAPID) | ~(feed > 0.0)
+    minutes = track.length / np.where(rapid, RAPID_FEED, feed)
+    start = np.cumsum(minutes) - minutes
+    cut = minutes * track.cutting
+    worn = np.cumsum(cut) - cut
+    force = job.frame.vectors(track.force(piece, w))
+    behind = np.concatenate((track.corner[1:], [True]))
+    stop = (w == 0.0) & track.corner[piece] | (w == 1.0) & behind[piece]
+    return Travel(force, 60.0 * (start[piece] + w * minutes[piece]), worn[piece] + w * cut[piece], stop)

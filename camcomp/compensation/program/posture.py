@@ -1,0 +1,80 @@
+"""What a program asks of an arm's posture: one branch of the inverse kinematics, room to singular configurations.
+
+The branch is fixed by the start pose: every point is reached from there by walking in short steps. Here it is proved that
+no step of the program changes it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from camcomp.gcode.program import Program
+from camcomp.ground.datatypes import Bools, Floats, Ints
+from camcomp.ground.errors import PhysicsError
+from camcomp.model.job import Job
+from camcomp.model.statics.arm import NEAR_SINGULAR, Arm, arm_of, dexterity, follow
+from camcomp.model.statics.target import Correction, correct
+
+SINGULAR = 1e-4  # dexterity: drives turn 10 000 times as far as the tip needs
+LARGE_TURN = 0.3  # rad between two end points: worth a closer look
+
+
+def check_posture(program: Program, job: Job, line: Ints, tip: Floats, rho: Floats) -> list[str]:
+    """Warnings for the source lines (N,) that pass near singular configurations.
+
+    tip (N, 3) mm, machine frame, rho (N, m) as the control computes them. Raises PhysicsError CC303 for lines that go
+    through one, CC305 where the joints would change to another branch. Machines that are no arms pass.
+    """
+    arm = arm_of(job.machine.nominal)
+    if arm is None or not len(tip):
+        return []
+    room = dexterity(arm, rho)
+    _refuse(program, "CC303", "the arm is singular", np.unique(line[room < SINGULAR]))
+    _refuse(program, "CC305", "the joints change to another branch", _flips(job, arm, line, tip, rho))
+    near = np.unique(line[room < NEAR_SINGULAR])
+    if not len(near):
+        return []
+    lines = ", ".join(str(n) for n in near[:10]) + (" ..." if len(near) > 10 else "")
+    worst = int(np.argmin(room))
+    text = f"near a singular configuration at source lines {lines}: nearest at line {line[worst]}, "
+    return [text + f"dexterity {room[worst]:.4f}; drives move fast there, and their errors grow"]
+
+
+def _flips(job: Job, arm: Arm, line: Ints, tip: Floats, rho: Floats) -> Ints:
+    """Source lines at whose end the joints are not where a straight way from the end point before leads them."""
+    far = np.flatnonzero(np.abs(np.diff(rho, axis=0)).max(axis=1) > LARGE_TURN) + 1
+    held, tool = job.machine.nominal.held_rotation, job.machine.nominal.tool
+    found = []
+    for i in far:
+        q = follow(arm, rho[i - 1], held, tip[i - 1] - held @ tool, tip[i] - held @ tool)
+        if q is not None and np.abs(q - rho[i]).max() > 0.1 * LARGE_TURN:
+            found.append(line[i])
+    return np.unique(np.array(found, np.int64))
+
+
+def _refuse(program: Program, rule: str, text: str, lines: Ints) -> None:
+    if not len(lines):
+        return
+    errors = [PhysicsError(rule, f"{text} on this line", at=program.text.place(int(n) - 1, 0)) for n in lines[:20]]
+    first, *rest = errors
+    first.others = tuple(rest)
+    raise first
+
+
+def whole_pose(job: Job, on: Bools, target: Floats, force: Floats, state: Correction) -> Correction:
+    """The state with joint commands that bring tip and orientation to the target, for machines with six actuators.
+
+    Words X Y Z can carry the correction of the tip only, and leave the platform tilted under load; the joint table can
+    carry both. on (N,) rows to correct, target (N, 3) mm and force (N, 3) N in the machine frame. The tilt of the state
+    stays that of the written program.
+    """
+    if len(job.machine.actuators) != 6 or not on.any():
+        return state
+    exact = correct(job.machine, target[on], force[on], pose=True)
+    solved = exact.status == 0
+    rows = np.flatnonzero(on)[solved]
+    rho, drive = state.rho.copy(), state.drive.copy()
+    rho[rows], drive[rows] = exact.rho[solved], exact.drive[solved]
+    return replace(state, rho=rho, drive=drive)

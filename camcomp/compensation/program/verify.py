@@ -1,0 +1,256 @@
+"""Verify a corrected program from its text alone: where does the loaded machine take the tip, and how far off is that?
+
+The corrected program is read as the control reads it, its moves are matched to the motions of the original, and points
+along every move go through the full model. The residual is the distance from the programmed path. Joining lines are
+not counted.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from camcomp.compensation.program.chords import trial_nodes
+from camcomp.compensation.program.moves import (
+    WITHIN_RAPID,
+    Layout,
+    corrected_pieces,
+    refuse_unsolved,
+    row_layout,
+    travel_of,
+)
+from camcomp.gcode.program import Program
+from camcomp.gcode.stamp import is_stamped
+from camcomp.ground import path_geometry
+from camcomp.ground.datatypes import ARC, RAPID, Bools, Floats, Ints, Path
+from camcomp.ground.errors import CheckFailed
+from camcomp.model.cutting.track import Track, lay_track
+from camcomp.model.job import Job
+from camcomp.model.motion.response import aim_at, respond
+
+PER_SECTION = 4  # points looked at within each straight move or section of an arc
+ARC_STEP = 0.1  # rad, section of an arc
+MATCH_PASSES = 20  # tip and force settle on a place of the path; on a circle of 1 mm it takes ten
+ALONG = 180  # sections of a piece to measure the path that ought to be commanded
+UNEVEN = 0.02  # change of a piece's length by the correction from which that is worth while
+PROBE_MM = 1e-4  # fraction of a piece
+LARGEST_GAP_MM = 0.05  # of a piece, in one pass
+NEAR_MM = 5.0  # a matched end may be this far from where it is expected
+
+
+@dataclass(frozen=True, eq=False)
+class LineResult:
+    """Residual of one source line in um, and its parts.
+
+    convergence: what the solver itself leaves. rounding: half the last digit written, worst case. vertex: end points
+    of moves, where rounding and the sharing of the chord's miss show. chord: what the straight lines between them add.
+    """
+
+    line: int
+    moves: int
+    residual_um: float
+    convergence_um: float
+    rounding_um: float
+    vertex_um: float
+    chord_um: float
+
+
+@dataclass(frozen=True, eq=False)
+class Verified:
+    """Residuals (k,) mm at all points looked at along feed moves, and per source line."""
+
+    residual: Floats
+    lines: list[LineResult]
+    joining: int
+
+    def as_json(self, tolerance_um: float) -> dict:
+        """The figures of a verification."""
+        size = 1e3 * self.residual
+        return {
+            "tolerance_um": tolerance_um,
+            "residual": {
+                "rms_um": float(np.sqrt(np.mean(size**2))) if len(size) else 0.0,
+                "max_um": float(size.max()) if len(size) else 0.0,
+            },
+            "points": len(size),
+            "joining_lines": self.joining,
+            "lines": [vars(each) for each in self.lines],
+        }
+
+
+def verify(corrected: Program, original: Program, job: Job) -> Verified:
+    """Residual of a corrected program. Raises CheckFailed CC604 when it is not one of this original."""
+    track = lay_track(original.path, job.conditions)
+    corrected_ones = corrected_pieces(original.path, track)
+    begin, expected = (_expected(original, job, track, corrected_ones, w) for w in (0.0, 1.0))
+    step = np.linalg.norm(begin - np.concatenate((original.path.start[:1], expected[:-1])), axis=1)
+    layout = row_layout(original.path, track, step, job.config.control.resolution_mm)
+    reach = _reach(original, job, track, corrected_ones)
+    first, last, joins = _match(corrected, track, expected, reach, layout, is_stamped(corrected.data))
+    moving = np.flatnonzero(layout.corrected & (track.length > 0.0))
+    piece, move, f = _samples(corrected.path, moving, first[moving], last[moving])
+    commanded = path_geometry.points(corrected.path, move, f)
+    residual, w = _residual(job, track, piece, commanded, _fraction(job, track, reach, corrected.path, piece, move, f))
+    # Rapids and starts are only there because drives remember them.
+    judged = (f > 0.0) & (original.path.kind[track.motion[piece]] != RAPID)
+    piece, residual, w, vertex = piece[judged], residual[judged], w[judged], f[judged] == 1.0
+    convergence = _convergence(job, track, piece[vertex], w[vertex])
+    lines = _per_line(original, job, track, piece, vertex, residual, convergence)
+    return Verified(residual, lines, joins)
+
+
+def _samples(path: Path, pieces: Ints, first: Ints, last: Ints) -> tuple[Ints, Ints, Floats]:
+    """Points looked at: piece (k,), move (k,) of the corrected path, and fraction (k,) of the move."""
+    none = np.zeros(0, np.int64)
+    move = np.concatenate([none, *(np.arange(a, b) for a, b in zip(first, last, strict=True))])
+    piece = np.repeat(pieces, last - first)
+    sections = np.ceil(np.abs(np.where(path.kind[move] == ARC, path.angle[move], 0.0)) / ARC_STEP)
+    count = np.where(
+        path.kind[move] == RAPID, len(WITHIN_RAPID) + 1, PER_SECTION * np.maximum(sections, 1).astype(np.int64)
+    )
+    points = count + 1
+    begin = np.cumsum(points) - points
+    k = np.arange(points.sum()) - np.repeat(begin, points)
+    return np.repeat(piece, points), np.repeat(move, points), k / np.repeat(count, points)
+
+
+def _expected(program: Program, job: Job, track: Track, corrected: Bools, w: float) -> Floats:
+    """Commanded tip (p, 3) at fraction w of every piece, as compensate would have it."""
+    pieces = np.arange(len(track.motion))
+    at = np.full(len(pieces), w)
+    out = track.points(pieces, at)
+    on = np.flatnonzero(corrected)
+    result = aim_at(job, out[on], travel_of(job, track, on, at[on]), "newton")
+    refuse_unsolved(program, track, on, out[on], result.status)
+    out[on] = result.commanded
+    return out
+
+
+def _reach(program: Program, job: Job, track: Track, corrected: Bools) -> Floats:
+    """Length (p,) mm of the commanded path of every piece; where the correction is large, a small arc grows or shrinks."""
+    angle = np.where(program.path.kind == ARC, np.abs(program.path.angle), 0.0)[track.motion] * (track.u1 - track.u0)
+    nodes = trial_nodes(track.length, angle, corrected & (angle > 0.0))
+    points = track.points(nodes.piece, nodes.w)
+    on = corrected[nodes.piece]
+    points[on] = aim_at(job, points[on], travel_of(job, track, nodes.piece[on], nodes.w[on]), "newton").commanded
+    step = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    inside = np.diff(nodes.piece) == 0
+    return np.bincount(nodes.piece[1:][inside], step[inside], len(corrected)).astype(np.float64)
+
+
+def _match(
+    corrected: Program, track: Track, expected: Floats, reach: Floats, layout: Layout, stamped: bool
+) -> tuple[Ints, Ints, int]:
+    """Moves [first, last) of the corrected program that belong to every piece, and the number of joining lines."""
+    end = corrected.path.end
+    step = path_geometry.lengths(corrected.path)
+    n, moves = len(track.motion), len(end)
+    first, last = np.zeros(n, np.int64), np.zeros(n, np.int64)
+    at = joins = 0
+    for i in range(n):
+        if stamped and layout.leading[i]:
+            at, joins = at + 1, joins + 1
+        left = n - i - 1
+        stop, walked = at, 0.0
+        best, found = np.inf, -1
+        limit = 1.3 * max(track.length[i], reach[i]) + NEAR_MM
+        while stop < moves - left:
+            walked += step[stop]
+            if walked > limit and stop > at:
+                break
+            off = float(np.linalg.norm(end[stop] - expected[i]))
+            score = off + 0.1 * min(abs(walked - track.length[i]), abs(walked - reach[i]))
+            if score < best - 1e-9:
+                best, found = score, stop
+            stop += 1
+        if found < 0 or best > NEAR_MM + 0.1 * limit:
+            line = int(track.path.line[track.motion[i]])
+            raise CheckFailed("CC604", f"no moves that cut line {line} of the original are found")
+        first[i], last[i] = at, found + 1
+        at = found + 1
+        if stamped and layout.trailing[i]:
+            at, joins = at + 1, joins + 1
+    if at != moves:
+        raise CheckFailed("CC604", f"{moves - at} moves at the end have no counterpart in the original")
+    return first, last, joins
+
+
+def _fraction(job: Job, track: Track, reach: Floats, path: Path, piece: Ints, move: Ints, f: Floats) -> Floats:
+    """First guess (k,) of the fraction of each piece: by the length of the path that ought to be commanded."""
+    length = path_geometry.lengths(path)
+    before = np.cumsum(length) - length
+    run = before[move] + f * length[move]
+    n = int(piece.max(initial=-1)) + 1
+    start, stop = np.full(n, np.inf), np.zeros(n)
+    np.minimum.at(start, piece, before[move])
+    np.maximum.at(stop, piece, run)
+    share = np.clip((run - start[piece]) / np.maximum(stop - start, 1e-300)[piece], 0.0, 1.0)
+    moves = np.zeros(n, np.int64)
+    np.maximum.at(moves, piece, move)
+    first = np.full(n, len(length))
+    np.minimum.at(first, piece, move)
+    # One move goes evenly, and so do many where the correction is small against the piece.
+    uneven = np.flatnonzero((moves > first) & (np.abs(reach - track.length)[:n] > UNEVEN * track.length[:n]))
+    w = np.linspace(0.0, 1.0, ALONG + 1)
+    at, along = np.repeat(uneven, len(w)), np.tile(w, len(uneven))
+    aimed = aim_at(job, track.points(at, along), travel_of(job, track, at, along), "newton").commanded.reshape(
+        -1, len(w), 3
+    )
+    for i, curve in zip(uneven, aimed, strict=True):
+        way = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(curve, axis=0), axis=1))))
+        on = piece == i
+        share[on] = np.interp(share[on] * way[-1], way, w)
+    return share
+
+
+def _residual(job: Job, track: Track, piece: Ints, commanded: Floats, w: Floats) -> tuple[Floats, Floats]:
+    """Distance (k,) mm of the loaded tip from the programmed path, and the fraction of the nearest point."""
+
+    def seen(w: Floats) -> tuple[Floats, Floats]:
+        """Distance from the place, and how far the tip lies ahead of it, mm."""
+        tip, _ = respond(job, commanded, travel_of(job, track, piece, w))
+        gap = tip - track.points(piece, w)
+        tangent = path_geometry.tangents(track.path, track.motion[piece], track.u(piece, w))
+        return np.linalg.norm(gap, axis=1), np.sum(gap * tangent, axis=1)
+
+    # With the place the force turns, and the tip with the force; on small arcs further than the place, so by secant.
+    last_w = np.where(w < 0.5, w + PROBE_MM, w - PROBE_MM)
+    nearest, last_along = seen(last_w)
+    best = last_w
+    for _ in range(MATCH_PASSES):
+        size, along = seen(w)
+        best, nearest = np.where(size < nearest, w, best), np.fmin(size, nearest)
+        change = along - last_along
+        slope = np.divide(w - last_w, -change, out=1.0 / track.length[piece], where=np.abs(change) > 1e-12)
+        better = np.clip(w + np.clip(along * slope, -LARGEST_GAP_MM, LARGEST_GAP_MM), 0.0, 1.0)
+        if np.abs((better - w) * track.length[piece]).max(initial=0.0) < 1e-7:
+            break
+        last_w, last_along, w = w, along, better
+    return nearest, best
+
+
+def _convergence(job: Job, track: Track, piece: Ints, w: Floats) -> Floats:
+    """What the solver leaves (k,) mm: the exact command of the nearest point, put through the model again."""
+    target, travel = track.points(piece, w), travel_of(job, track, piece, w)
+    tip, _ = respond(job, aim_at(job, target, travel, "newton").commanded, travel)
+    return np.linalg.norm(tip - target, axis=1)
+
+
+def _per_line(
+    original: Program, job: Job, track: Track, piece: Ints, vertex: Bools, residual: Floats, convergence: Floats
+) -> list[LineResult]:
+    line = original.path.line[track.motion[piece]]
+    rounding = 0.5 * np.sqrt(3.0) * 1e3 * job.config.control.resolution_mm
+    out = []
+    for number in np.unique(line):
+        on = line == number
+        v, all_of_it = float(residual[on & vertex].max()), float(residual[on].max())
+        solver = float(convergence[line[vertex] == number].max())
+        chord = max(0.0, all_of_it - v)
+        out.append(
+            LineResult(
+                int(number), int((on & vertex).sum()), 1e3 * all_of_it, 1e3 * solver, rounding, 1e3 * v, 1e3 * chord
+            )
+        )
+    return out

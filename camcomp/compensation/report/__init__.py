@@ -1,0 +1,1 @@
+"""What a compensation prints and draws: tables, page, figures."""

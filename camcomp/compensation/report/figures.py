@@ -1,0 +1,244 @@
+"""The plots of a compensation report."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from camcomp.compensation.program.compensate import Compensated, Trajectories
+from camcomp.compensation.program.verify import Verified
+from camcomp.ground.datatypes import RAPID, Bools, Floats, Ints
+from camcomp.model.job import Job
+from camcomp.model.statics.target import settle
+from camcomp.report.plot import INK, SCALE, STYLES, Figure, axis, brief, broken, gapped, level, line, thin
+
+AXES = "xyz"
+
+
+@dataclass(frozen=True, eq=False)
+class DrawnPath:
+    """What is drawn along the path, at the end points (N, ...) of the corrected program."""
+
+    s: Floats  # mm
+    line: Ints
+    hidden: Bools  # moves that are not drawn: rapids and what passes as programmed
+    target: Floats
+    shift: Floats  # (N, 3) um commanded minus programmed tip
+    change: Floats  # (N, m) um or mrad
+    drive: Floats  # (N, m) N or N m
+    before: Floats  # (N,) um
+    after: Floats  # (N,) um
+
+    def worst(self, size: Floats) -> int:
+        """Row where `size` (N,) is largest among what is drawn."""
+        return int(np.nanargmax(np.where(self.hidden | ~np.isfinite(size), -1.0, size)))
+
+
+def drawn_path_of(result: Compensated, job: Job) -> DrawnPath:
+    """Everything that is drawn along the path; the loaded tips of the written program are solved here."""
+    rows = result.rows
+    force = job.frame.vectors(rows.force)
+    tip, _ = settle(job.machine, job.frame.to_machine(result.written.end), force)
+    after = np.linalg.norm(job.frame.to_program(tip) - rows.target, axis=1)
+    drive_scale = np.where(job.machine.revolute, 1e-3, 1.0)
+    return DrawnPath(
+        s=result.s,
+        line=result.lines,
+        hidden=(rows.kind == RAPID) | ~rows.corrected | rows.joining,
+        target=rows.target,
+        shift=1e3 * (result.written.end - rows.target),
+        change=1e3 * (result.state.rho - result.nominal),
+        drive=result.state.drive * drive_scale,
+        before=1e3 * np.linalg.norm(result.uncorrected - rows.target, axis=1),
+        after=1e3 * after,
+    )
+
+
+def figure_trajectories(result: Compensated, found: Trajectories) -> Figure:
+    """Seed Fig. 4: target, the three trajectories of the original program, and the tip path to be commanded."""
+    target = result.rows.target
+    named = [
+        ("programmed", target),
+        ("chain errors alone", found.chain_error),
+        ("cutting force alone", found.force),
+        ("both", result.uncorrected),
+        ("commanded (adjusted)", result.written.end),
+    ]
+    rows = result.rows
+    hidden = (rows.kind == RAPID) | ~rows.corrected
+    index, gap = broken(thin(np.column_stack((target, result.uncorrected - target))), hidden)
+    traces = [line(name, [], [], i) for i, (name, _) in enumerate(named)]
+    traces[0]["line"] = {"color": INK, "dash": "solid", "width": 2}
+    base = {a: gapped(target[:, i], index, gap) for i, a in enumerate(AXES)}
+    shifts = [{a: gapped((points - target)[:, i], index, gap, 6) for i, a in enumerate(AXES)} for _, points in named]
+    off = [1e3 * float(np.nanmax(np.linalg.norm(points - target, axis=1)[~hidden], initial=0.0)) for _, points in named]
+    cutting = ~hidden & rows.force.any(axis=1)
+    drawn = target[cutting] if cutting.any() else target[~hidden]
+    extent = float(np.ptp(drawn, axis=0).max())
+    first = float(np.clip(0.12 * extent / max(1e-3 * max(off), 1e-9), 1.0, 1e4))
+    words = ", ".join(f"{name} {brief(value)} µm" for (name, _), value in zip(named[1:], off[1:], strict=True))
+    return Figure(
+        "trajectories",
+        "Five trajectories of the tool tip",
+        "Where the original program would take the tip for each cause alone and for both, and the path that is "
+        "commanded instead. Deviations from the programmed path are enlarged; the slider says how much. "
+        f"True largest deviations: {words}.",
+        f"Plot of five tool tip trajectories with enlarged deviations. Largest true deviations: {words}.",
+        traces,
+        {"xaxis": axis(""), "yaxis": axis("", scaleanchor="x", scaleratio=1)},
+        height=560,
+        exaggerate={"base": base, "shifts": shifts, "planes": _planes(drawn), "first": first, "most": 1e5},
+    )
+
+
+def _planes(points: Floats) -> list[str]:
+    """The three planes, the one with most to see first."""
+    x, y, z = np.ptp(points, axis=0)
+    planes = [("xy", x * y), ("xz", x * z), ("yz", y * z)]
+    return [name for name, _ in sorted(planes, key=lambda each: -each[1])]
+
+
+def figure_error(drawn: DrawnPath, tolerance_um: float) -> Figure:
+    """Tip error along the path, original and corrected program."""
+    index, gap = broken(thin(np.column_stack((drawn.before, drawn.after))), drawn.hidden)
+    s = gapped(drawn.s, index, gap, 4)
+    floor = 1e-4  # um: below what the drawing can show on its logarithmic axis
+    curves = []
+    for i, (name, size) in enumerate((("original program", drawn.before), ("corrected program", drawn.after))):
+        curves.append(line(name, s, gapped(np.maximum(size, floor), index, gap, 6), i))
+    curves.append(level("tolerance", [float(drawn.s[0]), float(drawn.s[-1])], tolerance_um))
+    a, b = drawn.worst(drawn.before), drawn.worst(drawn.after)
+    words = (
+        f"original program up to {brief(drawn.before[a])} µm (line {drawn.line[a]}), corrected program up to "
+        f"{brief(drawn.after[b])} µm at its end points (line {drawn.line[b]}), tolerance {tolerance_um:g} µm"
+    )
+    return Figure(
+        "error",
+        "Tip error along the path",
+        f"Distance of the loaded tip from the programmed tip, on a logarithmic scale: {words}. "
+        "What the straight lines between the end points add is part of the error budget below.",
+        f"Plot of the tip error along the path: {words}.",
+        curves,
+        {"xaxis": axis("path length in mm"), "yaxis": axis("error in µm", type="log", dtick=1, exponentformat="power")},
+    )
+
+
+def figure_shift(drawn: DrawnPath) -> Figure:
+    """Commanded minus programmed tip along the path."""
+    size = np.linalg.norm(drawn.shift, axis=1)
+    index, gap = broken(thin(drawn.shift), drawn.hidden)
+    s = gapped(drawn.s, index, gap, 4)
+    curves = [line(f"Δ{a}", s, gapped(drawn.shift[:, i], index, gap, 3), i) for i, a in enumerate(AXES)]
+    at = drawn.worst(size)
+    words = f"up to {brief(size[at])} µm, in source line {drawn.line[at]}"
+    return Figure(
+        "shift",
+        "Shift of the commanded tip",
+        f"Commanded minus programmed tip in the program frame: {words}.",
+        f"Plot of the shift of the commanded tip in x, y and z along the path: {words}.",
+        curves,
+        {"xaxis": axis("path length in mm"), "yaxis": axis("shift in µm")},
+    )
+
+
+def figures_actuators(drawn: DrawnPath, job: Job, *, drive: bool) -> list[Figure]:
+    """Changes of the actuators, or drive forces (seed Fig. 5), along the path; slides and hinges apart."""
+    out = []
+    for rotary in (False, True):
+        which = np.flatnonzero(job.machine.revolute == rotary)
+        if len(which):
+            out.append(_actuators(drawn, job.machine.actuators, which, rotary, drive))
+    return out
+
+
+def _actuators(drawn: DrawnPath, names: tuple[str, ...], which: Ints, rotary: bool, drive: bool) -> Figure:
+    values = (drawn.drive if drive else drawn.change)[:, which]
+    index, gap = broken(thin(values), drawn.hidden)
+    s = gapped(drawn.s, index, gap, 4)
+    curves = [line(names[a], s, gapped(values[:, i], index, gap, 3), i) for i, a in enumerate(which)]
+    row = drawn.worst(np.abs(values).max(axis=1))
+    column = int(np.abs(values[row]).argmax())
+    if drive:
+        unit, what = ("N·m", "Drive torques") if rotary else ("N", "Drive forces")
+        note = "What the drive exerts on its carriage under load, positive along its positive direction"
+    else:
+        unit, what = ("mrad", "Changes of the hinges") if rotary else ("µm", "Changes of the slides")
+        note = "Commanded minus nominal actuator coordinate"
+    words = f"up to {brief(abs(values[row, column]))} {unit}, actuator {names[which[column]]} in line {drawn.line[row]}"
+    return Figure(
+        f"{'drive' if drive else 'change'}-{'hinges' if rotary else 'slides'}",
+        f"{what} along the path",
+        f"{note}: {words}.",
+        f"Plot of {what.lower()} along the path, one curve per actuator: {words}.",
+        curves,
+        {"xaxis": axis("path length in mm"), "yaxis": axis(f"{'drive' if drive else 'change'} in {unit}")},
+    )
+
+
+def figure_path(drawn: DrawnPath) -> Figure:
+    """The tool path in space, coloured by the size of the correction."""
+    size = np.linalg.norm(drawn.shift, axis=1)
+    index, gap = broken(thin(np.column_stack((drawn.target, size))), drawn.hidden)
+    x, y, z = (gapped(drawn.target[:, i], index, gap, 4) for i in range(3))
+    bar = {"title": {"text": "correction<br>in µm"}, "thickness": 14, "len": 0.8}
+    color = np.where(np.isfinite(size[index]), size[index], 0.0)
+    trace = {
+        "type": "scatter3d", "mode": "lines", "x": x, "y": y, "z": z, "showlegend": False,
+        "line": {"width": 6, "color": np.round(color, 3).tolist(), "colorscale": SCALE, "colorbar": bar, "showscale": True},
+        "hovertemplate": "x %{x} y %{y} z %{z} mm<br>correction %{line.color} µm<extra></extra>",
+    }  # fmt: skip
+    low = float(np.nanmin(np.where(drawn.hidden, np.nan, size))) if (~drawn.hidden).any() else 0.0
+    words = f"correction from {brief(low)} to {brief(size[drawn.worst(size)])} µm"
+    return Figure(
+        "path",
+        "Tool path",
+        f"Feed moves of the program in space, {words}. Drag to turn.",
+        f"Three-dimensional plot of the tool path, coloured by the size of the correction: {words}.",
+        [trace],
+        {"scene": _scene(drawn.target[~drawn.hidden]), "margin": {"l": 0, "r": 0, "t": 0, "b": 0}},
+        height=520,
+    )
+
+
+def _scene(points: Floats) -> dict:
+    """Axes of one scale, a flat path with some room above and below, and an eye that sees all of it."""
+    middle, span = 0.5 * (points.max(axis=0) + points.min(axis=0)), np.ptp(points, axis=0)
+    half = 0.55 * np.maximum(span, 0.2 * max(float(span.max()), 1e-6))
+    ranges = np.column_stack((middle - half, middle + half)).round(6).tolist()
+    axes = {f"{a}axis": axis(f"{a} in mm", range=ranges[i]) for i, a in enumerate(AXES)}
+    ratio = dict(zip(AXES, (half / half.max()).round(6).tolist(), strict=True))
+    return axes | {"aspectmode": "manual", "aspectratio": ratio, "camera": {"eye": {"x": 0.75, "y": -1.0, "z": 0.85}}}
+
+
+def figure_budget(checked: Verified, tolerance_um: float) -> Figure:
+    """Where the error that is left comes from, worst case over the program."""
+    worst = {
+        "solver": max(each.convergence_um for each in checked.lines),
+        "rounding (bound)": max(each.rounding_um for each in checked.lines),
+        "end points": max(each.vertex_um for each in checked.lines),
+        "chords between them": max(each.chord_um for each in checked.lines),
+        "all": max(each.residual_um for each in checked.lines),
+    }
+    names = list(worst)[::-1]
+    values = [max(worst[name], 1e-7) for name in names]
+    bars = {
+        "type": "bar", "orientation": "h", "x": values, "y": names, "showlegend": False, "cliponaxis": False,
+        "marker": {"color": STYLES[0][0]}, "text": [f"{brief(worst[name])} µm" for name in names], "textposition": "outside",
+    }  # fmt: skip
+    limit = {
+        "type": "scatter", "mode": "lines", "x": [tolerance_um] * 2, "y": [names[0], names[-1]],
+        "name": "tolerance", "line": {"color": STYLES[1][0], "dash": "dot", "width": 2},
+    }  # fmt: skip
+    words = ", ".join(f"{name} {brief(value)} µm" for name, value in worst.items())
+    top = max(max(values), tolerance_um)
+    span = [float(np.log10(min(values))) - 0.3, float(np.log10(top)) + 1.0]
+    return Figure(
+        "parts",
+        "Error budget of the corrected program",
+        f"Read back from the text of the corrected program, largest value of each part: {words}.",
+        f"Bar chart of the parts of the error that is left: {words}.",
+        [bars, limit],
+        {"xaxis": axis("error in µm", type="log", dtick=1, range=span, exponentformat="power"), "yaxis": axis("")},
+        height=300,
+    )

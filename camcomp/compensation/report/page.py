@@ -1,0 +1,169 @@
+"""The report of a compensation, for people who want to see before they trust."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import PurePath
+
+import numpy as np
+
+from camcomp.compensation.program.compensate import Compensated, Trajectories, trajectories
+from camcomp.compensation.program.verify import LineResult, Verified, verify
+from camcomp.compensation.report.figures import (
+    DrawnPath,
+    drawn_path_of,
+    figure_budget,
+    figure_error,
+    figure_path,
+    figure_shift,
+    figure_trajectories,
+    figures_actuators,
+)
+from camcomp.gcode.interpret import read_program
+from camcomp.model.config.in_force import values_in_force
+from camcomp.model.control import setup_of
+from camcomp.model.job import Job
+from camcomp.report.inputs import Input, inputs_section
+from camcomp.report.page import Page, Section, Table, render
+from camcomp.report.plot import brief
+
+MOST_LINES = 1000
+BUDGET = (
+    "Solver: what the iteration itself leaves. Rounding: half the last digit written, in the worst case. "
+    "End points: error at the ends of the moves. Chords: what the straight lines between them add."
+)
+
+
+def compensation_html(
+    result: Compensated,
+    job: Job,
+    figures: Mapping,
+    *,
+    failed: Sequence[tuple[str, str]],
+    tolerance_um: float,
+    inputs: Sequence[Input],
+) -> bytes:
+    """One HTML file. figures: camcomp.report.tables.summary; failed: rule ids and texts of failed checks.
+
+    The trajectories are solved here, and the corrected program is read back from its text and verified. Raises
+    ConfigError CC216 when the plot library is not installed.
+    """
+    written = read_program(
+        result.written.data, name=result.program.name, setup=setup_of(job.config), dialect=result.program.dialect
+    )
+    checked = verify(written, result.program, job)
+    found = trajectories(result, job)
+    drawn = drawn_path_of(result, job)
+    name = PurePath(result.program.name).name
+    before, after = figures["before"]["max_um"], figures["after"]["max_um"]
+    if failed:
+        verdict = "The corrected program is written, but a check failed: " + "; ".join(text for _, text in failed) + "."
+    else:
+        verdict = (
+            f"By the model the original program leaves up to {brief(before)} µm at the tip, the corrected one "
+            f"{brief(after)} µm; the tolerance is {tolerance_um:g} µm."
+        )
+    notes = [f"{rule}: {text}" for rule, text in failed] + [str(each) for each in figures["warnings"]]
+    any_feed = bool((~drawn.hidden).any())
+    sections = [Section("warnings", "Warnings", items=notes)] if notes else []
+    if any_feed:
+        sections += _plots(result, found, job, drawn, checked, tolerance_um)
+        sections.append(Section("lines", "Line by line", tables=[_lines(drawn, job, checked)]))
+    sections += [_machine(job), inputs_section(inputs, result.written.data)]
+    page = Page(
+        title=f"{name} on {job.config.robot.name}",
+        subtitle=f"Compensation report: method {result.method}, {figures['points']} end points from "
+        f"{figures['segments_in']} motions",
+        verdict=verdict,
+        good=not failed,
+        cards=_cards(figures, tolerance_um),
+        sections=sections,
+    )
+    return render(page)
+
+
+def _cards(figures: Mapping, tolerance_um: float) -> list[tuple[str, str, str]]:
+    cards = [
+        (
+            "Tip error before",
+            f"{brief(figures['before']['max_um'])} µm",
+            f"rms {brief(figures['before']['rms_um'])} µm",
+        ),
+        ("Tip error after", f"{brief(figures['after']['max_um'])} µm", f"tolerance {tolerance_um:g} µm"),
+    ]
+    for key, what, unit in (
+        ("actuator_change_max_mm", "Largest change of a slide", "mm"),
+        ("actuator_change_max_rad", "Largest change of a hinge", "rad"),
+        ("actuator_force_max_N", "Largest drive force", "N"),
+        ("actuator_torque_max_Nmm", "Largest drive torque", "N·mm"),
+    ):
+        if figures.get(key):
+            cards.append((what, f"{brief(figures[key])} {unit}", ""))
+    tilt = figures["platform_tilt_max_mrad"]
+    cards.append(
+        ("Platform tilt left", f"{brief(tilt)} mrad", "not corrected with three actuators" if tilt > 1e-6 else "")
+    )
+    return cards
+
+
+def _plots(
+    result: Compensated, found: Trajectories, job: Job, drawn: DrawnPath, checked: Verified, tolerance_um: float
+) -> list[Section]:
+    budget = Section(
+        "budget",
+        "Error budget",
+        text=[BUDGET],
+        figures=[figure_budget(checked, tolerance_um)] if checked.lines else [],
+    )
+    return [
+        Section("paths", "Trajectories", figures=[figure_trajectories(result, found), figure_path(drawn)]),
+        Section("errors", "Tip error and shift", figures=[figure_error(drawn, tolerance_um), figure_shift(drawn)]),
+        Section("actuators", "Actuators", figures=[
+            *figures_actuators(drawn, job, drive=False), *figures_actuators(drawn, job, drive=True)
+        ]),
+        budget,
+    ]  # fmt: skip
+
+
+def _lines(drawn: DrawnPath, job: Job, checked: Verified) -> Table:
+    """Largest values per source line; of long programs those with the largest corrections."""
+    left = {each.line: each for each in checked.lines}
+    size = np.linalg.norm(drawn.shift, axis=1)
+    shown = ~drawn.hidden
+    numbers = np.unique(drawn.line[shown])
+    if len(numbers) > MOST_LINES:
+        peak = np.zeros(int(numbers.max()) + 1)
+        np.maximum.at(peak, drawn.line[shown], size[shown])
+        numbers = np.sort(numbers[np.argsort(-peak[numbers], kind="stable")[:MOST_LINES]])
+        caption = f"The {MOST_LINES} source lines with the largest corrections"
+    else:
+        caption = "Source lines with feed moves; largest values in each"
+    units = ["mrad" if rotary else "µm" for rotary in job.machine.revolute]
+    loads = ["N·m" if rotary else "N" for rotary in job.machine.revolute]
+    heads = ["line", "end points", "error before µm", "error after µm", "shift µm"]
+    heads += [f"Δ{a} {unit}" for a, unit in zip(job.machine.actuators, units, strict=True)]
+    heads += [f"drive {a} {unit}" for a, unit in zip(job.machine.actuators, loads, strict=True)]
+    order = np.flatnonzero(shown)
+    order = order[np.argsort(drawn.line[order], kind="stable")]
+    first = np.searchsorted(drawn.line[order], numbers, "left")
+    last = np.searchsorted(drawn.line[order], numbers, "right")
+    rows = []
+    for number, a, b in zip(numbers, first, last, strict=True):
+        at = order[a:b]
+        values = [drawn.before[at].max(), _left(left.get(int(number)), drawn, at), size[at].max()]
+        for of in (drawn.change, drawn.drive):
+            values += [column[np.abs(column).argmax()] for column in of[at].T]
+        rows.append([(float(number), str(number)), (float(b - a), str(b - a)), *((float(v), brief(v)) for v in values)])
+    return Table(caption, heads, rows, sortable=True)
+
+
+def _left(found: LineResult | None, drawn: DrawnPath, at: np.ndarray) -> float:
+    return found.residual_um if found else float(drawn.after[at].max())
+
+
+def _machine(job: Job) -> Section:
+    rows = [[name, text, place] for name, text, place in values_in_force(job.config)]
+    table = Table("Every value in force and where it stands", ("key", "value", "written in"), rows)
+    source = job.config.robot.source
+    text = [f"{job.config.robot.name}; source: {source}" if source else job.config.robot.name]
+    return Section("machine", "Machine", text=text, tables=[table])

@@ -1,0 +1,116 @@
+"""Results of a compensation as CSV text and as a summary; columns as documented in the README."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from camcomp.compensation.program.compensate import Compensated, Trajectories
+from camcomp.ground.datatypes import Floats
+from camcomp.model.job import Job
+
+CHUNK_ROWS = 20_000
+DECIMALS = 6
+DECIMALS_RAD = 9  # 2 m of reach make 2 nm of it
+
+
+def actuator_columns(job: Job) -> tuple[list[str], list[str], list[str]]:
+    """Column names of nominal coordinates, commanded coordinates and drive forces, in actuator order."""
+    nominal, commanded, force = [], [], []
+    for name, rotary in zip(job.machine.actuators, job.machine.revolute, strict=True):
+        length, load = ("rad", "Nmm") if rotary else ("mm", "N")
+        nominal.append(f"act_{name}_nominal_{length}")
+        commanded.append(f"act_{name}_{length}")
+        force.append(f"act_{name}_{load}")
+    return nominal, commanded, force
+
+
+def joint_columns(job: Job) -> list[str]:
+    """Column names of the joint table."""
+    head = ["line", "s_mm", "t_s", "x_mm", "y_mm", "z_mm", "xc_mm", "yc_mm", "zc_mm", "fx_N", "fy_N", "fz_N"]
+    return head + [name for trio in zip(*actuator_columns(job), strict=True) for name in trio]
+
+
+def decimals_of(names: Sequence[str]) -> list[int]:
+    """Decimals of the columns of a table."""
+    return [DECIMALS_RAD if name.endswith("_rad") else DECIMALS for name in names]
+
+
+def joint_csv(result: Compensated, job: Job) -> bytes:
+    """One row per end point of every motion of the corrected program."""
+    head, m = joint_columns(job), len(job.machine.actuators)
+    actuators = np.stack((result.nominal, result.state.rho, result.state.drive), axis=2).reshape(-1, 3 * m)
+    values = np.column_stack(
+        (result.s, result.t, result.rows.target, result.written.end, job.frame.vectors(result.rows.force), actuators)
+    )
+    return _csv(head, result.lines, values)
+
+
+def paths_csv(result: Compensated, trajectories: Trajectories) -> bytes:
+    """The five trajectories of the tool tip, program frame: seed Fig. 4."""
+    named = {
+        "target": result.rows.target,
+        "chain_error": trajectories.chain_error,
+        "force": trajectories.force,
+        "both": result.uncorrected,
+        "adjusted": result.written.end,
+    }
+    head = ["line", "s_mm"] + [f"{name}_{axis}_mm" for name in named for axis in "xyz"]
+    return _csv(head, result.lines, np.column_stack((result.s, *named.values())))
+
+
+def _csv(head: Sequence[str], line: np.ndarray, values: Floats) -> bytes:
+    """A table whose first column is the source line. Values that do not exist stand as empty cells."""
+    values = values + 0.0  # no minus zero
+    decimals = decimals_of(head[1:])
+    row = "%d" + "".join(f",%.{each}f" for each in decimals) + "\n"
+    parts = [",".join(head) + "\n"]
+    for a in range(0, len(line), CHUNK_ROWS):
+        block = np.column_stack((line[a : a + CHUNK_ROWS], values[a : a + CHUNK_ROWS]))
+        parts.append((row * len(block)) % tuple(block.ravel().tolist()))
+    text = "".join(parts)
+    for zero in sorted({f"{0.0:.{each}f}" for each in decimals}):
+        text = text.replace(f"-{zero},", f"{zero},").replace(f"-{zero}\n", f"{zero}\n")
+    return text.replace("nan", "").encode("ascii")
+
+
+def summary(result: Compensated, job: Job) -> dict:
+    """The figures of a run: see the README for their meaning."""
+    change = np.abs(result.state.rho - result.nominal)[result.rows.corrected]
+    force = np.abs(result.state.drive)[result.rows.corrected]
+    rotary = job.machine.revolute
+    sizes = {
+        "actuator_change_max_mm": _most(change[:, ~rotary]),
+        "actuator_force_max_N": _most(force[:, ~rotary]),
+    }
+    if rotary.any():
+        sizes |= {
+            "actuator_change_max_rad": _most(change[:, rotary]),
+            "actuator_torque_max_Nmm": _most(force[:, rotary]),
+        }
+    return {
+        "points": len(result.rows.piece),
+        "segments_in": len(result.program.path),
+        "lines_out": result.written.data.count(b"\n"),
+        "before": _size(result.before),
+        "after": _size(result.after),
+        **sizes,
+        "iterations_max": result.iterations,
+        "method": result.method,
+        "platform_tilt_max_mrad": 1e3 * _most(np.linalg.norm(result.state.tilt, axis=1)[result.rows.corrected]),
+        "joining_lines": int(result.rows.joining.sum()),
+        "warnings": result.warnings,
+    }
+
+
+def _most(values: Floats) -> float:
+    return float(np.nanmax(values)) if np.isfinite(values).any() else 0.0
+
+
+def _size(error: Floats) -> dict[str, float]:
+    size = np.linalg.norm(error, axis=1)
+    size = 1e3 * size[np.isfinite(size)]
+    if not len(size):
+        return {"rms_um": 0.0, "max_um": 0.0}
+    return {"rms_um": float(np.sqrt(np.mean(size**2))), "max_um": float(size.max())}

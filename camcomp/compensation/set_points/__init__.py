@@ -1,0 +1,1 @@
+"""Single set-points on-line: one line in, one line out."""

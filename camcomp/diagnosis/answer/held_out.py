@@ -1,0 +1,125 @@
+"""How far the gap shrinks on runs that were not used for the fit, how far it could, and what was re-fitted to say so."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from camcomp.diagnosis.fit.bench import Bench, CandidateCause, Run, thinned
+from camcomp.diagnosis.fit.columns import candidate_columns
+from camcomp.diagnosis.fit.problem import Problem
+from camcomp.diagnosis.statistics.cause_sets import Fitted
+from camcomp.diagnosis.statistics.shrinkage import shrinkage
+from camcomp.ground import shelf
+from camcomp.ground.datatypes import Floats
+
+_STEP = 0.02  # of an interval's half width, for differences of the gap
+
+
+def shrinkage_of(
+    problem: Problem,
+    best: Fitted,
+    seen: Bench,
+    thetas: Sequence[Floats],
+    order: Sequence[int],
+    part: slice,
+    floor_um: float,
+) -> dict[str, Any]:
+    """The `shrinkage` of the result. seen: the held-out runs; thetas: per run, fitted without it; order: of the members;
+    part: the channels of the gap.
+    """
+    causes = [problem.causes(best.members, theta, best.extra) for theta in thetas]
+    free, named = _nuisances(seen, problem.bench.runs, part)
+
+    def squares(count: int) -> list[Floats]:
+        gaps = [seen.gap(k, [causes[k][j] for j in order[:count]])[:, part] for k in range(len(seen.runs))]
+        return [_square(gap) for gap in _without(gaps, free)]
+
+    per_step = [squares(count) for count in range(len(best.members) + 1)]
+    times = [thinned(run.run_path.time[:, None], run.thin)[:, 0] for run in seen.runs]
+    whole = shrinkage(per_step[0], per_step[-1], times)
+    steps = []
+    for count, j in enumerate(order, start=1):
+        candidate = problem.columns.candidates[best.members[j]]
+        rms = shrinkage(per_step[0], per_step[count], times).after
+        steps.append({"effect": candidate.name, "target": candidate.target, "after_rms_um": round(rms, 3)})
+    ceiling = _ceiling(problem, best, seen, part, free)
+    return {
+        "holdout": [run.name for run in seen.runs],
+        "before_rms_um": round(whole.before, 3),
+        "after_rms_um": round(whole.after, 3),
+        "ratio": round(whole.ratio, 4),
+        "ci95": [round(whole.low, 4), round(whole.high, 4)],
+        "steps": steps,
+        "noise_floor_um": round(floor_um, 3),
+        "ceiling_rms_um": round(ceiling, 3),
+        "ceiling_ratio": round(1.0 - ceiling / whole.before, 4) if whole.before > 0 else 0.0,
+        "refitted": named,
+    }
+
+
+def _square(gap: Floats) -> Floats:
+    """Squared length (n,) of the gap over the channels that the run has; NaN where one of them is missing."""
+    here = np.isfinite(gap).any(axis=0)
+    return np.asarray(np.sum(gap[:, here] ** 2, axis=1)) if here.any() else np.full(len(gap), np.nan)
+
+
+def _ceiling(problem: Problem, best: Fitted, seen: Bench, part: slice, free: Sequence[Floats]) -> float:
+    """rms, um, that the same causes leave when they are fitted to the held-out runs themselves."""
+
+    def gaps(theta: Floats) -> list[Floats]:
+        causes = problem.causes(best.members, theta, best.extra)
+        return _without([seen.gap(k, causes)[:, part] for k in range(len(seen.runs))], free)
+
+    here = np.concatenate([gap.ravel() for gap in gaps(best.theta)])
+    known = np.isfinite(here)
+    if len(best.theta):
+        steps = np.maximum(_STEP * 2.0 * np.sqrt(np.diag(best.covariance)), 1e-6)
+        moved = [np.concatenate([gap.ravel() for gap in gaps(best.theta + step)]) for step in np.diag(steps)]
+        D = np.stack([(m - here)[known] / s for m, s in zip(moved, steps, strict=True)], axis=1)
+        change = np.linalg.lstsq(D, -here[known], rcond=1e-9)[0]
+        here = np.concatenate([gap.ravel() for gap in gaps(best.theta + change)])
+    squares = here**2
+    width = part.stop - part.start
+    rows = max(float(np.isfinite(squares.reshape(-1, width)).any(axis=1).sum()), 1.0)
+    return 1e3 * float(np.sqrt(np.nansum(squares) / rows))
+
+
+def _nuisances(seen: Bench, fitted: Sequence[Run], part: slice) -> tuple[list[Floats], list[str]]:
+    """Columns (per run (n, c, k)) of what only the held-out runs themselves can tell, and their names: the frame of another
+    clamping, the offset of another clock.
+    """
+    blocks = [
+        np.zeros((len(thinned(run.run_path.time[:, None], run.thin)), part.stop - part.start, 0)) for run in seen.runs
+    ]
+    named: list[str] = []
+    if part.start != 0:
+        return blocks, named
+    for label, effect, what in (
+        ("clamping", "workpiece_frame", "workpiece frame"),
+        ("clock", "time_sync", "clock offset"),
+    ):
+        first = getattr(fitted[0], label)
+        others = [each for each in dict.fromkeys(getattr(run, label) for run in seen.runs) if each != first]
+        if not others:
+            continue
+        columns = candidate_columns(seen, CandidateCause(effect, None, shelf.load("effects", effect)), {})
+        for other in others:
+            mine = [k for k, run in enumerate(seen.runs) if getattr(run, label) == other]
+            named += [f"{what} of {seen.runs[k].name} ({label} {other})" for k in mine]
+            for column in columns:
+                for k in range(len(blocks)):
+                    one = column[k][:, part] if k in mine else np.zeros_like(column[k][:, part])
+                    blocks[k] = np.concatenate([blocks[k], one[:, :, None]], axis=2)
+    return blocks, named
+
+
+def _without(gaps: Sequence[Floats], free: Sequence[Floats]) -> list[Floats]:
+    """Gaps less what the free columns explain of them, over all runs together."""
+    if not free or free[0].shape[2] == 0:
+        return list(gaps)
+    r = np.concatenate([gap.ravel() for gap in gaps])
+    D = np.concatenate([block.reshape(-1, block.shape[2]) for block in free])
+    known = np.isfinite(r)
+    a = np.linalg.lstsq(D[known], r[known], rcond=1e-9)[0]
+    return [gap - block @ a for gap, block in zip(gaps, free, strict=True)]

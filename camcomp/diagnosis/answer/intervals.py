@@ -1,0 +1,55 @@
+"""How well the parameters of an answer are known: amplitudes and shapes together, allowing for what no model states.
+
+Three parts: the posterior of the linear fit with everything else within tolerance; the scatter of what the fit leaves,
+block of time by block of time (a model that is a little wrong leaves more than noise, and leaves it in one piece);
+and what every healthy machine has of the same parameter, which is in the data as well.
+Source of the second part: sandwich covariance over blocks (Liang, Zeger 1986; Newey, West 1987).
+"""
+
+import numpy as np
+
+from camcomp.diagnosis.fit.problem import Problem
+from camcomp.diagnosis.statistics.cause_sets import Fitted
+from camcomp.ground.datatypes import Floats
+
+FORMULA = 0.005  # share of its size by which an effect's formula itself is off: no guide turns round as Dahl wrote
+BLOCKS = (6, 24, 96)  # per run
+
+
+def joint_covariance(problem: Problem, f: Fitted) -> Floats:
+    """Covariance (d + s, d + s) of the members' coordinates and, behind them, of their shapes in their own units."""
+    index = problem.member_columns(f.members)
+    names = problem.shapes_of(f.members)
+    d, s = len(index), len(names)
+    k = len(problem.columns.names)
+    shapes = problem.shape_columns(f.members, f.theta, f.extra) if s else [np.zeros((len(W), 0)) for W in f.white]
+    # a shape that the data do not tell is known to about a third
+    reach = np.array([0.3 * f.extra[i][p.name] for i, p in names])
+    G = []
+    for W, own, D in zip(problem.white, f.white, shapes, strict=True):
+        every = np.concatenate([W, D * reach], axis=1)
+        every[:, index] = own
+        G.append(every)
+    precision = np.concatenate([problem.prior.precision(f.factor), np.ones(s)])
+    precision[index] = 1e-2 / problem.prior.scale[index] ** 2
+    M = sum((g.T @ g for g in G), np.diag(precision))
+    size = 1.0 / np.sqrt(np.diag(M))
+    C = size[:, None] * np.linalg.inv(size[:, None] * M * size) * size
+    mean = C[:k, :] @ sum(g.T @ r for g, r in zip(G, f.residual, strict=True))
+    mine = np.array([*index, *range(k, k + s)], int)
+    scatter = np.zeros((len(BLOCKS), d + s))
+    for run, (g, r) in enumerate(zip(G, f.residual, strict=True)):
+        pull = (g @ C[:, mine]) * (r - g[:, :k] @ mean)[:, None]
+        at = problem.row_places(run)
+        for b, count in enumerate(BLOCKS):
+            block = np.minimum((at * count).astype(int), count - 1)
+            sums = np.zeros((count, d + s))
+            np.add.at(sums, block, pull)
+            scatter[b] += np.sum(sums**2, axis=0)
+    own = np.diag(C)[mine]
+    wider = np.sqrt(np.maximum(scatter.max(axis=0) / own, 1.0))
+    unit = np.concatenate([np.ones(d), reach])
+    out = C[np.ix_(mine, mine)] * np.outer(wider * unit, wider * unit)
+    healthy = np.concatenate([problem.prior.tolerance[index], np.zeros(s)])
+    formula = np.concatenate([FORMULA * f.theta, np.zeros(s)])
+    return np.asarray(out + np.diag(healthy**2 + formula**2), float)

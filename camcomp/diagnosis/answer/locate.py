@@ -1,0 +1,83 @@
+"""The gap of every run as the place-finding engines want it, and what they find: sizes, directions, periods, places."""
+
+from typing import Any
+
+import numpy as np
+
+from camcomp.diagnosis.fit.bench import thinned
+from camcomp.diagnosis.fit.columns import RUN_OFFSET_MM
+from camcomp.diagnosis.fit.gap import main_channels
+from camcomp.diagnosis.fit.problem import Problem
+from camcomp.diagnosis.statistics import places
+from camcomp.diagnosis.statistics.cause_sets import Fitted
+from camcomp.diagnosis.statistics.noise_model import effective_rows
+from camcomp.diagnosis.statistics.periods import SpectralLine, frequencies, screws
+
+
+def run_gaps(problem: Problem) -> list[places.RunGap]:
+    """Every run's gap in the main channels, with where the machine was and how it moved."""
+    part = main_channels(problem)
+    m = len(problem.bench.actuators)
+    out = []
+    for k, run in enumerate(problem.bench.runs):
+        gap = problem.bench.gap(k)[:, part]
+        noise = problem.noise.sigma[k, part]
+        if part.start == 0:  # what no sensor makes belongs to the gap
+            found = problem.background.colour()
+            noise = np.where(found.excess > 0, np.minimum(noise, found.floor), noise)
+        thin = float(np.mean([1.0 / effective_rows(problem.noise, c, 1) for c in range(part.start, part.stop)]))
+        line = thinned(run.measured.line[:, None], run.thin)[:, 0]
+        if part.start == 0:
+            slope = thinned(problem.bench.row_slopes(k).reshape(-1, 3 * m), run.thin).reshape(-1, 3, m)
+            clean = np.where(np.isfinite(gap), gap, 0.0)
+            drives = np.einsum("nij,nj->ni", np.linalg.pinv(slope), clean)
+        else:
+            drives = gap if gap.shape[1] == m else np.zeros((len(gap), m))
+        motion = problem.bench.nominal[k].motion
+        tip, position, direction = (
+            thinned(v, run.thin) for v in (problem.bench.nominal[k].tip, motion.encoder, motion.direction)
+        )
+        noise = np.where(np.isfinite(noise), np.hypot(noise, RUN_OFFSET_MM if part.start == 0 else 0.0), 1.0)
+        out.append(places.RunGap(run.name, gap, noise, thin, problem.times[k], line, drives, tip, position, direction))
+    return out
+
+
+def rest_by_actuator(problem: Problem, f: Fitted, kind: str) -> dict[str, float]:
+    """Energy that a set leaves in one kind of channel by actuator, as shares; that of the tip read as motion of the carriages."""
+    names = problem.bench.actuators
+    m = len(names)
+    energy = np.zeros(m)
+    causes = problem.causes(f.members, f.theta, f.extra)
+    for k, run in enumerate(problem.bench.runs):
+        rest = problem.bench.difference(k, problem.bench.read(k, causes))
+        rest = np.where(np.isfinite(rest), rest, 0.0)
+        if kind == "tip":
+            slope = thinned(problem.bench.row_slopes(k).reshape(-1, 3 * m), run.thin).reshape(-1, 3, m)
+            rest = np.einsum("nij,nj->ni", np.linalg.pinv(slope), rest[:, :3])
+        elif kind in ("encoder", "drive"):
+            rest = rest[:, 3:][:, :m] if kind == "encoder" else rest[:, 3 + m :][:, :m]
+        else:
+            return {}
+        energy += np.sum(rest**2, axis=0)
+    return places.shares(dict(zip(names, energy.tolist(), strict=True)))
+
+
+def channel_axes(problem: Problem) -> list[str]:
+    """Names of the main channels: x, y, z of the tip, or the actuators."""
+    return ["x", "y", "z"] if main_channels(problem).start == 0 else list(problem.bench.actuators)
+
+
+def patterns_of(problem: Problem, gaps: list[places.RunGap]) -> dict[str, Any]:
+    """What the gap does with the direction of travel, the turns of the screws, time, and the place in the workspace."""
+    actuators = problem.bench.actuators
+    return {
+        "travel": places.travel(gaps, actuators),
+        "screws": [_line(each, "actuator", "period_mm") for each in screws(gaps, actuators)],
+        "frequencies": [_line(each, "axis", "hertz") for each in frequencies(gaps, channel_axes(problem))],
+        "places": places.places(gaps),
+    }
+
+
+def _line(line: SpectralLine, whose: str, at: str) -> dict[str, Any]:
+    size = round(1e3 * line.amplitude, 3)
+    return {whose: line.name, at: round(line.at, 4), "amplitude_um": size, "share": round(line.share, 4)}

@@ -1,0 +1,1 @@
+"""The study of static poses of a serial arm."""

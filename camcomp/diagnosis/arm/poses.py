@@ -1,0 +1,220 @@
+"""Static poses of an arm on the bench: where its tip should have been, and how every effect would move it.
+
+The same hooks act in the same order as for a program; what depends on motion sees none. Frame of the tracker and
+place of its target are found per campaign and are nuisances.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from camcomp.diagnosis.arm.discrepancy import ResidualBlock, without_nuisance
+from camcomp.diagnosis.arm.registration import Registration, nuisance_columns, register
+from camcomp.ground import shelf
+from camcomp.ground.datatypes import Floats
+from camcomp.model.effect import Cause, Load, Motion, Parameter
+from camcomp.model.statics.arm import Arm, arm_of
+from camcomp.model.statics.description import Actuator, Link, Robot
+from camcomp.model.statics.hanging import Hung, hang
+
+_SHARE_OF_SCALE = 0.05  # step of a difference
+_VISIBLE = 1e-9  # mm per scale: a column smaller than this is none
+# Effects of these hooks stand still, or are part of the registration.
+_UNSEEN = ("time_sync", "workpiece_frame", "tool_length", "chain_error", "servo_lag", "backlash", "friction", "none")
+
+
+@dataclass(frozen=True, eq=False)
+class Poses:
+    """Poses of one campaign: joints q (n, m), measured tips (n, 3) mm, time (n,) s, temperature (n,) or None, run (n,)."""
+
+    label: str
+    q: Floats
+    tip: Floats
+    time: Floats
+    temperature: Floats | None
+    run: np.ndarray
+
+    def take(self, rows: np.ndarray) -> Poses:
+        """The poses of a mask or of indices."""
+        heat = None if self.temperature is None else self.temperature[rows]
+        return Poses(self.label, self.q[rows], self.tip[rows], self.time[rows], heat, self.run[rows])
+
+    @property
+    def features(self) -> Floats:
+        """What makes two postures alike: sines and cosines (n, 2 m) of hinges. Slides count by their share of 1 m."""
+        return np.concatenate([np.sin(self.q), np.cos(self.q)], axis=1)
+
+
+@dataclass(frozen=True)
+class Column:
+    """One parameter of an effect at a target, fitted in units of its scale."""
+
+    effect: str
+    target: str | None
+    module: Any
+    parameter: Parameter
+
+    def cause(self, amount: float) -> Cause:
+        """The cause with this parameter at an amplitude."""
+        p = self.parameter
+        return Cause(self.effect, self.module, self.target, {p.name: p.value(amount * p.scale)})
+
+
+@dataclass(eq=False)
+class ArmBench:
+    """An arm's model and its campaigns. start: first registration of every campaign."""
+
+    robot: Robot
+    causes: tuple[Cause, ...]
+    campaigns: Sequence[Poses]
+    start: list[Registration] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.arm: Arm = _need(arm_of(self.robot))
+        for each in self.campaigns:
+            hung = self.poses(each, ())
+            self.start.append(register(each.tip, hung.point, hung.rotation, self.robot.tool))
+
+    @property
+    def actuators(self) -> tuple[str, ...]:
+        """Names in order."""
+        return tuple(a.name for a in self.robot.actuators)
+
+    def poses(self, campaign: Poses, causes: Sequence[Cause]) -> Hung:
+        """Platform poses of a campaign with causes on top of those of the config."""
+        causes = (*self.causes, *causes)
+        motion = _standing(self.robot, campaign)
+        robot, error = self.robot, np.zeros_like(campaign.q)
+        load = Load(np.zeros((len(campaign.q), 3)), np.zeros((len(campaign.q), 6)))
+        for cause in causes:
+            if (hook := cause.hook("on_drive")) is not None:
+                error = hook(error, motion, cause.which(self.actuators), _complete(cause))
+            if (hook := cause.hook("on_robot")) is not None:
+                robot = hook(robot, cause.aimed(self.actuators), _complete(cause))
+            if (hook := cause.hook("on_load")) is not None:
+                load = hook(load, motion, _complete(cause))
+        return hang(robot, campaign.q + error, load.wrench if load.wrench.any() else None)
+
+    def tips(self, k: int, causes: Sequence[Cause], at: Registration) -> Floats:
+        """Tips (n, 3) of campaign k in the machine frame, without its nuisances."""
+        hung = self.poses(self.campaigns[k], causes)
+        return at.tips(hung.point, hung.rotation)
+
+    def columns(self, without: Sequence[str] = ()) -> list[Column]:
+        """Every parameter of the shelf that may move a standing arm."""
+        springs = any(a.stiffness is not None for a in self.robot.actuators)
+        links = any(isinstance(e, Link) for e in self.arm.chain.elements)
+        found: list[Column] = []
+        for name in shelf.members("effects"):
+            if name in _UNSEEN or name in without:
+                continue
+            module = shelf.load("effects", name)
+            if (name == "drive_stiffness" and not springs) or (name == "link_stiffness" and not links):
+                continue
+            targets: list[str | None] = [None] if module.TARGET == "machine" else list(self.actuators)
+            for target in targets:
+                turns = target is None or self.drive(target).revolute
+                for p in _parameters(module, turns):
+                    found.append(Column(name, target, module, p))
+        return found
+
+    def drive(self, name: str) -> Actuator:
+        """The actuator called `name`."""
+        return next(a for a in self.robot.actuators if a.name == name)
+
+    def blocks(self, columns: Sequence[Column], at: Mapping[int, float] | None = None) -> list[ResidualBlock]:
+        """Linearised rows of every campaign at amplitudes `at` (index of column -> amount), about its own registration."""
+        amounts = dict(at or {})
+        causes = combined(columns, amounts)
+        out = []
+        for k, campaign in enumerate(self.campaigns):
+            frame = self.registration(k, causes)
+            hung = self.poses(campaign, causes)
+            here = frame.tips(hung.point, hung.rotation)
+            measured = frame.to_machine(campaign.tip)
+            X = np.empty((*here.shape, len(columns)))
+            for j in range(len(columns)):
+                step = _SHARE_OF_SCALE
+                moved = combined(columns, {**amounts, j: amounts.get(j, 0.0) + step})
+                X[:, :, j] = (self.tips(k, moved, frame) - here) / step
+            N = nuisance_columns(here, hung.rotation, here.mean(axis=0))
+            left = measured - here + X @ np.array([amounts.get(j, 0.0) for j in range(len(columns))])
+            out.append(ResidualBlock(campaign.features, X, N, left, k, True))
+        return out
+
+    def registration(self, k: int, causes: Sequence[Cause]) -> Registration:
+        """Frame and tool vector of campaign k that fit best with causes."""
+        campaign, at = self.campaigns[k], self.start[k]
+        hung = self.poses(campaign, causes)
+        for _ in range(3):
+            here = at.tips(hung.point, hung.rotation)
+            about = here.mean(axis=0)
+            N = nuisance_columns(here, hung.rotation, about)
+            gap = (at.to_machine(campaign.tip) - here).ravel()
+            at = at.moved(np.asarray(np.linalg.lstsq(N.reshape(-1, 9), gap, rcond=1e-8)[0], float), about)
+        return at
+
+    def gap(self, k: int, causes: Sequence[Cause]) -> Floats:
+        """Measured minus modelled tips (n, 3) of campaign k, machine frame, frames fitted again."""
+        at = self.registration(k, causes)
+        hung = self.poses(self.campaigns[k], causes)
+        return at.to_machine(self.campaigns[k].tip) - at.tips(hung.point, hung.rotation)
+
+
+def combined(columns: Sequence[Column], amounts: Mapping[int, float]) -> list[Cause]:
+    """Causes at amplitudes by column index; parameters of one effect and target make one cause."""
+    merged: dict[tuple[str, str | None], Cause] = {}
+    for j, amount in amounts.items():
+        if amount == 0.0:
+            continue
+        column = columns[j]
+        one, key = column.cause(amount), (column.effect, column.target)
+        values = {**merged[key].values, **one.values} if key in merged else one.values
+        merged[key] = replace(one, values=values)
+    return list(merged.values())
+
+
+def visible(blocks: Sequence[ResidualBlock], columns: Sequence[Column]) -> list[int]:
+    """Indices of columns that move some tip by more than frames and tool vector could."""
+    size = np.zeros(len(columns))
+    for b in blocks:
+        for j in range(len(columns)):
+            size[j] = max(size[j], float(np.abs(without_nuisance(b.X[:, :, j], b.N)).max()))
+    return [int(j) for j in np.flatnonzero(size > max(_VISIBLE, 1e-9 * float(size.max(initial=0.0))))]
+
+
+def _parameters(module: Any, turns: bool) -> tuple[Parameter, ...]:
+    """The parameters that make sense for a hinge (turns) or a slide, without scanned shapes."""
+    own = getattr(module, "ROTARY", module.PARAMETERS) if turns else getattr(module, "FITTED", module.PARAMETERS)
+    if turns and hasattr(module, "on_drive") and not hasattr(module, "ROTARY"):
+        own = tuple(p for p in own if p.unit == "ppm")  # lengths of a slide mean nothing to a hinge
+    if any(p.scan for p in own):
+        return ()
+    return tuple(own)
+
+
+def _complete(cause: Cause) -> dict[str, float]:
+    """All parameters of a cause, nominal where none is given."""
+    return {**{p.name: p.nominal for p in cause.effect.PARAMETERS}, **cause.values}
+
+
+def _standing(robot: Robot, campaign: Poses) -> Motion:
+    """The motion of poses that do not move."""
+    zero = np.zeros_like(campaign.q)
+    drives = robot.actuators
+    stiffness = np.array([np.inf if a.stiffness is None else a.stiffness for a in drives])
+    home = np.array([a.home for a in drives])
+    n = len(campaign.q)
+    return Motion(
+        campaign.time, campaign.time, np.zeros(n), campaign.temperature, campaign.q, zero, zero, home, stiffness, False
+    )
+
+
+def _need(arm: Arm | None) -> Arm:
+    if arm is None:
+        raise ValueError("not an arm: several chains, or joints without a drive")
+    return arm

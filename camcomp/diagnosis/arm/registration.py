@@ -1,0 +1,83 @@
+"""Where a tracker stands and where its target sits: frame and tool vector that bring an arm's poses onto measured points.
+
+Nobody knows either better than by this fit, so both are nuisances of a campaign and never causes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from camcomp.ground.datatypes import Floats
+
+_PASSES = 500
+_DONE_MM = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Registration:
+    """measured = origin + rotation (point + pose tool): rotation (3, 3), origin (3,) mm, tool (3,) mm platform axes."""
+
+    rotation: Floats
+    origin: Floats
+    tool: Floats
+
+    def to_machine(self, measured: Floats) -> Floats:
+        """Measured points (n, 3) in the machine frame."""
+        return (measured - self.origin) @ self.rotation
+
+    def tips(self, point: Floats, pose: Floats) -> Floats:
+        """Tips (n, 3), machine frame, of platform poses: points (n, 3), rotations (n, 3, 3)."""
+        return point + pose @ self.tool
+
+    def moved(self, step: Floats, about: Floats) -> Registration:
+        """After a step (9,): turn rad and shift mm of the machine about a point (3,), machine axes, and of the tool."""
+        turn = _turn(step[:3])
+        rotation = self.rotation @ turn
+        return Registration(
+            rotation, self.origin + self.rotation @ (step[3:6] + about) - rotation @ about, self.tool + step[6:]
+        )
+
+
+def register(measured: Floats, point: Floats, pose: Floats, tool: Floats) -> Registration:
+    """Best frame and tool for measured points (n, 3) and platform poses; tool (3,) is the start value.
+
+    Alternates the rotation of corresponding points (Kabsch, Acta Cryst. A 32 (1976) 922) with the linear fit of origin
+    and tool. What the poses do not show of the tool stays as it was.
+    """
+    tool = np.array(tool, float)
+    origin = np.zeros(3)
+    rotation = np.eye(3)
+    for _ in range(_PASSES):
+        tips = point + pose @ tool
+        u, _, vt = np.linalg.svd((tips - tips.mean(0)).T @ (measured - measured.mean(0)))
+        flip = np.diag([1.0, 1.0, np.sign(np.linalg.det(vt.T @ u.T))])
+        rotation = vt.T @ flip @ u.T
+        A = np.concatenate([np.broadcast_to(np.eye(3), pose.shape), rotation @ pose], axis=2).reshape(-1, 6)
+        b = (measured - tips @ rotation.T).ravel()
+        step = np.linalg.lstsq(A, b, rcond=1e-6)[0]
+        origin, tool = step[:3], tool + step[3:]
+        if np.abs(step[3:]).max() < _DONE_MM:
+            break
+    return Registration(rotation, origin, tool)
+
+
+def nuisance_columns(tips: Floats, pose: Floats, about: Floats) -> Floats:
+    """Motion (n, 3, 9) of tips, machine frame, per unit of what a registration is moved by (rad, mm, mm), negated frame.
+
+    The columns are those of model tips against measured points that are brought into the machine frame.
+    """
+    lever = tips - about
+    turn = np.zeros((len(tips), 3, 3))
+    for i in range(3):
+        turn[:, :, i] = np.cross(np.eye(3)[i], lever)
+    return np.concatenate([turn, np.broadcast_to(np.eye(3), turn.shape), pose], axis=2)
+
+
+def _turn(w: Floats) -> Floats:
+    angle = float(np.linalg.norm(w))
+    W = np.array([[0.0, -w[2], w[1]], [w[2], 0.0, -w[0]], [-w[1], w[0], 0.0]])
+    if angle < 1e-12:
+        return np.eye(3) + W
+    return np.eye(3) + np.sin(angle) / angle * W + (1.0 - np.cos(angle)) / angle**2 * (W @ W)

@@ -1,0 +1,1 @@
+"""The study of logs of single axes without a tip."""

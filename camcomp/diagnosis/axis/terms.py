@@ -1,0 +1,114 @@
+"""What the following error and the drive force of one axis may be made of."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from camcomp.ground.datatypes import Floats
+from camcomp.model.hysteresis import direction
+
+PRESLIDING_GRID_MM = (1e-4, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1)  # the first is a step
+STRIBECK_MM_PER_S = 10.0
+WIDE = 5  # samples on either side of a local cubic
+
+
+@dataclass(frozen=True, eq=False)
+class AxisTravel:
+    """Encoder of one run as a local cubic: position mm, speed mm/s, acceleration mm/s2, each (n,); time (n,) s."""
+
+    time: Floats
+    position: Floats
+    speed: Floats
+    acceleration: Floats
+
+    def reversal(self, distance: float) -> Floats:
+        """Direction of travel (n,) that turns round over a distance, mm."""
+        return direction(self.position[:, None], distance)[:, 0]
+
+
+def travel(time: Floats, encoder: Floats) -> AxisTravel:
+    """Local cubics over 11 samples (Savitzky, Golay 1964) of evenly sampled encoders (n,)."""
+    dt = float(np.median(np.diff(time)))
+    k = np.arange(-WIDE, WIDE + 1)
+    weights = np.linalg.pinv(np.vander(k * dt, 4, increasing=True))
+    padded = np.concatenate(
+        (2 * encoder[0] - encoder[WIDE:0:-1], encoder, 2 * encoder[-1] - encoder[-2 : -WIDE - 2 : -1])
+    )
+    value, speed, half = (np.convolve(padded, w[::-1], "valid") for w in weights[:3])
+    return AxisTravel(time, value, speed, 2.0 * half)
+
+
+def strangers(at: AxisTravel, distance: float) -> dict[str, tuple[str, Floats]]:
+    """Terms that no effect states, by name: covariate kind and column (n,). They are tried, so that a leftover has a name."""
+    v, d = at.speed / 100.0, at.reversal(distance)
+    x = at.position / 100.0
+    return {
+        "position spring": ("position", x),
+        "quadratic viscous": ("velocity", v * np.abs(v)),
+        "cubic viscous": ("velocity", v**3),
+        "Stribeck": ("velocity", d * np.exp(-((at.speed / STRIBECK_MM_PER_S) ** 2))),
+        "friction along the travel": ("position", d * x),
+    }
+
+
+@dataclass(frozen=True)
+class Ripple:
+    """A line in the leftover over position: period mm, amplitude (both directions), share of the leftover's energy."""
+
+    period: float
+    amplitude: float
+    forward: float
+    backward: float
+    share: float
+
+
+def ripple(at: list[AxisTravel], left: list[Floats], shortest: float = 0.5, longest: float = 60.0) -> Ripple | None:
+    """The strongest line over position, where it stands out and both directions of travel show it alike.
+
+    Periods are scanned evenly in frequency, finer than the travel resolves. Lines that only one direction shows are none.
+    """
+    x = np.concatenate([t.position for t in at])
+    y = np.concatenate(left)
+    v = np.concatenate([t.speed for t in at])
+    way = np.concatenate([np.concatenate([[0.0], np.abs(np.diff(t.position))]) for t in at])
+    moving = np.abs(v) > 1.0
+    x, y, v, way = x[moving], y[moving] - y[moving].mean(), v[moving], way[moving]
+    span = float(np.ptp(x)) if len(x) else 0.0
+    if span < 4.0 * shortest:
+        return None
+    # rows are spread evenly over the way, so that slow stretches do not count for more
+    bins = np.round(x / (shortest / 12.0)).astype(int)
+    found = []
+    for sign in (1.0, -1.0):
+        on = v * sign > 0
+        if not on.any():
+            return None
+        lowest = bins[on].min()
+        weight = np.bincount(bins[on] - lowest, way[on])
+        mean = np.bincount(bins[on] - lowest, way[on] * y[on]) / np.maximum(weight, 1e-300)
+        used = weight > 0
+        place = (np.flatnonzero(used) + lowest) * (shortest / 12.0)
+        found.append((place, mean[used], np.sqrt(weight[used])))
+    frequency = np.arange(1.0 / min(longest, span / 4.0), 1.0 / shortest, 0.1 / span)
+    lines = [_lines(place, value - np.average(value, weights=w**2), w, frequency) for place, value, w in found]
+    both = np.abs(lines[0]) * np.abs(lines[1])
+    best = int(np.argmax(both))
+    strength = np.sqrt(both)
+    far = np.abs(frequency - frequency[best]) > 2.0 / span
+    if not far.any() or strength[best] < 1.6 * strength[far].max():
+        return None
+    f = frequency[best]
+    A = np.stack([np.sin(2 * np.pi * f * x), np.cos(2 * np.pi * f * x)], axis=1)
+    c = np.linalg.lstsq(A, y, rcond=None)[0]
+    share = 1.0 - float(((y - A @ c) ** 2).sum() / max(float((y**2).sum()), 1e-300))
+    return Ripple(
+        1.0 / f, float(np.hypot(*c)), float(2 * np.abs(lines[0][best])), float(2 * np.abs(lines[1][best])), share
+    )
+
+
+def _lines(x: Floats, y: Floats, weight: Floats, frequency: Floats) -> np.ndarray:
+    """Weighted Fourier sums (f,) of y (n,) at places x (n,)."""
+    w = weight**2 / (weight**2).sum()
+    return np.array([(w * y * np.exp(-2j * np.pi * f * x)).sum() for f in frequency])

@@ -1,0 +1,264 @@
+"""Where logs and model differ, which effect is the cause, how far the gap shrinks with it, and what to measure next.
+
+Reads like the question: put the runs on the bench, open the problem, search_causes the causes, look at what is left, try the
+answer on runs it has not seen.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from camcomp.diagnosis.answer.held_out import shrinkage_of
+from camcomp.diagnosis.answer.intervals import joint_covariance
+from camcomp.diagnosis.answer.locate import channel_axes, patterns_of, rest_by_actuator, run_gaps
+from camcomp.diagnosis.fit.bench import Bench, Run
+from camcomp.diagnosis.fit.columns import candidate_causes
+from camcomp.diagnosis.fit.gap import gap_of, main_channels
+from camcomp.diagnosis.fit.problem import Problem, open_problem
+from camcomp.diagnosis.next_experiment.after_unknown import explore
+from camcomp.diagnosis.next_experiment.information_gain import Proposal, propose
+from camcomp.diagnosis.search.cause_search import CauseSearch, search_causes
+from camcomp.diagnosis.search.indistinguishable import classes, likeness
+from camcomp.diagnosis.search.unknown import firm_prior, residual_tests
+from camcomp.diagnosis.statistics import places
+from camcomp.diagnosis.statistics.cause_sets import Fitted, total
+from camcomp.ground.datatypes import Floats
+from camcomp.model.effect import Cause
+from camcomp.model.job import Job
+from camcomp.model.motion.twin import Twin
+
+MOSTLY_ONE_ACTUATOR = 0.6  # share of what is unknown from which on it is one actuator's
+RIVALS = 8  # sets that one experiment is asked to tell from the answer
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis:
+    """The result as a mapping of the result file, and what a report may want to draw."""
+
+    result: dict[str, Any]
+    problem: Problem
+    search: CauseSearch
+    proposal: Proposal | None
+
+
+def diagnose(
+    job: Job, twin: Twin, runs: Sequence[Run], *, holdout: Sequence[str] = (), without: Sequence[str] = ()
+) -> Diagnosis:
+    """The diagnosis of an experiment; `without` names effects that the library is to do without."""
+    used = [run for run in runs if run.name not in holdout] or list(runs)
+    bench = Bench(twin, used)
+    problem = open_problem(bench, candidate_causes(twin.actuators, without))
+    found = search_causes(problem)
+    best = found.fits[found.verdict.best]
+    gap = gap_of(problem)
+    word = "unknown" if found.unknown_in else found.verdict.word
+    causes = _causes(problem, found)
+    result: dict[str, Any] = {
+        "verdict": word,
+        "gap": gap,
+        "where": _where(problem, found, best),
+        "causes": causes,
+        "alternatives": _alternatives(problem, found) if word == "ambiguous" else [],
+        "shrinkage": _shrinkage(twin, runs, holdout, problem, best),
+        "next_experiment": None,
+        "equivalent": [[_named(problem, i) for i in group] for group in classes(likeness(problem))],
+    }
+    if word != "unknown":  # noise is measured before causes are known, and no more can be noise than they leave
+        floor = min(gap["noise_floor_um"], result["shrinkage"]["ceiling_rms_um"])
+        gap["noise_floor_um"] = result["shrinkage"]["noise_floor_um"] = floor
+    proposal = _next(problem, found, word, job)
+    if proposal is not None:
+        result["next_experiment"] = {
+            "action": proposal.candidate.action,
+            "separates": list(proposal.separates),
+            "gain": round(proposal.gain, 4),
+            "minutes": round(proposal.candidate.minutes, 1),
+        }
+    return Diagnosis(result, problem, found, proposal)
+
+
+def _next(problem: Problem, found: CauseSearch, word: str, job: Job) -> Proposal | None:
+    """What separates the answer from its rivals: those that explain alike, or else those that are not yet excluded."""
+    if word == "none":
+        return None
+    if found.unknown_in:
+        return explore(problem, found.left[found.unknown_in].labels, job)
+    best = found.verdict.best
+    close = [best, *sorted(found.verdict.rivals, key=lambda j: -found.probability[j])[:RIVALS]]
+    if len(close) == 1:
+        close += [j for j in np.argsort(-found.probability) if j != best and found.probability[j] > 0.02][:3]
+    p = found.probability[close]
+    if found.verdict.rivals:
+        p = np.maximum(p, 0.1 * p.max())  # alike by construction: their prior is no reason to leave them untested
+    return propose(problem, [found.fits[j] for j in close], p / p.sum(), job)
+
+
+# -- causes -----------------------------------------------------------------------------------------------------------
+
+
+def _energies(problem: Problem, f: Fitted) -> list[float]:
+    """White energy of each member's own signal."""
+    A, out, at = total(f.grams).A, [], 0
+    for i in f.members:
+        index = list(problem.candidates.columns[i])
+        theta = f.theta[at : at + len(index)]
+        at += len(index)
+        out.append(float(theta @ A[np.ix_(index, index)] @ theta))
+    return out
+
+
+def _causes(problem: Problem, found: CauseSearch) -> list[dict[str, Any]]:
+    best = found.fits[found.verdict.best]
+    energy = _energies(problem, best)
+    left = found.left[found.unknown_in].energy if found.unknown_in else 0.0
+    whole = sum(energy) + left
+    out: list[dict[str, Any]] = []
+    causes = problem.causes(best.members, best.theta, best.extra)
+    covariance = joint_covariance(problem, best) if best.members else np.zeros((0, 0))
+    for j, i in enumerate(best.members):
+        candidate = problem.columns.candidates[i]
+        out.append({
+            "effect": candidate.name,
+            "target": candidate.target,
+            "probability": round(min(found.verdict.inclusion.get(i, 0.0), 1.0), 4),
+            "share": round(energy[j] / whole, 4) if whole > 0 else 0.0,
+            "parameters": _parameters(problem, best, covariance, j, causes[j]),
+        })  # fmt: skip
+    out.sort(key=lambda c: (-c["probability"], -c["share"]))
+    if found.unknown_in:
+        shares = rest_by_actuator(problem, best, found.unknown_in)
+        target = next((name for name, share in shares.items() if share > MOSTLY_ONE_ACTUATOR), None)
+        out.append({
+            "effect": "unknown", "target": target, "probability": 1.0,
+            "share": round(left / whole, 4) if whole > 0 else 1.0, "parameters": {},
+        })  # fmt: skip
+    return out
+
+
+def _parameters(problem: Problem, f: Fitted, covariance: Floats, j: int, cause: Cause) -> dict[str, Any]:
+    """Values with 95 % intervals; those of derived values follow the slopes of what they are derived from."""
+    idle = _idle_shapes(problem, cause)
+    kinds = {p.name: p for p in cause.effect.PARAMETERS}
+    d = len(f.theta)
+    shapes = problem.shapes_of(f.members)
+
+    def at(step: Floats) -> dict[str, float]:
+        extra = {i: dict(values) for i, values in f.extra.items()}
+        for (i, p), change in zip(shapes, step[d:], strict=True):
+            extra[i][p.name] += change
+        values = problem.causes(f.members, f.theta + step[:d], extra)[j].values
+        return {name: float(np.log(value)) if kinds[name].log else value for name, value in values.items()}
+
+    # small steps inwards: a parameter on its bound still has a slope
+    steps = (
+        1e-3 * np.sqrt(np.diag(covariance)) * np.concatenate([np.where(f.theta < 0, -1.0, 1.0), np.ones(len(shapes))])
+    )
+    here, out = at(np.zeros(len(steps))), {}
+    moved = [at(row) for row in np.diag(steps)]
+    for name, value in cause.values.items():
+        if name in idle:
+            continue
+        change = np.array([each[name] - here[name] for each in moved])
+        if name == "phase_rad":
+            change = np.angle(np.exp(1j * change))
+        slope = change / steps
+        half = 1.96 * float(np.sqrt(slope @ covariance @ slope))
+        ends = [here[name] - half, here[name] + half]
+        low, high = np.exp(ends) if kinds[name].log else ends
+        if name != "phase_rad":
+            low, high = max(low, kinds[name].low), min(high, kinds[name].high)
+        out[name] = {"value": _round(value), "ci95": [_round(low), _round(high)]}
+    return out
+
+
+def _idle_shapes(problem: Problem, cause: Cause) -> set[str]:
+    """Scanned parameters that nothing depends on here: a warm-up time where temperatures are logged."""
+    logged = all(run.run_path.temperature is not None for run in problem.bench.runs)
+    return {p.name for p in cause.effect.PARAMETERS if p.scan and p.unit == "s"} if logged else set()
+
+
+def _round(value: float) -> float:
+    return float(f"{value:.6g}")
+
+
+def _alternatives(problem: Problem, found: CauseSearch) -> list[list[dict[str, Any]]]:
+    sets = [found.fits[found.verdict.best], *(found.fits[j] for j in found.verdict.rivals)]
+    return [[_named(problem, i) for i in f.members] for f in sets]
+
+
+def _named(problem: Problem, i: int) -> dict[str, Any]:
+    return {"effect": problem.columns.candidates[i].name, "target": problem.columns.candidates[i].target}
+
+
+# -- where ------------------------------------------------------------------------------------------------------------
+
+
+def _where(problem: Problem, found: CauseSearch, best: Fitted) -> dict[str, Any]:
+    gaps = run_gaps(problem)
+    at = places.axes(gaps, channel_axes(problem))
+    return {
+        "stage": _stage(problem, best, found),
+        "axes": {axis: at.get(axis, 0.0) for axis in "xyz"},
+        "actuators": places.actuators(gaps, problem.bench.actuators),
+        "lines": places.lines(gaps),
+        "intervals": places.intervals(gaps),
+        "drivers": _drivers(problem, found),
+        **patterns_of(problem, gaps),
+    }
+
+
+def _stage(problem: Problem, best: Fitted, found: CauseSearch) -> str:
+    """The stage of the largest cause; of an unknown one, the stage of the channel that shows it."""
+    energy = _energies(problem, best)
+    left = found.left[found.unknown_in].energy if found.unknown_in else 0.0
+    if found.unknown_in and left > max(energy, default=0.0):
+        stage = {"encoder": "control", "dyno": "process"}.get(found.unknown_in)
+        return stage or ("structure" if _first_label(found).startswith("force") else "drive")
+    if energy:
+        return str(problem.columns.candidates[best.members[int(np.argmax(energy))]].effect.STAGE)
+    parts = {"control": slice(3, 3 + len(problem.bench.actuators)), "structure": slice(0, 3)}
+    size = {}
+    for name, part in parts.items():
+        white = [np.nanmean((r[:, part] / problem.noise.sigma[k, part]) ** 2) for k, r in enumerate(problem.residuals)
+                 if np.isfinite(r[:, part]).any()]  # fmt: skip
+        size[name] = float(np.mean(white)) if white else 0.0
+    return max(size, key=lambda each: size[each])
+
+
+def _first_label(found: CauseSearch) -> str:
+    labels = found.left[found.unknown_in].labels if found.unknown_in else ()
+    return labels[0][0] if labels else ""
+
+
+def _drivers(problem: Problem, found: CauseSearch) -> list[dict[str, Any]]:
+    """What the gap depends on; with an unknown cause, what the rest depends on."""
+    if found.unknown_in:
+        labels = found.left[found.unknown_in].labels
+    else:
+        null = problem.refit(())
+        at_null = residual_tests(problem, null, firm_prior(problem))
+        labels = max(at_null.values(), key=lambda each: each.energy).labels if at_null else ()
+    return [{"covariate": name, "share": round(share, 4)} for name, share in labels[:6] if share > 0.02]
+
+
+# -- shrinkage --------------------------------------------------------------------------------------------------------
+
+
+def _shrinkage(
+    twin: Twin, runs: Sequence[Run], holdout: Sequence[str], problem: Problem, best: Fitted
+) -> dict[str, Any]:
+    """Named runs are judged with the fit of the others; without names every run is held out once."""
+    if holdout:
+        seen = Bench(twin, [run for run in runs if run.name in holdout])
+        thetas = [best.theta] * len(seen.runs)
+    else:
+        seen = problem.bench
+        thetas = [problem.theta_without(best, k) for k in range(len(seen.runs))]
+    floor = gap_of(problem)["noise_floor_um"]
+    return shrinkage_of(problem, best, seen, thetas, _by_energy(problem, best), main_channels(problem), floor)
+
+
+def _by_energy(problem: Problem, f: Fitted) -> list[int]:
+    return list(np.argsort([-e for e in _energies(problem, f)]))

@@ -1,0 +1,1 @@
+"""Experiment files and logs to runs: reading, checking, importing the recordings of others; nothing is fitted here."""

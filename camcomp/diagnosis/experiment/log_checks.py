@@ -1,0 +1,110 @@
+"""Whether a log can be what its run says: right program, units, axes and order. What cannot is refused with the reason."""
+
+from itertools import permutations
+
+import numpy as np
+
+from camcomp.diagnosis.fit.measured import Measured
+from camcomp.ground.datatypes import Bools, Floats
+from camcomp.ground.errors import ConfigError, Location
+from camcomp.model.motion.run_path import RunPath
+
+FAR_MM = 5.0  # no machine of the kind is wrong by so much; a log of another program or unit is
+FAR_RAD = 0.1
+LEAST_ROWS = 10  # of a run that executes a program; fewer say nothing about their own noise
+_LENGTH_UNITS = {1e-3: "m", 25.4: "mm where inches are due", 1.0 / 25.4: "inches", 1e3: "um"}
+_TURNS = {180.0 / np.pi: "degrees"}
+_TIMES = {1e3: "ms", 1e6: "us", 1.0 / 60.0: "minutes"}
+_FORCES = {1e-3: "kN", 1e3: "mN"}
+_HOT_C = 150.0
+_STRONG_N = 20.0
+
+
+def check_rows(name: str, measured: Measured) -> None:
+    """Raise CC404 when nothing is measured, CC405 when time does not run forward, CC407 for temperatures in kelvin."""
+    if not any(measured.has(each) for each in ("tip", "encoder", "drive", "dyno")):
+        message = "the log measures nothing: no tip, encoder, drive force or dynamometer column holds a number"
+        raise ConfigError("CC404", message, at=Location(name, 1, 1))
+    back = np.flatnonzero(np.diff(measured.time) <= 0)
+    if len(back):
+        row = int(back[0])
+        message = f"t_s goes from {measured.time[row]:g} to {measured.time[row + 1]:g}"
+        raise ConfigError("CC405", message, at=Location(name, row + 3, 1))
+    if measured.has("temperature") and np.nanmedian(measured.temperature) > _HOT_C:
+        message = f"temp_C is about {np.nanmedian(measured.temperature):.0f}: it looks as if logged in kelvin"
+        raise ConfigError("CC407", message, at=Location(name, 1, 1))
+
+
+def check_length(name: str, run: str, measured: Measured, due_s: float) -> None:
+    """Raise CC409 when a run has too few rows, CC407 when its time is in another unit; due_s: length of the program."""
+    rows = len(measured.time)
+    if rows < LEAST_ROWS:
+        message = f"run '{run}': the log has {rows} row{'s' if rows > 1 else ''}, {LEAST_ROWS} are the least"
+        raise ConfigError("CC409", message, at=Location(name, rows + 1, 1))
+    took = float(measured.time[-1] - measured.time[0])
+    for factor, unit in _TIMES.items():
+        if due_s > 0.0 and 0.7 < took / (factor * due_s) < 1.4:
+            message = (
+                f"run '{run}': the log takes {took:g} s and the program {due_s:.3g} s: t_s looks as if logged in {unit}"
+            )
+            raise ConfigError("CC407", message, at=Location(name, 1, 1))
+
+
+def check_forces(name: str, run: str, measured: Measured, force: Floats) -> None:
+    """Raise CC407 when forces are a thousand times off what the model says; force (n, 3) N: modelled, on the tool."""
+    due = float(np.sqrt((force**2).sum(axis=1).mean()))
+    if due < _STRONG_N:
+        return
+    for what, found in (("drive forces", measured.drive), ("dynamometer forces", measured.dyno)):
+        rows = np.isfinite(found).all(axis=1)
+        size = float(np.sqrt((found[rows] ** 2).sum(axis=1).mean())) if rows.any() else due
+        for factor, unit in _FORCES.items():
+            if 0.1 < size / (factor * due) < 10.0:
+                raise ConfigError(
+                    "CC407", f"run '{run}': the {what} look as if logged in {unit}", at=Location(name, 1, 1)
+                )
+
+
+def check_program(name: str, run: str, measured: Measured, rows: Bools) -> None:
+    """Raise CC406 when most rows carry source lines that the program does not cut."""
+    known = np.isfinite(measured.line)
+    if known.any() and np.mean(rows[known]) < 0.5:
+        lines = sorted({int(each) for each in measured.line[known & ~rows]})[:5]
+        message = f"run '{run}': most rows are on lines that the program does not move on, e.g. {lines}"
+        raise ConfigError("CC406", message, at=Location(name, 1, 1))
+
+
+def check_places(name: str, run: str, measured: Measured, run_path: RunPath, tip: Floats, rotary: bool = False) -> None:
+    """Raise CC407 (units), CC408 (axes), CC406 (another program) where tip or encoders are far from where they were due.
+
+    tip (n, 3) mm, run_path.row_rho (n, m): where tip and actuators should have been; rotary: all actuators are hinges.
+    """
+    turning = (
+        "encoders look",
+        measured.encoder,
+        run_path.row_rho,
+        FAR_RAD if rotary else FAR_MM,
+        _TURNS if rotary else _LENGTH_UNITS,
+    )
+    for what, found, due, far, units in (("tip looks", measured.tip, tip, FAR_MM, _LENGTH_UNITS), turning):
+        rows = np.isfinite(found).all(axis=1)
+        if not rows.any() or _distance(found[rows], due[rows]) < far:
+            continue
+        found, due = found[rows], due[rows]
+        at = Location(name, 1, 1)
+        for factor, unit in units.items():
+            if _distance(found / factor, due) < far:
+                raise ConfigError("CC407", f"run '{run}': the {what} as if logged in {unit}", at=at)
+        for order in permutations(range(due.shape[1])):
+            for sign in np.ndindex(*(2,) * due.shape[1]) if due.shape[1] <= 3 else ((0,) * due.shape[1],):
+                turned = found[:, order] * (1 - 2 * np.array(sign))
+                if _distance(turned, due) < far:
+                    message = f"run '{run}': the {what} right when axes are swapped or reversed"
+                    raise ConfigError("CC408", message, at=at)
+        off, name_of = _distance(found, due), what.split()[0]
+        unit = "rad" if units is _TURNS else "mm"
+        raise ConfigError("CC406", f"run '{run}': {name_of} {off:.3g} {unit} from where the program goes", at=at)
+
+
+def _distance(found: Floats, due: Floats) -> float:
+    return float(np.median(np.linalg.norm(found - due, axis=1)))

@@ -1,0 +1,166 @@
+"""Runs on the bench: differences between logs and twin, and how every parameter would change them.
+
+Columns are differences of the twin itself, at nominal or at any set of causes, so that what is fitted is what
+simulate and compensate use.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from camcomp.diagnosis.fit.measured import Measured, stack
+from camcomp.ground.datatypes import Floats
+from camcomp.model.effect import Cause, Parameter
+from camcomp.model.motion.run_path import RunPath, beside_jumps
+from camcomp.model.motion.twin import Reading, Slopes, Solved, Twin
+
+_SHARE_OF_SCALE = 0.05  # step of a difference
+_KEPT = 12  # changed machines whose structures are kept per run
+
+
+@dataclass(frozen=True)
+class CandidateCause:
+    """One possible cause: an effect at a target. Fitted parameters in order; shape holds the scanned ones."""
+
+    name: str
+    target: str | None
+    effect: Any
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """The fitted parameters whose nominal value means no effect, i.e. all but the scanned shapes."""
+        return tuple(p for p in fitted(self.effect) if not p.scan)
+
+    @property
+    def shapes(self) -> tuple[Parameter, ...]:
+        """The scanned parameters."""
+        return tuple(p for p in fitted(self.effect) if p.scan)
+
+    @property
+    def label(self) -> str:
+        """Name for messages."""
+        return f"{self.name}({self.target})" if self.target else self.name
+
+
+def fitted(effect: Any) -> tuple[Parameter, ...]:
+    """The parameters in which an effect is fitted; those of its file unless it says otherwise."""
+    return tuple(getattr(effect, "FITTED", effect.PARAMETERS))
+
+
+def public_values(effect: Any, values: Mapping[str, float]) -> dict[str, float]:
+    """Parameter values of an effect's file from the fitted ones."""
+    return dict(effect.public(values)) if hasattr(effect, "public") else dict(values)
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """A run on the bench: its run path, what was measured, its labels, and a factor by which rows are thinned."""
+
+    name: str
+    run_path: RunPath
+    measured: Measured
+    clamping: str | int | None
+    clock: str | int | None
+    thin: int = 1
+
+
+@dataclass(eq=False)
+class Bench:
+    """A twin and the runs compared with it."""
+
+    twin: Twin
+    runs: Sequence[Run]
+    solved: list[Solved] = field(default_factory=list)
+    slopes: list[Slopes] = field(default_factory=list)
+    nominal: list[Reading] = field(default_factory=list)
+    _row_slopes: dict[int, Floats] = field(default_factory=dict)
+    _changed: dict[tuple, Solved] = field(default_factory=dict)  # structures of changed machines, by run and change
+
+    def __post_init__(self) -> None:
+        for run in self.runs:
+            reading, solved = self.twin.sense(run.run_path, measured=self._encoders(run))
+            slopes = self.twin.slopes(run.run_path, (), solved)
+            self.solved.append(solved)
+            self.slopes.append(slopes)
+            reading, _ = self.twin.sense(run.run_path, solved=solved, slopes=slopes, measured=self._encoders(run))
+            self.nominal.append(reading)
+
+    @property
+    def actuators(self) -> tuple[str, ...]:
+        """Names in order."""
+        return self.twin.actuators
+
+    def _encoders(self, run: Run) -> Floats | None:
+        return run.measured.encoder if run.measured.has("encoder") else None
+
+    def read(self, k: int, causes: Sequence[Cause]) -> Reading:
+        """Readings of run k with causes on top of the config."""
+        run = self.runs[k]
+        return self._sense(k, causes, self._encoders(run))
+
+    def _sense(self, k: int, causes: Sequence[Cause], encoders: Floats | None) -> Reading:
+        """Readings of run k; the structure of a machine that was asked for lately is not solved again."""
+        key = (k, self.twin.edited((*self.twin.causes, *causes))[1])
+        solved = self._changed.get(key, self.solved[k])
+        reading, used = self.twin.sense(
+            self.runs[k].run_path, causes, solved=solved, slopes=self.slopes[k], measured=encoders
+        )
+        if used is not self.solved[k]:
+            if len(self._changed) >= _KEPT * len(self.runs):
+                self._changed.pop(next(iter(self._changed)))
+            self._changed[key] = used
+        return reading
+
+    def row_slopes(self, k: int) -> Floats:
+        """Derivative (n, 3, m) of the tip in the program frame by the carriages, at every row of run k."""
+        if k not in self._row_slopes:
+            run = self.runs[k]
+            at_nodes = self.twin.rotation.T @ self.slopes[k].tip_rho
+            self._row_slopes[k] = run.run_path.place(run.run_path.time).of(at_nodes)
+        return self._row_slopes[k]
+
+    def channels(self, reading: Reading) -> Floats:
+        """Channels (n, c) of readings."""
+        return stack(reading.tip, reading.encoder, reading.drive, reading.dyno)
+
+    def observed(self, k: int) -> Floats:
+        """Channels (n, c) as measured in run k; NaN where missing, and in what the force moves where the force jumps."""
+        m = self.runs[k].measured
+        loaded = np.where(beside_jumps(self.runs[k].run_path), np.nan, 0.0)[:, None]
+        return stack(m.tip + loaded, m.encoder, m.drive + loaded, m.dyno + loaded)
+
+    def residual(self, k: int, causes: Sequence[Cause] = ()) -> Floats:
+        """Measured minus model (n, c) in run k, thinned."""
+        return self.difference(k, self.read(k, causes) if causes else self.nominal[k])
+
+    def difference(self, k: int, reading: Reading) -> Floats:
+        """Measured minus a reading (n, c) of run k, thinned."""
+        return thinned(self.observed(k) - self.channels(reading), self.runs[k].thin)
+
+    def gap(self, k: int, causes: Sequence[Cause] = ()) -> Floats:
+        """Measured minus model (n, c) in run k, thinned, with the model's own encoders: the gap as a user sees it."""
+        reading = self._sense(k, causes, None)
+        return thinned(self.observed(k) - self.channels(reading), self.runs[k].thin)
+
+
+def thinned(values: Floats, factor: int) -> Floats:
+    """Means (n // factor, c) of `factor` rows each, NaN where one is missing."""
+    if factor == 1:
+        return values
+    n = len(values) // factor
+    return values[: n * factor].reshape(n, factor, -1).mean(axis=1)
+
+
+def cause_of(candidate: CandidateCause, coordinates: Mapping[str, float]) -> Cause:
+    """The cause at fitting coordinates by parameter name; what is missing is nominal."""
+    values = {
+        p.name: p.value(coordinates.get(p.name, 0.0 if not p.scan else p.nominal)) for p in fitted(candidate.effect)
+    }
+    return Cause(candidate.name, candidate.effect, candidate.target, public_values(candidate.effect, values))
+
+
+def step_of(parameter: Parameter) -> float:
+    """Coordinate step of a difference."""
+    return parameter.scale * _SHARE_OF_SCALE if not parameter.scan else 1e-4 * max(abs(parameter.nominal), 1e-3)

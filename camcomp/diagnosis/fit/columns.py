@@ -1,0 +1,259 @@
+"""Every way in which the runs could differ from the model, as columns: effects, nuisances, allowances, patterns.
+
+Columns are in units of their own scale, so that priors read the same for all of them: an effect's scale is 1, its
+tolerance what every healthy machine has of it.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+
+import numpy as np
+
+from camcomp.diagnosis.fit.bench import Bench, CandidateCause, Run, cause_of, step_of, thinned
+from camcomp.diagnosis.fit.measured import channel_names
+from camcomp.diagnosis.fit.patterns import Dictionary, Ground, dictionary
+from camcomp.diagnosis.statistics.evidence import Prior
+from camcomp.ground import shelf
+from camcomp.ground.datatypes import Floats, Ints
+from camcomp.model.effect import Cause, Load
+from camcomp.model.statics.description import Link, Parallelogram, Robot
+
+RUN_OFFSET_MM = 0.001  # repeatability of a run
+RUN_OFFSET_N = 0.3
+CLOCK_JITTER_S = 1e-5
+CLOCK_RATE = 1e-5
+SPRING_LOG = 0.003  # one link's spring against its stated value
+_EDIT = 0.05  # step of the allowances' differences
+FORCE_TURN_RAD = 0.002  # direction of the cutting force in the plane of the work
+
+
+def candidate_causes(actuators: Sequence[str], without: Sequence[str] = ()) -> list[CandidateCause]:
+    """All causes that the shelf knows for a machine with these actuators."""
+    found: list[CandidateCause] = []
+    for name in shelf.members("effects"):
+        if name == "none" or name in without:
+            continue
+        effect = shelf.load("effects", name)
+        if getattr(effect, "ARM_ONLY", False):
+            continue
+        if effect.TARGET in ("actuator", "either"):
+            found += [CandidateCause(name, a, effect) for a in actuators]
+        if effect.TARGET in ("machine", "either"):
+            found.append(CandidateCause(name, None, effect))
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class Columns:
+    """k columns: candidate (k,) index of the candidate or -1, names (k,), prior, blocks per run (n, c, k)."""
+
+    candidates: tuple[CandidateCause, ...]
+    candidate: np.ndarray
+    names: tuple[str, ...]
+    prior: Prior
+    blocks: tuple[Floats, ...]
+
+    def of(self, candidate: int) -> list[int]:
+        """Columns of an candidate."""
+        return [int(i) for i in np.flatnonzero(self.candidate == candidate)]
+
+    @cached_property
+    def run_offsets(self) -> Ints:
+        """Columns by which the measured tip of one run may differ from that of the next."""
+        firm = (self.prior.flexible == 0) & np.isfinite(self.prior.tolerance)
+        return np.flatnonzero(firm & np.array([n.startswith("offset.") for n in self.names], bool))
+
+    def with_blocks(self, changed: Mapping[int, Sequence[Floats]]) -> "Columns":
+        """A copy with some columns (index -> per run (n, c)) replaced."""
+        blocks = []
+        for r, block in enumerate(self.blocks):
+            block = block.copy()
+            for i, per_run in changed.items():
+                block[:, :, i] = per_run[r]
+            blocks.append(block)
+        return replace(self, blocks=tuple(blocks))
+
+
+def candidate_columns(bench: Bench, candidate: CandidateCause, shape: Mapping[str, float]) -> list[list[Floats]]:
+    """Columns at nominal of an candidate's parameters, per run (n, c), in units of their scales; shape: scanned values."""
+    out = []
+    for p in candidate.parameters:
+        after = cause_of(candidate, {**shape, p.name: step_of(p)})
+        per_run = []
+        for k, run in enumerate(bench.runs):
+            change = bench.channels(bench.read(k, [after])) - bench.channels(bench.nominal[k])
+            per_run.append(thinned(change * (p.scale / step_of(p)), run.thin))
+        out.append(per_run)
+    return out
+
+
+def shape_default(candidate: CandidateCause) -> dict[str, float]:
+    """Nominal values of the scanned parameters."""
+    return {p.name: p.nominal for p in candidate.shapes}
+
+
+def build(bench: Bench, candidates: Sequence[CandidateCause], shapes: Mapping[int, Mapping[str, float]]) -> Columns:
+    """All columns at nominal. Atoms that no channel can see have columns of zeros and stay."""
+    owner: list[int] = []
+    names: list[str] = []
+    tolerance: list[float] = []
+    sign: list[float] = []
+    flexible: list[float] = []
+    parts: list[list[Floats]] = []
+
+    def put(who: int, name: str, size: float, per_run: list[Floats], signed: int = 0, loose: bool = False) -> None:
+        owner.append(who)
+        names.append(name)
+        tolerance.append(size)
+        sign.append(float(signed))
+        flexible.append(float(loose))
+        parts.append(per_run)
+
+    for i, candidate in enumerate(candidates):
+        for p, per_run in zip(
+            candidate.parameters,
+            candidate_columns(bench, candidate, shapes.get(i, shape_default(candidate))),
+            strict=True,
+        ):
+            put(i, f"{candidate.label}.{p.name}", p.tolerance / p.scale, per_run, p.sign, True)
+    for name, size, per_run, loose in _nuisances(bench):
+        put(-1, name, size, per_run, 0, loose)
+    blocks = tuple(np.stack([each[r] for each in parts], axis=2) for r in range(len(bench.runs)))
+    k = len(owner)
+    prior = Prior(np.array(tolerance), np.ones(k), np.array(sign), np.array(flexible))
+    return Columns(tuple(candidates), np.array(owner), tuple(names), prior, blocks)
+
+
+def _nuisances(bench: Bench) -> list[tuple[str, float, list[Floats], bool]]:
+    """Name, narrow size in units of the column, column per run, whether its size may be off."""
+    found: list[tuple[str, float, list[Floats], bool]] = []
+    zero = [thinned(np.zeros_like(bench.observed(k)), run.thin) for k, run in enumerate(bench.runs)]
+
+    def only(r: int, values: Floats) -> list[Floats]:
+        return [values if k == r else zero[k] for k in range(len(zero))]
+
+    m = len(bench.actuators)
+    for r, run in enumerate(bench.runs):
+        for c in range(6 + 2 * m):
+            if 3 <= c < 3 + m or not np.isfinite(bench.observed(r)[:, c]).any():
+                continue
+            one = zero[r].copy()
+            one[:, c] = 1.0
+            size = RUN_OFFSET_MM if c < 3 else RUN_OFFSET_N
+            found.append((f"offset.{run.name}.{channel_names(bench.actuators)[c]}", size, only(r, one), c >= 3))
+    clock = CandidateCause("time_sync", None, shelf.load("effects", "time_sync"))
+    frame = CandidateCause("workpiece_frame", None, shelf.load("effects", "workpiece_frame"))
+    if any(run.measured.has("tip") for run in bench.runs):
+        ticks = candidate_columns(bench, clock, {})[0]
+        scale = clock.parameters[0].scale
+        for r, run in enumerate(bench.runs):
+            second = ticks[r] / scale
+            time = thinned(run.run_path.time[:, None], run.thin)
+            found.append((f"clock.{run.name}", CLOCK_JITTER_S, only(r, second), True))
+            found.append((f"rate.{run.name}", CLOCK_RATE, only(r, second * time), True))
+        _by_label(found, bench, "clock", [("clock", ticks)])
+        frames = candidate_columns(bench, frame, {})
+        _by_label(found, bench, "clamping", [(p.name, f) for p, f in zip(frame.parameters, frames, strict=True)])
+    found += _allowances(bench)
+    return found
+
+
+def _by_label(found: list, bench: Bench, label: str, columns: Sequence[tuple[str, list[Floats]]]) -> None:
+    """Free columns for every label after the first: only differences between labels are nuisances."""
+    labels = [getattr(run, label) for run in bench.runs]
+    for other in list(dict.fromkeys(labels))[1:]:
+        for name, per_run in columns:
+            masked = [f if mine == other else 0.0 * f for mine, f in zip(labels, per_run, strict=True)]
+            found.append((f"{label} {other}.{name}", np.inf, masked, False))
+
+
+def _allowances(bench: Bench) -> list[tuple[str, float, list[Floats], bool]]:
+    """What is always a little wrong with any model and is no effect of the library: each chain's own springs."""
+    found: list[tuple[str, float, list[Floats], bool]] = []
+    edits: list[tuple[str, Callable[[Robot], Robot]]] = []
+    for chain in bench.twin.robot.chains:
+        if any(isinstance(e, Link) for e in chain.elements):
+            edits.append((f"links.{chain.name}", partial(_stiffer_links, chain=chain.name)))
+        if any(isinstance(e, Parallelogram) for e in chain.elements):
+            edits.append((f"bars.{chain.name}", partial(_stiffer_bars, chain=chain.name)))
+    if len(edits) <= 12:
+        for label, edit in edits:
+            found.append(
+                (f"spring.{label}", SPRING_LOG, _difference(bench, f"spring.{label}", _Edit(edit), _EDIT), True)
+            )
+    if any(np.abs(run.run_path.node_force).max(initial=0.0) > 0 for run in bench.runs):
+        found.append(("force.direction", FORCE_TURN_RAD, _difference(bench, "force.direction", _Turn(), _EDIT), True))
+    return found
+
+
+def _stiffer_links(robot: Robot, chain: str) -> Robot:
+    f = float(np.exp(_EDIT))
+    return robot.edit(Link, lambda e: replace(e, stiffness=e.stiffness * f), chain)
+
+
+def _stiffer_bars(robot: Robot, chain: str) -> Robot:
+    f = float(np.exp(_EDIT))
+    return robot.edit(Parallelogram, lambda e: replace(e, bar_stiffness=e.bar_stiffness * f), chain)
+
+
+class _Edit:
+    """An on_robot hook around a function."""
+
+    PARAMETERS = ()
+
+    def __init__(self, change: Callable[[Robot], Robot]) -> None:
+        self.change = change
+
+    def on_robot(self, robot: Robot, actuators: tuple[str, ...], p: Mapping[str, float]) -> Robot:
+        return self.change(robot)
+
+
+class _Turn:
+    """The cutting force turned by _EDIT rad about machine z."""
+
+    PARAMETERS = ()
+
+    def on_load(self, load: Load, motion: object, p: Mapping[str, float]) -> Load:
+        c, s = np.cos(_EDIT), np.sin(_EDIT)
+        return Load(load.force @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]), load.wrench)
+
+
+def _difference(bench: Bench, name: str, effect: object, step: float) -> list[Floats]:
+    cause = Cause(name, effect, None, {})  # the name tells one changed machine from another
+    out = []
+    for k, run in enumerate(bench.runs):
+        change = bench.channels(bench.read(k, [cause])) - bench.channels(bench.nominal[k])
+        out.append(thinned(change / step, run.thin))
+    return out
+
+
+def grounds(bench: Bench) -> list[Ground]:
+    """What patterns are made of, per run, at the rows that are kept after thinning."""
+    out = []
+    for k, run in enumerate(bench.runs):
+        reading = bench.nominal[k]
+        keep = _middle_rows(run)
+        tip = reading.tip
+        velocity = (
+            np.gradient(tip, run.run_path.time, axis=0) if run.run_path.ordered and len(tip) > 2 else np.zeros_like(tip)
+        )
+        motion = reading.motion
+        motion = replace(
+            motion,
+            **{n: getattr(motion, n)[keep] for n in ("time", "common", "cut_min", "encoder", "speed", "direction")},
+            temperature=None if motion.temperature is None else motion.temperature[keep],
+        )
+        present = {n: run.measured.has(n) for n in ("tip", "encoder", "drive", "dyno")}
+        out.append(Ground(motion, reading.drive[keep], reading.dyno[keep], tip[keep], velocity[keep], present))
+    return out
+
+
+def _middle_rows(run: Run) -> np.ndarray:
+    n = len(run.run_path.time) // run.thin
+    return np.arange(n) * run.thin + run.thin // 2
+
+
+def patterns(bench: Bench) -> list[Dictionary]:
+    """Generic patterns for all runs, by kind of channel."""
+    return dictionary(grounds(bench), bench.actuators)

@@ -1,0 +1,102 @@
+"""Shapes that nothing shows while an effect is absent (pitches, time constants): tried one by one against a leftover."""
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+from camcomp.diagnosis.fit.bench import Bench, CandidateCause, cause_of, thinned
+from camcomp.diagnosis.fit.columns import Columns, shape_default
+from camcomp.diagnosis.statistics.cause_sets import total
+from camcomp.diagnosis.statistics.evidence import Gram
+from camcomp.ground.datatypes import Floats, Ints
+from camcomp.model.effect import Parameter
+
+_FINER = 17  # values between the neighbours of the best
+_OTHER_HOOKS = ("on_servo", "on_robot", "on_load", "on_pose", "on_workpiece", "on_clock")
+
+
+def beside(
+    grams: Sequence[Gram], white: Sequence[Floats], residual: Sequence[Floats], columns: Columns, others: Ints
+) -> list[Floats]:
+    """White residual per run with the columns `others` softly fitted and taken out."""
+    data = total(grams)
+    precision = np.where(columns.candidate >= 0, 1.0 / 9.0, columns.prior.precision(1.0))[others]
+    M = data.A[np.ix_(others, others)] + np.diag(precision)
+    size = 1.0 / np.sqrt(np.diag(M))
+    L = np.linalg.cholesky(size[:, None] * M * size + 1e-12 * np.eye(len(size)))
+    a = size * np.linalg.solve(L.T, np.linalg.solve(L, size * data.b[others]))
+    return [r - W[:, others] @ a for r, W in zip(residual, white, strict=True)]
+
+
+def best_shape(
+    bench: Bench, candidate: CandidateCause, rest: Sequence[Floats], whitened: Callable[[int, Floats], Floats]
+) -> dict[str, float] | None:
+    """The scanned shape whose columns explain most of `rest` (white, per run); None where the effect is not scanned."""
+    p = candidate.shapes[0]
+    values = np.asarray(p.scan)
+    gains = _gains(bench, candidate, p, values, rest, whitened)
+    if gains is None:
+        return None
+    best = int(np.argmax(gains))
+    # between its neighbours the gain has one peak, and a large effect off its peak leaves what looks like noise
+    near = np.geomspace(values[max(best - 1, 0)], values[min(best + 1, len(values) - 1)], _FINER)
+    finer = _gains(bench, candidate, p, near, rest, whitened)
+    value = near[int(np.argmax(finer))] if finer is not None and finer.max() > gains[best] else values[best]
+    return {**shape_default(candidate), p.name: float(value)}
+
+
+def _gains(
+    bench: Bench,
+    candidate: CandidateCause,
+    p: Parameter,
+    values: Floats,
+    rest: Sequence[Floats],
+    whitened: Callable[[int, Floats], Floats],
+) -> Floats | None:
+    """Chi-square (v,) that the columns of an effect explain with each value of a shape; None where it is not scanned."""
+    quick = [quick_columns(bench, candidate, {**shape_default(candidate), p.name: float(value)}) for value in values]
+    found = [each for each in quick if each is not None]
+    if len(found) < len(values):
+        return None
+    d = len(candidate.parameters)
+    white = np.concatenate([
+        whitened(k, np.stack([c[k] for each in found for c in each], axis=2)) for k in range(len(bench.runs))
+    ])  # fmt: skip
+    h = white.T @ np.concatenate(rest)
+    gains = []
+    for v in range(len(values)):
+        own = white[:, v * d : v * d + d]
+        G = own.T @ own
+        G += (1e-9 * np.trace(G) + 1e-12) * np.eye(d)
+        gains.append(float(h[v * d : v * d + d] @ np.linalg.solve(G, h[v * d : v * d + d])))
+    return np.array(gains)
+
+
+def reach(p: Parameter, value: float) -> float:
+    """Share of its value by which a shape may move in one step: half way to the next value that was scanned."""
+    gaps = np.abs(np.log(np.asarray(p.scan)[np.asarray(p.scan) > 0] / value))
+    return float(np.clip(0.5 * np.sort(gaps[gaps > 1e-9])[:2].max(initial=0.0), 0.005, 0.4))
+
+
+def quick_columns(bench: Bench, candidate: CandidateCause, shape: Mapping[str, float]) -> list[list[Floats]] | None:
+    """Columns of an effect that moves carriages only, straight from its hook; None for any other effect."""
+    if hasattr(candidate.effect, "on_drive") and not any(hasattr(candidate.effect, h) for h in _OTHER_HOOKS):
+        out = []
+        for p in candidate.parameters:
+            cause = cause_of(candidate, {**shape, p.name: p.scale})
+            which = cause.which(bench.actuators)
+            effort = cause.hook("on_drive_force")
+            per_run = []
+            for k, run in enumerate(bench.runs):
+                motion = bench.nominal[k].motion
+                moved = candidate.effect.on_drive(np.zeros_like(motion.encoder), motion, which, cause.values)
+                values = np.zeros_like(bench.observed(k))
+                slope = bench.row_slopes(k)
+                values[:, :3] = np.einsum("nij,nj->ni", slope, moved)
+                if effort is not None:
+                    m = len(bench.actuators)
+                    values[:, 3 + m : 3 + 2 * m] = effort(np.zeros_like(moved), motion, which, cause.values)
+                per_run.append(thinned(values, run.thin))
+            out.append(per_run)
+        return out
+    return None

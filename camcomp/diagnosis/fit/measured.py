@@ -1,0 +1,45 @@
+"""What was measured in one run, row by row; NaN where a cell is empty or a column is missing."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from camcomp.ground.datatypes import Bools, Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """n rows, m actuators. tip (n, 3) mm program frame; setpoint, encoder, drive (n, m); dyno (n, 3) N machine frame."""
+
+    time: Floats
+    line: Floats
+    tip: Floats
+    setpoint: Floats
+    encoder: Floats
+    drive: Floats
+    dyno: Floats
+    temperature: Floats
+
+    def has(self, name: str) -> bool:
+        """Whether the channel holds any value."""
+        return bool(np.isfinite(getattr(self, name)).any())
+
+    def take(self, rows: Bools) -> "Measured":
+        """The rows that a mask picks."""
+        return Measured(**{each: getattr(self, each)[rows] for each in self.__dataclass_fields__})
+
+
+STAGE_OF_CHANNEL = {"tip": "structure", "encoder": "control", "drive": "structure", "dyno": "process"}
+
+
+def channel_names(actuators: tuple[str, ...]) -> tuple[str, ...]:
+    """Names of the residual channels in their order: tip, encoders, drive forces, dynamometer."""
+    tips = ("tip_x", "tip_y", "tip_z")
+    encoders = tuple(f"encoder_{a}" for a in actuators)
+    drives = tuple(f"drive_{a}" for a in actuators)
+    return (*tips, *encoders, *drives, "dyno_x", "dyno_y", "dyno_z")
+
+
+def stack(tip: Floats, encoder: Floats, drive: Floats, dyno: Floats) -> Floats:
+    """Channels (n, 6 + 2 m) in the order of channel_names."""
+    return np.concatenate([tip, encoder, drive, dyno], axis=1)

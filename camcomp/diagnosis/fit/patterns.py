@@ -1,0 +1,215 @@
+"""Patterns that no library states: what a leftover may depend on, covariate by covariate.
+
+They serve three ends: the noise is measured beside them, an unknown effect is found by them, and they name what it
+depends on. A pattern moves a carriage (and so the tip, through the machine's own Jacobian), an encoder, a drive force,
+the tip itself, or the dynamometer.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from camcomp.ground.datatypes import Floats
+from camcomp.model.effect import Motion
+
+_KNOTS = 12  # hats along the travel of an actuator
+_PLACES = 20  # hats along an axis of the workpiece: a bump of a tenth of the travel is still seen
+_MOMENTS = 24  # hats along the time of all runs
+_RELAX_MM = (0.5, 3.0)
+KINDS = ("tip", "encoder", "drive", "dyno")
+
+
+@dataclass(frozen=True, eq=False)
+class Ground:
+    """What patterns of one run are made of: motion at its rows (n), model drive force (n, m), model force (n, 3), rate of
+    the tip (n, 3) mm/s in the program frame, and which channels were measured.
+    """
+
+    motion: Motion
+    drive: Floats
+    force: Floats
+    tip: Floats  # (n, 3) mm, program frame
+    velocity: Floats
+    present: dict[str, bool]
+
+
+@dataclass(frozen=True, eq=False)
+class Dictionary:
+    """Patterns of one kind of channel. labels (p,): covariate; blocks: per run (n, c, p), c channels from `first` on."""
+
+    kind: str
+    first: int
+    labels: tuple[str, ...]
+    blocks: tuple[Floats, ...]
+
+
+def _reversal(motion: Motion, length: float, j: int) -> Floats:
+    """Decaying memory (n,) of the last reversal of actuator j: 2 at the reversal, signed by the new direction."""
+    x, sign = motion.encoder[:, j], np.sign(np.round(motion.direction[:, j], 2))
+    travelled = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(x)))])
+    turned = np.concatenate([[False], (sign[1:] != sign[:-1]) & (sign[1:] != 0)])
+    last = np.maximum.accumulate(np.where(turned, travelled, -np.inf))
+    with np.errstate(over="ignore"):
+        return np.where(np.isfinite(last), 2.0 * np.exp(-(travelled - last) / length) * sign, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class _Sizes:
+    """What makes covariates dimensionless, over all runs."""
+
+    low: Floats
+    span: Floats
+    fast: Floats
+    strong: Floats
+    start: float
+    length: float
+
+
+def _sizes(grounds: Sequence[Ground]) -> _Sizes:
+    position = np.concatenate([g.motion.encoder for g in grounds])
+    low = position.min(axis=0)
+    start = min(float(g.motion.common.min()) for g in grounds)
+    return _Sizes(
+        low,
+        np.maximum(position.max(axis=0) - low, 1e-9),
+        np.maximum(np.max([np.abs(g.motion.speed).max(axis=0) for g in grounds], axis=0), 1e-9),
+        np.maximum(np.max([np.abs(g.drive).max(axis=0) for g in grounds], axis=0), 1e-9),
+        start,
+        max(max(float(g.motion.common.max()) for g in grounds) - start, 1e-9),
+    )
+
+
+def _of_actuator(g: Ground, size: _Sizes, j: int, knots: int) -> dict[str, list[Floats]]:
+    """Functions (n,) of about size one of what actuator j does, by covariate."""
+    m = g.motion
+    x = (m.encoder[:, j] - size.low[j]) / size.span[j]
+    v = m.speed[:, j] / size.fast[j]
+    d = g.drive[:, j] / size.strong[j]
+    out = {
+        "position": hats(x, knots),
+        "velocity": [v, v * np.abs(v), np.abs(v)],
+        "reversal": [m.direction[:, j], *(_reversal(m, each, j) for each in _RELAX_MM)],
+        "force": [d, d * np.abs(d)],
+    }
+    if m.ordered and len(m.time) > 2:
+        push = np.gradient(m.speed[:, j], m.time)
+        out["acceleration"] = [push / max(float(np.abs(push).max()), 1e-9)]
+    return out
+
+
+def hats(x: Floats, knots: int) -> list[Floats]:
+    """Piecewise linear functions (n,) that are 1 at one knot and 0 at the others, for x (n,) in 0 .. 1."""
+    return [np.maximum(1.0 - np.abs(x * (knots - 1) - n), 0.0) for n in range(knots)]
+
+
+def _of_time(g: Ground, size: _Sizes) -> dict[str, list[Floats]]:
+    t = 2.0 * (g.motion.common - size.start) / size.length - 1.0
+    own = g.motion.time - g.motion.time[0]
+    u = 2.0 * own / max(float(own[-1]), 1e-9) - 1.0
+    out = {"time": [np.ones_like(t), t, 0.5 * (3 * t**2 - 1), u, 0.5 * (3 * u**2 - 1)]}
+    if g.motion.temperature is not None:
+        out["temperature"] = [(g.motion.temperature - 20.0) / 10.0]
+    return out
+
+
+def _of_direction(g: Ground) -> list[Floats]:
+    """Functions (n,) of the feed direction in the plane of the workpiece."""
+    speed = np.linalg.norm(g.velocity, axis=1)
+    moving = speed > 1e-3 * max(float(speed.max()), 1e-9)
+    angle = np.arctan2(g.velocity[:, 1], g.velocity[:, 0])
+    return [np.where(moving, f(k * angle), 0.0) for k in (1, 2) for f in (np.cos, np.sin)]
+
+
+class _Store:
+    """Collects patterns of one kind; those that are zero in every run are left out."""
+
+    def __init__(self, kind: str, first: int, width: int, runs: int) -> None:
+        self.kind, self.first, self.width = kind, first, width
+        self.labels: list[str] = []
+        self.columns: list[list[Floats]] = [[] for _ in range(runs)]
+
+    def put(self, label: str, channel: int, per_run: Sequence[Floats], size: float) -> None:
+        if max(float(np.abs(v).max(initial=0.0)) for v in per_run) < 1e-12:
+            return
+        self.labels.append(label)
+        for store, values in zip(self.columns, per_run, strict=True):
+            column = np.zeros((len(values), self.width))
+            column[:, channel] = size * values
+            store.append(column)
+
+    def done(self) -> Dictionary:
+        blocks = tuple(np.stack(c, axis=2) if c else np.zeros((0, self.width, 0)) for c in self.columns)
+        return Dictionary(self.kind, self.first, tuple(self.labels), blocks)
+
+
+def dictionary(grounds: Sequence[Ground], actuators: Sequence[str]) -> list[Dictionary]:
+    """All patterns of the channels that were measured; unit size is 1 um or 1 N."""
+    size, m = _sizes(grounds), len(actuators)
+    rows = sum(len(g.tip) for g in grounds)
+    knots_of, places_of = (int(np.clip(rows / r, 4, most)) for r, most in ((250, _KNOTS), (150, _PLACES)))
+    found = {name: any(g.present[name] for g in grounds) for name in KINDS}
+    stores = {
+        "tip": _Store("tip", 0, 3, len(grounds)),
+        "encoder": _Store("encoder", 3, m, len(grounds)),
+        "drive": _Store("drive", 3 + m, m, len(grounds)),
+        "dyno": _Store("dyno", 3 + 2 * m, 3, len(grounds)),
+    }
+    for j, a in enumerate(actuators):
+        for kind, knots in (("tip", knots_of), ("encoder", 5), ("drive", knots_of)):
+            if not found[kind]:
+                continue
+            per_run = [_of_actuator(g, size, j, knots) for g in grounds]
+            for name in per_run[0]:
+                if kind == "encoder" and name == "force":
+                    continue
+                for i in range(len(per_run[0][name])):
+                    values = [functions[name][i] for functions in per_run]
+                    # a carriage that strays, strays in any direction: the tip is given all three axes
+                    for channel in range(3) if kind == "tip" else (j,):
+                        stores[kind].put(f"{name}:{a}", channel, values, 1.0 if kind == "drive" else 1e-3)
+    times = [_of_time(g, size) for g in grounds]
+    names = {"tip": "xyz", "encoder": actuators, "drive": actuators, "dyno": "xyz"}
+    for kind in KINDS:
+        if not found[kind]:
+            continue
+        for channel, axis_name in enumerate(names[kind]):
+            for name in times[0]:
+                for i in range(len(times[0][name])):
+                    values = [functions[name][i] for functions in times]
+                    stores[kind].put(
+                        f"{name}:{axis_name}", channel, values, 1e-3 if kind in ("tip", "encoder") else 1.0
+                    )
+    if found["tip"]:
+        # what happens at a moment: hats over the time in which something was measured, one run after the other
+        spent = [g.motion.time - g.motion.time[0] for g in grounds]
+        begin = np.concatenate([[0.0], np.cumsum([float(t[-1]) for t in spent])])
+        knots = int(np.clip(rows / 100, 4, _MOMENTS))
+        moments = [hats((b + t) / max(float(begin[-1]), 1e-9), knots) for b, t in zip(begin, spent, strict=False)]
+        for i in range(knots):
+            for channel, axis_name in enumerate("xyz"):
+                stores["tip"].put(f"time:{axis_name}", channel, [each[i] for each in moments], 1e-3)
+    places = np.concatenate([g.tip for g in grounds])
+    low, span = places.min(axis=0), np.ptp(places, axis=0)
+    for axis, name in enumerate("xyz"):
+        if not found["tip"] or span[axis] < 1e-3:
+            continue
+        per_place = [hats((g.tip[:, axis] - low[axis]) / span[axis], places_of) for g in grounds]
+        for i in range(places_of):
+            for channel in range(3):
+                stores["tip"].put(f"position:{name}", channel, [each[i] for each in per_place], 1e-3)
+    turns = [_of_direction(g) for g in grounds]
+    for axis, name in enumerate("xyz"):
+        for i in range(len(turns[0])):
+            values = [t[i] for t in turns]
+            if found["tip"]:
+                stores["tip"].put(f"direction:{name}", axis, values, 1e-3)
+            if found["dyno"]:
+                stores["dyno"].put(f"direction:{name}", axis, values, 1.0)
+        pushes = [g.force[:, axis] / 100.0 for g in grounds]
+        if found["tip"]:
+            for channel in range(3):
+                stores["tip"].put(f"force:{name}", channel, pushes, 1e-3)
+        if found["dyno"]:
+            stores["dyno"].put(f"force:{name}", axis, pushes, 1.0)
+    return [store.done() for kind, store in stores.items() if found[kind]]

@@ -1,0 +1,313 @@
+"""The state of one diagnosis: columns, white rows, and re-fits of sets of causes through the twin."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from camcomp.diagnosis.fit.bench import Bench, CandidateCause, cause_of, step_of, thinned
+from camcomp.diagnosis.fit.columns import Columns, build, candidate_columns, patterns, shape_default
+from camcomp.diagnosis.fit.grid_parameters import beside, best_shape, reach
+from camcomp.diagnosis.fit.noise import Background, first_noise, inflation, measure_noise
+from camcomp.diagnosis.fit.patterns import Dictionary
+from camcomp.diagnosis.statistics.cause_sets import CausePrior, Fitted, Members, Scale, total
+from camcomp.diagnosis.statistics.evidence import Gram, Prior, estimate, gram
+from camcomp.diagnosis.statistics.noise_model import Noise
+from camcomp.ground.datatypes import Floats
+from camcomp.model.effect import Cause, Parameter
+from camcomp.model.motion.twin import Reading
+
+BENT = 0.1  # share of its own change by which the model may miss a straight line before all columns are worked out anew
+SETTLED = 0.05  # chi-square that one more pass may cost
+STRAIGHT = 0.3  # chi-square that the bend of the model may cost before it is followed
+
+
+@dataclass(eq=False)
+class Problem:
+    """Everything that stays the same while sets of causes are tried."""
+
+    bench: Bench
+    columns: Columns
+    dictionaries: list[Dictionary]
+    inflate: list[Floats]
+    times: list[Floats]
+    residuals: list[Floats]
+    background: Background
+    white: list[Floats]  # per run (w, k)
+    white_patterns: list[list[Floats]]  # per run, per kind (rows of the kind, p)
+    white_residual: list[Floats]
+    shapes: dict[int, dict[str, float]]
+    candidates: CausePrior
+
+    @property
+    def noise(self) -> Noise:
+        """Noise of the channels."""
+        return self.background.noise
+
+    @property
+    def prior(self) -> Prior:
+        """Prior of the columns."""
+        return self.columns.prior
+
+    @cached_property
+    def base_grams(self) -> tuple[Gram, ...]:
+        """Per run, at nominal."""
+        return self.grams(self.white_residual, self.white)
+
+    def grams(self, residual: Sequence[Floats], white: Sequence[Floats]) -> tuple[Gram, ...]:
+        """Per run."""
+        return tuple(gram(D, r) for D, r in zip(white, residual, strict=True))
+
+    def whitened(self, k: int, values: Floats) -> Floats:
+        """White rows (w, j) of channels (n, c, j) of run k."""
+        return self.noise.rows(k, values, self.inflate[k], self.times[k])
+
+    def causes(self, members: Members, theta: Floats, shapes: Mapping[int, Mapping[str, float]]) -> list[Cause]:
+        """Causes at coordinates theta (d,)."""
+        out, at = [], 0
+        for i in members:
+            candidate = self.columns.candidates[i]
+            values = {p.name: float(theta[at + j]) * p.scale for j, p in enumerate(candidate.parameters)}
+            at += len(candidate.parameters)
+            out.append(cause_of(candidate, {**shapes.get(i, self.shapes.get(i, shape_default(candidate))), **values}))
+        return out
+
+    def member_columns(self, members: Members) -> list[int]:
+        """Columns of a set in the order of theta."""
+        return [c for i in members for c in self.candidates.columns[i]]
+
+    def refit(self, members: Members, theta: Floats | None = None, passes: int = 3) -> Fitted:
+        """Gauss-Newton through the twin from theta, or from the linear answer."""
+        shapes = {i: dict(self.shapes[i]) for i in members if i in self.shapes}
+        index = self.member_columns(members)
+        grams = self.base_grams
+        if not members:
+            scale = Scale(total(grams), self.prior, self.candidates)
+            return Fitted((), np.zeros(0), np.zeros((0, 0)), scale(()), grams, {}, scale.factor(()))
+        if theta is None:
+            theta = estimate(total(grams), self.prior, index)[0][index]
+        theta = self._bounded(members, theta)
+        white = [W[:, index] for W in self.white]
+        left = list(self.white_residual)
+        bent = False
+        passes += 3 if shapes else 0
+        for step in range(passes):
+            causes = self.causes(members, theta, shapes)
+            readings = [self.bench.read(k, causes) for k in range(len(self.bench.runs))]
+            now = [self.whitened(k, self.bench.difference(k, r)[:, :, None])[:, 0] for k, r in enumerate(readings)]
+            bend, size = self._bend(now, index, theta)
+            if step == 0 and not shapes and bend < STRAIGHT:
+                grams = self.base_grams
+                theta = self._bounded(members, estimate(total(grams), self.prior, index)[0][index])
+                break
+            bent = bent or (step == 0 and bend > BENT**2 * size)
+            moved = self._columns_at(members, theta, shapes, readings, bent)
+            white = [self._stacked(k, [m[k] for m in moved], index) for k in range(len(self.bench.runs))]
+            left = [r + W @ theta for r, W in zip(now, white, strict=True)]
+            grams = self._grams_at(index, white, left)
+            mean, full = estimate(total(grams), self.prior, index)
+            after = self._bounded(members, mean[index])
+            change = after - theta
+            theta = after
+            size = float(change @ np.linalg.solve(full[np.ix_(index, index)] + 1e-18 * np.eye(len(index)), change))
+            if shapes and step < passes - 1:
+                size = self._move_shapes(members, theta, shapes, left, white, mean)
+            if step > 0 and size < SETTLED:
+                break
+        scale = Scale(total(grams), self.prior, self.candidates)
+        factor = scale.factor(members)
+        mean, full = estimate(total(grams), self.prior, index, factor)
+        theta, covariance = self._bounded(members, mean[index]), full[np.ix_(index, index)]
+        return Fitted(members, theta, covariance, scale(members), grams, shapes, factor, tuple(white), tuple(left))
+
+    def theta_without(self, f: Fitted, k: int) -> Floats:
+        """The members' coordinates fitted without run k, about the fit to all runs."""
+        if len(f.grams) == 1 or not f.members:
+            return f.theta
+        index = self.member_columns(f.members)
+        others = total(f.grams) - f.grams[k]
+        return self._bounded(f.members, estimate(others, self.prior, index, f.factor)[0][index])
+
+    def _stacked(self, k: int, moved: Sequence[Floats | None], index: Sequence[int]) -> Floats:
+        """White columns (w, d) of run k: those that were worked out anew, and the nominal ones of the others."""
+        W = self.white[k][:, index].copy()
+        new = [j for j, m in enumerate(moved) if m is not None]
+        if new:
+            W[:, new] = self.whitened(k, np.stack([m for m in moved if m is not None], axis=2))
+        return W
+
+    def _grams_at(self, index: Sequence[int], white: Sequence[Floats], left: Sequence[Floats]) -> tuple[Gram, ...]:
+        """Per run, with the columns `index` replaced by white (w, d) and the residual by left (w,)."""
+        out = []
+        for k, (own, r) in enumerate(zip(white, left, strict=True)):
+            W = self.white[k]
+            A = self.base_grams[k].A.copy()
+            cross = W.T @ own
+            cross[index] = own.T @ own
+            A[:, index], A[index, :] = cross, cross.T
+            b = W.T @ r
+            b[index] = own.T @ r
+            out.append(Gram(A, b, float(r @ r), len(r)))
+        return tuple(out)
+
+    def _bend(self, now: Sequence[Floats], index: Sequence[int], theta: Floats) -> tuple[float, float]:
+        """Chi-square by which the columns at nominal miss the white residuals at theta, and that of their own change."""
+        bend = size = 0.0
+        for r, nominal, W in zip(now, self.white_residual, self.white, strict=True):
+            change = W[:, index] @ theta
+            bend, size = bend + float(np.sum((r - nominal + change) ** 2)), size + float(change @ change)
+        return bend, size
+
+    def _bounded(self, members: Members, theta: Floats) -> Floats:
+        parameters = [p for i in members for p in self.columns.candidates[i].parameters]
+        out = theta.copy()
+        for j, p in enumerate(parameters):
+            out[j] = p.coordinate(p.value(float(theta[j]) * p.scale)) / p.scale
+            # an amplitude of exactly nominal has no shape to fit
+            if p.sign > 0 and out[j] <= 0.0:
+                out[j] = 1e-3 * p.tolerance / p.scale
+        return out
+
+    def _columns_at(
+        self, members: Members, theta: Floats, shapes: Mapping[int, Mapping[str, float]], readings: Sequence[Reading],
+        bent: bool,
+    ) -> list[Sequence[Floats | None]]:  # fmt: skip
+        """Columns of the members' parameters at theta, per run (n, c).
+
+        None where the nominal column will do: changed structures cost most and bend least.
+        """
+        out: list[Sequence[Floats | None]] = []
+        at = 0
+        for i in members:
+            candidate = self.columns.candidates[i]
+            for j, p in enumerate(candidate.parameters):
+                if hasattr(candidate.effect, "on_robot") and not bent:
+                    out.append([None] * len(readings))
+                    continue
+                step, here = step_of(p), float(theta[at + j]) * p.scale
+                if p.coordinate(p.value(here + step)) < here + 0.5 * step:
+                    step = -step
+                changed = theta.copy()
+                changed[at + j] += step / p.scale
+                out.append(self._slope(self.causes(members, changed, shapes), readings, step / p.scale))
+            at += len(candidate.parameters)
+        return out
+
+    def _slope(self, causes: Sequence[Cause], readings: Sequence[Reading], step: float) -> list[Floats]:
+        """Change of the channels per unit, per run (n, c), from readings to those with other causes."""
+        out = []
+        for k, (reading, run) in enumerate(zip(readings, self.bench.runs, strict=True)):
+            change = self.bench.channels(self.bench.read(k, causes)) - self.bench.channels(reading)
+            out.append(thinned(change / step, run.thin))
+        return out
+
+    def shape_columns(self, members: Members, theta: Floats, shapes: Mapping[int, Mapping[str, float]]) -> list[Floats]:
+        """White columns (w, s) per run of the members' shapes, in their own units."""
+        causes = self.causes(members, theta, shapes)
+        readings = [self.bench.read(k, causes) for k in range(len(self.bench.runs))]
+        moved = []
+        for i, p in self.shapes_of(members):
+            step = 1e-4 * shapes[i][p.name]
+            changed = {**shapes, i: {**shapes[i], p.name: shapes[i][p.name] + step}}
+            moved.append(self._slope(self.causes(members, theta, changed), readings, step))
+        return [self.whitened(k, np.stack([m[k] for m in moved], axis=2)) for k in range(len(readings))]
+
+    def shapes_of(self, members: Members) -> list[tuple[int, Parameter]]:
+        """(candidate, shape) of a set in order."""
+        return [(i, p) for i in members for p in self.columns.candidates[i].shapes]
+
+    def row_places(self, k: int) -> Floats:
+        """Where in the time of run k each white row (w,) lies, 0 to 1."""
+        t = self.times[k]
+        at = (t - t[0]) / max(float(t[-1] - t[0]), 1e-12)
+        return self.noise.rows_of(k, at, self.inflate[k])
+
+    def _move_shapes(
+        self, members: Members, theta: Floats, shapes: dict[int, dict[str, float]], left: Sequence[Floats],
+        white: Sequence[Floats], mean: Floats,
+    ) -> float:  # fmt: skip
+        """One Gauss-Newton step of the scanned shapes at their best amplitudes, within reach of the scan.
+
+        By how much chi-square it moves the model; shapes that the data do not ask to move stay.
+        """
+        names, index = self.shapes_of(members), self.member_columns(members)
+        others = mean.copy()
+        others[index] = 0.0
+        D = self.shape_columns(members, theta, shapes)
+        A = np.concatenate([np.concatenate([W, d], axis=1) for W, d in zip(white, D, strict=True)])
+        rest = np.concatenate([r - W @ others for r, W in zip(left, self.white, strict=True)])
+        rest = rest - A[:, : len(index)] @ theta
+        size = np.linalg.norm(A, axis=0) + 1e-12
+        step = np.linalg.lstsq(A / size, rest, rcond=1e-8)[0] / size
+        most = np.array([reach(p, shapes[i][p.name]) * shapes[i][p.name] for i, p in names])
+        step *= min(1.0, float(np.min(most / np.maximum(np.abs(step[len(index) :]), 1e-300))))
+        moves = float(np.sum((A @ step) ** 2))
+        if moves > SETTLED:
+            for (i, p), s in zip(names, step[len(index) :], strict=True):
+                shapes[i][p.name] = float(np.clip(shapes[i][p.name] + s, p.low, p.high))
+        return moves
+
+
+def open_problem(bench: Bench, candidates: Sequence[CandidateCause]) -> Problem:
+    """Columns, noise and white rows for a bench and the candidates that may be causes."""
+    columns = build(bench, candidates, {})
+    words = patterns(bench)
+    extra = inflation(bench)
+    times = [thinned(run.run_path.time[:, None], run.thin)[:, 0] for run in bench.runs]
+    residuals = [bench.residual(k) for k in range(len(bench.runs))]
+    shapes: dict[int, dict[str, float]] = {i: shape_default(a) for i, a in enumerate(candidates) if a.shapes}
+    if shapes:
+        # shapes first: what has the wrong one would pass for noise
+        columns = _scan(_whiten(bench, columns, [], first_noise(extra, residuals), times, residuals, shapes))
+    background = measure_noise(bench, columns, words, extra, times, residuals)
+    return _whiten(bench, columns, words, background, times, residuals, shapes)
+
+
+def _whiten(bench: Bench, columns: Columns, words: list[Dictionary], background: Background, times: list[Floats],
+            residuals: list[Floats], shapes: dict[int, dict[str, float]]) -> Problem:  # fmt: skip
+    noise, inflate = background.noise, background.inflate
+    white, white_patterns, white_residual = [], [], []
+    for k in range(len(bench.runs)):
+        present = np.isfinite(inflate[k])
+        clean = lambda block, mask=present: np.where(mask[:, :, None], block, 0.0)
+        white.append(noise.rows(k, clean(columns.blocks[k]), inflate[k], times[k]))
+        white_patterns.append([noise.rows(k, w.blocks[k], inflate[k], times[k], w.first) for w in words])
+        white_residual.append(noise.rows(k, residuals[k][:, :, None], inflate[k], times[k])[:, 0])
+    return Problem(bench, columns, words, inflate, times, residuals, background, white, white_patterns, white_residual,
+                   shapes, cause_prior(columns))  # fmt: skip
+
+
+def cause_prior(columns: Columns) -> CausePrior:
+    """Prior weights: every effect alike; within an effect one value for all weighs half, or all targets alike."""
+    names = sorted({a.name for a in columns.candidates})
+    weight = []
+    for a in columns.candidates:
+        same = [b for b in columns.candidates if b.name == a.name]
+        common = any(b.target is None for b in same)
+        share = (
+            1.0 / len(same) if not common or len(same) == 1 else (0.5 if a.target is None else 0.5 / (len(same) - 1))
+        )
+        weight.append(np.log(share / len(names)))
+
+    def exclusive(i: int, j: int) -> bool:
+        a, b = columns.candidates[i], columns.candidates[j]
+        return a.name == b.name and (a.target is None or b.target is None)
+
+    return CausePrior(tuple(tuple(columns.of(i)) for i in range(len(columns.candidates))), np.array(weight), exclusive)
+
+
+def _scan(problem: Problem) -> Columns:
+    """Columns with the scanned shapes (pitches, time constants) that explain most of what the others leave."""
+    own = [c for i in problem.shapes for c in problem.candidates.columns[i]]
+    others = np.setdiff1d(np.arange(len(problem.columns.names)), own)
+    rest = beside(problem.base_grams, problem.white, problem.white_residual, problem.columns, others)
+    changed: dict[int, list[Floats]] = {}
+    for i in problem.shapes:
+        best = best_shape(problem.bench, problem.columns.candidates[i], rest, problem.whitened)
+        if best is None:
+            continue
+        problem.shapes[i] = best
+        columns = candidate_columns(problem.bench, problem.columns.candidates[i], best)
+        changed.update(zip(problem.candidates.columns[i], columns, strict=True))
+    return problem.columns.with_blocks(changed)

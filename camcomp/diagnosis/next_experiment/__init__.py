@@ -1,0 +1,1 @@
+"""What to measure next and the program that does it."""

@@ -1,0 +1,1 @@
+"""What a diagnosis prints and draws."""

@@ -1,0 +1,202 @@
+"""The plots of a diagnosis report."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from camcomp.diagnosis.report.answer import cause_name
+from camcomp.diagnosis.report.run_view import Rival, RunView, likeness, rms, spectrum
+from camcomp.report.plot import INK, SCALE, STYLES, Figure, Json, axis, brief, level, line, numbers, thin
+
+MAP_POINTS = 4000
+
+
+def figure_ladder(result: Mapping[str, Any]) -> Figure:
+    """The gap on held-out runs with one cause after the other in the model."""
+    shrink, floor = result["shrinkage"], result["gap"]["noise_floor_um"]
+    names = ["as it was", *(f"+ {cause_name(step)}" for step in shrink["steps"])]
+    values = [shrink["before_rms_um"], *(step["after_rms_um"] for step in shrink["steps"])]
+    bars = {
+        "type": "bar", "orientation": "h", "x": values[::-1], "y": names[::-1], "showlegend": False, "cliponaxis": False,
+        "marker": {"color": STYLES[0][0]}, "text": [f"{brief(v)} µm" for v in values[::-1]], "textposition": "outside",
+    }  # fmt: skip
+    style = {"color": STYLES[1][0], "dash": "dot", "width": 2}
+    noise = {
+        "type": "scatter", "mode": "lines", "x": [floor, floor], "y": [names[-1], names[0]], "name": "noise floor",
+        "line": style,
+    }  # fmt: skip
+    words = ", ".join(f"{name} {brief(value)} µm" for name, value in zip(names, values, strict=True))
+    return Figure(
+        "ladder",
+        "Shrinkage ladder",
+        f"Root mean square of the gap on runs that the fit has not seen, with one cause after the other put into the "
+        f"model: {words}. Noise floor {brief(floor)} µm.",
+        f"Bar chart of the gap that remains: {words}; noise floor {brief(floor)} µm.",
+        [bars, noise],
+        {"xaxis": axis("gap in µm (rms)", range=[0.0, 1.15 * max(*values, floor)]), "yaxis": axis("")},
+        height=150 + 42 * len(names),
+    )
+
+
+def figure_run(view: RunView, number: int, floor: float, *, along: str) -> Figure:
+    """The gap of one run along time or path, before and after."""
+    before, after = view.sizes
+    index = thin(np.column_stack((before, after)))
+    where = view.time if along == "time" else view.path
+    unit = "time in s" if along == "time" else "path length in mm"
+    x = numbers(where[index], 4)
+    curves = [
+        line("before", x, numbers(before[index], 3), 0),
+        line("with the causes found", x, numbers(after[index], 3), 1),
+        level("noise floor", [float(where[0]), float(where[-1])], floor),
+    ]
+    words = f"rms {brief(rms(before))} µm before, {brief(rms(after))} µm with the causes found"
+    told = "not used for the fit" if view.held_out else "used for the fit"
+    return Figure(
+        f"{along}-{number}",
+        f"Run {view.name}: gap along the {along}",
+        f"Size of measured minus modelled: {words}. This run was {told}.",
+        f"Plot of the gap of run {view.name} along the {along}: {words}.",
+        curves,
+        {"xaxis": axis(unit), "yaxis": axis("gap in µm", rangemode="tozero")},
+        height=300,
+    )
+
+
+def figure_map(views: Sequence[RunView]) -> Figure:
+    """The gap where it is on the workpiece, before and after, in one scale of colours."""
+    position = np.concatenate([view.position for view in views])
+    before, after = (np.concatenate([view.sizes[i] for view in views]) for i in range(2))
+    known = np.isfinite(position).all(axis=1) & np.isfinite(before)
+    position, before, after = position[known], before[known], after[known]
+    step = max(len(position) // MAP_POINTS, 1)
+    position, before, after = position[::step], before[::step], after[::step]
+    spans = np.ptp(position, axis=0)
+    h, v = sorted(np.argsort(-spans, kind="stable")[:2])
+    top = float(np.quantile(before, 0.99)) if len(before) else 1.0
+    traces: list[Json] = []
+    for i, (name, size) in enumerate((("before", before), ("with the causes found", after))):
+        marker: Json = {"size": 5, "color": numbers(size, 2), "colorscale": SCALE, "cmin": 0.0, "cmax": round(top, 3)}
+        if i:
+            marker |= {"colorbar": {"title": {"text": "gap<br>in µm"}, "thickness": 14}}
+        traces.append({
+            "type": "scatter", "mode": "markers", "name": name, "x": numbers(position[:, h], 3), "y": numbers(position[:, v], 3),
+            "marker": marker, "xaxis": "x2" if i else "x", "yaxis": "y2" if i else "y", "showlegend": False,
+            "hovertemplate": "%{x} %{y} mm: %{marker.color} µm<extra>" + name + "</extra>",
+        })  # fmt: skip
+    a, b = "xyz"[h], "xyz"[v]
+    layout = {
+        "xaxis": axis(f"{a} in mm (before)", domain=[0.0, 0.47]),
+        "yaxis": axis(f"{b} in mm", scaleanchor="x"),
+        "xaxis2": axis(f"{a} in mm (with the causes found)", domain=[0.53, 1.0], matches="x"),
+        "yaxis2": axis("", anchor="x2", matches="y", showticklabels=False),
+    }
+    words = f"from rms {brief(rms(before))} µm to {brief(rms(after))} µm"
+    return Figure(
+        "map",
+        "Map on the workpiece",
+        f"Every measured row where the tip was, coloured by the size of the gap, before and with the causes found: {words}.",
+        f"Two maps of the gap over {a} and {b} of the workpiece: {words}.",
+        traces,
+        layout,
+        height=430,
+    )
+
+
+def figure_shares(where: Mapping[str, Any]) -> Figure | None:
+    """Shares of the gap by axis and actuator, and what it depends on."""
+    groups = [("axis", where["axes"]), ("actuator", where["actuators"])]
+    groups.append(("depends on", {each["covariate"]: each["share"] for each in where["drivers"]}))
+    rows = [(f"{kind} {name}", share) for kind, part in groups for name, share in part.items()][::-1]
+    if not any(share for _, share in rows):
+        return None
+    bars = {
+        "type": "bar", "orientation": "h", "x": [100.0 * share for _, share in rows], "y": [name for name, _ in rows],
+        "marker": {"color": STYLES[0][0]}, "text": [f"{100 * share:.0f} %" for _, share in rows], "textposition": "outside",
+        "cliponaxis": False, "showlegend": False,
+    }  # fmt: skip
+    words = ", ".join(f"{name} {100 * share:.0f} %" for name, share in rows[::-1] if share)
+    return Figure(
+        "shares",
+        "By axis and actuator, and what it depends on",
+        "Share of the gap's energy above the noise by axis of the workpiece and, read as motion of the carriages, by "
+        "actuator; below, how much of the gap follows each quantity. These may overlap.",
+        f"Bar chart of shares of the gap: {words}.",
+        [bars],
+        {"xaxis": axis("share in %", range=[0, 115]), "yaxis": axis("")},
+        height=120 + 26 * len(rows),
+    )
+
+
+def figure_spectrum(view: RunView) -> Figure | None:
+    """Amplitudes of the gap over frequency, before and after."""
+    curves = []
+    peaks = []
+    for i, (name, values) in enumerate((("before", view.before), ("with the causes found", view.after))):
+        frequency, amplitude = spectrum(view.time, values)
+        if not len(frequency):
+            return None
+        index = thin(amplitude[:, None])
+        curves.append(line(name, numbers(frequency[index], 5), numbers(np.maximum(amplitude[index], 1e-4), 5), i))
+        top = int(amplitude.argmax())
+        peaks.append(f"{name} largest at {brief(frequency[top])} Hz with {brief(amplitude[top])} µm")
+    words = "; ".join(peaks)
+    return Figure(
+        "spectrum",
+        f"By frequency, run {view.name}",
+        f"Amplitude of the gap, all channels together: {words}.",
+        f"Plot of the amplitude of the gap over frequency: {words}.",
+        curves,
+        {"xaxis": axis("frequency in Hz", type="log", dtick=1, exponentformat="power"),
+         "yaxis": axis("amplitude in µm", type="log", dtick=1, exponentformat="power")},
+    )  # fmt: skip
+
+
+def figure_causes(causes: Sequence[Mapping[str, Any]]) -> Figure:
+    """Probability of every cause and its share of the gap."""
+    shown = causes[::-1]
+    names = [cause_name(each) for each in shown]
+    bars = []
+    for i, (key, label) in enumerate((("share", "share of the gap"), ("probability", "probability"))):
+        values = [100.0 * float(each.get(key) or 0.0) for each in shown]
+        bars.append({
+            "type": "bar", "orientation": "h", "name": label, "x": values, "y": names, "cliponaxis": False,
+            "marker": {"color": STYLES[2 * (1 - i)][0], "pattern": {"shape": "" if i else "/"}},
+            "text": [f"{value:.0f} %" for value in values], "textposition": "outside",
+        })  # fmt: skip
+    words = ", ".join(f"{cause_name(c)} {100 * float(c.get('probability') or 0):.0f} %" for c in causes)
+    return Figure(
+        "causes-plot",
+        "Causes by probability",
+        "Probability that the cause is at work, given the library of effects, and its share of the gap's energy.",
+        f"Bar chart of causes and their probabilities: {words}.",
+        bars,
+        {"xaxis": axis("%", range=[0, 115]), "yaxis": axis(""), "barmode": "group", "legend": {
+            "orientation": "h", "traceorder": "reversed", "x": 0, "y": 1.02, "yanchor": "bottom"}},
+        height=150 + 60 * len(names),
+    )  # fmt: skip
+
+
+def figure_rivals(rivals: Sequence[Rival], views: Sequence[RunView]) -> Figure | None:
+    """What sets of causes that cannot be told apart do to the run in which they do most."""
+    if len(rivals) < 2 or not views:
+        return None
+    k = int(np.argmax([rms(np.linalg.norm(each, axis=1)) for each in rivals[0].signals]))
+    c = int(np.argmax(np.nanstd(rivals[0].signals[k], axis=0)))
+    view = views[k]
+    index = thin(np.column_stack([each.signals[k][:, c] for each in rivals]))
+    x = numbers(view.time[index], 4)
+    curves = [line(each.name, x, numbers(each.signals[k][index, c], 3), i) for i, each in enumerate(rivals[:6])]
+    alike = ", ".join(f"{each.name} {100 * likeness(rivals[0], each):.1f} %" for each in rivals[1:])
+    return Figure(
+        "rivals",
+        "Why they cannot be told apart",
+        f"What each set of causes does to {view.channels[c]} in run {view.name}. Likeness with {rivals[0].name} over all "
+        f"runs: {alike}.",
+        f"Plot of the signals of causes that cannot be told apart; likeness with {rivals[0].name}: {alike}.",
+        curves,
+        {"xaxis": axis("time in s"), "yaxis": axis("signal in µm", zerolinecolor=INK)},
+    )

@@ -1,0 +1,82 @@
+"""What a diagnosis report draws of one run, and the spectrum of a gap."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from camcomp.ground.datatypes import Floats
+
+
+@dataclass(frozen=True, eq=False)
+class RunView:
+    """Rows (n,) of one run. before, after: measured minus modelled (n, c) um, without and with the causes found.
+
+    time (n,) s; line (n,) source line, NaN where unknown; position (n, 3) mm modelled tip in the program frame; channels:
+    names of the c columns. held_out: the causes were fitted without this run. NaN where nothing was measured.
+    """
+
+    name: str
+    held_out: bool
+    time: Floats
+    line: Floats
+    position: Floats
+    before: Floats
+    after: Floats
+    channels: tuple[str, ...]
+
+    @property
+    def sizes(self) -> tuple[Floats, Floats]:
+        """Size (n,) um of the gap before and after."""
+        return np.linalg.norm(self.before, axis=1), np.linalg.norm(self.after, axis=1)
+
+    @property
+    def path(self) -> Floats:
+        """Path length (n,) mm."""
+        step = np.linalg.norm(np.diff(self.position, axis=0), axis=1)
+        return np.concatenate(([0.0], np.cumsum(np.where(np.isfinite(step), step, 0.0))))
+
+
+@dataclass(frozen=True, eq=False)
+class Rival:
+    """A set of causes that the data cannot tell from the first one: its name, and what it does to each run (n, c) um."""
+
+    name: str
+    signals: tuple[Floats, ...]
+
+
+def rms(size: Floats) -> float:
+    """Root mean square of what is finite; 0 when nothing is."""
+    known = size[np.isfinite(size)]
+    return float(np.sqrt(np.mean(known**2))) if len(known) else 0.0
+
+
+def likeness(one: Rival, other: Rival) -> float:
+    """How much two sets of causes do the same: 1 alike up to a factor, 0 nothing in common."""
+    a = np.concatenate([each.ravel() for each in one.signals])
+    b = np.concatenate([each.ravel() for each in other.signals])
+    known = np.isfinite(a) & np.isfinite(b)
+    a, b = a[known], b[known]
+    size = float(np.linalg.norm(a) * np.linalg.norm(b))
+    return float(abs(a @ b) / size) if size > 0.0 else 0.0
+
+
+def spectrum(time: Floats, values: Floats) -> tuple[Floats, Floats]:
+    """Frequencies (f,) Hz and amplitudes (f,) um of values (n, c), all channels together, by a Hann window.
+
+    Rows are put on an even grid first; a gap is bridged by a straight line. Empty when there are fewer than 16 rows.
+    """
+    known = np.isfinite(values).all(axis=1) & np.isfinite(time)
+    t, v = time[known], values[known]
+    if len(t) < 16 or t[-1] <= t[0] or (np.diff(t) < 0).any():
+        return np.zeros(0), np.zeros(0)
+    step = float(np.median(np.diff(t)[np.diff(t) > 0])) if (np.diff(t) > 0).any() else 0.0
+    if step <= 0.0:
+        return np.zeros(0), np.zeros(0)
+    grid = np.arange(t[0], t[-1], step)
+    even = np.column_stack([np.interp(grid, t, v[:, c]) for c in range(v.shape[1])])
+    window = np.hanning(len(grid))[:, None]
+    amplitude = 2.0 * np.abs(np.fft.rfft((even - even.mean(axis=0)) * window, axis=0)) / window.sum()
+    size: Floats = np.linalg.norm(amplitude, axis=1)
+    return np.asarray(np.fft.rfftfreq(len(grid), step)[1:], float), size[1:]

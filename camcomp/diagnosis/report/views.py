@@ -1,0 +1,105 @@
+"""From a diagnosis to what its report draws: the gap of every run before and after, and the signals of rival causes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import PurePath
+from typing import TYPE_CHECKING, Any
+
+from camcomp.diagnosis.experiment.open_experiment import OpenExperiment
+from camcomp.diagnosis.fit.bench import Bench, Run, thinned
+from camcomp.diagnosis.fit.gap import main_channels
+from camcomp.diagnosis.fit.measured import channel_names
+from camcomp.diagnosis.fit.problem import Problem
+from camcomp.diagnosis.report.answer import cause_name
+from camcomp.diagnosis.report.page import diagnosis_html
+from camcomp.diagnosis.report.run_view import Rival, RunView
+from camcomp.diagnosis.statistics.cause_sets import Fitted
+from camcomp.ground.datatypes import Floats
+from camcomp.ground.files import read_bytes
+from camcomp.model.config.load import load_config, load_experiment
+from camcomp.model.motion.twin import Twin
+from camcomp.report.inputs import Input
+
+MICRO = 1e3  # mm -> um
+
+if TYPE_CHECKING:
+    from camcomp.diagnosis.diagnose import Diagnosis
+
+
+def report_of(path: str, result: dict[str, Any], done: Diagnosis | None, opened: OpenExperiment | None) -> bytes:
+    """The report of an experiment file. Without `done` (studies of logs that have no program) no runs are drawn."""
+    experiment = load_experiment(path)
+    inputs = [Input("experiment", str(path), read_bytes(path))]
+    inputs += [Input("configuration", each, read_bytes(each)) for each in experiment.config]
+    for run in experiment.runs:
+        if run.program is not None:
+            inputs.append(Input(f"program of {run.name}", run.program, read_bytes(run.program)))
+        inputs.append(Input(f"log of {run.name}", run.log, read_bytes(run.log)))
+    views: list[RunView] = []
+    rivals: list[Rival] = []
+    if done is not None and opened is not None:
+        views = views_of(done, opened.twin, opened.runs, experiment.holdout)
+        rivals = rivals_of(done)
+    return diagnosis_html(
+        result,
+        views,
+        title=PurePath(path).name,
+        machine=load_config(experiment.config).robot.name,
+        inputs=inputs,
+        notes=opened.notes if opened is not None else (),
+        rivals=rivals,
+    )
+
+
+def views_of(done: Diagnosis, twin: Twin, runs: Sequence[Run], holdout: Sequence[str]) -> list[RunView]:
+    """Runs of the fit in their order, then those named in `holdout`.
+
+    Without names every run is judged with causes fitted without it.
+    """
+    problem = done.problem
+    best = done.search.fits[done.search.verdict.best]
+    out = []
+    for k in range(len(problem.bench.runs)):
+        theta = best.theta if holdout else problem.theta_without(best, k)
+        out.append(_view(problem, problem.bench, k, best, theta, held_out=not holdout and len(problem.bench.runs) > 1))
+    unseen = [run for run in runs if run.name in holdout and run.name not in {each.name for each in problem.bench.runs}]
+    if unseen:
+        bench = Bench(twin, unseen)
+        out += [_view(problem, bench, k, best, best.theta, held_out=True) for k in range(len(unseen))]
+    return out
+
+
+def rivals_of(done: Diagnosis) -> list[Rival]:
+    """Sets of causes that the data cannot tell apart, the best one first; none when there is only one."""
+    found, problem = done.search, done.problem
+    if done.result["verdict"] != "ambiguous":
+        return []
+    part = main_channels(problem)
+    out = []
+    for fit in (found.fits[found.verdict.best], *(found.fits[j] for j in found.verdict.rivals)):
+        causes = problem.causes(fit.members, fit.theta, fit.extra)
+        names = [cause_name({"effect": each.name, "target": each.target}) for each in causes]
+        signals = tuple(
+            MICRO * (problem.bench.gap(k) - problem.bench.gap(k, causes))[:, part]
+            for k in range(len(problem.bench.runs))
+        )
+        out.append(Rival(" and ".join(names), signals))
+    return out
+
+
+def _view(problem: Problem, bench: Bench, k: int, fit: Fitted, theta: Floats, *, held_out: bool) -> RunView:
+    part, run = main_channels(problem), bench.runs[k]
+    causes = problem.causes(fit.members, theta, fit.extra)
+    before = bench.gap(k)
+    after = bench.gap(k, causes) if causes else before
+    return RunView(
+        run.name,
+        held_out,
+        thinned(run.run_path.time[:, None], run.thin)[:, 0],
+        thinned(run.measured.line[:, None], run.thin)[:, 0],
+        thinned(bench.nominal[k].tip, run.thin),
+        MICRO * before[:, part],
+        MICRO * after[:, part],
+        tuple(each.replace("_", " ") for each in channel_names(bench.actuators)[part]),
+    )

@@ -1,0 +1,251 @@
+"""The search for causes on one problem: which sets are tried, in which order, and how they are ranked."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from camcomp.diagnosis.fit.problem import Problem
+from camcomp.diagnosis.search.indistinguishable import Likeness, likeness, stand_ins
+from camcomp.diagnosis.search.unknown import (
+    colour_left,
+    confirmed,
+    firm_prior,
+    idle,
+    known_part,
+    mostly,
+    residual_tests,
+    signal_rms,
+    steady_prior,
+    strongest_unknown,
+)
+from camcomp.diagnosis.statistics.cause_sets import (
+    Fitted,
+    Members,
+    Scale,
+    extensions,
+    pairs,
+    predictive,
+    probabilities,
+    total,
+)
+from camcomp.diagnosis.statistics.evidence import Gram, estimate
+from camcomp.diagnosis.statistics.score_test import ResidualTest
+from camcomp.diagnosis.statistics.verdict import Verdict, judge
+from camcomp.ground.datatypes import Floats
+
+SINGLES, PAIRS, TRIPLES = 6, 6, 3
+TEMPERATURE = 1.5  # what evidence is divided by before it becomes a probability; calibrated on the truth plants
+NUISANCE_RMS = 0.25  # size of a cause, in units of the noise of the channel that shows it best, below which it is none
+CANCELLING = 8.0  # size of a member, in units of the whole set, above which the set lives on differences of its members
+SLIGHT = 0.06  # of the largest member
+MINOR = 0.25  # size of a known cause, in units of an unknown one, below which it is not named beside it
+HARM_LOG = 2.0  # log density by which a cause has to harm the prediction of other runs before it goes
+HALF = 0.5  # share of the tip's gap beyond noise that causes have to take away to be its explanation
+SAME_FIT = 4.0  # chi-square by which two sets may differ and still be the same answer
+
+
+@dataclass(frozen=True, eq=False)
+class CauseSearch:
+    """Sets of causes that were fitted, their probabilities, the verdict, and what the best of them leaves."""
+
+    fits: tuple[Fitted, ...]
+    probability: Floats
+    verdict: Verdict
+    left: Mapping[str, ResidualTest]  # per kind of channel
+    unknown_in: str | None  # the kind in which an effect shows that the library does not have
+
+
+def search_causes(problem: Problem) -> CauseSearch:
+    """Tries no cause, single causes, pairs and triples; re-fits those that look best."""
+    every = [i for i in range(len(problem.columns.candidates)) if visible(problem, i)]
+    null = problem.refit(())
+    at_null = Scale(total(null.grams), problem.prior, problem.candidates)
+    done: dict[Members, Fitted] = {(): null}
+
+    def fit(members: Members, near: Fitted | None = None) -> Fitted:
+        if members not in done:
+            theta = None
+            if near is not None:
+                index = problem.member_columns(members)
+                theta = estimate(total(near.grams), problem.prior, index)[0][index]
+            done[members] = problem.refit(members, theta)
+        return done[members]
+
+    def value(f: Fitted) -> float:
+        return f.log_evidence + problem.candidates.prior(f.members)
+
+    singles = extensions(at_null, (), every)
+    for _, members in singles[:SINGLES]:
+        fit(members)
+    for members in _same_name(problem, singles[0][1], every):
+        fit(members)
+    ones = sorted((f for m, f in done.items() if len(m) == 1), key=value, reverse=True)
+    found: list[tuple[float, Members, Fitted | None]] = [(v, m, None) for v, m in pairs(at_null, every, PAIRS)]
+    for f in ones[:3]:
+        scale = Scale(total(f.grams), problem.prior, problem.candidates)
+        found += [(v, m, f) for v, m in extensions(scale, f.members, every)[:4]]
+    best_one = max(value(f) for f in done.values())
+    _fit_best(found, fit, PAIRS, best_one)
+    twos = sorted((f for m, f in done.items() if len(m) == 2), key=value, reverse=True)
+    found = []
+    for f in twos[:2]:
+        scale = Scale(total(f.grams), problem.prior, problem.candidates)
+        found += [(v, m, f) for v, m in extensions(scale, f.members, every)[:3]]
+    _fit_best(found, fit, TRIPLES, max(value(f) for f in done.values()))
+    fits = tuple(sorted(done.values(), key=value, reverse=True))
+    fits = tuple(f for f in fits if _matters(problem, f) and not _cancels(problem, f))
+    probability = probabilities(fits, problem.candidates, TEMPERATURE)
+    fits, probability = _prune(problem, fits, probability)
+    design = likeness(problem)
+    fits, probability, same = _with_stand_ins(problem, design, fits, probability, fit)
+    verdict = judge(fits, probability, same)
+    best = fits[verdict.best]
+    left = residual_tests(problem, best, steady_prior(problem, best))
+    if left and idle(problem, best, HALF):
+        return _nothing_known(problem, fits, null)
+    # noise that is none stays whatever the causes are
+    coloured = colour_left(problem, left)
+    if coloured is None and strongest_unknown(problem, best, left) is None:
+        return CauseSearch(fits, probability, verdict, left, None)
+    members = best.members if coloured is None and mostly(problem, best, left) else known_part(problem, best)
+    known, left = _beside_unknown(problem, members, fit, coloured is not None)
+    if left and idle(problem, known):
+        return _nothing_known(problem, fits, null)
+    if known.members != best.members:
+        fits = (known, *(f for f in fits if f is not known))
+        probability = np.concatenate([[1.0], np.zeros(len(fits) - 1)])
+        verdict = Verdict("identified", 0, (), dict.fromkeys(known.members, 1.0))
+    if coloured is not None:
+        return CauseSearch(fits, probability, verdict, {**left, coloured.kind: coloured}, coloured.kind)
+    return CauseSearch(fits, probability, verdict, left, strongest_unknown(problem, known, left))
+
+
+def _nothing_known(problem: Problem, fits: tuple[Fitted, ...], null: Fitted) -> CauseSearch:
+    """All of the gap is unknown."""
+    left = residual_tests(problem, null, firm_prior(problem))
+    fits = (null, *(f for f in fits if f is not null))
+    sure = np.array([1.0] + [0.0] * (len(fits) - 1))
+    return CauseSearch(
+        fits, sure, Verdict("identified", 0, (), {}), left, max(left, key=lambda kind: left[kind].energy)
+    )
+
+
+def _beside_unknown(
+    problem: Problem, members: Members, fit: Callable[[Members], Fitted], coloured: bool
+) -> tuple[Fitted, dict[str, ResidualTest]]:
+    """The members that are causes beside an unknown one, and what they leave.
+
+    Beside something large and unknown, something small and known is most likely a part of it.
+    """
+    while True:
+        known = fit(members)
+        left = residual_tests(problem, known, firm_prior(problem))
+        large = 1.0 if coloured else max(each.rms for each in left.values())
+        kept = tuple(
+            i for i in confirmed(problem, known) if max(signal_rms(problem, known, (i,)).values()) > MINOR * large
+        )
+        if kept == members:
+            return known, left
+        members = kept
+
+
+def _with_stand_ins(
+    problem: Problem,
+    design: Likeness,
+    fits: tuple[Fitted, ...],
+    probability: Floats,
+    fit: Callable[[Members], Fitted],
+) -> tuple[tuple[Fitted, ...], Floats, list[tuple[Members, Members]]]:
+    """The fits with those sets added that do the same as the leader by their structure, and all pairs that are alike."""
+    best = fits[int(np.argmax(probability))]
+    same = _same(problem, fits, probability)
+    for members in stand_ins(design, best.members, best.theta):
+        other = fit(members)
+        if not _plausible(problem, other) or _cancels(problem, other):
+            continue
+        same.append((best.members, members))
+        if all(f.members != members for f in fits):
+            fits = (*fits, other)
+    if len(fits) > len(probability):
+        probability = probabilities(fits, problem.candidates, TEMPERATURE)
+    return fits, probability, same
+
+
+def visible(problem: Problem, i: int) -> bool:
+    """Whether an effect of three scales would show at all in the channels present."""
+    energy = sum(float((W[:, list(problem.candidates.columns[i])] ** 2).sum()) for W in problem.white)
+    return energy * 9.0 > 1.0
+
+
+def _matters(problem: Problem, f: Fitted) -> bool:
+    """Whether every member shows in some kind of channel by more than what is always a little wrong.
+
+    What lies below the noise beside something many times larger is most likely a fault in how that one is modelled.
+    """
+    sizes = [max(signal_rms(problem, f, (i,)).values(), default=0.0) for i in f.members]
+    return all(each > (NUISANCE_RMS if each > SLIGHT * max(sizes) else 1.0) for each in sizes)
+
+
+def _cancels(problem: Problem, f: Fitted) -> bool:
+    """Whether members undo each other nearly: by chance that hardly happens, but a fit of what is unknown seeks it."""
+    whole = signal_rms(problem, f)
+    each = [signal_rms(problem, f, (i,)) for i in f.members]
+    return any(one[kind] > max(1.0, CANCELLING * whole[kind]) for one in each for kind in whole)
+
+
+def _same_name(problem: Problem, members: Members, every: list[int]) -> list[Members]:
+    """The leader's effect at its other targets: right effect, wrong actuator, is the mistake to exclude first."""
+    names = {problem.columns.candidates[i].name for i in members}
+    return [(i,) for i in every if problem.columns.candidates[i].name in names]
+
+
+def _fit_best(found, fit, count: int, best: float) -> None:  # type: ignore[no-untyped-def]
+    tried: set[Members] = set()
+    for v, members, near in sorted(found, key=lambda each: -each[0]):
+        if members in tried or v < best - 12.0 or len(tried) >= count:
+            continue
+        tried.add(members)
+        fit(members, near)
+
+
+def _prune(problem: Problem, fits: tuple[Fitted, ...], probability: Floats) -> tuple[tuple[Fitted, ...], Floats]:
+    """Scores the leaders on runs not used for fitting; a set that predicts worse than the same set less a member goes."""
+    if len(problem.bench.runs) < 2:
+        return fits, probability
+    keep = list(range(len(fits)))
+    for j in list(np.argsort(-probability)[:4]):
+        f = fits[j]
+        if not f.members or probability[j] < 0.02:
+            continue
+        smaller = [tuple(x for x in f.members if x != i) for i in f.members]
+        scores = predictive(f.grams, problem.prior, problem.candidates, [f.members, *smaller])
+        if scores[0] < scores[1:].max() - HARM_LOG:
+            keep.remove(j)
+    kept = tuple(fits[j] for j in keep)
+    return kept, probability[keep] / probability[keep].sum()
+
+
+def _same(problem: Problem, fits: tuple[Fitted, ...], probability: Floats) -> list[tuple[Members, Members]]:
+    """Pairs of the leader and a set of its size that fits as well, whatever the priors say of them."""
+    best = fits[int(np.argmax(probability))]
+    found = []
+    for f in fits:
+        if f is best or len(f.members) != len(best.members) or not best.members:
+            continue
+        if misfit(problem, f) - misfit(problem, best) < SAME_FIT and _plausible(problem, f):
+            found.append((best.members, f.members))
+    return found
+
+
+def misfit(problem: Problem, f: Fitted) -> float:
+    """Chi-square left when the members are free and everything else stays within tolerance, penalties included."""
+    data: Gram = total(f.grams)
+    index = problem.member_columns(f.members)
+    mean, _ = estimate(data, problem.prior, index, 1.0)
+    return data.c - float(data.b @ mean)
+
+
+def _plausible(problem: Problem, f: Fitted) -> bool:
+    parameters = [p for i in f.members for p in problem.columns.candidates[i].parameters]
+    return all(abs(t) < 8.0 and (p.sign == 0 or t > 0) for t, p in zip(f.theta, parameters, strict=True))

@@ -1,0 +1,139 @@
+"""Searching the sets of up to three causes: all sets that look good linearly, re-fitted through the twin, then ranked.
+
+The search knows grams, priors and numbers of candidates; what an candidate is, and how it is re-fitted, its caller says.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import combinations
+
+import numpy as np
+from scipy.special import logsumexp
+
+from camcomp.diagnosis.statistics.evidence import (
+    TOLERANCE_LOG,
+    TOLERANCES,
+    Base,
+    Gram,
+    Prior,
+    base,
+    log_bayes,
+    log_bayes_pairs,
+)
+from camcomp.ground.datatypes import Floats
+
+Members = tuple[int, ...]
+SIZES = (0.5, 0.35, 0.12, 0.03)  # prior probability of 0, 1, 2 and 3 causes
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """A set of causes with the evidence for it. theta (d,): coordinates of its columns in units of their scales."""
+
+    members: Members
+    theta: Floats
+    covariance: Floats
+    log_evidence: float
+    grams: tuple[Gram, ...]  # per run, about the fit, in absolute coordinates
+    extra: Mapping[int, Mapping[str, float]] = field(default_factory=dict)  # scanned shapes by candidate
+    factor: float = 1.0  # the tolerances, as far off as the data have them
+    white: tuple[Floats, ...] = ()  # per run (w, d), the members' columns at the fit
+    residual: tuple[Floats, ...] = ()  # per run (w,), in absolute coordinates
+
+
+@dataclass(frozen=True, eq=False)
+class CausePrior:
+    """Columns of every candidate, and the log prior weight of each as a member."""
+
+    columns: tuple[tuple[int, ...], ...]
+    weight: Floats
+    exclusive: Callable[[int, int], bool]  # whether two candidates make no sense together
+
+    def prior(self, members: Members) -> float:
+        """Log prior probability of a set."""
+        d = len(members)
+        if d == 0:
+            return float(np.log(SIZES[0]))
+        orders = float(np.log(np.arange(1, d + 1)).sum())
+        return float(np.log(SIZES[d]) + orders + sum(self.weight[i] for i in members))
+
+
+def total(grams: Sequence[Gram]) -> Gram:
+    """Sum over runs."""
+    out = grams[0]
+    for each in grams[1:]:
+        out = out + each
+    return out
+
+
+class Scale:
+    """Evidence of sets of candidates for one gram, averaged over how far off the tolerances may be."""
+
+    def __init__(self, data: Gram, prior: Prior, candidates: CausePrior) -> None:
+        self.prior, self.candidates = prior, candidates
+        self.bases: list[Base] = [base(data, prior, f) for f in TOLERANCES]
+
+    def __call__(self, members: Members) -> float:
+        """Log evidence of a set."""
+        values = self._by_tolerance(members)
+        return float(logsumexp(values) - np.log(len(values)))
+
+    def factor(self, members: Members) -> float:
+        """How far off the tolerances most likely are, given a set."""
+        return TOLERANCES[int(np.argmax(self._by_tolerance(members)))]
+
+    def _by_tolerance(self, members: Members) -> list[float]:
+        sets = [self.candidates.columns[i] for i in members]
+        return [
+            b.log_evidence + odds + (log_bayes(b, self.prior, sets) if sets else 0.0)
+            for b, odds in zip(self.bases, TOLERANCE_LOG, strict=True)
+        ]
+
+
+def predictive(grams: Sequence[Gram], prior: Prior, candidates: CausePrior, sets: Sequence[Members]) -> Floats:
+    """Sum over runs of the log density of a run given the others (s,), for every set; one run only: its evidence."""
+    everything = total(grams)
+    whole = Scale(everything, prior, candidates)
+    full = np.array([whole(each) for each in sets])
+    if len(grams) == 1:
+        return full
+    out = np.zeros(len(sets))
+    for g in grams:
+        rest = Scale(everything - g, prior, candidates)
+        out += full - np.array([rest(each) for each in sets])
+    return out
+
+
+def extensions(scale: Scale, members: Members, candidates: Sequence[int]) -> list[tuple[float, Members]]:
+    """The set with one more candidate each: (log evidence + log prior, set), best first."""
+    found = []
+    for i in candidates:
+        if i in members or any(scale.candidates.exclusive(i, j) for j in members):
+            continue
+        more = tuple(sorted((*members, i)))
+        found.append((scale(more) + scale.candidates.prior(more), more))
+    return sorted(found, reverse=True)
+
+
+def pairs(scale: Scale, candidates: Sequence[int], most: int) -> list[tuple[float, Members]]:
+    """The best sets of two, best first: screened at the stated tolerances, then scored."""
+    two = [each for each in combinations(sorted(candidates), 2) if not scale.candidates.exclusive(*each)]
+    single = [len(scale.candidates.columns[a]) == len(scale.candidates.columns[b]) == 1 for a, b in two]
+    at = scale.bases[TOLERANCES.index(1.0)]
+    rough = np.empty(len(two))
+    fast = np.flatnonzero(single)
+    if len(fast):
+        first = np.array([scale.candidates.columns[two[k][0]][0] for k in fast])
+        second = np.array([scale.candidates.columns[two[k][1]][0] for k in fast])
+        rough[fast] = log_bayes_pairs(at, scale.prior, first, second)
+    for k in np.flatnonzero(~np.array(single, bool)):
+        rough[k] = log_bayes(at, scale.prior, [scale.candidates.columns[i] for i in two[k]])
+    rough += [scale.candidates.prior(each) for each in two]
+    best = [two[k] for k in np.argsort(-rough)[:most]]
+    return sorted(((scale(each) + scale.candidates.prior(each), each) for each in best), reverse=True)
+
+
+def probabilities(fits: Sequence[Fitted], candidates: CausePrior, temperature: float = 1.0) -> Floats:
+    """Posterior probability of every set among those fitted."""
+    value = np.array([f.log_evidence / temperature + candidates.prior(f.members) for f in fits])
+    return np.exp(value - logsumexp(value))

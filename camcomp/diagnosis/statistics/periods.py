@@ -1,0 +1,147 @@
+"""What repeats in the gap: with the turn of a screw, or in time at one frequency.
+
+Sines of every period are fitted by least squares beside a smooth trend; a line counts where chance would not make it
+among all the periods tried. A screw's line has to be there in both directions of travel, a vibration's in runs of
+different speed. Source: least-squares spectra (Scargle, Astrophysical Journal 263, 1982), Bonferroni over periods.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from camcomp.diagnosis.statistics.places import RunGap
+from camcomp.ground.datatypes import Floats
+
+_CHANCE = 1e-3
+_TREND = 4  # terms of the polynomial that is taken out with the sines
+_LEAST_TURNS = 2.5  # periods on the travel below which a line is a trend
+_PER_PERIOD = 2.5  # rows a period needs
+_STANDS_OUT = 0.2  # share of what the trend leaves
+_AT_ONCE = 1_000_000  # values held in memory
+_AGREE = 0.6  # by how much both directions may differ, in units of their sum
+
+
+@dataclass(frozen=True, eq=False)
+class SpectralLine:
+    """A sine in the gap: whose (actuator or axis), its period (mm) or frequency (Hz), amplitude mm, share of the energy."""
+
+    name: str
+    at: float
+    amplitude: float
+    share: float
+
+
+def _trend(x: Floats, signs: Floats | None) -> Floats:
+    """Columns (n, k) of what is smooth in x (n,), apart for each direction of travel."""
+    span = max(float(np.ptp(x)), 1e-9)
+    u = 2.0 * (x - x.min()) / span - 1.0
+    powers = u[:, None] ** np.arange(_TREND)
+    return powers if signs is None else np.concatenate([powers, powers * signs[:, None]], axis=1)
+
+
+def _spectrum(y: Floats, x: Floats, frequencies: Floats, trend: Floats) -> tuple[Floats, float]:
+    """Energy (f,) that sines of x at each frequency explain of y (n,) beside the trend, and the energy there is."""
+    Q, _ = np.linalg.qr(trend)
+    rest = y - Q @ (Q.T @ y)
+    found = [np.zeros(0)]
+    for part in np.array_split(frequencies, max(len(frequencies) * len(x) // _AT_ONCE, 1)):
+        turn = 2.0 * np.pi * x[:, None] * part
+        waves = np.stack([np.sin(turn), np.cos(turn)], axis=2)  # (n, f, 2)
+        waves = waves - np.tensordot(Q, np.tensordot(Q, waves, axes=(0, 0)), axes=(1, 0))
+        M = np.einsum("nfi,nfj->fij", waves, waves)
+        M = M + (1e-9 * np.trace(M, axis1=1, axis2=2)[:, None, None] + 1e-30) * np.eye(2)
+        b = np.einsum("nfi,n->fi", waves, rest)
+        found.append(np.einsum("fi,fi->f", b, np.linalg.solve(M, b[:, :, None])[:, :, 0]))
+    return np.concatenate(found), float(rest @ rest)
+
+
+def _log_chance(explained: Floats, energy: float, rows: float) -> Floats:
+    """Log of the chance that noise of `rows` independent rows leaves so little unexplained, per frequency."""
+    left = np.clip(1.0 - explained / max(energy, 1e-300), 1e-12, 1.0)
+    return 0.5 * max(rows - 2.0, 0.0) * np.log(left)
+
+
+def screws(runs: Sequence[RunGap], names: Sequence[str]) -> list[SpectralLine]:
+    """Lines at one period of an actuator's own travel, the gap read as motion of its carriage."""
+    found = []
+    for j, name in enumerate(names):
+        y = np.concatenate([r.drives[:, j] for r in runs])
+        x = np.concatenate([r.position[:, j] for r in runs])
+        sign = np.concatenate([np.sign(r.direction[:, j]) for r in runs])
+        steps = np.concatenate([np.abs(np.diff(r.position[:, j])) for r in runs if len(r.time) > 1] or [np.zeros(1)])
+        span, step = float(np.ptp(x)), float(np.quantile(steps, 0.9))
+        if span <= 0.0 or step <= 0.0 or len(y) < 30:
+            continue
+        thin = float(np.mean([r.thin for r in runs]))
+        frequencies = np.arange(_LEAST_TURNS / span, min(1.0 / (_PER_PERIOD * step), 2.0), 0.25 / span)
+        if len(frequencies) == 0:
+            continue
+        explained, energy = _spectrum(y, x, frequencies, _trend(x, sign))
+        best = int(np.argmax(explained))
+        log_chance = _log_chance(explained, energy, len(y) / thin)[best] + np.log(len(frequencies) * len(names))
+        if log_chance > np.log(_CHANCE) or explained[best] < _STANDS_OUT * energy:
+            continue
+        f = _finer(y, x, frequencies, best, _trend(x, sign))
+        ways = [_wave(y[sign * s > 0], x[sign * s > 0], f) for s in (1.0, -1.0) if (sign * s > 0).sum() > 15]
+        if len(ways) < 2 or abs(ways[0] - ways[1]) > _AGREE * (abs(ways[0]) + abs(ways[1])):
+            continue
+        found.append(
+            SpectralLine(name, 1.0 / f, abs(sum(ways)) / 2.0, float(explained[best]) / max(_whole(runs), 1e-300))
+        )
+    return sorted(found, key=lambda line: -line.share)
+
+
+def frequencies(runs: Sequence[RunGap], names: Sequence[str]) -> list[SpectralLine]:
+    """Lines at one frequency in time, in the channels of the gap; phases differ from run to run."""
+    found = []
+    for j, name in enumerate(names):
+        parts = []
+        for r in runs:
+            known = np.isfinite(r.gap[:, j])
+            if known.sum() > 30:
+                parts.append((r.gap[known, j], r.time[known], r.thin))
+        if not parts:
+            continue
+        shortest = min(float(np.ptp(t)) for _, t, _ in parts)
+        step = max(float(np.median(np.diff(t))) for _, t, _ in parts)
+        tried = np.arange(
+            _LEAST_TURNS / shortest, 1.0 / (_PER_PERIOD * step), 0.25 / max(float(np.ptp(t)) for _, t, _ in parts)
+        )
+        if len(tried) == 0:
+            continue
+        logs, shares, energies = np.zeros(len(tried)), [], np.zeros(len(tried))
+        for y, t, thin in parts:
+            explained, energy = _spectrum(y, t, tried, _trend(t, None))
+            logs += _log_chance(explained, energy, len(y) / thin)
+            shares.append(explained / max(energy, 1e-300))
+            energies += explained
+        common = np.median(shares, axis=0)
+        best = int(np.argmax(common))
+        if common[best] < _STANDS_OUT or logs[best] + np.log(len(tried) * len(names)) > np.log(_CHANCE):
+            continue
+        f = float(tried[best])
+        size = np.mean([abs(_wave(y, t, f)) for y, t, _ in parts])
+        found.append(
+            SpectralLine(
+                name, f, float(size), float(energies[best]) / max(sum(float(np.nansum(r.gap**2)) for r in runs), 1e-300)
+            )
+        )
+    return sorted(found, key=lambda line: -line.share)
+
+
+def _whole(runs: Sequence[RunGap]) -> float:
+    return sum(float((r.drives**2).sum()) for r in runs)
+
+
+def _finer(y: Floats, x: Floats, tried: Floats, best: int, trend: Floats) -> float:
+    step = tried[1] - tried[0] if len(tried) > 1 else 0.05 * tried[0]
+    near = tried[best] + step * np.linspace(-1.0, 1.0, 21)
+    return float(near[int(np.argmax(_spectrum(y, x, near, trend)[0]))])
+
+
+def _wave(y: Floats, x: Floats, f: float) -> complex:
+    """Amplitude and phase of the sine at frequency f in y (n,) over x (n,), beside a trend."""
+    columns = np.column_stack([np.sin(2 * np.pi * f * x), np.cos(2 * np.pi * f * x), _trend(x, None)])
+    a = np.linalg.lstsq(columns, y, rcond=1e-9)[0]
+    return complex(a[0], a[1])

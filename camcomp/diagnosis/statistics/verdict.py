@@ -1,0 +1,46 @@
+"""From ranked sets of causes to a verdict: none, identified, ambiguous or unknown."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from camcomp.diagnosis.statistics.cause_sets import Fitted, Members
+from camcomp.ground.datatypes import Floats
+
+EQUAL_LOG_ODDS = 3.0  # log odds within which two sets are told apart by nobody
+
+
+@dataclass(frozen=True, eq=False)
+class Verdict:
+    """word: none | identified | ambiguous | unknown. best: index of the leading set. rivals: indices of sets that explain
+    the data alike. inclusion: probability of every candidate that any fitted set has.
+    """
+
+    word: str
+    best: int
+    rivals: tuple[int, ...]
+    inclusion: dict[int, float]
+
+
+def judge(fits: Sequence[Fitted], probability: Floats, twins: Sequence[tuple[Members, Members]]) -> Verdict:
+    """Fits with their probabilities; twins: pairs of sets that the data cannot tell apart whatever their prior."""
+    order = np.argsort(-probability)
+    best = int(order[0])
+    leader = fits[best]
+    inclusion: dict[int, float] = {}
+    for fit, p in zip(fits, probability, strict=True):
+        for i in fit.members:
+            inclusion[i] = inclusion.get(i, 0.0) + float(p)
+    if not leader.members:
+        return Verdict("none", best, (), inclusion)
+    rivals = []
+    for j in order[1:]:
+        fit = fits[j]
+        alike = np.log(max(probability[best], 1e-300)) - np.log(max(probability[j], 1e-300)) < EQUAL_LOG_ODDS
+        alike = alike or (leader.members, fit.members) in twins or (fit.members, leader.members) in twins
+        # A set with a superfluous member, or one too few, is no rival but the same answer less well put.
+        nested = set(fit.members) >= set(leader.members) or set(fit.members) <= set(leader.members)
+        if alike and not nested and len(fit.members) <= len(leader.members):
+            rivals.append(int(j))
+    return Verdict("ambiguous" if rivals else "identified", best, tuple(rivals), inclusion)

@@ -1,0 +1,106 @@
+"""Errors a user can act on: each has a rule id, a place in a file, a hint, and the exit code of its family.
+
+Several mistakes of one file travel together: the first is raised and carries the `others`.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+from camcomp.ground.rules import RULES
+
+
+@dataclass(frozen=True)
+class Location:
+    """A place in a text file; `line` and `column` count from 1, `source` is the text of that line."""
+
+    file: str
+    line: int
+    column: int
+    source: str = ""
+
+
+class CamcompError(Exception):
+    """Base of every error that is the input's fault, not the program's. Only its subclasses are raised."""
+
+    exit_code: ClassVar[int]
+
+    def __init__(
+        self,
+        rule: str,
+        message: str,
+        *,
+        at: Location | None = None,
+        hint: str | None = None,
+        others: Sequence["CamcompError"] = (),
+    ) -> None:
+        super().__init__(message)
+        self.rule = rule
+        self.message = message
+        self.at = at
+        self.hint = hint or RULES[rule].hint or f"`camcomp explain {rule}` says more"
+        self.others = tuple(others)
+
+    def all(self) -> tuple["CamcompError", ...]:
+        """This error and those found with it, in the order in which they were found."""
+        return (self, *(each for other in self.others for each in other.all()))
+
+
+class CheckFailed(CamcompError):
+    """The work is finished, and a check says no (residual, limit, already compensated)."""
+
+    exit_code = 1
+
+
+class ConfigError(CamcompError):
+    """Usage, YAML or experiment file."""
+
+    exit_code = 2
+
+
+class ProgramError(CamcompError):
+    """NC program not readable or not supported."""
+
+    exit_code = 3
+
+
+class PhysicsError(CamcompError):
+    """No convergence, unreachable, singular or not stable."""
+
+    exit_code = 4
+
+
+class FileError(CamcompError):
+    """A file cannot be read or written."""
+
+    exit_code = 5
+
+
+def raise_all(errors: Sequence[CamcompError]) -> None:
+    """Raise the first of `errors` with the rest attached; do nothing when there is none."""
+    if errors:
+        first, *rest = errors
+        first.others = (*first.others, *rest)
+        raise first
+
+
+_RED, _BOLD, _CYAN, _OFF = "\033[31;1m", "\033[1m", "\033[36m", "\033[0m"
+
+
+def format_error(error: CamcompError, color: bool = False) -> str:
+    """Text for a person: one block per error, `file:line:col: error[id]: text`, the line with a caret, the hint."""
+    red, bold, cyan, off = (_RED, _BOLD, _CYAN, _OFF) if color else ("", "", "", "")
+    blocks = []
+    for each in error.all():
+        at = each.at
+        place = f"{at.file}:{at.line}:{at.column}" if at else "camcomp"
+        block = [f"{bold}{place}:{off} {red}error[{each.rule}]{off}: {each.message}"]
+        if at and at.source.strip():
+            source = at.source.rstrip("\r\n")
+            # Tabs stay tabs under the line, so that the caret stands below its character.
+            padding = "".join(c if c == "\t" else " " for c in source[: at.column - 1])
+            block += [f"  {source}", f"  {padding}{red}^{off}"]
+        if each.hint:
+            block.append(f"  {cyan}hint:{off} {each.hint}")
+        blocks.append("\n".join(block))
+    return "\n".join(blocks)

@@ -1,0 +1,201 @@
+"""YAML files to checked specs and plug-ins. Every mistake of every file is reported at once."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import Field, create_model
+
+from camcomp.ground import shelf
+from camcomp.ground.errors import CamcompError, ConfigError, FileError, Location, raise_all
+from camcomp.ground.files import display_name, read_bytes
+from camcomp.model.config.base import Spec
+from camcomp.model.config.robot import RobotSpec
+from camcomp.model.config.spec import Config, Experiment
+from camcomp.model.config.yaml_check import check, choose
+from camcomp.model.config.yaml_tree import Node, merge, plain, read_tree
+
+ROBOT_KEYS = (
+    "name",
+    "source",
+    "start_reference_mm",
+)  # belong to the robot, whatever plug-in builds its chains
+
+_NO_FORCE = Node({"model": Node("none", Location("", 1, 1))}, Location("", 1, 1))
+
+
+def load_config(paths: Sequence[Path | str]) -> Config:
+    """The configuration that `paths` make together: later files over earlier ones, key by key.
+
+    Raises ConfigError (exit code 2) with every mistake of every file, FileError (5) when a file cannot be read.
+    """
+    tree, errors = _read_merged(paths)
+    if tree is None:
+        _raise(errors)
+        raise ConfigError("CC212", "no configuration is given", hint="name one with --config FILE")
+    if _get(tree, "robot") is None:
+        errors.append(ConfigError("CC212", "there is no section 'robot'", at=tree.at))
+    config, more = _check_config(tree)
+    _raise([*errors, *more])
+    assert config is not None
+    return config
+
+
+def check_config(paths: Sequence[Path | str]) -> None:
+    """Raise what is wrong with `paths`, which need not be complete.
+
+    Without the name of a robot they are overrides of some machine file, where any key may be missing.
+    """
+    tree, errors = _read_merged(paths)
+    more = _check_config(tree)[1] if tree is not None else []
+    if _get(tree, "robot", "name") is None:
+        more = [each for each in more if each.rule != "CC203"]
+    _raise([*errors, *more])
+
+
+def load_experiment(path: Path | str) -> Experiment:
+    """An experiment file, its paths resolved against its own folder. Raises as load_config."""
+    tree, errors = _read_merged([path])
+    experiment, more = check(Experiment, tree) if tree is not None else (None, [])
+    _raise([*errors, *more])
+    assert experiment is not None
+    folder = Path(path).parent
+    runs = [
+        run.model_copy(update={"log": str(folder / run.log), "program": run.program and str(folder / run.program)})
+        for run in experiment.runs
+    ]
+    return experiment.model_copy(update={"config": [str(folder / each) for each in experiment.config], "runs": runs})
+
+
+def is_experiment(data: bytes) -> bool:
+    """Whether YAML text is an experiment file: it has `runs` and no `robot`."""
+    return bool(re.search(rb"^(\xef\xbb\xbf)?runs\s*:", data, re.MULTILINE)) and not re.search(
+        rb"^robot\s*:", data, re.MULTILINE
+    )
+
+
+def _raise(errors: Sequence[CamcompError]) -> None:
+    """Raise all errors: files that cannot be read first, then file by file from top to bottom."""
+
+    def place(error: CamcompError) -> tuple[int, int, int]:
+        return (files.index(error.at.file), error.at.line, error.at.column) if error.at else (-1, 0, 0)
+
+    files = list(dict.fromkeys(error.at.file for error in errors if error.at))
+    raise_all(sorted(errors, key=place))
+
+
+def _read_merged(paths: Sequence[Path | str]) -> tuple[Node | None, list[CamcompError]]:
+    merged: Node | None = None
+    errors: list[CamcompError] = []
+    for path in paths:
+        try:
+            tree, more = read_tree(read_bytes(path), display_name(path))
+        except FileError as error:
+            errors.append(error)
+            continue
+        errors += more
+        if tree is not None:
+            merged = tree if merged is None else merge(merged, tree)
+    return merged, errors
+
+
+def _check_config(tree: Node) -> tuple[Config | None, list[CamcompError]]:
+    data, skip = plain(tree), []
+    errors: list[CamcompError] = []
+    robot = _get(tree, "robot")
+    if robot is not None and _get(robot, "type") is not None:
+        data["robot"], errors = _robot_from_plugin(robot)
+    if not isinstance(data, dict) or data.get("robot") is None:
+        skip = ["robot"]  # missing in a file of overrides, or its own errors are known already
+    config, more = check(Config, tree, data, skip=skip)
+    errors += more
+    force, more = _plugin("forces", "model", _get(tree, "process", "force") or _NO_FORCE, name="process.force")
+    errors += more
+    entries = _get(tree, "effects")
+    listed = entries.value if entries is not None and isinstance(entries.value, list) else []
+    effects = [
+        _plugin("effects", "effect", entry, name=f"effects[{i + 1}]", also=("target",))
+        for i, entry in enumerate(listed)
+    ]
+    errors += [each for _, more in effects for each in more]
+    errors += _dialect(_get(tree, "control", "dialect"))
+    if config is None or errors:
+        return None, errors
+    config._tree = tree
+    config.process.force._params = force
+    for choice, (params, _) in zip(config.effects, effects, strict=True):
+        choice._params = params
+    return config, _check_targets(config)
+
+
+def _robot_from_plugin(node: Node) -> tuple[RobotSpec | None, list[CamcompError]]:
+    if "chains" in node.value:
+        message = "a robot is given by its type or by its chains, not by both"
+        return None, [ConfigError("CC215", message, at=node.value["chains"].key_at)]
+    params, errors = _plugin("robots", "type", node, name="robot", also=ROBOT_KEYS)
+    if params is None or errors:
+        return None, errors
+    chains = shelf.load("robots", node.value["type"].value).chains(params)
+    own = {key: plain(node.value[key]) for key in ROBOT_KEYS if key in node.value}
+    robot, errors = check(RobotSpec, node, {**own, "chains": chains})
+    return robot and robot.model_copy(update={"type": node.value["type"].value}), errors
+
+
+def _plugin(
+    shelf_name: str, key: str, node: Node | None, *, name: str = "", also: Sequence[str] = ()
+) -> tuple[Any, list[CamcompError]]:
+    """Parameters of the plug-in that `node` names under `key`, as its own spec; None when it has none."""
+    chosen = _get(node, key)
+    if node is None or chosen is None or not isinstance(chosen.value, str):
+        return None, []  # missing or mistyped: the spec of the section says so
+    try:
+        member = shelf.load(shelf_name, chosen.value, at=chosen.at)
+    except ConfigError as error:
+        return None, [error]
+    own = {each: below for each, below in node.value.items() if each not in (key, *also)}
+    return check(params_of(member), replace(node, value=own), name=name)
+
+
+def _dialect(chosen: Node | None) -> list[CamcompError]:
+    names = shelf.members("dialects")
+    if chosen is None or not isinstance(chosen.value, str) or chosen.value in names:
+        return []
+    message = f"there is no dialect called '{chosen.value}'"
+    return [ConfigError("CC213", message, at=chosen.at, hint=choose(chosen.value, names))]
+
+
+def params_of(member: Any) -> type[Spec]:
+    """A plug-in's spec: its class Params, or one made from the records PARAMETERS of an effect."""
+    if hasattr(member, "PARAMETERS"):
+        fields: dict[str, Any] = {
+            each.name: (Annotated[float, Field(ge=each.low, le=each.high)], each.nominal) for each in member.PARAMETERS
+        }
+        return create_model("Parameters", __base__=Spec, **fields)
+    return member.Params
+
+
+def _check_targets(config: Config) -> list[CamcompError]:
+    """Whether every effect has the target it needs: an actuator of this robot, or none."""
+    names = list(config.robot.actuators)
+    errors: list[CamcompError] = []
+    for i, each in enumerate(config.effects):
+        at = config.at("effects", i, "target" if each.target is not None else "effect")
+        kind = getattr(shelf.load("effects", each.effect), "TARGET", "either")
+        if each.target is not None and each.target not in names:
+            message, hint = f"there is no actuator '{each.target}'", choose(each.target, names)
+        elif kind == "actuator" and each.target is None:
+            message, hint = f"'{each.effect}' needs a target", f"add target: one of {', '.join(names)}"
+        elif kind == "machine" and each.target is not None:
+            message, hint = f"'{each.effect}' concerns the machine as a whole", "leave the target out"
+        else:
+            continue
+        errors.append(ConfigError("CC205", f"effects[{i + 1}]: {message}", at=at, hint=hint))
+    return errors
+
+
+def _get(node: Node | None, *keys: str) -> Node | None:
+    for key in keys:
+        node = node.value.get(key) if node is not None and isinstance(node.value, dict) else None
+    return node

@@ -1,0 +1,235 @@
+"""YAML specs of a robot: chains of elements from the base to the platform. mm, N, rad; degrees only in `_deg` keys.
+
+Elements stand in chain order and in the local frame left by the elements before them. Joints offer `stiffness`, `home`,
+`limits`, `rest`, `start` in mm or rad whatever their kind, so that nobody else needs to look at the unit of a key.
+"""
+
+from math import radians
+from typing import Annotated, ClassVar, Literal
+
+from pydantic import Field, model_validator
+from pydantic_core import PydanticCustomError
+
+from camcomp.model.config.base import Axis, AxisLetter, Limits, Name, Positive, Spec, Vector, Zero
+from camcomp.model.config.links import Spring
+
+# ---------------------------------------------------------------------------------------------------------------------
+# elements
+
+
+class TransformSpec(Spec):
+    """A rigid step: first the translation, then the rotation (rotation vector), both in the frame before it."""
+
+    type: Literal["transform"]
+    translation_mm: Vector = Zero
+    rotation_deg: Vector = Zero
+
+
+class _Prismatic(Spec):
+    joint: Literal["prismatic"]
+    axis: Axis
+    stiffness_N_per_mm: Positive | None = None
+    rotary: ClassVar[bool] = False
+
+    @property
+    def stiffness(self) -> float | None:
+        """N/mm; None = rigid drive, or free passive joint."""
+        return self.stiffness_N_per_mm
+
+
+class _Revolute(Spec):
+    joint: Literal["revolute"]
+    axis: Axis
+    stiffness_Nmm_per_rad: Positive | None = None
+    rotary: ClassVar[bool] = True
+
+    @property
+    def stiffness(self) -> float | None:
+        """N mm/rad; None = rigid drive, or free passive joint."""
+        return self.stiffness_Nmm_per_rad
+
+
+class PrismaticActuator(_Prismatic):
+    """Driven slide; without a stiffness its drive is rigid."""
+
+    type: Literal["actuator"]
+    name: Name | None = Field(None, description="default: the name of the chain")
+    home_mm: float = 0.0
+    start_mm: float | None = Field(None, description="position in the start pose of an arm; default: home_mm")
+    limits_mm: Limits | None = None
+
+    @property
+    def home(self) -> float:
+        """Position of the home switch, mm."""
+        return self.home_mm
+
+    @property
+    def start(self) -> float | None:
+        """Position in the start pose, mm; None = home."""
+        return self.start_mm
+
+    @property
+    def limits(self) -> tuple[float, float] | None:
+        """Travel, mm."""
+        return (self.limits_mm[0], self.limits_mm[1]) if self.limits_mm else None
+
+
+class RevoluteActuator(_Revolute):
+    """Driven hinge; without a stiffness its drive is rigid."""
+
+    type: Literal["actuator"]
+    name: Name | None = Field(None, description="default: the name of the chain")
+    home_deg: float = 0.0
+    start_deg: float | None = Field(
+        None, description="angle in the start pose, which fixes the branch of an arm; default: home_deg"
+    )
+    limits_deg: Limits | None = None
+
+    @property
+    def home(self) -> float:
+        """Position of the home switch, rad."""
+        return radians(self.home_deg)
+
+    @property
+    def start(self) -> float | None:
+        """Angle in the start pose, rad; None = home."""
+        return None if self.start_deg is None else radians(self.start_deg)
+
+    @property
+    def limits(self) -> tuple[float, float] | None:
+        """Travel, rad."""
+        return (radians(self.limits_deg[0]), radians(self.limits_deg[1])) if self.limits_deg else None
+
+
+class PrismaticPassive(_Prismatic):
+    """Free slide; with a stiffness a spring that rests at `rest_mm`."""
+
+    type: Literal["passive"]
+    rest_mm: float = 0.0
+    start_mm: float = Field(0.0, description="guess of its position at robot.start_reference_mm")
+
+    @property
+    def rest(self) -> float:
+        """Where its spring is relaxed, mm."""
+        return self.rest_mm
+
+    @property
+    def start(self) -> float:
+        """Guess at the start reference, mm."""
+        return self.start_mm
+
+
+class RevolutePassive(_Revolute):
+    """Free hinge; with a stiffness a spring that rests at `rest_deg`."""
+
+    type: Literal["passive"]
+    rest_deg: float = 0.0
+    start_deg: float = Field(0.0, description="guess of its angle at robot.start_reference_mm")
+
+    @property
+    def rest(self) -> float:
+        """Where its spring is relaxed, rad."""
+        return radians(self.rest_deg)
+
+    @property
+    def start(self) -> float:
+        """Guess at the start reference, rad."""
+        return radians(self.start_deg)
+
+
+class LinkSpec(Spring):
+    """An elastic link: a 6-dof spring at this place of the chain, without length."""
+
+    type: Literal["link"]
+
+
+class ParallelogramSpec(Spec):
+    """Two equal bars between hinges: the arm turns about `hinge`, the cross-bar keeps its orientation."""
+
+    type: Literal["parallelogram"]
+    arm_mm: Vector
+    hinge: AxisLetter
+    crossbar: AxisLetter
+    width_mm: Positive
+    bar: Spring
+    start_deg: float = Field(0.0, description="guess of the arm's angle at robot.start_reference_mm")
+
+    @property
+    def start(self) -> float:
+        """Guess at the start reference, rad."""
+        return radians(self.start_deg)
+
+
+class WeightSpec(Spec):
+    """Weight of a link, along machine -z at `centre_mm` of the local frame."""
+
+    type: Literal["weight"]
+    force_N: Positive
+    centre_mm: Vector = Zero
+
+
+Actuator = Annotated[PrismaticActuator | RevoluteActuator, Field(discriminator="joint")]
+Passive = Annotated[PrismaticPassive | RevolutePassive, Field(discriminator="joint")]
+Element = Annotated[
+    TransformSpec | Actuator | Passive | LinkSpec | ParallelogramSpec | WeightSpec, Field(discriminator="type")
+]
+
+# ---------------------------------------------------------------------------------------------------------------------
+# chains and the robot
+
+
+class GeometricError(Spec):
+    """Where a part really is, against where it should be: translation, then rotation vector, in the chain's frame."""
+
+    translation_mm: Vector = Zero
+    rotation_deg: Vector = Zero
+
+
+class ChainSpec(Spec):
+    """Elements from the base to the platform in a local frame that permutes the machine's axes.
+
+    `frame: yzx` means: local x, y, z point along machine y, z, x. The platform end is turned back, so that at zero the
+    platform's frame is parallel to the machine's.
+    """
+
+    frame: Literal["xyz", "yzx", "zxy"] = "xyz"
+    base_error: GeometricError = Field(default_factory=lambda: GeometricError())
+    end_error: GeometricError = Field(default_factory=lambda: GeometricError())
+    elements: Annotated[list[Element], Field(min_length=1)]
+
+    def actuators(self, chain: str) -> dict[str, PrismaticActuator | RevoluteActuator]:
+        """The actuators in order by name; one that has no name of its own bears the name of the `chain`."""
+        found = [each for each in self.elements if isinstance(each, PrismaticActuator | RevoluteActuator)]
+        names = [each.name or chain for each in found]
+        for name in names:
+            if names.count(name) > 1:
+                raise PydanticCustomError("CC205", f"two actuators of chain '{chain}' are called '{name}'")
+        return dict(zip(names, found, strict=True))
+
+
+class RobotSpec(Spec):
+    """A machine: chains that all carry the same platform."""
+
+    name: str
+    type: str | None = Field(None, description="member of the shelf robots that builds the chains from its parameters")
+    chains: Annotated[dict[Name, ChainSpec], Field(min_length=1)]
+    start_reference_mm: Vector = Field(
+        default_factory=lambda: [0.0, 0.0, 0.0],
+        description="platform reference point at which the start guesses of the passive joints hold; an arm's start "
+        "pose follows from the start angles of its joints instead",
+    )
+
+    @model_validator(mode="after")
+    def _names(self) -> "RobotSpec":
+        names = [name for key, chain in self.chains.items() for name in chain.actuators(key)]
+        for name in names:
+            if names.count(name) > 1:
+                raise PydanticCustomError("CC205", f"two actuators of the robot are called '{name}'")
+        if not names:
+            raise PydanticCustomError("CC205", "no chain has an actuator")
+        return self
+
+    @property
+    def actuators(self) -> dict[str, PrismaticActuator | RevoluteActuator]:
+        """All actuators by name, chain by chain, base to platform."""
+        return {name: each for key, chain in self.chains.items() for name, each in chain.actuators(key).items()}

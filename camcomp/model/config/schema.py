@@ -1,0 +1,84 @@
+"""JSON schemas (draft-07) of the YAML files, plug-ins included, for editors."""
+
+from typing import Any
+
+from pydantic import BaseModel
+
+from camcomp.ground import shelf
+from camcomp.model.config.load import ROBOT_KEYS, params_of
+from camcomp.model.config.spec import Config, EffectChoice, Experiment, ForceChoice
+
+Schema = dict[str, Any]
+
+_DRAFT = "http://json-schema.org/draft-07/schema#"
+
+
+def config_schema() -> Schema:
+    """Schema of a machine file; the robot is not required, so that files of overrides pass."""
+    schema = _draft07(Config.model_json_schema(by_alias=True, ref_template="#/definitions/{model}"))
+    definitions = schema["definitions"]
+    del schema["required"]
+    general = definitions["Robot"]
+    del general["properties"]["type"]
+    shared = {key: general["properties"][key] for key in ROBOT_KEYS}
+    _offer(definitions, "Robot", "robots", "type", shared, ["name"], first=[general])
+    _offer(definitions, ForceChoice.__name__, "forces", "model", {}, [])
+    target = definitions[EffectChoice.__name__]["properties"]["target"]
+    _offer(definitions, EffectChoice.__name__, "effects", "effect", {"target": target}, [])
+    return {"$schema": _DRAFT, **schema, "title": "camcomp machine file"}
+
+
+def experiment_schema() -> Schema:
+    """Schema of an experiment file."""
+    schema = _draft07(Experiment.model_json_schema(by_alias=True, ref_template="#/definitions/{model}"))
+    return {"$schema": _DRAFT, **schema, "title": "camcomp experiment file"}
+
+
+def _offer(
+    definitions: Schema,
+    name: str,
+    shelf_name: str,
+    key: str,
+    shared: Schema,
+    required: list[str],
+    first: list[Schema] | None = None,
+) -> None:
+    """Replace a definition by one alternative per member of a shelf; users' own plug-ins are left to camcomp."""
+    options = list(first or [])
+    for member in shelf.members(shelf_name):
+        spec: type[BaseModel] = params_of(shelf.load(shelf_name, member))
+        # Two plug-ins may have classes of one name.
+        template = f"#/definitions/{shelf_name}.{member}.{{model}}"
+        one = _draft07(spec.model_json_schema(by_alias=True, ref_template=template))
+        definitions.update({f"{shelf_name}.{member}.{key}": each for key, each in one.pop("definitions", {}).items()})
+        one["title"] = member
+        one["properties"] = {key: {"const": member}, **shared, **one["properties"]}
+        one["required"] = [key, *required, *one.get("required", [])]
+        options.append(one)
+    definitions[name] = {"anyOf": options, "description": definitions[name].get("description", "")}
+
+
+def _draft07(value: Any) -> Any:
+    """Pydantic's schema (2020-12) in draft-07: `definitions`, nothing beside a `$ref`, no OpenAPI discriminators."""
+    if isinstance(value, list):
+        return [_draft07(each) for each in value]
+    if not isinstance(value, dict):
+        return value
+    out = {
+        "definitions" if key == "$defs" else key: _draft07(each)
+        for key, each in value.items()
+        if not (key == "discriminator" and isinstance(each, dict) and "propertyName" in each)
+    }
+    if isinstance(out.get("definitions"), dict):
+        out["definitions"] = {_noun(key): each for key, each in out["definitions"].items()}
+    for key in ("$ref", "title"):
+        if isinstance(out.get(key), str):
+            out[key] = _noun(out[key])
+    if isinstance(out.get("$ref"), str) and len(out) > 1:
+        return {"allOf": [{"$ref": out.pop("$ref")}], **out}
+    return out
+
+
+def _noun(name: str) -> str:
+    """A YAML mapping by what it describes: the class RobotSpec is called Robot outside."""
+    return name.removesuffix("Spec") or name

@@ -1,0 +1,205 @@
+"""YAML specs of the sections of a machine file, and of an experiment file."""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import ConfigDict, Field, PrivateAttr, model_validator
+from pydantic_core import PydanticCustomError
+
+from camcomp.ground.errors import Location
+from camcomp.model.config.base import NotNegative, Positive, Spec, Vector, Zero, exactly_one
+from camcomp.model.config.robot import RobotSpec
+from camcomp.model.config.yaml_tree import Node, find
+
+WorkOffset = Annotated[str, Field(pattern=r"^G5([5-9]|9\.[123])$")]
+ToolNumber = Annotated[int, Field(ge=0)]
+NotEmpty = Annotated[str, Field(min_length=1)]
+
+
+class Workpiece(Spec):
+    """Where G54 lies in the machine frame, and where the stock begins."""
+
+    origin_mm: Vector = Zero
+    rotation_deg: float | None = Field(None, description="about the tool axis (machine z)")
+    rotation_vector_deg: Vector | None = Field(None, description="rotation vector in machine axes")
+    stock_top_mm: float | None = Field(
+        None, description="height in the program frame; feed moves at or above it cut air"
+    )
+
+    @model_validator(mode="after")
+    def _one_rotation(self) -> "Workpiece":
+        if self.rotation_deg is not None or self.rotation_vector_deg is not None:
+            exactly_one(self, "rotation_deg", "rotation_vector_deg")
+        return self
+
+    @property
+    def rotation(self) -> list[float]:
+        """Rotation vector (3,) in degrees, program frame against machine frame."""
+        return self.rotation_vector_deg or [0.0, 0.0, self.rotation_deg or 0.0]
+
+
+class Tool(Spec):
+    """The tool in the spindle."""
+
+    length_mm: NotNegative | None = Field(None, description="along platform -z, from its reference point to the tip")
+    vector_mm: Vector | None = Field(None, description="from the tip to the platform reference point, in platform axes")
+    turn_deg: float | None = Field(
+        None,
+        description="of the platform's x axis from program X about the tool axis, for machines with six actuators; "
+        "default: what is nearest to the start pose",
+    )
+    diameter_mm: Positive | None = None
+    teeth: Annotated[int, Field(ge=1)] | None = None
+
+    @model_validator(mode="after")
+    def _one_length(self) -> "Tool":
+        if self.length_mm is not None and self.vector_mm is not None:
+            exactly_one(self, "length_mm", "vector_mm")
+        return self
+
+    @property
+    def tip(self) -> list[float]:
+        """Tip (3,) mm seen from the platform reference point, in platform axes."""
+        if self.vector_mm is not None:
+            return [-value for value in self.vector_mm]
+        return [0.0, 0.0, -(self.length_mm or 0.0)]
+
+
+class Choice(Spec):
+    """A plug-in chosen by name, with its own parameters beside the name.
+
+    `given` are these parameters as written; `params` the same as checked and completed by the plug-in's own spec.
+    """
+
+    model_config = ConfigDict(extra="allow")
+
+    _params: Any = PrivateAttr(None)
+
+    @property
+    def given(self) -> dict[str, Any]:
+        """The plug-in's own keys."""
+        return dict(self.model_extra or {})
+
+    @property
+    def params(self) -> Any:
+        """Instance of the plug-in's Params."""
+        return self._params
+
+
+class ForceChoice(Choice):
+    """Cutting-force model, a member of the shelf `forces`."""
+
+    model: str
+
+
+class EffectChoice(Choice):
+    """Something real the ideal model leaves out, a member of the shelf `effects`; target = actuator, or none."""
+
+    effect: str
+    target: str | None = None
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Every parameter of the effect by name; what the file leaves out has its nominal value."""
+        return self.params.model_dump(exclude={"source"})
+
+
+class Process(Spec):
+    """The cut."""
+
+    force: ForceChoice = Field(default_factory=lambda: ForceChoice(model="none"))
+    spindle_rpm: Positive | None = Field(None, description="used where the program has no S")
+    feed_mm_per_min: Positive | None = Field(None, description="used where the program has no F")
+    depth_mm: Positive | None = Field(None, description="axial depth of cut")
+    width_mm: Positive | None = Field(None, description="radial width of cut")
+    temperature_C: float | None = Field(
+        None, description="of the drives during the cut; without it they warm up from 20 when the program starts"
+    )
+
+
+class Control(Spec):
+    """The NC control: what the program text alone does not say."""
+
+    resolution_mm: Positive = 0.001
+    start_mm: Vector = Zero
+    dialect: str | None = Field(None, description="member of the shelf dialects; default: found from the text")
+    offsets_mm: dict[WorkOffset, Vector] = Field(
+        default_factory=dict,
+        description="origins of G55 to G59.3 in the machine frame, e.g. G55: [100, 0, 0]; that of G54 is "
+        "workpiece.origin_mm",
+    )
+    tool_number: ToolNumber = Field(0, description="tool in the spindle when the program starts")
+    tool_lengths_mm: dict[ToolNumber, float] = Field(
+        default_factory=dict, description="length offsets of G43 by tool number"
+    )
+    reference_positions_mm: dict[Literal["G28", "G30"], Vector] = Field(
+        default_factory=dict, description="machine coordinates to which G28 and G30 go"
+    )
+    table_axes: list[Literal["A", "B", "C"]] = Field(
+        default_factory=list,
+        description="rotary axes that turn the workpiece between cuts: lines that move nothing else pass unchanged",
+    )
+    block_delete: bool = Field(False, description="the switch is on: lines that start with / are not executed")
+    input_increment_mm: Positive | None = Field(
+        None,
+        description="worth of one unit in a number without decimal point (Fanuc IS-B: 0.001); missing = a number is in mm",
+    )
+    acceleration_mm_per_s2: Positive = 1500.0
+
+
+class Compensation(Spec):
+    """How the correction is found."""
+
+    method: Literal["newton", "stiffness", "fixed-point", "linear"] = "newton"
+    tolerance_um: Positive = 1.0
+    arcs: bool = Field(
+        False, description="programmed arcs come out as arcs (G2, G3) where those are fewer than straight lines"
+    )
+
+
+class Config(Spec):
+    """All sections of a machine file; several files make one Config, later keys win."""
+
+    robot: RobotSpec
+    workpiece: Workpiece = Field(default_factory=lambda: Workpiece())
+    tool: Tool = Field(default_factory=lambda: Tool())
+    process: Process = Field(default_factory=lambda: Process())
+    control: Control = Field(default_factory=lambda: Control())
+    compensation: Compensation = Field(default_factory=lambda: Compensation())
+    effects: list[EffectChoice] = Field(default_factory=list)
+
+    _tree: Node | None = PrivateAttr(None)
+
+    def at(self, *keys: str | int) -> Location | None:
+        """Where the value under these keys was written; the nearest mapping above it when it is a default."""
+        return find(self._tree, keys).at if self._tree is not None else None
+
+
+class RunSpec(Spec):
+    """One run of an experiment: a program, its log, and what was the same or different about it."""
+
+    name: NotEmpty
+    program: NotEmpty | None = None
+    log: NotEmpty
+    cutting: bool
+    started_s: float = 0.0
+    clamping: str | int | None = None
+    clock: str | int | None = None
+
+
+class Experiment(Spec):
+    """An experiment file; paths are relative to it as written and absolute once loaded."""
+
+    config: Annotated[list[NotEmpty], Field(min_length=1)]
+    runs: Annotated[list[RunSpec], Field(min_length=1)]
+    holdout: list[str] = Field(default_factory=list)
+
+    @model_validator(mode="after")
+    def _names(self) -> "Experiment":
+        names = [run.name for run in self.runs]
+        for name in names:
+            if names.count(name) > 1:
+                raise PydanticCustomError("CC205", f"two runs are called '{name}'")
+        for name in self.holdout:
+            if name not in names:
+                raise PydanticCustomError("CC205", f"holdout names '{name}', and there is no such run")
+        return self

@@ -1,0 +1,71 @@
+"""Causes into a machine file: the YAML text gains entries under `effects:`; its comments and layout stay."""
+
+import io
+import os
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from ruamel.yaml import YAML
+from ruamel.yaml.comments import CommentedMap, CommentedSeq
+
+
+def machine_file(texts: Sequence[str]) -> int:
+    """Which of the config files, in the order in which they count, has to gain the causes: a later list of effects replaces
+    an earlier one, so it is the last that has one; where none has, the last that describes a robot.
+    """
+    trees = [YAML(typ="safe").load(text) or {} for text in texts]
+    for key in ("effects", "robot"):
+        having = [k for k, tree in enumerate(trees) if tree.get(key)]
+        if having:
+            return having[-1]
+    return len(texts) - 1
+
+
+def with_causes(
+    text: str, causes: Sequence[Mapping[str, Any]], *, folder: str = "", moved_to: str = "", note: str = ""
+) -> str:
+    """The text of a machine file with the `causes` of a diagnosis appended to its effects; what is unknown is left out.
+
+    causes: as in the result file. Values are those found, intervals go into a comment behind them. folder, moved_to: where
+    the file stands and where the new one will; relative paths in it are changed to match. note: comment above the causes.
+    """
+    yaml = YAML()
+    yaml.preserve_quotes = True
+    yaml.width = 4096
+    yaml.indent(mapping=2, sequence=4, offset=2)
+    tree = yaml.load(text)
+    _move(tree, folder, moved_to)
+    known = [cause for cause in causes if cause["effect"] != "unknown"]
+    effects = tree.get("effects")
+    if effects is None and known:
+        effects = tree["effects"] = CommentedSeq()
+    for k, cause in enumerate(known):
+        entry = CommentedMap()
+        entry["effect"] = cause["effect"]
+        if cause["target"] is not None:
+            entry["target"] = cause["target"]
+        for name, found in cause["parameters"].items():
+            entry[name] = found["value"]
+            low, high = found["ci95"]
+            entry.yaml_add_eol_comment(f"95 %: {low:g} to {high:g}", name)
+        effects.append(entry)
+        if k == 0 and note:
+            effects.yaml_set_comment_before_after_key(len(effects) - 1, before=note, indent=2)
+    out = io.StringIO()
+    yaml.dump(tree, out)
+    return out.getvalue()
+
+
+def _move(node: Any, folder: str, moved_to: str) -> None:
+    """Relative file names below a node, as seen from another folder."""
+    if isinstance(node, dict):
+        for key, value in node.items():
+            if key == "file" and isinstance(value, str) and not os.path.isabs(value):
+                node[key] = (
+                    os.path.relpath(os.path.join(folder, value), moved_to or ".") if folder != moved_to else value
+                )
+            else:
+                _move(value, folder, moved_to)
+    elif isinstance(node, list):
+        for each in node:
+            _move(each, folder, moved_to)

@@ -1,0 +1,189 @@
+"""YAML 1.2 text as a tree in which every value knows file, line and column."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from ruamel.yaml import YAML
+from ruamel.yaml.error import MarkedYAMLError
+from ruamel.yaml.nodes import MappingNode, ScalarNode, SequenceNode
+from ruamel.yaml.reader import ReaderError
+
+from camcomp.ground.errors import ConfigError, Location
+
+# A mapping that names another member than the earlier file did has other keys too: it replaces the earlier one whole.
+_SELECTORS = ("type", "model")
+
+
+@dataclass(frozen=True)
+class Node:
+    """A value (scalar, list of Nodes, dict of Nodes), where it stands and, in a mapping, where its key stands."""
+
+    value: Any
+    at: Location
+    key_at: Location | None = None
+
+
+def read_tree(data: bytes, name: str) -> tuple[Node | None, list[ConfigError]]:
+    """The tree of one YAML document and every error found in its text; None when there is no tree.
+
+    Raises nothing: syntax, encoding, duplicate keys, unknown tags and emptiness come back as errors.
+    """
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        column = error.start - data.rfind(b"\n", 0, error.start)
+        at = Location(name, line, column)
+        return None, [ConfigError("CC200", "the file is not UTF-8 text", at=at, hint="save it as UTF-8")]
+    builder = _Builder(name, text.splitlines())
+    try:
+        root = YAML(typ="rt", pure=True).compose(text)
+    except MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        at = builder.place(mark.line, mark.column) if mark else Location(name, 1, 1)
+        rule = "CC210" if at.source[at.column - 1 : at.column] == "\t" else "CC200"
+        problem = "tab in the indentation" if rule == "CC210" else (error.problem or error.context or "not YAML")
+        context = f" ({error.context})" if error.problem and error.context and rule == "CC200" else ""
+        return None, [ConfigError(rule, f"{problem}{context}", at=at)]
+    except ReaderError as error:
+        before = text[: error.position]
+        at = builder.place(before.count("\n"), error.position - before.rfind("\n") - 1)
+        return None, [ConfigError("CC200", f"character {ord(text[error.position]):#x} is not allowed", at=at)]
+    except RecursionError:
+        return None, [ConfigError("CC200", "nested too deeply", at=Location(name, 1, 1))]
+    if root is None:
+        return None, [ConfigError("CC211", "the file is empty", at=Location(name, 1, 1))]
+    tree = builder.build(root)
+    return tree, builder.errors
+
+
+class _Builder:
+    """Turns ruamel's composed nodes into Nodes and collects what is wrong with them."""
+
+    def __init__(self, name: str, lines: list[str]) -> None:
+        self.name = name
+        self.lines = lines
+        self.errors: list[ConfigError] = []
+        self.open: list[Any] = []  # collections being built, outermost first
+
+    def place(self, line: int, column: int) -> Location:
+        source = self.lines[line] if line < len(self.lines) else ""
+        return Location(self.name, line + 1, column + 1, source)
+
+    def build(self, node: Any) -> Node:
+        at = self.place(node.start_mark.line, node.start_mark.column)
+        if isinstance(node, ScalarNode):
+            return Node(self._scalar(node, at), at)
+        if any(each is node for each in self.open):
+            self.errors.append(ConfigError("CC200", "an anchor contains itself", at=at))
+            return Node(None, at)
+        self.open.append(node)
+        try:
+            if isinstance(node, MappingNode):
+                return Node(self._mapping(node), at)
+            assert isinstance(node, SequenceNode)
+            return Node([self.build(each) for each in node.value], at)
+        finally:
+            self.open.pop()
+
+    def _mapping(self, node: MappingNode) -> dict[Any, Node]:
+        own: dict[Any, Node] = {}
+        merged: dict[Any, Node] = {}
+        for key_node, value_node in node.value:
+            key = self.build(key_node)
+            if isinstance(key.value, list | dict):
+                self.errors.append(ConfigError("CC200", "a key has to be a single word or number", at=key.at))
+                continue
+            value = replace(self.build(value_node), key_at=key.at)
+            if isinstance(value_node, ScalarNode) and not value_node.value:
+                value = replace(value, at=key.at)  # nothing after the colon: the mark is lines further down
+            if key.value == "<<" and key_node.style is None:
+                for base in value.value if isinstance(value.value, list) else [value]:
+                    if isinstance(base.value, dict):
+                        merged = {**base.value, **merged}
+                    else:
+                        self.errors.append(ConfigError("CC204", "`<<` merges mappings only", at=base.at))
+            elif key.value in own:
+                first = own[key.value].key_at
+                line = f" (first in line {first.line})" if first else ""
+                self.errors.append(ConfigError("CC207", f"key '{key.value}' is given twice{line}", at=key.at))
+            else:
+                own[key.value] = value
+        return {**merged, **own}
+
+    def _scalar(self, node: ScalarNode, at: Location) -> Any:
+        kind = str(node.tag).removeprefix("tag:yaml.org,2002:")
+        text = node.value
+        try:
+            if kind == "null":
+                return None
+            if kind == "bool":
+                return text.lower() == "true"
+            if kind == "int":
+                digits = text.replace("_", "")
+                return int(digits, 0) if digits.lstrip("+-")[:2].lower() in ("0x", "0o", "0b") else int(digits)
+            if kind == "float":
+                word = text.replace("_", "").lower()
+                return float(word.replace(".inf", "inf") if "inf" in word else word.replace(".nan", "nan"))
+        except ValueError:
+            self.errors.append(ConfigError("CC204", f"'{text}' is not a number", at=at))
+            return None
+        if kind not in ("str", "timestamp", "value", "merge"):
+            self.errors.append(ConfigError("CC200", f"tags such as {kind} are not used here", at=at))
+        return text
+
+
+def merge(base: Node, over: Node) -> Node:
+    """`over` laid on `base` key by key: mappings merge, everything else (lists too) is replaced whole."""
+    if not (isinstance(base.value, dict) and isinstance(over.value, dict)):
+        return over
+    for key in _SELECTORS:
+        if key in base.value and key in over.value and base.value[key].value != over.value[key].value:
+            return over
+    both = {key: merge(base.value[key], node) for key, node in over.value.items() if key in base.value}
+    return replace(over, value={**base.value, **over.value, **both})
+
+
+def plain(node: Node) -> Any:
+    """The bare values. A string under the key `file` or `..._file` is a path: made relative to its own YAML file."""
+    if isinstance(node.value, list):
+        return [plain(each) for each in node.value]
+    if isinstance(node.value, dict):
+        return {key: _resolved(key, each) for key, each in node.value.items()}
+    return node.value
+
+
+def _resolved(key: Any, node: Node) -> Any:
+    if isinstance(node.value, str) and isinstance(key, str) and (key == "file" or key.endswith("_file")):
+        return str(Path(node.at.file).parent / node.value)
+    return plain(node)
+
+
+def find(node: Node, keys: Sequence[str | int]) -> Node:
+    """The node under `keys`; keys that are not in the tree are skipped, so the result is the nearest one above."""
+    for key in keys:
+        node = child(node, key) or node
+    return node
+
+
+def child(node: Node, key: str | int) -> Node | None:
+    """The node under one key of a mapping or one index of a list."""
+    if isinstance(node.value, dict):
+        return node.value.get(key)
+    if isinstance(node.value, list) and isinstance(key, int) and key < len(node.value):
+        return node.value[key]
+    return None
+
+
+def leaves(node: Node, name: str = "") -> Iterator[tuple[str, Node]]:
+    """Every scalar, and every list of scalars, under its dotted name."""
+    if isinstance(node.value, dict):
+        for key, each in node.value.items():
+            yield from leaves(each, f"{name}.{key}" if name else str(key))
+    elif isinstance(node.value, list) and any(isinstance(each.value, dict) for each in node.value):
+        for i, each in enumerate(node.value):
+            yield from leaves(each, f"{name}[{i + 1}]")
+    else:
+        yield name, node

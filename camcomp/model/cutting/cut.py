@@ -1,0 +1,44 @@
+"""What a force model may look at: the cut at n points of a path, as a struct of arrays."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from camcomp.ground.datatypes import Bools, Floats, Ints, frozen
+
+
+@dataclass(frozen=True, eq=False)
+class Cut:
+    """n points at which the tool cuts; rapids and air moves are not among them.
+
+    Raises ValueError when the arrays do not have one row per point. Missing data (NaN, None) is allowed here; the
+    force model that needs it complains.
+    """
+
+    tangent: Floats  # (n, 3) unit feed direction, program frame
+    tool_axis: Floats  # (3,) unit, program frame, pointing away from the workpiece
+    feed: Floats  # (n,) mm/min along the path
+    speed: Floats  # (n,) spindle, rev/min
+    depth: Floats  # (n,) mm axial depth; NaN: not known; <= 0: above the stock
+    width: Floats  # (n,) mm radial width; NaN: slot
+    arc_length: Floats  # (n,) mm along the program path
+    line: Ints  # (n,) source line
+    diameter_mm: float | None = None
+    teeth: int | None = None
+    to_machine: Floats = field(default_factory=lambda: np.eye(3))  # (3, 3) program axes to machine axes
+    # (n,) the point is seen as the end of a motion, not as the start of the next; empty: nowhere
+    ends: Bools = field(default_factory=lambda: np.zeros(0, np.bool_))
+
+    def __post_init__(self) -> None:
+        n = np.shape(self.line)[0]
+        rows = {"tangent": (n, 3), "tool_axis": (3,), "to_machine": (3, 3)}
+        for name in ("tangent", "tool_axis", "feed", "speed", "depth", "width", "arc_length", "to_machine"):
+            array = frozen(getattr(self, name))
+            if array.shape != rows.get(name, (n,)):
+                raise ValueError(f"Cut.{name} has shape {array.shape}, not {rows.get(name, (n,))}")
+            object.__setattr__(self, name, array)
+        object.__setattr__(self, "line", frozen(self.line, np.int64))
+        object.__setattr__(self, "ends", frozen(self.ends if np.size(self.ends) else np.zeros(n), np.bool_))
+
+    def __len__(self) -> int:
+        return int(self.line.shape[0])

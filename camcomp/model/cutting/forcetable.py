@@ -1,0 +1,153 @@
+"""A measured force along a path, read from CSV text: one header row, plain numbers, each column named with its unit.
+
+Columns used: `s_mm` (path length) or `line` (source line), and three forces on the tool, either `Fr_N, Ft_N, Fz_N` in
+the path frame or `fx_N, fy_N, fz_N` in the machine frame. Other columns are left alone, so that a log or a joint table
+can be given as it is. With `s_mm` rows are in path order and may repeat a place, where the force jumps: the first row
+holds for the motion that ends there, the last for the one that starts, and a `line` column settles which is which.
+With `line` alone the rows of a line are averaged. Rows without any force are skipped.
+"""
+
+import csv
+import io
+from dataclasses import dataclass
+from difflib import get_close_matches
+
+import numpy as np
+
+from camcomp.ground.datatypes import Bools, Floats, Ints
+from camcomp.ground.errors import CamcompError, ConfigError, Location, raise_all
+
+PATH_COLUMNS = ("Fr_N", "Ft_N", "Fz_N")
+MACHINE_COLUMNS = ("fx_N", "fy_N", "fz_N")
+
+# Lengths of path and table are both rounded sums; closer than this they are the same place.
+SAME_PLACE_MM = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class ForceTable:
+    """k rows; `key` is a path length in mm (`by_length`) or a source line, ascending."""
+
+    key: Floats  # (k,)
+    force: Floats  # (k, 3) N
+    by_length: bool
+    in_machine: bool  # frame of `force`: machine axes, or the path frame
+    line: Floats | None = None  # (k,) source line of each row, beside a path length
+
+
+class _TableReader:
+    """Rows of a CSV text with the place of every cell."""
+
+    def __init__(self, text: str, name: str) -> None:
+        self.name = name
+        self.text = text.removeprefix("\ufeff").splitlines()
+        self.errors: list[CamcompError] = []
+        rows = [(i, row) for i, row in enumerate(csv.reader(io.StringIO("\n".join(self.text))), start=1) if any(row)]
+        if len(rows) < 2:
+            raise ConfigError(
+                "CC260", "the force table needs a header row and at least one row of numbers", at=self.at(1)
+            )
+        (self.head_line, head), *self.rows = rows
+        self.head = [cell.strip() for cell in head]
+
+    def at(self, line: int, column: int = 0) -> Location:
+        source = self.text[line - 1] if line <= len(self.text) else ""
+        start = sum(len(cell) + 1 for cell in source.split(",")[:column])
+        return Location(self.name, line, min(start, len(source)) + 1, source)
+
+    def number(self, line: int, row: list[str], column: int) -> float:
+        cell = row[column].strip() if column < len(row) else ""
+        try:
+            value = float(cell)
+        except ValueError:
+            value = np.nan
+        if not np.isfinite(value):
+            text = f"'{cell}' is no finite number in column {self.head[column]}" if cell else "the cell is empty"
+            self.errors.append(ConfigError("CC262", text, at=self.at(line, column)))
+        return value
+
+
+def parse_table(text: str, name: str) -> ForceTable:
+    """The table in `text`; `name` is the file's name for messages. Raises ConfigError CC260 to CC263, all at once."""
+    reader = _TableReader(text, name)
+    head = reader.head
+    key_name = next((each for each in ("s_mm", "line") if each in head), None)
+    names = next((each for each in (PATH_COLUMNS, MACHINE_COLUMNS) if set(each) <= set(head)), None)
+    if key_name is None:
+        raise ConfigError("CC261", "no column says where: s_mm or line", at=reader.at(reader.head_line))
+    if names is None:
+        raise _no_force(reader)
+    also = ("line",) if key_name == "s_mm" and "line" in head else ()
+    columns = [head.index(each) for each in (key_name, *names, *also)]
+    values: list[list[float]] = []
+    for line, row in reader.rows:
+        if any(column < len(row) and row[column].strip() for column in columns[1:4]):
+            values.append([reader.number(line, row, column) for column in columns])
+            if key_name == "s_mm" and len(values) > 1 and values[-1][0] < values[-2][0]:
+                text = f"s_mm falls from {values[-2][0]:g} to {values[-1][0]:g}"
+                reader.errors.append(ConfigError("CC263", text, at=reader.at(line, columns[0])))
+    raise_all(reader.errors)
+    if not values:
+        raise ConfigError("CC260", "no row of the force table holds a force", at=reader.at(reader.head_line))
+    table = np.array(values)
+    key, force = table[:, 0], table[:, 1:4]
+    if key_name == "line":
+        key, rows = np.unique(key, return_inverse=True)
+        total = np.zeros((key.size, 3))
+        np.add.at(total, rows, force)
+        force = total / np.bincount(rows)[:, None]
+    return ForceTable(key, force, key_name == "s_mm", names is MACHINE_COLUMNS, table[:, 4] if also else None)
+
+
+def _no_force(reader: _TableReader) -> ConfigError:
+    wanted = (*PATH_COLUMNS, *MACHINE_COLUMNS)
+    for column, name in enumerate(reader.head):
+        close = get_close_matches(name, wanted, n=1)
+        if close and name not in wanted:
+            text = f"column '{name}' is none of {', '.join(wanted)}"
+            return ConfigError(
+                "CC261", text, at=reader.at(reader.head_line, column), hint=f"did you mean '{close[0]}'?"
+            )
+    text = "the three force columns Fr_N, Ft_N, Fz_N or fx_N, fy_N, fz_N are not all there"
+    return ConfigError("CC261", text, at=reader.at(reader.head_line))
+
+
+def look_up(table: ForceTable, arc_length: Floats, line: Ints, ends: Bools) -> Floats:
+    """Force (n, 3) in N, in the table's own frame: linear between rows, or that of the source line.
+
+    ends (n,): the point closes a motion, so that before a jump the row before it holds. Raises ConfigError CC264 for a
+    point that the table does not cover.
+    """
+    if table.by_length:
+        outside = (arc_length < table.key[0] - SAME_PLACE_MM) | (arc_length > table.key[-1] + SAME_PLACE_MM)
+        value = _along(table, arc_length, line, ends)
+        covered = f"s_mm = {table.key[0]:g} to {table.key[-1]:g}"
+    else:
+        rows = np.clip(np.searchsorted(table.key, line), 0, table.key.size - 1)
+        outside = table.key[rows] != line
+        value = table.force[rows]
+        covered = f"{table.key.size} lines from {table.key[0]:g} to {table.key[-1]:g}"
+    if outside.any():
+        first = int(np.argmax(outside))
+        text = f"program line {line[first]}, s_mm = {arc_length[first]:g}: the force table does not cover this point"
+        raise ConfigError("CC264", f"{text}; it covers {covered}")
+    return value
+
+
+def _along(table: ForceTable, s: Floats, line: Ints, ends: Bools) -> Floats:
+    key, force, last = table.key, table.force, table.key.size - 1
+    high = np.clip(np.searchsorted(key, s, side="right"), 0, last)
+    low = np.maximum(high - 1, 0)
+    step = key[high] - key[low]
+    share = np.clip((s - key[low]) / np.where(step > 0, step, 1.0), 0.0, 1.0)[:, None]
+    between = force[low] + share * (force[high] - force[low])
+    # A jump is one place with several rows, from `first` to `final`.
+    first = np.clip(np.searchsorted(key, s - SAME_PLACE_MM, side="left"), 0, last)
+    final = np.maximum(np.searchsorted(key, s + SAME_PLACE_MM, side="right") - 1, 0)
+    jump = (final > first) & (key[first] == key[final])
+    before = ends
+    if table.line is not None:
+        own_first, own_final = table.line[first] == line, table.line[final] == line
+        before = np.where(own_first == own_final, ends, own_first)
+    at_jump = np.where(before[:, None], force[first], force[final])
+    return np.where(jump[:, None], at_jump, between)

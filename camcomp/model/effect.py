@@ -1,0 +1,145 @@
+"""What an effect is: one way in which a machine differs from its model, as a module with parameters and hooks.
+
+A module of the effects shelf (or of an entry point in the group `camcomp.effects`) defines
+
+    STAGE       control | drive | structure | process | tool | workpiece | sensor: where the difference arises
+    TARGET      "actuator" (one cause per actuator), "machine" (target null), or "either"
+    PARAMETERS  tuple of Parameter; at their nominal values every hook returns its input unchanged, bit for bit
+    SOURCE      where the formula comes from
+
+and at least one hook. `p` maps parameter names to values; `which` (m,) is 1.0 for the actuators aimed at, else 0.0.
+
+    on_servo(position, motion, which, p)         (n, m) set-points in time -> (n, m) encoders
+    on_drive(error, motion, which, p)            (n, m) carriage minus encoder
+    on_drive_force(force, motion, which, p)      (n, m) what the drive exerts beyond the load of the structure
+    on_robot(robot, actuators, p)                description of the machine -> changed copy; `actuators` are names
+    on_load(load, motion, p)                     Load at the tool
+    on_pose(tip, load, motion, p)                (n, 3) tip in the machine frame
+    on_workpiece(tip, p)                         (n, 3) tip in the program frame
+    on_clock(time, p)                            (n,) row time -> time at which the tip stood where the row says
+    on_reading(channels, motion, p)              dict of measured channels by column name
+
+The twin calls them in the order of the signal path, effects in the order of the config. Of those on the drive the ones
+with a force of their own come last: guides hold back the carriage, behind the screw and its play.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal
+
+import numpy as np
+
+from camcomp.ground.datatypes import Floats
+
+Target = Literal["actuator", "machine", "either"]
+STAGES = ("control", "drive", "structure", "process", "tool", "workpiece", "sensor")
+HOOKS = (
+    "on_clock", "on_servo", "on_drive", "on_drive_force", "on_robot", "on_load", "on_pose", "on_workpiece",
+    "on_reading",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One number of an effect: unit, bounds and what is known about its size before any measurement.
+
+    `scale` is the size that is typical where the effect is present, `tolerance` the size that every healthy machine
+    has and no model states; both in `unit`, or as differences of the natural logarithm where `log` (factors). `sign` +1: never below
+    nominal. `scan`: a shape (a pitch, a time constant) that nothing shows while the effect is absent; the values to
+    try first.
+    """
+
+    name: str
+    unit: str
+    nominal: float
+    low: float
+    high: float
+    scale: float
+    tolerance: float
+    source: str
+    sign: int = 0
+    log: bool = False
+    scan: tuple[float, ...] = ()
+
+    def value(self, coordinate: float) -> float:
+        """Physical value at a fitting coordinate (0 = nominal), kept inside the bounds."""
+        if self.scan:
+            value = coordinate
+        else:
+            value = self.nominal * float(np.exp(coordinate)) if self.log else self.nominal + coordinate
+        return float(min(max(value, self.low), self.high))
+
+    def coordinate(self, value: float) -> float:
+        """Fitting coordinate of a physical value."""
+        if self.scan:
+            return value
+        return float(np.log(value / self.nominal)) if self.log else value - self.nominal
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """How the machine moves through n instants in order: what hooks may depend on. m actuators, mm or rad, s.
+
+    `direction` is the sign of travel with its memory: +1, -1, in between while a reversal takes up its presliding
+    distance, 0 where no move has been seen yet. `ordered` is false for poses that are not a movement.
+    """
+
+    time: Floats  # (n,) s since the start of the run
+    common: Floats  # (n,) s on the clock shared by all runs
+    cut_min: Floats  # (n,) minutes of cutting so far, over all runs
+    temperature: Floats | None  # (n,) deg C
+    encoder: Floats  # (n, m)
+    speed: Floats  # (n, m) of the encoder, per s
+    direction: Floats  # (n, m)
+    home: Floats  # (m,)
+    stiffness: Floats  # (m,) of the drives, N/mm or N mm/rad; inf = rigid
+    ordered: bool = True
+    nut: Floats | None = None  # (n, m) encoder and what the screw makes of it, for guides; None: as the encoder
+
+
+@dataclass(frozen=True, eq=False)
+class Load:
+    """Load on the tool in the machine frame: cutting force at the tip, and what pulls at the platform reference."""
+
+    force: Floats  # (n, 3) N
+    wrench: Floats  # (n, 6) N, N mm
+
+
+@dataclass(frozen=True)
+class Cause:
+    """An effect at work: the module, its target (actuator name or None) and its parameter values."""
+
+    name: str
+    effect: Any
+    target: str | None
+    values: Mapping[str, float] = field(default_factory=dict)
+
+    def which(self, actuators: tuple[str, ...]) -> Floats:
+        """(m,) 1.0 where this cause acts."""
+        return np.array([1.0 if self.target in (None, each) else 0.0 for each in actuators])
+
+    def aimed(self, actuators: tuple[str, ...]) -> tuple[str, ...]:
+        """Names of the actuators on which this cause acts."""
+        return tuple(each for each in actuators if self.target in (None, each))
+
+    def hook(self, name: str) -> Any:
+        """The hook called `name`, or None."""
+        return getattr(self.effect, name, None)
+
+
+def driven(causes: Sequence[Cause], actuators: tuple[str, ...], motion: Motion) -> tuple[Floats, Motion]:
+    """Carriage minus encoder (n, m), and the motion as the guides see it, with the nut where play and screw leave it."""
+    error = np.zeros_like(motion.encoder)
+    drives = [cause for cause in causes if cause.hook("on_drive") is not None]
+    for guide in (False, True):
+        if guide:
+            motion = replace(motion, nut=motion.encoder + error)
+        for cause in drives:
+            if (cause.hook("on_drive_force") is not None) == guide:
+                error = cause.hook("on_drive")(error, motion, cause.which(actuators), cause.values)
+    return error, motion
+
+
+def nominal(effect: Any) -> dict[str, float]:
+    """Parameter values at which the effect does nothing."""
+    return {each.name: each.nominal for each in effect.PARAMETERS}

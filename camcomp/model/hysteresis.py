@@ -1,0 +1,146 @@
+"""What remembers: lag, play and the direction of travel, as sweeps over ordered instants."""
+
+from itertools import pairwise
+
+import numpy as np
+from numba import njit
+
+from camcomp.ground.datatypes import Floats
+
+STILL = 1e-9  # mm or rad, round-off of two solutions of the same point
+PRESLIDING_MM = 0.005  # rolling guides take 1 to 20 um to turn their friction round (Armstrong-Helouvry 1994)
+
+
+@njit(cache=True)
+def _first_order(x, t, tau):  # type: ignore[no-untyped-def]  # pragma: no cover
+    y = np.empty_like(x)
+    y[0] = x[0]
+    for i in range(1, x.shape[0]):
+        dt = t[i] - t[i - 1]
+        decay = np.exp(-dt / tau)
+        hold = tau * (1.0 - decay) / dt if dt > 0.0 else 1.0
+        for j in range(x.shape[1]):
+            # exact for a set-point that moves linearly between two instants
+            y[i, j] = decay * y[i - 1, j] + (hold - decay) * x[i - 1, j] + (1.0 - hold) * x[i, j]
+    return y
+
+
+def first_order(x: Floats, time: Floats, tau: float) -> Floats:
+    """First-order lag of x (n, m) with time constant tau s, settled at the start; time (n,) s, not decreasing."""
+    return _first_order(np.ascontiguousarray(x), np.ascontiguousarray(time), tau)
+
+
+@njit(cache=True)
+def _play(x, width):  # type: ignore[no-untyped-def]  # pragma: no cover
+    y = np.empty_like(x)
+    for j in range(x.shape[1]):
+        state = x[0, j]
+        for i in range(x.shape[0]):
+            state = min(max(state, x[i, j] - 0.5 * width), x[i, j] + 0.5 * width)
+            y[i, j] = state - x[i, j]
+    return y
+
+
+def play(x: Floats, width: float) -> Floats:
+    """Carriage minus encoder (n, m) of a play of full `width` mm driven by x (n, m), centred at the start."""
+    return _play(np.ascontiguousarray(x), width)
+
+
+@njit(cache=True)
+def _direction(x, distance):  # type: ignore[no-untyped-def]  # pragma: no cover
+    y = np.zeros_like(x)
+    for j in range(x.shape[1]):
+        state = 0.0
+        for i in range(1, x.shape[0]):
+            step = x[i, j] - x[i - 1, j]
+            sign = 1.0 if step > 0.0 else -1.0
+            if step != 0.0:
+                state = sign + (state - sign) * np.exp(-abs(step) / distance)
+            y[i, j] = state
+    return y
+
+
+def direction(x: Floats, distance: float = PRESLIDING_MM) -> Floats:
+    """Sign of travel with memory (n, m): Dahl's law turns it round over `distance`; 0 before the first move.
+
+    Source: Dahl 1968 with exponent 1. Holds while: rate-independent friction.
+    """
+    return _direction(np.ascontiguousarray(x), distance)
+
+
+@njit(cache=True)
+def _held(x, stiffness, force, distance):  # type: ignore[no-untyped-def]  # pragma: no cover
+    out = np.zeros_like(x)
+    for j in range(x.shape[1]):
+        k = stiffness[j]
+        carriage = x[0, j]
+        state = 0.0
+        for i in range(1, x.shape[0]):
+            pull = k * (x[i, j] - carriage) - force * state if np.isfinite(k) else x[i, j] - carriage
+            if pull != 0.0:
+                sense = 1.0 if pull > 0.0 else -1.0
+                way = abs(pull)
+                turned = sense * state - 1.0
+                if np.isfinite(k):  # Newton from the left on a convex, falling function
+                    way = 0.0
+                    for _ in range(50):
+                        fade = turned * np.exp(-way / distance)
+                        left = sense * k * (x[i, j] - carriage) - k * way - force * (1.0 + fade)
+                        step = left / (k - force * fade / distance)
+                        way += step
+                        if step < 1e-9:
+                            break
+                state = sense * (1.0 + turned * np.exp(-way / distance))
+                carriage += sense * way
+            out[i, j] = state
+    return out
+
+
+def held_back(x: Floats, stiffness: Floats, force: float, distance: float = PRESLIDING_MM) -> Floats:
+    """Friction over its Coulomb force (n, m), -1 to 1, of carriages that encoders x (n, m) pull through springs (m,).
+
+    Dahl's law on the way of the carriage, not of the encoder: until the spring has turned round by 2 force/stiffness the
+    carriage hardly moves. distance mm; force N; stiffness inf = rigid. 0 before the first move.
+    """
+    return _held(np.ascontiguousarray(x), np.ascontiguousarray(stiffness, dtype=float), force, distance)
+
+
+def ways(x: Floats, least: float) -> Floats:
+    """Sense (n, m) in which x (n, m) was travelling when it arrived: +1, -1, 0 before the first move.
+
+    A reversal counts from the extremum on, and only when at least `least` of way back follow it.
+    """
+    out = np.zeros_like(x)
+    for j in range(x.shape[1]):
+        turns, first = turning_points(x[:, j], least)
+        sense = first
+        for a, b in pairwise([*turns, len(x) - 1]):
+            out[a + 1 : b + 1, j] = sense
+            sense = -sense
+    return out
+
+
+def turning_points(x: Floats, least: float) -> tuple[list[int], float]:
+    """Indices where x (n,) begins to travel at least `least` one way, and the sense of the first; ([], 0) if it never does."""
+    steps = np.diff(x)
+    moving = np.flatnonzero(np.abs(steps) > STILL)
+    if not len(moving):
+        return [], 0.0
+    inner = moving[1:][steps[moving[1:]] * steps[moving[:-1]] < 0.0]  # local extrema, in order
+    low = high = 0
+    sense, turns, first = 0.0, [], 0.0
+    for i in [*inner.tolist(), len(x) - 1]:
+        if x[i] > x[high]:
+            high = i
+        if x[i] < x[low]:
+            low = i
+        if sense <= 0.0 and x[i] - x[low] >= least:
+            turns.append(low)
+            sense, high = 1.0, i
+        elif sense >= 0.0 and x[high] - x[i] >= least:
+            turns.append(high)
+            sense, low = -1.0, i
+        else:
+            continue
+        first = first or sense
+    return turns, first

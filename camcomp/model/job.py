@@ -1,0 +1,121 @@
+"""A configuration made ready for work: the machine, the frames, the cutting conditions, the control."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from typing import Any
+
+import numpy as np
+
+from camcomp.ground import shelf
+from camcomp.ground.datatypes import Floats
+from camcomp.ground.errors import ConfigError
+from camcomp.model.config.spec import Config
+from camcomp.model.cutting.cut import Cut
+from camcomp.model.cutting.track import Conditions
+from camcomp.model.effect import Cause
+from camcomp.model.statics.build import build_robot, held_orientation, rotation_of
+from camcomp.model.statics.description import Robot
+from camcomp.model.statics.machine import Machine, build_machine
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """The program frame (G54 at program start) in the machine frame: machine = origin + rotation @ program."""
+
+    origin: Floats  # (3,) mm
+    rotation: Floats  # (3, 3)
+
+    def to_machine(self, points: Floats) -> Floats:
+        """Points (n, 3) mm, program to machine frame."""
+        return self.origin + points @ self.rotation.T
+
+    def to_program(self, points: Floats) -> Floats:
+        """Points (n, 3) mm, machine to program frame."""
+        return (points - self.origin) @ self.rotation
+
+    def vectors(self, vectors: Floats) -> Floats:
+        """Vectors (n, 3), program to machine axes."""
+        return vectors @ self.rotation.T
+
+
+@dataclass(frozen=True, eq=False)
+class Job:
+    """What the stories need from a Config."""
+
+    config: Config
+
+    @cached_property
+    def frame(self) -> Frame:
+        """Program frame in the machine frame."""
+        return Frame(np.asarray(self.config.workpiece.origin_mm, float), rotation_of(self.config.workpiece.rotation))
+
+    @cached_property
+    def machine(self) -> Machine:
+        """The machine with its chain errors. Raises ConfigError CC216 when it cannot be built."""
+        return self._build(*self._robots)
+
+    @cached_property
+    def perfect_machine(self) -> Machine:
+        """The same machine with perfect chains."""
+        return self._build(self._robots[1], self._robots[1])
+
+    @cached_property
+    def causes(self) -> tuple[Cause, ...]:
+        """The effects of the config, in its order."""
+        return tuple(
+            Cause(each.effect, shelf.load("effects", each.effect), each.target, dict(each.values))
+            for each in self.config.effects
+        )
+
+    @cached_property
+    def real_machine(self) -> Machine:
+        """The machine with its chain errors and with what the effects of the config change in it."""
+        robot, nominal = self._robots
+        names = tuple(each.name for each in robot.actuators)
+        for cause in self.causes:
+            if (hook := cause.hook("on_robot")) is not None:
+                robot = hook(robot, cause.aimed(names), cause.values)
+        return self.machine if robot is self._robots[0] else self._build(robot, nominal)
+
+    @cached_property
+    def _robots(self) -> tuple[Robot, Robot]:
+        """The robot as it is and as its control believes it to be, with the orientation that the tool keeps."""
+        robots = build_robot(self.config.robot, self.config.tool.tip)
+        if len(robots[0].actuators) != 6:
+            return robots
+        held = held_orientation(robots[1], self.frame.rotation, self.config.tool.turn_deg)
+        return replace(robots[0], held=held), replace(robots[1], held=held)
+
+    def _build(self, robot: Robot, nominal: Robot) -> Machine:
+        try:
+            return build_machine(robot, nominal)
+        except ValueError as error:
+            raise ConfigError("CC205", str(error), at=self.config.at("robot")) from error
+
+    @cached_property
+    def conditions(self) -> Conditions:
+        """Cutting conditions for camcomp.cutting.track, with the force model of the config."""
+        c = self.config
+        choice = c.process.force
+        member = shelf.load("forces", choice.model)
+        none = choice.model == "none"
+        return Conditions(
+            model=None if none else partial(_call, member.force, choice.params),
+            plunges=bool(getattr(member, "PLUNGES", False)),
+            tool_axis=self.frame.rotation.T @ self.machine.nominal.held_rotation[:, 2],
+            stock_top_mm=c.workpiece.stock_top_mm,
+            depth_mm=c.process.depth_mm,
+            width_mm=c.process.width_mm,
+            spindle_rpm=c.process.spindle_rpm,
+            feed_mm_per_min=c.process.feed_mm_per_min,
+            diameter_mm=c.tool.diameter_mm,
+            teeth=c.tool.teeth,
+            to_machine=self.frame.rotation,
+        )
+
+
+def _call(force: Callable[[Cut, Any], Floats], params: Any, cut: Cut) -> Floats:
+    return force(cut, params)

@@ -1,0 +1,195 @@
+"""What the whole machine does with commanded tips: control, drives, loaded structure, tool, workpiece.
+
+Without effects in the config this is the loaded equilibrium alone. With effects the same hooks act in the same order as
+in the twin, on a sequence of points in the order of travel; their correction is found by seed eq. (5) on top of the
+exact solution of the structure. Effects of the sensors change no part and are left out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+
+from camcomp.ground.datatypes import Bools, Floats
+from camcomp.model.effect import Load, Motion, driven
+from camcomp.model.hysteresis import direction, ways
+from camcomp.model.job import Job
+from camcomp.model.statics.solve import FREE, solve
+from camcomp.model.statics.target import Correction, correct, settle
+
+SETTLED_MM = 2e-5  # the correction of effects ends here
+MAX_AIM_STEPS = 50  # friction that turns round in a soft drive leaves up to nine tenths per step
+REST_S = 60.0
+AHEAD_MM = 2.0  # more than any play
+LEAST_MM = 2e-4  # a drive that comes back by less than this is not led through its play
+
+
+@dataclass(frozen=True, eq=False)
+class Travel:
+    """n points in the order of travel: force (n, 3) N of the cut in the machine frame, when, after how much cutting.
+
+    stop: the control comes to rest there, and the drives with it.
+    """
+
+    force: Floats
+    time: Floats  # (n,) s
+    cut_min: Floats  # (n,) minutes
+    stop: Bools
+
+    def take(self, rows: np.ndarray) -> Travel:
+        """Some of the points, still in order."""
+        return Travel(self.force[rows], self.time[rows], self.cut_min[rows], self.stop[rows])
+
+    @property
+    def rested(self) -> Floats:
+        """Times (n,) s with a pause of REST_S on the way to every stop, so that a servo has no lag there."""
+        return self.time + REST_S * np.cumsum(self.stop)
+
+
+def respond(
+    job: Job, commanded: Floats, travel: Travel, nominal_of: Floats | None = None, *, before: Floats | None = None
+) -> tuple[Floats, Correction]:
+    """Loaded tips (n, 3) of commanded tips (n, 3), both in the program frame, and the states of the machine.
+
+    nominal_of (n, 3): tips whose inverse kinematics go into rho_nominal of the states; the commanded ones by default.
+    before (3,): commanded tip from which the first one was reached; what drives remember depends on it.
+    """
+    if before is not None and job.causes and len(commanded):
+        rows = np.concatenate(([0], np.arange(len(commanded))))
+        other = None if nominal_of is None else nominal_of[rows]
+        tip, found = respond(job, np.concatenate((before[None], commanded)), travel.take(rows), other)
+        return tip[1:], Correction(**{each.name: getattr(found, each.name)[1:] for each in fields(found)})
+    told = job.frame.to_machine(commanded)
+    aim = None if nominal_of is None else job.frame.to_machine(nominal_of)
+    if not job.causes:
+        loaded, settled = settle(job.real_machine, told, travel.force, None, aim)
+        return job.frame.to_program(loaded), settled
+    control = solve(job.real_machine, FREE, told, check=False)
+    motion = _motion(job, control.rho_nominal, travel)
+    load = _load(job, motion, travel.force)
+    error, motion = driven(job.causes, job.real_machine.actuators, motion)
+    carriage = motion.encoder + error
+    state = solve(job.real_machine, FREE, told, force=load.force, wrench=load.wrench, rho=carriage)
+    drive, tip = state.drive, state.tip
+    for cause in job.causes:
+        if (hook := cause.hook("on_drive_force")) is not None:
+            drive = drive + hook(np.zeros_like(drive), motion, cause.which(job.real_machine.actuators), cause.values)
+        if (hook := cause.hook("on_pose")) is not None:
+            tip = hook(tip, load, motion, cause.values)
+    tip = job.frame.to_program(tip)
+    for cause in job.causes:
+        if (hook := cause.hook("on_workpiece")) is not None:
+            tip = hook(tip, cause.values)
+    nominal = control.rho_nominal if aim is None else solve(job.real_machine, FREE, aim, check=False).rho_nominal
+    state = replace(state, commanded=told, rho=control.rho_nominal, rho_nominal=nominal, drive=drive)
+    return tip, Correction.of(state, state.passes)
+
+
+def aim_at(job: Job, target: Floats, travel: Travel, method: str) -> Correction:
+    """Commands that bring the loaded tips to the targets (n, 3); `commanded` of the result is in the program frame."""
+    found = without_drives(job, target, travel, method)
+    commanded = job.frame.to_program(found.commanded)
+    if job.causes and method != "linear":
+        commanded = commanded + _through_play(job, found, travel)
+        for _ in range(MAX_AIM_STEPS):
+            tip, state = respond(job, commanded, travel, target)
+            left = target - tip
+            commanded = commanded + np.where(np.isfinite(left), left, 0.0)
+            found = replace(found, status=np.where(found.status == 0, state.status, found.status))
+            if not np.abs(left).max(initial=0.0) > SETTLED_MM:
+                break
+    return replace(found, commanded=commanded)
+
+
+def without_drives(job: Job, target: Floats, travel: Travel, method: str = "newton") -> Correction:
+    """Commands, machine frame, that bring the loaded tips to the targets (n, 3) if carriages go where they are told.
+
+    Their `rho` is where the carriages have to be, whatever the drives in front of them do.
+    """
+    load = Load(travel.force, np.zeros((len(target), 6)))
+    if job.causes:
+        nominal = solve(job.real_machine, FREE, job.frame.to_machine(target), check=False).rho_nominal
+        load = _load(job, _motion(job, nominal, travel), travel.force)
+    return correct(job.real_machine, job.frame.to_machine(target), load.force, load.wrench, method)
+
+
+def _through_play(job: Job, found: Correction, travel: Travel) -> Floats:
+    """Way (n, 3) mm of the commanded tips that takes every drive through its play as soon as its carriage turns round.
+
+    Eq. (5) alone would creep through it, by what is left to correct at every step.
+    """
+    solved = found.status == 0
+    carriage = found.rho[solved]
+    sense = ways(carriage, LEAST_MM)
+    motion = _motion(job, carriage + AHEAD_MM * sense, travel.take(np.flatnonzero(solved)))
+    still = replace(motion, ordered=False, direction=np.zeros_like(carriage))
+    lag, standing = (driven(job.causes, job.real_machine.actuators, each)[0] for each in (motion, still))
+    lag = lag - standing
+    out = np.zeros((len(solved), 3))
+    if lag.any():
+        lag[sense == 0.0] = 0.0
+        out[solved] = _tip_way(job, found.commanded[solved], -lag)
+    return out
+
+
+def _tip_way(job: Job, tip: Floats, by: Floats) -> Floats:
+    """Way (n, 3) mm of the tip, program frame, that moves the actuators by `by` (n, m), to first order."""
+    h = 1e-3
+    rates = [
+        (solve(job.real_machine, FREE, tip + h * axis, check=False).rho_nominal
+         - solve(job.real_machine, FREE, tip - h * axis, check=False).rho_nominal) / (2.0 * h)
+        for axis in np.eye(3)
+    ]  # fmt: skip
+    way = np.einsum("nkm,nm->nk", np.linalg.pinv(np.stack(rates, axis=2)), by)
+    return way @ job.frame.rotation
+
+
+def plays(job: Job, rho: Floats, travel: Travel) -> Bools:
+    """Actuators (m,) whose carriage stands still while its drive turns round: play, or wind-up against friction."""
+    return _differs(job, rho, travel, ordered=True)
+
+
+def winds_up(job: Job, rho: Floats, travel: Travel) -> Bools:
+    """Actuators (m,) whose drive winds up against friction, over some way of the carriage."""
+    return _differs(job, rho, travel, ordered=False)
+
+
+def _differs(job: Job, rho: Floats, travel: Travel, *, ordered: bool) -> Bools:
+    """Actuators (m,) whose carriage depends on the movement, or on its sense alone."""
+    motion = _motion(job, rho, travel)
+    poses = replace(motion, ordered=False)
+    other = motion if ordered else replace(poses, direction=-motion.direction)
+    out = np.zeros(rho.shape[1], np.bool_)
+    for cause in job.causes:
+        if (hook := cause.hook("on_drive")) is not None:
+            which, still = cause.which(job.real_machine.actuators), np.zeros_like(rho)
+            out |= (hook(still, poses, which, cause.values) != hook(still, other, which, cause.values)).any(axis=0)
+    return out
+
+
+def _motion(job: Job, setpoint: Floats, travel: Travel) -> Motion:
+    """The movement that the hooks see, with the encoders where the servos bring them."""
+    stiffness = np.array([np.inf if a.stiffness is None else a.stiffness for a in job.real_machine.robot.actuators])
+    zero = np.zeros_like(setpoint)
+    warm = job.config.process.temperature_C
+    heat = None if warm is None else np.full(len(setpoint), warm)
+    motion = Motion(
+        travel.rested, travel.time, travel.cut_min, heat, setpoint, zero, zero, job.real_machine.home, stiffness
+    )
+    encoder = setpoint
+    for cause in job.causes:
+        if (hook := cause.hook("on_servo")) is not None:
+            encoder = hook(encoder, motion, cause.which(job.real_machine.actuators), cause.values)
+    dt = np.diff(travel.rested, prepend=travel.time[:1] - 1.0)
+    step = np.diff(encoder, axis=0, prepend=encoder[:1])
+    speed = np.divide(step, dt[:, None], out=np.zeros_like(step), where=dt[:, None] > 0.0)
+    return replace(motion, encoder=encoder, speed=speed, direction=direction(encoder))
+
+
+def _load(job: Job, motion: Motion, force: Floats) -> Load:
+    load = Load(force, np.zeros((len(force), 6)))
+    for cause in job.causes:
+        if (hook := cause.hook("on_load")) is not None:
+            load = hook(load, motion, cause.values)
+    return load

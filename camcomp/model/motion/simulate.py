@@ -1,0 +1,71 @@
+"""What the modelled machine would log while it executes a program: the twin, read row by row."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from camcomp.ground.datatypes import Floats, Ints, Path
+from camcomp.ground.errors import ProgramError
+from camcomp.model.cutting.track import lay_track
+from camcomp.model.job import Job
+from camcomp.model.motion.run_path import path_of_program
+from camcomp.model.motion.timeline import schedule
+from camcomp.model.motion.twin import Reading, twin_of
+
+
+@dataclass(frozen=True, eq=False)
+class Simulated:
+    """n rows: time (n,) s, source line (n,), readings of the sensors, set-points (n, m)."""
+
+    time: Floats
+    line: Ints
+    reading: Reading
+    setpoint: Floats
+    actuators: tuple[str, ...]
+    rotary: tuple[bool, ...]
+
+
+def simulate(job: Job, path: Path, step_s: float, *, cutting: bool = True, started_s: float = 0.0) -> Simulated:
+    """Rows every step_s seconds from the first feed move to the end of the last, that end included.
+
+    Speed is trapezoidal along every motion and zero at its ends; rapids are not logged. Raises ProgramError CC420 when
+    the program has no feed move, PhysicsError where the machine cannot be.
+    """
+    twin = twin_of(job)
+    timeline = schedule(path, job.config.control.acceleration_mm_per_s2)
+    if not len(timeline.index):
+        raise ProgramError("CC420", "the program has no feed move")
+    time = np.arange(0.0, timeline.end, step_s)
+    if timeline.end - time[-1] > 1e-9:
+        time = np.append(time, timeline.end)
+    conditions = job.conditions if cutting else replace(job.conditions, model=None)
+    warm = job.config.process.temperature_C
+    run_path = path_of_program(
+        "simulation", timeline, lay_track(path, conditions), time, started=started_s, to_machine=twin.to_machine,
+        vectors=job.frame.vectors, inverse=twin.inverse, temperature=None if warm is None else np.full(len(time), warm),
+    )  # fmt: skip
+    _, solved = twin.sense(run_path)
+    slopes = twin.slopes(run_path, (), solved)
+    reading, _ = twin.sense(run_path, solved=solved, slopes=slopes)
+    motion, _ = timeline.locate(time)
+    line = path.line[timeline.index[motion]]
+    rotary = tuple(each.revolute for each in twin.robot.actuators)
+    return Simulated(time, line, reading, run_path.row_rho, twin.actuators, rotary)
+
+
+def log_table(run: Simulated) -> str:
+    """The log as CSV text: the columns that a controller, encoders, drives, a dynamometer and a tracker would log."""
+    names = ["t_s", "line", "x_mm", "y_mm", "z_mm"]
+    lengths = ["rad" if each else "mm" for each in run.rotary]
+    efforts = ["Nmm" if each else "N" for each in run.rotary]
+    names += [f"cmd_{a}_{u}" for a, u in zip(run.actuators, lengths, strict=True)]
+    names += [f"act_{a}_{u}" for a, u in zip(run.actuators, lengths, strict=True)]
+    names += [f"act_{a}_{u}" for a, u in zip(run.actuators, efforts, strict=True)]
+    names += ["fx_N", "fy_N", "fz_N"]
+    r = run.reading
+    table = np.concatenate([r.tip, run.setpoint, r.encoder, r.drive, r.dyno], axis=1)
+    rows = [",".join(names)]
+    for t, line, values in zip(run.time, run.line, table, strict=True):
+        cells = ",".join(f"{value:.6f}".replace("-0.000000", "0.000000") for value in values)
+        rows.append(f"{t:.6f},{int(line)},{cells}")
+    return "\n".join(rows) + "\n"

@@ -1,0 +1,1 @@
+"""The paper: chains, loaded equilibrium, stiffness, modified target, compiled; no G-code, no time."""

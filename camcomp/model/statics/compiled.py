@@ -1,0 +1,110 @@
+"""How the solver's functions are compiled, and how their cache on disk knows that it is out of date.
+
+Only the entry functions, those that Python calls, are cached; what they call is compiled into them. numba trusts its
+cache while the entry's own file is unchanged, so a digest of all kernel sources is added to what it compares.
+"""
+
+from __future__ import annotations
+
+import functools
+import gc
+import hashlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numba
+from numba.core.types import unliteral
+
+KERNEL_FILES = ("compiled", "layout", "vectors", "kernel", "chain", "rigid", "point", "sweep", "gradients")
+# Nothing is allocated, raised or handed to Python inside: what numba would build for that costs time to compile.
+_OPTIONS = {"nogil": True, "error_model": "numpy", "_nrt": False, "no_cfunc_wrapper": True}
+_numba: Any = numba  # its annotations leave out what it has
+
+
+@functools.cache
+def digest() -> str:
+    """Digest of all kernel sources."""
+    folder = Path(__file__).parent
+    return hashlib.sha256(b"".join((folder / f"{name}.py").read_bytes() for name in KERNEL_FILES)).hexdigest()
+
+
+def inner(function: Callable[..., Any], *, fastmath: bool = False) -> Any:
+    """Compiles a function that only compiled functions call. It allocates nothing, needs no interpreter lock, never raises.
+
+    fastmath: sums may be formed in any order, and so in vectors.
+
+    Constants among its arguments count as plain numbers: numba would compile the function anew for every one of them,
+    which takes half as long again.
+    """
+    if _numba.config.DISABLE_JIT:  # for the debugger
+        return function
+    dispatcher = _numba.njit(no_cpython_wrapper=True, fastmath=fastmath, **_OPTIONS)(function)
+    template = dispatcher.get_call_template
+
+    def plain(args: Any, kws: Any) -> Any:
+        return template(tuple(unliteral(a) for a in args), kws)
+
+    dispatcher.get_call_template = plain
+    return dispatcher
+
+
+def _load_lightly(cache: Any) -> None:
+    """Lets compiled code be loaded without what numba imports in front of it, a quarter of a second of declarations.
+
+    They serve compiling only: code that allocates nothing refers to none of them. Where there is nothing to load, or a
+    numba is built otherwise, it goes its own way.
+    """
+    if not (hasattr(cache, "_load_overload") and hasattr(cache, "_guard_against_spurious_io_errors")):
+        return
+    whole = cache.load_overload
+
+    def load(signature: Any, context: Any) -> Any:
+        with cache._guard_against_spurious_io_errors():
+            found = cache._load_overload(signature, context)
+        return whole(signature, context) if found is None else found
+
+    cache.load_overload = load
+
+
+def entry(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Compiles a function that Python calls, cached on disk for as long as no kernel source changes.
+
+    Where nothing can be cached (no writable folder) it is compiled anew in every process. While compiling, the search for
+    unreachable objects rests: it takes a sixth of the time and finds nothing.
+    """
+    if _numba.config.DISABLE_JIT:
+        return function
+    try:
+        dispatcher = _numba.njit(cache=True, **_OPTIONS)(function)
+        file = dispatcher._cache._cache_file
+        file._source_stamp = (file._source_stamp, digest())
+        _load_lightly(dispatcher._cache)
+    except RuntimeError:  # numba finds no place for its cache
+        dispatcher = _numba.njit(**_OPTIONS)(function)
+
+    @functools.wraps(function)
+    def call(*args: Any) -> Any:
+        if dispatcher.overloads:  # not its `signatures`, which makes a list every time
+            return dispatcher(*args)
+        resting = gc.isenabled()
+        gc.disable()
+        try:
+            return dispatcher(*args)
+        finally:
+            if resting:
+                gc.enable()
+
+    call.dispatcher = dispatcher  # type: ignore[attr-defined]
+    return call
+
+
+def direct(function: Callable[..., Any], args: tuple[Any, ...]) -> Callable[..., Any]:
+    """An entry function for arguments of exactly the types of `args`, with which it has been called before.
+
+    It is the machine code without numba's search for it, which takes longer than small work does.
+    """
+    dispatcher: Any = getattr(function, "dispatcher", None)
+    if dispatcher is None:
+        return function
+    return dispatcher.overloads[tuple(map(dispatcher.typeof_pyval, args))].entry_point

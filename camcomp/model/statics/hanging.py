@@ -1,0 +1,139 @@
+"""Arms under their own weight at given joint coordinates, many poses at once, in plain numpy. mm, N, rad.
+
+The general solver starts from tips; logs of static poses give joint angles, anywhere and in any posture. A chain whose
+only springs are drives and links settles by substitution: deflection = compliance times the generalised load of
+the weights at the deflected pose, a contraction for every arm that stands.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from camcomp.model.statics.arm import arm_of
+from camcomp.model.statics.description import Actuator, Link, Robot, Transform, Weight
+
+Array = NDArray[np.float64]
+MOST_PASSES = 50
+DONE = 1e-11  # largest change of a deflection, mm or rad
+
+
+@dataclass(frozen=True)
+class Hung:
+    """Loaded poses: platform reference (n, 3) mm, rotation (n, 3, 3), torque (n, m) that each drive exerts, N or N mm."""
+
+    point: Array
+    rotation: Array
+    drive: Array
+
+
+def hang(robot: Robot, q: Array, wrench: Array | None = None) -> Hung:
+    """Poses at joint coordinates q (n, m) under the weights of the arm and a wrench (n, 6) at the platform reference.
+
+    Raises ValueError for a machine that is no arm, ArithmeticError where an arm gives way without end.
+    """
+    arm = arm_of(robot)
+    if arm is None:
+        raise ValueError("not an arm: several chains, or joints without a drive")
+    chain = arm.chain
+    compliance: list[Array] = []  # one block per spring, base to end
+    for e in chain.elements:
+        if isinstance(e, Actuator):
+            compliance.append(np.array([[0.0 if e.stiffness is None else 1.0 / e.stiffness]]))
+        elif isinstance(e, Link):
+            C = np.zeros((6, 6))
+            on = np.ix_(e.active, e.active)
+            C[on] = np.linalg.inv(e.stiffness[on])
+            compliance.append(C)
+    z = [np.zeros((len(q), len(C))) for C in compliance]
+    for _ in range(MOST_PASSES):
+        point, rotation, loads = _walk(robot, q, z, wrench)
+        new = [load @ C for load, C in zip(loads, compliance, strict=True)]
+        change = max((float(np.abs(a - b).max(initial=0.0)) for a, b in zip(new, z, strict=True)), default=0.0)
+        z = new
+        if not np.isfinite(change) or change > 1e3:
+            break
+        if change < DONE:
+            drives = [load[:, 0] for load, C in zip(loads, compliance, strict=True) if len(C) == 1]
+            return Hung(point, rotation, -np.stack(drives, axis=1))
+    raise ArithmeticError("the arm gives way under its own weight")
+
+
+def _walk(robot: Robot, q: Array, z: list[Array], wrench: Array | None) -> tuple[Array, Array, list[Array]]:
+    """End pose at deflections z, and the generalised load (n, 1 or 6) of weights and wrench on every spring."""
+    chain, n = robot.chains[0], len(q)
+    R = np.broadcast_to(chain.frame, (n, 3, 3)).copy()
+    p = np.zeros((n, 3))
+    pulls: list[tuple[int, Array, Array]] = []  # springs in front, force (3,), point (n, 3)
+    axes: list[tuple[Array, Array, bool | None, Array]] = []  # axis or frame, point, turns (None: link), own rotation
+    k = 0
+
+    def rigid(translation: Array, rotation: Array) -> None:
+        nonlocal p, R
+        p = p + R @ translation
+        R = R @ rotation
+
+    if chain.base_error.any():
+        rigid(chain.base_error[:3], _turns(chain.base_error[None, 3:])[0])
+    for e in chain.elements:
+        if isinstance(e, Transform):
+            rigid(e.translation, e.rotation)
+        elif isinstance(e, Actuator):
+            axis = R @ e.axis
+            axes.append((axis, p, e.revolute, R))
+            value = q[:, k] + z[len(axes) - 1][:, 0]
+            k += 1
+            if e.revolute:
+                R = R @ _turns(value[:, None] * e.axis)
+            else:
+                p = p + axis * value[:, None]
+        elif isinstance(e, Link):
+            own = z[len(axes)]
+            p = p + np.einsum("nij,nj->ni", R, own[:, :3])
+            axes.append((own[:, 3:], p, None, R))
+            R = R @ _turns(own[:, 3:])
+        elif isinstance(e, Weight):
+            pulls.append((len(axes), np.asarray(e.force, float), p + R @ e.centre))
+    if chain.end_error.any():
+        rigid(chain.end_error[:3], _turns(chain.end_error[None, 3:])[0])
+    loads = []
+    for j, (axis, at, turns, frame) in enumerate(axes):
+        force, moment = np.zeros((n, 3)), np.zeros((n, 3))
+        for behind, pull, where in pulls:
+            if behind > j:
+                force = force + pull
+                moment = moment + np.cross(where - at, pull)
+        if wrench is not None:
+            force = force + wrench[:, :3]
+            moment = moment + wrench[:, 3:] + np.cross(p - at, wrench[:, :3])
+        if turns is None:
+            local = np.einsum("nji,nj->ni", frame, moment)
+            loads.append(np.concatenate((np.einsum("nji,nj->ni", frame, force), _left_transposed(axis, local)), axis=1))
+        else:
+            loads.append(np.einsum("ni,ni->n", axis, moment if turns else force)[:, None])
+    return p, R @ chain.frame.T, loads
+
+
+def _cross_matrices(w: Array) -> Array:
+    out = np.zeros((len(w), 3, 3))
+    out[:, 0, 1], out[:, 0, 2], out[:, 1, 2] = -w[:, 2], w[:, 1], -w[:, 0]
+    return out - out.transpose(0, 2, 1)
+
+
+def _turns(w: Array) -> Array:
+    """Rotations (n, 3, 3) of rotation vectors (n, 3)."""
+    angle = np.linalg.norm(w, axis=1)[:, None, None]
+    W = _cross_matrices(w)
+    small = angle < 1e-8
+    safe = np.where(small, 1.0, angle)
+    a = np.where(small, 1.0, np.sin(safe) / safe)
+    b = np.where(small, 0.5, (1.0 - np.cos(safe)) / safe**2)
+    return np.eye(3) + a * W + b * (W @ W)
+
+
+def _left_transposed(w: Array, moment: Array) -> Array:
+    """J_l(w)^T moment for the small turns of links: the work of a moment per unit of the rotation vector, to third order."""
+    first = np.cross(moment, w)
+    return moment + 0.5 * first + np.cross(first, w) / 6.0

@@ -1,0 +1,76 @@
+"""A machine ready to be solved: the packed elastic model and the rigid model that its control uses."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from camcomp.model.statics.arm import arm_of
+from camcomp.model.statics.closedform import ClosedForm, closed_form
+from camcomp.model.statics.description import Robot
+from camcomp.model.statics.layout import Packed
+from camcomp.model.statics.pack import pack
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Machine:
+    """Packed robot. robot: what is; nominal: what the control believes (perfect chains, nominal lengths)."""
+
+    robot: Robot
+    nominal: Robot
+    elastic: Packed
+    rigid: Packed
+    joint_var: NDArray[np.int64]  # (c, rigid variables) -> entry in z of the elastic chain, -1 none
+    start_y: Array  # (c, rigid variables) nominal joint coordinates at the start pose
+
+    @property
+    def actuators(self) -> tuple[str, ...]:
+        """Names of the actuators, in the order of every actuator array."""
+        return tuple(a.name for a in self.robot.actuators)
+
+    @property
+    def start_pose(self) -> Array:
+        """(12,) nominal platform at the start: rotation row by row, position."""
+        return np.concatenate((self.nominal.start_rotation.ravel(), self.nominal.start_reference))
+
+    @cached_property
+    def closed_form(self) -> ClosedForm | None:
+        """Inverse kinematics in closed form, where the control's arm has one."""
+        arm = arm_of(self.nominal)
+        return None if arm is None else closed_form(arm)
+
+    @property
+    def limits(self) -> Array:
+        """(m, 2) travel limits, mm or rad."""
+        return np.array([a.limits for a in self.robot.actuators])
+
+    @property
+    def home(self) -> Array:
+        """(m,) home coordinates, mm or rad."""
+        return np.array([a.home for a in self.robot.actuators])
+
+    @property
+    def revolute(self) -> NDArray[np.bool_]:
+        """(m,) True for rotary actuators."""
+        return np.array([a.revolute for a in self.robot.actuators])
+
+
+def build_machine(robot: Robot, nominal: Robot | None = None) -> Machine:
+    """Packs a robot. nominal: the robot as its control knows it, by default the same one.
+
+    Raises ValueError if the machine has neither three nor six actuators, or none of its chains is complete.
+    """
+    m = len(robot.actuators)
+    if m not in (3, 6):
+        raise ValueError(f"{m} actuators; a machine needs three (tip position) or six (tip pose)")
+    nominal = robot if nominal is None else nominal
+    elastic, rigid = pack(robot, rigid=False), pack(nominal, rigid=True)
+    joint_var = np.full(rigid.start.shape, -1, np.int64)
+    for row, own, other in zip(joint_var, rigid.joints, elastic.joints, strict=True):
+        row[own] = other
+    return Machine(robot, nominal, elastic.packed, rigid.packed, joint_var, rigid.start)

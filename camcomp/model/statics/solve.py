@@ -1,0 +1,151 @@
+"""The machine's answers for arrays of points: inverse kinematics, loaded pose, holding force.
+
+Arrays over points, machine frame, mm, N, rad. Long arrays are solved in pieces of fixed size on all cores; the pieces
+start cold, so results do not depend on the number of cores.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from camcomp.model.statics import point, rigid, sweep
+from camcomp.model.statics.layout import SPRINGS, new_memory, new_work
+from camcomp.model.statics.machine import Machine
+from camcomp.model.statics.rotation import rotation_vectors
+
+Array = NDArray[np.float64]
+PIECE = 256
+FREE, HOLD, TARGET, CLAMP, POSE = point.FREE, point.HOLD, point.TARGET, point.CLAMP, point.POSE
+STATUS = {
+    rigid.OK: "solved",
+    rigid.MAX_ITERATIONS: "no convergence",
+    rigid.OUT_OF_REACH: "out of reach",
+    rigid.SINGULAR: "singular configuration",
+    rigid.UNSTABLE: "not stable (buckling)",
+}
+
+
+@dataclass(frozen=True)
+class State:
+    """Solved points. Rows whose status is not 0 hold NaN.
+
+    tip (n, 3) loaded tool tip; rotation (n, 3, 3) platform; tilt (n, 3) its rotation vector against the nominal
+    orientation, rad; commanded (n, 3) tip the control is told; rho (n, m) actuator coordinates that go with it;
+    rho_nominal (n, m) inverse kinematics of the point asked for; drive (n, m) force of each drive on its carriage;
+    force (n, 3) at the tip; status, passes (n,) int; x (n, c, nz), F (n, c, 6): internal states and wrenches of the
+    chains, empty unless asked for; commanded_rotation (n, 3, 3); wrench (n, 6): sum of the chains' wrenches, the whole
+    load at the platform reference (the answer of CLAMP, and of HOLD with six actuators).
+    """
+
+    tip: Array
+    rotation: Array
+    tilt: Array
+    commanded: Array
+    rho: Array
+    rho_nominal: Array
+    drive: Array
+    force: Array
+    status: NDArray[np.int64]
+    passes: NDArray[np.int64]
+    x: Array
+    F: Array
+    commanded_rotation: Array
+    wrench: Array
+
+
+def _per_point(value: Array | None, n: int, shape: tuple[int, ...]) -> Array:
+    if value is None:
+        return np.zeros((n, *shape))
+    return np.ascontiguousarray(np.broadcast_to(np.asarray(value, float), (n, *shape))).copy()
+
+
+def _start(machine: Machine, rotation: Array, reference: Array) -> tuple[Array, Array]:
+    """Pose and joint coordinates from which the numeric inverse kinematics begins: the first point, if in closed form."""
+    if machine.closed_form is not None and (q := machine.closed_form.near(rotation, reference)) is not None:
+        return np.concatenate((rotation.ravel(), reference)), q[None]
+    return machine.start_pose, machine.start_y
+
+
+def threads() -> int:
+    """Threads of the solver: as many as there are cores for this process, or what CAMCOMP_THREADS says."""
+    limit = os.environ.get("CAMCOMP_THREADS", "")
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return max(1, int(limit)) if limit.isdigit() else cores
+
+
+def in_pieces(work: Callable[[slice], None], n: int) -> None:
+    """Runs work on slices of PIECE points, on every core."""
+    pieces = [slice(a, min(a + PIECE, n)) for a in range(0, n, PIECE)]
+    workers = min(threads(), len(pieces))
+    if workers < 2:
+        for piece in pieces:
+            work(piece)
+        return
+    with ThreadPoolExecutor(workers) as pool:
+        list(pool.map(work, pieces))
+
+
+def solve(
+    machine: Machine,
+    mode: int,
+    near: Array,
+    *,
+    aim: Array | None = None,
+    aim_rotation: Array | None = None,
+    force: Array | None = None,
+    wrench: Array | None = None,
+    rho: Array | None = None,
+    check: bool = True,
+    keep: bool = False,
+) -> State:
+    """Solves every point in one of the modes of camcomp.statics.point.
+
+    near (n, 3): a tip position near the answer (its nominal joint coordinates start the solver). force (n, 3) at the
+    tip, wrench (n, 6) at the platform reference. rho (n, m) commanded in FREE, HOLD and CLAMP; without it the control is
+    told to go to `near`. check: prove stability.
+    """
+    near = np.ascontiguousarray(near, float)
+    n, m = len(near), len(machine.actuators)
+    tool = np.ascontiguousarray(machine.robot.tool, float)
+    aim = near if aim is None else np.ascontiguousarray(aim, float)
+    R_aim = _per_point(machine.nominal.held_rotation if aim_rotation is None else aim_rotation, n, (3, 3))
+    # a clamped pose need not be one that the rigid machine can take
+    R_near = _per_point(machine.nominal.held_rotation, n, (3, 3)) if mode == CLAMP else R_aim
+    # the control aims with the tool it knows; the kernels have one tool, the real one
+    longer = tool - machine.nominal.tool
+    near = near + R_near @ longer
+    f, w = _per_point(force, n, (3,)), _per_point(wrench, n, (6,))
+    r = np.zeros((n, m)) if rho is None else np.array(rho, float).reshape(n, m)
+    nominal, drive, tip, total = (np.full((n, k), np.nan) for k in (m, m, 3, 6))
+    goal, pose = np.full((n, 12), np.nan), np.full((n, 12), np.nan)
+    status, passes = np.zeros(n, np.int64), np.zeros(n, np.int64)
+    kept = np.zeros((n if keep else 0, *machine.elastic.scale.shape))
+
+    def work(s: slice) -> None:
+        start, start_y = _start(machine, R_near[s.start], near[s.start] - R_near[s.start] @ tool)
+        sweep.solve_many(
+            mode, machine.elastic, machine.rigid, machine.joint_var, tool, start, start_y,
+            rho is None, check, R_near[s].reshape(-1, 9),
+            R_aim[s].reshape(-1, 9), near[s], aim[s], f[s], w[s], r[s], nominal[s], goal[s], pose[s],
+            tip[s], drive[s], total[s], status[s], passes[s], kept[s] if keep else kept,
+            new_memory(machine.elastic, machine.rigid), new_work(machine.elastic, machine.rigid),
+        )  # fmt: skip
+
+    in_pieces(work, n)
+    bad = status != rigid.OK
+    for a in (tip, drive, total, goal, pose, r):
+        a[bad] = np.nan
+    if mode == HOLD:
+        f[bad] = np.nan
+    nominal[status == rigid.OUT_OF_REACH] = np.nan
+    R, R_cmd = pose[:, :9].reshape(n, 3, 3), goal[:, :9].reshape(n, 3, 3)
+    tilt, commanded = rotation_vectors(R @ R_aim.transpose(0, 2, 1)), goal[:, 9:] + R_cmd @ machine.nominal.tool
+    f0 = machine.elastic.chain[:, SPRINGS]
+    F = np.stack([kept[:, c, k : k + 6] for c, k in enumerate(f0)], axis=1)
+    return State(tip, R, tilt, commanded, r, nominal, drive, f, status, passes, kept, F, R_cmd, total)

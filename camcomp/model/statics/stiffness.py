@@ -1,0 +1,120 @@
+"""Cartesian stiffness of every chain and of the machine, loaded and unloaded, and what moves the tip.
+
+Loaded: derivative of the wrench by the pose at the solved equilibrium, with all Hessian terms (Pashkevich, Klimchik,
+Chablat, Mech. Mach. Theory 46 (2011) 662-679). Unloaded: the same where nothing is strained. Assembly: Klimchik et al.
+2012, eqs. (6)-(7).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from camcomp.model.statics.gradients import ends_many, gradients_many
+from camcomp.model.statics.layout import new_work
+from camcomp.model.statics.machine import Machine, build_machine
+from camcomp.model.statics.rotation import rotation_vectors
+from camcomp.model.statics.solve import FREE, State, in_pieces, solve
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Stiffness:
+    """At n points: chains (n, c, 6, 6), their sum machine (n, 6, 6), N/mm, N, N mm/rad at the platform reference point.
+
+    by_rho (n, 6, m): wrench per actuator displacement with the pose held.
+    """
+
+    chains: Array
+    machine: Array
+    by_rho: Array
+
+
+@dataclass(frozen=True)
+class TipSensitivity:
+    """Derivatives at n loaded points with the actuators given: of the tip (mm) and of the drive forces (N or N mm).
+
+    By the actuator coordinates (n, 3 or m, m), by the force at the tip (n, 3 or m, 3), by a wrench at the platform
+    reference (n, 3 or m, 6).
+    """
+
+    by_rho: Array
+    by_force: Array
+    by_wrench: Array
+    drive_by_rho: Array
+    drive_by_force: Array
+    drive_by_wrench: Array
+
+
+def _gradients(machine: Machine, state: State) -> tuple[Array, Array, Array, Array, Array]:
+    """Chains, total, by_rho, tip_by, drive_by of gradients_many; NaN in rows that are not solved or singular."""
+    n, m = state.rho.shape
+    if len(state.x) != n:
+        raise ValueError("the state has to be solved with keep=True")
+    c = state.x.shape[1]
+    out = tuple(np.full((n, *shape), np.nan) for shape in ((c, 6, 6), (6, 6), (6, m), (3, m + 9), (m, m + 9)))
+    tool = np.ascontiguousarray(machine.robot.tool, float)
+    pose = np.concatenate((state.rotation.reshape(n, 9), state.tip - state.rotation @ tool), axis=1)
+    solved = (state.status == 0).astype(np.int64)
+
+    def work(s: slice) -> None:
+        gradients_many(
+            machine.elastic, tool, state.x[s], state.rho[s], pose[s], state.force[s], solved[s], *(a[s] for a in out),
+            new_work(machine.elastic, machine.rigid),
+        )  # fmt: skip
+
+    in_pieces(work, n)
+    return out  # type: ignore[return-value]
+
+
+def loaded_stiffness(machine: Machine, state: State) -> Stiffness:
+    """Stiffness at solved points, d(wrench)/d(pose) with the actuators held. `state` has to be solved with keep=True.
+
+    Raises ValueError when the state does not hold its inner variables.
+    """
+    chains, _, by_rho, _, _ = _gradients(machine, state)
+    return Stiffness(chains, chains.sum(axis=1), -by_rho)
+
+
+def unloaded_stiffness(machine: Machine, tips: Array) -> Stiffness:
+    """Stiffness (n, ...) of the perfect machine without any load at tips (n, 3): K_C of the seed's eqs. (4) and (7)."""
+    perfect = build_machine(machine.nominal, machine.nominal)
+    return loaded_stiffness(perfect, solve(perfect, FREE, tips, check=False, keep=True))
+
+
+def tip_sensitivity(machine: Machine, state: State) -> TipSensitivity:
+    """What moves the tip and the drive forces at points solved with keep=True, to first order; exact at the loaded point."""
+    m = state.rho.shape[1]
+    tip, drive = _gradients(machine, state)[3:]
+    parts = [(a[..., :m], a[..., m : m + 3], a[..., m + 3 :]) for a in (tip, drive)]
+    return TipSensitivity(*parts[0], *parts[1])
+
+
+def tip_compliance(machine: Machine, state: State) -> Array:
+    """Displacement of the tip (n, 3, 3) mm/N per force at the tip, at solved points."""
+    return tip_sensitivity(machine, state).by_force
+
+
+def chain_shifts(machine: Machine, tips: Array) -> Array:
+    """Shift (n, c, 6) of every free chain's end by its own geometric error at tips (n, 3): eps_i of eq. (6)."""
+    perfect = build_machine(machine.nominal, machine.nominal)
+    state = solve(perfect, FREE, tips, check=False, keep=True)
+    ends = []
+    for model in (perfect, build_machine(machine.robot, machine.nominal)):
+        ends.append(np.zeros((*state.x.shape[:2], 12)))
+        ends_many(model.elastic, state.x, ends[-1], new_work(model.elastic, model.rigid))
+    R0, R1 = (e[..., :9].reshape(*e.shape[:2], 3, 3) for e in ends)
+    return np.concatenate((ends[1][..., 9:] - ends[0][..., 9:], rotation_vectors(R1 @ R0.swapaxes(-1, -2))), axis=-1)
+
+
+def assembly_shift(stiffness: Array, shifts: Array) -> tuple[Array, Array]:
+    """Platform displacement (n, 6) and internal wrenches (n, c, 6) from chain errors, to first order: eq. (7).
+
+    stiffness (n, c, 6, 6) of the chains, shifts (n, c, 6): dt = (sum K_i)^-1 sum K_i eps_i, F_i = K_i (dt - eps_i).
+    """
+    total = np.einsum("ncij,ncj->ni", stiffness, shifts)
+    dt = np.linalg.solve(stiffness.sum(axis=1), total[..., None])[..., 0]
+    return dt, np.einsum("ncij,ncj->nci", stiffness, dt[:, None, :] - shifts)

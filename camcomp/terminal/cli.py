@@ -1,0 +1,134 @@
+"""The command line: verbs found by file name in terminal/commands and imported when called; errors to exit codes.
+
+0 done · 1 a check failed · 2 usage, YAML · 3 NC program · 4 physics · 5 input, output · 70 bug in camcomp ·
+130 interrupted · 141 the reader of our output went away.
+"""
+
+import gc
+import os
+import sys
+from importlib import import_module
+
+import click
+
+from camcomp import __version__
+from camcomp.ground.errors import CamcompError, FileError, format_error
+from camcomp.ground.garbage import collect_seldom
+
+# Matrices here are small: threads of the linear algebra wait for each other longer than they compute, most of all on a
+# machine that does other things too. It has to be said before numpy is imported; a user's own setting stands.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+# One line per verb, so that `camcomp --help` imports none of them; a test keeps the table and the commands equal.
+VERBS = {
+    "batch": "Compensate many programs at once.",
+    "canon": "Print what a program was understood to do, one line per motion.",
+    "compare": "Compare two logs or joint tables of one program.",
+    "compensate": "Write the deflection of the machine back into an NC program.",
+    "config": "Show what several YAML files make together.",
+    "diagnose": "Find out why a machine and its model differ.",
+    "effects": "List what can make a machine differ from its model.",
+    "explain": "Say what a rule id of an error message means.",
+    "import": "Turn recordings of others into logs and an experiment file.",
+    "init": "Start a project: a machine file, a program, a README.",
+    "schema": "Print the JSON schema of the YAML files.",
+    "simulate": "Write the log that the modelled machine would produce.",
+    "stream": "Compensate single set-points, line by line, from standard input to standard output.",
+    "validate": "Check YAML files and NC programs; report every error at once.",
+    "verify": "Settle a compensated program on the model and measure what is left.",
+}
+
+
+class _Verbs(click.Group):
+    """Commands by file name."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        files = os.listdir(os.path.join(os.path.dirname(__file__), "commands"))
+        return sorted(each[:-3] for each in files if each.endswith(".py") and not each.startswith("_"))
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in self.list_commands(ctx):
+            return None
+        return import_module(f"camcomp.terminal.commands.{cmd_name}").command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, VERBS.get(name, "")) for name in self.list_commands(ctx)])
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        if args[0] not in self.list_commands(ctx) and not args[0].startswith("-"):
+            from difflib import get_close_matches
+
+            close = get_close_matches(args[0], self.list_commands(ctx), n=1)
+            ctx.fail(f"No such command '{args[0]}'." + (f" Did you mean '{close[0]}'?" if close else ""))
+        return super().resolve_command(ctx, args)
+
+
+@click.group(cls=_Verbs, context_settings={"help_option_names": ["-h", "--help"], "auto_envvar_prefix": "CAMCOMP"})
+@click.version_option(__version__, prog_name="camcomp", message="%(prog)s %(version)s")
+def cli() -> None:
+    """G-code and a machine file in, G-code that makes up for the machine's compliance out."""
+
+
+def main(args: list[str] | None = None) -> None:
+    """Run the command line and leave the process with the exit code of the contract."""
+    collect_seldom()
+    code = run(sys.argv[1:] if args is None else args)
+    gc.freeze()  # the interpreter need not look through everything once more when it ends
+    sys.exit(code)
+
+
+def run(args: list[str]) -> int:
+    """Run one command line; the exit code. Messages go to standard error."""
+    if "_CAMCOMP_COMPLETE" in os.environ:
+        from click.shell_completion import shell_complete
+
+        return shell_complete(cli, {}, "camcomp", "_CAMCOMP_COMPLETE", os.environ["_CAMCOMP_COMPLETE"])
+    try:
+        with cli.make_context("camcomp", list(args)) as context:
+            code = cli.invoke(context)
+        sys.stdout.flush()
+        return code if isinstance(code, int) else 0
+    except CamcompError as error:
+        return _report(error)
+    except click.exceptions.Exit as stop:
+        return stop.exit_code
+    except click.exceptions.FileError as error:
+        return _report(FileError("CC500", f"cannot open {error.ui_filename}: {error.message}"))
+    except click.ClickException as error:
+        error.show()
+        return 2
+    except (KeyboardInterrupt, click.Abort):
+        click.echo("camcomp: interrupted", err=True)
+        return 130
+    except BrokenPipeError:
+        # Python flushes standard output once more at exit; there must be something left to flush into.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 141
+    except OSError as error:
+        name = f"{error.filename}: " if error.filename else ""
+        return _report(FileError("CC503", f"{name}{error.strerror or error}"))
+    except Exception as error:  # noqa: BLE001 - whatever else comes is a bug, and is called one
+        return _bug(error)
+
+
+def _report(error: CamcompError) -> int:
+    color = sys.stderr.isatty() and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
+    click.echo(format_error(error, color), err=True, color=color)
+    return error.exit_code
+
+
+def _bug(error: Exception) -> int:
+    if os.environ.get("CAMCOMP_DEBUG"):
+        import traceback
+
+        traceback.print_exc()
+    click.echo(
+        f"camcomp: internal error: {type(error).__name__}: {error}\n"
+        f"  This is a bug in camcomp {__version__}, not a mistake in your files.\n"
+        "  Run again with CAMCOMP_DEBUG=1 for the traceback, and report it with the files that show it.",
+        err=True,
+    )
+    return 70

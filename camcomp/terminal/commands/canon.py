@@ -1,0 +1,26 @@
+"""camcomp canon."""
+
+import click
+
+from camcomp.ground.files import display_name
+from camcomp.model.config.load import load_config
+
+
+@click.command()
+@click.argument("program", metavar="PROGRAM")
+@click.option("--config", "configs", metavar="FILE", multiple=True, help="Machine whose control reads it.")
+def command(program: str, configs: tuple[str, ...]) -> None:
+    """Print what a program was understood to do, one line per motion.
+
+    Source line, kind, end point in mm in the program frame of G54, and for arcs the centre and the sweep; all units,
+    offsets, modes, loops and cycles are resolved.
+    """
+    from camcomp.gcode.canon import canonical
+    from camcomp.model.control import open_program
+
+    read = open_program(program, load_config(configs) if configs else None)
+    for warning in read.warnings:
+        click.echo(f"{display_name(program)}: warning: {warning}", err=True)
+    click.echo(f"; {read.dialect}, {len(read.path)} motions")
+    for line in canonical(read.path):
+        click.echo(line)

@@ -1,0 +1,107 @@
+"""camcomp diagnose."""
+
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from camcomp.ground.files import STANDARD, read_bytes, write_all
+from camcomp.model.config.write_back import machine_file, with_causes
+from camcomp.terminal.commands._options import quiet_option
+from camcomp.terminal.progress import say, working
+
+if TYPE_CHECKING:
+    from camcomp.diagnosis.diagnose import Diagnosis
+    from camcomp.diagnosis.experiment.open_experiment import OpenExperiment
+
+
+def diagnose_experiment(path: str | Path, without: Sequence[str] = ()) -> dict[str, Any]:
+    """The result mapping of an experiment file, ready for JSON. Raises CamcompError."""
+    return examine(path, without)[0]
+
+
+def examine(
+    path: str | Path, without: Sequence[str] = ()
+) -> "tuple[dict[str, Any], Diagnosis | None, OpenExperiment | None]":
+    """The result, and what it was drawn from; nothing of that for logs that have a study of their own."""
+    from camcomp.diagnosis.diagnose import diagnose
+    from camcomp.diagnosis.experiment.open_experiment import open_experiment
+    from camcomp.diagnosis.studies import study_of
+
+    if (study := study_of(path, without)) is not None:
+        return study, None, None
+    opened = open_experiment(path)
+    done = diagnose(opened.job, opened.twin, opened.runs, holdout=opened.experiment.holdout, without=without)
+    return done.result, done, opened
+
+
+def _machine_with_causes(configs: Sequence[str], result: dict[str, Any], target: str) -> str:
+    """Text of the machine file with the causes in it."""
+    texts = [read_bytes(each).decode("utf-8-sig") for each in configs]
+    k = machine_file(texts)
+    note = f"found by camcomp diagnose, verdict {result['verdict']}"
+    if result["verdict"] == "ambiguous":
+        note += f": the likeliest of {len(result['alternatives'])} sets that explain the data alike"
+    to = Path.cwd() if target == STANDARD else Path(target).absolute().parent
+    return with_causes(
+        texts[k], result["causes"], folder=str(Path(configs[k]).absolute().parent), moved_to=str(to), note=note
+    )
+
+
+@click.command()
+@click.argument("experiment")
+@click.option("--json", "json_file", metavar="OUT.json", help="The result; - is standard output.")
+@click.option("--report", metavar="OUT.html", help="What was found and why, as one page with plots.")
+@click.option("--write-config", "config_file", metavar="OUT.yaml", help="The machine file with the causes as effects.")
+@click.option("--next-program", metavar="OUT.nc", help="NC program of the proposed next experiment.")
+@click.option("--without", multiple=True, metavar="EFFECT", help="Take an effect out of the library; repeatable.")
+@quiet_option
+def command(
+    experiment: str,
+    json_file: str | None,
+    report: str | None,
+    config_file: str | None,
+    next_program: str | None,
+    without: tuple[str, ...],
+    quiet: bool,
+) -> None:
+    """Find out why a machine and its model differ.
+
+    EXPERIMENT is a YAML file that names the config under judgement and the runs with their programs and logs.
+    """
+    if report:
+        from camcomp.report.page import plot_library
+
+        plot_library()  # a missing library is told before the work, not after it
+    with working(f"diagnosing {experiment}", quiet=quiet):
+        result, done, opened = examine(experiment, without)
+    for each in opened.notes if opened is not None else ():
+        click.echo(f"note: {each}", err=True)
+    outputs: dict[str, bytes] = {}
+    if json_file or not (report or config_file or next_program):
+        outputs[json_file or STANDARD] = (json.dumps(result, indent=1, allow_nan=False) + "\n").encode()
+    if report:
+        from camcomp.diagnosis.report.views import report_of
+
+        with working("drawing the report", quiet=quiet):
+            outputs[report] = report_of(experiment, result, done, opened)
+    inputs: tuple[str, ...] = (experiment,)
+    if config_file:
+        from camcomp.model.config.load import load_experiment
+
+        configs = load_experiment(experiment).config
+        inputs = (experiment, *configs)
+        outputs[config_file] = _machine_with_causes(configs, result, config_file).encode()
+    if next_program and done is not None:
+        if done.proposal is None:
+            click.echo("nothing is left to separate: no next experiment, no program", err=True)
+        else:
+            outputs[next_program] = done.proposal.candidate.program.encode()
+    write_all(outputs, inputs=inputs)
+    sys.stdout.flush()
+    from camcomp.diagnosis.report.answer import answer_lines
+
+    say(*answer_lines(result), quiet=quiet)

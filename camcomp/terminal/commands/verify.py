@@ -1,0 +1,80 @@
+"""camcomp verify."""
+
+import json
+
+import click
+
+from camcomp.ground.errors import CamcompError, CheckFailed
+from camcomp.ground.files import display_name, write_all
+from camcomp.model.config.load import load_config
+from camcomp.report.findings import Case, Finding, findings_of
+from camcomp.report.outputs import findings_files
+from camcomp.terminal.commands._options import findings_options, quiet_option
+from camcomp.terminal.progress import say, working
+
+
+@click.command()
+@click.argument("corrected")
+@click.option("--against", "original", metavar="ORIGINAL", required=True, help="Program that was compensated.")
+@click.option("--config", "configs", metavar="FILE", multiple=True, required=True, help="Machine; later files win.")
+@click.option("--json", "json_file", metavar="OUT.json", help="Residuals, in all and per source line.")
+@findings_options("sarif", "junit")
+@quiet_option
+@click.option("--tolerance-um", type=click.FloatRange(min=0, min_open=True), help="Largest residual that passes.")
+def command(
+    corrected: str,
+    original: str,
+    configs: tuple[str, ...],
+    json_file: str | None,
+    sarif_file: str | None,
+    junit_file: str | None,
+    quiet: bool,
+    tolerance_um: float | None,
+) -> None:
+    """Settle a compensated program on the model and measure what is left.
+
+    Only the text of CORRECTED counts. Exit code 1 when the residual is over the tolerance.
+    """
+    config = load_config(configs)
+    from camcomp.compensation.program.verify import verify
+    from camcomp.model.control import open_program
+    from camcomp.model.job import Job
+
+    tolerance = tolerance_um or config.compensation.tolerance_um
+    inputs = (corrected, original, *configs)
+    findings: list[Finding] = []
+    outputs: dict[str, bytes] = {}
+    failure: CamcompError | None = None
+    note = ""
+    try:
+        source = open_program(original, config)
+        with working("settling the corrected program", quiet=quiet):
+            done = verify(open_program(corrected, config), source, Job(config))
+        figures = done.as_json(tolerance)
+        if json_file:
+            outputs[json_file] = (json.dumps(figures, indent=2) + "\n").encode()
+        worst = figures["residual"]["max_um"]
+        note = f"residual rms {figures['residual']['rms_um']:.3f} um, max {worst:.3f} um at {figures['points']} points"
+        say(f"{note}; {done.joining} joining lines not counted", quiet=quiet)
+        for each in sorted(done.lines, key=lambda e: -e.residual_um)[:10]:
+            say(
+                f"  line {each.line}: {each.residual_um:.3f} um in {each.moves} moves (vertex {each.vertex_um:.3f}, "
+                f"chord +{each.chord_um:.3f}, rounding <= {each.rounding_um:.3f}, solver {each.convergence_um:.1e})",
+                quiet=quiet,
+            )
+        over = [each for each in done.lines if each.residual_um > tolerance]
+        if not worst <= tolerance * (1.0 + 1e-9):
+            lines = ", ".join(str(each.line) for each in over)
+            text = f"{worst:.3f} um are left, more than {tolerance:g} um, at source lines {lines}"
+            failure = CheckFailed("CC601", text)
+            for each in over:
+                at = source.text.place(each.line - 1, 0)
+                text = f"{each.residual_um:.3f} um are left, more than {tolerance:g} um"
+                findings.append(Finding("CC601", text, at.file, at.line, at.column, at.source, check=True))
+    except CamcompError as error:
+        failure, findings = error, findings_of(error, display_name(corrected))
+    case = Case(display_name(corrected), findings, note)
+    outputs |= findings_files("verify", [case], sarif_file=sarif_file, junit_file=junit_file)
+    write_all(outputs, inputs=inputs)
+    if failure is not None:
+        raise failure

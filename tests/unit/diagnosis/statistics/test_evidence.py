@@ -1,0 +1,84 @@
+"""Evidence in closed form against the integral itself, and what it has to prefer."""
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.stats import norm
+
+from camcomp.diagnosis.statistics.cause_sets import CausePrior, Scale, predictive
+from camcomp.diagnosis.statistics.evidence import (
+    PRIOR_WIDTHS,
+    Prior,
+    base,
+    estimate,
+    gram,
+    log_bayes,
+    log_bayes_pairs,
+)
+
+RNG = np.random.default_rng(7)
+
+
+def prior(k, sign=None, tolerance=0.01):
+    return Prior(np.full(k, tolerance), np.ones(k), np.zeros(k) if sign is None else np.array(sign), np.ones(k))
+
+
+def data(truth, n=300, k=4, seed=1):
+    rng = np.random.default_rng(seed)
+    D = rng.standard_normal((n, k))
+    return gram(D, D @ np.array(truth) + rng.standard_normal(n))
+
+
+def test_bayes_factor_of_one_cause_is_the_integral_it_stands_for():
+    g, p = data([0.2], k=1), prior(1)
+    a, b = g.A[0, 0], g.b[0]
+
+    def integral(density):
+        return quad(lambda x: np.exp(b * x - 0.5 * a * x * x) * density(x), -3, 3, points=[b / a, 0.0], limit=400)[0]
+
+    weights = [0.15, 0.3, 0.35, 0.2]
+    wide = sum(w * integral(lambda x, s=s: norm.pdf(x, 0, s)) for w, s in zip(weights, PRIOR_WIDTHS, strict=True))
+    narrow = integral(lambda x: norm.pdf(x, 0, 0.01))
+    assert log_bayes(base(g, p, 1.0), p, [[0]]) == pytest.approx(np.log(wide / narrow), abs=1e-5)
+
+
+def test_a_cause_of_the_wrong_sign_is_held_against_it():
+    g = data([-0.5], k=1)
+    free, signed = prior(1), prior(1, [1.0])
+    assert log_bayes(base(g, signed, 1.0), signed, [[0]]) < log_bayes(base(g, free, 1.0), free, [[0]]) - 10
+
+
+def test_pairs_at_once_equal_pairs_one_by_one():
+    g, p = data([0.3, 0.0, -0.2, 0.05]), prior(4, [0.0, 1.0, 0.0, 1.0])
+    at = base(g, p, 1.0)
+    first, second = np.array([0, 0, 1, 2]), np.array([1, 2, 3, 3])
+    one_by_one = [log_bayes(at, p, [[i], [j]]) for i, j in zip(first, second, strict=True)]
+    assert log_bayes_pairs(at, p, first, second) == pytest.approx(one_by_one, abs=1e-8)
+
+
+def test_what_is_within_tolerance_is_no_finding():
+    p = prior(4, tolerance=0.3)
+    assert log_bayes(base(data([0.2, 0, 0, 0]), p, 1.0), p, [[0]]) < 1.0
+    assert log_bayes(base(data([2.0, 0, 0, 0]), p, 1.0), p, [[0]]) > 5.0
+
+
+def test_the_right_cause_wins_and_its_estimate_covers_the_truth():
+    p = prior(4)
+    candidates = CausePrior(((0,), (1,), (2,), (3,)), np.log(np.full(4, 0.25)), lambda i, j: False)
+    hits = 0
+    for seed in range(20):
+        g = data([0, 0.4, 0, 0], seed=seed)
+        scale = Scale(g, p, candidates)
+        values = {m: scale(m) + candidates.prior(m) for m in [(), (0,), (1,), (2,), (3,), (0, 1)]}
+        assert max(values, key=values.get) == (1,)
+        mean, covariance = estimate(g, p, [1])
+        hits += abs(mean[1] - 0.4) < 1.96 * np.sqrt(covariance[1, 1])
+    assert hits >= 16
+
+
+def test_runs_left_out_are_predicted_better_with_the_cause_than_without():
+    p = prior(4)
+    candidates = CausePrior(((0,), (1,), (2,), (3,)), np.log(np.full(4, 0.25)), lambda i, j: False)
+    runs = [data([0, 0.4, 0, 0], seed=s) for s in range(4)]
+    with_it, without, wrong = predictive(runs, p, candidates, [(1,), (), (3,)])
+    assert with_it > without + 5 and with_it > wrong + 5
