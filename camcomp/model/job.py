@@ -12,6 +12,7 @@ import numpy as np
 from camcomp.ground import shelf
 from camcomp.ground.datatypes import Floats
 from camcomp.ground.errors import ConfigError
+from camcomp.model import signal_path
 from camcomp.model.config.spec import Config
 from camcomp.model.cutting.cut import Cut
 from camcomp.model.cutting.track import Conditions
@@ -74,11 +75,8 @@ class Job:
     def real_machine(self) -> Machine:
         """The machine with its chain errors and with what the effects of the config change in it."""
         robot, nominal = self._robots
-        names = tuple(each.name for each in robot.actuators)
-        for cause in self.causes:
-            if (hook := cause.hook("on_robot")) is not None:
-                robot = hook(robot, cause.aimed(names), cause.values)
-        return self.machine if robot is self._robots[0] else self._build(robot, nominal)
+        changed, by = signal_path.edited(self.causes, tuple(each.name for each in robot.actuators), robot)
+        return self._build(changed, nominal) if by else self.machine
 
     @cached_property
     def _robots(self) -> tuple[Robot, Robot]:

@@ -283,7 +283,7 @@ def _drivers(bench: ArmBench, found: ArmFit) -> list[dict[str, Any]]:
     """What the leftover depends on."""
     patterns: dict[str, list[Floats]] = {}
     for k, campaign in enumerate(bench.campaigns):
-        hung = bench.poses(campaign, ())
+        hung = bench.standing(campaign, ()).hung
         lever = bench.start[k].tips(hung.point, hung.rotation) - hung.point
         J = np.array([jacobian(bench.arm, q) for q in campaign.q])
         moves = J[:, :3] + np.cross(J[:, 3:], lever[:, :, None], axis=1)

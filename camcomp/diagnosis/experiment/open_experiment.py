@@ -57,7 +57,7 @@ def open_experiment(path: str | FilePath) -> OpenExperiment:
     order = sorted(range(len(runs)), key=lambda k: experiment.runs[k].started_s)
     worn = 0.0
     for k in order:
-        runs[k] = replace(runs[k], run_path=replace(runs[k].run_path, cut_before_min=worn, kept={}))
+        runs[k] = replace(runs[k], run_path=replace(runs[k].run_path, cut_before_min=worn))
         worn += runs[k].run_path.cut_min
     return OpenExperiment(experiment, job, twin, tuple(runs), tuple(notes))
 

@@ -1,8 +1,8 @@
 """One run as the twin sees it: where the set-points are in time, and where in the program every row of a log stands."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,7 +48,16 @@ class RunPath:
     temperature: Floats | None  # (n,) deg C at the rows
     timeline: Timeline | None
     cut_before_min: float = 0.0
-    kept: dict[Any, Any] = field(default_factory=dict)  # what the twin has worked out for this run_path before
+
+    @cached_property
+    def row_place(self) -> Places:
+        """Where the rows lie between the nodes."""
+        return self.place(self.time)
+
+    @cached_property
+    def row_force(self) -> Floats:
+        """Cutting force (n, 3) N at the rows, machine frame, as modelled."""
+        return self.row_place.of(self.node_force)
 
     @property
     def cut_min(self) -> float:
