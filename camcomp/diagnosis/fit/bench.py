@@ -118,7 +118,7 @@ class Bench:
         if k not in self._row_slopes:
             run = self.runs[k]
             at_nodes = self.twin.rotation.T @ self.slopes[k].tip_rho
-            self._row_slopes[k] = run.run_path.place(run.run_path.time).of(at_nodes)
+            self._row_slopes[k] = run.run_path.row_place.of(at_nodes)
         return self._row_slopes[k]
 
     def channels(self, reading: Reading) -> Floats:
