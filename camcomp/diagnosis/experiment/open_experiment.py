@@ -9,26 +9,21 @@ from pathlib import Path as FilePath
 
 import numpy as np
 
+from camcomp.diagnosis.experiment.driven_run import drive
 from camcomp.diagnosis.experiment.log_checks import (
-    check_forces,
     check_length,
-    check_places,
-    check_program,
     check_rows,
 )
 from camcomp.diagnosis.fit.bench import Run
 from camcomp.diagnosis.fit.measured import Measured
-from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import Floats
 from camcomp.ground.errors import ConfigError, Location
 from camcomp.ground.files import display_name, read_bytes
 from camcomp.model.config.load import load_config, load_experiment
 from camcomp.model.config.spec import Experiment, RunSpec
 from camcomp.model.control import open_program
-from camcomp.model.cutting.track import lay_track
 from camcomp.model.job import Job
-from camcomp.model.motion.run_path import RunPath, path_of_program
-from camcomp.model.motion.timeline import fit_to_log, schedule
+from camcomp.model.motion.timeline import schedule
 from camcomp.model.motion.twin import Twin, twin_of
 
 STEADY_S = 15.0  # half the width of a temperature's local straight line
@@ -67,29 +62,20 @@ def open_run(spec: RunSpec, job: Job, twin: Twin, notes: list[str]) -> Run:
     measured, log = read_log(spec.log, twin), display_name(spec.log)
     notes += unread(spec.log, twin)
     check_rows(log, measured)
-    if spec.program is None:
-        raise ConfigError("CC402", f"run '{spec.name}' has no program")
-    program = open_program(spec.program, job.config)
     conditions = job.conditions if spec.cutting else replace(job.conditions, model=None)
-    timeline = schedule(program.path, job.config.control.acceleration_mm_per_s2)
-    check_length(log, spec.name, measured, timeline.end)
-    fit = fit_to_log(timeline, measured.time, measured.line)
-    check_program(log, spec.name, measured, fit.rows)
-    track = lay_track(program.path, conditions)
-    temperature = steadied(measured.time, measured.temperature)
-    run_path: RunPath = path_of_program(
-        spec.name, fit.timeline, track, measured.time, started=spec.started_s, to_machine=twin.to_machine,
-        vectors=job.frame.vectors, inverse=twin.inverse,
-        setpoints=measured.setpoint if measured.has("setpoint") else None, temperature=temperature,
+    path = None if spec.program is None else open_program(spec.program, job.config).path
+    if path is not None:
+        check_length(log, spec.name, measured, schedule(path, job.config.control.acceleration_mm_per_s2).end)
+    run = drive(
+        log, spec.name, measured, path, conditions, twin, spec.started_s, job.frame.vectors,
+        steadied(measured.time, measured.temperature),
     )  # fmt: skip
-    k, share = fit.timeline.locate(measured.time)
-    rotary = all(a.revolute for a in twin.robot.actuators)
-    check_places(
-        log, spec.name, measured, run_path, path_geometry.points(program.path, fit.timeline.index[k], share), rotary
-    )
-    check_forces(log, spec.name, measured, run_path.place(measured.time).of(run_path.node_force))
+    if run.lag:
+        notes.append(f"{log}: line numbers are {abs(run.lag)} rows {'late' if run.lag > 0 else 'early'}")
     thin = int(np.ceil(len(measured.time) / MOST_ROWS))
-    return Run(spec.name, run_path, measured, spec.clamping, spec.clock, thin)
+    return Run(
+        spec.name, run.run_path, measured, spec.clamping, spec.clock, thin, by=run.by, unsure=run.unsure, turn=run.turn
+    )
 
 
 def steadied(time: Floats, values: Floats) -> Floats | None:

@@ -91,7 +91,7 @@ def quick_columns(bench: Bench, candidate: CandidateCause, shape: Mapping[str, f
                 effort = signal_path.drive_forces([cause], bench.actuators, guided)
                 values = np.zeros_like(bench.observed(k))
                 slope = bench.row_slopes(k)
-                values[:, :3] = np.einsum("nij,nj->ni", slope, moved)
+                values[:, :3] = bench.turned(k, np.einsum("nij,nj->ni", slope, moved))
                 if effort is not None:
                     m = len(bench.actuators)
                     values[:, 3 + m : 3 + 2 * m] = effort

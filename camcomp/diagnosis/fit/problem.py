@@ -199,7 +199,7 @@ class Problem:
         """Change of the channels per unit, per run (n, c), from readings to those with other causes."""
         out = []
         for k, (reading, run) in enumerate(zip(readings, self.bench.runs, strict=True)):
-            change = self.bench.channels(self.bench.read(k, causes)) - self.bench.channels(reading)
+            change = self.bench.channels(k, self.bench.read(k, causes)) - self.bench.channels(k, reading)
             out.append(thinned(change / step, run.thin))
         return out
 

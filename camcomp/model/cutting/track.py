@@ -99,6 +99,11 @@ class Track:
                      self.points(piece, w))  # fmt: skip
         return out + (1.0 - w)[:, None] * self.fade0[piece] + w[:, None] * self.fade1[piece]
 
+    def force_along(self, piece: Ints, w: Floats, direction: Floats) -> Floats:
+        """Cutting force on the tool (k, 3) N, program frame, where the tip is driven along unit vectors direction (k, 3)."""
+        return _force(self.path, self.conditions, self.cutting, self.motion, self.s0, self.length, piece, w, direction,
+                      self.points(piece, w))  # fmt: skip
+
 
 def _force(
     path: Path, c: Conditions, cutting: Bools, motion: Ints, s0: Floats, length: Floats, piece: Ints, w: Floats,

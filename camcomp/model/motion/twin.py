@@ -12,7 +12,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from camcomp.ground.datatypes import Floats
+from camcomp.ground.datatypes import Floats, Ints
 from camcomp.ground.errors import PhysicsError
 from camcomp.model import signal_path
 from camcomp.model.effect import Cause, Load, Motion
@@ -27,6 +27,9 @@ _RHO_STEP = 1e-3  # mm or 1e-3 mrad of drive, to first order linear within 1e-6
 _FORCE_STEP = 1.0  # N
 _SLOPES = ("tip_rho", "tip_wrench", "drive_rho", "drive_wrench")
 _MOMENT_STEP = 100.0  # N mm
+_KNOT_MM = 0.25  # or mrad / 4: 0.1 um of a circle of 300 mm
+_FORWARD_PASSES = 12
+_FORWARD_MM = 1e-7
 _SAME_LOAD = 1e-3  # share of the load by which a changed machine's may differ from that it was solved with
 
 
@@ -107,6 +110,30 @@ class Twin:
             raise PhysicsError("CC410", f"tip {np.round(tip[bad], 3).tolist()} (machine frame) is {STATUS[3]}")
         return state.rho_nominal
 
+    def forward(self, rho: Floats, near: Floats) -> Floats:
+        """Machine tips (n, 3) to which actuators rho (n, m) lead the perfect, unloaded machine; near (n, 3): tips near by.
+
+        Newton's method on the inverse kinematics at points some way apart, first order between them: the way is short
+        against the size of the machine. Raises PhysicsError CC410.
+        """
+        knots, nearest = _knots(rho * np.where([a.revolute for a in self.robot.actuators], 1000.0, 1.0))
+        tip = near[knots].copy()
+        for _ in range(_FORWARD_PASSES):
+            off = rho[knots] - self.inverse(tip)
+            ways = np.stack(
+                [
+                    (self.inverse(tip + _RHO_STEP * e) - self.inverse(tip - _RHO_STEP * e)) / (2 * _RHO_STEP)
+                    for e in np.eye(3)
+                ],
+                axis=2,
+            )
+            back = np.linalg.pinv(ways)
+            step = np.einsum("nij,nj->ni", back, off)
+            tip = tip + step
+            if np.abs(step).max(initial=0.0) < _FORWARD_MM:
+                break
+        return np.asarray(tip[nearest] + np.einsum("nij,nj->ni", back[nearest], rho - rho[knots][nearest]))
+
     def edited(self, causes: Sequence[Cause]) -> tuple[Robot, tuple]:
         """The machine with the effects on it, and a key that tells equal ones."""
         robot, by = signal_path.edited(causes, self.actuators, self.robot)
@@ -163,8 +190,8 @@ class Twin:
             known = self.structure(run_path, self._machine(robot, key), key, shift, load)
         solved = known
         load = signal_path.loaded(causes, rows, run_path.row_force)
-        load_tip = signal_path.loaded(causes, at_tip, place_tip.of(run_path.node_force)) if late else load
-        drive, tip = place.of(solved.drive), place_tip.of(solved.tip)
+        load_tip = signal_path.loaded(causes, at_tip, run_path.forces(place_tip)) if late else load
+        drive, tip = place.of(solved.drive), run_path.tips(solved.tip, place_tip, seen)
         if slopes is not None:
             at_rows = slopes.at(place)
             d_rho, d_wrench = self._differences(solved, place, gap_row, load)
@@ -288,6 +315,15 @@ class Twin:
         lever = self.nominal.tool  # platform axes; its tilt under load is of second order here
         d_wrench = d_wrench + np.concatenate([d_force, np.cross(lever, d_force)], axis=1)
         return d_rho, d_wrench
+
+
+def _knots(rho: Floats) -> tuple[Ints, Ints]:
+    """Rows that are some _KNOT_MM of way apart in the actuators (n, m), mm or mrad, and which of them (n,) is next to a row."""
+    way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(rho, axis=0)).max(axis=1))])
+    knots = np.flatnonzero(np.diff(np.floor(way / _KNOT_MM), prepend=-1.0) > 0)
+    right = np.clip(np.searchsorted(way[knots], way), 0, len(knots) - 1)
+    left = np.maximum(right - 1, 0)
+    return knots, np.where(way - way[knots][left] <= way[knots][right] - way, left, right)
 
 
 def twin_of(job: Job) -> Twin:
