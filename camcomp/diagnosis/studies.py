@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
+from pydantic import ValidationError
 
 from camcomp.diagnosis.arm.poses import Poses
 from camcomp.diagnosis.arm.study import study as study_arm
@@ -18,6 +18,7 @@ from camcomp.diagnosis.axis.study import AxisRun
 from camcomp.diagnosis.axis.study import study as study_axes
 from camcomp.diagnosis.experiment.open_experiment import open_log, read_log
 from camcomp.diagnosis.fit.measured import Measured
+from camcomp.diagnosis.result.types import DiagnosisResult
 from camcomp.ground import shelf
 from camcomp.ground.errors import ConfigError, Location
 from camcomp.ground.files import display_name
@@ -29,7 +30,7 @@ from camcomp.model.statics.arm import arm_of
 from camcomp.model.statics.build import build_robot
 
 
-def study_of(path: str | Path, without: Sequence[str] = ()) -> dict[str, Any] | None:
+def study_of(path: str | Path, without: Sequence[str] = ()) -> DiagnosisResult | None:
     """Result of an experiment of static poses or of axis logs; None where it is for the general diagnosis.
 
     Raises ConfigError CC420 where the logs say too little.
@@ -53,6 +54,8 @@ def study_of(path: str | Path, without: Sequence[str] = ()) -> dict[str, Any] | 
                 for k, a in enumerate(robot.actuators)
             }
             return study_axes(axes, holdout=experiment.holdout, without=without)
+    except ValidationError:  # a ValueError too, and a fault of ours
+        raise
     except ValueError as error:
         raise ConfigError("CC420", str(error), at=Location(display_name(path), 1, 1)) from error
     return None
