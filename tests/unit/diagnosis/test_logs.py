@@ -7,6 +7,7 @@ from camcomp.diagnosis.experiment.open_experiment import columns_of, open_log, r
 from camcomp.ground.errors import ConfigError
 from camcomp.model.config.load import load_config
 from camcomp.model.job import Job
+from camcomp.model.motion.log_columns import log_columns
 from camcomp.model.motion.twin import twin_of
 from camcomp.terminal.cli import run
 from tests.commandline import ROOT, table
@@ -37,6 +38,14 @@ def test_what_is_simulated_is_read_in_its_channels(tmp_path, columns):
     np.testing.assert_array_equal(measured.drive[:, 1], raw["act_y_N"])
     np.testing.assert_array_equal(measured.dyno[:, 2], raw["fz_N"])
     assert not measured.has("temperature") and not measured.has("tip_sd")
+
+
+def test_the_names_of_a_log():
+    """As the README has them, in the order in which a simulated machine writes them."""
+    named = log_columns(["x", "c"], [False, True])
+    head = "t_s,line,x_mm,y_mm,z_mm,cmd_x_mm,cmd_c_rad,act_x_mm,act_c_rad,act_x_N,act_c_Nmm,fx_N,fy_N,fz_N"
+    assert ",".join(named.simulated) == head
+    assert set(named.known) == {*named.simulated, "temp_C", "x_sd_mm", "y_sd_mm", "z_sd_mm"}
 
 
 def test_the_deviation_that_an_instrument_states_is_read(tmp_path, columns):

@@ -49,6 +49,7 @@ def test_a_row_that_ends_early_has_empty_cells():
         ("a;b\n1;2\n", "CC400", 1, 1, "not by semicolons"),
         ('a,b\n1,2\n3,"4\n5,6\n', "CC400", 3, 1, "no table"),
         ("a,b,a\n1,2,3\n", "CC401", 1, 5, "column a stands there twice"),
+        ('"a,1",b,b\n1,2,3\n', "CC401", 1, 9, "column b stands there twice"),
         ('a,"b, mm"\n1,2\n\n"3",x\n', "CC403", 4, 5, "'x' in column b, mm is not a number"),
         ('"a,1",b\n"4",inf\n', "CC403", 2, 5, "'inf' in column b is not a number"),
         ("a,b\r1,2\r3,1_0\r", "CC403", 3, 3, "'1_0'"),
