@@ -9,6 +9,7 @@ import numpy as np
 from camcomp.compensation.long.plain import Done, PlainCorrector
 from camcomp.compensation.long.plain_run import PlainRun
 from camcomp.compensation.program.compensate import Compensated
+from camcomp.compensation.program.result import ErrorSize, Interpolation, Summary
 from camcomp.ground.datatypes import LINE, Bools, Floats, Ints
 from camcomp.model.job import Job
 from camcomp.model.statics.target import correct, settle
@@ -45,9 +46,9 @@ class _Errors:
         self.count += len(square)
         self.most = max(self.most, float(np.sqrt(square.max(initial=0.0))))
 
-    def figures(self) -> dict[str, float]:
+    def figures(self) -> ErrorSize:
         rms = np.sqrt(self.squares / self.count) if self.count else 0.0
-        return {"rms_um": 1e3 * float(rms), "max_um": 1e3 * self.most}
+        return ErrorSize(rms_um=1e3 * float(rms), max_um=1e3 * self.most)
 
 
 class Totals:
@@ -61,7 +62,7 @@ class Totals:
         self.change = self.force = np.zeros(len(job.machine.actuators))
         self.tilt = 0.0
         self.warnings: list[str] = []
-        self.interpolated: dict[str, float] = {}
+        self.interpolated: Interpolation | None = None
         self._s = self._t = 0.0
         self._beyond: list[list[int]] = [[] for _ in job.machine.actuators]
         self._random = np.random.default_rng(int(digest[:16], 16))
@@ -152,16 +153,16 @@ class Totals:
         gaps = (exact.commanded - p - correction, tip - p - unloaded, (written.rho_nominal - joints) * reach)
         worst = max(1e3 * float(np.abs(each).max()) for each in gaps)
         self.iterations = max(self.iterations, int(exact.iterations.max()))
-        self.interpolated = {
-            "bound_um": BOUND_UM,
-            "checked": len(p),
-            "worst_um": worst if np.isfinite(worst) else float("inf"),
-            "worst_drive_force": float(np.nan_to_num(np.abs(written.drive - drive), nan=np.inf).max()),
-            "tiles": len(known.tiles.half),
-            "exact_solutions": known.solved + 3 * len(p) + 2 * corrector.exact,
-        }
+        self.interpolated = Interpolation(
+            bound_um=BOUND_UM,
+            checked=len(p),
+            worst_um=worst if np.isfinite(worst) else float("inf"),
+            worst_drive_force=float(np.nan_to_num(np.abs(written.drive - drive), nan=np.inf).max()),
+            tiles=len(known.tiles.half),
+            exact_solutions=known.solved + 3 * len(p) + 2 * corrector.exact,
+        )
 
-    def summary(self) -> dict:
+    def summary(self) -> Summary:
         """The figures, as report.tables.summary has them for short programs, and those of the interpolation."""
         rotary = self.job.machine.revolute
         sizes = {
@@ -173,20 +174,22 @@ class Totals:
                 "actuator_change_max_rad": float(self.change[rotary].max()),
                 "actuator_torque_max_Nmm": float(self.force[rotary].max()),
             }
-        return {
-            "points": self.points,
-            "segments_in": self.motions,
-            "lines_out": self.lines_out,
-            "before": self.before.figures(),
-            "after": self.after.figures(),
-            **sizes,
-            "iterations_max": self.iterations,
-            "method": "newton",
-            "platform_tilt_max_mrad": 1e3 * self.tilt,
-            "joining_lines": self.joins,
-            "interpolation": self.interpolated or None,
-            "warnings": self.warnings,
-        }
+        return Summary.model_validate(
+            {
+                "points": self.points,
+                "segments_in": self.motions,
+                "lines_out": self.lines_out,
+                "before": self.before.figures(),
+                "after": self.after.figures(),
+                **sizes,
+                "iterations_max": self.iterations,
+                "method": "newton",
+                "platform_tilt_max_mrad": 1e3 * self.tilt,
+                "joining_lines": self.joins,
+                "interpolation": self.interpolated,
+                "warnings": self.warnings,
+            }
+        )
 
     def failed_checks(self, tolerance_um: float) -> list[tuple[str, str]]:
         """Rule id and text of every check that the program does not pass."""
@@ -205,7 +208,9 @@ class Totals:
                         f"actuator {name} leaves its travel {k * low:g} to {k * high:g} {unit} at source lines {lines}",
                     )
                 )
-        if self.interpolated and not self.interpolated["worst_um"] <= BOUND_UM:
-            text = f"{self.interpolated['worst_um']:.3f} um between interpolated and exact points, more than {BOUND_UM:g} um"
+        if self.interpolated and not self.interpolated.worst_um <= BOUND_UM:
+            text = (
+                f"{self.interpolated.worst_um:.3f} um between interpolated and exact points, more than {BOUND_UM:g} um"
+            )
             out.append(("CC607", text))
         return out
