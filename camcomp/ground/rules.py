@@ -371,6 +371,12 @@ RULES: dict[str, Rule] = {
         "the program the joints would have to change over to another one.",
         "choose start angles nearer to the work, move the workpiece, or turn the tool about its axis (tool.turn_deg)",
     ),
+    "CC306": Rule(
+        "result not finite",
+        "The model answered with NaN or infinity. An effect, a force model or a value of the machine file leads out of what "
+        "can be computed; nothing is written, for such a number looks like none at all in a mean or a maximum.",
+        "look at the plug-ins and effects named, and at values far from those of real machines",
+    ),
     # --- CC4xx logs, experiments -------------------------------------------------------------------------------
     "CC400": Rule(
         "log without rows",
