@@ -7,7 +7,6 @@ no tips) have studies of their own. Everything else goes to the general diagnosi
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +16,7 @@ from camcomp.diagnosis.arm.poses import Poses
 from camcomp.diagnosis.arm.study import study as study_arm
 from camcomp.diagnosis.axis.study import AxisRun
 from camcomp.diagnosis.axis.study import study as study_axes
-from camcomp.diagnosis.experiment.open_experiment import read_log
+from camcomp.diagnosis.experiment.open_experiment import open_log, read_log
 from camcomp.diagnosis.fit.measured import Measured
 from camcomp.ground import shelf
 from camcomp.ground.errors import ConfigError, Location
@@ -25,20 +24,9 @@ from camcomp.ground.files import display_name
 from camcomp.model.config.load import load_config, load_experiment
 from camcomp.model.config.spec import Config, RunSpec
 from camcomp.model.effect import Cause
+from camcomp.model.motion.log_columns import log_columns
 from camcomp.model.statics.arm import arm_of
 from camcomp.model.statics.build import build_robot
-from camcomp.model.statics.description import Robot
-
-
-@dataclass(frozen=True, eq=False)
-class _Names:
-    """What reading a log needs to know of a machine."""
-
-    robot: Robot
-
-    @property
-    def actuators(self) -> tuple[str, ...]:
-        return tuple(a.name for a in self.robot.actuators)
 
 
 def study_of(path: str | Path, without: Sequence[str] = ()) -> dict[str, Any] | None:
@@ -51,8 +39,8 @@ def study_of(path: str | Path, without: Sequence[str] = ()) -> dict[str, Any] | 
         return None
     config = load_config(experiment.config)
     robot, _ = build_robot(config.robot, config.tool.tip)
-    names = _Names(robot)
-    logs = [read_log(run.log, names) for run in experiment.runs]  # type: ignore[arg-type]
+    columns = log_columns([a.name for a in robot.actuators], [a.revolute for a in robot.actuators])
+    logs = [read_log(open_log(run.log), columns) for run in experiment.runs]
     try:
         if all(m.has("tip") and m.has("encoder") and not m.has("setpoint") for m in logs):
             if arm_of(robot) is None:

@@ -267,8 +267,9 @@ def _run(problem: Problem, candidate: Candidate, job: Job) -> Run:
     nan = np.full(n, np.nan)
     encoder = run_path.row_rho if "encoder" in candidate.channels else np.full((n, m), np.nan)
     measured = Measured(
-        time, nan, np.zeros((n, 3)), np.full((n, m), np.nan), encoder, np.zeros((n, m)), np.zeros((n, 3)), nan
-    )
+        time, nan, np.zeros((n, 3)), np.full((n, m), np.nan), encoder, np.zeros((n, m)), np.zeros((n, 3)), nan,
+        np.full((n, 3), np.nan),
+    )  # fmt: skip
     return Run("candidate", run_path, measured, None, None)
 
 

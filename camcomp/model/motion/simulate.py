@@ -9,6 +9,7 @@ from camcomp.ground.errors import ProgramError
 from camcomp.model.cutting.track import lay_track
 from camcomp.model.finite import not_finite
 from camcomp.model.job import Job
+from camcomp.model.motion.log_columns import log_columns
 from camcomp.model.motion.run_path import path_of_program
 from camcomp.model.motion.timeline import schedule
 from camcomp.model.motion.twin import Reading, twin_of
@@ -60,16 +61,9 @@ def simulate(job: Job, path: Path, step_s: float, *, cutting: bool = True, start
 
 def log_table(run: Simulated) -> str:
     """The log as CSV text: the columns that a controller, encoders, drives, a dynamometer and a tracker would log."""
-    names = ["t_s", "line", "x_mm", "y_mm", "z_mm"]
-    lengths = ["rad" if each else "mm" for each in run.rotary]
-    efforts = ["Nmm" if each else "N" for each in run.rotary]
-    names += [f"cmd_{a}_{u}" for a, u in zip(run.actuators, lengths, strict=True)]
-    names += [f"act_{a}_{u}" for a, u in zip(run.actuators, lengths, strict=True)]
-    names += [f"act_{a}_{u}" for a, u in zip(run.actuators, efforts, strict=True)]
-    names += ["fx_N", "fy_N", "fz_N"]
     r = run.reading
     table = np.concatenate([r.tip, run.setpoint, r.encoder, r.drive, r.dyno], axis=1)
-    rows = [",".join(names)]
+    rows = [",".join(log_columns(run.actuators, run.rotary).simulated)]
     for t, line, values in zip(run.time, run.line, table, strict=True):
         cells = ",".join(f"{value:.6f}".replace("-0.000000", "0.000000") for value in values)
         rows.append(f"{t:.6f},{int(line)},{cells}")
