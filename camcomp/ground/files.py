@@ -1,17 +1,18 @@
 """The only disk access: bytes in, bytes out, `-` for the standard streams, several outputs all or none."""
 
+import errno
 import os
 import shutil
 import stat
 import sys
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import BinaryIO, cast
 
 from camcomp.ground.errors import FileError
-from camcomp.ground.places import STANDARD, one_place_each, stream_at, unusable
+from camcomp.ground.places import STANDARD, one_place_each, source_places, stream_at, unusable
 from camcomp.ground.replacement import Replacement
 
 
@@ -19,7 +20,7 @@ class _Inputs:
     """What the command that is running has read: never to be overwritten, and read again where that works but once."""
 
     def __init__(self) -> None:
-        self.names: list[str] = []
+        self.places: set[Hashable] = set()
         self.kept: dict[str, bytes] = {}
 
 
@@ -42,7 +43,7 @@ def read_bytes(path: str | Path) -> bytes:
     inputs = _reading[-1] if _reading else _Inputs()
     if name in inputs.kept:
         return inputs.kept[name]
-    inputs.names.append(name)
+    inputs.places |= source_places(name)
     try:
         if name == STANDARD:
             data, again = sys.stdin.buffer.read(), False
@@ -71,10 +72,10 @@ def _unread(path: str | Path, error: OSError) -> FileError:
 def open_source(path: str | Path) -> BinaryIO:
     """A file to be read from the begin as often as wanted; a pipe is put aside on disk. Raises FileError CC500."""
     try:
+        if _reading:
+            _reading[-1].places |= source_places(str(path))
         if str(path) != STANDARD:
             file = Path(path).open("rb")  # noqa: SIM115 - the caller closes it
-            if _reading:
-                _reading[-1].names.append(str(path))
             if file.seekable():
                 return file
         else:
@@ -118,7 +119,8 @@ def writing(
 
     keep: false writes nothing in the end. Raises FileError as write_all does.
     """
-    one_place_each(paths, [*map(str, inputs), *(_reading[-1].names if _reading else ())])
+    sources = [source_places(str(each)) for each in inputs]
+    one_place_each(paths, *sources, *(each.places for each in _reading[-1:]))
     files: dict[str, BinaryIO] = {}
     replacements: list[Replacement] = []
     with ExitStack() as opened:
@@ -170,6 +172,39 @@ def _pour(file: BinaryIO, path: str, stream: str | int) -> None:
     except OSError as error:
         name = "standard output" if path == STANDARD else path
         raise FileError("CC501", f"cannot write {name}: {error.strerror}") from error
+
+
+@contextmanager
+def alone_in(folder: Path, lock: Path) -> Iterator[None]:
+    """Within it no other process is in here with `folder`; a dead process is in no one's way. `lock`: a file for it.
+
+    Raises FileError: CC504 when another one is there, CC501 when the lock cannot be made.
+    """
+    try:
+        lock.parent.mkdir(parents=True, exist_ok=True)
+        handle = os.open(lock, os.O_RDWR | os.O_CREAT, 0o666)
+    except OSError as error:
+        raise FileError("CC501", f"cannot write {lock}: {error.strerror}") from error
+    with os.fdopen(handle, "r+b") as file:
+        try:
+            _lock(file.fileno())
+        except OSError as error:
+            if error.errno not in (errno.EACCES, errno.EAGAIN, errno.EDEADLK):
+                raise FileError("CC501", f"cannot lock {lock}: {error.strerror}") from error
+            raise FileError("CC504", f"another process is writing to {folder}") from error
+        yield
+
+
+def _lock(handle: int) -> None:
+    """The system lets go of the lock when the process ends."""
+    if sys.platform == "win32":
+        import msvcrt
+
+        msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)
+    else:
+        import fcntl
+
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
 def shipped(name: str) -> Path:

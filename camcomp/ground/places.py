@@ -4,6 +4,7 @@ import os
 import re
 import stat
 from collections.abc import Hashable, Sequence
+from collections.abc import Set as AbstractSet
 from pathlib import Path
 
 from camcomp.ground.errors import FileError
@@ -33,16 +34,18 @@ def unusable(path: str) -> str | None:
     return next((f"it is {kind}" for kind, test in kinds.items() if test(mode)), None)
 
 
-def one_place_each(outputs: Sequence[str], inputs: Sequence[str] = ()) -> None:
+def one_place_each(outputs: Sequence[str], *sources: AbstractSet[Hashable], capitals_count: bool = False) -> None:
     """Raises FileError CC502 when two outputs, or an output and an input, are one file under whatever names.
 
-    Names that differ in nothing but capitals are one: on many disks they are.
+    sources: `source_places` of inputs. capitals_count: names that differ in capitals only are two files; on many
+    disks they are one.
     """
-    sources = {place for each in inputs for place in _places(each, 0)}
     taken: dict[Hashable, str] = {}
     for path in outputs:
         places = _places(path, 1)
-        if sources & places:
+        if not capitals_count:
+            places |= {str(place).casefold() for place in places if isinstance(place, Path)}
+        if any(not known.isdisjoint(places) for known in sources):
             raise FileError("CC502", f"{_shown(path)} is an input and would be overwritten")
         for place in places:
             if place in taken:
@@ -50,6 +53,12 @@ def one_place_each(outputs: Sequence[str], inputs: Sequence[str] = ()) -> None:
                 hint = "give each output its own name"
                 raise FileError("CC502", f"two outputs go to the same file: {names}", hint=hint)
         taken |= dict.fromkeys(places, path)
+
+
+def source_places(path: str) -> set[Hashable]:
+    """All by which an input is known again under another name."""
+    found = _places(path, 0)
+    return {each for each in found if not (isinstance(each, Path) and each.is_char_device())}  # /dev/null, terminals
 
 
 def _shown(path: str) -> str:
@@ -68,10 +77,7 @@ def _places(path: str, standard: int) -> set[Hashable]:
         found.add((status.st_dev, status.st_ino))
     if number is not None:
         return found | {number}
-    target = Path(path).resolve()
-    if status is not None and stat.S_ISCHR(status.st_mode):
-        return found if standard == 0 else {target}  # terminals and /dev/null are read and written
-    return found | {target, str(target).casefold()} if standard == 1 else found | {target}
+    return found | {Path(path).resolve()}
 
 
 def _mode(path: str) -> int:
