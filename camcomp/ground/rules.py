@@ -476,10 +476,21 @@ RULES: dict[str, Rule] = {
     ),
     "CC502": Rule(
         "output is the input",
-        "An output names the file that is being read. The input is never overwritten.",
+        "An output names a file that is being read, or the file of another output, perhaps through a link. An input is "
+        "never overwritten.",
         "choose another name for the output",
     ),
     "CC503": Rule("input or output failed", "The operating system refused a file or stream.", "check disk and rights"),
+    "CC504": Rule(
+        "output folder in use",
+        "Another batch is writing into this folder. Two at once would mix their programs.",
+        "wait for the other, or choose another folder",
+    ),
+    "CC505": Rule(
+        "workers do not fit",
+        "A worker of the Dask cluster has no camcomp, or another version of it, and would make other programs.",
+        "install the same version of camcomp on all workers",
+    ),
     # --- CC6xx checks ------------------------------------------------------------------------------------------
     "CC601": Rule(
         "residual over tolerance",

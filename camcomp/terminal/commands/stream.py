@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import gc
-import signal
 import sys
 from array import array
-from collections.abc import Iterator
-from contextlib import contextmanager
 from time import perf_counter_ns
 from typing import TYPE_CHECKING
 
@@ -52,26 +49,11 @@ def command(configs: tuple[str, ...], as_json: bool, columns: str | None) -> Non
     tally = _Tally()
     stream = Stream(job)
     try:
-        with _ended_by_sigterm():
-            _serve(stream, reader, writer, tally)
+        _serve(stream, reader, writer, tally)
     finally:
         print(f"{tally.count} set-points, {tally.text()}{tally.errors} errors", file=sys.stderr)
     if tally.errors:
         raise CheckFailed("CC605", f"{tally.errors} of the lines have an error as their answer")
-
-
-@contextmanager
-def _ended_by_sigterm() -> Iterator[None]:
-    """Lets a supervisor's way to end a service come as an exception, so that what was done is still said."""
-
-    def end(number: int, frame: object) -> None:
-        raise click.exceptions.Exit(128 + number)
-
-    before = signal.signal(signal.SIGTERM, end)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)
 
 
 class _Tally:
