@@ -253,6 +253,18 @@ RULES: dict[str, Rule] = {
         "What is asked for needs a package that a plain installation leaves out because it is large.",
         "pip install 'camcomp[report]'",
     ),
+    "CC217": Rule(
+        "YAML beyond the budget",
+        "A machine file has some hundred values. More than a megabyte, 20 000 values (an alias counts wherever it is used) "
+        "or 50 levels are a mistake, or meant to stop the reader.",
+        "tables belong into CSV files",
+    ),
+    "CC218": Rule(
+        "no file of camcomp",
+        "None of the sections of a machine file or of an experiment stands in the file. Nothing of it is shown, for it may "
+        "be a file that was never meant to be read aloud.",
+        "check the path; `camcomp init DIR` writes a machine file",
+    ),
     "CC240": Rule(
         "robot description not usable",
         "A URDF describes a tree of links. camcomp takes one chain of hinges and slides from it, with masses and centres; "

@@ -1,7 +1,4 @@
-"""Lines of set-points and of their answers, as CSV or JSON: one line in, one line out, whatever stands in it.
-
-Python takes more for a number than any control writes (`1_0`, `nan`, full-width digits): such cells are refused.
-"""
+"""Lines of set-points and of their answers, as CSV or JSON: one line in, one line out, whatever stands in it."""
 
 from __future__ import annotations
 
@@ -9,16 +6,16 @@ import csv
 import json
 import re
 from collections.abc import Sequence
+from math import isnan
 from typing import Any, NamedTuple
 
-from camcomp.ground.bounds import LARGEST_NUMBER
+from camcomp.ground.bounds import LARGEST_NUMBER, number_of
 from camcomp.ground.errors import CamcompError, ConfigError
 
 NEEDED = ("x_mm", "y_mm", "z_mm", "fx_N", "fy_N", "fz_N")
 TIME = "t_s"
 _NAMES = frozenset((*NEEDED, TIME))
 _OF_ROWS = b"0123456789+-.eE, \t\r\n"  # a line of other bytes is no plain row
-_NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 _LIKE_A_NUMBER = re.compile(r"[+-]?([.\d]|nan$|inf)", re.IGNORECASE)
 _MARK = b"\xef\xbb\xbf"  # byte order mark
 
@@ -71,10 +68,7 @@ class Reader:
         if self._is_header(cells, text):
             self._header(cells)
             return None
-        bad = next((cell for cell in cells if not _NUMBER.fullmatch(cell)), None)
-        if bad is not None or text[0] == "#":
-            raise ConfigError("CC270", f"'{(text if bad is None else bad)[:40]}' is not a number")
-        return self._row([float(cell) for cell in cells])
+        return self._row([_number(cell) for cell in ([text] if text[0] == "#" else cells)])
 
     def _is_header(self, cells: list[str], text: str) -> bool:
         """Whether a line is meant as a header: it names a column, or it comes first and is no row with a mistake in it."""
@@ -118,6 +112,13 @@ def _cells(text: str) -> list[str]:
     """Cells of a CSV line without blanks and the mark of a comment around them. Raises csv.Error."""
     lines = csv.reader([text.lstrip("# ")], skipinitialspace=True, strict=True)
     return [cell.strip() for cell in next(lines, [])] or [""]
+
+
+def _number(cell: str) -> float:
+    value = number_of(cell)
+    if value is None or isnan(value):
+        raise ConfigError("CC270", f"'{cell[:40]}' is not a number")
+    return value
 
 
 def _from_json(text: str) -> SetPoint:

@@ -144,6 +144,7 @@ def test_lines_of_both_kinds_are_read():
         ("1,2,3,4,5,\uff16", "is not a number"),
         ("1,2,3,4,5,0x10", "'0x10' is not a number"),
         ("1,2,3,4,5,1e999", "larger than"),
+        ('"1e999",2,3,4,5,6', "'1e999' is not a number"),
         ("1e308,1e308,3,4,5,6", "larger than"),
         ("#1,2,3,4,5,6", "'1' is none of"),
         ("x_mm,y_mm", "z_mm is missing"),
