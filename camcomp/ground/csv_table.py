@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from camcomp.ground.bounds import number_of
 from camcomp.ground.datatypes import Floats
 from camcomp.ground.errors import ConfigError, Location
 
@@ -130,12 +131,8 @@ def _rows(
 
 
 def _number(cell: str, *, decimal_comma: bool) -> float | None:
-    """A number or NaN; None where the text is neither, or not finite."""
-    try:
-        number = float(cell.replace(",", ".") if decimal_comma else cell)
-    except ValueError:
-        return None
-    return None if np.isinf(number) or "_" in cell else number
+    """A number or NaN; None where the text is neither, or no number of this world."""
+    return number_of(cell.replace(",", ".") if decimal_comma else cell)
 
 
 def _start(source: str, mark: str, column: int) -> int:

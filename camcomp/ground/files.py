@@ -1,27 +1,59 @@
 """The only disk access: bytes in, bytes out, `-` for the standard streams, several outputs all or none."""
 
+import errno
 import os
 import shutil
+import stat
 import sys
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Hashable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import BinaryIO, cast
 
 from camcomp.ground.errors import FileError
+from camcomp.ground.places import STANDARD, one_place_each, source_places, stream_at, unusable
+from camcomp.ground.replacement import Replacement
 
-STANDARD = "-"
+
+class _Inputs:
+    """What the command that is running has read: never to be overwritten, and read again where that works but once."""
+
+    def __init__(self) -> None:
+        self.places: set[Hashable] = set()
+        self.kept: dict[str, bytes] = {}
+
+
+_reading: list[_Inputs] = []  # innermost last; empty outside of commands
+
+
+@contextmanager
+def remembering_inputs() -> Iterator[None]:
+    """Within it no output may be a file that was read, and a pipe gives the same bytes every time it is read."""
+    _reading.append(_Inputs())
+    try:
+        yield
+    finally:
+        _reading.pop()
 
 
 def read_bytes(path: str | Path) -> bytes:
     """Content of a file, or of standard input for "-". Raises FileError CC500."""
-    if str(path) == STANDARD:
-        return sys.stdin.buffer.read()
+    name = str(path)
+    inputs = _reading[-1] if _reading else _Inputs()
+    if name in inputs.kept:
+        return inputs.kept[name]
+    inputs.places |= source_places(name)
     try:
-        return Path(path).read_bytes()
+        if name == STANDARD:
+            data, again = sys.stdin.buffer.read(), False
+        else:
+            data, again = Path(path).read_bytes(), stat.S_ISREG(os.stat(path).st_mode)
     except OSError as error:
         raise _unread(path, error) from error
+    if not again:
+        inputs.kept[name] = data
+    return data
 
 
 def _unread(path: str | Path, error: OSError) -> FileError:
@@ -34,20 +66,31 @@ def _unread(path: str | Path, error: OSError) -> FileError:
     elif isinstance(error, FileNotFoundError) and wanted.parent.is_dir():
         close = get_close_matches(wanted.name, sorted(each.name for each in wanted.parent.iterdir()), n=1)
         hint = f"did you mean {wanted.parent / close[0]}?" if close else None
-    return FileError("CC500", f"cannot read {path}: {error.strerror}", hint=hint)
+    return FileError("CC500", f"cannot read {display_name(path)}: {error.strerror}", hint=hint)
 
 
 def open_source(path: str | Path) -> BinaryIO:
-    """A file to be read from the begin as often as wanted; standard input is put aside on disk. Raises FileError CC500."""
-    if str(path) == STANDARD:
-        aside = cast(BinaryIO, tempfile.TemporaryFile())  # noqa: SIM115 - the caller closes it
-        shutil.copyfileobj(sys.stdin.buffer, aside)
+    """A file to be read from the begin as often as wanted; a pipe is put aside on disk. Raises FileError CC500."""
+    try:
+        if _reading:
+            _reading[-1].places |= source_places(str(path))
+        if str(path) != STANDARD:
+            file = Path(path).open("rb")  # noqa: SIM115 - the caller closes it
+            if file.seekable():
+                return file
+        else:
+            file = sys.stdin.buffer  # type: ignore[assignment]
+        aside = _aside()
+        shutil.copyfileobj(file, aside)
         aside.seek(0)
         return aside
-    try:
-        return Path(path).open("rb")
     except OSError as error:
         raise _unread(path, error) from error
+
+
+def _aside() -> BinaryIO:
+    """A file without a name, in memory as long as it is small: a folder for such files is needed by large ones only."""
+    return cast(BinaryIO, tempfile.SpooledTemporaryFile(max_size=1 << 24))
 
 
 def display_name(path: str | Path) -> str:
@@ -58,64 +101,14 @@ def display_name(path: str | Path) -> str:
 def write_all(outputs: Mapping[str, bytes] | Mapping[Path, bytes], *, inputs: Sequence[str | Path] = ()) -> None:
     """Write every output or none: whole files are made beside their targets first and then moved into place.
 
-    A target keeps its permissions; a link is followed. "-" goes to standard output, after the files. Raises FileError:
-    CC502 when an output is one of `inputs`, CC501 when one cannot be written.
+    A target keeps its permissions; a link is followed; what is written is on the disk when this returns. Standard output
+    ("-"), pipes and character devices are written to, after the files. Raises FileError: CC502 when an output is one of
+    `inputs` or of what the command has read, or another output; CC501 when one cannot be written.
     """
     contents = {str(path): data for path, data in outputs.items()}
-    targets = {path: Path(path).resolve() for path in contents if path != STANDARD}
-    _refuse_clashes(targets, inputs)
-    made: list[tuple[str, Path]] = []
-    try:
-        for path, target in targets.items():
-            made.append((_write_beside(target, contents[path]), target))
-        while made:
-            os.replace(*made[0])
-            made.pop(0)
-    except OSError as error:
-        raise FileError("CC501", f"cannot write {error.filename2 or error.filename}: {error.strerror}") from error
-    finally:
-        for temporary, _ in made:
-            os.unlink(temporary)
-    if STANDARD in contents:
-        sys.stdout.buffer.write(contents[STANDARD])
-        sys.stdout.buffer.flush()
-
-
-def _refuse_clashes(targets: Mapping[str, Path], inputs: Sequence[str | Path]) -> None:
-    sources = [Path(path) for path in inputs if str(path) != STANDARD]
-    for path, target in targets.items():
-        for source in sources:
-            if target == source.resolve() or (target.exists() and source.exists() and target.samefile(source)):
-                raise FileError("CC502", f"{path} is an input and would be overwritten")
-    if len(set(targets.values())) < len(targets):
-        names = ", ".join(targets)
-        raise FileError("CC502", f"two outputs go to the same file: {names}", hint="give each output its own name")
-
-
-def _write_beside(target: Path, data: bytes) -> str:
-    file, temporary = _open_beside(target)
-    try:
-        with file:
-            file.write(data)
-    except BaseException:
-        os.unlink(temporary)
-        raise
-    return temporary
-
-
-def _open_beside(target: Path) -> tuple[BinaryIO, str]:
-    if target.is_dir():
-        raise IsADirectoryError(21, "is a directory", str(target))
-    try:
-        handle, temporary = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
-    except OSError as error:  # name the file asked for, not the temporary one
-        raise OSError(error.errno, error.strerror, str(target)) from error
-    try:
-        os.chmod(temporary, target.stat().st_mode & 0o7777 if target.exists() else 0o666 & ~_umask())
-        return os.fdopen(handle, "w+b"), temporary
-    except BaseException:
-        os.unlink(temporary)
-        raise
+    with writing(list(contents), inputs=inputs) as files:
+        for path, data in contents.items():
+            files[path].write(data)
 
 
 @contextmanager
@@ -124,43 +117,94 @@ def writing(
 ) -> Iterator[dict[str, BinaryIO]]:
     """Open files to be filled bit by bit; they take the place of `paths` when the block ends well, or none of them does.
 
-    "-" goes to standard output at the end. keep: false writes nothing in the end. Raises FileError as write_all does.
+    keep: false writes nothing in the end. Raises FileError as write_all does.
     """
-    targets = {path: Path(path).resolve() for path in paths if path != STANDARD}
-    _refuse_clashes(targets, inputs)
+    sources = [source_places(str(each)) for each in inputs]
+    one_place_each(paths, *sources, *(each.places for each in _reading[-1:]))
     files: dict[str, BinaryIO] = {}
-    made: list[tuple[str, Path]] = []
-    try:
-        for path, target in targets.items():
-            files[path], temporary = _open_beside(target)
-            made.append((temporary, target))
-        if STANDARD in paths:
-            files[STANDARD] = cast(BinaryIO, tempfile.TemporaryFile())  # noqa: SIM115 - closed below
+    replacements: list[Replacement] = []
+    with ExitStack() as opened:
+        for path in paths:
+            if reason := unusable(path):
+                raise FileError("CC501", f"cannot write {path}: {reason}")
+            if stream_at(path) is not None:
+                files[path] = opened.enter_context(_aside())
+            else:
+                with _naming(path):
+                    replacement = opened.enter_context(Replacement(path))
+                replacements.append(replacement)
+                files[path] = replacement.file
         yield files
-        for path in targets:
-            files[path].close()
-        while made and keep:
-            os.replace(*made[0])
-            made.pop(0)
-        if STANDARD in files and keep:
-            files[STANDARD].seek(0)
-            shutil.copyfileobj(files[STANDARD], sys.stdout.buffer)
+        if not keep:
+            return
+        for each in replacements:
+            with _naming(each.name):
+                each.finish()
+        for each in replacements:
+            with _naming(each.name):
+                each.move()
+        for path in paths:
+            if (stream := stream_at(path)) is not None:
+                _pour(files[path], path, stream)
+
+
+@contextmanager
+def _naming(path: str) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise FileError("CC501", f"cannot write {path}: {error.strerror}") from error
+
+
+def _pour(file: BinaryIO, path: str, stream: str | int) -> None:
+    """What was put aside into a stream. A reader that goes away is no error of the output's."""
+    file.seek(0)
+    try:
+        if path == STANDARD:
+            shutil.copyfileobj(file, sys.stdout.buffer)
             sys.stdout.buffer.flush()
+        else:
+            handle = os.dup(stream) if isinstance(stream, int) else os.open(stream, os.O_WRONLY)
+            with os.fdopen(handle, "wb") as sink:
+                shutil.copyfileobj(file, sink)
     except BrokenPipeError:
         raise
     except OSError as error:
-        raise FileError("CC501", f"cannot write {error.filename2 or error.filename}: {error.strerror}") from error
-    finally:
-        for file in files.values():
-            file.close()
-        for temporary, _ in made:
-            os.unlink(temporary)
+        name = "standard output" if path == STANDARD else path
+        raise FileError("CC501", f"cannot write {name}: {error.strerror}") from error
 
 
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
+@contextmanager
+def alone_in(folder: Path, lock: Path) -> Iterator[None]:
+    """Within it no other process is in here with `folder`; a dead process is in no one's way. `lock`: a file for it.
+
+    Raises FileError: CC504 when another one is there, CC501 when the lock cannot be made.
+    """
+    try:
+        lock.parent.mkdir(parents=True, exist_ok=True)
+        handle = os.open(lock, os.O_RDWR | os.O_CREAT, 0o666)
+    except OSError as error:
+        raise FileError("CC501", f"cannot write {lock}: {error.strerror}") from error
+    with os.fdopen(handle, "r+b") as file:
+        try:
+            _lock(file.fileno())
+        except OSError as error:
+            if error.errno not in (errno.EACCES, errno.EAGAIN, errno.EDEADLK):
+                raise FileError("CC501", f"cannot lock {lock}: {error.strerror}") from error
+            raise FileError("CC504", f"another process is writing to {folder}") from error
+        yield
+
+
+def _lock(handle: int) -> None:
+    """The system lets go of the lock when the process ends."""
+    if sys.platform == "win32":
+        import msvcrt
+
+        msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)
+    else:
+        import fcntl
+
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
 def shipped(name: str) -> Path:

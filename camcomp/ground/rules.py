@@ -253,6 +253,18 @@ RULES: dict[str, Rule] = {
         "What is asked for needs a package that a plain installation leaves out because it is large.",
         "pip install 'camcomp[report]'",
     ),
+    "CC217": Rule(
+        "YAML beyond the budget",
+        "A machine file has some hundred values. More than a megabyte, 20 000 values (an alias counts wherever it is used) "
+        "or 50 levels are a mistake, or meant to stop the reader.",
+        "tables belong into CSV files",
+    ),
+    "CC218": Rule(
+        "no file of camcomp",
+        "None of the sections of a machine file or of an experiment stands in the file. Nothing of it is shown, for it may "
+        "be a file that was never meant to be read aloud.",
+        "check the path; `camcomp init DIR` writes a machine file",
+    ),
     "CC240": Rule(
         "robot description not usable",
         "A URDF describes a tree of links. camcomp takes one chain of hinges and slides from it, with masses and centres; "
@@ -371,6 +383,12 @@ RULES: dict[str, Rule] = {
         "the program the joints would have to change over to another one.",
         "choose start angles nearer to the work, move the workpiece, or turn the tool about its axis (tool.turn_deg)",
     ),
+    "CC306": Rule(
+        "result not finite",
+        "The model answered with NaN or infinity. An effect, a force model or a value of the machine file leads out of what "
+        "can be computed; nothing is written, for such a number looks like none at all in a mean or a maximum.",
+        "look at the plug-ins and effects named, and at values far from those of real machines",
+    ),
     # --- CC4xx logs, experiments -------------------------------------------------------------------------------
     "CC400": Rule(
         "log without rows",
@@ -470,10 +488,21 @@ RULES: dict[str, Rule] = {
     ),
     "CC502": Rule(
         "output is the input",
-        "An output names the file that is being read. The input is never overwritten.",
+        "An output names a file that is being read, or the file of another output, perhaps through a link. An input is "
+        "never overwritten.",
         "choose another name for the output",
     ),
     "CC503": Rule("input or output failed", "The operating system refused a file or stream.", "check disk and rights"),
+    "CC504": Rule(
+        "output folder in use",
+        "Another batch is writing into this folder. Two at once would mix their programs.",
+        "wait for the other, or choose another folder",
+    ),
+    "CC505": Rule(
+        "workers do not fit",
+        "A worker of the Dask cluster has no camcomp, or another version of it, and would make other programs.",
+        "install the same version of camcomp on all workers",
+    ),
     # --- CC6xx checks ------------------------------------------------------------------------------------------
     "CC601": Rule(
         "residual over tolerance",

@@ -29,6 +29,7 @@ from typing import Any, Literal
 import numpy as np
 
 from camcomp.ground.datatypes import Floats
+from camcomp.ground.errors import Location
 
 Target = Literal["actuator", "machine", "either"]
 
@@ -101,12 +102,13 @@ class Load:
 
 @dataclass(frozen=True)
 class Cause:
-    """An effect at work: the module, its target (actuator name or None) and its parameter values."""
+    """An effect at work: the module, its target (actuator name or None), its parameter values, where a config names it."""
 
     name: str
     effect: Any
     target: str | None
     values: Mapping[str, float] = field(default_factory=dict)
+    at: Location | None = field(default=None, compare=False)
 
     def which(self, actuators: tuple[str, ...]) -> Floats:
         """(m,) 1.0 where this cause acts."""

@@ -8,11 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from camcomp.ground.datatypes import Floats
+from camcomp.ground.errors import PhysicsError
 from camcomp.model.effect import Cause, Load, Motion
 from camcomp.model.statics.description import Robot
 
@@ -127,4 +129,27 @@ def read(causes: Sequence[Cause], reading: Any, motion: Motion) -> Any:
 def _hooks(causes: Sequence[Cause], name: str) -> Iterator[tuple[Callable[..., Any], Cause]]:
     for cause in causes:
         if (hook := cause.hook(name)) is not None:
-            yield hook, cause
+            yield partial(_finite, hook, cause), cause
+
+
+def _finite(hook: Callable[..., Any], cause: Cause, *given: Any) -> Any:
+    """What the hook answers. Raises PhysicsError CC306 when that is no number although all that it was given were."""
+    answer = hook(*given)
+    if not all(map(_all_finite, _numbers(answer))) and all(
+        _all_finite(each) for one in given for each in _numbers(one)
+    ):
+        raise PhysicsError("CC306", f"effect '{cause.name}' answers with what is not finite", at=cause.at)
+    return answer
+
+
+def _numbers(value: Any) -> tuple[Floats, ...]:
+    """The arrays in what hooks are given and answer with. A rigid drive has an infinite stiffness: that counts as known."""
+    if isinstance(value, Load):
+        return value.force, value.wrench
+    if isinstance(value, Motion):
+        return value.time, value.encoder
+    return (value,) if isinstance(value, np.ndarray) else ()
+
+
+def _all_finite(values: Floats) -> bool:
+    return bool(np.isfinite(values).all())

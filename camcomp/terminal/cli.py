@@ -1,19 +1,23 @@
 """The command line: verbs found by file name in terminal/commands and imported when called; errors to exit codes.
 
 0 done · 1 a check failed · 2 usage, YAML · 3 NC program · 4 physics · 5 input, output · 70 bug in camcomp ·
-130 interrupted · 141 the reader of our output went away.
+130 interrupted · 141 the reader of our output went away · 143 ended by SIGTERM, 129 by SIGHUP.
 """
 
 import gc
 import os
+import signal
 import sys
 from importlib import import_module
+from types import FrameType
 
 import click
 
 from camcomp import __version__
 from camcomp.ground.errors import CamcompError, FileError, format_error
+from camcomp.ground.files import remembering_inputs
 from camcomp.ground.garbage import collect_seldom
+from camcomp.terminal.standard_streams import stand_in_for_closed
 
 # Matrices here are small: threads of the linear algebra wait for each other longer than they compute, most of all on a
 # machine that does other things too. It has to be said before numpy is imported; a user's own setting stands.
@@ -72,10 +76,35 @@ def cli() -> None:
     """G-code and a machine file in, G-code that makes up for the machine's compliance out."""
 
 
+class Terminated(BaseException):
+    """A signal asks the process to end; whatever is open is closed on the way out, and no file is left half-written."""
+
+    def __init__(self, number: int) -> None:
+        super().__init__(number)
+        self.number = number
+
+
+def _terminate(number: int, _frame: FrameType | None) -> None:
+    raise Terminated(number)
+
+
+def _end_on_signals() -> None:
+    for name in ("SIGTERM", "SIGHUP"):
+        number = getattr(signal, name, None)
+        if number is not None and signal.getsignal(number) is signal.SIG_DFL:  # nohup ignores one
+            signal.signal(number, _terminate)
+
+
 def main(args: list[str] | None = None) -> None:
     """Run the command line and leave the process with the exit code of the contract."""
+    stand_in_for_closed()
     collect_seldom()
+    _end_on_signals()
     code = run(sys.argv[1:] if args is None else args)
+    try:
+        sys.stdout.flush()
+    except OSError:
+        _forget_output()  # the error has been said when it first occurred
     gc.freeze()  # the interpreter need not look through everything once more when it ends
     sys.exit(code)
 
@@ -87,7 +116,7 @@ def run(args: list[str]) -> int:
 
         return shell_complete(cli, {}, "camcomp", "_CAMCOMP_COMPLETE", os.environ["_CAMCOMP_COMPLETE"])
     try:
-        with cli.make_context("camcomp", list(args)) as context:
+        with remembering_inputs(), cli.make_context("camcomp", list(args)) as context:
             code = cli.invoke(context)
         sys.stdout.flush()
         return code if isinstance(code, int) else 0
@@ -103,15 +132,22 @@ def run(args: list[str]) -> int:
     except (KeyboardInterrupt, click.Abort):
         click.echo("camcomp: interrupted", err=True)
         return 130
+    except Terminated as end:
+        click.echo("camcomp: terminated", err=True)
+        return 128 + end.number
     except BrokenPipeError:
-        # Python flushes standard output once more at exit; there must be something left to flush into.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _forget_output()
         return 141
     except OSError as error:
         name = f"{error.filename}: " if error.filename else ""
         return _report(FileError("CC503", f"{name}{error.strerror or error}"))
     except Exception as error:  # noqa: BLE001 - whatever else comes is a bug, and is called one
         return _bug(error)
+
+
+def _forget_output() -> None:
+    """Python flushes standard output once more at exit; there must be something left to flush into."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _report(error: CamcompError) -> int:

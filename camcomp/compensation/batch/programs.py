@@ -6,17 +6,20 @@ import glob
 import hashlib
 import json
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from camcomp.compensation.batch.worker import Outcome, Task
 from camcomp.ground.errors import CamcompError, ConfigError, FileError, format_error
-from camcomp.ground.files import read_bytes, write_all
+from camcomp.ground.files import alone_in, read_bytes, write_all
+from camcomp.ground.places import one_place_each
 from camcomp.model.config.spec import Config
+from camcomp.model.config.yaml_tree import leaves, plain
 
 SUFFIXES = frozenset((".nc", ".ngc", ".ncc", ".tap", ".gcode", ".cnc", ".mpf", ".spf", ".eia", ".min", ".iso"))
 STATE = ".camcomp"  # folder beside the outputs: what each was made from
-DONE, FAILED_CHECK, SKIPPED, ERROR = "done", "check failed", "unchanged", "error"
+DONE, FAILED_CHECK, SKIPPED, ERROR, OPEN = "done", "check failed", "unchanged", "error", "not done"
 
 
 @dataclass(frozen=True)
@@ -43,7 +46,7 @@ def find_programs(paths: Sequence[str], output: Path) -> list[FoundProgram]:
     """Programs of files, folders and patterns, each once, with mirrored places. Raises ConfigError CC271, FileError CC500.
 
     Folders are searched through for names with the usual endings; the output folder is left out. A pattern mirrors what
-    lies behind its part without wildcards.
+    lies behind its part without wildcards. A link is a program of its own, beside the file that it leads to.
     """
     found: dict[Path, Path] = {}
     out = output.resolve()
@@ -60,8 +63,9 @@ def find_programs(paths: Sequence[str], output: Path) -> list[FoundProgram]:
             base = Path(*fixed) if fixed else Path()
             files = [Path(each) for each in glob.glob(text, recursive=True)]
         for each in sorted(files):
-            if each.is_file() and not each.resolve().is_relative_to(out):
-                found.setdefault(each.resolve(), each.relative_to(base))
+            place = each.parent.resolve() / each.name
+            if (each.is_file() or (each.is_symlink() and not each.exists())) and not place.is_relative_to(out):
+                found.setdefault(place, each.relative_to(base))
     if not found:
         raise ConfigError("CC271", f"no NC program in {', '.join(paths)}")
     places: dict[Path, Path] = {}
@@ -81,7 +85,6 @@ class Plan:
     """What is the same for every program of a batch."""
 
     config: Config
-    config_files: tuple[str, ...]
     output: Path
     method: str
     tolerance_um: float
@@ -89,18 +92,40 @@ class Plan:
     version: str
 
     def key_of_config(self) -> str:
-        """Hash of the configuration files, of the tables that they name, and of the options."""
+        """Hash of the configuration, of the tables that it names, and of the options: by content, whatever the names."""
         digest = hashlib.sha256(repr((self.version, self.method, self.tolerance_um, self.joints)).encode())
-        table = getattr(self.config.process.force.params, "file", None)
-        for each in (*self.config_files, *([table] if table else ())):
-            digest.update(hashlib.sha256(read_bytes(each)).digest())
+        assert self.config._tree is not None  # every loaded config has one
+        for name, node in sorted(leaves(self.config._tree), key=lambda each: each[0]):
+            value = plain(node)
+            key = name.rpartition(".")[2]
+            if (key == "file" or key.endswith("_file")) and isinstance(value, str):
+                value = hashlib.sha256(read_bytes(Path(node.at.file).parent / value)).hexdigest()
+            digest.update(repr((name, value)).encode())
         return digest.hexdigest()
+
+
+@contextmanager
+def output_tree(plan: Plan, programs: Sequence[FoundProgram], others: Sequence[str]) -> Iterator[None]:
+    """Within it the output folder is there, and this batch is alone in it.
+
+    others: further outputs of the command. Raises FileError: CC502 when two outputs are one file, perhaps through links
+    that lie in the folder, CC504 when another batch is writing there, CC501 when nothing can be written.
+    """
+    lock = plan.output / STATE / "lock"
+    with alone_in(plan.output, lock):
+        outputs = [path for each in programs for path in (*_targets(plan, each).values(), _note(plan, each))]
+        two_files = not lock.with_name(lock.name.upper()).exists()
+        one_place_each([*map(str, outputs), *others], capitals_count=two_files)
+        yield
 
 
 def run_batch(
     plan: Plan, programs: Sequence[FoundProgram], pool: Callable[[Iterable[Task]], Iterator[Outcome]]
 ) -> Iterator[Status]:
-    """Every program's status, as soon as it is known. Outputs are written here, each with the note that it is done."""
+    """Every program's status, as soon as it is known. Outputs are written here, each with the note that it is done.
+
+    What ends the pool (FileError, a signal) comes through, after the status of all that is known by then.
+    """
     config_key = plan.key_of_config()
     pending: dict[str, FoundProgram] = {}
     early: list[Status] = []
@@ -122,10 +147,14 @@ def run_batch(
                 str(each.source), key, data, plan.config, config_key, plan.method, plan.tolerance_um, plan.joints
             )
 
-    for outcome in pool(tasks()):
-        while early:
-            yield early.pop(0)
-        yield _keep(plan, pending.pop(outcome.key), outcome)
+    try:
+        for outcome in pool(tasks()):
+            while early:
+                yield early.pop(0)
+            yield _keep(plan, pending.pop(outcome.key), outcome)
+    except FileError:
+        yield from early
+        raise
     yield from early
 
 
@@ -180,7 +209,7 @@ def _keep(plan: Plan, found: FoundProgram, outcome: Outcome) -> Status:
     try:
         for target in (*contents, _note(plan, found)):
             target.parent.mkdir(parents=True, exist_ok=True)
-        write_all(contents, inputs=(found.source, *plan.config_files))
+        write_all(contents, inputs=(found.source,))
         write_all({_note(plan, found): (json.dumps(note) + "\n").encode()})
     except OSError as error:
         return _refused(found, FileError("CC501", f"cannot write {error.filename}: {error.strerror}"))
@@ -197,10 +226,15 @@ def _refused(found: FoundProgram, error: CamcompError) -> Status:
     return Status(str(found.source), None, ERROR, error.exit_code, {}, messages)
 
 
-def summary(statuses: Sequence[Status]) -> dict:
-    """The figures of a batch: counts, the exit code, and every program in the order of its name."""
-    ordered = sorted(statuses, key=lambda each: each.source)
-    counts = {name: sum(each.status == name for each in ordered) for name in (DONE, SKIPPED, FAILED_CHECK, ERROR)}
+def summary(statuses: Sequence[Status], programs: Sequence[FoundProgram] = (), stopped: int = 0) -> dict:
+    """The figures of a batch: counts, the exit code, and every program in the order of its name.
+
+    stopped: exit code of what ended the batch before all of `programs` had their turn; those left are not done.
+    """
+    told = {each.source for each in statuses}
+    left = [Status(str(each.source), None, OPEN, stopped) for each in programs if str(each.source) not in told]
+    ordered = sorted([*statuses, *left], key=lambda each: each.source)
+    counts = {name: sum(each.status == name for each in ordered) for name in (DONE, SKIPPED, FAILED_CHECK, ERROR, OPEN)}
     worst = {"max_um": max((each.figures["after"]["max_um"] for each in ordered if each.figures), default=0.0)}
     return {
         "programs": len(ordered),

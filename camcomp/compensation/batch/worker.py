@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import os
+import signal
+import threading
+import time
 from dataclasses import dataclass, field
 from functools import lru_cache
 
+from camcomp import __version__
 from camcomp.ground.garbage import collect_seldom, keep_what_lives
 from camcomp.model.config.spec import Config
 
 BUG = 70
+WATCH = 0.5  # s between two looks at the parent
 
 
 @dataclass(frozen=True)
@@ -36,6 +41,19 @@ class Outcome:
     program: bytes | None = None
     joints: bytes | None = None
     figures: dict = field(default_factory=dict)
+    version: str = __version__  # of the camcomp that did the work
+
+
+def live_with(parent: int) -> None:
+    """For worker processes of this machine: interrupts are the parent's business, and its end, however it comes, theirs."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_without, args=(parent,), daemon=True).start()
+
+
+def _end_without(parent: int) -> None:
+    while os.getppid() == parent:
+        time.sleep(WATCH)
+    os._exit(1)
 
 
 def work(task: Task) -> Outcome:
@@ -54,7 +72,6 @@ def work(task: Task) -> Outcome:
 
 
 def _compensate(task: Task) -> Outcome:
-    from camcomp import __version__
     from camcomp.compensation.program.compensate import compensate
     from camcomp.compensation.report import tables
     from camcomp.gcode.interpret import read_program

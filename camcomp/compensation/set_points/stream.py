@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from math import isfinite
 from typing import NamedTuple
 
 import numpy as np
@@ -15,6 +16,7 @@ from camcomp.compensation.program.moves import RULE_OF_STATUS
 from camcomp.ground.datatypes import Floats
 from camcomp.ground.errors import PhysicsError
 from camcomp.model import signal_path
+from camcomp.model.finite import not_finite
 from camcomp.model.job import Job
 from camcomp.model.motion.response import Travel, aim_at, respond
 from camcomp.model.statics.single import PointSolver
@@ -76,7 +78,10 @@ class Stream:
         return self._point(commanded, solved.rho_nominal.copy(), solved.rho.copy(), solved.drive.copy())
 
     def _point(self, commanded: Floats, nominal: Floats, rho: Floats, drive: Floats) -> Point:
-        travel = zip(rho.tolist(), self._travel, self._names, strict=True)
+        at = rho.tolist()
+        if not isfinite(sum(commanded.tolist()) + sum(nominal.tolist()) + sum(at) + sum(drive.tolist())):
+            raise not_finite(self._job.config, "the corrected set-point")
+        travel = zip(at, self._travel, self._names, strict=True)
         beyond = tuple([name for at, (low, high), name in travel if at < low or at > high])
         return Point(commanded, nominal, rho, drive, beyond)
 

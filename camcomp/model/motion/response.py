@@ -14,6 +14,7 @@ import numpy as np
 from camcomp.ground.datatypes import Bools, Floats
 from camcomp.model import signal_path
 from camcomp.model.effect import Load, Motion
+from camcomp.model.finite import not_finite
 from camcomp.model.hysteresis import direction, ways
 from camcomp.model.job import Job
 from camcomp.model.statics.solve import FREE, solve
@@ -65,7 +66,7 @@ def respond(
     aim = None if nominal_of is None else job.frame.to_machine(nominal_of)
     if not job.causes:
         loaded, settled = settle(job.real_machine, told, travel.force, None, aim)
-        return job.frame.to_program(loaded), settled
+        return _finite(job, job.frame.to_program(loaded), settled)
     control = solve(job.real_machine, FREE, told, check=False)
     motion = _motion(job, control.rho_nominal, travel)
     error, guided = signal_path.driven(job.causes, job.real_machine.actuators, motion)
@@ -78,7 +79,17 @@ def respond(
     tip = signal_path.clamped(job.causes, tip)
     nominal = control.rho_nominal if aim is None else solve(job.real_machine, FREE, aim, check=False).rho_nominal
     state = replace(state, commanded=told, rho=control.rho_nominal, rho_nominal=nominal, drive=drive)
-    return tip, Correction.of(state, state.passes)
+    return _finite(job, tip, Correction.of(state, state.passes))
+
+
+def _finite(job: Job, tip: Floats, state: Correction) -> tuple[Floats, Correction]:
+    """Both as they are. Raises PhysicsError CC306 for a point that counts as solved and is no number."""
+    known = np.isfinite(tip).all(axis=1) & np.isfinite(state.drive).all(axis=1) & np.isfinite(state.rho).all(axis=1)
+    bad = ~known & (state.status == 0)
+    if bad.any():
+        x, y, z = state.commanded[int(np.argmax(bad))]
+        raise not_finite(job.config, f"the loaded tip at X{x:.4f} Y{y:.4f} Z{z:.4f} (machine frame, mm)")
+    return tip, state
 
 
 def aim_at(job: Job, target: Floats, travel: Travel, method: str) -> Correction:

@@ -7,6 +7,7 @@ import numpy as np
 from camcomp.ground.datatypes import Floats, Ints, Path
 from camcomp.ground.errors import ProgramError
 from camcomp.model.cutting.track import lay_track
+from camcomp.model.finite import not_finite
 from camcomp.model.job import Job
 from camcomp.model.motion.log_columns import log_columns
 from camcomp.model.motion.run_path import path_of_program
@@ -50,6 +51,10 @@ def simulate(job: Job, path: Path, step_s: float, *, cutting: bool = True, start
     reading, _ = twin.sense(run_path, solved=solved, slopes=slopes)
     motion, _ = timeline.locate(time)
     line = path.line[timeline.index[motion]]
+    rows = np.concatenate([run_path.row_rho, reading.tip, reading.encoder, reading.drive, reading.dyno], axis=1)
+    bad = ~np.isfinite(rows).all(axis=1)
+    if bad.any():
+        raise not_finite(job.config, f"what the machine does in program line {line[int(np.argmax(bad))]}")
     rotary = tuple(each.revolute for each in twin.robot.actuators)
     return Simulated(time, line, reading, run_path.row_rho, twin.actuators, rotary)
 

@@ -5,6 +5,26 @@ from typing import Any
 
 import click
 
+from camcomp.ground.places import one_place_each
+
+
+class OutputFile(click.ParamType):
+    """Name of an output, or "-": none twice in one command, which is said before the work begins."""
+
+    name = "file"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        """The name. Raises FileError CC502 when another option of the command names the same file."""
+        if not value:
+            self.fail("the name of an output is empty", param, ctx)
+        if param is not None and ctx is not None:
+            named = ctx.meta.setdefault("camcomp.outputs", {})
+            named[param.name] = str(value)
+            one_place_each(list(named.values()))
+        return str(value)
+
+
+OUTPUT = OutputFile()
 config_option = click.option(
     "--config",
     "configs",
@@ -27,7 +47,7 @@ def findings_options(*names: str) -> Callable[[Callable[..., Any]], Callable[...
     def add(function: Callable[..., Any]) -> Callable[..., Any]:
         for name in reversed(names):
             metavar, text = _FORMATS[name]
-            function = click.option(f"--{name}", f"{name}_file", metavar=metavar, help=text)(function)
+            function = click.option(f"--{name}", f"{name}_file", metavar=metavar, type=OUTPUT, help=text)(function)
         return function
 
     return add

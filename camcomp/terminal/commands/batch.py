@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,7 +12,7 @@ from typing import TYPE_CHECKING
 import click
 
 from camcomp import __version__
-from camcomp.ground.errors import CheckFailed
+from camcomp.ground.errors import CamcompError, CheckFailed
 from camcomp.model.config.load import load_config
 from camcomp.report.findings import Case, findings_of_messages
 from camcomp.report.outputs import findings_files
@@ -19,9 +20,11 @@ from camcomp.terminal.commands._options import config_option, findings_options, 
 from camcomp.terminal.progress import say
 
 if TYPE_CHECKING:
-    from camcomp.compensation.batch.programs import Status
+    from camcomp.compensation.batch.programs import FoundProgram, Plan, Status
+    from camcomp.compensation.batch.worker import Outcome, Task
 
 SUMMARY = "camcomp-batch.json"
+INTERRUPTED = 130  # stands in the summary when a signal or a bug ended the batch
 
 
 @click.command()
@@ -54,37 +57,67 @@ def command(
 
     PATH is a program, a folder, or a pattern such as 'parts/**/*.nc'. The tree of inputs is mirrored in DIR. A program that
     fails does not stop the others; the exit code is then the largest of theirs. A second run skips what is done and
-    unchanged: program, configuration, options, version and output. DIR/camcomp-batch.json tells what became of each.
+    unchanged: program, configuration, options, version and output. DIR/camcomp-batch.json tells what became of each, also
+    when the batch ends early: what is done then counts for the next run. One batch at a time writes into DIR. Without a
+    worker in the cluster the batch says so after 5 s and waits; when the scheduler goes away it ends with exit code 5.
     """
+    if scheduler == "":
+        raise click.BadParameter("the address of the scheduler is empty", param_hint="--scheduler")
     if scheduler and jobs:
         raise click.UsageError("--jobs is about this machine; a scheduler has its own workers")
     config = load_config(configs)
     from camcomp.compensation.batch import pools
-    from camcomp.compensation.batch.programs import Plan, find_programs, run_batch, summary
+    from camcomp.compensation.batch.programs import Plan, find_programs, output_tree
     from camcomp.ground.files import write_all
 
     plan = Plan(
-        config, configs, Path(output_dir), method or config.compensation.method,
+        config, Path(output_dir), method or config.compensation.method,
         tolerance_um or config.compensation.tolerance_um, joints, __version__,
     )  # fmt: skip
     programs = find_programs(paths, plan.output)
     if scheduler:
-        pool = partial(pools.on_a_cluster, address=scheduler)
+        pool = partial(pools.on_a_cluster, address=scheduler, tell=partial(say, quiet=False))
     else:
         pool = partial(pools.on_this_machine, jobs=min(jobs or pools.cores(), len(programs)))
-    statuses = []
+    statuses: list[Status] = []
+    findings = [each for each in (sarif_file, junit_file) if each is not None]
+    with output_tree(plan, programs, [str(plan.output / SUMMARY), *findings]):
+        try:
+            _work(plan, programs, pool, statuses, quiet)
+        except CamcompError as error:
+            _note_down(plan, statuses, programs, error.exit_code)
+            raise
+        except BaseException:
+            _note_down(plan, statuses, programs, INTERRUPTED)
+            raise
+        figures = _note_down(plan, statuses, programs, 0)
+        cases = [_case(each) for each in sorted(statuses, key=lambda each: each.source)]
+        write_all(findings_files("batch", cases, sarif_file=sarif_file, junit_file=junit_file))
+    counts = ", ".join(f"{count} {name}" for name, count in figures["counts"].items() if count)
+    say(f"{figures['programs']} programs: {counts}", quiet=quiet)
+    return figures["exit_code"]
+
+
+def _work(
+    plan: Plan, programs: Sequence[FoundProgram], pool: Callable[[Iterable[Task]], Iterator[Outcome]],
+    statuses: list[Status], quiet: bool,
+) -> None:  # fmt: skip
+    from camcomp.compensation.batch.programs import run_batch
+
     for status in run_batch(plan, programs, pool):
         statuses.append(status)
         if not quiet or status.exit_code:
             _tell(status, len(statuses), len(programs))
-    figures = summary(statuses)
-    plan.output.mkdir(parents=True, exist_ok=True)
+
+
+def _note_down(plan: Plan, statuses: Sequence[Status], programs: Sequence[FoundProgram], stopped: int) -> dict:
+    """Writes what became of every program so far; the figures."""
+    from camcomp.compensation.batch.programs import summary
+    from camcomp.ground.files import write_all
+
+    figures = summary(statuses, programs, stopped)
     write_all({plan.output / SUMMARY: (json.dumps(figures, indent=2) + "\n").encode()})
-    cases = [_case(each) for each in sorted(statuses, key=lambda each: each.source)]
-    write_all(findings_files("batch", cases, sarif_file=sarif_file, junit_file=junit_file))
-    counts = ", ".join(f"{count} {name}" for name, count in figures["counts"].items() if count)
-    say(f"{figures['programs']} programs: {counts}", quiet=quiet)
-    return figures["exit_code"]
+    return figures
 
 
 def _case(status: Status) -> Case:

@@ -9,6 +9,7 @@ import click
 
 from camcomp.ground.errors import CheckFailed, ConfigError
 from camcomp.ground.files import STANDARD, write_all
+from camcomp.terminal.commands._options import OUTPUT
 
 if TYPE_CHECKING:
     from camcomp.diagnosis.compare import Comparison, Difference
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
     "--by", type=click.Choice(["s", "t", "row"]), help="Align by path length, time or row; default: what fits."
 )
 @click.option("--column", "columns", metavar="NAME", multiple=True, help="Only this column; repeatable.")
-@click.option("--json", "json_file", metavar="OUT.json", help="The figures as JSON.")
+@click.option("--json", "json_file", metavar="OUT.json", type=OUTPUT, help="The figures as JSON.")
 @click.option(
     "--tolerance", "tolerances", metavar="[NAME=]VALUE", multiple=True,
     help="Exit with 1 when a column (without NAME: any) differs by more, in its own unit; repeatable.",

@@ -8,7 +8,7 @@ from camcomp import __version__
 from camcomp.ground.errors import CheckFailed
 from camcomp.ground.files import STANDARD, display_name, open_source, read_bytes, write_all
 from camcomp.model.config.load import load_config
-from camcomp.terminal.commands._options import quiet_option
+from camcomp.terminal.commands._options import OUTPUT, quiet_option
 from camcomp.terminal.progress import say, working
 
 if TYPE_CHECKING:
@@ -18,13 +18,18 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("program")
 @click.option("--config", "configs", metavar="FILE", multiple=True, required=True, help="Machine; later files win.")
-@click.option("-o", "--output", metavar="OUT.nc", help="Corrected program; - is standard output.")
+@click.option("-o", "--output", metavar="OUT.nc", type=OUTPUT, help="Corrected program; - is standard output.")
 @click.option(
-    "--joints", metavar="OUT.csv", help="Actuator coordinates and drive forces at every end point; .parquet too."
+    "--joints",
+    metavar="OUT.csv",
+    type=OUTPUT,
+    help="Actuator coordinates and drive forces at every end point; .parquet too.",
 )
-@click.option("--summary", "summary_file", metavar="OUT.json", help="Figures of the run.")
-@click.option("--paths", metavar="OUT.csv", help="The five trajectories: target, errors, force, both, adjusted.")
-@click.option("--report", metavar="OUT.html", help="What was done and why, as one page with plots.")
+@click.option("--summary", "summary_file", metavar="OUT.json", type=OUTPUT, help="Figures of the run.")
+@click.option(
+    "--paths", metavar="OUT.csv", type=OUTPUT, help="The five trajectories: target, errors, force, both, adjusted."
+)
+@click.option("--report", metavar="OUT.html", type=OUTPUT, help="What was done and why, as one page with plots.")
 @click.option(
     "--method",
     type=click.Choice(["newton", "stiffness", "fixed-point", "linear"]),

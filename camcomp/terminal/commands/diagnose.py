@@ -9,7 +9,7 @@ import click
 
 from camcomp.ground.files import STANDARD, read_bytes, write_all
 from camcomp.model.config.write_back import machine_file, with_causes
-from camcomp.terminal.commands._options import quiet_option
+from camcomp.terminal.commands._options import OUTPUT, quiet_option
 from camcomp.terminal.progress import say, working
 
 if TYPE_CHECKING:
@@ -51,10 +51,16 @@ def _machine_with_causes(configs: Sequence[str], result: "DiagnosisResult", targ
 
 @click.command()
 @click.argument("experiment")
-@click.option("--json", "json_file", metavar="OUT.json", help="The result; - is standard output.")
-@click.option("--report", metavar="OUT.html", help="What was found and why, as one page with plots.")
-@click.option("--write-config", "config_file", metavar="OUT.yaml", help="The machine file with the causes as effects.")
-@click.option("--next-program", metavar="OUT.nc", help="NC program of the proposed next experiment.")
+@click.option("--json", "json_file", metavar="OUT.json", type=OUTPUT, help="The result; - is standard output.")
+@click.option("--report", metavar="OUT.html", type=OUTPUT, help="What was found and why, as one page with plots.")
+@click.option(
+    "--write-config",
+    "config_file",
+    metavar="OUT.yaml",
+    type=OUTPUT,
+    help="The machine file with the causes as effects.",
+)
+@click.option("--next-program", metavar="OUT.nc", type=OUTPUT, help="NC program of the proposed next experiment.")
 @click.option("--without", multiple=True, metavar="EFFECT", help="Take an effect out of the library; repeatable.")
 @quiet_option
 def command(

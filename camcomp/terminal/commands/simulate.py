@@ -4,12 +4,13 @@ import click
 
 from camcomp.ground.files import STANDARD, write_all
 from camcomp.model.config.load import load_config
+from camcomp.terminal.commands._options import OUTPUT
 
 
 @click.command()
 @click.argument("program")
 @click.option("--config", "configs", metavar="FILE", multiple=True, required=True, help="Machine; later files win.")
-@click.option("-o", "--output", metavar="LOG.csv", help="The log; default and -: standard output.")
+@click.option("-o", "--output", metavar="LOG.csv", type=OUTPUT, help="The log; default and -: standard output.")
 @click.option("--step-s", type=click.FloatRange(min=1e-5), default=0.02, show_default=True, help="Time between rows.")
 @click.option("--air", is_flag=True, help="The tool does not cut.")
 @click.option("--started-s", type=float, default=0.0, help="Start on the common clock, for effects of warming up.")

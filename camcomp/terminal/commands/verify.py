@@ -7,7 +7,7 @@ from camcomp.ground.files import display_name, write_all
 from camcomp.model.config.load import load_config
 from camcomp.report.findings import Case, Finding, findings_of
 from camcomp.report.outputs import findings_files
-from camcomp.terminal.commands._options import findings_options, quiet_option
+from camcomp.terminal.commands._options import OUTPUT, findings_options, quiet_option
 from camcomp.terminal.progress import say, working
 
 
@@ -15,7 +15,7 @@ from camcomp.terminal.progress import say, working
 @click.argument("corrected")
 @click.option("--against", "original", metavar="ORIGINAL", required=True, help="Program that was compensated.")
 @click.option("--config", "configs", metavar="FILE", multiple=True, required=True, help="Machine; later files win.")
-@click.option("--json", "json_file", metavar="OUT.json", help="Residuals, in all and per source line.")
+@click.option("--json", "json_file", metavar="OUT.json", type=OUTPUT, help="Residuals, in all and per source line.")
 @findings_options("sarif", "junit")
 @quiet_option
 @click.option("--tolerance-um", type=click.FloatRange(min=0, min_open=True), help="Largest residual that passes.")

@@ -1,5 +1,6 @@
 """Workers that die: nothing is lost, nothing is done twice."""
 
+import json
 import os
 import signal
 import socket
@@ -60,8 +61,9 @@ def test_several_processes_give_what_one_gives():
     assert one == two and None not in one.values()
 
 
-def test_no_scheduler_is_an_error():
+def test_no_scheduler_is_an_error(monkeypatch):
     pytest.importorskip("distributed")
+    monkeypatch.setattr(pools, "CONNECT", 0.5)
     with pytest.raises(FileError) as error:
         list(pools.on_a_cluster(tasks(1), f"tcp://127.0.0.1:{free_port()}"))
     assert error.value.rule == "CC503"
@@ -73,51 +75,154 @@ def free_port():
         return probe.getsockname()[1]
 
 
-@pytest.fixture
-def cluster(tmp_path):
-    """A real scheduler and two worker processes on loopback: (address, worker processes)."""
-    pytest.importorskip("distributed")
-    port = free_port()
-    address = f"tcp://127.0.0.1:{port}"
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+class Cluster:
+    """A real scheduler on loopback, and the workers that are started."""
 
-    def start(*words):
-        command = [sys.executable, "-m", "distributed.cli." + words[0], *words[1:]]
-        with open(tmp_path / f"{words[0]}-{time.monotonic_ns()}.log", "wb") as log:
-            return subprocess.Popen(
-                command, env=environment, cwd=tmp_path, stdout=log, stderr=log, start_new_session=True
-            )
+    def __init__(self, folder):
+        self.folder, self.workers = folder, []
+        port = free_port()
+        self.address = f"tcp://127.0.0.1:{port}"
+        self.scheduler = self._start("dask_scheduler", "--host", "127.0.0.1", "--port", str(port), "--no-dashboard")
 
-    started = [start("dask_scheduler", "--host", "127.0.0.1", "--port", str(port), "--no-dashboard")]
-    for _ in range(2):
-        started.append(
-            start("dask_worker", address, "--nthreads", "1", "--no-nanny", "--no-dashboard", "--host", "127.0.0.1")
-        )
-    try:
-        yield address, started[1:]
-    finally:
-        for each in started:
+    def work(self, count=1, **environment):
+        words = ("dask_worker", self.address, "--nthreads", "1", "--no-nanny", "--no-dashboard", "--host", "127.0.0.1")
+        self.workers += [self._start(*words, **environment) for _ in range(count)]
+
+    def wait(self, workers=0):
+        from distributed import Client
+
+        with Client(self.address, timeout=30, set_as_default=False) as client:
+            if workers:
+                client.wait_for_workers(workers, timeout=60)
+
+    def kill(self):
+        for each in (self.scheduler, *self.workers):
             if each.poll() is None:
                 os.killpg(each.pid, signal.SIGKILL)
             each.wait()
 
+    def _start(self, *words, **environment):
+        command = [sys.executable, "-m", "distributed.cli." + words[0], *words[1:]]
+        with open(self.folder / f"{words[0]}-{time.monotonic_ns()}.log", "wb") as log:
+            return subprocess.Popen(
+                command, env={**os.environ, "PYTHONPATH": str(ROOT), **environment}, cwd=self.folder, stdout=log, stderr=log,
+                start_new_session=True,
+            )  # fmt: skip
+
+
+@pytest.fixture
+def cluster(tmp_path):
+    pytest.importorskip("distributed")
+    made = Cluster(tmp_path)
+    try:
+        yield made
+    finally:
+        made.kill()
+
 
 @pytest.mark.filterwarnings("default")
 def test_a_worker_killed_in_a_cluster_loses_nothing(cluster):
-    address, workers = cluster
-    from distributed import Client
-
-    with Client(address, timeout=30, set_as_default=False) as client:
-        client.wait_for_workers(2, timeout=60)
+    cluster.work(2)
+    cluster.wait(2)
     circles = "G21 G90 G94\nG0 X0 Y0 Z5\nG1 Z0 F100\nG3 X0 Y0 I{x} J0\nM30\n"
     seen: Counter = Counter()
     programs = {}
-    for outcome in pools.on_a_cluster(tasks(12, circles), address):
+    for outcome in pools.on_a_cluster(tasks(12, circles), cluster.address):
         seen[outcome.key] += 1
         programs[outcome.key] = outcome.program
         if len(programs) == 3:
-            os.killpg(workers[0].pid, signal.SIGKILL)
-            workers[0].wait()
+            os.killpg(cluster.workers[0].pid, signal.SIGKILL)
+            cluster.workers[0].wait()
     assert seen == Counter({f"key-{i}": 1 for i in range(12)})
     alone = {each.key: each.program for each in pools.on_this_machine(tasks(12, circles), 1)}
     assert programs == alone
+
+
+@pytest.mark.filterwarnings("default")
+def test_without_workers_it_says_so_and_waits_and_another_version_is_refused(cluster, monkeypatch):
+    cluster.wait()
+    monkeypatch.setattr(pools, "PATIENCE", 0.2)
+    monkeypatch.setattr(pools, "LOOK", 0.1)
+    said = []
+
+    def tell(text):
+        said.append(text)
+        cluster.work(1)
+
+    assert [each.exit_code for each in pools.on_a_cluster(tasks(1), cluster.address, tell)] == [0]
+    assert len(said) == 1 and "has no workers" in said[0]
+    monkeypatch.setattr(pools, "__version__", "0.0.1")
+    with pytest.raises(FileError, match="has camcomp .*, this is 0.0.1") as error:
+        list(pools.on_a_cluster(tasks(1), cluster.address))
+    assert error.value.rule == "CC505"
+
+
+@pytest.mark.filterwarnings("default")
+def test_a_scheduler_that_dies_ends_the_batch_and_what_is_done_stays_done(cluster, tmp_path):
+    cluster.work(1)
+    cluster.wait(1)
+    for name, text in {f"{i}.nc": GOOD.format(x=i + 1) for i in range(60)}.items():
+        (tmp_path / "in").mkdir(exist_ok=True)
+        (tmp_path / "in" / name).write_text(text)
+    words = [sys.executable, "-m", "camcomp", "batch", "in", "--config", str(shipped("config/cartesian.yaml")), "--output-dir",
+             "out"]  # fmt: skip
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    batch = subprocess.Popen(
+        [*words, "--scheduler", cluster.address], cwd=tmp_path, env=environment, stderr=subprocess.PIPE, text=True
+    )
+    said = [batch.stderr.readline() for _ in range(5)]
+    os.killpg(cluster.scheduler.pid, signal.SIGKILL)
+    said += batch.communicate(timeout=60)[1].splitlines(keepends=True)
+    assert batch.returncode == 5
+    assert "error[CC503]: the Dask scheduler at tcp://127.0.0.1:" in "".join(said) and "Traceback" not in "".join(said)
+    figures = json.loads((tmp_path / "out" / "camcomp-batch.json").read_text())
+    done = figures["counts"]["done"]
+    assert 5 <= done < 60 and figures["counts"] == {**figures["counts"], "done": done, "not done": 60 - done}
+    assert figures["exit_code"] == 5 and figures["programs"] == 60
+    again = subprocess.run(
+        [*words, "--jobs", "1"], cwd=tmp_path, env=environment, capture_output=True, text=True, check=True
+    )
+    assert f"60 programs: {60 - done} done, {done} unchanged" in again.stderr
+
+
+# --- processes that go together -----------------------------------------------------------------------------------------
+
+
+def children(pid):
+    """Processes whose parent is `pid`, by the system's own list."""
+    found = subprocess.run(["ps", "-o", "pid=", "--ppid", str(pid)], capture_output=True, text=True, check=False).stdout
+    return [int(each) for each in found.split()]
+
+
+def running(pid):
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+@pytest.mark.skipif(not Path("/proc").is_dir(), reason="looks at processes as Linux shows them")
+@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
+def test_workers_end_with_the_batch_however_it_ends(tmp_path, how):
+    for i in range(400):
+        (tmp_path / "in").mkdir(exist_ok=True)
+        (tmp_path / "in" / f"{i}.nc").write_text(GOOD.format(x=i + 1))
+    batch = subprocess.Popen(
+        [sys.executable, "-m", "camcomp", "batch", "in", "--config", str(shipped("config/cartesian.yaml")), "--output-dir", "out",
+         "--jobs", "2"], cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(ROOT)}, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    said = [batch.stderr.readline() for _ in range(3)]
+    workers = children(batch.pid)
+    assert len(workers) >= 2
+    batch.send_signal(how)
+    said += batch.communicate(timeout=30)[1].splitlines(keepends=True)
+    assert batch.returncode == {signal.SIGKILL: -9, signal.SIGTERM: 143, signal.SIGINT: 130}[how]
+    assert "Traceback" not in "".join(said)
+    deadline = time.monotonic() + 5
+    while any(running(each) for each in workers) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert not any(running(each) for each in workers)
+    if how != signal.SIGKILL:
+        figures = json.loads((tmp_path / "out" / "camcomp-batch.json").read_text())
+        assert figures["counts"]["done"] >= 3 and figures["programs"] == 400
+    assert [each.name for each in (tmp_path / "out").rglob(".camcomp-*")] == []

@@ -1,6 +1,7 @@
 """A batch: which programs there are, what is written where, what is skipped, what an error stops."""
 
 import json
+from io import BytesIO, TextIOWrapper
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,7 @@ from camcomp.compensation.batch.worker import Outcome, Task, work
 from camcomp.ground.errors import ConfigError, FileError
 from camcomp.ground.files import shipped
 from camcomp.model.config.load import load_config
+from camcomp.terminal import cli
 from tests.commandline import camcomp
 
 MACHINE = str(shipped("config/cartesian.yaml"))
@@ -59,6 +61,14 @@ def test_two_programs_for_one_place_are_refused(parts):
     assert error.value.rule == "CC502"
 
 
+def test_a_link_is_a_program_beside_the_file_that_it_leads_to(parts):
+    (parts / "link.nc").symlink_to("a.nc")
+    (parts / "gone.nc").symlink_to("nothing.nc")
+    assert places([parts], parts / "out") == {"a.nc", "link.nc", "gone.nc", "deep/b.NGC", "deep/c.tap", "d.gcode"}
+    (parts / "same").symlink_to("deep")
+    assert places([parts / "deep", parts / "same"]) == {"b.NGC", "c.tap"}
+
+
 def test_nothing_found_is_an_error(parts):
     with pytest.raises(ConfigError) as error:
         places([parts / "*.xyz"])
@@ -93,7 +103,7 @@ def bench(tmp_path):
                         yield Outcome(task.key, 0, [], b"corrected " + task.data, None, figures)
 
             config = load_config([MACHINE])
-            plan = programs.Plan(config, (MACHINE,), tmp_path / "out", "newton", tolerance, False, version)
+            plan = programs.Plan(config, tmp_path / "out", "newton", tolerance, False, version)
             found = programs.find_programs([str(self.folder)], plan.output)
             return {Path(each.source).name: each for each in programs.run_batch(plan, found, pool)}
 
@@ -135,9 +145,57 @@ def test_changed_configuration_is_noticed_by_its_content(tmp_path):
     keys = set()
     for stiffness in ("2.0e+4", "3.0e+4"):
         machine.write_text(machine.read_text().replace("2.0e+4", stiffness))
-        plan = programs.Plan(load_config([machine]), (str(machine),), tmp_path, "newton", 1.0, False, "1")
+        plan = programs.Plan(load_config([machine]), tmp_path, "newton", 1.0, False, "1")
         keys.add(plan.key_of_config())
     assert len(keys) == 2
+
+
+def test_configuration_on_standard_input_counts_by_its_content(tmp_path, monkeypatch):
+    keys = []
+    for text in (
+        Path(MACHINE).read_text(),
+        Path(MACHINE).read_text(),
+        Path(MACHINE).read_text().replace("2.0e+4", "3.0e+4"),
+    ):
+        monkeypatch.setattr("sys.stdin", TextIOWrapper(BytesIO(text.encode())))
+        keys.append(programs.Plan(load_config(["-"]), tmp_path, "newton", 1.0, False, "1").key_of_config())
+    assert keys[0] == keys[1] != keys[2]
+
+
+def test_a_changed_table_is_noticed_wherever_the_configuration_names_it(tmp_path):
+    table, machine = tmp_path / "forces.csv", tmp_path / "m.yaml"
+    machine.write_text("process: {force: {model: table, file: forces.csv}}\n")
+    keys = set()
+    for force in (1, 2):
+        table.write_text(f"feed_mm_min,fr_N,ft_N,fz_N\n100,{force},0,0\n200,{force},0,0\n")
+        config = load_config([MACHINE, machine])
+        keys.add(programs.Plan(config, tmp_path, "newton", 1.0, False, "1").key_of_config())
+    assert len(keys) == 2
+
+
+def test_two_batches_do_not_write_into_one_folder(tmp_path):
+    plan = programs.Plan(load_config([MACHINE]), tmp_path / "out", "newton", 1.0, False, "1")
+    with programs.output_tree(plan, [], []):
+        with pytest.raises(FileError) as error, programs.output_tree(plan, [], []):
+            pass
+        assert error.value.rule == "CC504" and str(tmp_path / "out") in error.value.message
+    with programs.output_tree(plan, [], []):
+        pass
+
+
+def test_outputs_that_are_one_file_through_links_are_refused(bench, tmp_path):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "a.nc").symlink_to("b.nc")
+    plan = programs.Plan(load_config([MACHINE]), tmp_path / "out", "newton", 1.0, False, "1")
+    found = programs.find_programs([str(bench.folder)], plan.output)
+    with pytest.raises(FileError, match="same file") as error, programs.output_tree(plan, found, []):
+        pass
+    assert error.value.rule == "CC502"
+    with (
+        pytest.raises(FileError, match="same file"),
+        programs.output_tree(plan, found, [str(tmp_path / "out" / "c.nc")]),
+    ):
+        pass
 
 
 # --- one program ------------------------------------------------------------------------------------------------------
@@ -190,3 +248,12 @@ def test_the_verb(tmp_path):
     (source / "bad.nc").unlink()
     second = camcomp(*words)
     assert second.returncode == 0 and "2 unchanged" in second.stderr.decode()
+    piped = ["-" if word == MACHINE else 1 if word == 2 else word for word in words]
+    assert "2 unchanged" in camcomp(*piped, stdin=Path(MACHINE).read_bytes()).stderr.decode()
+    softer = Path(MACHINE).read_bytes().replace(b"2.0e+4", b"3.0e+4")
+    assert "2 done" in camcomp(*piped, stdin=softer).stderr.decode()
+
+
+def test_an_empty_address_is_no_scheduler(tmp_path):
+    done = cli.run(["batch", MACHINE, "--config", MACHINE, "--output-dir", str(tmp_path), "--scheduler", ""])
+    assert done == 2

@@ -1,0 +1,111 @@
+"""A file that takes the place of another when it is whole, and is on the disk then."""
+
+import contextlib
+import io
+import os
+import secrets
+from pathlib import Path
+from types import TracebackType
+from typing import Any, BinaryIO, Self
+
+from camcomp.ground.errors import FileError
+
+
+class Replacement:
+    """`file` is filled; `finish` brings it to the disk, `move` puts it in place of the target; otherwise it is gone.
+
+    Where the system can (Linux), the file has no name until it is moved, so that nothing is left of it however the
+    process ends. The target keeps its permissions; a link is followed. Raises OSError.
+    """
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self._target = Path(name).resolve()
+        self._aside = self._target.with_name(f".camcomp-{secrets.token_hex(8)}")
+        self._named = False
+        try:
+            handle = self._open()
+        except OSError as error:
+            raise OSError(error.errno, error.strerror, name) from error
+        self.file: BinaryIO = io.BufferedRandom(_Named(handle, name))
+
+    def _open(self) -> int:
+        if hasattr(os, "O_TMPFILE") and os.path.isdir("/proc/self/fd"):
+            with contextlib.suppress(OSError):  # a kind of disk that has no such files
+                return os.open(self._target.parent, os.O_TMPFILE | os.O_RDWR | os.O_CLOEXEC, 0o600)
+        self._named = True
+        return os.open(self._aside, os.O_CREAT | os.O_EXCL | os.O_RDWR | getattr(os, "O_BINARY", 0), 0o600)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        with contextlib.suppress(FileError, OSError):  # what could not be written has been said
+            self.file.close()
+        if self._named:
+            with contextlib.suppress(OSError):
+                os.unlink(self._aside)
+
+    def finish(self) -> None:
+        """All that was written is on the disk, with the permissions that the target has or a new file gets."""
+        self.file.flush()
+        handle = self.file.fileno()
+        if hasattr(os, "fchmod"):
+            os.fchmod(handle, self._target.stat().st_mode & 0o7777 if self._target.exists() else 0o666 & ~_umask())
+        os.fsync(handle)
+        if self._named:
+            self.file.close()  # some systems move no open files
+
+    def move(self) -> None:
+        """The finished file stands under the name of the target, and will after a loss of power."""
+        if self._named:
+            self._replace()
+        else:
+            try:
+                self._link(self._target.name)
+            except FileExistsError:
+                self._named = True
+                self._link(self._aside.name)
+                self._replace()
+        with contextlib.suppress(OSError):  # not every system opens folders, not every folder may be read
+            folder = os.open(self._target.parent, os.O_RDONLY)
+            try:
+                os.fsync(folder)
+            finally:
+                os.close(folder)
+
+    def _replace(self) -> None:
+        os.replace(self._aside, self._target)
+        self._named = False
+
+    def _link(self, name: str) -> None:
+        """Names the nameless file."""
+        folder = os.open(self._target.parent, os.O_PATH)
+        try:
+            # With the descriptor of a folder Python asks for links to be followed, and this one leads to the file.
+            source = f"/proc/self/fd/{self.file.fileno()}"
+            os.link(source, name, src_dir_fd=folder, dst_dir_fd=folder, follow_symlinks=True)
+        finally:
+            os.close(folder)
+
+
+class _Named(io.FileIO):
+    """A file whose errors say which output it is to become."""
+
+    def __init__(self, handle: int, output: str) -> None:
+        super().__init__(handle, "r+b")
+        self._output = output
+
+    def write(self, data: Any) -> int:
+        try:
+            return super().write(data)
+        except OSError as error:
+            raise FileError("CC501", f"cannot write {self._output}: {error.strerror}") from error
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
