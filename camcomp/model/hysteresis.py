@@ -3,15 +3,15 @@
 from itertools import pairwise
 
 import numpy as np
-from numba import njit
 
 from camcomp.ground.datatypes import Floats
+from camcomp.ground.machine_code import kept
 
 STILL = 1e-9  # mm or rad, round-off of two solutions of the same point
 PRESLIDING_MM = 0.005  # rolling guides take 1 to 20 um to turn their friction round (Armstrong-Helouvry 1994)
 
 
-@njit(cache=True)
+@kept
 def _first_order(x, t, tau):  # type: ignore[no-untyped-def]  # pragma: no cover
     y = np.empty_like(x)
     y[0] = x[0]
@@ -30,7 +30,7 @@ def first_order(x: Floats, time: Floats, tau: float) -> Floats:
     return _first_order(np.ascontiguousarray(x), np.ascontiguousarray(time), tau)
 
 
-@njit(cache=True)
+@kept
 def _play(x, width):  # type: ignore[no-untyped-def]  # pragma: no cover
     y = np.empty_like(x)
     for j in range(x.shape[1]):
@@ -46,7 +46,7 @@ def play(x: Floats, width: float) -> Floats:
     return _play(np.ascontiguousarray(x), width)
 
 
-@njit(cache=True)
+@kept
 def _direction(x, distance):  # type: ignore[no-untyped-def]  # pragma: no cover
     y = np.zeros_like(x)
     for j in range(x.shape[1]):
@@ -68,7 +68,7 @@ def direction(x: Floats, distance: float = PRESLIDING_MM) -> Floats:
     return _direction(np.ascontiguousarray(x), distance)
 
 
-@njit(cache=True)
+@kept
 def _held(x, stiffness, force, distance):  # type: ignore[no-untyped-def]  # pragma: no cover
     out = np.zeros_like(x)
     for j in range(x.shape[1]):

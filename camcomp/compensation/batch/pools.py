@@ -19,6 +19,7 @@ from typing import Any
 from camcomp import __version__
 from camcomp.compensation.batch.worker import BUG, Outcome, Task, live_with, work
 from camcomp.ground.errors import ConfigError, FileError
+from camcomp.ground.notes import note
 
 DEATHS = 3  # workers that a task may bring down before it is given up
 CONNECT = 10.0  # s within which a scheduler has to answer
@@ -55,6 +56,8 @@ def on_this_machine(tasks: Iterable[Task], jobs: int) -> Iterator[Outcome]:
         )  # fmt: skip
         for outcome in pool(calls):
             open_tasks.pop(outcome.key)
+            for topic, text in outcome.notes.items():
+                note(topic, text)
             yield outcome
 
     for _ in range(DEATHS):

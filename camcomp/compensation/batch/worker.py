@@ -11,6 +11,7 @@ from functools import lru_cache
 
 from camcomp import __version__
 from camcomp.ground.garbage import collect_seldom, keep_what_lives
+from camcomp.ground.notes import held, hold
 from camcomp.model.config.spec import Config
 
 BUG = 70
@@ -42,11 +43,13 @@ class Outcome:
     joints: bytes | None = None
     figures: dict = field(default_factory=dict)
     version: str = __version__  # of the camcomp that did the work
+    notes: dict[str, str] = field(default_factory=dict)  # by topic, for the user of the batch
 
 
 def live_with(parent: int) -> None:
     """For worker processes of this machine: interrupts are the parent's business, and its end, however it comes, theirs."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    hold()
     threading.Thread(target=_end_without, args=(parent,), daemon=True).start()
 
 
@@ -89,7 +92,7 @@ def _compensate(task: Task) -> Outcome:
     messages = [{"rule": rule, "message": text, "text": f"{task.name}: error[{rule}]: {text}"} for rule, text in failed]
     joints = tables.joint_csv(result, job) if task.joints else None
     figures = tables.summary(result, job).as_json()
-    outcome = Outcome(task.key, int(bool(failed)), messages, result.written.data, joints, figures)
+    outcome = Outcome(task.key, int(bool(failed)), messages, result.written.data, joints, figures, notes=held())
     _settle()
     return outcome
 

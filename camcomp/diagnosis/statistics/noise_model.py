@@ -10,9 +10,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from camcomp.ground.datatypes import Bools, Floats
+from camcomp.ground.machine_code import kept
 
 LAGS = 30
 _MEMORIES = np.array([-0.5, -0.2, 0.2, 0.4, 0.5, 0.6, 0.7, 0.75, 0.8, 0.85, 0.9, 0.93, 0.95, 0.97, 0.98, 0.99])
@@ -56,7 +56,7 @@ class Noise:
         return np.concatenate(out) if out else np.zeros(0)
 
 
-@njit(cache=True)
+@kept
 def _innovations(x, fresh, slow, memory):  # type: ignore[no-untyped-def]  # pragma: no cover
     n, k = x.shape
     out = np.empty((n, k))

@@ -1,7 +1,7 @@
 """How the solver's functions are compiled, and how their cache on disk knows that it is out of date.
 
-Only the entry functions, those that Python calls, are cached; what they call is compiled into them. numba trusts its
-cache while the entry's own file is unchanged, so a digest of all kernel sources is added to what it compares.
+Only the entry functions, those that Python calls, are cached; what they call is compiled into them. The cache knows the
+entry's own file, so a digest of all kernel sources is added to what it compares.
 """
 
 from __future__ import annotations
@@ -70,18 +70,17 @@ def _load_lightly(cache: Any) -> None:
 def entry(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compiles a function that Python calls, cached on disk for as long as no kernel source changes.
 
-    Where nothing can be cached (no writable folder) it is compiled anew in every process. While compiling, the search for
+    Where nothing can be cached it is compiled anew in every process. While compiling, the search for
     unreachable objects rests: it takes a sixth of the time and finds nothing.
     """
     if _numba.config.DISABLE_JIT:
         return function
-    try:
-        dispatcher = _numba.njit(cache=True, **_OPTIONS)(function)
-        file = dispatcher._cache._cache_file
+    from camcomp.ground.machine_code import kept  # only those who compile need it
+
+    dispatcher = kept(function, **_OPTIONS)
+    if (file := getattr(dispatcher._cache, "_cache_file", None)) is not None:
         file._source_stamp = (file._source_stamp, digest())
         _load_lightly(dispatcher._cache)
-    except RuntimeError:  # numba finds no place for its cache
-        dispatcher = _numba.njit(**_OPTIONS)(function)
 
     @functools.wraps(function)
     def call(*args: Any) -> Any:
