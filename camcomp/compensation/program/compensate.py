@@ -22,6 +22,7 @@ from camcomp.gcode.output import Part, Rewritten
 from camcomp.gcode.program import Program
 from camcomp.gcode.rewrite import rewrite
 from camcomp.ground.datatypes import RAPID, Bools, Floats, Ints
+from camcomp.model.cutting.spindle import cut_without_spindle, spindle_warning
 from camcomp.model.cutting.track import Track, lay_track
 from camcomp.model.job import Job
 from camcomp.model.motion.response import aim_at
@@ -48,6 +49,7 @@ class Compensated:
     after: Floats  # errors (k, 3) mm of the corrected program along feed motions
     iterations: int
     method: str
+    without_spindle: Ints  # source lines that cut while the spindle stands
     warnings: list[str]
 
     @property
@@ -152,9 +154,10 @@ def compensate(
             missed, tolerance * np.clip(0.9e-3 * tolerance_um / np.maximum(worst, 1e-12), 0.3, 0.9), tolerance
         )
     before = see_original(job, points)
-    warnings = _warnings(job, rows)
+    still = np.intersect1d(cut_without_spindle(track), path.line[track.motion[feeding]])
+    warnings = _warnings(job, rows) + spindle_warning(still)
     iterations = int(aimed.iterations.max(initial=0))
-    return _assemble(program, job, track, rows, written, points, before, after, iterations, method, warnings)
+    return _assemble(program, job, track, rows, written, points, before, after, iterations, method, still, warnings)
 
 
 @dataclass(frozen=True, eq=False)
@@ -227,7 +230,7 @@ def _warnings(job: Job, rows: CorrectedRows) -> list[str]:
 
 def _assemble(
     program: Program, job: Job, track: Track, rows: CorrectedRows, written: Rewritten, points: JudgedPoints, before: Seen,
-    after: Seen, iterations: int, method: str, warnings: list[str],
+    after: Seen, iterations: int, method: str, still: Ints, warnings: list[str],
 ) -> Compensated:  # fmt: skip
     s = track.s0[rows.piece] + rows.w * track.length[rows.piece]
     feed = program.path.feed[rows.motion]
@@ -242,4 +245,4 @@ def _assemble(
     warnings += check_posture(program, job, program.path.line[rows.motion], target, nominal)
     state = after.state if method == "linear" else whole_pose(job, rows.corrected, target, force, after.state)
     return Compensated(program, written, rows, s, t, nominal, state, before.tip, before.error[points.judged],
-                       after.error[points.judged], iterations, method, warnings)  # fmt: skip
+                       after.error[points.judged], iterations, method, still, warnings)  # fmt: skip

@@ -4,7 +4,8 @@ A piece is a motion, or the part of a motion on one side of the stock's top, or 
 vertical and the direction across the tool turns over. Rapids and air moves carry no force, and
 plunges none unless the force model says otherwise. Where two cutting pieces meet at less than JOIN_ANGLE the corner
 takes the force of the bisecting direction and the difference fades linearly along the pieces; where they meet at more,
-or where a cut starts or ends, the force jumps.
+where a cut starts or ends, and where the model gives both sides different forces in one direction (another feed, speed
+or sense of the spindle, another tool, a step of a table) the force jumps.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ PLUNGE_SINE = (
     5e-3  # of the angle between feed and tool axis: corrected plunges slant by some 1e-4, rounded short ones too
 )
 NO_FORCE = 1e-9  # N
+SAME_FORCE = 1e-6  # of the force: lengths of the path are rounded sums, and a table is looked up by them
 BESIDE = 1e-5  # rad: how far beside the ends of an upright arc its direction is taken; at the vertical it has none
 
 
@@ -128,6 +130,7 @@ def _force(
         teeth=c.teeth,
         to_machine=np.eye(3) if c.to_machine is None else c.to_machine,
         ends=w[on] == 1.0,
+        turn=path.turn[rows],
     )
     out[on] = to_vector(c.model(cut), cut.tangent, cut.tool_axis)
     return out
@@ -167,13 +170,15 @@ def lay_track(path: Path, conditions: Conditions, length: Floats | None = None) 
     corner = np.ones(n, np.bool_)
     corner[b] = ~straight_on
     smooth = cutting[a] & cutting[b] & straight_on & ~over[b]
+    bisector = np.where(smooth[:, None], last[a] + first[b], 0.0)
+    bisector /= np.maximum(np.linalg.norm(bisector, axis=1, keepdims=True), 1e-300)
+    ahead, behind = force(a, np.ones(len(a)), bisector), force(b, np.zeros(len(b)), bisector)
+    smooth &= np.linalg.norm(behind - ahead, axis=1) <= SAME_FORCE * np.linalg.norm(ahead, axis=1) + NO_FORCE
     jump[b] = ~smooth & (np.linalg.norm(own0[b] - own1[a], axis=1) > NO_FORCE)
     if len(real) and real[0] > 0:  # moves without length stand before the first cut
         jump[real[0]] = bool(np.linalg.norm(own0[real[0]]) > NO_FORCE)
     a, b = a[smooth], b[smooth]
-    bisector = last[a] + first[b]
-    bisector /= np.linalg.norm(bisector, axis=1, keepdims=True)
-    shared = 0.5 * (force(a, np.ones(len(a)), bisector) + force(b, np.zeros(len(b)), bisector))
+    shared = 0.5 * (ahead + behind)[smooth]
     fade1[a] = shared - own1[a]
     fade0[b] = shared - own0[b]
     _carry_over((piece_length > 0.0) | rapid, own1 + fade1, fade0, fade1)
