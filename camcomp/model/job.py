@@ -11,7 +11,7 @@ import numpy as np
 
 from camcomp.ground import shelf
 from camcomp.ground.datatypes import Floats
-from camcomp.ground.errors import ConfigError, PhysicsError
+from camcomp.ground.errors import ConfigError, Location, PhysicsError
 from camcomp.model import signal_path
 from camcomp.model.config.spec import Config
 from camcomp.model.cutting.cut import Cut
@@ -107,7 +107,9 @@ class Job:
         member = shelf.load("forces", choice.model)
         none = choice.model == "none"
         return Conditions(
-            model=None if none else partial(_finite, c, partial(_call, member.force, choice.params)),
+            model=None
+            if none
+            else partial(_finite, c, partial(_call, member.force, choice.params, c.at("process", "force"))),
             plunges=bool(getattr(member, "PLUNGES", False)),
             tool_axis=self.frame.rotation.T @ self.machine.nominal.held_rotation[:, 2],
             stock_top_mm=c.workpiece.stock_top_mm,
@@ -121,8 +123,13 @@ class Job:
         )
 
 
-def _call(force: Callable[[Cut, Any], Floats], params: Any, cut: Cut) -> Floats:
-    return force(cut, params)
+def _call(force: Callable[[Cut, Any], Floats], params: Any, place: Location | None, cut: Cut) -> Floats:
+    """Forces of a model. What it asks for in vain stands, or ought to stand, in the machine file."""
+    try:
+        return force(cut, params)
+    except ConfigError as error:
+        error.at = error.at or place
+        raise
 
 
 def _finite(config: Config, model: Callable[[Cut], Floats], cut: Cut) -> Floats:

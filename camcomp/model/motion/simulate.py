@@ -6,6 +6,7 @@ import numpy as np
 
 from camcomp.ground.datatypes import Floats, Ints, Path
 from camcomp.ground.errors import ProgramError
+from camcomp.model.cutting.spindle import cut_without_spindle, spindle_warning
 from camcomp.model.cutting.track import lay_track
 from camcomp.model.finite import not_finite
 from camcomp.model.job import Job
@@ -25,6 +26,7 @@ class Simulated:
     setpoint: Floats
     actuators: tuple[str, ...]
     rotary: tuple[bool, ...]
+    warnings: list[str]
 
 
 def simulate(job: Job, path: Path, step_s: float, *, cutting: bool = True, started_s: float = 0.0) -> Simulated:
@@ -42,8 +44,9 @@ def simulate(job: Job, path: Path, step_s: float, *, cutting: bool = True, start
         time = np.append(time, timeline.end)
     conditions = job.conditions if cutting else replace(job.conditions, model=None)
     warm = job.config.process.temperature_C
+    track = lay_track(path, conditions)
     run_path = path_of_program(
-        "simulation", timeline, lay_track(path, conditions), time, started=started_s, to_machine=twin.to_machine,
+        "simulation", timeline, track, time, started=started_s, to_machine=twin.to_machine,
         vectors=job.frame.vectors, inverse=twin.inverse, temperature=None if warm is None else np.full(len(time), warm),
     )  # fmt: skip
     _, solved = twin.sense(run_path)
@@ -56,7 +59,9 @@ def simulate(job: Job, path: Path, step_s: float, *, cutting: bool = True, start
     if bad.any():
         raise not_finite(job.config, f"what the machine does in program line {line[int(np.argmax(bad))]}")
     rotary = tuple(each.revolute for each in twin.robot.actuators)
-    return Simulated(time, line, reading, run_path.row_rho, twin.actuators, rotary)
+    return Simulated(
+        time, line, reading, run_path.row_rho, twin.actuators, rotary, spindle_warning(cut_without_spindle(track))
+    )
 
 
 def log_table(run: Simulated) -> str:
