@@ -58,20 +58,23 @@ class Diagnosis:
 
 
 def diagnose(
-    job: Job, twin: Twin, runs: Sequence[Run], *, holdout: Sequence[str] = (), without: Sequence[str] = ()
+    job: Job,
+    twin: Twin,
+    runs: Sequence[Run],
+    *,
+    holdout: Sequence[str] = (),
+    without: Sequence[str] = (),
+    stated_mm: float | None = None,
 ) -> Diagnosis:
     """The diagnosis of an experiment; `without` names effects that the library is to do without."""
     used = [run for run in runs if run.name not in holdout] or list(runs)
     bench = Bench(twin, used)
-    problem = open_problem(bench, candidate_causes(twin.actuators, without))
+    problem = open_problem(bench, candidate_causes(twin.actuators, without), stated_mm)
     found = search_causes(problem)
     best = found.fits[found.verdict.best]
     gap = gap_of(problem)
     word: Any = "unknown" if found.unknown_in else found.verdict.word
     shrinkage = _shrinkage(twin, runs, holdout, problem, best)
-    if word != "unknown":  # noise is measured before causes are known, and no more can be noise than they leave
-        gap["noise_floor_um"] = min(gap["noise_floor_um"], shrinkage["ceiling_rms_um"])
-        shrinkage["noise_floor_um"] = gap["noise_floor_um"]
     unseen = len(used) < len(runs) or (len(used) > 1 and not holdout)
     proposal = _next(problem, found, word, job)
     result = DiagnosisResult(
@@ -82,7 +85,7 @@ def diagnose(
         alternatives=_alternatives(problem, found) if word == "ambiguous" else (),
         shrinkage=UnseenShrinkage.model_validate(shrinkage) if unseen else None,
         next_experiment=_proposed(proposal) if proposal is not None else None,
-        floor=Floor(um=gap["noise_floor_um"], source="rows"),
+        floor=Floor(um=gap["noise_floor_um"], source=problem.floor.source),
         equivalent=tuple(tuple(_named(problem, i) for i in group) for group in classes(likeness(problem))),
     )
     return Diagnosis(result, problem, found, proposal)

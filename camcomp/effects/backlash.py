@@ -2,8 +2,6 @@
 
 from collections.abc import Mapping
 
-import numpy as np
-
 from camcomp.ground.datatypes import Floats
 from camcomp.model.effect import Motion, Parameter
 from camcomp.model.hysteresis import play
@@ -23,4 +21,7 @@ def on_drive(error: Floats, motion: Motion, which: Floats, p: Mapping[str, float
     width = p["width_mm"]
     if width == 0.0 or not motion.ordered:
         return error
-    return error + np.where(which > 0, play(motion.encoder, width), 0.0)
+    aimed = which > 0
+    out = error.copy()
+    out[:, aimed] += play(motion.encoder[:, aimed], width)
+    return out

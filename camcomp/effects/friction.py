@@ -26,25 +26,29 @@ _MORE = (
 PARAMETERS = (FITTED[0], *_MORE, FITTED[1])
 
 
-def _pull(motion: Motion, p: Mapping[str, float]) -> Floats | None:
-    """Force (n, m) of the guides against the travel, N; None where there is none."""
+def _pull(motion: Motion, which: Floats, p: Mapping[str, float]) -> Floats | None:
+    """Force (n, m) of the guides against the travel, N, of the actuators aimed at; None where there is none."""
     force, viscous = p["force_N"], p.get("viscous_Ns_per_mm", 0.0)
     lopsided = p.get("asymmetry_Ns_per_mm", 0.0)
     if force == 0.0 and viscous == 0.0 and lopsided == 0.0:
         return None
     length = p.get("presliding_mm", PRESLIDING_MM)
     nut = motion.encoder if motion.nut is None else motion.nut
-    turned = held_back(nut, motion.stiffness, force, length) if motion.ordered else motion.direction
-    return force * turned + viscous * motion.speed + lopsided * np.abs(motion.speed)
+    turned = motion.direction
+    if motion.ordered:
+        aimed = which > 0
+        turned = np.zeros_like(nut)
+        turned[:, aimed] = held_back(nut[:, aimed], motion.stiffness[aimed], force, length)
+    return which * (force * turned + viscous * motion.speed + lopsided * np.abs(motion.speed))
 
 
 def on_drive(error: Floats, motion: Motion, which: Floats, p: Mapping[str, float]) -> Floats:
     """Carriage minus encoder (n, m), mm: the spring gives way against the travel."""
-    pull = _pull(motion, p)
-    return error if pull is None else error - which * pull / motion.stiffness
+    pull = _pull(motion, which, p)
+    return error if pull is None else error - pull / motion.stiffness
 
 
 def on_drive_force(effort: Floats, motion: Motion, which: Floats, p: Mapping[str, float]) -> Floats:
     """Force of the drive on its carriage (n, m), N: more by the friction, along the travel."""
-    pull = _pull(motion, p)
-    return effort if pull is None else effort + which * pull
+    pull = _pull(motion, which, p)
+    return effort if pull is None else effort + pull

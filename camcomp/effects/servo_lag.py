@@ -2,8 +2,6 @@
 
 from collections.abc import Mapping
 
-import numpy as np
-
 from camcomp.ground.datatypes import Floats
 from camcomp.model.effect import Motion, Parameter
 from camcomp.model.hysteresis import first_order
@@ -21,4 +19,7 @@ def on_servo(position: Floats, motion: Motion, which: Floats, p: Mapping[str, fl
     tau = p["time_constant_ms"] * 1e-3
     if tau == 0.0 or not motion.ordered:
         return position
-    return np.where(which > 0, first_order(position, motion.time, tau), position)
+    aimed = which > 0
+    out = position.copy()
+    out[:, aimed] = first_order(position[:, aimed], motion.time, tau)
+    return out

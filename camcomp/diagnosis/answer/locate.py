@@ -22,9 +22,6 @@ def run_gaps(problem: Problem) -> list[places.RunGap]:
     for k, run in enumerate(problem.bench.runs):
         gap = problem.bench.gap(k)[:, part]
         noise = problem.noise.sigma[k, part]
-        if part.start == 0:  # what no sensor makes belongs to the gap
-            found = problem.background.colour()
-            noise = np.where(found.excess > 0, np.minimum(noise, found.floor), noise)
         thin = float(np.mean([1.0 / effective_rows(problem.noise, c, 1) for c in range(part.start, part.stop)]))
         line = thinned(run.measured.line[:, None], run.thin)[:, 0]
         if part.start == 0:

@@ -79,6 +79,7 @@ class Bench:
     slopes: list[Slopes] = field(default_factory=list)
     nominal: list[Reading] = field(default_factory=list)
     _row_slopes: dict[int, Floats] = field(default_factory=dict)
+    _out: list[Bools] = field(default_factory=list)
     _changed: dict[tuple, Solved] = field(default_factory=dict)  # structures of changed machines, by run and change
 
     def __post_init__(self) -> None:
@@ -89,6 +90,10 @@ class Bench:
             self.slopes.append(slopes)
             reading, _ = self.twin.sense(run.run_path, solved=solved, slopes=slopes, measured=self._encoders(run))
             self.nominal.append(reading)
+
+    def without(self, outlying: Sequence[Bools]) -> None:
+        """Leaves out cells (n, c) per run from all that follows."""
+        self._out = list(outlying)
 
     @property
     def actuators(self) -> tuple[str, ...]:
@@ -148,7 +153,10 @@ class Bench:
         if run.by != "setpoint":
             encoder = np.full_like(encoder, np.nan)
         loaded = np.where(run.run_path.jumping, np.nan, 0.0)[:, None]
-        return stack(tip + loaded, encoder, m.drive + loaded, m.dyno + loaded)
+        out = stack(tip + loaded, encoder, m.drive + loaded, m.dyno + loaded)
+        if self._out:
+            out[self._out[k]] = np.nan
+        return out
 
     def residual(self, k: int, causes: Sequence[Cause] = ()) -> Floats:
         """Measured minus model (n, c) in run k, thinned."""

@@ -11,6 +11,7 @@ from functools import cached_property, partial
 import numpy as np
 
 from camcomp.diagnosis.fit.bench import Bench, CandidateCause, Run, cause_of, step_of, thinned
+from camcomp.diagnosis.fit.floor import NoiseFloor
 from camcomp.diagnosis.fit.measured import channel_names
 from camcomp.diagnosis.fit.patterns import Dictionary, Ground, dictionary
 from camcomp.diagnosis.statistics.evidence import Prior
@@ -23,9 +24,11 @@ RUN_OFFSET_MM = 0.001  # repeatability of a run
 RUN_OFFSET_N = 0.3
 CLOCK_JITTER_S = 1e-5
 CLOCK_RATE = 1e-5
-SPRING_LOG = 0.003  # one link's spring against its stated value
+SPRING_LOG = 0.01  # one link's spring against its stated value
+HEALTHY = 0.15  # of the noise floor at the tip: what of every effect is within tolerance
+MOST_HEALTHY = 0.3  # of an effect's typical size
 _EDIT = 0.05  # step of the allowances' differences
-FORCE_TURN_RAD = 0.002  # direction of the cutting force in the plane of the work
+FORCE_TURN_RAD = 0.005  # direction of the cutting force in the plane of the work
 
 
 def candidate_causes(actuators: Sequence[str], without: Sequence[str] = ()) -> list[CandidateCause]:
@@ -93,8 +96,17 @@ def shape_default(candidate: CandidateCause) -> dict[str, float]:
     return {p.name: p.nominal for p in candidate.shapes}
 
 
-def build(bench: Bench, candidates: Sequence[CandidateCause], shapes: Mapping[int, Mapping[str, float]]) -> Columns:
-    """All columns at nominal. Atoms that no channel can see have columns of zeros and stay."""
+def build(
+    bench: Bench,
+    candidates: Sequence[CandidateCause],
+    shapes: Mapping[int, Mapping[str, float]],
+    floor: NoiseFloor,
+) -> Columns:
+    """All columns at nominal. Candidates that no channel can see have columns of zeros and stay.
+
+    Every healthy machine has a little of everything: what moves the tip by HEALTHY of the noise floor is within tolerance,
+    whatever other channels see of it.
+    """
     owner: list[int] = []
     names: list[str] = []
     tolerance: list[float] = []
@@ -116,13 +128,30 @@ def build(bench: Bench, candidates: Sequence[CandidateCause], shapes: Mapping[in
             candidate_columns(bench, candidate, shapes.get(i, shape_default(candidate))),
             strict=True,
         ):
-            put(i, f"{candidate.label}.{p.name}", p.tolerance / p.scale, per_run, p.sign, True)
+            healthy = min(HEALTHY * floor.tip_um / max(tip_um(bench, per_run), 1e-9), MOST_HEALTHY)
+            put(i, f"{candidate.label}.{p.name}", max(p.tolerance / p.scale, healthy), per_run, p.sign, True)
     for name, size, per_run, loose in _nuisances(bench):
         put(-1, name, size, per_run, 0, loose)
     blocks = tuple(np.stack([each[r] for each in parts], axis=2) for r in range(len(bench.runs)))
     k = len(owner)
     prior = Prior(np.array(tolerance), np.ones(k), np.array(sign), np.array(flexible))
     return Columns(tuple(candidates), np.array(owner), tuple(names), prior, blocks)
+
+
+def tip_um(bench: Bench, per_run: Sequence[Floats]) -> float:
+    """How far (rms over rows of all runs, um) changes of the channels (n, c) per run move the tip.
+
+    What encoders see moves it too, although a model that follows logged encoders says nothing of it.
+    """
+    m = len(bench.actuators)
+    whole = rows = 0.0
+    for k, each in enumerate(per_run):
+        moved = each[:, :3]
+        if bench.runs[k].by == "setpoint" and bench.runs[k].measured.has("encoder"):
+            ways = thinned(bench.row_slopes(k).reshape(-1, 3 * m), bench.runs[k].thin).reshape(-1, 3, m)
+            moved = moved + np.einsum("nij,nj->ni", ways, each[:, 3 : 3 + m])
+        whole, rows = whole + float(np.sum(moved**2)), rows + len(each)
+    return 1e3 * float(np.sqrt(whole / max(rows, 1.0)))
 
 
 def _nuisances(bench: Bench) -> list[tuple[str, float, list[Floats], bool]]:

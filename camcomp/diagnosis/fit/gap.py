@@ -4,7 +4,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from camcomp.diagnosis.fit.columns import RUN_OFFSET_MM
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.ground.datatypes import Floats
 from camcomp.model.effect import Cause
@@ -31,20 +30,23 @@ def gap_sizes(problem: Problem, causes: Sequence[Cause] = ()) -> Floats:
 
 
 def gap_of(problem: Problem) -> dict[str, float]:
-    """Size of the gap over all runs, and of its noise, um."""
-    part, size = main_channels(problem), gap_sizes(problem)
-    repeats = RUN_OFFSET_MM if part.start == 0 else 0.0  # what one run differs from the next belongs to the floor
-    seen = np.isfinite(problem.noise.sigma[:, part])
-    sigma = np.where(seen, problem.noise.sigma[:, part] ** 2, 0.0).sum(axis=0) / np.maximum(seen.sum(axis=0), 1)
-    if part.start == 0:
-        sigma = sigma - problem.background.colour().excess ** 2
-    noise = np.sqrt(np.sum(np.maximum(sigma, 0.0) + repeats**2, where=seen.any(axis=0))) * 1e3
+    """Size of the gap over all runs, and of the floor, um."""
+    size = gap_sizes(problem)
     return {
         "rms_um": round(float(np.sqrt(np.mean(size**2))), 3),
         "p95_um": round(float(np.quantile(size, 0.95)), 3),
         "max_um": round(float(size.max()), 3),
-        "noise_floor_um": round(float(noise), 3),
+        "noise_floor_um": round(floor_um(problem), 3),
     }
+
+
+def floor_um(problem: Problem) -> float:
+    """The floor in the channels in which the gap is stated, um."""
+    part = main_channels(problem)
+    if part.start == 0:
+        return problem.floor.tip_um
+    fast = problem.floor.fast[part]
+    return 1e3 * float(np.sqrt(np.nansum(fast**2)))
 
 
 def _together(gaps: list[Floats]) -> list[Floats]:

@@ -8,13 +8,15 @@ import numpy as np
 
 from camcomp.diagnosis.fit.bench import Bench, CandidateCause, cause_of, step_of, thinned
 from camcomp.diagnosis.fit.columns import Columns, build, candidate_columns, patterns, shape_default
+from camcomp.diagnosis.fit.floor import NoiseFloor, least_noise, measure_floor
 from camcomp.diagnosis.fit.grid_parameters import beside, best_shape, reach
-from camcomp.diagnosis.fit.noise import Background, first_noise, inflation, measure_noise
+from camcomp.diagnosis.fit.noise import inflation, instrument_noise, less_certain
+from camcomp.diagnosis.fit.outliers import outlying, tails
 from camcomp.diagnosis.fit.patterns import Dictionary
 from camcomp.diagnosis.statistics.cause_sets import CausePrior, Fitted, Members, Scale, total
 from camcomp.diagnosis.statistics.evidence import Gram, Prior, estimate, gram
 from camcomp.diagnosis.statistics.noise_model import Noise
-from camcomp.ground.datatypes import Floats
+from camcomp.ground.datatypes import Bools, Floats
 from camcomp.model.effect import Cause, Parameter
 from camcomp.model.motion.twin import Reading
 from camcomp.model.signal_path import stages_of
@@ -34,17 +36,14 @@ class Problem:
     inflate: list[Floats]
     times: list[Floats]
     residuals: list[Floats]
-    background: Background
+    floor: NoiseFloor
+    noise: Noise
+    outliers: list[Bools]  # per run (n, c), before thinning
     white: list[Floats]  # per run (w, k)
     white_patterns: list[list[Floats]]  # per run, per kind (rows of the kind, p)
     white_residual: list[Floats]
     shapes: dict[int, dict[str, float]]
     candidates: CausePrior
-
-    @property
-    def noise(self) -> Noise:
-        """Noise of the channels."""
-        return self.background.noise
 
     @property
     def prior(self) -> Prior:
@@ -250,24 +249,32 @@ class Problem:
         return moves
 
 
-def open_problem(bench: Bench, candidates: Sequence[CandidateCause]) -> Problem:
-    """Columns, noise and white rows for a bench and the candidates that may be causes."""
-    columns = build(bench, candidates, {})
-    words = patterns(bench)
-    extra = inflation(bench)
+def open_problem(bench: Bench, candidates: Sequence[CandidateCause], stated_mm: float | None = None) -> Problem:
+    """Columns, noise and white rows for a bench and the candidates that may be causes.
+
+    stated_mm: whole deviation of the tip's instrument per axis, where the user states it.
+    """
+    outliers = outlying(bench)
+    bench.without(outliers)
+    floor = measure_floor(bench, stated_mm)
     times = [thinned(run.run_path.time[:, None], run.thin)[:, 0] for run in bench.runs]
     residuals = [bench.residual(k) for k in range(len(bench.runs))]
+    noise = instrument_noise(bench, floor, least_noise(bench, floor), times)
+    inflate = less_certain(noise, inflation(bench), tails(bench))
+    columns = build(bench, candidates, {}, floor)
     shapes: dict[int, dict[str, float]] = {i: shape_default(a) for i, a in enumerate(candidates) if a.shapes}
-    if shapes:
-        # shapes first: what has the wrong one would pass for noise
-        columns = _scan(_whiten(bench, columns, [], first_noise(extra, residuals), times, residuals, shapes))
-    background = measure_noise(bench, columns, words, extra, times, residuals)
-    return _whiten(bench, columns, words, background, times, residuals, shapes)
+    words = patterns(bench)
+    problem = _whiten(bench, columns, words, floor, noise, inflate, times, residuals, shapes, outliers)
+    if not shapes:
+        return problem
+    columns = _scan(problem)
+    return _whiten(bench, columns, words, floor, noise, inflate, times, residuals, shapes, outliers)
 
 
-def _whiten(bench: Bench, columns: Columns, words: list[Dictionary], background: Background, times: list[Floats],
-            residuals: list[Floats], shapes: dict[int, dict[str, float]]) -> Problem:  # fmt: skip
-    noise, inflate = background.noise, background.inflate
+def _whiten(
+    bench: Bench, columns: Columns, words: list[Dictionary], floor: NoiseFloor, noise: Noise, inflate: list[Floats],
+    times: list[Floats], residuals: list[Floats], shapes: dict[int, dict[str, float]], outliers: list[Bools],
+) -> Problem:  # fmt: skip
     white, white_patterns, white_residual = [], [], []
     for k in range(len(bench.runs)):
         present = np.isfinite(inflate[k])
@@ -275,8 +282,8 @@ def _whiten(bench: Bench, columns: Columns, words: list[Dictionary], background:
         white.append(noise.rows(k, clean(columns.blocks[k]), inflate[k], times[k]))
         white_patterns.append([noise.rows(k, w.blocks[k], inflate[k], times[k], w.first) for w in words])
         white_residual.append(noise.rows(k, residuals[k][:, :, None], inflate[k], times[k])[:, 0])
-    return Problem(bench, columns, words, inflate, times, residuals, background, white, white_patterns, white_residual,
-                   shapes, cause_prior(columns))  # fmt: skip
+    return Problem(bench, columns, words, inflate, times, residuals, floor, noise, outliers, white, white_patterns,
+                   white_residual, shapes, cause_prior(columns))  # fmt: skip
 
 
 def cause_prior(columns: Columns) -> CausePrior:

@@ -7,18 +7,8 @@ import numpy as np
 
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.search.indistinguishable import Likeness, likeness, stand_ins
-from camcomp.diagnosis.search.unknown import (
-    colour_left,
-    confirmed,
-    firm_prior,
-    idle,
-    known_part,
-    mostly,
-    residual_tests,
-    signal_rms,
-    steady_prior,
-    strongest_unknown,
-)
+from camcomp.diagnosis.search.unexplained import Unexplained, size_um, unexplained, worst
+from camcomp.diagnosis.search.unknown import firm_prior, foretelling, residual_tests, signal_rms
 from camcomp.diagnosis.statistics.cause_sets import (
     Fitted,
     Members,
@@ -34,15 +24,18 @@ from camcomp.diagnosis.statistics.score_test import ResidualTest
 from camcomp.diagnosis.statistics.verdict import Verdict, judge
 from camcomp.ground.datatypes import Floats
 
-SINGLES, PAIRS, TRIPLES = 6, 6, 3
-TEMPERATURE = 1.5  # what evidence is divided by before it becomes a probability; calibrated on the truth plants
-NUISANCE_RMS = 0.25  # size of a cause, in units of the noise of the channel that shows it best, below which it is none
+SINGLES, PAIRS, TRIPLES, MORE = 6, 6, 3, 3  # sets that are tried of each size; beyond three one is added at a time
+TEMPERATURE = (
+    1.5  # what evidence is divided by before it becomes a probability, where the model is as good as its noise
+)
+MINOR = 0.3  # of the noise floor at the tip: what moves it by less is no cause, whatever its significance (contract, section 6)
 CANCELLING = 8.0  # size of a member, in units of the whole set, above which the set lives on differences of its members
-SLIGHT = 0.06  # of the largest member
-MINOR = 0.25  # size of a known cause, in units of an unknown one, below which it is not named beside it
 HARM_LOG = 2.0  # log density by which a cause has to harm the prediction of other runs before it goes
-HALF = 0.5  # share of the tip's gap beyond noise that causes have to take away to be its explanation
 SAME_FIT = 4.0  # chi-square by which two sets may differ and still be the same answer
+GATE = 0.4  # of the noise floor: what unseen runs show beyond it makes an effect that the library lacks
+GATE_SHARE = 0.1  # of what the causes explain: none is modelled better than that
+GATE_LOCAL = 1.5  # of the floor: the same for what acts for a while only
+SURE_Z = 5.0  # standard deviations of chance
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +47,7 @@ class CauseSearch:
     verdict: Verdict
     left: Mapping[str, ResidualTest]  # per kind of channel
     unknown_in: str | None  # the kind in which an effect shows that the library does not have
+    beyond: Mapping[str, Unexplained]  # what unseen runs show beyond the floor, per kind of channel
 
 
 def search_causes(problem: Problem) -> CauseSearch:
@@ -93,61 +87,57 @@ def search_causes(problem: Problem) -> CauseSearch:
         scale = Scale(total(f.grams), problem.prior, problem.candidates)
         found += [(v, m, f) for v, m in extensions(scale, f.members, every)[:3]]
     _fit_best(found, fit, TRIPLES, max(value(f) for f in done.values()))
+    for _ in range(MORE):
+        best = max(done.values(), key=value)
+        if len(best.members) < 3:
+            break
+        scale = Scale(total(best.grams), problem.prior, problem.candidates)
+        fit(extensions(scale, best.members, every)[0][1], best)
+        if max(done.values(), key=value) is best:
+            break
     fits = tuple(sorted(done.values(), key=value, reverse=True))
     fits = tuple(f for f in fits if _matters(problem, f) and not _cancels(problem, f))
-    probability = probabilities(fits, problem.candidates, TEMPERATURE)
+    temperature = TEMPERATURE * overdispersion(problem, fits[0])
+    probability = probabilities(fits, problem.candidates, temperature)
     fits, probability = _prune(problem, fits, probability)
     design = likeness(problem)
-    fits, probability, same = _with_stand_ins(problem, design, fits, probability, fit)
+    fits, probability, same = _with_stand_ins(problem, design, fits, probability, fit, temperature)
     verdict = judge(fits, probability, same)
     best = fits[verdict.best]
-    left = residual_tests(problem, best, steady_prior(problem, best))
-    if left and idle(problem, best, HALF):
-        return _nothing_known(problem, fits, null)
-    # noise that is none stays whatever the causes are
-    coloured = colour_left(problem, left)
-    if coloured is None and strongest_unknown(problem, best, left) is None:
-        return CauseSearch(fits, probability, verdict, left, None)
-    members = best.members if coloured is None and mostly(problem, best, left) else known_part(problem, best)
-    known, left = _beside_unknown(problem, members, fit, coloured is not None)
-    if left and idle(problem, known):
-        return _nothing_known(problem, fits, null)
+    beyond = unexplained(problem, best)
+    kind = unknown_kind(problem, best, beyond)
+    if kind is None:
+        return CauseSearch(fits, probability, verdict, residual_tests(problem, best, problem.prior), None, beyond)
+    known = best
+    while (kept := foretelling(problem, known)) != known.members:
+        known = fit(kept)
+    beyond = unexplained(problem, known)
+    kind = unknown_kind(problem, known, beyond) or worst(beyond).kind
     if known.members != best.members:
-        fits = (known, *(f for f in fits if f is not known))
+        fits = (known, *(f for f in fits if f.members != known.members))
         probability = np.concatenate([[1.0], np.zeros(len(fits) - 1)])
-        verdict = Verdict("identified", 0, (), dict.fromkeys(known.members, 1.0))
-    if coloured is not None:
-        return CauseSearch(fits, probability, verdict, {**left, coloured.kind: coloured}, coloured.kind)
-    return CauseSearch(fits, probability, verdict, left, strongest_unknown(problem, known, left))
+        inclusion = {i: verdict.inclusion.get(i, 0.0) for i in known.members}
+        verdict = Verdict("identified", 0, (), inclusion)
+    left = residual_tests(problem, known, firm_prior(problem))
+    return CauseSearch(fits, probability, verdict, left, kind if kind in left else next(iter(left)), beyond)
 
 
-def _nothing_known(problem: Problem, fits: tuple[Fitted, ...], null: Fitted) -> CauseSearch:
-    """All of the gap is unknown."""
-    left = residual_tests(problem, null, firm_prior(problem))
-    fits = (null, *(f for f in fits if f is not null))
-    sure = np.array([1.0] + [0.0] * (len(fits) - 1))
-    return CauseSearch(
-        fits, sure, Verdict("identified", 0, (), {}), left, max(left, key=lambda kind: left[kind].energy)
-    )
+def overdispersion(problem: Problem, f: Fitted) -> float:
+    """By how much the best set leaves more than noise: all evidence is worth that much less (quasi-likelihood)."""
+    data = total(f.grams)
+    return max(1.0, misfit(problem, f) / max(data.rows, 1))
 
 
-def _beside_unknown(
-    problem: Problem, members: Members, fit: Callable[[Members], Fitted], coloured: bool
-) -> tuple[Fitted, dict[str, ResidualTest]]:
-    """The members that are causes beside an unknown one, and what they leave.
-
-    Beside something large and unknown, something small and known is most likely a part of it.
-    """
-    while True:
-        known = fit(members)
-        left = residual_tests(problem, known, firm_prior(problem))
-        large = 1.0 if coloured else max(each.rms for each in left.values())
-        kept = tuple(
-            i for i in confirmed(problem, known) if max(signal_rms(problem, known, (i,)).values()) > MINOR * large
-        )
-        if kept == members:
-            return known, left
-        members = kept
+def unknown_kind(problem: Problem, f: Fitted, beyond: Mapping[str, Unexplained]) -> str | None:
+    """The kind of channel in which unseen runs show more than the floor, None where none does."""
+    floor = problem.floor.tip_um
+    explained = size_um(problem, f)
+    least = max(GATE * floor, GATE_SHARE * explained)
+    for_a_while = max(GATE_LOCAL * floor, 2.0 * GATE_SHARE * explained)
+    # where the tip is measured it says itself what moves it; only of the control it knows nothing
+    counts = [beyond[kind] for kind in (("tip", "encoder") if "tip" in beyond else beyond) if kind in beyond]
+    found = [each for each in counts if each.z > SURE_Z and (each.excess_um > least or each.local_um > for_a_while)]
+    return max(found, key=lambda each: each.excess_um).kind if found else None
 
 
 def _with_stand_ins(
@@ -156,6 +146,7 @@ def _with_stand_ins(
     fits: tuple[Fitted, ...],
     probability: Floats,
     fit: Callable[[Members], Fitted],
+    temperature: float,
 ) -> tuple[tuple[Fitted, ...], Floats, list[tuple[Members, Members]]]:
     """The fits with those sets added that do the same as the leader by their structure, and all pairs that are alike."""
     best = fits[int(np.argmax(probability))]
@@ -168,7 +159,7 @@ def _with_stand_ins(
         if all(f.members != members for f in fits):
             fits = (*fits, other)
     if len(fits) > len(probability):
-        probability = probabilities(fits, problem.candidates, TEMPERATURE)
+        probability = probabilities(fits, problem.candidates, temperature)
     return fits, probability, same
 
 
@@ -179,12 +170,8 @@ def visible(problem: Problem, i: int) -> bool:
 
 
 def _matters(problem: Problem, f: Fitted) -> bool:
-    """Whether every member shows in some kind of channel by more than what is always a little wrong.
-
-    What lies below the noise beside something many times larger is most likely a fault in how that one is modelled.
-    """
-    sizes = [max(signal_rms(problem, f, (i,)).values(), default=0.0) for i in f.members]
-    return all(each > (NUISANCE_RMS if each > SLIGHT * max(sizes) else 1.0) for each in sizes)
+    """Whether every member moves the tip by more than what is minor."""
+    return all(size_um(problem, f, (i,)) > MINOR * problem.floor.tip_um for i in f.members)
 
 
 def _cancels(problem: Problem, f: Fitted) -> bool:

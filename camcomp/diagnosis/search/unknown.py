@@ -2,40 +2,21 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
-from itertools import combinations
 
 import numpy as np
 
-from camcomp.diagnosis.fit.bench import thinned
-from camcomp.diagnosis.fit.gap import gap_of, gap_sizes, main_channels
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.statistics.cause_sets import Fitted, Members, total
-from camcomp.diagnosis.statistics.evidence import Prior, base, estimate, log_bayes
+from camcomp.diagnosis.statistics.evidence import Prior, estimate
 from camcomp.diagnosis.statistics.score_test import (
     Projected,
     ResidualTest,
     project,
     score_test,
-    unknown_evidence,
 )
-from camcomp.diagnosis.statistics.sensor_noise import covariate
 from camcomp.ground.datatypes import Floats, Ints
 
-UNKNOWN_LOG10 = -10.0  # chance below which a leftover is no accident
-UNKNOWN_RMS = 0.18  # size of a leftover, in units of the noise, below which no model error is called a cause
-RUNS = 6  # runs that this holds for
-UNKNOWN_SHARE = 0.12  # share of what is explained that a leftover has to exceed: no cause is modelled perfectly
-ROUGHLY = 0.05  # share of the evidence for an unknown effect that a known cause has to add beside it
-MOSTLY = 0.3  # size of a leftover, in units of what the causes explain, below which the causes are not questioned
-SURPRISE = 0.3  # size of what a set does not foretell of a run, in units of the noise, below which all is well
-FEW = 4  # runs
-CONFIRMED = 0.3  # share of what a run shows beyond noise that a cause beside an unknown one has to foretell of it
-BELIED = 0.15  # share of it by which no run may get worse
-FAINT_SHARE = (
-    0.1  # what a run shows beyond noise, in units of the noise's energy, below which there is nothing to foretell
-)
-STRAINED = 2.5  # offsets of runs, in units of what repeats, above which they are no repeatability
-UNKNOWN_COLOUR = 0.8  # size of what a sensor cannot have made, in units of what it can
+CONFIRMED = 0.5  # share of its own signal that a cause beside an unknown one has to take away from unseen runs
 
 
 def residual_tests(problem: Problem, f: Fitted, prior: Prior) -> dict[str, ResidualTest]:
@@ -58,39 +39,9 @@ def about(problem: Problem, f: Fitted) -> tuple[list[Floats], list[Floats]]:
     return white, list(f.residual)
 
 
-def steady_prior(problem: Problem, f: Fitted) -> Prior:
-    """The prior that a set's leftover is judged with: runs repeat as well as they do, and what would need more is no accident.
-
-    Offsets of runs that are within reason stay free within it. Where they are not, or where the set does not foretell a
-    run from the others, they would hide what differs from run to run, and are held at nought.
-    """
-    offsets = problem.columns.run_offsets
-    size = _strain(problem, f)[offsets]
-    if len(size) and (np.sqrt(np.mean(size**2)) > STRAINED or _surprised(problem, f)):
-        return _held(problem.prior, offsets)
-    return problem.prior
-
-
-def _surprised(problem: Problem, f: Fitted) -> bool:
-    """Whether tips go where a set fitted to the other runs does not let one expect; with few runs no fit is that sure."""
-    if len(problem.bench.runs) < FEW:
-        return False
-    least = max(SURPRISE, UNKNOWN_SHARE * signal_rms(problem, f).get("tip", 0.0))
-    left = _unforetold(problem, f, f.members)
-    return "tip" in left and float(np.mean(left["tip"])) > least**2
-
-
 def firm_prior(problem: Problem) -> Prior:
     """The prior to describe an unknown effect with: everything else is as stated, and no tolerance stretches to follow it."""
     return _held(problem.prior, np.flatnonzero(np.isfinite(problem.prior.tolerance)))
-
-
-def _strain(problem: Problem, f: Fitted) -> Floats:
-    """Every column (k,) beside a set in units of its tolerance; 0 where it is free."""
-    index = problem.member_columns(f.members)
-    out = estimate(total(f.grams), problem.prior, index, 1.0)[0] / problem.prior.tolerance
-    out[index] = 0.0
-    return out
 
 
 def _held(prior: Prior, columns: Ints) -> Prior:
@@ -124,94 +75,22 @@ def signal_rms(problem: Problem, f: Fitted, members: Members | None = None) -> d
     return out
 
 
-def strongest_unknown(problem: Problem, f: Fitted, left: Mapping[str, ResidualTest]) -> str | None:
-    """The kind of channel in which an effect shows that the library does not have, None where there is none."""
-    explained = signal_rms(problem, f)
-    # one run cannot show that something happens again
-    least = UNKNOWN_RMS * np.sqrt(RUNS / min(len(problem.bench.runs), RUNS))
-    found = {
-        kind: each.energy
-        for kind, each in left.items()
-        if each.log10_chance < UNKNOWN_LOG10 and each.rms > max(least, UNKNOWN_SHARE * explained[kind])
-    }
-    return max(found, key=lambda kind: found[kind]) if found else None
+def foretelling(problem: Problem, f: Fitted) -> Members:
+    """The members that foretell, fitted to the other runs, what a run shows: they stand or fall one by one.
 
-
-def colour_left(problem: Problem, left: Mapping[str, ResidualTest]) -> ResidualTest | None:
-    """The noise of tip or encoders as a leftover, where it cannot be that of a sensor.
-
-    left: what the patterns say of the leftover; a line in the spectrum is time's, of anything else they know more.
-    """
-    m = len(problem.bench.actuators)
-    parts = {"tip": slice(0, 3), "encoder": slice(3, 3 + m)}
-    found = {kind: problem.background.colour(part) for kind, part in parts.items()}
-    kind = max(found, key=lambda each: found[each].ratio)
-    if found[kind].ratio < UNKNOWN_COLOUR:
-        return None
-    rest = [r[:, parts[kind]] for r in problem.background.rest]
-    drives = [np.where(np.isfinite(r), r, 0.0) for r in rest]
-    if kind == "tip":
-        for k, run in enumerate(problem.bench.runs):
-            slope = thinned(problem.bench.row_slopes(k).reshape(-1, 3 * m), run.thin).reshape(-1, 3, m)
-            drives[k] = np.einsum("nij,nj->ni", np.linalg.pinv(slope), drives[k])
-    names = "xyz" if kind == "tip" else problem.bench.actuators
-    label = covariate(rest, problem.times, drives, names, problem.bench.actuators, found[kind].excess)
-    rows = sum(int(np.isfinite(r).sum()) for r in rest)
-    known = left[kind].labels if kind in left and not label.startswith("time") else ()
-    return ResidualTest(kind, -300.0, found[kind].ratio, rows, known or ((label, 1.0),))
-
-
-def mostly(problem: Problem, f: Fitted, left: Mapping[str, ResidualTest]) -> bool:
-    """Whether a set explains so much of every kind of channel that what is left is a flaw of it, not something in its place."""
-    if steady_prior(problem, f) is not problem.prior:
-        return False  # a cause that some runs do not show
-    explained = signal_rms(problem, f)
-    return all(each.rms < MOSTLY * explained[kind] or each.rms < UNKNOWN_RMS for kind, each in left.items())
-
-
-def idle(problem: Problem, f: Fitted, most: float = 0.0) -> bool:
-    """Whether a set's causes, put into the machine by themselves, leave the tip where it was.
-
-    A fit has help from all that is always a little wrong; causes that take more from there than they give explain
-    nothing. most: share of the gap's energy beyond noise that they have to take away.
-    """
-    stated = gap_of(problem)
-    noise = stated["noise_floor_um"] ** 2
-    whole = stated["rms_um"] ** 2 - noise
-    if main_channels(problem).start != 0 or not f.members or whole < noise:
-        return False
-    left = float(np.mean(gap_sizes(problem, problem.causes(f.members, f.theta, f.extra)) ** 2)) - noise
-    return left > (1.0 - most) * whole
-
-
-def known_part(problem: Problem, best: Fitted) -> Members:
-    """The members of the best set that are still causes when an unknown effect may take their place."""
-    white, residual = about(problem, best)
-    prior = steady_prior(problem, best)
-    alone = base(total(problem.grams(residual, white)), prior, 1.0)
-    found = []
-    nothing = 0.0
-    for count in range(len(best.members) + 1):
-        for members in combinations(best.members, count):
-            evidence = max(unknown_evidence(_projected(problem, prior, white, residual, members)).values(), default=0.0)
-            nothing = evidence if not members else nothing
-            sets = [problem.candidates.columns[i] for i in members]
-            known = log_bayes(alone, prior, sets) if sets else 0.0
-            # Patterns follow an unknown effect only roughly; a cause is not kept for what they miss, unless it leaves nothing.
-            rough = ROUGHLY * nothing * len(members) if evidence > ROUGHLY * nothing else 0.0
-            found.append((evidence + known + problem.candidates.prior(members) - rough, members))
-    return max(found)[1]
-
-
-def confirmed(problem: Problem, f: Fitted) -> Members:
-    """The members that foretell, fitted to the other runs, what a run shows: all that counts beside an unknown effect.
-
-    In the runs that they were fitted to, any few effects follow an unknown one for some way.
+    In the runs that they were fitted to, any few effects follow an unknown one for some way; a cause that is there takes
+    away from a run that it has not seen what it takes away from the others.
     """
     members = f.members
-    while members and len(problem.bench.runs) > 1:
+    if len(problem.bench.runs) < 2:
+        return members
+    while members:
         now = _unforetold(problem, f, members)
-        gains = [_gain(_unforetold(problem, f, tuple(each for each in members if each != i)), now) for i in members]
+        own = [_own(problem, f, i) for i in members]
+        gains = [
+            _gain(_unforetold(problem, f, tuple(each for each in members if each != i)), now, signal)
+            for i, signal in zip(members, own, strict=True)
+        ]
         if min(gains) >= CONFIRMED:
             break
         least = members[int(np.argmin(gains))]
@@ -219,15 +98,28 @@ def confirmed(problem: Problem, f: Fitted) -> Members:
     return members
 
 
-def _gain(before: Mapping[str, Floats], after: Mapping[str, Floats]) -> float:
-    """Share of the energy that a member foretells in the kind of channel that it foretells best; 0 if a run belies it."""
-    gains = [0.0]
-    for kind, each in before.items():
-        whole = max(float(np.mean(each)), FAINT_SHARE)
-        change = each - after[kind]
-        if min(change) > -BELIED * whole:
-            gains.append(float(np.mean(change)) / whole)
-    return max(gains)
+def _gain(before: Mapping[str, Floats], after: Mapping[str, Floats], own: Mapping[str, Floats]) -> float:
+    """Share of its own signal that a member takes away from unseen runs, in the kind of channel that shows it best."""
+    kind = max(own, key=lambda each: float(own[each].sum()))
+    change, whole = before[kind] - after[kind], own[kind]
+    seen = whole > 0.1 * whole.max(initial=0.0)
+    if not seen.any():
+        return 0.0
+    # no run may speak against it
+    return min(float(change[seen].sum() / whole[seen].sum()), 1.0 + float(np.min(change[seen] / whole[seen])))
+
+
+def _own(problem: Problem, f: Fitted, i: int) -> dict[str, Floats]:
+    """Energy per row (runs,) of a member's own signal, per kind of channel."""
+    index, at = problem.member_columns((i,)), problem.member_columns(f.members)
+    theta = np.array([f.theta[at.index(c)] for c in index])
+    out: dict[str, list[float]] = {words.kind: [] for words in problem.dictionaries}
+    for W, parts in zip(about(problem, f)[0], problem.white_patterns, strict=True):
+        signal, first = W[:, index] @ theta, 0
+        for kind, part in zip(out, parts, strict=True):
+            out[kind].append(float(np.mean(signal[first : first + len(part)] ** 2)) if len(part) else 0.0)
+            first += len(part)
+    return {kind: np.array(each) for kind, each in out.items()}
 
 
 def _unforetold(problem: Problem, f: Fitted, members: Members) -> dict[str, Floats]:

@@ -23,7 +23,7 @@ from camcomp.diagnosis.statistics.evidence import (
 from camcomp.ground.datatypes import Floats
 
 Members = tuple[int, ...]
-SIZES = (0.5, 0.35, 0.12, 0.03)  # prior probability of 0, 1, 2 and 3 causes
+SIZES = (0.45, 0.33, 0.13, 0.055, 0.022, 0.009, 0.004)  # prior probability of 0, 1, 2 ... causes
 
 
 @dataclass(frozen=True, eq=False)

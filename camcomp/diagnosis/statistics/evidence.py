@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
+from scipy.linalg.lapack import dpotrf, dpotri
 from scipy.special import log_ndtr, logsumexp
 
 from camcomp.ground.datatypes import Floats, Ints
@@ -79,13 +80,19 @@ def base(data: Gram, prior: Prior, factor: float) -> Base:
     # scaled so that the factorisation does not mix mm with ppm
     size = 1.0 / np.sqrt(np.diag(data.A) + precision)
     scaled = size[:, None] * data.A * size + np.diag(precision * size**2)
-    L = np.linalg.cholesky(scaled + 1e-13 * np.eye(len(size)))
-    half = np.linalg.solve(L, np.diag(size))
-    covariance = half.T @ half
-    y = half @ data.b
-    log_det = 2.0 * np.log(np.diag(L)).sum() - 2.0 * np.log(size).sum()
-    evidence = -0.5 * (data.c - float(y @ y)) - 0.5 * (log_det - np.log(precision).sum())
-    return Base(half.T @ y, covariance, precision, evidence)
+    covariance, log_det = _inverse(scaled, size)
+    mean = covariance @ data.b
+    evidence = -0.5 * (data.c - float(data.b @ mean)) - 0.5 * (log_det - np.log(precision).sum())
+    return Base(mean, covariance, precision, evidence)
+
+
+def _inverse(scaled: Floats, size: Floats) -> tuple[Floats, float]:
+    """Inverse (k, k) and log determinant of a positive matrix that is `scaled` after division by size (k,) on both sides."""
+    half, _ = dpotrf(scaled + 1e-13 * np.eye(len(size)), lower=1)
+    triangle, _ = dpotri(half, lower=1)
+    inverse = np.tril(triangle) + np.tril(triangle, -1).T
+    log_det = 2.0 * np.log(np.diag(half)).sum() - 2.0 * np.log(size).sum()
+    return size[:, None] * inverse * size, float(log_det)
 
 
 def log_bayes(at: Base, prior: Prior, candidates: Sequence[Sequence[int]]) -> float:
@@ -154,6 +161,5 @@ def estimate(data: Gram, prior: Prior, members: Sequence[int], factor: float = 1
     precision[members] = 1.0 / (10.0 * prior.scale[members]) ** 2
     size = 1.0 / np.sqrt(np.diag(data.A) + precision)
     scaled = size[:, None] * data.A * size + np.diag(precision * size**2)
-    half = np.linalg.solve(np.linalg.cholesky(scaled + 1e-13 * np.eye(len(size))), np.diag(size))
-    covariance = half.T @ half
+    covariance, _ = _inverse(scaled, size)
     return covariance @ data.b, covariance

@@ -9,14 +9,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import logsumexp
 from scipy.stats import chi2
 
 from camcomp.diagnosis.statistics.evidence import Prior
 from camcomp.ground.datatypes import Floats, Ints
 
 _TOLD = 0.01  # share of its information that a direction keeps beside the others, below which it tells of the noise's colour
-_AMPLITUDES = (1.0, 3.0, 10.0, 30.0, 100.0)  # um or N
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,20 +111,6 @@ def score_test(left: Projected, rows: Mapping[str, int]) -> dict[str, ResidualTe
             rows[kind],
             _shares(P, h, [left.labels[i] for i in mine]),
         )
-    return out
-
-
-def unknown_evidence(left: Projected) -> dict[str, float]:
-    """Log Bayes factor of an unknown effect that depends on one covariate, per covariate, against none."""
-    every = np.array(left.labels)
-    out = {}
-    for name in dict.fromkeys(left.labels):
-        index = np.flatnonzero(every == name)
-        P, h = left.P[np.ix_(index, index)], left.h[index]
-        value, vector = np.linalg.eigh(P)
-        value, z = np.maximum(value, 0.0), vector.T @ h
-        logs = [0.5 * np.sum(z**2 / (value + 1 / t**2)) - 0.5 * np.sum(np.log1p(t**2 * value)) for t in _AMPLITUDES]
-        out[name] = float(logsumexp(logs) - np.log(len(logs)))
     return out
 
 

@@ -32,7 +32,11 @@ def examine(
     if (study := study_of(path, without)) is not None:
         return study, None, None
     opened = open_experiment(path)
-    done = diagnose(opened.job, opened.twin, opened.runs, holdout=opened.experiment.holdout, without=without)
+    sd = opened.experiment.sd
+    done = diagnose(
+        opened.job, opened.twin, opened.runs, holdout=opened.experiment.holdout, without=without,
+        stated_mm=None if sd is None else sd.tip_mm,
+    )  # fmt: skip
     return done.result, done, opened
 
 

@@ -1,0 +1,119 @@
+"""The noise floor: what the instruments and the machine's repeatability make of a reading when nothing is wrong.
+
+It is measured or stated, and never what a fitted model leaves: fast noise from the scatter of neighbouring rows, slow
+noise as the repeatability of runs, or both as the experiment states them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from camcomp.diagnosis.fit.bench import Bench, thinned
+from camcomp.ground.datatypes import Floats
+
+REPEATABILITY_MM = 0.001  # of a run, per axis, where nothing is stated (contract, section 5)
+LEAST_SHARE = 0.05  # of the floor: what moves the tip by less is the resolution of a channel and no finding
+CLIPPED = 6.0  # robust deviations beyond which a difference of rows says nothing about the noise
+LEAST_ROWS = 20
+REGULAR = 1.6  # usual steps of time: a longer one is a gap
+
+
+@dataclass(frozen=True, eq=False)
+class NoiseFloor:
+    """fast (c,): standard deviation from row to row of every channel, NaN where it has none; slow: of what remembers, per
+    axis of the tip, mm; tip_um: both together in three axes.
+    """
+
+    fast: Floats
+    slow_mm: float
+    tip_um: float
+    source: Literal["stated", "rows", "not identifiable"]
+
+    @property
+    def axis_mm(self) -> float:
+        """Per axis of the tip."""
+        return 1e-3 * self.tip_um / np.sqrt(3.0)
+
+
+def measure_floor(bench: Bench, stated_mm: float | None = None) -> NoiseFloor:
+    """The floor of a bench's runs. stated_mm: the whole deviation of the tip's instrument per axis, where the user states it."""
+    gaps = [bench.residual(k) for k in range(len(bench.runs))]
+    times = [thinned(run.run_path.time[:, None], run.thin)[:, 0] for run in bench.runs]
+    fast = np.full(gaps[0].shape[1], np.nan)
+    for c in range(len(fast)):
+        sizes = [row_scatter(g[:, c], t) for g, t in zip(gaps, times, strict=True)]
+        known = np.array([s for s in sizes if np.isfinite(s)])
+        if len(known):  # one sensor: a run whose corners scatter has not the sensor's noise
+            fast[c] = float(np.median(known))
+    per_row = [run.measured.tip_sd for run in bench.runs if np.isfinite(run.measured.tip_sd).any()]
+    if stated_mm is None and per_row:
+        stated_mm = float(np.sqrt(np.mean([np.nanmean(sd**2) for sd in per_row])))
+    tip = fast[:3][np.isfinite(fast[:3])]
+    white = float(np.sqrt(np.mean(tip**2))) if len(tip) else 0.0
+    if stated_mm is not None:
+        axis = max(stated_mm, white)
+        slow = float(np.sqrt(max(stated_mm**2 - white**2, 0.0)))
+        return NoiseFloor(fast, slow, 1e3 * np.sqrt(3.0) * axis, "stated")
+    axis = float(np.hypot(white, REPEATABILITY_MM))
+    return NoiseFloor(fast, REPEATABILITY_MM, 1e3 * np.sqrt(3.0) * axis, "rows" if len(tip) else "not identifiable")
+
+
+def row_scatter(values: Floats, time: Floats) -> float:
+    """Standard deviation of the noise of values (n,) from their second differences; NaN where they are too few.
+
+    What is smooth does not enter; single rows far off hardly do, heavy tails do.
+    """
+    known = np.flatnonzero(np.isfinite(values))
+    if len(known) < LEAST_ROWS:
+        return float("nan")
+    x, t = values[known], time[known]
+    step = np.diff(t)
+    usual = float(np.median(step))
+    near = step < REGULAR * usual
+    bend = (x[2:] - 2.0 * x[1:-1] + x[:-2])[near[1:] & near[:-1]] / np.sqrt(6.0)
+    if len(bend) < LEAST_ROWS // 2:
+        return float("nan")
+    middle = 1.4826 * float(np.median(np.abs(bend)))
+    if middle == 0.0:
+        return float(np.sqrt(np.mean(bend**2)))
+    return float(np.sqrt(np.mean(np.clip(bend, -CLIPPED * middle, CLIPPED * middle) ** 2)))
+
+
+def least_noise(bench: Bench, floor: NoiseFloor) -> Floats:
+    """Least standard deviation (c,) of every channel: what moves the tip by LEAST_SHARE of the floor, or one digit.
+
+    The resolution of a channel is noise, and no finding, however sharp.
+    """
+    m = len(bench.actuators)
+    way = np.zeros(m)
+    push = 0.0
+    for k, run in enumerate(bench.runs):
+        slopes = bench.slopes[k].at(run.run_path.row_place)
+        way = np.maximum(way, np.sqrt(np.mean(np.sum(slopes.tip_rho**2, axis=1), axis=0)))
+        push = max(push, float(np.sqrt(np.mean(np.sum(slopes.tip_wrench[:, :, :3] ** 2, axis=(1, 2))))))
+    axis = LEAST_SHARE * floor.axis_mm
+    carriage = axis / np.maximum(way, 1e-9)
+    springs = np.array([np.inf if a.stiffness is None else a.stiffness for a in bench.twin.robot.actuators])
+    drive = carriage * np.where(np.isfinite(springs), springs, 1e4)
+    out = np.concatenate([np.full(3, 0.2 * floor.axis_mm), carriage, drive, np.full(3, axis / max(push, 1e-12))])
+    digit = np.zeros_like(out)
+    for k in range(len(bench.runs)):
+        digit = np.maximum(digit, _digits(bench.observed(k)))
+    return np.asarray(np.hypot(out, digit / np.sqrt(12.0)))
+
+
+def _digits(values: Floats) -> Floats:
+    """Step (c,) between the values that a channel takes: a hundredth of the rows apart at least, 0 where none is plain."""
+    out = np.zeros(values.shape[1])
+    for c, x in enumerate(values.T):
+        each = np.unique(x[np.isfinite(x)])
+        if len(each) < 3:
+            continue
+        steps = np.diff(each)
+        step = float(np.min(steps[steps > 1e-9], initial=np.inf))
+        if np.isfinite(step) and np.allclose(steps / step, np.round(steps / step), atol=0.05):
+            out[c] = step
+    return out

@@ -1,0 +1,66 @@
+"""Readings that the machine has not made: beam breaks and dropped telegrams go, heavy tails count less.
+
+Both are told from the rows beside them, before anything is fitted: what a model explains badly is no outlier.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.ndimage import median_filter
+
+from camcomp.diagnosis.fit.bench import Bench, thinned
+from camcomp.ground.datatypes import Bools, Floats
+
+OFF = 8.0  # robust deviations from the rows beside it by which a single row is off
+SHORT, LONG = 7, 61  # rows of the running medians
+GROSS = 160.0  # robust deviations from the rows around it by which several rows in a row are off
+MANY = 0.02  # of the rows: more are no outliers
+HEAVY = 3.5  # robust deviations beyond which a reading counts less
+LEAST_ROWS = 20
+
+
+def outlying(bench: Bench) -> list[Bools]:
+    """Per run (n, c): cells that have nothing to do with the machine: beam breaks, dropped telegrams. They are listed and not fitted."""
+    out = []
+    for k, run in enumerate(bench.runs):
+        gap = bench.observed(k) - bench.channels(k, bench.nominal[k])
+        bad = np.zeros(gap.shape, bool)
+        for c, x in enumerate(gap.T):
+            known = np.flatnonzero(np.isfinite(x))
+            if len(known) >= LEAST_ROWS and run.run_path.ordered:
+                bad[known, c] = _jumping_off(x[known])
+        m = len(bench.actuators)
+        for part in (slice(0, 3), slice(3 + 2 * m, 6 + 2 * m)):  # one instrument, one telegram
+            bad[:, part] = np.any(bad[:, part], axis=1, keepdims=True)
+        out.append(bad)
+    return out
+
+
+def _jumping_off(x: Floats) -> Bools:
+    beside = x - median_filter(x, SHORT, mode="nearest")
+    scale = 1.4826 * float(np.median(np.abs(beside)))
+    single = np.abs(beside) > OFF * max(scale, 1e-12)
+    around = x - median_filter(x, min(LONG, len(x)), mode="nearest")
+    wide = 1.4826 * float(np.median(np.abs(around)))
+    gross = np.abs(around) > GROSS * max(wide, scale, 1e-12)
+    if scale == 0.0 or single.mean() > MANY:
+        single[:] = False
+    return np.asarray(single | (gross if gross.mean() < 2.0 * MANY else False))
+
+
+def tails(bench: Bench) -> list[Floats]:
+    """Per run (n, c) >= 1: by how much a reading counts less because it lies far from its neighbours (heavy tails)."""
+    out = []
+    for k, run in enumerate(bench.runs):
+        gap = bench.observed(k) - bench.channels(k, bench.nominal[k])
+        weight = np.ones_like(gap)
+        for c, x in enumerate(gap.T):
+            known = np.flatnonzero(np.isfinite(x))
+            if len(known) < LEAST_ROWS or not run.run_path.ordered:
+                continue
+            beside = x[known] - median_filter(x[known], SHORT, mode="nearest")
+            scale = 1.4826 * float(np.median(np.abs(beside)))
+            if scale > 0.0:
+                weight[known, c] = np.maximum(np.abs(beside) / (HEAVY * scale), 1.0)
+        out.append(thinned(weight, run.thin))
+    return out

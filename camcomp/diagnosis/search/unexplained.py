@@ -1,0 +1,158 @@
+"""What a set of causes leaves on runs that it was not fitted to, at the scale of the tip: how far is the tip from where
+the model with these causes lets one expect it, beyond the noise floor?
+
+Every kind of channel is read as micrometres at the tip: an encoder through the kinematics, a drive force through the
+spring that it winds up, a dynamometer through the compliance. Fast noise is averaged out over blocks of rows; what the
+instruments are allowed to drift is taken off. Causes are fitted to the other runs; what every healthy machine has, and
+what runs and clampings differ by, is fitted too, but held within reason.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from camcomp.diagnosis.fit.bench import thinned
+from camcomp.diagnosis.fit.columns import tip_um
+from camcomp.diagnosis.fit.floor import row_scatter
+from camcomp.diagnosis.fit.problem import Problem
+from camcomp.diagnosis.statistics.cause_sets import Fitted, total
+from camcomp.diagnosis.statistics.evidence import estimate
+from camcomp.ground.datatypes import Floats
+
+BLOCK = 8  # rows that are averaged
+STRETCH = 2.5  # tolerances up to which what is always a little wrong may follow the data
+FEW_RUNS = 3  # from which on causes are fitted to the other runs
+KINDS = ("tip", "encoder", "drive", "dyno")
+
+
+@dataclass(frozen=True, eq=False)
+class Unexplained:
+    """One kind of channel. excess_um: rms at the tip beyond the floor; z: in standard deviations of its chance; local_um:
+    the largest over a stretch of blocks; where: (run, t0 s, t1 s) of it; energy (m or 3,): by actuator or axis.
+    """
+
+    kind: str
+    excess_um: float
+    z: float
+    local_um: float
+    where: tuple[int, float, float]
+    energy: Floats
+
+
+def unexplained(problem: Problem, f: Fitted) -> dict[str, Unexplained]:
+    """Per kind of channel that was measured."""
+    left = [_left(problem, f, k) for k in range(len(problem.bench.runs))]
+    out = {}
+    for kind in KINDS:
+        at_tip = [_at_tip(problem, k, r, kind) for k, r in enumerate(left)]
+        if any(np.isfinite(a).any() for a in at_tip):
+            out[kind] = _judged(problem, kind, at_tip)
+    return out
+
+
+def _left(problem: Problem, f: Fitted, k: int) -> Floats:
+    """Channels (n, c) of run k that the causes, fitted to the other runs, and the usual small errors leave."""
+    bench = problem.bench
+    several = len(bench.runs) >= FEW_RUNS
+    theta = problem.theta_without(f, k) if several else f.theta
+    left = bench.difference(k, bench.read(k, problem.causes(f.members, theta, f.extra)))
+    index = problem.member_columns(f.members)
+    usual = estimate(total(f.grams), problem.prior, index, 1.0)[0]
+    tolerance = problem.prior.tolerance
+    held = np.where(np.isfinite(tolerance), np.clip(usual, -STRETCH * tolerance, STRETCH * tolerance), usual)
+    held[index] = 0.0
+    return np.asarray(left - problem.columns.blocks[k] @ held)
+
+
+def _at_tip(problem: Problem, k: int, left: Floats, kind: str) -> Floats:
+    """Left-overs of one kind (n, 3) mm at the tip."""
+    bench, run = problem.bench, problem.bench.runs[k]
+    m = len(bench.actuators)
+    if kind == "tip":
+        return left[:, :3]
+    slopes = bench.slopes[k].at(run.run_path.row_place)
+    if kind == "dyno":
+        ways = slopes.tip_wrench[:, :, :3]
+        lever = bench.twin.nominal.tool
+        turned = slopes.tip_wrench[:, :, 3:]
+        cross = np.array([[0.0, -lever[2], lever[1]], [lever[2], 0.0, -lever[0]], [-lever[1], lever[0], 0.0]])
+        ways = ways + turned @ cross
+        part = left[:, 3 + 2 * m :]
+    else:
+        ways = slopes.tip_rho
+        part = left[:, 3 : 3 + m] if kind == "encoder" else left[:, 3 + m : 3 + 2 * m]
+        if kind == "drive":
+            springs = np.array([np.inf if a.stiffness is None else a.stiffness for a in bench.twin.robot.actuators])
+            part = part / springs
+    ways = thinned(ways.reshape(len(ways), -1), run.thin).reshape(-1, 3, part.shape[1])
+    return np.asarray(np.einsum("nij,nj->ni", ways, part))
+
+
+def _judged(problem: Problem, kind: str, at_tip: Sequence[Floats]) -> Unexplained:
+    slow = problem.floor.slow_mm if kind == "tip" else 0.0
+    excess: list[Floats] = []
+    weight: list[Floats] = []
+    place: list[tuple[int, float, float]] = []
+    axes = np.zeros(3)
+    for k, values in enumerate(at_tip):
+        t = problem.times[k]
+        inflate = problem.inflate[k][:, :3] if kind == "tip" else np.ones_like(values)
+        values = np.where(inflate < 3.0, values, np.nan)
+        noise = np.array([row_scatter(x, t) for x in values.T])
+        noise = np.where(np.isfinite(noise), noise, 0.0)
+        for a in range(0, len(values), BLOCK):
+            rows = values[a : a + BLOCK]
+            count = np.isfinite(rows).sum(axis=0)
+            if not (count >= BLOCK // 2).any():
+                continue
+            middle = np.nansum(rows, axis=0) / np.maximum(count, 1)
+            beyond = np.where(count >= BLOCK // 2, middle**2 - noise**2 / np.maximum(count, 1) - slow**2, 0.0)
+            excess.append(beyond)
+            axes += beyond
+            weight.append(np.where(count >= BLOCK // 2, noise**2 / np.maximum(count, 1) + slow**2, 0.0))
+            place.append((k, float(t[a]), float(t[min(a + BLOCK, len(t)) - 1])))
+    e, w = np.array(excess), np.array(weight)
+    if not len(e):
+        return Unexplained(kind, 0.0, 0.0, 0.0, (0, 0.0, 0.0), axes)
+    each = e.sum(axis=1)
+    mean = float(each.mean())
+    doubt = float(np.sqrt(2.0 * np.sum(w**2) / len(e) ** 2)) + 1e-12
+    local, at = _stretch(each, place)
+    return Unexplained(
+        kind, 1e3 * float(np.sqrt(max(mean, 0.0))), mean / doubt, 1e3 * float(np.sqrt(max(local, 0.0))), at, axes
+    )
+
+
+LOCAL_BLOCKS = 5  # of a stretch in which something acts for a while
+
+
+def _stretch(each: Floats, place: Sequence[tuple[int, float, float]]) -> tuple[float, tuple[int, float, float]]:
+    """The stretch of blocks of one run with the largest mean, and where it lies."""
+    best, at = 0.0, place[0]
+    runs = np.array([p[0] for p in place])
+    for k in np.unique(runs):
+        mine = np.flatnonzero(runs == k)
+        n = min(LOCAL_BLOCKS, len(mine))
+        if n == 0:
+            continue
+        mean = np.convolve(each[mine], np.ones(n) / n, mode="valid")
+        i = int(np.argmax(mean))
+        if mean[i] > best:
+            best, at = float(mean[i]), (int(k), place[mine[i]][1], place[mine[i + n - 1]][2])
+    return best, at
+
+
+def size_um(problem: Problem, f: Fitted, members: Sequence[int] | None = None) -> float:
+    """How far (rms over the rows, um) the members, or some of them, move the tip by themselves."""
+    index = problem.member_columns(f.members)
+    mine = set(problem.member_columns(tuple(f.members if members is None else members)))
+    theta = np.array([t if c in mine else 0.0 for c, t in zip(index, f.theta, strict=True)])
+    return tip_um(problem.bench, [block[:, :, index] @ theta for block in problem.columns.blocks])
+
+
+def worst(left: Mapping[str, Unexplained]) -> Unexplained:
+    """The kind that leaves most."""
+    return max(left.values(), key=lambda each: max(each.excess_um, 0.5 * each.local_um))
