@@ -56,14 +56,16 @@ def main():
 @click.option("--channels", type=click.Choice(sorted(CHANNELS)), default="full")
 @click.option("--ratio", "ratios", type=float, multiple=True, help="Sizes over the noise; default 1, 3, 10.")
 @click.option("--rapids", type=click.Choice(["yes", "no", "mixed"]), default="mixed", help="Rows of rapids and rest.")
+@click.option("--stated", type=click.Choice(["yes", "no", "mixed"]), default="mixed", help="Key sd of the experiment.")
 @click.option("--line-rows", default=0, help="Rows by which the column line lags.")
 @click.option("--rows", default=500)
 @click.option("--runs", default=6)
-def make_(out, kind, machine, count, seed, noise_um, channels, ratios, rapids, line_rows, rows, runs):
+def make_(out, kind, machine, count, seed, noise_um, channels, ratios, rapids, stated, line_rows, rows, runs):
     """Write experiments below OUT; their truth goes to OUT/truth."""
     sensors = Sensors(tip_mm=noise_um * 1e-3, line_rows=line_rows)
-    logged = {"yes": True, "no": False, "mixed": None}[rapids]
-    base = Plan(0, machine=machine, channels=channels, sensors=sensors, rapids=logged, rows=rows, runs=runs)
+    choice = {"yes": True, "no": False, "mixed": None}
+    base = Plan(0, machine=machine, channels=channels, sensors=sensors, rows=rows, runs=runs)
+    base = replace(base, rapids=choice[rapids], stated=choice[stated])
     (out / "truth").mkdir(parents=True, exist_ok=True)
     for i in range(count):
         name, answer = f"e-{seed + i:05d}", out / "truth" / f"e-{seed + i:05d}.json"

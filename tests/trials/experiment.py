@@ -32,7 +32,8 @@ class Plan:
     """What to make; everything that is not said here is drawn from the seed.
 
     causes: (effect, target); ratios: their sizes over the noise.  rapids: whether rows of rapids and rest are logged, None
-    lets the seed choose.  imperfect: springs some per cent off, a force up to a tenth off, ripple of the teeth.
+    lets the seed choose.  imperfect: springs some per cent off, a force up to a tenth off, ripple of the teeth.  stated: whether
+    the experiment says how far the tip's instrument is off; None lets the seed choose where the slow noise is small.
     """
 
     seed: int
@@ -46,6 +47,7 @@ class Plan:
     runs: int = 6
     rapids: bool | None = None
     imperfect: bool = False
+    stated: bool | None = None
 
 
 @dataclass
@@ -160,6 +162,26 @@ def sensitivity(machine: str) -> dict[tuple[str, Target], float]:
     return out
 
 
+def unabsorbed(bench: Bench, machine: str, base: tuple[Fault, ...], fault: Fault, sensors: Sensors) -> float:
+    """Tip rms (mm) that is left of a fault when every effect of the library, to first order, takes what it can."""
+
+    def readings(states: list[State]) -> np.ndarray:
+        tip = np.concatenate([s.tip[s.steady] / sensors.tip_mm for s in states])
+        encoder = np.concatenate([s.encoder[s.steady] / sensors.encoder_step_mm for s in states])
+        return np.concatenate([tip.ravel(), encoder.ravel()])
+
+    plain, size = readings(bench.see(base)), 0.1 * sensors.rms_mm
+    columns = []
+    for (effect, target), per_mm in sensitivity(machine).items():
+        changed = bench.see((*base, bench.fault(effect, target, size / per_mm, 1)))
+        columns.append(readings(changed) - plain)
+    span = np.stack(columns, 1)
+    gap = readings(bench.see((*base, fault))) - plain
+    left = gap - span @ np.linalg.lstsq(span, gap, rcond=1e-9)[0]
+    rows = sum(int(s.steady.sum()) for s in bench.see(base))
+    return float(sensors.tip_mm * np.sqrt((left[: 3 * rows] ** 2).sum() / rows))
+
+
 def small_errors(
     bench: Bench, machine: str, without: set[str], noise_mm: float, rng: np.random.Generator
 ) -> tuple[Fault, ...]:
@@ -213,7 +235,10 @@ def make(plan: Plan) -> Made:
     listed = []
     for each in named:
         moved = rms(bench.see(tuple(other for other in every if other is not each)), few)
-        listed.append({**asdict(each), "strange": each.effect in STRANGE, "um": 1e3 * moved, "ratio": moved / noise})
+        one = {**asdict(each), "strange": each.effect in STRANGE, "um": 1e3 * moved, "ratio": moved / noise}
+        if each.effect in STRANGE:
+            one["left_ratio"] = unabsorbed(bench, plan.machine, small, each, plan.sensors) / noise
+        listed.append(one)
     times = [row_times(run, plan.rows, rapids) for run in runs]
     states, perfect = bench.see(every, times), bench.see((), times)
     record = {
@@ -239,7 +264,8 @@ def write(made: Made, plan: Plan, folder: Path) -> Path:
     rng = np.random.default_rng([plan.seed, 11])
     lines = [f"config: [{machine.config}]"]
     unstated = sensors.tip_mm * (sensors.slow + sensors.drift) ** 0.5 <= SLOW_UNSTATED
-    if not (unstated and rng.integers(2)):
+    drawn = not (unstated and rng.integers(2))
+    if drawn if plan.stated is None else plan.stated:
         lines.append(f"sd: {{tip_mm: {sensors.tip_mm:g}}}")
     lines.append("runs:")
     for i, (run, state) in enumerate(zip(made.runs, made.states, strict=True), 1):

@@ -63,7 +63,10 @@ def judge(result: Row, truth: Row, known: set[str]) -> Row:
     true = {(c["effect"], c["target"]) for c in real if c["effect"] in known}
     foreign = [c for c in real if c["effect"] not in known]
     out: Row = {"ratio": min((c["ratio"] for c in real), default=0.0), "true": sorted(map(str, true))}
-    out |= {"foreign": [c["effect"] for c in foreign]}
+    out |= {
+        "foreign": [c["effect"] for c in foreign],
+        "left": min((c.get("left_ratio", 0.0) for c in foreign), default=0.0),
+    }
     if "failed" in result:
         return out | {"failed": result["failed"]}
     causes = [c for c in result["causes"] if c["effect"] != "unknown"]
@@ -113,7 +116,8 @@ def trial(task: tuple[str, str, set[str]]) -> Row:
 
 def run(folder: Path, results: Path, jobs: int, only: tuple[str, ...] = ()) -> list[Row]:
     """Judges every experiment below `folder` that `results` (JSON lines) does not hold yet; all rows."""
-    rows = {row["name"]: row for row in map(json.loads, results.read_text().splitlines())} if results.exists() else {}
+    done = map(json.loads, results.read_text().splitlines()) if results.exists() else ()
+    rows = {row["name"]: row for row in done if "failed" not in row}
     known = library()
     answers = sorted((folder / "truth").glob("*.json"))
     todo = [
@@ -164,6 +168,11 @@ def render(rows: list[Row]) -> str:
     rate("two and more causes: all named", [r for r in complete if len(r["true"]) > 1], "all")
     rate("two and more causes: first right", [r for r in complete if len(r["true"]) > 1], "first")
     rate("unknown named unknown", [r for r in good if r["foreign"]], "unknown")
+    rate(
+        "unknown that the library leaves >= 1 x noise of",
+        [r for r in good if r["foreign"] and r["left"] >= 1],
+        "unknown",
+    )
     rate("complete library: false unknown", complete, "unknown")
     rate("a false cause at p > 0.5", good, "false_cause")
     rate("sure (p > 0.8) and wrong", good, "sure_and_wrong")
