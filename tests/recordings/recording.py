@@ -1,0 +1,62 @@
+"""Recorded motions: where LinuxCNC commanded the tip to be at every millisecond, and which line it then executed.
+
+The files hold whole multiples of 10 nm as second differences, which are small: 1 kHz costs some 10 kB per recording.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+HERE = Path(__file__).parent
+STEP_S = 1e-3
+QUANTUM_MM = 1e-5
+
+
+@dataclass(frozen=True)
+class Recording:
+    """One program as it was run: t (n,) s, tip (n, 3) mm in the program frame, line (n,), kind (n,) of motion.
+
+    line: 1-based source line as the control reports it, 0 before the first; kind: 0 standstill, 1 rapid, 2 line, 3 arc.
+    """
+
+    name: str
+    program: str
+    t: np.ndarray
+    tip: np.ndarray
+    line: np.ndarray
+    kind: np.ndarray
+
+
+def names() -> list[str]:
+    """Every recording there is."""
+    return sorted(path.stem for path in (HERE / "data").glob("*.npz"))
+
+
+def save(name: str, values: np.ndarray) -> None:
+    """Stores rows (n, 5): tip mm, line, kind of motion, a row per millisecond."""
+    whole = np.round(values[:, :3] / QUANTUM_MM).astype(np.int64)
+    twice = np.diff(whole, n=2, axis=0)
+    assert np.abs(twice).max() < 2**15
+    (HERE / "data").mkdir(exist_ok=True)
+    np.savez_compressed(
+        HERE / "data" / f"{name}.npz",
+        start=whole[:2],
+        bend=twice.astype(np.int16).T,
+        line=values[:, 3].astype(np.int16),
+        kind=values[:, 4].astype(np.int8),
+    )
+
+
+@cache
+def load(name: str) -> Recording:
+    """A recording by its name."""
+    with np.load(HERE / "data" / f"{name}.npz") as file:
+        start, bend, line, kind = (file[key] for key in ("start", "bend", "line", "kind"))
+    speed = np.cumsum(np.concatenate([start[1:] - start[:1], bend.T.astype(np.int64)]), 0)
+    tip = np.concatenate([start[:1], start[:1] + np.cumsum(speed, 0)]) * QUANTUM_MM
+    program = (HERE / "programs" / f"{name}.nc").read_text()
+    return Recording(name, program, np.arange(len(tip)) * STEP_S, tip, line.astype(int), kind.astype(int))

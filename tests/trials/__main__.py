@@ -1,0 +1,97 @@
+"""Trials on recorded motions: `python -m tests.trials make` writes experiments, `score` asks camcomp about them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import click
+import numpy as np
+
+from tests.trials import score as judging
+from tests.trials.experiment import Plan, make, truth_json, write
+from tests.trials.faults import every
+from tests.trials.machines import MACHINES
+from tests.trials.sensors import CHANNELS, Sensors
+from tests.trials.strange import STRANGE
+
+KINDS = ("null", "single", "pair", "unknown", "imperfect")
+
+
+def plan(kind: str, index: int, seed: int, base: Plan, ratios: tuple[float, ...]) -> Plan:
+    """The plan of one experiment; kinds go round the library and the strange faults as index grows."""
+    rng = np.random.default_rng([seed, 1])
+    names = every(MACHINES[base.machine].actuators)
+    if kind == "single":
+        causes, sizes = [names[(index * 7) % len(names)]], ratios or (1.0, 3.0, 10.0)
+        chosen = [sizes[index % len(sizes)]]
+    elif kind == "pair":
+        first = names[(index * 11) % len(names)]
+        others = [each for each in names if each[0] != first[0]]
+        causes = [first, others[int(rng.integers(len(others)))]]
+        chosen = [3.0, float(rng.choice([3.0, 6.0, 9.0]))]
+    elif kind == "unknown":
+        sizes = ratios or (3.0, 10.0)
+        causes = [(sorted(STRANGE)[(index * 5) % len(STRANGE)], str(rng.choice(list("xyz"))))]
+        chosen = [sizes[index % len(sizes)]]
+    else:
+        causes, chosen = [], []
+    return replace(
+        base, seed=seed, kind=kind, causes=tuple(causes), ratios=tuple(chosen), imperfect=kind == "imperfect"
+    )
+
+
+@click.group()
+def main():
+    """Make experiments and score the answers."""
+
+
+@main.command("make")
+@click.option("--out", type=click.Path(path_type=Path), required=True)
+@click.option("--kind", type=click.Choice(KINDS), required=True)
+@click.option("--machine", type=click.Choice(sorted(MACHINES)), default="orthoglide")
+@click.option("--count", default=10)
+@click.option("--seed", default=1, help="Of the first experiment; the next ones count on.")
+@click.option("--noise-um", default=3.0, help="Deviation of the measured tip per axis.")
+@click.option("--channels", type=click.Choice(sorted(CHANNELS)), default="full")
+@click.option("--ratio", "ratios", type=float, multiple=True, help="Sizes over the noise; default 1, 3, 10.")
+@click.option("--rapids", type=click.Choice(["yes", "no", "mixed"]), default="mixed", help="Rows of rapids and rest.")
+@click.option("--stated", type=click.Choice(["yes", "no", "mixed"]), default="mixed", help="Key sd of the experiment.")
+@click.option("--line-rows", default=0, help="Rows by which the column line lags.")
+@click.option("--rows", default=500)
+@click.option("--runs", default=6)
+def make_(out, kind, machine, count, seed, noise_um, channels, ratios, rapids, stated, line_rows, rows, runs):
+    """Write experiments below OUT; their truth goes to OUT/truth."""
+    sensors = Sensors(tip_mm=noise_um * 1e-3, line_rows=line_rows)
+    choice = {"yes": True, "no": False, "mixed": None}
+    base = Plan(0, machine=machine, channels=channels, sensors=sensors, rows=rows, runs=runs)
+    base = replace(base, rapids=choice[rapids], stated=choice[stated])
+    (out / "truth").mkdir(parents=True, exist_ok=True)
+    for i in range(count):
+        name, answer = f"e-{seed + i:05d}", out / "truth" / f"e-{seed + i:05d}.json"
+        if answer.exists():
+            click.echo(f"{name} is there")
+            continue
+        wanted = plan(kind, i, seed + i, base, ratios)
+        made = make(wanted)
+        write(made, wanted, out / name)
+        answer.write_text(truth_json(made))
+        click.echo(f"{name} {kind} {[(c['effect'], c['target'], round(c['ratio'], 2)) for c in made.record['causes']]}")
+
+
+@main.command("score")
+@click.argument("folder", type=click.Path(path_type=Path, exists=True))
+@click.option("--results", type=click.Path(path_type=Path), help="Default FOLDER/results.jsonl; resumed if there.")
+@click.option("--jobs", default=1)
+@click.option("--only", multiple=True, help="Names of experiments.")
+@click.option("--list", "listed", is_flag=True, help="Print every answer too.")
+def score_(folder, results, jobs, only, listed):
+    """Ask camcomp about every experiment of FOLDER and print the rates."""
+    rows = judging.run(folder, results or folder / "results.jsonl", jobs, only)
+    if listed:
+        click.echo(judging.listing(rows) + "\n")
+    click.echo(judging.render(rows))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,203 @@
+"""One answer of `camcomp diagnose` against the truth, and rates over many with Wilson's intervals."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+import os
+import tempfile
+import time
+from collections.abc import Callable
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+NAMED = 0.3  # of the noise: a cause of at least this size may be named
+SURE = 0.8
+Row = dict[str, Any]
+
+
+def ask(experiment: Path) -> Row:
+    """The result JSON, run in this process; `failed` when there is none."""
+    from camcomp.terminal.cli import run as camcomp
+
+    said = io.StringIO()
+    with tempfile.TemporaryDirectory() as folder:
+        answer = Path(folder) / "result.json"
+        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
+            code = camcomp(["diagnose", str(experiment), "--json", str(answer)])
+        if not answer.exists():
+            return {"failed": f"exit {code}: {said.getvalue().strip()[-300:]}"}
+        return json.loads(answer.read_text())
+
+
+def library() -> set[str]:
+    """Names of all effects that the tool has."""
+    from camcomp.terminal.cli import run as camcomp
+
+    said = io.StringIO()
+    with contextlib.redirect_stdout(said):
+        camcomp(["effects", "--json"])
+    return {each["effect"] for each in json.loads(said.getvalue())}
+
+
+def held(cause: Row, truth: dict[str, float]) -> list[bool]:
+    """Whether each interval of a named cause holds the true value."""
+    out = []
+    for name, value in truth.items():
+        got = cause.get("parameters", {}).get(name)
+        if got and got.get("ci95"):
+            low, high = got["ci95"]
+            turn = 2 * np.pi
+            value = value + turn * round((got["value"] - value) / turn) if name.startswith("phase") else value
+            out.append(bool(low <= value <= high))
+    return out
+
+
+def judge(result: Row, truth: Row, known: set[str]) -> Row:
+    """What was right; keys that do not apply are missing."""
+    real = [c for c in truth["causes"] if c["ratio"] >= NAMED]
+    true = {(c["effect"], c["target"]) for c in real if c["effect"] in known}
+    foreign = [c for c in real if c["effect"] not in known]
+    out: Row = {"ratio": min((c["ratio"] for c in real), default=0.0), "true": sorted(map(str, true))}
+    out |= {
+        "foreign": [c["effect"] for c in foreign],
+        "left": min((c.get("left_ratio", 0.0) for c in foreign), default=0.0),
+    }
+    if "failed" in result:
+        return out | {"failed": result["failed"]}
+    causes = [c for c in result["causes"] if c["effect"] != "unknown"]
+    found = [(c["effect"], c["target"]) for c in causes]
+    sets = [{(m["effect"], m["target"]) for m in one} for one in result["alternatives"]]
+    out |= {
+        "verdict": result["verdict"],
+        "found": [[*pair, c.get("probability")] for pair, c in zip(found, causes, strict=True)],
+    }
+    gap, floor = result["gap"], result.get("floor") or {}
+    out |= {
+        "gap_um": gap["rms_um"],
+        "floor_um": floor.get("um", gap.get("noise_floor_um")),
+        "source": floor.get("source"),
+    }
+    out["unknown"], out["none"] = result["verdict"] == "unknown", result["verdict"] == "none"
+    if true:
+        out["first"] = bool(found) and found[0] in true
+        out["first_or_class"] = out["first"] or any(true <= one for one in sets)
+        out["all"] = true <= set(found) or any(true <= one for one in sets)
+    sure = [(pair, c.get("probability") or 0.0) for pair, c in zip(found, causes, strict=True)]
+    out["false_cause"] = any(pair not in true and p > 0.5 for pair, p in sure)
+    out["sure_and_wrong"] = any(pair not in true and p > SURE for pair, p in sure)
+    out["calibration"] = [[p, pair in true] for pair, p in sure]
+    out["held"] = [
+        hit
+        for cause, pair in zip(causes, found, strict=True)
+        for c in real
+        if pair == (c["effect"], c["target"])
+        for hit in held(cause, c["parameters"])
+    ]
+    return out
+
+
+def trial(task: tuple[str, str, set[str]]) -> Row:
+    """Asks and judges one experiment."""
+    folder, answer, known = Path(task[0]), Path(task[1]), task[2]
+    truth = json.loads(answer.read_text())
+    row: Row = {"name": folder.name, **{k: truth[k] for k in ("kind", "machine", "channels", "noise_um", "small_um")}}
+    begin = time.perf_counter()
+    try:
+        result = ask(folder / "experiment.yaml")
+    except Exception as error:  # noqa: BLE001 - a crash is counted, not hidden
+        result = {"failed": f"{type(error).__name__}: {error}"[:300]}
+    return row | {"seconds": time.perf_counter() - begin} | judge(result, truth, known)
+
+
+def run(folder: Path, results: Path, jobs: int, only: tuple[str, ...] = ()) -> list[Row]:
+    """Judges every experiment below `folder` that `results` (JSON lines) does not hold yet; all rows."""
+    done = map(json.loads, results.read_text().splitlines()) if results.exists() else ()
+    rows = {row["name"]: row for row in done if "failed" not in row}
+    known = library()
+    answers = sorted((folder / "truth").glob("*.json"))
+    todo = [
+        (str(folder / a.stem), str(a), known) for a in answers if a.stem not in rows and (not only or a.stem in only)
+    ]
+    for name in ("NUMBA_NUM_THREADS", "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
+    with results.open("a") as out, get_context("spawn").Pool(jobs, maxtasksperchild=50) as pool:
+        for row in pool.imap_unordered(trial, todo):
+            rows[row["name"]] = row
+            out.write(json.dumps(row) + "\n")
+            out.flush()
+    return [rows[name] for name in sorted(rows)]
+
+
+def wilson(hits: int, total: int, z: float = 1.96) -> tuple[float, float]:
+    """Interval (95 %) of a rate."""
+    if total == 0:
+        return 0.0, 1.0
+    p, n = hits / total, total
+    middle, half = p + z * z / (2 * n), z * np.sqrt(p * (1 - p) / n + z * z / (4 * n * n))
+    return float((middle - half) / (1 + z * z / n)), float((middle + half) / (1 + z * z / n))
+
+
+def render(rows: list[Row]) -> str:
+    """Rates as a table."""
+    lines = []
+
+    def rate(name: str, chosen: list[Row], key: str | Callable[[Row], bool]) -> None:
+        pick = key if callable(key) else (lambda row: bool(row[key]))
+        hits, total = sum(pick(row) for row in chosen), len(chosen)
+        low, high = wilson(hits, total)
+        lines.append(
+            f"{name:<52} {hits:4d} / {total:<4d} {hits / total if total else float('nan'):6.3f} [{low:.3f}, {high:.3f}]"
+        )
+
+    good = [row for row in rows if "failed" not in row]
+    rate("failed", rows, lambda row: "failed" in row)
+    rate(
+        "null or imperfect below the noise: verdict none",
+        [r for r in good if not r["true"] and not r["foreign"]],
+        "none",
+    )
+    complete = [r for r in good if not r["foreign"]]
+    for low, high in ((0.3, 2), (2, 6), (6, 1e9)):
+        some = [r for r in complete if len(r["true"]) == 1 and low <= r["ratio"] < high]
+        rate(f"one cause, {low:g} to {high:g} x noise: first or in class", some, "first_or_class")
+    rate("two and more causes: all named", [r for r in complete if len(r["true"]) > 1], "all")
+    rate("two and more causes: first right", [r for r in complete if len(r["true"]) > 1], "first")
+    rate("unknown named unknown", [r for r in good if r["foreign"]], "unknown")
+    rate(
+        "unknown that the library leaves >= 1 x noise of",
+        [r for r in good if r["foreign"] and r["left"] >= 1],
+        "unknown",
+    )
+    rate("complete library: false unknown", complete, "unknown")
+    rate("a false cause at p > 0.5", good, "false_cause")
+    rate("sure (p > 0.8) and wrong", good, "sure_and_wrong")
+    held_ = [{"hit": hit} for row in good for hit in row["held"]]
+    rate("95 % intervals that hold", held_, "hit")
+    pairs = np.array([pair for row in good for pair in row["calibration"] if pair[0]], float).reshape(-1, 2)
+    if len(pairs):
+        bins = np.clip((pairs[:, 0] * 10).astype(int), 0, 9)
+        off = [abs(pairs[bins == b, 0].sum() - pairs[bins == b, 1].sum()) for b in range(10)]
+        lines.append(f"{'expected calibration error':<52} {sum(off) / len(pairs):.3f} of {len(pairs)}")
+    for name, key in (("gap", "gap_um"), ("floor", "floor_um"), ("seconds", "seconds")):
+        values = [row[key] for row in good if row.get(key) is not None]
+        if values:
+            q = np.percentile(values, [10, 50, 90])
+            lines.append(f"{name:<52} {q[0]:.1f} {q[1]:.1f} {q[2]:.1f} (10, 50, 90 %)")
+    return "\n".join(lines)
+
+
+def listing(rows: list[Row]) -> str:
+    """One line per answer."""
+    out = []
+    for r in rows:
+        said = (
+            r.get("failed")
+            or f"{r['verdict']:<10} gap {r['gap_um'] or 0:8.1f} floor {r['floor_um'] or 0:6.1f} {r['found'][:3]}"
+        )
+        out.append(f"{r['name']} {r['kind']:<9} {r['true']} {r['foreign']} x{r['ratio']:.1f} -> {said}")
+    return "\n".join(out)

@@ -1,0 +1,64 @@
+"""Experiments of the trials: sizes are as asked, nothing tells the truth, logs hold what the contract says."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from camcomp.diagnosis.experiment.open_experiment import open_experiment
+from tests.trials.experiment import Plan, make, truth_json, write
+from tests.trials.score import judge, wilson
+from tests.trials.sensors import Sensors, tip_noise
+
+PLAN = Plan(7, "single", (("backlash", "y"),), (3.0,), runs=2, rows=120)
+
+
+@pytest.fixture(scope="module")
+def made():
+    return make(PLAN)
+
+
+def test_sizes_are_over_the_noise(made):
+    (cause,) = made.record["causes"]
+    assert cause["ratio"] == pytest.approx(3.0, rel=0.05)
+    assert made.record["small_um"] <= 0.5 * made.record["noise_um"]
+    assert {each["effect"] for each in made.record["small"]}.isdisjoint({"backlash"})
+
+
+def test_the_folder_is_read_and_tells_nothing(made, tmp_path):
+    path = write(made, PLAN, tmp_path / "e-1")
+    assert len(open_experiment(path).runs) == 2
+    everything = "".join(each.read_text() for each in (tmp_path / "e-1").iterdir())
+    assert "backlash" not in everything and "single" not in everything and "truth" not in everything
+
+
+def test_noise_has_the_stated_deviation():
+    t = np.arange(0, 12, 0.024)
+    drawn = np.concatenate([tip_noise(Sensors(), t, np.random.default_rng(k)) for k in range(60)])
+    assert drawn.std(0) == pytest.approx(np.full(3, 0.003), rel=0.03)
+
+
+def test_answers_are_judged(made):
+    truth = json.loads(truth_json(made))
+    width = truth["causes"][0]["parameters"]["width_mm"]
+    cause = {"effect": "backlash", "target": "y", "probability": 0.97}
+    cause["parameters"] = {"width_mm": {"value": width, "ci95": [0.9 * width, 1.1 * width]}}
+    gap = {"rms_um": 16.0, "noise_floor_um": 5.2}
+    right = {"verdict": "identified", "causes": [cause], "alternatives": [], "gap": gap}
+    good = judge(right, truth, {"backlash"})
+    assert good["first"] and good["all"] and good["held"] == [True] and not good["false_cause"]
+    wrong = judge({**right, "causes": [{**cause, "target": "x"}]}, truth, {"backlash"})
+    assert wrong["sure_and_wrong"] and not wrong["first_or_class"]
+    class_ = [[{"effect": "friction", "target": "y"}], [{"effect": "backlash", "target": "y"}]]
+    assert judge({**right, "causes": [], "alternatives": class_}, truth, {"backlash"})["first_or_class"]
+    assert judge({**right, "verdict": "unknown"}, truth, set())["foreign"] == ["backlash"]
+
+
+def test_wilson_by_the_textbook():
+    assert wilson(8, 10) == (pytest.approx(0.4902, abs=1e-4), pytest.approx(0.9433, abs=1e-4))
+
+
+def test_the_seed_decides(made):
+    again = make(replace(PLAN))
+    assert all(np.array_equal(a.tip, b.tip) for a, b in zip(made.states, again.states, strict=True))
