@@ -107,7 +107,7 @@ def check_fast_program(run, phase):
     assert moving.sum() > 100
     if phase == "pause":
         assert (rows["velocity"][at][np.flatnonzero(moving)[0] : np.flatnonzero(moving)[-1]] == 0).sum() > 100
-    at = at[rows["wait"][at] == 0][::8]
+    at = at[(rows["wait"][at] == 0) & (rows["tool"][at] == rows["tool"][at - LATEST])][::8]
     assert not rows["error"][at].any()
     # the oldest of the answers that the offsets still follow
     age = np.max([(rows["period"] - rows["answered"])[at - k] for k in range(FOLLOWED)], axis=0)
