@@ -137,7 +137,7 @@ class WorkOffset:
 def hurry(process):
     """Lets a process wait for nothing but realtime threads, where the user may (rtprio in /etc/security/limits.conf)."""
     try:
-        os.sched_setscheduler(process, os.SCHED_FIFO, os.sched_param(PRIORITY))
+        os.sched_setscheduler(process, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, os.sched_param(PRIORITY))
     except PermissionError:
         print("camcomp: no realtime priority; other work on this computer may delay it", file=sys.stderr)
 

@@ -176,7 +176,24 @@ def steps(task):
                 "error": text_of("camcomp.error"),
             }
         )
-    return {"rows": rows}
+    return {"rows": rows, "refused": [refused(code, force) for code, force in task["refused"]]}
+
+
+def refused(code, force):
+    """Whether the component, and not only the clock, refuses what some G-code leads to; undone afterwards."""
+    push(force)
+    mode(linuxcnc.MODE_MDI)
+    COMMAND.mdi(code)
+    until(lambda: is_on("camcomp.error"))
+    seen = is_on("camcomp.refused") and is_on("motion.feed-hold")
+    push((0.0, 0.0, 0.0))
+    COMMAND.abort()
+    mode(linuxcnc.MODE_MDI)
+    COMMAND.mdi("G49")
+    COMMAND.wait_complete()
+    recover()
+    patiently(lambda: mdi("G0 X0 Y0 Z0"))
+    return seen
 
 
 class Recorder:

@@ -21,7 +21,7 @@ pytestmark = simulator.needs_linuxcnc
 FORCE = (-60.0, 80.0, -30.0)  # N on the tool
 OFFSET, TURN_DEG = np.array([12.0, -7.0, 3.0]), 20.0  # G54
 LENGTHS = (100.0, 60.0)  # of the tools, mm
-PROGRAM = "G21 G90 G54 G64\nG1 X25 Y0 Z0 F3000\nG3 X25 Y0 I-25 J0\nG1 X-10 Y5 Z2\nG1 X25 Y0\nM2\n"
+PROGRAM = "G21 G90 G54 G64 M53 P0\nG1 X25 Y0 Z0 F3000\nG3 X25 Y0 I-25 J0\nG1 X-10 Y5 Z2\nG1 X25 Y0\nM2\n"
 FAULTS = [
     ("killed solver", "stream", signal.SIGKILL),
     ("stopped solver", "stream", signal.SIGSTOP),

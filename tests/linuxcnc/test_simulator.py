@@ -22,6 +22,12 @@ STEPS = [
     ("G2 X-20 Y-8.5 I0 J-8.5", (1000.0, 2000.0, 4000.0)),
     ("G0 X0 Y0", (0.0, 0.0, 0.0)),
 ]
+REFUSED = [
+    ("G0 X199.95", (-2000.0, 0.0, 0.0)),  # the correction of 0.1 mm leads beyond the soft limit of 200 mm
+    ("T1 M6 G43", (0.0, 0.0, 0.0)),
+    ("T2 M6 G43", (0.0, 0.0, 0.0)),
+]
+TOOLS = "T1 P1 X3 Z10 ;\nT2 P2 Z-5 ;\n"
 
 
 @pytest.fixture
@@ -32,8 +38,8 @@ def folder():
 
 
 def test_the_joints_go_where_camcomp_sends_them(folder):
-    simulator.machine(folder, CONFIG)
-    seen, said = simulator.simulate(folder, "steps", steps=STEPS)
+    simulator.machine(folder, CONFIG, TOOLS)
+    seen, said = simulator.simulate(folder, "steps", steps=STEPS, refused=REFUSED)
     assert "error" not in seen, f"{seen}\n{said}"
     stream = Stream(Job(load_config([CONFIG])))
     programmed = [(0, 0, 0), (10, 5, -2), (12, 5, -2), (-20, 8.5, 1), (-20, -8.5, 1), (0, 0, 1)]
@@ -44,4 +50,5 @@ def test_the_joints_go_where_camcomp_sends_them(folder):
         assert np.abs(np.array(row["joints"]) - point.actuators).max() <= 1.01e-4, (code, row)  # a count is 0.1 um
         assert np.array(row["drive"]) == pytest.approx(point.drive, abs=1e-3)
         largest = max(largest, np.abs(np.array(row["joints"]) - tip).max())
+    assert seen["refused"] == [True] * len(REFUSED), said
     assert largest == pytest.approx(0.1, abs=1e-3)  # 2000 N against 20 000 N/mm
