@@ -7,12 +7,16 @@
 import gc
 import os
 import sys
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib import import_module
+from typing import Any
 
 import click
 
 from camcomp import __version__
-from camcomp.ground.errors import CamcompError, FileError, format_error
+from camcomp.ground.errors import CamcompError, FileError, PluginWarning, format_error
 from camcomp.ground.garbage import collect_seldom
 
 # Matrices here are small: threads of the linear algebra wait for each other longer than they compute, most of all on a
@@ -87,7 +91,7 @@ def run(args: list[str]) -> int:
 
         return shell_complete(cli, {}, "camcomp", "_CAMCOMP_COMPLETE", os.environ["_CAMCOMP_COMPLETE"])
     try:
-        with cli.make_context("camcomp", list(args)) as context:
+        with _plugins_left_out(), cli.make_context("camcomp", list(args)) as context:
             code = cli.invoke(context)
         sys.stdout.flush()
         return code if isinstance(code, int) else 0
@@ -114,9 +118,31 @@ def run(args: list[str]) -> int:
         return _bug(error)
 
 
+@contextmanager
+def _plugins_left_out() -> Iterator[None]:
+    """Warnings about users' plug-ins as lines like those of errors, each once; other warnings stay what they are."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", PluginWarning)
+        others, told = warnings.showwarning, set()
+
+        def show(message: Warning | str, category: type[Warning], *rest: Any, **more: Any) -> None:
+            if not issubclass(category, PluginWarning):
+                others(message, category, *rest, **more)
+            elif str(message) not in told:
+                told.add(str(message))
+                click.echo(f"camcomp: warning: {message}", err=True)
+
+        warnings.showwarning = show
+        yield
+
+
 def _report(error: CamcompError) -> int:
     color = sys.stderr.isatty() and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
     click.echo(format_error(error, color), err=True, color=color)
+    if error.__cause__ is not None and os.environ.get("CAMCOMP_DEBUG"):
+        import traceback
+
+        traceback.print_exception(error.__cause__)
     return error.exit_code
 
 

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import os
+import warnings
 from dataclasses import dataclass, field
 from functools import lru_cache
 
+from camcomp.ground.errors import PluginWarning
 from camcomp.ground.garbage import collect_seldom, keep_what_lives
+from camcomp.ground.old_names import keep_old_names
 from camcomp.model.config.spec import Config
 
 BUG = 70
+keep_old_names()  # tasks bring parameters of users' plug-ins, whose modules are imported before anything is asked of them
 
 
 @dataclass(frozen=True)
@@ -45,7 +49,9 @@ def work(task: Task) -> Outcome:
     collect_seldom()
     os.environ["CAMCOMP_THREADS"] = "1"  # the solver asks; the cores belong to the other workers
     try:
-        return _compensate(task)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", PluginWarning)  # told once, by the process that asks for the batch
+            return _compensate(task)
     except CamcompError as error:
         return Outcome(task.key, error.exit_code, [_message(each, format_error(each)) for each in error.all()])
     except Exception as error:  # noqa: BLE001 - a bug in one program must not take the others with it
