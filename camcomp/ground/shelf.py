@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext, redirect_stdout
 from difflib import get_close_matches
 from importlib import import_module
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint, distributions, entry_points
 from pathlib import Path
 from pkgutil import iter_modules
 from typing import Any
@@ -30,6 +30,21 @@ def _own(shelf: str) -> list[str]:
     return [each.name for each in iter_modules([str(folder)]) if not each.name.startswith("_")]
 
 
+def _announced(shelf: str) -> list[EntryPoint]:
+    """Entry points of users' plug-ins. One package whose list cannot be read does not hide those of the others."""
+    group = f"camcomp.{shelf}"
+    try:
+        return list(entry_points(group=group))
+    except Exception:
+        found = []
+        for package in distributions():
+            try:
+                found += [each for each in package.entry_points if each.group == group]
+            except Exception as error:
+                warn_left_out(f"the entry points of the package {package.name}: {type(error).__name__}: {error}")
+        return found
+
+
 def is_own(shelf: str, name: str) -> bool:
     """Whether the member of this name is camcomp's own."""
     return name in _own(shelf)
@@ -37,7 +52,7 @@ def is_own(shelf: str, name: str) -> bool:
 
 def members(shelf: str) -> tuple[str, ...]:
     """Names of all members of a shelf, sorted; nothing is imported."""
-    return tuple(sorted({*_own(shelf), *(each.name for each in entry_points(group=f"camcomp.{shelf}"))}))
+    return tuple(sorted({*_own(shelf), *(each.name for each in _announced(shelf))}))
 
 
 def load(shelf: str, name: str, *, at: Location | None = None) -> Any:
@@ -48,7 +63,7 @@ def load(shelf: str, name: str, *, at: Location | None = None) -> Any:
     """
     if name in _own(shelf):
         return import_module(f"camcomp.{shelf}.{name}")
-    announced = {each.value: each for each in entry_points(group=f"camcomp.{shelf}", name=name)}
+    announced = {each.value: each for each in _announced(shelf) if each.name == name}
     if len(announced) > 1:
         both = " and ".join(sorted(_who(shelf, each) for each in announced.values()))
         raise ConfigError("CC280", f"two plug-ins have one name: {both}", at=at, hint="uninstall one of them")
@@ -70,7 +85,7 @@ def load(shelf: str, name: str, *, at: Location | None = None) -> Any:
 def usable(shelf: str, without: Sequence[str] = ()) -> Iterator[tuple[str, Any]]:
     """Name and member of all of a shelf; a user's own that is no plug-in is left out with a PluginWarning that names it."""
     own = _own(shelf)
-    for each in entry_points(group=f"camcomp.{shelf}"):
+    for each in _announced(shelf):
         if each.name in own:
             warn_left_out(f"{_who(shelf, each)}: the name belongs to camcomp's own")
     for name in members(shelf):
@@ -94,7 +109,7 @@ def blaming(shelf: str, name: str) -> AbstractContextManager[None]:
     """Inside it errors are the member's fault: CC281 for a user's own; those of camcomp's own stay what they are."""
     if name in _own(shelf):
         return nullcontext()
-    return blamed(next((_who(shelf, each) for each in entry_points(group=f"camcomp.{shelf}", name=name)), name))
+    return blamed(next((_who(shelf, each) for each in _announced(shelf) if each.name == name), name))
 
 
 def _load(shelf: str, announced: EntryPoint) -> Any:
