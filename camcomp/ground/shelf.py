@@ -35,12 +35,12 @@ def _announced(shelf: str) -> list[EntryPoint]:
     group = f"camcomp.{shelf}"
     try:
         return list(entry_points(group=group))
-    except Exception:
+    except Exception:  # noqa: BLE001 - whatever a torn list makes of it
         found = []
         for package in distributions():
             try:
                 found += [each for each in package.entry_points if each.group == group]
-            except Exception as error:
+            except Exception as error:  # noqa: BLE001
                 warn_left_out(f"the entry points of the package {package.name}: {type(error).__name__}: {error}")
         return found
 
