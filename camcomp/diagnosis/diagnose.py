@@ -14,7 +14,7 @@ from camcomp.diagnosis.answer.held_out import shrinkage_of
 from camcomp.diagnosis.answer.intervals import joint_covariance
 from camcomp.diagnosis.answer.locate import channel_axes, patterns_of, rest_by_actuator, run_gaps
 from camcomp.diagnosis.fit.bench import Bench, Run
-from camcomp.diagnosis.fit.columns import candidate_causes
+from camcomp.diagnosis.fit.columns import candidate_causes, working_causes
 from camcomp.diagnosis.fit.gap import gap_of, main_channels
 from camcomp.diagnosis.fit.problem import Problem, open_problem
 from camcomp.diagnosis.next_experiment.after_unknown import explore
@@ -69,7 +69,8 @@ def diagnose(
     """The diagnosis of an experiment; `without` names effects that the library is to do without."""
     used = [run for run in runs if run.name not in holdout] or list(runs)
     bench = Bench(twin, used)
-    problem = open_problem(bench, candidate_causes(twin.actuators, without), stated_mm)
+    causes = working_causes(bench, candidate_causes(twin.actuators, without))
+    problem = open_problem(bench, causes, stated_mm)
     found = search_causes(problem)
     best = found.fits[found.verdict.best]
     gap = gap_of(problem)

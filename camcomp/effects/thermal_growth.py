@@ -22,7 +22,7 @@ PARAMETERS = (
 )  # fmt: skip
 
 
-def warmth(motion: Motion, warm_up_s: float) -> Floats:
+def _warmth(motion: Motion, warm_up_s: float) -> Floats:
     """Kelvin above 20 deg C (n,): as logged, or along a first-order warm-up from the start of the common clock."""
     if motion.temperature is not None:
         return motion.temperature - REFERENCE_C
@@ -34,4 +34,4 @@ def on_drive(error: Floats, motion: Motion, which: Floats, p: Mapping[str, float
     growth = p["growth_mm_per_K"]
     if growth == 0.0:
         return error
-    return error + growth * warmth(motion, p["warm_up_s"])[:, None] * which
+    return error + growth * _warmth(motion, p["warm_up_s"])[:, None] * which

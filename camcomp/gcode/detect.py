@@ -1,11 +1,12 @@
 """Which dialect a program is written in: told by the user, or by the marks that each dialect's record lists."""
 
 import re
+from typing import Any
 
 from camcomp.gcode.dialect import Dialect
 from camcomp.gcode.text import Text
 from camcomp.ground.errors import ProgramError
-from camcomp.ground.shelf import load, members
+from camcomp.ground.shelf import load, usable
 
 _LOOKED_AT = 200_000  # characters
 _PLAINTEXT = re.compile(
@@ -35,8 +36,8 @@ def dialect_of(text: Text, name: str | None = None) -> Dialect:
         )
     sample = _PLAIN_LINES.sub("", sample)  # most of a program; every control reads them, so no mark is in them
     best, most = _record(DEFAULT), _ENOUGH - 1
-    for member in members("dialects"):
-        record = _record(member)
+    for _, member in usable("dialects"):
+        record = _of(member)
         weight = record.weight(sample)
         if weight > most:
             best, most = record, weight
@@ -44,5 +45,10 @@ def dialect_of(text: Text, name: str | None = None) -> Dialect:
 
 
 def _record(name: str) -> Dialect:
-    member = load("dialects", name)
-    return getattr(member, "DIALECT", member)
+    return _of(load("dialects", name))
+
+
+def _of(member: Any) -> Dialect:
+    """A plug-in is a module with its record, or, from an entry point, the record itself."""
+    record: Dialect = getattr(member, "DIALECT", member)
+    return record

@@ -46,6 +46,10 @@ class CamcompError(Exception):
         return (self, *(each for other in self.others for each in other.all()))
 
 
+class PluginWarning(UserWarning):
+    """A plug-in of the user's cannot be used and is left out of a list; a run that names it gets an error instead."""
+
+
 class CheckFailed(CamcompError):
     """The work is finished, and a check says no (residual, limit, already compensated)."""
 

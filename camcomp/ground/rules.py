@@ -359,6 +359,19 @@ RULES: dict[str, Rule] = {
         "None of the paths, folders and patterns names an NC program.",
         "programs end in .nc, .ngc, .tap, .gcode, .cnc, .mpf, .ncc or .txt, or are named one by one",
     ),
+    "CC280": Rule(
+        "plug-in not usable",
+        "What the entry point of a robot, dialect, force model or effect names cannot be imported or does not keep to its "
+        "contract: the names that have to be there, hooks and their arguments, values that are allowed, and nothing "
+        "changed at nominal parameters. The contracts stand in camcomp/plugins. Runs that do not name it go on without it.",
+        "mend it, or uninstall its package",
+    ),
+    "CC281": Rule(
+        "plug-in failed",
+        "A function of the user's plug-in raised an error in the middle of the work, or returned what it must not: "
+        "another shape than it was given, or a value that is no number where all that it was given were numbers.",
+        "CAMCOMP_DEBUG=1 shows the traceback; `diagnose --without NAME` leaves an effect out",
+    ),
     # --- CC3xx physics -----------------------------------------------------------------------------------------
     "CC301": Rule(
         "no convergence",

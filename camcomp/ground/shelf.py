@@ -1,19 +1,28 @@
 """Plug-ins by file name: a robot, dialect, force model or effect is one file in its folder, or one entry point.
 
-The YAML name is the file name. A user's own plug-in is announced in the entry-point group `camcomp.<shelf>`.
+The YAML name is the file name. A user's own plug-in is announced in the entry-point group `camcomp.<shelf>`. It is held
+against its contract (camcomp/plugins) when it is loaded: one that a run names is refused with CC280, one that is merely
+there is left out with a warning. camcomp's own are held against it by tests, so that starting stays fast.
 """
 
 import sys
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import AbstractContextManager, nullcontext, redirect_stdout
 from difflib import get_close_matches
 from importlib import import_module
-from importlib.metadata import entry_points
+from importlib.metadata import EntryPoint, distributions, entry_points
 from pathlib import Path
 from pkgutil import iter_modules
 from typing import Any
 
-from camcomp.ground.errors import ConfigError, Location
+from camcomp.ground.blame import blamed, place_of
+from camcomp.ground.errors import ConfigError, Location, PluginWarning
+from camcomp.ground.old_names import keep_old_names
 
 SHELVES = ("robots", "dialects", "forces", "effects")
+
+_checked: dict[tuple[str, str], tuple[Any, Any]] = {}  # what an entry point named, and the same found to be usable
 
 
 def _own(shelf: str) -> list[str]:
@@ -21,34 +30,106 @@ def _own(shelf: str) -> list[str]:
     return [each.name for each in iter_modules([str(folder)]) if not each.name.startswith("_")]
 
 
-# Where plug-ins written for the first releases import from, and what stands there now.
-_MOVED = {"camcomp.gap.effect": "camcomp.model.effect", "camcomp.specbase": "camcomp.model.config.base"}
+def _announced(shelf: str) -> list[EntryPoint]:
+    """Entry points of users' plug-ins. One package whose list cannot be read does not hide those of the others."""
+    group = f"camcomp.{shelf}"
+    try:
+        return list(entry_points(group=group))
+    except Exception:  # noqa: BLE001 - whatever a torn list makes of it
+        found = []
+        for package in distributions():
+            try:
+                found += [each for each in package.entry_points if each.group == group]
+            except Exception as error:  # noqa: BLE001
+                warn_left_out(f"the entry points of the package {package.name}: {type(error).__name__}: {error}")
+        return found
 
 
-def _keep_old_names() -> None:
-    """Lets a user's plug-in import what it always has."""
-    for old, new in _MOVED.items():
-        sys.modules.setdefault(old, import_module(new))
+def is_own(shelf: str, name: str) -> bool:
+    """Whether the member of this name is camcomp's own."""
+    return name in _own(shelf)
 
 
 def members(shelf: str) -> tuple[str, ...]:
     """Names of all members of a shelf, sorted; nothing is imported."""
-    return tuple(sorted({*_own(shelf), *(each.name for each in entry_points(group=f"camcomp.{shelf}"))}))
+    return tuple(sorted({*_own(shelf), *(each.name for each in _announced(shelf))}))
 
 
 def load(shelf: str, name: str, *, at: Location | None = None) -> Any:
     """The member called `name`: a module of camcomp, or whatever its entry point names.
 
     An own file wins over an entry point of the same name, so that installing a package cannot change what a shipped
-    name means. Raises ConfigError CC213, which lists what there is.
+    name means. Raises ConfigError CC213, which lists what there is, CC280 where an entry point names what is no plug-in.
     """
     if name in _own(shelf):
         return import_module(f"camcomp.{shelf}.{name}")
-    for each in entry_points(group=f"camcomp.{shelf}", name=name):
-        _keep_old_names()
-        return each.load()
+    announced = {each.value: each for each in _announced(shelf) if each.name == name}
+    if len(announced) > 1:
+        both = " and ".join(sorted(_who(shelf, each) for each in announced.values()))
+        raise ConfigError("CC280", f"two plug-ins have one name: {both}", at=at, hint="uninstall one of them")
+    for each in announced.values():
+        try:
+            return _load(shelf, each)
+        except ConfigError as error:
+            where = f" ({error.at.file}:{error.at.line})" if at and error.at else ""
+            raise ConfigError(
+                error.rule, error.message + where, at=at or error.at, hint=error.hint
+            ) from error.__cause__
     known = members(shelf)
     close = get_close_matches(name, known, n=1)
     start = f"did you mean '{close[0]}'? " if close else ""
     hint = f"{start}known {shelf}: {', '.join(known) or 'none'}"
     raise ConfigError("CC213", f"there is no {shelf.removesuffix('s')} called '{name}'", at=at, hint=hint)
+
+
+def usable(shelf: str, without: Sequence[str] = ()) -> Iterator[tuple[str, Any]]:
+    """Name and member of all of a shelf; a user's own that is no plug-in is left out with a PluginWarning that names it."""
+    own = _own(shelf)
+    for each in _announced(shelf):
+        if each.name in own:
+            warn_left_out(f"{_who(shelf, each)}: the name belongs to camcomp's own")
+    for name in members(shelf):
+        if name in without:
+            continue
+        try:
+            member = load(shelf, name)
+        except ConfigError as error:
+            place = f" ({error.at.file}:{error.at.line})" if error.at else ""
+            warn_left_out(f"{error.message}{place}")
+            continue
+        yield name, member
+
+
+def warn_left_out(why: str) -> None:
+    """Tells that something of the user's is there and is not used."""
+    warnings.warn(PluginWarning(f"left out: {why}"), stacklevel=3)
+
+
+def blaming(shelf: str, name: str) -> AbstractContextManager[None]:
+    """Inside it errors are the member's fault: CC281 for a user's own; those of camcomp's own stay what they are."""
+    if name in _own(shelf):
+        return nullcontext()
+    return blamed(next((_who(shelf, each) for each in _announced(shelf) if each.name == name), name))
+
+
+def _load(shelf: str, announced: EntryPoint) -> Any:
+    keep_old_names()
+    who, key = _who(shelf, announced), (shelf, announced.name)
+    try:
+        with redirect_stdout(sys.stderr):  # standard output is for data
+            found = announced.load()
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:
+        what = f"{type(error).__name__}: {error}".rstrip(": ")
+        raise ConfigError("CC280", f"{who} cannot be imported: {what}", at=place_of(error)) from error
+    if key not in _checked or _checked[key][0] is not found:
+        contract = import_module(f"camcomp.plugins.{shelf}")
+        with redirect_stdout(sys.stderr):
+            _checked[key] = found, contract.checked(announced.name, found, who)
+    return _checked[key][1]
+
+
+def _who(shelf: str, each: EntryPoint) -> str:
+    package = f" of {each.dist.name} {each.dist.version}" if each.dist is not None else ""
+    return f"{shelf.removesuffix('s')} '{each.name}' (entry point {each.name} = {each.value}{package})"

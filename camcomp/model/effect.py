@@ -1,25 +1,7 @@
 """What an effect is: one way in which a machine differs from its model, as a module with parameters and hooks.
 
-A module of the effects shelf (or of an entry point in the group `camcomp.effects`) defines
-
-    STAGE       control | drive | structure | process | tool | workpiece | sensor: where the difference arises
-    TARGET      "actuator" (one cause per actuator), "machine" (target null), or "either"
-    PARAMETERS  tuple of Parameter; at their nominal values every hook returns its input unchanged, bit for bit
-    SOURCE      where the formula comes from
-
-and at least one hook. `p` maps parameter names to values; `which` (m,) is 1.0 for the actuators aimed at, else 0.0.
-
-    on_servo(position, motion, which, p)         (n, m) set-points in time -> (n, m) encoders
-    on_drive(error, motion, which, p)            (n, m) carriage minus encoder
-    on_drive_force(force, motion, which, p)      (n, m) what the drive exerts beyond the load of the structure
-    on_robot(robot, actuators, p)                description of the machine -> changed copy; `actuators` are names
-    on_load(load, motion, p)                     Load at the tool
-    on_pose(tip, load, motion, p)                (n, 3) tip in the machine frame
-    on_workpiece(tip, p)                         (n, 3) tip in the program frame
-    on_clock(time, p)                            (n,) row time -> time at which the tip stood where the row says
-    on_reading(channels, motion, p)              dict of measured channels by column name
-
-camcomp/model/signal_path.py calls them, stage by stage, effects in the order of the config.
+What such a module has to have, and what its hooks are given, stands in camcomp/plugins/effects.py.
+camcomp/model/signal_path.py calls the hooks, stage by stage, effects in the order of the config.
 """
 
 from collections.abc import Mapping

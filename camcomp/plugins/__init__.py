@@ -1,7 +1,27 @@
-"""What a user's plug-in may import, and nothing else: names that stay when the rooms behind them move."""
+"""What a user's plug-in may import, and nothing else: names that stay when the rooms behind them move.
+
+One file per shelf says what its plug-ins have to be, as a protocol, and holds a user's own against it when it is loaded.
+"""
 
 from camcomp.model.config.base import Positive, Spec
 from camcomp.model.cutting.cut import Cut
 from camcomp.model.effect import Load, Motion, Parameter
+from camcomp.plugins.dialects import Dialect, DialectPlugin
+from camcomp.plugins.effects import EffectHooks, EffectPlugin
+from camcomp.plugins.forces import ForcePlugin
+from camcomp.plugins.robots import RobotPlugin
 
-__all__ = ["Cut", "Load", "Motion", "Parameter", "Positive", "Spec"]
+__all__ = [
+    "Cut",
+    "Dialect",
+    "DialectPlugin",
+    "EffectHooks",
+    "EffectPlugin",
+    "ForcePlugin",
+    "Load",
+    "Motion",
+    "Parameter",
+    "Positive",
+    "RobotPlugin",
+    "Spec",
+]

@@ -84,7 +84,7 @@ def chains(params: Params) -> dict[str, Any]:
     return {params.chain: {"elements": elements}}
 
 
-def turned(*about: tuple[str, float]) -> list[float]:
+def _turned(*about: tuple[str, float]) -> list[float]:
     """Rotation vector (3,) deg of turns about z or x, in deg, one after the other in moving axes; by quaternions."""
     w, x, y, z = 1.0, 0.0, 0.0, 0.0
     for axis, angle in about:
@@ -119,13 +119,13 @@ _PASSED_ON = (
 def _row(row: Joint, *, modified: bool) -> list[dict[str, Any]]:
     given = {key: value for key in _PASSED_ON if (value := getattr(row, key)) is not None}
     axis = "-z" if row.reversed else "z"
-    out = _transform([row.a_mm, 0.0, 0.0], turned(("x", row.alpha_deg))) if modified else []
+    out = _transform([row.a_mm, 0.0, 0.0], _turned(("x", row.alpha_deg))) if modified else []
     out.append({"type": "actuator", "name": row.name, "joint": row.joint, "axis": axis, **given})
     if modified:
-        out += _transform([0.0, 0.0, row.d_mm], turned(("z", row.theta_deg)))
+        out += _transform([0.0, 0.0, row.d_mm], _turned(("z", row.theta_deg)))
     else:
         c, s = cos(radians(row.theta_deg)), sin(radians(row.theta_deg))
-        turn = turned(("z", row.theta_deg), ("x", row.alpha_deg))
+        turn = _turned(("z", row.theta_deg), ("x", row.alpha_deg))
         out += _transform([row.a_mm * c, row.a_mm * s, row.d_mm], turn)
     if row.link is not None:
         out.append({"type": "link", **row.link.model_dump(by_alias=True, exclude_none=True)})

@@ -8,13 +8,17 @@ import gc
 import os
 import signal
 import sys
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib import import_module
 from types import FrameType
+from typing import Any
 
 import click
 
 from camcomp import __version__
-from camcomp.ground.errors import CamcompError, FileError, format_error
+from camcomp.ground.errors import CamcompError, FileError, PluginWarning, format_error
 from camcomp.ground.files import remembering_inputs
 from camcomp.ground.garbage import collect_seldom
 from camcomp.terminal.standard_streams import stand_in_for_closed
@@ -116,7 +120,7 @@ def run(args: list[str]) -> int:
 
         return shell_complete(cli, {}, "camcomp", "_CAMCOMP_COMPLETE", os.environ["_CAMCOMP_COMPLETE"])
     try:
-        with remembering_inputs(), cli.make_context("camcomp", list(args)) as context:
+        with remembering_inputs(), _plugins_left_out(), cli.make_context("camcomp", list(args)) as context:
             code = cli.invoke(context)
         sys.stdout.flush()
         return code if isinstance(code, int) else 0
@@ -150,9 +154,31 @@ def _forget_output() -> None:
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
+@contextmanager
+def _plugins_left_out() -> Iterator[None]:
+    """Warnings about users' plug-ins as lines like those of errors, each once; other warnings stay what they are."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", PluginWarning)
+        others, told = warnings.showwarning, set()
+
+        def show(message: Warning | str, category: type[Warning], *rest: Any, **more: Any) -> None:
+            if not issubclass(category, PluginWarning):
+                others(message, category, *rest, **more)
+            elif str(message) not in told:
+                told.add(str(message))
+                click.echo(f"camcomp: warning: {message}", err=True)
+
+        warnings.showwarning = show
+        yield
+
+
 def _report(error: CamcompError) -> int:
     color = sys.stderr.isatty() and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
     click.echo(format_error(error, color), err=True, color=color)
+    if error.__cause__ is not None and os.environ.get("CAMCOMP_DEBUG"):
+        import traceback
+
+        traceback.print_exception(error.__cause__)
     return error.exit_code
 
 

@@ -42,7 +42,13 @@ def test_the_wheel_holds_all_that_is_needed_and_nothing_else(built):
         files = subprocess.run(["git", "ls-files", folder], check=True, cwd=ROOT, capture_output=True, text=True).stdout
         assert files
         assert {f"camcomp/data/{each}" for each in files.splitlines()} <= names
-    for each in ("report/assets/page.css", "report/assets/page.js", "data/commands.md", "effects/backlash.py"):
+    for each in (
+        "report/assets/page.css",
+        "report/assets/page.js",
+        "data/commands.md",
+        "effects/backlash.py",
+        "py.typed",
+    ):
         assert f"camcomp/{each}" in names
     strangers = [each for each in names if not each.startswith(("camcomp/", "camcomp-"))]
     assert strangers == [] and not any("__pycache__" in each or "/tests/" in each for each in names)

@@ -6,16 +6,20 @@ import os
 import signal
 import threading
 import time
+import warnings
 from dataclasses import dataclass, field
 from functools import lru_cache
 
 from camcomp import __version__
+from camcomp.ground.errors import PluginWarning
 from camcomp.ground.garbage import collect_seldom, keep_what_lives
 from camcomp.ground.notes import held, hold
+from camcomp.ground.old_names import keep_old_names
 from camcomp.model.config.spec import Config
 
 BUG = 70
 WATCH = 0.5  # s between two looks at the parent
+keep_old_names()  # tasks bring parameters of users' plug-ins, whose modules are imported before anything is asked of them
 
 
 @dataclass(frozen=True)
@@ -66,7 +70,9 @@ def work(task: Task) -> Outcome:
     collect_seldom()
     os.environ["CAMCOMP_THREADS"] = "1"  # the solver asks; the cores belong to the other workers
     try:
-        return _compensate(task)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", PluginWarning)  # told once, by the process that asks for the batch
+            return _compensate(task)
     except CamcompError as error:
         return Outcome(task.key, error.exit_code, [_message(each, format_error(each)) for each in error.all()])
     except Exception as error:  # noqa: BLE001 - a bug in one program must not take the others with it

@@ -120,10 +120,7 @@ class ArmBench:
         springs = any(a.stiffness is not None for a in self.robot.actuators)
         links = any(isinstance(e, Link) for e in self.arm.chain.elements)
         found: list[Column] = []
-        for name in shelf.members("effects"):
-            if name in _UNSEEN or name in without:
-                continue
-            module = shelf.load("effects", name)
+        for name, module in shelf.usable("effects", (*_UNSEEN, *without)):
             if (name == "drive_stiffness" and not springs) or (name == "link_stiffness" and not links):
                 continue
             targets: list[str | None] = [None] if module.TARGET == "machine" else list(self.actuators)

@@ -17,6 +17,7 @@ from camcomp.diagnosis.fit.patterns import Dictionary, Ground, dictionary
 from camcomp.diagnosis.statistics.evidence import Prior
 from camcomp.ground import shelf
 from camcomp.ground.datatypes import Floats, Ints
+from camcomp.ground.errors import ConfigError
 from camcomp.model.effect import Cause, Load
 from camcomp.model.statics.description import Link, Parallelogram, Robot
 
@@ -34,10 +35,7 @@ FORCE_TURN_RAD = 0.005  # direction of the cutting force in the plane of the wor
 def candidate_causes(actuators: Sequence[str], without: Sequence[str] = ()) -> list[CandidateCause]:
     """All causes that the shelf knows for a machine with these actuators."""
     found: list[CandidateCause] = []
-    for name in shelf.members("effects"):
-        if name == "none" or name in without:
-            continue
-        effect = shelf.load("effects", name)
+    for name, effect in shelf.usable("effects", ("none", *without)):
         if getattr(effect, "ARM_ONLY", False):
             continue
         if effect.TARGET in ("actuator", "either"):
@@ -45,6 +43,22 @@ def candidate_causes(actuators: Sequence[str], without: Sequence[str] = ()) -> l
         if effect.TARGET in ("machine", "either"):
             found.append(CandidateCause(name, None, effect))
     return found
+
+
+def working_causes(bench: Bench, candidates: Sequence[CandidateCause]) -> list[CandidateCause]:
+    """Candidates without those effects of the user's own that fail on these runs: nobody named them, so nobody loses."""
+    failed: set[str] = set()
+    for each in candidates:
+        if each.name in failed or shelf.is_own("effects", each.name):
+            continue
+        try:
+            candidate_columns(bench, each, shape_default(each))
+        except ConfigError as error:
+            if error.rule != "CC281":
+                raise
+            shelf.warn_left_out(error.message)
+            failed.add(each.name)
+    return [each for each in candidates if each.name not in failed]
 
 
 @dataclass(frozen=True, eq=False)

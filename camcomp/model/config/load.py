@@ -16,7 +16,7 @@ from camcomp.model.config.base import Spec
 from camcomp.model.config.robot import RobotSpec
 from camcomp.model.config.spec import Config, Experiment
 from camcomp.model.config.yaml_check import check, choose
-from camcomp.model.config.yaml_tree import Node, merge, plain, read_tree
+from camcomp.model.config.yaml_tree import Node, merge, plain, read_tree, tree_of
 
 ROBOT_KEYS = (
     "name",
@@ -153,10 +153,14 @@ def _robot_from_plugin(node: Node) -> tuple[RobotSpec | None, list[CamcompError]
     params, errors = _plugin("robots", "type", node, name="robot", also=ROBOT_KEYS)
     if params is None or errors:
         return None, errors
-    chains = shelf.load("robots", node.value["type"].value).chains(params)
-    own = {key: plain(node.value[key]) for key in ROBOT_KEYS if key in node.value}
-    robot, errors = check(RobotSpec, node, {**own, "chains": chains})
-    return robot and robot.model_copy(update={"type": node.value["type"].value}), errors
+    chosen = node.value["type"]
+    chains = shelf.load("robots", chosen.value).chains(params)
+    own = {key: node.value[key] for key in ROBOT_KEYS if key in node.value}
+    # What is wrong with chains that a plug-in made is told where the plug-in is named.
+    tree = replace(node, value={**own, "chains": tree_of(chains, chosen.at)})
+    data = {**{key: plain(each) for key, each in own.items()}, "chains": chains}
+    robot, errors = check(RobotSpec, tree, data, name=f"robot '{chosen.value}'")
+    return robot and robot.model_copy(update={"type": chosen.value}), errors
 
 
 def _plugin(
@@ -171,15 +175,18 @@ def _plugin(
     except ConfigError as error:
         return None, [error]
     own = {each: below for each, below in node.value.items() if each not in (key, *also)}
-    return check(params_of(member), replace(node, value=own), name=name)
+    with shelf.blaming(shelf_name, chosen.value):
+        return check(params_of(member), replace(node, value=own), name=name)
 
 
 def _dialect(chosen: Node | None) -> list[CamcompError]:
-    names = shelf.members("dialects")
-    if chosen is None or not isinstance(chosen.value, str) or chosen.value in names:
+    if chosen is None or not isinstance(chosen.value, str):
         return []
-    message = f"there is no dialect called '{chosen.value}'"
-    return [ConfigError("CC213", message, at=chosen.at, hint=choose(chosen.value, names))]
+    try:
+        shelf.load("dialects", chosen.value, at=chosen.at)
+    except ConfigError as error:
+        return [error]
+    return []
 
 
 def params_of(member: Any) -> type[Spec]:

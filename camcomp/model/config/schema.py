@@ -50,10 +50,10 @@ def _offer(
     required: list[str],
     first: list[Schema] | None = None,
 ) -> None:
-    """Replace a definition by one alternative per member of a shelf; users' own plug-ins are left to camcomp."""
+    """Replace a definition by one alternative per member of a shelf."""
     options = list(first or [])
-    for member in shelf.members(shelf_name):
-        spec: type[BaseModel] = params_of(shelf.load(shelf_name, member))
+    for member, plugin in shelf.usable(shelf_name):
+        spec: type[BaseModel] = params_of(plugin)
         # Two plug-ins may have classes of one name.
         template = f"#/definitions/{shelf_name}.{member}.{{model}}"
         one = _draft07(spec.model_json_schema(by_alias=True, ref_template=template))

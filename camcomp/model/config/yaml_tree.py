@@ -237,6 +237,15 @@ def child(node: Node, key: str | int) -> Node | None:
     return None
 
 
+def tree_of(value: Any, at: Location) -> Node:
+    """Bare values as a tree in which every node stands at one place."""
+    if isinstance(value, dict):
+        return Node({key: tree_of(each, at) for key, each in value.items()}, at)
+    if isinstance(value, list):
+        return Node([tree_of(each, at) for each in value], at)
+    return Node(value, at)
+
+
 def leaves(node: Node, name: str = "") -> Iterator[tuple[str, Node]]:
     """Every scalar, and every list of scalars, under its dotted name."""
     if isinstance(node.value, dict):

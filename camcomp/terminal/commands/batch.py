@@ -69,7 +69,10 @@ def command(
     from camcomp.compensation.batch import pools
     from camcomp.compensation.batch.programs import Plan, find_programs, output_tree
     from camcomp.ground.files import write_all
+    from camcomp.ground.shelf import usable
 
+    if config.control.dialect is None:
+        list(usable("dialects"))  # says which plug-ins are left out; workers would say it once each
     plan = Plan(
         config, Path(output_dir), method or config.compensation.method,
         tolerance_um or config.compensation.tolerance_um, joints, __version__,

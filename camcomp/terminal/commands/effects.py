@@ -11,8 +11,7 @@ def describe() -> list[dict[str, object]]:
     from camcomp.model.signal_path import HOOKS
 
     out: list[dict[str, object]] = []
-    for name in shelf.members("effects"):
-        effect = shelf.load("effects", name)
+    for name, effect in shelf.usable("effects"):
         if not effect.PARAMETERS:
             continue
         out.append({

@@ -1,5 +1,3 @@
-from importlib.metadata import EntryPoint
-
 import pytest
 
 from camcomp.ground import shelf
@@ -25,18 +23,3 @@ def test_unknown_name_lists_what_there_is():
     assert caught.value.at == at
     assert "did you mean 'constant'" in caught.value.hint
     assert "kienzle" in caught.value.hint
-
-
-def test_an_entry_point_is_a_member_and_cannot_hide_an_own_file(monkeypatch):
-    points = [
-        EntryPoint("mine", "collections:OrderedDict", "camcomp.forces"),
-        EntryPoint("constant", "collections:OrderedDict", "camcomp.forces"),
-    ]
-
-    def entry_points(group, name=None):
-        return [each for each in points if each.group == group and name in (None, each.name)]
-
-    monkeypatch.setattr(shelf, "entry_points", entry_points)
-    assert {"mine", "constant"} <= set(shelf.members("forces"))
-    assert shelf.load("forces", "mine").__name__ == "OrderedDict"
-    assert shelf.load("forces", "constant").__name__ == "camcomp.forces.constant"

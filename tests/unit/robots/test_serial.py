@@ -9,7 +9,7 @@ from camcomp.ground.errors import ConfigError
 from camcomp.model.config.load import load_config
 from camcomp.model.statics.arm import arm_of, end_pose
 from camcomp.model.statics.build import build_robot
-from camcomp.robots.serial import Params, chains, turned
+from camcomp.robots.serial import Params, _turned, chains
 
 TABLE = [(350.0, -90.0, 449.4, 10.0), (1150.0, 0.0, -20.0, -90.0), (41.0, 37.0, 5.0, 180.0), (0.0, 90.0, -1200.0, 3.0)]
 
@@ -53,9 +53,9 @@ def test_pose_is_the_product_of_the_table_s_matrices(convention):
 
 
 def test_half_turns_lose_no_digits():
-    assert turned(("z", 180.0)) == [0.0, 0.0, 180.0]
-    np.testing.assert_allclose(turned(("z", 180.0), ("x", 180.0)), [0.0, 180.0, 0.0], atol=1e-12)
-    np.testing.assert_allclose(turned(("z", 90.0), ("x", 90.0)), np.full(3, 120 / np.sqrt(3)), atol=1e-12)
+    assert _turned(("z", 180.0)) == [0.0, 0.0, 180.0]
+    np.testing.assert_allclose(_turned(("z", 180.0), ("x", 180.0)), [0.0, 180.0, 0.0], atol=1e-12)
+    np.testing.assert_allclose(_turned(("z", 90.0), ("x", 90.0)), np.full(3, 120 / np.sqrt(3)), atol=1e-12)
 
 
 def test_weights_pull_by_mass_at_their_centres():

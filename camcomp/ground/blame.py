@@ -1,0 +1,41 @@
+"""Whose fault an error is: what a user's own code raises is told as an error of theirs, with its place, and not as a bug."""
+
+import linecache
+import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from camcomp.ground.errors import CamcompError, ConfigError, Location
+
+_PACKAGE = str(Path(__file__).parent.parent)
+
+
+@contextmanager
+def blamed(who: str) -> Iterator[None]:
+    """Turns what is raised inside, CamcompErrors excepted, into ConfigError CC281 about `who`, chained to it."""
+    try:
+        yield
+    except (CamcompError, KeyboardInterrupt, GeneratorExit):
+        raise
+    except BaseException as error:
+        what = f"{type(error).__name__}: {error}".rstrip(": ")
+        raise ConfigError("CC281", f"{who} raised {what}", at=place_of(error)) from error
+
+
+def place_of(error: BaseException) -> Location | None:
+    """Where in code that is not camcomp's own an error arose: the innermost line of the first file on the way to it."""
+    if isinstance(error, SyntaxError) and error.filename and error.lineno:
+        return Location(error.filename, error.lineno, max(error.offset or 1, 1), error.text or "")
+    frames = [(each.filename, each.lineno or 1) for each in traceback.extract_tb(error.__traceback__)]
+    theirs = [each for each in frames if not _is_machinery(each[0])]
+    if not theirs:
+        return None
+    file, line = [each for each in theirs if each[0] == theirs[0][0]][-1]
+    source = linecache.getline(file, line)
+    return Location(file, line, len(source) - len(source.lstrip()) + 1, source)
+
+
+def _is_machinery(file: str) -> bool:
+    """Frames between camcomp and a plug-in."""
+    return file.startswith(("<frozen", _PACKAGE)) or "importlib" in Path(file).parts or file.endswith("contextlib.py")

@@ -1,0 +1,232 @@
+"""Effects: what a user's own has to be, checked when it is loaded."""
+
+import math
+import warnings
+from collections.abc import Callable, Mapping
+from functools import partial
+from types import ModuleType
+from typing import TYPE_CHECKING, Any, Protocol, get_args
+
+import numpy as np
+
+from camcomp.ground.datatypes import Floats
+from camcomp.ground.errors import ConfigError
+from camcomp.model.config.load import params_of
+from camcomp.model.effect import STAGES, Load, Motion, Parameter, Target, nominal
+from camcomp.model.statics.description import Robot
+from camcomp.plugins.contract import (
+    check_functions,
+    check_module,
+    check_names,
+    described,
+    failure,
+    guarded,
+    has_nan,
+    refusal,
+    same,
+    with_functions,
+    wrong_array,
+)
+
+if TYPE_CHECKING:  # the solver is not needed to say what an effect is
+    from camcomp.model.motion.twin import Reading
+
+_ALSO = ("public",)
+_YAML_KEYS = {"effect", "target", "source"}  # stand beside the parameters
+
+
+class EffectPlugin(Protocol):
+    """One way in which a machine differs from its model: a module with these names and at least one hook of EffectHooks.
+
+    At their nominal values the parameters do nothing: every hook returns its input unchanged, bit for bit. May also have
+    FITTED (tuple of Parameter: the ones a diagnosis fits, where others are easier to fit) with the function `public`
+    (their values -> those of PARAMETERS), ROTARY (those that a hinge has), ARM_ONLY (for serial arms), WARMS (compensate
+    asks for the temperature).
+    """
+
+    STAGE: str  # control | drive | structure | process | tool | workpiece | sensor: where the difference arises
+    TARGET: Target  # "actuator": one cause per actuator; "machine": target null; "either"
+    PARAMETERS: tuple[Parameter, ...]
+    SOURCE: str  # where the formula comes from
+
+
+class EffectHooks(Protocol):
+    """Where effects act, in the order of the signal path; n rows, m actuators, mm or rad, N, s.
+
+    `p` maps parameter names to values; `which` (m,) is 1.0 for the actuators aimed at, else 0.0. Nothing that is given
+    may be changed in place.
+    """
+
+    def on_servo(self, position: Floats, motion: Motion, which: Floats, p: Mapping[str, float]) -> Floats:
+        """Set-points (n, m) in time -> encoders."""
+
+    def on_drive(self, error: Floats, motion: Motion, which: Floats, p: Mapping[str, float]) -> Floats:
+        """Carriage minus encoder (n, m)."""
+
+    def on_drive_force(self, force: Floats, motion: Motion, which: Floats, p: Mapping[str, float]) -> Floats:
+        """What the drives exert (n, m) beyond the load of the structure."""
+
+    def on_robot(self, robot: Robot, actuators: tuple[str, ...], p: Mapping[str, float]) -> Robot:
+        """Description of the machine -> changed copy; `actuators` are the names aimed at."""
+
+    def on_load(self, load: Load, motion: Motion, p: Mapping[str, float]) -> Load:
+        """Load at the tool."""
+
+    def on_pose(self, tip: Floats, load: Load, motion: Motion, p: Mapping[str, float]) -> Floats:
+        """Tips (n, 3) in the machine frame."""
+
+    def on_workpiece(self, tip: Floats, p: Mapping[str, float]) -> Floats:
+        """Tips (n, 3) in the program frame."""
+
+    def on_clock(self, time: Floats, p: Mapping[str, float]) -> Floats:
+        """Times (n,) of rows -> times at which the tip stood where the rows say."""
+
+    def on_reading(self, reading: "Reading", motion: Motion, p: Mapping[str, float]) -> "Reading":
+        """What the sensors show."""
+
+
+def checked(name: str, found: Any, who: str) -> ModuleType:
+    """The effect behind an entry point, its hooks guarded. Raises ConfigError CC280."""
+    del name
+    module = check_module(who, found)
+    check_names(who, module, {"STAGE": str, "TARGET": str, "PARAMETERS": tuple, "SOURCE": str})
+    for key, allowed in (("STAGE", STAGES), ("TARGET", get_args(Target))):
+        if (value := getattr(module, key)) not in allowed:
+            raise refusal(who, f"{key} is '{value}', not one of {', '.join(allowed)}")
+    hooks = check_functions(who, module, EffectHooks, _ALSO)
+    if not hooks:
+        raise refusal(
+            who, "there is no hook", hint=f"one of {', '.join(each for each in dir(EffectHooks) if each[:3] == 'on_')}"
+        )
+    if not module.PARAMETERS:
+        raise refusal(who, "PARAMETERS is empty")
+    for key in ("PARAMETERS", "FITTED", "ROTARY"):
+        _check_parameters(who, key, getattr(module, key, ()))
+    _check_spec(who, module)
+    wrapped = {each: guarded(who, each, getattr(module, each), partial(_wrong, each)) for each in hooks}
+    if hasattr(module, "public"):
+        wrapped["public"] = guarded(who, "public", module.public, partial(_wrong_values, module))
+    effect = with_functions(module, wrapped)
+    _try(who, effect, hooks)
+    return effect
+
+
+def _check_parameters(who: str, key: str, parameters: Any) -> None:
+    if not isinstance(parameters, tuple):
+        raise refusal(who, f"{key} is {described(parameters)}, not a tuple of Parameter")
+    for i, each in enumerate(parameters):
+        if not isinstance(each, Parameter):
+            hint = "a tuple of one needs a comma: (Parameter(...),)" if len(parameters) == 1 else None
+            raise refusal(who, f"{key}[{i}] is {described(each)}, not a Parameter", hint=hint)
+        if why := _wrong_parameter(each):
+            raise refusal(who, f"{key}: {each.name!r} {why}")
+    names = [each.name for each in parameters]
+    if twice := {each for each in names if names.count(each) > 1}:
+        raise refusal(who, f"{key}: {', '.join(sorted(twice))} is there twice")
+
+
+def _wrong_parameter(p: Any) -> str:
+    """What is wrong with a parameter, in words; empty: nothing."""
+    if not isinstance(p.name, str) or not p.name.isidentifier() or p.name in _YAML_KEYS or p.name.startswith("_"):
+        return "cannot be a key in YAML"
+    if not (isinstance(p.unit, str) and isinstance(p.source, str)):
+        return "needs unit and source as text"
+    numbers = (p.nominal, p.low, p.high, p.scale, p.tolerance, *p.scan)
+    if not all(isinstance(each, (int, float)) and not math.isnan(each) for each in numbers):
+        return "has something in place of a number"
+    if not p.low <= p.nominal <= p.high or not math.isfinite(p.nominal):
+        return f"has the nominal value {p.nominal:g} outside its bounds {p.low:g} to {p.high:g}"
+    if not 0.0 < p.scale < math.inf or not 0.0 <= p.tolerance < math.inf:
+        return "needs a scale above zero and a tolerance of zero or more"
+    if p.sign not in (0, 1):
+        return f"has the sign {p.sign}, not 0 or +1"
+    if p.log and not p.low > 0.0:
+        return "is a factor (log) with a bound that is not above zero"
+    if not all(p.low <= each <= p.high for each in p.scan):
+        return "has a value to scan outside its bounds"
+    return ""
+
+
+def _check_spec(who: str, module: ModuleType) -> None:
+    """Whether the parameters can be keys of a YAML mapping."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            params_of(module).model_json_schema()
+    except Exception as error:
+        raise refusal(who, f"its parameters cannot be keys in YAML: {error}") from error
+
+
+def _wrong(hook: str, result: Any, given: Any, *rest: Any) -> str:
+    """What is wrong with the result of a hook, in words; empty: nothing."""
+    if hook == "on_robot":
+        return _wrong_robot(result, given)
+    if hook == "on_load":
+        if not isinstance(result, Load):
+            return f"{described(result)}, not a Load"
+        wrong = (wrong_array(getattr(result, each), getattr(given, each), *rest) for each in ("force", "wrench"))
+        return next((f"a Load with {each}" for each in wrong if each), "")
+    if hook == "on_reading":
+        if not isinstance(result, type(given)):
+            return f"{described(result)}, not a {type(given).__name__}"
+        pairs = ((getattr(result, each), getattr(given, each)) for each in ("tip", "encoder", "drive", "dyno"))
+        wrong = (wrong_array(mine, was, *rest) for mine, was in pairs)
+        return next((f"a {type(given).__name__} with {each}" for each in wrong if each), "")
+    return wrong_array(result, given, *rest)
+
+
+def _wrong_robot(result: Any, given: Robot) -> str:
+    if not isinstance(result, Robot):
+        return f"{described(result)}, not a Robot"
+    if [each.name for each in result.actuators] != [each.name for each in given.actuators]:
+        return "a Robot with other actuators"
+    return "a Robot with a number that is none" if has_nan(result) and not has_nan(given) else ""
+
+
+def _wrong_values(module: ModuleType, result: Any, *_given: Any) -> str:
+    if not isinstance(result, Mapping) or set(result) != {each.name for each in module.PARAMETERS}:
+        return f"{described(result)}, not a value for each of PARAMETERS"
+    return "a value that is no number" if has_nan(dict(result)) else ""
+
+
+def _try(who: str, effect: ModuleType, hooks: tuple[str, ...]) -> None:
+    """Every hook on small machines: unchanged at nominal; a typical size away it works on one of them at least.
+
+    An effect may be meant for one kind of machine and know nothing of another one; what it does on it does not count.
+    """
+    from camcomp.plugins import trial
+
+    machines = [trial.arm()] if getattr(effect, "ARM_ONLY", False) else [trial.legs(), trial.arm()]
+    failed: list[ConfigError] = []
+    for robot in machines:
+        try:
+            with warnings.catch_warnings(), np.errstate(all="ignore"):
+                warnings.simplefilter("ignore")
+                for hook in hooks:
+                    _try_hook(who, effect, hook, trial.inputs(robot, whole=effect.TARGET == "machine"))
+        except ConfigError as error:
+            if error.rule == "CC280":
+                raise
+            failed.append(error)
+    if len(failed) == len(machines):
+        raise ConfigError("CC280", f"{failed[0].message} in a trial", at=failed[0].at) from failed[0].__cause__
+
+
+def _try_hook(who: str, effect: ModuleType, hook: str, given: Mapping[str, tuple[Any, ...]]) -> None:
+    call: Callable[..., Any] = getattr(effect, hook)
+    if not same(call(*given[hook], nominal(effect)), given[hook][0]):
+        raise refusal(who, f"{hook} changes something at the nominal values of all parameters")
+    call(*given[hook], _away(who, effect))
+
+
+def _away(who: str, effect: ModuleType) -> dict[str, float]:
+    """Parameters a typical size from nominal; shapes stay."""
+    fitted = getattr(effect, "FITTED", effect.PARAMETERS)
+    values = {p.name: p.nominal if p.scan else p.value(p.scale) for p in fitted}
+    if hasattr(effect, "public"):
+        values = dict(effect.public(values))
+    if unknown := set(values) - set(nominal(effect)):
+        raise failure(
+            who, f"FITTED has {', '.join(sorted(unknown))}, which is not in PARAMETERS, and there is no `public`"
+        )
+    return {**nominal(effect), **values}

@@ -1,0 +1,67 @@
+"""Small machines and a movement of them, on which the hooks of an effect are tried before it is believed."""
+
+from typing import Any
+
+import numpy as np
+
+from camcomp.model.effect import Load, Motion
+from camcomp.model.motion.twin import Reading
+from camcomp.model.statics.description import Actuator, Chain, Link, Parallelogram, Passive, Robot, Transform
+
+_ROWS = 41
+
+
+def legs() -> Robot:
+    """Three slides x, y, z that move a platform by parallelograms."""
+    x, y, z = np.eye(3)
+    behind = (
+        Link(1e4 * np.eye(6)),
+        Passive(True, z),
+        Parallelogram(310.0 * x, y, z, 80.0, 1e4 * np.eye(6)),
+        Passive(True, z),
+    )
+    chains = [
+        Chain(name, (Actuator(name, False, x, 1e4, -300.0), *behind), np.roll(np.eye(3), k, axis=0))
+        for k, name in enumerate("xyz")
+    ]
+    return Robot("three legs", tuple(chains), np.array([0.0, 0.0, -100.0]))
+
+
+def arm() -> Robot:
+    """Six hinges a1 to a6, each with an elastic link behind it."""
+    elements: list[Any] = []
+    for k in range(6):
+        elements += [
+            Actuator(f"a{k + 1}", True, np.eye(3)[2 - k % 2], 1e9),
+            Transform(np.array([100.0, 0.0, 50.0])),
+            Link(1e6 * np.eye(6)),
+        ]
+    return Robot("six hinges", (Chain("arm", tuple(elements)),), np.array([0.0, 0.0, -100.0]))
+
+
+def inputs(robot: Robot, *, whole: bool) -> dict[str, tuple[Any, ...]]:
+    """What every hook gets but the parameters. whole: aimed at the machine, else at its first actuator."""
+    m = len(robot.actuators)
+    time = np.linspace(0.0, 2.0, _ROWS)
+    encoder = -200.0 + 20.0 * np.sin(np.outer(3.0 * time, 1.0 + 0.1 * np.arange(m)))
+    speed = np.gradient(encoder, time, axis=0)
+    home, stiffness = np.full(m, -300.0), np.full(m, 1e4)
+    motion = Motion(time, 100.0 + time, time / 60.0, 22.0 + time, encoder, speed, np.sign(speed), home, stiffness)
+    load = Load(np.tile([200.0, -10.0, -25.0], (_ROWS, 1)), np.zeros((_ROWS, 6)))
+    which = np.ones(m) if whole else np.eye(m)[0]
+    tip = 20.0 * np.column_stack((np.sin(time), np.cos(time), time))
+    still = np.zeros_like(encoder)
+    for each in (time, encoder, load.force, load.wrench, tip, still):
+        each.flags.writeable = False
+    names = tuple(each.name for each in robot.actuators)
+    return {
+        "on_servo": (encoder, motion, which),
+        "on_drive": (still, motion, which),
+        "on_drive_force": (still, motion, which),
+        "on_robot": (robot, names if whole else names[:1]),
+        "on_load": (load, motion),
+        "on_pose": (tip, load, motion),
+        "on_workpiece": (tip,),
+        "on_clock": (time,),
+        "on_reading": (Reading(tip, encoder, still, load.force, motion), motion),
+    }
