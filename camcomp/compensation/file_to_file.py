@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 from camcomp.compensation.report.joint_table import joint_table
 from camcomp.ground.errors import ProgramError
@@ -32,7 +32,7 @@ class Wanted:
 class Finished:
     """What became of a long program: its figures, the checks it failed, and the size of every output."""
 
-    figures: dict
+    figures: dict[str, Any]
     failed: list[tuple[str, str]]
     sizes: dict[str, int]
 

@@ -8,6 +8,7 @@ import json
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from camcomp.compensation.batch.worker import Outcome, Task
 from camcomp.ground.errors import CamcompError, ConfigError, FileError, format_error
@@ -35,8 +36,8 @@ class Status:
     output: str | None
     status: str
     exit_code: int
-    figures: dict = field(default_factory=dict)
-    messages: list[dict] = field(default_factory=list)
+    figures: dict[str, Any] = field(default_factory=dict)
+    messages: list[dict[str, Any]] = field(default_factory=list)
 
 
 def find_programs(paths: Sequence[str], output: Path) -> list[FoundProgram]:
@@ -197,7 +198,7 @@ def _refused(found: FoundProgram, error: CamcompError) -> Status:
     return Status(str(found.source), None, ERROR, error.exit_code, {}, messages)
 
 
-def summary(statuses: Sequence[Status]) -> dict:
+def summary(statuses: Sequence[Status]) -> dict[str, Any]:
     """The figures of a batch: counts, the exit code, and every program in the order of its name."""
     ordered = sorted(statuses, key=lambda each: each.source)
     counts = {name: sum(each.status == name for each in ordered) for name in (DONE, SKIPPED, FAILED_CHECK, ERROR)}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -161,7 +162,7 @@ class Totals:
             "exact_solutions": known.solved + 3 * len(p) + 2 * corrector.exact,
         }
 
-    def summary(self) -> dict:
+    def summary(self) -> dict[str, Any]:
         """The figures, as report.tables.summary has them for short programs, and those of the interpolation."""
         rotary = self.job.machine.revolute
         sizes = {

@@ -228,7 +228,8 @@ def _kept(track: Track, nodes: Nodes, commanded: Floats, half: float) -> Bools:
     moved = np.abs(commanded - track.points(nodes.piece, nodes.w)).max(axis=1)
     most = np.zeros(len(track.motion))
     np.maximum.at(most, nodes.piece, moved)
-    return (most <= half) & (np.bincount(track.motion)[track.motion] == 1)
+    out: Bools = (most <= half) & (np.bincount(track.motion)[track.motion] == 1)
+    return out
 
 
 def _rows(
@@ -330,7 +331,8 @@ class _Points:
     @property
     def end(self) -> Bools:
         """Which ones are end points."""
-        return self.fraction == 1.0
+        out: Bools = self.fraction == 1.0
+        return out
 
     def along(self, ends: Floats, arcs: Arcs) -> Floats:
         """Points (k, 3) of the moves between end points (N, 3)."""

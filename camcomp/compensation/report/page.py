@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import PurePath
+from typing import Any
 
 import numpy as np
 
@@ -37,7 +38,7 @@ BUDGET = (
 def compensation_html(
     result: Compensated,
     job: Job,
-    figures: Mapping,
+    figures: Mapping[str, Any],
     *,
     failed: Sequence[tuple[str, str]],
     tolerance_um: float,
@@ -82,7 +83,7 @@ def compensation_html(
     return render(page)
 
 
-def _cards(figures: Mapping, tolerance_um: float) -> list[tuple[str, str, str]]:
+def _cards(figures: Mapping[str, Any], tolerance_um: float) -> list[tuple[str, str, str]]:
     cards = [
         (
             "Tip error before",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -75,7 +76,7 @@ def _csv(head: Sequence[str], line: np.ndarray, values: Floats) -> bytes:
     return text.replace("nan", "").encode("ascii")
 
 
-def summary(result: Compensated, job: Job) -> dict:
+def summary(result: Compensated, job: Job) -> dict[str, Any]:
     """The figures of a run: see the README for their meaning."""
     change = np.abs(result.state.rho - result.nominal)[result.rows.corrected]
     force = np.abs(result.state.drive)[result.rows.corrected]

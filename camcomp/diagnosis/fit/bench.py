@@ -76,7 +76,9 @@ class Bench:
     slopes: list[Slopes] = field(default_factory=list)
     nominal: list[Reading] = field(default_factory=list)
     _row_slopes: dict[int, Floats] = field(default_factory=dict)
-    _changed: dict[tuple, Solved] = field(default_factory=dict)  # structures of changed machines, by run and change
+    _changed: dict[tuple[Any, ...], Solved] = field(
+        default_factory=dict
+    )  # structures of changed machines, by run and change
 
     def __post_init__(self) -> None:
         for run in self.runs:
@@ -150,7 +152,8 @@ def thinned(values: Floats, factor: int) -> Floats:
     if factor == 1:
         return values
     n = len(values) // factor
-    return values[: n * factor].reshape(n, factor, -1).mean(axis=1)
+    out: Floats = values[: n * factor].reshape(n, factor, -1).mean(axis=1)
+    return out
 
 
 def cause_of(candidate: CandidateCause, coordinates: Mapping[str, float]) -> Cause:

@@ -43,7 +43,7 @@ class Reading:
 class Solved:
     """The structure at a run path's nodes, for the drive positions and loads it was solved with."""
 
-    key: tuple
+    key: tuple[Any, ...]
     shift: Floats  # (pieces, m) carriage minus set-point, piece by piece
     force: Floats  # (q, 3)
     wrench: Floats  # (q, 6)
@@ -70,7 +70,7 @@ class Twin:
     origin: Floats
     rotation: Floats
     causes: tuple[Cause, ...] = ()
-    machines: dict[tuple, Machine] = field(default_factory=dict)
+    machines: dict[tuple[Any, ...], Machine] = field(default_factory=dict)
 
     @property
     def actuators(self) -> tuple[str, ...]:
@@ -94,7 +94,7 @@ class Twin:
             raise PhysicsError("CC410", f"tip {np.round(tip[bad], 3).tolist()} (machine frame) is {STATUS[3]}")
         return state.rho_nominal
 
-    def edited(self, causes: Sequence[Cause]) -> tuple[Robot, tuple]:
+    def edited(self, causes: Sequence[Cause]) -> tuple[Robot, tuple[Any, ...]]:
         """The machine with the effects on it, and a key that tells equal ones."""
         robot, key = self.robot, []
         for cause in causes:
@@ -188,7 +188,7 @@ class Twin:
         return reading, solved
 
     def _node_load(
-        self, run_path: RunPath, grid: Motion, causes: Sequence[Cause], known: Solved | None, key: tuple
+        self, run_path: RunPath, grid: Motion, causes: Sequence[Cause], known: Solved | None, key: tuple[Any, ...]
     ) -> Load:
         """Load to solve the nodes with: that of the structure known so far where slopes may carry on from it.
 
@@ -207,7 +207,7 @@ class Twin:
         )
         return Load(known.force, known.wrench) if near and known.key == key else load
 
-    def structure(self, run_path: RunPath, machine: Machine, key: tuple, shift: Floats, load: Load) -> Solved:
+    def structure(self, run_path: RunPath, machine: Machine, key: tuple[Any, ...], shift: Floats, load: Load) -> Solved:
         """Loaded equilibrium at the nodes. Raises PhysicsError CC411 when a node cannot be solved."""
         node_piece = np.arange(len(run_path.node_tip)) // max(len(run_path.node_tip) // max(run_path.pieces, 1), 1)
         rho = run_path.node_rho + shift[node_piece]
@@ -241,7 +241,7 @@ class Twin:
 
     # -- pieces of the path -------------------------------------------------------------------------------------------
 
-    def _machine(self, robot: Robot, key: tuple) -> Machine:
+    def _machine(self, robot: Robot, key: tuple[Any, ...]) -> Machine:
         """The packed machine; runs of one experiment ask for the same one after each other."""
         if key not in self.machines:
             if len(self.machines) > 4:
@@ -321,7 +321,8 @@ def _kept(run_path: RunPath, name: object, make: Callable[[], Any]) -> Any:
 
 
 def _place(run_path: RunPath) -> Places:
-    return _kept(run_path, "place", lambda: run_path.place(run_path.time))
+    out: Places = _kept(run_path, "place", lambda: run_path.place(run_path.time))
+    return out
 
 
 def _slopes_at(run_path: RunPath, slopes: Slopes, place: Places, name: str | None) -> Slopes:
@@ -376,4 +377,5 @@ def _piece_means(run_path: RunPath, gap: Floats) -> Floats:
 
 def _apply(slope: Floats, change: Floats) -> Floats:
     """Slopes (n, 3, k) times changes (n, k)."""
-    return np.einsum("nik,nk->ni", slope, change)
+    out: Floats = np.einsum("nik,nk->ni", slope, change)
+    return out

@@ -87,7 +87,8 @@ def command(
     write_all(findings_files("batch", cases, sarif_file=sarif_file, junit_file=junit_file))
     counts = ", ".join(f"{count} {name}" for name, count in figures["counts"].items() if count)
     say(f"{figures['programs']} programs: {counts}", quiet=quiet)
-    return figures["exit_code"]
+    out: int = figures["exit_code"]
+    return out
 
 
 def _case(status: Status) -> Case:

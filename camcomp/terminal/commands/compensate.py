@@ -1,6 +1,7 @@
 """camcomp compensate."""
 
 import json
+from typing import Any
 
 import click
 
@@ -111,7 +112,7 @@ def command(
     _finish(figures, {each: len(made) for each, made in outputs.items()} if dry_run else {}, failed, quiet)
 
 
-def _finish(figures: dict, sizes: dict[str, int], failed: list[tuple[str, str]], quiet: bool) -> None:
+def _finish(figures: dict[str, Any], sizes: dict[str, int], failed: list[tuple[str, str]], quiet: bool) -> None:
     """Says what was done, or would have been, and raises the checks that failed."""
     say(*_told(figures), quiet=quiet)
     say(*(f"would write {name}: {size} bytes" for name, size in sizes.items()), quiet=quiet)
@@ -121,7 +122,7 @@ def _finish(figures: dict, sizes: dict[str, int], failed: list[tuple[str, str]],
         raise first
 
 
-def _told(figures: dict) -> list[str]:
+def _told(figures: dict[str, Any]) -> list[str]:
     before, after = figures["before"], figures["after"]
     lines = [
         f"{figures['segments_in']} motions in, {figures['points']} end points out ({figures['method']})",
@@ -139,7 +140,7 @@ def _told(figures: dict) -> list[str]:
     return lines + [f"warning: {each}" for each in figures["warnings"]]
 
 
-def _either(figures: dict, *keys: str) -> str:
+def _either(figures: dict[str, Any], *keys: str) -> str:
     """The figures that are not zero, in their own units; a machine may have slides, hinges or both."""
     parts = [f"{figures[key]:.4g} {key.rsplit('_', 1)[1]}" for key in keys if figures.get(key)]
     return " and ".join(parts) or "0"

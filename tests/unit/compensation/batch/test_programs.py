@@ -185,7 +185,7 @@ def test_the_verb(tmp_path):
     assert "decimal comma" in first.stderr.decode() and "3 programs: 2 done, 1 error" in first.stderr.decode()
     alone = camcomp("compensate", source / "one.nc", "--config", MACHINE)
     assert (tmp_path / "out" / "one.nc").read_bytes() == alone.stdout
-    figures = json.loads((tmp_path / "out" / "camcomp-programs.json").read_text())
+    figures = json.loads((tmp_path / "out" / "camcomp-batch.json").read_text())
     assert [Path(each["source"]).name for each in figures["files"]] == ["bad.nc", "one.nc", "two.nc"]
     (source / "bad.nc").unlink()
     second = camcomp(*words)
