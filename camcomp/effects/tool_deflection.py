@@ -30,4 +30,5 @@ def on_pose(tip: Floats, load: Load, motion: Motion, p: Mapping[str, float]) -> 
     compliance = p["compliance_mm_per_N"]
     if compliance == 0.0:
         return tip
-    return tip + compliance * load.force * np.array([1.0, 1.0, 0.0])
+    out: Floats = tip + compliance * load.force * np.array([1.0, 1.0, 0.0])
+    return out

@@ -26,4 +26,5 @@ def on_workpiece(tip: Floats, p: Mapping[str, float]) -> Floats:
     if angle == 0.0:
         return tip if not shift.any() else tip - shift
     c, s = np.cos(angle), np.sin(angle)
-    return (tip - shift) @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    out: Floats = (tip - shift) @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    return out

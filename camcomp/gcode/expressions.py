@@ -4,7 +4,7 @@ Two spellings: `#1`, `#<name>`, `[...]` of RS274 and Fanuc, and `R1`, `(...)` of
 """
 
 import math
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from camcomp.gcode.spelling import FANUC, RS274, Spelling
 
@@ -20,7 +20,7 @@ class ExpressionError(Exception):
 
 # A parsed expression: ("number", x), ("parameter", e), ("name", s), ("call", f, e), ("atan", a, b), ("exists", e),
 # ("negative", e), ("operator", symbol, a, b). Each is a tuple whose last item is the column, for messages.
-Expression = tuple
+Expression = tuple[Any, ...]
 
 
 _DEEPEST = 100  # values in one expression
@@ -282,7 +282,8 @@ def _operate(symbol: str, a: float, b: float, column: int, spelling: Spelling) -
             result = a**b
             if isinstance(result, complex):
                 raise ValueError
-            return result
+            out: float = result
+            return out
         if b == 0.0:
             raise ExpressionError("division by zero", column)
         if symbol == "/":

@@ -190,7 +190,8 @@ class Macro(Subprograms):
         for other in [*range(row + 1, last), *range(first, row + 1)]:
             found = _NUMBER.match(self.text.line(other))
             if found and int(found[1]) == number:
-                return other
+                out: int = other
+                return out
         self.refuse(row, 0, "CC124", f"GOTO: there is no line N{number:g} in this program")
 
     def _loop_number(self, row: int, parser: Parser) -> int:

@@ -16,7 +16,8 @@ def _class_of(word: str) -> type | None:
         from pygcode.exceptions import GCodeParameterError, GCodeWordStrError
         from pygcode.gcodes import word_gcode_class
     try:
-        return word_gcode_class(Word(word))
+        out: type | None = word_gcode_class(Word(word))
+        return out
     except (GCodeParameterError, GCodeWordStrError, ValueError):
         return None
 

@@ -117,7 +117,8 @@ class OWords(Subprograms):
         if self.reader.state.setup.skip_deleted and self.text.line(row).lstrip().startswith("/"):
             return row + 1
         self.memory.row = row
-        return getattr(self, f"_do_{statement.keyword}")(row, statement)
+        out: int | None = getattr(self, f"_do_{statement.keyword}")(row, statement)
+        return out
 
     def _computed_call(self, row: int) -> Statement:
         """`o[#1] call`: the label is the value of an expression."""

@@ -1,6 +1,7 @@
 """The nouns that more than one room uses: struct of arrays, first axis = motion, float64, read-only."""
 
 from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -28,9 +29,9 @@ _FORMS: dict[str, tuple[type, tuple[int, ...]]] = {
 }
 
 
-def frozen(values: ArrayLike, dtype: type = np.float64) -> NDArray:
+def frozen(values: ArrayLike, dtype: type = np.float64) -> NDArray[Any]:
     """Read-only view of `values` as an array of `dtype`; the caller's own array keeps its write flag."""
-    array: NDArray = np.asarray(values, dtype=dtype, order="C").view()
+    array: NDArray[Any] = np.asarray(values, dtype=dtype, order="C").view()
     array.flags.writeable = False
     return array
 
@@ -68,6 +69,6 @@ class Path:
     def __len__(self) -> int:
         return int(self.line.shape[0])
 
-    def take(self, rows: NDArray) -> "Path":
+    def take(self, rows: NDArray[Any]) -> "Path":
         """The motions that `rows` (indices or mask) picks."""
         return Path(**{each.name: getattr(self, each.name)[rows] for each in fields(self)})

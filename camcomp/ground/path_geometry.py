@@ -13,7 +13,8 @@ def turn(vectors: Floats, axis: Floats, angle: Floats) -> Floats:
     """Vectors (k, 3) turned about unit axes (k, 3) by angles (k,) rad."""
     c, s = np.cos(angle)[:, None], np.sin(angle)[:, None]
     along = np.sum(vectors * axis, axis=1, keepdims=True) * axis
-    return along + (vectors - along) * c + np.cross(axis, vectors) * s
+    out: Floats = along + (vectors - along) * c + np.cross(axis, vectors) * s
+    return out
 
 
 def _arc(path: Path, motion: Ints) -> tuple[Floats, Floats, Floats, Floats, Floats]:
@@ -59,7 +60,8 @@ def tangents(path: Path, motion: Ints, u: Floats) -> Floats:
             + climb[:, None] * axis
         )
     size = np.linalg.norm(out, axis=1, keepdims=True)
-    return np.divide(out, size, out=np.zeros_like(out), where=size > 0.0)
+    found: Floats = np.divide(out, size, out=np.zeros_like(out), where=size > 0.0)
+    return found
 
 
 def lengths(path: Path) -> Floats:
@@ -71,4 +73,5 @@ def lengths(path: Path) -> Floats:
         radius = np.linalg.norm(first, axis=1)
         around = radius * (1.0 + 0.5 * growth) * np.abs(angle)
         out[arc] = np.sqrt(around**2 + climb**2 + (radius * growth) ** 2)
-    return out
+    found: Floats = out
+    return found

@@ -27,7 +27,8 @@ def _first_order(x, t, tau):  # type: ignore[no-untyped-def]  # pragma: no cover
 
 def first_order(x: Floats, time: Floats, tau: float) -> Floats:
     """First-order lag of x (n, m) with time constant tau s, settled at the start; time (n,) s, not decreasing."""
-    return _first_order(np.ascontiguousarray(x), np.ascontiguousarray(time), tau)
+    out: Floats = _first_order(np.ascontiguousarray(x), np.ascontiguousarray(time), tau)
+    return out
 
 
 @kept
@@ -43,7 +44,8 @@ def _play(x, width):  # type: ignore[no-untyped-def]  # pragma: no cover
 
 def play(x: Floats, width: float) -> Floats:
     """Carriage minus encoder (n, m) of a play of full `width` mm driven by x (n, m), centred at the start."""
-    return _play(np.ascontiguousarray(x), width)
+    out: Floats = _play(np.ascontiguousarray(x), width)
+    return out
 
 
 @kept
@@ -65,7 +67,8 @@ def direction(x: Floats, distance: float = PRESLIDING_MM) -> Floats:
 
     Source: Dahl 1968 with exponent 1. Holds while: rate-independent friction.
     """
-    return _direction(np.ascontiguousarray(x), distance)
+    out: Floats = _direction(np.ascontiguousarray(x), distance)
+    return out
 
 
 @kept
@@ -102,7 +105,8 @@ def held_back(x: Floats, stiffness: Floats, force: float, distance: float = PRES
     Dahl's law on the way of the carriage, not of the encoder: until the spring has turned round by 2 force/stiffness the
     carriage hardly moves. distance mm; force N; stiffness inf = rigid. 0 before the first move.
     """
-    return _held(np.ascontiguousarray(x), np.ascontiguousarray(stiffness, dtype=float), force, distance)
+    out: Floats = _held(np.ascontiguousarray(x), np.ascontiguousarray(stiffness, dtype=float), force, distance)
+    return out
 
 
 def ways(x: Floats, least: float) -> Floats:

@@ -33,7 +33,8 @@ def junit(suite: str, cases: Sequence[Case]) -> bytes:
             lines = ([case.note] if case.note else []) + [_line(f) for f in warnings]
             xml.SubElement(each, "system-out").text = _clean("\n".join(lines))
     xml.indent(root)
-    return b'<?xml version="1.0" encoding="UTF-8"?>\n' + xml.tostring(root, encoding="utf-8") + b"\n"
+    out: bytes = b'<?xml version="1.0" encoding="UTF-8"?>\n' + xml.tostring(root, encoding="utf-8") + b"\n"
+    return out
 
 
 def _line(finding: Finding) -> str:

@@ -57,7 +57,8 @@ class _Verbs(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in self.list_commands(ctx):
             return None
-        return import_module(f"camcomp.terminal.commands.{cmd_name}").command
+        out: click.Command | None = import_module(f"camcomp.terminal.commands.{cmd_name}").command
+        return out
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("Commands"):

@@ -218,7 +218,8 @@ def _materials() -> list[tuple[str, ...]]:
 def _read(path: Path) -> dict[str, Any]:
     tree, _ = read_tree(path.read_bytes(), path.name)
     assert isinstance(tree, Node)
-    return plain(tree)
+    out: dict[str, Any] = plain(tree)
+    return out
 
 
 # --- rules --------------------------------------------------------------------------------------------------------

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from camcomp.compensation.batch.worker import Outcome, Task
 from camcomp.ground.errors import CamcompError, ConfigError, FileError, format_error
@@ -38,8 +39,8 @@ class Status:
     output: str | None
     status: str
     exit_code: int
-    figures: dict = field(default_factory=dict)
-    messages: list[dict] = field(default_factory=list)
+    figures: dict[str, Any] = field(default_factory=dict)
+    messages: list[dict[str, Any]] = field(default_factory=list)
 
 
 def find_programs(paths: Sequence[str], output: Path) -> list[FoundProgram]:

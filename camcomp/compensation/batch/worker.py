@@ -9,6 +9,7 @@ import time
 import warnings
 from dataclasses import dataclass, field
 from functools import lru_cache
+from typing import TYPE_CHECKING, Any
 
 from camcomp import __version__
 from camcomp.ground.errors import PluginWarning
@@ -16,6 +17,9 @@ from camcomp.ground.garbage import collect_seldom, keep_what_lives
 from camcomp.ground.notes import held, hold
 from camcomp.ground.old_names import keep_old_names
 from camcomp.model.config.spec import Config
+
+if TYPE_CHECKING:
+    from camcomp.model.job import Job
 
 BUG = 70
 WATCH = 0.5  # s between two looks at the parent
@@ -42,7 +46,7 @@ class Outcome:
 
     key: str
     exit_code: int
-    messages: list[dict] = field(default_factory=list)  # rule, message, and where: file, line, column
+    messages: list[dict[str, Any]] = field(default_factory=list)  # rule, message, and where: file, line, column
     program: bytes | None = None
     joints: bytes | None = None
     figures: dict = field(default_factory=dict)
@@ -65,8 +69,6 @@ def _end_without(parent: int) -> None:
 
 def work(task: Task) -> Outcome:
     """Compensates a program on one core. Never raises."""
-    from camcomp.ground.errors import CamcompError, format_error
-
     collect_seldom()
     os.environ["CAMCOMP_THREADS"] = "1"  # the solver asks; the cores belong to the other workers
     try:
@@ -123,12 +125,12 @@ class _Once:
 
 
 @lru_cache(maxsize=2)
-def _job(_key: str, once: _Once):  # type: ignore[no-untyped-def]
+def _job(_key: str, once: _Once) -> Job:
     from camcomp.model.job import Job
 
     return Job(once.config)
 
 
-def _message(error, text: str) -> dict:  # type: ignore[no-untyped-def]
+def _message(error: CamcompError, text: str) -> dict[str, Any]:
     where = {"file": error.at.file, "line": error.at.line, "column": error.at.column} if error.at else {}
     return {"rule": error.rule, "message": error.message, "text": text, **where}

@@ -50,9 +50,10 @@ class Plain(NamedTuple):
         return Plain(*(each[a:b] for each in self))  # type: ignore[arg-type]
 
 
-def scan(*args: Any) -> tuple:
+def scan(*args: Any) -> tuple[Any, ...]:
     """scan_lines with room to work in."""
-    return scan_lines(*args, np.empty(5, np.int64), np.empty(5, np.int64), np.zeros(5))
+    out: tuple[Any, ...] = scan_lines(*args, np.empty(5, np.int64), np.empty(5, np.int64), np.zeros(5))
+    return out
 
 
 @entry

@@ -95,7 +95,8 @@ def put_eol(out, at, data, begin, finish):
 
 def write_rows(*args: Any) -> int:
     """write_lines with room to work in."""
-    return write_lines(*args, np.empty(3), np.empty(3), np.empty(3, np.bool_))
+    out: int = write_lines(*args, np.empty(3), np.empty(3), np.empty(3, np.bool_))
+    return out
 
 
 @entry

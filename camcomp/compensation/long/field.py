@@ -9,6 +9,7 @@ not help (near singular configurations, at the border of the workspace) its poin
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -156,7 +157,7 @@ class Field:
             self._build(np.unique(room[:count]))
         return tips
 
-    def packed(self) -> tuple:
+    def packed(self) -> tuple[Any, ...]:
         """Arguments of the compiled look-up: cells, tiles, bases. The terms of a basis are the first ones of the largest."""
         t, most = self.tiles, self.bases[-1]
         shape = np.array([(*each.degree, len(each.position), len(each.force)) for each in self.bases])

@@ -217,7 +217,8 @@ class PlainCorrector:
         return bool(small.any())
 
     def _judged(self, run: PlainRun, rows: PlainRows) -> Bools:
-        return (run.plain.kind[rows.move] == LINE) & ~rows.joining
+        out: Bools = (run.plain.kind[rows.move] == LINE) & ~rows.joining
+        return out
 
     # --- the machine ---------------------------------------------------------------------------------------------
 

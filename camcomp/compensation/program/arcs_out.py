@@ -106,7 +106,8 @@ def through(start: Floats, middle: Floats, end: Floats, axis: Floats, way: Float
     """
 
     def level(vector: Floats) -> Floats:
-        return vector - np.sum(vector * axis, axis=1, keepdims=True) * axis
+        out: Floats = vector - np.sum(vector * axis, axis=1, keepdims=True) * axis
+        return out
 
     a, b = level(end - start), level(middle - start)
     area = np.sum(axis * np.cross(b, a), axis=1)  # > 0: counter-clockwise
@@ -127,7 +128,8 @@ def sweeps(start: Floats, end: Floats, centre: Floats, axis: Floats, way: Floats
     sine, cosine = np.sum(axis * np.cross(p, q), axis=1), np.sum(p * q, axis=1)
     cosine -= np.sum(p * axis, axis=1) * np.sum(q * axis, axis=1)
     angle = np.arctan2(sine, cosine)
-    return np.where(way > 0.0, np.mod(angle, 2.0 * np.pi), -np.mod(-angle, 2.0 * np.pi))
+    out: Floats = np.where(way > 0.0, np.mod(angle, 2.0 * np.pi), -np.mod(-angle, 2.0 * np.pi))
+    return out
 
 
 def lengths(start: Floats, end: Floats, arcs: Arcs, axis: Floats) -> Floats:
@@ -136,7 +138,8 @@ def lengths(start: Floats, end: Floats, arcs: Arcs, axis: Floats) -> Floats:
     p = start - arcs.centre
     p = p - np.sum(p * axis, axis=1, keepdims=True) * axis
     climb = np.sum((end - start) * axis, axis=1)
-    return np.where(arcs.on, np.hypot(np.linalg.norm(p, axis=1) * np.abs(arcs.angle), climb), straight)
+    out: Floats = np.where(arcs.on, np.hypot(np.linalg.norm(p, axis=1) * np.abs(arcs.angle), climb), straight)
+    return out
 
 
 def along(start: Floats, end: Floats, arcs: Arcs, axis: Floats, f: Floats) -> Floats:

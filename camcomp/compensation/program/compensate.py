@@ -212,7 +212,8 @@ def _kept(track: Track, nodes: Nodes, commanded: Floats, half: float) -> Bools:
     moved = np.abs(commanded - track.points(nodes.piece, nodes.w)).max(axis=1)
     most = np.zeros(len(track.motion))
     np.maximum.at(most, nodes.piece, moved)
-    return (most <= half) & (np.bincount(track.motion)[track.motion] == 1)
+    out: Bools = (most <= half) & (np.bincount(track.motion)[track.motion] == 1)
+    return out
 
 
 def _warnings(job: Job, rows: CorrectedRows) -> list[str]:

@@ -8,6 +8,7 @@ not counted.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -186,7 +187,8 @@ def _fraction(job: Job, track: Track, reach: Floats, path: Path, piece: Ints, mo
         way = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(curve, axis=0), axis=1))))
         on = piece == i
         share[on] = np.interp(share[on] * way[-1], way, w)
-    return share
+    out: Floats = share
+    return out
 
 
 def _residual(job: Job, track: Track, piece: Ints, commanded: Floats, w: Floats) -> tuple[Floats, Floats]:
@@ -219,7 +221,8 @@ def _convergence(job: Job, track: Track, piece: Ints, w: Floats) -> Floats:
     """What the solver leaves (k,) mm: the exact command of the nearest point, put through the model again."""
     target, travel = track.points(piece, w), travel_of(job, track, piece, w)
     tip, _ = respond(job, aim_at(job, target, travel, "newton").commanded, travel)
-    return np.linalg.norm(tip - target, axis=1)
+    out: Floats = np.linalg.norm(tip - target, axis=1)
+    return out
 
 
 def _per_line(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -201,7 +202,7 @@ def figure_path(drawn: DrawnPath) -> Figure:
     )
 
 
-def _scene(points: Floats) -> dict:
+def _scene(points: Floats) -> dict[str, Any]:
     """Axes of one scale, a flat path with some room above and below, and an eye that sees all of it."""
     middle, span = 0.5 * (points.max(axis=0) + points.min(axis=0)), np.ptp(points, axis=0)
     half = 0.55 * np.maximum(span, 0.2 * max(float(span.max()), 1e-6))

@@ -22,7 +22,8 @@ def turns(joint: Floats, angle: Floats) -> Floats:
     """Motion (n, 3, 2 HARMONICS) of tips by a joint error that repeats with the joint's angle (n,). joint (n, 3): mm/rad."""
     k = np.arange(1, HARMONICS + 1) * angle[:, None]
     waves = np.concatenate([np.sin(k), np.cos(k)], axis=1)
-    return AMPLITUDE * joint[:, :, None] * waves[:, None, :]
+    out: Floats = AMPLITUDE * joint[:, :, None] * waves[:, None, :]
+    return out
 
 
 def shares(

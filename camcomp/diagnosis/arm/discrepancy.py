@@ -38,7 +38,8 @@ class Discrepancy:
         distance = np.maximum(square[:, None] + square[None, :] - 2.0 * features @ features.T, 0.0)
         K = self.size**2 * np.exp(-0.5 * distance / self.length**2)
         K[np.diag_indices(len(K))] += self.noise**2
-        return K
+        out: Floats = K
+        return out
 
 
 def fit_discrepancy(features: Sequence[Floats], rest: Sequence[Floats]) -> Discrepancy:

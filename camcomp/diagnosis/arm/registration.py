@@ -79,5 +79,7 @@ def _turn(w: Floats) -> Floats:
     angle = float(np.linalg.norm(w))
     W = np.array([[0.0, -w[2], w[1]], [w[2], 0.0, -w[0]], [-w[1], w[0], 0.0]])
     if angle < 1e-12:
-        return np.eye(3) + W
-    return np.eye(3) + np.sin(angle) / angle * W + (1.0 - np.cos(angle)) / angle**2 * (W @ W)
+        small: Floats = np.eye(3) + W
+        return small
+    out: Floats = np.eye(3) + np.sin(angle) / angle * W + (1.0 - np.cos(angle)) / angle**2 * (W @ W)
+    return out

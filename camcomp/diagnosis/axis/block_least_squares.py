@@ -53,7 +53,8 @@ def solve(A: Floats, y: Floats) -> Floats:
     """Least squares (k,) by scaled normal equations."""
     size = np.sqrt(np.mean(A**2, axis=0)) + 1e-300
     B = A / size
-    return np.linalg.lstsq(B.T @ B, B.T @ y, rcond=1e-13)[0] / size
+    out: Floats = np.linalg.lstsq(B.T @ B, B.T @ y, rcond=1e-13)[0] / size
+    return out
 
 
 def withheld(data: Series, A: Floats) -> Floats:

@@ -80,12 +80,14 @@ def _seconds(stamps: Floats | None, n: int, notes: list[str]) -> Floats:
     """Seconds since the earliest row: of times in s, or of stamps such as 20200714163904; else the number of the row."""
     if stamps is not None and np.isfinite(stamps).all() and np.unique(stamps).size > 0.5 * n:
         if stamps.min() < 1e12:
-            return stamps - stamps.min()
+            out: Floats = stamps - stamps.min()
+            return out
         try:
             seconds = np.array(
                 [(datetime.strptime(f"{s:.0f}", "%Y%m%d%H%M%S") - datetime(2000, 1, 1)).total_seconds() for s in stamps]
             )
-            return seconds - seconds.min()
+            told: Floats = seconds - seconds.min()
+            return told
         except ValueError:
             pass
     notes.append("no usable times, t_s is the number of the row")

@@ -187,7 +187,8 @@ def thinned(values: Floats, factor: int) -> Floats:
     if factor == 1:
         return values
     n = len(values) // factor
-    return values[: n * factor].reshape(n, factor, -1).mean(axis=1)
+    out: Floats = values[: n * factor].reshape(n, factor, -1).mean(axis=1)
+    return out
 
 
 def cause_of(candidate: CandidateCause, coordinates: Mapping[str, float]) -> Cause:

@@ -7,6 +7,7 @@ tolerance what every healthy machine has of it.
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from typing import Any
 
 import numpy as np
 
@@ -202,7 +203,7 @@ def _nuisances(bench: Bench) -> list[tuple[str, float, list[Floats], bool]]:
     return found
 
 
-def _by_label(found: list, bench: Bench, label: str, columns: Sequence[tuple[str, list[Floats]]]) -> None:
+def _by_label(found: list[Any], bench: Bench, label: str, columns: Sequence[tuple[str, list[Floats]]]) -> None:
     """Free columns for every label after the first: only differences between labels are nuisances."""
     labels = [getattr(run, label) for run in bench.runs]
     for other in list(dict.fromkeys(labels))[1:]:

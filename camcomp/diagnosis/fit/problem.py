@@ -278,8 +278,8 @@ def _whiten(
     white, white_patterns, white_residual = [], [], []
     for k in range(len(bench.runs)):
         present = np.isfinite(inflate[k])
-        clean = lambda block, mask=present: np.where(mask[:, :, None], block, 0.0)
-        white.append(noise.rows(k, clean(columns.blocks[k]), inflate[k], times[k]))
+        clean = np.where(present[:, :, None], columns.blocks[k], 0.0)
+        white.append(noise.rows(k, clean, inflate[k], times[k]))
         white_patterns.append([noise.rows(k, w.blocks[k], inflate[k], times[k], w.first) for w in words])
         white_residual.append(noise.rows(k, residuals[k][:, :, None], inflate[k], times[k])[:, 0])
     return Problem(bench, columns, words, inflate, times, residuals, floor, noise, outliers, white, white_patterns,

@@ -281,4 +281,5 @@ def _temperature(problem: Problem, common: Floats) -> Floats | None:
     t = np.concatenate([c.started + c.time for c in courses])
     warm = np.concatenate([c.temperature for c in courses if c.temperature is not None])
     slope = np.polyfit(t - t.mean(), warm, 1)[0] if np.ptp(t) > 0 else 0.0
-    return warm[int(np.argmax(t))] + np.clip(slope * (common - t.max()), -_WARMS_K, _WARMS_K)
+    out: Floats | None = warm[int(np.argmax(t))] + np.clip(slope * (common - t.max()), -_WARMS_K, _WARMS_K)
+    return out

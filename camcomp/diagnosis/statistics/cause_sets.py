@@ -136,4 +136,5 @@ def pairs(scale: Scale, candidates: Sequence[int], most: int) -> list[tuple[floa
 def probabilities(fits: Sequence[Fitted], candidates: CausePrior, temperature: float = 1.0) -> Floats:
     """Posterior probability of every set among those fitted."""
     value = np.array([f.log_evidence / temperature + candidates.prior(f.members) for f in fits])
-    return np.exp(value - logsumexp(value))
+    out: Floats = np.exp(value - logsumexp(value))
+    return out

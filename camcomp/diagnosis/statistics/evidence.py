@@ -151,7 +151,8 @@ def log_bayes_pairs(at: Base, prior: Prior, first: Ints, second: Ints) -> Floats
         chance = log_ndtr(mid / np.sqrt(np.maximum(var, 1e-300))) + np.log(2.0)
         volume = volume + np.where(signs[:, k, None] > 0, chance, 0.0)
     value = fit + volume + _WEIGHTS[widths].sum(axis=1)
-    return logsumexp(np.where(good, value, -np.inf), axis=1)
+    out: Floats = logsumexp(np.where(good, value, -np.inf), axis=1)
+    return out
 
 
 def estimate(data: Gram, prior: Prior, members: Sequence[int], factor: float = 1.0) -> tuple[Floats, Floats]:

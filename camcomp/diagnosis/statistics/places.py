@@ -57,7 +57,8 @@ def actuators(runs: Sequence[RunGap], names: Sequence[str]) -> dict[str, float]:
 
 
 def _energy(run: RunGap) -> Floats:
-    return np.nansum(run.gap**2, axis=1)
+    out: Floats = np.nansum(run.gap**2, axis=1)
+    return out
 
 
 def _chance(run: RunGap, rows: Ints) -> float:

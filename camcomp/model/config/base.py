@@ -126,11 +126,13 @@ Zero = Field(default_factory=lambda: [0.0, 0.0, 0.0])
 
 def _axis(value: Any) -> str | list[float]:
     if value in get_args(AxisLetter):
-        return value
+        out: str | list[float] = value
+        return out
     numbers = isinstance(value, list) and all(type(each) in (int, float) and isfinite(each) for each in value)
     if not numbers or len(value) != 3 or not any(value):
         raise PydanticCustomError("CC205", "an axis is one of x, y, z, -x, -y, -z, or three numbers, not all zero")
-    return value
+    axis: str | list[float] = value
+    return axis
 
 
 _NUMBER_ARRAY = {"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItems": 3}

@@ -196,7 +196,8 @@ def params_of(member: Any) -> type[Spec]:
             each.name: (Annotated[float, Field(ge=each.low, le=each.high)], each.nominal) for each in member.PARAMETERS
         }
         return create_model("Parameters", __base__=Spec, **fields)
-    return member.Params
+    out: type[Spec] = member.Params
+    return out
 
 
 def _check_targets(config: Config) -> list[CamcompError]:

@@ -100,7 +100,8 @@ class EffectChoice(Choice):
     @property
     def values(self) -> dict[str, float]:
         """Every parameter of the effect by name; what the file leaves out has its nominal value."""
-        return self.params.model_dump(exclude={"source"})
+        out: dict[str, float] = self.params.model_dump(exclude={"source"})
+        return out
 
 
 class Process(Spec):

@@ -233,7 +233,8 @@ def child(node: Node, key: str | int) -> Node | None:
     if isinstance(node.value, dict):
         return node.value.get(key)
     if isinstance(node.value, list) and isinstance(key, int) and key < len(node.value):
-        return node.value[key]
+        out: Node | None = node.value[key]
+        return out
     return None
 
 

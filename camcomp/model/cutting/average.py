@@ -46,7 +46,8 @@ def linear_edge(
     x = c / 4 * (ktc * cos2 - krc * twice) - kte * sin1 + kre * cos1
     y = c / 4 * (ktc * twice + krc * cos2) - kte * cos1 - kre * sin1
     z = kac * c * cos1 - kae * turn
-    return (teeth * a / (2 * np.pi))[..., None] * np.stack([x, y, z], axis=-1)
+    out: Floats = (teeth * a / (2 * np.pi))[..., None] * np.stack([x, y, z], axis=-1)
+    return out
 
 
 def power_law(
@@ -70,7 +71,8 @@ def power_law(
     mixed = _span(lambda phi: np.abs(np.sin(phi)) ** (2 - mc), start, stop) / (2 - mc)
     single = sine_power(1 - mc, start, stop)
     law = np.stack([-mixed - radial * square, square - radial * mixed, -axial * single], axis=-1)
-    return (teeth * a * kc11 * c ** (1 - mc) / (2 * np.pi))[..., None] * law
+    out: Floats = (teeth * a * kc11 * c ** (1 - mc) / (2 * np.pi))[..., None] * law
+    return out
 
 
 def sine_power(power: float, start: ArrayLike, stop: ArrayLike) -> Floats:
@@ -82,7 +84,10 @@ def sine_power(power: float, start: ArrayLike, stop: ArrayLike) -> Floats:
     half = (power + 1) / 2
 
     def from_crest(phi: Floats) -> Floats:
-        return np.sign(phi - np.pi / 2) * beta(0.5, half) / 2 * betainc(0.5, half, np.minimum(np.cos(phi) ** 2, 1.0))
+        out: Floats = (
+            np.sign(phi - np.pi / 2) * beta(0.5, half) / 2 * betainc(0.5, half, np.minimum(np.cos(phi) ** 2, 1.0))
+        )
+        return out
 
     return _span(from_crest, start, stop)
 

@@ -25,7 +25,8 @@ def feed_per_tooth(cut: Cut) -> Floats:
         raise ConfigError("CC251", "the number of teeth of the tool is not known")
     _refuse("CC250", ~(np.abs(cut.speed) > 0), cut, "the tool cuts, but the spindle speed is zero or not known")
     _refuse("CC252", ~(cut.feed > 0), cut, "the tool cuts, but the feed is zero or not known")
-    return cut.feed * lateral(cut.tangent, cut.tool_axis) / (cut.teeth * np.abs(cut.speed))
+    out: Floats = cut.feed * lateral(cut.tangent, cut.tool_axis) / (cut.teeth * np.abs(cut.speed))
+    return out
 
 
 def axial_depth(cut: Cut) -> Floats:

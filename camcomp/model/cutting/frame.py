@@ -16,7 +16,8 @@ ALONG_SINE = 1e-6  # of the angle between feed and tool axis; below it the feed 
 def lateral(tangent: ArrayLike, tool_axis: ArrayLike) -> Floats:
     """Sine (n,) of the angle between the feed direction (n, 3) and the tool axis (3,); 1 for a level feed."""
     across = _across(np.asarray(tangent, float), np.asarray(tool_axis, float))
-    return np.linalg.norm(across, axis=-1)
+    out: Floats = np.linalg.norm(across, axis=-1)
+    return out
 
 
 def path_frame(tangent: ArrayLike, tool_axis: ArrayLike) -> tuple[Floats, Floats, Floats]:
@@ -33,13 +34,15 @@ def path_frame(tangent: ArrayLike, tool_axis: ArrayLike) -> tuple[Floats, Floats
 def to_vector(components: ArrayLike, tangent: ArrayLike, tool_axis: ArrayLike) -> Floats:
     """Vectors (n, 3) in the frame of the tangent from components (Fr, Ft, Fz) (n, 3), same unit."""
     frame = np.stack(path_frame(tangent, tool_axis), axis=1)
-    return np.einsum("ni,nij->nj", np.asarray(components, float), frame)
+    out: Floats = np.einsum("ni,nij->nj", np.asarray(components, float), frame)
+    return out
 
 
 def to_components(vectors: ArrayLike, tangent: ArrayLike, tool_axis: ArrayLike) -> Floats:
     """Components (Fr, Ft, Fz) (n, 3) of vectors (n, 3); the inverse of to_vector."""
     frame = np.stack(path_frame(tangent, tool_axis), axis=1)
-    return np.einsum("nij,nj->ni", frame, np.asarray(vectors, float))
+    out: Floats = np.einsum("nij,nj->ni", frame, np.asarray(vectors, float))
+    return out
 
 
 def _across(tangent: Floats, axis: Floats) -> Floats:

@@ -67,7 +67,8 @@ class Places:
         """Node values (q, ...) interpolated to the points (n, ...)."""
         flat = values.reshape(len(values), -1)
         out = np.einsum("nj,njc->nc", self.basis, flat[self.node])
-        return out.reshape(len(self.piece), *values.shape[1:])
+        found: Floats = out.reshape(len(self.piece), *values.shape[1:])
+        return found
 
 
 def cut(path: Path, motion: Ints, u0: Floats, u1: Floats, length: Floats) -> tuple[Ints, Floats, Floats]:

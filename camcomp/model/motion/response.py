@@ -148,7 +148,8 @@ def _tip_way(job: Job, tip: Floats, by: Floats) -> Floats:
         for axis in np.eye(3)
     ]  # fmt: skip
     way = np.einsum("nkm,nm->nk", np.linalg.pinv(np.stack(rates, axis=2)), by)
-    return way @ job.frame.rotation
+    out: Floats = way @ job.frame.rotation
+    return out
 
 
 def plays(job: Job, rho: Floats, travel: Travel) -> Bools:

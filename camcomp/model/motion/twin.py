@@ -48,7 +48,7 @@ class Reading:
 class Solved:
     """The structure at a run path's nodes, for the drive positions and loads it was solved with."""
 
-    key: tuple
+    key: tuple[Any, ...]
     shift: Floats  # (pieces, m) carriage minus set-point, piece by piece
     force: Floats  # (q, 3)
     wrench: Floats  # (q, 6)
@@ -208,7 +208,7 @@ class Twin:
         return signal_path.read(causes, Reading(tip, encoder, drive, load.force, rows), rows), solved
 
     def _node_load(
-        self, run_path: RunPath, grid: Motion, causes: Sequence[Cause], known: Solved | None, key: tuple
+        self, run_path: RunPath, grid: Motion, causes: Sequence[Cause], known: Solved | None, key: tuple[Any, ...]
     ) -> Load:
         """Load to solve the nodes with: that of the structure known so far where slopes may carry on from it.
 
@@ -229,7 +229,7 @@ class Twin:
         )
         return Load(known.force, known.wrench) if near and known.key == key else load
 
-    def structure(self, run_path: RunPath, machine: Machine, key: tuple, shift: Floats, load: Load) -> Solved:
+    def structure(self, run_path: RunPath, machine: Machine, key: tuple[Any, ...], shift: Floats, load: Load) -> Solved:
         """Loaded equilibrium at the nodes. Raises PhysicsError CC411 when a node cannot be solved."""
         node_piece = np.arange(len(run_path.node_tip)) // max(len(run_path.node_tip) // max(run_path.pieces, 1), 1)
         rho = run_path.node_rho + shift[node_piece]
@@ -263,7 +263,7 @@ class Twin:
 
     # -- pieces of the path -------------------------------------------------------------------------------------------
 
-    def _machine(self, robot: Robot, key: tuple) -> Machine:
+    def _machine(self, robot: Robot, key: tuple[Any, ...]) -> Machine:
         """The packed machine; runs of one experiment ask for the same one after each other."""
         if key not in self._machines:
             if len(self._machines) > 4:
@@ -377,4 +377,5 @@ def _piece_means(run_path: RunPath, gap: Floats) -> Floats:
 
 def _apply(slope: Floats, change: Floats) -> Floats:
     """Slopes (n, 3, k) times changes (n, k)."""
-    return np.einsum("nik,nk->ni", slope, change)
+    out: Floats = np.einsum("nik,nk->ni", slope, change)
+    return out

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camcomp.model.config import robot as spec
+from camcomp.model.config.links import Spring
 from camcomp.model.statics.arm import arm_of, end_pose
 from camcomp.model.statics.description import (
     Actuator,
@@ -34,7 +35,8 @@ def axis_vector(axis: str | list[float]) -> Array:
         out[_AXES[axis[-1]]] = -1.0 if axis.startswith("-") else 1.0
         return out
     vector = np.asarray(axis, float)
-    return vector / np.linalg.norm(vector)
+    found: Array = vector / np.linalg.norm(vector)
+    return found
 
 
 def rotation_of(vector_deg: list[float]) -> Array:
@@ -42,7 +44,7 @@ def rotation_of(vector_deg: list[float]) -> Array:
     return exp_rotation(np.radians(np.asarray(vector_deg, float)))
 
 
-def spring(given: spec.Spring) -> Link:
+def spring(given: Spring) -> Link:
     """A 6-dof spring in whichever notation it was given; a zero compliance means rigid in that direction."""
     if given.stiffness is not None:
         return Link(np.asarray(given.stiffness, float))
@@ -133,7 +135,8 @@ def held_orientation(robot: Robot, program: Array, turn_deg: float | None) -> Ar
     """
     if turn_deg is not None:
         c, s = np.cos(np.radians(turn_deg)), np.sin(np.radians(turn_deg))
-        return program @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        out: Array = program @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        return out
     z = program[:, 2]
     x = robot.start_rotation[:, 0] - z * (z @ robot.start_rotation[:, 0])
     if np.linalg.norm(x) < 0.1:  # the start pose's x axis points along the tool: its y axis decides instead

@@ -106,4 +106,5 @@ def direct(function: Callable[..., Any], args: tuple[Any, ...]) -> Callable[...,
     dispatcher: Any = getattr(function, "dispatcher", None)
     if dispatcher is None:
         return function
-    return dispatcher.overloads[tuple(map(dispatcher.typeof_pyval, args))].entry_point
+    out: Callable[..., Any] = dispatcher.overloads[tuple(map(dispatcher.typeof_pyval, args))].entry_point
+    return out

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from camcomp.model.statics.arm import NEAR_SINGULAR, arm_of, dexterity
 from camcomp.model.statics.machine import Machine
-from camcomp.model.statics.point import MAX_ITERATIONS, SINGULAR
+from camcomp.model.statics.rigid import MAX_ITERATIONS, SINGULAR
 from camcomp.model.statics.solve import FREE, HOLD, POSE, TARGET, State, solve
 
 Array = NDArray[np.float64]
