@@ -2,7 +2,8 @@
 
 The YAML name is the file name. A user's own plug-in is announced in the entry-point group `camcomp.<shelf>`. It is held
 against its contract (camcomp/plugins) when it is loaded: one that a run names is refused with CC280, one that is merely
-there is left out with a warning. camcomp's own are held against it by tests, so that starting stays fast.
+there is left out with a warning. camcomp's own are held against it by tests, and what serves users' ones alone is
+imported when there is one, so that starting stays fast.
 """
 
 import sys
@@ -16,9 +17,7 @@ from pathlib import Path
 from pkgutil import iter_modules
 from typing import Any
 
-from camcomp.ground.blame import blamed, place_of
 from camcomp.ground.errors import ConfigError, Location, PluginWarning
-from camcomp.ground.old_names import keep_old_names
 
 SHELVES = ("robots", "dialects", "forces", "effects")
 
@@ -109,10 +108,15 @@ def blaming(shelf: str, name: str) -> AbstractContextManager[None]:
     """Inside it errors are the member's fault: CC281 for a user's own; those of camcomp's own stay what they are."""
     if name in _own(shelf):
         return nullcontext()
+    from camcomp.ground.blame import blamed
+
     return blamed(next((_who(shelf, each) for each in _announced(shelf) if each.name == name), name))
 
 
 def _load(shelf: str, announced: EntryPoint) -> Any:
+    from camcomp.ground.blame import place_of
+    from camcomp.ground.old_names import keep_old_names
+
     keep_old_names()
     who, key = _who(shelf, announced), (shelf, announced.name)
     try:
