@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext, redirect_stdout
 from difflib import get_close_matches
 from importlib import import_module
-from importlib.metadata import EntryPoint, distributions, entry_points
+from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from pkgutil import iter_modules
 from typing import Any
@@ -30,18 +30,8 @@ def _own(shelf: str) -> list[str]:
 
 
 def _announced(shelf: str) -> list[EntryPoint]:
-    """Entry points of users' plug-ins. One package whose list cannot be read does not hide those of the others."""
-    group = f"camcomp.{shelf}"
-    try:
-        return list(entry_points(group=group))
-    except Exception:  # noqa: BLE001 - whatever a torn list makes of it
-        found = []
-        for package in distributions():
-            try:
-                found += [each for each in package.entry_points if each.group == group]
-            except Exception as error:  # noqa: BLE001
-                warn_left_out(f"the entry points of the package {package.name}: {type(error).__name__}: {error}")
-        return found
+    """Entry points of users' plug-ins."""
+    return list(entry_points(group=f"camcomp.{shelf}"))
 
 
 def is_own(shelf: str, name: str) -> bool:

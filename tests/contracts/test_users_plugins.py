@@ -174,16 +174,6 @@ def test_two_packages_with_one_name(put, tmp_path):
     assert caught.value.rule == "CC280" and f"our-{name}_2" in caught.value.message
 
 
-@pytest.mark.parametrize("text", [b"[camcomp.effects]\nnonsense\n", b"[camcomp.effects]\nx = \xff\n"])
-def test_a_broken_list_of_entry_points(put, text, tmp_path, capsys):
-    name = put("effects", EFFECT)
-    install(tmp_path / "site", "effects", "torn", EFFECT)
-    (tmp_path / "site/our_torn-1.0.dist-info/entry_points.txt").write_bytes(text)
-    assert run(["effects"]) == 0
-    out, said = capsys.readouterr()
-    assert name in out and "entry points of the package our-torn" in said and said.count("warning") == 1
-
-
 def test_a_shipped_name_cannot_be_taken(put, tmp_path):
     install(tmp_path / "site", "effects", "backlash", EFFECT, module=next(names))
     with pytest.warns(PluginWarning, match="'backlash'.* belongs to camcomp's own"):
