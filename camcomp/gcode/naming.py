@@ -30,7 +30,10 @@ def name_of(word: str) -> str:
 
 
 def modal_group_of(word: str) -> int | None:
-    """Modal group of a code as pygcode has it, in the numbering of RS274/NGC; None: not modal, or not known."""
+    """Modal group of a code as pygcode has it, in the numbering of RS274/NGC; None: not modal, or not known.
+
+    For the test that holds the own table of groups against it.
+    """
     found = _class_of(word)
     return getattr(found, "modal_group", None)
 

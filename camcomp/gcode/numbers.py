@@ -2,8 +2,6 @@
 
 import math
 
-MM_PER_INCH = 25.4
-
 
 def decimals(resolution_mm: float, unit_mm: float) -> int:
     """Digits after the point so that one step of the last digit is not coarser than `resolution_mm`."""

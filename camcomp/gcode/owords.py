@@ -43,7 +43,6 @@ class OWords(Subprograms):
         self._statements: dict[int, Statement] = {}
         self._subs: dict[str, int] = {}
         self._partner: dict[int, int] = {}  # loop start -> end, if -> next branch, sub -> endsub, and loop end -> start
-        self._open_end: dict[int, int] = {}  # if branch -> endif
         self._calls: list[Call] = []
         self._repeats: dict[tuple[int, int], int] = {}  # (depth, row of repeat) -> passes left
         self._taken: set[tuple[int, int]] = set()  # (depth, row of endif) whose branch was executed

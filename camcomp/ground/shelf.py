@@ -2,7 +2,8 @@
 
 The YAML name is the file name. A user's own plug-in is announced in the entry-point group `camcomp.<shelf>`. It is held
 against its contract (camcomp/plugins) when it is loaded: one that a run names is refused with CC280, one that is merely
-there is left out with a warning. camcomp's own are held against it by tests, so that starting stays fast.
+there is left out with a warning. camcomp's own are held against it by tests, and what serves users' ones alone is
+imported when there is one, so that starting stays fast.
 """
 
 import sys
@@ -11,14 +12,12 @@ from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext, redirect_stdout
 from difflib import get_close_matches
 from importlib import import_module
-from importlib.metadata import EntryPoint, distributions, entry_points
+from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from pkgutil import iter_modules
 from typing import Any
 
-from camcomp.ground.blame import blamed, place_of
 from camcomp.ground.errors import ConfigError, Location, PluginWarning
-from camcomp.ground.old_names import keep_old_names
 
 SHELVES = ("robots", "dialects", "forces", "effects")
 
@@ -31,18 +30,8 @@ def _own(shelf: str) -> list[str]:
 
 
 def _announced(shelf: str) -> list[EntryPoint]:
-    """Entry points of users' plug-ins. One package whose list cannot be read does not hide those of the others."""
-    group = f"camcomp.{shelf}"
-    try:
-        return list(entry_points(group=group))
-    except Exception:  # noqa: BLE001 - whatever a torn list makes of it
-        found = []
-        for package in distributions():
-            try:
-                found += [each for each in package.entry_points if each.group == group]
-            except Exception as error:  # noqa: BLE001
-                warn_left_out(f"the entry points of the package {package.name}: {type(error).__name__}: {error}")
-        return found
+    """Entry points of users' plug-ins."""
+    return list(entry_points(group=f"camcomp.{shelf}"))
 
 
 def is_own(shelf: str, name: str) -> bool:
@@ -109,10 +98,15 @@ def blaming(shelf: str, name: str) -> AbstractContextManager[None]:
     """Inside it errors are the member's fault: CC281 for a user's own; those of camcomp's own stay what they are."""
     if name in _own(shelf):
         return nullcontext()
+    from camcomp.ground.blame import blamed
+
     return blamed(next((_who(shelf, each) for each in _announced(shelf) if each.name == name), name))
 
 
 def _load(shelf: str, announced: EntryPoint) -> Any:
+    from camcomp.ground.blame import place_of
+    from camcomp.ground.old_names import keep_old_names
+
     keep_old_names()
     who, key = _who(shelf, announced), (shelf, announced.name)
     try:

@@ -12,7 +12,8 @@ import numpy as np
 from camcomp.ground.datatypes import Floats
 from camcomp.ground.errors import ConfigError
 from camcomp.model.config.load import params_of
-from camcomp.model.effect import STAGES, Load, Motion, Parameter, Target, nominal
+from camcomp.model.effect import Load, Motion, Parameter, Target, nominal
+from camcomp.model.signal_path import STAGES
 from camcomp.model.statics.description import Robot
 from camcomp.plugins.contract import (
     check_functions,

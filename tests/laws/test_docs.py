@@ -5,6 +5,7 @@ import shutil
 
 import pytest
 
+from camcomp import __version__
 from camcomp.ground import shelf
 from camcomp.terminal import reference
 from camcomp.terminal.cli import VERBS
@@ -60,8 +61,52 @@ def test_the_readme_is_followed(reader):
         )
 
 
+CONTRIBUTING = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+
+
+def test_contributing_tells_the_checks_that_are_run():
+    """What takes minutes is compared with what runs it; the rest is done below."""
+    told = [step.text for step in steps(CONTRIBUTING)]
+    ci = (ROOT / ".ci/run").read_text(encoding="utf-8")
+    done_anyway = (".ci/run", "venv", "camcomp schema", "camcomp.terminal.reference", "git tag", "hatchling build")
+    rest = [each for each in told if not any(part in each for part in done_anyway)]
+    assert len(rest) == 4 and all(each in ci for each in rest)
+    assert ".ci/run" in told and all("-e '.[dev]'" in each for each in (README, CONTRIBUTING, ci))
+
+
+def test_schemas_are_made_as_contributing_says(reader):
+    (reader.folder / "config").mkdir()
+    for step in steps(CONTRIBUTING):
+        if step.text.startswith("camcomp schema"):
+            reader.give(step)
+    made = sorted(path.name for path in (reader.folder / "config").iterdir())
+    assert made == ["camcomp-experiment.schema.json", "camcomp.schema.json"]
+    for name in made:
+        assert (reader.folder / "config" / name).read_text() == (ROOT / "config" / name).read_text()
+
+
+def test_paths_in_contributing_are_there():
+    for path in re.findall(r"`((?:camcomp|tests|config|samples|\.ci|CHANGELOG)[\w./-]*)`", CONTRIBUTING):
+        assert (ROOT / path).exists(), path
+
+
+def test_the_changelog_is_in_form():
+    """Unreleased, then releases from new to old with their days; the version of the package has a section or is none yet."""
+    text = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    heads = re.findall(r"^## (.*)$", text, re.MULTILINE)
+    assert heads[0] == "Unreleased" and len(heads) > 1
+    releases = [re.fullmatch(r"(\d+)\.(\d+)\.(\d+) - (\d{4}-\d\d-\d\d)", each) for each in heads[1:]]
+    assert all(releases)
+    order = [(tuple(map(int, each.groups()[:3])), each[4]) for each in releases]
+    assert order == sorted(order, reverse=True)
+    assert set(re.findall(r"^### (.*)$", text, re.MULTILINE)) <= {"Added", "Changed", "Fixed", "Removed"}
+    lines = [line for line in text.splitlines()[1:] if line and not line.startswith("#")]
+    assert all(line.startswith(("- ", "  ", "What a user sees")) for line in lines)
+    assert "dev" in __version__ or f"{__version__} - " in "".join(heads[1:])
+
+
 def test_links_of_documents_lead_somewhere():
-    for path in (ROOT / "README.md", *(ROOT / "samples").rglob("*.md")):
+    for path in (ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(ROOT / "samples").rglob("*.md")):
         for target in re.findall(r"\]\(([^)#]+)[^)]*\)", path.read_text(encoding="utf-8")):
             if "://" not in target:
                 assert (path.parent / target).exists(), f"{path.name}: {target}"
@@ -75,7 +120,7 @@ def test_the_readme_knows_every_command():
 @pytest.mark.parametrize("name", sorted(reference.pages()))
 def test_reference_pages_are_up_to_date(name):
     assert (reference.FOLDER / name).read_text(encoding="utf-8") == reference.pages()[name], (
-        "run `python -m camcomp.reference`"
+        "run `python -m camcomp.terminal.reference`"
     )
 
 

@@ -22,6 +22,15 @@ def test_every_id_explained_is_used():
     assert set(RULES) - used() == set()
 
 
+def test_every_id_is_met_by_a_test():
+    """By its name, in a test or in one of the programs that tests read."""
+    texts = [
+        path.read_bytes() for path in (PACKAGE.parent / "tests").rglob("*") if path.suffix != ".pyc" and path.is_file()
+    ]
+    met = {rule.decode() for text in texts for rule in re.findall(rb"CC\d{3}", text)}
+    assert set(RULES) - met == set()
+
+
 def test_every_rule_says_something_and_stands_in_order():
     assert list(RULES) == sorted(RULES)
     for rule, text in RULES.items():

@@ -32,9 +32,6 @@ class Measured:
         return Measured(**{each: getattr(self, each)[rows] for each in self.__dataclass_fields__})
 
 
-STAGE_OF_CHANNEL = {"tip": "structure", "encoder": "control", "drive": "structure", "dyno": "process"}
-
-
 def channel_names(actuators: tuple[str, ...]) -> tuple[str, ...]:
     """Names of the residual channels in their order: tip, encoders, drive forces, dynamometer."""
     tips = ("tip_x", "tip_y", "tip_z")

@@ -32,6 +32,8 @@ class SlotFit:
 def fit_slot(chip: ArrayLike, force: ArrayLike, *, depth_mm: float, teeth: int, clockwise: bool = True) -> SlotFit:
     """Least squares of mean slot forces on the tool, (Fr, Ft, Fz) (k, 3) in N, over the feed per tooth (k,) in mm.
 
+    No command calls it: it is for those who measured and write their own YAML.
+
     A dynamometer under the work measures the opposite force: change all signs first. Raises ConfigError CC265 when
     there are fewer than two different feeds, or numbers that are not finite or not positive.
     """

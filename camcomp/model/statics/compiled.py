@@ -1,7 +1,7 @@
 """How the solver's functions are compiled, and how their cache on disk knows that it is out of date.
 
 Only the entry functions, those that Python calls, are cached; what they call is compiled into them. The cache knows the
-entry's own file, so a digest of all kernel sources is added to what it compares.
+entry's own file, so a digest of all files that functions and constants come from is added to what it compares.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 import functools
 import gc
 import hashlib
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -16,17 +17,46 @@ from typing import Any
 import numba
 from numba.core.types import unliteral
 
-KERNEL_FILES = ("compiled", "layout", "vectors", "kernel", "chain", "rigid", "point", "sweep", "gradients")
 # Nothing is allocated, raised or handed to Python inside: what numba would build for that costs time to compile.
 _OPTIONS = {"nogil": True, "error_model": "numpy", "_nrt": False, "no_cfunc_wrapper": True}
 _numba: Any = numba  # its annotations leave out what it has
 
 
+ROOT = Path(__file__).parents[3]  # of the package
+_IMPORT = re.compile(r"^(?:from (camcomp[\w.]*) import (\([^)]*\)|.*)|import (camcomp[\w.]*))", re.MULTILINE)
+
+
 @functools.cache
-def digest() -> str:
-    """Digest of all kernel sources."""
-    folder = Path(__file__).parent
-    return hashlib.sha256(b"".join((folder / f"{name}.py").read_bytes() for name in KERNEL_FILES)).hexdigest()
+def sources(file: Path) -> frozenset[Path]:
+    """Files of camcomp from which a kernel's file takes functions or constants, by whatever way, itself included.
+
+    All of it becomes part of the machine code: a constant as its value, a function as its instructions.
+    """
+    found, open_files = set(), [file]
+    while open_files:
+        each = open_files.pop()
+        if each not in found:
+            found.add(each)
+            open_files += _imported(each)
+    return frozenset(found)
+
+
+@functools.cache
+def _imported(file: Path) -> tuple[Path, ...]:
+    """Files of camcomp that a file imports when it is itself imported."""
+    found = []
+    for module, names, alone in _IMPORT.findall(file.read_text(encoding="utf-8")):
+        place = ROOT.joinpath(*(module or alone).split("."))
+        below = [place / name for name in re.findall(r"\w+", names)]
+        for each in (place, *below):
+            found += [path for path in (each.with_suffix(".py"), each / "__init__.py") if path.is_file()]
+    return tuple(found)
+
+
+@functools.cache
+def digest(file: Path) -> str:
+    """Digest of the sources of a kernel's file."""
+    return hashlib.sha256(b"".join(each.read_bytes() for each in sorted(sources(file)))).hexdigest()
 
 
 def inner(function: Callable[..., Any], *, fastmath: bool = False) -> Any:
@@ -68,7 +98,7 @@ def _load_lightly(cache: Any) -> None:
 
 
 def entry(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Compiles a function that Python calls, cached on disk for as long as no kernel source changes.
+    """Compiles a function that Python calls, cached on disk for as long as nothing changes that goes into it.
 
     Where nothing can be cached it is compiled anew in every process. While compiling, the search for
     unreachable objects rests: it takes a sixth of the time and finds nothing.
@@ -79,7 +109,7 @@ def entry(function: Callable[..., Any]) -> Callable[..., Any]:
 
     dispatcher = kept(function, **_OPTIONS)
     if (file := getattr(dispatcher._cache, "_cache_file", None)) is not None:
-        file._source_stamp = (file._source_stamp, digest())
+        file._source_stamp = (file._source_stamp, digest(Path(function.__code__.co_filename)))
         _load_lightly(dispatcher._cache)
 
     @functools.wraps(function)

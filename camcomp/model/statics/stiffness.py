@@ -99,7 +99,10 @@ def tip_compliance(machine: Machine, state: State) -> Array:
 
 
 def chain_shifts(machine: Machine, tips: Array) -> Array:
-    """Shift (n, c, 6) of every free chain's end by its own geometric error at tips (n, 3): eps_i of eq. (6)."""
+    """Shift (n, c, 6) of every free chain's end by its own geometric error at tips (n, 3): eps_i of eq. (6).
+
+    With assembly_shift what the paper computes to first order; the product solves the whole, and tests compare them.
+    """
     perfect = build_machine(machine.nominal, machine.nominal)
     state = solve(perfect, FREE, tips, check=False, keep=True)
     ends = []

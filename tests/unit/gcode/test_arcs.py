@@ -97,3 +97,7 @@ def test_parts_of_a_helix():
     first, second = divide([5.0, 0.0, 0.0], move, 17, 2)
     assert first.end == pytest.approx([5 / 2**0.5, 5 / 2**0.5, 2.0])
     assert second.end == [0.0, 5.0, 4.0]
+
+
+def test_a_radius_a_little_longer_than_half_the_chord_puts_the_centre_beside_it():
+    assert centre_of_radius((0.0, 0.0), (2.0, 0.0), 1.005, True) == pytest.approx((1.0, (1.005**2 - 1.0) ** 0.5))

@@ -207,3 +207,10 @@ def test_a_program_without_motions_passes_and_one_without_statements_does_not():
         with pytest.raises(ProgramError) as caught:
             read_program(nothing, name="in.nc")
         assert caught.value.rule == "CC100"
+
+
+def test_an_offset_stated_where_the_tool_stands_keeps_decimals_that_the_resolution_has_not():
+    """The program stands at X10.0004, the corrected one, in micrometres, at X10.5; what follows must not move by 0.4 um."""
+    text = "G0 X0 Y0 Z0\nG1 X10.0004 F100\nG92 X0\nG1 X5\n"
+    rows = [START, (1, LINE, (10.5, 0, 0)), (2, LINE, (15.0004, 0, 0))]
+    assert written(text, rows)[2] == "G92 X0.4996"

@@ -61,3 +61,11 @@ def test_rows_of_foreign_lines_are_told():
     timeline = schedule(lines([[0, 0, 0], [20, 0, 0]], 600.0), 1500.0)
     t = np.linspace(0, 1, 10)
     assert not fit_to_log(timeline, t, np.full(10, 99.0)).rows.any()
+
+
+def test_a_tenth_of_a_second_late_is_not_as_expected():
+    path = lines([[0, 0, 0], [20, 0, 0], [20, 20, 0]], 600.0)
+    timeline = schedule(path, 1500.0)
+    t = np.arange(0.0, timeline.end + 0.1, 0.01)
+    fit = fit_to_log(timeline, t, np.where(t < timeline.start[1] + 0.1, 10.0, 11.0))
+    assert not fit.as_expected and fit.off_s == pytest.approx(0.1, abs=0.011)
