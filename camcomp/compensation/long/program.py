@@ -60,7 +60,6 @@ class Bulk:
             rest = block[-LINE_OF_STAMP:]
         source.seek(0)
         self._carry = Carry(np.array(self.setup.start_mm, float), np.array(self.setup.start_mm, float))
-        self._corrector = PlainCorrector(self.job, self.tolerance_um)
         self._told: Future[None] = Future()
         self._told.set_result(None)
         self.totals = Totals(self.job, digest.hexdigest(), size)
@@ -68,6 +67,7 @@ class Bulk:
         self._runs = Runs(
             source, self.name, self.setup, self.job.config.control.dialect, np.nan if top is None else top
         )
+        self._corrector = PlainCorrector(self.job, self.tolerance_um, self._runs.language, self._runs.feed_point)
         self._stamp: str | None = f"camcomp {self.version} sha256:{digest.hexdigest()}"
         with ThreadPoolExecutor(1) as self._beside:
             for data in self._pieces():
