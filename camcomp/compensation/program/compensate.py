@@ -47,6 +47,7 @@ class Compensated:
     uncorrected: Floats  # (N, 3) loaded tip of the original program, program frame
     before: Floats  # errors (k, 3) mm of the original program along feed motions
     after: Floats  # errors (k, 3) mm of the corrected program along feed motions
+    judged: Ints  # (k,) end point to which the move leads on which an error was found
     iterations: int
     method: str
     without_spindle: Ints  # source lines that cut while the spindle stands
@@ -135,7 +136,12 @@ def compensate(
             program, job, track, nodes, commanded, kept, circles, begins=part is None or part.first == 0
         )
         written = rewrite(
-            program, output_of(path, rows), resolution_mm=job.config.control.resolution_mm, version=version, part=part
+            program,
+            output_of(path, rows),
+            resolution_mm=job.config.control.resolution_mm,
+            version=version,
+            part=part,
+            model=job.fingerprint,
         )
         points = judged_points(job, track, rows, feeding)
         after = see(job, points, written.end, replace(rows.arcs, centre=written.centre))
@@ -246,4 +252,4 @@ def _assemble(
     warnings += check_posture(program, job, program.path.line[rows.motion], target, nominal)
     state = after.state if method == "linear" else whole_pose(job, rows.corrected, target, force, after.state)
     return Compensated(program, written, rows, s, t, nominal, state, before.tip, before.error[points.judged],
-                       after.error[points.judged], iterations, method, still, warnings)  # fmt: skip
+                       after.error[points.judged], points.row[points.judged], iterations, method, still, warnings)  # fmt: skip
