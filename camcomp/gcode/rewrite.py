@@ -23,20 +23,20 @@ from camcomp.ground.errors import ProgramError
 
 
 def rewrite(
-    program: Program, out: Output, *, resolution_mm: float, version: str, part: Part | None = None
+    program: Program, out: Output, *, resolution_mm: float, version: str, part: Part | None = None, model: str = ""
 ) -> Rewritten:
     """The program with the moves of `out`, rounded to `resolution_mm`, and stamped.
 
     A motion with one row that ends where it was programmed (within half a resolution) keeps its bytes, as do moves in
     machine coordinates and moves before X, Y and Z are all known. Raises ProgramError CC137 where a line does too much
-    at once to be written anew. part: only these motions are written, and there is no stamp.
+    at once to be written anew. model: hash of machine and process. part: only these motions are written, and there is no stamp.
     """
     if part is not None:
         writer = Writer(program, out, resolution_mm)
         behind = writer.run_part(part)
         data = program.text.encode(writer.edits.apply(program.text.string))
         return Rewritten(data=data, end=writer.ends, line=writer.lines + 1, centre=writer.centres, behind=behind)
-    stamp = stamp_line(program.data, version, *program.language.comment)
+    stamp = stamp_line(program.data, version, *program.language.comment, model)
     if out.repeats(program.path, resolution_mm):
         data = _stamped(program.text, Edits(), stamp)
         line = program.path.line[out.motion] + 1
@@ -158,7 +158,7 @@ class Writer(LineEditor):
         if kind == ARC:
             plane = int(self.sites.plane[self.k])
             end = self._landing(moves[0].end, new)
-            moves = plan(self.position, moves[0], end, plane, self.resolution, self.unit, self.turns)
+            moves = plan(self.position, moves[0], end, plane, self.step, self.unit, self.turns)
             if moves[-1].kind == ARC:
                 self.centres[row] = self._centre_said(moves[0])
         at_line = 0

@@ -6,6 +6,7 @@ import re
 from camcomp.gcode.text import Text
 
 _STAMP = re.compile(rb"(?:^|[\r\n])[ \t]*[(;][ \t]*camcomp [0-9][^ )]* sha256:[0-9a-f]{64}(?![0-9a-f])")
+_MODEL = re.compile(_STAMP.pattern + rb" model:([0-9a-f]{16})")
 _MARKS = (b"\xef\xbb\xbf", b"\xff\xfe", b"\xfe\xff")
 
 
@@ -17,9 +18,20 @@ def is_stamped(data: bytes) -> bool:
     return _STAMP.search(data.replace(b"\0", b"")) is not None
 
 
-def stamp_line(data: bytes, version: str, opening: str = "(", closing: str = ")") -> str:
-    """The comment that names camcomp, its version and the hash of the input."""
-    return f"{opening}camcomp {version} sha256:{hashlib.sha256(data).hexdigest()}{closing}"
+def stamp_line(data: bytes, version: str, opening: str = "(", closing: str = ")", model: str = "") -> str:
+    """The comment that names camcomp, its version, the hash of the input, and that of machine and process if given."""
+    return opening + stamp_text(hashlib.sha256(data).hexdigest(), version, model) + closing
+
+
+def stamp_text(digest: str, version: str, model: str = "") -> str:
+    """What the comment says."""
+    return f"camcomp {version} sha256:{digest}" + (f" model:{model}" if model else "")
+
+
+def stamped_model(data: bytes) -> str | None:
+    """The hash of machine and process in a stamp; None where there is none."""
+    found = _MODEL.search(data.replace(b"\0", b""))
+    return found[1].decode() if found else None
 
 
 def stamp_index(text: Text) -> int:

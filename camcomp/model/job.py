@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -47,6 +50,15 @@ class Job:
     """What the stories need from a Config."""
 
     config: Config
+
+    @cached_property
+    def fingerprint(self) -> str:
+        """16 hex digits that change with the machine, the tool, the workpiece's place, the process and the effects.
+
+        Files that a section names count by their content, remarks about sources do not.
+        """
+        parts = self.config.model_dump(mode="json", include={"robot", "workpiece", "tool", "process", "effects"})
+        return hashlib.sha256(json.dumps(_bare(parts), sort_keys=True).encode()).hexdigest()[:16]
 
     @cached_property
     def frame(self) -> Frame:
@@ -121,6 +133,17 @@ class Job:
             teeth=c.tool.teeth,
             to_machine=self.frame.rotation,
         )
+
+
+def _bare(value: Any) -> Any:
+    """What counts of a section: no remarks, and files by their content."""
+    if isinstance(value, dict):
+        return {key: _bare(each) for key, each in value.items() if key != "source"}
+    if isinstance(value, list):
+        return [_bare(each) for each in value]
+    if isinstance(value, str) and Path(value).is_absolute() and Path(value).is_file():
+        return hashlib.sha256(Path(value).read_bytes()).hexdigest()
+    return value
 
 
 def _call(force: Callable[[Cut, Any], Floats], params: Any, place: Location | None, cut: Cut) -> Floats:

@@ -24,7 +24,7 @@ from camcomp.compensation.program.compensate import compensate
 from camcomp.compensation.program.moves import MOST_ERRORS, RULE_OF_STATUS
 from camcomp.gcode.output import Part
 from camcomp.gcode.setup import Setup
-from camcomp.gcode.stamp import is_stamped, stamp_index
+from camcomp.gcode.stamp import is_stamped, stamp_index, stamp_text
 from camcomp.gcode.text import Text
 from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import LINE, RAPID
@@ -60,7 +60,6 @@ class Bulk:
             rest = block[-LINE_OF_STAMP:]
         source.seek(0)
         self._carry = Carry(np.array(self.setup.start_mm, float), np.array(self.setup.start_mm, float))
-        self._corrector = PlainCorrector(self.job, self.tolerance_um)
         self._told: Future[None] = Future()
         self._told.set_result(None)
         self.totals = Totals(self.job, digest.hexdigest(), size)
@@ -68,7 +67,8 @@ class Bulk:
         self._runs = Runs(
             source, self.name, self.setup, self.job.config.control.dialect, np.nan if top is None else top
         )
-        self._stamp: str | None = f"camcomp {self.version} sha256:{digest.hexdigest()}"
+        self._corrector = PlainCorrector(self.job, self.tolerance_um, self._runs.language, self._runs.feed_point)
+        self._stamp: str | None = stamp_text(digest.hexdigest(), self.version, self.job.fingerprint)
         with ThreadPoolExecutor(1) as self._beside:
             for data in self._pieces():
                 self.totals.lines_out += data.count(b"\n")

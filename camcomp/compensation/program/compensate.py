@@ -15,7 +15,7 @@ from camcomp.compensation.program.arcs_out import Arcs, Bend
 from camcomp.compensation.program.chords import Nodes, second_derivative, trial_nodes
 from camcomp.compensation.program.corrected_rows import CorrectedRows, corrected_rows, output_of
 from camcomp.compensation.program.judged_points import JudgedPoints, Seen, judged_points, see, see_original
-from camcomp.compensation.program.moves import WITHIN_RAPID, corrected_pieces, refuse_unsolved, travel_of
+from camcomp.compensation.program.moves import WITHIN_RAPID, chord_budget, corrected_pieces, refuse_unsolved, travel_of
 from camcomp.compensation.program.posture import check_posture, whole_pose
 from camcomp.compensation.program.reversals import cut_at_reversals
 from camcomp.gcode.output import Part, Rewritten
@@ -47,6 +47,7 @@ class Compensated:
     uncorrected: Floats  # (N, 3) loaded tip of the original program, program frame
     before: Floats  # errors (k, 3) mm of the original program along feed motions
     after: Floats  # errors (k, 3) mm of the corrected program along feed motions
+    judged: Ints  # (k,) end point to which the move leads on which an error was found
     iterations: int
     method: str
     without_spindle: Ints  # source lines that cut while the spindle stands
@@ -104,15 +105,14 @@ def compensate(
     part: the motions to be corrected and written, when the program is a part of a longer one. The others are only there
     because their neighbours depend on them: they are not divided, and their errors do not count.
     """
-    path, resolution = program.path, job.config.control.resolution_mm
+    path, resolution = program.path, program.step_mm(job.config.control.resolution_mm)
     spacing = FINE_MM if job.causes else COARSE_MM  # a screw's error has waves of a few mm
     track, turning = cut_at_reversals(job, lay_track(path, job.conditions), spacing)
     corrected = corrected_pieces(path, track)
     feeding = corrected & (path.kind[track.motion] != RAPID)
     if part is not None:
         feeding &= (track.motion >= part.first) & (track.motion < part.last)
-    rounding = 0.5 * np.sqrt(3.0) * resolution
-    budget = max(1e-3 * tolerance_um - rounding, 0.1e-3 * tolerance_um)
+    budget = chord_budget(tolerance_um, resolution)
     tolerance = np.full(len(track.motion), budget)
 
     trial = trial_nodes(track.length, track.angle, feeding & ~turning & (track.length > 0.0), spacing)
@@ -135,7 +135,14 @@ def compensate(
         rows = corrected_rows(
             program, job, track, nodes, commanded, kept, circles, begins=part is None or part.first == 0
         )
-        written = rewrite(program, output_of(path, rows), resolution_mm=resolution, version=version, part=part)
+        written = rewrite(
+            program,
+            output_of(path, rows),
+            resolution_mm=job.config.control.resolution_mm,
+            version=version,
+            part=part,
+            model=job.fingerprint,
+        )
         points = judged_points(job, track, rows, feeding)
         after = see(job, points, written.end, replace(rows.arcs, centre=written.centre))
         worst = np.zeros(len(tolerance))
@@ -198,7 +205,7 @@ def _bent(
     to = np.flatnonzero((np.diff(nodes.piece, prepend=-1) == 0) & bend.use[nodes.piece])
     if len(to):
         motion = track.motion[nodes.piece[to]]
-        flat = arcs_out.FLATTEST * job.config.control.resolution_mm
+        flat = arcs_out.FLATTEST * program.step_mm(job.config.control.resolution_mm)
         found, wrong = arcs_out.through(
             commanded[to - 1], solved[middle], commanded[to], track.path.axis[motion], track.path.angle[motion], flat
         )
@@ -246,4 +253,4 @@ def _assemble(
     warnings += check_posture(program, job, program.path.line[rows.motion], target, nominal)
     state = after.state if method == "linear" else whole_pose(job, rows.corrected, target, force, after.state)
     return Compensated(program, written, rows, s, t, nominal, state, before.tip, before.error[points.judged],
-                       after.error[points.judged], iterations, method, still, warnings)  # fmt: skip
+                       after.error[points.judged], points.row[points.judged], iterations, method, still, warnings)  # fmt: skip

@@ -53,7 +53,7 @@ def corrected_rows(
     start, stop = commanded[nodes.first[:-1]], commanded[nodes.first[1:] - 1]
     before = path.start[:1] if begins else start[:1]
     step = np.linalg.norm(start - np.concatenate((before, stop[:-1])), axis=1)
-    layout = row_layout(path, track, step, job.config.control.resolution_mm)
+    layout = row_layout(path, track, step, program.step_mm(job.config.control.resolution_mm))
     corrected, leading, trailing = layout.corrected, layout.leading, layout.trailing
     keep = (k > 0) | leading[nodes.piece]
     extra = np.flatnonzero(trailing)

@@ -76,4 +76,5 @@ class Verification(Result):
     residual: ErrorSize
     points: Annotated[int, Field(description="looked at along the feed moves")]
     joining_lines: int
+    warnings: list[str]
     lines: tuple[LineResult, ...]

@@ -7,15 +7,15 @@ not counted.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from camcomp.compensation.program.chords import trial_nodes
+from camcomp.compensation.program.matching import match_moves
 from camcomp.compensation.program.moves import (
     WITHIN_RAPID,
-    Layout,
     corrected_pieces,
     refuse_unsolved,
     row_layout,
@@ -23,10 +23,9 @@ from camcomp.compensation.program.moves import (
 )
 from camcomp.compensation.program.result import ErrorSize, LineResult, Verification
 from camcomp.gcode.program import Program
-from camcomp.gcode.stamp import is_stamped
+from camcomp.gcode.stamp import is_stamped, stamped_model
 from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import ARC, RAPID, Bools, Floats, Ints, Path
-from camcomp.ground.errors import CheckFailed
 from camcomp.model.cutting.track import Track, lay_track
 from camcomp.model.job import Job
 from camcomp.model.motion.response import aim_at, respond
@@ -38,7 +37,6 @@ ALONG = 180  # sections of a piece to measure the path that ought to be commande
 UNEVEN = 0.02  # change of a piece's length by the correction from which that is worth while
 PROBE_MM = 1e-4  # fraction of a piece
 LARGEST_GAP_MM = 0.05  # of a piece, in one pass
-NEAR_MM = 5.0  # a matched end may be this far from where it is expected
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +46,7 @@ class Verified:
     residual: Floats
     lines: list[LineResult]
     joining: int
+    warnings: list[str] = field(default_factory=list)
 
     def figures(self, tolerance_um: float) -> Verification:
         """The figures of a verification."""
@@ -61,6 +60,7 @@ class Verified:
             residual=residual,
             points=len(size),
             joining_lines=self.joining,
+            warnings=self.warnings,
             lines=tuple(self.lines),
         )
 
@@ -71,9 +71,12 @@ def verify(corrected: Program, original: Program, job: Job) -> Verified:
     corrected_ones = corrected_pieces(original.path, track)
     begin, expected = (_expected(original, job, track, corrected_ones, w) for w in (0.0, 1.0))
     step = np.linalg.norm(begin - np.concatenate((original.path.start[:1], expected[:-1])), axis=1)
-    layout = row_layout(original.path, track, step, job.config.control.resolution_mm)
+    layout = row_layout(original.path, track, step, original.step_mm(job.config.control.resolution_mm))
     reach = _reach(original, job, track, corrected_ones)
-    first, last, joins = _match(corrected, track, expected, reach, layout, is_stamped(corrected.data))
+    warnings = _other_model(corrected, job)
+    first, last, joins = match_moves(
+        corrected.path, track, expected, reach, layout, stamped=is_stamped(corrected.data), foreign=bool(warnings)
+    )
     moving = np.flatnonzero(layout.corrected & (track.length > 0.0))
     piece, move, f = _samples(corrected.path, moving, first[moving], last[moving])
     commanded = path_geometry.points(corrected.path, move, f)
@@ -83,7 +86,16 @@ def verify(corrected: Program, original: Program, job: Job) -> Verified:
     piece, residual, w, vertex = piece[judged], residual[judged], w[judged], f[judged] == 1.0
     convergence = _convergence(job, track, piece[vertex], w[vertex])
     lines = _per_line(original, job, track, piece, vertex, residual, convergence)
-    return Verified(residual, lines, joins)
+    return Verified(residual, lines, joins, warnings)
+
+
+def _other_model(corrected: Program, job: Job) -> list[str]:
+    """A warning where the program was made for another machine or process."""
+    stamped = stamped_model(corrected.data)
+    if stamped in (None, job.fingerprint):
+        return []
+    text = f"the program was compensated for another machine or process (stamp: {stamped}, here: {job.fingerprint})"
+    return [text]
 
 
 def _samples(path: Path, pieces: Ints, first: Ints, last: Ints) -> tuple[Ints, Ints, Floats]:
@@ -123,43 +135,6 @@ def _reach(program: Program, job: Job, track: Track, corrected: Bools) -> Floats
     step = np.linalg.norm(np.diff(points, axis=0), axis=1)
     inside = np.diff(nodes.piece) == 0
     return np.bincount(nodes.piece[1:][inside], step[inside], len(corrected)).astype(np.float64)
-
-
-def _match(
-    corrected: Program, track: Track, expected: Floats, reach: Floats, layout: Layout, stamped: bool
-) -> tuple[Ints, Ints, int]:
-    """Moves [first, last) of the corrected program that belong to every piece, and the number of joining lines."""
-    end = corrected.path.end
-    step = path_geometry.lengths(corrected.path)
-    n, moves = len(track.motion), len(end)
-    first, last = np.zeros(n, np.int64), np.zeros(n, np.int64)
-    at = joins = 0
-    for i in range(n):
-        if stamped and layout.leading[i]:
-            at, joins = at + 1, joins + 1
-        left = n - i - 1
-        stop, walked = at, 0.0
-        best, found = np.inf, -1
-        limit = 1.3 * max(track.length[i], reach[i]) + NEAR_MM
-        while stop < moves - left:
-            walked += step[stop]
-            if walked > limit and stop > at:
-                break
-            off = float(np.linalg.norm(end[stop] - expected[i]))
-            score = off + 0.1 * min(abs(walked - track.length[i]), abs(walked - reach[i]))
-            if score < best - 1e-9:
-                best, found = score, stop
-            stop += 1
-        if found < 0 or best > NEAR_MM + 0.1 * limit:
-            line = int(track.path.line[track.motion[i]])
-            raise CheckFailed("CC604", f"no moves that cut line {line} of the original are found")
-        first[i], last[i] = at, found + 1
-        at = found + 1
-        if stamped and layout.trailing[i]:
-            at, joins = at + 1, joins + 1
-    if at != moves:
-        raise CheckFailed("CC604", f"{moves - at} moves at the end have no counterpart in the original")
-    return first, last, joins
 
 
 def _fraction(job: Job, track: Track, reach: Floats, path: Path, piece: Ints, move: Ints, f: Floats) -> Floats:
@@ -229,7 +204,7 @@ def _per_line(
     original: Program, job: Job, track: Track, piece: Ints, vertex: Bools, residual: Floats, convergence: Floats
 ) -> list[LineResult]:
     line = original.path.line[track.motion[piece]]
-    rounding = 0.5 * np.sqrt(3.0) * 1e3 * job.config.control.resolution_mm
+    rounding = 0.5 * np.sqrt(3.0) * 1e3 * original.step_mm(job.config.control.resolution_mm)
     out = []
     for number in np.unique(line):
         on = line == number

@@ -11,7 +11,6 @@ from camcomp.compensation.program.compensate import Compensated, Trajectories
 from camcomp.compensation.program.verify import Verified
 from camcomp.ground.datatypes import RAPID, Bools, Floats, Ints
 from camcomp.model.job import Job
-from camcomp.model.statics.target import settle
 from camcomp.report.plot import INK, SCALE, STYLES, Figure, axis, brief, broken, gapped, level, line, thin
 
 AXES = "xyz"
@@ -28,7 +27,7 @@ class DrawnPath:
     shift: Floats  # (N, 3) um commanded minus programmed tip
     change: Floats  # (N, m) um or mrad
     drive: Floats  # (N, m) N or N m
-    before: Floats  # (N,) um
+    before: Floats  # (N,) um, the largest error on the move that ends there; 0 where none counts
     after: Floats  # (N,) um
 
     def worst(self, size: Floats) -> int:
@@ -37,11 +36,14 @@ class DrawnPath:
 
 
 def drawn_path_of(result: Compensated, job: Job) -> DrawnPath:
-    """Everything that is drawn along the path; the loaded tips of the written program are solved here."""
+    """Everything that is drawn along the path."""
     rows = result.rows
-    force = job.frame.vectors(rows.force)
-    tip, _ = settle(job.machine, job.frame.to_machine(result.written.end), force)
-    after = np.linalg.norm(job.frame.to_program(tip) - rows.target, axis=1)
+
+    def largest(error: Floats) -> Floats:
+        out = np.zeros(len(rows.w))
+        np.fmax.at(out, result.judged, 1e3 * np.linalg.norm(error, axis=1))
+        return out
+
     drive_scale = np.where(job.machine.revolute, 1e-3, 1.0)
     return DrawnPath(
         s=result.s,
@@ -51,8 +53,8 @@ def drawn_path_of(result: Compensated, job: Job) -> DrawnPath:
         shift=1e3 * (result.written.end - rows.target),
         change=1e3 * (result.state.rho - result.nominal),
         drive=result.state.drive * drive_scale,
-        before=1e3 * np.linalg.norm(result.uncorrected - rows.target, axis=1),
-        after=1e3 * after,
+        before=largest(result.before),
+        after=largest(result.after),
     )
 
 
@@ -112,13 +114,13 @@ def figure_error(drawn: DrawnPath, tolerance_um: float) -> Figure:
     a, b = drawn.worst(drawn.before), drawn.worst(drawn.after)
     words = (
         f"original program up to {brief(drawn.before[a])} µm (line {drawn.line[a]}), corrected program up to "
-        f"{brief(drawn.after[b])} µm at its end points (line {drawn.line[b]}), tolerance {tolerance_um:g} µm"
+        f"{brief(drawn.after[b])} µm (line {drawn.line[b]}), tolerance {tolerance_um:g} µm"
     )
     return Figure(
         "error",
         "Tip error along the path",
         f"Distance of the loaded tip from the programmed tip, on a logarithmic scale: {words}. "
-        "What the straight lines between the end points add is part of the error budget below.",
+        "At every end point stands the largest error on the move to it.",
         f"Plot of the tip error along the path: {words}.",
         curves,
         {"xaxis": axis("path length in mm"), "yaxis": axis("error in µm", type="log", dtick=1, exponentformat="power")},

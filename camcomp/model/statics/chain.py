@@ -109,13 +109,36 @@ def evaluate(P, c, z, rho, pose, W, full):
     M = W.matrix[c]
     n = P.chain[c, SIZE]
     f0 = P.chain[c, SPRINGS]
-    walk(P, c, z, W)
-    for i in range(n):
-        W.residual[i] = 0.0
     if full:
         for i in range(n):
             for j in range(n + 1 + P.chain[c, ACTS]):
                 M[i, j] = 0.0
+    add_loads(P, c, z, W, M, full)
+    end = W.end
+    add_springs(P, c, z, rho, W, M, full)
+    w = log_product(pose, end)
+    gap = 0.0
+    for i in range(3):
+        C = P.end_compliance[c]
+        W.residual[f0 + i] = pose[9 + i] - end[9 + i] - C * z[f0 + i]
+        W.residual[f0 + 3 + i] = w[i] - 1e-4 * C * z[f0 + 3 + i]
+        gap = max(gap, abs(W.residual[f0 + i]), MACHINE_LENGTH * abs(W.residual[f0 + 3 + i]))
+        if full:
+            M[f0 + i, f0 + i] += C
+            M[f0 + 3 + i, f0 + 3 + i] += 1e-4 * C
+    if full:
+        for i in range(n):
+            M[i, n] = W.residual[i]
+    return gap
+
+
+@inner
+def add_loads(P, c, z, W, M, full):
+    """Walks chain c; its residual becomes what wrench and weights do to its coordinates; if full, M gets their derivatives."""
+    walk(P, c, z, W)
+    for i in range(P.chain[c, SIZE]):
+        W.residual[i] = 0.0
+    f0 = P.chain[c, SPRINGS]
     end = W.end
     first = P.chain[c, SLOT_FIRST]
     for e in range(P.chain[c, FIRST] - 1, P.chain[c, LAST]):  # loads: the end wrench, then the weights
@@ -144,21 +167,6 @@ def evaluate(P, c, z, rho, pose, W, full):
                     M[f0 + 3 + i, v] += W.slot[OMEGA + i, s]
                     M[v, f0 + i] -= W.slot[MOVE + i, s]
                     M[v, f0 + 3 + i] -= W.slot[OMEGA + i, s]
-    add_springs(P, c, z, rho, W, M, full)
-    w = log_product(pose, end)
-    gap = 0.0
-    for i in range(3):
-        C = P.end_compliance[c]
-        W.residual[f0 + i] = pose[9 + i] - end[9 + i] - C * z[f0 + i]
-        W.residual[f0 + 3 + i] = w[i] - 1e-4 * C * z[f0 + 3 + i]
-        gap = max(gap, abs(W.residual[f0 + i]), MACHINE_LENGTH * abs(W.residual[f0 + 3 + i]))
-        if full:
-            M[f0 + i, f0 + i] += C
-            M[f0 + 3 + i, f0 + 3 + i] += 1e-4 * C
-    if full:
-        for i in range(n):
-            M[i, n] = W.residual[i]
-    return gap
 
 
 @inner

@@ -3,7 +3,7 @@
 # mypy: disallow-untyped-defs=False, disallow-incomplete-defs=False
 # numba infers the types of these functions; written by hand they would only be repeated.
 
-from camcomp.model.statics.chain import advance
+from camcomp.model.statics.chain import advance, evaluate
 from camcomp.model.statics.compiled import entry
 from camcomp.model.statics.kernel import walk
 from camcomp.model.statics.layout import A_CHAIN, A_ELEMENT, A_VAR, ACT_FIRST, ACTS, SIZE, SPRINGS, STIFFNESS
@@ -13,13 +13,14 @@ from camcomp.model.statics.vectors import cross, part, turned, unit
 
 
 @entry
-def gradients_many(P, tool, z, rho, pose, force, solved, chains, total, by_rho, tip_by, drive_by, W):
+def gradients_many(P, tool, z, rho, pose, force, solved, chains, total, by_rho, tip_by, drive_by, held, W):
     """At every solved point, the actuators being given (mode FREE).
 
     Shapes: z (n, c, nz), rho (n, m), pose (n, 12), force (n, 3), solved (n,) int. Fills chains (n, c, 6, 6) = d(chain
     wrench)/d(pose), total (n, 6, 6) = their sum minus the change of the tip load's moment, by_rho (n, 6, m) = d(sum of
     the wrenches)/d(rho), tip_by (n, 3, m + 9) and drive_by (n, m, m + 9) = derivatives of tip and drive forces by rho,
     by the force at the tip, by the wrench at the platform reference. Rows of singular points are left as they are.
+    held (m, nz): room to work in.
     """
     m = rho.shape[1]
     M = W.solve
@@ -27,6 +28,13 @@ def gradients_many(P, tool, z, rho, pose, force, solved, chains, total, by_rho, 
     for i in range(rho.shape[0]):
         if solved[i] == 0:
             continue
+        for a in range(m):  # what holds the carriage beside its drive, before the elimination goes over it
+            c = P.actuator[a, A_CHAIN]
+            v = P.actuator[a, A_VAR]
+            evaluate(P, c, z[i, c], rho[i], pose[i], W, True)
+            for r in range(P.chain[c, SIZE]):
+                held[a, r] = W.matrix[c, v, r]
+            held[a, v] -= P.value[P.actuator[a, A_ELEMENT], STIFFNESS]
         evaluate_machine(P, tool, force[i], pose[i], z[i], rho[i], W, True)
         lever = turned(pose[i], part(tool, 0))
         for r in range(6):
@@ -65,8 +73,11 @@ def gradients_many(P, tool, z, rho, pose, force, solved, chains, total, by_rho, 
                 n = P.chain[c, SIZE]
                 advance(W.matrix[c], W.answer[c], f0, n, P.chain[c, ACT_FIRST], P.chain[c, ACTS], W.step, W.dz[c])
             for a in range(m):
-                spring = W.dz[P.actuator[a, A_CHAIN], P.actuator[a, A_VAR]] - W.step[6 + a]
-                drive_by[i, a, k] = -P.value[P.actuator[a, A_ELEMENT], STIFFNESS] * spring
+                c = P.actuator[a, A_CHAIN]
+                change = 0.0
+                for r in range(P.chain[c, SIZE]):
+                    change += held[a, r] * W.dz[c, r]
+                drive_by[i, a, k] = change
 
 
 @entry

@@ -15,18 +15,16 @@ the machine; while steps are short the factored matrices serve several passes. T
 
 import math
 
-from camcomp.model.statics.chain import advance, answer, carry, evaluate, factor
+from camcomp.model.statics.chain import add_loads, advance, answer, carry, evaluate, factor
 from camcomp.model.statics.compiled import inner
 from camcomp.model.statics.layout import (
     A_CHAIN,
-    A_ELEMENT,
     A_VAR,
     ACT_FIRST,
     ACTS,
     MACHINE_LENGTH,
     SIZE,
     SPRINGS,
-    STIFFNESS,
 )
 from camcomp.model.statics.rigid import (
     LARGEST_RIGID_STEP,
@@ -257,8 +255,12 @@ def smallest_pivot(S, L):
 
 
 @inner
-def drive_forces(P, z, rho, out):
-    """Fills out (m,): force the drive exerts on its carriage, positive along the actuator."""
-    for a in range(rho.shape[0]):
-        k = P.value[P.actuator[a, A_ELEMENT], STIFFNESS]
-        out[a] = -k * (z[P.actuator[a, A_CHAIN], P.actuator[a, A_VAR]] - rho[a])
+def drive_forces(P, z, W, out):
+    """Fills out (m,): force the drive exerts on its carriage, positive along the actuator.
+
+    By the carriage's equilibrium with everything else: the way that a nearly rigid drive gives is too small to be counted.
+    """
+    for c in range(P.chain.shape[0]):
+        add_loads(P, c, z[c], W, W.matrix[c], False)
+        for a in range(P.chain[c, ACT_FIRST], P.chain[c, ACT_FIRST] + P.chain[c, ACTS]):
+            out[a] = -W.residual[P.actuator[a, A_VAR]]

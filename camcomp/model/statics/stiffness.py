@@ -63,7 +63,7 @@ def _gradients(machine: Machine, state: State) -> tuple[Array, Array, Array, Arr
     def work(s: slice) -> None:
         gradients_many(
             machine.elastic, tool, state.x[s], state.rho[s], pose[s], state.force[s], solved[s], *(a[s] for a in out),
-            new_work(machine.elastic, machine.rigid),
+            np.zeros((m, state.x.shape[2])), new_work(machine.elastic, machine.rigid),
         )  # fmt: skip
 
     in_pieces(work, n)

@@ -200,7 +200,7 @@ def solve_many(
             total[i, k] = 0.0
             for c in range(z.shape[0]):
                 total[i, k] += z[c, P.chain[c, SPRINGS] + k]
-        drive_forces(P, z, rho[i], drive[i])
+        drive_forces(P, z, W, drive[i])
         if kept.shape[0] > 0:
             for c in range(z.shape[0]):
                 for j in range(z.shape[1]):

@@ -60,6 +60,8 @@ def command(
                 f"chord +{each.chord_um:.3f}, rounding <= {each.rounding_um:.3f}, solver {each.convergence_um:.1e})",
                 quiet=quiet,
             )
+        for each_warning in done.warnings:
+            say(f"warning: {each_warning}", quiet=quiet)
         over = [each for each in done.lines if each.residual_um > tolerance]
         if not worst <= tolerance * (1.0 + 1e-9):
             lines = ", ".join(str(each.line) for each in over)
