@@ -61,7 +61,7 @@ def _end_without(parent: int) -> None:
 
 def work(task: Task) -> Outcome:
     """Compensates a program on one core. Never raises."""
-    from camcomp.ground.errors import CamcompError, format_error
+    from camcomp.ground.errors import CamcompError, FileError, format_error
 
     collect_seldom()
     os.environ["CAMCOMP_THREADS"] = "1"  # the solver asks; the cores belong to the other workers
@@ -69,6 +69,11 @@ def work(task: Task) -> Outcome:
         return _compensate(task)
     except CamcompError as error:
         return Outcome(task.key, error.exit_code, [_message(each, format_error(each)) for each in error.all()])
+    except MemoryError:
+        text = "there is not enough memory"
+        return Outcome(
+            task.key, FileError.exit_code, [{"rule": "CC503", "message": text, "text": f"{task.name}: {text}"}]
+        )
     except Exception as error:  # noqa: BLE001 - a bug in one program must not take the others with it
         text = f"internal error: {type(error).__name__}: {error}"
         return Outcome(task.key, BUG, [{"rule": None, "message": text, "text": f"{task.name}: {text}"}])
