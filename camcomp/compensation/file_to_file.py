@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import BinaryIO
 
+from camcomp.compensation.program.result import Summary
 from camcomp.compensation.report.joint_table import joint_table
 from camcomp.ground.errors import ProgramError
 from camcomp.ground.files import writing
@@ -32,7 +32,7 @@ class Wanted:
 class Finished:
     """What became of a long program: its figures, the checks it failed, and the size of every output."""
 
-    figures: dict
+    figures: Summary
     failed: list[tuple[str, str]]
     sizes: dict[str, int]
 
@@ -69,7 +69,7 @@ def compensate_long(
                 table.close()
             figures = totals.summary()
             if wanted.summary:
-                files[wanted.summary].write((json.dumps(figures, indent=2) + "\n").encode())
+                files[wanted.summary].write(figures.to_json())
             sizes = {name: files[name].tell() for name in names}
     except (NotInPieces, ProgramError):
         source.seek(0)

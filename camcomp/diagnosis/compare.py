@@ -13,7 +13,10 @@ from typing import Any
 
 import numpy as np
 
+from camcomp.ground.csv_table import TableRules, read_csv
 from camcomp.ground.datatypes import Floats, Ints
+from camcomp.ground.errors import ConfigError
+from camcomp.ground.files import display_name, read_bytes
 
 Columns = Mapping[str, Floats]
 KEYS = ("line", "s_mm", "t_s")
@@ -63,6 +66,17 @@ class Comparison:
             for d in self.differences
         ]
         return {**vars(self), "differences": rows}
+
+
+def read_columns(path: str) -> Columns:
+    """Columns (n,) by name; empty cells are NaN. Raises ConfigError CC450, FileError CC500."""
+    table = read_csv(read_bytes(path), display_name(path), TableRules("CC450", "CC450", "CC450"))
+    table.refuse_twice()
+    for i, row in enumerate(table.rows):
+        if len(row) < len(table.header):
+            message = f"{len(row)} cells under {len(table.header)} column names"
+            raise ConfigError("CC450", message, at=table.at(i))
+    return dict(zip(table.header, table.values().T, strict=True))
 
 
 def default_key(a: Columns, b: Columns) -> str:

@@ -19,11 +19,25 @@ from camcomp.diagnosis.fit.gap import gap_of, main_channels
 from camcomp.diagnosis.fit.problem import Problem, open_problem
 from camcomp.diagnosis.next_experiment.after_unknown import explore
 from camcomp.diagnosis.next_experiment.information_gain import Proposal, propose
+from camcomp.diagnosis.result.types import (
+    DiagnosisResult,
+    Driver,
+    Estimate,
+    Floor,
+    FoundCause,
+    GapSize,
+    NamedCause,
+    NextExperiment,
+    UnknownCause,
+    UnseenShrinkage,
+    Where,
+)
 from camcomp.diagnosis.search.cause_search import CauseSearch, search_causes
 from camcomp.diagnosis.search.indistinguishable import classes, likeness
 from camcomp.diagnosis.search.unknown import firm_prior, residual_tests
 from camcomp.diagnosis.statistics import places
 from camcomp.diagnosis.statistics.cause_sets import Fitted, total
+from camcomp.diagnosis.statistics.probability import probability_of_chance, stated
 from camcomp.ground.datatypes import Floats
 from camcomp.model.effect import Cause
 from camcomp.model.job import Job
@@ -35,9 +49,9 @@ RIVALS = 8  # sets that one experiment is asked to tell from the answer
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
-    """The result as a mapping of the result file, and what a report may want to draw."""
+    """The result, and what a report may want to draw."""
 
-    result: dict[str, Any]
+    result: DiagnosisResult
     problem: Problem
     search: CauseSearch
     proposal: Proposal | None
@@ -53,30 +67,34 @@ def diagnose(
     found = search_causes(problem)
     best = found.fits[found.verdict.best]
     gap = gap_of(problem)
-    word = "unknown" if found.unknown_in else found.verdict.word
-    causes = _causes(problem, found)
-    result: dict[str, Any] = {
-        "verdict": word,
-        "gap": gap,
-        "where": _where(problem, found, best),
-        "causes": causes,
-        "alternatives": _alternatives(problem, found) if word == "ambiguous" else [],
-        "shrinkage": _shrinkage(twin, runs, holdout, problem, best),
-        "next_experiment": None,
-        "equivalent": [[_named(problem, i) for i in group] for group in classes(likeness(problem))],
-    }
+    word: Any = "unknown" if found.unknown_in else found.verdict.word
+    shrinkage = _shrinkage(twin, runs, holdout, problem, best)
     if word != "unknown":  # noise is measured before causes are known, and no more can be noise than they leave
-        floor = min(gap["noise_floor_um"], result["shrinkage"]["ceiling_rms_um"])
-        gap["noise_floor_um"] = result["shrinkage"]["noise_floor_um"] = floor
+        gap["noise_floor_um"] = min(gap["noise_floor_um"], shrinkage["ceiling_rms_um"])
+        shrinkage["noise_floor_um"] = gap["noise_floor_um"]
+    unseen = len(used) < len(runs) or (len(used) > 1 and not holdout)
     proposal = _next(problem, found, word, job)
-    if proposal is not None:
-        result["next_experiment"] = {
-            "action": proposal.candidate.action,
-            "separates": list(proposal.separates),
-            "gain": round(proposal.gain, 4),
-            "minutes": round(proposal.candidate.minutes, 1),
-        }
+    result = DiagnosisResult(
+        verdict=word,
+        gap=GapSize(**gap),
+        where=_where(problem, found, best),
+        causes=_causes(problem, found),
+        alternatives=_alternatives(problem, found) if word == "ambiguous" else (),
+        shrinkage=UnseenShrinkage.model_validate(shrinkage) if unseen else None,
+        next_experiment=_proposed(proposal) if proposal is not None else None,
+        floor=Floor(um=gap["noise_floor_um"], source="rows"),
+        equivalent=tuple(tuple(_named(problem, i) for i in group) for group in classes(likeness(problem))),
+    )
     return Diagnosis(result, problem, found, proposal)
+
+
+def _proposed(proposal: Proposal) -> NextExperiment:
+    return NextExperiment(
+        action=proposal.candidate.action,
+        separates=tuple(proposal.separates),
+        gain=round(proposal.gain, 4),
+        minutes=round(proposal.candidate.minutes, 1),
+    )
 
 
 def _next(problem: Problem, found: CauseSearch, word: str, job: Job) -> Proposal | None:
@@ -109,35 +127,41 @@ def _energies(problem: Problem, f: Fitted) -> list[float]:
     return out
 
 
-def _causes(problem: Problem, found: CauseSearch) -> list[dict[str, Any]]:
+def _causes(problem: Problem, found: CauseSearch) -> tuple[FoundCause, ...]:
+    """Causes by probability, the unknown one last: its probability is that of the chance of what is left."""
     best = found.fits[found.verdict.best]
     energy = _energies(problem, best)
     left = found.left[found.unknown_in].energy if found.unknown_in else 0.0
     whole = sum(energy) + left
-    out: list[dict[str, Any]] = []
+    out: list[FoundCause] = []
     causes = problem.causes(best.members, best.theta, best.extra)
     covariance = joint_covariance(problem, best) if best.members else np.zeros((0, 0))
     for j, i in enumerate(best.members):
         candidate = problem.columns.candidates[i]
-        out.append({
-            "effect": candidate.name,
-            "target": candidate.target,
-            "probability": round(min(found.verdict.inclusion.get(i, 0.0), 1.0), 4),
-            "share": round(energy[j] / whole, 4) if whole > 0 else 0.0,
-            "parameters": _parameters(problem, best, covariance, j, causes[j]),
-        })  # fmt: skip
-    out.sort(key=lambda c: (-c["probability"], -c["share"]))
+        out.append(
+            FoundCause(
+                effect=candidate.name,
+                target=candidate.target,
+                probability=round(min(found.verdict.inclusion.get(i, 0.0), 1.0), 4),
+                share=round(energy[j] / whole, 4) if whole > 0 else 0.0,
+                parameters=_parameters(problem, best, covariance, j, causes[j]),
+            )
+        )
+    out.sort(key=lambda c: (-c.probability, -c.share))
     if found.unknown_in:
         shares = rest_by_actuator(problem, best, found.unknown_in)
         target = next((name for name, share in shares.items() if share > MOSTLY_ONE_ACTUATOR), None)
-        out.append({
-            "effect": "unknown", "target": target, "probability": 1.0,
-            "share": round(left / whole, 4) if whole > 0 else 1.0, "parameters": {},
-        })  # fmt: skip
-    return out
+        out.append(
+            UnknownCause(
+                target=target,
+                probability=stated(probability_of_chance(found.left[found.unknown_in].log10_chance)),
+                share=round(left / whole, 4) if whole > 0 else 1.0,
+            )
+        )
+    return tuple(out)
 
 
-def _parameters(problem: Problem, f: Fitted, covariance: Floats, j: int, cause: Cause) -> dict[str, Any]:
+def _parameters(problem: Problem, f: Fitted, covariance: Floats, j: int, cause: Cause) -> dict[str, Estimate]:
     """Values with 95 % intervals; those of derived values follow the slopes of what they are derived from."""
     idle = _idle_shapes(problem, cause)
     kinds = {p.name: p for p in cause.effect.PARAMETERS}
@@ -155,7 +179,7 @@ def _parameters(problem: Problem, f: Fitted, covariance: Floats, j: int, cause: 
     steps = (
         1e-3 * np.sqrt(np.diag(covariance)) * np.concatenate([np.where(f.theta < 0, -1.0, 1.0), np.ones(len(shapes))])
     )
-    here, out = at(np.zeros(len(steps))), {}
+    here, out = at(np.zeros(len(steps))), dict[str, Estimate]()
     moved = [at(row) for row in np.diag(steps)]
     for name, value in cause.values.items():
         if name in idle:
@@ -169,7 +193,7 @@ def _parameters(problem: Problem, f: Fitted, covariance: Floats, j: int, cause: 
         low, high = np.exp(ends) if kinds[name].log else ends
         if name != "phase_rad":
             low, high = max(low, kinds[name].low), min(high, kinds[name].high)
-        out[name] = {"value": _round(value), "ci95": [_round(low), _round(high)]}
+        out[name] = Estimate(value=_round(value), ci95=(_round(low), _round(high)))
     return out
 
 
@@ -183,22 +207,22 @@ def _round(value: float) -> float:
     return float(f"{value:.6g}")
 
 
-def _alternatives(problem: Problem, found: CauseSearch) -> list[list[dict[str, Any]]]:
+def _alternatives(problem: Problem, found: CauseSearch) -> tuple[tuple[NamedCause, ...], ...]:
     sets = [found.fits[found.verdict.best], *(found.fits[j] for j in found.verdict.rivals)]
-    return [[_named(problem, i) for i in f.members] for f in sets]
+    return tuple(tuple(_named(problem, i) for i in f.members) for f in sets)
 
 
-def _named(problem: Problem, i: int) -> dict[str, Any]:
-    return {"effect": problem.columns.candidates[i].name, "target": problem.columns.candidates[i].target}
+def _named(problem: Problem, i: int) -> NamedCause:
+    return NamedCause(effect=problem.columns.candidates[i].name, target=problem.columns.candidates[i].target)
 
 
 # -- where ------------------------------------------------------------------------------------------------------------
 
 
-def _where(problem: Problem, found: CauseSearch, best: Fitted) -> dict[str, Any]:
+def _where(problem: Problem, found: CauseSearch, best: Fitted) -> Where:
     gaps = run_gaps(problem)
     at = places.axes(gaps, channel_axes(problem))
-    return {
+    return Where.model_validate({
         "stage": _stage(problem, best, found),
         "axes": {axis: at.get(axis, 0.0) for axis in "xyz"},
         "actuators": places.actuators(gaps, problem.bench.actuators),
@@ -206,7 +230,7 @@ def _where(problem: Problem, found: CauseSearch, best: Fitted) -> dict[str, Any]
         "intervals": places.intervals(gaps),
         "drivers": _drivers(problem, found),
         **patterns_of(problem, gaps),
-    }
+    })  # fmt: skip
 
 
 def _stage(problem: Problem, best: Fitted, found: CauseSearch) -> str:
@@ -232,7 +256,7 @@ def _first_label(found: CauseSearch) -> str:
     return labels[0][0] if labels else ""
 
 
-def _drivers(problem: Problem, found: CauseSearch) -> list[dict[str, Any]]:
+def _drivers(problem: Problem, found: CauseSearch) -> list[Driver]:
     """What the gap depends on; with an unknown cause, what the rest depends on."""
     if found.unknown_in:
         labels = found.left[found.unknown_in].labels
@@ -240,7 +264,7 @@ def _drivers(problem: Problem, found: CauseSearch) -> list[dict[str, Any]]:
         null = problem.refit(())
         at_null = residual_tests(problem, null, firm_prior(problem))
         labels = max(at_null.values(), key=lambda each: each.energy).labels if at_null else ()
-    return [{"covariate": name, "share": round(share, 4)} for name, share in labels[:6] if share > 0.02]
+    return [Driver(covariate=name, share=round(share, 4)) for name, share in labels[:6] if share > 0.02]
 
 
 # -- shrinkage --------------------------------------------------------------------------------------------------------

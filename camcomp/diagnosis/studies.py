@@ -7,41 +7,30 @@ no tips) have studies of their own. Everything else goes to the general diagnosi
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
+from pydantic import ValidationError
 
 from camcomp.diagnosis.arm.poses import Poses
 from camcomp.diagnosis.arm.study import study as study_arm
 from camcomp.diagnosis.axis.study import AxisRun
 from camcomp.diagnosis.axis.study import study as study_axes
-from camcomp.diagnosis.experiment.open_experiment import read_log
+from camcomp.diagnosis.experiment.open_experiment import open_log, read_log
 from camcomp.diagnosis.fit.measured import Measured
+from camcomp.diagnosis.result.types import DiagnosisResult
 from camcomp.ground import shelf
 from camcomp.ground.errors import ConfigError, Location
 from camcomp.ground.files import display_name
 from camcomp.model.config.load import load_config, load_experiment
 from camcomp.model.config.spec import Config, RunSpec
 from camcomp.model.effect import Cause
+from camcomp.model.motion.log_columns import log_columns
 from camcomp.model.statics.arm import arm_of
 from camcomp.model.statics.build import build_robot
-from camcomp.model.statics.description import Robot
 
 
-@dataclass(frozen=True, eq=False)
-class _Names:
-    """What reading a log needs to know of a machine."""
-
-    robot: Robot
-
-    @property
-    def actuators(self) -> tuple[str, ...]:
-        return tuple(a.name for a in self.robot.actuators)
-
-
-def study_of(path: str | Path, without: Sequence[str] = ()) -> dict[str, Any] | None:
+def study_of(path: str | Path, without: Sequence[str] = ()) -> DiagnosisResult | None:
     """Result of an experiment of static poses or of axis logs; None where it is for the general diagnosis.
 
     Raises ConfigError CC420 where the logs say too little.
@@ -51,8 +40,8 @@ def study_of(path: str | Path, without: Sequence[str] = ()) -> dict[str, Any] | 
         return None
     config = load_config(experiment.config)
     robot, _ = build_robot(config.robot, config.tool.tip)
-    names = _Names(robot)
-    logs = [read_log(run.log, names) for run in experiment.runs]  # type: ignore[arg-type]
+    columns = log_columns([a.name for a in robot.actuators], [a.revolute for a in robot.actuators])
+    logs = [read_log(open_log(run.log), columns) for run in experiment.runs]
     try:
         if all(m.has("tip") and m.has("encoder") and not m.has("setpoint") for m in logs):
             if arm_of(robot) is None:
@@ -65,6 +54,8 @@ def study_of(path: str | Path, without: Sequence[str] = ()) -> dict[str, Any] | 
                 for k, a in enumerate(robot.actuators)
             }
             return study_axes(axes, holdout=experiment.holdout, without=without)
+    except ValidationError:  # a ValueError too, and a fault of ours
+        raise
     except ValueError as error:
         raise ConfigError("CC420", str(error), at=Location(display_name(path), 1, 1)) from error
     return None

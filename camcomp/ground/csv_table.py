@@ -1,52 +1,148 @@
-"""Tables of numbers from CSV files: logs, joint tables, measured forces."""
+"""The one reader of CSV files: logs, joint tables, measured forces, recordings of others.
+
+A file is UTF-8 with or without a mark at its start; lines end in LF, CR LF or CR; blank lines count for nothing. The first
+row names the columns. Cells may stand in quotes; an empty cell, one that is missing at the end of a row, and `nan` hold no
+value. What is neither that nor a finite number is refused with its place, and so is a cell beyond the last column.
+"""
 
 from __future__ import annotations
 
 import csv
 import io
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
+from camcomp.ground.bounds import number_of
 from camcomp.ground.datatypes import Floats
 from camcomp.ground.errors import ConfigError, Location
-from camcomp.ground.files import display_name, read_bytes
+
+_SPREADSHEET_MARKS = ";\t,"
 
 
-def read_table(path: str) -> dict[str, Floats]:
-    """Columns (n,) by name; empty cells are NaN. Raises ConfigError CC450, FileError CC500."""
-    name = display_name(path)
-    text = read_bytes(path).decode("utf-8-sig", errors="replace")
-    reader = csv.reader(io.StringIO(text))
-    heads = [each.strip() for each in next(reader, [])]
-    if not any(heads):
-        raise ConfigError("CC450", "the file is empty", at=Location(name, 1, 1))
-    twice = sorted({each for each in heads if heads.count(each) > 1})
-    if twice:
-        raise ConfigError(
-            "CC450", f"column {twice[0]} stands there twice", at=Location(name, 1, 1, text.split("\n", 1)[0])
-        )
-    rows = []
-    for row in reader:
-        if any(cell.strip() for cell in row):
-            rows.append(_numbers(row, heads, name, reader.line_num))
+@dataclass(frozen=True)
+class TableRules:
+    """Ids of the rules under which one kind of table is refused: for what it is, for its columns, for one of its cells."""
+
+    table: str
+    column: str
+    cell: str
+
+
+@dataclass(frozen=True, eq=False)
+class CsvTable:
+    """Cells as text, each with its place. header: names of the columns; rows: n rows of cells, of any length."""
+
+    name: str
+    rules: TableRules
+    mark: str  # between cells
+    header: tuple[str, ...]
+    rows: tuple[list[str], ...]
+    _line: tuple[int, ...]  # of the header and of every row, from 1
+    _source: list[str]
+
+    def at(self, row: int, column: int = 0) -> Location:
+        """Place of a cell; row -1 is the header. A cell that is missing stands behind the last of its row."""
+        line = self._line[row + 1]
+        source = self._source[line - 1]
+        return Location(self.name, line, min(_start(source, self.mark, column), len(source)) + 1, source)
+
+    def text(self, row: int, column: int) -> str:
+        """A cell without the blanks around it; empty where the row ends before it."""
+        cells = self.rows[row]
+        return cells[column].strip() if column < len(cells) else ""
+
+    def value(self, row: int, column: int) -> float:
+        """A number, NaN where there is none. Raises ConfigError."""
+        cell = self.text(row, column)
+        if not cell:
+            return float("nan")
+        number = _number(cell, decimal_comma=self.mark != ",")
+        if number is None:
+            message = f"'{cell}' in column {self.header[column]} is not a number"
+            raise ConfigError(self.rules.cell, message, at=self.at(row, column))
+        return number
+
+    def values(self, columns: Sequence[int] | None = None) -> Floats:
+        """Numbers (n, k) of some columns, of all without names. Raises ConfigError."""
+        wanted = range(len(self.header)) if columns is None else columns
+        out = np.empty((len(self.rows), len(wanted)))
+        for i in range(len(self.rows)):
+            out[i] = [self.value(i, j) for j in wanted]
+        return out
+
+    def refuse_twice(self, columns: Sequence[int] | None = None) -> None:
+        """Raise ConfigError where a named column (of those given, or of all) is there twice."""
+        for j in range(len(self.header)) if columns is None else columns:
+            first = self.header.index(self.header[j])
+            again = next((k for k in range(first + 1, len(self.header)) if self.header[k] == self.header[j]), None)
+            if self.header[j] and again is not None:
+                message = f"column {self.header[j]} stands there twice"
+                raise ConfigError(self.rules.column, message, at=self.at(-1, again))
+
+
+def read_csv(data: bytes | str, name: str, rules: TableRules, *, spreadsheet: bool = False) -> CsvTable:
+    """Cells of a CSV file; `name` is the file's for messages. Raises ConfigError.
+
+    spreadsheet: cells may be parted by semicolons or tabs, and then numbers may have decimal commas.
+    """
+    text = data.decode("utf-8", errors="replace") if isinstance(data, bytes) else data
+    text = text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
+    source = text.split("\n")
+    first = next((each for each in source if each.strip()), "")
+    mark = max(_SPREADSHEET_MARKS, key=first.count) if spreadsheet else ","
+    lines, rows = _rows(text, mark, name, rules, source)
     if not rows:
-        raise ConfigError("CC450", "the table has no rows", at=Location(name, 1, 1))
-    values = np.array(rows)
-    return {head: values[:, i] for i, head in enumerate(heads)}
+        raise ConfigError(rules.table, "the file is empty", at=Location(name, 1, 1))
+    header = tuple(cell.strip() for cell in rows[0])
+    at = Location(name, lines[0], 1, source[lines[0] - 1])
+    if len(header) == 1 and ";" in header[0]:
+        raise ConfigError(rules.table, "cells are separated by commas, not by semicolons", at=at)
+    if len(rows) < 2:
+        raise ConfigError(rules.table, "the table has no rows", at=at)
+    table = CsvTable(name, rules, mark, header, tuple(rows[1:]), tuple(lines), source)
+    for i, row in enumerate(table.rows):
+        beyond = next((j for j in range(len(header), len(row)) if row[j].strip()), None)
+        if beyond is not None:
+            message = f"{len(row)} cells under {len(header)} column names"
+            raise ConfigError(rules.cell, message, at=table.at(i, beyond))
+    return table
 
 
-def _numbers(row: Sequence[str], heads: Sequence[str], name: str, line: int) -> list[float]:
-    source = ",".join(row)
-    if len(row) != len(heads):
-        at = Location(name, line, 1, source)
-        raise ConfigError("CC450", f"{len(row)} cells under {len(heads)} column names", at=at)
-    out, column = [], 1
-    for cell, head in zip(row, heads, strict=True):
-        try:
-            out.append(float(cell) if cell.strip() else np.nan)
-        except ValueError:
-            at = Location(name, line, column, source)
-            raise ConfigError("CC450", f"'{cell}' in column {head} is not a number", at=at) from None
-        column += len(cell) + 1
-    return out
+def _rows(
+    text: str, mark: str, name: str, rules: TableRules, source: Sequence[str]
+) -> tuple[list[int], list[list[str]]]:
+    """Line on which each row starts, and its cells; rows without any text are left out."""
+    reader = csv.reader(io.StringIO(text), delimiter=mark, skipinitialspace=True, strict=True)
+    lines: list[int] = []
+    rows: list[list[str]] = []
+    start = 1
+    try:
+        for row in reader:
+            if any(cell.strip() for cell in row):
+                lines.append(start)
+                rows.append(row)
+            start = reader.line_num + 1
+    except csv.Error as error:
+        at = Location(name, start, 1, source[start - 1])
+        raise ConfigError(rules.table, f"the file is no table: {error}", at=at) from error
+    return lines, rows
+
+
+def _number(cell: str, *, decimal_comma: bool) -> float | None:
+    """A number or NaN; None where the text is neither, or no number of this world."""
+    return number_of(cell.replace(",", ".") if decimal_comma else cell)
+
+
+def _start(source: str, mark: str, column: int) -> int:
+    """Where a cell begins in its line, from 0; behind the last where there are fewer."""
+    quoted, seen = False, 0
+    for i, sign in enumerate(source):
+        if seen == column:
+            return i
+        if sign == '"':
+            quoted = not quoted
+        elif sign == mark and not quoted:
+            seen += 1
+    return len(source)

@@ -253,6 +253,18 @@ RULES: dict[str, Rule] = {
         "What is asked for needs a package that a plain installation leaves out because it is large.",
         "pip install 'camcomp[report]'",
     ),
+    "CC217": Rule(
+        "YAML beyond the budget",
+        "A machine file has some hundred values. More than a megabyte, 20 000 values (an alias counts wherever it is used) "
+        "or 50 levels are a mistake, or meant to stop the reader.",
+        "tables belong into CSV files",
+    ),
+    "CC218": Rule(
+        "no file of camcomp",
+        "None of the sections of a machine file or of an experiment stands in the file. Nothing of it is shown, for it may "
+        "be a file that was never meant to be read aloud.",
+        "check the path; `camcomp init DIR` writes a machine file",
+    ),
     "CC240": Rule(
         "robot description not usable",
         "A URDF describes a tree of links. camcomp takes one chain of hinges and slides from it, with masses and centres; "
@@ -301,6 +313,12 @@ RULES: dict[str, Rule] = {
         "Kienzle's law gives the tangential force only. The radial and the axial force follow by ratios that depend on "
         "tool, material and wear; there is no value that would be right in general.",
         "measure one slot and divide: radial = force against the feed over force square to it",
+    ),
+    "CC258": Rule(
+        "sense of rotation contradicts the program",
+        "M3 and M4 say how the spindle turns, and a side force turns over with it. The machine file may say it for programs "
+        "that do not; it may not say something else.",
+        "take process: force: spindle out, or correct the program",
     ),
     "CC260": Rule(
         "force table empty",
@@ -370,6 +388,12 @@ RULES: dict[str, Rule] = {
         "An arm reaches most points in several postures. It keeps that of the start pose; between two end points of "
         "the program the joints would have to change over to another one.",
         "choose start angles nearer to the work, move the workpiece, or turn the tool about its axis (tool.turn_deg)",
+    ),
+    "CC306": Rule(
+        "result not finite",
+        "The model answered with NaN or infinity. An effect, a force model or a value of the machine file leads out of what "
+        "can be computed; nothing is written, for such a number looks like none at all in a mean or a maximum.",
+        "look at the plug-ins and effects named, and at values far from those of real machines",
     ),
     # --- CC4xx logs, experiments -------------------------------------------------------------------------------
     "CC400": Rule(

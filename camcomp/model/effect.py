@@ -19,24 +19,19 @@ and at least one hook. `p` maps parameter names to values; `which` (m,) is 1.0 f
     on_clock(time, p)                            (n,) row time -> time at which the tip stood where the row says
     on_reading(channels, motion, p)              dict of measured channels by column name
 
-The twin calls them in the order of the signal path, effects in the order of the config. Of those on the drive the ones
-with a force of their own come last: guides hold back the carriage, behind the screw and its play.
+camcomp/model/signal_path.py calls them, stage by stage, effects in the order of the config.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
 
 from camcomp.ground.datatypes import Floats
+from camcomp.ground.errors import Location
 
 Target = Literal["actuator", "machine", "either"]
-STAGES = ("control", "drive", "structure", "process", "tool", "workpiece", "sensor")
-HOOKS = (
-    "on_clock", "on_servo", "on_drive", "on_drive_force", "on_robot", "on_load", "on_pose", "on_workpiece",
-    "on_reading",
-)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -107,12 +102,13 @@ class Load:
 
 @dataclass(frozen=True)
 class Cause:
-    """An effect at work: the module, its target (actuator name or None) and its parameter values."""
+    """An effect at work: the module, its target (actuator name or None), its parameter values, where a config names it."""
 
     name: str
     effect: Any
     target: str | None
     values: Mapping[str, float] = field(default_factory=dict)
+    at: Location | None = field(default=None, compare=False)
 
     def which(self, actuators: tuple[str, ...]) -> Floats:
         """(m,) 1.0 where this cause acts."""
@@ -125,19 +121,6 @@ class Cause:
     def hook(self, name: str) -> Any:
         """The hook called `name`, or None."""
         return getattr(self.effect, name, None)
-
-
-def driven(causes: Sequence[Cause], actuators: tuple[str, ...], motion: Motion) -> tuple[Floats, Motion]:
-    """Carriage minus encoder (n, m), and the motion as the guides see it, with the nut where play and screw leave it."""
-    error = np.zeros_like(motion.encoder)
-    drives = [cause for cause in causes if cause.hook("on_drive") is not None]
-    for guide in (False, True):
-        if guide:
-            motion = replace(motion, nut=motion.encoder + error)
-        for cause in drives:
-            if (cause.hook("on_drive_force") is not None) == guide:
-                error = cause.hook("on_drive")(error, motion, cause.which(actuators), cause.values)
-    return error, motion
 
 
 def nominal(effect: Any) -> dict[str, float]:

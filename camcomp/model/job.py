@@ -11,7 +11,8 @@ import numpy as np
 
 from camcomp.ground import shelf
 from camcomp.ground.datatypes import Floats
-from camcomp.ground.errors import ConfigError
+from camcomp.ground.errors import ConfigError, Location, PhysicsError
+from camcomp.model import signal_path
 from camcomp.model.config.spec import Config
 from camcomp.model.cutting.cut import Cut
 from camcomp.model.cutting.track import Conditions
@@ -66,19 +67,22 @@ class Job:
     def causes(self) -> tuple[Cause, ...]:
         """The effects of the config, in its order."""
         return tuple(
-            Cause(each.effect, shelf.load("effects", each.effect), each.target, dict(each.values))
-            for each in self.config.effects
+            Cause(
+                each.effect,
+                shelf.load("effects", each.effect),
+                each.target,
+                dict(each.values),
+                self.config.at("effects", i, "effect"),
+            )
+            for i, each in enumerate(self.config.effects)
         )
 
     @cached_property
     def real_machine(self) -> Machine:
         """The machine with its chain errors and with what the effects of the config change in it."""
         robot, nominal = self._robots
-        names = tuple(each.name for each in robot.actuators)
-        for cause in self.causes:
-            if (hook := cause.hook("on_robot")) is not None:
-                robot = hook(robot, cause.aimed(names), cause.values)
-        return self.machine if robot is self._robots[0] else self._build(robot, nominal)
+        changed, by = signal_path.edited(self.causes, tuple(each.name for each in robot.actuators), robot)
+        return self._build(changed, nominal) if by else self.machine
 
     @cached_property
     def _robots(self) -> tuple[Robot, Robot]:
@@ -103,7 +107,9 @@ class Job:
         member = shelf.load("forces", choice.model)
         none = choice.model == "none"
         return Conditions(
-            model=None if none else partial(_call, member.force, choice.params),
+            model=None
+            if none
+            else partial(_finite, c, partial(_call, member.force, choice.params, c.at("process", "force"))),
             plunges=bool(getattr(member, "PLUNGES", False)),
             tool_axis=self.frame.rotation.T @ self.machine.nominal.held_rotation[:, 2],
             stock_top_mm=c.workpiece.stock_top_mm,
@@ -117,5 +123,21 @@ class Job:
         )
 
 
-def _call(force: Callable[[Cut, Any], Floats], params: Any, cut: Cut) -> Floats:
-    return force(cut, params)
+def _call(force: Callable[[Cut, Any], Floats], params: Any, place: Location | None, cut: Cut) -> Floats:
+    """Forces of a model. What it asks for in vain stands, or ought to stand, in the machine file."""
+    try:
+        return force(cut, params)
+    except ConfigError as error:
+        error.at = error.at or place
+        raise
+
+
+def _finite(config: Config, model: Callable[[Cut], Floats], cut: Cut) -> Floats:
+    """The forces (n, 3) of a model. Raises PhysicsError CC306 where one is not finite."""
+    force = model(cut)
+    bad = ~np.isfinite(force).all(axis=-1)
+    if bad.any():
+        name, line = config.process.force.model, cut.line[int(np.argmax(bad))]
+        message = f"force model '{name}': the force in program line {line} is not finite"
+        raise PhysicsError("CC306", message, at=config.at("process", "force", "model"))
+    return force

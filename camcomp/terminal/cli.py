@@ -17,6 +17,7 @@ from camcomp import __version__
 from camcomp.ground.errors import CamcompError, FileError, format_error
 from camcomp.ground.files import remembering_inputs
 from camcomp.ground.garbage import collect_seldom
+from camcomp.terminal.standard_streams import stand_in_for_closed
 
 # Matrices here are small: threads of the linear algebra wait for each other longer than they compute, most of all on a
 # machine that does other things too. It has to be said before numpy is imported; a user's own setting stands.
@@ -99,6 +100,7 @@ def _end_on_signals() -> None:
 
 def main(args: list[str] | None = None) -> None:
     """Run the command line and leave the process with the exit code of the contract."""
+    stand_in_for_closed()
     collect_seldom()
     _end_on_signals()
     code = run(sys.argv[1:] if args is None else args)

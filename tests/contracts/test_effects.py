@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from camcomp.ground import shelf
-from camcomp.model.effect import HOOKS, STAGES, Cause, Load, Motion, nominal
+from camcomp.model.effect import Cause, Load, Motion, nominal
+from camcomp.model.signal_path import HOOKS, STAGES
 from camcomp.model.statics.description import Actuator, Chain, Link, Parallelogram, Passive, Robot
 
 CONTRACT = {

@@ -24,10 +24,11 @@ class Workshop:
         return write(made, plan, folder, runner.CONFIG), made
 
     def _answer(self, plan):
-        """Everything behind the diagnosis of a plan: (result, diagnosis, campaign)."""
+        """Everything behind the diagnosis of a plan: (result as JSON has it, diagnosis, experiment)."""
         from camcomp.terminal.commands.diagnose import examine
 
-        return examine(self.made(plan)[0])
+        result, *behind = examine(self.made(plan)[0])
+        return result.as_json(), *behind
 
 
 @pytest.fixture(scope="session")

@@ -60,7 +60,7 @@ def follow(workshop, plan, tmp_path, candidate):
             channels=channels,
             started_s=round(candidate.started, 1),
         )
-    return examine(folder / "experiment.yaml", without)[0]
+    return examine(folder / "experiment.yaml", without)[0].as_json()
 
 
 def test_the_classes_are_known_without_residuals(workshop):

@@ -34,7 +34,7 @@ def test_rows_on_the_wrong_side_of_a_corner_change_no_answer(tmp_path, cause):
     plan = plan_of(cause, design="six", samples=250, ratio=10.0)
     made, count = stamped_early(make(plan))
     assert count
-    result = examine(write(made, plan, tmp_path / "e", runner.CONFIG))[0]
+    result = examine(write(made, plan, tmp_path / "e", runner.CONFIG))[0].as_json()
     assert result["verdict"] == "identified"
     assert [(each["effect"], each["target"]) for each in result["causes"]] == [cause]
     assert result["gap"]["max_um"] < 8 * result["gap"]["rms_um"]

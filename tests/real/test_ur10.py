@@ -13,6 +13,7 @@ from camcomp.diagnosis.arm.study import investigate, merged
 from camcomp.model.config.load import load_config
 from camcomp.model.statics.build import build_robot
 from tests.commandline import ROOT, camcomp, table
+from tests.schemas import check as check_schema
 
 DATA = Path(os.environ.get("CAMCOMP_DATA", "/nowhere")) / "ipa_ur10"
 WHOLE = pytest.mark.skipif(not DATA.is_dir(), reason="the whole data set is not here: CAMCOMP_DATA")
@@ -48,6 +49,8 @@ def check(result, floor, least):
 
 def test_sample(tmp_path):
     result = diagnosed("samples/ur10/experiment.yaml", tmp_path)
+    check_schema("diagnosis", result)
+    assert result["floor"] == {"um": None, "source": "not identifiable"}
     assert result["verdict"] == "unknown"
     assert effects(result)[:2] == [GEOMETRY, GRAVITY]
     assert "joint_offset" not in effects(result)

@@ -3,6 +3,7 @@
 import numpy as np
 
 from camcomp.diagnosis.report.run_view import Rival, RunView
+from camcomp.diagnosis.result.types import DiagnosisResult
 
 
 def run_view(name, held_out, *, size=20.0, left=2.0, seed=0, frequency=0.5):
@@ -29,7 +30,7 @@ UNKNOWN = {"effect": "unknown", "target": "y", "probability": 0.999, "share": 0.
 
 
 def result(verdict):
-    """A result file with this verdict."""
+    """A result with this verdict."""
     causes = {"none": [], "identified": [BACKLASH, GRAVITY], "ambiguous": [BACKLASH], "unknown": [GRAVITY, UNKNOWN]}[
         verdict
     ]
@@ -42,7 +43,7 @@ def result(verdict):
         [{"effect": "backlash", "target": "x"}],
         [{"effect": "friction", "target": "x"}, {"effect": "gravity", "target": None}],
     ]
-    return {
+    return DiagnosisResult.model_validate({
         "verdict": verdict,
         "gap": {"rms_um": 14.1, "p95_um": 19.8, "max_um": 21.3, "noise_floor_um": 0.87},
         "where": {
@@ -62,7 +63,8 @@ def result(verdict):
         "next_experiment": None
         if verdict in ("none", "identified")
         else {"action": "Mill the circle in air at 2000 mm/min.", "separates": ["backlash(x)", "friction(x)"], "gain": 0.83},
-    }  # fmt: skip
+        "floor": {"um": 0.87, "source": "rows"},
+    })  # fmt: skip
 
 
 def views():

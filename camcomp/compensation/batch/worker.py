@@ -96,7 +96,7 @@ def _compensate(task: Task) -> Outcome:
     failed = result.failed_checks(job, task.tolerance_um)
     messages = [{"rule": rule, "message": text, "text": f"{task.name}: error[{rule}]: {text}"} for rule, text in failed]
     joints = tables.joint_csv(result, job) if task.joints else None
-    figures = tables.summary(result, job)
+    figures = tables.summary(result, job).as_json()
     outcome = Outcome(task.key, int(bool(failed)), messages, result.written.data, joints, figures, notes=held())
     _settle()
     return outcome

@@ -9,7 +9,9 @@ import numpy as np
 from camcomp.compensation.long.plain import Done, PlainCorrector
 from camcomp.compensation.long.plain_run import PlainRun
 from camcomp.compensation.program.compensate import Compensated
+from camcomp.compensation.program.result import ErrorSize, Interpolation, Summary
 from camcomp.ground.datatypes import LINE, Bools, Floats, Ints
+from camcomp.model.cutting.spindle import MOST_LINES, spindle_warning
 from camcomp.model.job import Job
 from camcomp.model.statics.target import correct, settle
 
@@ -45,9 +47,9 @@ class _Errors:
         self.count += len(square)
         self.most = max(self.most, float(np.sqrt(square.max(initial=0.0))))
 
-    def figures(self) -> dict[str, float]:
+    def figures(self) -> ErrorSize:
         rms = np.sqrt(self.squares / self.count) if self.count else 0.0
-        return {"rms_um": 1e3 * float(rms), "max_um": 1e3 * self.most}
+        return ErrorSize(rms_um=1e3 * float(rms), max_um=1e3 * self.most)
 
 
 class Totals:
@@ -61,12 +63,13 @@ class Totals:
         self.change = self.force = np.zeros(len(job.machine.actuators))
         self.tilt = 0.0
         self.warnings: list[str] = []
-        self.interpolated: dict[str, float] = {}
+        self.interpolated: Interpolation | None = None
         self._s = self._t = 0.0
         self._beyond: list[list[int]] = [[] for _ in job.machine.actuators]
         self._random = np.random.default_rng(int(digest[:16], 16))
         self._share = min(1.0, 3.0 * SAMPLE * 24.0 / max(size, 1))  # a line has some 24 bytes
         self._sample: list[Floats] = []
+        self._still: list[int] = []  # source lines that cut while the spindle stands, the first ones
 
     # --- pieces --------------------------------------------------------------------------------------------------
 
@@ -85,6 +88,8 @@ class Totals:
         drive, joints = answers.rest[:, 3 : 3 + m], corrector.joints(done)
         self._common(run.motions, rows.joining, np.ones(len(s), np.bool_), plain.row[rows.move] + run.row0 + 1, answers.nominal,
                      joints, drive, answers.rest[:, :3], done.before, done.after)  # fmt: skip
+        if run.state.sense == 0.0:
+            self._stands(np.unique(plain.row[rows.move[rows.force.any(axis=1)]]) + run.row0 + 1)
         force = frame.vectors(rows.force)
         chosen = np.flatnonzero(self._random.random(len(s)) < self._share)
         if len(chosen):
@@ -106,6 +111,7 @@ class Totals:
         self._common(motions, rows.joining[own], corrected, result.lines[own], result.nominal[own], state.rho[own], state.drive[own],
                      state.tilt[own], result.before, result.after)  # fmt: skip
         self.iterations = max(self.iterations, result.iterations)
+        self._stands(result.without_spindle)
         force = self.job.frame.vectors(rows.force[own])
         return Batch(result.lines[own], s, t, rows.target[own], result.written.end[own], force, result.nominal[own], state.rho[own],
                      state.drive[own])  # fmt: skip
@@ -128,6 +134,9 @@ class Totals:
             if len(over) and len(self._beyond[a]) < 10:
                 self._beyond[a] = sorted({*self._beyond[a], *np.unique(line[over])[:10].tolist()})[:10]
 
+    def _stands(self, lines: Ints) -> None:
+        self._still += lines[: MOST_LINES + 1 - len(self._still)].tolist()
+
     # --- the end -------------------------------------------------------------------------------------------------
 
     def finish(self, corrector: PlainCorrector, warnings: list[str]) -> None:
@@ -137,6 +146,7 @@ class Totals:
             self.warnings.append(
                 f"{self.joins} joining lines where the cutting force jumps; they are not part of before and after"
             )
+        self.warnings += spindle_warning(np.array(self._still, np.int64))
         known, m = corrector.field, len(self.job.machine.actuators)
         if known is None or not self._sample:
             return
@@ -152,16 +162,16 @@ class Totals:
         gaps = (exact.commanded - p - correction, tip - p - unloaded, (written.rho_nominal - joints) * reach)
         worst = max(1e3 * float(np.abs(each).max()) for each in gaps)
         self.iterations = max(self.iterations, int(exact.iterations.max()))
-        self.interpolated = {
-            "bound_um": BOUND_UM,
-            "checked": len(p),
-            "worst_um": worst if np.isfinite(worst) else float("inf"),
-            "worst_drive_force": float(np.nan_to_num(np.abs(written.drive - drive), nan=np.inf).max()),
-            "tiles": len(known.tiles.half),
-            "exact_solutions": known.solved + 3 * len(p) + 2 * corrector.exact,
-        }
+        self.interpolated = Interpolation(
+            bound_um=BOUND_UM,
+            checked=len(p),
+            worst_um=worst if np.isfinite(worst) else float("inf"),
+            worst_drive_force=float(np.nan_to_num(np.abs(written.drive - drive), nan=np.inf).max()),
+            tiles=len(known.tiles.half),
+            exact_solutions=known.solved + 3 * len(p) + 2 * corrector.exact,
+        )
 
-    def summary(self) -> dict:
+    def summary(self) -> Summary:
         """The figures, as report.tables.summary has them for short programs, and those of the interpolation."""
         rotary = self.job.machine.revolute
         sizes = {
@@ -173,20 +183,22 @@ class Totals:
                 "actuator_change_max_rad": float(self.change[rotary].max()),
                 "actuator_torque_max_Nmm": float(self.force[rotary].max()),
             }
-        return {
-            "points": self.points,
-            "segments_in": self.motions,
-            "lines_out": self.lines_out,
-            "before": self.before.figures(),
-            "after": self.after.figures(),
-            **sizes,
-            "iterations_max": self.iterations,
-            "method": "newton",
-            "platform_tilt_max_mrad": 1e3 * self.tilt,
-            "joining_lines": self.joins,
-            "interpolation": self.interpolated or None,
-            "warnings": self.warnings,
-        }
+        return Summary.model_validate(
+            {
+                "points": self.points,
+                "segments_in": self.motions,
+                "lines_out": self.lines_out,
+                "before": self.before.figures(),
+                "after": self.after.figures(),
+                **sizes,
+                "iterations_max": self.iterations,
+                "method": "newton",
+                "platform_tilt_max_mrad": 1e3 * self.tilt,
+                "joining_lines": self.joins,
+                "interpolation": self.interpolated,
+                "warnings": self.warnings,
+            }
+        )
 
     def failed_checks(self, tolerance_um: float) -> list[tuple[str, str]]:
         """Rule id and text of every check that the program does not pass."""
@@ -205,7 +217,9 @@ class Totals:
                         f"actuator {name} leaves its travel {k * low:g} to {k * high:g} {unit} at source lines {lines}",
                     )
                 )
-        if self.interpolated and not self.interpolated["worst_um"] <= BOUND_UM:
-            text = f"{self.interpolated['worst_um']:.3f} um between interpolated and exact points, more than {BOUND_UM:g} um"
+        if self.interpolated and not self.interpolated.worst_um <= BOUND_UM:
+            text = (
+                f"{self.interpolated.worst_um:.3f} um between interpolated and exact points, more than {BOUND_UM:g} um"
+            )
             out.append(("CC607", text))
         return out

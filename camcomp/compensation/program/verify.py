@@ -20,6 +20,7 @@ from camcomp.compensation.program.moves import (
     row_layout,
     travel_of,
 )
+from camcomp.compensation.program.result import ErrorSize, LineResult, Verification
 from camcomp.gcode.program import Program
 from camcomp.gcode.stamp import is_stamped
 from camcomp.ground import path_geometry
@@ -40,23 +41,6 @@ NEAR_MM = 5.0  # a matched end may be this far from where it is expected
 
 
 @dataclass(frozen=True, eq=False)
-class LineResult:
-    """Residual of one source line in um, and its parts.
-
-    convergence: what the solver itself leaves. rounding: half the last digit written, worst case. vertex: end points
-    of moves, where rounding and the sharing of the chord's miss show. chord: what the straight lines between them add.
-    """
-
-    line: int
-    moves: int
-    residual_um: float
-    convergence_um: float
-    rounding_um: float
-    vertex_um: float
-    chord_um: float
-
-
-@dataclass(frozen=True, eq=False)
 class Verified:
     """Residuals (k,) mm at all points looked at along feed moves, and per source line."""
 
@@ -64,19 +48,20 @@ class Verified:
     lines: list[LineResult]
     joining: int
 
-    def as_json(self, tolerance_um: float) -> dict:
+    def figures(self, tolerance_um: float) -> Verification:
         """The figures of a verification."""
         size = 1e3 * self.residual
-        return {
-            "tolerance_um": tolerance_um,
-            "residual": {
-                "rms_um": float(np.sqrt(np.mean(size**2))) if len(size) else 0.0,
-                "max_um": float(size.max()) if len(size) else 0.0,
-            },
-            "points": len(size),
-            "joining_lines": self.joining,
-            "lines": [vars(each) for each in self.lines],
-        }
+        residual = ErrorSize(
+            rms_um=float(np.sqrt(np.mean(size**2))) if len(size) else 0.0,
+            max_um=float(size.max()) if len(size) else 0.0,
+        )
+        return Verification(
+            tolerance_um=tolerance_um,
+            residual=residual,
+            points=len(size),
+            joining_lines=self.joining,
+            lines=tuple(self.lines),
+        )
 
 
 def verify(corrected: Program, original: Program, job: Job) -> Verified:
@@ -250,7 +235,13 @@ def _per_line(
         chord = max(0.0, all_of_it - v)
         out.append(
             LineResult(
-                int(number), int((on & vertex).sum()), 1e3 * all_of_it, 1e3 * solver, rounding, 1e3 * v, 1e3 * chord
+                line=int(number),
+                moves=int((on & vertex).sum()),
+                residual_um=1e3 * all_of_it,
+                convergence_um=1e3 * solver,
+                rounding_um=rounding,
+                vertex_um=1e3 * v,
+                chord_um=1e3 * chord,
             )
         )
     return out

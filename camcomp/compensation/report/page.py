@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import PurePath
 
 import numpy as np
 
 from camcomp.compensation.program.compensate import Compensated, Trajectories, trajectories
-from camcomp.compensation.program.verify import LineResult, Verified, verify
+from camcomp.compensation.program.result import LineResult, Summary
+from camcomp.compensation.program.verify import Verified, verify
 from camcomp.compensation.report.figures import (
     DrawnPath,
     drawn_path_of,
@@ -37,7 +38,7 @@ BUDGET = (
 def compensation_html(
     result: Compensated,
     job: Job,
-    figures: Mapping,
+    figures: Summary,
     *,
     failed: Sequence[tuple[str, str]],
     tolerance_um: float,
@@ -55,7 +56,7 @@ def compensation_html(
     found = trajectories(result, job)
     drawn = drawn_path_of(result, job)
     name = PurePath(result.program.name).name
-    before, after = figures["before"]["max_um"], figures["after"]["max_um"]
+    before, after = figures.before.max_um, figures.after.max_um
     if failed:
         verdict = "The corrected program is written, but a check failed: " + "; ".join(text for _, text in failed) + "."
     else:
@@ -63,7 +64,7 @@ def compensation_html(
             f"By the model the original program leaves up to {brief(before)} µm at the tip, the corrected one "
             f"{brief(after)} µm; the tolerance is {tolerance_um:g} µm."
         )
-    notes = [f"{rule}: {text}" for rule, text in failed] + [str(each) for each in figures["warnings"]]
+    notes = [f"{rule}: {text}" for rule, text in failed] + [str(each) for each in figures.warnings]
     any_feed = bool((~drawn.hidden).any())
     sections = [Section("warnings", "Warnings", items=notes)] if notes else []
     if any_feed:
@@ -72,8 +73,8 @@ def compensation_html(
     sections += [_machine(job), inputs_section(inputs, result.written.data)]
     page = Page(
         title=f"{name} on {job.config.robot.name}",
-        subtitle=f"Compensation report: method {result.method}, {figures['points']} end points from "
-        f"{figures['segments_in']} motions",
+        subtitle=f"Compensation report: method {result.method}, {figures.points} end points from "
+        f"{figures.segments_in} motions",
         verdict=verdict,
         good=not failed,
         cards=_cards(figures, tolerance_um),
@@ -82,24 +83,24 @@ def compensation_html(
     return render(page)
 
 
-def _cards(figures: Mapping, tolerance_um: float) -> list[tuple[str, str, str]]:
+def _cards(figures: Summary, tolerance_um: float) -> list[tuple[str, str, str]]:
     cards = [
         (
             "Tip error before",
-            f"{brief(figures['before']['max_um'])} µm",
-            f"rms {brief(figures['before']['rms_um'])} µm",
+            f"{brief(figures.before.max_um)} µm",
+            f"rms {brief(figures.before.rms_um)} µm",
         ),
-        ("Tip error after", f"{brief(figures['after']['max_um'])} µm", f"tolerance {tolerance_um:g} µm"),
+        ("Tip error after", f"{brief(figures.after.max_um)} µm", f"tolerance {tolerance_um:g} µm"),
     ]
-    for key, what, unit in (
-        ("actuator_change_max_mm", "Largest change of a slide", "mm"),
-        ("actuator_change_max_rad", "Largest change of a hinge", "rad"),
-        ("actuator_force_max_N", "Largest drive force", "N"),
-        ("actuator_torque_max_Nmm", "Largest drive torque", "N·mm"),
+    for most, what, unit in (
+        (figures.actuator_change_max_mm, "Largest change of a slide", "mm"),
+        (figures.actuator_change_max_rad, "Largest change of a hinge", "rad"),
+        (figures.actuator_force_max_N, "Largest drive force", "N"),
+        (figures.actuator_torque_max_Nmm, "Largest drive torque", "N·mm"),
     ):
-        if figures.get(key):
-            cards.append((what, f"{brief(figures[key])} {unit}", ""))
-    tilt = figures["platform_tilt_max_mrad"]
+        if most:
+            cards.append((what, f"{brief(most)} {unit}", ""))
+    tilt = figures.platform_tilt_max_mrad
     cards.append(
         ("Platform tilt left", f"{brief(tilt)} mrad", "not corrected with three actuators" if tilt > 1e-6 else "")
     )

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from camcomp.compensation.program.compensate import Compensated, Trajectories
+from camcomp.compensation.program.result import ErrorSize, Summary
 from camcomp.ground.datatypes import Floats
 from camcomp.model.job import Job
 
@@ -75,7 +76,7 @@ def _csv(head: Sequence[str], line: np.ndarray, values: Floats) -> bytes:
     return text.replace("nan", "").encode("ascii")
 
 
-def summary(result: Compensated, job: Job) -> dict:
+def summary(result: Compensated, job: Job) -> Summary:
     """The figures of a run: see the README for their meaning."""
     change = np.abs(result.state.rho - result.nominal)[result.rows.corrected]
     force = np.abs(result.state.drive)[result.rows.corrected]
@@ -89,28 +90,30 @@ def summary(result: Compensated, job: Job) -> dict:
             "actuator_change_max_rad": _most(change[:, rotary]),
             "actuator_torque_max_Nmm": _most(force[:, rotary]),
         }
-    return {
-        "points": len(result.rows.piece),
-        "segments_in": len(result.program.path),
-        "lines_out": result.written.data.count(b"\n"),
-        "before": _size(result.before),
-        "after": _size(result.after),
-        **sizes,
-        "iterations_max": result.iterations,
-        "method": result.method,
-        "platform_tilt_max_mrad": 1e3 * _most(np.linalg.norm(result.state.tilt, axis=1)[result.rows.corrected]),
-        "joining_lines": int(result.rows.joining.sum()),
-        "warnings": result.warnings,
-    }
+    return Summary.model_validate(
+        {
+            "points": len(result.rows.piece),
+            "segments_in": len(result.program.path),
+            "lines_out": result.written.data.count(b"\n"),
+            "before": _size(result.before),
+            "after": _size(result.after),
+            **sizes,
+            "iterations_max": result.iterations,
+            "method": result.method,
+            "platform_tilt_max_mrad": 1e3 * _most(np.linalg.norm(result.state.tilt, axis=1)[result.rows.corrected]),
+            "joining_lines": int(result.rows.joining.sum()),
+            "warnings": result.warnings,
+        }
+    )
 
 
 def _most(values: Floats) -> float:
     return float(np.nanmax(values)) if np.isfinite(values).any() else 0.0
 
 
-def _size(error: Floats) -> dict[str, float]:
+def _size(error: Floats) -> ErrorSize:
     size = np.linalg.norm(error, axis=1)
     size = 1e3 * size[np.isfinite(size)]
     if not len(size):
-        return {"rms_um": 0.0, "max_um": 0.0}
-    return {"rms_um": float(np.sqrt(np.mean(size**2))), "max_um": float(size.max())}
+        return ErrorSize(rms_um=0.0, max_um=0.0)
+    return ErrorSize(rms_um=float(np.sqrt(np.mean(size**2))), max_um=float(size.max()))

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from math import isfinite
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +15,8 @@ import numpy as np
 from camcomp.compensation.program.moves import RULE_OF_STATUS
 from camcomp.ground.datatypes import Floats
 from camcomp.ground.errors import PhysicsError
+from camcomp.model import signal_path
+from camcomp.model.finite import not_finite
 from camcomp.model.job import Job
 from camcomp.model.motion.response import Travel, aim_at, respond
 from camcomp.model.statics.single import PointSolver
@@ -43,7 +46,7 @@ class Stream:
         self._origin, self._rotation = job.frame.origin.tolist(), job.frame.rotation.tolist()
         self._names = self._machine.actuators
         self._travel = job.machine.limits.tolist()
-        self._hooked = any(cause.hook(name) for cause in job.causes for name in _HOOKS)
+        self._hooked = any(signal_path.stages_of(cause.effect) - _IN_THE_MACHINE for cause in job.causes)
         self._before: tuple[Floats, Floats] | None = None
         self._tip = PointSolver(self._machine, TARGET)
         self._pose = PointSolver(self._machine, POSE) if len(self._names) == 6 else None
@@ -75,7 +78,10 @@ class Stream:
         return self._point(commanded, solved.rho_nominal.copy(), solved.rho.copy(), solved.drive.copy())
 
     def _point(self, commanded: Floats, nominal: Floats, rho: Floats, drive: Floats) -> Point:
-        travel = zip(rho.tolist(), self._travel, self._names, strict=True)
+        at = rho.tolist()
+        if not isfinite(sum(commanded.tolist()) + sum(nominal.tolist()) + sum(at) + sum(drive.tolist())):
+            raise not_finite(self._job.config, "the corrected set-point")
+        travel = zip(at, self._travel, self._names, strict=True)
         beyond = tuple([name for at, (low, high), name in travel if at < low or at > high])
         return Point(commanded, nominal, rho, drive, beyond)
 
@@ -93,7 +99,7 @@ class Stream:
         return self._point(told[1], state.rho_nominal[1], state.rho[1], state.drive[1])
 
 
-_HOOKS = ("on_load", "on_servo", "on_drive", "on_drive_force", "on_pose", "on_workpiece")
+_IN_THE_MACHINE = {"structure", "sensor"}  # what the solved machine has in it already, and what moves no tip
 
 
 def _refuse(status: int) -> None:

@@ -77,5 +77,5 @@ def _best(evidence: Evidence, widths: Floats, name: str, columns: Sequence[int])
 
 
 def odds(gain: float) -> float:
-    """Probability that goes with a gain in log density, even odds before it; never certain."""
-    return float(min(1.0 / (1.0 + np.exp(-np.clip(gain, -50.0, 50.0))), 0.999))
+    """Probability that goes with a gain in log density, even odds before it."""
+    return float(1.0 / (1.0 + np.exp(-np.clip(gain, -50.0, 50.0))))

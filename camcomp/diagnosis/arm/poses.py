@@ -1,7 +1,8 @@
 """Static poses of an arm on the bench: where its tip should have been, and how every effect would move it.
 
 The same hooks act in the same order as for a program; what depends on motion sees none. Frame of the tracker and
-place of its target are found per campaign and are nuisances.
+place of its target are found per campaign and are nuisances: behind them nothing is left for hooks of workpiece and
+sensor to say. Nothing cuts, so the drives push nothing but the load.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from camcomp.diagnosis.arm.discrepancy import ResidualBlock, without_nuisance
 from camcomp.diagnosis.arm.registration import Registration, nuisance_columns, register
 from camcomp.ground import shelf
 from camcomp.ground.datatypes import Floats
+from camcomp.model import signal_path
 from camcomp.model.effect import Cause, Load, Motion, Parameter
 from camcomp.model.statics.arm import Arm, arm_of
 from camcomp.model.statics.description import Actuator, Link, Robot
@@ -64,6 +66,20 @@ class Column:
         return Cause(self.effect, self.module, self.target, {p.name: p.value(amount * p.scale)})
 
 
+@dataclass(frozen=True, eq=False)
+class Standing:
+    """An arm that stands in poses with causes on it: where its platform hangs, and what the tool behind it is told."""
+
+    hung: Hung
+    causes: tuple[Cause, ...]
+    load: Load
+    motion: Motion
+
+    def tips(self, at: Registration) -> Floats:
+        """Tips (n, 3) in the machine frame, without the nuisances of a registration."""
+        return signal_path.posed(self.causes, at.tips(self.hung.point, self.hung.rotation), self.load, self.motion)
+
+
 @dataclass(eq=False)
 class ArmBench:
     """An arm's model and its campaigns. start: first registration of every campaign."""
@@ -76,7 +92,7 @@ class ArmBench:
     def __post_init__(self) -> None:
         self.arm: Arm = _need(arm_of(self.robot))
         for each in self.campaigns:
-            hung = self.poses(each, ())
+            hung = self.standing(each, ()).hung
             self.start.append(register(each.tip, hung.point, hung.rotation, self.robot.tool))
 
     @property
@@ -84,25 +100,20 @@ class ArmBench:
         """Names in order."""
         return tuple(a.name for a in self.robot.actuators)
 
-    def poses(self, campaign: Poses, causes: Sequence[Cause]) -> Hung:
-        """Platform poses of a campaign with causes on top of those of the config."""
-        causes = (*self.causes, *causes)
-        motion = _standing(self.robot, campaign)
-        robot, error = self.robot, np.zeros_like(campaign.q)
-        load = Load(np.zeros((len(campaign.q), 3)), np.zeros((len(campaign.q), 6)))
-        for cause in causes:
-            if (hook := cause.hook("on_drive")) is not None:
-                error = hook(error, motion, cause.which(self.actuators), _complete(cause))
-            if (hook := cause.hook("on_robot")) is not None:
-                robot = hook(robot, cause.aimed(self.actuators), _complete(cause))
-            if (hook := cause.hook("on_load")) is not None:
-                load = hook(load, motion, _complete(cause))
-        return hang(robot, campaign.q + error, load.wrench if load.wrench.any() else None)
+    def standing(self, campaign: Poses, causes: Sequence[Cause]) -> Standing:
+        """A campaign with causes on top of those of the config."""
+        causes = [replace(cause, values=_complete(cause)) for cause in (*self.causes, *causes)]
+        robot, _ = signal_path.edited(causes, self.actuators, self.robot)
+        motion = _standing(robot, campaign)
+        motion = replace(motion, encoder=signal_path.controlled(causes, self.actuators, motion))
+        error, _ = signal_path.driven(causes, self.actuators, motion)
+        load = signal_path.loaded(causes, motion, np.zeros((len(campaign.q), 3)))
+        hung = hang(robot, motion.encoder + error, load.wrench if load.wrench.any() else None)
+        return Standing(hung, tuple(causes), load, motion)
 
     def tips(self, k: int, causes: Sequence[Cause], at: Registration) -> Floats:
         """Tips (n, 3) of campaign k in the machine frame, without its nuisances."""
-        hung = self.poses(self.campaigns[k], causes)
-        return at.tips(hung.point, hung.rotation)
+        return self.standing(self.campaigns[k], causes).tips(at)
 
     def columns(self, without: Sequence[str] = ()) -> list[Column]:
         """Every parameter of the shelf that may move a standing arm."""
@@ -133,15 +144,15 @@ class ArmBench:
         out = []
         for k, campaign in enumerate(self.campaigns):
             frame = self.registration(k, causes)
-            hung = self.poses(campaign, causes)
-            here = frame.tips(hung.point, hung.rotation)
+            stood = self.standing(campaign, causes)
+            here = stood.tips(frame)
             measured = frame.to_machine(campaign.tip)
             X = np.empty((*here.shape, len(columns)))
             for j in range(len(columns)):
                 step = _SHARE_OF_SCALE
                 moved = combined(columns, {**amounts, j: amounts.get(j, 0.0) + step})
                 X[:, :, j] = (self.tips(k, moved, frame) - here) / step
-            N = nuisance_columns(here, hung.rotation, here.mean(axis=0))
+            N = nuisance_columns(here, stood.hung.rotation, here.mean(axis=0))
             left = measured - here + X @ np.array([amounts.get(j, 0.0) for j in range(len(columns))])
             out.append(ResidualBlock(campaign.features, X, N, left, k, True))
         return out
@@ -149,11 +160,11 @@ class ArmBench:
     def registration(self, k: int, causes: Sequence[Cause]) -> Registration:
         """Frame and tool vector of campaign k that fit best with causes."""
         campaign, at = self.campaigns[k], self.start[k]
-        hung = self.poses(campaign, causes)
+        stood = self.standing(campaign, causes)
         for _ in range(3):
-            here = at.tips(hung.point, hung.rotation)
+            here = stood.tips(at)
             about = here.mean(axis=0)
-            N = nuisance_columns(here, hung.rotation, about)
+            N = nuisance_columns(here, stood.hung.rotation, about)
             gap = (at.to_machine(campaign.tip) - here).ravel()
             at = at.moved(np.asarray(np.linalg.lstsq(N.reshape(-1, 9), gap, rcond=1e-8)[0], float), about)
         return at
@@ -161,8 +172,7 @@ class ArmBench:
     def gap(self, k: int, causes: Sequence[Cause]) -> Floats:
         """Measured minus modelled tips (n, 3) of campaign k, machine frame, frames fitted again."""
         at = self.registration(k, causes)
-        hung = self.poses(self.campaigns[k], causes)
-        return at.to_machine(self.campaigns[k].tip) - at.tips(hung.point, hung.rotation)
+        return at.to_machine(self.campaigns[k].tip) - self.tips(k, causes, at)
 
 
 def combined(columns: Sequence[Column], amounts: Mapping[int, float]) -> list[Cause]:
@@ -190,7 +200,7 @@ def visible(blocks: Sequence[ResidualBlock], columns: Sequence[Column]) -> list[
 def _parameters(module: Any, turns: bool) -> tuple[Parameter, ...]:
     """The parameters that make sense for a hinge (turns) or a slide, without scanned shapes."""
     own = getattr(module, "ROTARY", module.PARAMETERS) if turns else getattr(module, "FITTED", module.PARAMETERS)
-    if turns and hasattr(module, "on_drive") and not hasattr(module, "ROTARY"):
+    if turns and "drive" in signal_path.stages_of(module) and not hasattr(module, "ROTARY"):
         own = tuple(p for p in own if p.unit == "ppm")  # lengths of a slide mean nothing to a hinge
     if any(p.scan for p in own):
         return ()
@@ -205,13 +215,11 @@ def _complete(cause: Cause) -> dict[str, float]:
 def _standing(robot: Robot, campaign: Poses) -> Motion:
     """The motion of poses that do not move."""
     zero = np.zeros_like(campaign.q)
-    drives = robot.actuators
-    stiffness = np.array([np.inf if a.stiffness is None else a.stiffness for a in drives])
-    home = np.array([a.home for a in drives])
-    n = len(campaign.q)
+    home, worn = np.array([a.home for a in robot.actuators]), np.zeros(len(campaign.q))
     return Motion(
-        campaign.time, campaign.time, np.zeros(n), campaign.temperature, campaign.q, zero, zero, home, stiffness, False
-    )
+        campaign.time, campaign.time, worn, campaign.temperature, campaign.q, zero, zero, home,
+        signal_path.springs(robot), False,
+    )  # fmt: skip
 
 
 def _need(arm: Arm | None) -> Arm:

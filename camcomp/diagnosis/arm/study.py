@@ -24,6 +24,19 @@ from camcomp.diagnosis.arm.discrepancy import (
 )
 from camcomp.diagnosis.arm.forward_selection import LEAST_SHARE, Step, Taken, odds, rms, take
 from camcomp.diagnosis.arm.poses import ArmBench, Column, Poses, combined, visible
+from camcomp.diagnosis.result.types import (
+    DiagnosisResult,
+    Driver,
+    Estimate,
+    Floor,
+    FoundCause,
+    GapSize,
+    ShrinkageStep,
+    UnknownCause,
+    UnseenShrinkage,
+    Where,
+)
+from camcomp.diagnosis.statistics.probability import stated
 from camcomp.ground.datatypes import Floats
 from camcomp.model.effect import Cause
 from camcomp.model.statics.arm import jacobian
@@ -66,8 +79,8 @@ def study(
     *,
     holdout: Sequence[str] = (),
     without: Sequence[str] = (),
-) -> dict[str, Any]:
-    """Result mapping for static poses of an arm. runs: one entry per run, whose label is its campaign (clamping).
+) -> DiagnosisResult:
+    """Result for static poses of an arm. runs: one entry per run, whose label is its campaign (clamping).
 
     holdout: names of runs (`Poses.run`) that are judged and never fitted; only their frames are. Raises ValueError when
     a campaign has too few poses for its frames.
@@ -86,16 +99,15 @@ def study(
     floor = 1e3 * np.sqrt(3.0) * found.discrepancy.noise
     left = 1e3 * _size(found.rest)
     unknown = left > UNKNOWN_FACTOR * floor
-    result: dict[str, Any] = {
-        "verdict": "unknown" if unknown else "identified" if found.taken.steps else "none",
-        "gap": _gap(gaps, floor),
-        "where": _where(bench, gaps, found, unknown),
-        "causes": _causes(bench, found, gaps, unknown),
-        "alternatives": [],
-        "shrinkage": _shrinkage(judge, found, [n for n in names if not holdout or n in holdout]),
-        "next_experiment": None,
-    }
-    return result
+    unseen = judge is not None or len(campaigns) > 1
+    return DiagnosisResult(
+        verdict="unknown" if unknown else "identified" if found.taken.steps else "none",
+        gap=_gap(gaps, floor),
+        where=_where(bench, gaps, found, unknown),
+        causes=_causes(bench, found, gaps, UNKNOWN_FACTOR * floor if unknown else None),
+        shrinkage=_shrinkage(judge, found, [n for n in names if not holdout or n in holdout]) if unseen else None,
+        floor=Floor(um=None, source="not identifiable"),
+    )
 
 
 def merged(runs: Sequence[Poses]) -> list[Poses]:
@@ -197,22 +209,25 @@ def _size(parts: Sequence[Floats]) -> float:
     return float(np.sqrt(np.mean((every**2).sum(axis=1))))
 
 
-def _gap(gaps: Sequence[Floats], floor: float) -> dict[str, float]:
+def _gap(gaps: Sequence[Floats], floor: float) -> GapSize:
     size = 1e3 * np.linalg.norm(np.concatenate(list(gaps)), axis=1)
-    return {
-        "rms_um": _round(np.sqrt(np.mean(size**2))),
-        "p95_um": _round(np.quantile(size, 0.95)),
-        "max_um": _round(size.max()),
-        "noise_floor_um": _round(floor),
-    }
+    return GapSize(
+        rms_um=_round(np.sqrt(np.mean(size**2))),
+        p95_um=_round(np.quantile(size, 0.95)),
+        max_um=_round(size.max()),
+        noise_floor_um=_round(floor),
+    )
 
 
-def _causes(bench: ArmBench, found: ArmFit, gaps: Sequence[Floats], unknown: bool) -> list[dict[str, Any]]:
-    """Effects with the actuators that matter; shares by the order in which the groups were taken."""
+def _causes(bench: ArmBench, found: ArmFit, gaps: Sequence[Floats], unknown_um: float | None) -> tuple[FoundCause, ...]:
+    """Effects with the actuators that matter; shares by the order in which the groups were taken.
+
+    unknown_um: size from which on a leftover is unknown, None where there is no such cause.
+    """
     before = found.taken.none
     whole = float(np.mean(before.squares))
     full = found.evidence.value(np.where(found.amount != 0.0, found.taken.widths, 0.0))
-    out: list[dict[str, Any]] = []
+    out: list[FoundCause] = []
     for step in found.taken.steps:
         share = (np.mean(before.squares) - np.mean(step.squares)) / whole
         sure = odds(step.density - before.density)
@@ -220,26 +235,43 @@ def _causes(bench: ArmBench, found: ArmFit, gaps: Sequence[Floats], unknown: boo
         energy = sum(e for e, _, _ in own)
         for (e, probability, parameters), target in zip(own, dict.fromkeys(_targets(found, step.group)), strict=True):
             if probability >= LEAST_TARGET:
-                out.append({
-                    "effect": step.group, "target": target, "probability": round(min(sure, probability), 4),
-                    "share": round(float(share * e / energy), 4), "parameters": parameters,
-                })  # fmt: skip
+                out.append(
+                    FoundCause(
+                        effect=step.group,
+                        target=target,
+                        probability=stated(min(sure, probability)),
+                        share=round(float(share * e / energy), 4),
+                        parameters=parameters,
+                    )
+                )
         before = step
     order = [s.group for s in found.taken.steps]
-    out.sort(key=lambda c: (-c["probability"], order.index(c["effect"]), -c["share"]))
-    if unknown:
-        out.append({
-            "effect": "unknown", "target": None, "probability": 0.999,
-            "share": round(_size(found.rest) ** 2 / _size(gaps) ** 2, 4), "parameters": {},
-        })  # fmt: skip
-    return out
+    out.sort(key=lambda c: (-c.probability, order.index(c.effect), -c.share))
+    if unknown_um is not None:
+        squares = [1e6 * (r**2).sum(axis=1) for r in found.rest]
+        features = [c.features for c in bench.campaigns]
+        left = round(_size(found.rest) ** 2 / _size(gaps) ** 2, 4)
+        out.append(UnknownCause(target=None, probability=exceeding(squares, features, unknown_um), share=left))
+    return tuple(out)
+
+
+def exceeding(squares: Sequence[Floats], features: Sequence[Floats], limit: float) -> float:
+    """Probability that a leftover, squares (n,) um2 per campaign, is larger than a limit in um (rms).
+
+    With regions of postures drawn anew, the share of draws in which it is: (hits + 1) / (draws + 2), Laplace's rule for
+    an even prior, which is never surer than the number of draws allows.
+    """
+    energy, count = _by_region(squares, features), _by_region([np.ones(len(s)) for s in squares], features)
+    pick = np.random.default_rng(CAMPAIGN_SEED).integers(0, len(energy), (DRAWS, len(energy)))
+    hits = int((energy[pick].sum(axis=1) > limit**2 * count[pick].sum(axis=1)).sum())
+    return stated((hits + 1) / (DRAWS + 2))
 
 
 def _targets(found: ArmFit, group: str) -> list[str | None]:
     return [found.columns[j].target for j in found.groups[group] if found.amount[j] != 0.0]
 
 
-def _target(found: ArmFit, step: Step, target: str | None, full: float) -> tuple[float, float, dict[str, Any]]:
+def _target(found: ArmFit, step: Step, target: str | None, full: float) -> tuple[float, float, dict[str, Estimate]]:
     """Energy, probability and parameters of a group at one target."""
     own = [j for j in found.groups[step.group] if found.columns[j].target == target and found.amount[j] != 0.0]
     widths = np.where(found.amount != 0.0, found.taken.widths, 0.0)
@@ -251,13 +283,13 @@ def _target(found: ArmFit, step: Step, target: str | None, full: float) -> tuple
     for j in own:
         p = found.columns[j].parameter
         spread = 1.96 * float(np.sqrt(found.covariance[j, j]))
-        ends = [p.value((found.amount[j] + s * spread) * p.scale) for s in (-1.0, 1.0)]
+        low, high = (_digits(p.value((found.amount[j] + s * spread) * p.scale)) for s in (-1.0, 1.0))
         value = p.value(found.amount[j] * p.scale)
-        parameters[p.name] = {"value": _digits(value), "ci95": [_digits(each) for each in ends]}
+        parameters[p.name] = Estimate(value=_digits(value), ci95=(low, high))
     return energy, odds(full - found.evidence.value(widths)), parameters
 
 
-def _where(bench: ArmBench, gaps: Sequence[Floats], found: ArmFit, unknown: bool) -> dict[str, Any]:
+def _where(bench: ArmBench, gaps: Sequence[Floats], found: ArmFit, unknown: bool) -> Where:
     energy = (np.concatenate(list(gaps)) ** 2).sum(axis=0)
     actuators = dict.fromkeys(bench.actuators, 0.0)
     stages: dict[str, float] = {}
@@ -269,21 +301,21 @@ def _where(bench: ArmBench, gaps: Sequence[Floats], found: ArmFit, unknown: bool
             if target is not None:
                 actuators[target] += size
     total = max(sum(actuators.values()), 1e-300)
-    return {
-        "stage": max(stages, key=lambda s: stages[s]) if stages else "structure",
-        "axes": {axis: round(float(e / energy.sum()), 4) for axis, e in zip("xyz", energy, strict=True)},
-        "actuators": {name: round(size / total, 4) for name, size in actuators.items()},
-        "lines": [],
-        "intervals": [],
-        "drivers": _drivers(bench, found) if unknown else [],
-    }
+    most: Any = max(stages, key=lambda s: stages[s]) if stages else "structure"
+    whole = max(float(energy.sum()), 1e-300)
+    return Where(
+        stage=most,
+        axes={axis: round(float(e) / whole, 4) for axis, e in zip("xyz", energy, strict=True)},
+        actuators={name: round(size / total, 4) for name, size in actuators.items()},
+        drivers=_drivers(bench, found) if unknown else (),
+    )
 
 
-def _drivers(bench: ArmBench, found: ArmFit) -> list[dict[str, Any]]:
+def _drivers(bench: ArmBench, found: ArmFit) -> tuple[Driver, ...]:
     """What the leftover depends on."""
     patterns: dict[str, list[Floats]] = {}
     for k, campaign in enumerate(bench.campaigns):
-        hung = bench.poses(campaign, ())
+        hung = bench.standing(campaign, ()).hung
         lever = bench.start[k].tips(hung.point, hung.rotation) - hung.point
         J = np.array([jacobian(bench.arm, q) for q in campaign.q])
         moves = J[:, :3] + np.cross(J[:, 3:], lever[:, :, None], axis=1)
@@ -309,10 +341,10 @@ def _drivers(bench: ArmBench, found: ArmFit) -> list[dict[str, Any]]:
             for c in bench.campaigns
         ]
     every_share = shares(patterns, found.rest, [c.features for c in bench.campaigns], found.discrepancy.noise)
-    return [{"covariate": name, "share": round(share, 4)} for name, share in every_share[:6] if share > 0.02]
+    return tuple(Driver(covariate=name, share=round(share, 4)) for name, share in every_share[:6] if share > 0.02)
 
 
-def _shrinkage(bench: ArmBench | None, found: ArmFit, names: list[str]) -> dict[str, Any]:
+def _shrinkage(bench: ArmBench | None, found: ArmFit, names: list[str]) -> UnseenShrinkage:
     """On held-out runs with their frames fitted again; without such runs, every block is withheld once."""
     groups = [s.group for s in found.taken.steps]
     if bench is not None:
@@ -326,17 +358,17 @@ def _shrinkage(bench: ArmBench | None, found: ArmFit, names: list[str]) -> dict[
         low, high = _resampled(found.taken.none.squares, (found.taken.steps or (found.taken.none,))[-1].squares)
     after = size[-1]
     ratio_value = 1.0 - after / size[0] if size[0] > 0 else 0.0
-    return {
-        "holdout": names,
-        "before_rms_um": _round(1e3 * size[0]),
-        "after_rms_um": _round(1e3 * after),
-        "ratio": round(ratio_value, 4),
-        "ci95": [round(min(low, ratio_value), 4), round(max(high, ratio_value), 4)],
-        "steps": [
-            {"effect": g, "target": None, "after_rms_um": _round(1e3 * s)}
+    return UnseenShrinkage(
+        holdout=tuple(names),
+        before_rms_um=_round(1e3 * size[0]),
+        after_rms_um=_round(1e3 * after),
+        ratio=round(ratio_value, 4),
+        ci95=(round(min(low, ratio_value), 4), round(max(high, ratio_value), 4)),
+        steps=tuple(
+            ShrinkageStep(effect=g, target=None, after_rms_um=_round(1e3 * s))
             for g, s in zip(groups, size[1:], strict=True)
-        ],
-    }
+        ),
+    )
 
 
 def _stages(bench: ArmBench, found: ArmFit) -> list[list[Floats]]:
@@ -369,14 +401,16 @@ def shortened(found: ArmFit, count: int) -> Taken:
 
 def _interval(first: Sequence[Floats], last: Sequence[Floats], features: Sequence[Floats]) -> tuple[float, float]:
     """95 % interval of the ratio by drawing regions of postures, 16 per campaign, with replacement."""
-    a, b, n = [], [], []
-    for f, x, y in zip(features, first, last, strict=True):
+    return _resampled(_by_region(first, features), _by_region(last, features))
+
+
+def _by_region(values: Sequence[Floats], features: Sequence[Floats]) -> Floats:
+    """Sums (r,) of values, each (n,), over regions of postures, 16 per campaign."""
+    out = []
+    for f, x in zip(features, values, strict=True):
         group = regions(f, 2 * REGIONS)
-        for g in np.unique(group):
-            a.append(x[group == g].sum())
-            b.append(y[group == g].sum())
-            n.append((group == g).sum())
-    return _resampled(np.array(a), np.array(b))
+        out += [float(x[group == g].sum()) for g in np.unique(group)]
+    return np.array(out)
 
 
 def _resampled(before: Floats, after: Floats) -> tuple[float, float]:

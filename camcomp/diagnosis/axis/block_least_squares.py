@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import t as student
 
 from camcomp.ground.datatypes import Floats, Ints
 
@@ -19,11 +20,14 @@ MOST_BLOCKS = 25
 
 @dataclass(frozen=True, eq=False)
 class Series:
-    """Rows of one channel over all runs: y (n,), block number (n,), and for every block the rows to fit on (n,) bool."""
+    """Rows of one channel over all runs: y (n,), block number (n,), and for every block the rows to fit on (n,) bool; whole:
+    blocks are whole runs.
+    """
 
     y: Floats
     block: Ints
     others: tuple[np.ndarray, ...]
+    whole: bool
 
 
 def series(times: Sequence[Floats], values: Sequence[Floats]) -> Series:
@@ -42,7 +46,7 @@ def series(times: Sequence[Floats], values: Sequence[Floats]) -> Series:
         mine = block == b
         near = (run == run[mine][0]) & (time > time[mine].min() - MARGIN_S) & (time < time[mine].max() + MARGIN_S)
         others.append(~near if len(times) < 4 else ~mine)
-    return Series(y, np.unique(block, return_inverse=True)[1], tuple(others))
+    return Series(y, np.unique(block, return_inverse=True)[1], tuple(others), len(times) >= 4)
 
 
 def solve(A: Floats, y: Floats) -> Floats:
@@ -64,17 +68,28 @@ def withheld(data: Series, A: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class Gain:
-    """What a term adds: mean log ratio of rms on withheld blocks, and that mean over its standard error."""
+    """What a term adds: mean log ratio of rms on withheld blocks, that mean over its standard error, and how many blocks."""
 
     log_ratio: float
     z: float
+    blocks: int
 
 
 def gain(before: Floats, after: Floats) -> Gain:
     """From mean squares of the same blocks (blocks,)."""
     each = 0.5 * (np.log(np.maximum(before, 1e-300)) - np.log(np.maximum(after, 1e-300)))
     spread = float(each.std(ddof=1)) / np.sqrt(len(each)) if len(each) > 1 else 0.0
-    return Gain(float(each.mean()), float(each.mean() / spread) if spread > 0 else 0.0)
+    return Gain(float(each.mean()), float(each.mean() / spread) if spread > 0 else 0.0, len(each))
+
+
+def log10_chance(found: Gain, tried: int = 1) -> float:
+    """log10 of the chance that a term which is not there gains as much; tried: terms of which this one is the best.
+
+    Student's t of the mean over the blocks, times the terms tried (Bonferroni).
+    """
+    if found.blocks < 2:
+        return 0.0
+    return min(float(student.logsf(found.z, found.blocks - 1) + np.log(tried)) / float(np.log(10.0)), 0.0)
 
 
 def fit(data: Series, A: Floats) -> tuple[Floats, Floats]:

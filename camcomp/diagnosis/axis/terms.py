@@ -55,13 +55,16 @@ def strangers(at: AxisTravel, distance: float) -> dict[str, tuple[str, Floats]]:
 
 @dataclass(frozen=True)
 class Ripple:
-    """A line in the leftover over position: period mm, amplitude (both directions), share of the leftover's energy."""
+    """A line in the leftover over position: period mm, amplitude (both directions), share of the leftover's energy; how many
+    periods were tried.
+    """
 
     period: float
     amplitude: float
     forward: float
     backward: float
     share: float
+    tried: int
 
 
 def ripple(at: list[AxisTravel], left: list[Floats], shortest: float = 0.5, longest: float = 60.0) -> Ripple | None:
@@ -104,7 +107,12 @@ def ripple(at: list[AxisTravel], left: list[Floats], shortest: float = 0.5, long
     c = np.linalg.lstsq(A, y, rcond=None)[0]
     share = 1.0 - float(((y - A @ c) ** 2).sum() / max(float((y**2).sum()), 1e-300))
     return Ripple(
-        1.0 / f, float(np.hypot(*c)), float(2 * np.abs(lines[0][best])), float(2 * np.abs(lines[1][best])), share
+        1.0 / f,
+        float(np.hypot(*c)),
+        float(2 * np.abs(lines[0][best])),
+        float(2 * np.abs(lines[1][best])),
+        share,
+        len(frequency),
     )
 
 

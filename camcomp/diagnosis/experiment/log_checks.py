@@ -1,13 +1,15 @@
 """Whether a log can be what its run says: right program, units, axes and order. What cannot is refused with the reason."""
 
+from collections.abc import Callable
+from functools import partial
 from itertools import permutations
 
 import numpy as np
+from scipy.spatial import KDTree
 
 from camcomp.diagnosis.fit.measured import Measured
 from camcomp.ground.datatypes import Bools, Floats
 from camcomp.ground.errors import ConfigError, Location
-from camcomp.model.motion.run_path import RunPath
 
 FAR_MM = 5.0  # no machine of the kind is wrong by so much; a log of another program or unit is
 FAR_RAD = 0.1
@@ -74,37 +76,51 @@ def check_program(name: str, run: str, measured: Measured, rows: Bools) -> None:
         raise ConfigError("CC406", message, at=Location(name, 1, 1))
 
 
-def check_places(name: str, run: str, measured: Measured, run_path: RunPath, tip: Floats, rotary: bool = False) -> None:
+def check_places(name: str, run: str, measured: Measured, rho: Floats, tip: Floats, rotary: bool = False) -> None:
     """Raise CC407 (units), CC408 (axes), CC406 (another program) where tip or encoders are far from where they were due.
 
-    tip (n, 3) mm, run_path.row_rho (n, m): where tip and actuators should have been; rotary: all actuators are hinges.
+    tip (n, 3) mm, rho (n, m): where tip and actuators should have been; rotary: all actuators are hinges.
     """
-    turning = (
-        "encoders look",
-        measured.encoder,
-        run_path.row_rho,
-        FAR_RAD if rotary else FAR_MM,
-        _TURNS if rotary else _LENGTH_UNITS,
-    )
-    for what, found, due, far, units in (("tip looks", measured.tip, tip, FAR_MM, _LENGTH_UNITS), turning):
+    far = FAR_RAD if rotary else FAR_MM
+    for what, found, due, most in (
+        ("tip looks", measured.tip, tip, FAR_MM),
+        ("encoders look", measured.encoder, rho, far),
+    ):
         rows = np.isfinite(found).all(axis=1)
-        if not rows.any() or _distance(found[rows], due[rows]) < far:
-            continue
-        found, due = found[rows], due[rows]
-        at = Location(name, 1, 1)
-        for factor, unit in units.items():
-            if _distance(found / factor, due) < far:
-                raise ConfigError("CC407", f"run '{run}': the {what} as if logged in {unit}", at=at)
-        for order in permutations(range(due.shape[1])):
-            for sign in np.ndindex(*(2,) * due.shape[1]) if due.shape[1] <= 3 else ((0,) * due.shape[1],):
-                turned = found[:, order] * (1 - 2 * np.array(sign))
-                if _distance(turned, due) < far:
-                    message = f"run '{run}': the {what} right when axes are swapped or reversed"
-                    raise ConfigError("CC408", message, at=at)
-        off, name_of = _distance(found, due), what.split()[0]
-        unit = "rad" if units is _TURNS else "mm"
-        raise ConfigError("CC406", f"run '{run}': {name_of} {off:.3g} {unit} from where the program goes", at=at)
+        if rows.any():
+            _check(name, run, what, found[rows], partial(_distance, due=due[rows]), most, rotary and most == FAR_RAD)
 
 
-def _distance(found: Floats, due: Floats) -> float:
+def check_told(name: str, run: str, what: str, told: Floats, program: Floats, rotary: bool = False) -> None:
+    """Like `check_places` for the motion itself: told (n, m) against the actuators program (s, m) along the program."""
+    tree = KDTree(program)
+
+    def distance(found: Floats) -> float:
+        return float(np.median(tree.query(found)[0]))
+
+    _check(name, run, f"{what}s look", told, distance, FAR_RAD if rotary else FAR_MM, rotary)
+
+
+def _check(
+    name: str, run: str, what: str, found: Floats, distance: Callable[[Floats], float], far: float, rotary: bool
+) -> None:
+    off = distance(found)
+    if off < far:
+        return
+    at = Location(name, 1, 1)
+    for factor, unit in (_TURNS if rotary else _LENGTH_UNITS).items():
+        if distance(found / factor) < far:
+            raise ConfigError("CC407", f"run '{run}': the {what} as if logged in {unit}", at=at)
+    m = found.shape[1]
+    for order in permutations(range(m)):
+        for sign in np.ndindex(*(2,) * m) if m <= 3 else ((0,) * m,):
+            if distance(found[:, order] * (1 - 2 * np.array(sign))) < far:
+                message = f"run '{run}': the {what} right when axes are swapped or reversed"
+                raise ConfigError("CC408", message, at=at)
+    unit = "rad" if rotary else "mm"
+    message = f"run '{run}': {what.split()[0]} {off:.3g} {unit} from where the program goes"
+    raise ConfigError("CC406", message, at=at)
+
+
+def _distance(found: Floats, *, due: Floats) -> float:
     return float(np.median(np.linalg.norm(found - due, axis=1)))

@@ -16,17 +16,18 @@ from typing import Any
 
 import numpy as np
 
+from camcomp.ground.csv_table import TableRules, read_csv
 from camcomp.ground.datatypes import Floats
 from camcomp.ground.errors import ConfigError, Location
 from camcomp.model.config.robot import PrismaticActuator, RevoluteActuator
+from camcomp.model.motion.log_columns import TEMPERATURE, TIME, TIP, log_columns
 
-USUAL = {
-    "t_s": ("t_s", "time_s", "time", "timestamp"),
-    "x_mm": ("x_mm", "measurement_x", "x"),
-    "y_mm": ("y_mm", "measurement_y", "y"),
-    "z_mm": ("z_mm", "measurement_z", "z"),
-    "temp_C": ("temp_c", "measurement_temperature", "temperature"),
+USUAL = {  # beside the log's own names
+    TIME: ("time_s", "time", "timestamp"),
+    **{own: (f"measurement_{axis}", axis) for own, axis in zip(TIP, "xyz", strict=True)},
+    TEMPERATURE: ("measurement_temperature", "temperature"),
 }
+POSE_RULES = TableRules(table="CC421", column="CC421", cell="CC422")
 Actuators = Mapping[str, PrismaticActuator | RevoluteActuator]
 
 
@@ -45,16 +46,12 @@ def read_poses(
     **_: Any,
 ) -> Recording:  # fmt: skip
     """A table of static poses. Raises ConfigError CC421 for missing columns, CC422 for cells that are no numbers."""
-    text = data.decode("utf-8-sig", errors="replace")
-    lines = [line for line in text.splitlines() if line.strip()]
-    if not lines:
-        raise ConfigError("CC421", "the table is empty", at=Location(name, 1, 1))
-    mark = max(";\t,", key=lines[0].count)
-    header = [cell.strip().strip('"') for cell in lines[0].split(mark)]
-    lower = [each.lower() for each in header]
-    wanted: dict[str, tuple[str, ...]] = {}
-    for key, each in actuators.items():
-        wanted[f"act_{key}_{'rad' if each.rotary else 'mm'}"] = (key.lower(), f"{key.lower()}_joint")
+    recorded = read_csv(data, name, POSE_RULES, spreadsheet=True)
+    lower = [each.lower() for each in recorded.header]
+    encoders = log_columns(list(actuators), [each.rotary for each in actuators.values()]).encoder
+    wanted: dict[str, tuple[str, ...]] = {
+        log: (key.lower(), f"{key.lower()}_joint") for key, log in zip(actuators, encoders, strict=True)
+    }
     wanted |= USUAL
     index: dict[str, int] = {}
     for log, theirs in wanted.items():
@@ -63,33 +60,20 @@ def read_poses(
         found = [i for i, each in enumerate(lower) if each in names]
         if found:
             index[log] = found[0]
-        elif log not in ("t_s", "temp_C"):
-            hint = f"name it: --column {log}=THEIRS; there are: {', '.join(header)}"
-            raise ConfigError("CC421", f"no column for {log}", at=Location(name, 1, 1, lines[0]), hint=hint)
-    table = np.empty((len(lines) - 1, len(index)))
-    for r, line in enumerate(lines[1:]):
-        cells = line.split(mark)
-        for c, i in enumerate(index.values()):
-            table[r, c] = _number(cells[i] if i < len(cells) else "", mark, Location(name, r + 2, 1, line))
+        elif log not in (TIME, TEMPERATURE):
+            hint = f"name it: --column {log}=THEIRS; there are: {', '.join(recorded.header)}"
+            raise ConfigError("CC421", f"no column for {log}", at=recorded.at(-1), hint=hint)
+    recorded.refuse_twice(list(index.values()))
+    table = recorded.values(list(index.values()))
     notes: list[str] = []
     values = dict(zip(index, table.T, strict=True))
-    values["t_s"] = _seconds(values.get("t_s"), len(table), notes)
+    values[TIME] = _seconds(values.get(TIME), len(table), notes)
     if rows is not None and rows < len(table):
         keep = np.unique(np.linspace(0, len(table) - 1, rows).round().astype(int))
         values = {key: each[keep] for key, each in values.items()}
         notes.append(f"{len(keep)} of {len(table)} rows")
-    order = ["t_s", *(key for key in wanted if key in values and key != "t_s")]
-    return Recording(Path(name).stem, _csv({key: values[key] for key in order}), len(values["t_s"]), tuple(notes))
-
-
-def _number(cell: str, mark: str, at: Location) -> float:
-    cell = cell.strip().strip('"')
-    if not cell:
-        return float("nan")
-    try:
-        return float(cell.replace(",", ".") if mark != "," else cell)
-    except ValueError:
-        raise ConfigError("CC422", f"'{cell}' is not a number", at=at) from None
+    order = [TIME, *(key for key in wanted if key in values and key != TIME)]
+    return Recording(Path(name).stem, _csv({key: values[key] for key in order}), len(values[TIME]), tuple(notes))
 
 
 def _seconds(stamps: Floats | None, n: int, notes: list[str]) -> Floats:
@@ -129,16 +113,17 @@ def read_axis(
     target = actuator or next(iter(actuators))
     if target not in actuators:
         raise ConfigError("CC423", f"the machine has no actuator '{target}'", at=Location(name, 1, 1))
+    named = log_columns([target], [False])
     values = {
-        "t_s": found["t"] - found["t"][0],
-        f"cmd_{target}_mm": 1e3 * found["qg"],
-        f"act_{target}_mm": 1e3 * found["qm"],
+        TIME: found["t"] - found["t"][0],
+        named.setpoint[0]: 1e3 * found["qg"],
+        named.encoder[0]: 1e3 * found["qm"],
     }
     if "vir" in found and "gtau" in found:
-        values[f"act_{target}_N"] = found["vir"] * float(found["gtau"][0])
+        values[named.drive[0]] = found["vir"] * float(found["gtau"][0])
     if rows is not None:
         values = {key: each[:rows] for key, each in values.items()}
-    return Recording(Path(name).stem, _csv(values), len(values["t_s"]))
+    return Recording(Path(name).stem, _csv(values), len(values[TIME]))
 
 
 def _csv(columns: Mapping[str, Floats]) -> bytes:

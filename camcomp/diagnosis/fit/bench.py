@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from camcomp.diagnosis.fit.measured import Measured, stack
-from camcomp.ground.datatypes import Floats
+from camcomp.ground.datatypes import Bools, Floats
 from camcomp.model.effect import Cause, Parameter
-from camcomp.model.motion.run_path import RunPath, beside_jumps
+from camcomp.model.motion.run_path import RunPath
 from camcomp.model.motion.twin import Reading, Slopes, Solved, Twin
 
 _SHARE_OF_SCALE = 0.05  # step of a difference
@@ -64,6 +64,9 @@ class Run:
     clamping: str | int | None
     clock: str | int | None
     thin: int = 1
+    by: str = "setpoint"  # the channel that is the motion
+    unsure: Bools | None = None  # (n,) rows whose tip says nothing
+    turn: Floats | None = None  # (n, 3, 3) program axes to along and across the path, where the tip is the motion
 
 
 @dataclass(eq=False)
@@ -118,18 +121,34 @@ class Bench:
         if k not in self._row_slopes:
             run = self.runs[k]
             at_nodes = self.twin.rotation.T @ self.slopes[k].tip_rho
-            self._row_slopes[k] = run.run_path.place(run.run_path.time).of(at_nodes)
+            self._row_slopes[k] = run.run_path.row_place.of(at_nodes)
         return self._row_slopes[k]
 
-    def channels(self, reading: Reading) -> Floats:
-        """Channels (n, c) of readings."""
-        return stack(reading.tip, reading.encoder, reading.drive, reading.dyno)
+    def channels(self, k: int, reading: Reading) -> Floats:
+        """Channels (n, c) of readings of run k; its tip along and across the path where the tip is the motion."""
+        return stack(self.turned(k, reading.tip), reading.encoder, reading.drive, reading.dyno)
+
+    def turned(self, k: int, tip: Floats) -> Floats:
+        """Vectors (n, 3), program axes, as the tip's channels of run k have them."""
+        turn = self.runs[k].turn
+        return tip if turn is None else np.einsum("nij,nj->ni", turn, tip)
 
     def observed(self, k: int) -> Floats:
-        """Channels (n, c) as measured in run k; NaN where missing, and in what the force moves where the force jumps."""
-        m = self.runs[k].measured
-        loaded = np.where(beside_jumps(self.runs[k].run_path), np.nan, 0.0)[:, None]
-        return stack(m.tip + loaded, m.encoder, m.drive + loaded, m.dyno + loaded)
+        """Channels (n, c) as measured in run k.
+
+        NaN where missing, where nobody knows what was asked for or how the force stood, and in the channel that is the
+        motion itself.
+        """
+        run, m = self.runs[k], self.runs[k].measured
+        tip, encoder = self.turned(k, m.tip), m.encoder
+        if run.unsure is not None:
+            tip = np.where(run.unsure[:, None], np.nan, tip)
+        if run.turn is not None:
+            tip = np.where([True, False, False], np.nan, tip)
+        if run.by != "setpoint":
+            encoder = np.full_like(encoder, np.nan)
+        loaded = np.where(run.run_path.jumping, np.nan, 0.0)[:, None]
+        return stack(tip + loaded, encoder, m.drive + loaded, m.dyno + loaded)
 
     def residual(self, k: int, causes: Sequence[Cause] = ()) -> Floats:
         """Measured minus model (n, c) in run k, thinned."""
@@ -137,12 +156,22 @@ class Bench:
 
     def difference(self, k: int, reading: Reading) -> Floats:
         """Measured minus a reading (n, c) of run k, thinned."""
-        return thinned(self.observed(k) - self.channels(reading), self.runs[k].thin)
+        return thinned(self.observed(k) - self.channels(k, reading), self.runs[k].thin)
 
     def gap(self, k: int, causes: Sequence[Cause] = ()) -> Floats:
-        """Measured minus model (n, c) in run k, thinned, with the model's own encoders: the gap as a user sees it."""
-        reading = self._sense(k, causes, None)
-        return thinned(self.observed(k) - self.channels(reading), self.runs[k].thin)
+        """Measured minus model (n, c) in run k, thinned, with the model's own encoders: the gap as a user sees it.
+
+        In program axes; along the path nothing is missing where the tip is the motion.
+        """
+        run = self.runs[k]
+        gap = self.observed(k) - self.channels(
+            k, self._sense(k, causes, None if run.by == "setpoint" else self._encoders(run))
+        )
+        if run.turn is not None:
+            known = np.asarray(np.isfinite(gap[:, 1:3]).all(axis=1))
+            back = np.einsum("nji,nj->ni", run.turn[:, 1:], gap[:, 1:3])
+            gap[:, :3] = np.where(known[:, None], back, np.nan)
+        return thinned(gap, run.thin)
 
 
 def thinned(values: Floats, factor: int) -> Floats:

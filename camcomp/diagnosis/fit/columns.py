@@ -82,7 +82,7 @@ def candidate_columns(bench: Bench, candidate: CandidateCause, shape: Mapping[st
         after = cause_of(candidate, {**shape, p.name: step_of(p)})
         per_run = []
         for k, run in enumerate(bench.runs):
-            change = bench.channels(bench.read(k, [after])) - bench.channels(bench.nominal[k])
+            change = bench.channels(k, bench.read(k, [after])) - bench.channels(k, bench.nominal[k])
             per_run.append(thinned(change * (p.scale / step_of(p)), run.thin))
         out.append(per_run)
     return out
@@ -223,7 +223,7 @@ def _difference(bench: Bench, name: str, effect: object, step: float) -> list[Fl
     cause = Cause(name, effect, None, {})  # the name tells one changed machine from another
     out = []
     for k, run in enumerate(bench.runs):
-        change = bench.channels(bench.read(k, [cause])) - bench.channels(bench.nominal[k])
+        change = bench.channels(k, bench.read(k, [cause])) - bench.channels(k, bench.nominal[k])
         out.append(thinned(change / step, run.thin))
     return out
 

@@ -9,10 +9,10 @@ from camcomp.diagnosis.fit.columns import Columns, shape_default
 from camcomp.diagnosis.statistics.cause_sets import total
 from camcomp.diagnosis.statistics.evidence import Gram
 from camcomp.ground.datatypes import Floats, Ints
+from camcomp.model import signal_path
 from camcomp.model.effect import Parameter
 
 _FINER = 17  # values between the neighbours of the best
-_OTHER_HOOKS = ("on_servo", "on_robot", "on_load", "on_pose", "on_workpiece", "on_clock")
 
 
 def beside(
@@ -79,23 +79,22 @@ def reach(p: Parameter, value: float) -> float:
 
 
 def quick_columns(bench: Bench, candidate: CandidateCause, shape: Mapping[str, float]) -> list[list[Floats]] | None:
-    """Columns of an effect that moves carriages only, straight from its hook; None for any other effect."""
-    if hasattr(candidate.effect, "on_drive") and not any(hasattr(candidate.effect, h) for h in _OTHER_HOOKS):
+    """Columns of an effect of the drive alone, straight from its hooks; None for any other effect."""
+    if signal_path.stages_of(candidate.effect) == {"drive"}:
         out = []
         for p in candidate.parameters:
             cause = cause_of(candidate, {**shape, p.name: p.scale})
-            which = cause.which(bench.actuators)
-            effort = cause.hook("on_drive_force")
             per_run = []
             for k, run in enumerate(bench.runs):
                 motion = bench.nominal[k].motion
-                moved = candidate.effect.on_drive(np.zeros_like(motion.encoder), motion, which, cause.values)
+                moved, guided = signal_path.driven([cause], bench.actuators, motion)
+                effort = signal_path.drive_forces([cause], bench.actuators, guided)
                 values = np.zeros_like(bench.observed(k))
                 slope = bench.row_slopes(k)
-                values[:, :3] = np.einsum("nij,nj->ni", slope, moved)
+                values[:, :3] = bench.turned(k, np.einsum("nij,nj->ni", slope, moved))
                 if effort is not None:
                     m = len(bench.actuators)
-                    values[:, 3 + m : 3 + 2 * m] = effort(np.zeros_like(moved), motion, which, cause.values)
+                    values[:, 3 + m : 3 + 2 * m] = effort
                 per_run.append(thinned(values, run.thin))
             out.append(per_run)
         return out

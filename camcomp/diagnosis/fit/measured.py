@@ -9,7 +9,9 @@ from camcomp.ground.datatypes import Bools, Floats
 
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """n rows, m actuators. tip (n, 3) mm program frame; setpoint, encoder, drive (n, m); dyno (n, 3) N machine frame."""
+    """n rows, m actuators. tip (n, 3) mm program frame; setpoint, encoder, drive (n, m); dyno (n, 3) N machine frame;
+    tip_sd (n, 3) mm: what the instrument states of its own deviation.
+    """
 
     time: Floats
     line: Floats
@@ -19,6 +21,7 @@ class Measured:
     drive: Floats
     dyno: Floats
     temperature: Floats
+    tip_sd: Floats
 
     def has(self, name: str) -> bool:
         """Whether the channel holds any value."""

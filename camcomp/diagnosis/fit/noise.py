@@ -63,9 +63,34 @@ def inflation(bench: Bench) -> list[Floats]:
             extra[:, 3 : 3 + m] = TIMING_S**2 * change
             if unsteady > 0.0:
                 extra[:, :3] = np.hypot(extra[:, :3], unsteady * np.abs(_speed(bench, k)))
+        extra = np.hypot(extra, _doubt(bench, k))
         extra = np.where(np.isfinite(observed), extra, np.nan)
         out.append(thinned(extra, run.thin))
     return out
+
+
+def _doubt(bench: Bench, k: int) -> Floats:
+    """What the channels (n, c) may be off by where the force is not known, standard deviations."""
+    run = bench.runs[k]
+    out = np.zeros_like(bench.observed(k))
+    if run.run_path.driven is None or not run.run_path.driven.doubt.any():
+        return out
+    force = run.run_path.driven.doubt
+    m = len(bench.actuators)
+    slopes = bench.slopes[k].at(run.run_path.row_place)
+    lever = bench.twin.nominal.tool
+    # each axis of the force may be off by itself
+    for axis in range(3):
+        push = np.zeros((len(force), 3))
+        push[:, axis] = force[:, axis]
+        wrench = np.concatenate([push, np.cross(lever, push)], axis=1)
+        tip = np.einsum("nij,nj->ni", slopes.tip_wrench, wrench) @ bench.twin.rotation
+        out[:, :3] = np.hypot(out[:, :3], bench.turned(k, tip))
+        out[:, 3 + m : 3 + 2 * m] = np.hypot(
+            out[:, 3 + m : 3 + 2 * m], np.einsum("nij,nj->ni", slopes.drive_wrench, wrench)
+        )
+    out[:, 3 + 2 * m :] = force
+    return np.abs(out)
 
 
 def jitter(bench: Bench) -> float:
@@ -80,7 +105,7 @@ def jitter(bench: Bench) -> float:
         if not run.run_path.ordered or len(t) < 60:
             continue
         speed = np.abs(_speed(bench, k))
-        gap = (bench.observed(k) - bench.channels(bench.nominal[k]))[:, :3]
+        gap = (bench.observed(k) - bench.channels(k, bench.nominal[k]))[:, :3]
         rough = np.diff(gap, 4, axis=0) ** 2 / 70.0
         for rows, v in zip(rough.T, speed[2:-2].T, strict=True):
             present = np.isfinite(rows)
@@ -104,7 +129,7 @@ def jitter(bench: Bench) -> float:
 def _speed(bench: Bench, k: int) -> Floats:
     """Velocity (n, 3) of the modelled tip in run k, mm/s."""
     t = bench.runs[k].run_path.time
-    return np.gradient(bench.channels(bench.nominal[k])[:, :3], t, axis=0)
+    return np.gradient(bench.channels(k, bench.nominal[k])[:, :3], t, axis=0)
 
 
 def first_noise(extra: Sequence[Floats], residuals: Sequence[Floats]) -> Background:

@@ -17,6 +17,7 @@ from camcomp.diagnosis.statistics.noise_model import Noise
 from camcomp.ground.datatypes import Floats
 from camcomp.model.effect import Cause, Parameter
 from camcomp.model.motion.twin import Reading
+from camcomp.model.signal_path import stages_of
 
 BENT = 0.1  # share of its own change by which the model may miss a straight line before all columns are worked out anew
 SETTLED = 0.05  # chi-square that one more pass may cost
@@ -182,7 +183,7 @@ class Problem:
         for i in members:
             candidate = self.columns.candidates[i]
             for j, p in enumerate(candidate.parameters):
-                if hasattr(candidate.effect, "on_robot") and not bent:
+                if "structure" in stages_of(candidate.effect) and not bent:
                     out.append([None] * len(readings))
                     continue
                 step, here = step_of(p), float(theta[at + j]) * p.scale
@@ -198,7 +199,7 @@ class Problem:
         """Change of the channels per unit, per run (n, c), from readings to those with other causes."""
         out = []
         for k, (reading, run) in enumerate(zip(readings, self.bench.runs, strict=True)):
-            change = self.bench.channels(self.bench.read(k, causes)) - self.bench.channels(reading)
+            change = self.bench.channels(k, self.bench.read(k, causes)) - self.bench.channels(k, reading)
             out.append(thinned(change / step, run.thin))
         return out
 

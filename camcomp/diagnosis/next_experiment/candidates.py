@@ -68,7 +68,7 @@ def site_of(bench: Bench) -> Site:
     runs = bench.runs
     tips = np.concatenate([reading.tip for reading in bench.nominal])
     low, high = np.quantile(tips, 0.02, axis=0), np.quantile(tips, 0.98, axis=0)
-    feeds = [float(np.median(run.run_path.timeline.feed)) * 60.0 for run in runs if run.run_path.timeline is not None]
+    feeds = [run.run_path.feed_mm_per_min for run in runs if np.isfinite(run.run_path.feed_mm_per_min)]
     return Site(
         np.round(0.5 * (low + high), 1),
         round(float(np.clip(0.5 * np.min((high - low)[:2]), 5.0, 40.0)), 1),

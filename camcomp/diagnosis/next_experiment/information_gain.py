@@ -146,8 +146,8 @@ def _on_bench(problem: Problem, candidate: Candidate, job: Job) -> Bench:
 
 def _lay(problem: Problem, candidate: Candidate, rivals: Sequence[Fitted], job: Job) -> _Laid:
     bench = _on_bench(problem, candidate, job)
-    nominal = bench.channels(bench.nominal[0])
-    changes = [bench.channels(bench.read(0, problem.causes(f.members, f.theta, f.extra))) - nominal for f in rivals]
+    nominal = bench.channels(0, bench.nominal[0])
+    changes = [bench.channels(0, bench.read(0, problem.causes(f.members, f.theta, f.extra))) - nominal for f in rivals]
     alone = _whitened(problem, bench, np.stack(changes, axis=2))
     if not candidate.knows and all(
         not _seen(alone[k], i, j, alone[k][:, i] - alone[k][:, j]) for k in alone for i, j in _pairs(rivals)
@@ -267,8 +267,9 @@ def _run(problem: Problem, candidate: Candidate, job: Job) -> Run:
     nan = np.full(n, np.nan)
     encoder = run_path.row_rho if "encoder" in candidate.channels else np.full((n, m), np.nan)
     measured = Measured(
-        time, nan, np.zeros((n, 3)), np.full((n, m), np.nan), encoder, np.zeros((n, m)), np.zeros((n, 3)), nan
-    )
+        time, nan, np.zeros((n, 3)), np.full((n, m), np.nan), encoder, np.zeros((n, m)), np.zeros((n, 3)), nan,
+        np.full((n, 3), np.nan),
+    )  # fmt: skip
     return Run("candidate", run_path, measured, None, None)
 
 

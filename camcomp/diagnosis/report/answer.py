@@ -2,37 +2,39 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
+from camcomp.diagnosis.result.types import DiagnosisResult, Estimate, NamedCause
 from camcomp.report.plot import brief
 
 
-def cause_name(cause: Mapping[str, Any]) -> str:
+def cause_name(cause: NamedCause) -> str:
     """`effect (target)`."""
-    return f"{cause['effect']} ({cause['target']})" if cause.get("target") else str(cause["effect"])
+    return f"{cause.effect} ({cause.target})" if cause.target else cause.effect
 
 
-def verdict_text(result: Mapping[str, Any]) -> str:
+def verdict_text(result: DiagnosisResult) -> str:
     """The answer in a sentence or two."""
-    gap, shrink = result["gap"], result["shrinkage"]
+    gap, shrink = result.gap, result.shrinkage
     told = (
-        f"On runs that the fit has not seen the gap goes from {brief(shrink['before_rms_um'])} µm to "
-        f"{brief(shrink['after_rms_um'])} µm (rms); the noise floor is {brief(gap['noise_floor_um'])} µm."
+        f"On runs that the fit has not seen the gap goes from {brief(shrink.before_rms_um)} µm to "
+        f"{brief(shrink.after_rms_um)} µm (rms); the noise floor is {brief(gap.noise_floor_um)} µm."
+        if shrink
+        else f"There is no run that the fit has not seen; the noise floor is {brief(gap.noise_floor_um)} µm."
     )
-    known = [cause_name(each) for each in result["causes"] if each["effect"] != "unknown"]
-    if result["verdict"] == "none":
+    known = [cause_name(each) for each in result.known]
+    if result.verdict == "none":
         return (
-            f"Measurement and model differ by {brief(gap['rms_um'])} µm (rms), which is the noise floor of "
-            f"{brief(gap['noise_floor_um'])} µm: there is nothing to explain."
+            f"Measurement and model differ by {brief(gap.rms_um)} µm (rms), which is the noise floor of "
+            f"{brief(gap.noise_floor_um)} µm: there is nothing to explain."
         )
-    if result["verdict"] == "identified":
+    if result.verdict == "identified":
         return f"{together(known)} {'explain' if len(known) > 1 else 'explains'} the gap. {told}"
-    if result["verdict"] == "ambiguous":
-        sets = [together([cause_name(each) for each in one]) for one in result["alternatives"]]
+    if result.verdict == "ambiguous":
+        sets = [together([cause_name(each) for each in one]) for one in result.alternatives]
         return f"These runs cannot tell apart: {'; or '.join(sets)}. {told}"
     rest = f" {together(known)} {'are' if len(known) > 1 else 'is'} identified." if known else ""
-    drivers = ", ".join(each["covariate"] for each in result["where"]["drivers"][:3])
+    drivers = ", ".join(each.covariate for each in result.where.drivers[:3])
     what = f" The rest depends on {drivers}." if drivers else ""
     return f"Something is at work that no effect of the library explains.{rest}{what} {told}"
 
@@ -42,23 +44,23 @@ def together(names: Sequence[str]) -> str:
     return ", ".join(names[:-1]) + " and " + names[-1] if len(names) > 1 else "".join(names)
 
 
-def parameter_text(name: str, each: Mapping[str, Any]) -> str:
+def parameter_text(name: str, each: Estimate) -> str:
     """A value with its 95 % interval."""
-    low, high = each["ci95"]
-    return f"{name} = {brief(each['value'], 4)} ({brief(low, 4)} to {brief(high, 4)})"
+    low, high = each.ci95
+    return f"{name} = {brief(each.value, 4)} ({brief(low, 4)} to {brief(high, 4)})"
 
 
-def answer_lines(result: Mapping[str, Any]) -> list[str]:
+def answer_lines(result: DiagnosisResult) -> list[str]:
     """The answer in a few lines: verdict, causes with their values, what to measure next."""
-    lines = [f"{result['verdict']}: {verdict_text(result)}"]
-    for cause in result["causes"]:
-        chance = "" if cause.get("probability") is None else f", probability {100 * cause['probability']:.1f} %"
-        lines.append(f"  {cause_name(cause)}: {100 * cause['share']:.0f} % of the gap{chance}")
-        lines += [f"    {parameter_text(name, each)}" for name, each in (cause.get("parameters") or {}).items()]
-    shrink = result["shrinkage"]
-    if result["causes"] and shrink:
-        low, high = shrink["ci95"]
-        lines.append(f"  removed on unseen runs: {100 * shrink['ratio']:.0f} % ({100 * low:.0f} to {100 * high:.0f} %)")
-    if proposal := result["next_experiment"]:
-        lines.append(f"  measure next: {proposal['action']}")
+    lines = [f"{result.verdict}: {verdict_text(result)}"]
+    for cause in result.causes:
+        share, chance = f"{100 * cause.share:.0f} % of the gap", f"probability {100 * cause.probability:.1f} %"
+        lines.append(f"  {cause_name(cause)}: {share}, {chance}")
+        lines += [f"    {parameter_text(name, each)}" for name, each in cause.parameters.items()]
+    shrink = result.shrinkage
+    if result.causes and shrink:
+        low, high = shrink.ci95
+        lines.append(f"  removed on unseen runs: {100 * shrink.ratio:.0f} % ({100 * low:.0f} to {100 * high:.0f} %)")
+    if proposal := result.next_experiment:
+        lines.append(f"  measure next: {proposal.action}")
     return [each.replace("µm", "um") for each in lines]

@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 
 from camcomp.diagnosis.report.answer import cause_name
 from camcomp.diagnosis.report.run_view import Rival, RunView, likeness, rms, spectrum
+from camcomp.diagnosis.result.types import FoundCause, UnseenShrinkage, Where
 from camcomp.report.plot import INK, SCALE, STYLES, Figure, Json, axis, brief, level, line, numbers, thin
 
 MAP_POINTS = 4000
 
 
-def figure_ladder(result: Mapping[str, Any]) -> Figure:
-    """The gap on held-out runs with one cause after the other in the model."""
-    shrink, floor = result["shrinkage"], result["gap"]["noise_floor_um"]
-    names = ["as it was", *(f"+ {cause_name(step)}" for step in shrink["steps"])]
-    values = [shrink["before_rms_um"], *(step["after_rms_um"] for step in shrink["steps"])]
+def figure_ladder(shrink: UnseenShrinkage, floor: float) -> Figure:
+    """The gap on held-out runs with one cause after the other in the model; floor: of the noise, um."""
+    names = ["as it was", *(f"+ {cause_name(step)}" for step in shrink.steps)]
+    values = [shrink.before_rms_um, *(step.after_rms_um for step in shrink.steps)]
     bars = {
         "type": "bar", "orientation": "h", "x": values[::-1], "y": names[::-1], "showlegend": False, "cliponaxis": False,
         "marker": {"color": STYLES[0][0]}, "text": [f"{brief(v)} µm" for v in values[::-1]], "textposition": "outside",
@@ -106,10 +105,10 @@ def figure_map(views: Sequence[RunView]) -> Figure:
     )
 
 
-def figure_shares(where: Mapping[str, Any]) -> Figure | None:
+def figure_shares(where: Where) -> Figure | None:
     """Shares of the gap by axis and actuator, and what it depends on."""
-    groups = [("axis", where["axes"]), ("actuator", where["actuators"])]
-    groups.append(("depends on", {each["covariate"]: each["share"] for each in where["drivers"]}))
+    groups = [("axis", where.axes), ("actuator", where.actuators)]
+    groups.append(("depends on", {each.covariate: each.share for each in where.drivers}))
     rows = [(f"{kind} {name}", share) for kind, part in groups for name, share in part.items()][::-1]
     if not any(share for _, share in rows):
         return None
@@ -155,19 +154,20 @@ def figure_spectrum(view: RunView) -> Figure | None:
     )  # fmt: skip
 
 
-def figure_causes(causes: Sequence[Mapping[str, Any]]) -> Figure:
+def figure_causes(causes: Sequence[FoundCause]) -> Figure:
     """Probability of every cause and its share of the gap."""
     shown = causes[::-1]
     names = [cause_name(each) for each in shown]
     bars = []
-    for i, (key, label) in enumerate((("share", "share of the gap"), ("probability", "probability"))):
-        values = [100.0 * float(each.get(key) or 0.0) for each in shown]
+    sizes = {"share of the gap": [c.share for c in shown], "probability": [c.probability for c in shown]}
+    for i, (label, size) in enumerate(sizes.items()):
+        values = [100.0 * each for each in size]
         bars.append({
             "type": "bar", "orientation": "h", "name": label, "x": values, "y": names, "cliponaxis": False,
             "marker": {"color": STYLES[2 * (1 - i)][0], "pattern": {"shape": "" if i else "/"}},
             "text": [f"{value:.0f} %" for value in values], "textposition": "outside",
         })  # fmt: skip
-    words = ", ".join(f"{cause_name(c)} {100 * float(c.get('probability') or 0):.0f} %" for c in causes)
+    words = ", ".join(f"{cause_name(c)} {100 * c.probability:.0f} %" for c in causes)
     return Figure(
         "causes-plot",
         "Causes by probability",

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 from camcomp.diagnosis.report.answer import cause_name, parameter_text, together, verdict_text
 from camcomp.diagnosis.report.figures import (
@@ -16,11 +15,13 @@ from camcomp.diagnosis.report.figures import (
     figure_spectrum,
 )
 from camcomp.diagnosis.report.run_view import Rival, RunView, rms
+from camcomp.diagnosis.result.types import DiagnosisResult, NextExperiment, UnseenShrinkage, Where
 from camcomp.report.inputs import Input, inputs_section
 from camcomp.report.page import Page, Section, Table, render
 from camcomp.report.plot import brief
 
 MOST_RUNS = 4
+Row = list[str | tuple[float, str]]  # of a table: text, or a number to sort by and its text
 ALIKE_TEXT = (
     "Each of these sets explains the logs as well as the others. They stay together because, in the runs that were made, "
     "they do the same to what was measured: the same columns, the same places, the same times."
@@ -29,7 +30,7 @@ WORDS = {"none": "No gap", "identified": "Identified", "ambiguous": "Ambiguous",
 
 
 def diagnosis_html(
-    result: Mapping[str, Any],
+    result: DiagnosisResult,
     views: Sequence[RunView],
     *,
     title: str,
@@ -38,22 +39,23 @@ def diagnosis_html(
     notes: Sequence[str] = (),
     rivals: Sequence[Rival] = (),
 ) -> bytes:
-    """One HTML file. result: the result file of diagnose; views: runs to draw, those held out of the fit first.
+    """One HTML file. result: of any kind of study; views: runs to draw, those held out of the fit first.
 
     rivals: sets of causes that explain the logs alike, the most probable first, with what each does to the runs of
     `views`. Raises ConfigError CC216 when the plot library is not installed.
     """
     seen = [view for view in views if view.held_out] or list(views)
     seen = sorted(seen, key=lambda view: -rms(view.sizes[0]))
-    floor = result["gap"]["noise_floor_um"]
+    floor = result.gap.noise_floor_um
     sections = [Section("notes", "Notes", items=notes)] if notes else []
     sections.append(_causes(result))
-    if len(result["alternatives"]) > 1:
+    if len(result.alternatives) > 1:
         sections.append(_apart(result, rivals, views))
-    if result["shrinkage"]["steps"]:
-        sections.append(Section("shrinkage", "How far the gap shrinks", [_shrinkage(result)], [figure_ladder(result)]))
-    if result["next_experiment"]:
-        sections.append(_next(result["next_experiment"]))
+    if result.shrinkage and result.shrinkage.steps:
+        ladder = figure_ladder(result.shrinkage, floor)
+        sections.append(Section("shrinkage", "How far the gap shrinks", [_shrinkage(result.shrinkage)], [ladder]))
+    if result.next_experiment:
+        sections.append(_next(result.next_experiment))
     shown = seen[:MOST_RUNS]
     if shown:
         left_out = len(seen) - len(shown)
@@ -63,10 +65,10 @@ def diagnosis_html(
             Section("path", "Gap along the path", text, [figure_run(v, i, floor, along="path") for i, v in enumerate(shown, 1)]),
             Section("map", "On the workpiece", figures=[figure_map(seen)]),
         ]  # fmt: skip
-    sections.append(_where(result, shown))
+    sections.append(_where(result.where, shown))
     if inputs:
         sections.append(inputs_section(inputs))
-    verdict = result["verdict"]
+    verdict = result.verdict
     page = Page(
         title=title,
         subtitle=f"Diagnosis of the gap between {machine} and its model",
@@ -79,38 +81,32 @@ def diagnosis_html(
     return render(page)
 
 
-def _cards(result: Mapping[str, Any]) -> list[tuple[str, str, str]]:
-    gap, shrink = result["gap"], result["shrinkage"]
-    low, high = shrink["ci95"]
-    return [
-        (
-            "Gap",
-            f"{brief(gap['rms_um'])} µm",
-            f"rms; 95 % below {brief(gap['p95_um'])} µm, max {brief(gap['max_um'])} µm",
-        ),
-        ("Noise floor", f"{brief(gap['noise_floor_um'])} µm", "what no model can explain"),
-        ("Gap on unseen runs", f"{brief(shrink['after_rms_um'])} µm", f"was {brief(shrink['before_rms_um'])} µm"),
-        (
-            "Part of the gap removed",
-            f"{100 * shrink['ratio']:.1f} %",
-            f"95 % interval {100 * low:.1f} to {100 * high:.1f} %",
-        ),
-        ("Stage", str(result["where"]["stage"]), "where in the machine"),
+def _cards(result: DiagnosisResult) -> list[tuple[str, str, str]]:
+    gap = result.gap
+    cards = [
+        ("Gap", f"{brief(gap.rms_um)} µm", f"rms; 95 % below {brief(gap.p95_um)} µm, max {brief(gap.max_um)} µm"),
+        ("Noise floor", f"{brief(gap.noise_floor_um)} µm", "what no model can explain"),
     ]
+    if shrink := result.shrinkage:
+        low, high = shrink.ci95
+        interval = f"95 % interval {100 * low:.1f} to {100 * high:.1f} %"
+        cards += [
+            ("Gap on unseen runs", f"{brief(shrink.after_rms_um)} µm", f"was {brief(shrink.before_rms_um)} µm"),
+            ("Part of the gap removed", f"{100 * shrink.ratio:.1f} %", interval),
+        ]
+    return [*cards, ("Stage", result.where.stage, "where in the machine")]
 
 
-def _causes(result: Mapping[str, Any]) -> Section:
-    causes = result["causes"]
+def _causes(result: DiagnosisResult) -> Section:
+    causes = result.causes
     if not causes:
         return Section("causes", "Causes", ["None: the gap is at the noise floor."])
     rows = []
     for i, cause in enumerate(causes, 1):
-        parameters = cause.get("parameters") or {}
-        values = "; ".join(parameter_text(name, each) for name, each in parameters.items())
-        probability = cause.get("probability")
+        values = "; ".join(parameter_text(name, each) for name, each in cause.parameters.items())
         rows.append([
-            str(i), cause["effect"], cause.get("target") or "–",
-            "" if probability is None else f"{100 * probability:.1f} %", f"{100 * cause['share']:.1f} %", values,
+            str(i), cause.effect, cause.target or "–", f"{100 * cause.probability:.1f} %", f"{100 * cause.share:.1f} %",
+            values,
         ])  # fmt: skip
     heads = ("rank", "effect", "target", "probability", "share of the gap", "parameters with 95 % intervals")
     return Section(
@@ -118,58 +114,50 @@ def _causes(result: Mapping[str, Any]) -> Section:
     )
 
 
-def _apart(result: Mapping[str, Any], rivals: Sequence[Rival], views: Sequence[RunView]) -> Section:
-    items = [together([cause_name(each) for each in one]) for one in result["alternatives"]]
+def _apart(result: DiagnosisResult, rivals: Sequence[Rival], views: Sequence[RunView]) -> Section:
+    items = [together([cause_name(each) for each in one]) for one in result.alternatives]
     figure = figure_rivals(rivals, views)
     return Section("apart", "What cannot be told apart, and why", [ALIKE_TEXT], [figure] if figure else [], items=items)
 
 
-def _shrinkage(result: Mapping[str, Any]) -> str:
-    shrink = result["shrinkage"]
-    low, high = shrink["ci95"]
+def _shrinkage(shrink: UnseenShrinkage) -> str:
+    low, high = shrink.ci95
     return (
-        f"Judged on {together(shrink['holdout'])}, with causes fitted without what is judged. {100 * shrink['ratio']:.1f} % of the "
+        f"Judged on {together(shrink.holdout)}, with causes fitted without what is judged. {100 * shrink.ratio:.1f} % of the "
         f"gap goes (95 % interval {100 * low:.1f} to {100 * high:.1f} %)."
     )
 
 
-def _next(proposal: Mapping[str, Any]) -> Section:
-    separates = together([str(each) for each in proposal["separates"]])
-    text = [str(proposal["action"])]
-    if "unknown" in proposal["separates"]:
+def _next(proposal: NextExperiment) -> Section:
+    separates = together(proposal.separates)
+    text = [proposal.action]
+    if "unknown" in proposal.separates:
         text.append(
-            f"It changes what the unknown effect may depend on, and nothing else. Expected gain: {proposal['gain']:.2f} bits."
+            f"It changes what the unknown effect may depend on, and nothing else. Expected gain: {proposal.gain:.2f} bits."
         )
     elif separates:
         text.append(
-            f"It separates {separates}. Expected gain: {proposal['gain']:.2f} (0: none, 1: the question is settled)."
+            f"It separates {separates}. Expected gain: {proposal.gain:.2f} (0: none, 1: the question is settled)."
         )
     return Section("next", "Next experiment", text)
 
 
-def _where(result: Mapping[str, Any], shown: Sequence[RunView]) -> Section:
-    where = result["where"]
+def _where(where: Where, shown: Sequence[RunView]) -> Section:
     figures = [figure for figure in (figure_shares(where), figure_spectrum(shown[0]) if shown else None) if figure]
     tables = []
-    if where["lines"]:
-        rows = [
-            [e["run"], (float(e["line"]), str(e["line"])), (e["share"], f"{100 * e['share']:.1f} %"),
-             (e["rms_um"], brief(e["rms_um"]))]
-            for e in where["lines"]
-        ]  # fmt: skip
-        tables.append(
-            Table("Source lines with most of the gap", ("run", "line", "share", "rms µm"), rows, sortable=True)
-        )
-    if where["intervals"]:
-        rows = [
-            [
-                e["run"],
-                (e["t0_s"], brief(e["t0_s"])),
-                (e["t1_s"], brief(e["t1_s"])),
-                (e["share"], f"{100 * e['share']:.1f} %"),
-            ]
-            for e in where["intervals"]
+    if where.lines:
+        lines: list[Row] = [
+            [e.run, (float(e.line), str(e.line)), (e.share, f"{100 * e.share:.1f} %"), (e.rms_um, brief(e.rms_um))]
+            for e in where.lines
         ]
-        tables.append(Table("Times with most of the gap", ("run", "from s", "to s", "share"), rows, sortable=True))
-    text = [f"The gap arises in the stage: {where['stage']}."] if where["stage"] else []
+        tables.append(
+            Table("Source lines with most of the gap", ("run", "line", "share", "rms µm"), lines, sortable=True)
+        )
+    if where.intervals:
+        intervals: list[Row] = [
+            [e.run, (e.t0_s, brief(e.t0_s)), (e.t1_s, brief(e.t1_s)), (e.share, f"{100 * e.share:.1f} %")]
+            for e in where.intervals
+        ]
+        tables.append(Table("Times with most of the gap", ("run", "from s", "to s", "share"), intervals, sortable=True))
+    text = [f"The gap arises in the stage: {where.stage}."]
     return Section("where", "Where the gap is", text, figures, tables)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import PurePath
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from camcomp.diagnosis.experiment.open_experiment import OpenExperiment
 from camcomp.diagnosis.fit.bench import Bench, Run, thinned
@@ -14,6 +14,7 @@ from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.report.answer import cause_name
 from camcomp.diagnosis.report.page import diagnosis_html
 from camcomp.diagnosis.report.run_view import Rival, RunView
+from camcomp.diagnosis.result.types import DiagnosisResult, NamedCause
 from camcomp.diagnosis.statistics.cause_sets import Fitted
 from camcomp.ground.datatypes import Floats
 from camcomp.ground.files import read_bytes
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
     from camcomp.diagnosis.diagnose import Diagnosis
 
 
-def report_of(path: str, result: dict[str, Any], done: Diagnosis | None, opened: OpenExperiment | None) -> bytes:
+def report_of(path: str, result: DiagnosisResult, done: Diagnosis | None, opened: OpenExperiment | None) -> bytes:
     """The report of an experiment file. Without `done` (studies of logs that have no program) no runs are drawn."""
     experiment = load_experiment(path)
     inputs = [Input("experiment", str(path), read_bytes(path))]
@@ -73,13 +74,13 @@ def views_of(done: Diagnosis, twin: Twin, runs: Sequence[Run], holdout: Sequence
 def rivals_of(done: Diagnosis) -> list[Rival]:
     """Sets of causes that the data cannot tell apart, the best one first; none when there is only one."""
     found, problem = done.search, done.problem
-    if done.result["verdict"] != "ambiguous":
+    if done.result.verdict != "ambiguous":
         return []
     part = main_channels(problem)
     out = []
     for fit in (found.fits[found.verdict.best], *(found.fits[j] for j in found.verdict.rivals)):
         causes = problem.causes(fit.members, fit.theta, fit.extra)
-        names = [cause_name({"effect": each.name, "target": each.target}) for each in causes]
+        names = [cause_name(NamedCause(effect=each.name, target=each.target)) for each in causes]
         signals = tuple(
             MICRO * (problem.bench.gap(k) - problem.bench.gap(k, causes))[:, part]
             for k in range(len(problem.bench.runs))

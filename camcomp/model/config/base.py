@@ -21,6 +21,8 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
+from camcomp.ground.bounds import SMALLEST_NUMBER
+
 
 class Spec(BaseModel):
     """Base of every YAML mapping. `source` says where its values come from."""
@@ -52,6 +54,14 @@ def exactly_one(spec: Spec, *names: str) -> None:
         raise PydanticCustomError("CC215", f"needs exactly one of {text}; {len(given)} are given")
 
 
+def _not_tiny(value: float) -> float:
+    if 0.0 < value < SMALLEST_NUMBER:
+        raise PydanticCustomError(
+            "CC205", f"{value:g} is smaller than {SMALLEST_NUMBER:g}; nothing can be divided by it"
+        )
+    return value
+
+
 def _limits(pair: list[float]) -> list[float]:
     if len(pair) != 2 or not pair[0] < pair[1]:
         raise PydanticCustomError("CC209", f"limits have to be [low, high] with low < high, not {pair}")
@@ -77,6 +87,8 @@ def _matrix(kind: str, zero_is_rigid: bool) -> Callable[[list[list[float]]], lis
             raise refuse(
                 f"is not positive definite: element {number[np.argmin(np.diag(m))]} of the diagonal is not > 0"
             )
+        if (np.diag(m) < SMALLEST_NUMBER).any():
+            raise refuse(f"has an element of the diagonal below {SMALLEST_NUMBER:g}; nothing can be divided by it")
         # mm and rad differ by orders of magnitude: symmetry and definiteness are judged on the unit-free matrix.
         scale = np.sqrt(np.diag(m))
         m = m / np.outer(scale, scale)
@@ -94,8 +106,8 @@ def _matrix(kind: str, zero_is_rigid: bool) -> Callable[[list[list[float]]], lis
 _SIX = {"type": "array", "minItems": 6, "maxItems": 6}
 _MATRIX_SCHEMA = WithJsonSchema({**_SIX, "items": {**_SIX, "items": {"type": "number"}}})
 
-Positive = Annotated[float, Field(gt=0)]
-NotNegative = Annotated[float, Field(ge=0)]
+Positive = Annotated[float, Field(gt=0), AfterValidator(_not_tiny)]
+NotNegative = Annotated[float, Field(ge=0), AfterValidator(_not_tiny)]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")]  # becomes part of CSV column names
 Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
 PositiveVector = Annotated[list[Positive], Field(min_length=3, max_length=3)]

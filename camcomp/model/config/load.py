@@ -3,6 +3,7 @@
 import re
 from collections.abc import Sequence
 from dataclasses import replace
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -23,6 +24,8 @@ ROBOT_KEYS = (
     "start_reference_mm",
 )  # belong to the robot, whatever plug-in builds its chains
 
+_SECTIONS = tuple(key for spec in (Config, Experiment) for key in spec.yaml_keys() if key != "source")
+_SECTION = re.compile(rb"(^|[{,])[ \t\"']*(%s)[\"']?[ \t]*:([ \t\r\n]|$)" % "|".join(_SECTIONS).encode(), re.MULTILINE)
 _NO_FORCE = Node({"model": Node("none", Location("", 1, 1))}, Location("", 1, 1))
 
 
@@ -91,14 +94,27 @@ def _read_merged(paths: Sequence[Path | str]) -> tuple[Node | None, list[Camcomp
     errors: list[CamcompError] = []
     for path in paths:
         try:
-            tree, more = read_tree(read_bytes(path), display_name(path))
+            data = read_bytes(path)
         except FileError as error:
             errors.append(error)
+            continue
+        tree, more = read_tree(data, display_name(path))
+        if not _is_ours(tree, data) and not any(each.rule in ("CC211", "CC217") for each in more):
+            message = "this is neither a machine file nor an experiment: it has none of their sections"
+            errors.append(ConfigError("CC218", message, at=Location(display_name(path), 1, 1)))
             continue
         errors += more
         if tree is not None:
             merged = tree if merged is None else merge(merged, tree)
     return merged, errors
+
+
+def _is_ours(tree: Node | None, data: bytes) -> bool:
+    """Whether a file can be meant for camcomp: it has a section, or a key that is nearly called like one."""
+    if tree is None:  # not YAML: by the look of its lines
+        return bool(_SECTION.search(data))
+    keys = tree.value if isinstance(tree.value, dict) else {}
+    return any(key in _SECTIONS or get_close_matches(str(key)[:40], _SECTIONS, n=1) for key in keys)
 
 
 def _check_config(tree: Node) -> tuple[Config | None, list[CamcompError]]:

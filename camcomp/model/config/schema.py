@@ -1,4 +1,4 @@
-"""JSON schemas (draft-07) of the YAML files, plug-ins included, for editors."""
+"""JSON schemas (draft-07) of the YAML files, plug-ins included, for editors, and of results, for those who read them."""
 
 from typing import Any
 
@@ -11,6 +11,7 @@ from camcomp.model.config.spec import Config, EffectChoice, Experiment, ForceCho
 Schema = dict[str, Any]
 
 _DRAFT = "http://json-schema.org/draft-07/schema#"
+_OLDER = {"$defs": "definitions", "prefixItems": "items"}  # what newer drafts call otherwise
 
 
 def config_schema() -> Schema:
@@ -32,6 +33,12 @@ def experiment_schema() -> Schema:
     """Schema of an experiment file."""
     schema = _draft07(Experiment.model_json_schema(by_alias=True, ref_template="#/definitions/{model}"))
     return {"$schema": _DRAFT, **schema, "title": "camcomp experiment file"}
+
+
+def result_schema(kind: type[BaseModel], title: str) -> Schema:
+    """Schema of a file that camcomp writes."""
+    schema = kind.model_json_schema(mode="serialization", ref_template="#/definitions/{model}")
+    return {"$schema": _DRAFT, **_draft07(schema), "title": title}
 
 
 def _offer(
@@ -65,7 +72,7 @@ def _draft07(value: Any) -> Any:
     if not isinstance(value, dict):
         return value
     out = {
-        "definitions" if key == "$defs" else key: _draft07(each)
+        _OLDER.get(key, key): _draft07(each)
         for key, each in value.items()
         if not (key == "discriminator" and isinstance(each, dict) and "propertyName" in each)
     }

@@ -186,12 +186,21 @@ class RunSpec(Spec):
     clock: str | int | None = None
 
 
+class Deviations(Spec):
+    """Standard deviations of the instruments over a run, per axis, drift and their own frame included."""
+
+    tip_mm: Positive | None = None
+    encoder_mm: Positive | None = None
+    force_N: Positive | None = None
+
+
 class Experiment(Spec):
     """An experiment file; paths are relative to it as written and absolute once loaded."""
 
     config: Annotated[list[NotEmpty], Field(min_length=1)]
     runs: Annotated[list[RunSpec], Field(min_length=1)]
     holdout: list[str] = Field(default_factory=list)
+    sd: Deviations | None = None
 
     @model_validator(mode="after")
     def _names(self) -> "Experiment":

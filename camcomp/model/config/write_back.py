@@ -3,10 +3,38 @@
 import io
 import os
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, Protocol
 
 from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
+
+
+class EstimatedValue(Protocol):
+    """What is known of a parameter."""
+
+    @property
+    def value(self) -> float:
+        """As estimated."""
+
+    @property
+    def ci95(self) -> tuple[float, float]:
+        """Its 95 % interval."""
+
+
+class NamedEffect(Protocol):
+    """A cause that a diagnosis has found."""
+
+    @property
+    def effect(self) -> str:
+        """Its name on the shelf."""
+
+    @property
+    def target(self) -> str | None:
+        """Where it is at work."""
+
+    @property
+    def parameters(self) -> Mapping[str, EstimatedValue]:
+        """By name."""
 
 
 def machine_file(texts: Sequence[str]) -> int:
@@ -22,11 +50,11 @@ def machine_file(texts: Sequence[str]) -> int:
 
 
 def with_causes(
-    text: str, causes: Sequence[Mapping[str, Any]], *, folder: str = "", moved_to: str = "", note: str = ""
+    text: str, causes: Sequence[NamedEffect], *, folder: str = "", moved_to: str = "", note: str = ""
 ) -> str:
-    """The text of a machine file with the `causes` of a diagnosis appended to its effects; what is unknown is left out.
+    """The text of a machine file with the `causes` of a diagnosis appended to its effects.
 
-    causes: as in the result file. Values are those found, intervals go into a comment behind them. folder, moved_to: where
+    Values are those found, intervals go into a comment behind them. folder, moved_to: where
     the file stands and where the new one will; relative paths in it are changed to match. note: comment above the causes.
     """
     yaml = YAML()
@@ -35,18 +63,17 @@ def with_causes(
     yaml.indent(mapping=2, sequence=4, offset=2)
     tree = yaml.load(text)
     _move(tree, folder, moved_to)
-    known = [cause for cause in causes if cause["effect"] != "unknown"]
     effects = tree.get("effects")
-    if effects is None and known:
+    if effects is None and causes:
         effects = tree["effects"] = CommentedSeq()
-    for k, cause in enumerate(known):
+    for k, cause in enumerate(causes):
         entry = CommentedMap()
-        entry["effect"] = cause["effect"]
-        if cause["target"] is not None:
-            entry["target"] = cause["target"]
-        for name, found in cause["parameters"].items():
-            entry[name] = found["value"]
-            low, high = found["ci95"]
+        entry["effect"] = cause.effect
+        if cause.target is not None:
+            entry["target"] = cause.target
+        for name, found in cause.parameters.items():
+            entry[name] = found.value
+            low, high = found.ci95
             entry.yaml_add_eol_comment(f"95 %: {low:g} to {high:g}", name)
         effects.append(entry)
         if k == 0 and note:

@@ -2,18 +2,26 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from math import inf
 from pathlib import Path
 from typing import Any
 
 from ruamel.yaml import YAML
+from ruamel.yaml.composer import Composer
 from ruamel.yaml.error import MarkedYAMLError
 from ruamel.yaml.nodes import MappingNode, ScalarNode, SequenceNode
 from ruamel.yaml.reader import ReaderError
 
+from camcomp.ground.bounds import LARGEST_NUMBER
 from camcomp.ground.errors import ConfigError, Location
 
 # A mapping that names another member than the earlier file did has other keys too: it replaces the earlier one whole.
 _SELECTORS = ("type", "model")
+
+# Budgets: what is written by hand has some hundred values; a file within them is read in about a second.
+MOST_BYTES = 1 << 20
+MOST_VALUES = 20_000  # an alias counts as often as it is used
+DEEPEST = 50
 
 
 @dataclass(frozen=True)
@@ -28,8 +36,10 @@ class Node:
 def read_tree(data: bytes, name: str) -> tuple[Node | None, list[ConfigError]]:
     """The tree of one YAML document and every error found in its text; None when there is no tree.
 
-    Raises nothing: syntax, encoding, duplicate keys, unknown tags and emptiness come back as errors.
+    Raises nothing: syntax, encoding, budgets, duplicate keys, unknown tags and emptiness come back as errors.
     """
+    if len(data) > MOST_BYTES:
+        return None, [ConfigError("CC217", f"more than {MOST_BYTES} bytes", at=Location(name, 1, 1))]
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -39,7 +49,11 @@ def read_tree(data: bytes, name: str) -> tuple[Node | None, list[ConfigError]]:
         return None, [ConfigError("CC200", "the file is not UTF-8 text", at=at, hint="save it as UTF-8")]
     builder = _Builder(name, text.splitlines())
     try:
-        root = YAML(typ="rt", pure=True).compose(text)
+        yaml = YAML(typ="rt", pure=True)
+        yaml.Composer = _Composer
+        root = yaml.compose(text)
+    except _BeyondBudget as error:
+        return None, [ConfigError("CC217", str(error), at=builder.place(error.line, error.column))]
     except MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         at = builder.place(mark.line, mark.column) if mark else Location(name, 1, 1)
@@ -55,8 +69,38 @@ def read_tree(data: bytes, name: str) -> tuple[Node | None, list[ConfigError]]:
         return None, [ConfigError("CC200", "nested too deeply", at=Location(name, 1, 1))]
     if root is None:
         return None, [ConfigError("CC211", "the file is empty", at=Location(name, 1, 1))]
-    tree = builder.build(root)
+    try:
+        tree = builder.build(root)
+    except _BeyondBudget as error:
+        return None, [ConfigError("CC217", str(error), at=builder.place(error.line, error.column))]
     return tree, builder.errors
+
+
+class _BeyondBudget(Exception):
+    """A file asks for more than any machine file needs."""
+
+    def __init__(self, what: str, mark: Any) -> None:
+        super().__init__(what)
+        self.line, self.column = mark.line, mark.column
+
+
+class _Composer(Composer):
+    """Composes no more than the budgets allow."""
+
+    values = depth = 0
+
+    def compose_node(self, parent: Any, index: Any) -> Any:
+        """A node with all below it."""
+        self.values += 1
+        self.depth += 1
+        if self.values > MOST_VALUES:
+            raise _BeyondBudget(f"more than {MOST_VALUES} values", self.parser.peek_event().start_mark)
+        if self.depth > DEEPEST:
+            raise _BeyondBudget("nested too deeply", self.parser.peek_event().start_mark)
+        try:
+            return super().compose_node(parent, index)
+        finally:
+            self.depth -= 1
 
 
 class _Builder:
@@ -67,6 +111,7 @@ class _Builder:
         self.lines = lines
         self.errors: list[ConfigError] = []
         self.open: list[Any] = []  # collections being built, outermost first
+        self.values = 0
 
     def place(self, line: int, column: int) -> Location:
         source = self.lines[line] if line < len(self.lines) else ""
@@ -74,6 +119,9 @@ class _Builder:
 
     def build(self, node: Any) -> Node:
         at = self.place(node.start_mark.line, node.start_mark.column)
+        self.values += 1
+        if self.values > MOST_VALUES:
+            raise _BeyondBudget(f"more than {MOST_VALUES} values, each alias counted where it is used", node.start_mark)
         if isinstance(node, ScalarNode):
             return Node(self._scalar(node, at), at)
         if any(each is node for each in self.open):
@@ -123,16 +171,28 @@ class _Builder:
                 return text.lower() == "true"
             if kind == "int":
                 digits = text.replace("_", "")
-                return int(digits, 0) if digits.lstrip("+-")[:2].lower() in ("0x", "0o", "0b") else int(digits)
+                return self._bounded(
+                    int(digits, 0) if digits.lstrip("+-")[:2].lower() in ("0x", "0o", "0b") else int(digits), at
+                )
             if kind == "float":
                 word = text.replace("_", "").lower()
-                return float(word.replace(".inf", "inf") if "inf" in word else word.replace(".nan", "nan"))
+                return self._bounded(
+                    float(word.replace(".inf", "inf") if "inf" in word else word.replace(".nan", "nan")), at
+                )
         except ValueError:
-            self.errors.append(ConfigError("CC204", f"'{text}' is not a number", at=at))
+            self.errors.append(ConfigError("CC204", f"'{text[:40]}' is not a number", at=at))
             return None
         if kind not in ("str", "timestamp", "value", "merge"):
             self.errors.append(ConfigError("CC200", f"tags such as {kind} are not used here", at=at))
         return text
+
+    def _bounded(self, value: float, at: Location) -> float:
+        """The value; one beyond every machine is an error, infinity is one of the spec."""
+        if LARGEST_NUMBER < abs(value) < inf:
+            message = f"the number is larger than {LARGEST_NUMBER:g}, beyond every machine"
+            self.errors.append(ConfigError("CC205", message, at=at))
+            return LARGEST_NUMBER if value > 0 else -LARGEST_NUMBER
+        return value
 
 
 def merge(base: Node, over: Node) -> Node:

@@ -7,15 +7,14 @@ holds for the motion that ends there, the last for the one that starts, and a `l
 With `line` alone the rows of a line are averaged. Rows without any force are skipped.
 """
 
-import csv
-import io
 from dataclasses import dataclass
 from difflib import get_close_matches
 
 import numpy as np
 
+from camcomp.ground.csv_table import CsvTable, TableRules, read_csv
 from camcomp.ground.datatypes import Bools, Floats, Ints
-from camcomp.ground.errors import CamcompError, ConfigError, Location, raise_all
+from camcomp.ground.errors import CamcompError, ConfigError, raise_all
 
 PATH_COLUMNS = ("Fr_N", "Ft_N", "Fz_N")
 MACHINE_COLUMNS = ("fx_N", "fy_N", "fz_N")
@@ -35,81 +34,63 @@ class ForceTable:
     line: Floats | None = None  # (k,) source line of each row, beside a path length
 
 
-class _TableReader:
-    """Rows of a CSV text with the place of every cell."""
-
-    def __init__(self, text: str, name: str) -> None:
-        self.name = name
-        self.text = text.removeprefix("\ufeff").splitlines()
-        self.errors: list[CamcompError] = []
-        rows = [(i, row) for i, row in enumerate(csv.reader(io.StringIO("\n".join(self.text))), start=1) if any(row)]
-        if len(rows) < 2:
-            raise ConfigError(
-                "CC260", "the force table needs a header row and at least one row of numbers", at=self.at(1)
-            )
-        (self.head_line, head), *self.rows = rows
-        self.head = [cell.strip() for cell in head]
-
-    def at(self, line: int, column: int = 0) -> Location:
-        source = self.text[line - 1] if line <= len(self.text) else ""
-        start = sum(len(cell) + 1 for cell in source.split(",")[:column])
-        return Location(self.name, line, min(start, len(source)) + 1, source)
-
-    def number(self, line: int, row: list[str], column: int) -> float:
-        cell = row[column].strip() if column < len(row) else ""
-        try:
-            value = float(cell)
-        except ValueError:
-            value = np.nan
-        if not np.isfinite(value):
-            text = f"'{cell}' is no finite number in column {self.head[column]}" if cell else "the cell is empty"
-            self.errors.append(ConfigError("CC262", text, at=self.at(line, column)))
-        return value
-
-
 def parse_table(text: str, name: str) -> ForceTable:
     """The table in `text`; `name` is the file's name for messages. Raises ConfigError CC260 to CC263, all at once."""
-    reader = _TableReader(text, name)
-    head = reader.head
+    table = read_csv(text, name, TableRules(table="CC260", column="CC261", cell="CC262"))
+    table.refuse_twice()
+    head = table.header
     key_name = next((each for each in ("s_mm", "line") if each in head), None)
     names = next((each for each in (PATH_COLUMNS, MACHINE_COLUMNS) if set(each) <= set(head)), None)
     if key_name is None:
-        raise ConfigError("CC261", "no column says where: s_mm or line", at=reader.at(reader.head_line))
+        raise ConfigError("CC261", "no column says where: s_mm or line", at=table.at(-1))
     if names is None:
-        raise _no_force(reader)
+        raise _no_force(table)
     also = ("line",) if key_name == "s_mm" and "line" in head else ()
     columns = [head.index(each) for each in (key_name, *names, *also)]
-    values: list[list[float]] = []
-    for line, row in reader.rows:
-        if any(column < len(row) and row[column].strip() for column in columns[1:4]):
-            values.append([reader.number(line, row, column) for column in columns])
-            if key_name == "s_mm" and len(values) > 1 and values[-1][0] < values[-2][0]:
-                text = f"s_mm falls from {values[-2][0]:g} to {values[-1][0]:g}"
-                reader.errors.append(ConfigError("CC263", text, at=reader.at(line, columns[0])))
-    raise_all(reader.errors)
-    if not values:
-        raise ConfigError("CC260", "no row of the force table holds a force", at=reader.at(reader.head_line))
-    table = np.array(values)
-    key, force = table[:, 0], table[:, 1:4]
+    errors: list[CamcompError] = []
+    found: list[list[float]] = []
+    for row in range(len(table.rows)):
+        if any(table.text(row, column) for column in columns[1:4]):
+            found.append([_number(table, row, column, errors) for column in columns])
+            if key_name == "s_mm" and len(found) > 1 and found[-1][0] < found[-2][0]:
+                text = f"s_mm falls from {found[-2][0]:g} to {found[-1][0]:g}"
+                errors.append(ConfigError("CC263", text, at=table.at(row, columns[0])))
+    raise_all(errors)
+    if not found:
+        raise ConfigError("CC260", "no row of the force table holds a force", at=table.at(-1))
+    values = np.array(found)
+    key, force = values[:, 0], values[:, 1:4]
     if key_name == "line":
         key, rows = np.unique(key, return_inverse=True)
         total = np.zeros((key.size, 3))
         np.add.at(total, rows, force)
         force = total / np.bincount(rows)[:, None]
-    return ForceTable(key, force, key_name == "s_mm", names is MACHINE_COLUMNS, table[:, 4] if also else None)
+    return ForceTable(key, force, key_name == "s_mm", names is MACHINE_COLUMNS, values[:, 4] if also else None)
 
 
-def _no_force(reader: _TableReader) -> ConfigError:
+def _number(table: CsvTable, row: int, column: int, errors: list[CamcompError]) -> float:
+    """A number; where there is none an error is added."""
+    try:
+        value = table.value(row, column)
+    except ConfigError as error:
+        errors.append(error)
+        return np.nan
+    if np.isnan(value):
+        cell = table.text(row, column)
+        text = f"'{cell}' in column {table.header[column]} is not a number" if cell else "the cell is empty"
+        errors.append(ConfigError("CC262", text, at=table.at(row, column)))
+    return value
+
+
+def _no_force(table: CsvTable) -> ConfigError:
     wanted = (*PATH_COLUMNS, *MACHINE_COLUMNS)
-    for column, name in enumerate(reader.head):
+    for column, name in enumerate(table.header):
         close = get_close_matches(name, wanted, n=1)
         if close and name not in wanted:
             text = f"column '{name}' is none of {', '.join(wanted)}"
-            return ConfigError(
-                "CC261", text, at=reader.at(reader.head_line, column), hint=f"did you mean '{close[0]}'?"
-            )
+            return ConfigError("CC261", text, at=table.at(-1, column), hint=f"did you mean '{close[0]}'?")
     text = "the three force columns Fr_N, Ft_N, Fz_N or fx_N, fy_N, fz_N are not all there"
-    return ConfigError("CC261", text, at=reader.at(reader.head_line))
+    return ConfigError("CC261", text, at=table.at(-1))
 
 
 def look_up(table: ForceTable, arc_length: Floats, line: Ints, ends: Bools) -> Floats:

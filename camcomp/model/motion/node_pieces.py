@@ -14,7 +14,7 @@ from camcomp.ground.datatypes import ARC, Floats, Ints, Path
 NODES = 6
 _ARC_RAD = np.pi / 3
 _LINE_MM = 60.0
-_SPLIT = 0.5 * (1.0 - np.cos(np.pi * np.arange(NODES) / (NODES - 1)))  # on 0 .. 1
+SPLIT = 0.5 * (1.0 - np.cos(np.pi * np.arange(NODES) / (NODES - 1)))  # on 0 .. 1
 _WEIGHT = np.array([0.5 if j in (0, NODES - 1) else 1.0 for j in range(NODES)]) * (-1.0) ** np.arange(NODES)
 
 
@@ -28,7 +28,7 @@ class Pieces:
 
     def nodes(self) -> tuple[Ints, Floats]:
         """Piece (q,) and fraction of the piece (q,) of every node; q = NODES x pieces."""
-        return np.repeat(np.arange(len(self.motion)), NODES), np.tile(_SPLIT, len(self.motion))
+        return np.repeat(np.arange(len(self.motion)), NODES), np.tile(SPLIT, len(self.motion))
 
     def share(self, piece: Ints, w: Floats) -> Floats:
         """Share (n,) of the motion at fraction w (n,) of the piece."""
@@ -41,13 +41,18 @@ class Pieces:
         key = motion + np.minimum(share, 1.0 - 1e-12)
         piece = np.clip(np.searchsorted(self.motion + self.u0, key, side="right") - 1, 0, len(self.motion) - 1)
         local = np.clip((share - self.u0[piece]) / (self.u1[piece] - self.u0[piece]), 0.0, 1.0)
-        gap = local[:, None] - _SPLIT[None, :]
-        hit = np.abs(gap) < 1e-14
-        raw = _WEIGHT / np.where(hit, 1.0, gap)
-        basis = raw / raw.sum(axis=1, keepdims=True)
-        on_node = hit.any(axis=1)
-        basis[on_node] = hit[on_node]
-        return Places(piece, piece[:, None] * NODES + np.arange(NODES), basis)
+        return Places(piece, piece[:, None] * NODES + np.arange(NODES), basis_at(local))
+
+
+def basis_at(local: Floats) -> Floats:
+    """Weights (n, NODES) of a piece's nodes at fractions local (n,) of the piece."""
+    gap = local[:, None] - SPLIT[None, :]
+    hit = np.abs(gap) < 1e-14
+    raw = _WEIGHT / np.where(hit, 1.0, gap)
+    basis = raw / raw.sum(axis=1, keepdims=True)
+    on_node = hit.any(axis=1)
+    basis[on_node] = hit[on_node]
+    return np.asarray(basis, float)
 
 
 @dataclass(frozen=True, eq=False)

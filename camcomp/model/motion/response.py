@@ -12,7 +12,9 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from camcomp.ground.datatypes import Bools, Floats
-from camcomp.model.effect import Load, Motion, driven
+from camcomp.model import signal_path
+from camcomp.model.effect import Load, Motion
+from camcomp.model.finite import not_finite
 from camcomp.model.hysteresis import direction, ways
 from camcomp.model.job import Job
 from camcomp.model.statics.solve import FREE, solve
@@ -64,26 +66,30 @@ def respond(
     aim = None if nominal_of is None else job.frame.to_machine(nominal_of)
     if not job.causes:
         loaded, settled = settle(job.real_machine, told, travel.force, None, aim)
-        return job.frame.to_program(loaded), settled
+        return _finite(job, job.frame.to_program(loaded), settled)
     control = solve(job.real_machine, FREE, told, check=False)
     motion = _motion(job, control.rho_nominal, travel)
-    load = _load(job, motion, travel.force)
-    error, motion = driven(job.causes, job.real_machine.actuators, motion)
+    error, guided = signal_path.driven(job.causes, job.real_machine.actuators, motion)
+    effort = signal_path.drive_forces(job.causes, job.real_machine.actuators, guided)
+    load = signal_path.loaded(job.causes, motion, travel.force)
     carriage = motion.encoder + error
     state = solve(job.real_machine, FREE, told, force=load.force, wrench=load.wrench, rho=carriage)
-    drive, tip = state.drive, state.tip
-    for cause in job.causes:
-        if (hook := cause.hook("on_drive_force")) is not None:
-            drive = drive + hook(np.zeros_like(drive), motion, cause.which(job.real_machine.actuators), cause.values)
-        if (hook := cause.hook("on_pose")) is not None:
-            tip = hook(tip, load, motion, cause.values)
-    tip = job.frame.to_program(tip)
-    for cause in job.causes:
-        if (hook := cause.hook("on_workpiece")) is not None:
-            tip = hook(tip, cause.values)
+    drive = state.drive if effort is None else state.drive + effort
+    tip = job.frame.to_program(signal_path.posed(job.causes, state.tip, load, motion))
+    tip = signal_path.clamped(job.causes, tip)
     nominal = control.rho_nominal if aim is None else solve(job.real_machine, FREE, aim, check=False).rho_nominal
     state = replace(state, commanded=told, rho=control.rho_nominal, rho_nominal=nominal, drive=drive)
-    return tip, Correction.of(state, state.passes)
+    return _finite(job, tip, Correction.of(state, state.passes))
+
+
+def _finite(job: Job, tip: Floats, state: Correction) -> tuple[Floats, Correction]:
+    """Both as they are. Raises PhysicsError CC306 for a point that counts as solved and is no number."""
+    known = np.isfinite(tip).all(axis=1) & np.isfinite(state.drive).all(axis=1) & np.isfinite(state.rho).all(axis=1)
+    bad = ~known & (state.status == 0)
+    if bad.any():
+        x, y, z = state.commanded[int(np.argmax(bad))]
+        raise not_finite(job.config, f"the loaded tip at X{x:.4f} Y{y:.4f} Z{z:.4f} (machine frame, mm)")
+    return tip, state
 
 
 def aim_at(job: Job, target: Floats, travel: Travel, method: str) -> Correction:
@@ -110,7 +116,7 @@ def without_drives(job: Job, target: Floats, travel: Travel, method: str = "newt
     load = Load(travel.force, np.zeros((len(target), 6)))
     if job.causes:
         nominal = solve(job.real_machine, FREE, job.frame.to_machine(target), check=False).rho_nominal
-        load = _load(job, _motion(job, nominal, travel), travel.force)
+        load = signal_path.loaded(job.causes, _motion(job, nominal, travel), travel.force)
     return correct(job.real_machine, job.frame.to_machine(target), load.force, load.wrench, method)
 
 
@@ -124,7 +130,7 @@ def _through_play(job: Job, found: Correction, travel: Travel) -> Floats:
     sense = ways(carriage, LEAST_MM)
     motion = _motion(job, carriage + AHEAD_MM * sense, travel.take(np.flatnonzero(solved)))
     still = replace(motion, ordered=False, direction=np.zeros_like(carriage))
-    lag, standing = (driven(job.causes, job.real_machine.actuators, each)[0] for each in (motion, still))
+    lag, standing = (signal_path.driven(job.causes, job.real_machine.actuators, each)[0] for each in (motion, still))
     lag = lag - standing
     out = np.zeros((len(solved), 3))
     if lag.any():
@@ -161,35 +167,23 @@ def _differs(job: Job, rho: Floats, travel: Travel, *, ordered: bool) -> Bools:
     poses = replace(motion, ordered=False)
     other = motion if ordered else replace(poses, direction=-motion.direction)
     out = np.zeros(rho.shape[1], np.bool_)
-    for cause in job.causes:
-        if (hook := cause.hook("on_drive")) is not None:
-            which, still = cause.which(job.real_machine.actuators), np.zeros_like(rho)
-            out |= (hook(still, poses, which, cause.values) != hook(still, other, which, cause.values)).any(axis=0)
+    for cause in signal_path.acting(job.causes, "drive"):
+        one, two = (signal_path.driven([cause], job.real_machine.actuators, each)[0] for each in (poses, other))
+        out |= (one != two).any(axis=0)
     return out
 
 
 def _motion(job: Job, setpoint: Floats, travel: Travel) -> Motion:
     """The movement that the hooks see, with the encoders where the servos bring them."""
-    stiffness = np.array([np.inf if a.stiffness is None else a.stiffness for a in job.real_machine.robot.actuators])
+    stiffness = signal_path.springs(job.real_machine.robot)
     zero = np.zeros_like(setpoint)
     warm = job.config.process.temperature_C
     heat = None if warm is None else np.full(len(setpoint), warm)
     motion = Motion(
         travel.rested, travel.time, travel.cut_min, heat, setpoint, zero, zero, job.real_machine.home, stiffness
     )
-    encoder = setpoint
-    for cause in job.causes:
-        if (hook := cause.hook("on_servo")) is not None:
-            encoder = hook(encoder, motion, cause.which(job.real_machine.actuators), cause.values)
+    encoder = signal_path.controlled(job.causes, job.real_machine.actuators, motion)
     dt = np.diff(travel.rested, prepend=travel.time[:1] - 1.0)
     step = np.diff(encoder, axis=0, prepend=encoder[:1])
     speed = np.divide(step, dt[:, None], out=np.zeros_like(step), where=dt[:, None] > 0.0)
     return replace(motion, encoder=encoder, speed=speed, direction=direction(encoder))
-
-
-def _load(job: Job, motion: Motion, force: Floats) -> Load:
-    load = Load(force, np.zeros((len(force), 6)))
-    for cause in job.causes:
-        if (hook := cause.hook("on_load")) is not None:
-            load = hook(load, motion, cause.values)
-    return load

@@ -1,26 +1,35 @@
 """One run as the twin sees it: where the set-points are in time, and where in the program every row of a log stands."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from camcomp.ground import path_geometry
-from camcomp.ground.datatypes import Floats
+from camcomp.ground.datatypes import Bools, Floats
 from camcomp.model.cutting.track import Track
 from camcomp.model.hysteresis import direction
-from camcomp.model.motion.node_pieces import NODES, Pieces, Places, cut
+from camcomp.model.motion.node_pieces import Pieces, Places, cut
 from camcomp.model.motion.timeline import Timeline
 
 STEP_S = 0.001  # grid of what has memory: 0.2 um of interpolation at 1500 mm/s2
 MOST_STEPS = 40000
-ABRUPT_S = (
-    0.010  # clocks of logs, the lag of a control and the build-up of a chip: a jump of the force is no better known
-)
-_MOST = 0.1  # of a run's rows; those of grooves are one in a hundred
-_JUMP_N = 0.1  # of the largest force in the run; the turn of an arc or of a fine polygon stays beneath
+_IN_DOUBT = 0.05  # of the largest force
+
+
+@dataclass(frozen=True, eq=False)
+class Driven:
+    """What is known at the rows of a run that was really driven, machine frame.
+
+    tip (n, 3) mm: nominal, where the set-points of the row lead; force (n, 3) N; doubt (n, 3) N: half of what the force
+    may be off by; lead: times (k,) -> nominal tips (k, 3).
+    """
+
+    tip: Floats
+    force: Floats
+    doubt: Floats
+    lead: Callable[[Floats], Floats]
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,35 +55,48 @@ class RunPath:
     place: Callable[[Floats], Places]  # times (n,) -> where they lie between the nodes
     row_rho: Floats  # (n, m) set-points at the rows
     temperature: Floats | None  # (n,) deg C at the rows
-    timeline: Timeline | None
+    driven: Driven | None = None
+    feed_mm_per_min: float = np.nan  # of the program, in the middle
     cut_before_min: float = 0.0
-    kept: dict[Any, Any] = field(default_factory=dict)  # what the twin has worked out for this run_path before
+
+    @cached_property
+    def row_place(self) -> Places:
+        """Where the rows lie between the nodes."""
+        return self.place(self.time)
+
+    @cached_property
+    def row_force(self) -> Floats:
+        """Cutting force (n, 3) N at the rows, machine frame, as modelled."""
+        return self.row_place.of(self.node_force) if self.driven is None else self.driven.force
+
+    def forces(self, place: Places) -> Floats:
+        """Cutting force (n, 3) N, machine frame, at a `place` that lies little beside that of the rows."""
+        found = place.of(self.node_force)
+        return found if self.driven is None else found + self.row_force - self.row_place.of(self.node_force)
+
+    def tips(self, at_nodes: Floats, place: Places, at: Floats) -> Floats:
+        """Loaded tips (n, 3), machine frame, at times (n,) from those at the nodes (q, 3).
+
+        Along a program they lie between the nodes; where a log says what was driven, only what the structure adds does.
+        """
+        if self.driven is None:
+            return place.of(at_nodes)
+        nominal = self.driven.tip if at is self.time else self.driven.lead(at)
+        return np.asarray(nominal + place.of(at_nodes - self.node_tip))
+
+    @cached_property
+    def jumping(self) -> Bools:
+        """Rows (n,) of which nobody knows on which side of a jump of the force they were taken: the tip springs there."""
+        if self.driven is None:
+            return np.zeros(len(self.time), bool)
+        largest = float(np.linalg.norm(self.driven.force, axis=1).max(initial=0.0))
+        return np.asarray(np.linalg.norm(self.driven.doubt, axis=1) > max(_IN_DOUBT * largest, 1e-9))
 
     @property
     def cut_min(self) -> float:
         """Minutes of cutting in this run."""
         dt = np.diff(self.grid, prepend=self.grid[:1])
         return float((dt * self.grid_cut).sum() / 60.0)
-
-
-def beside_jumps(run_path: RunPath) -> NDArray[np.bool_]:
-    """Rows (n,) within ABRUPT_S of an instant at which the modelled force jumps (corner, entry, exit).
-
-    On which side of the jump such a row was taken nobody knows, and the machine springs by up to a millimetre there. None
-    where they are too many: short lines with corners between them leave no other rows to judge by.
-    """
-    near = np.zeros(len(run_path.time), dtype=bool)
-    size = np.linalg.norm(run_path.node_force, axis=1).max(initial=0.0)
-    if not run_path.ordered or size == 0.0:
-        return near
-    before = np.concatenate(
-        [np.zeros((1, 3)), run_path.node_force[NODES - 1 :: NODES]]
-    )  # the machine is idle before and after
-    after = np.concatenate([run_path.node_force[::NODES], np.zeros((1, 3))])
-    start = np.append(run_path.node_time[::NODES], run_path.node_time[-1])
-    at = np.sort(start[np.linalg.norm(after - before, axis=1) > _JUMP_N * size])
-    found = np.searchsorted(at, run_path.time - ABRUPT_S) < np.searchsorted(at, run_path.time + ABRUPT_S, side="right")
-    return found if found.mean() < _MOST else near
 
 
 def path_of_program(
@@ -87,13 +109,12 @@ def path_of_program(
     to_machine: Callable[[Floats], Floats],
     vectors: Callable[[Floats], Floats],
     inverse: Callable[[Floats], Floats],
-    setpoints: Floats | None = None,
     temperature: Floats | None = None,
 ) -> RunPath:
-    """RunPath of a program's feed motions, whose loads are those of `track`.
+    """Run path of a program's feed motions on its own timeline, whose loads are those of `track`.
 
     to_machine: tips (q, 3) program -> machine frame; vectors: the same for vectors. inverse: machine tips (q, 3) ->
-    set-points (q, m). setpoints (n, m): as logged, instead of computed.
+    set-points (q, m).
     """
     rank = np.full(len(timeline.path), -1)
     rank[timeline.index] = np.arange(len(timeline.index))
@@ -117,15 +138,11 @@ def path_of_program(
     where = place(grid)
     grid_rho = where.of(rho)
     row_rho = place(time).of(rho)
-    if setpoints is not None:
-        ahead = np.where(np.isfinite(setpoints), setpoints - row_rho, 0.0)
-        row_rho = row_rho + ahead
-        grid_rho = grid_rho + np.column_stack([np.interp(grid, time, each) for each in ahead.T])
     grid_cut = (np.abs(where.of(load)).sum(axis=1) > 1e-9).astype(float)
     grid_cut[(grid < 0.0) | (grid > timeline.end)] = 0.0
     return RunPath(
         name, time, started, True, tip, load, rho, _node_times(timeline, pieces.motion[piece], share), grid, grid_rho, grid_cut,
-        where.piece, len(pieces.motion), place, row_rho, temperature, timeline,
+        where.piece, len(pieces.motion), place, row_rho, temperature, feed_mm_per_min=60.0 * float(np.median(timeline.feed)),
     )  # fmt: skip
 
 

@@ -6,8 +6,11 @@ import numpy as np
 
 from camcomp.ground.datatypes import Floats, Ints, Path
 from camcomp.ground.errors import ProgramError
+from camcomp.model.cutting.spindle import cut_without_spindle, spindle_warning
 from camcomp.model.cutting.track import lay_track
+from camcomp.model.finite import not_finite
 from camcomp.model.job import Job
+from camcomp.model.motion.log_columns import log_columns
 from camcomp.model.motion.run_path import path_of_program
 from camcomp.model.motion.timeline import schedule
 from camcomp.model.motion.twin import Reading, twin_of
@@ -23,6 +26,7 @@ class Simulated:
     setpoint: Floats
     actuators: tuple[str, ...]
     rotary: tuple[bool, ...]
+    warnings: list[str]
 
 
 def simulate(job: Job, path: Path, step_s: float, *, cutting: bool = True, started_s: float = 0.0) -> Simulated:
@@ -40,8 +44,9 @@ def simulate(job: Job, path: Path, step_s: float, *, cutting: bool = True, start
         time = np.append(time, timeline.end)
     conditions = job.conditions if cutting else replace(job.conditions, model=None)
     warm = job.config.process.temperature_C
+    track = lay_track(path, conditions)
     run_path = path_of_program(
-        "simulation", timeline, lay_track(path, conditions), time, started=started_s, to_machine=twin.to_machine,
+        "simulation", timeline, track, time, started=started_s, to_machine=twin.to_machine,
         vectors=job.frame.vectors, inverse=twin.inverse, temperature=None if warm is None else np.full(len(time), warm),
     )  # fmt: skip
     _, solved = twin.sense(run_path)
@@ -49,22 +54,21 @@ def simulate(job: Job, path: Path, step_s: float, *, cutting: bool = True, start
     reading, _ = twin.sense(run_path, solved=solved, slopes=slopes)
     motion, _ = timeline.locate(time)
     line = path.line[timeline.index[motion]]
+    rows = np.concatenate([run_path.row_rho, reading.tip, reading.encoder, reading.drive, reading.dyno], axis=1)
+    bad = ~np.isfinite(rows).all(axis=1)
+    if bad.any():
+        raise not_finite(job.config, f"what the machine does in program line {line[int(np.argmax(bad))]}")
     rotary = tuple(each.revolute for each in twin.robot.actuators)
-    return Simulated(time, line, reading, run_path.row_rho, twin.actuators, rotary)
+    return Simulated(
+        time, line, reading, run_path.row_rho, twin.actuators, rotary, spindle_warning(cut_without_spindle(track))
+    )
 
 
 def log_table(run: Simulated) -> str:
     """The log as CSV text: the columns that a controller, encoders, drives, a dynamometer and a tracker would log."""
-    names = ["t_s", "line", "x_mm", "y_mm", "z_mm"]
-    lengths = ["rad" if each else "mm" for each in run.rotary]
-    efforts = ["Nmm" if each else "N" for each in run.rotary]
-    names += [f"cmd_{a}_{u}" for a, u in zip(run.actuators, lengths, strict=True)]
-    names += [f"act_{a}_{u}" for a, u in zip(run.actuators, lengths, strict=True)]
-    names += [f"act_{a}_{u}" for a, u in zip(run.actuators, efforts, strict=True)]
-    names += ["fx_N", "fy_N", "fz_N"]
     r = run.reading
     table = np.concatenate([r.tip, run.setpoint, r.encoder, r.drive, r.dyno], axis=1)
-    rows = [",".join(names)]
+    rows = [",".join(log_columns(run.actuators, run.rotary).simulated)]
     for t, line, values in zip(run.time, run.line, table, strict=True):
         cells = ",".join(f"{value:.6f}".replace("-0.000000", "0.000000") for value in values)
         rows.append(f"{t:.6f},{int(line)},{cells}")

@@ -1,19 +1,21 @@
 """The one forward model: set-points in time -> control -> drive -> structure -> tool -> workpiece -> sensor.
 
-simulate prints it, diagnose compares it with logs, compensate inverts it. Effects act at fixed hooks in this order and
-nowhere else. The loaded equilibrium is solved at the nodes of a run path; between them, and for small differences, its
+simulate prints it, diagnose compares it with logs, compensate inverts it. Hooks of effects act where signal_path.py says. The loaded equilibrium is solved at the nodes of a run path; between them, and for small differences, its
 first derivatives carry on.
 """
 
-from collections.abc import Callable, Sequence
+from __future__ import annotations
+
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from camcomp.ground.datatypes import Floats
+from camcomp.ground.datatypes import Floats, Ints
 from camcomp.ground.errors import PhysicsError
-from camcomp.model.effect import Cause, Load, Motion, driven
+from camcomp.model import signal_path
+from camcomp.model.effect import Cause, Load, Motion
 from camcomp.model.job import Job
 from camcomp.model.motion.node_pieces import Places
 from camcomp.model.motion.run_path import RunPath, travel_direction
@@ -25,6 +27,9 @@ _RHO_STEP = 1e-3  # mm or 1e-3 mrad of drive, to first order linear within 1e-6
 _FORCE_STEP = 1.0  # N
 _SLOPES = ("tip_rho", "tip_wrench", "drive_rho", "drive_wrench")
 _MOMENT_STEP = 100.0  # N mm
+_KNOT_MM = 0.25  # or mrad / 4: 0.1 um of a circle of 300 mm
+_FORWARD_PASSES = 12
+_FORWARD_MM = 1e-7
 _SAME_LOAD = 1e-3  # share of the load by which a changed machine's may differ from that it was solved with
 
 
@@ -59,6 +64,13 @@ class Slopes:
     tip_wrench: Floats
     drive_rho: Floats
     drive_wrench: Floats
+    _at: WeakKeyDictionary[Places, Slopes] = field(default_factory=WeakKeyDictionary, init=False, repr=False)
+
+    def at(self, place: Places) -> Slopes:
+        """The same between the nodes, worked out once for every `place`."""
+        if place not in self._at:
+            self._at[place] = Slopes(*(place.of(getattr(self, each)) for each in _SLOPES))
+        return self._at[place]
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +82,11 @@ class Twin:
     origin: Floats
     rotation: Floats
     causes: tuple[Cause, ...] = ()
-    machines: dict[tuple, Machine] = field(default_factory=dict)
+    # what was worked out before, for this machine with these causes; a copy of a changed twin starts without
+    _machines: dict[tuple, Machine] = field(default_factory=dict, init=False, repr=False)
+    _usual: WeakKeyDictionary[RunPath, tuple[Motion, Motion]] = field(
+        default_factory=WeakKeyDictionary, init=False, repr=False
+    )
 
     @property
     def actuators(self) -> tuple[str, ...]:
@@ -94,17 +110,34 @@ class Twin:
             raise PhysicsError("CC410", f"tip {np.round(tip[bad], 3).tolist()} (machine frame) is {STATUS[3]}")
         return state.rho_nominal
 
+    def forward(self, rho: Floats, near: Floats) -> Floats:
+        """Machine tips (n, 3) to which actuators rho (n, m) lead the perfect, unloaded machine; near (n, 3): tips near by.
+
+        Newton's method on the inverse kinematics at points some way apart, first order between them: the way is short
+        against the size of the machine. Raises PhysicsError CC410.
+        """
+        knots, nearest = _knots(rho * np.where([a.revolute for a in self.robot.actuators], 1000.0, 1.0))
+        tip = near[knots].copy()
+        for _ in range(_FORWARD_PASSES):
+            off = rho[knots] - self.inverse(tip)
+            ways = np.stack(
+                [
+                    (self.inverse(tip + _RHO_STEP * e) - self.inverse(tip - _RHO_STEP * e)) / (2 * _RHO_STEP)
+                    for e in np.eye(3)
+                ],
+                axis=2,
+            )
+            back = np.linalg.pinv(ways)
+            step = np.einsum("nij,nj->ni", back, off)
+            tip = tip + step
+            if np.abs(step).max(initial=0.0) < _FORWARD_MM:
+                break
+        return np.asarray(tip[nearest] + np.einsum("nij,nj->ni", back[nearest], rho - rho[knots][nearest]))
+
     def edited(self, causes: Sequence[Cause]) -> tuple[Robot, tuple]:
         """The machine with the effects on it, and a key that tells equal ones."""
-        robot, key = self.robot, []
-        for cause in causes:
-            hook = cause.hook("on_robot")
-            if hook is not None:
-                changed = hook(robot, cause.aimed(self.actuators), cause.values)
-                if changed is not robot:
-                    key.append((cause.name, cause.target, tuple(sorted(cause.values.items()))))
-                robot = changed
-        return robot, tuple(key)
+        robot, by = signal_path.edited(causes, self.actuators, self.robot)
+        return robot, tuple((cause.name, cause.target, tuple(sorted(cause.values.items()))) for cause in by)
 
     # -- the signal path ----------------------------------------------------------------------------------------------
 
@@ -128,14 +161,12 @@ class Twin:
         robot, key = self.edited(causes)
         grid, rows = self._motions(run_path, causes)
         if robot is not self.robot:
-            springs = _springs(robot)
+            springs = signal_path.springs(robot)
             grid, rows = replace(grid, stiffness=springs), replace(rows, stiffness=springs)
-        error, guided = driven(causes, self.actuators, grid)
+        error, guided = signal_path.driven(causes, self.actuators, grid)
+        effort = signal_path.drive_forces(causes, self.actuators, guided)
         carriage = grid.encoder + error if error.any() else grid.encoder
-        seen = run_path.time
-        for cause in causes:
-            if (hook := cause.hook("on_clock")) is not None:
-                seen = hook(seen, cause.values)
+        seen = signal_path.clock(causes, run_path.time)
         late = seen is not run_path.time
         encoder = rows.encoder
         ahead = None
@@ -146,7 +177,7 @@ class Twin:
         gap = carriage - run_path.grid_rho if moved else None  # carriage minus set-point
         gap_row = _gap_at(run_path, run_path.time, gap, ahead)
         gap_tip = _gap_at(run_path, seen, gap, ahead) if late else gap_row
-        place = _place(run_path)
+        place = run_path.row_place
         place_tip = run_path.place(seen) if late else place
         # structure
         known = solved if slopes is not None else None
@@ -158,34 +189,23 @@ class Twin:
         if known is None or known.key != key or load.force is not known.force:
             known = self.structure(run_path, self._machine(robot, key), key, shift, load)
         solved = known
-        load = self._load(causes, rows, _kept(run_path, "force", lambda: place.of(run_path.node_force)))
-        load_tip = self._load(causes, at_tip, place_tip.of(run_path.node_force)) if late else load
-        drive, tip = place.of(solved.drive), place_tip.of(solved.tip)
+        load = signal_path.loaded(causes, rows, run_path.row_force)
+        load_tip = signal_path.loaded(causes, at_tip, run_path.forces(place_tip)) if late else load
+        drive, tip = place.of(solved.drive), run_path.tips(solved.tip, place_tip, seen)
         if slopes is not None:
-            at_rows = _slopes_at(run_path, slopes, place, "rows")
+            at_rows = slopes.at(place)
             d_rho, d_wrench = self._differences(solved, place, gap_row, load)
             drive = drive + _apply(at_rows.drive_rho, d_rho) + _apply(at_rows.drive_wrench, d_wrench)
             if late:
-                at_rows = _slopes_at(run_path, slopes, place_tip, None)
+                at_rows = slopes.at(place_tip)
                 d_rho, d_wrench = self._differences(solved, place_tip, gap_tip, load_tip)
             tip = tip + _apply(at_rows.tip_rho, d_rho) + _apply(at_rows.tip_wrench, d_wrench)
-        for cause in causes:
-            if (hook := cause.hook("on_drive_force")) is not None:
-                effort = hook(np.zeros_like(grid.encoder), guided, cause.which(self.actuators), cause.values)
-                drive = drive + _interpolate(run_path, run_path.time, effort)
+        if effort is not None:
+            drive = drive + _interpolate(run_path, run_path.time, effort)
         # tool, workpiece, sensor
-        for cause in causes:
-            if (hook := cause.hook("on_pose")) is not None:
-                tip = hook(tip, load_tip, at_tip, cause.values)
-        tip = self.to_program(tip)
-        for cause in causes:
-            if (hook := cause.hook("on_workpiece")) is not None:
-                tip = hook(tip, cause.values)
-        reading = Reading(tip, encoder, drive, load.force, rows)
-        for cause in causes:
-            if (hook := cause.hook("on_reading")) is not None:
-                reading = hook(reading, rows, cause.values)
-        return reading, solved
+        tip = self.to_program(signal_path.posed(causes, tip, load_tip, at_tip))
+        tip = signal_path.clamped(causes, tip)
+        return signal_path.read(causes, Reading(tip, encoder, drive, load.force, rows), rows), solved
 
     def _node_load(
         self, run_path: RunPath, grid: Motion, causes: Sequence[Cause], known: Solved | None, key: tuple
@@ -194,10 +214,12 @@ class Twin:
 
         Slopes are those of the unchanged machine; a changed one gives way by its own, so its nodes are solved under the load.
         """
-        loading = any(cause.hook("on_load") is not None for cause in causes[len(self.causes) :])
+        loading = bool(signal_path.acting(causes[len(self.causes) :], "process"))
         if known is not None and (not loading or key == self.edited(self.causes)[1]):
             return Load(known.force, known.wrench)
-        load = self._load(causes, _at(run_path, grid, run_path.node_time, run_path.node_rho), run_path.node_force)
+        load = signal_path.loaded(
+            causes, _at(run_path, grid, run_path.node_time, run_path.node_rho), run_path.node_force
+        )
         if known is None:
             return load
         size = _SAME_LOAD * max(float(np.abs(load.force).max(initial=0.0)), float(np.abs(load.wrench).max(initial=0.0)))
@@ -243,21 +265,22 @@ class Twin:
 
     def _machine(self, robot: Robot, key: tuple) -> Machine:
         """The packed machine; runs of one experiment ask for the same one after each other."""
-        if key not in self.machines:
-            if len(self.machines) > 4:
-                self.machines.clear()
-            self.machines[key] = build_machine(robot, self.nominal)
-        return self.machines[key]
+        if key not in self._machines:
+            if len(self._machines) > 4:
+                self._machines.clear()
+            self._machines[key] = build_machine(robot, self.nominal)
+        return self._machines[key]
 
     def _motions(self, run_path: RunPath, causes: Sequence[Cause]) -> tuple[Motion, Motion]:
         """Motion on the fine grid and at the rows; the same for all causes that leave the control alone."""
-        servo = [cause for cause in causes if cause.hook("on_servo") is not None]
-
-        def make() -> tuple[Motion, Motion]:
-            grid = self._grid_motion(run_path, servo)
-            return grid, _at(run_path, grid, run_path.time, run_path.row_rho)
-
-        return make() if servo else _kept(run_path, "motions", make)
+        servo = signal_path.acting(causes, "control")
+        if not servo and run_path in self._usual:
+            return self._usual[run_path]
+        grid = self._grid_motion(run_path, servo)
+        motions = grid, _at(run_path, grid, run_path.time, run_path.row_rho)
+        if not servo:
+            self._usual[run_path] = motions
+        return motions
 
     def _grid_motion(self, run_path: RunPath, servo: Sequence[Cause]) -> Motion:
         home = np.array([a.home for a in self.robot.actuators])
@@ -277,21 +300,12 @@ class Twin:
             zero,
             zero,
             home,
-            _springs(self.robot),
+            signal_path.springs(self.robot),
             run_path.ordered,
         )
-        encoder = run_path.grid_rho
-        for cause in servo:
-            encoder = cause.hook("on_servo")(encoder, motion, cause.which(self.actuators), cause.values)
+        encoder = signal_path.controlled(servo, self.actuators, motion)
         speed = np.gradient(encoder, t, axis=0) if run_path.ordered and len(t) > 1 else zero
         return replace(motion, encoder=encoder, speed=speed, direction=travel_direction(run_path, encoder))
-
-    def _load(self, causes: Sequence[Cause], motion: Motion, force: Floats) -> Load:
-        load = Load(force, np.zeros((len(force), 6)))
-        for cause in causes:
-            if (hook := cause.hook("on_load")) is not None:
-                load = hook(load, motion, cause.values)
-        return load
 
     def _differences(self, solved: Solved, place: Places, gap: Floats, load: Load) -> tuple[Floats, Floats]:
         """Carriage (n, m) and wrench at the reference (n, 6) beyond what the nodes were solved with."""
@@ -303,32 +317,19 @@ class Twin:
         return d_rho, d_wrench
 
 
-def _springs(robot: Robot) -> Floats:
-    """Stiffness (m,) of the drives; inf = rigid."""
-    return np.array([np.inf if a.stiffness is None else a.stiffness for a in robot.actuators])
+def _knots(rho: Floats) -> tuple[Ints, Ints]:
+    """Rows that are some _KNOT_MM of way apart in the actuators (n, m), mm or mrad, and which of them (n,) is next to a row."""
+    way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(rho, axis=0)).max(axis=1))])
+    knots = np.flatnonzero(np.diff(np.floor(way / _KNOT_MM), prepend=-1.0) > 0)
+    right = np.clip(np.searchsorted(way[knots], way), 0, len(knots) - 1)
+    left = np.maximum(right - 1, 0)
+    return knots, np.where(way - way[knots][left] <= way[knots][right] - way, left, right)
 
 
 def twin_of(job: Job) -> Twin:
     """The forward model of a config, its `effects:` included. Raises ConfigError CC205."""
     machine = job.machine
     return Twin(machine.robot, machine.nominal, job.frame.origin, job.frame.rotation, job.causes)
-
-
-def _kept(run_path: RunPath, name: object, make: Callable[[], Any]) -> Any:
-    if name not in run_path.kept:
-        run_path.kept[name] = make()
-    return run_path.kept[name]
-
-
-def _place(run_path: RunPath) -> Places:
-    return _kept(run_path, "place", lambda: run_path.place(run_path.time))
-
-
-def _slopes_at(run_path: RunPath, slopes: Slopes, place: Places, name: str | None) -> Slopes:
-    def make() -> Slopes:
-        return Slopes(*(place.of(getattr(slopes, each)) for each in _SLOPES))
-
-    return make() if name is None else _kept(run_path, (name, id(slopes)), make)
 
 
 def _at(run_path: RunPath, grid: Motion, at: Floats, rho: Floats | None) -> Motion:

@@ -36,10 +36,9 @@ def command(
     are aligned by source line and path length, or by time; B is interpolated between its rows.
     """
     from camcomp.diagnosis import compare as story
-    from camcomp.ground.csv_table import read_table
 
     limits = [_limit(each) for each in tolerances]
-    first, second = read_table(a), read_table(b)
+    first, second = story.read_columns(a), story.read_columns(b)
     try:
         done = story.compare(first, second, {"s": "s_mm", "t": "t_s", "row": "row"}[by] if by else None)
     except ValueError as error:

@@ -1,6 +1,6 @@
 """camcomp compensate."""
 
-import json
+from typing import TYPE_CHECKING
 
 import click
 
@@ -10,6 +10,9 @@ from camcomp.ground.files import STANDARD, display_name, open_source, read_bytes
 from camcomp.model.config.load import load_config
 from camcomp.terminal.commands._options import OUTPUT, quiet_option
 from camcomp.terminal.progress import say, working
+
+if TYPE_CHECKING:
+    from camcomp.compensation.program.result import Summary
 
 
 @click.command()
@@ -99,7 +102,7 @@ def command(
     if paths:
         outputs[paths] = tables.paths_csv(result, trajectories(result, job))
     if summary_file:
-        outputs[summary_file] = (json.dumps(figures, indent=2) + "\n").encode()
+        outputs[summary_file] = figures.to_json()
     failed = result.failed_checks(job, tolerance)
     if report:
         from camcomp.compensation.report.page import compensation_html
@@ -116,7 +119,7 @@ def command(
     _finish(figures, {each: len(made) for each, made in outputs.items()} if dry_run else {}, failed, quiet)
 
 
-def _finish(figures: dict, sizes: dict[str, int], failed: list[tuple[str, str]], quiet: bool) -> None:
+def _finish(figures: "Summary", sizes: dict[str, int], failed: list[tuple[str, str]], quiet: bool) -> None:
     """Says what was done, or would have been, and raises the checks that failed."""
     say(*_told(figures), quiet=quiet)
     say(*(f"would write {name}: {size} bytes" for name, size in sizes.items()), quiet=quiet)
@@ -126,25 +129,27 @@ def _finish(figures: dict, sizes: dict[str, int], failed: list[tuple[str, str]],
         raise first
 
 
-def _told(figures: dict) -> list[str]:
-    before, after = figures["before"], figures["after"]
+def _told(figures: "Summary") -> list[str]:
+    before, after = figures.before, figures.after
+    changes = ((figures.actuator_change_max_mm, "mm"), (figures.actuator_change_max_rad, "rad"))
+    efforts = ((figures.actuator_force_max_N, "N"), (figures.actuator_torque_max_Nmm, "Nmm"))
     lines = [
-        f"{figures['segments_in']} motions in, {figures['points']} end points out ({figures['method']})",
-        f"tip error before: rms {before['rms_um']:.2f} um, max {before['max_um']:.2f} um",
-        f"tip error after:  rms {after['rms_um']:.2f} um, max {after['max_um']:.2f} um",
-        f"largest change of an actuator {_either(figures, 'actuator_change_max_mm', 'actuator_change_max_rad')}",
-        f"largest drive force {_either(figures, 'actuator_force_max_N', 'actuator_torque_max_Nmm')}",
-        f"platform tilt left {figures['platform_tilt_max_mrad']:.2f} mrad",
+        f"{figures.segments_in} motions in, {figures.points} end points out ({figures.method})",
+        f"tip error before: rms {before.rms_um:.2f} um, max {before.max_um:.2f} um",
+        f"tip error after:  rms {after.rms_um:.2f} um, max {after.max_um:.2f} um",
+        f"largest change of an actuator {_either(*changes)}",
+        f"largest drive force {_either(*efforts)}",
+        f"platform tilt left {figures.platform_tilt_max_mrad:.2f} mrad",
     ]
-    if checked := figures.get("interpolation"):
+    if checked := figures.interpolation:
         lines.append(
-            f"interpolated between {checked['exact_solutions']} exact solutions; {checked['checked']} points checked: "
-            f"{checked['worst_um']:.4f} um at most, allowed {checked['bound_um']:g} um"
+            f"interpolated between {checked.exact_solutions} exact solutions; {checked.checked} points checked: "
+            f"{checked.worst_um:.4f} um at most, allowed {checked.bound_um:g} um"
         )
-    return lines + [f"warning: {each}" for each in figures["warnings"]]
+    return lines + [f"warning: {each}" for each in figures.warnings]
 
 
-def _either(figures: dict, *keys: str) -> str:
-    """The figures that are not zero, in their own units; a machine may have slides, hinges or both."""
-    parts = [f"{figures[key]:.4g} {key.rsplit('_', 1)[1]}" for key in keys if figures.get(key)]
+def _either(*figures: tuple[float | None, str]) -> str:
+    """The figures that are not zero, with their units; a machine may have slides, hinges or both."""
+    parts = [f"{most:.4g} {unit}" for most, unit in figures if most]
     return " and ".join(parts) or "0"

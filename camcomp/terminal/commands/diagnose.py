@@ -1,10 +1,9 @@
 """camcomp diagnose."""
 
-import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -16,17 +15,16 @@ from camcomp.terminal.progress import say, working
 if TYPE_CHECKING:
     from camcomp.diagnosis.diagnose import Diagnosis
     from camcomp.diagnosis.experiment.open_experiment import OpenExperiment
-
-
-def diagnose_experiment(path: str | Path, without: Sequence[str] = ()) -> dict[str, Any]:
-    """The result mapping of an experiment file, ready for JSON. Raises CamcompError."""
-    return examine(path, without)[0]
+    from camcomp.diagnosis.result.types import DiagnosisResult
 
 
 def examine(
     path: str | Path, without: Sequence[str] = ()
-) -> "tuple[dict[str, Any], Diagnosis | None, OpenExperiment | None]":
-    """The result, and what it was drawn from; nothing of that for logs that have a study of their own."""
+) -> "tuple[DiagnosisResult, Diagnosis | None, OpenExperiment | None]":
+    """The result of an experiment file, and what it was drawn from; nothing of that for logs that have a study of their own.
+
+    Raises CamcompError.
+    """
     from camcomp.diagnosis.diagnose import diagnose
     from camcomp.diagnosis.experiment.open_experiment import open_experiment
     from camcomp.diagnosis.studies import study_of
@@ -38,16 +36,16 @@ def examine(
     return done.result, done, opened
 
 
-def _machine_with_causes(configs: Sequence[str], result: dict[str, Any], target: str) -> str:
+def _machine_with_causes(configs: Sequence[str], result: "DiagnosisResult", target: str) -> str:
     """Text of the machine file with the causes in it."""
     texts = [read_bytes(each).decode("utf-8-sig") for each in configs]
     k = machine_file(texts)
-    note = f"found by camcomp diagnose, verdict {result['verdict']}"
-    if result["verdict"] == "ambiguous":
-        note += f": the likeliest of {len(result['alternatives'])} sets that explain the data alike"
+    note = f"found by camcomp diagnose, verdict {result.verdict}"
+    if result.verdict == "ambiguous":
+        note += f": the likeliest of {len(result.alternatives)} sets that explain the data alike"
     to = Path.cwd() if target == STANDARD else Path(target).absolute().parent
     return with_causes(
-        texts[k], result["causes"], folder=str(Path(configs[k]).absolute().parent), moved_to=str(to), note=note
+        texts[k], result.known, folder=str(Path(configs[k]).absolute().parent), moved_to=str(to), note=note
     )
 
 
@@ -88,7 +86,7 @@ def command(
         click.echo(f"note: {each}", err=True)
     outputs: dict[str, bytes] = {}
     if json_file or not (report or config_file or next_program):
-        outputs[json_file or STANDARD] = (json.dumps(result, indent=1, allow_nan=False) + "\n").encode()
+        outputs[json_file or STANDARD] = result.to_json()
     if report:
         from camcomp.diagnosis.report.views import report_of
 

@@ -8,7 +8,7 @@ import click
 def describe() -> list[dict[str, object]]:
     """Every effect of the shelf, those of entry points included, ready for JSON."""
     from camcomp.ground import shelf
-    from camcomp.model.effect import HOOKS
+    from camcomp.model.signal_path import HOOKS
 
     out: list[dict[str, object]] = []
     for name in shelf.members("effects"):

@@ -1,7 +1,5 @@
 """camcomp verify."""
 
-import json
-
 import click
 
 from camcomp.ground.errors import CamcompError, CheckFailed
@@ -50,11 +48,11 @@ def command(
         source = open_program(original, config)
         with working("settling the corrected program", quiet=quiet):
             done = verify(open_program(corrected, config), source, Job(config))
-        figures = done.as_json(tolerance)
+        figures = done.figures(tolerance)
         if json_file:
-            outputs[json_file] = (json.dumps(figures, indent=2) + "\n").encode()
-        worst = figures["residual"]["max_um"]
-        note = f"residual rms {figures['residual']['rms_um']:.3f} um, max {worst:.3f} um at {figures['points']} points"
+            outputs[json_file] = figures.to_json()
+        worst = figures.residual.max_um
+        note = f"residual rms {figures.residual.rms_um:.3f} um, max {worst:.3f} um at {figures.points} points"
         say(f"{note}; {done.joining} joining lines not counted", quiet=quiet)
         for each in sorted(done.lines, key=lambda e: -e.residual_um)[:10]:
             say(

@@ -139,6 +139,8 @@ def test_tolerances_decide(joints, capsys):
         ("a,a\n1,2\n", "column a stands there twice"),
         ("a,b\n1,2\n\n1,x\n", "bad.csv:4:3: error[CC450]: 'x' in column b"),
         ("a,b\n1\n", "bad.csv:2:1: error[CC450]: 1 cells under 2"),
+        ("a,b\r1,2\r1,x\r", "bad.csv:3:3: error[CC450]: 'x' in column b"),
+        ("a,b\n1,2\n1,-inf\n", "bad.csv:3:3: error[CC450]: '-inf' in column b is not a number"),
     ],
 )
 def test_tables_that_are_none(joints, capsys, text, told):

@@ -53,7 +53,7 @@ def test_columns_can_be_named_and_rows_thinned(actuators):
 
 
 def test_a_word_in_a_cell_is_refused_on_its_line(actuators):
-    with pytest.raises(ConfigError, match="'n.a.' is not a number") as caught:
+    with pytest.raises(ConfigError, match="'n.a.' in column shoulder_lift_joint is not a number") as caught:
         read(f"{HEAD}\n{ROW}\n{ROW.replace('0,25', 'n.a.')}\n", actuators)
     assert (caught.value.rule, caught.value.at.line) == ("CC422", 3)
 

@@ -54,22 +54,22 @@ A, B = ([-2, -2.5, -2, -3, -2, -3], [1, -0.3, 2, 3, 2, 3]), ([-1, -1.8, -1, -2, 
 def test_a_longer_link_and_a_soft_joint_are_found_on_other_campaigns(robot):
     truth = {"longer": 0.7, "soft": 1.2e-8}
     result = arm_study(robot, (), [run("A", 1, *A, **truth), run("B", 2, *B, **truth)], holdout=["B"])
-    assert result["verdict"] == "identified"
-    assert {c["effect"] for c in result["causes"]} == {"link_length", "gravity_compliance"}
-    longer = next(c for c in result["causes"] if c["effect"] == "link_length" and c["target"] == "elbow")
-    assert longer["parameters"]["length_mm"]["value"] == pytest.approx(0.7, rel=0.05)
-    soft = next(c for c in result["causes"] if c["effect"] == "gravity_compliance")
-    assert soft["target"] == "shoulder_lift"
-    assert soft["parameters"]["compliance_rad_per_Nmm"]["value"] == pytest.approx(1.2e-8, rel=0.05)
-    assert result["shrinkage"]["after_rms_um"] == pytest.approx(20 * np.sqrt(3), rel=0.15)  # the noise put in
-    assert result["gap"]["noise_floor_um"] == pytest.approx(20 * np.sqrt(3), rel=0.2)
+    assert result.verdict == "identified"
+    assert {c.effect for c in result.causes} == {"link_length", "gravity_compliance"}
+    longer = next(c for c in result.causes if c.effect == "link_length" and c.target == "elbow")
+    assert longer.parameters["length_mm"].value == pytest.approx(0.7, rel=0.05)
+    soft = next(c for c in result.causes if c.effect == "gravity_compliance")
+    assert soft.target == "shoulder_lift"
+    assert soft.parameters["compliance_rad_per_Nmm"].value == pytest.approx(1.2e-8, rel=0.05)
+    assert result.shrinkage.after_rms_um == pytest.approx(20 * np.sqrt(3), rel=0.15)  # the noise put in
+    assert result.gap.noise_floor_um == pytest.approx(20 * np.sqrt(3), rel=0.2)
 
 
 def test_an_arm_that_is_its_model_has_no_cause(robot):
     result = arm_study(robot, (), [run("A", 3, *A), run("B", 4, *B)])
-    assert result["verdict"] == "none"
-    assert result["causes"] == []
-    assert result["gap"]["rms_um"] == pytest.approx(20 * np.sqrt(3), rel=0.1)
+    assert result.verdict == "none"
+    assert result.causes == ()
+    assert result.gap.rms_um == pytest.approx(20 * np.sqrt(3), rel=0.1)
 
 
 def test_registration_finds_frame_and_tool():
@@ -98,24 +98,24 @@ def axis_log(lag=0.005, coulomb=30.0, viscous=0.1, lopsided=0.0, line=0.0, seed=
 
 def test_an_axis_with_lag_friction_and_an_unlisted_ripple():
     result = axis_study({"x": [axis_log(lopsided=-0.03, line=2.0)]})
-    parameters = {c["effect"]: c["parameters"] for c in result["causes"]}
-    assert parameters["servo_lag"]["time_constant_ms"]["value"] == pytest.approx(5.0, rel=0.01)
-    assert parameters["friction"]["force_N"]["value"] == pytest.approx(30.0, rel=0.03)
-    assert parameters["friction"]["asymmetry_Ns_per_mm"]["value"] == pytest.approx(-0.03, rel=0.1)
-    assert result["verdict"] == "unknown"
-    line = result["where"]["drivers"][0]
-    assert line["period_mm"] == pytest.approx(5.0, rel=0.005)
-    assert line["amplitude_N"] == pytest.approx(2.0, rel=0.1)
+    parameters = {c.effect: c.parameters for c in result.causes}
+    assert parameters["servo_lag"]["time_constant_ms"].value == pytest.approx(5.0, rel=0.01)
+    assert parameters["friction"]["force_N"].value == pytest.approx(30.0, rel=0.03)
+    assert parameters["friction"]["asymmetry_Ns_per_mm"].value == pytest.approx(-0.03, rel=0.1)
+    assert result.verdict == "unknown"
+    line = result.where.drivers[0]
+    assert line.period_mm == pytest.approx(5.0, rel=0.005)
+    assert line.amplitude_N == pytest.approx(2.0, rel=0.1)
 
 
 def test_what_is_not_there_is_not_found():
     result = axis_study({"x": [axis_log()]})
-    assert {c["effect"] for c in result["causes"]} == {"servo_lag", "friction"}
-    assert "asymmetry_Ns_per_mm" not in result["causes"][-1]["parameters"]
-    assert result["where"]["drivers"] == []
-    assert result["verdict"] == "identified"
+    assert {c.effect for c in result.causes} == {"servo_lag", "friction"}
+    assert "asymmetry_Ns_per_mm" not in result.causes[-1].parameters
+    assert result.where.drivers == ()
+    assert result.verdict == "identified"
     still = axis_study({"x": [axis_log(lag=0.0, coulomb=0.0, viscous=0.0)]})
-    assert still["causes"] == []
+    assert still.causes == ()
 
 
 def test_logs_that_say_nothing_are_refused():

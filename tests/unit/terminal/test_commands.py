@@ -44,6 +44,19 @@ def test_the_shipped_schema_is_the_generated_one(printed, args, name):
 
 
 def test_the_schema_is_clean_draft_07(schema):
+    clean(schema)
+
+
+@pytest.mark.parametrize("kind", ["diagnosis", "summary", "verify"])
+def test_the_schema_of_a_result_is_clean_too(printed, kind):
+    clean(json.loads(printed("schema", "--result", kind)))
+
+
+def test_one_schema_at_a_time(printed):
+    assert "ask for one" in printed("schema", "--experiment", "--result", "verify", code=2)
+
+
+def clean(schema):
     assert schema["$schema"] == "http://json-schema.org/draft-07/schema#"
     jsonschema.Draft7Validator.check_schema(schema)
     known = set(jsonschema.Draft7Validator.META_SCHEMA["properties"])

@@ -1,0 +1,192 @@
+"""The motion of a run as its log has it: set-points, else encoders, else the tip itself, led along the program."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from camcomp.diagnosis.experiment.log_checks import check_forces, check_places, check_told
+from camcomp.diagnosis.fit.measured import Measured
+from camcomp.ground import path_geometry
+from camcomp.ground.datatypes import RAPID, Bools, Floats, Path
+from camcomp.ground.errors import ConfigError, Location
+from camcomp.model.cutting.track import Conditions, Track, lay_track
+from camcomp.model.motion.alignment import Aligned, align
+from camcomp.model.motion.driven_path import Forces, cutting_forces, driven_path
+from camcomp.model.motion.run_path import RunPath
+from camcomp.model.motion.twin import Twin
+
+SAMPLE_MM = 2.0  # of the program, where places are compared
+GAP_ROWS = 3.0  # usual steps between rows over which a motion is not led
+STILL_S = 0.1  # from which on standing at the end of a line may be idleness
+STILL_MM = 0.005
+LED_PASSES = 2  # of a tip along its program: the second knows how the machine bends
+
+
+@dataclass(frozen=True, eq=False)
+class DrivenRun:
+    """run_path; by: the channel that is the motion ("setpoint", "encoder", "tip"); unsure (n,): rows whose tip says
+    nothing, because nobody knows where the machine was told to be; turn (n, 3, 3): program axes to along and across the
+    path, where the tip is the motion.
+    """
+
+    run_path: RunPath
+    by: str
+    unsure: Bools
+    turn: Floats | None
+    lag: int
+
+
+@dataclass(frozen=True, eq=False)
+class _Program:
+    """A program with its loads, and places on it: tips (s, 3) mm, program frame, and actuators (s, m)."""
+
+    track: Track
+    tips: Floats
+    rho: Floats
+
+    @property
+    def feed(self) -> float:
+        feeds = self.track.path.feed[(self.track.path.kind != RAPID) & np.isfinite(self.track.path.feed)]
+        return float(np.median(feeds)) if len(feeds) else np.nan
+
+
+def drive(
+    log: str, name: str, measured: Measured, path: Path | None, conditions: Conditions, twin: Twin, started: float,
+    vectors: Callable[[Floats], Floats], temperature: Floats | None,
+) -> DrivenRun:  # fmt: skip
+    """The run of a log; path: of its program, None where it has none. Raises ConfigError CC402, CC406 to CC408."""
+    program = None if path is None else _open(path, conditions, twin)
+    by = next((each for each in ("setpoint", "encoder", "tip") if measured.has(each)), "")
+    if not by or (by == "tip" and program is None):
+        message = f"run '{name}' has neither a program nor set-points: nobody knows where the machine was told to go"
+        raise ConfigError("CC402", message, at=Location(log, 1, 1))
+    if by == "tip":
+        assert program is not None
+        return _led_by_tip(log, name, measured, program, twin, started, vectors, temperature)
+    told = getattr(measured, by)
+    known = np.isfinite(told).all(axis=1)
+    if known.sum() < 2:
+        raise ConfigError(
+            "CC404", f"run '{name}': hardly a row holds the {by}s of all actuators", at=Location(log, 1, 1)
+        )
+    rho = np.column_stack([np.interp(measured.time, measured.time[known], v[known]) for v in told.T])
+    rotary = all(a.revolute for a in twin.robot.actuators)
+    if program is not None:
+        check_told(log, name, by, rho, program.rho, rotary)
+    near = _near(log, name, measured, rho, program, twin)
+    tip = twin.to_program(twin.forward(rho, twin.to_machine(near)))
+    check_places(log, name, measured, rho, tip, rotary)
+    aligned = None if program is None else _aligned(log, name, program, tip, measured)
+    unsure = ~_close(measured.time, known)
+    if program is None or aligned is None:
+        zero = np.zeros_like(tip)
+        forces = Forces(zero, zero, np.zeros(len(tip), bool))
+    else:
+        forces = cutting_forces(program.track, aligned, tip, measured.time, bool(np.isfinite(measured.line).any()))
+        unsure |= _idle_or_not(forces, aligned, program, tip, measured.time)
+    run_path = driven_path(
+        name, measured.time, rho, tip, forces, started=started, to_machine=twin.to_machine, vectors=vectors,
+        forward=twin.forward, temperature=temperature,
+    )  # fmt: skip
+    if program is not None:
+        run_path = replace(run_path, feed_mm_per_min=program.feed)
+    check_forces(log, name, measured, run_path.row_force)
+    return DrivenRun(run_path, by, unsure, None, 0 if aligned is None else aligned.lag)
+
+
+def _open(path: Path, conditions: Conditions, twin: Twin) -> _Program:
+    track = lay_track(path, conditions)
+    length = path_geometry.lengths(path)
+    feeds = np.flatnonzero((path.kind != RAPID) & (length > 0.0) & ~path.machine)
+    if not len(feeds):
+        feeds = np.flatnonzero(length > 0.0)
+    count = np.maximum(np.ceil(length[feeds] / SAMPLE_MM), 1.0).astype(np.int64)
+    motion = np.repeat(feeds, count + 1)
+    u = np.concatenate([np.linspace(0.0, 1.0, c + 1) for c in count]) if len(count) else np.zeros(0)
+    tips = path_geometry.points(path, motion, u)
+    return _Program(track, tips, twin.inverse(twin.to_machine(tips)))
+
+
+def _near(log: str, name: str, measured: Measured, rho: Floats, program: _Program | None, twin: Twin) -> Floats:
+    """Tips (n, 3), program frame, near those of actuators rho (n, m)."""
+    if program is not None:
+        _, index = KDTree(program.rho).query(rho)
+        return program.tips[index]
+    known = np.isfinite(measured.tip).all(axis=1)
+    if not known.any():
+        message = f"run '{name}' has neither a program nor measured tips: its place is not known"
+        raise ConfigError("CC402", message, at=Location(log, 1, 1))
+    return np.column_stack([np.interp(measured.time, measured.time[known], v[known]) for v in measured.tip.T])
+
+
+def _aligned(log: str, name: str, program: _Program, tip: Floats, measured: Measured) -> Aligned:
+    path = program.track.path
+    line = measured.line
+    known = np.isfinite(line) & (line > 0)
+    if known.any() and not np.isin(line[known], path.line).any():
+        lines = sorted({int(each) for each in line[known]})[:5]
+        message = f"run '{name}': the rows are on lines that the program does not move on, e.g. {lines}"
+        raise ConfigError("CC406", message, at=Location(log, 1, 1))
+    return align(path, tip, line)
+
+
+def _close(time: Floats, known: Bools) -> Bools:
+    """Rows (n,) between known ones that are near in time."""
+    if known.all() or len(time) < 3:
+        return known
+    usual = float(np.median(np.diff(time)))
+    at = time[known]
+    after = np.clip(np.searchsorted(at, time), 0, len(at) - 1)
+    before = np.maximum(after - 1, 0)
+    return known | ((at[after] - at[before]) < GAP_ROWS * usual) & (time >= at[0]) & (time <= at[-1])
+
+
+def _idle_or_not(forces: Forces, aligned: Aligned, program: _Program, tip: Floats, time: Floats) -> Bools:
+    """Rows (n,) that stand still for a while where a cutting line ends: whether it is still executed nobody says."""
+    path = program.track.path
+    ends = np.linalg.norm(path.end[aligned.motion] - tip, axis=1) < STILL_MM
+    step = np.linalg.norm(np.diff(tip, axis=0), axis=1)
+    still = ends & np.concatenate([[False], step < STILL_MM]) & np.concatenate([step < STILL_MM, [True]])
+    out = np.zeros(len(tip), bool)
+    edge = np.flatnonzero(np.diff(np.concatenate([[0], still.astype(int), [0]])))
+    for a, b in zip(edge[::2], edge[1::2], strict=True):
+        if time[b - 1] - time[a] > STILL_S and forces.cutting[a:b].any():
+            out[a:b] = True
+    return out
+
+
+def _led_by_tip(
+    log: str, name: str, measured: Measured, program: _Program, twin: Twin, started: float,
+    vectors: Callable[[Floats], Floats], temperature: Floats | None,
+) -> DrivenRun:  # fmt: skip
+    """The tip led along the program: its time along the path is free, and only what lies across is evidence."""
+    path = program.track.path
+    known = np.isfinite(measured.tip).all(axis=1)
+    whole = np.column_stack([np.interp(measured.time, measured.time[known], v[known]) for v in measured.tip.T])
+    bend = np.zeros_like(whole)
+    for _ in range(LED_PASSES):
+        aligned = _aligned(log, name, program, whole - bend, measured)
+        tip = path_geometry.points(path, aligned.motion, aligned.share)
+        check_places(log, name, measured, np.zeros((len(tip), 0)), tip)
+        forces = cutting_forces(program.track, aligned, tip, measured.time, bool(np.isfinite(measured.line).any()))
+        run_path = driven_path(
+            name, measured.time, twin.inverse(twin.to_machine(tip)), tip, forces, started=started,
+            to_machine=twin.to_machine, vectors=vectors, forward=twin.forward, temperature=temperature,
+        )  # fmt: skip
+        bend = twin.sense(run_path)[0].tip - tip
+    unsure = ~known | _idle_or_not(forces, aligned, program, tip, measured.time)
+    run_path = replace(run_path, feed_mm_per_min=program.feed)
+    return DrivenRun(run_path, "tip", unsure, _across(program.track, aligned), aligned.lag)
+
+
+def _across(track: Track, aligned: Aligned) -> Floats:
+    """Axes (n, 3, 3) along the path and across it."""
+    along = path_geometry.tangents(track.path, aligned.motion, aligned.share)
+    other = np.where(np.abs(along[:, 2:3]) < 0.9, [[0.0, 0.0, 1.0]], [[1.0, 0.0, 0.0]])
+    side = np.cross(along, other)
+    side /= np.maximum(np.linalg.norm(side, axis=1, keepdims=True), 1e-12)
+    return np.stack([along, side, np.cross(along, side)], axis=1)

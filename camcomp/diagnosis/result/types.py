@@ -1,0 +1,236 @@
+"""The result of a diagnosis as types, key by key; the same for programs, poses of arms and logs of axes.
+
+Every key is always there: empty or null where a study has nothing to say.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, ClassVar, Literal
+
+from pydantic import Field
+
+from camcomp.ground.result import Result
+
+Stage = Literal["control", "drive", "structure", "process", "tool", "workpiece", "sensor"]
+Share = float  # of the gap's energy, 0 to 1
+Pair = Annotated[tuple[float, float], Field(description="low and high end")]
+UNKNOWN: Literal["unknown"] = "unknown"
+
+
+class GapSize(Result):
+    """Size of measured minus modelled over all runs, um, and of its noise."""
+
+    rms_um: float
+    p95_um: float
+    max_um: float
+    noise_floor_um: float
+
+
+class LineShare(Result):
+    """A source line of a run where the gap stands out of the noise."""
+
+    run: str
+    line: int
+    share: Share
+    rms_um: float
+
+
+class IntervalShare(Result):
+    """A stretch of time of a run where the gap stands out of the noise."""
+
+    run: str
+    t0_s: float
+    t1_s: float
+    share: Share
+
+
+class Driver(Result):
+    """What the gap depends on; with an unknown cause, what the rest depends on."""
+
+    covariate: str
+    share: Share
+
+
+class RippleDriver(Driver):
+    """A line over position in the drive force: its period, and its amplitude in both directions and in each."""
+
+    channel: str
+    period_mm: float
+    amplitude_N: float
+    forward_N: float
+    backward_N: float
+
+
+class DirectionShares(Result):
+    """How the gap, as motion of one actuator, goes with its direction: not at all, turning round, close behind reversals."""
+
+    both_ways: Share
+    with_direction: Share
+    after_reversal: Share
+
+
+class ScrewLine(Result):
+    """A line of the gap's spectrum over the travel of an actuator."""
+
+    actuator: str
+    period_mm: float
+    amplitude_um: float
+    share: Share
+
+
+class FrequencyLine(Result):
+    """A line of the gap's spectrum over time."""
+
+    axis: str
+    hertz: float
+    amplitude_um: float
+    share: Share
+
+
+class PlaceShare(Result):
+    """A part of the workspace where the gap stands out of the noise."""
+
+    x_mm: Pair
+    y_mm: Pair
+    z_mm: Pair
+    share: Share
+    rms_um: float
+
+
+class Where(Result):
+    """Where the gap arises, and where it shows."""
+
+    stage: Stage
+    axes: dict[str, Share]
+    actuators: dict[str, Share]
+    lines: tuple[LineShare, ...] = ()
+    intervals: tuple[IntervalShare, ...] = ()
+    drivers: tuple[RippleDriver | Driver, ...] = ()
+    travel: dict[str, DirectionShares] = Field(default_factory=dict)
+    screws: tuple[ScrewLine, ...] = ()
+    frequencies: tuple[FrequencyLine, ...] = ()
+    places: tuple[PlaceShare, ...] = ()
+
+
+class NamedCause(Result):
+    """An effect at its target, null where it has none."""
+
+    effect: str
+    target: str | None
+
+
+class Estimate(Result):
+    """A value with its 95 % interval."""
+
+    value: float
+    ci95: Pair
+
+
+class FoundCause(NamedCause):
+    """A cause: the probability that it is at work, its share of the gap, its parameters."""
+
+    probability: Annotated[float, Field(ge=0.0, le=1.0)]
+    share: Share
+    parameters: dict[str, Estimate] = Field(default_factory=dict)
+
+
+class LawTerm(Result):
+    """A term of a law, with its coefficient."""
+
+    term: str
+    value: float
+    ci95: Pair
+    unit: str
+
+
+class Law(Result):
+    """What the unknown follows, and within which bounds that was seen."""
+
+    formula: str
+    on: Stage
+    terms: tuple[LawTerm, ...]
+    envelope: dict[str, Pair]
+    after_rms_um: float
+
+
+class UnknownCause(FoundCause):
+    """What no effect of the library explains."""
+
+    effect: Literal["unknown"] = UNKNOWN
+    law: Law | None = None
+
+
+class ShrinkageStep(NamedCause):
+    """What is left on unseen runs when this cause is in as well."""
+
+    after_rms_um: float
+
+
+class UnseenShrinkage(Result):
+    """How far the gap shrinks on runs or campaigns that the fit has not seen, and how far it could."""
+
+    holdout: tuple[str, ...]
+    before_rms_um: float
+    after_rms_um: float
+    ratio: float
+    ci95: Pair
+    steps: tuple[ShrinkageStep, ...] = ()
+    noise_floor_um: float | None = None
+    ceiling_rms_um: Annotated[float | None, Field(description="left when the causes are fitted to these runs")] = None
+    ceiling_ratio: float | None = None
+    refitted: Annotated[tuple[str, ...], Field(description="what only the unseen runs themselves can tell")] = ()
+
+
+class NextExperiment(Result):
+    """What to measure next: what it separates, what is to be gained, and how long it takes."""
+
+    action: str
+    separates: tuple[str, ...]
+    gain: float
+    minutes: float | None = None
+
+
+class MinorEffect(NamedCause):
+    """An effect of the size that every healthy machine has."""
+
+    size_um: float
+
+
+class Floor(Result):
+    """Noise of the gap, null where nothing tells it, and what it was told by."""
+
+    um: float | None
+    source: Literal["repeats", "rest", "stated", "rows", "not identifiable"]
+
+
+class Outlier(Result):
+    """A row of a run's log that was left out, from 1."""
+
+    run: str
+    row: int
+
+
+class DiagnosisResult(Result):
+    """The result file of `camcomp diagnose`."""
+
+    INDENT: ClassVar[int] = 1
+
+    verdict: Literal["none", "identified", "ambiguous", "unknown"]
+    gap: GapSize
+    where: Where
+    causes: tuple[UnknownCause | FoundCause, ...]
+    alternatives: tuple[tuple[NamedCause, ...], ...] = ()
+    shrinkage: UnseenShrinkage | None
+    next_experiment: NextExperiment | None = None
+    minor: tuple[MinorEffect, ...] = ()
+    floor: Floor
+    outliers: tuple[Outlier, ...] = ()
+    equivalent: Annotated[
+        tuple[tuple[NamedCause, ...], ...], Field(description="causes that these runs cannot tell apart")
+    ] = ()
+    axes_in_detail: dict[str, dict[str, Any]] = Field(default_factory=dict, description="studies of axes: every fit")
+
+    @property
+    def known(self) -> tuple[FoundCause, ...]:
+        """The causes that the library has."""
+        return tuple(each for each in self.causes if not isinstance(each, UnknownCause))

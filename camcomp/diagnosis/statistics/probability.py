@@ -1,0 +1,23 @@
+"""From the chance of a test to the probability of a cause, and how a result states it."""
+
+from math import exp, log
+
+EVEN = 0.5  # of an effect, before the data are looked at
+PLACES = 4
+
+
+def probability_of_chance(log10_chance: float, prior: float = EVEN) -> float:
+    """Probability of an effect where noise alone looks as the data do with the chance p; log10_chance is log10 of p.
+
+    P = 1 / (1 + (1 - prior) / prior * B), and B = -e p ln p is the least Bayes factor for "noise alone" that a chance p
+    goes with, 1 where p exceeds 1/e: no prior of the effect's size can make more of p. Source: Sellke, Bayarri, Berger,
+    The American Statistician 55 (2001) 62.
+    """
+    log_chance = log(10.0) * log10_chance
+    log_factor = 1.0 + log_chance + log(-log_chance) if log_chance < -1.0 else 0.0
+    return 1.0 / (1.0 + (1.0 - prior) / prior * exp(log_factor))
+
+
+def stated(probability: float) -> float:
+    """A probability as a result states it: rounded, and never to what would read as certain."""
+    return min(round(probability, PLACES), 1.0 - 10.0**-PLACES)

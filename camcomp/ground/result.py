@@ -1,0 +1,34 @@
+"""What results of commands share: they are frozen types, and here is where they become JSON."""
+
+from __future__ import annotations
+
+import json
+from math import isfinite
+from typing import Annotated, Any, ClassVar
+
+from pydantic import AllowInfNan, BaseModel, ConfigDict, PlainSerializer
+
+
+def _finite(value: float) -> float | None:
+    return value if isfinite(value) else None
+
+
+Size = Annotated[float, AllowInfNan(True), PlainSerializer(_finite, when_used="json")]  # null where it is not finite
+
+
+class Result(BaseModel):
+    """Base of every part of a result: no other keys, finite numbers; keys stand in the order of the fields."""
+
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, allow_inf_nan=False, json_schema_serialization_defaults_required=True
+    )
+
+    INDENT: ClassVar[int] = 2
+
+    def as_json(self) -> dict[str, Any]:
+        """As a mapping of what JSON knows."""
+        return self.model_dump(mode="json")
+
+    def to_json(self) -> bytes:
+        """As a JSON file."""
+        return (json.dumps(self.as_json(), indent=self.INDENT, allow_nan=False) + "\n").encode()

@@ -1,0 +1,266 @@
+"""A run as it was really driven: what moved is what was logged, and the program says what was cut and where.
+
+The set-points (or encoders) of a log are the motion. Between rows they are led smoothly; the cutting force acts along
+the way that the tip takes, while the line being executed cuts; where the force cannot be known (on which side of a
+corner, at which instant a cut begins) the rows say so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import Akima1DInterpolator
+
+from camcomp.ground import path_geometry
+from camcomp.ground.datatypes import Bools, Floats, Ints
+from camcomp.model.cutting.track import Track
+from camcomp.model.motion.alignment import Aligned
+from camcomp.model.motion.node_pieces import NODES, SPLIT, Places, basis_at
+from camcomp.model.motion.run_path import MOST_STEPS, STEP_S, Driven, RunPath
+
+CLOCK_S = 0.010  # by which the clock of a tip measurement may be off that of the control
+_JUMP_SHARE = 0.1  # of the largest force: what the force changes from row to row is more than the turn of an arc
+_USUAL = 4.0  # times the usual change from row to row
+_PIECE_MM = 60.0
+_PIECE_RAD = np.pi / 3
+_AGREE = np.cos(np.radians(5.0))  # driven and programmed direction are the same
+_STILL_MM_PER_S = 0.05
+_CHORD_MM = 0.02  # over which a direction is taken: digits and noise of set-points are small beside it
+
+
+@dataclass(frozen=True, eq=False)
+class Forces:
+    """Cutting force at n rows. force, doubt (n, 3) N, program frame: doubt is half of what it may be off by."""
+
+    force: Floats
+    doubt: Floats
+    cutting: Bools
+
+
+def driven_path(
+    name: str,
+    time: Floats,
+    rho: Floats,
+    tip: Floats,
+    forces: Forces,
+    *,
+    started: float,
+    to_machine: Callable[[Floats], Floats],
+    vectors: Callable[[Floats], Floats],
+    forward: Callable[[Floats, Floats], Floats],
+    temperature: Floats | None = None,
+) -> RunPath:
+    """Run path of driven actuators rho (n, m) at times (n,) s, and the nominal tips tip (n, 3), program frame, that go with them.
+
+    to_machine, vectors: program -> machine frame. forward: actuators (q, m) and tips near by (q, 3), machine frame -> tips.
+    """
+    n = len(time)
+    row_tip, row_force = to_machine(tip), vectors(forces.force)
+    span = float(time[-1] - time[0])
+    grid = np.linspace(time[0], time[-1], max(int(min(np.ceil(span / STEP_S) + 1, MOST_STEPS)), 2))
+    lead, lead_tip = _smooth(time, rho), _smooth(time, row_tip)
+    grid_rho, grid_tip = lead(grid), lead_tip(grid)
+    jump = _jumps(row_force, forces.cutting)
+    pieces = _Pieces.along(time, grid, grid_tip, jump)
+    node_time = pieces.node_times()
+    node_rho = lead(node_time)
+    node_tip = forward(node_rho, lead_tip(node_time))
+    sure = np.linalg.norm(forces.doubt, axis=1) == 0.0
+    node_force = _of_stretches(time, row_force, sure, jump, node_time, pieces)
+    index = np.clip(np.searchsorted(time, grid), 0, n - 1)
+    return RunPath(
+        name, time, started, True, node_tip, node_force, node_rho, node_time, grid, grid_rho,
+        forces.cutting[index].astype(float), pieces.of(grid), len(pieces.begin), pieces.at, rho, temperature,
+        driven=Driven(row_tip, row_force, np.abs(vectors(forces.doubt)), lead_tip),
+    )  # fmt: skip
+
+
+def cutting_forces(track: Track, aligned: Aligned, tip: Floats, time: Floats, logged_line: bool) -> Forces:
+    """What the model says of the force along the way that the tip (n, 3) mm, program frame, was driven at times (n,) s."""
+    path = track.path
+    motion, share, on = _executed(track, aligned, tip, time, logged_line)
+    piece = _piece_of(track, motion, share)
+    w = np.clip((share - track.u0[piece]) / np.maximum(track.u1[piece] - track.u0[piece], 1e-12), 0.0, 1.0)
+    on &= track.cutting[piece]
+    n = len(tip)
+    zero = np.zeros((n, 3))
+    if not on.any():
+        return Forces(zero, zero, on)
+    before, after = driven_directions(tip, time)
+    programmed = path_tangents(track, piece, w)
+    middle = before + after
+    size = np.linalg.norm(middle, axis=1, keepdims=True)
+    middle = np.where(size > 0.2, middle / np.maximum(size, 1e-12), after)
+    as_told = (np.sum(middle * programmed, axis=1) > _AGREE) | (np.linalg.norm(middle, axis=1) == 0.0)
+    force = np.where(as_told[:, None], track.force(piece, w), track.force_along(piece, w, middle))
+    force[~on] = 0.0
+    return Forces(force, _doubt(force, time, on), on)
+
+
+def path_tangents(track: Track, piece: Ints, w: Floats) -> Floats:
+    """Programmed direction (n, 3) at fraction w (n,) of pieces (n,)."""
+    return path_geometry.tangents(track.path, track.motion[piece], track.u(piece, w))
+
+
+def driven_directions(tip: Floats, time: Floats) -> tuple[Floats, Floats]:
+    """Directions (n, 3) in which a row was reached and is left; at standstill those of the last movement, zero before any."""
+    step = np.diff(tip, axis=0)
+    length = np.linalg.norm(step, axis=1)
+    at = np.concatenate([[0.0], np.cumsum(length)])
+    n = len(tip)
+    # rows that are at least _CHORD_MM away along the way, neighbours where these are further
+    left = np.minimum(np.searchsorted(at, at - _CHORD_MM, side="right") - 1, np.arange(n) - 1)
+    right = np.maximum(np.searchsorted(at, at + _CHORD_MM, side="left"), np.arange(n) + 1)
+    before = _unit(tip - tip[np.clip(left, 0, n - 1)])
+    after = _unit(tip[np.clip(right, 0, n - 1)] - tip)
+    slow = np.concatenate([length / np.maximum(np.diff(time), 1e-9) < _STILL_MM_PER_S, [True]])
+    moving = ~(slow & np.concatenate([[True], slow[:-1]]))
+    last = np.maximum.accumulate(np.where(moving, np.arange(n), -1))
+    held = np.where(last[:, None] >= 0, after[np.maximum(last, 0)], 0.0)
+    still = ~moving
+    before[still], after[still] = held[still], held[still]
+    first = moving & (np.linalg.norm(before, axis=1) == 0.0)
+    before[first] = after[first]
+    end = moving & (np.linalg.norm(after, axis=1) == 0.0)
+    after[end] = before[end]
+    return before, after
+
+
+def _unit(vectors: Floats) -> Floats:
+    size = np.linalg.norm(vectors, axis=1, keepdims=True)
+    return np.divide(vectors, size, out=np.zeros_like(vectors), where=size > 1e-9)
+
+
+def _executed(track: Track, aligned: Aligned, tip: Floats, time: Floats, logged: bool) -> tuple[Ints, Floats, Bools]:
+    """Motion and share (n,) that the control says it executes, and whether it executes any."""
+    path = track.path
+    motion, share = aligned.motion.copy(), aligned.share.copy()
+    on = np.ones(len(motion), bool)
+    if not logged:
+        return motion, share, on
+    line = aligned.line
+    idle = np.isfinite(line) & ((line <= 0) | ~np.isin(np.where(np.isfinite(line), line, 0), path.line))
+    on[idle] = False
+    other = np.isfinite(line) & ~idle & (path.line[motion] != line)
+    for i in np.flatnonzero(other):
+        mine = np.flatnonzero(path.line == line[i])
+        k = mine[np.argmin(np.abs(mine - motion[i]))]
+        share[i], motion[i] = (0.0 if k > motion[i] else 1.0), k
+    return motion, share, on
+
+
+def _piece_of(track: Track, motion: Ints, share: Floats) -> Ints:
+    key = motion + np.minimum(share, 1.0 - 1e-12)
+    return np.clip(np.searchsorted(track.motion + track.u0, key, side="right") - 1, 0, len(track.motion) - 1)
+
+
+def _doubt(force: Floats, time: Floats, cutting: Bools) -> Floats:
+    """Half of what the force (n, 3) may be off by where it jumps between rows: the jump itself, as far as clocks reach."""
+    change = np.diff(force, axis=0)
+    size = np.linalg.norm(change, axis=1)
+    out = np.zeros_like(force)
+    for k in np.flatnonzero(_abrupt(size, force) | np.diff(cutting)):
+        near = (time >= time[k] - CLOCK_S) & (time <= time[k + 1] + CLOCK_S)
+        near[k : k + 2] = True
+        out[near] = np.maximum(out[near], np.abs(change[k]))
+    return out
+
+
+def _abrupt(size: Floats, force: Floats) -> Bools:
+    largest = float(np.linalg.norm(force, axis=1).max(initial=0.0))
+    moving = size[size > 0.0]
+    usual = float(np.median(moving)) if len(moving) else 0.0
+    return size > max(_JUMP_SHARE * largest, min(_USUAL * usual, 0.5 * largest), 1e-9)
+
+
+def _jumps(force: Floats, cutting: Bools) -> Ints:
+    """Rows behind which the force jumps."""
+    size = np.linalg.norm(np.diff(force, axis=0), axis=1)
+    return np.flatnonzero(_abrupt(size, force) | np.diff(cutting)) if len(force) > 1 else np.zeros(0, np.int64)
+
+
+def _smooth(time: Floats, values: Floats) -> Callable[[Floats], Floats]:
+    """Values (n, c) between rows: smooth, and without overshoot where a line begins or ends (Akima 1970)."""
+    if len(time) < 3:
+        return lambda at: np.column_stack([np.interp(at, time, v) for v in values.T])
+    lead = Akima1DInterpolator(time, values, axis=0)
+    return lambda at: np.asarray(lead(np.clip(at, time[0], time[-1])))
+
+
+@dataclass(frozen=True, eq=False)
+class _Pieces:
+    """p pieces of a run, one after the other in time. begin, end (p,) s; way (p + 1 per piece) along the tip's path on the grid."""
+
+    begin: Floats
+    end: Floats
+    grid: Floats
+    way: Floats  # (g,) mm that the tip has come so far
+    stretch: NDArray[np.int64]  # (p,) which stretch without a jump of the force
+
+    @classmethod
+    def along(cls, time: Floats, grid: Floats, tip: Floats, jump: Ints) -> _Pieces:
+        step = np.diff(tip, axis=0)
+        length = np.linalg.norm(step, axis=1)
+        way = np.concatenate([[0.0], np.cumsum(length)])
+        unit = _unit(step)
+        moves = np.flatnonzero(length > 1e-6)
+        turn = np.zeros(len(grid))
+        if len(moves) > 1:
+            cosine = np.clip(np.sum(unit[moves[1:]] * unit[moves[:-1]], axis=1), -1.0, 1.0)
+            np.add.at(turn, moves[1:], np.arccos(cosine))
+        turned = np.cumsum(turn)
+        edges = np.unique(np.concatenate([[time[0]], 0.5 * (time[jump] + time[jump + 1]), [time[-1]]]))
+        begin: list[float] = []
+        stretch: list[int] = []
+        for s, (a, b) in enumerate(zip(edges[:-1], edges[1:], strict=True)):
+            i, j = np.searchsorted(grid, (a, b))
+            i, j = min(i, len(grid) - 1), min(j, len(grid) - 1)
+            effort = (way[i : j + 1] - way[i]) / _PIECE_MM + (turned[i : j + 1] - turned[i]) / _PIECE_RAD
+            count = max(int(np.ceil(effort[-1] if len(effort) else 0.0)), 1)
+            inner = [float(np.interp(effort[-1] * m / count, effort, grid[i : j + 1])) for m in range(1, count)]
+            cuts = [float(a), *(each for each in inner if a < each < b)]
+            begin += cuts
+            stretch += [s] * len(cuts)
+        start = np.array(begin)
+        return cls(start, np.append(start[1:], time[-1]), grid, way, np.array(stretch))
+
+    def of(self, at: Floats) -> Ints:
+        """Piece (n,) at times (n,)."""
+        return np.clip(np.searchsorted(self.begin, at, side="right") - 1, 0, len(self.begin) - 1)
+
+    def _local(self, piece: Ints, at: Floats) -> Floats:
+        """Fraction (n,) of the piece that is done: of its way, or of its time where it stands still."""
+        first, last = np.interp(self.begin, self.grid, self.way), np.interp(self.end, self.grid, self.way)
+        way = (last - first)[piece]
+        moved = (np.interp(at, self.grid, self.way) - first[piece]) / np.where(way > 1e-3, way, 1.0)
+        spent = (at - self.begin[piece]) / np.maximum((self.end - self.begin)[piece], 1e-9)
+        return np.clip(np.where(way > 1e-3, moved, spent), 0.0, 1.0)
+
+    def at(self, at: Floats) -> Places:
+        piece = self.of(at)
+        return Places(piece, piece[:, None] * NODES + np.arange(NODES), basis_at(self._local(piece, at)))
+
+    def node_times(self) -> Floats:
+        out = []
+        for a, b in zip(self.begin, self.end, strict=True):
+            inside = (self.grid > a) & (self.grid < b)
+            t = np.concatenate([[a], self.grid[inside], [b]])
+            way = np.interp(t, self.grid, self.way)
+            done = (way - way[0]) / (way[-1] - way[0]) if way[-1] - way[0] > 1e-3 else (t - a) / max(b - a, 1e-9)
+            out.append(np.interp(SPLIT, done, t))
+        return np.concatenate(out)
+
+
+def _of_stretches(time: Floats, values: Floats, sure: Bools, jump: Ints, at: Floats, pieces: _Pieces) -> Floats:
+    """Values (n, 3) at node times (q,), led between the sure rows (n,) of the node's own stretch."""
+    edge = np.concatenate([[0], jump + 1, [len(time)]])
+    stretch = np.repeat(pieces.stretch, NODES)
+    out = np.empty((len(at), values.shape[1]))
+    for s in np.unique(stretch):
+        every, mine = np.arange(edge[s], edge[s + 1]), stretch == s
+        rows = every[sure[every]] if sure[every].any() else every
+        out[mine] = np.column_stack([np.interp(at[mine], time[rows], v) for v in values[rows].T])
+    return out

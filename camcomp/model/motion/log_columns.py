@@ -1,0 +1,41 @@
+"""The columns of a log: the one place that has their names, for logs that are written and for those that are read."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+TIME, LINE, TEMPERATURE = "t_s", "line", "temp_C"
+TIP = ("x_mm", "y_mm", "z_mm")
+TIP_SD = ("x_sd_mm", "y_sd_mm", "z_sd_mm")
+DYNO = ("fx_N", "fy_N", "fz_N")
+
+
+@dataclass(frozen=True)
+class LogColumns:
+    """Names per actuator (m): set-points, encoders, drive forces. Everything else is alike for all machines."""
+
+    setpoint: tuple[str, ...]
+    encoder: tuple[str, ...]
+    drive: tuple[str, ...]
+
+    @property
+    def simulated(self) -> tuple[str, ...]:
+        """What a simulated machine logs, in the order of its columns: a log in full but for what it cannot know."""
+        return (TIME, LINE, *TIP, *self.setpoint, *self.encoder, *self.drive, *DYNO)
+
+    @property
+    def known(self) -> tuple[str, ...]:
+        """Every column that is read."""
+        return (*self.simulated, TEMPERATURE, *TIP_SD)
+
+
+def log_columns(actuators: Sequence[str], rotary: Sequence[bool]) -> LogColumns:
+    """For actuators by name, in their order; rotary: whether they turn."""
+    lengths = ["rad" if each else "mm" for each in rotary]
+    efforts = ["Nmm" if each else "N" for each in rotary]
+    return LogColumns(
+        tuple(f"cmd_{a}_{unit}" for a, unit in zip(actuators, lengths, strict=True)),
+        tuple(f"act_{a}_{unit}" for a, unit in zip(actuators, lengths, strict=True)),
+        tuple(f"act_{a}_{unit}" for a, unit in zip(actuators, efforts, strict=True)),
+    )

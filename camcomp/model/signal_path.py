@@ -1,0 +1,155 @@
+"""The signal path: in which order the hooks of effects act between set-point and sensor. It is written here and nowhere else.
+
+Whoever runs the model (the twin in time, the response along a program, poses of an arm, a stream of set-points) does its
+own solving in between and calls these functions for the hooks. Each applies one stage, effects in the order given.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from camcomp.ground.datatypes import Floats
+from camcomp.ground.errors import PhysicsError
+from camcomp.model.effect import Cause, Load, Motion
+from camcomp.model.statics.description import Robot
+
+ORDER = (
+    ("control", ("on_servo",)),
+    ("drive", ("on_drive", "on_drive_force")),
+    ("structure", ("on_robot",)),
+    ("process", ("on_load",)),
+    ("tool", ("on_pose",)),
+    ("workpiece", ("on_workpiece",)),
+    ("sensor", ("on_clock", "on_reading")),
+)
+STAGES = tuple(stage for stage, _ in ORDER)
+HOOKS = tuple(hook for _, hooks in ORDER for hook in hooks)
+
+
+def stages_of(effect: Any) -> set[str]:
+    """The stages of the signal path at which an effect has hooks."""
+    return {stage for stage, hooks in ORDER if any(hasattr(effect, hook) for hook in hooks)}
+
+
+def acting(causes: Sequence[Cause], stage: str) -> list[Cause]:
+    """The causes with a hook at a stage."""
+    return [cause for cause in causes if stage in stages_of(cause.effect)]
+
+
+def controlled(causes: Sequence[Cause], actuators: tuple[str, ...], motion: Motion) -> Floats:
+    """Encoders (n, m) of a motion whose encoders are still the set-points."""
+    encoder = motion.encoder
+    for hook, cause in _hooks(causes, "on_servo"):
+        encoder = hook(encoder, motion, cause.which(actuators), cause.values)
+    return encoder
+
+
+def driven(causes: Sequence[Cause], actuators: tuple[str, ...], motion: Motion) -> tuple[Floats, Motion]:
+    """Carriage minus encoder (n, m), and the motion as the guides see it, with the nut where play and screw leave it.
+
+    Effects with a force of their own come last: guides hold back the carriage, behind the screw and its play.
+    """
+    error = np.zeros_like(motion.encoder)
+    drives = list(_hooks(causes, "on_drive"))
+    for guide in (False, True):
+        if guide:
+            motion = replace(motion, nut=motion.encoder + error)
+        for hook, cause in drives:
+            if (cause.hook("on_drive_force") is not None) == guide:
+                error = hook(error, motion, cause.which(actuators), cause.values)
+    return error, motion
+
+
+def drive_forces(causes: Sequence[Cause], actuators: tuple[str, ...], guided: Motion) -> Floats | None:
+    """Force (n, m) of the drives beyond the load of the structure; None where no effect has one. guided: as `driven` says."""
+    effort = None
+    for hook, cause in _hooks(causes, "on_drive_force"):
+        effort = np.zeros_like(guided.encoder) if effort is None else effort
+        effort = hook(effort, guided, cause.which(actuators), cause.values)
+    return effort
+
+
+def edited(causes: Sequence[Cause], actuators: tuple[str, ...], robot: Robot) -> tuple[Robot, tuple[Cause, ...]]:
+    """The machine with the effects on it, and the causes that changed it."""
+    by = []
+    for hook, cause in _hooks(causes, "on_robot"):
+        changed = hook(robot, cause.aimed(actuators), cause.values)
+        if changed is not robot:
+            by.append(cause)
+        robot = changed
+    return robot, tuple(by)
+
+
+def springs(robot: Robot) -> Floats:
+    """Stiffness (m,) of the drives, as a Motion states it; inf = rigid."""
+    return np.array([np.inf if each.stiffness is None else each.stiffness for each in robot.actuators])
+
+
+def loaded(causes: Sequence[Cause], motion: Motion, force: Floats) -> Load:
+    """Load on the tool under a modelled cutting force (n, 3)."""
+    load = Load(force, np.zeros((len(force), 6)))
+    for hook, cause in _hooks(causes, "on_load"):
+        load = hook(load, motion, cause.values)
+    return load
+
+
+def posed(causes: Sequence[Cause], tip: Floats, load: Load, motion: Motion) -> Floats:
+    """Tips (n, 3), machine frame, behind the tool."""
+    for hook, cause in _hooks(causes, "on_pose"):
+        tip = hook(tip, load, motion, cause.values)
+    return tip
+
+
+def clamped(causes: Sequence[Cause], tip: Floats) -> Floats:
+    """Tips (n, 3), program frame, as the workpiece meets them where it is clamped."""
+    for hook, cause in _hooks(causes, "on_workpiece"):
+        tip = hook(tip, cause.values)
+    return tip
+
+
+def clock(causes: Sequence[Cause], time: Floats) -> Floats:
+    """Times (n,) s at which the tip stood where rows stamped `time` (n,) say; `time` itself without such an effect."""
+    for hook, cause in _hooks(causes, "on_clock"):
+        time = hook(time, cause.values)
+    return time
+
+
+def read(causes: Sequence[Cause], reading: Any, motion: Motion) -> Any:
+    """Readings as the sensors show them."""
+    for hook, cause in _hooks(causes, "on_reading"):
+        reading = hook(reading, motion, cause.values)
+    return reading
+
+
+def _hooks(causes: Sequence[Cause], name: str) -> Iterator[tuple[Callable[..., Any], Cause]]:
+    for cause in causes:
+        if (hook := cause.hook(name)) is not None:
+            yield partial(_finite, hook, cause), cause
+
+
+def _finite(hook: Callable[..., Any], cause: Cause, *given: Any) -> Any:
+    """What the hook answers. Raises PhysicsError CC306 when that is no number although all that it was given were."""
+    answer = hook(*given)
+    if not all(map(_all_finite, _numbers(answer))) and all(
+        _all_finite(each) for one in given for each in _numbers(one)
+    ):
+        raise PhysicsError("CC306", f"effect '{cause.name}' answers with what is not finite", at=cause.at)
+    return answer
+
+
+def _numbers(value: Any) -> tuple[Floats, ...]:
+    """The arrays in what hooks are given and answer with. A rigid drive has an infinite stiffness: that counts as known."""
+    if isinstance(value, Load):
+        return value.force, value.wrench
+    if isinstance(value, Motion):
+        return value.time, value.encoder
+    return (value,) if isinstance(value, np.ndarray) else ()
+
+
+def _all_finite(values: Floats) -> bool:
+    return bool(np.isfinite(values).all())

@@ -1,0 +1,117 @@
+"""The result of a diagnosis: one type for every kind of study, and its JSON keeps to the printed schema."""
+
+import json
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from camcomp.diagnosis.arm.study import exceeding
+from camcomp.diagnosis.axis.study import AxisRun
+from camcomp.diagnosis.axis.study import study as axis_study
+from camcomp.diagnosis.report.answer import answer_lines
+from camcomp.diagnosis.report.page import diagnosis_html
+from camcomp.diagnosis.result.types import DiagnosisResult, Floor, Law, LawTerm, UnknownCause
+from camcomp.terminal.cli import run
+from tests.commandline import ROOT
+from tests.report.diagnoses import result
+from tests.schemas import check, validator
+
+CONTRACT = (
+    "verdict", "gap", "where", "causes", "alternatives", "shrinkage", "next_experiment", "minor", "floor", "outliers",
+)  # fmt: skip
+
+
+def axis_run(name="r", *, ripple=0.0, friction=30.0, noise=0.5, seed=0):
+    t = np.arange(0.0, 16.0, 8e-3)
+    x = 100 * np.sin(0.9 * t) + 40 * np.sin(2.3 * t + 0.4)
+    speed = 90 * np.cos(0.9 * t) + 92 * np.cos(2.3 * t + 0.4)
+    rng = np.random.default_rng(seed)
+    force = friction * np.tanh(speed / 0.5) + 0.1 * speed + ripple * np.sin(2 * np.pi * x / 15.0)
+    force += noise * rng.standard_normal(len(t))
+    return AxisRun(name, t, x + 0.005 * speed + 5e-4 * rng.standard_normal(len(t)), x, force)
+
+
+@pytest.fixture(scope="module")
+def axis():
+    return axis_study({"x": [axis_run(ripple=3.0)]})
+
+
+@pytest.fixture(scope="module")
+def ambiguous(tmp_path_factory):
+    out = tmp_path_factory.mktemp("ambiguous") / "r.json"
+    words = ["diagnose", ROOT / "samples/diagnosis/ambiguous/experiment.yaml", "--json", out, "-q"]
+    assert run([str(each) for each in words]) == 0
+    return json.loads(out.read_text())
+
+
+def test_a_diagnosis_of_programs_keeps_to_the_schema(ambiguous):
+    check("diagnosis", ambiguous)
+    assert tuple(ambiguous)[: len(CONTRACT)] == CONTRACT
+    assert ambiguous["minor"] == ambiguous["outliers"] == []
+    assert ambiguous["floor"] == {"um": ambiguous["gap"]["noise_floor_um"], "source": "rows"}
+    assert ambiguous["next_experiment"]["minutes"] > 0 and ambiguous["shrinkage"]["ceiling_rms_um"] > 0
+
+
+def test_a_study_of_axes_fills_the_same_keys(axis, ambiguous):
+    told = json.loads(axis.to_json())
+    check("diagnosis", told)
+    for part in (lambda r: r, lambda r: r["where"], lambda r: r["gap"]):
+        assert list(part(told)) == list(part(ambiguous))
+    assert told["shrinkage"] is None and told["next_experiment"] is None  # one run: none is unseen
+    assert told["causes"][-1]["effect"] == "unknown" and told["causes"][-1]["law"] is None
+    assert told["where"]["drivers"][0]["period_mm"] == pytest.approx(15.0, rel=0.01)
+    assert told["axes_in_detail"]["x"]["force"]["mass_kg"]["ci95"][0] < 1.0
+
+
+def test_a_study_of_axes_with_unseen_runs_tells_how_far_the_gap_shrinks():
+    runs = [axis_run(name, seed=k) for k, name in enumerate("abcd")]
+    assert axis_study({"x": runs}).shrinkage.holdout == ("a", "b", "c", "d")
+    assert axis_study({"x": runs[:2]}, holdout=["b"]).shrinkage.holdout == ("b",)
+    assert axis_study({"x": runs[:2]}).shrinkage is None
+
+
+@pytest.mark.parametrize("verdict", ["none", "identified", "ambiguous", "unknown"])
+def test_a_result_without_unseen_runs_is_told_and_drawn(verdict):
+    alone = result(verdict).model_copy(update={"shrinkage": None})
+    check("diagnosis", alone.as_json())
+    told = "\n".join(answer_lines(alone))
+    assert "has not seen; the noise floor is 0.87" in told or verdict == "none"
+    assert "goes from" not in told and "removed" not in told
+    assert b"ladder" not in diagnosis_html(alone, [], title="e", machine="m")
+
+
+def test_what_the_contract_foresees_has_its_place():
+    term = LawTerm(term="sin(q)", value=1.0, ci95=(0.9, 1.1), unit="mm")
+    law = Law(formula="a sin(q)", on="drive", terms=(term,), envelope={"q_rad": (0.0, 1.0)}, after_rms_um=1.0)
+    cause = UnknownCause(target="x", probability=0.9, share=0.5, law=law)
+    made = result("unknown").model_copy(
+        update={"causes": (cause,), "floor": Floor(um=None, source="not identifiable"), "shrinkage": None}
+    )
+    check("diagnosis", made.as_json())
+    assert made.known == ()
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"floor": {"um": 1.0, "source": "a guess"}}, {"verdict": "sure"}, {"minor": None}, {"more": 1}]
+)
+def test_the_schema_refuses_what_the_type_refuses(wrong):
+    told = {**result("unknown").as_json(), **wrong}
+    assert not validator("diagnosis").is_valid(told)
+    with pytest.raises(ValidationError):
+        DiagnosisResult.model_validate(told)
+
+
+def test_the_unknown_on_an_axis_is_as_sure_as_its_data():
+    p = [axis_study({"x": [axis_run(ripple=3.0, noise=noise)]}).causes[-1].probability for noise in (0.5, 6.0)]
+    assert 0.5 < p[1] < p[0] < 1.0
+
+
+def test_a_leftover_of_poses_is_as_sure_as_its_regions():
+    rng = np.random.default_rng(1)
+    features = [rng.uniform(-1, 1, (400, 3))]
+    even = [np.full(400, 2.0**2)]
+    lumpy = [np.where(features[0][:, 0] > 0.8, 40.0, 0.1)]
+    assert exceeding(even, features, 1.9) == pytest.approx(2001 / 2002, abs=1e-4)
+    assert exceeding(even, features, 2.1) == pytest.approx(1 / 2002, abs=1e-4)
+    assert 0.05 < exceeding(lumpy, features, float(np.sqrt(np.mean(lumpy[0])))) < 0.95

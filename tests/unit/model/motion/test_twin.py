@@ -1,0 +1,99 @@
+"""What a twin has worked out before belongs to that machine: the next one on the same run path works out its own."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from camcomp.gcode.interpret import read_program
+from camcomp.ground import shelf
+from camcomp.model.config.load import load_config
+from camcomp.model.cutting.track import lay_track
+from camcomp.model.effect import Cause
+from camcomp.model.job import Job
+from camcomp.model.motion.run_path import path_of_program
+from camcomp.model.motion.timeline import schedule
+from camcomp.model.motion.twin import Slopes, Twin, twin_of
+from camcomp.model.statics.description import Actuator
+
+CONFIG = Path(__file__).parents[4] / "config" / "orthoglide.yaml"
+PROGRAM = b"G21 G90 G17\nG0 X10 Y10 Z0\nG1 X40 Y20 F1500\nX10 Y30\nM30\n"
+
+
+@pytest.fixture(scope="module")
+def job():
+    return Job(load_config([CONFIG]))
+
+
+def a_run(job):
+    twin, path = twin_of(job), read_program(PROGRAM, name="run").path
+    timeline = schedule(path, job.config.control.acceleration_mm_per_s2)
+    return path_of_program(
+        "run", timeline, lay_track(path, job.conditions), np.arange(0.0, timeline.end, 0.02), started=0.0,
+        to_machine=twin.to_machine, vectors=job.frame.vectors, inverse=twin.inverse,
+    )  # fmt: skip
+
+
+def changed(twin, robot, causes=()):
+    return Twin(robot, twin.nominal, twin.origin, twin.rotation, causes)
+
+
+def softer(robot):
+    return robot.edit(Actuator, lambda each: replace(each, stiffness=0.3 * each.stiffness))
+
+
+def elsewhere(robot):
+    return robot.edit(Actuator, lambda each: replace(each, home=each.home + 50.0))
+
+
+def cause(name, **values):
+    effect = shelf.load("effects", name)
+    return Cause(name, effect, "x", {p.name: p.nominal for p in effect.PARAMETERS} | values)
+
+
+def read(twin, run_path, causes=()):
+    """Tip, encoder, drive of a run, read off slopes as simulate and diagnose do."""
+    _, solved = twin.sense(run_path, causes)
+    reading, _ = twin.sense(run_path, causes, solved=solved, slopes=twin.slopes(run_path, causes, solved))
+    return np.concatenate([reading.tip, reading.encoder, reading.drive], axis=1)
+
+
+SECOND = {
+    "softer drives": (softer, cause("friction", force_N=60.0)),
+    "another home": (elsewhere, cause("screw_pitch", error_ppm=300.0)),
+}
+
+
+@pytest.mark.parametrize("name", SECOND)
+def test_a_second_twin_on_a_used_run_path_reads_as_on_a_fresh_one(job, name):
+    change, one = SECOND[name]
+    first = changed(twin_of(job), twin_of(job).robot, (one,))
+    second = changed(first, change(first.robot), (one,))
+    run_path = a_run(job)
+    before = read(first, run_path)
+    assert np.array_equal(read(second, run_path), read(second, a_run(job)))
+    assert np.array_equal(read(first, run_path), before)
+    assert np.abs(read(second, run_path) - before).max() > 1e-3
+
+
+def test_a_copy_of_a_used_twin_with_another_machine_has_not_the_first_ones(job):
+    first, run_path = twin_of(job), a_run(job)
+    before = read(first, run_path)
+    soft = replace(first, robot=softer(first.robot))
+    assert np.array_equal(read(soft, run_path), read(changed(first, softer(first.robot)), a_run(job)))
+    assert np.abs(read(soft, run_path) - before).max() > 1e-3
+
+
+def test_slopes_are_not_taken_for_others_that_are_gone(job):
+    """An id tells objects apart only while they live; the next one may get the same."""
+    twin, run_path = twin_of(job), a_run(job)
+    _, solved = twin.sense(run_path)
+    known, moved = twin.slopes(run_path, (), solved), run_path.row_rho + 0.01
+    still = twin.sense(run_path, solved=solved, slopes=known)[0].tip
+    away = twin.sense(run_path, solved=solved, slopes=known, measured=moved)[0].tip - still
+    for k in range(2, 12):
+        slopes = Slopes(k * known.tip_rho, known.tip_wrench, known.drive_rho, known.drive_wrench)
+        tip = twin.sense(run_path, solved=solved, slopes=slopes, measured=moved)[0].tip
+        del slopes
+        assert tip - still == pytest.approx(k * away, abs=1e-9)
