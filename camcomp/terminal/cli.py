@@ -38,7 +38,7 @@ VERBS = {
     "explain": "Say what a rule id of an error message means.",
     "import": "Turn recordings of others into logs and an experiment file.",
     "init": "Start a project: a machine file, a program, a README.",
-    "schema": "Print the JSON schema of the YAML files.",
+    "schema": "Print the JSON schema of the YAML files, or of a result.",
     "simulate": "Write the log that the modelled machine would produce.",
     "stream": "Compensate single set-points, line by line, from standard input to standard output.",
     "validate": "Check YAML files and NC programs; report every error at once.",
