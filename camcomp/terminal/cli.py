@@ -27,6 +27,9 @@ from camcomp.terminal.standard_streams import stand_in_for_closed
 # machine that does other things too. It has to be said before numpy is imported; a user's own setting stands.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+SHORT_OF_MEMORY = "there is not enough memory"
+ENOUGH = 1 << 26  # bytes; every verb that computes needs more
+
 # One line per verb, so that `camcomp --help` imports none of them; a test keeps the table and the commands equal.
 VERBS = {
     "batch": "Compensate many programs at once.",
@@ -39,7 +42,7 @@ VERBS = {
     "explain": "Say what a rule id of an error message means.",
     "import": "Turn recordings of others into logs and an experiment file.",
     "init": "Start a project: a machine file, a program, a README.",
-    "schema": "Print the JSON schema of the YAML files.",
+    "schema": "Print the JSON schema of the YAML files, or of a result.",
     "simulate": "Write the log that the modelled machine would produce.",
     "stream": "Compensate single set-points, line by line, from standard input to standard output.",
     "validate": "Check YAML files and NC programs; report every error at once.",
@@ -146,8 +149,23 @@ def run(args: list[str]) -> int:
     except OSError as error:
         name = f"{error.filename}: " if error.filename else ""
         return _report(FileError("CC503", f"{name}{error.strerror or error}"))
+    except MemoryError:
+        return _report(FileError("CC503", SHORT_OF_MEMORY))
+    except ImportError as error:
+        if isinstance(error, ModuleNotFoundError):
+            return _bug(error)
+        return _report(FileError("CC503", f"a library cannot be loaded: {error}"))
     except Exception as error:  # noqa: BLE001 - whatever else comes is a bug, and is called one
-        return _bug(error)
+        return _report(FileError("CC503", SHORT_OF_MEMORY)) if _short_of_memory() else _bug(error)
+
+
+def _short_of_memory() -> bool:
+    """Whether there is too little left to go on with: then Python and libraries fail in ways that name something else."""
+    try:
+        bytearray(ENOUGH)
+    except MemoryError:
+        return True
+    return False
 
 
 def _forget_output() -> None:

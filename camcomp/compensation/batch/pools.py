@@ -6,6 +6,7 @@ and only a task that brings down worker after worker is given up.
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import os
 import time
@@ -148,7 +149,9 @@ class _Cluster:
             outcome: Outcome = future.result(timeout=LOOK)
         except KilledWorker:
             return died(key)
-        except (Exception, CancelledError) as error:  # noqa: BLE001 - the cluster's, not the task's: `work` never raises
+        except (CancelledError, asyncio.CancelledError) as error:  # nobody else cancels: the one who knew of it is gone
+            raise self._gone() from error
+        except Exception as error:  # noqa: BLE001 - the cluster's, not the task's: `work` never raises
             self._workers()
             text = f"the cluster did not do it: {type(error).__name__}: {error}"
             return Outcome(key, FileError.exit_code, [{"rule": "CC503", "message": text, "text": text}])
@@ -159,7 +162,7 @@ class _Cluster:
     def _workers(self) -> list[str]:
         """Addresses of the workers that there are. Says after PATIENCE that there is none. Raises FileError."""
         if self._client.status != "running":
-            raise FileError("CC503", f"the Dask scheduler at {self._address} went away")
+            raise self._gone()
         workers = list(self._client.scheduler_info(n_workers=-1)["workers"])
         self._check_versions([each for each in workers if each not in self._fitting])
         if workers:
@@ -171,6 +174,9 @@ class _Cluster:
             self._told = True
         return workers
 
+    def _gone(self) -> FileError:
+        return FileError("CC503", f"the Dask scheduler at {self._address} went away")
+
     def _check_versions(self, workers: Sequence[str]) -> None:
         if not workers:
             return
@@ -178,7 +184,7 @@ class _Cluster:
         ask = "__import__('camcomp').__version__"
         try:
             found = self._client.run(eval, ask, workers=list(workers), on_error="return")
-        except (OSError, CancelledError):
+        except (OSError, CancelledError, asyncio.CancelledError):
             return  # gone meanwhile; the next look tells
         for worker, version in found.items():
             if isinstance(version, OSError):

@@ -12,7 +12,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 from camcomp import __version__
-from camcomp.ground.errors import PluginWarning
+from camcomp.ground.errors import CamcompError, FileError, PluginWarning, format_error
 from camcomp.ground.garbage import collect_seldom, keep_what_lives
 from camcomp.ground.notes import held, hold
 from camcomp.ground.old_names import keep_old_names
@@ -77,6 +77,11 @@ def work(task: Task) -> Outcome:
             return _compensate(task)
     except CamcompError as error:
         return Outcome(task.key, error.exit_code, [_message(each, format_error(each)) for each in error.all()])
+    except MemoryError:
+        text = "there is not enough memory"
+        return Outcome(
+            task.key, FileError.exit_code, [{"rule": "CC503", "message": text, "text": f"{task.name}: {text}"}]
+        )
     except Exception as error:  # noqa: BLE001 - a bug in one program must not take the others with it
         text = f"internal error: {type(error).__name__}: {error}"
         return Outcome(task.key, BUG, [{"rule": None, "message": text, "text": f"{task.name}: {text}"}])

@@ -1,4 +1,5 @@
 import os
+import signal
 import subprocess
 import sys
 from importlib import import_module
@@ -51,6 +52,7 @@ def raising(error):
         (click.UsageError("text"), 2),
         (click.FileError("name", "text"), 5),
         (OSError(28, "text", "name"), 5),
+        (ImportError("text.so: failed to map segment from shared object"), 5),
         (KeyboardInterrupt(), 130),
         (click.Abort(), 130),
         (ZeroDivisionError("text"), 70),
@@ -145,3 +147,38 @@ def test_as_a_process():
 def test_shell_completion():
     done = camcomp(_CAMCOMP_COMPLETE="bash_complete", COMP_WORDS="camcomp ex", COMP_CWORD="1")
     assert done.stdout == "plain,explain\n"
+
+
+def test_what_goes_wrong_for_lack_of_memory_is_no_bug(verb, capsys, monkeypatch):
+    verb(raising(MemoryError()))
+    assert cli.run(["test"]) == 5
+    assert "not enough memory" in capsys.readouterr().err
+    monkeypatch.setattr(cli, "ENOUGH", 1 << 62)
+    verb(raising(ValueError("field 'target' is required for AnnAssign")))
+    assert cli.run(["test"]) == 5
+    assert "not enough memory" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGTERM, 143), (signal.SIGHUP, 129), (signal.SIGINT, 130)])
+def test_a_signal_ends_a_command_in_the_middle_and_leaves_nothing(tmp_path, number, code):
+    """It is waiting for its program with an output open beside its target: on a system whose files all have names."""
+    script = (
+        "import os, sys; vars(os).pop('O_TMPFILE', None); from camcomp.ground import files; from camcomp.terminal import cli\n"
+        "import click\n"
+        "@click.command()\n"
+        "def test():\n"
+        "    with files.writing(['out']) as opened:\n"
+        "        opened['out'].write(b'half'); print('ready', flush=True); sys.stdin.read()\n"
+        "cli.cli.list_commands = lambda ctx: ['test']\n"
+        "cli.cli.get_command = lambda ctx, name: test\n"
+        "cli.main(['test'])\n"
+    )
+    process = subprocess.Popen(
+        [sys.executable, "-c", script], cwd=tmp_path, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        text=True,
+    )  # fmt: skip
+    assert process.stdout.readline() == "ready\n"
+    assert len(list(tmp_path.iterdir())) == 1
+    process.send_signal(number)
+    said = process.communicate(timeout=20)[1]
+    assert (process.returncode, list(tmp_path.iterdir())) == (code, []) and "Traceback" not in said
