@@ -17,9 +17,13 @@ from xml.sax.xmlreader import InputSource
 import numpy as np
 from numpy.typing import NDArray
 
+from camcomp.ground.bounds import number_of
 from camcomp.ground.errors import ConfigError, Location
 
 STANDARD_GRAVITY = 9.80665  # m/s2
+LARGEST_M = 1e12  # of any number: m, kg, rad
+MOST_BYTES = 1 << 23
+MOST_PARTS = 2000  # links and joints; an arm has some twenty
 MOVING = {"revolute": "revolute", "continuous": "revolute", "prismatic": "prismatic"}
 Array = NDArray[np.float64]
 
@@ -79,8 +83,12 @@ def read_urdf(data: bytes, name: str, tip: str | None = None) -> UrdfArm:
     root = _parse(data, name)
 
     def refuse(text: str, node: UrdfNode, hint: str = "") -> ConfigError:
-        return ConfigError("CC240", text, at=Location(name, node.line, 1), hint=hint or None)
+        return ConfigError(
+            "CC240", _on_one_line(text), at=Location(name, node.line, 1), hint=_on_one_line(hint) or None
+        )
 
+    if len(root.below) > MOST_PARTS:
+        raise refuse(f"more than {MOST_PARTS} links and joints", root)
     links = {each.given.get("name", ""): each for each in root.below if each.tag == "link"}
     joints = [each for each in root.below if each.tag == "joint"]
     parent: dict[str, UrdfNode] = {}
@@ -108,6 +116,8 @@ def read_urdf(data: bytes, name: str, tip: str | None = None) -> UrdfArm:
 
 
 def _parse(data: bytes, name: str) -> UrdfNode:
+    if len(data) > MOST_BYTES:
+        raise ConfigError("CC240", f"more than {MOST_BYTES} bytes", at=Location(name, 1, 1))
     reader, parser = _UrdfReader(), make_parser()
     parser.setContentHandler(reader)
     source = InputSource()
@@ -117,6 +127,8 @@ def _parse(data: bytes, name: str) -> UrdfNode:
     except SAXParseException as error:
         at = Location(name, error.getLineNumber() or 1, (error.getColumnNumber() or 0) + 1)
         raise ConfigError("CC240", f"not XML: {error.getMessage()}", at=at) from error
+    except (LookupError, ValueError) as error:  # encodings that Python does not know, or that are none of text
+        raise ConfigError("CC240", "not XML: its encoding is not known", at=Location(name, 1, 1)) from error
     root = reader.root
     assert root is not None
     if root.tag != "robot":
@@ -149,21 +161,30 @@ def _numbers(node: UrdfNode | None, key: str, default: tuple[float, float, float
     if node is None or key not in node.given:
         return np.array(default)
     try:
-        values = np.array([float(each) for each in node.given[key].split()])
+        return np.array([_value(each) for each in node.given[key].split()], float).reshape(3)
     except ValueError:
-        values = np.empty(0)
-    if values.shape != (3,) or not np.isfinite(values).all():
-        raise refuse(f'{key}="{node.given[key]}" is not three numbers', node)
-    return values
+        raise refuse(f'{key}="{node.given[key][:60]}" is not three numbers', node) from None
 
 
 def _number(node: UrdfNode | None, key: str, refuse) -> float | None:  # type: ignore[no-untyped-def]
     if node is None or key not in node.given:
         return None
     try:
-        return float(node.given[key])
+        return _value(node.given[key])
     except ValueError:
-        raise refuse(f'{key}="{node.given[key]}" is not a number', node) from None
+        raise refuse(f'{key}="{node.given[key][:60]}" is not a number', node) from None
+
+
+def _value(text: str) -> float:
+    value = number_of(text)
+    if value is None or not abs(value) <= LARGEST_M:
+        raise ValueError(text)
+    return value
+
+
+def _on_one_line(text: str) -> str:
+    """Text of the file as it may stand in a comment or a message: names in XML may hold ends of lines and signs of control."""
+    return " ".join("".join(each if each.isprintable() else " " for each in text).split())
 
 
 def rotation_vector_deg(rpy: Array) -> Array:
@@ -199,7 +220,7 @@ def _arm(title: str, route: list[UrdfNode], links: dict[str, UrdfNode], tip: str
     for joint in route:
         kind, label = joint.given.get("type", ""), joint.given.get("name", "")
         child = _link(joint, "child")
-        lines.append(f"# {label} ({kind}) to {child}")
+        lines.append(_on_one_line(f"# {label} ({kind}) to {child}"))
         lines += _step(joint.first("origin"), refuse)
         if joint.first("mimic") is not None:
             raise refuse(f"joint '{label}' follows another joint", joint, "coupled joints cannot be modelled")
@@ -215,7 +236,8 @@ def _arm(title: str, route: list[UrdfNode], links: dict[str, UrdfNode], tip: str
     lines.append("- {type: transform, rotation_deg: [180, 0, 0]}")
     if len(moving) not in (3, 6):
         notes.append(f"{len(moving)} driven joints; camcomp needs three or six")
-    return UrdfArm(title, tuple(lines), tuple(moving), (f"chain to link '{tip}': {', '.join(moving)}", *notes))
+    notes.insert(0, f"chain to link '{tip}': {', '.join(moving)}")
+    return UrdfArm(_on_one_line(title), tuple(lines), tuple(moving), tuple(map(_on_one_line, notes)))
 
 
 def _name(label: str) -> str:
@@ -262,13 +284,13 @@ def machine_yaml(arm: UrdfArm, source: str) -> str:
     body = "\n".join(f"        {line}" for line in arm.lines)
     return f"""# yaml-language-server: $schema=camcomp.schema.json
 #
-# Written from {source}: geometry, limits and masses. Fill in what a URDF does not know:
+# Written from {_on_one_line(source)}: geometry, limits and masses. Fill in what a URDF does not know:
 #   1. stiffness of the joints, compliance of the links (commented keys below); without them everything is rigid
 #   2. start angles: a posture near the work, not singular; they fix the branch of the inverse kinematics
 #   3. workpiece, tool and cutting force
 robot:
-  name: {json.dumps(arm.name)}
-  source: {json.dumps(source)}
+  name: {json.dumps(arm.name, ensure_ascii=False)}
+  source: {json.dumps(_on_one_line(source), ensure_ascii=False)}
   chains:
     arm:
       elements:
