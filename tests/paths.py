@@ -5,7 +5,7 @@ import numpy as np
 from camcomp.ground.datatypes import ARC, LINE, RAPID, Path
 
 
-def path_of(*moves, start=(0.0, 0.0, 0.0), feed=300.0, speed=8000.0):
+def path_of(*moves, start=(0.0, 0.0, 0.0), feed=300.0, speed=8000.0, turn=1.0):
     """A path from ("rapid" | "line", end) and ("arc", end, centre, angle about +z) tuples; lines count from 1."""
     rows = []
     at = np.asarray(start, float)
@@ -27,6 +27,7 @@ def path_of(*moves, start=(0.0, 0.0, 0.0), feed=300.0, speed=8000.0):
         angle=np.array(angle),
         feed=np.where(np.array(kind) == RAPID, np.nan, feed),
         speed=np.full(n, speed),
+        turn=np.full(n, turn),
         tool=np.zeros(n, int),
         known=np.ones(n, bool),
         machine=np.zeros(n, bool),

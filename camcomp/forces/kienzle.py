@@ -8,7 +8,7 @@ from camcomp.ground.datatypes import Floats
 from camcomp.ground.errors import ConfigError
 from camcomp.model.config.base import Spec
 from camcomp.model.cutting.average import power_law, to_path
-from camcomp.model.cutting.conditions import axial_depth, engagement, feed_per_tooth
+from camcomp.model.cutting.conditions import axial_depth, clockwise, engagement, feed_per_tooth
 from camcomp.model.cutting.cut import Cut
 
 SOURCES = (
@@ -29,7 +29,9 @@ class Params(Spec):
     axial_ratio: float | None = Field(None, description="axial over tangential force; positive pulls the tool down")
     rake_deg: float = Field(0.0, gt=-90, lt=90, description="rake of the tool; tables of kc1.1 hold for 0")
     milling: Literal["up", "down"] | None = Field(None, description="side that cuts; needed when the cut is no slot")
-    spindle: Literal["clockwise", "counterclockwise"] = Field("clockwise", description="seen from above the tool")
+    spindle: Literal["clockwise", "counterclockwise"] | None = Field(
+        None, description="sense of rotation, seen from above the tool; M3 and M4 of the program say it, too"
+    )
 
 
 def force(cut: Cut, params: Params) -> Floats:
@@ -42,4 +44,4 @@ def force(cut: Cut, params: Params) -> Floats:
     chip, depth = feed_per_tooth(cut), axial_depth(cut)
     start, stop = engagement(cut, params.milling)
     mean = power_law(chip, depth, cut.teeth or 0, start, stop, kc11, params.mc, ratios)
-    return to_path(mean, params.spindle == "clockwise")
+    return to_path(mean, clockwise(cut, params.spindle))

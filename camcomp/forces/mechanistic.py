@@ -7,7 +7,7 @@ from pydantic import Field
 from camcomp.ground.datatypes import Floats
 from camcomp.model.config.base import Spec
 from camcomp.model.cutting.average import linear_edge, to_path
-from camcomp.model.cutting.conditions import axial_depth, engagement, feed_per_tooth
+from camcomp.model.cutting.conditions import axial_depth, clockwise, engagement, feed_per_tooth
 from camcomp.model.cutting.cut import Cut
 
 SOURCES = (
@@ -27,7 +27,9 @@ class Params(Spec):
     Kre_N_per_mm: float = Field(description="radial edge coefficient, positive towards the tool centre")
     Kae_N_per_mm: float = Field(description="axial edge coefficient; positive pulls the tool towards the work")
     milling: Literal["up", "down"] | None = Field(None, description="side that cuts; needed when the cut is no slot")
-    spindle: Literal["clockwise", "counterclockwise"] = Field("clockwise", description="seen from above the tool")
+    spindle: Literal["clockwise", "counterclockwise"] | None = Field(
+        None, description="sense of rotation, seen from above the tool; M3 and M4 of the program say it, too"
+    )
 
 
 def force(cut: Cut, params: Params) -> Floats:
@@ -36,4 +38,4 @@ def force(cut: Cut, params: Params) -> Floats:
     edge = (params.Kte_N_per_mm, params.Kre_N_per_mm, params.Kae_N_per_mm)
     chip, depth = feed_per_tooth(cut), axial_depth(cut)
     start, stop = engagement(cut, params.milling)
-    return to_path(linear_edge(chip, depth, cut.teeth or 0, start, stop, cutting, edge), params.spindle == "clockwise")
+    return to_path(linear_edge(chip, depth, cut.teeth or 0, start, stop, cutting, edge), clockwise(cut, params.spindle))

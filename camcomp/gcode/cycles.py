@@ -154,8 +154,9 @@ class Cycles(Motions):
         step = abs(self._held.get("Q", 0.0)) * state.unit
         if step <= 0.0 or (level - bottom) / step > 1e5:
             self.refuse("CC132", f"G{code // 10} needs its peck depth as Q")
-        # LinuxCNC backs off by 0.01 inch, which is a hundredth of the unit in G20.
+        # LinuxCNC backs off by 0.01 inch, which is a hundredth of the unit in G20; nobody sets it finer than that.
         gap = self.dialect.peck_clearance_mm
+        gap = gap if state.unit == 1.0 else round(gap / state.unit, 2) * state.unit
         reached = level - step
         while reached > bottom:
             self._go(block, 1, self._at(place, depth, reached), feed)

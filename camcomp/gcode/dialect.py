@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from camcomp.gcode.codes import GROUPS, REFUSED
+from camcomp.gcode.numbers import decimals
 from camcomp.gcode.spelling import Spelling
 
 
@@ -39,7 +40,7 @@ class Dialect:
     idle_letters: str = "DN"  # letters that mean nothing for the path wherever they stand
     brackets_comment: bool = True  # `(...)` is a comment
     comment: tuple[str, str] = ("(", ")")
-    decimals_max: int = 9
+    decimals_max: int = 9  # behind the point of a length, in either unit
 
     @property
     def groups(self) -> dict[int, int]:
@@ -51,6 +52,14 @@ class Dialect:
         """Codes that are refused, with rule and reason."""
         own = {**self.more, **dict.fromkeys(self.passed, 0)}
         return {code: why for code, why in REFUSED.items() if code not in own}
+
+    def digits(self, resolution_mm: float, unit_mm: float) -> int:
+        """Digits behind the point of a length: those of the resolution, as far as the control reads them."""
+        return min(decimals(resolution_mm, unit_mm), self.decimals_max)
+
+    def step_mm(self, resolution_mm: float, unit_mm: float) -> float:
+        """What lengths can be told apart by, as written: the resolution, or a step of the last digit if that is coarser."""
+        return max(resolution_mm, unit_mm * 10.0 ** -self.digits(resolution_mm, unit_mm))
 
     def weight(self, text: str) -> int:
         """How much a text looks like this dialect."""

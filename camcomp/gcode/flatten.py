@@ -8,7 +8,7 @@ import numpy as np
 
 from camcomp.gcode.edits import Edits
 from camcomp.gcode.interpret import Interpreter, controller, read_program
-from camcomp.gcode.numbers import decimals, plain
+from camcomp.gcode.numbers import plain
 from camcomp.gcode.program import Program
 from camcomp.gcode.trace import Executed, Trace
 from camcomp.gcode.words import BLANK, Word, code_of
@@ -31,7 +31,8 @@ def flatten(program: Program, resolution_mm: float) -> Program:
     data = program.text.encode(string)
     flat = read_program(data, name=program.name, setup=program.setup, dialect=program.dialect)
     same = len(flat.path) == len(program.path) and bool((flat.path.kind == program.path.kind).all())
-    if not same or np.abs(flat.path.end - program.path.end).max() > 0.5 * resolution_mm:
+    half = 0.5 * program.step_mm(resolution_mm) * (1.0 + 1e-9)
+    if not same or np.abs(flat.path.end - program.path.end).max() > half:
         raise ProgramError("CC137", "the program cannot be written out without loops", at=program.text.place(0))
     return flat
 
@@ -67,8 +68,7 @@ class Printer:
         return code_of(line, self.program.language.brackets_comment)
 
     def _digits(self, unit: float) -> int:
-        digits = decimals(self.resolution, unit) + _SPARE_DIGITS
-        return min(digits, self.program.language.decimals_max)
+        return self.program.language.digits(self.resolution * 10.0**-_SPARE_DIGITS, unit)
 
     def _entry(self, entry: Executed) -> list[str]:
         repeated = entry.row in self.seen

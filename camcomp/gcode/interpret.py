@@ -17,7 +17,7 @@ from camcomp.gcode.settings import Settings
 from camcomp.gcode.setup import Setup
 from camcomp.gcode.text import Text
 from camcomp.gcode.trace import Trace
-from camcomp.gcode.words import code_of
+from camcomp.gcode.words import code_of, points_in_feeds
 from camcomp.ground.errors import ProgramError
 
 _NO_AXES = frozenset((40, 921, 922, 923, 281, 301))
@@ -56,6 +56,7 @@ def read_program(data: bytes, *, name: str, setup: Setup | None = None, dialect:
         rebases=tuple(reader.rebases),
         setup=setup,
         language=language,
+        feed_point=points_in_feeds(text.line(row) for row in range(len(text))),
         straight=reader.straight and not reader.record.cycles,
     )
 

@@ -5,7 +5,7 @@ import math
 from camcomp.gcode.arcplan import Move, Point, turns_of
 from camcomp.gcode.arcs import PLANES, sweep
 from camcomp.gcode.edits import Edits
-from camcomp.gcode.numbers import decimals, plain, significant
+from camcomp.gcode.numbers import plain, significant
 from camcomp.gcode.output import FEED_SLACK
 from camcomp.gcode.program import F, G, P, Program, R
 from camcomp.ground.datatypes import ARC, RAPID
@@ -22,7 +22,6 @@ class LineEditor:
         self.text, self.sites, self.path = program.text, program.sites, program.path
         self.edits = Edits()
         self.resolution = resolution_mm
-        self.half = 0.5 * resolution_mm * (1.0 + 1e-9)
         self.position: Point = self.path.start[0].tolist()
         self.code: int | None = None  # motion code in force in the output
         self.feed: tuple[int, float] | None = None  # feed mode and value in force in the output
@@ -36,7 +35,9 @@ class LineEditor:
         self.finish: list[int] = sites.finish[k].tolist()
         self.unit, self.offset = float(sites.unit[k]), sites.offset[k].tolist()
         self.relative = bool(sites.relative[k])
-        self.digits = decimals(self.resolution, self.unit)
+        self.digits = self.program.language.digits(self.resolution, self.unit)
+        self.step = self.program.language.step_mm(self.resolution, self.unit)
+        self.half = 0.5 * self.step * (1.0 + 1e-9)
         self.fresh: list[str] = []  # words to append to the line
         # What the text stated since the previous motion is in force, or is about to be.
         if sites.code_stated[k]:
@@ -85,6 +86,9 @@ class LineEditor:
             return mode, feed / length if length > 1e-6 else float(self.sites.modal_feed[self.k])
         return mode, feed / float(self.path.speed[self.k]) if mode == 95 else feed
 
+    def _feed_number(self, mode: int, value: float) -> str:
+        return significant(value if mode == 93 else value / self.unit, point=self.program.feed_point)
+
     def _feed_words(self, feed: float, length: float) -> list[str]:
         """F word for a new line, where the feed in force is another one."""
         mode, value = self._wanted_feed(feed, length)
@@ -92,7 +96,7 @@ class LineEditor:
         if abs(value - held) <= FEED_SLACK * held and held < math.inf:
             return []
         self.feed = None if mode == 93 else (mode, value)
-        return ["F" + significant(value if mode == 93 else value / self.unit)]
+        return ["F" + self._feed_number(mode, value)]
 
     def _feed_on_line(self, feed: float, length: float) -> None:
         if self.begin[F] < 0:
@@ -103,7 +107,7 @@ class LineEditor:
         if abs(value - programmed) <= FEED_SLACK * programmed:
             value = programmed
         else:
-            self._replace(F, significant(value if mode == 93 else value / self.unit))
+            self._replace(F, self._feed_number(mode, value))
         self.feed = None if mode == 93 else (mode, value)
 
     def _length(self, move: Move, start: Point, end: Point) -> float:

@@ -25,8 +25,8 @@ def plain(value: float, digits: int, point: bool = True) -> str:
     return text[1:] if text.startswith("-") and float(text) == 0.0 else text
 
 
-def significant(value: float, digits: int = 6) -> str:
-    """A feed: `digits` significant digits, whole numbers without a point."""
+def significant(value: float, digits: int = 6, point: bool = False) -> str:
+    """A feed: `digits` significant digits, whole numbers with a point only where that is asked for."""
     if value <= 0.0:
         return "0"
-    return plain(value, max(0, digits - 1 - math.floor(math.log10(value))), point=False)
+    return plain(value, max(0, digits - 1 - math.floor(math.log10(value))), point)

@@ -66,4 +66,11 @@ class Program:
     rebases: tuple[Rebase, ...]
     setup: Setup
     language: Dialect
+    feed_point: bool  # feeds are written with a point; some controls read whole numbers in smaller units
     straight: bool  # no loops, subprograms, parameters, cycles: a line means at most one motion, as it stands
+
+    def step_mm(self, resolution_mm: float) -> float:
+        """The coarsest step of its lengths, written for a control of this resolution."""
+        return max(
+            self.language.step_mm(resolution_mm, float(each)) for each in np.unique(np.append(self.sites.unit, 1.0))
+        )

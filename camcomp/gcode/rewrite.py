@@ -158,7 +158,7 @@ class Writer(LineEditor):
         if kind == ARC:
             plane = int(self.sites.plane[self.k])
             end = self._landing(moves[0].end, new)
-            moves = plan(self.position, moves[0], end, plane, self.resolution, self.unit, self.turns)
+            moves = plan(self.position, moves[0], end, plane, self.step, self.unit, self.turns)
             if moves[-1].kind == ARC:
                 self.centres[row] = self._centre_said(moves[0])
         at_line = 0

@@ -7,6 +7,7 @@ from camcomp.gcode.spelling import RS274
 from camcomp.gcode.words import Word
 
 _INCH = (200, 700, 7000)
+_TURNS = {3: 1.0, 4: -1.0, 5: 0.0}
 _MODE_GROUPS = (2, 3, 4, 5, 6, 8, 12)
 
 
@@ -29,6 +30,7 @@ class Settings(BlockReader):
             self._feed(words["F"])
         if "S" in words and not (dwells and "S" in self.dialect.dwell):
             state.speed = words["S"].value
+            state.no_speed = state.speed == 0.0
             if state.speed < 0.0:
                 self.refuse("CC138", "negative spindle speed", words["S"])
         self._tool(block)
@@ -72,7 +74,7 @@ class Settings(BlockReader):
                     self.refuse("CC133", "M61 needs the tool number as Q", word)
                 state.tool = self._whole("Q", words["Q"])
             elif code in (3, 4, 5):
-                state.spindle = code
+                state.spindle, state.turn = code, _TURNS[code]
 
     def _tool_length(self, block: Block, code: int) -> None:
         state, words = self.state, block.words

@@ -1,5 +1,7 @@
 """ControlState of a control while it executes a program: modes, offsets and where the tool tip stands."""
 
+import math
+
 from camcomp.gcode.codes import OFFSET_NAMES, WORK_OFFSETS
 from camcomp.gcode.dialect import Dialect
 from camcomp.gcode.setup import Setup
@@ -45,9 +47,16 @@ class ControlState:
         self.feed: float | None = None  # G94: mm/min, G93: 1/min, G95: mm/rev
         self.speed = 0.0
         self.spindle = 5  # M3, M4 or M5
+        self.turn = math.nan  # +1, -1, 0 by M3, M4, M5; NaN: none of them yet
+        self.no_speed = False  # S0
         self.tool = setup.tool
         self.next_tool = setup.tool
         self.update()
+
+    @property
+    def sense(self) -> float:
+        """Sense in which the spindle turns, as in Path."""
+        return 0.0 if self.no_speed else self.turn
 
     def update(self) -> None:
         """Recompute the sum of offsets, after one of them has changed."""

@@ -1,6 +1,7 @@
 """One line of a program as words, strictly: what a control might read in two ways is refused, never guessed."""
 
 import re
+from collections.abc import Iterable
 from typing import NamedTuple, NoReturn
 
 from camcomp.gcode.expressions import Expression, ExpressionError, Parser
@@ -10,6 +11,7 @@ from camcomp.ground.errors import ProgramError
 
 BLANK = " \t\0\x1a\x0b\x0c"
 _WORD = re.compile(r"([A-Za-z])[ \t]*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))")
+_FEED = re.compile(r"(?<![A-Za-z_])[Ff][ \t]*=?[ \t]*[+]?([0-9]+\.?[0-9]*|\.[0-9]+)")
 _LOOSE = re.compile(r"[A-Za-z]?[ \t]*[+-]?[0-9.,]+(?:[ \t]+[0-9.,]+)*")
 
 
@@ -79,6 +81,14 @@ def code_of(line: str, brackets: bool = True) -> str:
             pieces.append(line[k])
             k += 1
     return "".join(pieces).ljust(len(line))
+
+
+def points_in_feeds(lines: Iterable[str]) -> bool:
+    """Whether the first feed of a program, a plain number, has a decimal point."""
+    for line in lines:
+        if ("F" in line or "f" in line) and (found := _FEED.search(code_of(line))):
+            return "." in found[1]
+    return False
 
 
 def read_line(text: Text, row: int, spelling: Spelling | None = None, start: int = 0) -> Line:

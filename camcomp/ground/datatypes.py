@@ -21,6 +21,7 @@ _FORMS: dict[str, tuple[type, tuple[int, ...]]] = {
     "angle": (np.float64, ()),
     "feed": (np.float64, ()),
     "speed": (np.float64, ()),
+    "turn": (np.float64, ()),
     "tool": (np.int64, ()),
     "known": (np.bool_, ()),
     "machine": (np.bool_, ()),
@@ -51,6 +52,7 @@ class Path:
     angle: Floats  # (n,) rad about `axis`, + = counter-clockwise seen from its tip; extra turns add 2 pi
     feed: Floats  # (n,) mm/min of the tip; NaN for rapids
     speed: Floats  # (n,) spindle, rev/min
+    turn: Floats  # (n,) sense of the spindle: +1 clockwise (M3), -1 (M4), 0 stopped (M5, S0), NaN: not said
     tool: Ints  # (n,) tool number
     known: Bools  # (n,) X, Y and Z have all been commanded by the end of this motion
     machine: Bools  # (n,) move in machine coordinates (G53, G28, G30)

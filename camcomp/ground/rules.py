@@ -314,6 +314,12 @@ RULES: dict[str, Rule] = {
         "tool, material and wear; there is no value that would be right in general.",
         "measure one slot and divide: radial = force against the feed over force square to it",
     ),
+    "CC258": Rule(
+        "sense of rotation contradicts the program",
+        "M3 and M4 say how the spindle turns, and a side force turns over with it. The machine file may say it for programs "
+        "that do not; it may not say something else.",
+        "take process: force: spindle out, or correct the program",
+    ),
     "CC260": Rule(
         "force table empty",
         "A force table is CSV text: one header row, then rows of plain numbers.",
@@ -468,6 +474,11 @@ RULES: dict[str, Rule] = {
         "name of a run",
         "Runs are called by their files, without folder and suffix. Each name has to be there once.",
         "rename a file",
+    ),
+    "CC425": Rule(
+        "table too long",
+        "A log or another table has more rows than memory and patience should be spent on.",
+        "log less often, or cut the run into several; check the feed, the acceleration and --step-s",
     ),
     "CC450": Rule(
         "table not readable",

@@ -66,13 +66,13 @@ def put_int(out, at, value):
 
 
 @inner
-def put_feed(out, at, value):
+def put_feed(out, at, value, point):
     """Writes a feed with six significant digits, as numbers.significant does."""
     if not value > 0.0:
         out[at] = 48
         return at + 1
     digits = 5 - int(np.floor(np.log10(value)))
-    return put_decimal(out, at, value, min(max(digits, 0), 17), False)
+    return put_decimal(out, at, value, min(max(digits, 0), 17), point)
 
 
 @inner
@@ -100,14 +100,14 @@ def write_rows(*args: Any) -> int:
 
 @entry
 def write_lines(data, text_at, text_end, lines, begin, finish, kind, programmed, code_stated, feed_stated, program_feed,
-                first, joining, wanted, feed, position, state, unit, offset, digits, half, out, written, value, goes, fresh):  # fmt: skip
+                first, joining, wanted, feed, position, state, unit, offset, digits, half, feed_point, out, written, value, goes, fresh):  # fmt: skip
     """The bytes text_at..text_end of `data`, which hold n motions, with N rows in their place.
 
     lines (n, 3), begin and finish (n, 5), kind (n,), programmed (n, 3) mm, program_feed (n,): see
     fastread.Plain.
     first (n + 1,): rows of every motion. joining (N,), wanted (N, 3) mm, feed (N,) mm/min (NaN: as programmed).
     position (3,) mm and state (2,) = motion code in force (-1 unknown), feed in force (NaN unknown):
-    carried on. Fills out (bytes) and written (N, 3) mm. Returns the number of bytes. value,
+    carried on. feed_point: whole feeds have a point. Fills out (bytes) and written (N, 3) mm. Returns the number of bytes. value,
     goes, fresh (3,): room to work in.
     """
     at = 0
@@ -187,7 +187,7 @@ def write_lines(data, text_at, text_end, lines, begin, finish, kind, programmed,
                         out[at] = 32
                         at += 1
                     out[at] = 102 if lower else 70
-                    at = put_feed(out, at + 1, want / unit)
+                    at = put_feed(out, at + 1, want / unit, feed_point)
                     state[1] = want
                 if row < main:
                     at = put_eol(out, at, data, eol_begin, eol_end)
@@ -224,7 +224,7 @@ def write_lines(data, text_at, text_end, lines, begin, finish, kind, programmed,
                             state[1] = program_feed[i]
                         else:
                             out[at] = data[word_at]
-                            at = put_feed(out, at + 1, want / unit)
+                            at = put_feed(out, at + 1, want / unit, feed_point)
                             state[1] = want
                     else:
                         at = copy(out, at, data, word_at, end)
@@ -242,7 +242,7 @@ def write_lines(data, text_at, text_end, lines, begin, finish, kind, programmed,
                                 out[at] = 32
                                 at += 1
                             out[at] = 102 if lower else 70
-                            at = put_feed(out, at + 1, want / unit)
+                            at = put_feed(out, at + 1, want / unit, feed_point)
                             state[1] = want
                 copied = done
             for k in range(3):

@@ -20,6 +20,10 @@ class Edge:
     kind: int
     start: Floats  # (3,) mm
     end: Floats
+    feed: float  # mm/min
+    speed: float  # of the spindle, rev/min
+    turn: float  # of the spindle, as in Path
+    tool: int
     corrected: bool = True
     machine: bool = False  # in machine coordinates
 
@@ -46,10 +50,11 @@ def loads_of(run: PlainRun, before: Edge | None, after: Edge | None, c: Conditio
     start, end = np.empty((len(kind), 3)), np.empty((len(kind), 3))
     own = slice(len(left), len(left) + n)
     kind[own], start[own], end[own] = plain.kind, plain.start, plain.end
-    for each, row in [(e, 0) for e in left] + [(e, -1) for e in right]:
+    beside = [(e, 0) for e in left] + [(e, -1) for e in right]
+    for each, row in beside:
         start[row], end[row] = each.start, each.end
     if constant is None:
-        return _of_model(run, kind, start, end, own, c)
+        return _of_model(run, kind, start, end, own, beside, c)
     first, last, length = np.empty(start.shape), np.empty(start.shape), np.empty(len(kind))
     jump = np.zeros(len(kind) + 1, np.bool_)
     axis = np.asarray(c.tool_axis, float)
@@ -62,13 +67,25 @@ def loads_of(run: PlainRun, before: Edge | None, after: Edge | None, c: Conditio
     return Loads(f0, f1, jump[own.start : own.stop + 1], length[own], at)
 
 
-def _of_model(run: PlainRun, kind: np.ndarray, start: Floats, end: Floats, own: slice, c: Conditions) -> Loads:
-    n, plain = len(kind), run.plain
-    feed, line = np.full(n, float(plain.feed[-1])), np.zeros(n, np.int64)
-    feed[own], line[own] = plain.feed, plain.row + run.row0 + 1
+def _of_model(
+    run: PlainRun,
+    kind: np.ndarray,
+    start: Floats,
+    end: Floats,
+    own: slice,
+    beside: list[tuple[Edge, int]],
+    c: Conditions,
+) -> Loads:
+    n, plain, state = len(kind), run.plain, run.state
+    line, feed, speed, turn, tool = np.zeros(n, np.int64), *np.empty((3, n)), np.empty(n, np.int64)
+    line[own], feed[own], speed[own], turn[own], tool[own] = (
+        plain.row + run.row0 + 1, plain.feed, state.speed, state.sense, state.tool,
+    )  # fmt: skip
+    for each, row in beside:
+        feed[row], speed[row], turn[row], tool[row] = each.feed, each.speed, each.turn, each.tool
     path = Path(
         line=line, kind=kind, start=start, end=end, centre=np.full((n, 3), np.nan), axis=np.zeros((n, 3)), angle=np.zeros(n),
-        feed=np.where(kind == RAPID, np.nan, feed), speed=np.full(n, run.state.speed), tool=np.full(n, run.state.tool),
+        feed=np.where(kind == RAPID, np.nan, feed), speed=speed, turn=turn, tool=tool,
         known=np.ones(n, np.bool_), machine=np.zeros(n, np.bool_),
     )  # fmt: skip
     track = lay_track(path, c)

@@ -13,7 +13,8 @@ from camcomp.compensation.long.kernel import BASIC, follow, look_up
 from camcomp.compensation.long.loads import Edge, Loads, joints_at, loads_of
 from camcomp.compensation.long.plain_run import NotInPieces, PlainRun
 from camcomp.compensation.program.chords import divide, second_derivative, trial_nodes
-from camcomp.gcode.numbers import decimals
+from camcomp.compensation.program.moves import chord_budget
+from camcomp.gcode.dialect import Dialect
 from camcomp.gcode.output import Standing
 from camcomp.ground.datatypes import LINE, RAPID, Bools, Floats, Ints
 from camcomp.model.job import Job
@@ -27,6 +28,7 @@ MODELS = (
     "mechanistic",
     "kienzle",
 )  # whose force does not depend on the way from the program's start
+COARSE_MM = 1e-3  # a control with larger steps moves the joints by more than first order tells
 SLICE = 4096  # rows that a thread takes at once
 
 
@@ -105,15 +107,14 @@ def _sizes(vectors: Floats) -> Floats:
 class PlainCorrector:
     """Corrects runs of plain lines of one program."""
 
-    def __init__(self, job: Job, tolerance_um: float) -> None:
-        """Raises NotInPieces for what needs the program as a whole."""
+    def __init__(self, job: Job, tolerance_um: float, language: Dialect, feed_point: bool) -> None:
+        """language, feed_point: how it is written. Raises NotInPieces for what needs the program as a whole."""
         force = job.config.process.force
         if force.model not in MODELS:
             raise NotInPieces
         self.job, self.machine = job, job.real_machine
-        self.resolution = job.config.control.resolution_mm
+        self.language, self.feed_point = language, feed_point
         self.tolerance = 1e-3 * tolerance_um
-        self.budget = max(self.tolerance - 0.5 * np.sqrt(3.0) * self.resolution, 0.1 * self.tolerance)
         self.field: Field | None = None
         self.exact = 0  # rows that had to be solved one by one
         self._constant: Floats | None = None
@@ -129,6 +130,8 @@ class PlainCorrector:
             force = self.job.frame.vectors(np.concatenate((loads.first, loads.last)))
             self.field = Field(self.machine, force, self.job.frame.origin)
         lead, trail = joints_at(loads, run.plain.kind, before, after)
+        self.resolution = self.language.step_mm(self.job.config.control.resolution_mm, run.state.unit)
+        self.budget = chord_budget(1e3 * self.tolerance, self.resolution)
         tolerance = np.full(run.motions, self.budget)
         hard = (loads.length > EASY_MM) & (run.plain.kind == LINE)
         settled = False
@@ -275,7 +278,7 @@ class PlainCorrector:
         out = np.zeros((len(tile), m))
         follow(done.answers.tiles.rates, tile, off, out)
         out += done.answers.nominal + done.answers.rest[:, 3 + m :]
-        lost = np.flatnonzero(tile < 0)
+        lost = np.flatnonzero((tile < 0) | (self.resolution > COARSE_MM))
         if len(lost):
             out[lost] = solve(self.machine, FREE, frame.to_machine(done.written[lost]), check=False).rho_nominal
         return out
@@ -340,8 +343,8 @@ class PlainCorrector:
         size = write_rows(
             run.data, run.text_at, run.text_end, plain.line, plain.begin, plain.finish, plain.kind, plain.end,
             plain.code_stated, plain.feed_stated, plain.feed, first, rows.joining, commanded, self._feeds(run, rows, commanded, kept, carry),
-            position, state, unit, np.array(run.state.offset), decimals(self.resolution, unit), 0.5 * self.resolution * (1.0 + 1e-9),
-            out, written,
+            position, state, unit, np.array(run.state.offset), self.language.digits(self.job.config.control.resolution_mm, unit),
+            0.5 * self.resolution * (1.0 + 1e-9), self.feed_point, out, written,
         )  # fmt: skip
         carry.written, carry.commanded = position, commanded[-1].copy()
         carry.code, carry.feed = float(state[0]), float(state[1])

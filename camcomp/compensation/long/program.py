@@ -60,7 +60,6 @@ class Bulk:
             rest = block[-LINE_OF_STAMP:]
         source.seek(0)
         self._carry = Carry(np.array(self.setup.start_mm, float), np.array(self.setup.start_mm, float))
-        self._corrector = PlainCorrector(self.job, self.tolerance_um)
         self._told: Future[None] = Future()
         self._told.set_result(None)
         self.totals = Totals(self.job, digest.hexdigest(), size)
@@ -68,6 +67,7 @@ class Bulk:
         self._runs = Runs(
             source, self.name, self.setup, self.job.config.control.dialect, np.nan if top is None else top
         )
+        self._corrector = PlainCorrector(self.job, self.tolerance_um, self._runs.language, self._runs.feed_point)
         self._stamp: str | None = f"camcomp {self.version} sha256:{digest.hexdigest()}"
         with ThreadPoolExecutor(1) as self._beside:
             for data in self._pieces():
@@ -203,7 +203,19 @@ class _Piece:
             if not len(real):
                 raise NotInPieces
             self.ends = (int(real[0]), int(real[-1]))
-            self.first, self.last = (Edge(int(plain.kind[k]), plain.start[k], plain.end[k]) for k in self.ends)
+            state = run.state
+            self.first, self.last = (
+                Edge(
+                    int(plain.kind[k]),
+                    plain.start[k],
+                    plain.end[k],
+                    float(plain.feed[k]),
+                    state.speed,
+                    state.sense,
+                    state.tool,
+                )
+                for k in self.ends
+            )
             return
         path = runs.program(run.text, run.row0, run.state).path
         real = np.flatnonzero((path.kind == RAPID) | (path_geometry.lengths(path) > 0.0))
@@ -217,6 +229,16 @@ class _Piece:
             point = path.start[k] if u == 0.0 else path.end[k]
             kind = RAPID if path.kind[k] == RAPID else LINE
             edges.append(
-                Edge(kind, point - (u * way), point + (1.0 - u) * way, bool(corrected[k]), bool(path.machine[k]))
+                Edge(
+                    kind,
+                    point - (u * way),
+                    point + (1.0 - u) * way,
+                    float(path.feed[k]),
+                    float(path.speed[k]),
+                    float(path.turn[k]),
+                    int(path.tool[k]),
+                    bool(corrected[k]),
+                    bool(path.machine[k]),
+                )
             )
         self.first, self.last = edges

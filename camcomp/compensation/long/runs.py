@@ -21,6 +21,7 @@ from camcomp.gcode.program import Program
 from camcomp.gcode.setup import Setup
 from camcomp.gcode.state import ControlState
 from camcomp.gcode.text import Text
+from camcomp.gcode.words import points_in_feeds
 from camcomp.ground.errors import Location, ProgramError
 
 CHUNK_BYTES = 1 << 22  # bytes read at once
@@ -69,7 +70,9 @@ class Runs:
         self._at = 0
         self._row = 0
         self._last = len(head) < CHUNK_BYTES
-        self.language = dialect_of(Text.read(head[:200_000], self.name), self.dialect)
+        begin = Text.read(head[:200_000], self.name)
+        self.language = dialect_of(begin, self.dialect)
+        self.feed_point = points_in_feeds(begin.line(row) for row in range(len(begin)))
         self._state = ControlState(self.setup, self.language)
         self._flags = [False, False]  # code stated, feed stated
         self._tape = False  # the program began with a %
@@ -216,7 +219,7 @@ class Runs:
         path, sites = reader.record.finish()
         return Program(
             data=text, name=self.name, dialect=self.language.name, path=replace(path, line=path.line + row0), warnings=(),
-            text=piece, sites=sites, rebases=tuple(reader.rebases), setup=self.setup, language=self.language, straight=True,
+            text=piece, sites=sites, rebases=tuple(reader.rebases), setup=self.setup, language=self.language, feed_point=self.feed_point, straight=True,
         )  # fmt: skip
 
 

@@ -10,6 +10,7 @@ from camcomp.compensation.long.plain import Done, PlainCorrector
 from camcomp.compensation.long.plain_run import PlainRun
 from camcomp.compensation.program.compensate import Compensated
 from camcomp.ground.datatypes import LINE, Bools, Floats, Ints
+from camcomp.model.cutting.spindle import MOST_LINES, spindle_warning
 from camcomp.model.job import Job
 from camcomp.model.statics.target import correct, settle
 
@@ -67,6 +68,7 @@ class Totals:
         self._random = np.random.default_rng(int(digest[:16], 16))
         self._share = min(1.0, 3.0 * SAMPLE * 24.0 / max(size, 1))  # a line has some 24 bytes
         self._sample: list[Floats] = []
+        self._still: list[int] = []  # source lines that cut while the spindle stands, the first ones
 
     # --- pieces --------------------------------------------------------------------------------------------------
 
@@ -85,6 +87,8 @@ class Totals:
         drive, joints = answers.rest[:, 3 : 3 + m], corrector.joints(done)
         self._common(run.motions, rows.joining, np.ones(len(s), np.bool_), plain.row[rows.move] + run.row0 + 1, answers.nominal,
                      joints, drive, answers.rest[:, :3], done.before, done.after)  # fmt: skip
+        if run.state.sense == 0.0:
+            self._stands(np.unique(plain.row[rows.move[rows.force.any(axis=1)]]) + run.row0 + 1)
         force = frame.vectors(rows.force)
         chosen = np.flatnonzero(self._random.random(len(s)) < self._share)
         if len(chosen):
@@ -106,6 +110,7 @@ class Totals:
         self._common(motions, rows.joining[own], corrected, result.lines[own], result.nominal[own], state.rho[own], state.drive[own],
                      state.tilt[own], result.before, result.after)  # fmt: skip
         self.iterations = max(self.iterations, result.iterations)
+        self._stands(result.without_spindle)
         force = self.job.frame.vectors(rows.force[own])
         return Batch(result.lines[own], s, t, rows.target[own], result.written.end[own], force, result.nominal[own], state.rho[own],
                      state.drive[own])  # fmt: skip
@@ -128,6 +133,9 @@ class Totals:
             if len(over) and len(self._beyond[a]) < 10:
                 self._beyond[a] = sorted({*self._beyond[a], *np.unique(line[over])[:10].tolist()})[:10]
 
+    def _stands(self, lines: Ints) -> None:
+        self._still += lines[: MOST_LINES + 1 - len(self._still)].tolist()
+
     # --- the end -------------------------------------------------------------------------------------------------
 
     def finish(self, corrector: PlainCorrector, warnings: list[str]) -> None:
@@ -137,6 +145,7 @@ class Totals:
             self.warnings.append(
                 f"{self.joins} joining lines where the cutting force jumps; they are not part of before and after"
             )
+        self.warnings += spindle_warning(np.array(self._still, np.int64))
         known, m = corrector.field, len(self.job.machine.actuators)
         if known is None or not self._sample:
             return

@@ -6,51 +6,31 @@ bends, solve again at the division points, write, and put the written program th
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from camcomp.compensation.program import arcs_out
 from camcomp.compensation.program.arcs_out import Arcs, Bend
 from camcomp.compensation.program.chords import Nodes, second_derivative, trial_nodes
-from camcomp.compensation.program.moves import (
-    WITHIN_RAPID,
-    corrected_pieces,
-    refuse_unsolved,
-    row_layout,
-    travel_of,
-)
+from camcomp.compensation.program.corrected_rows import CorrectedRows, corrected_rows, output_of
+from camcomp.compensation.program.judged_points import JudgedPoints, Seen, judged_points, see, see_original
+from camcomp.compensation.program.moves import WITHIN_RAPID, chord_budget, corrected_pieces, refuse_unsolved, travel_of
 from camcomp.compensation.program.posture import check_posture, whole_pose
 from camcomp.compensation.program.reversals import cut_at_reversals
-from camcomp.gcode.output import Output, Part, Rewritten
+from camcomp.gcode.output import Part, Rewritten
 from camcomp.gcode.program import Program
 from camcomp.gcode.rewrite import rewrite
-from camcomp.ground.datatypes import ARC, LINE, RAPID, Bools, Floats, Ints, Path
+from camcomp.ground.datatypes import RAPID, Bools, Floats, Ints
+from camcomp.model.cutting.spindle import cut_without_spindle, spindle_warning
 from camcomp.model.cutting.track import Track, lay_track
 from camcomp.model.job import Job
-from camcomp.model.motion.response import Travel, aim_at, respond
+from camcomp.model.motion.response import aim_at
 from camcomp.model.statics.target import Correction, settle
 
 MAX_ROUNDS, ARC_ROUNDS = 6, 4
 STUCK = 0.95  # of the miss is left by a finer division that is no use, as where an arc passes the vertical
 COARSE_MM, FINE_MM = 8.0, 0.5  # distance of trial points on straight lines, without and with effects
-
-
-@dataclass(frozen=True, eq=False)
-class CorrectedRows:
-    """End points (N,) of the motions of the corrected program, in order."""
-
-    piece: Ints
-    motion: Ints
-    w: Floats  # fraction of the piece at the end point
-    kind: Ints
-    joining: Bools
-    corrected: Bools  # False: passes as programmed
-    force: Floats  # (N, 3) N at the end point, program frame
-    target: Floats  # (N, 3) mm programmed tip
-    end: Floats  # (N, 3) mm commanded tip, program frame
-    feed: Floats  # (N,) mm/min
-    arcs: Arcs  # (N,) circles of corrected arcs that come out as arcs
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,6 +49,7 @@ class Compensated:
     after: Floats  # errors (k, 3) mm of the corrected program along feed motions
     iterations: int
     method: str
+    without_spindle: Ints  # source lines that cut while the spindle stands
     warnings: list[str]
 
     @property
@@ -123,15 +104,14 @@ def compensate(
     part: the motions to be corrected and written, when the program is a part of a longer one. The others are only there
     because their neighbours depend on them: they are not divided, and their errors do not count.
     """
-    path, resolution = program.path, job.config.control.resolution_mm
+    path, resolution = program.path, program.step_mm(job.config.control.resolution_mm)
     spacing = FINE_MM if job.causes else COARSE_MM  # a screw's error has waves of a few mm
     track, turning = cut_at_reversals(job, lay_track(path, job.conditions), spacing)
     corrected = corrected_pieces(path, track)
     feeding = corrected & (path.kind[track.motion] != RAPID)
     if part is not None:
         feeding &= (track.motion >= part.first) & (track.motion < part.last)
-    rounding = 0.5 * np.sqrt(3.0) * resolution
-    budget = max(1e-3 * tolerance_um - rounding, 0.1e-3 * tolerance_um)
+    budget = chord_budget(tolerance_um, resolution)
     tolerance = np.full(len(track.motion), budget)
 
     trial = trial_nodes(track.length, track.angle, feeding & ~turning & (track.length > 0.0), spacing)
@@ -151,12 +131,17 @@ def compensate(
             tolerance[gone] = budget
             nodes, shift = bend.divided(trial, tolerance)
         commanded, circles = _bent(program, job, track, nodes, shift, corrected, method, bend)
-        rows = _rows(program, job, track, nodes, commanded, kept, circles, begins=part is None or part.first == 0)
-        written = rewrite(program, _output(path, rows), resolution_mm=resolution, version=version, part=part)
-        points = _points(job, track, rows, feeding)
-        after = _see(job, points, written.end, replace(rows.arcs, centre=written.centre))
+        rows = corrected_rows(
+            program, job, track, nodes, commanded, kept, circles, begins=part is None or part.first == 0
+        )
+        written = rewrite(
+            program, output_of(path, rows), resolution_mm=job.config.control.resolution_mm, version=version, part=part
+        )
+        points = judged_points(job, track, rows, feeding)
+        after = see(job, points, written.end, replace(rows.arcs, centre=written.centre))
         worst = np.zeros(len(tolerance))
-        np.maximum.at(worst, points.piece[points.judged], np.linalg.norm(after.error[points.judged], axis=1))
+        size = np.where(after.status == 0, np.linalg.norm(after.error, axis=1), np.inf)
+        np.maximum.at(worst, points.piece[points.judged], size[points.judged])
         missed = (worst > 1e-3 * tolerance_um) & ~kept
         count = np.diff(nodes.first)
         stuck = missed & (worst >= STUCK * last) & (count > last_count)
@@ -170,10 +155,14 @@ def compensate(
         tolerance = np.where(
             missed, tolerance * np.clip(0.9e-3 * tolerance_um / np.maximum(worst, 1e-12), 0.3, 0.9), tolerance
         )
-    before = _see_original(job, points)
-    warnings = _warnings(job, rows)
+    before = see_original(job, points)
+    for seen in (after, before):
+        judged = points.judged
+        refuse_unsolved(program, track, points.piece[judged], points.target[judged], seen.status[judged])
+    still = np.intersect1d(cut_without_spindle(track), path.line[track.motion[feeding]])
+    warnings = _warnings(job, rows) + spindle_warning(still)
     iterations = int(aimed.iterations.max(initial=0))
-    return _assemble(program, job, track, rows, written, points, before, after, iterations, method, warnings)
+    return _assemble(program, job, track, rows, written, points, before, after, iterations, method, still, warnings)
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,7 +203,7 @@ def _bent(
     to = np.flatnonzero((np.diff(nodes.piece, prepend=-1) == 0) & bend.use[nodes.piece])
     if len(to):
         motion = track.motion[nodes.piece[to]]
-        flat = arcs_out.FLATTEST * job.config.control.resolution_mm
+        flat = arcs_out.FLATTEST * program.step_mm(job.config.control.resolution_mm)
         found, wrong = arcs_out.through(
             commanded[to - 1], solved[middle], commanded[to], track.path.axis[motion], track.path.angle[motion], flat
         )
@@ -231,164 +220,6 @@ def _kept(track: Track, nodes: Nodes, commanded: Floats, half: float) -> Bools:
     return (most <= half) & (np.bincount(track.motion)[track.motion] == 1)
 
 
-def _rows(
-    program: Program,
-    job: Job,
-    track: Track,
-    nodes: Nodes,
-    commanded: Floats,
-    kept: Bools,
-    circles: Arcs,
-    *,
-    begins: bool,
-) -> CorrectedRows:
-    """End points of the corrected program: the nodes but the first of each piece, and joining lines at jumps."""
-    path = program.path
-    k = np.arange(len(nodes.w)) - nodes.first[nodes.piece]
-    kind = path.kind[track.motion]
-    start, stop = commanded[nodes.first[:-1]], commanded[nodes.first[1:] - 1]
-    before = path.start[:1] if begins else start[:1]
-    step = np.linalg.norm(start - np.concatenate((before, stop[:-1])), axis=1)
-    layout = row_layout(path, track, step, job.config.control.resolution_mm)
-    corrected, leading, trailing = layout.corrected, layout.leading, layout.trailing
-    keep = (k > 0) | leading[nodes.piece]
-    extra = np.flatnonzero(trailing)
-    piece = np.concatenate((nodes.piece[keep], extra))
-    w = np.concatenate((nodes.w[keep], np.ones(len(extra))))
-    joining = np.concatenate(((k == 0)[keep], np.ones(len(extra), np.bool_)))
-    free = track.points(extra, np.ones(len(extra)))
-    if len(extra):  # behind the cut, without its force
-        unloaded = replace(travel_of(job, track, extra, np.ones(len(extra))), force=np.zeros((len(extra), 3)))
-        result = aim_at(job, free, unloaded, "newton")
-        refuse_unsolved(program, track, extra, free, result.status)
-        free = result.commanded
-    end = np.concatenate((commanded[keep], free))
-    circles = circles.take(np.flatnonzero(keep)).followed_by(len(extra))
-    order = np.lexsort((joining & (w > 0.0), w, piece))
-    piece, w, joining, end, circles = piece[order], w[order], joining[order], end[order], circles.take(order)
-    trailing_row = joining & (w > 0.0)
-    target = track.points(piece, w)
-    force = track.force(piece, w)
-    force[trailing_row] = 0.0
-    rows_kind = np.where(kind[piece] == RAPID, RAPID, LINE)
-    passed = ~corrected[piece]
-    whole = (passed | kept[piece]) & ~joining & (np.bincount(piece, minlength=len(kind)) == 1)[piece]
-    rows_kind = np.where(circles.on, ARC, np.where(whole, kind[piece], rows_kind))
-    end[whole & ~circles.on] = target[whole & ~circles.on]
-    rows = CorrectedRows(
-        piece, track.motion[piece], w, rows_kind, joining, ~passed, force, target, end, np.empty(len(piece)), circles
-    )
-    return replace(rows, feed=_feeds(program, track, rows))
-
-
-def _feeds(program: Program, track: Track, rows: CorrectedRows) -> Floats:
-    """Feed of every row so that the tip keeps its programmed speed: scaled by commanded over programmed length."""
-    feed = program.path.feed[rows.motion]
-    start = np.concatenate((program.path.start[:1], rows.end[:-1]))
-    same = np.concatenate(([False], (rows.piece[1:] == rows.piece[:-1])))
-    w0 = np.where(same, np.concatenate(([0.0], rows.w[:-1])), 0.0)
-    programmed = (rows.w - w0) * track.length[rows.piece]
-    commanded = arcs_out.lengths(start, rows.end, rows.arcs, program.path.axis[rows.motion])
-    scale = np.divide(commanded, programmed, out=np.ones(len(feed)), where=programmed > 1e-6)
-    plain = rows.joining | ((rows.kind != LINE) & ~rows.arcs.on) | ~rows.corrected | (programmed < 0.01)
-    return np.where(plain, feed, feed * np.clip(scale, 0.2, 5.0))
-
-
-def _output(path: Path, rows: CorrectedRows) -> Output:
-    arc, bent = rows.kind == ARC, rows.arcs.on
-    centre = np.where(bent[:, None], rows.arcs.centre, path.centre[rows.motion])
-    angle = np.where(bent, rows.arcs.angle, path.angle[rows.motion])
-    return Output(
-        motion=rows.motion,
-        kind=rows.kind.astype(np.int8),
-        end=rows.end,
-        centre=np.where(arc[:, None], centre, np.nan),
-        angle=np.where(arc, angle, 0.0),
-        feed=rows.feed,
-        joining=rows.joining,
-    )
-
-
-@dataclass(frozen=True, eq=False)
-class _Points:
-    """Where a corrected program is looked at, in the order of travel.
-
-    End points, and between them the middles of lines and the quarters of arcs.
-    """
-
-    row: Ints  # (k,) end point that the point belongs to
-    fraction: Floats  # (k,) of the move to it, 1 at its end
-    axis: Floats  # (k, 3) of arcs
-    piece: Ints
-    w: Floats
-    target: Floats  # (k, 3) mm programmed tip
-    travel: Travel
-    judged: Bools  # (k,) counted in before and after: feed motions, no joining lines
-    kept: Bools  # (k,) between the ends of an arc that stays as programmed
-    before: Floats | None  # (3,) where the first move starts, if that is known
-
-    @property
-    def end(self) -> Bools:
-        """Which ones are end points."""
-        return self.fraction == 1.0
-
-    def along(self, ends: Floats, arcs: Arcs) -> Floats:
-        """Points (k, 3) of the moves between end points (N, 3)."""
-        first = ends[:1] if self.before is None else self.before[None]
-        start = np.concatenate((first, ends[:-1]))[self.row]
-        out = arcs_out.along(start, ends[self.row], arcs.take(self.row), self.axis, self.fraction)
-        return np.where(self.kept[:, None], self.target, np.where(self.end[:, None], ends[self.row], out))
-
-
-def _points(job: Job, track: Track, rows: CorrectedRows, feeding: Bools) -> _Points:
-    n = len(rows.piece)
-    cut = feeding[rows.piece] & ~rows.joining
-    begins = np.concatenate(([True], rows.piece[1:] != rows.piece[:-1])) | np.concatenate(([True], rows.joining[:-1]))
-    start = np.where(begins, 0.0, np.concatenate(([0.0], rows.w[:-1])))
-    inner = np.flatnonzero(cut & (track.length[rows.piece] > 0.0))
-    bent = inner[rows.arcs.on[inner]]
-    rapid = np.flatnonzero((rows.kind == RAPID) & rows.corrected) if job.causes else inner[:0]
-    row = np.concatenate((np.arange(n), inner, bent, bent, np.repeat(rapid, len(WITHIN_RAPID))))
-    fraction = np.repeat([1.0, 0.5, 0.25, 0.75], [n, len(inner), len(bent), len(bent)])
-    fraction = np.concatenate((fraction, np.tile(WITHIN_RAPID, len(rapid))))
-    order = np.lexsort((fraction, row))
-    row, fraction = row[order], fraction[order]
-    end = fraction == 1.0
-    piece = rows.piece[row]
-    w = np.where(end, rows.w[row], start[row] + fraction * (rows.w - start)[row])
-    travel = travel_of(job, track, piece, w)
-    force = np.where(end[:, None], job.frame.vectors(rows.force)[row], travel.force)  # joining lines know better
-    kept = ~end & ((rows.kind == ARC) & ~rows.arcs.on)[row]
-    axis = track.path.axis[track.motion[piece]]
-    travel = replace(travel, force=force)
-    before = track.path.start[0] if n and track.path.known[0] else None
-    return _Points(row, fraction, axis, piece, w, track.points(piece, w), travel, cut[row], kept, before)
-
-
-@dataclass(frozen=True, eq=False)
-class _Seen:
-    """A program put through the full model: errors (k, 3) mm at the points, tips (N, 3) and states at the end points."""
-
-    error: Floats
-    tip: Floats
-    state: Correction
-
-
-def _see(job: Job, points: _Points, ends: Floats, arcs: Arcs) -> _Seen:
-    """The loaded machine along the moves between commanded end points (N, 3), program frame."""
-    told = points.along(ends, arcs)
-    tip, state = respond(job, told, points.travel, points.target, before=points.before)
-    at = {each.name: getattr(state, each.name)[points.end] for each in fields(state)}
-    return _Seen(tip - points.target, tip[points.end], Correction(**at))
-
-
-def _see_original(job: Job, points: _Points) -> _Seen:
-    """The original program through the full model, at the same points."""
-    tip, state = respond(job, points.target, points.travel, before=points.before)
-    at = {each.name: getattr(state, each.name)[points.end] for each in fields(state)}
-    return _Seen(tip - points.target, tip[points.end], Correction(**at))
-
-
 def _warnings(job: Job, rows: CorrectedRows) -> list[str]:
     joins = int(rows.joining.sum())
     out = (
@@ -403,8 +234,8 @@ def _warnings(job: Job, rows: CorrectedRows) -> list[str]:
 
 
 def _assemble(
-    program: Program, job: Job, track: Track, rows: CorrectedRows, written: Rewritten, points: _Points, before: _Seen,
-    after: _Seen, iterations: int, method: str, warnings: list[str],
+    program: Program, job: Job, track: Track, rows: CorrectedRows, written: Rewritten, points: JudgedPoints, before: Seen,
+    after: Seen, iterations: int, method: str, still: Ints, warnings: list[str],
 ) -> Compensated:  # fmt: skip
     s = track.s0[rows.piece] + rows.w * track.length[rows.piece]
     feed = program.path.feed[rows.motion]
@@ -419,4 +250,4 @@ def _assemble(
     warnings += check_posture(program, job, program.path.line[rows.motion], target, nominal)
     state = after.state if method == "linear" else whole_pose(job, rows.corrected, target, force, after.state)
     return Compensated(program, written, rows, s, t, nominal, state, before.tip, before.error[points.judged],
-                       after.error[points.judged], iterations, method, warnings)  # fmt: skip
+                       after.error[points.judged], iterations, method, still, warnings)  # fmt: skip

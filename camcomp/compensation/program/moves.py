@@ -49,6 +49,14 @@ def row_layout(path: Path, track: Track, step: Floats, resolution: float) -> Lay
     return Layout(corrected, leading, trailing)
 
 
+def chord_budget(tolerance_um: float, step_mm: float) -> float:
+    """What straight lines may miss, mm, beside the rounding of their ends to steps of step_mm."""
+    tolerance, rounding = 1e-3 * tolerance_um, 0.5 * np.sqrt(3.0) * step_mm
+    if rounding >= tolerance:  # rounding alone leaves more than that, and finer lines do not help
+        return tolerance
+    return float(max(tolerance - rounding, 0.1 * tolerance))
+
+
 def corrected_pieces(path: Path, track: Track) -> Bools:
     """Pieces (p,) whose tips are known and not given in machine coordinates."""
     return path.known[track.motion] & ~path.machine[track.motion]

@@ -85,7 +85,7 @@ def verify(corrected: Program, original: Program, job: Job) -> Verified:
     corrected_ones = corrected_pieces(original.path, track)
     begin, expected = (_expected(original, job, track, corrected_ones, w) for w in (0.0, 1.0))
     step = np.linalg.norm(begin - np.concatenate((original.path.start[:1], expected[:-1])), axis=1)
-    layout = row_layout(original.path, track, step, job.config.control.resolution_mm)
+    layout = row_layout(original.path, track, step, original.step_mm(job.config.control.resolution_mm))
     reach = _reach(original, job, track, corrected_ones)
     first, last, joins = _match(corrected, track, expected, reach, layout, is_stamped(corrected.data))
     moving = np.flatnonzero(layout.corrected & (track.length > 0.0))
@@ -241,7 +241,7 @@ def _per_line(
     original: Program, job: Job, track: Track, piece: Ints, vertex: Bools, residual: Floats, convergence: Floats
 ) -> list[LineResult]:
     line = original.path.line[track.motion[piece]]
-    rounding = 0.5 * np.sqrt(3.0) * 1e3 * job.config.control.resolution_mm
+    rounding = 0.5 * np.sqrt(3.0) * 1e3 * original.step_mm(job.config.control.resolution_mm)
     out = []
     for number in np.unique(line):
         on = line == number

@@ -168,6 +168,9 @@ class _Builder:
     def _scalar(self, node: ScalarNode, at: Location) -> Any:
         kind = str(node.tag).removeprefix("tag:yaml.org,2002:")
         text = node.value
+        if any(each == "\0" or "\ud800" <= each <= "\udfff" for each in text):
+            self.errors.append(ConfigError("CC200", "a zero byte or half a character is no text", at=at))
+            return None
         try:
             if kind == "null":
                 return None

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import beta, betainc
 
-from camcomp.ground.datatypes import Floats
+from camcomp.ground.datatypes import Bools, Floats
 
 
 def linear_edge(
@@ -87,12 +87,14 @@ def sine_power(power: float, start: ArrayLike, stop: ArrayLike) -> Floats:
     return _span(from_crest, start, stop)
 
 
-def to_path(force: Floats, clockwise: bool) -> Floats:
+def to_path(force: Floats, clockwise: bool | Bools) -> Floats:
     """(Fx, Fy, Fz) (n, 3) of this module as (Fr, Ft, Fz) on the tool; e_r is right of the feed, hence Fr = -Fy.
+
+    clockwise: the sense of the spindle, of all rows or of each (n,).
 
     A counter-clockwise spindle with a left-hand cutter is the mirror image in the plane of feed and tool axis.
     """
-    right = -force[..., 1] if clockwise else force[..., 1]
+    right = np.where(clockwise, -force[..., 1], force[..., 1])
     return np.stack([right, force[..., 0], force[..., 2]], axis=-1)
 
 

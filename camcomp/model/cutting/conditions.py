@@ -1,5 +1,7 @@
 """Cutting conditions of the averaged models, taken from a Cut, with errors that name the key to add."""
 
+from typing import Literal
+
 import numpy as np
 
 from camcomp.ground.datatypes import Bools, Floats
@@ -30,6 +32,21 @@ def axial_depth(cut: Cut) -> Floats:
     """Axial depth (n,) in mm, zero above the stock. Raises ConfigError CC253 where it is not known."""
     _refuse("CC253", np.isnan(cut.depth), cut, "the axial depth of the cut is not known")
     return np.maximum(cut.depth, 0.0)
+
+
+def clockwise(cut: Cut, stated: Literal["clockwise", "counterclockwise"] | None) -> Bools:
+    """Whether the spindle turns clockwise (n,): as the program says, else as stated, else clockwise.
+
+    Raises ConfigError CC258 where the program turns it the other way than stated.
+    """
+    if stated is None:
+        return ~(cut.turn < 0.0)
+    sense = 1.0 if stated == "clockwise" else -1.0
+    message = (
+        f"the program turns the spindle with {'M4' if sense > 0.0 else 'M3'}, process: force: spindle says {stated}"
+    )
+    _refuse("CC258", cut.turn == -sense, cut, message)
+    return np.full(len(cut), sense > 0.0)
 
 
 def engagement(cut: Cut, milling: Milling | None) -> tuple[Floats, Floats]:

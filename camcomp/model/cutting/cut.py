@@ -28,11 +28,15 @@ class Cut:
     to_machine: Floats = field(default_factory=lambda: np.eye(3))  # (3, 3) program axes to machine axes
     # (n,) the point is seen as the end of a motion, not as the start of the next; empty: nowhere
     ends: Bools = field(default_factory=lambda: np.zeros(0, np.bool_))
+    # (n,) sense of the spindle by the program, +1 clockwise, -1, 0 stopped, NaN not said; empty: nowhere said
+    turn: Floats = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
         n = np.shape(self.line)[0]
+        if not np.size(self.turn):
+            object.__setattr__(self, "turn", np.full(n, np.nan))
         rows = {"tangent": (n, 3), "tool_axis": (3,), "to_machine": (3, 3)}
-        for name in ("tangent", "tool_axis", "feed", "speed", "depth", "width", "arc_length", "to_machine"):
+        for name in ("tangent", "tool_axis", "feed", "speed", "depth", "width", "arc_length", "to_machine", "turn"):
             array = frozen(getattr(self, name))
             if array.shape != rows.get(name, (n,)):
                 raise ValueError(f"Cut.{name} has shape {array.shape}, not {rows.get(name, (n,))}")

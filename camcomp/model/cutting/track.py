@@ -4,7 +4,8 @@ A piece is a motion, or the part of a motion on one side of the stock's top, or 
 vertical and the direction across the tool turns over. Rapids and air moves carry no force, and
 plunges none unless the force model says otherwise. Where two cutting pieces meet at less than JOIN_ANGLE the corner
 takes the force of the bisecting direction and the difference fades linearly along the pieces; where they meet at more,
-or where a cut starts or ends, the force jumps.
+where a cut starts or ends, and where the model gives both sides different forces in one direction (another feed, speed
+or sense of the spindle, another tool, a step of a table) the force jumps.
 """
 
 from __future__ import annotations
@@ -18,13 +19,14 @@ from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import ARC, RAPID, Bools, Floats, Ints, Path
 from camcomp.model.cutting.cut import Cut
 from camcomp.model.cutting.frame import lateral, to_vector
+from camcomp.model.cutting.upright import Verticals
 
 JOIN_ANGLE = np.radians(5.0)
 PLUNGE_SINE = (
     5e-3  # of the angle between feed and tool axis: corrected plunges slant by some 1e-4, rounded short ones too
 )
 NO_FORCE = 1e-9  # N
-BESIDE = 1e-5  # rad: how far beside the ends of an upright arc its direction is taken; at the vertical it has none
+SAME_FORCE = 1e-6  # of the force: lengths of the path are rounded sums, and a table is looked up by them
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +62,8 @@ class Track:
     fade1: Floats  # (p, 3) N, at its end
     jump: Bools  # the force jumps at the start of the piece
     corner: Bools  # the tip cannot pass the start of the piece without a stop
+    beside0: Floats  # fraction of the motion behind the start of the piece where the direction is that farther in
+    beside1: Floats  # the same in front of its end
 
     @property
     def angle(self) -> Floats:
@@ -89,7 +93,8 @@ class Track:
             self, motion=self.motion[of], u0=self.u(of, begin), u1=self.u(of, end), cutting=self.cutting[of],
             length=(end - begin) * self.length[of], s0=self.s0[of] + begin * self.length[of],
             fade0=a + begin[:, None] * (b - a), fade1=a + end[:, None] * (b - a), jump=self.jump[of] & ~inner,
-            corner=self.corner[of] & ~inner,
+            corner=self.corner[of] & ~inner, beside0=np.where(inner, 0.0, self.beside0[of]),
+            beside1=np.where(end < 1.0, 0.0, self.beside1[of]),
         )  # fmt: skip
 
     def force(self, piece: Ints, w: Floats) -> Floats:
@@ -128,6 +133,7 @@ def _force(
         teeth=c.teeth,
         to_machine=np.eye(3) if c.to_machine is None else c.to_machine,
         ends=w[on] == 1.0,
+        turn=path.turn[rows],
     )
     out[on] = to_vector(c.model(cut), cut.tangent, cut.tool_axis)
     return out
@@ -136,15 +142,16 @@ def _force(
 def lay_track(path: Path, conditions: Conditions, length: Floats | None = None) -> Track:
     """Pieces of a path with the loads at their corners. Raises what the force model raises."""
     length = path_geometry.lengths(path) if length is None else length
-    motion, u0, u1, over = _pieces(path, conditions)
+    axis = np.asarray(conditions.tool_axis, float)
+    upright = Verticals.none() if conditions.model is None else Verticals.of(path, axis)
+    motion, u0, u1, over = _pieces(path, conditions, upright)
+    beside0, beside1 = upright.beside(path, axis, motion, u0, u1)
     n = len(motion)
     piece_length = length[motion] * (u1 - u0)
     s0 = np.concatenate(([0.0], np.cumsum(length)))[motion] + length[motion] * u0
     middle = 0.5 * (u0 + u1)
-    margin = np.minimum(_margin(path, conditions, motion), 0.25 * (u1 - u0))
-    first = path_geometry.tangents(path, motion, u0 + margin)
-    last = path_geometry.tangents(path, motion, u1 - margin)
-    axis = np.asarray(conditions.tool_axis, float)
+    first = path_geometry.tangents(path, motion, u0 + beside0)
+    last = path_geometry.tangents(path, motion, u1 - beside1)
     feeding = (path.kind[motion] != RAPID) & path.known[motion] & ~path.machine[motion] & (piece_length > 0.0)
     sine = np.maximum(lateral(first, axis), lateral(path_geometry.tangents(path, motion, middle), axis))
     cutting = feeding & ((sine > PLUNGE_SINE) | conditions.plunges)
@@ -167,17 +174,32 @@ def lay_track(path: Path, conditions: Conditions, length: Floats | None = None) 
     corner = np.ones(n, np.bool_)
     corner[b] = ~straight_on
     smooth = cutting[a] & cutting[b] & straight_on & ~over[b]
+    bisector = np.where(smooth[:, None], last[a] + first[b], 0.0)
+    bisector /= np.maximum(np.linalg.norm(bisector, axis=1, keepdims=True), 1e-300)
+    ahead, behind = force(a, np.ones(len(a)), bisector), force(b, np.zeros(len(b)), bisector)
+    smooth &= np.linalg.norm(behind - ahead, axis=1) <= SAME_FORCE * np.linalg.norm(ahead, axis=1) + NO_FORCE
     jump[b] = ~smooth & (np.linalg.norm(own0[b] - own1[a], axis=1) > NO_FORCE)
     if len(real) and real[0] > 0:  # moves without length stand before the first cut
         jump[real[0]] = bool(np.linalg.norm(own0[real[0]]) > NO_FORCE)
     a, b = a[smooth], b[smooth]
-    bisector = last[a] + first[b]
-    bisector /= np.linalg.norm(bisector, axis=1, keepdims=True)
-    shared = 0.5 * (force(a, np.ones(len(a)), bisector) + force(b, np.zeros(len(b)), bisector))
+    shared = 0.5 * (ahead + behind)[smooth]
     fade1[a] = shared - own1[a]
     fade0[b] = shared - own0[b]
     _carry_over((piece_length > 0.0) | rapid, own1 + fade1, fade0, fade1)
-    return Track(path, conditions, motion, u0, u1, cutting, piece_length, s0, fade0, fade1, jump, corner)
+    track = Track(
+        path, conditions, motion, u0, u1, cutting, piece_length, s0, fade0, fade1, jump, corner, beside0, beside1
+    )
+    return _cut_at_swings(track, upright)
+
+
+def _cut_at_swings(track: Track, upright: Verticals) -> Track:
+    """The track with parts of their own where the force turns round quickly, so that other parts need not be as fine."""
+    motion, u = upright.swings(track.path)
+    piece = np.searchsorted(track.motion + 0.5 * track.u0, motion + 0.5 * u, side="right") - 1
+    u0, u1 = track.u0[piece], track.u1[piece]
+    w = (u - u0) / (u1 - u0)
+    inner = (w > 1e-6) & (w < 1.0 - 1e-6)
+    return track.cut(piece[inner], w[inner]) if inner.any() else track
 
 
 def _carry_over(moves: Bools, end_force: Floats, fade0: Floats, fade1: Floats) -> None:
@@ -187,37 +209,12 @@ def _carry_over(moves: Bools, end_force: Floats, fade0: Floats, fade1: Floats) -
     fade0[still] = fade1[still] = end_force[before[still]]
 
 
-def _margin(path: Path, conditions: Conditions, motion: Ints) -> Floats:
-    """How far from the ends, as a fraction of the motion, the direction of an upright arc is taken; else 0."""
-    upright = (path.kind[motion] == ARC) & (np.abs(path.axis[motion] @ np.asarray(conditions.tool_axis, float)) < 0.999)
-    angle = np.where(upright, np.maximum(np.abs(path.angle[motion]), 4.0 * BESIDE), 1.0)
-    return np.where(upright, BESIDE / angle, 0.0)
-
-
 def _beside(track: Track, piece: Ints, w: Floats) -> Floats:
     """Fraction of the motion at which the direction at fraction w of the piece is taken."""
-    u0, u1 = track.u0[piece], track.u1[piece]
-    margin = np.minimum(_margin(track.path, track.conditions, track.motion[piece]), 0.25 * (u1 - u0))
-    return np.clip(track.u(piece, w), u0 + margin, u1 - margin)
+    return np.clip(track.u(piece, w), (track.u0 + track.beside0)[piece], (track.u1 - track.beside1)[piece])
 
 
-def _overturns(path: Path, conditions: Conditions) -> list[tuple[int, float]]:
-    """Arcs and fractions at which the feed is along the tool axis: the radius vector is square to it."""
-    axis = np.asarray(conditions.tool_axis, float)
-    level = np.abs(path.axis @ axis) < 1e-3
-    out = []
-    for i in np.flatnonzero((path.kind == ARC) & level & path.known & ~path.machine):
-        radius = path.start[i] - path.centre[i]
-        radius = radius - (radius @ path.axis[i]) * path.axis[i]
-        phase = np.arctan2(np.cross(path.axis[i], radius) @ axis, radius @ axis)
-        angle = float(path.angle[i])
-        low, high = sorted((0.0, angle))
-        k = np.arange(np.ceil((low - phase) / np.pi - 0.5), np.floor((high - phase) / np.pi - 0.5) + 1.0)
-        out += [(int(i), float(u)) for u in np.sort((phase + (k + 0.5) * np.pi) / angle)]
-    return [(i, u) for i, u in out if 1e-6 < u < 1.0 - 1e-6]
-
-
-def _pieces(path: Path, conditions: Conditions) -> tuple[Ints, Floats, Floats, Bools]:
+def _pieces(path: Path, conditions: Conditions, upright: Verticals) -> tuple[Ints, Floats, Floats, Bools]:
     """Every motion once, or in parts where a feed motion crosses the stock's top or an arc passes the vertical.
 
     The last result says which parts begin at the vertical.
@@ -226,7 +223,7 @@ def _pieces(path: Path, conditions: Conditions) -> tuple[Ints, Floats, Floats, B
     whole = np.arange(n), np.zeros(n), np.ones(n), np.zeros(n, np.bool_)
     if conditions.model is None or n == 0:
         return whole
-    over = _overturns(path, conditions)
+    over = upright.overturns(path)
     cuts = sorted({*over, *_crossings(path, conditions.stock_top_mm)})
     if not cuts:
         return whole

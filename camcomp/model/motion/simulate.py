@@ -4,8 +4,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from camcomp.ground.csv_table import refuse_long
 from camcomp.ground.datatypes import Floats, Ints, Path
 from camcomp.ground.errors import ProgramError
+from camcomp.model.cutting.spindle import cut_without_spindle, spindle_warning
 from camcomp.model.cutting.track import lay_track
 from camcomp.model.finite import not_finite
 from camcomp.model.job import Job
@@ -25,25 +27,28 @@ class Simulated:
     setpoint: Floats
     actuators: tuple[str, ...]
     rotary: tuple[bool, ...]
+    warnings: list[str]
 
 
 def simulate(job: Job, path: Path, step_s: float, *, cutting: bool = True, started_s: float = 0.0) -> Simulated:
     """Rows every step_s seconds from the first feed move to the end of the last, that end included.
 
     Speed is trapezoidal along every motion and zero at its ends; rapids are not logged. Raises ProgramError CC420 when
-    the program has no feed move, PhysicsError where the machine cannot be.
+    the program has no feed move, ConfigError CC425 for too many rows, PhysicsError where the machine cannot be.
     """
     twin = twin_of(job)
     timeline = schedule(path, job.config.control.acceleration_mm_per_s2)
     if not len(timeline.index):
         raise ProgramError("CC420", "the program has no feed move")
+    refuse_long(timeline.end / step_s, "the log")
     time = np.arange(0.0, timeline.end, step_s)
     if timeline.end - time[-1] > 1e-9:
         time = np.append(time, timeline.end)
     conditions = job.conditions if cutting else replace(job.conditions, model=None)
     warm = job.config.process.temperature_C
+    track = lay_track(path, conditions)
     run_path = path_of_program(
-        "simulation", timeline, lay_track(path, conditions), time, started=started_s, to_machine=twin.to_machine,
+        "simulation", timeline, track, time, started=started_s, to_machine=twin.to_machine,
         vectors=job.frame.vectors, inverse=twin.inverse, temperature=None if warm is None else np.full(len(time), warm),
     )  # fmt: skip
     _, solved = twin.sense(run_path)
@@ -56,7 +61,9 @@ def simulate(job: Job, path: Path, step_s: float, *, cutting: bool = True, start
     if bad.any():
         raise not_finite(job.config, f"what the machine does in program line {line[int(np.argmax(bad))]}")
     rotary = tuple(each.revolute for each in twin.robot.actuators)
-    return Simulated(time, line, reading, run_path.row_rho, twin.actuators, rotary)
+    return Simulated(
+        time, line, reading, run_path.row_rho, twin.actuators, rotary, spindle_warning(cut_without_spindle(track))
+    )
 
 
 def log_table(run: Simulated) -> str:

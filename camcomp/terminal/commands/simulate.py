@@ -5,6 +5,7 @@ import click
 from camcomp.ground.files import STANDARD, write_all
 from camcomp.model.config.load import load_config
 from camcomp.terminal.commands._options import OUTPUT
+from camcomp.terminal.progress import say
 
 
 @click.command()
@@ -28,4 +29,6 @@ def command(
 
     source = open_program(program, config)
     run = simulate(Job(config), source.path, step_s, cutting=not air, started_s=started_s)
+    for each in run.warnings:
+        say(f"warning: {each}")
     write_all({output or STANDARD: log_table(run).encode()}, inputs=(program, *configs))

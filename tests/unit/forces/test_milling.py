@@ -109,3 +109,20 @@ def test_parameters_without_meaning_are_refused(model: Any, key: str, value: Any
     with pytest.raises(ValidationError) as caught:
         model.Params(**good | {key: value})
     assert caught.value.errors()[0]["loc"] == (key,)
+
+
+@pytest.mark.parametrize("model", ["mechanistic", "kienzle"])
+def test_the_program_says_how_the_spindle_turns(model) -> None:
+    module = {"mechanistic": mechanistic, "kienzle": kienzle}[model]
+    keys = (
+        COEFFICIENTS
+        if model == "mechanistic"
+        else {"kc11_N_per_mm2": 641, "mc": 0.27, "radial_ratio": 0.3, "axial_ratio": 0.1}
+    )
+    force = module.force(cut(4, turn=[1.0, -1.0, 0.0, np.nan]), module.Params(**keys))
+    np.testing.assert_array_equal(force, force[0] * [[1, 1, 1], [-1, 1, 1], [1, 1, 1], [1, 1, 1]])
+    stated = module.Params(**keys, spindle="counterclockwise")
+    np.testing.assert_array_equal(module.force(cut(2, turn=[-1.0, np.nan]), stated), force[[1, 1]])
+    with pytest.raises(ConfigError, match="line 1: .*M3.*counterclockwise") as caught:
+        module.force(cut(2, turn=[-1.0, 1.0]), stated)
+    assert caught.value.rule == "CC258"

@@ -7,7 +7,7 @@ from camcomp.ground.datatypes import Path, frozen
 def path(n=2, **changes):
     point = np.arange(3.0 * n).reshape(n, 3)
     fields = {
-        **{name: np.zeros(n) for name in ("kind", "angle", "feed", "speed", "tool")},
+        **{name: np.zeros(n) for name in ("kind", "angle", "feed", "speed", "turn", "tool")},
         **{name: np.zeros((n, 3)) for name in ("centre", "axis")},
         **{name: np.ones(n, bool) for name in ("known", "machine")},
         "line": np.arange(1, n + 1),

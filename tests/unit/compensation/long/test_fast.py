@@ -127,7 +127,7 @@ def decimal(out, value, digits):
 
 @numba.njit
 def feed(out, value):
-    return put_feed(out, 0, value)
+    return put_feed(out, 0, value, False)
 
 
 @pytest.mark.parametrize("digits", [0, 1, 3, 4, 6])
@@ -190,7 +190,7 @@ def test_lines_are_written_as_the_writer_of_whole_programs_writes_them(seed):
     size = write_rows(
         data, 0, len(data), read.line, read.begin, read.finish, read.kind, read.end, read.code_stated, read.feed_stated,
         read.feed, first, joining, end, feed, position, state, 1.0, np.zeros(3), decimals(RESOLUTION, 1.0),
-        0.5 * RESOLUTION * (1 + 1e-9), out, written,
+        0.5 * RESOLUTION * (1 + 1e-9), False, out, written,
     )  # fmt: skip
     text_out = out[:size].tobytes().decode()
     reference = expected.data.decode()

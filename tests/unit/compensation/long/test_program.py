@@ -319,3 +319,12 @@ def test_compiled_csv_is_that_of_python():
         assert row.split(",")[0] == str(line[i])
         for ours, theirs in zip(row.split(",")[1:], cells, strict=True):
             assert ours == theirs or abs(float(ours) - float(theirs)) <= 1.01e-6
+
+
+def test_a_control_with_four_decimals_of_an_inch(orthoglide):
+    lines = "".join(f"X{0.02 * k:.4f} Y{0.1 + 0.01 * (k % 7):.4f} F{10 + k % 3}.\n" for k in range(60))
+    text = f"%\nO0001 (TEST)\nG20 G90 G17\nM3 S2000\nG0 X0. Y0. Z1.\nG1 Z0. F10.\n{lines}G0 Z1.\nM30\n%\n"
+    (ours, _, _), _ = both(orthoglide, text, 8.0)
+    assert_same(orthoglide, text, 8.0)
+    assert re.search(r"X\d\.\d{4} ", ours) and not re.search(r"[XYZ]-?\d*\.\d{5}", ours)
+    assert not re.search(r"F\d+(?![.\d])", ours)

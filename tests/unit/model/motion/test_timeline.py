@@ -13,7 +13,7 @@ def lines(points, feed, kinds=None):
     nan = np.full((n, 3), np.nan)
     return Path(
         line=np.arange(10, 10 + n), kind=np.array(kinds or [LINE] * n), start=p[:-1], end=p[1:], centre=nan, axis=np.zeros((n, 3)),
-        angle=np.zeros(n), feed=np.full(n, feed), speed=np.zeros(n), tool=np.zeros(n), known=np.ones(n, bool),
+        angle=np.zeros(n), feed=np.full(n, feed), speed=np.zeros(n), turn=np.ones(n), tool=np.zeros(n), known=np.ones(n, bool),
         machine=np.zeros(n, bool),
     )  # fmt: skip
 

@@ -1,0 +1,114 @@
+"""The motions of a corrected program: the commanded nodes as end points, joining lines at jumps, the feed of each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from camcomp.compensation.program import arcs_out
+from camcomp.compensation.program.arcs_out import Arcs
+from camcomp.compensation.program.chords import Nodes
+from camcomp.compensation.program.moves import refuse_unsolved, row_layout, travel_of
+from camcomp.gcode.output import Output
+from camcomp.gcode.program import Program
+from camcomp.ground.datatypes import ARC, LINE, RAPID, Bools, Floats, Ints, Path
+from camcomp.model.cutting.track import Track
+from camcomp.model.job import Job
+from camcomp.model.motion.response import aim_at
+
+
+@dataclass(frozen=True, eq=False)
+class CorrectedRows:
+    """End points (N,) of the motions of the corrected program, in order."""
+
+    piece: Ints
+    motion: Ints
+    w: Floats  # fraction of the piece at the end point
+    kind: Ints
+    joining: Bools
+    corrected: Bools  # False: passes as programmed
+    force: Floats  # (N, 3) N at the end point, program frame
+    target: Floats  # (N, 3) mm programmed tip
+    end: Floats  # (N, 3) mm commanded tip, program frame
+    feed: Floats  # (N,) mm/min
+    arcs: Arcs  # (N,) circles of corrected arcs that come out as arcs
+
+
+def corrected_rows(
+    program: Program,
+    job: Job,
+    track: Track,
+    nodes: Nodes,
+    commanded: Floats,
+    kept: Bools,
+    circles: Arcs,
+    *,
+    begins: bool,
+) -> CorrectedRows:
+    """End points of the corrected program: the nodes but the first of each piece, and joining lines at jumps."""
+    path = program.path
+    k = np.arange(len(nodes.w)) - nodes.first[nodes.piece]
+    kind = path.kind[track.motion]
+    start, stop = commanded[nodes.first[:-1]], commanded[nodes.first[1:] - 1]
+    before = path.start[:1] if begins else start[:1]
+    step = np.linalg.norm(start - np.concatenate((before, stop[:-1])), axis=1)
+    layout = row_layout(path, track, step, program.step_mm(job.config.control.resolution_mm))
+    corrected, leading, trailing = layout.corrected, layout.leading, layout.trailing
+    keep = (k > 0) | leading[nodes.piece]
+    extra = np.flatnonzero(trailing)
+    piece = np.concatenate((nodes.piece[keep], extra))
+    w = np.concatenate((nodes.w[keep], np.ones(len(extra))))
+    joining = np.concatenate(((k == 0)[keep], np.ones(len(extra), np.bool_)))
+    free = track.points(extra, np.ones(len(extra)))
+    if len(extra):  # behind the cut, without its force
+        unloaded = replace(travel_of(job, track, extra, np.ones(len(extra))), force=np.zeros((len(extra), 3)))
+        result = aim_at(job, free, unloaded, "newton")
+        refuse_unsolved(program, track, extra, free, result.status)
+        free = result.commanded
+    end = np.concatenate((commanded[keep], free))
+    circles = circles.take(np.flatnonzero(keep)).followed_by(len(extra))
+    order = np.lexsort((joining & (w > 0.0), w, piece))
+    piece, w, joining, end, circles = piece[order], w[order], joining[order], end[order], circles.take(order)
+    trailing_row = joining & (w > 0.0)
+    target = track.points(piece, w)
+    force = track.force(piece, w)
+    force[trailing_row] = 0.0
+    rows_kind = np.where(kind[piece] == RAPID, RAPID, LINE)
+    passed = ~corrected[piece]
+    whole = (passed | kept[piece]) & ~joining & (np.bincount(piece, minlength=len(kind)) == 1)[piece]
+    rows_kind = np.where(circles.on, ARC, np.where(whole, kind[piece], rows_kind))
+    end[whole & ~circles.on] = target[whole & ~circles.on]
+    rows = CorrectedRows(
+        piece, track.motion[piece], w, rows_kind, joining, ~passed, force, target, end, np.empty(len(piece)), circles
+    )
+    return replace(rows, feed=_feeds(program, track, rows))
+
+
+def _feeds(program: Program, track: Track, rows: CorrectedRows) -> Floats:
+    """Feed of every row so that the tip keeps its programmed speed: scaled by commanded over programmed length."""
+    feed = program.path.feed[rows.motion]
+    start = np.concatenate((program.path.start[:1], rows.end[:-1]))
+    same = np.concatenate(([False], (rows.piece[1:] == rows.piece[:-1])))
+    w0 = np.where(same, np.concatenate(([0.0], rows.w[:-1])), 0.0)
+    programmed = (rows.w - w0) * track.length[rows.piece]
+    commanded = arcs_out.lengths(start, rows.end, rows.arcs, program.path.axis[rows.motion])
+    scale = np.divide(commanded, programmed, out=np.ones(len(feed)), where=programmed > 1e-6)
+    plain = rows.joining | ((rows.kind != LINE) & ~rows.arcs.on) | ~rows.corrected | (programmed < 0.01)
+    return np.where(plain, feed, feed * np.clip(scale, 0.2, 5.0))
+
+
+def output_of(path: Path, rows: CorrectedRows) -> Output:
+    """The rows as the writer wants them."""
+    arc, bent = rows.kind == ARC, rows.arcs.on
+    centre = np.where(bent[:, None], rows.arcs.centre, path.centre[rows.motion])
+    angle = np.where(bent, rows.arcs.angle, path.angle[rows.motion])
+    return Output(
+        motion=rows.motion,
+        kind=rows.kind.astype(np.int8),
+        end=rows.end,
+        centre=np.where(arc[:, None], centre, np.nan),
+        angle=np.where(arc, angle, 0.0),
+        feed=rows.feed,
+        joining=rows.joining,
+    )

@@ -1,0 +1,102 @@
+"""Where a program is looked at, and what the full model says there: the errors before and after."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+
+from camcomp.compensation.program import arcs_out
+from camcomp.compensation.program.arcs_out import Arcs
+from camcomp.compensation.program.corrected_rows import CorrectedRows
+from camcomp.compensation.program.moves import WITHIN_RAPID, travel_of
+from camcomp.ground.datatypes import ARC, RAPID, Bools, Floats, Ints
+from camcomp.model.cutting.track import Track
+from camcomp.model.job import Job
+from camcomp.model.motion.response import Travel, respond
+from camcomp.model.statics.target import Correction
+
+
+@dataclass(frozen=True, eq=False)
+class JudgedPoints:
+    """Where a corrected program is looked at, in the order of travel.
+
+    End points, and between them the middles of lines and the quarters of arcs.
+    """
+
+    row: Ints  # (k,) end point that the point belongs to
+    fraction: Floats  # (k,) of the move to it, 1 at its end
+    axis: Floats  # (k, 3) of arcs
+    piece: Ints
+    w: Floats
+    target: Floats  # (k, 3) mm programmed tip
+    travel: Travel
+    judged: Bools  # (k,) counted in before and after: feed motions, no joining lines
+    kept: Bools  # (k,) between the ends of an arc that stays as programmed
+    before: Floats | None  # (3,) where the first move starts, if that is known
+
+    @property
+    def end(self) -> Bools:
+        """Which ones are end points."""
+        return self.fraction == 1.0
+
+    def along(self, ends: Floats, arcs: Arcs) -> Floats:
+        """Points (k, 3) of the moves between end points (N, 3)."""
+        first = ends[:1] if self.before is None else self.before[None]
+        start = np.concatenate((first, ends[:-1]))[self.row]
+        out = arcs_out.along(start, ends[self.row], arcs.take(self.row), self.axis, self.fraction)
+        return np.where(self.kept[:, None], self.target, np.where(self.end[:, None], ends[self.row], out))
+
+
+def judged_points(job: Job, track: Track, rows: CorrectedRows, feeding: Bools) -> JudgedPoints:
+    """End points of the rows, and what lies between them on `feeding` pieces (p,)."""
+    n = len(rows.piece)
+    cut = feeding[rows.piece] & ~rows.joining
+    begins = np.concatenate(([True], rows.piece[1:] != rows.piece[:-1])) | np.concatenate(([True], rows.joining[:-1]))
+    start = np.where(begins, 0.0, np.concatenate(([0.0], rows.w[:-1])))
+    inner = np.flatnonzero(cut & (track.length[rows.piece] > 0.0))
+    bent = inner[rows.arcs.on[inner]]
+    rapid = np.flatnonzero((rows.kind == RAPID) & rows.corrected) if job.causes else inner[:0]
+    row = np.concatenate((np.arange(n), inner, bent, bent, np.repeat(rapid, len(WITHIN_RAPID))))
+    fraction = np.repeat([1.0, 0.5, 0.25, 0.75], [n, len(inner), len(bent), len(bent)])
+    fraction = np.concatenate((fraction, np.tile(WITHIN_RAPID, len(rapid))))
+    order = np.lexsort((fraction, row))
+    row, fraction = row[order], fraction[order]
+    end = fraction == 1.0
+    piece = rows.piece[row]
+    w = np.where(end, rows.w[row], start[row] + fraction * (rows.w - start)[row])
+    travel = travel_of(job, track, piece, w)
+    force = np.where(end[:, None], job.frame.vectors(rows.force)[row], travel.force)  # joining lines know better
+    kept = ~end & ((rows.kind == ARC) & ~rows.arcs.on)[row]
+    axis = track.path.axis[track.motion[piece]]
+    travel = replace(travel, force=force)
+    before = track.path.start[0] if n and track.path.known[0] else None
+    return JudgedPoints(row, fraction, axis, piece, w, track.points(piece, w), travel, cut[row], kept, before)
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """A program put through the full model: errors (k, 3) mm at the points, tips (N, 3) and states at the end points.
+
+    status (k,): 0 where the machine could be solved; the errors of other points are NaN.
+    """
+
+    error: Floats
+    status: Ints
+    tip: Floats
+    state: Correction
+
+
+def see(job: Job, points: JudgedPoints, ends: Floats, arcs: Arcs) -> Seen:
+    """The loaded machine along the moves between commanded end points (N, 3), program frame."""
+    told = points.along(ends, arcs)
+    tip, state = respond(job, told, points.travel, points.target, before=points.before)
+    at = {each.name: getattr(state, each.name)[points.end] for each in fields(state)}
+    return Seen(tip - points.target, state.status, tip[points.end], Correction(**at))
+
+
+def see_original(job: Job, points: JudgedPoints) -> Seen:
+    """The original program through the full model, at the same points."""
+    tip, state = respond(job, points.target, points.travel, before=points.before)
+    at = {each.name: getattr(state, each.name)[points.end] for each in fields(state)}
+    return Seen(tip - points.target, state.status, tip[points.end], Correction(**at))

@@ -1,0 +1,23 @@
+"""Lines that feed into material while the program has stopped the spindle: nothing cuts there, something breaks."""
+
+import numpy as np
+
+from camcomp.ground.datatypes import Ints
+from camcomp.model.cutting.track import NO_FORCE, Track
+
+MOST_LINES = 10  # that a warning names
+
+
+def cut_without_spindle(track: Track) -> Ints:
+    """Source lines, ascending, along which the model cuts while the program has stopped the spindle."""
+    still = np.flatnonzero(track.cutting & (track.path.turn[track.motion] == 0.0))
+    force = track.force(still, np.full(len(still), 0.5))
+    return np.unique(track.path.line[track.motion[still[np.linalg.norm(force, axis=1) > NO_FORCE]]])
+
+
+def spindle_warning(lines: Ints) -> list[str]:
+    """What to say of source lines, ascending, that cut with a stopped spindle."""
+    if not len(lines):
+        return []
+    named = ", ".join(str(line) for line in lines[:MOST_LINES]) + (" ..." if len(lines) > MOST_LINES else "")
+    return [f"the tool cuts with the spindle stopped (M5 or S0) at source lines {named}"]

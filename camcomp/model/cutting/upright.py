@@ -1,0 +1,107 @@
+"""Arcs in planes along the tool axis (G18, G19): where the direction across the tool turns over.
+
+Such an arc goes up or down the tool twice a turn. There its direction across the tool turns round, and the side force with it:
+at once where the arc stays in its plane, and over a short way where it also climbs out of it. Everything counts along the
+curve as it is: rounded end points make it a spiral, whose tangent is vertical somewhat beside the end of the radius.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from camcomp.ground.datatypes import ARC, Floats, Ints, Path
+
+BESIDE = 2e-4  # rad from a sharp turn at which the directions on its sides are taken
+AT_END = 1e-5  # rad from the ends of an arc at which its directions there are taken; at the vertical it has none
+NEAR_END = 1e-3  # rad: an arc that turns over so near to its end begins or ends there; its end points are rounded
+SHARP = 3e-4  # sine of the angle to the tool axis below which the direction turns over at once
+LEVEL = 1e-7  # sine of an arc that stays in its plane
+SPREAD, WIDE = 3.0, 0.3  # a turn that takes its time is divided at its width times powers of SPREAD, up to WIDE rad
+SIDES = 3.0  # times the width of a turn: where the direction beside it is taken
+ROUNDS = 6
+
+
+@dataclass(frozen=True, eq=False)
+class Verticals:
+    """Places (k,) where arcs come nearest to the direction of the tool: motion, fraction u, and the sine of what is left.
+
+    Those of a motion follow each other by u.
+    """
+
+    motion: Ints
+    u: Floats
+    sine: Floats
+
+    @classmethod
+    def none(cls) -> Verticals:
+        """No such place."""
+        return cls(np.zeros(0, np.int64), np.zeros(0), np.zeros(0))
+
+    @classmethod
+    def of(cls, path: Path, tool_axis: Floats) -> Verticals:
+        """All of a path."""
+        tool = np.asarray(tool_axis, float)
+        arcs = np.flatnonzero((path.kind == ARC) & (np.abs(path.axis @ tool) < 1e-3) & path.known & ~path.machine)
+        axis, angle = path.axis[arcs], path.angle[arcs]
+        side = np.cross(axis, tool)
+        first, last = path.start[arcs] - path.centre[arcs], path.end[arcs] - path.centre[arcs]
+        climb = np.sum((last - first) * axis, axis=1)
+        radius, final = (np.hypot(each @ tool, np.sum(each * side, axis=1)) for each in (first, last))
+        growth = final / np.maximum(radius, 1e-300) - 1.0
+        begin = np.arctan2(np.sum(first * side, axis=1), first @ tool)
+        low, high = np.minimum(begin, begin + angle), np.maximum(begin, begin + angle)
+        count = np.floor(high / np.pi - 0.5) - np.ceil(low / np.pi - 0.5) + 3.0  # one more on either side
+        of = np.repeat(np.arange(len(arcs)), count.astype(np.int64))
+        k = np.arange(len(of)) - np.searchsorted(of, of) + np.ceil(low / np.pi - 0.5)[of] - 1.0
+        u = np.zeros(len(of))
+        for _ in range(ROUNDS):  # the radius grows with u, by little
+            leans = np.arctan2(growth[of], angle[of] * (1.0 + growth[of] * u) * np.sign(angle[of])) * np.sign(angle[of])
+            u = ((k + 0.5) * np.pi + leans - begin[of]) / angle[of]
+        inside = (u >= -NEAR_END / np.abs(angle[of])) & (u <= 1.0 + NEAR_END / np.abs(angle[of]))
+        of, u = of[inside], u[inside]
+        way = np.hypot(radius[of] * angle[of] * (1.0 + growth[of] * u), radius[of] * growth[of])
+        sine = np.abs(climb[of]) / np.maximum(np.hypot(way, climb[of]), 1e-300)
+        order = np.lexsort((u, of))
+        return cls(arcs[of[order]], u[order], sine[order])
+
+    @property
+    def sides(self) -> Floats:
+        """Angles (k,) rad from sharp turns at which the directions beside them are taken."""
+        return np.maximum(BESIDE, SIDES * self.sine)
+
+    def overturns(self, path: Path) -> list[tuple[int, float]]:
+        """Motions and fractions, away from their ends, at which the direction turns over at once."""
+        end = NEAR_END / np.abs(path.angle[self.motion])
+        sharp = (self.sine < SHARP) & (self.u > end) & (self.u < 1.0 - end)
+        return [(int(i), float(u)) for i, u in zip(self.motion[sharp], self.u[sharp], strict=True)]
+
+    def swings(self, path: Path) -> tuple[Ints, Floats]:
+        """Motions and fractions at which arcs are divided because their direction turns round quickly beside them."""
+        slow = np.flatnonzero(self.sine > LEVEL)
+        powers = SPREAD ** np.arange(np.ceil(np.log(WIDE / BESIDE) / np.log(SPREAD)))
+        width = np.where(self.sine < SHARP, self.sides, self.sine)[slow, None] * powers
+        off = np.concatenate((-width[:, ::-1], width), axis=1) / np.abs(path.angle[self.motion[slow]])[:, None]
+        wanted = np.concatenate((width[:, ::-1], width), axis=1) <= WIDE
+        motion, u = np.repeat(self.motion[slow], off.shape[1])[wanted.ravel()], (self.u[slow, None] + off)[wanted]
+        inside = (u > 1e-6) & (u < 1.0 - 1e-6)
+        return motion[inside], u[inside]
+
+    def beside(self, path: Path, tool_axis: Floats, motion: Ints, u0: Floats, u1: Floats) -> tuple[Floats, Floats]:
+        """Fractions of the motion next to both ends of parts (p,) where the direction is that farther in."""
+        upright = (path.kind[motion] == ARC) & (np.abs(path.axis[motion] @ np.asarray(tool_axis, float)) < 0.999)
+        angle = np.where(upright, np.maximum(np.abs(path.angle[motion]), 4.0 * AT_END), 1.0)
+        head = np.where(upright, AT_END / angle, 0.0)
+        tail = head.copy()
+        end = NEAR_END / angle
+        sharp = self.sine < SHARP
+        for i, u, sides in zip(self.motion[sharp], self.u[sharp], self.sides[sharp], strict=True):
+            for p in np.flatnonzero(motion == i):
+                side = sides / angle[p]
+                if abs(u - u0[p]) <= end[p]:
+                    head[p] = max(head[p], u - u0[p] + side)
+                if abs(u - u1[p]) <= end[p]:
+                    tail[p] = max(tail[p], u1[p] - u + side)
+        most = 0.25 * (u1 - u0)
+        return np.minimum(head, most), np.minimum(tail, most)
