@@ -34,6 +34,11 @@ MARKUP = (
     b"0", b"&#10;robot: {}", b"&#0;", b"mimic", b"floating", b"fixed", b"xacro:a",
 )  # fmt: skip
 
+DECLARATIONS = tuple(
+    b"<?xml version='1.0' encoding='%s'?>" % each
+    for each in (b"no-such", b"utf-16", b"hex", b"latin-1", b"ascii", b"utf-7")
+)
+
 
 def mutated_text(random: Random, data: bytes, words: tuple[bytes, ...] = WORDS) -> bytes:
     """Some bytes, words or lines changed, anywhere."""
@@ -101,5 +106,7 @@ def mutated_table(random: Random, data: bytes) -> bytes:
 
 
 def mutated_markup(random: Random, data: bytes) -> bytes:
-    """An XML file with attributes, tags or bytes changed."""
+    """An XML file with attributes, tags or bytes changed, or with another first line."""
+    if random.random() < 0.1:
+        data = data.replace(data.split(b"\n")[0], random.choice((*DECLARATIONS, *MARKUP)))
     return mutated_text(random, data, MARKUP)

@@ -13,7 +13,7 @@ from camcomp.gcode.trace import Trace
 from camcomp.gcode.words import BLANK, Line, Word, code_of, read_line
 from camcomp.ground.errors import ProgramError
 
-_MOST_BLOCKS = 1_000_000  # executed by a program that has loops
+_MOST_BLOCKS = 150_000  # executed by a program that has loops
 _MOST_IDLE = 100_000  # of them in a row that move nothing
 _INCREMENTAL_LETTERS = "XYZIJKRQ"
 

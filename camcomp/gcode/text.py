@@ -14,6 +14,7 @@ from camcomp.ground.datatypes import Ints
 from camcomp.ground.errors import Location, ProgramError
 
 _END = re.compile(r"\r\n|\n|\r")
+LONGEST_LINE = 1 << 14  # characters; controls read some hundred
 _UTF16 = {b"\xff\xfe": "utf-16-le", b"\xfe\xff": "utf-16-be"}
 
 
@@ -28,7 +29,15 @@ class Text:
 
     @classmethod
     def read(cls, data: bytes, name: str) -> "Text":
-        """Text of `data`. Raises ProgramError CC128 when a file marked as UTF-16 is none."""
+        """Text of `data`. Raises ProgramError CC128 when a file marked as UTF-16 is none, CC140 for a line beyond reason."""
+        text = cls._decoded(data, name)
+        if len(text) and (length := int((text.ends - text.starts).max())) > LONGEST_LINE:
+            at = Location(name, int(np.argmax(text.ends - text.starts)) + 1, 1)
+            raise ProgramError("CC140", f"the line has {length} characters, more than {LONGEST_LINE}", at=at)
+        return text
+
+    @classmethod
+    def _decoded(cls, data: bytes, name: str) -> "Text":
         codec = _UTF16.get(data[:2])
         if codec is None:
             mark = b"\xef\xbb\xbf" if data.startswith(b"\xef\xbb\xbf") else b""

@@ -18,6 +18,8 @@ from camcomp.ground.bounds import number_of
 from camcomp.ground.datatypes import Floats
 from camcomp.ground.errors import ConfigError, Location
 
+MOST_TABLE_ROWS = 5_000_000  # more than an hour at 1 kHz
+MOST_TABLE_BYTES = 1 << 30
 _SPREADSHEET_MARKS = ";\t,"
 
 
@@ -87,8 +89,11 @@ def read_csv(data: bytes | str, name: str, rules: TableRules, *, spreadsheet: bo
 
     spreadsheet: cells may be parted by semicolons or tabs, and then numbers may have decimal commas.
     """
+    if len(data) > MOST_TABLE_BYTES:
+        raise ConfigError("CC425", f"more than {MOST_TABLE_BYTES} bytes", at=Location(name, 1, 1))
     text = data.decode("utf-8", errors="replace") if isinstance(data, bytes) else data
     text = text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
+    refuse_long(text.count("\n"), "the table", Location(name, 1, 1))
     source = text.split("\n")
     first = next((each for each in source if each.strip()), "")
     mark = max(_SPREADSHEET_MARKS, key=first.count) if spreadsheet else ","
@@ -108,6 +113,12 @@ def read_csv(data: bytes | str, name: str, rules: TableRules, *, spreadsheet: bo
             message = f"{len(row)} cells under {len(header)} column names"
             raise ConfigError(rules.cell, message, at=table.at(i, beyond))
     return table
+
+
+def refuse_long(rows: float, what: str, at: Location | None = None) -> None:
+    """Raise ConfigError CC425 for more rows than any work here needs."""
+    if not rows <= MOST_TABLE_ROWS:
+        raise ConfigError("CC425", f"{what} has {rows:.3g} rows, more than {MOST_TABLE_ROWS}", at=at)
 
 
 def _rows(

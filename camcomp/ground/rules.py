@@ -136,7 +136,8 @@ RULES: dict[str, Rule] = {
     ),
     "CC126": Rule(
         "program without end",
-        "A million blocks were executed, or a hundred thousand without a motion, or calls are nested a hundred deep.",
+        "A hundred and fifty thousand blocks were executed by a program with loops or calls, or a hundred thousand without a "
+        "motion, or calls are nested a hundred deep.",
         "check the condition of the loop",
     ),
     "CC127": Rule(
@@ -186,6 +187,12 @@ RULES: dict[str, Rule] = {
         "Behind a comma, controls expect a corner radius or a chamfer, which changes the geometry; and some people "
         "write decimal commas.",
         "post corners as arcs and lines",
+    ),
+    "CC140": Rule(
+        "line too long",
+        "No control reads a line of more than some hundred characters; one of 16 384 is no NC program, or has lost its ends "
+        "of line.",
+        "is this the right file?",
     ),
     # --- CC2xx usage, YAML, config -----------------------------------------------------------------------------
     "CC200": Rule(
@@ -487,6 +494,11 @@ RULES: dict[str, Rule] = {
         "name of a run",
         "Runs are called by their files, without folder and suffix. Each name has to be there once.",
         "rename a file",
+    ),
+    "CC425": Rule(
+        "table too long",
+        "A log or another table has more rows than memory and patience should be spent on.",
+        "log less often, or cut the run into several; check the feed, the acceleration and --step-s",
     ),
     "CC450": Rule(
         "table not readable",

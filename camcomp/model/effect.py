@@ -43,7 +43,7 @@ class Parameter:
         if self.scan:
             value = coordinate
         else:
-            value = self.nominal * float(np.exp(coordinate)) if self.log else self.nominal + coordinate
+            value = self.nominal * float(np.exp(min(coordinate, 700.0))) if self.log else self.nominal + coordinate
         return float(min(max(value, self.low), self.high))
 
     def coordinate(self, value: float) -> float:

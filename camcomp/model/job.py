@@ -14,7 +14,7 @@ import numpy as np
 
 from camcomp.ground import shelf
 from camcomp.ground.datatypes import Floats
-from camcomp.ground.errors import ConfigError, Location, PhysicsError
+from camcomp.ground.errors import ConfigError, PhysicsError
 from camcomp.model import signal_path
 from camcomp.model.config.spec import Config
 from camcomp.model.cutting.cut import Cut
@@ -119,9 +119,7 @@ class Job:
         member = shelf.load("forces", choice.model)
         none = choice.model == "none"
         return Conditions(
-            model=None
-            if none
-            else partial(_finite, c, partial(_call, member.force, choice.params, c.at("process", "force"))),
+            model=None if none else partial(_forces, member.force, choice.params, c),
             plunges=bool(getattr(member, "PLUNGES", False)),
             tool_axis=self.frame.rotation.T @ self.machine.nominal.held_rotation[:, 2],
             stock_top_mm=c.workpiece.stock_top_mm,
@@ -146,21 +144,19 @@ def _bare(value: Any) -> Any:
     return value
 
 
-def _call(force: Callable[[Cut, Any], Floats], params: Any, place: Location | None, cut: Cut) -> Floats:
-    """Forces of a model. What it asks for in vain stands, or ought to stand, in the machine file."""
+def _forces(force: Callable[[Cut, Any], Floats], params: Any, config: Config, cut: Cut) -> Floats:
+    """Forces of a model; what it asks for in vain stands, or ought to stand, in the machine file.
+
+    Raises what the model raises, PhysicsError CC306 where a force is not finite.
+    """
     try:
-        return force(cut, params)
+        found = force(cut, params)
     except ConfigError as error:
-        error.at = error.at or place
+        error.at = error.at or config.at("process", "force")
         raise
-
-
-def _finite(config: Config, model: Callable[[Cut], Floats], cut: Cut) -> Floats:
-    """The forces (n, 3) of a model. Raises PhysicsError CC306 where one is not finite."""
-    force = model(cut)
-    bad = ~np.isfinite(force).all(axis=-1)
+    bad = ~np.isfinite(found).all(axis=-1)
     if bad.any():
-        name, line = config.process.force.model, cut.line[int(np.argmax(bad))]
-        message = f"force model '{name}': the force in program line {line} is not finite"
+        line = cut.line[int(np.argmax(bad))]
+        message = f"force model '{config.process.force.model}': the force in program line {line} is not finite"
         raise PhysicsError("CC306", message, at=config.at("process", "force", "model"))
-    return force
+    return found

@@ -146,7 +146,8 @@ def compensate(
         points = judged_points(job, track, rows, feeding)
         after = see(job, points, written.end, replace(rows.arcs, centre=written.centre))
         worst = np.zeros(len(tolerance))
-        np.maximum.at(worst, points.piece[points.judged], np.linalg.norm(after.error[points.judged], axis=1))
+        size = np.where(after.status == 0, np.linalg.norm(after.error, axis=1), np.inf)
+        np.maximum.at(worst, points.piece[points.judged], size[points.judged])
         missed = (worst > 1e-3 * tolerance_um) & ~kept
         count = np.diff(nodes.first)
         stuck = missed & (worst >= STUCK * last) & (count > last_count)
@@ -161,6 +162,9 @@ def compensate(
             missed, tolerance * np.clip(0.9e-3 * tolerance_um / np.maximum(worst, 1e-12), 0.3, 0.9), tolerance
         )
     before = see_original(job, points)
+    for seen in (after, before):
+        judged = points.judged
+        refuse_unsolved(program, track, points.piece[judged], points.target[judged], seen.status[judged])
     still = np.intersect1d(cut_without_spindle(track), path.line[track.motion[feeding]])
     warnings = _warnings(job, rows) + spindle_warning(still)
     iterations = int(aimed.iterations.max(initial=0))

@@ -76,9 +76,13 @@ def judged_points(job: Job, track: Track, rows: CorrectedRows, feeding: Bools) -
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """A program put through the full model: errors (k, 3) mm at the points, tips (N, 3) and states at the end points."""
+    """A program put through the full model: errors (k, 3) mm at the points, tips (N, 3) and states at the end points.
+
+    status (k,): 0 where the machine could be solved; the errors of other points are NaN.
+    """
 
     error: Floats
+    status: Ints
     tip: Floats
     state: Correction
 
@@ -88,11 +92,11 @@ def see(job: Job, points: JudgedPoints, ends: Floats, arcs: Arcs) -> Seen:
     told = points.along(ends, arcs)
     tip, state = respond(job, told, points.travel, points.target, before=points.before)
     at = {each.name: getattr(state, each.name)[points.end] for each in fields(state)}
-    return Seen(tip - points.target, tip[points.end], Correction(**at))
+    return Seen(tip - points.target, state.status, tip[points.end], Correction(**at))
 
 
 def see_original(job: Job, points: JudgedPoints) -> Seen:
     """The original program through the full model, at the same points."""
     tip, state = respond(job, points.target, points.travel, before=points.before)
     at = {each.name: getattr(state, each.name)[points.end] for each in fields(state)}
-    return Seen(tip - points.target, tip[points.end], Correction(**at))
+    return Seen(tip - points.target, state.status, tip[points.end], Correction(**at))

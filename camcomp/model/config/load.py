@@ -147,13 +147,15 @@ def _check_config(tree: Node) -> tuple[Config | None, list[CamcompError]]:
 
 
 def _robot_from_plugin(node: Node) -> tuple[RobotSpec | None, list[CamcompError]]:
+    chosen = node.value["type"]
+    if not isinstance(chosen.value, str):
+        return None, [ConfigError("CC204", "robot.type: has to be the name of a kind of robot", at=chosen.at)]
     if "chains" in node.value:
         message = "a robot is given by its type or by its chains, not by both"
         return None, [ConfigError("CC215", message, at=node.value["chains"].key_at)]
     params, errors = _plugin("robots", "type", node, name="robot", also=ROBOT_KEYS)
     if params is None or errors:
         return None, errors
-    chosen = node.value["type"]
     chains = shelf.load("robots", chosen.value).chains(params)
     own = {key: node.value[key] for key in ROBOT_KEYS if key in node.value}
     # What is wrong with chains that a plug-in made is told where the plug-in is named.

@@ -7,11 +7,13 @@ Elements stand in chain order and in the local frame left by the elements before
 from math import radians
 from typing import Annotated, ClassVar, Literal
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from camcomp.model.config.base import Axis, AxisLetter, Limits, Name, Positive, Spec, Vector, Zero
 from camcomp.model.config.links import Spring
+
+SHORTEST_ARM_MM = 1e-6
 
 # ---------------------------------------------------------------------------------------------------------------------
 # elements
@@ -143,11 +145,17 @@ class LinkSpec(Spring):
     type: Literal["link"]
 
 
+def _some_length(arm: list[float]) -> list[float]:
+    if max(map(abs, arm)) < SHORTEST_ARM_MM:
+        raise PydanticCustomError("CC205", "an arm without length has no direction")
+    return arm
+
+
 class ParallelogramSpec(Spec):
     """Two equal bars between hinges: the arm turns about `hinge`, the cross-bar keeps its orientation."""
 
     type: Literal["parallelogram"]
-    arm_mm: Vector
+    arm_mm: Annotated[Vector, AfterValidator(_some_length)]
     hinge: AxisLetter
     crossbar: AxisLetter
     width_mm: Positive

@@ -120,7 +120,7 @@ class Process(Spec):
 class Control(Spec):
     """The NC control: what the program text alone does not say."""
 
-    resolution_mm: Positive = 0.001
+    resolution_mm: Annotated[float, Field(ge=1e-9)] = 0.001
     start_mm: Vector = Zero
     dialect: str | None = Field(None, description="member of the shelf dialects; default: found from the text")
     offsets_mm: dict[WorkOffset, Vector] = Field(
@@ -151,7 +151,7 @@ class Compensation(Spec):
     """How the correction is found."""
 
     method: Literal["newton", "stiffness", "fixed-point", "linear"] = "newton"
-    tolerance_um: Positive = 1.0
+    tolerance_um: Annotated[float, Field(ge=1e-6)] = 1.0
     arcs: bool = Field(
         False, description="programmed arcs come out as arcs (G2, G3) where those are fewer than straight lines"
     )

@@ -87,7 +87,11 @@ class _BeyondBudget(Exception):
 class _Composer(Composer):
     """Composes no more than the budgets allow."""
 
-    values = depth = 0
+    values = level = 0
+
+    def __init__(self, loader: Any = None) -> None:
+        super().__init__(loader)
+        self.warn_double_anchors = False  # YAML allows them
 
     def __init__(self, loader: Any = None) -> None:
         super().__init__(loader)
@@ -96,15 +100,15 @@ class _Composer(Composer):
     def compose_node(self, parent: Any, index: Any) -> Any:
         """A node with all below it."""
         self.values += 1
-        self.depth += 1
+        self.level += 1
         if self.values > MOST_VALUES:
             raise _BeyondBudget(f"more than {MOST_VALUES} values", self.parser.peek_event().start_mark)
-        if self.depth > DEEPEST:
+        if self.level > DEEPEST:
             raise _BeyondBudget("nested too deeply", self.parser.peek_event().start_mark)
         try:
             return super().compose_node(parent, index)
         finally:
-            self.depth -= 1
+            self.level -= 1
 
 
 class _Builder:
@@ -168,6 +172,9 @@ class _Builder:
     def _scalar(self, node: ScalarNode, at: Location) -> Any:
         kind = str(node.tag).removeprefix("tag:yaml.org,2002:")
         text = node.value
+        if any(each == "\0" or "\ud800" <= each <= "\udfff" for each in text):
+            self.errors.append(ConfigError("CC200", "a zero byte or half a character is no text", at=at))
+            return None
         try:
             if kind == "null":
                 return None

@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from camcomp.ground.csv_table import refuse_long
 from camcomp.ground.datatypes import Floats, Ints, Path
 from camcomp.ground.errors import ProgramError
 from camcomp.model.cutting.spindle import cut_without_spindle, spindle_warning
@@ -33,12 +34,13 @@ def simulate(job: Job, path: Path, step_s: float, *, cutting: bool = True, start
     """Rows every step_s seconds from the first feed move to the end of the last, that end included.
 
     Speed is trapezoidal along every motion and zero at its ends; rapids are not logged. Raises ProgramError CC420 when
-    the program has no feed move, PhysicsError where the machine cannot be.
+    the program has no feed move, ConfigError CC425 for too many rows, PhysicsError where the machine cannot be.
     """
     twin = twin_of(job)
     timeline = schedule(path, job.config.control.acceleration_mm_per_s2)
     if not len(timeline.index):
         raise ProgramError("CC420", "the program has no feed move")
+    refuse_long(timeline.end / step_s, "the log")
     time = np.arange(0.0, timeline.end, step_s)
     if timeline.end - time[-1] > 1e-9:
         time = np.append(time, timeline.end)

@@ -37,7 +37,7 @@ INTERRUPTED = 130  # stands in the summary when a signal or a bug ended the batc
 )
 @click.option("--joints", is_flag=True, help="Write a joint table beside every program.")
 @click.option("--method", type=click.Choice(["newton", "stiffness", "fixed-point", "linear"]), help="As in compensate.")
-@click.option("--tolerance-um", type=click.FloatRange(min=0, min_open=True), help="Bound of the error left.")
+@click.option("--tolerance-um", type=click.FloatRange(min=1e-6), help="Bound of the error left.")
 @findings_options("sarif", "junit")
 @quiet_option
 def command(

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     type=click.Choice(["newton", "stiffness", "fixed-point", "linear"]),
     help="How the target is found; default: what the machine file says, newton.",
 )
-@click.option("--tolerance-um", type=click.FloatRange(min=0, min_open=True), help="Bound of the error left.")
+@click.option("--tolerance-um", type=click.FloatRange(min=1e-6), help="Bound of the error left.")
 @click.option("--arcs/--no-arcs", default=None, help="Arcs come out as arcs where those are fewer than straight lines.")
 @click.option("--dry-run", is_flag=True, help="Do everything but write.")
 @quiet_option

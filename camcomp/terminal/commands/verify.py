@@ -18,7 +18,7 @@ from camcomp.terminal.progress import say, working
 @click.option("--json", "json_file", metavar="OUT.json", type=OUTPUT, help="Residuals, in all and per source line.")
 @findings_options("sarif", "junit")
 @quiet_option
-@click.option("--tolerance-um", type=click.FloatRange(min=0, min_open=True), help="Largest residual that passes.")
+@click.option("--tolerance-um", type=click.FloatRange(min=1e-6), help="Largest residual that passes.")
 def command(
     corrected: str,
     original: str,

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from camcomp.ground import csv_table
 from camcomp.ground.csv_table import TableRules, read_csv
 from camcomp.ground.errors import ConfigError
 
@@ -63,3 +64,18 @@ def test_what_is_no_table_is_refused_where_it_stands(text, rule, line, column, t
         table.values()
     at = caught.value.at
     assert (caught.value.rule, at.file, at.line, at.column) == (rule, "t.csv", line, column)
+
+
+def test_a_table_beyond_all_patience_is_refused_before_it_is_read(monkeypatch):
+    monkeypatch.setattr(csv_table, "MOST_TABLE_ROWS", 3)
+    for data in (b"a\n1\n2\n3\n4\n", b"a\r1\r2\r3\r4\r"):
+        with pytest.raises(ConfigError) as caught:
+            read_csv(data, "log.csv", RULES)
+        assert caught.value.rule == "CC425"
+
+
+@pytest.mark.parametrize("cell", ["1e308", "-1e19", "1_0", "\uff11", "infinity"])
+def test_a_cell_is_a_number_of_this_world(cell):
+    with pytest.raises(ConfigError) as caught:
+        read_csv(f"a,b\n1,{cell}\n", "log.csv", RULES).values()
+    assert caught.value.at.line == 2 and caught.value.at.column == 3

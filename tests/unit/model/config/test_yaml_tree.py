@@ -1,3 +1,5 @@
+import time
+
 import pytest
 
 from camcomp.model.config.yaml_tree import find, leaves, merge, plain, read_tree
@@ -54,7 +56,7 @@ def test_anchors_and_merge_keys():
         ("a: {<<: 3}\n", ("CC204", 1, 9)),
         (b"a: 1\nb: \xff\n", ("CC200", 2, 4)),
         ("a: 1\nb: \x07\n", ("CC200", 2, 4)),
-        ("[" * 5000, ("CC200", 1, 1)),
+        ("[" * 5000, ("CC217", 1, 51)),
     ],
 )
 def test_what_is_no_clean_yaml_has_its_place(text, expected):
@@ -114,3 +116,38 @@ def test_paths_are_relative_to_their_own_file():
 def test_leaves_have_dotted_names():
     named = {name: plain(node) for name, node in leaves(tree_of("{a: {b: [{c: 1}, {c: [2, 3]}]}, d: []}"))}
     assert named == {"a.b[1].c": 1, "a.b[2].c": [2, 3], "d": []}
+
+
+BOMB = "a: &a [1,1,1,1,1,1,1,1,1,1]\n" + "".join(
+    f"{name}: &{name} [{','.join(['*' + before] * 10)}]\n" for before, name in zip("abcdefgh", "bcdefghi", strict=True)
+)
+MERGES = "a0: &a0 {x: 1}\n" + "".join(
+    f"a{i}: &a{i} {{<<: *a{i - 1}, b: *a{i - 1}, c: *a{i - 1}}}\n" for i in range(1, 40)
+)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [BOMB, MERGES, "[" + "1," * 30_000 + "1]", "[" * 5000, "{a: " * 3000, "- " * 5000, "? " * 5000, "# x\n" * 300_000],
+    ids=["aliases", "merges", "values", "lists", "maps", "items", "keys", "bytes"],
+)
+def test_budgets_end_what_no_machine_file_needs(text):
+    begun = time.process_time()
+    tree, errors = read_tree(text.encode(), "file.yaml")
+    assert tree is None and [each.rule for each in errors] == ["CC217"] and errors[0].at.line >= 1
+    assert time.process_time() - begun < 2.0
+
+
+@pytest.mark.parametrize("number", ["1e308", "-1e19", "9" * 300, "0x" + "f" * 99])
+def test_numbers_have_bounds(number):
+    errors = read_tree(f"robot:\n  length_mm: {number}\n".encode(), "file.yaml")[1]
+    assert [(each.rule, each.at.line) for each in errors] == [("CC205", 2)]
+
+
+@pytest.mark.parametrize("text", ["\\0", "\\ud800"])
+def test_text_that_no_file_name_may_hold(text):
+    assert [each.rule for each in read_tree(f'file: "{text}"\n'.encode(), "file.yaml")[1]] == ["CC200"]
+
+
+def test_an_anchor_may_be_used_again():
+    assert read_tree(b"a: &x 1\nb: &x 2\nc: *x\n", "file.yaml")[1] == []
