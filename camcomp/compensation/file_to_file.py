@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
 from camcomp.compensation.program.result import Summary
 from camcomp.compensation.report.joint_table import joint_table

@@ -47,7 +47,7 @@ def _not_kept(reason: str) -> None:
     )
 
 
-class _UserWide(_caching.UserWideCacheLocator):
+class _UserWide(_caching.UserWideCacheLocator):  # type: ignore[misc]
     """The user's cache folder, for users who have one: without a home it would be one in the current folder, called ~."""
 
     @classmethod
@@ -56,11 +56,11 @@ class _UserWide(_caching.UserWideCacheLocator):
         return super().from_function(py_func, py_file) if known else None
 
 
-class _Place(_caching.CompileResultCacheImpl):
+class _Place(_caching.CompileResultCacheImpl):  # type: ignore[misc]
     _locator_classes: ClassVar = [_caching.UserProvidedCacheLocator, _caching.InTreeCacheLocator, _UserWide]
 
 
-class _Cache(_caching.FunctionCache):
+class _Cache(_caching.FunctionCache):  # type: ignore[misc]
     _impl_class = _Place
 
     def __init__(self, function: Callable[..., Any]) -> None:

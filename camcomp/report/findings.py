@@ -9,7 +9,7 @@ from pathlib import Path, PurePath
 from typing import Any
 
 from camcomp.ground.errors import CamcompError, CheckFailed
-from camcomp.ground.files import STANDARD
+from camcomp.ground.places import STANDARD
 
 WARNING = "warning"  # rule of what is only a warning; warnings have no ids of their own
 

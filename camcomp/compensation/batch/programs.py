@@ -227,7 +227,7 @@ def _refused(found: FoundProgram, error: CamcompError) -> Status:
     return Status(str(found.source), None, ERROR, error.exit_code, {}, messages)
 
 
-def summary(statuses: Sequence[Status], programs: Sequence[FoundProgram] = (), stopped: int = 0) -> dict:
+def summary(statuses: Sequence[Status], programs: Sequence[FoundProgram] = (), stopped: int = 0) -> dict[str, Any]:
     """The figures of a batch: counts, the exit code, and every program in the order of its name.
 
     stopped: exit code of what ended the batch before all of `programs` had their turn; those left are not done.

@@ -49,7 +49,7 @@ class Outcome:
     messages: list[dict[str, Any]] = field(default_factory=list)  # rule, message, and where: file, line, column
     program: bytes | None = None
     joints: bytes | None = None
-    figures: dict = field(default_factory=dict)
+    figures: dict[str, Any] = field(default_factory=dict)
     version: str = __version__  # of the camcomp that did the work
     notes: dict[str, str] = field(default_factory=dict)  # by topic, for the user of the batch
 

@@ -38,7 +38,8 @@ class JudgedPoints:
     @property
     def end(self) -> Bools:
         """Which ones are end points."""
-        return self.fraction == 1.0
+        out: Bools = self.fraction == 1.0
+        return out
 
     def along(self, ends: Floats, arcs: Arcs) -> Floats:
         """Points (k, 3) of the moves between end points (N, 3)."""

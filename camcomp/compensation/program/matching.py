@@ -7,6 +7,7 @@ of the moves tells: those of a piece go along it, and a joining line goes from o
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -93,7 +94,7 @@ class _Way:
     stretch: float  # mm by which its pieces are longer or shorter than expected: whether it is worth following
     at: int
     joins: int
-    bounds: tuple | None  # (bounds of the pieces before, first, last)
+    bounds: tuple[Any, ...] | None  # (bounds of the pieces before, first, last)
 
 
 def _by_course(

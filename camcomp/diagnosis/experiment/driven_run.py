@@ -115,7 +115,8 @@ def _near(log: str, name: str, measured: Measured, rho: Floats, program: _Progra
     """Tips (n, 3), program frame, near those of actuators rho (n, m)."""
     if program is not None:
         _, index = KDTree(program.rho).query(rho)
-        return program.tips[index]
+        near: Floats = program.tips[index]
+        return near
     known = np.isfinite(measured.tip).all(axis=1)
     if not known.any():
         message = f"run '{name}' has neither a program nor measured tips: its place is not known"
@@ -142,7 +143,8 @@ def _close(time: Floats, known: Bools) -> Bools:
     at = time[known]
     after = np.clip(np.searchsorted(at, time), 0, len(at) - 1)
     before = np.maximum(after - 1, 0)
-    return known | ((at[after] - at[before]) < GAP_ROWS * usual) & (time >= at[0]) & (time <= at[-1])
+    out: Bools = known | ((at[after] - at[before]) < GAP_ROWS * usual) & (time >= at[0]) & (time <= at[-1])
+    return out
 
 
 def _idle_or_not(forces: Forces, aligned: Aligned, program: _Program, tip: Floats, time: Floats) -> Bools:

@@ -80,7 +80,8 @@ class Bench:
     nominal: list[Reading] = field(default_factory=list)
     _row_slopes: dict[int, Floats] = field(default_factory=dict)
     _out: list[Bools] = field(default_factory=list)
-    _changed: dict[tuple, Solved] = field(default_factory=dict)  # structures of changed machines, by run and change
+    # structures of changed machines, by run and change
+    _changed: dict[tuple[Any, ...], Solved] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for run in self.runs:

@@ -35,7 +35,7 @@ class NoiseFloor:
     @property
     def axis_mm(self) -> float:
         """Per axis of the tip."""
-        return 1e-3 * self.tip_um / np.sqrt(3.0)
+        return float(1e-3 * self.tip_um / np.sqrt(3.0))
 
 
 def measure_floor(bench: Bench, stated_mm: float | None = None) -> NoiseFloor:

@@ -93,10 +93,6 @@ class _Composer(Composer):
         super().__init__(loader)
         self.warn_double_anchors = False  # YAML allows them
 
-    def __init__(self, loader: Any = None) -> None:
-        super().__init__(loader)
-        self.warn_double_anchors = False  # YAML allows them
-
     def compose_node(self, parent: Any, index: Any) -> Any:
         """A node with all below it."""
         self.values += 1

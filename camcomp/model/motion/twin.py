@@ -1,13 +1,15 @@
 """The one forward model: set-points in time -> control -> drive -> structure -> tool -> workpiece -> sensor.
 
-simulate prints it, diagnose compares it with logs, compensate inverts it. Hooks of effects act where signal_path.py says. The loaded equilibrium is solved at the nodes of a run path; between them, and for small differences, its
-first derivatives carry on.
+simulate prints it, diagnose compares it with logs, compensate inverts it. Hooks of effects act where signal_path.py says.
+The loaded equilibrium is solved at the nodes of a run path; between them, and for small differences, its first derivatives
+carry on.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -83,7 +85,7 @@ class Twin:
     rotation: Floats
     causes: tuple[Cause, ...] = ()
     # what was worked out before, for this machine with these causes; a copy of a changed twin starts without
-    _machines: dict[tuple, Machine] = field(default_factory=dict, init=False, repr=False)
+    _machines: dict[tuple[Any, ...], Machine] = field(default_factory=dict, init=False, repr=False)
     _usual: WeakKeyDictionary[RunPath, tuple[Motion, Motion]] = field(
         default_factory=WeakKeyDictionary, init=False, repr=False
     )
@@ -134,7 +136,7 @@ class Twin:
                 break
         return np.asarray(tip[nearest] + np.einsum("nij,nj->ni", back[nearest], rho - rho[knots][nearest]))
 
-    def edited(self, causes: Sequence[Cause]) -> tuple[Robot, tuple]:
+    def edited(self, causes: Sequence[Cause]) -> tuple[Robot, tuple[Any, ...]]:
         """The machine with the effects on it, and a key that tells equal ones."""
         robot, by = signal_path.edited(causes, self.actuators, self.robot)
         return robot, tuple((cause.name, cause.target, tuple(sorted(cause.values.items()))) for cause in by)

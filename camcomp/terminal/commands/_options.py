@@ -8,7 +8,7 @@ import click
 from camcomp.ground.places import one_place_each
 
 
-class OutputFile(click.ParamType):
+class OutputFile(click.ParamType[str]):
     """Name of an output, or "-": none twice in one command, which is said before the work begins."""
 
     name = "file"

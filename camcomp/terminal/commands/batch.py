@@ -7,7 +7,7 @@ import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -98,7 +98,8 @@ def command(
         write_all(findings_files("batch", cases, sarif_file=sarif_file, junit_file=junit_file))
     counts = ", ".join(f"{count} {name}" for name, count in figures["counts"].items() if count)
     say(f"{figures['programs']} programs: {counts}", quiet=quiet)
-    return figures["exit_code"]
+    out: int = figures["exit_code"]
+    return out
 
 
 def _work(
@@ -113,7 +114,9 @@ def _work(
             _tell(status, len(statuses), len(programs))
 
 
-def _note_down(plan: Plan, statuses: Sequence[Status], programs: Sequence[FoundProgram], stopped: int) -> dict:
+def _note_down(
+    plan: Plan, statuses: Sequence[Status], programs: Sequence[FoundProgram], stopped: int
+) -> dict[str, Any]:
     """Writes what became of every program so far; the figures."""
     from camcomp.compensation.batch.programs import summary
     from camcomp.ground.files import write_all

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import click
 
 from camcomp.ground.errors import CheckFailed, ConfigError
-from camcomp.ground.files import STANDARD, write_all
+from camcomp.ground.files import write_all
+from camcomp.ground.places import STANDARD
 from camcomp.terminal.commands._options import OUTPUT
 
 if TYPE_CHECKING:

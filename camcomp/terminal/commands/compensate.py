@@ -6,7 +6,8 @@ import click
 
 from camcomp import __version__
 from camcomp.ground.errors import CheckFailed
-from camcomp.ground.files import STANDARD, display_name, open_source, read_bytes, write_all
+from camcomp.ground.files import display_name, open_source, read_bytes, write_all
+from camcomp.ground.places import STANDARD
 from camcomp.model.config.load import load_config
 from camcomp.terminal.commands._options import OUTPUT, quiet_option
 from camcomp.terminal.progress import say, working

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from camcomp.ground.files import STANDARD, read_bytes, write_all
+from camcomp.ground.files import read_bytes, write_all
+from camcomp.ground.places import STANDARD
 from camcomp.model.config.write_back import machine_file, with_causes
 from camcomp.terminal.commands._options import OUTPUT, quiet_option
 from camcomp.terminal.progress import say, working

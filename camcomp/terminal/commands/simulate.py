@@ -2,7 +2,8 @@
 
 import click
 
-from camcomp.ground.files import STANDARD, write_all
+from camcomp.ground.files import write_all
+from camcomp.ground.places import STANDARD
 from camcomp.model.config.load import load_config
 from camcomp.terminal.commands._options import OUTPUT
 from camcomp.terminal.progress import say

@@ -8,7 +8,8 @@ from typing import TypeVar
 import click
 
 from camcomp.ground.errors import CamcompError, raise_all
-from camcomp.ground.files import STANDARD, display_name, read_bytes, write_all
+from camcomp.ground.files import display_name, read_bytes, write_all
+from camcomp.ground.places import STANDARD
 from camcomp.model.config.load import check_config, is_experiment, load_config, load_experiment
 from camcomp.report.findings import WARNING, Case, Finding, findings_of
 from camcomp.report.outputs import findings_files
