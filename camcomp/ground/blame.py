@@ -6,17 +6,17 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from camcomp.ground.errors import CamcompError, ConfigError, Location
+from camcomp.ground.errors import CamcompError, ConfigError, Location, Terminated
 
 _PACKAGE = str(Path(__file__).parent.parent)
 
 
 @contextmanager
 def blamed(who: str) -> Iterator[None]:
-    """Turns what is raised inside, CamcompErrors excepted, into ConfigError CC281 about `who`, chained to it."""
+    """Turns what is raised inside into ConfigError CC281 about `who`, chained to it; not what camcomp says itself or is told."""
     try:
         yield
-    except (CamcompError, KeyboardInterrupt, GeneratorExit):
+    except (CamcompError, KeyboardInterrupt, Terminated, GeneratorExit):
         raise
     except BaseException as error:
         what = f"{type(error).__name__}: {error}".rstrip(": ")

@@ -46,6 +46,14 @@ class CamcompError(Exception):
         return (self, *(each for other in self.others for each in other.all()))
 
 
+class Terminated(BaseException):
+    """A signal asks the process to end; whatever is open is closed on the way out, and no file is left half-written."""
+
+    def __init__(self, number: int) -> None:
+        super().__init__(number)
+        self.number = number
+
+
 class PluginWarning(UserWarning):
     """A plug-in of the user's cannot be used and is left out of a list; a run that names it gets an error instead."""
 

@@ -17,7 +17,7 @@ from pathlib import Path
 from pkgutil import iter_modules
 from typing import Any
 
-from camcomp.ground.errors import ConfigError, Location, PluginWarning
+from camcomp.ground.errors import ConfigError, Location, PluginWarning, Terminated
 
 SHELVES = ("robots", "dialects", "forces", "effects")
 
@@ -112,7 +112,7 @@ def _load(shelf: str, announced: EntryPoint) -> Any:
     try:
         with redirect_stdout(sys.stderr):  # standard output is for data
             found = announced.load()
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, Terminated):
         raise
     except BaseException as error:
         what = f"{type(error).__name__}: {error}".rstrip(": ")

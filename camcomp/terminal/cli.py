@@ -18,7 +18,7 @@ from typing import Any
 import click
 
 from camcomp import __version__
-from camcomp.ground.errors import CamcompError, FileError, PluginWarning, format_error
+from camcomp.ground.errors import CamcompError, FileError, PluginWarning, Terminated, format_error
 from camcomp.ground.files import remembering_inputs
 from camcomp.ground.garbage import collect_seldom
 from camcomp.terminal.standard_streams import stand_in_for_closed
@@ -82,14 +82,6 @@ class _Verbs(click.Group):
 @click.version_option(__version__, prog_name="camcomp", message="%(prog)s %(version)s")
 def cli() -> None:
     """G-code and a machine file in, G-code that makes up for the machine's compliance out."""
-
-
-class Terminated(BaseException):
-    """A signal asks the process to end; whatever is open is closed on the way out, and no file is left half-written."""
-
-    def __init__(self, number: int) -> None:
-        super().__init__(number)
-        self.number = number
 
 
 def _terminate(number: int, _frame: FrameType | None) -> None:

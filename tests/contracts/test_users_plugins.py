@@ -11,7 +11,7 @@ from camcomp.diagnosis.experiment.open_experiment import open_experiment
 from camcomp.diagnosis.fit.bench import Bench, CandidateCause
 from camcomp.diagnosis.fit.columns import working_causes
 from camcomp.ground import shelf
-from camcomp.ground.errors import ConfigError, PluginWarning
+from camcomp.ground.errors import ConfigError, PluginWarning, Terminated
 from camcomp.terminal.cli import run
 from tests.commandline import ROOT
 from tests.installed import install
@@ -154,6 +154,12 @@ def test_a_plugin_that_cannot_be_imported(shelf_name, source, told, put, capsys)
     assert "cannot be imported" in said and told in said
     if source is not None:
         assert ".py:" in said, "the place in the plug-in is told"
+
+
+def test_a_signal_while_a_plugin_is_imported_is_not_its_fault(put):
+    name = put("effects", "from camcomp.ground.errors import Terminated\nraise Terminated(15)\n")
+    with pytest.raises(Terminated):
+        shelf.load("effects", name)
 
 
 @pytest.mark.parametrize("shelf_name", list(GOOD))
