@@ -31,6 +31,7 @@ from camcomp.model.motion.run_path import path_of_program
 from camcomp.model.motion.timeline import schedule
 from camcomp.model.motion.twin import twin_of
 from camcomp.model.statics.solve import FREE, solve
+from camcomp.plugins.effects import EffectHooks
 
 ROOT = Path(camcomp.__file__).parent
 CONFIG = ROOT.parent / "config"
@@ -321,8 +322,9 @@ def test_an_effect_of_drives_and_more_takes_no_short_cut_through_the_twin(hook):
     assert quick_columns(None, CandidateCause("planted", "x", effect), {}) is None
 
 
-# Files that may name a hook: the path itself and the effects. A table of forces has a key `on_workpiece`, which is none.
-MAY_NAME_HOOKS = ("model/signal_path.py", "effects/", "forces/")
+# Files that may name a hook: the path itself, the effects, and what users' effects are held against, which tells what hooks
+# are given and calls each by itself. A table of forces has a key `on_workpiece`, which is none.
+MAY_NAME_HOOKS = ("model/signal_path.py", "effects/", "plugins/effects.py", "plugins/trial.py", "forces/")
 
 
 def hooks_named(source):
@@ -346,5 +348,4 @@ def test_a_planted_hook_is_found(source):
 
 
 def test_every_hook_of_the_contract_has_its_place():
-    text = ast.get_docstring(ast.parse((ROOT / "model" / "effect.py").read_text(encoding="utf-8")))
-    assert {line.split("(")[0] for line in text.split() if line.startswith("on_")} == set(signal_path.HOOKS)
+    assert tuple(each for each in vars(EffectHooks) if each.startswith("on_")) == signal_path.HOOKS

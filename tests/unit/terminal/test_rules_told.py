@@ -63,7 +63,7 @@ def test_a_run_without_a_program(told, tmp_path):
         f"config: [{CARTESIAN}]\nruns: [{{name: r, log: tip.csv, cutting: true, started_s: 0}}]\n"
     )
     code, said = told("diagnose", "experiment.yaml")
-    assert code == 2 and "error[CC402]: run 'r' has no program" in said
+    assert code == 2 and "error[CC402]: run 'r' has neither a program nor set-points" in said
 
 
 def test_tables_without_a_column_in_common(told):
