@@ -12,10 +12,10 @@ import numpy as np
 
 from camcomp.diagnosis.answer.held_out import shrinkage_of
 from camcomp.diagnosis.answer.intervals import joint_covariance
-from camcomp.diagnosis.answer.locate import channel_axes, patterns_of, rest_by_actuator, run_gaps
+from camcomp.diagnosis.answer.locate import channel_axes, patterns_of, run_gaps
 from camcomp.diagnosis.fit.bench import Bench, Run
 from camcomp.diagnosis.fit.columns import candidate_causes
-from camcomp.diagnosis.fit.gap import gap_of, main_channels
+from camcomp.diagnosis.fit.gap import gap_of, main_channels, rest_by_actuator
 from camcomp.diagnosis.fit.problem import Problem, open_problem
 from camcomp.diagnosis.next_experiment.after_unknown import explore
 from camcomp.diagnosis.next_experiment.information_gain import Proposal, propose

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,7 +81,6 @@ def driven_path(
 
 def cutting_forces(track: Track, aligned: Aligned, tip: Floats, time: Floats, logged_line: bool) -> Forces:
     """What the model says of the force along the way that the tip (n, 3) mm, program frame, was driven at times (n,) s."""
-    path = track.path
     motion, share, on = _executed(track, aligned, tip, time, logged_line)
     piece = _piece_of(track, motion, share)
     w = np.clip((share - track.u0[piece]) / np.maximum(track.u1[piece] - track.u0[piece], 1e-12), 0.0, 1.0)
@@ -215,7 +215,7 @@ class _Pieces:
         edges = np.unique(np.concatenate([[time[0]], 0.5 * (time[jump] + time[jump + 1]), [time[-1]]]))
         begin: list[float] = []
         stretch: list[int] = []
-        for s, (a, b) in enumerate(zip(edges[:-1], edges[1:], strict=True)):
+        for s, (a, b) in enumerate(pairwise(edges)):
             i, j = np.searchsorted(grid, (a, b))
             i, j = min(i, len(grid) - 1), min(j, len(grid) - 1)
             effort = (way[i : j + 1] - way[i]) / _PIECE_MM + (turned[i : j + 1] - turned[i]) / _PIECE_RAD
