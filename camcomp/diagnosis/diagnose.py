@@ -12,10 +12,10 @@ import numpy as np
 
 from camcomp.diagnosis.answer.held_out import shrinkage_of
 from camcomp.diagnosis.answer.intervals import joint_covariance
-from camcomp.diagnosis.answer.locate import channel_axes, patterns_of, rest_by_actuator, run_gaps
+from camcomp.diagnosis.answer.locate import channel_axes, patterns_of, run_gaps
 from camcomp.diagnosis.fit.bench import Bench, Run
 from camcomp.diagnosis.fit.columns import candidate_causes, working_causes
-from camcomp.diagnosis.fit.gap import gap_of, main_channels
+from camcomp.diagnosis.fit.gap import gap_of, main_channels, rest_by_actuator
 from camcomp.diagnosis.fit.problem import Problem, open_problem
 from camcomp.diagnosis.next_experiment.after_unknown import explore
 from camcomp.diagnosis.next_experiment.information_gain import Proposal, propose
@@ -34,9 +34,10 @@ from camcomp.diagnosis.result.types import (
 )
 from camcomp.diagnosis.search.cause_search import CauseSearch, search_causes
 from camcomp.diagnosis.search.indistinguishable import classes, likeness
+from camcomp.diagnosis.search.unexplained import size_um, worst
 from camcomp.diagnosis.search.unknown import firm_prior, residual_tests
 from camcomp.diagnosis.statistics import places
-from camcomp.diagnosis.statistics.cause_sets import Fitted, total
+from camcomp.diagnosis.statistics.cause_sets import Fitted
 from camcomp.diagnosis.statistics.probability import probability_of_chance, stated
 from camcomp.ground.datatypes import Floats
 from camcomp.model.effect import Cause
@@ -121,21 +122,23 @@ def _next(problem: Problem, found: CauseSearch, word: str, job: Job) -> Proposal
 
 
 def _energies(problem: Problem, f: Fitted) -> list[float]:
-    """White energy of each member's own signal."""
-    A, out, at = total(f.grams).A, [], 0
-    for i in f.members:
-        index = list(problem.candidates.columns[i])
-        theta = f.theta[at : at + len(index)]
-        at += len(index)
-        out.append(float(theta @ A[np.ix_(index, index)] @ theta))
-    return out
+    """What each member moves the tip by, um squared."""
+    return [size_um(problem, f, (i,)) ** 2 for i in f.members]
+
+
+def _unknown_energy(found: CauseSearch) -> float:
+    """What unseen runs show beyond the floor, um squared; for a while only where it acts for a while."""
+    if found.unknown_in is None:
+        return 0.0
+    each = found.beyond.get(found.unknown_in) or worst(found.beyond)
+    return max(each.excess_um, 1e-3) ** 2
 
 
 def _causes(problem: Problem, found: CauseSearch) -> tuple[FoundCause, ...]:
     """Causes by probability, the unknown one last: its probability is that of the chance of what is left."""
     best = found.fits[found.verdict.best]
     energy = _energies(problem, best)
-    left = found.left[found.unknown_in].energy if found.unknown_in else 0.0
+    left = _unknown_energy(found)
     whole = sum(energy) + left
     out: list[FoundCause] = []
     causes = problem.causes(best.members, best.theta, best.extra)
@@ -158,7 +161,7 @@ def _causes(problem: Problem, found: CauseSearch) -> tuple[FoundCause, ...]:
         out.append(
             UnknownCause(
                 target=target,
-                probability=stated(probability_of_chance(found.left[found.unknown_in].log10_chance)),
+                probability=stated(probability_of_chance(worst(found.beyond).log10_chance)),
                 share=round(left / whole, 4) if whole > 0 else 1.0,
             )
         )
@@ -240,7 +243,7 @@ def _where(problem: Problem, found: CauseSearch, best: Fitted) -> Where:
 def _stage(problem: Problem, best: Fitted, found: CauseSearch) -> str:
     """The stage of the largest cause; of an unknown one, the stage of the channel that shows it."""
     energy = _energies(problem, best)
-    left = found.left[found.unknown_in].energy if found.unknown_in else 0.0
+    left = _unknown_energy(found)
     if found.unknown_in and left > max(energy, default=0.0):
         stage = {"encoder": "control", "dyno": "process"}.get(found.unknown_in)
         return stage or ("structure" if _first_label(found).startswith("force") else "drive")

@@ -9,7 +9,6 @@ from camcomp.diagnosis.fit.columns import RUN_OFFSET_MM
 from camcomp.diagnosis.fit.gap import main_channels
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.statistics import places
-from camcomp.diagnosis.statistics.cause_sets import Fitted
 from camcomp.diagnosis.statistics.noise_model import effective_rows
 from camcomp.diagnosis.statistics.periods import SpectralLine, frequencies, screws
 
@@ -37,26 +36,6 @@ def run_gaps(problem: Problem) -> list[places.RunGap]:
         noise = np.where(np.isfinite(noise), np.hypot(noise, RUN_OFFSET_MM if part.start == 0 else 0.0), 1.0)
         out.append(places.RunGap(run.name, gap, noise, thin, problem.times[k], line, drives, tip, position, direction))
     return out
-
-
-def rest_by_actuator(problem: Problem, f: Fitted, kind: str) -> dict[str, float]:
-    """Energy that a set leaves in one kind of channel by actuator, as shares; that of the tip read as motion of the carriages."""
-    names = problem.bench.actuators
-    m = len(names)
-    energy = np.zeros(m)
-    causes = problem.causes(f.members, f.theta, f.extra)
-    for k, run in enumerate(problem.bench.runs):
-        rest = problem.bench.difference(k, problem.bench.read(k, causes))
-        rest = np.where(np.isfinite(rest), rest, 0.0)
-        if kind == "tip":
-            slope = thinned(problem.bench.row_slopes(k).reshape(-1, 3 * m), run.thin).reshape(-1, 3, m)
-            rest = np.einsum("nij,nj->ni", np.linalg.pinv(slope), rest[:, :3])
-        elif kind in ("encoder", "drive"):
-            rest = rest[:, 3:][:, :m] if kind == "encoder" else rest[:, 3 + m :][:, :m]
-        else:
-            return {}
-        energy += np.sum(rest**2, axis=0)
-    return places.shares(dict(zip(names, energy.tolist(), strict=True)))
 
 
 def channel_axes(problem: Problem) -> list[str]:

@@ -24,10 +24,13 @@ from camcomp.model.statics.description import Link, Parallelogram, Robot
 
 RUN_OFFSET_MM = 0.001  # repeatability of a run
 RUN_OFFSET_N = 0.3
+STARTED_MM, STARTED_RAD = 0.1, 1e-4  # by which an actuator has to move before its play is taken up
+START_MM, START_RAD = 0.005, 5e-6  # where its carriage may stand until then
+STARTING_ROWS = 5
 CLOCK_JITTER_S = 1e-5
 CLOCK_RATE = 1e-5
 SPRING_LOG = 0.01  # one link's spring against its stated value
-HEALTHY = 0.15  # of the noise floor at the tip: what of every effect is within tolerance
+HEALTHY = 0.08  # of the noise floor at the tip: what of every effect is within tolerance
 MOST_HEALTHY = 0.3  # of an effect's typical size
 _EDIT = 0.05  # step of the allowances' differences
 FORCE_TURN_RAD = 0.005  # direction of the cutting force in the plane of the work
@@ -186,6 +189,7 @@ def _nuisances(bench: Bench) -> list[tuple[str, float, list[Floats], bool]]:
             one[:, c] = 1.0
             size = RUN_OFFSET_MM if c < 3 else RUN_OFFSET_N
             found.append((f"offset.{run.name}.{channel_names(bench.actuators)[c]}", size, only(r, one), c >= 3))
+    found += _starts(bench, only)
     clock = CandidateCause("time_sync", None, shelf.load("effects", "time_sync"))
     frame = CandidateCause("workpiece_frame", None, shelf.load("effects", "workpiece_frame"))
     if any(run.measured.has("tip") for run in bench.runs):
@@ -200,6 +204,34 @@ def _nuisances(bench: Bench) -> list[tuple[str, float, list[Floats], bool]]:
         frames = candidate_columns(bench, frame, {})
         _by_label(found, bench, "clamping", [(p.name, f) for p, f in zip(frame.parameters, frames, strict=True)])
     found += _allowances(bench)
+    return found
+
+
+def _starts(bench: Bench, only: Callable[[int, Floats], list[Floats]]) -> list[tuple[str, float, list[Floats], bool]]:
+    """Where play and guides stood when a run began, nobody knows: until an actuator has moved, its carriage may be anywhere.
+
+    One column per run and actuator for the rows before that, where there are enough of them.
+    """
+    found = []
+    for r, run in enumerate(bench.runs):
+        if not run.run_path.ordered:
+            continue
+        moved = np.abs(run.run_path.row_rho - run.run_path.row_rho[0])
+        for j, a in enumerate(bench.actuators):
+            revolute = bench.twin.robot.actuators[j].revolute
+            still = np.maximum.accumulate(moved[:, j]) < (STARTED_RAD if revolute else STARTED_MM)
+            if still.sum() < STARTING_ROWS:
+                continue
+            values = np.zeros_like(bench.observed(r))
+            values[:, :3] = bench.turned(r, bench.row_slopes(r)[:, :, j] * still[:, None])
+            found.append(
+                (
+                    f"start.{run.name}.{a}",
+                    START_RAD if revolute else START_MM,
+                    only(r, thinned(values, run.thin)),
+                    False,
+                )
+            )
     return found
 
 

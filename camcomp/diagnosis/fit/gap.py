@@ -4,7 +4,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from camcomp.diagnosis.fit.bench import thinned
 from camcomp.diagnosis.fit.problem import Problem
+from camcomp.diagnosis.statistics import places
+from camcomp.diagnosis.statistics.cause_sets import Fitted
 from camcomp.ground.datatypes import Floats
 from camcomp.model.effect import Cause
 
@@ -57,3 +60,23 @@ def _together(gaps: list[Floats]) -> list[Floats]:
         whole = np.all(known | ~np.any(known, axis=0), axis=1)
         out.append(np.where(np.reshape(whole, (-1, 1)), g, np.nan))
     return out
+
+
+def rest_by_actuator(problem: Problem, f: Fitted, kind: str) -> dict[str, float]:
+    """Energy that a set leaves in one kind of channel by actuator, as shares; that of the tip read as motion of the carriages."""
+    names = problem.bench.actuators
+    m = len(names)
+    energy = np.zeros(m)
+    causes = problem.causes(f.members, f.theta, f.extra)
+    for k, run in enumerate(problem.bench.runs):
+        rest = problem.bench.difference(k, problem.bench.read(k, causes))
+        rest = np.where(np.isfinite(rest), rest, 0.0)
+        if kind == "tip":
+            slope = thinned(problem.bench.row_slopes(k).reshape(-1, 3 * m), run.thin).reshape(-1, 3, m)
+            rest = np.einsum("nij,nj->ni", np.linalg.pinv(slope), rest[:, :3])
+        elif kind in ("encoder", "drive"):
+            rest = rest[:, 3:][:, :m] if kind == "encoder" else rest[:, 3 + m :][:, :m]
+        else:
+            return {}
+        energy += np.sum(rest**2, axis=0)
+    return places.shares(dict(zip(names, energy.tolist(), strict=True)))

@@ -21,7 +21,7 @@ from camcomp.model.effect import Cause, Parameter
 from camcomp.model.motion.twin import Reading
 from camcomp.model.signal_path import stages_of
 
-BENT = 0.1  # share of its own change by which the model may miss a straight line before all columns are worked out anew
+BENT = 9.0  # chi-square by which the model may miss a straight line before all columns are worked out anew
 SETTLED = 0.05  # chi-square that one more pass may cost
 STRAIGHT = 0.3  # chi-square that the bend of the model may cost before it is followed
 
@@ -77,7 +77,7 @@ class Problem:
         """Columns of a set in the order of theta."""
         return [c for i in members for c in self.candidates.columns[i]]
 
-    def refit(self, members: Members, theta: Floats | None = None, passes: int = 3) -> Fitted:
+    def refit(self, members: Members, theta: Floats | None = None, passes: int = 5) -> Fitted:
         """Gauss-Newton through the twin from theta, or from the linear answer."""
         shapes = {i: dict(self.shapes[i]) for i in members if i in self.shapes}
         index = self.member_columns(members)
@@ -91,17 +91,17 @@ class Problem:
         white = [W[:, index] for W in self.white]
         left = list(self.white_residual)
         bent = False
-        passes += 3 if shapes else 0
+        passes += 1 if shapes else 0
         for step in range(passes):
             causes = self.causes(members, theta, shapes)
             readings = [self.bench.read(k, causes) for k in range(len(self.bench.runs))]
             now = [self.whitened(k, self.bench.difference(k, r)[:, :, None])[:, 0] for k, r in enumerate(readings)]
-            bend, size = self._bend(now, index, theta)
+            bend = self._bend(now, index, theta)
             if step == 0 and not shapes and bend < STRAIGHT:
                 grams = self.base_grams
                 theta = self._bounded(members, estimate(total(grams), self.prior, index)[0][index])
                 break
-            bent = bent or (step == 0 and bend > BENT**2 * size)
+            bent = bent or (step == 0 and bend > BENT)
             moved = self._columns_at(members, theta, shapes, readings, bent)
             white = [self._stacked(k, [m[k] for m in moved], index) for k in range(len(self.bench.runs))]
             left = [r + W @ theta for r, W in zip(now, white, strict=True)]
@@ -151,13 +151,12 @@ class Problem:
             out.append(Gram(A, b, float(r @ r), len(r)))
         return tuple(out)
 
-    def _bend(self, now: Sequence[Floats], index: Sequence[int], theta: Floats) -> tuple[float, float]:
-        """Chi-square by which the columns at nominal miss the white residuals at theta, and that of their own change."""
-        bend = size = 0.0
-        for r, nominal, W in zip(now, self.white_residual, self.white, strict=True):
-            change = W[:, index] @ theta
-            bend, size = bend + float(np.sum((r - nominal + change) ** 2)), size + float(change @ change)
-        return bend, size
+    def _bend(self, now: Sequence[Floats], index: Sequence[int], theta: Floats) -> float:
+        """Chi-square by which the columns at nominal miss the white residuals at theta."""
+        return sum(
+            float(np.sum((r - nominal + W[:, index] @ theta) ** 2))
+            for r, nominal, W in zip(now, self.white_residual, self.white, strict=True)
+        )
 
     def _bounded(self, members: Members, theta: Floats) -> Floats:
         parameters = [p for i in members for p in self.columns.candidates[i].parameters]

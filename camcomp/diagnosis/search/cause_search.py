@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from camcomp.diagnosis.fit.gap import rest_by_actuator
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.search.indistinguishable import Likeness, likeness, stand_ins
 from camcomp.diagnosis.search.unexplained import Unexplained, size_um, unexplained, worst
@@ -36,6 +37,8 @@ GATE = 0.4  # of the noise floor: what unseen runs show beyond it makes an effec
 GATE_SHARE = 0.1  # of what the causes explain: none is modelled better than that
 GATE_LOCAL = 1.5  # of the floor: the same for what acts for a while only
 SURE_Z = 5.0  # standard deviations of chance
+PART_OF_UNKNOWN = 1.0  # size in units of an unknown effect below which a cause at its place is taken for a part of it
+POINTED = 0.5  # share of what is left that one actuator has to have to be that place
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,9 +112,9 @@ def search_causes(problem: Problem) -> CauseSearch:
     if kind is None:
         return CauseSearch(fits, probability, verdict, residual_tests(problem, best, problem.prior), None, beyond)
     known = best
-    while (kept := foretelling(problem, known)) != known.members:
+    while (kept := beside_unknown(problem, known, beyond)) != known.members:
         known = fit(kept)
-    beyond = unexplained(problem, known)
+        beyond = unexplained(problem, known)
     kind = unknown_kind(problem, known, beyond) or worst(beyond).kind
     if known.members != best.members:
         fits = (known, *(f for f in fits if f.members != known.members))
@@ -120,6 +123,25 @@ def search_causes(problem: Problem) -> CauseSearch:
         verdict = Verdict("identified", 0, (), inclusion)
     left = residual_tests(problem, known, firm_prior(problem))
     return CauseSearch(fits, probability, verdict, left, kind if kind in left else next(iter(left)), beyond)
+
+
+def beside_unknown(problem: Problem, f: Fitted, beyond: Mapping[str, Unexplained]) -> Members:
+    """The members that stand beside an unknown effect, one by one.
+
+    They foretell what unseen runs show. What is smaller than the unknown one and aimed at the actuator that the rest
+    points at is most likely a part of it.
+    """
+    members = foretelling(problem, f)
+    left = worst(beyond)
+    shares = rest_by_actuator(problem, f, left.kind)
+    where = max(shares, key=lambda a: shares[a]) if shares else None
+    if where is not None and shares[where] < POINTED:
+        where = None
+    return tuple(
+        i for i in members
+        if size_um(problem, f, (i,)) > PART_OF_UNKNOWN * left.excess_um
+        or (where is not None and problem.columns.candidates[i].target not in (where, None))
+    )  # fmt: skip
 
 
 def overdispersion(problem: Problem, f: Fitted) -> float:

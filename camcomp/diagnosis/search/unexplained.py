@@ -13,6 +13,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import norm
 
 from camcomp.diagnosis.fit.bench import thinned
 from camcomp.diagnosis.fit.columns import tip_um
@@ -40,6 +41,11 @@ class Unexplained:
     local_um: float
     where: tuple[int, float, float]
     energy: Floats
+
+    @property
+    def log10_chance(self) -> float:
+        """Of as much from noise alone."""
+        return float(norm.logsf(self.z) / np.log(10.0))
 
 
 def unexplained(problem: Problem, f: Fitted) -> dict[str, Unexplained]:
