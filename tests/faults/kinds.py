@@ -17,7 +17,7 @@ from tests.faults.mutate import mutated
 from tests.faults.process import Ended, Fault, Shot, camcomp, environment
 
 SLOW, FAST = 0.004, 0.0  # s that every step of writing takes longer
-LONGEST = 0.35  # s, about the time of a compensation with slow steps
+LONGEST = 0.25  # s, about the time of a compensation with slow steps
 
 
 def _compensated(rng, project, fault=None, shot=None, signals=(), leftovers=False):

@@ -190,3 +190,14 @@ def test_experiments_are_told_from_machines():
     assert is_experiment(EXPERIMENT.encode())
     assert not is_experiment(b"robot: {}\nruns: []")
     assert not is_experiment(b"a: [")
+
+
+@pytest.mark.parametrize(
+    "text", ["robot:\n", "robot: {type: }\n", "robot: {type: {a: b}}\n", "robot: {type: 5, name: x}\n"]
+)
+def test_a_robot_that_is_none_is_an_error_of_the_file(tmp_path, text):
+    file = tmp_path / "m.yaml"
+    file.write_text(text)
+    with pytest.raises(ConfigError) as error:
+        load_config([file])
+    assert error.value.at.line == 1 and "Node(" not in str(error.value)
