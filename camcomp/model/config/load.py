@@ -121,8 +121,7 @@ def _check_config(tree: Node) -> tuple[Config | None, list[CamcompError]]:
     data, skip = plain(tree), []
     errors: list[CamcompError] = []
     robot = _get(tree, "robot")
-    kind = _get(robot, "type")
-    if robot is not None and kind is not None and isinstance(kind.value, str):
+    if robot is not None and _get(robot, "type") is not None:
         data["robot"], errors = _robot_from_plugin(robot)
     if robot is None or (errors and data["robot"] is None):
         skip = ["robot"]  # missing in a file of overrides, or its own errors are known already
