@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from camcomp.diagnosis.experiment.open_experiment import open_experiment
 from tests.importing import imported
 
 FOLDER = Path(__file__).parent / "halsampler"
@@ -23,6 +24,8 @@ def test_the_planner_s_motion(tmp_path, capsys):
     assert log["act_x_mm"][1:] == pytest.approx(log["cmd_x_mm"][:-1], abs=1e-6)
     assert np.max(np.abs(np.diff(log["cmd_x_mm"]))) == pytest.approx(50 * 0.001, abs=1e-5)  # F3000
     assert set(log["line"]) == {0, 4, 5, 6, 7}
+    opened = open_experiment(tmp_path / "x/experiment.yaml")
+    assert [run.name for run in opened.runs] == ["corner"] and opened.notes == ()
 
 
 def test_bare_pins_by_number(tmp_path, capsys):

@@ -32,20 +32,13 @@ def read_sampled(
     if suffix in _ELSEWHERE:
         raise ConfigError("CC452", f"{suffix} files are not read", at=at, hint=_ELSEWHERE[suffix])
     if suffix == ".mcap" or data.startswith(_MCAP):
-        return _without_names(read_mcap(data, file), names)
+        return read_mcap(data, file)
     if suffix == ".tdms" or data.startswith(_TDMS):
-        return _without_names(read_tdms(data, file), names)
+        return read_tdms(data, file)
     if suffix == ".xlsx" or data.startswith(_ZIP):
         return read_xlsx(data, file, names)
     if is_scope_text(data):
-        return _without_names(read_scope(data, file), names)
+        return read_scope(data, file)
     if b"\0" in data[:4096]:
         raise ConfigError("CC452", "neither text nor a format that is known", at=at)
     return read_text_table(data, file, names, period_s)
-
-
-def _without_names(found: list[SampledColumns], names: Sequence[str]) -> list[SampledColumns]:
-    if names:
-        hint = "name columns by --column LOG=THEIRS instead"
-        raise ConfigError("CC421", "the recording has names of its own", at=found[0].at(-1, 0), hint=hint)
-    return found

@@ -84,6 +84,8 @@ def _on_time(parts: Sequence[Part]) -> Joined:
             values[name] = each[near] if poses else _between(times[k], each, base[row], name == LINE)
         met &= close | (not poses)
     values, row = {name: each[met] for name, each in values.items()}, row[met]
+    if not len(row):
+        _refuse(parts, "no rows of the parts belong to the same time")
     how = "nearest in time" if poses else "on time"
     note = f"joined {how}, on the rows of {parts[lead].file}: {_files(parts)}"
     lost = parts[lead].rows - len(row)

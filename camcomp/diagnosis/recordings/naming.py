@@ -144,7 +144,7 @@ def _told(parts: Sequence[SampledColumns], log: str, theirs: str, notes: list[st
         raise ConfigError("CC421", f"there is no column {theirs} for {log}", at=parts[0].at(-1, 0), hint=hint)
     out = []
     for i, j in hits:
-        unit = _unit(parts[i], j)
+        unit = _unit(parts[i], j, log)
         factor = factor_to(log, unit) if unit else None
         if unit and factor is None:
             notes.append(f"{theirs} is in {unit}, and is taken as {unit_of(log)} all the same")
@@ -160,7 +160,7 @@ def _usual(parts: Sequence[SampledColumns], log: str, usual: Sequence[str], take
     for wanted in (log.lower(), *usual):
         for fits in (_same, _same_with_unit, _ends):
             hits = [(i, j) for i, j, name in free if fits(name, wanted)]
-            units = {(i, j): _unit(parts[i], j) for i, j in hits}
+            units = {(i, j): _unit(parts[i], j, log) for i, j in hits}
             factors = {key: factor_to(log, unit) if unit else None for key, unit in units.items()}
             good = [Pick(i, j, factors[i, j]) for i, j in hits if not units[i, j] or factors[i, j] is not None]
             if len(good) > 1 and fits is _same:
@@ -170,10 +170,10 @@ def _usual(parts: Sequence[SampledColumns], log: str, usual: Sequence[str], take
     return []
 
 
-def _unit(part: SampledColumns, column: int) -> str:
-    """The unit that a recording states. The log's own suffixes state one only where it is another than they say."""
-    stated = part.units[column]
-    unit = split_unit(part.names[column])[1]
+def _unit(part: SampledColumns, column: int, log: str) -> str:
+    """The unit that a recording states. Who names a column without header by the log's name need not mean its unit."""
+    name, stated = part.names[column], part.units[column]
+    unit = "" if name == log and not part.headed else split_unit(name)[1]
     return unit if unit and stated in ("", SI) else stated
 
 

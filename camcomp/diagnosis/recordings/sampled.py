@@ -18,7 +18,7 @@ class SampledColumns:
 
     file: name for messages; units: as the recording states them, "SI", or empty where it states none; time (n,) s on
     whatever clock, NaN where a row has none, or None; read: values (n,) of a column by its number; at: place of a cell by
-    row (-1: header) and column; notes: what the reader left out or took for granted.
+    row (-1: header) and column; notes: what the reader left out or took for granted; headed: the names are the recording's own.
     """
 
     file: str
@@ -29,6 +29,7 @@ class SampledColumns:
     read: Callable[[int], Floats]
     at: Callable[[int, int], Location]
     notes: tuple[str, ...] = ()
+    headed: bool = True
 
 
 def library(module: str, package: str, what: str) -> Any:
@@ -51,6 +52,13 @@ def reading(name: str, what: str) -> Iterator[None]:
         reason = (str(error) or type(error).__name__).splitlines()[0][:200]
         message = f"not {what} that can be read: {reason}"
         raise ConfigError("CC452", message, at=Location(name, 1, 1)) from error
+
+
+def refuse_names(parts: Sequence[SampledColumns], names: Sequence[Sequence[str]]) -> None:
+    """Raise ConfigError CC421 where names are given and every part of a run has its own."""
+    if names and all(part.headed for part in parts):
+        hint = "name columns by --column LOG=THEIRS instead of --columns"
+        raise ConfigError("CC421", "the recording has names of its own", at=parts[0].at(-1, 0), hint=hint)
 
 
 def some(names: Sequence[str], most: int = 8) -> str:

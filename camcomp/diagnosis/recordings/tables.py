@@ -22,13 +22,10 @@ _OVERRUN = b"overrun"
 def read_text_table(
     data: bytes, name: str, names: Sequence[str] = (), period_s: float | None = None
 ) -> list[SampledColumns]:
-    """A table; names: of its columns, where it has no header. Raises ConfigError CC421, CC422."""
+    """A table; names: of its columns, if it has no header. Raises ConfigError CC421, CC422."""
     text, notes = _without_remarks(data)
     table = _without_torn_row(read_csv(text, name, TABLE_RULES, spreadsheet=True), notes)
     if table.headed:
-        if names:
-            message = "the table has a header of its own"
-            raise ConfigError("CC421", message, at=table.at(-1), hint="name columns by --column LOG=THEIRS instead")
         return [of_table(table, notes=notes)]
     counted = table.mark == " " and _counts(table) and not (len(names) == len(table.header) and names[0] == TIME)
     table = _named(table, names, counted)
@@ -61,7 +58,15 @@ def of_table(
 
     names = tuple(table.header[j] for j in kept)
     return SampledColumns(
-        table.name, names, tuple(units or ("",) * len(names)), len(table.rows), time, read, at, tuple(notes)
+        table.name,
+        names,
+        tuple(units or ("",) * len(names)),
+        len(table.rows),
+        time,
+        read,
+        at,
+        tuple(notes),
+        table.headed,
     )
 
 

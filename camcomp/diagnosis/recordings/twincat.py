@@ -15,7 +15,7 @@ from camcomp.ground.csv_table import CsvTable, read_csv
 from camcomp.ground.datatypes import Floats
 from camcomp.ground.errors import ConfigError, Location
 
-_CHANNELS, _UNIT, _END = "Name", "Unit", "EOF"
+_CHANNELS, _UNIT = "Name", "Unit"
 _OF_CHANNELS = ("SymbolName", "SampleTime[ms]", "Data-Type")
 _FILE_TIME = 1e15  # beyond it times are steps of 100 ns since 1601, else ms
 
@@ -41,7 +41,7 @@ def read_scope(data: bytes, name: str) -> list[SampledColumns]:
         label = line.split(mark, 1)[0].strip()
         if label == _UNIT and i > head:
             units = next(csv.reader([line], delimiter=mark))
-        if i != head and label and not _begins_number(label) or label == _END:
+        if i != head and label and not _begins_number(label):
             lines[i] = ""
     table = read_csv("\n".join(lines), name, TABLE_RULES, spreadsheet=True)
     timed: dict[int, list[int]] = {}

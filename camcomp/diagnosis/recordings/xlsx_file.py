@@ -34,8 +34,8 @@ def read_xlsx(data: bytes, name: str, names: Sequence[str] = ()) -> list[Sampled
     header = [str(cell).strip() if cell is not None else "" for cell in rows[first]]
     if not headed:
         header = list(names) or [str(j + 1) for j in range(len(rows[first]))]
-    if headed and names or len(header) != len(rows[first]):
-        what = "the sheet has a header of its own" if headed else f"{len(names)} names for {len(rows[first])} columns"
+    if len(header) != len(rows[first]):
+        what = f"{len(names)} names for {len(rows[first])} columns"
         raise ConfigError("CC421", what, at=Location(name, first + 1, 1))
     lines = [i for i in range(first + headed, len(rows)) if _is_filled(rows[i])]
     kept = [j for j, label in enumerate(header) if label not in ("", "-")]
@@ -52,7 +52,7 @@ def read_xlsx(data: bytes, name: str, names: Sequence[str] = ()) -> list[Sampled
 
     notes = [f"sheet {title}"] + ([f"dropped sheets: {some(others)}"] if others else [])
     labels = tuple(header[j] for j in kept)
-    return [SampledColumns(name, labels, ("",) * len(labels), len(lines), None, read, at, tuple(notes))]
+    return [SampledColumns(name, labels, ("",) * len(labels), len(lines), None, read, at, tuple(notes), headed)]
 
 
 def _is_filled(row: Sequence[Any]) -> bool:

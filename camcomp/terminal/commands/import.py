@@ -3,6 +3,7 @@
 import os
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
@@ -10,6 +11,9 @@ from camcomp.ground.errors import FileError
 from camcomp.ground.files import display_name, read_bytes, write_all
 from camcomp.model.config.load import load_config
 from camcomp.terminal.commands._options import config_option
+
+if TYPE_CHECKING:
+    from camcomp.diagnosis.recordings.sampled import SampledColumns
 
 
 @click.command()
@@ -22,14 +26,16 @@ from camcomp.terminal.commands._options import config_option
     help="Which column of theirs a column of the log is, by its name or, without header, its number; repeatable.",
 )  # fmt: skip
 @click.option(
-    "--columns", "names", metavar="'NAME NAME ...'", default="",
+    "--columns", "names", metavar="'NAME NAME ...'", multiple=True,
     help="Names of the columns of a table without header, in their order; - leaves one out. halsampler's sample number "
-    "need not be named.",
+    "need not be named. Given several times: for the files of FILE+FILE in their order.",
 )  # fmt: skip
 @click.option("--period-s", type=click.FloatRange(min=0.0, min_open=True), metavar="S",
               help="Time between samples of a table without times; default for halsampler -t: 0.001.")  # fmt: skip
 @click.option(
-    "--degrees/--radians", default=None, help="Unit of joint angles whose unit is not stated; default: by size."
+    "--degrees/--radians",
+    default=None,
+    help="Whether joint angles are degrees; default: as the recording states, else by size.",
 )
 @click.option(
     "--join", "by", type=click.Choice(["time", "rows"]), help="How files of one run are joined; default: see above."
@@ -43,7 +49,7 @@ from camcomp.terminal.commands._options import config_option
 @click.option("--rows", type=click.IntRange(min=12), help="At most so many rows of every table, spread evenly.")
 def command(
     files: tuple[str, ...], configs: tuple[str, ...], output_dir: str, actuator: str | None, columns: tuple[str, ...],
-    names: str, period_s: float | None, degrees: bool | None, by: str | None, programs: tuple[str, ...], cutting: bool,
+    names: tuple[str, ...], period_s: float | None, degrees: bool | None, by: str | None, programs: tuple[str, ...], cutting: bool,
     one_clamping: bool, holdout: tuple[str, ...], rows: int | None,
 ) -> None:  # fmt: skip
     """Turn recordings of others into logs and an experiment file.
@@ -62,7 +68,6 @@ def command(
     """
     from camcomp.diagnosis.recordings.axis_file import read_axis
     from camcomp.diagnosis.recordings.experiment_file import experiment_yaml, run_names
-    from camcomp.diagnosis.recordings.formats import read_sampled
     from camcomp.diagnosis.recordings.naming import told_columns
     from camcomp.diagnosis.recordings.run_log import Recording, Wishes, log_of
 
@@ -77,12 +82,7 @@ def command(
         if len(group) == 1 and Path(group[0]).suffix.lower() == ".mat":
             read = read_axis(read_bytes(group[0]), display_name(group[0]), run, actuators, actuator, wishes)
         else:
-            parts = [
-                part
-                for file in group
-                for part in read_sampled(read_bytes(file), display_name(file), names.split(), period_s)
-            ]
-            read = log_of(run, parts, actuators, wishes)
+            read = log_of(run, _parts(group, [each.split() for each in names], period_s), actuators, wishes)
         recordings.append(read)
     out = Path(output_dir)
     outputs: dict[Path, bytes] = {out / f"{each.name}.csv": each.log for each in recordings}
@@ -99,6 +99,19 @@ def command(
 def _files_of(word: str) -> list[str]:
     """Files of one run: a file, or several joined by +."""
     return [word] if os.path.lexists(word) else word.split("+")
+
+
+def _parts(group: Sequence[str], names: Sequence[Sequence[str]], period_s: float | None) -> "list[SampledColumns]":
+    """What the files of one run hold; names: of columns of tables without header, by file, the last for all others."""
+    from camcomp.diagnosis.recordings.formats import read_sampled
+    from camcomp.diagnosis.recordings.sampled import refuse_names
+
+    parts = list["SampledColumns"]()
+    for k, file in enumerate(group):
+        own = names[min(k, len(names) - 1)] if names else ()
+        parts += read_sampled(read_bytes(file), display_name(file), own, period_s)
+    refuse_names(parts, names)
+    return parts
 
 
 def _programs(words: Sequence[str], runs: Sequence[str]) -> dict[str, str]:

@@ -7,6 +7,7 @@ import pytest
 from scipy.io import savemat
 
 from camcomp.model.config.load import load_experiment
+from camcomp.terminal.cli import run
 from tests.importing import imported
 
 JOINTS = ["shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3"]
@@ -143,6 +144,12 @@ def test_degrees_by_size_by_unit_and_as_told(read, tmp_path):
         assert got.logs[name]["act_shoulder_pan_rad"][0] == pytest.approx(due), name
 
 
+def test_degrees_in_columns_that_are_named_as_those_of_the_log(read):
+    text = "\n".join(f"{k} 0 0 0 0 90.5 1 2 3.0" for k in (10, 20, 15))
+    got = read(text, "--columns", " ".join(LOG[1:]))
+    assert got.logs["poses"]["act_wrist_3_rad"][0] == pytest.approx(np.radians(90.5))
+
+
 def test_lengths_in_the_unit_that_is_stated(read):
     head = HEAD.replace("measurement_x", "measurement_x (m)").replace("measurement_y", "measurement_y_um")
     log = read(f"{head}\n{ROW}\n").logs["poses"]
@@ -223,6 +230,21 @@ def test_two_files_row_by_row(read):
     assert "joined row by row:" in got.told and "tracker.csv" in got.told
 
 
+def test_two_files_of_which_one_or_both_have_no_header(read, tmp_path):
+    joints, tips = "\n".join(f"{k} 0 0 0 0 0" for k in (0.1, 0.3, 0.2)), "x;y;z\n1;2;3\n4;5;6\n7;8;9\n"
+    names = " ".join(LOG[1:7])
+    got = read({"j.txt": joints, "t.csv": tips}, "--columns", names)
+    assert list(got.logs["j"]["act_shoulder_pan_rad"]) == [0.1, 0.3, 0.2] and list(got.logs["j"]["z_mm"]) == [3, 6, 9]
+    (tmp_path / "x/experiment.yaml").unlink()
+    bare = tips.split("\n", 1)[1]
+    got = read({"k.txt": joints, "t.csv": bare}, "--columns", names, "--columns", "x_mm - z_mm")
+    assert got.code == 2 and "no column for y_mm" in got.told
+    got = read({"k.txt": joints, "t.csv": bare}, "--columns", names, "--columns", "x_mm y_mm z_mm")
+    assert list(got.logs["k"]["z_mm"]) == [3, 6, 9]
+    got = read(tips, "--columns", names, name="t.csv")
+    assert got.code == 2 and "t.csv:1:1: error[CC421]: the recording has names of its own" in got.told
+
+
 def test_two_files_that_cannot_be_joined(read):
     head, tips = ";".join(HEAD.split(";")[:7]), "measurement_x,measurement_y,measurement_z\n1,2,3\n"
     rows = "\n".join(";".join(row.split(";")[:7]) for row in rows_of(3).split("\n"))
@@ -232,6 +254,11 @@ def test_two_files_that_cannot_be_joined(read):
     early = head.replace("Timestamp", "time").replace(";", ",") + "\n" + "\n".join(f"{k},1,1,1,1,1,1" for k in range(9))
     got = read({"joints.csv": early, "tracker.csv": late})
     assert got.code == 2 and "too little in common" in got.told
+    between = f"time,{tips.splitlines()[0]}\n3.4,1,2,3\n"
+    got = read({"joints.csv": early, "tracker.csv": between})
+    assert got.code == 2 and "no rows of the parts belong to the same time" in got.told
+    got = read({"joints.csv": early, "tracker.csv": tips}, "--join", "rows")
+    assert got.code == 2 and "9 and 1 rows cannot be joined row by row" in got.told
 
 
 def test_two_files_on_time(read):
@@ -304,6 +331,14 @@ def test_nothing_is_written_over_and_a_wrong_word_leaves_nothing(tmp_path, capsy
     assert got.code == 5 and "CC501" in got.told
 
 
+def test_the_experiment_is_what_diagnose_reads(tmp_path, capsys):
+    (tmp_path / "poses.csv").write_text(f"{HEAD}\n{ROW}\n")
+    assert imported(capsys, tmp_path / "x", tmp_path / "poses.csv").code == 0
+    assert run(["diagnose", str(tmp_path / "x/experiment.yaml")]) == 2
+    told = capsys.readouterr().err
+    assert "CC420" in told and "has 1 poses" in told
+
+
 def test_programs_and_clampings_as_told(tmp_path, capsys):
     (tmp_path / "run.csv").write_text(DRIVEN.replace("1,1,0,0,1,0,0\n", "", 1))
     (tmp_path / "part.nc").write_text("G1 X1 F60\n")
@@ -311,8 +346,8 @@ def test_programs_and_clampings_as_told(tmp_path, capsys):
         capsys, tmp_path / "x", tmp_path / "run.csv", "--program", f"run={tmp_path}/part.nc", "--cutting",
         "--one-clamping", config="cartesian",
     )  # fmt: skip
-    run = load_experiment(tmp_path / "x/experiment.yaml").runs[0]
-    assert run.cutting and run.clamping is None and (tmp_path / "x/../part.nc").samefile(run.program), got.told
+    part = load_experiment(tmp_path / "x/experiment.yaml").runs[0]
+    assert part.cutting and part.clamping is None and (tmp_path / "part.nc").samefile(part.program), got.told
     for word, rule in ((f"other={tmp_path}/part.nc", "CC424"), (f"run={tmp_path}/pat.nc", "CC500")):
         got = imported(capsys, tmp_path / "y", tmp_path / "run.csv", "--program", word, config="cartesian")
         assert rule in got.told and got.yaml is None
