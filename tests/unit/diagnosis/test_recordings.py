@@ -265,7 +265,7 @@ def test_two_files_on_time(read):
     time = 0.001 * np.arange(400)
     drive = "t,x_cmd,y_cmd,z_cmd,line\n" + "\n".join(f"{t:.3f},{10 * t:.5f},0,0,{int(10 * t)}" for t in time)
     laser = "t,measurement_x,measurement_y,measurement_z\n" + "\n".join(
-        f"{t:.4f},{10 * t + 0.01:.5f},0,0" for t in 0.0105 + 0.01 * np.arange(60)
+        f"{t:.4f},{10 * t + 0.01:.5f},0,0" for t in 0.0095 + 0.01 * np.arange(60)
     )
     got = read({"drive.csv": drive, "laser.csv": laser}, config="cartesian")
     log = got.logs["drive"]
