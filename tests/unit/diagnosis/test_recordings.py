@@ -138,6 +138,7 @@ def test_degrees_by_size_by_unit_and_as_told(read, tmp_path):
         ("b", f"{HEAD}\n{ROW}\n", ["--degrees"], np.radians(-1.5)),
         ("c", f"{HEAD}\n{ROW}\n".replace("pan_joint", "pan_joint [deg]"), [], np.radians(-1.5)),
         ("d", f"{HEAD}\n{wide}\n".replace("pan_joint", "pan_joint_rad"), [], -150),
+        ("e", f"{HEAD}\n{wide}\n".replace("shoulder_pan_joint", "act_shoulder_pan_rad"), [], -150),
     ):
         (tmp_path / "x/experiment.yaml").unlink()
         got = read(text, *words, name=f"{name}.csv")
