@@ -91,20 +91,7 @@ def usual_names(actuators: Sequence[str], columns: LogColumns) -> dict[str, tupl
 
 def check_enough(parts: Sequence[SampledColumns], picked: Picked, columns: LogColumns, *, program: bool) -> None:
     """Raise ConfigError CC421 for the first column without which no study can use the run."""
-    there = picked.columns
-    tip = any(log in there for log in TIP)
-    loads = any(log in there for log in (*columns.drive, *DYNO))
-    encoders = [log for log in columns.encoder if log in there]
-    axes = zip(columns.encoder, columns.setpoint, columns.drive, strict=True)
-    missing = [log for log in TIP if tip and log not in there]
-    if missing:
-        pass
-    elif program or all(log in there for log in columns.setpoint):
-        missing = [] if tip or loads or encoders else [*columns.encoder]
-    elif tip:
-        missing = [log for log in columns.encoder if log not in there]
-    elif not any(act in there and (cmd in there or drive in there) for act, cmd, drive in axes):
-        missing = [*(TIP if encoders else columns.encoder)]
+    missing = _missing(set(picked.columns), columns, program)
     if missing:
         log = missing[0]
         names = [name for part in parts for name in part.names]
@@ -112,6 +99,21 @@ def check_enough(parts: Sequence[SampledColumns], picked: Picked, columns: LogCo
         could = f", it could be {some(rivals)}" if rivals else ""
         hint = f"name it: --column {log}=THEIRS; there are: {some(names, 40)}"
         raise ConfigError("CC421", f"no column for {log}{could}", at=parts[0].at(-1, 0), hint=hint)
+
+
+def _missing(there: set[str], columns: LogColumns, program: bool) -> list[str]:
+    """Columns that a study of what is there would need."""
+    if there.intersection(TIP) and not there.issuperset(TIP):
+        return [log for log in TIP if log not in there]
+    if program or there.issuperset(columns.setpoint):
+        measured = there.intersection((*TIP, *DYNO, *columns.encoder, *columns.drive))
+        return [] if measured else list(columns.encoder)
+    if there.intersection(TIP):
+        return [log for log in columns.encoder if log not in there]
+    axes = zip(columns.encoder, columns.setpoint, columns.drive, strict=True)
+    if any(act in there and (cmd in there or drive in there) for act, cmd, drive in axes):
+        return []
+    return list(TIP if there.intersection(columns.encoder) else columns.encoder)
 
 
 def leftovers(parts: Sequence[SampledColumns], picked: Picked) -> list[str]:
