@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -20,7 +21,7 @@ from camcomp.ground.errors import ConfigError, Location
 
 MOST_TABLE_ROWS = 5_000_000  # more than an hour at 1 kHz
 MOST_TABLE_BYTES = 1 << 30
-_SPREADSHEET_MARKS = ";\t,"
+_BLANK = " "  # any number of blanks and tabs between cells
 
 
 @dataclass(frozen=True)
@@ -34,7 +35,10 @@ class TableRules:
 
 @dataclass(frozen=True, eq=False)
 class CsvTable:
-    """Cells as text, each with its place. header: names of the columns; rows: n rows of cells, of any length."""
+    """Cells as text, each with its place. header: names of the columns; rows: n rows of cells, of any length.
+
+    headed: whether the names stand in the file; without, columns are called 1, 2, 3 and so on.
+    """
 
     name: str
     rules: TableRules
@@ -43,9 +47,10 @@ class CsvTable:
     rows: tuple[list[str], ...]
     _line: tuple[int, ...]  # of the header and of every row, from 1
     _source: list[str]
+    headed: bool = True
 
     def at(self, row: int, column: int = 0) -> Location:
-        """Place of a cell; row -1 is the header. A cell that is missing stands behind the last of its row."""
+        """Place of a cell; row -1 is the header, or the first row where there is none. A cell that is missing stands behind the last of its row."""
         line = self._line[row + 1]
         source = self._source[line - 1]
         return Location(self.name, line, min(_start(source, self.mark, column), len(source)) + 1, source)
@@ -87,7 +92,8 @@ class CsvTable:
 def read_csv(data: bytes | str, name: str, rules: TableRules, *, spreadsheet: bool = False) -> CsvTable:
     """Cells of a CSV file; `name` is the file's for messages. Raises ConfigError.
 
-    spreadsheet: cells may be parted by semicolons or tabs, and then numbers may have decimal commas.
+    spreadsheet: cells may be parted by semicolons, tabs or blanks, and then numbers may have decimal commas; a first row
+    of numbers, most of its cells at least, is no header.
     """
     if len(data) > MOST_TABLE_BYTES:
         raise ConfigError("CC425", f"more than {MOST_TABLE_BYTES} bytes", at=Location(name, 1, 1))
@@ -96,21 +102,24 @@ def read_csv(data: bytes | str, name: str, rules: TableRules, *, spreadsheet: bo
     refuse_long(text.count("\n"), "the table", Location(name, 1, 1))
     source = text.split("\n")
     first = next((each for each in source if each.strip()), "")
-    mark = max(_SPREADSHEET_MARKS, key=first.count) if spreadsheet else ","
+    mark = _mark(first) if spreadsheet else ","
     lines, rows = _rows(text, mark, name, rules, source)
     if not rows:
         raise ConfigError(rules.table, "the file is empty", at=Location(name, 1, 1))
+    headed = not (spreadsheet and _share_of_numbers(rows[0], decimal_comma=mark != ",") > 0.5)
+    if not headed:
+        rows, lines = [[str(j + 1) for j in range(len(rows[0]))], *rows], [lines[0], *lines]
     header = tuple(cell.strip() for cell in rows[0])
     at = Location(name, lines[0], 1, source[lines[0] - 1])
     if len(header) == 1 and ";" in header[0]:
         raise ConfigError(rules.table, "cells are separated by commas, not by semicolons", at=at)
     if len(rows) < 2:
         raise ConfigError(rules.table, "the table has no rows", at=at)
-    table = CsvTable(name, rules, mark, header, tuple(rows[1:]), tuple(lines), source)
+    table = CsvTable(name, rules, mark, header, tuple(rows[1:]), tuple(lines), source, headed)
     for i, row in enumerate(table.rows):
         beyond = next((j for j in range(len(header), len(row)) if row[j].strip()), None)
         if beyond is not None:
-            message = f"{len(row)} cells under {len(header)} column names"
+            message = f"{len(row)} cells under {len(header)} column{' names' if headed else 's'}"
             raise ConfigError(rules.cell, message, at=table.at(i, beyond))
     return table
 
@@ -121,10 +130,29 @@ def refuse_long(rows: float, what: str, at: Location | None = None) -> None:
         raise ConfigError("CC425", f"{what} has {rows:.3g} rows, more than {MOST_TABLE_ROWS}", at=at)
 
 
+def _mark(first: str) -> str:
+    """What stands between the cells of a spreadsheet, by its first line."""
+    for mark in ";\t":
+        if mark in first:
+            return mark
+    words = first.split()
+    parted = len(words) > 1 and ("," not in first or _share_of_numbers(words, decimal_comma=True) == 1.0)
+    return _BLANK if parted else ","
+
+
+def _share_of_numbers(cells: Sequence[str], *, decimal_comma: bool) -> float:
+    """How many of the cells that are not empty hold numbers, 0 to 1."""
+    numbers = [_number(cell.strip(), decimal_comma=decimal_comma) is not None for cell in cells if cell.strip()]
+    return sum(numbers) / max(len(numbers), 1)
+
+
 def _rows(
     text: str, mark: str, name: str, rules: TableRules, source: Sequence[str]
 ) -> tuple[list[int], list[list[str]]]:
     """Line on which each row starts, and its cells; rows without any text are left out."""
+    if mark == _BLANK:
+        filled = [(i + 1, line.split()) for i, line in enumerate(source) if line.strip()]
+        return [line for line, _ in filled], [cells for _, cells in filled]
     reader = csv.reader(io.StringIO(text), delimiter=mark, skipinitialspace=True, strict=True)
     lines: list[int] = []
     rows: list[list[str]] = []
@@ -148,6 +176,9 @@ def _number(cell: str, *, decimal_comma: bool) -> float | None:
 
 def _start(source: str, mark: str, column: int) -> int:
     """Where a cell begins in its line, from 0; behind the last where there are fewer."""
+    if mark == _BLANK:
+        starts = [word.start() for word in re.finditer(r"\S+", source)]
+        return starts[column] if column < len(starts) else len(source)
     quoted, seen = False, 0
     for i, sign in enumerate(source):
         if seen == column:

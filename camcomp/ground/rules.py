@@ -492,8 +492,8 @@ RULES: dict[str, Rule] = {
     ),
     "CC424": Rule(
         "name of a run",
-        "Runs are called by their files, without folder and suffix. Each name has to be there once.",
-        "rename a file",
+        "Runs are called by their files, without folder and suffix, with a number behind where that is there twice.",
+        "the runs are listed",
     ),
     "CC425": Rule(
         "table too long",
@@ -510,6 +510,17 @@ RULES: dict[str, Rule] = {
         "Two tables are compared where they have columns in common and a common way to find the place: path length and "
         "source line, time, or the number of the row.",
         "choose another --by",
+    ),
+    "CC452": Rule(
+        "recording cannot be read",
+        "The file is not what its name or its first bytes say, is damaged, holds no numbers, or is of a kind that nothing "
+        "well kept reads.",
+        "export it as CSV",
+    ),
+    "CC453": Rule(
+        "files of one run cannot be joined",
+        "Files of one run are joined row by row where they have equally many rows, else on a time that they have in common.",
+        "cut both to the same rows, or bring their times to one clock",
     ),
     "CC500": Rule("file cannot be read", "The file is not there, or may not be read.", "check the path"),
     "CC501": Rule(

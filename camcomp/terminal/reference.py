@@ -76,7 +76,7 @@ def _command(path: str, command: click.Command) -> str:
 
 
 def _option(option: click.Option, context: click.Context) -> tuple[str, str]:
-    names = ", ".join(f"`{name}`" for name in option.opts)
+    names = ", ".join(f"`{name}`" for name in (*option.opts, *option.secondary_opts))
     if not option.is_flag:
         metavar = option.make_metavar(context)
         names += f" {_OPTION_TYPES.get(metavar, metavar)}"

@@ -1,0 +1,52 @@
+"""A MATLAB file of one axis, as the EMPS benchmark has them."""
+
+from __future__ import annotations
+
+import io
+
+import numpy as np
+
+from camcomp.diagnosis.recordings.run_log import Actuators, Recording, Wishes, csv_of
+from camcomp.ground.errors import ConfigError, Location
+from camcomp.model.motion.log_columns import TIME, log_columns
+
+
+def read_axis(
+    data: bytes, file: str, name: str, actuators: Actuators, actuator: str | None, wishes: Wishes
+) -> Recording:
+    """Time t s, reference qg m, position qm m, drive signal vir, gtau N per unit of it, of an actuator or the first.
+
+    Raises ConfigError CC423 where something is missing.
+    """
+    from scipy.io import loadmat
+    from scipy.io.matlab import MatReadError
+
+    at = Location(file, 1, 1)
+    if wishes.columns:
+        raise ConfigError("CC423", "variables of a MATLAB file cannot be named by --column", at=at)
+    try:
+        found = {key: np.ravel(value) for key, value in loadmat(io.BytesIO(data)).items() if not key.startswith("__")}
+    except (ValueError, TypeError, NotImplementedError, OSError, MatReadError) as error:
+        raise ConfigError("CC423", f"not a MATLAB file that can be read: {error}", at=at) from error
+    missing = [key for key in ("t", "qg", "qm") if key not in found]
+    if missing:
+        there = ", ".join(found) or "nothing"
+        raise ConfigError("CC423", f"no variable {', '.join(missing)}; there is {there}", at=at)
+    target = actuator or next(iter(actuators))
+    if target not in actuators:
+        raise ConfigError("CC423", f"the machine has no actuator '{target}'", at=at)
+    named = log_columns([target], [False])
+    values = {
+        TIME: found["t"] - found["t"][0],
+        named.setpoint[0]: 1e3 * found["qg"],
+        named.encoder[0]: 1e3 * found["qm"],
+    }
+    if "vir" in found and "gtau" in found:
+        values[named.drive[0]] = found["vir"] * float(found["gtau"][0])
+    unused = sorted(set(found) - {"t", "qg", "qm", "vir", "gtau"})
+    notes = [f"variables dropped: {', '.join(unused)}"] if unused else []
+    total = len(values[TIME])
+    if wishes.rows is not None and wishes.rows < total:
+        values = {key: each[: wishes.rows] for key, each in values.items()}
+        notes.append(f"the first {wishes.rows} of {total} rows (--rows), {total - wishes.rows} dropped")
+    return Recording(name, csv_of(values), len(values[TIME]), tuple(notes))

@@ -1,0 +1,125 @@
+"""Parts of one run on common rows: files of several instruments, topics of one container.
+
+Time counts where the parts have it in common; tables of equally many rows, of two files, are joined row by row, for poses
+stand still while they are measured one after the other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from camcomp.ground.datatypes import Floats, Ints
+from camcomp.ground.errors import ConfigError, Location
+from camcomp.model.motion.log_columns import LINE
+
+POSES_S = 0.5  # rows further apart are poses: nothing is known between them
+_GAP = 5.0  # usual steps between rows, over which nothing is interpolated
+_COMMON = 0.5  # of the shorter part's span, from which on two clocks are one
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """Columns of a log that were sampled together: time (n,) s ascending or None, values (n,) by name."""
+
+    file: str
+    time: Floats | None
+    values: Mapping[str, Floats]
+    leading: bool  # has places or coordinates: others come to its rows
+
+    @property
+    def rows(self) -> int:
+        """How many there are."""
+        return len(next(iter(self.values.values())))
+
+
+@dataclass(frozen=True, eq=False)
+class Joined:
+    """One table. row (n,): of the leading part; lead: its number."""
+
+    time: Floats | None
+    values: dict[str, Floats]
+    lead: int
+    row: Ints
+    notes: tuple[str, ...]
+
+
+def join(parts: Sequence[Part], by: str | None) -> Joined:
+    """Parts on common rows; by: "time", "rows" or None for what fits. Raises ConfigError CC453 where nothing does."""
+    if len(parts) == 1:
+        return Joined(parts[0].time, dict(parts[0].values), 0, np.arange(parts[0].rows), ())
+    files = {part.file for part in parts}
+    alike = len({part.rows for part in parts}) == 1
+    if by == "rows" or (by is None and len(files) == len(parts) and alike):
+        if not alike:
+            _refuse(parts, f"{' and '.join(str(part.rows) for part in parts)} rows cannot be joined row by row")
+        time = next((part.time for part in parts if part.time is not None), None)
+        values = {name: each for part in parts for name, each in part.values.items()}
+        return Joined(time, values, 0, np.arange(parts[0].rows), (f"joined row by row: {_files(parts)}",))
+    return _on_time(parts)
+
+
+def _on_time(parts: Sequence[Part]) -> Joined:
+    times = [part.time for part in parts if part.time is not None]
+    if len(times) < len(parts):
+        _refuse(parts, "the parts have neither times nor equally many rows")
+    start, end = max(t[0] for t in times), min(t[-1] for t in times)
+    if end - start < _COMMON * min(t[-1] - t[0] for t in times):
+        _refuse(parts, "the times of the parts have too little in common")
+    within = [int(((t >= start) & (t <= end)).sum()) for t in times]
+    candidates = [k for k, part in enumerate(parts) if part.leading] or list(range(len(parts)))
+    lead = min(candidates, key=lambda k: within[k])
+    base = times[lead]
+    row = np.flatnonzero((base >= start) & (base <= end))
+    poses = max(_step(t) for t in times) >= POSES_S
+    values, met = {name: each[row] for name, each in parts[lead].values.items()}, np.ones(len(row), bool)
+    for k, part in enumerate(parts):
+        if k == lead:
+            continue
+        near = _nearest(times[k], base[row])
+        close = np.abs(times[k][near] - base[row]) <= 0.5 * max(_step(times[k]), _step(base))
+        for name, each in part.values.items():
+            values[name] = each[near] if poses else _between(times[k], each, base[row], name == LINE)
+        met &= close | (not poses)
+    values, row = {name: each[met] for name, each in values.items()}, row[met]
+    if not len(row):
+        _refuse(parts, "no rows of the parts belong to the same time")
+    how = "nearest in time" if poses else "on time"
+    note = f"joined {how}, on the rows of {parts[lead].file}: {_files(parts)}"
+    lost = parts[lead].rows - len(row)
+    notes = (note, f"{lost} rows outside the common time dropped") if lost else (note,)
+    return Joined(base[row], values, lead, row, notes)
+
+
+def _step(time: Floats) -> float:
+    return float(np.median(np.diff(time))) if len(time) > 1 else 0.0
+
+
+def _nearest(time: Floats, wanted: Floats) -> Ints:
+    right = np.clip(np.searchsorted(time, wanted), 1, max(len(time) - 1, 1))
+    right = np.minimum(right, len(time) - 1)
+    left = np.maximum(right - 1, 0)
+    return np.where(wanted - time[left] <= time[right] - wanted, left, right)
+
+
+def _between(time: Floats, values: Floats, wanted: Floats, held: bool) -> Floats:
+    """Values at other times: straight between rows, the last one where `held`; NaN over gaps."""
+    known = np.isfinite(values)
+    if not known.any():
+        return np.full(len(wanted), np.nan)
+    t, v = time[known], values[known]
+    after = np.clip(np.searchsorted(t, wanted), 0, len(t) - 1)
+    before = np.clip(np.searchsorted(t, wanted, side="right") - 1, 0, len(t) - 1)
+    out = v[before] if held else np.interp(wanted, t, v)
+    wide = (t[after] - t[before] > _GAP * _step(time)) | (wanted < t[0]) | (wanted > t[-1])
+    return np.where(wide, np.nan, out)
+
+
+def _files(parts: Sequence[Part]) -> str:
+    return ", ".join(dict.fromkeys(part.file for part in parts))
+
+
+def _refuse(parts: Sequence[Part], message: str) -> None:
+    raise ConfigError("CC453", f"{message}: {_files(parts)}", at=Location(parts[-1].file, 1, 1))

@@ -1,0 +1,156 @@
+"""MCAP, the container of ROS 2 and others: every topic is a table, its fields are called topic.field.
+
+Lists that name their members are told apart by these names: `joint_states.position.elbow_joint`, and
+`tf.tool0.translation.x`. Messages are ROS 2's, protobuf's or JSON.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Callable, Iterator
+from functools import partial
+from numbers import Real
+from typing import Any
+
+import numpy as np
+
+from camcomp.diagnosis.recordings.sampled import SampledColumns, library, reading, some
+from camcomp.diagnosis.recordings.units import SI
+from camcomp.ground.datatypes import Floats
+from camcomp.ground.errors import ConfigError, Location
+
+_WHAT = "an MCAP file"
+_LONGEST = 64  # lists of more numbers are pictures, clouds or the like
+_DEEPEST = 12
+_IN_SI = ("ros2", "foxglove.")  # encodings and families of schemas whose lengths are m
+_NAMES = ("child_frame_id", "name", "joint_name")
+_NOT_FIELDS = ("header", "stamp", "timestamp")
+
+
+def read_mcap(data: bytes, name: str) -> list[SampledColumns]:
+    """Topics with numbers. Raises ConfigError CC216 (package missing), CC452 (no such file, no numbers)."""
+    reader = library("mcap.reader", "mcap", "MCAP files")
+    factories = [
+        library("mcap_ros2.decoder", "mcap-ros2-support", "MCAP files").DecoderFactory(),
+        library("mcap_protobuf.decoder", "mcap-protobuf-support", "MCAP files").DecoderFactory(),
+    ]
+    rows: dict[str, list[dict[str, float]]] = {}
+    times: dict[str, list[tuple[float, float]]] = {}
+    in_si: dict[str, bool] = {}
+    unread: dict[str, str] = {}
+    with reading(name, _WHAT):
+        decoders: dict[int, Callable[[bytes], Any] | None] = {}
+        for schema, channel, message in reader.make_reader(io.BytesIO(data)).iter_messages():
+            topic = channel.topic.strip("/").replace("/", ".")
+            if channel.id not in decoders:
+                decoders[channel.id] = _decoder(channel.message_encoding, schema, factories)
+            decode = decoders[channel.id]
+            if decode is None:
+                unread[topic] = channel.message_encoding
+                continue
+            content = decode(message.data)
+            rows.setdefault(topic, []).append(dict(_numbers(content, topic, 0)))
+            times.setdefault(topic, []).append((_stamp(content), 1e-9 * message.log_time))
+            family = (schema.encoding, schema.name) if schema is not None else ("", "")
+            in_si[topic] = family[0].startswith(_IN_SI[0]) or family[1].startswith(_IN_SI[1])
+    notes = [f"topics in an encoding that is not read: {some(sorted(unread))}"] if unread else []
+    out = []
+    for topic, found in rows.items():
+        names = list(dict.fromkeys(key for row in found for key in row))
+        if names:
+            table = np.array([[row.get(key, np.nan) for key in names] for row in found])
+            out.append(_sampled(name, names, table, np.array(times[topic]), SI if in_si[topic] else "", notes))
+            notes = []
+    if not out:
+        raise ConfigError("CC452", "the file has no messages with numbers", at=Location(name, 1, 1))
+    return out
+
+
+def _sampled(file: str, names: list[str], table: Floats, times: Floats, unit: str, notes: list[str]) -> SampledColumns:
+    """One topic. times (n, 2) s: stamp of the message, and when it was logged; the stamps count if all have one."""
+    time = times[:, 0] if np.isfinite(times[:, 0]).all() else times[:, 1]
+    units = (unit,) * len(names)
+    return SampledColumns(
+        file, tuple(names), units, len(table), time, partial(_column, table), partial(_at, file), tuple(notes)
+    )
+
+
+def _column(table: Floats, j: int) -> Floats:
+    return table[:, j]
+
+
+def _at(file: str, row: int, column: int) -> Location:
+    return Location(file, 1, 1)
+
+
+def _decoder(encoding: str, schema: Any, factories: list[Any]) -> Callable[[bytes], Any] | None:
+    if encoding == "json":
+        return json.loads
+    return next((found for each in factories if (found := each.decoder_for(encoding, schema)) is not None), None)
+
+
+def _fields(content: Any) -> dict[str, Any] | None:
+    """Fields of a message by name; None where it is none."""
+    if isinstance(content, dict):
+        return content
+    if hasattr(content, "DESCRIPTOR"):
+        return {each.name: getattr(content, each.name) for each in content.DESCRIPTOR.fields}
+    if hasattr(content, "__slots__") and hasattr(content, "_full_text"):
+        return {each: getattr(content, each) for each in content.__slots__}
+    return None
+
+
+def _numbers(content: Any, path: str, depth: int) -> Iterator[tuple[str, float]]:
+    """Every number in a message, with its path."""
+    if isinstance(content, Real):
+        yield path, float(content)
+        return
+    fields = _fields(content)
+    if fields is not None and depth < _DEEPEST:
+        labels: Any = fields.get("name")
+        for key, value in fields.items():
+            if key in _NOT_FIELDS:
+                continue
+            if _parallel(labels, value):
+                yield from ((f"{path}.{key}.{a}", float(b)) for a, b in zip(labels, value, strict=True))
+            else:
+                yield from _numbers(value, path if key in ("transforms", "transform") else f"{path}.{key}", depth + 1)
+    elif _is_list(content) and len(content) <= _LONGEST and depth < _DEEPEST:
+        for i, member in enumerate(content):
+            yield from _numbers(member, f"{path}.{_label(member, i)}", depth + 1)
+
+
+def _is_list(content: Any) -> bool:
+    return not isinstance(content, str | bytes | bytearray) and hasattr(content, "__len__")
+
+
+def _parallel(labels: Any, values: Any) -> bool:
+    """Whether a list holds one number for every name of the list beside it, as in JointState."""
+    return (
+        _is_list(labels) and _is_list(values) and 0 < len(labels) == len(values)
+        and all(isinstance(a, str) and isinstance(b, Real) for a, b in zip(labels, values, strict=True))
+    )  # fmt: skip
+
+
+def _label(member: Any, index: int) -> str:
+    fields = _fields(member) or {}
+    named = (fields[key] for key in _NAMES if isinstance(fields.get(key), str) and fields[key])
+    return next(named, str(index)).strip("/").replace("/", ".")
+
+
+def _stamp(content: Any) -> float:
+    """The message's own time in s, of its header or of its first member; NaN where it has none."""
+    fields = _fields(content) or {}
+    for key in _NOT_FIELDS:
+        inner = _fields(fields.get(key)) or {}
+        whole, part = (
+            inner.get("sec", inner.get("seconds")),
+            inner.get("nanosec", inner.get("nanos", inner.get("nsec"))),
+        )
+        if isinstance(whole, Real) and isinstance(part, Real) and (whole or part):
+            return float(whole) + 1e-9 * float(part)
+        if inner and np.isfinite(nested := _stamp(fields[key])):
+            return nested
+    members: Any = fields.get("transforms")
+    return _stamp(members[0]) if _is_list(members) and len(members) else float("nan")

@@ -1,0 +1,217 @@
+"""Which column of a recording is which column of the log: as told, else by its usual names."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from difflib import get_close_matches
+
+from camcomp.diagnosis.recordings.sampled import SampledColumns, some
+from camcomp.diagnosis.recordings.units import SI, factor_to, split_unit, unit_of
+from camcomp.ground.errors import ConfigError
+from camcomp.model.motion.log_columns import DYNO, LINE, TEMPERATURE, TIME, TIP, TIP_SD, LogColumns, log_columns
+
+_USUAL = {  # beside the log's own names, most telling first; those of actuators are made of theirs
+    TIME: ("time_s", "time", "timestamp", "t"),
+    **{own: (f"measurement_{axis}", axis) for own, axis in zip(TIP, "xyz", strict=True)},
+    TEMPERATURE: ("measurement_temperature", "temperature"),
+}
+_OTHER_QUANTITIES = {"velocity", "effort", "acceleration", "rotation", "orientation", "angular", "covariance"}
+_TURNING = re.compile(
+    r"(.*[._ ])?(q[wxyz]|quat\w*|r[xyz]|rotvec\w*|roll|pitch|yaw|(rotation|orientation)[._]?[wxyz])([_ (\[].*)?",
+    re.IGNORECASE,
+)
+
+
+@dataclass(frozen=True)
+class Pick:
+    """A column of a part; factor: to the unit of the log, None where the recording states no unit."""
+
+    part: int
+    column: int
+    factor: float | None
+
+
+@dataclass
+class Picked:
+    """Columns of the log that were found, and names of those that could be several."""
+
+    columns: dict[str, Pick] = field(default_factory=dict)
+    times: dict[int, Pick] = field(default_factory=dict)  # by part
+    doubtful: dict[str, list[str]] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+
+
+def pick_columns(
+    parts: Sequence[SampledColumns], actuators: Sequence[str], columns: LogColumns, told: Mapping[str, str]
+) -> Picked:
+    """Columns of a log in the parts of a run. Raises ConfigError CC421 for a name in `told` that is not there."""
+    picked = Picked()
+    for log, theirs in told.items():
+        hits = _told(parts, log, theirs, picked.notes)
+        if log == TIME:
+            picked.times |= {hit.part: hit for hit in hits}
+        elif len(hits) > 1:
+            message = f"column {theirs} stands there twice"
+            raise ConfigError("CC421", message, at=parts[hits[1].part].at(-1, hits[1].column))
+        else:
+            picked.columns[log] = hits[0]
+    usual = usual_names(actuators, columns)
+    taken = {(each.part, each.column) for each in (*picked.columns.values(), *picked.times.values())}
+    found = {log: _usual(parts, log, names, taken) for log, names in usual.items() if log not in (TIME, *told)}
+    for log, hits in found.items():
+        rivals = [other for other in found if other != log and set(found[other]) & set(hits)]
+        if len(hits) == 1 and not rivals:
+            picked.columns[log] = hits[0]
+        elif hits:
+            picked.doubtful[log] = [parts[hit.part].names[hit.column] for hit in hits]
+    for i, part in enumerate(parts):
+        if part.time is None and TIME not in told:
+            for hit in _usual([part], TIME, usual[TIME], {(0, column) for k, column in taken if k == i})[:1]:
+                picked.times[i] = replace(hit, part=i)
+    return picked
+
+
+def usual_names(actuators: Sequence[str], columns: LogColumns) -> dict[str, tuple[str, ...]]:
+    """Names by which every column of a log is looked for, in lower case, in the order of the log's columns."""
+    out: dict[str, tuple[str, ...]] = {TIME: (), LINE: ()}
+    out |= {log: (f"{a}_cmd",) for a, log in zip(actuators, columns.setpoint, strict=True)}
+    out |= {log: (a, f"{a}_joint", f"{a}_act") for a, log in zip(actuators, columns.encoder, strict=True)}
+    out |= {each: () for each in (*columns.drive, *TIP, *TIP_SD, *DYNO, TEMPERATURE)}
+    drives = set(columns.drive)  # act_x is an encoder
+    return {
+        log: tuple(
+            each.lower()
+            for each in (*more, *_USUAL.get(log, ()), *(() if log in drives else (log.rpartition("_")[0] or log,)))
+        )
+        for log, more in out.items()
+    }
+
+
+def check_enough(parts: Sequence[SampledColumns], picked: Picked, columns: LogColumns, *, program: bool) -> None:
+    """Raise ConfigError CC421 for the first column without which no study can use the run."""
+    missing = _missing(set(picked.columns), columns, program)
+    if missing:
+        log = missing[0]
+        names = [name for part in parts for name in part.names]
+        rivals = picked.doubtful.get(log)
+        could = f", it could be {some(rivals)}" if rivals else ""
+        hint = f"name it: --column {log}=THEIRS; there are: {some(names, 40)}"
+        raise ConfigError("CC421", f"no column for {log}{could}", at=parts[0].at(-1, 0), hint=hint)
+
+
+def _missing(there: set[str], columns: LogColumns, program: bool) -> list[str]:
+    """Columns that a study of what is there would need."""
+    if there.intersection(TIP) and not there.issuperset(TIP):
+        return [log for log in TIP if log not in there]
+    if program or there.issuperset(columns.setpoint):
+        measured = there.intersection((*TIP, *DYNO, *columns.encoder, *columns.drive))
+        return [] if measured else list(columns.encoder)
+    if there.intersection(TIP):
+        return [log for log in columns.encoder if log not in there]
+    axes = zip(columns.encoder, columns.setpoint, columns.drive, strict=True)
+    if any(act in there and (cmd in there or drive in there) for act, cmd, drive in axes):
+        return []
+    return list(TIP if there.intersection(columns.encoder) else columns.encoder)
+
+
+def leftovers(parts: Sequence[SampledColumns], picked: Picked) -> list[str]:
+    """Notes on columns that nothing was made of."""
+    used = {(each.part, each.column) for each in (*picked.columns.values(), *picked.times.values())}
+    rest = [name for i, part in enumerate(parts) for j, name in enumerate(part.names) if (i, j) not in used]
+    turning = [name for name in rest if _TURNING.fullmatch(name)]
+    other = [name for name in rest if name not in turning]
+    out = []
+    if turning:
+        out.append(f"orientation dropped, a log holds the place of the tip only: {some(turning)}")
+    if other:
+        out.append(f"{len(other)} column{'s' * (len(other) > 1)} dropped: {some(other)}")
+    for log, names in picked.doubtful.items():
+        out.append(f"{log} left out, it could be {some(names)}: --column says which")
+    return out
+
+
+def _told(parts: Sequence[SampledColumns], log: str, theirs: str, notes: list[str]) -> list[Pick]:
+    """Columns of this name, as it is written, else whatever the case: at least one, in every part at most one."""
+    every = [(i, j, name) for i, part in enumerate(parts) for j, name in enumerate(part.names)]
+    hits = [(i, j) for i, j, name in every if name == theirs] or [
+        (i, j) for i, j, name in every if _plain(name) == _plain(theirs)
+    ]
+    if not hits:
+        names = {_plain(name): name for _, _, name in every}
+        close = get_close_matches(_plain(theirs), names, n=1)
+        meant = f"did you mean {names[close[0]]}? " if close else ""
+        hint = f"{meant}there are: {some(list(names.values()), 40)}"
+        raise ConfigError("CC421", f"there is no column {theirs} for {log}", at=parts[0].at(-1, 0), hint=hint)
+    out = []
+    for i, j in hits:
+        unit = _unit(parts[i], j, log)
+        factor = factor_to(log, unit) if unit else None
+        if unit and factor is None:
+            notes.append(f"{theirs} is in {unit}, and is taken as {unit_of(log)} all the same")
+        out.append(Pick(i, j, factor))
+    return out
+
+
+def _usual(parts: Sequence[SampledColumns], log: str, usual: Sequence[str], taken: set[tuple[int, int]]) -> list[Pick]:
+    """Columns that the first name to be there fits: the log's own, a usual one, one with a unit, the end of a path."""
+    free = [
+        (i, j, _plain(name)) for i, part in enumerate(parts) for j, name in enumerate(part.names) if (i, j) not in taken
+    ]
+    for wanted in (log.lower(), *usual):
+        for fits in (_same, _same_with_unit, _ends):
+            hits = [(i, j) for i, j, name in free if fits(name, wanted)]
+            units = {(i, j): _unit(parts[i], j, log) for i, j in hits}
+            factors = {key: factor_to(log, unit) if unit else None for key, unit in units.items()}
+            good = [Pick(i, j, factors[i, j]) for i, j in hits if not units[i, j] or factors[i, j] is not None]
+            if len(good) > 1 and fits is _same:
+                good = good[:1]  # twice in one table: told when it is read
+            if good:
+                return good
+    return []
+
+
+def _unit(part: SampledColumns, column: int, log: str) -> str:
+    """The unit that a recording states. Who names a column without header by the log's name need not mean its unit."""
+    name, stated = part.names[column], part.units[column]
+    unit = "" if name == log and not part.headed else split_unit(name)[1]
+    return unit if unit and stated in ("", SI) else stated
+
+
+def _plain(name: str) -> str:
+    return name.lower().lstrip("/").replace("/", ".")
+
+
+def _same(name: str, wanted: str) -> bool:
+    return name == wanted
+
+
+def _same_with_unit(name: str, wanted: str) -> bool:
+    return split_unit(name)[0] == wanted
+
+
+def _ends(name: str, wanted: str) -> bool:
+    words = split_unit(name)[0].split(".")
+    return len(words) > 1 and words[-1] == wanted and not _OTHER_QUANTITIES & set(words)
+
+
+def told_columns(words: Sequence[str], actuators: Sequence[str], rotary: Sequence[bool]) -> dict[str, str]:
+    """`LOG=THEIRS` of the command line. Raises ConfigError CC421 for what is no column of this machine's logs."""
+    known = log_columns(actuators, rotary).known
+    out: dict[str, str] = {}
+    for word in words:
+        log, mark, theirs = word.partition("=")
+        if not mark or not theirs:
+            raise ConfigError(
+                "CC421", f"--column {word} is not LOG=THEIRS", hint=f"columns of a log: {', '.join(known)}"
+            )
+        if log not in known:
+            close = get_close_matches(log, known, n=1)
+            meant = f"did you mean {close[0]}? " if close else ""
+            hint = f"{meant}columns of a log: {', '.join(known)}"
+            raise ConfigError("CC421", f"--column {word}: a log of this machine has no column {log}", hint=hint)
+        if log in out:
+            raise ConfigError("CC421", f"--column names {log} twice")
+        out[log] = theirs
+    return out

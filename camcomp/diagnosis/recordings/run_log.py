@@ -1,0 +1,184 @@
+"""The log of one run: columns picked and joined, units, rows that are no use dropped, and everything of it said."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from camcomp.diagnosis.recordings.joining import Joined, Part, join
+from camcomp.diagnosis.recordings.naming import Pick, Picked, check_enough, leftovers, pick_columns, usual_names
+from camcomp.diagnosis.recordings.sampled import SampledColumns
+from camcomp.diagnosis.recordings.units import seconds
+from camcomp.ground.bounds import LARGEST_NUMBER
+from camcomp.ground.datatypes import Floats, Ints
+from camcomp.ground.errors import ConfigError
+from camcomp.model.config.robot import PrismaticActuator, RevoluteActuator
+from camcomp.model.motion.log_columns import LINE, TIME, LogColumns, log_columns
+
+Actuators = Mapping[str, PrismaticActuator | RevoluteActuator]
+_TWO_TURNS = 4.0 * np.pi  # no joint of an arm turns further, and angles beyond it are degrees
+
+
+@dataclass(frozen=True)
+class Recording:
+    """One run: its name, log as CSV, number of rows, and what the reader should know."""
+
+    name: str
+    log: bytes
+    rows: int
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Wishes:
+    """What the user says of recordings.
+
+    columns: theirs by the log's; rows: at most; degrees: joint angles are, are not, or None: by their size; period_s
+    between rows without times; join: "time", "rows" or None; program: the run has one.
+    """
+
+    columns: Mapping[str, str] = field(default_factory=dict)
+    rows: int | None = None
+    degrees: bool | None = None
+    period_s: float | None = None
+    join: str | None = None
+    program: bool = False
+
+
+def log_of(name: str, sampled: Sequence[SampledColumns], actuators: Actuators, wishes: Wishes) -> Recording:
+    """The log of a run. Raises ConfigError CC405 (time), CC421 (columns), CC422 (cells), CC453 (parts of a run)."""
+    columns = log_columns(list(actuators), [each.rotary for each in actuators.values()])
+    picked = pick_columns(sampled, list(actuators), columns, wishes.columns)
+    check_enough(sampled, picked, columns, program=wishes.program)
+    notes = [note for part in sampled for note in part.notes] + picked.notes
+    parts, numbers, order = _parts(sampled, picked, columns, notes)
+    joined = join(parts, wishes.join)
+    notes += joined.notes
+    lead = sampled[numbers[joined.lead]]
+    row = order[joined.lead][joined.row]
+    values = _in_rad(joined.values, columns, picked, wishes.degrees, notes)
+    driven = wishes.program or all(log in values for log in columns.setpoint)
+    time, keep = _times(joined, values, row, lead, driven, wishes.period_s, notes)
+    keep = _thinned(keep, wishes.rows, notes)
+    notes += leftovers(sampled, picked)
+    table = {TIME: time[keep]}
+    table |= {log: values[log][keep] for log in usual_names(list(actuators), columns) if log in values and log != TIME}
+    empty = {log: int(np.isnan(each).sum()) for log, each in table.items() if np.isnan(each).any()}
+    if empty:
+        notes.append("empty cells: " + ", ".join(f"{count} in {log}" for log, count in empty.items()))
+    return Recording(name, csv_of(table), len(keep), tuple(notes))
+
+
+def csv_of(columns: Mapping[str, Floats]) -> bytes:
+    """A table (n, k) as CSV, NaN as empty cells."""
+    lines = [",".join(columns)]
+    table = np.column_stack(list(columns.values()))
+    lines += [",".join("" if np.isnan(cell) else f"{cell:.9g}" for cell in row) for row in table]
+    return ("\n".join(lines) + "\n").encode("ascii")
+
+
+def _parts(
+    sampled: Sequence[SampledColumns], picked: Picked, columns: LogColumns, notes: list[str]
+) -> tuple[list[Part], list[int], list[Ints]]:
+    """What of each is wanted: parts, which of `sampled` each is, and which of its rows are kept."""
+    several = len({each.part for each in picked.columns.values()}) > 1
+    parts, numbers, order = [], [], []
+    for k, source in enumerate(sampled):
+        wanted = {log: each for log, each in picked.columns.items() if each.part == k}
+        if not wanted:
+            continue
+        values = {log: _read(source, each) for log, each in wanted.items()}
+        time = _clock(source, k, picked)
+        there = np.any([np.isfinite(each) for log, each in values.items() if log != LINE or len(values) == 1], axis=0)
+        _say(notes, int((~there).sum()), "rows without values dropped", source)
+        if time is not None:
+            _say(notes, int((there & ~np.isfinite(time)).sum()), "rows without time dropped", source)
+            there &= np.isfinite(time)
+        rows = np.flatnonzero(there)
+        if not len(rows):
+            raise ConfigError("CC422", "no row holds numbers in the columns that count", at=source.at(-1, 0))
+        if several and time is not None:
+            rows = rows[np.argsort(time[rows], kind="stable")]
+        kept = {log: each[rows] for log, each in values.items()}
+        parts.append(Part(source.file, None if time is None else time[rows], kept, bool(_places(kept, columns))))
+        numbers.append(k)
+        order.append(rows)
+    return parts, numbers, order
+
+
+def _places(values: Mapping[str, Floats], columns: LogColumns) -> list[str]:
+    return [log for log in values if log in ("x_mm", *columns.setpoint, *columns.encoder)]
+
+
+def _read(source: SampledColumns, pick: Pick) -> Floats:
+    """Values (n,) in the unit of the log. Raises ConfigError CC422 for what is no number of this world."""
+    values = source.read(pick.column) * (1.0 if pick.factor is None else pick.factor)
+    wild = np.flatnonzero(np.abs(values) > LARGEST_NUMBER)
+    if len(wild):
+        message = f"{values[wild[0]]:g} in row {wild[0] + 1} of column {source.names[pick.column]} is no value"
+        raise ConfigError("CC422", message, at=source.at(int(wild[0]), pick.column))
+    return values
+
+
+def _clock(source: SampledColumns, part: int, picked: Picked) -> Floats | None:
+    """Times (n,) s of a part, by the column named for them or as it brings them."""
+    pick = picked.times.get(part)
+    return source.time if pick is None else seconds(source.read(pick.column), pick.factor)
+
+
+def _in_rad(
+    values: dict[str, Floats], columns: LogColumns, picked: Picked, degrees: bool | None, notes: list[str]
+) -> dict[str, Floats]:
+    """Joint angles in rad: those whose unit nobody states may be degrees."""
+    angles = [
+        log for log in (*columns.setpoint, *columns.encoder)
+        if log in values and log.endswith("_rad") and (degrees or picked.columns[log].factor is None)
+    ]  # fmt: skip
+    if not angles or degrees is False:
+        return values
+    largest = max(float(np.nanmax(np.abs(values[log]), initial=0.0)) for log in angles)
+    if not degrees and largest <= _TWO_TURNS:
+        return values
+    why = "--degrees" if degrees else f"they go up to {largest:.4g}; --radians if they are not"
+    notes.append(f"joint angles are read as degrees: {why}")
+    return values | {log: np.radians(values[log]) for log in angles}
+
+
+def _times(
+    joined: Joined, values: Mapping[str, Floats], row: Ints, lead: SampledColumns, driven: bool,
+    period_s: float | None, notes: list[str],
+) -> tuple[Floats, Ints]:  # fmt: skip
+    """Seconds since the earliest row (n,), and the rows that are kept. Raises ConfigError CC405 where time runs backward."""
+    n = len(next(iter(values.values())))
+    if joined.time is None:
+        if period_s is None:
+            notes.append("no usable times, t_s is the number of the row")
+        else:
+            notes.append(f"no usable times, rows are {period_s:g} s apart (--period-s)")
+        return (row - row[0]) * (1.0 if period_s is None else period_s), np.arange(n)
+    time = joined.time - joined.time.min()
+    keep = np.arange(n)
+    if driven:
+        keep = np.flatnonzero(np.concatenate(([True], np.diff(time) != 0.0)))
+        _say(notes, n - len(keep), "rows of a time that was there before dropped", lead)
+        back = np.flatnonzero(np.diff(time[keep]) < 0.0)
+        if len(back):
+            first, second = time[keep[back[0] : back[0] + 2]]
+            message = f"time goes back by {first - second:g} s"
+            raise ConfigError("CC405", message, at=lead.at(int(row[keep[back[0] + 1]]), 0))
+    return time, keep
+
+
+def _thinned(keep: Ints, rows: int | None, notes: list[str]) -> Ints:
+    if rows is None or rows >= len(keep):
+        return keep
+    some = keep[np.unique(np.linspace(0, len(keep) - 1, rows).round().astype(int))]
+    notes.append(f"{len(some)} of {len(keep)} rows (--rows), {len(keep) - len(some)} dropped")
+    return np.asarray(some, np.int64)
+
+
+def _say(notes: list[str], count: int, what: str, source: SampledColumns) -> None:
+    if count:
+        notes.append(f"{count} {what} ({source.file})")

@@ -1,0 +1,67 @@
+"""What every reader of recordings hands over, and what all of them need."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any
+
+from camcomp.ground.datatypes import Floats
+from camcomp.ground.errors import CamcompError, ConfigError, Location
+
+
+@dataclass(frozen=True, eq=False)
+class SampledColumns:
+    """Columns that were sampled together, n rows each.
+
+    file: name for messages; units: as the recording states them, "SI", or empty where it states none; time (n,) s on
+    whatever clock, NaN where a row has none, or None; read: values (n,) of a column by its number; at: place of a cell by
+    row (-1: header) and column; notes: what the reader left out or took for granted; headed: the names are the recording's own.
+    """
+
+    file: str
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    rows: int
+    time: Floats | None
+    read: Callable[[int], Floats]
+    at: Callable[[int, int], Location]
+    notes: tuple[str, ...] = ()
+    headed: bool = True
+
+
+def library(module: str, package: str, what: str) -> Any:
+    """An optional module. Raises ConfigError CC216 with what to install where it is missing."""
+    try:
+        return import_module(module)
+    except ImportError as error:
+        hint = "pip install 'camcomp[import]'"
+        raise ConfigError("CC216", f"{what} need the package {package}", hint=hint) from error
+
+
+@contextmanager
+def reading(name: str, what: str) -> Iterator[None]:
+    """Whatever a foreign reader raises over a broken file becomes ConfigError CC452."""
+    try:
+        yield
+    except CamcompError:
+        raise
+    except Exception as error:  # no two readers agree on what they raise
+        reason = (str(error) or type(error).__name__).splitlines()[0][:200]
+        message = f"not {what} that can be read: {reason}"
+        raise ConfigError("CC452", message, at=Location(name, 1, 1)) from error
+
+
+def refuse_names(parts: Sequence[SampledColumns], names: Sequence[Sequence[str]]) -> None:
+    """Raise ConfigError CC421 where names are given and every part of a run has its own."""
+    if names and all(part.headed for part in parts):
+        hint = "name columns by --column LOG=THEIRS instead of --columns"
+        raise ConfigError("CC421", "the recording has names of its own", at=parts[0].at(-1, 0), hint=hint)
+
+
+def some(names: Sequence[str], most: int = 8) -> str:
+    """Names for a message, the first of many."""
+    listed = ", ".join(names[:most])
+    return listed if len(names) <= most else f"{listed} and {len(names) - most} more"

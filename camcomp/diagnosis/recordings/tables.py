@@ -1,0 +1,113 @@
+"""Tables as text: spreadsheets' CSV, blank-separated columns without header, LinuxCNC's halsampler."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from camcomp.diagnosis.recordings.sampled import SampledColumns
+from camcomp.ground.csv_table import CsvTable, TableRules, read_csv
+from camcomp.ground.datatypes import Floats
+from camcomp.ground.errors import ConfigError, Location
+from camcomp.model.motion.log_columns import TIME
+
+TABLE_RULES = TableRules(table="CC421", column="CC421", cell="CC422")
+SERVO_PERIOD_S = 1e-3  # of LinuxCNC, where nothing else is said
+UNNAMED = "-"  # a column without header that is not wanted
+_OVERRUN = b"overrun"
+
+
+def read_text_table(
+    data: bytes, name: str, names: Sequence[str] = (), period_s: float | None = None
+) -> list[SampledColumns]:
+    """A table; names: of its columns, if it has no header. Raises ConfigError CC421, CC422."""
+    text, notes = _without_remarks(data)
+    table = _without_torn_row(read_csv(text, name, TABLE_RULES, spreadsheet=True), notes)
+    if table.headed:
+        return [of_table(table, notes=notes)]
+    counted = table.mark == " " and _counts(table) and not (len(names) == len(table.header) and names[0] == TIME)
+    table = _named(table, names, counted)
+    if not counted:
+        return [of_table(table, notes=notes)]
+    number = table.value
+    period = SERVO_PERIOD_S if period_s is None else period_s
+    time = period * np.array([number(i, 0) - number(0, 0) for i in range(len(table.rows))])
+    notes.append(f"its first column counts samples of {1e3 * period:g} ms{'' if period_s else ' (--period-s)'}")
+    lost = round(number(len(table.rows) - 1, 0) - number(0, 0)) + 1 - len(table.rows)
+    if lost:
+        notes.append(f"{lost} samples were lost while recording")
+    return [of_table(table, range(1, len(table.header)), time, notes=notes)]
+
+
+def of_table(
+    table: CsvTable, columns: Sequence[int] | None = None, time: Floats | None = None, units: Sequence[str] | None = None,
+    notes: Sequence[str] = (),
+) -> SampledColumns:  # fmt: skip
+    """Some columns of a table; cells are read, and refused, only where they are wanted."""
+    wanted = range(len(table.header)) if columns is None else columns
+    kept = [j for j in wanted if table.header[j] not in ("", UNNAMED)]
+
+    def read(k: int) -> Floats:
+        table.refuse_twice([kept[k]])
+        return table.values([kept[k]])[:, 0]
+
+    def at(row: int, k: int) -> Location:
+        return table.at(row, kept[k] if kept else 0)
+
+    names = tuple(table.header[j] for j in kept)
+    return SampledColumns(
+        table.name,
+        names,
+        tuple(units or ("",) * len(names)),
+        len(table.rows),
+        time,
+        read,
+        at,
+        tuple(notes),
+        table.headed,
+    )
+
+
+def _without_remarks(data: bytes) -> tuple[bytes, list[str]]:
+    """The text with lines of remarks, and halsampler's word for lost samples, left blank; how many there were."""
+    if b"#" not in data and _OVERRUN not in data:
+        return data, []
+    lines = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n").split(b"\n")
+    remarks = [i for i, line in enumerate(lines) if line.lstrip().startswith(b"#")]
+    overruns = [i for i, line in enumerate(lines) if line.strip() == _OVERRUN]
+    for i in (*remarks, *overruns):
+        lines[i] = b""
+    notes = [f"{len(remarks)} lines of remarks dropped"] if remarks else []
+    if overruns:
+        notes.append(f"the sampler could not keep up {len(overruns)} times")
+    return b"\n".join(lines), notes
+
+
+def _without_torn_row(table: CsvTable, notes: list[str]) -> CsvTable:
+    """Without a last row that ends early, as a logger leaves it that is stopped while writing."""
+    if table.mark != " " or len(table.rows) < 2 or len(table.rows[-1]) >= len(table.rows[-2]):
+        return table
+    notes.append("the last row ends early: dropped")
+    return replace(table, rows=table.rows[:-1])
+
+
+def _counts(table: CsvTable) -> bool:
+    """Whether the first column is the number of the sample: it goes up by one, and by more where samples were lost."""
+    if len(table.rows) < 3:
+        return False
+    first = np.array([table.value(i, 0) for i in range(len(table.rows))])
+    steps = np.diff(first)
+    return bool((first == np.round(first)).all() and (steps >= 1.0).all() and np.mean(steps == 1.0) > 0.5)
+
+
+def _named(table: CsvTable, names: Sequence[str], counted: bool) -> CsvTable:
+    """The table with names; the number of the sample need not be named."""
+    if not names:
+        return table
+    header = ("", *names) if counted and len(names) == len(table.header) - 1 else tuple(names)
+    if len(header) != len(table.header):
+        message = f"{len(names)} names for {len(table.header)} columns"
+        raise ConfigError("CC421", message, at=table.at(-1), hint=f"--columns names all; {UNNAMED} leaves one out")
+    return replace(table, header=header)

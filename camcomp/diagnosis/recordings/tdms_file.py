@@ -1,0 +1,87 @@
+"""TDMS, the files of LabVIEW: channels are called group.channel, waveforms bring their times."""
+
+from __future__ import annotations
+
+import io
+import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from camcomp.diagnosis.recordings.sampled import SampledColumns, library, reading
+from camcomp.ground.datatypes import Floats
+from camcomp.ground.errors import ConfigError, Location
+
+_Key = tuple[str, int, float | None, float]
+
+
+def read_tdms(data: bytes, name: str) -> list[SampledColumns]:
+    """Channels by group, length and sampling. Raises ConfigError CC216 (package missing), CC452."""
+    nptdms = library("nptdms", "npTDMS", "TDMS files")
+    together: dict[_Key, list[tuple[str, str, Floats]]] = {}
+    dropped = 0
+    with reading(name, "a TDMS file"), _remarks_of(nptdms) as remarks:
+        for group in nptdms.TdmsFile.read(io.BytesIO(data)).groups():
+            for channel in group.channels():
+                values = np.asarray(channel[:])
+                if values.ndim != 1 or values.dtype.kind not in "iufb" or not len(values):
+                    dropped += 1
+                    continue
+                unit = str(channel.properties.get("unit_string", ""))
+                key = (group.name, len(values), *_sampling(channel.properties))
+                together.setdefault(key, []).append((f"{group.name}.{channel.name}", unit, values.astype(float)))
+    if not together:
+        raise ConfigError("CC452", "the file has no channels with numbers", at=Location(name, 1, 1))
+    notes = [f"npTDMS: {each}" for each in remarks[:1]]
+    if dropped:
+        notes.append(f"{dropped} channels without numbers dropped")
+    return [
+        _sampled(name, key, channels, tuple(notes) if i == 0 else ())
+        for i, (key, channels) in enumerate(together.items())
+    ]
+
+
+@contextmanager
+def _remarks_of(nptdms: Any) -> Iterator[list[str]]:
+    """What the library says of the file, instead of its saying so itself."""
+    remarks: list[str] = []
+    handler = logging.Handler()
+    handler.emit = lambda record: remarks.append(record.getMessage()[:120])  # type: ignore[method-assign]
+    logger, manager = logging.getLogger("nptdms"), nptdms.log.log_manager
+    manager.console_handler.setLevel(logging.CRITICAL)
+    logger.addHandler(handler)
+    try:
+        yield remarks
+    finally:
+        logger.removeHandler(handler)
+        manager.console_handler.setLevel(manager.log_level)
+
+
+def _sampling(properties: Any) -> tuple[float | None, float]:
+    """Step between samples, s, where the channel is a waveform, and when it starts."""
+    step = properties.get("wf_increment")
+    if not step:
+        return None, 0.0
+    start = properties.get("wf_start_time")
+    since = 0.0 if start is None else np.datetime64(start).astype("datetime64[us]").astype(np.int64) * 1e-6
+    return float(step), float(since) + float(properties.get("wf_start_offset", 0.0))
+
+
+def _sampled(file: str, key: _Key, channels: list[tuple[str, str, Floats]], notes: tuple[str, ...]) -> SampledColumns:
+    _, rows, step, start = key
+    time = None if step is None else np.asarray(start + step * np.arange(rows), float)
+    names, units, values = zip(*channels, strict=True)
+    return SampledColumns(
+        file, tuple(names), tuple(units), rows, time, partial(_column, values), partial(_at, file), notes
+    )
+
+
+def _column(values: tuple[Floats, ...], j: int) -> Floats:
+    return values[j]
+
+
+def _at(file: str, row: int, column: int) -> Location:
+    return Location(file, 1, 1)

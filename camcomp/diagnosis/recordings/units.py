@@ -1,0 +1,77 @@
+"""Units that recordings state, in brackets or at the end of a name, and times of every kind as seconds."""
+
+from __future__ import annotations
+
+import re
+from datetime import datetime
+
+import numpy as np
+
+from camcomp.ground.datatypes import Floats
+
+SI = "SI"
+_TO_LOG = {  # unit of the log: factors that lead to it, by unit of theirs in lower case
+    "mm": {"mm": 1.0, "m": 1e3, "cm": 10.0, "um": 1e-3, "µm": 1e-3, "in": 25.4, "inch": 25.4},
+    "rad": {"rad": 1.0, "mrad": 1e-3, "deg": np.pi / 180.0, "°": np.pi / 180.0, "degrees": np.pi / 180.0},
+    "s": {"s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9, "min": 60.0},
+    "N": {"n": 1.0, "kn": 1e3},
+    "Nmm": {"nmm": 1.0, "nm": 1e3, "n·m": 1e3},
+    "C": {"c": 1.0, "°c": 1.0, "degc": 1.0},
+}
+_BASE = {"mm": "m", "rad": "rad", "s": "s", "N": "n", "Nmm": "nm", "C": "c"}
+_BRACKETS = re.compile(r"(.+?)[\s_]*[\[(]([^\[\]()]*)[\])]")
+_STAMP = (1e13, 1e14)  # 20200714163904
+_SINCE_1970 = ((1e12, 1e13, 1e-3), (1e15, 1e16, 1e-6))  # from, to, s: ms and us of this century
+
+
+def unit_of(log: str) -> str:
+    """Unit of a column of a log: x_mm has mm, line none."""
+    unit = log.rpartition("_")[2]
+    return unit if unit in _TO_LOG else ""
+
+
+def split_unit(name: str) -> tuple[str, str]:
+    """`x [mm]`, `x (mm)` and `x_mm` to name and unit; the unit is empty where there is none."""
+    if found := _BRACKETS.fullmatch(name):
+        return found[1], found[2].strip()
+    base, _, unit = name.rpartition("_")
+    known = any(unit.lower() in factors for factors in _TO_LOG.values())
+    return (base, unit) if base and known else (name, "")
+
+
+def factor_to(log: str, unit: str) -> float | None:
+    """What leads from a unit of theirs to that of a column of a log; None where the unit is of another kind."""
+    kind = unit_of(log)
+    if not kind:
+        return 1.0
+    return _TO_LOG[kind].get(_BASE[kind] if unit == SI else unit.lower())
+
+
+def seconds(stamps: Floats, factor: float | None) -> Floats | None:
+    """Times (n,) as s on their own clock, NaN where there is none; None where they tell too few rows apart.
+
+    factor: of their unit; without, times are s, stamps such as 20200714163904, or ms or us since 1970.
+    """
+    known = stamps[np.isfinite(stamps)]
+    if not known.size or np.unique(known).size <= 0.5 * len(stamps):
+        return None
+    if factor is not None:
+        return stamps * factor
+    least, most = known.min(), known.max()
+    for low, high, scale in _SINCE_1970:
+        if low <= least and most < high:
+            return stamps * scale
+    if most < _SINCE_1970[0][0]:
+        return stamps
+    if not (_STAMP[0] <= least and most < _STAMP[1]):
+        return None
+    try:
+        return np.array([_since_2000(each) for each in stamps])
+    except ValueError:
+        return None
+
+
+def _since_2000(stamp: float) -> float:
+    if not np.isfinite(stamp):
+        return float("nan")
+    return (datetime.strptime(f"{stamp:.0f}", "%Y%m%d%H%M%S") - datetime(2000, 1, 1)).total_seconds()
