@@ -149,7 +149,11 @@ class _Cluster:
             outcome: Outcome = future.result(timeout=LOOK)
         except KilledWorker:
             return died(key)
-        except (CancelledError, asyncio.CancelledError) as error:  # nobody else cancels: the one who knew of it is gone
+        except (
+            CancelledError,
+            asyncio.CancelledError,
+            OSError,
+        ) as error:  # nobody else cancels; who knew of it is gone
             raise self._gone() from error
         except Exception as error:  # noqa: BLE001 - the cluster's, not the task's: `work` never raises
             self._workers()

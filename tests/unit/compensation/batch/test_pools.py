@@ -135,6 +135,7 @@ def test_a_scheduler_that_dies_ends_the_batch_and_what_is_done_stays_done(cluste
     assert batch.returncode == 5
     assert "error[CC503]: the Dask scheduler at tcp://127.0.0.1:" in "".join(said) and "Traceback" not in "".join(said)
     figures = json.loads((tmp_path / "out" / "camcomp-batch.json").read_text())
+    assert [each["messages"] for each in figures["files"] if each["status"] == "error"] == []
     done = figures["counts"]["done"]
     assert 5 <= done < 60 and figures["counts"] == {**figures["counts"], "done": done, "not done": 60 - done}
     assert figures["exit_code"] == 5 and figures["programs"] == 60
