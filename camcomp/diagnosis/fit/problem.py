@@ -1,7 +1,7 @@
 """The state of one diagnosis: columns, white rows, and re-fits of sets of causes through the twin."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -264,10 +264,31 @@ def open_problem(bench: Bench, candidates: Sequence[CandidateCause], stated_mm: 
     shapes: dict[int, dict[str, float]] = {i: shape_default(a) for i, a in enumerate(candidates) if a.shapes}
     words = patterns(bench)
     problem = _whiten(bench, columns, words, floor, noise, inflate, times, residuals, shapes, outliers)
+    noise = _with_model_error(problem)
+    problem = _whiten(bench, columns, words, floor, noise, inflate, times, residuals, shapes, outliers)
     if not shapes:
         return problem
     columns = _scan(problem)
     return _whiten(bench, columns, words, floor, noise, inflate, times, residuals, shapes, outliers)
+
+
+def _with_model_error(problem: Problem) -> Noise:
+    """The noise with what even all effects together leave of encoders, drive forces and dynamometer: the model's own error.
+
+    It makes these channels count less, so that what a model of forces says wrongly is not held against a cause that the
+    tip shows. The tip keeps the noise of its instrument, and the floor is never touched.
+    """
+    free = [c for own in problem.candidates.columns for c in own]
+    mean, _ = estimate(total(problem.base_grams), problem.prior, free)
+    sigma = problem.noise.sigma.copy()
+    for k, (W, r) in enumerate(zip(problem.white, problem.white_residual, strict=True)):
+        left, at = (r - W @ mean) ** 2, 0
+        for c in range(sigma.shape[1]):
+            rows = int(np.isfinite(problem.inflate[k][:, c]).sum()) if np.isfinite(sigma[k, c]) else 0
+            if c >= 3 and rows:
+                sigma[k, c] *= max(1.0, float(np.sqrt(np.mean(left[at : at + rows]))))
+            at += rows
+    return replace(problem.noise, sigma=sigma)
 
 
 def _whiten(

@@ -32,12 +32,12 @@ TEMPERATURE = (
 MINOR = 0.3  # of the noise floor at the tip: what moves it by less is no cause, whatever its significance (contract, section 6)
 CANCELLING = 8.0  # size of a member, in units of the whole set, above which the set lives on differences of its members
 HARM_LOG = 2.0  # log density by which a cause has to harm the prediction of other runs before it goes
-SAME_FIT = 4.0  # chi-square by which two sets may differ and still be the same answer
+SAME_EVIDENCE = 2.0  # log evidence by which two sets may differ and still be the same answer, whatever their priors
 GATE = 0.4  # of the noise floor: what unseen runs show beyond it makes an effect that the library lacks
 GATE_SHARE = 0.1  # of what the causes explain: none is modelled better than that
 GATE_LOCAL = 1.5  # of the floor: the same for what acts for a while only
 SURE_Z = 5.0  # standard deviations of chance
-PART_OF_UNKNOWN = 1.0  # size in units of an unknown effect below which a cause at its place is taken for a part of it
+PART_OF_UNKNOWN = 2.0  # size in units of an unknown effect below which a cause at its place is taken for a part of it
 POINTED = 0.5  # share of what is left that one actuator has to have to be that place
 
 
@@ -242,7 +242,7 @@ def _same(problem: Problem, fits: tuple[Fitted, ...], probability: Floats) -> li
     for f in fits:
         if f is best or len(f.members) != len(best.members) or not best.members:
             continue
-        if misfit(problem, f) - misfit(problem, best) < SAME_FIT and _plausible(problem, f):
+        if best.log_evidence - f.log_evidence < SAME_EVIDENCE and _plausible(problem, f):
             found.append((best.members, f.members))
     return found
 
