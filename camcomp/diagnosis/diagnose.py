@@ -13,6 +13,7 @@ import numpy as np
 from camcomp.diagnosis.answer.held_out import shrinkage_of
 from camcomp.diagnosis.answer.intervals import joint_covariance
 from camcomp.diagnosis.answer.locate import channel_axes, patterns_of, run_gaps
+from camcomp.diagnosis.answer.minor import minor_effects, outlying_rows
 from camcomp.diagnosis.fit.bench import Bench, Run
 from camcomp.diagnosis.fit.columns import candidate_causes, working_causes
 from camcomp.diagnosis.fit.gap import gap_of, main_channels, rest_by_actuator
@@ -38,6 +39,7 @@ from camcomp.diagnosis.search.unexplained import size_um, worst
 from camcomp.diagnosis.search.unknown import firm_prior, residual_tests
 from camcomp.diagnosis.statistics import places
 from camcomp.diagnosis.statistics.cause_sets import Fitted
+from camcomp.diagnosis.statistics.periods import frequencies
 from camcomp.diagnosis.statistics.probability import probability_of_chance, stated
 from camcomp.ground.datatypes import Floats
 from camcomp.model.effect import Cause
@@ -45,6 +47,7 @@ from camcomp.model.job import Job
 from camcomp.model.motion.twin import Twin
 
 MOSTLY_ONE_ACTUATOR = 0.6  # share of what is unknown from which on it is one actuator's
+VIBRATION_SHARE = 0.4  # of the gap in one line of the spectrum
 RIVALS = 8  # sets that one experiment is asked to tell from the answer
 
 
@@ -87,6 +90,8 @@ def diagnose(
         alternatives=_alternatives(problem, found) if word == "ambiguous" else (),
         shrinkage=UnseenShrinkage.model_validate(shrinkage) if unseen else None,
         next_experiment=_proposed(proposal) if proposal is not None else None,
+        minor=minor_effects(problem, best),
+        outliers=outlying_rows(problem),
         floor=Floor(um=gap["noise_floor_um"], source=problem.floor.source),
         equivalent=tuple(tuple(_named(problem, i) for i in group) for group in classes(likeness(problem))),
     )
@@ -266,12 +271,18 @@ def _first_label(found: CauseSearch) -> str:
 def _drivers(problem: Problem, found: CauseSearch) -> list[Driver]:
     """What the gap depends on; with an unknown cause, what the rest depends on."""
     if found.unknown_in:
-        labels = found.left[found.unknown_in].labels
+        labels = (*_vibrations(problem), *found.left[found.unknown_in].labels)
     else:
         null = problem.refit(())
         at_null = residual_tests(problem, null, firm_prior(problem))
         labels = max(at_null.values(), key=lambda each: each.energy).labels if at_null else ()
     return [Driver(covariate=name, share=round(share, 4)) for name, share in labels[:6] if share > 0.02]
+
+
+def _vibrations(problem: Problem) -> tuple[tuple[str, float], ...]:
+    """What shakes at one frequency depends on time and on nothing else."""
+    heard = frequencies(run_gaps(problem), channel_axes(problem))
+    return tuple((f"time:{line.name}", line.share) for line in heard if line.share > VIBRATION_SHARE)
 
 
 # -- shrinkage --------------------------------------------------------------------------------------------------------

@@ -10,7 +10,7 @@ from tests.plants.experiments import Plan, make, write
 CONFIG = "../../../config/orthoglide.yaml"
 PLANS = {
     "clear": Plan(412, (Cause("backlash", "y", 3),), (6.0,), "six", "all", samples=160),
-    "ambiguous": Plan(103, (Cause("servo_lag", None, 8022),), (8.0,), "four", "tip", samples=160),
+    "ambiguous": Plan(103, (Cause("tool_length", None, 8022),), (8.0,), "four", "no-forces", samples=160),
     "unknown": Plan(655, (Cause("guide_straightness", "y", 8),), (6.0,), "six", "all", samples=160),
 }
 

@@ -16,7 +16,9 @@ PAIR = plan_of(("drive_stiffness", "y"), ("cutting_force", None), ratio=30.0, se
 def test_the_corrected_program_shrinks_the_error_as_predicted(workshop, tmp_path, plan):
     path, made = workshop.made(plan)
     result, better = workshop.answer(plan)[0], tmp_path / "better.yaml"
-    better.write_text(_machine_with_causes([str(path.parent / "machine.yaml")], result, str(better)))
+    better.write_text(
+        _machine_with_causes([str(path.parent / "machine.yaml")], workshop.answer(plan)[1].result, str(better))
+    )
     assert "# found by camcomp diagnose" in better.read_text()
     program = next(p for p, r in zip(made.programs, made.runs, strict=True) if r.cutting and "G3" in p)
     (tmp_path / "in.nc").write_text(program)

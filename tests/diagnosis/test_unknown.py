@@ -1,11 +1,7 @@
 """Effects that the library does not have, some of which a few of its members could follow for a while."""
 
-from dataclasses import replace
-
 import pytest
 
-from camcomp.diagnosis.search.cause_search import search_causes
-from camcomp.diagnosis.search.unknown import idle
 from camcomp.terminal.commands.diagnose import examine
 from tests.diagnosis.conftest import plan_of
 from tests.plants.causes import Cause
@@ -13,7 +9,6 @@ from tests.plants.experiments import Plan
 
 GROWTH = plan_of(("spindle_growth", None), design="six", samples=150)
 CREEP = plan_of(("creep", "x"), design="six", samples=150)
-SOFT = plan_of(("drive_stiffness", "y"), design="six", samples=150)
 CROSSTALK = plan_of(("force_crosstalk", "y"), design="six", samples=150, seed=62)
 
 
@@ -52,16 +47,3 @@ def test_members_that_undo_each_other_explain_nothing(workshop):
     result = examine(workshop.made(plan)[0], without=("link_stiffness",))[0].as_json()
     assert result["verdict"] == "unknown"
     assert "tool_length" not in [cause["effect"] for cause in result["causes"]]
-
-
-def test_causes_that_leave_the_gap_where_it_was_explain_nothing(workshop, monkeypatch):
-    _, diagnosis, _ = workshop.answer(SOFT)
-    best = diagnosis.search.fits[diagnosis.search.verdict.best]
-    assert not idle(diagnosis.problem, best, 0.5)
-    assert idle(diagnosis.problem, replace(best, theta=0.1 * best.theta), 0.5)
-    assert not idle(diagnosis.problem, replace(best, theta=0.1 * best.theta))
-    assert idle(diagnosis.problem, replace(best, theta=-best.theta))
-    monkeypatch.setattr("camcomp.diagnosis.search.cause_search.idle", lambda *_: True)
-    found = search_causes(diagnosis.problem)
-    assert found.unknown_in == "tip"
-    assert found.fits[found.verdict.best].members == ()

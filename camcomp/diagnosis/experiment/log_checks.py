@@ -13,6 +13,8 @@ from camcomp.ground.errors import ConfigError, Location
 
 FAR_MM = 5.0  # no machine of the kind is wrong by so much; a log of another program or unit is
 FAR_RAD = 0.1
+ASIDE_MM = 1.0  # no control leaves its path by so much for half of the time
+LEAST_AGREEMENT = 0.5  # of the moving rows
 LEAST_ROWS = 10  # of a run that executes a program; fewer say nothing about their own noise
 _LENGTH_UNITS = {1e-3: "m", 25.4: "mm where inches are due", 1.0 / 25.4: "inches", 1e3: "um"}
 _TURNS = {180.0 / np.pi: "degrees"}
@@ -74,6 +76,14 @@ def check_program(name: str, run: str, measured: Measured, rows: Bools) -> None:
         lines = sorted({int(each) for each in measured.line[known & ~rows]})[:5]
         message = f"run '{run}': most rows are on lines that the program does not move on, e.g. {lines}"
         raise ConfigError("CC406", message, at=Location(name, 1, 1))
+
+
+def check_followed(name: str, run: str, distance: Floats, agreement: float) -> None:
+    """Raise CC406 where the motion does not lie along the program: distance (n,) mm from it; share of rows that go its way."""
+    off = float(np.median(distance))
+    if off > ASIDE_MM or agreement < LEAST_AGREEMENT:
+        way = f"{off:.3g} mm beside the program" if off > ASIDE_MM else "against the way of the program"
+        raise ConfigError("CC406", f"run '{run}': the motion runs {way}", at=Location(name, 1, 1))
 
 
 def check_places(name: str, run: str, measured: Measured, rho: Floats, tip: Floats, rotary: bool = False) -> None:

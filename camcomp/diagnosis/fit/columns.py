@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 
 from camcomp.diagnosis.fit.bench import Bench, CandidateCause, Run, cause_of, step_of, thinned
-from camcomp.diagnosis.fit.floor import NoiseFloor
 from camcomp.diagnosis.fit.measured import channel_names
 from camcomp.diagnosis.fit.patterns import Dictionary, Ground, dictionary
 from camcomp.diagnosis.statistics.evidence import Prior
@@ -118,7 +117,7 @@ def build(
     bench: Bench,
     candidates: Sequence[CandidateCause],
     shapes: Mapping[int, Mapping[str, float]],
-    floor: NoiseFloor,
+    floor_um: float,
 ) -> Columns:
     """All columns at nominal. Candidates that no channel can see have columns of zeros and stay.
 
@@ -146,7 +145,7 @@ def build(
             candidate_columns(bench, candidate, shapes.get(i, shape_default(candidate))),
             strict=True,
         ):
-            healthy = min(HEALTHY * floor.tip_um / max(tip_um(bench, per_run), 1e-9), MOST_HEALTHY)
+            healthy = min(HEALTHY * floor_um / max(tip_um(bench, per_run), 1e-9), MOST_HEALTHY)
             put(i, f"{candidate.label}.{p.name}", max(p.tolerance / p.scale, healthy), per_run, p.sign, True)
     for name, size, per_run, loose in _nuisances(bench):
         put(-1, name, size, per_run, 0, loose)

@@ -260,7 +260,7 @@ def open_problem(bench: Bench, candidates: Sequence[CandidateCause], stated_mm: 
     residuals = [bench.residual(k) for k in range(len(bench.runs))]
     noise = instrument_noise(bench, floor, least_noise(bench, floor), times)
     inflate = less_certain(noise, inflation(bench), tails(bench))
-    columns = build(bench, candidates, {}, floor)
+    columns = build(bench, candidates, {}, floor.tip_um)
     shapes: dict[int, dict[str, float]] = {i: shape_default(a) for i, a in enumerate(candidates) if a.shapes}
     words = patterns(bench)
     problem = _whiten(bench, columns, words, floor, noise, inflate, times, residuals, shapes, outliers)

@@ -154,7 +154,7 @@ def _lay(problem: Problem, candidate: Candidate, rivals: Sequence[Fitted], job: 
     ):
         raise ValueError("nothing to see")
     shapes = {**problem.shapes, **{i: shape for f in rivals for i, shape in f.extra.items()}}
-    columns = build(bench, problem.columns.candidates, shapes, problem.floor)
+    columns = build(bench, problem.columns.candidates, shapes, problem.floor.tip_um)
     known = {name: i for i, name in enumerate(problem.columns.names)}
     mine = [i for i, name in enumerate(columns.names) if name in known]
     theirs = [known[columns.names[i]] for i in mine]

@@ -1,0 +1,37 @@
+"""What was seen and is no cause: effects of the size that every healthy machine has, and rows that are no readings."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from camcomp.diagnosis.fit.columns import tip_um
+from camcomp.diagnosis.fit.problem import Problem
+from camcomp.diagnosis.result.types import MinorEffect, Outlier
+from camcomp.diagnosis.statistics.cause_sets import Fitted, total
+from camcomp.diagnosis.statistics.evidence import estimate
+
+LEAST = 0.05  # of the noise floor: smaller ones are not worth a line
+MOST_LISTED = 8
+
+
+def minor_effects(problem: Problem, f: Fitted) -> tuple[MinorEffect, ...]:
+    """Effects beside the causes as a fit with shrinkage has them, largest first."""
+    mean, _ = estimate(total(f.grams), problem.prior, problem.member_columns(f.members), f.factor)
+    found = []
+    for i, (candidate, columns) in enumerate(zip(problem.columns.candidates, problem.candidates.columns, strict=True)):
+        if i in f.members or not columns:
+            continue
+        index = list(columns)
+        size = tip_um(problem.bench, [block[:, :, index] @ mean[index] for block in problem.columns.blocks])
+        if size > LEAST * problem.floor.tip_um:
+            found.append(MinorEffect(effect=candidate.name, target=candidate.target, size_um=round(size, 3)))
+    return tuple(sorted(found, key=lambda each: -each.size_um)[:MOST_LISTED])
+
+
+def outlying_rows(problem: Problem) -> tuple[Outlier, ...]:
+    """Rows of the logs of which something was left out, counted from 1."""
+    return tuple(
+        Outlier(run=run.name, row=int(row) + 1)
+        for run, cells in zip(problem.bench.runs, problem.outliers, strict=True)
+        for row in np.flatnonzero(cells.any(axis=1))
+    )
