@@ -12,9 +12,12 @@ from pathlib import Path
 import numpy as np
 from pydantic import ValidationError
 
+from camcomp.diagnosis.arm.noise_floor import StatedDeviation
+from camcomp.diagnosis.arm.plausible import check_poses
 from camcomp.diagnosis.arm.poses import Poses
 from camcomp.diagnosis.arm.study import study as study_arm
-from camcomp.diagnosis.axis.study import AxisRun
+from camcomp.diagnosis.axis.findings import AxisDeviation, AxisRun
+from camcomp.diagnosis.axis.plausible import check_axes
 from camcomp.diagnosis.axis.study import study as study_axes
 from camcomp.diagnosis.experiment.open_experiment import open_log, read_log
 from camcomp.diagnosis.fit.measured import Measured
@@ -29,11 +32,14 @@ from camcomp.model.motion.log_columns import log_columns
 from camcomp.model.statics.arm import arm_of
 from camcomp.model.statics.build import build_robot
 
+MOSTLY = 0.5  # share of rows with a value from which on a channel counts as logged, and rows without it as lost
+
 
 def study_of(path: str | Path, without: Sequence[str] = ()) -> DiagnosisResult | None:
     """Result of an experiment of static poses or of axis logs; None where it is for the general diagnosis.
 
-    Raises ConfigError CC420 where the logs say too little.
+    Raises ConfigError CC420 where the logs say too little, CC407, CC408, CC412, CC413 where they cannot be of this machine
+    as they are read.
     """
     experiment = load_experiment(path)
     if any(run.program is not None for run in experiment.runs):
@@ -47,13 +53,21 @@ def study_of(path: str | Path, without: Sequence[str] = ()) -> DiagnosisResult |
             if arm_of(robot) is None:
                 return None
             runs = [_poses(run, log) for run, log in zip(experiment.runs, logs, strict=True)]
-            return study_arm(robot, _causes(config), runs, holdout=experiment.holdout, without=without)
+            for run, each in zip(experiment.runs, runs, strict=True):
+                check_poses(display_name(run.log), run.name, robot, each.q, each.tip)
+            sd = experiment.sd
+            stated = StatedDeviation(sd.tip_mm, sd.encoder_mm) if sd else StatedDeviation()
+            return study_arm(robot, _causes(config), runs, holdout=experiment.holdout, without=without, stated=stated)
         if not any(m.has("tip") for m in logs) and all(m.has("encoder") for m in logs):
             axes = {
                 a.name: [_axis(run, log, k, a.revolute) for run, log in zip(experiment.runs, logs, strict=True)]
                 for k, a in enumerate(robot.actuators)
             }
-            return study_axes(axes, holdout=experiment.holdout, without=without)
+            for i, run in enumerate(experiment.runs):
+                check_axes(display_name(run.log), {name: own[i] for name, own in axes.items()})
+            sd = experiment.sd
+            deviation = AxisDeviation(sd.encoder_mm, sd.force_N) if sd else AxisDeviation()
+            return study_axes(axes, holdout=experiment.holdout, without=without, stated=deviation)
     except ValidationError:  # a ValueError too, and a fault of ours
         raise
     except ValueError as error:
@@ -73,12 +87,26 @@ def _poses(run: RunSpec, log: Measured) -> Poses:
     known = np.flatnonzero(np.isfinite(np.concatenate((log.encoder, log.tip), axis=1)).all(axis=1))
     heat = log.temperature if len(known) and np.isfinite(log.temperature[known]).all() else None
     label = "common" if run.clamping is None else str(run.clamping)
-    every = Poses(label, log.encoder, log.tip, run.started_s + log.time, heat, np.full(len(log.time), run.name))
+    n = len(log.time)
+    sd = log.tip_sd if np.isfinite(log.tip_sd).any() else None
+    every = Poses(
+        label, log.encoder, log.tip, run.started_s + log.time, heat, np.full(n, run.name), sd, np.arange(1, n + 1)
+    )
     return every.take(known)
 
 
 def _axis(run: RunSpec, log: Measured, k: int, revolute: bool) -> AxisRun:
-    """Rows with an encoder value. Torques of hinges are not studied: their friction has other units."""
-    known = np.isfinite(log.encoder[:, k])
+    """Rows, one per time and in its order, with all that the log has of this axis.
+
+    Torques of hinges are not studied: their friction has other units.
+    """
     force = np.full(len(log.time), np.nan) if revolute else log.drive[:, k]
-    return AxisRun(run.name, log.time[known], log.setpoint[known, k], log.encoder[known, k], force[known])
+    channels = (log.encoder[:, k], log.setpoint[:, k], force)
+    known = np.isfinite(log.encoder[:, k])
+    for each in channels:
+        if np.isfinite(each).mean() > MOSTLY:
+            known &= np.isfinite(each)
+    rows = np.flatnonzero(known)
+    rows = rows[np.unique(log.time[rows], return_index=True)[1]]
+    encoder, setpoint, force = (each[rows] for each in channels)
+    return AxisRun(run.name, log.time[rows], setpoint, encoder, force, rows + 1)

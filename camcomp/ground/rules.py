@@ -472,6 +472,18 @@ RULES: dict[str, Rule] = {
         "The loaded equilibrium of the model was not found at a point of the run.",
         "check the force and stiffness values of the config",
     ),
+    "CC412": Rule(
+        "joints and tips of different rows",
+        "The tips of static poses fit the joint angles of the row before or behind. Read as they are, every pose would be "
+        "as wrong as the arm is large, and effects would be fitted to that.",
+        "write the joints and the tip of one pose into one row",
+    ),
+    "CC413": Rule(
+        "poses of another machine",
+        "With the best frames, the tips are further from the arm of the config than any arm of the kind is wrong, in no "
+        "other unit, order or sign of the columns they would fit, and a diagnosis would be one of the mistake.",
+        "check the config of the experiment, and which column is which joint",
+    ),
     # --- CC5xx input and output --------------------------------------------------------------------------------
     "CC420": Rule(
         "too little to study",

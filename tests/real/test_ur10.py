@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from camcomp.diagnosis.arm.discrepancy import without_nuisance
+from camcomp.diagnosis.arm.fit import investigate
 from camcomp.diagnosis.arm.poses import ArmBench, Poses
-from camcomp.diagnosis.arm.study import investigate, merged
+from camcomp.diagnosis.arm.study import merged
 from camcomp.model.config.load import load_config
 from camcomp.model.statics.build import build_robot
 from tests.commandline import ROOT, camcomp, table
@@ -32,6 +33,8 @@ def effects(result):
 
 def check(result, floor, least):
     assert result["verdict"] == "unknown"
+    assert result["floor"] == {"um": result["gap"]["noise_floor_um"], "source": "repeats"}
+    assert 30 < result["floor"]["um"] < 45
     assert effects(result)[:2] == [GEOMETRY, GRAVITY]
     assert effects(result)[-1] == "unknown"
     assert "joint_offset" not in effects(result)
@@ -50,7 +53,8 @@ def check(result, floor, least):
 def test_sample(tmp_path):
     result = diagnosed("samples/ur10/experiment.yaml", tmp_path)
     check_schema("diagnosis", result)
-    assert result["floor"] == {"um": None, "source": "not identifiable"}
+    assert result["floor"]["source"] == "repeats"  # 37 poses of B were visited again
+    assert 20 < result["floor"]["um"] == result["gap"]["noise_floor_um"] < 40
     assert result["verdict"] == "unknown"
     assert effects(result)[:2] == [GEOMETRY, GRAVITY]
     assert "joint_offset" not in effects(result)

@@ -6,8 +6,10 @@ Shares are of the energy that is predicted for groups of neighbouring poses that
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import t as student
 
 from camcomp.diagnosis.arm.discrepancy import regions
 from camcomp.ground.datatypes import Floats
@@ -26,41 +28,51 @@ def turns(joint: Floats, angle: Floats) -> Floats:
     return out
 
 
-def shares(
-    patterns: Mapping[str, Sequence[Floats]], rest: Sequence[Floats], features: Sequence[Floats], noise: float
-) -> list[tuple[str, float]]:
-    """Covariates with their shares of the leftovers rest (n, 3) mm of every campaign, largest first.
+@dataclass(frozen=True)
+class Dependence:
+    """A covariate, the share of a leftover's energy that it predicts, and log10 of the chance that noise looks alike."""
 
-    patterns: covariate -> per campaign (n, 3, p), in units in which an amplitude of 1 is usual. noise: mm per coordinate.
+    covariate: str
+    share: float
+    log10_chance: float
+
+
+def dependences(
+    patterns: Mapping[str, Sequence[Floats]], rest: Sequence[Floats], features: Sequence[Floats]
+) -> list[Dependence]:
+    """What every covariate alone predicts of the leftovers rest (n, 3) mm of every block.
+
+    patterns: covariate -> per block (n, 3, p). Groups of neighbouring poses are withheld in turn, and their gains compared:
+    Student's t of their mean.
     """
-    names = list(patterns)
-    widths = [patterns[name][0].shape[2] for name in names]
-    parts = []
-    for k, r in enumerate(rest):
-        F = np.concatenate([patterns[name][k] for name in names], axis=2)
-        group = regions(features[k], max(len(r) // NEIGHBOURS, FOLDS))
-        parts.append((F, r, group % FOLDS))
-    p = sum(widths)
+    split = [regions(f, max(len(r) // NEIGHBOURS, 2 * FOLDS)) for f, r in zip(features, rest, strict=True)]
+    whole = sum(float((r**2).sum()) for r in rest)
+    return [_predicted(name, parts, rest, split, whole) for name, parts in patterns.items()] if whole > 0.0 else []
+
+
+def _predicted(
+    name: str, parts: Sequence[Floats], rest: Sequence[Floats], split: Sequence[np.ndarray], whole: float
+) -> Dependence:
+    p = parts[0].shape[2]
     A, b = np.zeros((FOLDS, p, p)), np.zeros((FOLDS, p))
-    for F, r, fold in parts:
+    for F, r, group in zip(parts, rest, split, strict=True):
         for i in range(FOLDS):
-            D = F[fold == i].reshape(-1, p)
+            D = F[group % FOLDS == i].reshape(-1, p)
             A[i] += D.T @ D
-            b[i] += D.T @ r[fold == i].ravel()
-    predicted = [np.zeros((len(r), 3, len(names))) for _, r, _ in parts]
-    ends = np.cumsum([0, *widths])
-    for i in range(FOLDS):
-        M = A.sum(axis=0) - A[i] + noise**2 * np.eye(p)
-        amplitude = np.linalg.solve(M, b.sum(axis=0) - b[i])
-        for (F, _, fold), out in zip(parts, predicted, strict=True):
-            for j in range(len(names)):
-                s = slice(ends[j], ends[j + 1])
-                out[fold == i, :, j] = F[fold == i][:, :, s] @ amplitude[s]
-    whole = sum(float((r**2).sum()) for _, r, _ in parts)
-    left = sum(float(((r - out.sum(axis=2)) ** 2).sum()) for (_, r, _), out in zip(parts, predicted, strict=True))
-    explained = max(1.0 - left / whole, 0.0) if whole > 0 else 0.0
-    energy = np.array([sum(float((out[:, :, j] ** 2).sum()) for out in predicted) for j in range(len(names))])
-    split = energy / max(float(energy.sum()), 1e-300)
-    return sorted(
-        ((name, explained * float(s)) for name, s in zip(names, split, strict=True)), key=lambda each: -each[1]
-    )
+            b[i] += D.T @ r[group % FOLDS == i].ravel()
+    # the pattern may be as large as the leftover, no coefficient more than another
+    ridge = max(float(np.trace(A.sum(axis=0))), 1e-300) * np.eye(p)
+    rows = sum(r.size for r in rest)
+    gains = []
+    coefficient = [np.linalg.solve(A.sum(axis=0) - A[i] + ridge / rows, b.sum(axis=0) - b[i]) for i in range(FOLDS)]
+    for F, r, group in zip(parts, rest, split, strict=True):
+        left = r.copy()
+        for i in range(FOLDS):
+            on = group % FOLDS == i
+            left[on] -= F[on] @ coefficient[i]
+        gain = (r**2).sum(axis=1) - (left**2).sum(axis=1)
+        gains += [float(gain[group == g].sum()) for g in np.unique(group)]
+    every = np.array(gains)
+    spread = float(every.std(ddof=1)) / np.sqrt(len(every)) if len(every) > 1 else 0.0
+    chance = float(student.logsf(every.mean() / spread, len(every) - 1) / np.log(10.0)) if spread > 0.0 else 0.0
+    return Dependence(name, max(float(every.sum()) / whole, 0.0), chance)

@@ -12,15 +12,16 @@ Vehtari, Ojanen, Statistics Surveys 6 (2012) 142.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import cho_solve, cholesky, solve_triangular
+from scipy.linalg import cholesky, solve_triangular
 
-from camcomp.ground.datatypes import Floats
+from camcomp.ground.datatypes import Floats, Ints
 
 KERNEL_WIDTHS = (0.3, 1.0, 3.0)  # of the amplitudes of a group, in units of their scales
 CLEAR = 5.0  # log likelihood by which a discrepancy has to be better than noise alone
+CHI2_3_MEDIAN, CHI2_3_EDGE = 2.366, 9.348  # of chi-square with 3 degrees of freedom: 50 and 97.5 %
 FREE = 1e-6  # precision of nuisances, mm and rad: 1 m
 
 
@@ -32,14 +33,13 @@ class Discrepancy:
     length: float
     noise: float
 
-    def covariance(self, features: Floats) -> Floats:
-        """Covariance (n, n) of one coordinate at features (n, f)."""
+    def covariance(self, features: Floats, loose: Floats | None = None) -> Floats:
+        """Covariance (n, n) of one coordinate at features (n, f); loose (n,): factors on the noise."""
         square = (features**2).sum(axis=1)
         distance = np.maximum(square[:, None] + square[None, :] - 2.0 * features @ features.T, 0.0)
         K = self.size**2 * np.exp(-0.5 * distance / self.length**2)
-        K[np.diag_indices(len(K))] += self.noise**2
-        out: Floats = K
-        return out
+        K[np.diag_indices(len(K))] += self.noise**2 * (1.0 if loose is None else loose**2)
+        return K
 
 
 def fit_discrepancy(features: Sequence[Floats], rest: Sequence[Floats]) -> Discrepancy:
@@ -76,7 +76,8 @@ def fit_discrepancy(features: Sequence[Floats], rest: Sequence[Floats]) -> Discr
 class ResidualBlock:
     """Rows that are withheld together. features (n, f); X (n, 3, k) in units of scales; N (n, 3, 9); r (n, 3) mm.
 
-    frame: number of the campaign, to which the nuisances belong; alone: whether the block is all of its campaign.
+    frame: number of the campaign, to which the nuisances belong; alone: whether the block is all of its campaign; loose
+    (n,): factors on the noise of rows that lie far out.
     """
 
     features: Floats
@@ -85,39 +86,65 @@ class ResidualBlock:
     r: Floats
     frame: int
     alone: bool
+    loose: Floats | None = None
+
+    def loosened(self, left: Floats) -> ResidualBlock:
+        """With the noise that leftovers (n, 3) mm suggest, so that no row far out counts for more than one at the edge.
+
+        Weights of Huber, Ann. Math. Stat. 35 (1964) 73; the scale is that of the median.
+        """
+        square = (left**2).sum(axis=1)
+        scale = max(float(np.median(square)) / CHI2_3_MEDIAN, 1e-18)
+        return replace(self, loose=np.maximum(np.sqrt(square / scale / CHI2_3_EDGE), 1.0))
+
+
+@dataclass(frozen=True)
+class Fold:
+    """A block that is predicted from others."""
+
+    block: int
+    others: tuple[int, ...]
+
+
+def each_withheld(count: int) -> tuple[Fold, ...]:
+    """Every block of `count` predicted from all others."""
+    return tuple(Fold(i, tuple(j for j in range(count) if j != i)) for i in range(count))
 
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """White Gram matrices of blocks over k effect columns and 9 nuisances per campaign."""
+    """White Gram matrices of blocks over k effect columns and 9 nuisances per campaign. folds: what is predicted from what."""
 
     blocks: tuple[ResidualBlock, ...]
     grams: Floats  # (blocks, q, q), q = k + 9 campaigns
     moments: Floats  # (blocks, q)
     effects: int
+    folds: tuple[Fold, ...]
 
     @staticmethod
-    def of(blocks: Sequence[ResidualBlock], discrepancy: Discrepancy) -> Evidence:
-        """Whitens every block by the discrepancy."""
+    def of(
+        blocks: Sequence[ResidualBlock], discrepancy: Discrepancy, folds: tuple[Fold, ...] | None = None
+    ) -> Evidence:
+        """Whitens every block by the discrepancy; without folds, each is withheld once."""
         k = blocks[0].X.shape[2]
         q = k + 9 * (1 + max(b.frame for b in blocks))
         grams, moments = np.zeros((len(blocks), q, q)), np.zeros((len(blocks), q))
         for i, b in enumerate(blocks):
-            L = cholesky(discrepancy.covariance(b.features), lower=True)
-            D = np.zeros((len(b.r), 3, q + 1))
-            D[:, :, :k] = b.X
-            D[:, :, k + 9 * b.frame : k + 9 * b.frame + 9] = b.N
-            D[:, :, q] = b.r
-            white = solve_triangular(L, D.reshape(len(b.r), -1), lower=True).reshape(-1, q + 1)
+            D = np.concatenate([design(b, k, q), b.r[:, :, None]], axis=2)
+            if discrepancy.size > 0.0:
+                L = cholesky(discrepancy.covariance(b.features, b.loose), lower=True)
+                white = solve_triangular(L, D.reshape(len(b.r), -1), lower=True).reshape(-1, q + 1)
+            else:
+                size = np.full(len(b.r), discrepancy.noise) * (1.0 if b.loose is None else b.loose)
+                white = (D / size[:, None, None]).reshape(-1, q + 1)
             G = white.T @ white
             grams[i], moments[i] = G[:q, :q], G[:q, q]
-        return Evidence(tuple(blocks), grams, moments, k)
+        return Evidence(tuple(blocks), grams, moments, k, each_withheld(len(blocks)) if folds is None else folds)
 
-    def _solve(self, widths: Floats, without: int | None) -> tuple[Floats, Floats, float]:
-        """Posterior mean and covariance (q,), (q, q) at prior widths (k,) (0 = absent), and log evidence up to a constant."""
-        A, b = self.grams.sum(axis=0), self.moments.sum(axis=0)
-        if without is not None:
-            A, b = A - self.grams[without], b - self.moments[without]
+    def posterior(self, widths: Floats, blocks: Sequence[int] | None = None) -> Posterior:
+        """What some blocks, or all, say at prior widths (k,), 0 = absent."""
+        on_blocks = list(range(len(self.blocks)) if blocks is None else blocks)
+        A, b = self.grams[on_blocks].sum(axis=0), self.moments[on_blocks].sum(axis=0)
         on = np.concatenate([np.flatnonzero(widths > 0), np.arange(self.effects, len(b))])
         precision = np.concatenate([1.0 / widths[widths > 0] ** 2, np.full(len(b) - self.effects, FREE)])
         M = A[np.ix_(on, on)] + np.diag(precision)
@@ -126,35 +153,64 @@ class Evidence:
         y = solve_triangular(L, size * b[on], lower=True)
         value = 0.5 * float(y @ y) - float(np.log(np.diag(L)).sum()) + float(np.log(size).sum())
         value += 0.5 * float(np.log(precision).sum())
-        mean, covariance = np.zeros(len(b)), np.zeros((len(b), len(b)))
+        mean = np.zeros(len(b))
         mean[on] = size * solve_triangular(L.T, y, lower=False)
-        covariance[np.ix_(on, on)] = size[:, None] * cho_solve((L, True), np.diag(size))
-        return mean, covariance, value
+        return Posterior(mean, on, M, value)
 
     def value(self, widths: Floats) -> float:
         """Log evidence of all blocks together, up to a constant common to all widths."""
-        return self._solve(widths, None)[2]
+        return self.posterior(widths).value
 
-    def fit(self, widths: Floats) -> tuple[Floats, Floats]:
-        """Amplitudes (k,) and covariance (k, k) from all blocks."""
-        mean, covariance, _ = self._solve(widths, None)
-        return mean[: self.effects], covariance[: self.effects, : self.effects]
+    def fit(self, widths: Floats, blocks: Sequence[int] | None = None) -> tuple[Floats, Floats]:
+        """Amplitudes (k,) and covariance (k, k) from some blocks, or all."""
+        found = self.posterior(widths, blocks)
+        k = self.effects
+        return found.mean[:k], found.covariance[:k, :k]
 
     def predict(self, widths: Floats) -> tuple[float, Floats]:
-        """Sum of log predictive densities of the blocks given the others, and mean squares (blocks,) mm2 there."""
-        whole = self.value(widths)
-        total, squares = 0.0, np.empty(len(self.blocks))
-        for i, b in enumerate(self.blocks):
-            mean, _, value = self._solve(widths, i)
-            total += whole - value
-            left = b.r - b.X @ mean[: self.effects]
-            if b.alone:  # its frame has to be found on it
-                left = without_nuisance(left, b.N)
-            else:
-                at = self.effects + 9 * b.frame
-                left = left - b.N @ mean[at : at + 9]
-            squares[i] = float((left**2).sum(axis=1).mean())
+        """Sum of log predictive densities over the folds, and mean squares (folds,) mm2 there."""
+        total, squares = 0.0, np.empty(len(self.folds))
+        for i, fold in enumerate(self.folds):
+            from_others = self.posterior(widths, fold.others)
+            total += self.posterior(widths, (*fold.others, fold.block)).value - from_others.value
+            squares[i] = float((self.left(fold, from_others) ** 2).sum(axis=1).mean())
         return total, squares
+
+    def left(self, fold: Fold, from_others: Posterior) -> Floats:
+        """What a prediction leaves of a fold's block, (n, 3) mm; its frame is found on it where no other block has it."""
+        b, mean = self.blocks[fold.block], from_others.mean
+        left = b.r - b.X @ mean[: self.effects]
+        if b.alone:
+            return without_nuisance(left, b.N)
+        at = self.effects + 9 * b.frame
+        return np.asarray(left - b.N @ mean[at : at + 9], float)
+
+
+@dataclass(frozen=True, eq=False)
+class Posterior:
+    """Mean (q,) and, of the columns that are on, the precision; value: log evidence up to a constant."""
+
+    mean: Floats
+    on: Ints
+    precision: Floats
+    value: float
+
+    @property
+    def covariance(self) -> Floats:
+        """Covariance (q, q), 0 for what is not on."""
+        size = 1.0 / np.sqrt(np.diag(self.precision))
+        inverse = size[:, None] * np.linalg.inv(size[:, None] * self.precision * size) * size
+        out = np.zeros((len(self.mean), len(self.mean)))
+        out[np.ix_(self.on, self.on)] = inverse
+        return out
+
+
+def design(b: ResidualBlock, effects: int, width: int) -> Floats:
+    """Columns (n, 3, width) of a block: its effects, and its frame among those of all campaigns."""
+    D = np.zeros((len(b.r), 3, width))
+    D[:, :, :effects] = b.X
+    D[:, :, effects + 9 * b.frame : effects + 9 * b.frame + 9] = b.N
+    return D
 
 
 def without_nuisance(left: Floats, N: Floats) -> Floats:

@@ -40,32 +40,68 @@ def rms(squares: Floats) -> float:
 
 
 def take(evidence: Evidence, groups: Mapping[str, Sequence[int]]) -> Taken:
-    """Forward selection by predictive density of withheld blocks.
+    """Forward selection by predictive density of withheld blocks; what was taken may be exchanged for what fits it better.
 
     A group also has to lower the rms there: density alone rewards certainty.
     """
-    widths = np.zeros(evidence.effects)
-    density, squares = evidence.predict(widths)
-    none = last = Step("", 0.0, density, squares)
+    density, squares = evidence.predict(np.zeros(evidence.effects))
+    none = Step("", 0.0, density, squares)
     steps: list[Step] = []
     while True:
+        widths = _widths(evidence, groups, steps)
+        last = (none, *steps)[-1]
         tried = [
-            _best(evidence, widths, name, columns)
+            best_width(evidence, widths, name, columns)
             for name, columns in groups.items()
             if name not in {s.group for s in steps}
         ]
-        if not tried:
-            return Taken(none, tuple(steps), (), widths)
-        best = max(tried, key=lambda s: s.density)
-        if best.density - last.density < LEAST_GAIN or rms(best.squares) > (1.0 - LEAST_SHARE) * rms(last.squares):
+        best = max(tried, key=lambda s: s.density, default=last)
+        if best.density - last.density >= LEAST_GAIN and rms(best.squares) <= (1.0 - LEAST_SHARE) * rms(last.squares):
+            steps.append(best)
+        elif (better := _exchanged(evidence, groups, steps)) is not None:
+            steps = better
+        else:
             return Taken(none, tuple(steps), tuple(sorted(tried, key=lambda s: -s.density)), widths)
-        widths = widths.copy()
-        widths[list(groups[best.group])] = best.width
-        steps.append(best)
-        last = best
 
 
-def _best(evidence: Evidence, widths: Floats, name: str, columns: Sequence[int]) -> Step:
+def _widths(evidence: Evidence, groups: Mapping[str, Sequence[int]], steps: Sequence[Step]) -> Floats:
+    widths = np.zeros(evidence.effects)
+    for step in steps:
+        widths[list(groups[step.group])] = step.width
+    return widths
+
+
+def _exchanged(evidence: Evidence, groups: Mapping[str, Sequence[int]], steps: Sequence[Step]) -> list[Step] | None:
+    """Steps with the one group exchanged that gains most and does not raise the rms; None where none gains enough.
+
+    What was taken first was taken without the others, and may have stood in for one of them.
+    """
+    names = [s.group for s in steps]
+    best: tuple[float, list[Step]] | None = None
+    for i in range(len(steps)):
+        for name in (each for each in groups if each not in names):
+            rest = [*steps[:i], *steps[i + 1 :]]
+            step = best_width(evidence, _widths(evidence, groups, rest), name, groups[name])
+            gain = step.density - steps[-1].density
+            if gain < LEAST_GAIN or rms(step.squares) > (1.0 + LEAST_SHARE) * rms(steps[-1].squares):
+                continue
+            if best is None or gain > best[0]:
+                best = gain, [*rest, step]
+    if best is None:
+        return None
+    return in_order(evidence, groups, [(s.group, s.width) for s in best[1]])
+
+
+def in_order(evidence: Evidence, groups: Mapping[str, Sequence[int]], some: Sequence[tuple[str, float]]) -> list[Step]:
+    """Groups with their widths as steps: what each leaves beside those in front of it."""
+    steps: list[Step] = []
+    for name, width in some:
+        density, squares = evidence.predict(_widths(evidence, groups, [*steps, Step(name, width, 0.0, np.zeros(0))]))
+        steps.append(Step(name, width, density, squares))
+    return steps
+
+
+def best_width(evidence: Evidence, widths: Floats, name: str, columns: Sequence[int]) -> Step:
     """The group added at its best width."""
     found = []
     for width in KERNEL_WIDTHS:

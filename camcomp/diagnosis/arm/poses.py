@@ -31,7 +31,10 @@ _UNSEEN = ("time_sync", "workpiece_frame", "tool_length", "chain_error", "servo_
 
 @dataclass(frozen=True, eq=False)
 class Poses:
-    """Poses of one campaign: joints q (n, m), measured tips (n, 3) mm, time (n,) s, temperature (n,) or None, run (n,)."""
+    """Poses of one campaign: joints q (n, m), measured tips (n, 3) mm, time (n,) s, temperature (n,) or None, run (n,).
+
+    sd (n, 3) mm: what the instrument states of itself, NaN or None where it says nothing; row (n,): of the run's log, from 1.
+    """
 
     label: str
     q: Floats
@@ -39,11 +42,21 @@ class Poses:
     time: Floats
     temperature: Floats | None
     run: np.ndarray
+    sd: Floats | None = None
+    row: np.ndarray | None = None
 
     def take(self, rows: np.ndarray) -> Poses:
         """The poses of a mask or of indices."""
         heat = None if self.temperature is None else self.temperature[rows]
-        return Poses(self.label, self.q[rows], self.tip[rows], self.time[rows], heat, self.run[rows])
+        sd = None if self.sd is None else self.sd[rows]
+        return Poses(
+            self.label, self.q[rows], self.tip[rows], self.time[rows], heat, self.run[rows], sd, self.rows[rows]
+        )
+
+    @property
+    def rows(self) -> np.ndarray:
+        """Row (n,) of every pose in the log of its run, from 1."""
+        return np.arange(1, len(self.q) + 1) if self.row is None else self.row
 
     @property
     def features(self) -> Floats:

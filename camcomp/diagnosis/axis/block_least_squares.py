@@ -59,11 +59,23 @@ def solve(A: Floats, y: Floats) -> Floats:
 
 def withheld(data: Series, A: Floats) -> Floats:
     """Mean squares (blocks,) of what columns A (n, k) leave of every block when fitted on the others."""
-    out = np.empty(len(data.others))
+    left = leftover(data, A)
+    return np.array([np.mean(left[data.block == b] ** 2) for b in range(len(data.others))])
+
+
+def leftover(data: Series, A: Floats) -> Floats:
+    """What columns A (n, k) leave of every row (n,) when fitted on the other blocks."""
+    out = data.y.copy()
+    if not A.shape[1]:
+        return out
+    size = np.sqrt(np.mean(A**2, axis=0)) + 1e-300
+    B = A / size
+    whole, moment = B.T @ B, B.T @ data.y
     for b, rest in enumerate(data.others):
+        own = B[~rest]  # the block and its margins
+        c = np.linalg.lstsq(whole - own.T @ own, moment - own.T @ data.y[~rest], rcond=1e-12)[0]
         mine = data.block == b
-        left = data.y[mine] - (A[mine] @ solve(A[rest], data.y[rest]) if A.shape[1] else 0.0)
-        out[b] = np.mean(left**2)
+        out[mine] -= B[mine] @ c
     return out
 
 

@@ -5,13 +5,29 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.signal import savgol_coeffs, savgol_filter
 
 from camcomp.ground.datatypes import Floats
 from camcomp.model.hysteresis import direction
 
 PRESLIDING_GRID_MM = (1e-4, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1)  # the first is a step
+TURNING_GRID_MM_PER_S = (0.1, 0.2, 0.35, 0.5, 0.7, 1.0, 1.5, 2.5, 5.0, 10.0)
 STRIBECK_MM_PER_S = 10.0
-WIDE = 5  # samples on either side of a local cubic
+WIDE = (5, 10, 20, 40)  # samples on either side of a local cubic
+
+
+@dataclass(frozen=True)
+class Turning:
+    """How friction turns round at a reversal: over a distance, mm, or where speed is given, with tanh(v / speed), mm/s."""
+
+    distance: float
+    speed: float | None = None
+
+
+TURNINGS = (
+    *(Turning(d) for d in PRESLIDING_GRID_MM),
+    *(Turning(PRESLIDING_GRID_MM[0], v) for v in TURNING_GRID_MM_PER_S),
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,26 +39,29 @@ class AxisTravel:
     speed: Floats
     acceleration: Floats
 
-    def reversal(self, distance: float) -> Floats:
-        """Direction of travel (n,) that turns round over a distance, mm."""
-        return direction(self.position[:, None], distance)[:, 0]
+    def reversal(self, how: Turning) -> Floats:
+        """Direction of travel (n,), -1 to 1."""
+        if how.speed is not None:
+            return np.asarray(np.tanh(self.speed / how.speed), float)
+        return direction(self.position[:, None], how.distance)[:, 0]
 
 
-def travel(time: Floats, encoder: Floats) -> AxisTravel:
-    """Local cubics over 11 samples (Savitzky, Golay 1964) of evenly sampled encoders (n,)."""
+def travel(time: Floats, encoder: Floats, wide: int = WIDE[0]) -> AxisTravel:
+    """Local cubics over 2 wide + 1 samples (Savitzky, Golay 1964) of evenly sampled encoders (n,)."""
     dt = float(np.median(np.diff(time)))
-    k = np.arange(-WIDE, WIDE + 1)
-    weights = np.linalg.pinv(np.vander(k * dt, 4, increasing=True))
-    padded = np.concatenate(
-        (2 * encoder[0] - encoder[WIDE:0:-1], encoder, 2 * encoder[-1] - encoder[-2 : -WIDE - 2 : -1])
-    )
-    value, speed, half = (np.convolve(padded, w[::-1], "valid") for w in weights[:3])
-    return AxisTravel(time, value, speed, 2.0 * half)
+    value, speed, push = (savgol_filter(encoder, 2 * wide + 1, 3, deriv=k, delta=dt, mode="interp") for k in range(3))
+    return AxisTravel(time, value, speed, push)
 
 
-def strangers(at: AxisTravel, distance: float) -> dict[str, tuple[str, Floats]]:
+def noise_gains(dt: float, wide: int) -> tuple[float, float]:
+    """Deviation of speed (1/s) and acceleration (1/s2) of such a cubic per deviation of one encoder value."""
+    first, second = (savgol_coeffs(2 * wide + 1, 3, deriv=k, delta=dt) for k in (1, 2))
+    return float(np.linalg.norm(first)), float(np.linalg.norm(second))
+
+
+def strangers(at: AxisTravel, how: Turning) -> dict[str, tuple[str, Floats]]:
     """Terms that no effect states, by name: covariate kind and column (n,). They are tried, so that a leftover has a name."""
-    v, d = at.speed / 100.0, at.reversal(distance)
+    v, d = at.speed / 100.0, at.reversal(how)
     x = at.position / 100.0
     return {
         "position spring": ("position", x),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from camcomp.diagnosis.result.types import DiagnosisResult, Estimate, NamedCause
+from camcomp.diagnosis.result.types import DiagnosisResult, Estimate, GapSize, NamedCause
 from camcomp.report.plot import brief
 
 
@@ -16,27 +16,33 @@ def cause_name(cause: NamedCause) -> str:
 def verdict_text(result: DiagnosisResult) -> str:
     """The answer in a sentence or two."""
     gap, shrink = result.gap, result.shrinkage
+    floor = floor_text(gap)
     told = (
         f"On runs that the fit has not seen the gap goes from {brief(shrink.before_rms_um)} µm to "
-        f"{brief(shrink.after_rms_um)} µm (rms); the noise floor is {brief(gap.noise_floor_um)} µm."
+        f"{brief(shrink.after_rms_um)} µm (rms); the noise floor is {floor}."
         if shrink
-        else f"There is no run that the fit has not seen; the noise floor is {brief(gap.noise_floor_um)} µm."
+        else f"There is no run that the fit has not seen; the noise floor is {floor}."
     )
     known = [cause_name(each) for each in result.known]
     if result.verdict == "none":
         return (
-            f"Measurement and model differ by {brief(gap.rms_um)} µm (rms), which is the noise floor of "
-            f"{brief(gap.noise_floor_um)} µm: there is nothing to explain."
+            f"Measurement and model differ by {brief(gap.rms_um)} µm (rms), which is the noise floor of {floor}: there "
+            "is nothing to explain."
         )
     if result.verdict == "identified":
         return f"{together(known)} {'explain' if len(known) > 1 else 'explains'} the gap. {told}"
     if result.verdict == "ambiguous":
-        sets = [together([cause_name(each) for each in one]) for one in result.alternatives]
+        sets = [together([cause_name(each) for each in one]) or "nothing but noise" for one in result.alternatives]
         return f"These runs cannot tell apart: {'; or '.join(sets)}. {told}"
     rest = f" {together(known)} {'are' if len(known) > 1 else 'is'} identified." if known else ""
     drivers = ", ".join(each.covariate for each in result.where.drivers[:3])
     what = f" The rest depends on {drivers}." if drivers else ""
     return f"Something is at work that no effect of the library explains.{rest}{what} {told}"
+
+
+def floor_text(gap: GapSize) -> str:
+    """The noise floor, or that nothing tells it."""
+    return "not known" if gap.noise_floor_um is None else f"{brief(gap.noise_floor_um)} µm"
 
 
 def together(names: Sequence[str]) -> str:

@@ -14,8 +14,8 @@ from camcomp.report.plot import INK, SCALE, STYLES, Figure, Json, axis, brief, l
 MAP_POINTS = 4000
 
 
-def figure_ladder(shrink: UnseenShrinkage, floor: float) -> Figure:
-    """The gap on held-out runs with one cause after the other in the model; floor: of the noise, um."""
+def figure_ladder(shrink: UnseenShrinkage, floor: float | None) -> Figure:
+    """The gap on held-out runs with one cause after the other in the model; floor: of the noise, um, where it is known."""
     names = ["as it was", *(f"+ {cause_name(step)}" for step in shrink.steps)]
     values = [shrink.before_rms_um, *(step.after_rms_um for step in shrink.steps)]
     bars = {
@@ -23,24 +23,25 @@ def figure_ladder(shrink: UnseenShrinkage, floor: float) -> Figure:
         "marker": {"color": STYLES[0][0]}, "text": [f"{brief(v)} µm" for v in values[::-1]], "textposition": "outside",
     }  # fmt: skip
     style = {"color": STYLES[1][0], "dash": "dot", "width": 2}
-    noise = {
+    noise: Json = {
         "type": "scatter", "mode": "lines", "x": [floor, floor], "y": [names[-1], names[0]], "name": "noise floor",
         "line": style,
     }  # fmt: skip
     words = ", ".join(f"{name} {brief(value)} µm" for name, value in zip(names, values, strict=True))
+    known = "not known" if floor is None else f"{brief(floor)} µm"
     return Figure(
         "ladder",
         "Shrinkage ladder",
         f"Root mean square of the gap on runs that the fit has not seen, with one cause after the other put into the "
-        f"model: {words}. Noise floor {brief(floor)} µm.",
-        f"Bar chart of the gap that remains: {words}; noise floor {brief(floor)} µm.",
-        [bars, noise],
-        {"xaxis": axis("gap in µm (rms)", range=[0.0, 1.15 * max(*values, floor)]), "yaxis": axis("")},
+        f"model: {words}. Noise floor {known}.",
+        f"Bar chart of the gap that remains: {words}; noise floor {known}.",
+        [bars] if floor is None else [bars, noise],
+        {"xaxis": axis("gap in µm (rms)", range=[0.0, 1.15 * max(*values, floor or 0.0)]), "yaxis": axis("")},
         height=150 + 42 * len(names),
     )
 
 
-def figure_run(view: RunView, number: int, floor: float, *, along: str) -> Figure:
+def figure_run(view: RunView, number: int, floor: float | None, *, along: str) -> Figure:
     """The gap of one run along time or path, before and after."""
     before, after = view.sizes
     index = thin(np.column_stack((before, after)))
@@ -50,8 +51,9 @@ def figure_run(view: RunView, number: int, floor: float, *, along: str) -> Figur
     curves = [
         line("before", x, numbers(before[index], 3), 0),
         line("with the causes found", x, numbers(after[index], 3), 1),
-        level("noise floor", [float(where[0]), float(where[-1])], floor),
     ]
+    if floor is not None:
+        curves.append(level("noise floor", [float(where[0]), float(where[-1])], floor))
     words = f"rms {brief(rms(before))} µm before, {brief(rms(after))} µm with the causes found"
     told = "not used for the fit" if view.held_out else "used for the fit"
     return Figure(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from camcomp.diagnosis.report.answer import cause_name, parameter_text, together, verdict_text
+from camcomp.diagnosis.report.answer import cause_name, floor_text, parameter_text, together, verdict_text
 from camcomp.diagnosis.report.figures import (
     figure_causes,
     figure_ladder,
@@ -85,7 +85,7 @@ def _cards(result: DiagnosisResult) -> list[tuple[str, str, str]]:
     gap = result.gap
     cards = [
         ("Gap", f"{brief(gap.rms_um)} µm", f"rms; 95 % below {brief(gap.p95_um)} µm, max {brief(gap.max_um)} µm"),
-        ("Noise floor", f"{brief(gap.noise_floor_um)} µm", "what no model can explain"),
+        ("Noise floor", floor_text(gap), "what no model can explain"),
     ]
     if shrink := result.shrinkage:
         low, high = shrink.ci95

@@ -23,7 +23,7 @@ class GapSize(Result):
     rms_um: float
     p95_um: float
     max_um: float
-    noise_floor_um: float
+    noise_floor_um: Annotated[float | None, Field(description="null where nothing tells it")]
 
 
 class LineShare(Result):

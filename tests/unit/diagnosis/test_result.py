@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from camcomp.diagnosis.arm.study import exceeding
-from camcomp.diagnosis.axis.study import AxisRun
+from camcomp.diagnosis.arm.gate import LeftOver, level
+from camcomp.diagnosis.arm.noise_floor import TipFloor
+from camcomp.diagnosis.axis.findings import AxisRun
 from camcomp.diagnosis.axis.study import study as axis_study
 from camcomp.diagnosis.report.answer import answer_lines
 from camcomp.diagnosis.report.page import diagnosis_html
@@ -110,8 +111,13 @@ def test_the_unknown_on_an_axis_is_as_sure_as_its_data():
 def test_a_leftover_of_poses_is_as_sure_as_its_regions():
     rng = np.random.default_rng(1)
     features = [rng.uniform(-1, 1, (400, 3))]
-    even = [np.full(400, 2.0**2)]
-    lumpy = [np.where(features[0][:, 0] > 0.8, 40.0, 0.1)]
-    assert exceeding(even, features, 1.9) == pytest.approx(2001 / 2002, abs=1e-4)
-    assert exceeding(even, features, 2.1) == pytest.approx(1 / 2002, abs=1e-4)
-    assert 0.05 < exceeding(lumpy, features, float(np.sqrt(np.mean(lumpy[0])))) < 0.95
+    even = np.full(400, 3.0)
+    lumpy = np.where(features[0][:, 0] > 0.8, 27.0, 0.3)
+    stated, known_badly = TipFloor(0.02, np.inf, "stated"), TipFloor(0.02, 30.0, "repeats")
+
+    def told(squares, floor):
+        return level(LeftOver((np.zeros((400, 3)),), (squares,)), features, floor)
+
+    assert told(even, stated) == pytest.approx((1.0, np.sqrt(2 / 1200)))
+    assert told(lumpy, stated)[1] > 5 * told(even, stated)[1]
+    assert told(even, known_badly)[1] == pytest.approx(np.hypot(np.sqrt(2 / 1200), np.sqrt(2 / 30)))

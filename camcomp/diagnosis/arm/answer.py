@@ -1,0 +1,320 @@
+"""The parts of an arm's result: gap, causes with their sizes and chances, alternatives, places, what to measure next."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from camcomp.diagnosis.arm.dependence import turns
+from camcomp.diagnosis.arm.discrepancy import regions, without_nuisance
+from camcomp.diagnosis.arm.fit import ArmFit
+from camcomp.diagnosis.arm.forward_selection import LEAST_GAIN, Step, odds, rms
+from camcomp.diagnosis.arm.gate import MINOR, Gate, standing_out, windows
+from camcomp.diagnosis.arm.noise_floor import TipFloor
+from camcomp.diagnosis.arm.poses import ArmBench, Poses
+from camcomp.diagnosis.arm.unseen import Court, Rival
+from camcomp.diagnosis.result.types import (
+    UNKNOWN,
+    Driver,
+    Estimate,
+    FoundCause,
+    GapSize,
+    IntervalShare,
+    MinorEffect,
+    NamedCause,
+    NextExperiment,
+    PlaceShare,
+    UnknownCause,
+    Where,
+)
+from camcomp.diagnosis.statistics.probability import EVEN, probability_of_chance, stated
+from camcomp.ground.datatypes import Floats
+from camcomp.model.statics.arm import jacobian
+
+FAINT = 0.01  # of the floor: what moves the tip less is not worth a line
+LEAST_TARGET = 0.5  # probability above which an actuator is named
+PLACES = 8  # parts of the workspace
+
+
+@dataclass(frozen=True, eq=False)
+class Told:
+    """All that an answer is made of."""
+
+    bench: ArmBench
+    found: ArmFit
+    gate: Gate
+    floor: TipFloor | None
+    sets: Sequence[Rival]
+    verdict: Any
+    judges: Court
+
+
+def gap(gaps: Sequence[Floats], floor: TipFloor | None) -> GapSize:
+    """Size of gaps (n, 3) mm."""
+    size = 1e3 * np.linalg.norm(np.concatenate(list(gaps)), axis=1)
+    return GapSize(
+        rms_um=_round(np.sqrt(np.mean(size**2))),
+        p95_um=_round(np.quantile(size, 0.95)),
+        max_um=_round(size.max()),
+        noise_floor_um=None if floor is None else _round(floor.um),
+    )
+
+
+# -- causes -----------------------------------------------------------------------------------------------------------
+
+
+def causes(told: Told, gaps: Sequence[Floats]) -> tuple[tuple[FoundCause, ...], tuple[MinorEffect, ...]]:
+    """Effects with the actuators that matter, the unknown one last, and those too small to be causes.
+
+    Shares follow the order in which the groups were taken. A set that has rivals is as probable as it is among them.
+    """
+    found = told.found
+    before = found.taken.none
+    whole = float(np.mean(before.squares))
+    full = found.evidence.value(np.where(found.amount != 0.0, found.taken.widths, 0.0))
+    weights = _weights(told)
+    out: list[FoundCause] = []
+    minor: list[MinorEffect] = []
+    for step in found.taken.steps:
+        share = (np.mean(before.squares) - np.mean(step.squares)) / whole
+        sure = min(odds(step.density - before.density), weights.get(step.group, 1.0))
+        targets = list(dict.fromkeys(_targets(found, step.group)))
+        own = [_target(found, step, target, full) for target in targets]
+        energy = sum(e for e, _, _ in own)
+        for (e, probability, parameters), target in zip(own, targets, strict=True):
+            size = 1e3 * float(np.sqrt(e / sum(len(b.r) for b in found.evidence.blocks)))
+            if told.floor is not None and size < MINOR * told.floor.um:
+                if size >= FAINT * told.floor.um:
+                    minor.append(MinorEffect(effect=step.group, target=target, size_um=_round(size)))
+            elif probability >= LEAST_TARGET:
+                out.append(
+                    FoundCause(
+                        effect=step.group,
+                        target=target,
+                        probability=stated(min(sure, probability)),
+                        share=round(float(share * e / energy), 4),
+                        parameters=parameters,
+                    )
+                )
+        before = step
+    order = [s.group for s in found.taken.steps]
+    out.sort(key=lambda c: (-c.probability, order.index(c.effect), -c.share))
+    if told.verdict == "unknown" or (told.verdict == "ambiguous" and not out):
+        left = round(_size(found.rest) ** 2 / _size(gaps) ** 2, 4)
+        chance = probability_of_chance(told.gate.chance) if told.verdict == "unknown" else EVEN
+        out.append(UnknownCause(target=None, probability=stated(chance), share=left))
+    return tuple(out), (*minor, *_slight(told))
+
+
+def _weights(told: Told) -> dict[str, float]:
+    """Probability of every group among the sets that explain alike.
+
+    Within one campaign density does not count: n sets of which k hold a group make (k + 1) / (n + 2), Laplace's rule.
+    """
+    sets = told.sets
+    density = np.array([s.density for s in sets])
+    p = np.exp(density - density.max())
+    p = p / p.sum()
+    out = {}
+    for group in told.found.groups:
+        holds = np.array([group in s.groups for s in sets])
+        out[group] = float(p[holds].sum()) if told.judges.whole else (int(holds.sum()) + 1) / (len(sets) + 2)
+    return out
+
+
+def _slight(told: Told) -> tuple[MinorEffect, ...]:
+    """Groups that were not taken, are there by density, and move the tip by less than matters."""
+    if told.floor is None:
+        return ()
+    taken = told.found.taken
+    last = (taken.none, *taken.steps)[-1]
+    out = []
+    for step in taken.refused:
+        size = 1e3 * float(np.sqrt(max(rms(last.squares) ** 2 - rms(step.squares) ** 2, 0.0)))
+        if step.density > last.density + LEAST_GAIN and FAINT * told.floor.um < size < MINOR * told.floor.um:
+            out.append(MinorEffect(effect=step.group, target=None, size_um=_round(size)))
+    return tuple(out)
+
+
+def alternatives(told: Told, named: Sequence[FoundCause]) -> tuple[tuple[NamedCause, ...], ...]:
+    """Sets that the poses cannot tell apart, the one that was taken first.
+
+    Where it has no rival among effects, the rival is that something unknown is there as well.
+    """
+    known = tuple(NamedCause(effect=c.effect, target=c.target) for c in named if not isinstance(c, UnknownCause))
+    others = [_members(told.found, each) for each in told.sets[1:]] if known else []
+    if not others:
+        others = [(*known, NamedCause(effect=UNKNOWN, target=None))]
+    return (known, *others)
+
+
+def _members(found: ArmFit, rival: Rival) -> tuple[NamedCause, ...]:
+    """Effects of a set at the targets that matter to it."""
+    widths = np.array(rival.widths)
+    full = found.evidence.value(widths)
+    out = []
+    for group in rival.groups:
+        chances = {}
+        for target in dict.fromkeys(found.columns[j].target for j in found.groups[group]):
+            less = widths.copy()
+            less[[j for j in found.groups[group] if found.columns[j].target == target]] = 0.0
+            chances[target] = odds(full - found.evidence.value(less))
+        some = [t for t, p in chances.items() if p >= LEAST_TARGET] or [max(chances, key=lambda t: chances[t])]
+        out += [NamedCause(effect=group, target=target) for target in some]
+    return tuple(out)
+
+
+def _targets(found: ArmFit, group: str) -> list[str | None]:
+    return [found.columns[j].target for j in found.groups[group] if found.amount[j] != 0.0]
+
+
+def _target(found: ArmFit, step: Step, target: str | None, full: float) -> tuple[float, float, dict[str, Estimate]]:
+    """Energy, probability and parameters of a group at one target."""
+    own = [j for j in found.groups[step.group] if found.columns[j].target == target and found.amount[j] != 0.0]
+    widths = np.where(found.amount != 0.0, found.taken.widths, 0.0)
+    widths[own] = 0.0
+    energy = 0.0
+    for b in found.evidence.blocks:
+        energy += float((without_nuisance(b.X[:, :, own] @ found.amount[own], b.N) ** 2).sum())
+    parameters = {}
+    for j in own:
+        p = found.columns[j].parameter
+        spread = 1.96 * float(np.sqrt(found.covariance[j, j]))
+        low, high = (_digits(p.value((found.amount[j] + s * spread) * p.scale)) for s in (-1.0, 1.0))
+        value = p.value(found.amount[j] * p.scale)
+        parameters[p.name] = Estimate(value=_digits(value), ci95=(low, high))
+    return energy, odds(full - found.evidence.value(widths)), parameters
+
+
+# -- where ------------------------------------------------------------------------------------------------------------
+
+
+def where(told: Told, gaps: Sequence[Floats]) -> Where:
+    """Shares of axes and actuators; with an unknown, what it depends on, when and in which places it stands out."""
+    found, bench = told.found, told.bench
+    energy = (np.concatenate(list(gaps)) ** 2).sum(axis=0)
+    actuators = dict.fromkeys(bench.actuators, 0.0)
+    stages: dict[str, float] = {}
+    for step in found.taken.steps:
+        for target in dict.fromkeys(_targets(found, step.group)):
+            size, _, _ = _target(found, step, target, 0.0)
+            stage = next(c.module.STAGE for c in found.columns if c.effect == step.group)
+            stages[stage] = stages.get(stage, 0.0) + size
+            if target is not None:
+                actuators[target] += size
+    total = max(sum(actuators.values()), 1e-300)
+    most: Any = max(stages, key=lambda s: stages[s]) if stages else "structure"
+    whole = max(float(energy.sum()), 1e-300)
+    unknown = told.verdict == "unknown"
+    return Where(
+        stage=most,
+        axes={axis: round(float(e) / whole, 4) for axis, e in zip("xyz", energy, strict=True)},
+        actuators={name: round(size / total, 4) for name, size in actuators.items()},
+        drivers=tuple(Driver(covariate=d.covariate, share=round(d.share, 4)) for d in told.gate.drivers[:6])
+        if unknown
+        else (),
+        intervals=_intervals(told) if unknown else (),
+        places=_places(told) if unknown else (),
+    )
+
+
+def _intervals(told: Told) -> tuple[IntervalShare, ...]:
+    """Stretches of a run's time in which the leftover is larger than elsewhere."""
+    whole = max(sum(float((r**2).sum()) for r in told.gate.left.rest), 1e-300)
+    out = []
+    for poses, rest in zip(told.judges.poses, told.gate.left.rest, strict=True):
+        square = (rest**2).sum(axis=1)
+        for run in dict.fromkeys(str(name) for name in poses.run):
+            rows = np.flatnonzero(poses.run == run)
+            own = windows(poses.time[rows])
+            for i in standing_out(square[rows], own):
+                time, energy = poses.time[rows][own[i]], float(square[rows][own[i]].sum())
+                out.append(
+                    IntervalShare(
+                        run=run, t0_s=float(time.min()), t1_s=float(time.max()), share=round(energy / whole, 4)
+                    )
+                )
+    return tuple(sorted(out, key=lambda each: -each.share))
+
+
+def _places(told: Told) -> tuple[PlaceShare, ...]:
+    """Parts of the workspace, boxes in the machine frame, in which the leftover is larger than elsewhere."""
+    point = np.concatenate([told.bench.standing(p, ()).hung.point for p in told.judges.poses])
+    square = np.concatenate([(r**2).sum(axis=1) for r in told.gate.left.rest])
+    group = regions(point, PLACES)
+    parts = [np.flatnonzero(group == g) for g in np.unique(group)]
+    whole = max(float(square.sum()), 1e-300)
+    out = []
+    for i in standing_out(square, parts):
+        own = parts[i]
+        x, y, z = ((_round(a.min()), _round(a.max())) for a in point[own].T)
+        size = 1e3 * float(np.sqrt(square[own].mean()))
+        share = round(float(square[own].sum()) / whole, 4)
+        out.append(PlaceShare(x_mm=x, y_mm=y, z_mm=z, share=share, rms_um=_round(size)))
+    return tuple(sorted(out, key=lambda each: -each.share))
+
+
+def patterns(bench: ArmBench, campaigns: Sequence[Poses]) -> dict[str, list[Floats]]:
+    """What a leftover of poses may depend on: covariate -> per campaign motions (n, 3, p) of the tip."""
+    out: dict[str, list[Floats]] = {}
+    for campaign in campaigns:
+        hung = bench.standing(campaign, ()).hung
+        lever = bench.start[0].tips(hung.point, hung.rotation) - hung.point
+        J = np.array([jacobian(bench.arm, q) for q in campaign.q])
+        moves = J[:, :3] + np.cross(J[:, 3:], lever[:, :, None], axis=1)
+        for a, drive in enumerate(bench.robot.actuators):
+            own = moves[:, :, a]
+            if drive.revolute:
+                out.setdefault(f"position:{drive.name}", []).append(turns(own, campaign.q[:, a]))
+                torque = hung.drive[:, a] / max(float(np.abs(hung.drive[:, a]).max()), 1e-9)
+                pair = np.stack([torque, torque * np.abs(torque)], axis=1)
+                out.setdefault(f"force:{drive.name}", []).append(3e-4 * own[:, :, None] * pair[:, None, :])
+            else:
+                span = np.ptp(campaign.q[:, a]) or 1.0
+                out.setdefault(f"position:{drive.name}", []).append(
+                    turns(own * 1e3, 2 * np.pi * campaign.q[:, a] / span)
+                )
+        slow = (campaign.time - campaign.time.mean()) / max(float(np.ptp(campaign.time)), 1e-9)
+        wide = np.stack([slow, slow**2], axis=1)
+        every = np.concatenate([np.eye(3)[None] * 0.3 * f[:, None, None] for f in wide.T], axis=2)
+        out.setdefault("time", []).append(every)
+    if all(c.temperature is not None and np.ptp(c.temperature) > 0.1 for c in campaigns):
+        out["temperature"] = [
+            np.eye(3)[None] * 0.1 * (c.temperature - c.temperature.mean())[:, None, None]  # type: ignore[union-attr]
+            for c in campaigns
+        ]
+    return out
+
+
+# -- what to measure next -----------------------------------------------------------------------------------------------
+
+
+def next_experiment(told: Told) -> NextExperiment | None:
+    """A campaign in other postures where there is one only; repeats where there is no floor. gain: nats, at most."""
+    if told.verdict in ("none", "identified"):
+        return None
+    if not told.judges.whole and told.found.taken.steps:
+        effects = list(dict.fromkeys(g for s in told.sets for g in s.groups))
+        action = "measure a second campaign in other postures, with a clamping of its own"
+        return NextExperiment(action=action, separates=tuple(effects), gain=round(float(np.log(len(told.sets) + 1)), 4))
+    if told.floor is None:
+        effects = [*dict.fromkeys(s.group for s in told.found.taken.steps), UNKNOWN]
+        action = "visit 20 of the poses once more, other poses in between, so that the floor is known"
+        return NextExperiment(action=action, separates=tuple(effects), gain=round(float(np.log(2.0)), 4))
+    return None
+
+
+def _size(parts: Sequence[Floats]) -> float:
+    every = np.concatenate(list(parts))
+    return float(np.sqrt(np.mean((every**2).sum(axis=1))))
+
+
+def _round(value: float) -> float:
+    return round(float(value), 3)
+
+
+def _digits(value: float) -> float:
+    return float(f"{value:.6g}")

@@ -1,0 +1,183 @@
+"""What is left on unseen poses against the floor: in size, among neighbours, in time, per actuator and period.
+
+Only what poses that were not fitted leave counts, and only beyond what the uncertainty of the fit does to them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from scipy.spatial import KDTree
+from scipy.stats import chi2, norm
+
+from camcomp.diagnosis.arm.dependence import Dependence, dependences
+from camcomp.diagnosis.arm.discrepancy import Evidence, design, regions
+from camcomp.diagnosis.arm.noise_floor import TipFloor
+from camcomp.ground.datatypes import Floats
+
+MINOR = 0.3  # of the floor: what moves the tip less is no cause and no unknown
+ABOVE = 1.25  # of the floor's square: instruments do not know themselves to better than an eighth
+LEVEL = 1.5  # of the floor's square that a leftover has to stay below to be the floor
+CHANCE = 1e-3  # of a structure in noise alone, over all that is tried
+FALSE = 0.01  # of what is named as a driver
+STEPS = 16  # stretches of time, regions of postures
+SHORTEST = 12  # poses in a stretch
+
+
+@dataclass(frozen=True, eq=False)
+class LeftOver:
+    """Leftovers (n, 3) mm of unseen poses, one entry per block, with their white squares (n,), which the floor makes 3 each."""
+
+    rest: tuple[Floats, ...]
+    squares: tuple[Floats, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Gate:
+    """The test of a leftover. word: `above` the floor, `at` it, or `open`, where the data decide neither.
+
+    chance: log10 of the chance of the strongest sign in noise alone; drivers: what the leftover depends on; floor:
+    whether there is one.
+    """
+
+    word: Literal["above", "at", "open"]
+    chance: float
+    drivers: tuple[Dependence, ...]
+    left: LeftOver
+    floor: bool
+
+
+def unseen(evidence: Evidence, widths: Floats, sd: float) -> LeftOver:
+    """What the folds of an evidence, which was whitened by the floor sd alone, leave of their blocks.
+
+    Every block may move the fit within what the others leave open: what is left then is nobody's uncertainty.
+    """
+    rest, squares = [], []
+    k = evidence.effects
+    for fold in evidence.folds:
+        b = evidence.blocks[fold.block]
+        others = evidence.posterior(widths, fold.others)
+        both = evidence.posterior(widths, (*fold.others, fold.block))
+        D = design(b, k, len(others.mean))
+        near = b.r - D @ both.mean
+        own = (evidence.left(fold, others) * near).sum(axis=1) / sd**2
+        freedom = 3.0 * len(b.r) - (9.0 if b.alone else 0.0)
+        rest.append(near)
+        squares.append(3.0 * own * len(b.r) / freedom)
+    return LeftOver(tuple(rest), tuple(squares))
+
+
+def judge(
+    left: LeftOver, floor: TipFloor | None, features: Sequence[Floats], times: Sequence[Floats],
+    patterns: Mapping[str, Sequence[Floats]],
+) -> Gate:  # fmt: skip
+    """The leftover against the floor; features (n, f), times (n,), patterns per block of the leftover."""
+    found = dependences(patterns, left.rest, features)
+    tried = len(found) + 2
+    limit = np.log10(CHANCE / tried)
+    whole = [*found, neighbours(left.rest, features), stretches(left.rest, times)]
+    sure = [each for each in whole if each.log10_chance < limit]
+    energy = float(np.mean(np.concatenate([(r**2).sum(axis=1) for r in left.rest])))
+    size = [each.share * energy for each in sure]
+    if floor is None:  # then the part that depends on nothing stands for it
+        structured = any(s > MINOR**2 * (energy - s) for s in size)
+    else:
+        structured = any(s > MINOR**2 * 3.0 * floor.sd**2 for s in size)
+    chance = min((each.log10_chance for each in sure), default=0.0) + np.log10(tried)
+    largest = sorted(_discovered(whole), key=lambda e: -e.share)
+    drivers = tuple({each.covariate: each for each in reversed(largest) if each.covariate}.values())[::-1]
+    if floor is None:
+        return Gate("above" if structured else "open", min(chance, 0.0), drivers, left, floor is not None)
+    mean, spread = level(left, features, floor)
+    if structured or mean - norm.ppf(0.99) * spread > ABOVE:
+        if mean - norm.ppf(0.99) * spread > ABOVE:
+            chance = min(chance, float(norm.logsf((mean - ABOVE) / spread) / np.log(10.0)))
+        return Gate("above", min(chance, 0.0), drivers, left, floor is not None)
+    return Gate("at" if mean + norm.ppf(0.95) * spread < LEVEL else "open", 0.0, drivers, left, True)
+
+
+def _discovered(tried: Sequence[Dependence]) -> list[Dependence]:
+    """Those of which one in a hundred is false. Source: Benjamini, Hochberg, J. R. Statist. Soc. B 57 (1995) 289."""
+    order = sorted(tried, key=lambda each: each.log10_chance)
+    found = [i for i, each in enumerate(order, 1) if each.log10_chance <= np.log10(FALSE * i / len(order))]
+    return order[: max(found, default=0)]
+
+
+def level(left: LeftOver, features: Sequence[Floats], floor: TipFloor) -> tuple[float, float]:
+    """Mean square in units of the floor's, and its standard error: between regions of postures, and of the floor itself."""
+    sums, counts = [], []
+    for s, f in zip(left.squares, features, strict=True):
+        group = regions(f, min(STEPS, max(len(s) // 4, 2)))
+        for g in np.unique(group):
+            sums.append(float(s[group == g].sum() / 3.0))
+            counts.append(float((group == g).sum()))
+    total, n = np.array(sums), np.array(counts)
+    mean = float(total.sum() / n.sum())
+    between = float(np.sqrt(((total - mean * n) ** 2).sum() * len(n) / max(len(n) - 1, 1)) / n.sum())
+    even = mean * float(np.sqrt(2.0 / (3.0 * n.sum())))  # the least that noise does
+    return mean, float(np.hypot(max(between, even), mean * np.sqrt(2.0 / floor.freedom)))
+
+
+def neighbours(rest: Sequence[Floats], features: Sequence[Floats]) -> Dependence:
+    """Whether neighbouring postures share their leftover: noise does not, and what depends on the joints does."""
+    products: list[Floats] = []
+    energy, count = 0.0, 0
+    for r, f in zip(rest, features, strict=True):
+        if len(r) > 1:
+            near = KDTree(f).query(f, k=2)[1][:, 1]
+            products.append((r * r[near]).sum(axis=1))
+            energy, count = energy + float((r**2).sum()), count + len(r)
+    if energy <= 0.0:
+        return Dependence("", 0.0, 0.0)
+    every = np.concatenate(products)
+    spread = np.sqrt(2.0 * (every**2).mean() / count)  # a pair that are each other's nearest counts once
+    chance = float(norm.logsf(every.mean() / max(float(spread), 1e-300)) / np.log(10.0))
+    return Dependence("", max(float(every.mean()) / (energy / count), 0.0), chance)
+
+
+def stretches(rest: Sequence[Floats], times: Sequence[Floats]) -> Dependence:
+    """Whether stretches of time have a leftover of their own."""
+    white, freedom, energy, count = 0.0, 0, 0.0, 0
+    for r, t in zip(rest, times, strict=True):
+        parts = windows(t)
+        if len(parts) < 2:
+            continue
+        spread = np.cov(r.T) + 1e-18 * np.eye(3)
+        for own in parts:
+            mean = r[own].mean(axis=0) - r.mean(axis=0)
+            white += len(own) * float(mean @ np.linalg.solve(spread, mean))
+            energy += len(own) * float(mean @ mean)
+        freedom, count = freedom + 3 * (len(parts) - 1), count + 1
+    if not freedom:
+        return Dependence("", 0.0, 0.0)
+    whole = sum(float((r**2).sum()) for r in rest)
+    expected = freedom / 3.0 * whole / sum(len(r) for r in rest)  # what noise alone does
+    share = max(energy - expected, 0.0) / max(whole, 1e-300)
+    return Dependence("time", share, float(chi2.logsf(white, freedom) / np.log(10.0)))
+
+
+def windows(time: Floats) -> list[np.ndarray]:
+    """Indices of at most STEPS stretches of time of SHORTEST poses or more."""
+    count = min(STEPS, len(time) // SHORTEST)
+    return list(np.array_split(np.argsort(time, kind="stable"), count)) if count > 1 else []
+
+
+def standing_out(size: Floats, groups: Sequence[np.ndarray]) -> list[int]:
+    """Groups of indices whose sizes (n,) are larger than those of the others: rank sums, 1 % over all groups.
+
+    Source: Mann, Whitney, Ann. Math. Stat. 18 (1947) 50.
+    """
+    rank = np.empty(len(size))
+    rank[np.argsort(size, kind="stable")] = np.arange(1, len(size) + 1)
+    out = []
+    for i, own in enumerate(groups):
+        n, m = len(own), len(size) - len(own)
+        if not n or not m:
+            continue
+        z = (rank[own].sum() - n * (n + m + 1) / 2.0) / np.sqrt(n * m * (n + m + 1) / 12.0)
+        if norm.sf(z) < 0.01 / len(groups):
+            out.append(i)
+    return out

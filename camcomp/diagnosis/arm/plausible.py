@@ -1,0 +1,96 @@
+"""Whether poses can be those of the arm: what cannot is refused before anything is fitted, with what it looks like."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import combinations
+
+import numpy as np
+
+from camcomp.diagnosis.arm.registration import register
+from camcomp.ground.datatypes import Floats
+from camcomp.ground.errors import ConfigError, Location
+from camcomp.model.statics.description import Robot
+from camcomp.model.statics.hanging import hang
+
+NEAR = 0.005  # of the poses' spread: arms as they are bought; below it no other reading is asked for
+FAR = 0.02  # of the spread: no arm of the kind is wrong by so much
+BETTER = 0.2  # of the misfit: what another reading has to leave to be what was meant
+SHIFTS = (1, -1, 2, -2)  # rows
+POSES = 200
+LEAST = 12  # poses; fewer fit anything
+_TIPS = {"m": 1e3, "inches": 25.4, "um": 1e-3}
+
+
+def check_poses(log: str, run: str, robot: Robot, q: Floats, tip: Floats) -> None:
+    """Raise ConfigError where poses of a log, joints q (n, m) and tips (n, 3) mm, cannot be the arm's as they are read.
+
+    CC407: another unit, CC408: columns exchanged or reversed, CC412: joints and tips of different rows, CC413: none of it.
+    """
+    if len(q) < LEAST:
+        return
+    rows = np.unique(np.linspace(0, len(q) - 1, POSES).astype(int))
+    point, pose = _stand(robot, q[rows])
+    spread = float(np.sqrt(((point - point.mean(axis=0)) ** 2).sum(axis=1).mean()))
+    off = _misfit(point, pose, tip[rows])
+    if off < NEAR * spread or spread <= 0.0:
+        return
+    for rule, text, read in _readings(robot, q, tip, rows):
+        if read() < BETTER * off:
+            raise ConfigError(rule, f"run '{run}': {text}", at=Location(log, 1, 1))
+    if off > FAR * spread:
+        text = (
+            f"run '{run}': the tips are {off:.3g} mm from where the arm of the config would have them (median, frames "
+            f"fitted), and poses that lie {spread:.3g} mm about their centre leave no doubt about it"
+        )
+        raise ConfigError("CC413", text, at=Location(log, 1, 1))
+
+
+def _readings(robot: Robot, q: Floats, tip: Floats, rows: np.ndarray) -> list[tuple[str, str, Callable[[], float]]]:
+    """Rule, what it looks like, and its misfit, of every other way to read the poses."""
+    names = [a.name for a in robot.actuators]
+    hinges = np.array([a.revolute for a in robot.actuators])
+
+    def joints(changed: Floats) -> Callable[[], float]:
+        return lambda: _misfit(*_stand(robot, changed[rows]), tip[rows])
+
+    def tips(changed: Floats) -> Callable[[], float]:
+        return lambda: _misfit(*_stand(robot, q[rows]), changed[rows])
+
+    def shifted(by: int) -> Callable[[], float]:
+        own = rows[(rows + by >= 0) & (rows + by < len(q))]
+        return lambda: _misfit(*_stand(robot, q[own + by]), tip[own])
+
+    out = [("CC407", f"the tip looks as if logged in {unit}", tips(tip * by)) for unit, by in _TIPS.items()]
+    out.append(("CC407", "the joints look as if logged in degrees", joints(np.where(hinges, np.radians(q), q))))
+    if not hinges.all():
+        out.append(("CC407", "the joints that slide look as if logged in m", joints(np.where(hinges, q, 1e3 * q))))
+    for by in SHIFTS:
+        way = "behind" if by < 0 else "ahead of"
+        text = f"the tips look {abs(by)} row{'s' if abs(by) > 1 else ''} {way} their joints"
+        out.append(("CC412", text, shifted(by)))
+    for i, j in combinations(range(len(names)), 2):
+        order = np.arange(len(names))
+        order[[i, j]] = order[[j, i]]
+        out.append(("CC408", f"the joints look right with {names[i]} and {names[j]} exchanged", joints(q[:, order])))
+    for j, name in enumerate(names):
+        sign = np.where(np.arange(len(names)) == j, -1.0, 1.0)
+        out.append(("CC408", f"the joints look right with {name} reversed", joints(q * sign)))
+    out.append(("CC408", "the tip looks right when two of its axes are exchanged", tips(tip[:, [1, 0, 2]])))
+    out += [
+        ("CC408", "the joints look right in another order", joints(np.roll(q, by, axis=1)))
+        for by in range(1, len(names))
+    ]
+    out.append(("CC408", "the joints look right in the opposite order", joints(q[:, ::-1])))
+    return out
+
+
+def _stand(robot: Robot, q: Floats) -> tuple[Floats, Floats]:
+    hung = hang(robot, q)
+    return hung.point, hung.rotation
+
+
+def _misfit(point: Floats, pose: Floats, tip: Floats) -> float:
+    """Median distance, mm, with the frames that fit best."""
+    at = register(tip, point, pose, np.zeros(3))
+    return float(np.median(np.linalg.norm(at.to_machine(tip) - at.tips(point, pose), axis=1)))

@@ -1,0 +1,136 @@
+"""The parts of an axis study's result: gap, what is unknown, where and when, and how far the gap shrinks on unseen runs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.stats import t as student
+
+from camcomp.diagnosis.axis.findings import AxisChannel, AxisFindings
+from camcomp.diagnosis.result.types import (
+    Driver,
+    FoundCause,
+    GapSize,
+    IntervalShare,
+    RippleDriver,
+    ShrinkageStep,
+    UnknownCause,
+    UnseenShrinkage,
+    Where,
+)
+from camcomp.diagnosis.statistics.probability import EVEN, probability_of_chance, stated
+from camcomp.model.motion.log_columns import log_columns
+
+STRETCHES_OF_ONE = 4  # that a run holds, at least; it differs from the next one by as much as means of these
+
+
+def unknown(axis: AxisFindings, whole: int) -> UnknownCause:
+    """What is left: its share of the gap, not of the leftover, as for every cause. Even odds where nothing shows it."""
+    shares = []
+    for channel in axis.channels:
+        left, first = float(np.mean(channel.last)), max(float(np.mean(channel.first)), 1e-300)
+        parts = [share for _, share in axis.unknown_in] if channel is axis.channels[-1] else []
+        if axis.ripple and channel is axis.force:
+            parts.append(axis.ripple.share)
+        if channel.gate and channel.gate.word == "above":
+            parts.append(max(1.0 - channel.floor**2 / max(left, 1e-300), 0.0))
+        shares.append(max(parts, default=0.0) * left / first)
+    probability = stated(probability_of_chance(axis.unknown_chance)) if axis.strange else EVEN
+    return UnknownCause(target=axis.name, probability=probability, share=round(min(sum(shares) / whole, 1.0), 6))
+
+
+def gap(channels: Sequence[AxisChannel]) -> GapSize:
+    """Size of the following errors in um; where only forces were logged, of these in mN."""
+    size = 1e3 * np.abs(np.concatenate([c.data.y - (np.mean(c.data.y) if c.data.y.size else 0.0) for c in channels]))
+    return GapSize(
+        rms_um=round(float(np.sqrt(np.mean(size**2))), 3),
+        p95_um=round(float(np.quantile(size, 0.95)), 3),
+        max_um=round(float(size.max()), 3),
+        noise_floor_um=round(1e3 * float(np.sqrt(np.mean([c.floor**2 for c in channels]))), 3),
+    )
+
+
+def where(found: Sequence[AxisFindings], causes: Sequence[FoundCause]) -> Where:
+    """Shares of axes; what leftovers depend on, and when they stand out."""
+    known = [c for c in causes if not isinstance(c, UnknownCause)]
+    energy = {a.name: float(np.mean(c.first)) for a in found if (c := a.following or a.force) is not None}
+    total = max(sum(energy.values()), 1e-300)
+    drivers: list[Driver] = []
+    for a in found:
+        if a.ripple:
+            line = a.ripple
+            drivers.append(
+                RippleDriver(
+                    covariate=f"position:{a.name}",
+                    share=round(line.share, 4),
+                    channel=log_columns([a.name], [False]).drive[0],
+                    period_mm=round(line.period, 4),
+                    amplitude_N=round(line.amplitude, 3),
+                    forward_N=round(line.forward, 3),
+                    backward_N=round(line.backward, 3),
+                )
+            )
+        largest = {name: share for name, share in sorted(a.unknown_in, key=lambda each: each[1])}
+        drivers += [Driver(covariate=name, share=round(share, 4)) for name, share in largest.items()]
+    lag = any(c.effect == "servo_lag" for c in known)
+    return Where(
+        stage="control" if lag or not known else "drive",
+        axes={axis: round(energy.get(axis, 0.0) / total, 4) for axis in "xyz"},
+        actuators={name: round(e / total, 4) for name, e in energy.items()},
+        drivers=tuple(sorted(drivers, key=lambda d: -d.share)),
+        intervals=_intervals(found),
+    )
+
+
+def _intervals(found: Sequence[AxisFindings]) -> tuple[IntervalShare, ...]:
+    every = [
+        IntervalShare(run=c.names[i.run], t0_s=round(i.t0, 6), t1_s=round(i.t1, 6), share=round(i.share, 4))
+        for a in found
+        for c in a.channels
+        if c.gate is not None
+        for i in c.gate.intervals
+    ]
+    return tuple(sorted(every, key=lambda each: -each.share))
+
+
+def shrinkage(judged: Sequence[Sequence[AxisChannel]], names: Sequence[str]) -> UnseenShrinkage:
+    """On whole runs that took no part in choosing and fitting; the interval is that of one more run."""
+    runs = [(_mean_square(channels, "first"), _mean_square(channels, "last")) for channels in judged]
+    before, after = (float(np.sqrt(np.mean([r[i] for r in runs]))) for i in (0, 1))
+    ratio = 1.0 - after / before if before > 0 else 0.0
+    effects = dict.fromkeys(e for channels in judged for c in channels for e, _ in c.steps)
+    low, high = _interval(judged, runs)
+    return UnseenShrinkage(
+        holdout=tuple(names),
+        before_rms_um=round(1e3 * before, 3),
+        after_rms_um=round(1e3 * after, 3),
+        ratio=round(ratio, 4),
+        ci95=(round(min(low, ratio), 4), round(max(high, ratio), 4)),
+        steps=tuple(ShrinkageStep(effect=e, target=None, after_rms_um=round(1e3 * after, 3)) for e in effects),
+    )
+
+
+def _interval(judged: Sequence[Sequence[AxisChannel]], runs: Sequence[tuple[float, float]]) -> tuple[float, float]:
+    """95 % interval for one more run. Logarithms of the ratio vary as between the runs at hand; of a single one, as means
+    over STRETCHES_OF_ONE of its stretches do. Student's t.
+    """
+    if len(runs) > 1:
+        each = np.array([_log_ratio(*r) for r in runs])
+        more = 1.0 + 1.0 / len(each)
+    else:
+        first, last = (np.concatenate([getattr(c, part) for c in judged[0]]) for part in ("first", "last"))
+        each = np.array([_log_ratio(float(a), float(b)) for a, b in zip(first, last, strict=True)])
+        more = 1.0 / STRETCHES_OF_ONE + 1.0 / len(each)
+    spread = float(each.std(ddof=1)) if len(each) > 1 else 0.0
+    half = float(student.ppf(0.975, max(len(each) - 1, 1))) * spread * float(np.sqrt(more))
+    middle = float(np.mean([_log_ratio(*r) for r in runs]))
+    return 1.0 - float(np.exp(middle + half)), 1.0 - float(np.exp(middle - half))
+
+
+def _mean_square(channels: Sequence[AxisChannel], part: str) -> float:
+    return float(np.mean(np.concatenate([getattr(c, part) for c in channels])))
+
+
+def _log_ratio(before: float, after: float) -> float:
+    return 0.5 * float(np.log(max(after, 1e-300) / max(before, 1e-300)))

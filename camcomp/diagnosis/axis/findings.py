@@ -1,0 +1,97 @@
+"""Runs of one axis, and what was found on it, channel by channel."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from camcomp.diagnosis.axis.block_least_squares import Series
+from camcomp.diagnosis.axis.gate import AxisGate
+from camcomp.diagnosis.axis.noise_floor import LEAST_SPIKE_MM, spikes
+from camcomp.diagnosis.axis.terms import WIDE, AxisTravel, Ripple
+from camcomp.diagnosis.result.types import FoundCause
+from camcomp.ground.datatypes import Floats
+
+
+@dataclass(frozen=True, eq=False)
+class AxisRun:
+    """Log of one axis in one run: time (n,) s; setpoint, encoder mm; force N, each (n,), NaN where nothing was logged.
+
+    row (n,): of the log, from 1.
+    """
+
+    name: str
+    time: Floats
+    setpoint: Floats
+    encoder: Floats
+    force: Floats
+    row: np.ndarray | None = None
+
+    def without_spikes(self) -> tuple[AxisRun, np.ndarray]:
+        """The run with neighbours in the place of rows that are no measurement, and these rows' numbers."""
+        row = np.arange(1, len(self.time) + 1) if self.row is None else self.row
+        off = np.zeros(len(self.time), bool)
+        kept = {}
+        for name, least in (("setpoint", LEAST_SPIKE_MM), ("encoder", LEAST_SPIKE_MM), ("force", 0.0)):
+            y = getattr(self, name)
+            bad = spikes(y, least)
+            good = np.isfinite(y) & ~bad
+            kept[name] = np.where(bad, np.interp(self.time, self.time[good], y[good]), y) if bad.any() else y
+            off |= bad
+        return replace(self, **kept), row[off]
+
+
+@dataclass(frozen=True)
+class AxisDeviation:
+    """What an experiment states of its instruments; None where it says nothing."""
+
+    encoder_mm: float | None = None
+    force_N: float | None = None
+
+
+@dataclass(eq=False)
+class AxisChannel:
+    """One channel of one axis: what was fitted, block by block."""
+
+    data: Series
+    runs: list[int]
+    first: Floats  # mean squares of withheld blocks without causes
+    last: Floats
+    columns: Floats = field(default_factory=lambda: np.zeros((0, 0)))  # (n, k) of what was fitted
+    moves: list[AxisTravel] = field(default_factory=list)
+    steps: list[tuple[str, float]] = field(default_factory=list)  # effect, rms after
+    left: list[Floats] = field(default_factory=list)  # per run
+    floor: float = 0.0
+    stated: bool = False
+    all_names: list[str] = field(default_factory=list)
+    encoder_noise: list[float] = field(default_factory=list)  # mm, of every run
+    names: list[str] = field(default_factory=list)  # of the runs that the gate has seen
+    gate: AxisGate | None = None
+
+
+@dataclass(eq=False)
+class AxisFindings:
+    """What was found on one axis."""
+
+    name: str
+    stated: AxisDeviation
+    wide: int = WIDE[0]
+    causes: list[FoundCause] = field(default_factory=list)
+    following: AxisChannel | None = None
+    force: AxisChannel | None = None
+    ripple: Ripple | None = None
+    unknown_in: list[tuple[str, float]] = field(default_factory=list)  # covariate kind, share
+    unknown_chance: float = 0.0  # log10, the least of all that is unknown
+    details: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def channels(self) -> list[AxisChannel]:
+        """Those that were studied."""
+        return [c for c in (self.following, self.force) if c is not None]
+
+    @property
+    def strange(self) -> bool:
+        """Whether something is left that no effect states."""
+        return bool(self.ripple or self.unknown_in or any(c.gate and c.gate.word == "above" for c in self.channels))

@@ -1,0 +1,121 @@
+"""What is left of a channel of an axis against its floor: in size, in stretches of time, over position and speed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from scipy.stats import chi2, norm
+from scipy.stats import t as student
+
+from camcomp.diagnosis.axis.block_least_squares import Series, gain, log10_chance, withheld
+from camcomp.diagnosis.axis.terms import AxisTravel
+from camcomp.ground.datatypes import Floats
+
+MINOR = 0.3  # of the floor: what is smaller is no unknown, however sure it is
+ABOVE = 1.25  # of the floor's square: rows do not tell it to better than an eighth
+LEVEL = 1.5  # of the floor's square that a leftover has to stay below to be the floor
+STRETCH_S = 0.5  # in which a leftover is looked for
+LEAST_ROWS = 20  # of a stretch
+BINS = 16
+LEAST_Z = 4.0  # mean gain over its standard error
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A stretch of a run's time in which more is left than elsewhere: its share of the leftover's energy."""
+
+    run: int
+    t0: float
+    t1: float
+    share: float
+
+
+@dataclass(frozen=True)
+class AxisGate:
+    """`above` the floor, `at` it, or `open`; log10 of the chance that the floor alone looks like this; when."""
+
+    word: Literal["above", "at", "open"]
+    chance: float
+    intervals: tuple[Interval, ...]
+
+
+def judge(squares: Floats, inside: float, left: Sequence[Floats], times: Sequence[Floats], floor: float) -> AxisGate:
+    """Leftovers against a floor. squares (blocks,): their means on rows that were not fitted; left, times (n,) per run.
+
+    inside: mean square where everything is fitted. What goes away then is what the rows leave open, and no unknown.
+    """
+    found, chance = intervals(left, times, floor)
+    floor = max(floor, 1e-12)
+    size = squares / floor**2
+    spread = float(size.std(ddof=1)) / np.sqrt(len(size)) if len(size) > 1 else float(size.mean())
+    spread, freedom = max(spread, 1e-12), max(len(size) - 1, 1)
+    sure = float(student.ppf(0.99, freedom)) * spread
+    if size.mean() - sure > ABOVE and inside > ABOVE * floor**2:
+        by_size = float(student.logsf((size.mean() - ABOVE) / spread, freedom) / np.log(10.0))
+        return AxisGate("above", min(chance, by_size), found)
+    if found:
+        return AxisGate("above", chance, found)
+    high = size.mean() + float(student.ppf(0.95, freedom)) * spread
+    return AxisGate("at" if high < LEVEL else "open", 0.0, ())
+
+
+def intervals(left: Sequence[Floats], times: Sequence[Floats], floor: float) -> tuple[tuple[Interval, ...], float]:
+    """Stretches in which the mean square is above the floor, and out of what other stretches show (1 % over all of them).
+
+    With log10 of the chance of the most conspicuous one.
+    """
+    stretches = [
+        (k, rows)
+        for k, t in enumerate(times)
+        for rows in np.array_split(np.arange(len(t)), max(_count(t), 1))
+        if len(rows) >= LEAST_ROWS
+    ]
+    if len(stretches) < 8:
+        return (), 0.0
+    whole = sum(float((r**2).sum()) for r in left)
+    energy = np.array([float((left[k][rows] ** 2).mean()) for k, rows in stretches])
+    log = np.log(np.maximum(energy, 1e-300))
+    middle = float(np.median(log))
+    spread = 1.4826 * float(np.median(np.abs(log - middle)))
+    rows_each = np.array([len(rows) for _, rows in stretches])
+    pure = chi2.isf(0.01 / len(stretches), rows_each) / rows_each  # what even white noise reaches
+    chances = norm.logsf((log - middle) / max(spread, 1e-12)) / np.log(10.0) + np.log10(len(stretches))
+    out = (chances < -2.0) & (energy > ABOVE * floor**2) & (energy > pure * np.exp(middle))
+    joined: list[Interval] = []
+    for (k, rows), e, on in zip(stretches, energy, out, strict=True):
+        if not on:
+            continue
+        t0, t1, share = float(times[k][rows[0]]), float(times[k][rows[-1]]), float(e * len(rows)) / max(whole, 1e-300)
+        last = joined[-1] if joined else None
+        if last is not None and last.run == k and t0 - last.t1 < 0.1 * STRETCH_S:
+            joined[-1] = Interval(k, last.t0, t1, last.share + share)
+        else:
+            joined.append(Interval(k, t0, t1, share))
+    return tuple(joined), float(chances[out].min(initial=0.0))
+
+
+def _count(time: Floats) -> int:
+    length = float(time[-1] - time[0])
+    return int(min(length / STRETCH_S, len(time) / LEAST_ROWS))
+
+
+def dependences(data: Series, A: Floats, moves: Sequence[AxisTravel]) -> list[tuple[str, float, float]]:
+    """Covariate, share of what columns A (n, k) leave that it predicts, log10 of its chance: steps over position, speed, ..."""
+    rest = withheld(data, A)
+    covariates = {
+        "position": np.concatenate([m.position for m in moves]),
+        "velocity": np.concatenate([m.speed for m in moves]),
+        "acceleration": np.concatenate([m.acceleration for m in moves]),
+    }
+    out = []
+    for name, x in covariates.items():
+        edges = np.unique(np.quantile(x, np.linspace(0.0, 1.0, BINS + 1)[1:-1]))
+        steps = (np.searchsorted(edges, x)[:, None] == np.arange(1, len(edges) + 1)).astype(float)
+        found = gain(rest, withheld(data, np.concatenate([A, steps], axis=1)))
+        if found.z > LEAST_Z and found.log_ratio > 0.0:
+            share = 1.0 - float(np.exp(-2.0 * found.log_ratio))
+            out.append((name, share, log10_chance(found, len(covariates))))
+    return out

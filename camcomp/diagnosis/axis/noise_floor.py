@@ -1,0 +1,51 @@
+"""How far a channel of an axis scatters by itself, from row to row, and which rows are no measurement at all."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.stats import median_abs_deviation
+
+from camcomp.ground.datatypes import Floats
+
+REPEATABILITY_MM = 1e-3  # by which runs differ, and positions drift, unless stated otherwise
+SPIKE = 12.0  # deviations from the neighbours' median
+LEAST_SPIKE_MM = 0.1  # no machine jumps so far and back from one row to the next
+MOST_SPIKES = 0.03  # of the rows; more are no mistakes
+BESIDE = 3  # rows on either side, so that two that follow each other do not hide each other
+
+
+def rows_floor(channels: Sequence[Floats]) -> float:
+    """Deviation of one row, from fourth differences of every run's channel (n,); never less than its resolution says.
+
+    By the median, so that steps at reversals and rows far out do not count; of the fourth order, so that motion does not.
+    """
+    noise = []
+    for y in channels:
+        steps = np.abs(np.diff(y))
+        quantum = float(np.min(steps[steps > 1e-9 * max(float(np.ptp(y)), 1e-300)], initial=np.inf))
+        often = np.mean(steps < 0.5 * quantum) > 0.1  # rows that stay on a value: it is a resolution
+        scatter = float(median_abs_deviation(np.diff(y, 4), scale="normal")) / np.sqrt(70.0) if len(y) > 5 else 0.0
+        noise.append(max(scatter, quantum / np.sqrt(12.0) if often and np.isfinite(quantum) else 0.0))
+    return float(np.sqrt(np.mean(np.square(noise)))) if noise else 0.0
+
+
+def spikes(y: Floats, least: float) -> np.ndarray:
+    """Mask (n,) of rows that stand out of what is before and behind them alike, by SPIKE deviations, `least` and any step.
+
+    None where they are many.
+    """
+    rows = np.flatnonzero(np.isfinite(y))
+    out = np.zeros(len(y), bool)
+    if len(rows) < 4 * BESIDE:
+        return out
+    known = y[rows]
+    padded = np.concatenate([known[:1].repeat(BESIDE), known, known[-1:].repeat(BESIDE)])
+    median = np.median(np.lib.stride_tricks.sliding_window_view(padded, BESIDE), axis=1)
+    before, behind = median[: len(known)], median[BESIDE + 1 :]
+    over = np.maximum(known - np.maximum(before, behind), np.minimum(before, behind) - known)
+    off = known - 0.5 * (before + behind)
+    step = 3.0 * float(np.quantile(np.abs(np.diff(known)), 0.95))
+    out[rows] = over > max(SPIKE * float(median_abs_deviation(off, scale="normal")), least, step)
+    return out if out.mean() <= MOST_SPIKES else np.zeros(len(y), bool)

@@ -1,0 +1,84 @@
+"""Whether the log of axes can be what its columns say: what cannot is refused before anything is fitted."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from camcomp.diagnosis.axis.block_least_squares import solve
+from camcomp.diagnosis.axis.findings import AxisRun
+from camcomp.diagnosis.axis.study import ROWS
+from camcomp.diagnosis.axis.terms import WIDE, travel
+from camcomp.ground.datatypes import Floats
+from camcomp.ground.errors import ConfigError, Location
+
+HEAVIEST_KG = 2e4  # of what one drive moves
+SLOWEST_S = 0.5  # of a loop that still follows its set-points
+NEAR = 0.1  # of a factor between set-points and encoder
+_FACTORS = {1e3: "m", 1e-3: "um", 25.4: "inches", 180.0 / np.pi: "degrees where radians are due"}
+
+
+def check_axes(log: str, runs: Mapping[str, AxisRun]) -> None:
+    """Raise ConfigError CC407 (units) or CC408 (columns exchanged or reversed) for one log's axes by name."""
+    for name, run in runs.items():
+        both = np.isfinite(run.setpoint) & np.isfinite(run.encoder)
+        if both.sum() < ROWS or np.ptp(run.encoder[both]) == 0.0:
+            continue
+        _check_factor(log, name, run.setpoint[both], run.encoder[both])
+        _check_order(log, name, runs)
+        _check_size(log, name, run)
+
+
+def _refused(rule: str, log: str, text: str) -> ConfigError:
+    return ConfigError(rule, text, at=Location(log, 1, 1))
+
+
+def _check_factor(log: str, name: str, setpoint: Floats, encoder: Floats) -> None:
+    slope = float(np.cov(setpoint, encoder)[0, 1] / np.var(encoder, ddof=1))
+    if abs(slope + 1.0) < NEAR:
+        raise _refused(
+            "CC408", log, f"set-points and encoder of {name} run in opposite directions: one of them is reversed"
+        )
+    for factor, unit in _FACTORS.items():
+        for ratio, what in ((factor, "encoder"), (1.0 / factor, "set-points")):
+            if abs(slope / ratio - 1.0) < NEAR:
+                verb = "looks" if what == "encoder" else "look"
+                raise _refused("CC407", log, f"the {what} of {name} {verb} as if logged in {unit}")
+
+
+def _check_order(log: str, name: str, runs: Mapping[str, AxisRun]) -> None:
+    run = runs[name]
+
+    def off(other: AxisRun) -> float:
+        gap = (
+            run.setpoint - other.encoder[: len(run.setpoint)]
+            if len(other.encoder) == len(run.setpoint)
+            else run.setpoint
+        )
+        gap = gap[np.isfinite(gap)]
+        return float(np.std(gap)) if len(gap) else np.inf
+
+    own = off(run)
+    for other, each in runs.items():
+        if other != name and own > 0.5 * float(np.nanstd(run.encoder)) and off(each) < 0.2 * own:
+            raise _refused("CC408", log, f"the set-points of {name} fit the encoder of {other}: columns are exchanged")
+
+
+def _check_size(log: str, name: str, run: AxisRun) -> None:
+    known = np.isfinite(run.encoder)
+    if known.sum() <= 2 * WIDE[-1]:
+        return
+    at = travel(run.time[known], run.encoder[known], WIDE[-1])
+    A = np.stack([np.ones_like(at.time), 1e-3 * at.acceleration, at.speed, np.sign(at.speed)], axis=1)
+    gap = (run.setpoint - run.encoder)[known]
+    if np.isfinite(gap).all() and solve(A, gap)[2] > SLOWEST_S:
+        raise _refused("CC407", log, f"{name} follows more than {SLOWEST_S:g} s late: t_s looks as if logged in ms")
+    force = run.force[known]
+    if np.isfinite(force).all() and np.ptp(at.acceleration) > 0.0 and (mass := float(solve(A, force)[1])) > HEAVIEST_KG:
+        what = (
+            f"the positions of {name} look as if logged in m"
+            if mass < 1e3 * HEAVIEST_KG
+            else "t_s looks as if logged in ms"
+        )
+        raise _refused("CC407", log, f"the drive force of {name} would move {mass:.3g} kg: {what}")
