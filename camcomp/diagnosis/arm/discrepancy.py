@@ -39,7 +39,7 @@ class Discrepancy:
         distance = np.maximum(square[:, None] + square[None, :] - 2.0 * features @ features.T, 0.0)
         K = self.size**2 * np.exp(-0.5 * distance / self.length**2)
         K[np.diag_indices(len(K))] += self.noise**2 * (1.0 if loose is None else loose**2)
-        return K
+        return np.asarray(K, float)
 
 
 def fit_discrepancy(features: Sequence[Floats], rest: Sequence[Floats]) -> Discrepancy:

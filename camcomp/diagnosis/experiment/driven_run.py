@@ -15,7 +15,7 @@ from camcomp.ground.datatypes import RAPID, Bools, Floats, Path
 from camcomp.ground.errors import ConfigError, Location
 from camcomp.model.cutting.track import Conditions, Track, lay_track
 from camcomp.model.motion.alignment import Aligned, align
-from camcomp.model.motion.driven_path import Forces, cutting_forces, driven_directions, driven_path
+from camcomp.model.motion.driven_path import Forces, cutting_forces, driven_path
 from camcomp.model.motion.run_path import RunPath
 from camcomp.model.motion.twin import Twin
 
@@ -23,7 +23,6 @@ SAMPLE_MM = 2.0  # of the program, where places are compared
 GAP_ROWS = 3.0  # usual steps between rows over which a motion is not led
 STILL_S = 0.1  # from which on standing at the end of a line may be idleness
 STILL_MM = 0.005
-AGREE_COSINE = 0.7  # of the angle between driven and programmed direction
 LED_PASSES = 2  # of a tip along its program: the second knows how the machine bends
 
 
@@ -134,16 +133,17 @@ def _aligned(log: str, name: str, program: _Program, tip: Floats, measured: Meas
         message = f"run '{name}': the rows are on lines that the program does not move on, e.g. {lines}"
         raise ConfigError("CC406", message, at=Location(log, 1, 1))
     found = align(path, tip, line)
-    check_followed(log, name, found.distance, _agreement(path, found, tip, measured.time))
+    check_followed(log, name, found.distance, _agreement(path, found, tip))
     return found
 
 
-def _agreement(path: Path, found: Aligned, tip: Floats, time: Floats) -> float:
-    """Share of the moving rows that go the way of the program, 1 where none moves."""
-    _, after = driven_directions(tip, time)
-    moving = np.linalg.norm(after, axis=1) > 0.0
-    along = np.sum(path_geometry.tangents(path, found.motion, found.share) * after, axis=1)
-    return float(np.mean(along[moving] > AGREE_COSINE)) if moving.any() else 1.0
+def _agreement(path: Path, found: Aligned, tip: Floats) -> float:
+    """Share of the moving rows that go the way of the program and not back, 1 where none moves."""
+    length = path_geometry.lengths(path)
+    at = np.concatenate([[0.0], np.cumsum(length)])[found.motion] + found.share * length[found.motion]
+    step = np.linalg.norm(np.diff(tip, axis=0), axis=1)
+    moving = step > STILL_MM
+    return float(np.mean(np.diff(at)[moving] > -0.5 * step[moving])) if moving.any() else 1.0
 
 
 def _close(time: Floats, known: Bools) -> Bools:

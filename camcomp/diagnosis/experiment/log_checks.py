@@ -14,7 +14,7 @@ from camcomp.ground.errors import ConfigError, Location
 FAR_MM = 5.0  # no machine of the kind is wrong by so much; a log of another program or unit is
 FAR_RAD = 0.1
 ASIDE_MM = 1.0  # no control leaves its path by so much for half of the time
-LEAST_AGREEMENT = 0.5  # of the moving rows
+LEAST_AGREEMENT = 0.7  # of the moving rows go the way of the program
 LEAST_ROWS = 10  # of a run that executes a program; fewer say nothing about their own noise
 _LENGTH_UNITS = {1e-3: "m", 25.4: "mm where inches are due", 1.0 / 25.4: "inches", 1e3: "um"}
 _TURNS = {180.0 / np.pi: "degrees"}

@@ -37,9 +37,9 @@ GATE = 0.4  # of the noise floor: what unseen runs show beyond it makes an effec
 GATE_SHARE = 0.1  # of what the causes explain: none is modelled better than that
 GATE_LOCAL = 1.5  # of the floor: the same for what acts for a while only
 SURE_Z = 5.0  # standard deviations of chance
-LEAST_BESIDE = 0.3  # size in units of an unknown effect below which nothing is named beside it
+LEAST_BESIDE = 0.4  # size in units of an unknown effect below which nothing is named beside it
 PART_OF_UNKNOWN = 2.0  # size in units of an unknown effect below which a cause at its place is taken for a part of it
-POINTED = 0.5  # share of what is left that one actuator has to have to be that place
+POINTED = 0.85  # share of what is left that one actuator has to have to be that place
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,10 +140,10 @@ def beside_unknown(problem: Problem, f: Fitted, beyond: Mapping[str, Unexplained
         where = None
     sizes = {i: size_um(problem, f, (i,)) / max(left.excess_um, 1e-9) for i in members}
 
-    def elsewhere(i: int) -> bool:
-        return where is not None and problem.columns.candidates[i].target not in (where, None)
+    def there(i: int) -> bool:
+        return where is not None and problem.columns.candidates[i].target in (where, None)
 
-    return tuple(i for i in members if sizes[i] > (LEAST_BESIDE if elsewhere(i) else PART_OF_UNKNOWN))
+    return tuple(i for i in members if sizes[i] > (PART_OF_UNKNOWN if there(i) else LEAST_BESIDE))
 
 
 def overdispersion(problem: Problem, f: Fitted) -> float:

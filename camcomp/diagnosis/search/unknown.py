@@ -16,7 +16,7 @@ from camcomp.diagnosis.statistics.score_test import (
 )
 from camcomp.ground.datatypes import Floats, Ints
 
-CONFIRMED = 0.5  # share of its own signal that a cause beside an unknown one has to take away from unseen runs
+CONFIRMED = 0.8  # share of its own signal that a cause beside an unknown one has to take away from unseen runs
 
 
 def residual_tests(problem: Problem, f: Fitted, prior: Prior) -> dict[str, ResidualTest]:
