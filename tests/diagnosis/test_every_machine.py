@@ -78,7 +78,7 @@ def blur(log, rng):
     np.savetxt(log, table, fmt="%.7f", delimiter=",", header=header, comments="")
 
 
-@pytest.mark.parametrize(("machine", "cause"), trials())
+@pytest.mark.parametrize(("machine", "cause"), list(trials()))
 def test_what_is_wrong_is_named_and_nothing_else(machine, cause, tmp_path):
     result = runner.ask(simulated(tmp_path, machine, cause))
     named = [(each["effect"], each["target"]) for each in result["causes"]]
