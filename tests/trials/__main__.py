@@ -13,15 +13,38 @@ from tests.trials.experiment import Plan, make, truth_json, write
 from tests.trials.faults import every
 from tests.trials.machines import MACHINES
 from tests.trials.sensors import CHANNELS, Sensors
-from tests.trials.strange import STRANGE
+from tests.trials.strange import ON_ACTUATORS, STRANGE
 
 KINDS = ("null", "single", "pair", "unknown", "imperfect")
+# what data may be like: changes of the sensors, and of the plan
+MESS: dict[str, tuple[dict, dict]] = {
+    "tails": ({"tails": True}, {}),
+    "outliers": ({"outliers": 0.005}, {}),
+    "drift": ({"slow": 0.3, "drift": 0.3}, {}),
+    "coarse": ({"tip_step_mm": 0.005}, {}),
+    "clock": ({"clock_ppm": 200.0, "jitter_s": 5e-4}, {}),
+    "late-lines": ({"line_rows": 3}, {}),
+    "early-lines": ({"line_rows": -3}, {}),
+    "20-hertz": ({}, {"hertz": 20.0}),
+    "200-hertz": ({}, {"hertz": 200.0}),
+    "middle": ({}, {"middle": True}),
+    "waits": ({}, {"waits": True, "rapids": True}),
+}
+
+
+def messy(base: Plan, names: tuple[str, ...]) -> Plan:
+    """The plan with all that is said of its data."""
+    for name in names:
+        sensors, more = MESS[name]
+        base = replace(base, sensors=replace(base.sensors, **sensors), **more)
+    return base
 
 
 def plan(kind: str, index: int, seed: int, base: Plan, ratios: tuple[float, ...]) -> Plan:
     """The plan of one experiment; kinds go round the library and the strange faults as index grows."""
     rng = np.random.default_rng([seed, 1])
-    names = every(MACHINES[base.machine].actuators)
+    machine = MACHINES[base.machine]
+    names = every(machine)
     if kind == "single":
         causes, sizes = [names[(index * 7) % len(names)]], ratios or (1.0, 3.0, 10.0)
         chosen = [sizes[index % len(sizes)]]
@@ -32,7 +55,8 @@ def plan(kind: str, index: int, seed: int, base: Plan, ratios: tuple[float, ...]
         chosen = [3.0, float(rng.choice([3.0, 6.0, 9.0]))]
     elif kind == "unknown":
         sizes = ratios or (3.0, 10.0)
-        causes = [(sorted(STRANGE)[(index * 5) % len(STRANGE)], str(rng.choice(list("xyz"))))]
+        odd = sorted(STRANGE)[(index * 5) % len(STRANGE)]
+        causes = [(odd, str(rng.choice(machine.actuators if odd in ON_ACTUATORS else list("xyz"))))]
         chosen = [sizes[index % len(sizes)]]
     else:
         causes, chosen = [], []
@@ -57,15 +81,15 @@ def main():
 @click.option("--ratio", "ratios", type=float, multiple=True, help="Sizes over the noise; default 1, 3, 10.")
 @click.option("--rapids", type=click.Choice(["yes", "no", "mixed"]), default="mixed", help="Rows of rapids and rest.")
 @click.option("--stated", type=click.Choice(["yes", "no", "mixed"]), default="mixed", help="Key sd of the experiment.")
-@click.option("--line-rows", default=0, help="Rows by which the column line lags.")
+@click.option("--mess", multiple=True, type=click.Choice(list(MESS)), help="What is poor about the data; repeatable.")
 @click.option("--rows", default=500)
 @click.option("--runs", default=6)
-def make_(out, kind, machine, count, seed, noise_um, channels, ratios, rapids, stated, line_rows, rows, runs):
+def make_(out, kind, machine, count, seed, noise_um, channels, ratios, rapids, stated, mess, rows, runs):
     """Write experiments below OUT; their truth goes to OUT/truth."""
-    sensors = Sensors(tip_mm=noise_um * 1e-3, line_rows=line_rows)
+    sensors = Sensors(tip_mm=noise_um * 1e-3)
     choice = {"yes": True, "no": False, "mixed": None}
     base = Plan(0, machine=machine, channels=channels, sensors=sensors, rows=rows, runs=runs)
-    base = replace(base, rapids=choice[rapids], stated=choice[stated])
+    base = messy(replace(base, rapids=choice[rapids], stated=choice[stated]), mess)
     (out / "truth").mkdir(parents=True, exist_ok=True)
     for i in range(count):
         name, answer = f"e-{seed + i:05d}", out / "truth" / f"e-{seed + i:05d}.json"
