@@ -36,7 +36,7 @@ class Plan:
     causes: (effect, target); ratios: their sizes over the noise.  rapids: whether rows of rapids and rest are logged, None
     lets the seed choose.  imperfect: springs some per cent off, a force up to a tenth off, ripple of the teeth.  stated: whether
     the experiment says how far the tip's instrument is off; None lets the seed choose where the slow noise is small.
-    hertz: of the log, in place of `rows` per run.  waits: machines stand idle now and then.  middle: logs begin after a part of
+    paths: names of the recordings to choose from, circles among them.  hertz: of the log, in place of `rows` per run.  waits: machines stand idle now and then.  middle: logs begin after a part of
     the run, at the common time that started_s says.
     """
 
@@ -52,6 +52,7 @@ class Plan:
     rapids: bool | None = None
     imperfect: bool = False
     stated: bool | None = None
+    paths: tuple[str, ...] = ()
     hertz: float | None = None
     waits: bool = False
     middle: bool = False
@@ -82,7 +83,7 @@ def character(rng: np.random.Generator, ripple: bool) -> Character:
 
 def schedule(plan: Plan, rng: np.random.Generator) -> list[Run]:
     """Runs of different recordings with pauses between them: circles first, all kinds of paths, one or two in the air."""
-    names = recording.names()
+    names = list(plan.paths) or recording.names()
     circles = [each for each in names if each.startswith("circles")]
     others = [str(each) for each in rng.permutation([each for each in names if each not in circles])]
     chosen = [str(rng.choice(circles)), *others[: plan.runs - 2]]
