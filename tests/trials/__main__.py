@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
 import click
 import numpy as np
 
+from tests.trials import laws as law
 from tests.trials import score as judging
 from tests.trials.experiment import Plan, make, truth_json, write
 from tests.trials.faults import every
@@ -101,6 +103,39 @@ def make_(out, kind, machine, count, seed, noise_um, channels, ratios, rapids, s
         write(made, wanted, out / name)
         answer.write_text(truth_json(made))
         click.echo(f"{name} {kind} {[(c['effect'], c['target'], round(c['ratio'], 2)) for c in made.record['causes']]}")
+
+
+@main.command("laws")
+@click.option("--out", type=click.Path(path_type=Path), required=True)
+@click.option("--count", default=4, help="Experiments; every law is tried on each.")
+@click.option("--seed", default=1)
+@click.option("--machine", type=click.Choice(sorted(MACHINES)), default="orthoglide")
+@click.option("--rows", default=250)
+@click.option("--runs", default=3)
+@click.option("--only", multiple=True, type=click.Choice([*law.LESS, *law.SAME]), help="Laws; default all.")
+def laws_(out, count, seed, machine, rows, runs, only):
+    """Try the laws of diagnosis on experiments of every kind with all or few columns."""
+    results = out / "laws.jsonl"
+    (out / "truth").mkdir(parents=True, exist_ok=True)
+    done = [json.loads(line) for line in results.read_text().splitlines()] if results.exists() else []
+    there = {(row["name"], row["law"]) for row in done}
+    wanted = tuple(only) or (*law.LESS, *law.SAME)
+    for i in range(count):
+        kind, channels = ("single", "unknown", "pair")[i % 3], sorted(CHANNELS)[(i * 5) % len(CHANNELS)]
+        base = Plan(0, machine=machine, channels=channels, rows=rows, runs=runs, stated=False)
+        name, todo = f"e-{seed + i:05d}", [each for each in wanted if (f"e-{seed + i:05d}", each) not in there]
+        if not todo:
+            continue
+        wish = plan(kind, i + seed, seed + i, base, ())
+        made = make(wish)
+        write(made, wish, out / name)
+        (out / "truth" / f"{name}.json").write_text(truth_json(made))
+        for row in judging.laws(out / name, todo, seed + i):
+            done.append(row)
+            with results.open("a") as file:
+                file.write(json.dumps(row) + "\n")
+            click.echo(f"{name} {kind} {channels} {row['law']}: {row['said']}")
+    click.echo(judging.render_laws(done))
 
 
 @main.command("score")
