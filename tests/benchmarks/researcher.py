@@ -26,9 +26,9 @@ class Researcher:
         yielding[:, 0, 0] += 1.0 / np.asarray(legs.drive)
         self.foot = np.linalg.inv(yielding)
         self.bars = np.broadcast_to(legs.bar, (3, 6, 6))
-        self.carriage = energy.CYCLES @ turn(legs.base[:, 3:])
-        self.origin = np.einsum("bij,bj->bi", energy.CYCLES, legs.base[:, :3])
-        self.back = np.swapaxes(energy.CYCLES, 1, 2)
+        self.carriage = legs.axes @ turn(legs.base[:, 3:])
+        self.origin = np.einsum("bij,bj->bi", legs.axes, legs.base[:, :3])
+        self.back = np.swapaxes(legs.axes, 1, 2)
 
     def residual(self, u, tip, force):
         """Gradient of the energy and miss of the tip, for u = platform (6), legs (3 k), commanded tip (3)."""

@@ -19,10 +19,6 @@ import numpy as np
 from tests.plants.legs import Legs
 from tests.plants.rotations import Walk, rate, turn, vector
 
-CYCLES = np.stack(
-    [np.eye(3), np.roll(np.eye(3), 1, axis=0), np.roll(np.eye(3), 2, axis=0)]
-)  # local -> machine, per leg
-
 
 class Settled(NamedTuple):
     """Loaded equilibria of n points: tip and platform reference (n, 3) mm, drive forces (n, 3) N, tilt (n, 3) rad.
@@ -39,7 +35,10 @@ class Settled(NamedTuple):
 
 
 def inverse(legs: Legs, tip: np.ndarray) -> np.ndarray:
-    """Actuator coordinates (n, 3) mm of the perfect machine for the tips (n, 3) mm, assembly mode s = -1."""
+    """Actuator coordinates (n, 3) mm of the perfect machine for the tips (n, 3) mm, assembly mode s = -1.
+
+    Slides are the machine's axes.
+    """
     p = np.atleast_2d(tip) + [0.0, 0.0, legs.tool]
     square = (p**2).sum(1, keepdims=True) - p**2
     reach = legs.nominal_length**2 - square
@@ -52,7 +51,7 @@ def direct(legs: Legs, rho: np.ndarray) -> np.ndarray:
     """Platform references (n, 3) of the perfect machine for actuator coordinates (n, 3), by Newton on the spheres."""
     p = np.zeros_like(rho)
     for _ in range(60):
-        d = p[:, None, :] - rho[:, :, None] * np.eye(3)
+        d = p[:, None, :] - legs.centres(rho)
         error = (d**2).sum(2) - legs.nominal_length**2
         step = np.linalg.solve(2 * d, error[:, :, None])[:, :, 0]
         p = p - step
@@ -106,7 +105,7 @@ def _leg(legs: Legs, length: np.ndarray, end: np.ndarray, z: np.ndarray) -> Walk
 
 def _start(legs: Legs, rho: np.ndarray, p: np.ndarray) -> np.ndarray:
     """Leg coordinates (n*3, k) of the perfect unloaded machine."""
-    d = np.einsum("lji,nlj->nli", CYCLES, p[:, None, :] - rho[:, :, None] * np.eye(3)).reshape(-1, 3)
+    d = np.einsum("lji,nlj->nli", legs.axes, p[:, None, :] - legs.centres(rho)).reshape(-1, 3)
     q2, q1 = -np.arcsin(d[:, 2] / np.linalg.norm(d, axis=1)), np.arctan2(d[:, 1], d[:, 0])
     passive, _, rows = _LAYOUT[legs.kind]
     z = np.zeros((len(d), passive + len(rows)))
@@ -144,16 +143,20 @@ def settle(
     passive, _, rows = _LAYOUT[legs.kind]
     length, drive = np.asarray(legs.length)[leg], np.asarray(legs.drive)[leg]
     yielding = np.linalg.inv(np.broadcast_to(legs.foot, (3, 6, 6)))[leg]
-    yielding[:, 0, 0] += 1 / drive  # the drive spring and the foot are in series along the actuator
+    slide = np.array(legs.slide)
+    yielding[:, :3, :3] += (
+        np.outer(slide, slide) / drive[:, None, None]
+    )  # the drive spring and the foot are in series along the actuator
     foot = np.linalg.inv(yielding)
     bars = np.broadcast_to(legs.bar, (3, 6, 6))[leg]
     base, end = legs.base[leg], legs.end[leg]
-    a = CYCLES[leg] @ turn(base[:, 3:])  # carriage axes in the machine frame
+    axes = legs.axes[leg]
+    a = axes @ turn(base[:, 3:])  # carriage axes in the machine frame
     a_t = np.swapaxes(a, 1, 2)
-    origin = np.einsum("bij,bj->bi", CYCLES[leg], base[:, :3])
-    rail = np.zeros((3 * n, 3))
-    rail[:, 0] = rho.reshape(-1) - legs.offset
-    back = np.swapaxes(CYCLES, 1, 2)[leg]  # the leg ends in its local axes, the platform is parallel to the machine
+    column = legs.feet - slide * (slide @ legs.feet)  # about this point a base is rolled
+    origin = np.einsum("bij,bj->bi", axes, base[:, :3] + column)
+    rail = rho.reshape(-1, 1) * slide + (legs.feet - column)
+    back = np.swapaxes(axes, 1, 2)  # the leg ends in its local axes, the platform is parallel to the machine
     k = passive + len(rows)
     gap = np.zeros((3 * n, 6))
     step = 0
@@ -200,7 +203,7 @@ def settle(
             break
     else:
         raise ArithmeticError(f"energy did not settle: last step {size.max():.2e} mm")
-    return Settled(p + r @ arm, -load.reshape(n, 3, 6)[:, :, 0], vector(r), p, size, step)
+    return Settled(p + r @ arm, -load.reshape(n, 3, 6)[:, :, :3] @ slide, vector(r), p, size, step)
 
 
 def compliance(legs: Legs, reference: np.ndarray, load: float = 1.0) -> np.ndarray:

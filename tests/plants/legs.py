@@ -1,10 +1,12 @@
-"""Parameters of the three-legged truth machines: Orthoglide (3-PRPaR) and REF-PUU (3-PUU).  mm, N, rad."""
+"""Parameters of the three-legged truth machines: Orthoglide (3-PRPaR), REF-PUU (3-PUU), linear delta.  mm, N, rad."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+
+from tests.plants.rotations import turn
 
 
 def beam(length: float, young: float, shear: float, area: float, iy: float, iz: float, torsion: float) -> np.ndarray:
@@ -18,9 +20,16 @@ def beam(length: float, young: float, shear: float, area: float, iy: float, iz: 
     return k
 
 
+# local -> machine, per leg of a machine whose slides are the axes
+CYCLES = np.stack([np.eye(3), np.roll(np.eye(3), 1, axis=0), np.roll(np.eye(3), 2, axis=0)])
+
+
 @dataclass(frozen=True)
 class Legs:
-    """Everything the energy of a three-legged machine depends on; tuples are per leg x, y, z."""
+    """Everything the energy of a three-legged machine depends on; tuples are per leg x, y, z.
+
+    In the local axes of a leg its passive hinge is z, the parallelogram's y, and its bars lie along x where both are 0.
+    """
 
     kind: str  # "parallelogram" or "universal"
     length: tuple[float, float, float]
@@ -33,6 +42,19 @@ class Legs:
     base: np.ndarray = field(default_factory=lambda: np.zeros((3, 6)))  # base error per leg, local axes
     end: np.ndarray = field(default_factory=lambda: np.zeros((3, 6)))  # end error per leg, local axes
     nominal_length: float = 0.0  # what the controller believes
+    axes: np.ndarray = field(default_factory=lambda: CYCLES)  # (3, 3, 3) local -> machine
+    slide: tuple[float, float, float] = (1.0, 0.0, 0.0)  # direction of the actuator, local axes
+    stand: tuple[float, float, float] | None = None  # carriage at 0, local axes; None: -offset along x
+
+    @property
+    def feet(self) -> np.ndarray:
+        """Carriage (3,) at 0 in local axes."""
+        return np.array([-self.offset, 0.0, 0.0] if self.stand is None else self.stand)
+
+    def centres(self, rho: np.ndarray) -> np.ndarray:
+        """Points (n, 3, 3), machine frame, about which the platform swings at the length of each leg."""
+        local = self.feet + rho[:, :, None] * np.array(self.slide) + [self.offset, 0.0, 0.0]
+        return np.einsum("lij,nlj->nli", self.axes, local)
 
 
 def orthoglide(
@@ -67,7 +89,14 @@ def orthoglide(
     )
 
 
-def ref_puu(*, tool: float = 100.0, roll_deg: float = 0.0) -> Legs:
+def ref_puu(
+    *,
+    tool: float = 100.0,
+    roll_deg: float | tuple[float, ...] = 0.0,
+    longer: tuple[float, ...] = (0.0, 0.0, 0.0),
+    drive_factor: tuple[float, ...] = (1.0, 1.0, 1.0),
+    link_factor: float = 1.0,
+) -> Legs:
     """The invented 3-PUU cross-check machine: feet are 60 mm posts, bars two 12 x 24 mm profiles lumped."""
     nominal = 310.25
     foot = np.diag([4.409171e-6, 4.409171e-6, 3.968254e-7, 1.322751e-9, 1.322751e-9, 2.086671e-9])
@@ -77,17 +106,55 @@ def ref_puu(*, tool: float = 100.0, roll_deg: float = 0.0) -> Legs:
     bar[1, 5] = bar[5, 1] = 9.946993e-5
     bar[2, 4] = bar[4, 2] = -2.486748e-5
     base = np.zeros((3, 6))
-    base[:, 3] = np.deg2rad(roll_deg)
+    base[:, 3] = np.deg2rad(np.broadcast_to(roll_deg, 3))
     return Legs(
         kind="universal",
-        length=(nominal,) * 3,
-        drive=(1e4,) * 3,
-        foot=np.linalg.inv(foot),
-        bar=np.linalg.inv(bar),
+        length=tuple(nominal + d for d in longer),  # type: ignore[arg-type]
+        drive=tuple(1e4 * f for f in drive_factor),  # type: ignore[arg-type]
+        foot=link_factor * np.linalg.inv(foot),
+        bar=link_factor * np.linalg.inv(bar),
         offset=31.0,
         tool=tool,
         base=base,
         nominal_length=nominal,
+    )
+
+
+def delta(
+    *,
+    tool: float = 60.0,
+    roll_deg: tuple[float, ...] = (0.0, 0.0, 0.0),
+    longer: tuple[float, ...] = (0.0, 0.0, 0.0),
+    drive_factor: tuple[float, ...] = (1.0, 1.0, 1.0),
+    link_factor: float = 1.0,
+) -> Legs:
+    """The linear delta: columns at 250 mm, slides upright, bars of 400 mm between carriage and a platform of 50 mm.
+
+    In local axes x points away from the machine's axis, y down, z is the crossbar.
+    """
+    young, outer, inner = 120000.0, 16.0, 12.0
+    second = np.pi / 64 * (outer**4 - inner**4)
+    bar = beam(400.0, young, young / 2.6, np.pi / 4 * (outer**2 - inner**2), second, second, 2 * second)
+    # the carriage gives way less along its slide, local y
+    foot = np.diag(1 / np.array([1e-4, 2e-5, 1e-4, 5e-8, 5e-8, 5e-8]))
+    upright = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
+    columns = [turn(np.array([0.0, 0.0, angle])) @ upright for angle in np.radians([0.0, 120.0, 240.0])]
+    base = np.zeros((3, 6))
+    base[:, 4] = -np.deg2rad(roll_deg)
+    return Legs(
+        kind="parallelogram",
+        length=tuple(400.0 + d for d in longer),  # type: ignore[arg-type]
+        drive=tuple(5e3 * f for f in drive_factor),  # type: ignore[arg-type]
+        foot=link_factor * foot,
+        bar=link_factor * bar,
+        width=80.0,
+        offset=-50.0,
+        tool=tool,
+        base=base,
+        nominal_length=400.0,
+        axes=np.stack(columns),
+        slide=(0.0, -1.0, 0.0),
+        stand=(250.0, -((400.0**2 - 200.0**2) ** 0.5), 0.0),
     )
 
 

@@ -2,26 +2,51 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
 import click
 import numpy as np
 
+from tests.trials import laws as law
 from tests.trials import score as judging
 from tests.trials.experiment import Plan, make, truth_json, write
 from tests.trials.faults import every
 from tests.trials.machines import MACHINES
 from tests.trials.sensors import CHANNELS, Sensors
-from tests.trials.strange import STRANGE
+from tests.trials.strange import ON_ACTUATORS, STRANGE
 
 KINDS = ("null", "single", "pair", "unknown", "imperfect")
+# what data may be like: changes of the sensors, and of the plan
+MESS: dict[str, tuple[dict, dict]] = {
+    "tails": ({"tails": True}, {}),
+    "outliers": ({"outliers": 0.005}, {}),
+    "drift": ({"slow": 0.3, "drift": 0.3}, {}),
+    "coarse": ({"tip_step_mm": 0.005}, {}),
+    "clock": ({"clock_ppm": 200.0, "jitter_s": 5e-4}, {}),
+    "late-lines": ({"line_rows": 3}, {}),
+    "early-lines": ({"line_rows": -3}, {}),
+    "20-hertz": ({}, {"hertz": 20.0}),
+    "200-hertz": ({}, {"hertz": 200.0}),
+    "middle": ({}, {"middle": True}),
+    "waits": ({}, {"waits": True, "rapids": True}),
+}
+
+
+def messy(base: Plan, names: tuple[str, ...]) -> Plan:
+    """The plan with all that is said of its data."""
+    for name in names:
+        sensors, more = MESS[name]
+        base = replace(base, sensors=replace(base.sensors, **sensors), **more)
+    return base
 
 
 def plan(kind: str, index: int, seed: int, base: Plan, ratios: tuple[float, ...]) -> Plan:
     """The plan of one experiment; kinds go round the library and the strange faults as index grows."""
     rng = np.random.default_rng([seed, 1])
-    names = every(MACHINES[base.machine].actuators)
+    machine = MACHINES[base.machine]
+    names = every(machine)
     if kind == "single":
         causes, sizes = [names[(index * 7) % len(names)]], ratios or (1.0, 3.0, 10.0)
         chosen = [sizes[index % len(sizes)]]
@@ -32,7 +57,8 @@ def plan(kind: str, index: int, seed: int, base: Plan, ratios: tuple[float, ...]
         chosen = [3.0, float(rng.choice([3.0, 6.0, 9.0]))]
     elif kind == "unknown":
         sizes = ratios or (3.0, 10.0)
-        causes = [(sorted(STRANGE)[(index * 5) % len(STRANGE)], str(rng.choice(list("xyz"))))]
+        odd = sorted(STRANGE)[(index * 5) % len(STRANGE)]
+        causes = [(odd, str(rng.choice(machine.actuators if odd in ON_ACTUATORS else list("xyz"))))]
         chosen = [sizes[index % len(sizes)]]
     else:
         causes, chosen = [], []
@@ -57,15 +83,15 @@ def main():
 @click.option("--ratio", "ratios", type=float, multiple=True, help="Sizes over the noise; default 1, 3, 10.")
 @click.option("--rapids", type=click.Choice(["yes", "no", "mixed"]), default="mixed", help="Rows of rapids and rest.")
 @click.option("--stated", type=click.Choice(["yes", "no", "mixed"]), default="mixed", help="Key sd of the experiment.")
-@click.option("--line-rows", default=0, help="Rows by which the column line lags.")
+@click.option("--mess", multiple=True, type=click.Choice(list(MESS)), help="What is poor about the data; repeatable.")
 @click.option("--rows", default=500)
 @click.option("--runs", default=6)
-def make_(out, kind, machine, count, seed, noise_um, channels, ratios, rapids, stated, line_rows, rows, runs):
+def make_(out, kind, machine, count, seed, noise_um, channels, ratios, rapids, stated, mess, rows, runs):
     """Write experiments below OUT; their truth goes to OUT/truth."""
-    sensors = Sensors(tip_mm=noise_um * 1e-3, line_rows=line_rows)
+    sensors = Sensors(tip_mm=noise_um * 1e-3)
     choice = {"yes": True, "no": False, "mixed": None}
     base = Plan(0, machine=machine, channels=channels, sensors=sensors, rows=rows, runs=runs)
-    base = replace(base, rapids=choice[rapids], stated=choice[stated])
+    base = messy(replace(base, rapids=choice[rapids], stated=choice[stated]), mess)
     (out / "truth").mkdir(parents=True, exist_ok=True)
     for i in range(count):
         name, answer = f"e-{seed + i:05d}", out / "truth" / f"e-{seed + i:05d}.json"
@@ -77,6 +103,39 @@ def make_(out, kind, machine, count, seed, noise_um, channels, ratios, rapids, s
         write(made, wanted, out / name)
         answer.write_text(truth_json(made))
         click.echo(f"{name} {kind} {[(c['effect'], c['target'], round(c['ratio'], 2)) for c in made.record['causes']]}")
+
+
+@main.command("laws")
+@click.option("--out", type=click.Path(path_type=Path), required=True)
+@click.option("--count", default=4, help="Experiments; every law is tried on each.")
+@click.option("--seed", default=1)
+@click.option("--machine", type=click.Choice(sorted(MACHINES)), default="orthoglide")
+@click.option("--rows", default=250)
+@click.option("--runs", default=3)
+@click.option("--only", multiple=True, type=click.Choice([*law.LESS, *law.SAME]), help="Laws; default all.")
+def laws_(out, count, seed, machine, rows, runs, only):
+    """Try the laws of diagnosis on experiments of every kind with all or few columns."""
+    results = out / "laws.jsonl"
+    (out / "truth").mkdir(parents=True, exist_ok=True)
+    done = [json.loads(line) for line in results.read_text().splitlines()] if results.exists() else []
+    there = {(row["name"], row["law"]) for row in done}
+    wanted = tuple(only) or (*law.LESS, *law.SAME)
+    for i in range(count):
+        kind, channels = ("single", "unknown", "pair")[i % 3], sorted(CHANNELS)[(i * 5) % len(CHANNELS)]
+        base = Plan(0, machine=machine, channels=channels, rows=rows, runs=runs, stated=False)
+        name, todo = f"e-{seed + i:05d}", [each for each in wanted if (f"e-{seed + i:05d}", each) not in there]
+        if not todo:
+            continue
+        wish = plan(kind, i + seed, seed + i, base, ())
+        made = make(wish)
+        write(made, wish, out / name)
+        (out / "truth" / f"{name}.json").write_text(truth_json(made))
+        for row in judging.laws(out / name, todo, seed + i):
+            done.append(row)
+            with results.open("a") as file:
+                file.write(json.dumps(row) + "\n")
+            click.echo(f"{name} {kind} {channels} {row['law']}: {row['said']}")
+    click.echo(judging.render_laws(done))
 
 
 @main.command("score")

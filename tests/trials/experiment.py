@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from tests.recordings import recording
+from tests.recordings.recording import Recording
 from tests.trials import faults as library
 from tests.trials.faults import Fault, Faults, Target
 from tests.trials.machines import MACHINES
@@ -21,6 +22,7 @@ from tests.trials.plant import Character, Run, State, observe
 from tests.trials.sensors import Sensors, table, write_log
 from tests.trials.strange import STRANGE, strange
 
+IDLE_S = (1.0, 6.0)
 FEW = 40  # rows per run on which sizes are found
 SMALL = (0.03, 0.25)  # ratio of a small error, drawn evenly in its logarithm
 SMALL_TOGETHER = 0.5  # ratio of all small errors at most
@@ -34,6 +36,8 @@ class Plan:
     causes: (effect, target); ratios: their sizes over the noise.  rapids: whether rows of rapids and rest are logged, None
     lets the seed choose.  imperfect: springs some per cent off, a force up to a tenth off, ripple of the teeth.  stated: whether
     the experiment says how far the tip's instrument is off; None lets the seed choose where the slow noise is small.
+    paths: names of the recordings to choose from, circles among them.  hertz: of the log, in place of `rows` per run.  waits: machines stand idle now and then.  middle: logs begin after a part of
+    the run, at the common time that started_s says.
     """
 
     seed: int
@@ -48,6 +52,10 @@ class Plan:
     rapids: bool | None = None
     imperfect: bool = False
     stated: bool | None = None
+    paths: tuple[str, ...] = ()
+    hertz: float | None = None
+    waits: bool = False
+    middle: bool = False
 
 
 @dataclass
@@ -75,7 +83,7 @@ def character(rng: np.random.Generator, ripple: bool) -> Character:
 
 def schedule(plan: Plan, rng: np.random.Generator) -> list[Run]:
     """Runs of different recordings with pauses between them: circles first, all kinds of paths, one or two in the air."""
-    names = recording.names()
+    names = list(plan.paths) or recording.names()
     circles = [each for each in names if each.startswith("circles")]
     others = [str(each) for each in rng.permutation([each for each in names if each not in circles])]
     chosen = [str(rng.choice(circles)), *others[: plan.runs - 2]]
@@ -83,18 +91,33 @@ def schedule(plan: Plan, rng: np.random.Generator) -> list[Run]:
     air = set(rng.permutation(len(chosen))[: max(1, round(len(chosen) / 4))].tolist())
     runs, clock, cut = [], float(rng.integers(60, 400)), 0.0
     for i, name in enumerate(chosen):
-        run = Run(recording.load(name), i not in air, round(clock, 1), cut)
+        record = recording.load(name)
+        run = Run(idling(record, rng) if plan.waits else record, i not in air, round(clock, 1), cut)
         runs.append(run)
         cut += float(run.cuts.sum()) * recording.STEP_S / 60
         clock += run.last_s + float(rng.integers(120, 600))
     return runs
 
 
-def row_times(run: Run, rows: int, rapids: bool) -> np.ndarray:
-    """Times of the rows (about `rows`,) s: evenly spaced samples on the control's grid, without rapids and rest if so chosen."""
+def idling(record: Recording, rng: np.random.Generator) -> Recording:
+    """The recording with IDLE_S of standing still, wherever its speed is 0 anyway, one to three times."""
+    still = np.flatnonzero((np.diff(record.tip, axis=0) == 0).all(1))
+    k = np.sort(rng.choice(still, min(len(still), int(rng.integers(1, 4))), replace=False))
+    times = np.ones(len(record.t), int)
+    times[k] += (rng.uniform(*IDLE_S, len(k)) / recording.STEP_S).astype(int)
+    each = np.repeat(np.arange(len(times)), times)
+    t = np.arange(len(each)) * recording.STEP_S
+    name = f"{record.name}, idle at {[(int(i), int(n)) for i, n in zip(k, times[k], strict=True)]}"
+    return Recording(name, record.program, t, record.tip[each], record.line[each], record.kind[each])
+
+
+def row_times(run: Run, plan: Plan, rapids: bool, rng: np.random.Generator) -> np.ndarray:
+    """Times of the rows (about plan.rows,) s: samples at even steps of the control, without rapids and rest if so chosen."""
     record = run.recording
     logged = np.ones(len(record.t), bool) if rapids else record.kind > 1
-    step = max(1, round(int(logged.sum()) / rows))
+    if plan.middle:
+        logged &= record.t >= rng.uniform(0.1, 0.5) * run.last_s
+    step = max(1, round(int(logged.sum()) / plan.rows if plan.hertz is None else 1 / (plan.hertz * recording.STEP_S)))
     k = np.arange(step // 2, len(record.t), step)
     return record.t[k[logged[k]]]
 
@@ -127,8 +150,8 @@ class Bench:
     def fault(self, effect: str, target: Target, size: float, seed: int) -> Fault:
         """A fault of the library or a strange one."""
         if effect in STRANGE:
-            return strange(effect, target or "x", size, seed, self.span)
-        return library.sized(effect, target, size, seed)
+            return strange(effect, target or self.machine.actuators[0], size, seed, self.span)
+        return library.sized(effect, target, size, seed, self.machine.reach if self.machine.rotary else None)
 
     def sized(self, base: tuple[Fault, ...], effect: str, target: Target, goal_mm: float, seed: int) -> Fault:
         """The fault that, put to base, moves the tip by goal_mm rms."""
@@ -155,7 +178,7 @@ def sensitivity(machine: str) -> dict[tuple[str, Target], float]:
     bench = Bench(plan, schedule(plan, np.random.default_rng(1)), Character())
     before = bench.see(())
     out = {}
-    for effect, target in library.every(bench.machine.actuators):
+    for effect, target in library.every(bench.machine):
         fair = library.LIBRARY[effect].fair
         fair = fair / 10 if effect in ("backlash", "servo_lag", "time_sync", "friction") else fair
         out[effect, target] = rms(before, bench.see((bench.fault(effect, target, fair, 1),))) / fair
@@ -167,7 +190,7 @@ def unabsorbed(bench: Bench, machine: str, base: tuple[Fault, ...], fault: Fault
 
     def readings(states: list[State]) -> np.ndarray:
         tip = np.concatenate([s.tip[s.steady] / sensors.tip_mm for s in states])
-        encoder = np.concatenate([s.encoder[s.steady] / sensors.encoder_step_mm for s in states])
+        encoder = np.concatenate([s.encoder[s.steady] * bench.machine.reach / sensors.encoder_step_mm for s in states])
         return np.concatenate([tip.ravel(), encoder.ravel()])
 
     plain, size = readings(bench.see(base)), 0.1 * sensors.rms_mm
@@ -187,7 +210,7 @@ def small_errors(
 ) -> tuple[Fault, ...]:
     """Errors of every kind but those named, each of a size that stays below the noise, and all of them together too."""
     ratios, found = {}, []
-    for effect, target in library.every(bench.machine.actuators):
+    for effect, target in library.every(bench.machine):
         common = target is None and library.LIBRARY[effect].own
         if effect not in without and not common:  # one value for all is the same thing once more
             ratios[effect, target] = float(np.exp(rng.uniform(*np.log(SMALL))))
@@ -209,7 +232,8 @@ def small_errors(
 def off_model(bench: Bench, rng: np.random.Generator) -> tuple[Fault, ...]:
     """A model that is not perfect: springs some per cent off, a cutting force up to a tenth off."""
     out = [Fault("cutting_force", None, {"factor": float(1 + rng.choice([-1, 1]) * rng.uniform(0.03, 0.1))})]
-    out.append(Fault("link_stiffness", None, {"factor": float(1 + rng.normal() * 0.02)}))
+    if "link_stiffness" not in bench.machine.without:
+        out.append(Fault("link_stiffness", None, {"factor": float(1 + rng.normal() * 0.02)}))
     for each in bench.machine.actuators:
         out.append(Fault("drive_stiffness", each, {"factor": float(1 + rng.normal() * 0.03)}))
     return tuple(out)
@@ -239,7 +263,7 @@ def make(plan: Plan) -> Made:
         if each.effect in STRANGE:
             one["left_ratio"] = unabsorbed(bench, plan.machine, small, each, plan.sensors) / noise
         listed.append(one)
-    times = [row_times(run, plan.rows, rapids) for run in runs]
+    times = [row_times(run, plan, rapids, rng) for run in runs]
     states, perfect = bench.see(every, times), bench.see((), times)
     record = {
         "seed": plan.seed, "kind": plan.kind, "machine": plan.machine, "channels": plan.channels, "rapids": rapids,
@@ -270,10 +294,15 @@ def write(made: Made, plan: Plan, folder: Path) -> Path:
     lines.append("runs:")
     for i, (run, state) in enumerate(zip(made.runs, made.states, strict=True), 1):
         (folder / f"program-{i}.nc").write_text(run.recording.program)
-        write_log(folder / f"log-{i}.csv", *table(state, sensors, plan.channels, machine.actuators, rng))
+        log = table(state, sensors, plan.channels, machine, rng)
+        begun = float(state.t[0]) if plan.middle else 0.0
+        log.values[:, 0] -= begun
+        write_log(folder / f"log-{i}.csv", log)
+        made.record["runs"][i - 1]["outliers"] = log.outliers
         cutting = str(run.cutting).lower()
+        started = f"{run.started_s + begun:.3f}"
         lines.append(
-            f"  - {{name: run-{i}, program: program-{i}.nc, log: log-{i}.csv, cutting: {cutting}, started_s: {run.started_s}}}"
+            f"  - {{name: run-{i}, program: program-{i}.nc, log: log-{i}.csv, cutting: {cutting}, started_s: {started}}}"
         )
     (folder / "experiment.yaml").write_text("\n".join(lines) + "\n")
     return folder / "experiment.yaml"

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from tests.trials.machines import Machine
 
 Target = str | None
 
@@ -78,7 +82,6 @@ LIBRARY: dict[str, Kind] = {
     "squareness": Kind("angle_mrad", 0.2, 10.0, signed=True, own=True, common=False),
 }
 PLANES = ("xy", "xz", "yz")
-PARALLEL_ONLY = ("chain_error",)
 
 
 def targets(effect: str, actuators: tuple[str, ...]) -> list[Target]:
@@ -88,13 +91,18 @@ def targets(effect: str, actuators: tuple[str, ...]) -> list[Target]:
     return ([None] if kind.common else []) + (list(own) if kind.own else [])
 
 
-def every(actuators: tuple[str, ...]) -> list[tuple[str, Target]]:
+def every(machine: Machine) -> list[tuple[str, Target]]:
     """All (effect, target) of the library that apply to a machine."""
-    return [(effect, target) for effect in LIBRARY for target in targets(effect, actuators)]
+    applied = [effect for effect in LIBRARY if effect not in machine.without]
+    both = [(effect, target) for effect in applied for target in targets(effect, machine.actuators)]
+    return [each for each in both if each not in machine.unseen]
 
 
-def sized(effect: str, target: Target, size: float, seed: int) -> Fault:
-    """The fault of that size (a share for factors); what it has beside its size is drawn from the seed."""
+def sized(effect: str, target: Target, size: float, seed: int, reach: float | None = None) -> Fault:
+    """The fault of that size (a share for factors); what it has beside its size is drawn from the seed.
+
+    reach: of rotary joints, mm per rad, whose offset is given in rad.
+    """
     rng, kind = np.random.default_rng([seed, 3]), LIBRARY[effect]
     if effect == "screw_cyclic":
         more = {"pitch_mm": float(rng.choice([4.0, 5.0, 8.0, 10.0])), "phase_rad": float(rng.uniform(-np.pi, np.pi))}
@@ -104,6 +112,8 @@ def sized(effect: str, target: Target, size: float, seed: int) -> Fault:
         x, y, z = size * way / np.linalg.norm(way)
         turn = size * float(rng.uniform(-2.0, 2.0))
         return Fault(effect, target, {"shift_x_mm": x, "shift_y_mm": y, "shift_z_mm": z, "rotation_deg": turn})
+    if effect == "joint_offset" and reach is not None:
+        return Fault(effect, target, {"offset_rad": size / reach})
     return Fault(effect, target, {kind.parameter: 1 / (1 + size) if kind.factor else size})
 
 

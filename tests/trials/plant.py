@@ -10,7 +10,7 @@ From set-point to reading, each step with its sign:
     encoder     the servo's answer to it
     nut         encoder behind the play
     carriage    nut + pitch error (from home) + cyclic error + offset + growth x (T - 20), minus friction / spring
-    force       on the tool, along the velocity that the encoders show; on while the line being executed is a feed move that
+    force       on the tool, along the velocity that the encoders show and, where chips matter, by its size; on while the line being executed is a feed move that
                 does not plunge, in a run that cuts; kept at standstill; e_t is the feed's own direction, on ramps too
     tip         minimum of the energy there; + deflection x lateral force
     workpiece   Rz(-rotation) (tip - origin - shift), squareness added in the program frame
@@ -28,7 +28,7 @@ from tests.plants.drives import play
 from tests.recordings.recording import Recording
 from tests.trials import drives, strange
 from tests.trials.faults import Faults
-from tests.trials.machines import Orthoglide
+from tests.trials.machines import Machine
 
 JUMP_S = 0.010  # to both sides of a jump of the force
 JUMP = 0.1  # of the force, that is one
@@ -95,6 +95,7 @@ class State:
     temperature: np.ndarray  # (n,) deg C
     steady: np.ndarray  # (n,) bool, away from jumps of the cutting force
     middle: np.ndarray  # (m,) set-points at the program's origin
+    reach: float  # mm at the tip per unit of an actuator, about
     dragged: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
     load: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))  # (n, m) what the structure exerts on the drives
     drive: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))  # (n, m)
@@ -125,19 +126,35 @@ def directions(tip: np.ndarray) -> np.ndarray:
     return way[last] / length[last, None]
 
 
+def speeds(tip: np.ndarray) -> np.ndarray:
+    """Speeds (n,) mm/s on the grid of 1 ms."""
+    return np.linalg.norm(np.gradient(tip, drives.STEP_S, axis=0), axis=1)
+
+
 def _dragged(tip: np.ndarray, reach: float = 6.0) -> np.ndarray:
     """Where joints that hold back leave the platform behind its path (n, 3), at most 1: play over reach mm, rounded."""
     axes = [play(np.ascontiguousarray(tip[:, i]), reach, 0.0) - tip[:, i] for i in range(3)]
     return np.tanh(np.stack(axes, 1) / (0.4 * reach))
 
 
+_SETPOINTS: dict[tuple[str, str], np.ndarray] = {}
+
+
+def _setpoints(machine: Machine, recording: Recording) -> np.ndarray:
+    """Actuators (n, m) of a recording, found once."""
+    key = (machine.name, recording.name)
+    if key not in _SETPOINTS:
+        _SETPOINTS[key] = machine.inverse(recording.tip + machine.origin)
+    return _SETPOINTS[key]
+
+
 class Motion:
     """A run's set-points, encoders and forces on the grid of 1 ms."""
 
-    def __init__(self, machine: Orthoglide, run: Run, faults: Faults, character: Character) -> None:
+    def __init__(self, machine: Machine, run: Run, faults: Faults, character: Character) -> None:
         self.machine, self.run, self.faults, self.character = machine, run, faults, character
         record, names = run.recording, machine.actuators
-        self.setpoint = c = machine.inverse(record.tip + machine.origin)
+        self.setpoint = c = _setpoints(machine, record)
         lag = faults.sum("servo_lag", "time_constant_ms", names)
         self.encoder = np.stack([drives.servo(c[:, i], lag[i], character.speed_loop) for i in range(len(names))], 1)
         for each in faults:
@@ -152,6 +169,7 @@ class Motion:
         late = not np.array_equal(self.encoder, c)
         driven = machine.direct(self.encoder) - machine.origin if late else record.tip
         self.along = directions(driven)
+        self.triple = machine.triple(speeds(driven))
         self.cuts = run.cuts
         self.cut_min = run.cut_before_min + np.cumsum(self.cuts) * drives.STEP_S / 60
         self.dragged = _dragged(record.tip)
@@ -167,12 +185,12 @@ class Motion:
         along = self.along[k]
         right = np.cross(along, [0.0, 0.0, 1.0])
         right /= np.maximum(np.linalg.norm(right, axis=1), 1e-12)[:, None]
-        fr, ft, fz = self.machine.force
+        fr, ft, fz = self.triple[k].T[:, :, None]
         factor = self.faults.product("cutting_force", "factor", (None,))[0]
         worn = 1 + self.faults.sum("tool_wear", "growth_per_min", (None,))[0] * self.cut_min[k]
         turn = 2 * np.pi * self.character.teeth_hertz * (t + self.run.started_s)
         size = factor * worn * (1 + share * self.character.ripple * np.sin(turn)) * self.cuts[k]
-        return size[:, None] * (fr * right + ft * along + np.array([0.0, 0.0, fz]))
+        return size[:, None] * (fr * right + ft * along + fz * [0.0, 0.0, 1.0])
 
     def state(self, t: np.ndarray) -> State:
         """All readings at times t but the clock's error."""
@@ -184,7 +202,7 @@ class Motion:
         s = State(
             t, common, self.at(run.recording.tip, t), run.recording.line[k], self.cuts[k], self.cut_min[k],
             self.at(self.setpoint, t), self.at(self.encoder, t), self.force(t, 1.0), 20.0 + warm, run.steady[k],
-            machine.inverse(machine.origin[None])[0], self.dragged[k],
+            machine.inverse(machine.origin[None])[0], machine.reach, self.dragged[k],
         )  # fmt: skip
         nut = self.at(self.nut, t)
         carriage = nut + faults.sum("screw_pitch", "error_ppm", names) * 1e-6 * (nut - machine.home)
@@ -192,7 +210,7 @@ class Motion:
             i, value = names.index(each.target), each.parameters
             turn = 2 * np.pi * nut[:, i] / value["pitch_mm"] + value["phase_rad"]
             carriage[:, i] += value["amplitude_mm"] * np.sin(turn)
-        carriage += faults.sum("joint_offset", "offset_mm", names)
+        carriage += faults.sum("joint_offset", "offset_rad" if machine.rotary else "offset_mm", names)
         carriage += faults.sum("thermal_growth", "growth_mm_per_K", names) * warm[:, None]
         force = self.force(t, character.followed)
         odd = [each for each in faults if each.effect in strange.STRANGE]
@@ -240,7 +258,7 @@ class Motion:
         return tip
 
 
-def observe(machine: Orthoglide, run: Run, faults: Faults, character: Character, t: np.ndarray) -> State:
+def observe(machine: Machine, run: Run, faults: Faults, character: Character, t: np.ndarray) -> State:
     """The run's readings at times t (n,), the clock's error included."""
     motion = Motion(machine, run, faults, character)
     state = motion.state(t)

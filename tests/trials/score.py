@@ -15,6 +15,8 @@ from typing import Any
 
 import numpy as np
 
+from tests.trials import laws as law
+
 NAMED = 0.3  # of the noise: a cause of at least this size may be named
 SURE = 0.8
 Row = dict[str, Any]
@@ -131,6 +133,42 @@ def run(folder: Path, results: Path, jobs: int, only: tuple[str, ...] = ()) -> l
             out.write(json.dumps(row) + "\n")
             out.flush()
     return [rows[name] for name in sorted(rows)]
+
+
+def laws(folder: Path, names: list[str], seed: int) -> list[Row]:
+    """Every law of those names tried on one experiment."""
+    files, out = law.read(folder), []
+    before = ask(law.write(files, folder / "as it is"))
+    for name in names:
+        less = name in law.LESS
+        changed, labels = (law.LESS if less else law.SAME)[name](files, np.random.default_rng([seed, 7]))
+        after = ask(law.write(changed, folder / name))
+        row: Row = {"name": folder.name, "law": name, "less": less, "before": before.get("verdict")}
+        failed = "failed" in before or "failed" in after
+        if failed:
+            row |= {"failed": True, "said": after.get("failed", before.get("failed"))}
+        elif less:
+            row |= {"another": law.another_cause(before, after), "surer": law.surer(before, after)}
+            row |= {"said": f"{before['verdict']} {law.named(before)} -> {after['verdict']} {law.named(after)}"}
+        else:
+            row |= {"said": law.differences(before, after, labels, turned=name == "turned frame")}
+        out.append(row)
+    return out
+
+
+def render_laws(rows: list[Row]) -> str:
+    """How often each law was broken."""
+    lines = []
+    for name in [*law.LESS, *law.SAME]:
+        some = [row for row in rows if row["law"] == name]
+        good = [row for row in some if "failed" not in row]
+        opened = [row for row in good if row["before"] in ("unknown", "ambiguous")]
+        if name in law.LESS:
+            broken = f"another cause {sum(r['another'] for r in good)}, of {len(opened)} open ones closed {sum(r['surer'] for r in opened)}"
+        else:
+            broken = f"changed {sum(bool(r['said']) for r in good)}"
+        lines.append(f"{name:<18} {len(some):4d} tried, {len(some) - len(good)} failed, {broken}")
+    return "\n".join(lines)
 
 
 def wilson(hits: int, total: int, z: float = 1.96) -> tuple[float, float]:

@@ -16,6 +16,7 @@ from tests.trials.faults import Fault
 if TYPE_CHECKING:
     from tests.trials.plant import State
 
+ON_ACTUATORS = ("servo_resonance", "guide_bump", "disturbed_drive", "hardening", "crosstalk")  # the others: x, y, z
 # name -> (stage where it lives, what it truly depends on: beginnings of covariates that a report may name)
 STRANGE: dict[str, tuple[str, tuple[str, ...]]] = {
     "servo_resonance": ("control", ("acceleration", "time", "velocity", "reversal")),
@@ -60,18 +61,24 @@ def at_encoder(fault: Fault, i: int, setpoint: np.ndarray) -> np.ndarray:
 
 
 def at_carriage(fault: Fault, i: int, s: State) -> np.ndarray:
-    """What is added to the carriage (n,) of actuator i, mm."""
-    value, size = fault.parameters, fault.parameters["size"]
-    if fault.effect == "guide_bump":
-        place = s.middle[i] + value["place_mm"]
-        return 0.05 * size * np.exp(-(((s.setpoint[:, i] - place) / value["width_mm"]) ** 2))
-    if fault.effect == "disturbed_drive":
+    """What is added to the carriage (n,) of actuator i, mm or rad."""
+    value, size, load = fault.parameters, fault.parameters["size"], s.load / s.reach
+    return _at_carriage(fault.effect, value, size, (s.setpoint[:, i] - s.middle[i]) * s.reach, i, load, s) / s.reach
+
+
+def _at_carriage(
+    effect: str, value: dict[str, float], size: float, way: np.ndarray, i: int, load: np.ndarray, s: State
+) -> np.ndarray:
+    """The same in mm at the tip, about; way (n,) mm from the middle; load (n, m) N."""
+    if effect == "guide_bump":
+        return 0.05 * size * np.exp(-(((way - value["place_mm"]) / value["width_mm"]) ** 2))
+    if effect == "disturbed_drive":
         u = s.common - value["when_s"]
         return 0.06 * size * ((u >= 0) & (u < value["last_s"]))
-    if fault.effect == "hardening":  # the drive gives way less and less under load: what a straight spring misses
-        return 1e-6 * size * s.load[:, i] * np.abs(s.load[:, i])
-    if fault.effect == "crosstalk":
-        return 2e-4 * size * s.load[:, (i + 1) % s.load.shape[1]]
+    if effect == "hardening":  # the drive gives way less and less under load: what a straight spring misses
+        return 1e-6 * size * load[:, i] * np.abs(load[:, i])
+    if effect == "crosstalk":
+        return 2e-4 * size * load[:, (i + 1) % load.shape[1]]
     return np.zeros(len(s.t))
 
 

@@ -7,9 +7,13 @@ import numpy as np
 import pytest
 
 from camcomp.diagnosis.experiment.open_experiment import open_experiment
-from tests.trials.experiment import Plan, make, truth_json, write
+from tests.recordings import recording
+from tests.trials.__main__ import MESS, messy
+from tests.trials.experiment import Plan, idling, make, row_times, truth_json, write
+from tests.trials.machines import MACHINES
+from tests.trials.plant import Run
 from tests.trials.score import judge, wilson
-from tests.trials.sensors import Sensors, tip_noise
+from tests.trials.sensors import Sensors, beam_breaks, table, tip_noise
 
 PLAN = Plan(7, "single", (("backlash", "y"),), (3.0,), runs=2, rows=120)
 
@@ -62,3 +66,44 @@ def test_wilson_by_the_textbook():
 def test_the_seed_decides(made):
     again = make(replace(PLAN))
     assert all(np.array_equal(a.tip, b.tip) for a, b in zip(made.states, again.states, strict=True))
+
+
+@pytest.mark.parametrize("mess", list(MESS))
+def test_poor_data_are_poor(made, mess):
+    """Every option changes the log of the same state, or the rows and states that are logged."""
+    plan = messy(PLAN, (mess,))
+    assert plan != PLAN
+    if plan.sensors != PLAN.sensors:
+        state, machine = made.states[0], MACHINES[PLAN.machine]
+        logs = [table(state, each.sensors, "full", machine, np.random.default_rng(2)) for each in (PLAN, plan)]
+        assert not np.array_equal(logs[0].values, logs[1].values, equal_nan=True)
+
+
+def test_outliers_come_alone_and_in_bursts():
+    off = beam_breaks(200_000, 0.005, np.random.default_rng(1))
+    assert off.mean() == pytest.approx(0.005, rel=0.1)
+    bursts = np.diff(np.flatnonzero(np.diff(np.concatenate([[0], off.astype(int), [0]]))))[::2]
+    assert (bursts == 1).sum() > 300 and (bursts >= 3).sum() > 50
+
+
+def test_tails_are_heavy_and_as_wide():
+    t = np.arange(0, 2000, 0.02)
+    drawn = tip_noise(Sensors(tails=True), t, np.random.default_rng(1))
+    assert drawn.std() == pytest.approx(0.003, rel=0.1)
+    assert (np.abs(drawn) > 0.015).mean() > 5e-4
+
+
+def test_idle_machines_stand_still():
+    record = recording.load("dwell-exact")
+    idle = idling(record, np.random.default_rng(1))
+    assert len(idle.t) > len(record.t) + 1000
+    assert np.abs(np.diff(idle.tip, axis=0)).max() == np.abs(np.diff(record.tip, axis=0)).max()
+    assert idle.name != record.name
+
+
+def test_logs_begin_where_they_are_said_to():
+    plan = replace(PLAN, middle=True, hertz=20.0)
+    run = Run(recording.load("zigzag-blended"), True, 0.0)
+    first = row_times(run, plan, True, np.random.default_rng(1))
+    assert np.diff(first) == pytest.approx(0.05)
+    assert first[0] > 0.1 * run.last_s

@@ -162,6 +162,6 @@ def test_lines_that_cut_are_feeds_by_the_control_too(name):
 def test_every_effect_moves_the_tip_or_the_drives():
     t = rows("zigzag-10um", 12)
     plain = tips("zigzag-10um", NOTHING, cutting=True, t=t)
-    for effect, target in every(ORTHOGLIDE.actuators):
+    for effect, target in every(ORTHOGLIDE):
         got = tips("zigzag-10um", wrong(effect, target, LIBRARY[effect].fair), cutting=True, t=t)
         assert np.abs(got.tip - plain.tip).max() > 1e-4, (effect, target)
