@@ -101,7 +101,11 @@ REFUSED = {  # what happened, rule, place (a regular expression; file:line:colum
     "infinity": (cell(5, 3, "inf"), "CC403", r"log-1.csv:6:\d+"),
     "a cell too many": (each(lambda rows: [*rows[:5], [*rows[5], "1"], *rows[6:]]), "CC403", r"log-1.csv:6:\d\d+"),
     "nothing measured": (without(*TIP, *SETPOINTS, *ENCODERS, *DRIVES, *FORCES), "CC404", r"log-1.csv:1:1"),
-    "time backwards": (each(lambda rows: [*rows[:10], rows[5], *rows[10:]]), "CC405", r"log-1.csv:11:1"),
+    "two rows at one time": (
+        each(lambda rows: [*rows[:10], [rows[9][0], *rows[5][1:]], *rows[10:]]),
+        "CC405",
+        r"log-1.csv:1[12]:1",
+    ),
     "lines of another program": (cells(["line"], lambda c: "77"), "CC406", r"log-1.csv:1:1"),
     "another program": (other_program, "CC406", r"log-1.csv:1:1"),
     "logs exchanged": (exchanged, "CC40[68]", r"log-[12].csv:1:1"),

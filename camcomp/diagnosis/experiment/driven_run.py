@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import KDTree
 
-from camcomp.diagnosis.experiment.log_checks import check_followed, check_forces, check_places, check_told
+from camcomp.diagnosis.experiment.log_checks import ASIDE_MM, check_followed, check_forces, check_places, check_told
 from camcomp.diagnosis.fit.measured import Measured
 from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import RAPID, Bools, Floats, Path
@@ -90,7 +90,7 @@ def drive(
         unsure |= _idle_or_not(forces, aligned, program, tip, measured.time)
     run_path = driven_path(
         name, measured.time, rho, tip, forces, started=started, to_machine=twin.to_machine, vectors=vectors,
-        forward=twin.forward, temperature=temperature,
+        inverse=twin.inverse, temperature=temperature,
     )  # fmt: skip
     if program is not None:
         run_path = replace(run_path, feed_mm_per_min=program.feed)
@@ -188,10 +188,10 @@ def _led_by_tip(
         forces = cutting_forces(program.track, aligned, tip, measured.time, bool(np.isfinite(measured.line).any()))
         run_path = driven_path(
             name, measured.time, twin.inverse(twin.to_machine(tip)), tip, forces, started=started,
-            to_machine=twin.to_machine, vectors=vectors, forward=twin.forward, temperature=temperature,
+            to_machine=twin.to_machine, vectors=vectors, inverse=twin.inverse, temperature=temperature,
         )  # fmt: skip
         bend = twin.sense(run_path)[0].tip - tip
-    unsure = ~known | _idle_or_not(forces, aligned, program, tip, measured.time)
+    unsure = ~known | (aligned.distance > ASIDE_MM) | _idle_or_not(forces, aligned, program, tip, measured.time)
     run_path = replace(run_path, feed_mm_per_min=program.feed)
     return DrivenRun(run_path, "tip", unsure, _across(program.track, aligned), aligned.lag)
 

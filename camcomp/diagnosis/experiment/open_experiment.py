@@ -61,7 +61,7 @@ def open_experiment(path: str | FilePath) -> OpenExperiment:
 def open_run(spec: RunSpec, job: Job, twin: Twin, notes: list[str]) -> Run:
     """One run of an experiment."""
     table, log = open_log(spec.log), display_name(spec.log)
-    measured = read_log(table, columns_of(twin))
+    measured = in_time(read_log(table, columns_of(twin)))
     notes += unread(table, columns_of(twin))
     check_rows(log, measured)
     conditions = job.conditions if spec.cutting else replace(job.conditions, model=None)
@@ -78,6 +78,19 @@ def open_run(spec: RunSpec, job: Job, twin: Twin, notes: list[str]) -> Run:
     return Run(
         spec.name, run.run_path, measured, spec.clamping, spec.clock, thin, by=run.by, unsure=run.unsure, turn=run.turn
     )
+
+
+def in_time(measured: Measured) -> Measured:
+    """The rows in the order of their times, each once: loggers write some of them late or twice."""
+    order = np.argsort(measured.time, kind="stable")
+    measured = measured.take(order) if (np.diff(order) < 0).any() else measured
+    again = np.zeros(len(measured.time), bool)
+    for i in np.flatnonzero(np.diff(measured.time) == 0) + 1:
+        again[i] = all(
+            np.array_equal(getattr(measured, n)[i], getattr(measured, n)[i - 1], equal_nan=True)
+            for n in measured.__dataclass_fields__
+        )
+    return measured.take(~again) if again.any() else measured
 
 
 def steadied(time: Floats, values: Floats) -> Floats | None:

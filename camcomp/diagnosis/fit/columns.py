@@ -146,7 +146,7 @@ def build(
             strict=True,
         ):
             healthy = min(HEALTHY * floor_um / max(tip_um(bench, per_run), 1e-9), MOST_HEALTHY)
-            put(i, f"{candidate.label}.{p.name}", max(p.tolerance / p.scale, healthy), per_run, p.sign, True)
+            put(i, f"{candidate.label}.{p.name}", healthy, per_run, p.sign, True)
     for name, size, per_run, loose in _nuisances(bench):
         put(-1, name, size, per_run, 0, loose)
     blocks = tuple(np.stack([each[r] for each in parts], axis=2) for r in range(len(bench.runs)))
@@ -320,6 +320,7 @@ def grounds(bench: Bench) -> list[Ground]:
             temperature=None if motion.temperature is None else motion.temperature[keep],
         )
         present = {n: run.measured.has(n) for n in ("tip", "encoder", "drive", "dyno")}
+        present["encoder"] &= run.by == "setpoint"  # else it is the motion itself
         out.append(Ground(motion, reading.drive[keep], reading.dyno[keep], tip[keep], velocity[keep], present))
     return out
 

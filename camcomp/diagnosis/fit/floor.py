@@ -12,12 +12,13 @@ from typing import Literal
 import numpy as np
 
 from camcomp.diagnosis.fit.bench import Bench, thinned
-from camcomp.ground.datatypes import Floats
+from camcomp.ground.datatypes import Bools, Floats
 
 REPEATABILITY_MM = 0.001  # of a run, per axis, where nothing is stated (contract, section 5)
 LEAST_SHARE = 0.05  # of the floor: what moves the tip by less is the resolution of a channel and no finding
 CLIPPED = 6.0  # robust deviations beyond which a difference of rows says nothing about the noise
 LEAST_ROWS = 20
+RAPID_TIMES = 2.0  # of the program's feed: rows that are faster are no measure of the instrument
 REGULAR = 1.6  # usual steps of time: a longer one is a gap
 
 
@@ -40,7 +41,7 @@ class NoiseFloor:
 
 def measure_floor(bench: Bench, stated_mm: float | None = None) -> NoiseFloor:
     """The floor of a bench's runs. stated_mm: the whole deviation of the tip's instrument per axis, where the user states it."""
-    gaps = [bench.residual(k) for k in range(len(bench.runs))]
+    gaps = [np.where(_fast(bench, k)[:, None], np.nan, bench.residual(k)) for k in range(len(bench.runs))]
     times = [thinned(run.run_path.time[:, None], run.thin)[:, 0] for run in bench.runs]
     fast = np.full(gaps[0].shape[1], np.nan)
     for c in range(len(fast)):
@@ -59,6 +60,17 @@ def measure_floor(bench: Bench, stated_mm: float | None = None) -> NoiseFloor:
         return NoiseFloor(fast, slow, 1e3 * np.sqrt(3.0) * axis, "stated")
     axis = float(np.hypot(white, REPEATABILITY_MM))
     return NoiseFloor(fast, REPEATABILITY_MM, 1e3 * np.sqrt(3.0) * axis, "rows" if len(tip) else "not identifiable")
+
+
+def _fast(bench: Bench, k: int) -> Bools:
+    """Rows (n,), thinned, of rapids: there a clock that is a little unsteady scatters more than the instrument."""
+    run = bench.runs[k]
+    if not run.run_path.ordered or len(run.run_path.time) < 3:
+        return np.zeros(len(bench.residual(k)), bool)
+    speed = 60.0 * np.linalg.norm(np.gradient(bench.nominal[k].tip, run.run_path.time, axis=0), axis=1)
+    fast = np.nan_to_num(speed) > RAPID_TIMES * np.nan_to_num(run.run_path.feed_mm_per_min, nan=np.inf)
+    found = thinned(fast[:, None].astype(float), run.thin)[:, 0] > 0.0
+    return found if found.mean() < 0.5 else np.zeros(len(found), bool)
 
 
 def row_scatter(values: Floats, time: Floats) -> float:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from camcomp.ground.datatypes import Bools, Floats
+from camcomp.ground.datatypes import Bools, Floats, Ints
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +27,7 @@ class Measured:
         """Whether the channel holds any value."""
         return bool(np.isfinite(getattr(self, name)).any())
 
-    def take(self, rows: Bools) -> "Measured":
+    def take(self, rows: Bools | Ints) -> "Measured":
         """The rows that a mask picks."""
         return Measured(**{each: getattr(self, each)[rows] for each in self.__dataclass_fields__})
 

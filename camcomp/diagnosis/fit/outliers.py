@@ -37,10 +37,10 @@ def outlying(bench: Bench) -> list[Bools]:
 
 
 def _jumping_off(x: Floats) -> Bools:
-    beside = x - median_filter(x, SHORT, mode="nearest")
+    beside = x - median_filter(x, SHORT, mode="mirror")
     scale = 1.4826 * float(np.median(np.abs(beside)))
     single = np.abs(beside) > OFF * max(scale, 1e-12)
-    around = x - median_filter(x, min(LONG, len(x)), mode="nearest")
+    around = x - median_filter(x, min(LONG, len(x)), mode="mirror")
     wide = 1.4826 * float(np.median(np.abs(around)))
     gross = np.abs(around) > GROSS * max(wide, scale, 1e-12)
     if scale == 0.0 or single.mean() > MANY:
@@ -58,7 +58,7 @@ def tails(bench: Bench) -> list[Floats]:
             known = np.flatnonzero(np.isfinite(x))
             if len(known) < LEAST_ROWS or not run.run_path.ordered:
                 continue
-            beside = x[known] - median_filter(x[known], SHORT, mode="nearest")
+            beside = x[known] - median_filter(x[known], SHORT, mode="mirror")
             scale = 1.4826 * float(np.median(np.abs(beside)))
             if scale > 0.0:
                 weight[known, c] = np.maximum(np.abs(beside) / (HEAVY * scale), 1.0)

@@ -21,6 +21,7 @@ _LINE_TIMES = 4.0
 _SLACK_MM = 0.5  # by which a row may be further along than the way between two rows says
 _LOST_MM = 2.0  # from the path where the search begins anew
 _MOST_LAG = 25  # rows
+_GAINED = 0.35  # of the shift, in rows per change of line: short lines hide a part of it
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,7 +135,7 @@ def _lag(geometric: Ints, hint: Ints) -> int:
         score[lag] = float(np.mean((geometric[a:b] == hint[a + lag : b + lag])[both])) if both.any() else 0.0
     best = max(score, key=lambda lag: (score[lag], -abs(lag)))
     gained = (score[best] - score[0]) * n / len(change)  # rows per change of line
-    return best if gained > 0.6 * abs(best) and abs(best) > 1 else 0
+    return best if gained > _GAINED * abs(best) and abs(best) > 1 else 0
 
 
 def _shifted(line: Floats, lag: int) -> Floats:

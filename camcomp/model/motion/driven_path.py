@@ -29,6 +29,9 @@ _PIECE_MM = 60.0
 _PIECE_RAD = np.pi / 3
 _AGREE = np.cos(np.radians(5.0))  # driven and programmed direction are the same
 _STILL_MM_PER_S = 0.05
+BESIDE_MM = 0.6  # from the path: no blended corner leaves it further, and what does so is no cut of it
+_SURE_N = 20.0  # what the force may be off by for the nodes between rows to be led by it
+LEAST_FEED = 1e-3  # mm/min: at standstill the edges still rub
 _CHORD_MM = 0.02  # over which a direction is taken: digits and noise of set-points are small beside it
 
 
@@ -51,12 +54,12 @@ def driven_path(
     started: float,
     to_machine: Callable[[Floats], Floats],
     vectors: Callable[[Floats], Floats],
-    forward: Callable[[Floats, Floats], Floats],
+    inverse: Callable[[Floats], Floats],
     temperature: Floats | None = None,
 ) -> RunPath:
     """Run path of driven actuators rho (n, m) at times (n,) s, and the nominal tips tip (n, 3), program frame, that go with them.
 
-    to_machine, vectors: program -> machine frame. forward: actuators (q, m) and tips near by (q, 3), machine frame -> tips.
+    to_machine, vectors: program -> machine frame. inverse: machine tips (q, 3) -> set-points (q, m).
     """
     n = len(time)
     row_tip, row_force = to_machine(tip), vectors(forces.force)
@@ -67,9 +70,10 @@ def driven_path(
     jump = _jumps(row_force, forces.cutting)
     pieces = _Pieces.along(time, grid, grid_tip, jump)
     node_time = pieces.node_times()
-    node_rho = lead(node_time)
-    node_tip = forward(node_rho, lead_tip(node_time))
-    sure = np.linalg.norm(forces.doubt, axis=1) == 0.0
+    # the tip is led between rows, and the drives where it asks them to be: an arm keeps its tool upright there
+    node_tip = lead_tip(node_time)
+    node_rho = inverse(node_tip)
+    sure = np.linalg.norm(forces.doubt, axis=1) <= _SURE_N
     node_force = _of_stretches(time, row_force, sure, jump, node_time, pieces)
     index = np.clip(np.searchsorted(time, grid), 0, n - 1)
     return RunPath(
@@ -85,6 +89,8 @@ def cutting_forces(track: Track, aligned: Aligned, tip: Floats, time: Floats, lo
     piece = _piece_of(track, motion, share)
     w = np.clip((share - track.u0[piece]) / np.maximum(track.u1[piece] - track.u0[piece], 1e-12), 0.0, 1.0)
     on &= track.cutting[piece]
+    if not logged_line:
+        on &= aligned.distance < BESIDE_MM
     n = len(tip)
     zero = np.zeros((n, 3))
     if not on.any():
@@ -95,14 +101,29 @@ def cutting_forces(track: Track, aligned: Aligned, tip: Floats, time: Floats, lo
     size = np.linalg.norm(middle, axis=1, keepdims=True)
     middle = np.where(size > 0.2, middle / np.maximum(size, 1e-12), after)
     as_told = (np.sum(middle * programmed, axis=1) > _AGREE) | (np.linalg.norm(middle, axis=1) == 0.0)
-    force = np.where(as_told[:, None], track.force(piece, w), track.force_along(piece, w, middle))
+    feed = driven_feeds(tip, time)
+    told, chord = track.force(piece, w, feed), track.force_along(piece, w, programmed, feed)
+    force = np.where(as_told[:, None], told, track.force_along(piece, w, middle, feed))
     force[~on] = 0.0
-    return Forces(force, _doubt(force, time, on), on)
+    # on fine polygons a control turns somewhere between the corner alone and the whole of its lines
+    turning = np.where((as_told & on)[:, None], np.abs(told - chord), 0.0)
+    # line numbers that were late or early are right to a row
+    slack = CLOCK_S + (float(np.median(np.diff(time))) if aligned.lag else 0.0)
+    return Forces(force, np.maximum(_doubt(force, time, on, slack), turning), on)
 
 
 def path_tangents(track: Track, piece: Ints, w: Floats) -> Floats:
     """Programmed direction (n, 3) at fraction w (n,) of pieces (n,)."""
     return path_geometry.tangents(track.path, track.motion[piece], track.u(piece, w))
+
+
+def driven_feeds(tip: Floats, time: Floats) -> Floats:
+    """Feed (n,) mm/min at which tips (n, 3) were driven at times (n,) s: what a chip is thick by, whatever was programmed."""
+    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(tip, axis=0), axis=1))])
+    left, right = np.maximum(np.arange(len(time)) - 1, 0), np.minimum(np.arange(len(time)) + 1, len(time) - 1)
+    return np.asarray(
+        np.maximum(60.0 * (way[right] - way[left]) / np.maximum(time[right] - time[left], 1e-9), LEAST_FEED)
+    )
 
 
 def driven_directions(tip: Floats, time: Floats) -> tuple[Floats, Floats]:
@@ -158,13 +179,13 @@ def _piece_of(track: Track, motion: Ints, share: Floats) -> Ints:
     return np.clip(np.searchsorted(track.motion + track.u0, key, side="right") - 1, 0, len(track.motion) - 1)
 
 
-def _doubt(force: Floats, time: Floats, cutting: Bools) -> Floats:
+def _doubt(force: Floats, time: Floats, cutting: Bools, slack: float) -> Floats:
     """Half of what the force (n, 3) may be off by where it jumps between rows: the jump itself, as far as clocks reach."""
     change = np.diff(force, axis=0)
     size = np.linalg.norm(change, axis=1)
     out = np.zeros_like(force)
     for k in np.flatnonzero(_abrupt(size, force) | np.diff(cutting)):
-        near = (time >= time[k] - CLOCK_S) & (time <= time[k + 1] + CLOCK_S)
+        near = (time >= time[k] - slack) & (time <= time[k + 1] + slack)
         near[k : k + 2] = True
         out[near] = np.maximum(out[near], np.abs(change[k]))
     return out
