@@ -19,8 +19,6 @@ PERFECT = Sensors(
 AIR_UM = 1.0  # most that model and plant may differ
 CUT_UM = 5.0  # most for nine tenths of the rows: which line is executed beside a corner is known to a row only
 FAILS = {
-    ("kuka-kr210", False): "between the nodes of a driven path the arm is up to 110 um off",
-    ("kuka-kr210", True): "between the nodes of a driven path the arm is off",
     ("router", True): "its chips are those of the programmed feed, not of the feed that was driven: 270 um",
 }
 

@@ -31,6 +31,9 @@ TEMPERATURE = (
 )
 MINOR = 0.3  # of the noise floor at the tip: what moves it by less is no cause, whatever its significance (contract, section 6)
 CANCELLING = 8.0  # size of a member, in units of the whole set, above which the set lives on differences of its members
+BEYOND_DOUBT = (
+    20.0  # log evidence of a member, all tolerances strained as far as they like, above which no run vetoes it
+)
 HARM_LOG = 2.0  # log density by which a cause has to harm the prediction of other runs before it goes
 SAME_EVIDENCE = 2.0  # log evidence by which two sets may differ and still be the same answer, whatever their priors
 GATE = 0.4  # of the noise floor: what unseen runs show beyond it makes an effect that the library lacks
@@ -229,6 +232,9 @@ def _prune(problem: Problem, fits: tuple[Fitted, ...], probability: Floats) -> t
         f = fits[j]
         if not f.members or probability[j] < 0.02:
             continue
+        less = [g.log_evidence for g in fits if set(g.members) < set(f.members)]
+        if less and f.log_evidence - max(less) > BEYOND_DOUBT:
+            continue  # what is within tolerance foretells as well once it is strained; the strain is what speaks
         smaller = [tuple(x for x in f.members if x != i) for i in f.members]
         scores = predictive(f.grams, problem.prior, problem.candidates, [f.members, *smaller])
         if scores[0] < scores[1:].max() - HARM_LOG:

@@ -97,22 +97,22 @@ class Track:
             beside1=np.where(end < 1.0, 0.0, self.beside1[of]),
         )  # fmt: skip
 
-    def force(self, piece: Ints, w: Floats, feed: Floats | None = None) -> Floats:
-        """Cutting force on the tool (k, 3) N, program frame; feed (k,) mm/min as driven, else the program's."""
+    def force(self, piece: Ints, w: Floats) -> Floats:
+        """Cutting force on the tool (k, 3) N, program frame."""
         tangent = path_geometry.tangents(self.path, self.motion[piece], _beside(self, piece, w))
         out = _force(self.path, self.conditions, self.cutting, self.motion, self.s0, self.length, piece, w, tangent,
-                     self.points(piece, w), feed)  # fmt: skip
+                     self.points(piece, w))  # fmt: skip
         return out + (1.0 - w)[:, None] * self.fade0[piece] + w[:, None] * self.fade1[piece]
 
-    def force_along(self, piece: Ints, w: Floats, direction: Floats, feed: Floats | None = None) -> Floats:
+    def force_along(self, piece: Ints, w: Floats, direction: Floats) -> Floats:
         """Cutting force on the tool (k, 3) N, program frame, where the tip is driven along unit vectors direction (k, 3)."""
         return _force(self.path, self.conditions, self.cutting, self.motion, self.s0, self.length, piece, w, direction,
-                      self.points(piece, w), feed)  # fmt: skip
+                      self.points(piece, w))  # fmt: skip
 
 
 def _force(
     path: Path, c: Conditions, cutting: Bools, motion: Ints, s0: Floats, length: Floats, piece: Ints, w: Floats,
-    direction: Floats, tip: Floats, driven: Floats | None = None,
+    direction: Floats, tip: Floats,
 ) -> Floats:  # fmt: skip
     """Model force (k, 3) N for given feed directions, program frame."""
     out = np.zeros((len(piece), 3))
@@ -124,7 +124,7 @@ def _force(
     depth = fill if c.depth_mm is None else np.full(len(rows), c.depth_mm)
     if c.depth_mm is None and c.stock_top_mm is not None:
         depth = c.stock_top_mm - tip[on][:, 2]
-    feed, speed = path.feed[rows] if driven is None else driven[on], path.speed[rows]
+    feed, speed = path.feed[rows], path.speed[rows]
     cut = Cut(
         tangent=direction[on],
         tool_axis=np.asarray(c.tool_axis, float),

@@ -31,7 +31,6 @@ _AGREE = np.cos(np.radians(5.0))  # driven and programmed direction are the same
 _STILL_MM_PER_S = 0.05
 BESIDE_MM = 0.6  # from the path: no blended corner leaves it further, and what does so is no cut of it
 _SURE_N = 20.0  # what the force may be off by for the nodes between rows to be led by it
-LEAST_FEED = 1e-3  # mm/min: at standstill the edges still rub
 _CHORD_MM = 0.02  # over which a direction is taken: digits and noise of set-points are small beside it
 
 
@@ -101,9 +100,8 @@ def cutting_forces(track: Track, aligned: Aligned, tip: Floats, time: Floats, lo
     size = np.linalg.norm(middle, axis=1, keepdims=True)
     middle = np.where(size > 0.2, middle / np.maximum(size, 1e-12), after)
     as_told = (np.sum(middle * programmed, axis=1) > _AGREE) | (np.linalg.norm(middle, axis=1) == 0.0)
-    feed = driven_feeds(tip, time)
-    told, chord = track.force(piece, w, feed), track.force_along(piece, w, programmed, feed)
-    force = np.where(as_told[:, None], told, track.force_along(piece, w, middle, feed))
+    told, chord = track.force(piece, w), track.force_along(piece, w, programmed)
+    force = np.where(as_told[:, None], told, track.force_along(piece, w, middle))
     force[~on] = 0.0
     # on fine polygons a control turns somewhere between the corner alone and the whole of its lines
     turning = np.where((as_told & on)[:, None], np.abs(told - chord), 0.0)
@@ -115,15 +113,6 @@ def cutting_forces(track: Track, aligned: Aligned, tip: Floats, time: Floats, lo
 def path_tangents(track: Track, piece: Ints, w: Floats) -> Floats:
     """Programmed direction (n, 3) at fraction w (n,) of pieces (n,)."""
     return path_geometry.tangents(track.path, track.motion[piece], track.u(piece, w))
-
-
-def driven_feeds(tip: Floats, time: Floats) -> Floats:
-    """Feed (n,) mm/min at which tips (n, 3) were driven at times (n,) s: what a chip is thick by, whatever was programmed."""
-    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(tip, axis=0), axis=1))])
-    left, right = np.maximum(np.arange(len(time)) - 1, 0), np.minimum(np.arange(len(time)) + 1, len(time) - 1)
-    return np.asarray(
-        np.maximum(60.0 * (way[right] - way[left]) / np.maximum(time[right] - time[left], 1e-9), LEAST_FEED)
-    )
 
 
 def driven_directions(tip: Floats, time: Floats) -> tuple[Floats, Floats]:
