@@ -594,4 +594,10 @@ RULES: dict[str, Rule] = {
         "differ by more than they may; the outputs stand, and are not to be used.",
         "cut the program into parts of less than 1 MB, which are solved point by point, and report the case",
     ),
+    "CC608": Rule(
+        "no program for a next experiment",
+        "A program is proposed where causes are left to separate, the runs had programs, and the machine reaches the experiment "
+        "from above within the travel of its actuators.",
+        "next_experiment of the result says what would help, if anything",
+    ),
 }

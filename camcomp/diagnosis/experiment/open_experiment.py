@@ -76,7 +76,16 @@ def open_run(spec: RunSpec, job: Job, twin: Twin, notes: list[str]) -> Run:
         notes.append(f"{log}: line numbers are {abs(run.lag)} rows {'late' if run.lag > 0 else 'early'}")
     thin = int(np.ceil(len(measured.time) / MOST_ROWS))
     return Run(
-        spec.name, run.run_path, measured, spec.clamping, spec.clock, thin, by=run.by, unsure=run.unsure, turn=run.turn
+        spec.name,
+        run.run_path,
+        measured,
+        spec.clamping,
+        spec.clock,
+        thin,
+        by=run.by,
+        unsure=run.unsure,
+        turn=run.turn,
+        program=path,
     )
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from camcomp.diagnosis.fit.measured import Measured, stack
-from camcomp.ground.datatypes import Bools, Floats
+from camcomp.ground.datatypes import Bools, Floats, Path
 from camcomp.model.effect import Cause, Parameter
 from camcomp.model.motion.run_path import RunPath
 from camcomp.model.motion.twin import Reading, Slopes, Solved, Twin
@@ -66,6 +66,7 @@ class Run:
     thin: int = 1
     by: str = "setpoint"  # the channel that is the motion
     unsure: Bools | None = None  # (n,) rows whose tip says nothing
+    program: Path | None = None  # what the control was given
     turn: Floats | None = None  # (n, 3, 3) program axes to along and across the path, where the tip is the motion
 
 

@@ -138,7 +138,11 @@ def feasible(problem: Problem, candidate: Candidate, job: Job) -> bool:
 
 
 def _on_bench(problem: Problem, candidate: Candidate, job: Job) -> Bench:
-    bench = Bench(problem.bench.twin, [_run(problem, candidate, job)])
+    run = _run(problem, candidate, job)
+    low, high = np.array(job.machine.limits).T
+    if (run.run_path.grid_rho < low).any() or (run.run_path.grid_rho > high).any():
+        raise ValueError("out of the travel of an actuator")
+    bench = Bench(problem.bench.twin, [run])
     if _transmission(bench) > _STRETCH * _transmission(problem.bench):
         raise ValueError("too near a singular pose for the model to be trusted")
     return bench

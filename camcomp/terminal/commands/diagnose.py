@@ -3,10 +3,11 @@
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
+from camcomp.ground.errors import CheckFailed
 from camcomp.ground.files import read_bytes, write_all
 from camcomp.ground.places import STANDARD
 from camcomp.model.config.write_back import machine_file, with_causes
@@ -52,6 +53,20 @@ def _machine_with_causes(configs: Sequence[str], result: "DiagnosisResult", targ
     return with_causes(
         texts[k], result.known, folder=str(Path(configs[k]).absolute().parent), moved_to=str(to), note=note
     )
+
+
+def _next_program(done: Any, opened: Any) -> str:
+    """Text of the proposed program. Raises CheckFailed CC608 where there is none."""
+    if done is None or opened is None:
+        raise CheckFailed("CC608", "experiments without programs get no program for the next one")
+    if done.proposal is None:
+        raise CheckFailed("CC608", "nothing is left to separate, so no next experiment is proposed")
+    from camcomp.diagnosis.next_experiment.ready_program import ready_program
+
+    text = ready_program(done.proposal.candidate, opened.runs, opened.job, opened.twin)
+    if done.proposal.candidate.cutting:
+        click.echo("warning: the proposed program cuts; look through it before it runs", err=True)
+    return text
 
 
 @click.command()
@@ -104,13 +119,16 @@ def command(
         configs = load_experiment(experiment).config
         inputs = (experiment, *configs)
         outputs[config_file] = _machine_with_causes(configs, result, config_file).encode()
-    if next_program and done is not None:
-        if done.proposal is None:
-            click.echo("nothing is left to separate: no next experiment, no program", err=True)
-        else:
-            outputs[next_program] = done.proposal.candidate.program.encode()
+    failure: CheckFailed | None = None
+    if next_program:
+        try:
+            outputs[next_program] = _next_program(done, opened).encode()
+        except CheckFailed as error:
+            failure = error
     write_all(outputs, inputs=inputs)
     sys.stdout.flush()
     from camcomp.diagnosis.report.answer import answer_lines
 
     say(*answer_lines(result), quiet=quiet)
+    if failure is not None:
+        raise failure

@@ -1,0 +1,73 @@
+"""A proposed experiment as a program that a machine can run: from above, with the spindle as in the runs, inside the travel."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from camcomp.diagnosis.fit.bench import Run
+from camcomp.diagnosis.next_experiment.candidates import Candidate
+from camcomp.gcode.interpret import read_program
+from camcomp.ground import path_geometry
+from camcomp.ground.datatypes import Path
+from camcomp.ground.errors import CheckFailed, PhysicsError
+from camcomp.model.job import Job
+from camcomp.model.motion.twin import Twin
+
+CLEAR_MM = (10.0, 5.0, 2.0)  # above all that the runs and the experiment do, where their programs went no higher
+SAMPLES = 65  # points of a motion at which it is looked whether the drives reach it
+CUTS = "(WARNING: THIS PROGRAM CUTS, as the runs with cutting did: clamp stock and check the depth)"
+
+
+def ready_program(candidate: Candidate, runs: Sequence[Run], job: Job, twin: Twin) -> str:
+    """The candidate's NC text with retraction, approach, spindle and end. Raises CheckFailed CC608 out of the travel."""
+    head, _, body = candidate.program.partition("G54\n")
+    lines = body.splitlines()
+    lines.remove("M2")
+    x, y, z = (word[1:] for word in lines.pop(0).split()[1:])  # G0 X Y Z: where it begins
+    paths = [run.program for run in runs if run.program is not None]
+    feed = next(word for line in lines for word in line.split() if word[0] == "F")
+    on, off = _spindle(paths)
+    warning = [CUTS] if candidate.cutting else []
+    for height in _heights(candidate, paths):
+        above = f"G0 Z{height:.4f}"
+        moves = [above, *on, f"G0 X{x} Y{y}", f"G1 Z{z} {feed}", *lines, above, *off, "M2"]
+        remarks, _, modes = head.rpartition("\n")
+        program = "\n".join([remarks, *warning, f"{modes}G54", *moves]) + "\n"
+        if within_travel(read_program(program.encode(), name="next experiment").path, job, twin):
+            return program
+    raise CheckFailed("CC608", f"'{candidate.action}' leads an actuator out of its travel on the way from above")
+
+
+def within_travel(path: Path, job: Job, twin: Twin) -> bool:
+    """Whether no actuator leaves its travel along the motions whose ends are known."""
+    known = np.flatnonzero(path.known & ~path.machine)
+    u = np.linspace(0.0, 1.0, SAMPLES)
+    # The start of the first known motion is where the machine happens to stand.
+    points = [path_geometry.points(path, np.full(SAMPLES, k), u) for k in known[1:]] + [path.end[known[:1]]]
+    try:
+        rho = twin.inverse(twin.to_machine(np.concatenate(points)))
+    except PhysicsError:
+        return False
+    low, high = np.array(job.machine.limits).T
+    return bool(np.isfinite(rho).all() and (rho >= low).all() and (rho <= high).all())
+
+
+def _heights(candidate: Candidate, paths: Sequence[Path]) -> list[float]:
+    """Heights of retraction to try, mm: that of the runs' own rapids, else some clearance above everything."""
+    here = read_program(candidate.program.encode(), name="candidate").path.end[:, 2].max()
+    been = [float(path.end[path.known & ~path.machine, 2].max()) for path in paths]
+    top = max([float(here), *been])
+    clear = top - float(here) >= CLEAR_MM[-1]
+    return ([top] if clear else []) + [float(here if clear else top) + each for each in CLEAR_MM]
+
+
+def _spindle(paths: Sequence[Path]) -> tuple[list[str], list[str]]:
+    """Statements that start and stop the spindle as the last run that says anything about it had it."""
+    for path in reversed(paths):
+        said = np.flatnonzero(np.isfinite(path.turn) & (path.turn != 0.0) & (path.speed > 0.0))
+        if len(said):
+            k = int(said[-1])
+            return [f"{'M3' if path.turn[k] > 0.0 else 'M4'} S{path.speed[k]:.0f}"], ["M5"]
+    return [], []

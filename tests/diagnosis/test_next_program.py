@@ -1,0 +1,106 @@
+"""Programs of proposed experiments: from above, with the spindle of the runs, to an end, inside the travel, for rs274, too."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from camcomp.diagnosis.experiment.open_experiment import open_experiment
+from camcomp.diagnosis.fit.bench import Bench
+from camcomp.diagnosis.next_experiment.candidates import candidates, site_of
+from camcomp.diagnosis.next_experiment.ready_program import CUTS, ready_program
+from camcomp.gcode.interpret import read_program
+from camcomp.ground import path_geometry
+from camcomp.ground.errors import CheckFailed
+from camcomp.ground.files import shipped
+from camcomp.terminal.commands.diagnose import _next_program
+from tests.campaign.runner import invoke
+from tests.oracles import rs274
+
+SAMPLE = shipped("samples/diagnosis/ambiguous/experiment.yaml")
+
+
+@pytest.fixture(scope="module")
+def opened():
+    return open_experiment(str(SAMPLE))
+
+
+@pytest.fixture(scope="module")
+def proposals(opened):
+    site = site_of(Bench(opened.twin, opened.runs[:2]))
+    return [(each, ready_program(each, opened.runs, opened.job, opened.twin)) for each in candidates(site)]
+
+
+def test_every_experiment_is_a_program_that_a_machine_can_run(proposals):
+    assert len(proposals) > 10
+    for candidate, text in proposals:
+        path = read_program(text.encode(), name="n.nc").path
+        core = read_program(candidate.program.encode(), name="c.nc").path
+        ends, above = path.end, core.end[:, 2].max() + 2.0
+        np.testing.assert_array_equal(path.kind[:3], [0, 0, 1])  # up, across, down
+        assert list(path.known[:2]) == [False, True]
+        assert ends[0, 2] >= above and ends[1, 2] == ends[0, 2] == ends[-1, 2]
+        np.testing.assert_array_equal(ends[1, :2], core.end[0, :2])
+        np.testing.assert_array_equal(ends[2:-1], core.end)  # it begins where the plunge ends, and is the same
+        lines = text.splitlines()
+        assert lines.index("M3 S8000") < lines.index(next(line for line in lines if line.startswith("G1")))
+        assert lines[-2:] == ["M5", "M2"]
+        assert (CUTS in lines) == candidate.cutting
+
+
+@rs274.needs_rs274
+def test_linuxcnc_reads_them(proposals):
+    for _, text in proposals:
+        seen = rs274.run(text)
+        path = read_program(text.encode(), name="n.nc").path
+        assert seen.error == ""
+        np.testing.assert_allclose(seen.motions[-1].end, path.end[-1], atol=1e-3)
+
+
+def test_heights_stay_inside_the_travel_or_an_error_says_so(opened):
+    candidate = next(iter(candidates(site_of(Bench(opened.twin, opened.runs[:2])))))
+    first = read_program(candidate.program.encode(), name="c.nc").path
+
+    around = path_geometry.points(first, np.ones(200, int), np.linspace(0.0, 1.0, 200))
+
+    def limited(above):
+        z = opened.twin.inverse(opened.twin.to_machine(around + [0.0, 0.0, above]))[:, 2].max()
+        return SimpleNamespace(machine=SimpleNamespace(limits=[(-1e3, 1e3), (-1e3, 1e3), (-1e3, z)]))
+
+    low = ready_program(candidate, opened.runs, limited(3.0), opened.twin)
+    high = ready_program(candidate, opened.runs, opened.job, opened.twin)
+    heights = [read_program(each.encode(), name="n.nc").path.end[0, 2] for each in (low, high)]
+    assert heights[0] < heights[1]
+    with pytest.raises(CheckFailed) as caught:
+        ready_program(candidate, opened.runs, limited(-1.0), opened.twin)
+    assert caught.value.rule == "CC608"
+
+
+def test_the_spindle_is_that_of_the_runs(opened):
+    candidate = next(iter(candidates(site_of(Bench(opened.twin, opened.runs[:2])))))
+
+    def with_turn(turn):
+        timeline = opened.runs[0].run_path.timeline
+        path = replace(timeline.path, turn=np.full(len(timeline.path), turn))
+        return [
+            replace(opened.runs[0], run_path=replace(opened.runs[0].run_path, timeline=replace(timeline, path=path)))
+        ]
+
+    assert "M4 S8000" in ready_program(candidate, with_turn(-1.0), opened.job, opened.twin)
+    silent = ready_program(candidate, with_turn(np.nan), opened.job, opened.twin)
+    assert "M3" not in silent and "M5" not in silent
+
+
+def test_where_there_is_no_program_an_error_says_so():
+    for done, opened in ((None, None), (SimpleNamespace(proposal=None), SimpleNamespace())):
+        with pytest.raises(CheckFailed) as caught:
+            _next_program(done, opened)
+        assert caught.value.rule == "CC608"
+
+
+def test_the_command_warns_of_a_program_that_cuts(tmp_path):
+    out = tmp_path / "next.nc"
+    code, said = invoke(["diagnose", str(SAMPLE), "--next-program", str(out)])
+    assert code == 0
+    assert ("proposed program cuts" in said) == (CUTS in out.read_text())
