@@ -81,11 +81,8 @@ def test_the_spindle_is_that_of_the_runs(opened):
     candidate = next(iter(candidates(site_of(Bench(opened.twin, opened.runs[:2])))))
 
     def with_turn(turn):
-        timeline = opened.runs[0].run_path.timeline
-        path = replace(timeline.path, turn=np.full(len(timeline.path), turn))
-        return [
-            replace(opened.runs[0], run_path=replace(opened.runs[0].run_path, timeline=replace(timeline, path=path)))
-        ]
+        path = opened.runs[0].program
+        return [replace(opened.runs[0], program=replace(path, turn=np.full(len(path), turn)))]
 
     assert "M4 S8000" in ready_program(candidate, with_turn(-1.0), opened.job, opened.twin)
     silent = ready_program(candidate, with_turn(np.nan), opened.job, opened.twin)

@@ -218,4 +218,4 @@ def test_packages_hold_words_only_and_files_are_short():
         text = path.read_text(encoding="utf-8")
         if path.name == "__init__.py" and path.parent not in (PACKAGE, PACKAGE / "plugins"):
             assert len(ast.parse(text).body) == 1, f"{path}: code in a folder's own file"
-        assert text.count("\n") <= (600 if path.name == "rules.py" else 500), path  # the catalogue is a table
+        assert text.count("\n") <= (700 if path.name == "rules.py" else 500), path  # the catalogue is a table
