@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from camcomp.diagnosis.report.run_view import Rival, RunView
+from camcomp.diagnosis.report.run_view import RivalSignals, RunView
 from camcomp.diagnosis.result.types import DiagnosisResult
 
 
@@ -80,6 +80,6 @@ def rivals():
     """Two sets that do nearly the same."""
     one = [view.before - view.after for view in views()]
     return [
-        Rival("backlash (x)", tuple(one)),
-        Rival("friction (x) and gravity", tuple(1.1 * each + 0.2 for each in one)),
+        RivalSignals("backlash (x)", tuple(one)),
+        RivalSignals("friction (x) and gravity", tuple(1.1 * each + 0.2 for each in one)),
     ]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from camcomp.diagnosis.report.page import diagnosis_html, verdict_text
-from camcomp.diagnosis.report.run_view import Rival, likeness, rms, spectrum
+from camcomp.diagnosis.report.run_view import RivalSignals, likeness, rms, spectrum
 from camcomp.report.inputs import Input
 from camcomp.terminal.cli import run
 from tests.commandline import ROOT
@@ -122,8 +122,8 @@ def test_a_spectrum_finds_the_frequency_and_amplitude():
 
 def test_likeness():
     one = np.array([[1.0, 0.0], [np.nan, 0.0]])
-    assert likeness(Rival("a", (one,)), Rival("b", (-3 * one,))) == pytest.approx(1.0)
-    assert likeness(Rival("a", (one,)), Rival("b", (one[:, ::-1],))) == 0.0
+    assert likeness(RivalSignals("a", (one,)), RivalSignals("b", (-3 * one,))) == pytest.approx(1.0)
+    assert likeness(RivalSignals("a", (one,)), RivalSignals("b", (one[:, ::-1],))) == 0.0
     assert rms(np.array([np.nan, 3.0, -3.0])) == 3.0 and rms(np.array([np.nan])) == 0.0
 
 

@@ -80,7 +80,7 @@ class Column:
 
 
 @dataclass(frozen=True, eq=False)
-class Standing:
+class LoadedArm:
     """An arm that stands in poses with causes on it: where its platform hangs, and what the tool behind it is told."""
 
     hung: Hung
@@ -113,7 +113,7 @@ class ArmBench:
         """Names in order."""
         return tuple(a.name for a in self.robot.actuators)
 
-    def standing(self, campaign: Poses, causes: Sequence[Cause]) -> Standing:
+    def standing(self, campaign: Poses, causes: Sequence[Cause]) -> LoadedArm:
         """A campaign with causes on top of those of the config."""
         causes = [replace(cause, values=_complete(cause)) for cause in (*self.causes, *causes)]
         robot, _ = signal_path.edited(causes, self.actuators, self.robot)
@@ -122,7 +122,7 @@ class ArmBench:
         error, _ = signal_path.driven(causes, self.actuators, motion)
         load = signal_path.loaded(causes, motion, np.zeros((len(campaign.q), 3)))
         hung = hang(robot, motion.encoder + error, load.wrench if load.wrench.any() else None)
-        return Standing(hung, tuple(causes), load, motion)
+        return LoadedArm(hung, tuple(causes), load, motion)
 
     def tips(self, k: int, causes: Sequence[Cause], at: Registration) -> Floats:
         """Tips (n, 3) of campaign k in the machine frame, without its nuisances."""

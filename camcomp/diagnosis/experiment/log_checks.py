@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from camcomp.diagnosis.fit.measured import Measured
-from camcomp.ground.datatypes import Bools, Floats
+from camcomp.ground.datatypes import Floats
 from camcomp.ground.errors import ConfigError, Location
 
 FAR_MM = 5.0  # no machine of the kind is wrong by so much; a log of another program or unit is
@@ -67,15 +67,6 @@ def check_forces(name: str, run: str, measured: Measured, force: Floats) -> None
                 raise ConfigError(
                     "CC407", f"run '{run}': the {what} look as if logged in {unit}", at=Location(name, 1, 1)
                 )
-
-
-def check_program(name: str, run: str, measured: Measured, rows: Bools) -> None:
-    """Raise CC406 when most rows carry source lines that the program does not cut."""
-    known = np.isfinite(measured.line)
-    if known.any() and np.mean(rows[known]) < 0.5:
-        lines = sorted({int(each) for each in measured.line[known & ~rows]})[:5]
-        message = f"run '{run}': most rows are on lines that the program does not move on, e.g. {lines}"
-        raise ConfigError("CC406", message, at=Location(name, 1, 1))
 
 
 def check_followed(name: str, run: str, distance: Floats, agreement: float) -> None:

@@ -21,7 +21,7 @@ _COMMON = 0.5  # of the shorter part's span, from which on two clocks are one
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class SampledTable:
     """Columns of a log that were sampled together: time (n,) s ascending or None, values (n,) by name."""
 
     file: str
@@ -46,7 +46,7 @@ class Joined:
     notes: tuple[str, ...]
 
 
-def join(parts: Sequence[Part], by: str | None) -> Joined:
+def join(parts: Sequence[SampledTable], by: str | None) -> Joined:
     """Parts on common rows; by: "time", "rows" or None for what fits. Raises ConfigError CC453 where nothing does."""
     if len(parts) == 1:
         return Joined(parts[0].time, dict(parts[0].values), 0, np.arange(parts[0].rows), ())
@@ -61,7 +61,7 @@ def join(parts: Sequence[Part], by: str | None) -> Joined:
     return _on_time(parts)
 
 
-def _on_time(parts: Sequence[Part]) -> Joined:
+def _on_time(parts: Sequence[SampledTable]) -> Joined:
     times = [part.time for part in parts if part.time is not None]
     if len(times) < len(parts):
         _refuse(parts, "the parts have neither times nor equally many rows")
@@ -117,9 +117,9 @@ def _between(time: Floats, values: Floats, wanted: Floats, held: bool) -> Floats
     return np.where(wide, np.nan, out)
 
 
-def _files(parts: Sequence[Part]) -> str:
+def _files(parts: Sequence[SampledTable]) -> str:
     return ", ".join(dict.fromkeys(part.file for part in parts))
 
 
-def _refuse(parts: Sequence[Part], message: str) -> None:
+def _refuse(parts: Sequence[SampledTable], message: str) -> None:
     raise ConfigError("CC453", f"{message}: {_files(parts)}", at=Location(parts[-1].file, 1, 1))

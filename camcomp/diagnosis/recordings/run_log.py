@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from camcomp.diagnosis.recordings.joining import Joined, Part, join
+from camcomp.diagnosis.recordings.joining import Joined, SampledTable, join
 from camcomp.diagnosis.recordings.naming import Pick, Picked, check_enough, leftovers, pick_columns, usual_names
 from camcomp.diagnosis.recordings.sampled import SampledColumns
 from camcomp.diagnosis.recordings.units import seconds
@@ -81,7 +81,7 @@ def csv_of(columns: Mapping[str, Floats]) -> bytes:
 
 def _parts(
     sampled: Sequence[SampledColumns], picked: Picked, columns: LogColumns, notes: list[str]
-) -> tuple[list[Part], list[int], list[Ints]]:
+) -> tuple[list[SampledTable], list[int], list[Ints]]:
     """What of each is wanted: parts, which of `sampled` each is, and which of its rows are kept."""
     several = len({each.part for each in picked.columns.values()}) > 1
     parts, numbers, order = [], [], []
@@ -102,7 +102,9 @@ def _parts(
         if several and time is not None:
             rows = rows[np.argsort(time[rows], kind="stable")]
         kept = {log: each[rows] for log, each in values.items()}
-        parts.append(Part(source.file, None if time is None else time[rows], kept, bool(_places(kept, columns))))
+        parts.append(
+            SampledTable(source.file, None if time is None else time[rows], kept, bool(_places(kept, columns)))
+        )
         numbers.append(k)
         order.append(rows)
     return parts, numbers, order

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from camcomp.diagnosis.report.answer import cause_name
-from camcomp.diagnosis.report.run_view import Rival, RunView, likeness, rms, spectrum
+from camcomp.diagnosis.report.run_view import RivalSignals, RunView, likeness, rms, spectrum
 from camcomp.diagnosis.result.types import FoundCause, UnseenShrinkage, Where
 from camcomp.report.plot import INK, SCALE, STYLES, Figure, Json, axis, brief, level, line, numbers, thin
 
@@ -182,7 +182,7 @@ def figure_causes(causes: Sequence[FoundCause]) -> Figure:
     )  # fmt: skip
 
 
-def figure_rivals(rivals: Sequence[Rival], views: Sequence[RunView]) -> Figure | None:
+def figure_rivals(rivals: Sequence[RivalSignals], views: Sequence[RunView]) -> Figure | None:
     """What sets of causes that cannot be told apart do to the run in which they do most."""
     if len(rivals) < 2 or not views:
         return None

@@ -14,7 +14,7 @@ from camcomp.diagnosis.report.figures import (
     figure_shares,
     figure_spectrum,
 )
-from camcomp.diagnosis.report.run_view import Rival, RunView, rms
+from camcomp.diagnosis.report.run_view import RivalSignals, RunView, rms
 from camcomp.diagnosis.result.types import DiagnosisResult, NextExperiment, UnseenShrinkage, Where
 from camcomp.report.inputs import Input, inputs_section
 from camcomp.report.page import Page, Section, Table, render
@@ -37,7 +37,7 @@ def diagnosis_html(
     machine: str,
     inputs: Sequence[Input] = (),
     notes: Sequence[str] = (),
-    rivals: Sequence[Rival] = (),
+    rivals: Sequence[RivalSignals] = (),
 ) -> bytes:
     """One HTML file. result: of any kind of study; views: runs to draw, those held out of the fit first.
 
@@ -114,7 +114,7 @@ def _causes(result: DiagnosisResult) -> Section:
     )
 
 
-def _apart(result: DiagnosisResult, rivals: Sequence[Rival], views: Sequence[RunView]) -> Section:
+def _apart(result: DiagnosisResult, rivals: Sequence[RivalSignals], views: Sequence[RunView]) -> Section:
     items = [together([cause_name(each) for each in one]) for one in result.alternatives]
     figure = figure_rivals(rivals, views)
     return Section("apart", "What cannot be told apart, and why", [ALIKE_TEXT], [figure] if figure else [], items=items)

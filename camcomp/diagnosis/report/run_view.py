@@ -39,7 +39,7 @@ class RunView:
 
 
 @dataclass(frozen=True, eq=False)
-class Rival:
+class RivalSignals:
     """A set of causes that the data cannot tell from the first one: its name, and what it does to each run (n, c) um."""
 
     name: str
@@ -52,7 +52,7 @@ def rms(size: Floats) -> float:
     return float(np.sqrt(np.mean(known**2))) if len(known) else 0.0
 
 
-def likeness(one: Rival, other: Rival) -> float:
+def likeness(one: RivalSignals, other: RivalSignals) -> float:
     """How much two sets of causes do the same: 1 alike up to a factor, 0 nothing in common."""
     a = np.concatenate([each.ravel() for each in one.signals])
     b = np.concatenate([each.ravel() for each in other.signals])

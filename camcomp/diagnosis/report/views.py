@@ -13,7 +13,7 @@ from camcomp.diagnosis.fit.measured import channel_names
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.report.answer import cause_name
 from camcomp.diagnosis.report.page import diagnosis_html
-from camcomp.diagnosis.report.run_view import Rival, RunView
+from camcomp.diagnosis.report.run_view import RivalSignals, RunView
 from camcomp.diagnosis.result.types import DiagnosisResult, NamedCause
 from camcomp.diagnosis.statistics.cause_sets import Fitted
 from camcomp.ground.datatypes import Floats
@@ -38,7 +38,7 @@ def report_of(path: str, result: DiagnosisResult, done: Diagnosis | None, opened
             inputs.append(Input(f"program of {run.name}", run.program, read_bytes(run.program)))
         inputs.append(Input(f"log of {run.name}", run.log, read_bytes(run.log)))
     views: list[RunView] = []
-    rivals: list[Rival] = []
+    rivals: list[RivalSignals] = []
     if done is not None and opened is not None:
         views = views_of(done, opened.twin, opened.runs, experiment.holdout)
         rivals = rivals_of(done)
@@ -71,7 +71,7 @@ def views_of(done: Diagnosis, twin: Twin, runs: Sequence[Run], holdout: Sequence
     return out
 
 
-def rivals_of(done: Diagnosis) -> list[Rival]:
+def rivals_of(done: Diagnosis) -> list[RivalSignals]:
     """Sets of causes that the data cannot tell apart, the best one first; none when there is only one."""
     found, problem = done.search, done.problem
     if done.result.verdict != "ambiguous":
@@ -85,7 +85,7 @@ def rivals_of(done: Diagnosis) -> list[Rival]:
             MICRO * (problem.bench.gap(k) - problem.bench.gap(k, causes))[:, part]
             for k in range(len(problem.bench.runs))
         )
-        out.append(Rival(" and ".join(names), signals))
+        out.append(RivalSignals(" and ".join(names), signals))
     return out
 
 

@@ -1,15 +1,13 @@
 """What is left when the best causes are in: is it more than noise, and what does it depend on?
 
 A score test on the generic patterns: with the causes free and every healthy tolerance allowed for, the patterns'
-amplitudes are estimated and their joint size compared with chance. Source: Rao's score test; the threshold on the
-share of the gap keeps the imperfection of a rightly named cause from passing for another one.
+amplitudes are estimated and their joint size compared with what chance makes of it. Source: Rao's score test.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
 
 from camcomp.diagnosis.statistics.evidence import Prior
 from camcomp.ground.datatypes import Floats, Ints
@@ -19,13 +17,11 @@ _TOLD = 0.01  # share of its information that a direction keeps beside the other
 
 @dataclass(frozen=True, eq=False)
 class ResidualTest:
-    """What the patterns of one kind of channel carry. log10_chance: log10 of the chance that noise looks like this;
-    rms: size in units of the kind's noise, rows: how many the kind has; labels: covariates with the share of it that each
-    carries alone, largest first.
+    """What the patterns of one kind of channel carry. rms: size beyond chance in units of the kind's noise, rows: how many
+    the kind has; labels: covariates with the share of it that each carries alone, largest first.
     """
 
     kind: str
-    log10_chance: float
     rms: float
     rows: int
     labels: tuple[tuple[str, float], ...]
@@ -106,7 +102,6 @@ def score_test(left: Projected, rows: Mapping[str, int]) -> dict[str, ResidualTe
         dof, total = max(int(keep.sum()), 1), float(z @ z)
         out[kind] = ResidualTest(
             kind,
-            float(chi2.logsf(total, dof) / np.log(10.0)),
             float(np.sqrt(max(total - dof, 0.0) / rows[kind])),
             rows[kind],
             _shares(P, h, [left.labels[i] for i in mine]),

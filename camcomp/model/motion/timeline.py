@@ -3,10 +3,9 @@
 Motions are those of a Path; rapids take no time here, because logs leave them out.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import RAPID, Floats, Ints, Path
@@ -70,68 +69,3 @@ def schedule(path: Path, acceleration: float) -> Timeline:
     duration = trapezoid_duration(length[index], feed, acceleration)
     start = np.concatenate([[0.0], np.cumsum(duration)[:-1]]) if len(index) else np.zeros(0)
     return Timeline(path, index, start, duration, length[index], feed, acceleration)
-
-
-@dataclass(frozen=True, eq=False)
-class Fit:
-    """A timeline brought into line with a log: whether it was as expected, and how far its starts were off."""
-
-    timeline: Timeline
-    as_expected: bool
-    off_s: float
-    rows: NDArray[np.bool_]  # (n,) rows whose line belongs to the program
-
-
-def fit_to_log(timeline: Timeline, time: Floats, line: Floats, slack_s: float = 0.002) -> Fit:
-    """Moves motion starts so that every row lies in a motion of its source line; (n,) time s, (n,) line, NaN = unknown.
-
-    Kept as it is when no row contradicts it by more than `slack_s`. Otherwise motions start between the last row of
-    the line before and the first row of their own; runs of motions on one line share its time by their own lengths.
-    """
-    own = timeline.path.line[timeline.index]
-    known = np.isfinite(line)
-    inside = known & np.isin(np.where(known, line, -1), own)
-    if not inside.any():
-        return Fit(timeline, True, 0.0, inside | ~known)
-    k, _ = timeline.locate(time)
-    # A row at the seam may carry either line.
-    early, late = timeline.locate(time - slack_s)[0], timeline.locate(time + slack_s)[0]
-    agree = (own[k] == line) | (own[early] == line) | (own[late] == line)
-    if (agree | ~inside).all():
-        return Fit(timeline, True, 0.0, inside | ~known)
-    starts, ends = _bounds(own, time[inside], line[inside].astype(int), timeline)
-    off = float(np.max(np.abs(starts - timeline.start)))
-    moved = replace(timeline, start=starts, duration=np.maximum(ends - starts, 1e-9))
-    return Fit(moved, False, off, inside | ~known)
-
-
-def _bounds(own: Ints, time: Floats, line: Ints, timeline: Timeline) -> tuple[Floats, Floats]:
-    """Start and end (k,) of every motion from the rows' lines, matched in order."""
-    change = np.flatnonzero(np.diff(line)) + 1
-    first, last = np.concatenate([[0], change]), np.concatenate([change - 1, [len(line) - 1]])
-    block_edges = np.flatnonzero(np.diff(own)) + 1
-    a, b = np.concatenate([[0], block_edges]), np.concatenate([block_edges, [len(own)]])
-    start, end = timeline.start.copy(), timeline.start + timeline.duration
-    step = float(np.median(np.diff(time))) if len(time) > 1 else 0.02
-    seen = 0
-    shift = 0.0
-    for i, j in zip(a, b, strict=True):
-        match = next((r for r in range(seen, len(first)) if line[first[r]] == own[i]), None)
-        natural = timeline.duration[i:j]
-        if match is None:  # no row of this line: keep its own duration behind the one before
-            begin = timeline.start[i] + shift
-            finish = begin + natural.sum()
-        else:
-            t0, t1 = time[first[match]], time[last[match]]
-            before = time[last[match - 1]] if match > 0 else t0 - step
-            after = time[first[match + 1]] if match + 1 < len(first) else t1 + step
-            begin, finish = max(0.5 * (before + t0), t0 - step), min(0.5 * (t1 + after), t1 + step)
-            natural_end = begin + natural.sum()
-            # A stretch that the rows do not ask for is none.
-            if t1 <= natural_end <= after:
-                finish = natural_end
-            seen = match + 1
-            shift = finish - (timeline.start[j - 1] + timeline.duration[j - 1])
-        edges = begin + (finish - begin) * np.concatenate([[0.0], np.cumsum(natural) / natural.sum()])
-        start[i:j], end[i:j] = edges[:-1], edges[1:]
-    return np.maximum.accumulate(start), end

@@ -278,6 +278,20 @@ def test_what_is_not_there_is_not_found():
     assert still.causes == ()
 
 
+def test_friction_that_one_run_of_four_lacks_is_not_named():
+    """It lowers the mean rms of runs that were not fitted, and one of them speaks against it."""
+
+    def runs(coulomb):
+        logs = [axis_log(lag=0.0, coulomb=c, viscous=0.0, seed=k) for k, c in enumerate(coulomb)]
+        return [
+            AxisRun(f"r{k}", *(getattr(log, f)[::20] for f in ("time", "setpoint", "encoder", "force")))
+            for k, log in enumerate(logs)
+        ]
+
+    assert [c.effect for c in axis_study({"x": runs((30.0, 30.0, 30.0, 30.0))}).causes] == ["friction"]
+    assert axis_study({"x": runs((30.0, 30.0, 30.0, 3.0))}).known == ()
+
+
 def test_rows_of_an_axis_tell_its_floor_and_an_experiment_may_state_it():
     result = axis_study({"x": [axis_log()]})
     assert (result.verdict, result.floor.source) == ("identified", "rows")

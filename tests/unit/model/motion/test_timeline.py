@@ -1,10 +1,10 @@
-"""When a program is where: trapezoids by hand, and what a log may say against them."""
+"""When a program is where: trapezoids by hand."""
 
 import numpy as np
 import pytest
 
 from camcomp.ground.datatypes import LINE, RAPID, Path
-from camcomp.model.motion.timeline import fit_to_log, schedule
+from camcomp.model.motion.timeline import schedule
 
 
 def lines(points, feed, kinds=None):
@@ -38,34 +38,3 @@ def test_half_way_through_a_ramp_a_quarter_of_it_is_done():
 def test_rapids_take_no_time_and_the_first_feed_move_starts_at_zero():
     path = lines([[0, 0, 9], [0, 0, 0], [60, 0, 0]], 600.0, [RAPID, LINE])
     assert schedule(path, 1500.0).start.tolist() == [0.0]
-
-
-def test_a_log_that_agrees_leaves_the_timeline_alone():
-    path = lines([[0, 0, 0], [20, 0, 0], [20, 20, 0]], 600.0)
-    timeline = schedule(path, 1500.0)
-    t = np.arange(0.0, timeline.end, 0.02)
-    line = np.where(t < timeline.start[1], 10.0, 11.0)
-    assert fit_to_log(timeline, t, line).timeline is timeline
-
-
-def test_a_pause_between_lines_moves_the_second_one():
-    path = lines([[0, 0, 0], [20, 0, 0], [20, 20, 0]], 600.0)
-    timeline = schedule(path, 1500.0)
-    t = np.arange(0.0, timeline.end + 1.0, 0.02)
-    line = np.where(t < timeline.start[1] + 1.0, 10.0, 11.0)
-    fit = fit_to_log(timeline, t, line)
-    assert not fit.as_expected and fit.timeline.start[1] == pytest.approx(timeline.start[1] + 1.0, abs=0.02)
-
-
-def test_rows_of_foreign_lines_are_told():
-    timeline = schedule(lines([[0, 0, 0], [20, 0, 0]], 600.0), 1500.0)
-    t = np.linspace(0, 1, 10)
-    assert not fit_to_log(timeline, t, np.full(10, 99.0)).rows.any()
-
-
-def test_a_tenth_of_a_second_late_is_not_as_expected():
-    path = lines([[0, 0, 0], [20, 0, 0], [20, 20, 0]], 600.0)
-    timeline = schedule(path, 1500.0)
-    t = np.arange(0.0, timeline.end + 0.1, 0.01)
-    fit = fit_to_log(timeline, t, np.where(t < timeline.start[1] + 0.1, 10.0, 11.0))
-    assert not fit.as_expected and fit.off_s == pytest.approx(0.1, abs=0.011)

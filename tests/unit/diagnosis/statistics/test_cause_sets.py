@@ -1,0 +1,50 @@
+"""From sets of causes and their evidence to one answer: priors of sets, tolerances, rivals."""
+
+from math import comb
+
+import numpy as np
+import pytest
+
+from camcomp.diagnosis.statistics.cause_sets import SIZES, CausePrior, Fitted, Scale
+from camcomp.diagnosis.statistics.evidence import Prior, gram
+from camcomp.diagnosis.statistics.verdict import judge
+
+
+def candidates(n):
+    return CausePrior(tuple((i,) for i in range(n)), np.log(np.full(n, 1.0 / n)), lambda i, j: False)
+
+
+def fitted(*members):
+    return Fitted(members, np.zeros(len(members)), np.eye(len(members)), 0.0, ())
+
+
+@pytest.mark.parametrize("size", [0, 1, 2, 3])
+def test_sets_of_one_size_share_the_prior_of_that_size(size):
+    """Of n alike candidates, d drawn one after the other: every set comes in d! orders."""
+    one = np.exp(candidates(400).prior(tuple(range(size))))
+    assert comb(400, size) * one == pytest.approx(SIZES[size], rel=0.01)
+
+
+def test_tolerances_are_not_doubled_to_hide_a_cause():
+    """Amplitudes of two and a half tolerances: tolerances twice as wide would fit it best, and are not believed."""
+    rng = np.random.default_rng(3)
+    D = rng.standard_normal((400, 4))
+    prior = Prior(np.full(4, 0.2), np.ones(4), np.zeros(4), np.ones(4))
+    data = gram(D, D @ np.array([0.5, -0.5, 0.5, -0.5]) + 0.1 * rng.standard_normal(400))
+    assert Scale(data, prior, candidates(4)).factor(()) < 2.0
+
+
+def test_a_rival_is_another_set_that_is_neither_larger_nor_the_same_with_one_more_or_less():
+    fits = [fitted(0), fitted(1), fitted(0, 1), fitted(1, 2), fitted()]
+    verdict = judge(fits, np.full(5, 0.2) + [0.01, 0.0, 0.0, 0.0, 0.0], [])
+    assert (verdict.word, verdict.rivals) == ("ambiguous", (1,))
+    without = [each for each in fits if each.members != (1,)]
+    assert judge(without, np.array([0.28, 0.24, 0.24, 0.24]), []).word == "identified"
+    pair = judge([fitted(0, 1), fitted(1), fitted(2)], np.array([0.4, 0.3, 0.3]), [])
+    assert pair.rivals == (2,)
+
+
+def test_a_set_far_less_probable_is_a_rival_only_where_nothing_tells_it_apart():
+    fits = [fitted(0), fitted(1)]
+    assert judge(fits, np.array([0.99, 0.01]), []).word == "identified"
+    assert judge(fits, np.array([0.99, 0.01]), [((1,), (0,))]).rivals == (1,)
