@@ -122,7 +122,7 @@ def search_causes(problem: Problem) -> CauseSearch:
     kind = unknown_kind(problem, known, beyond) or worst(beyond).kind
     if known.members != best.members:
         fits = (known, *(f for f in fits if f.members != known.members))
-        probability = np.concatenate([[1.0], np.zeros(len(fits) - 1)])
+        probability = probabilities(fits, problem.candidates, temperature)
         inclusion = {i: verdict.inclusion.get(i, 0.0) for i in known.members}
         verdict = Verdict("identified", 0, (), inclusion)
     left = residual_tests(problem, known, firm_prior(problem))
