@@ -187,7 +187,7 @@ def test_every_way_sees_the_same_force(tmp_path, monkeypatch, model, arcs):
         return
     totals = bulk.run(io.BytesIO(truth.text.encode()), len)
     assert totals.joins == rows.joining.sum()
-    assert totals.interpolated["tiles"] > 0
+    assert totals.interpolated.tiles > 0
     every = [np.concatenate([getattr(b, name) for b in batches]) for name in ("line", "target", "written", "force")]
     truth.check(*every)
 

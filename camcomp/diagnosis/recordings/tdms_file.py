@@ -52,6 +52,8 @@ def _remarks_of(nptdms: Any) -> Iterator[list[str]]:
     handler.emit = lambda record: remarks.append(record.getMessage()[:120])  # type: ignore[method-assign]
     logger, manager = logging.getLogger("nptdms"), nptdms.log.log_manager
     manager.console_handler.setLevel(logging.CRITICAL)
+    for name in [each for each in logging.root.manager.loggerDict if each.split(".")[0] == "nptdms"]:
+        logging.getLogger(name).disabled = False  # other libraries silence all that were there before them
     logger.addHandler(handler)
     try:
         yield remarks
