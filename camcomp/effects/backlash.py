@@ -8,6 +8,11 @@ from camcomp.model.hysteresis import play
 
 STAGE = "drive"
 TARGET = "actuator"
+PLAIN = "play in the drive"
+REMEDY = (
+    "adjust the preload of nut and thrust bearing, or replace what is worn; until then compensate takes the play "
+    "up at every reversal"
+)
 SOURCE = "play operator (Krasnoselskii, Pokrovskii: Systems with hysteresis, 1989); reversal value B of ISO 230-2"
 PARAMETERS = (
     Parameter(

@@ -11,6 +11,8 @@ from camcomp.model.statics.rotation import exp_rotation
 
 STAGE = "structure"
 TARGET = "actuator"
+PLAIN = "a leg mounted at an angle"
+REMEDY = "measure how the base of this leg sits and turn it back, or keep the angle in the machine file"
 SOURCE = "assembly error of Klimchik et al. (ARK 2012): about 1 degree around the actuated axis"
 PARAMETERS = (
     Parameter("roll_deg", "deg", 0.0, -20.0, 20.0, 0.4, 0.0006, "assembly without fixtures: 0.1 to 1 degree"),

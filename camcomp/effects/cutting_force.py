@@ -6,6 +6,11 @@ from camcomp.model.effect import Load, Motion, Parameter
 
 STAGE = "process"
 TARGET = "machine"
+PLAIN = "a cutting force other than modelled"
+REMEDY = (
+    "cut two slots of different depth and let diagnose fit the force, and check material, tool and engagement "
+    "under process"
+)
 SOURCE = "definition; scatter of specific cutting forces between batches (Altintas: Manufacturing automation)"
 PARAMETERS = (
     Parameter("factor", "1", 1.0, 0.02, 20.0, 0.3, 0.002, "specific cutting forces are known to 10 to 50 %", log=True),

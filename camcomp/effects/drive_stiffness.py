@@ -8,6 +8,8 @@ from camcomp.model.statics.description import Actuator, Robot
 
 STAGE = "structure"
 TARGET = "actuator"
+PLAIN = "a drive softer or stiffer than stated"
+REMEDY = "push the carriage with a known force against a dial gauge; look at coupling, thrust bearing and nut"
 SOURCE = "definition: factor on the spring of the actuator"
 PARAMETERS = (
     Parameter(

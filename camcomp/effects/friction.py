@@ -10,6 +10,8 @@ from camcomp.model.hysteresis import PRESLIDING_MM, held_back
 
 STAGE = "drive"
 TARGET = "actuator"
+PLAIN = "friction in the guide"
+REMEDY = "clean and lubricate the guide, check covers and preload; run the machine warm before it is measured"
 SOURCE = "force balance of the carriage; turn-round of the force after Dahl 1968, on the carriage's way; viscous by the speed of the encoder"
 _LENGTH = (1e-4, 1.0, 0.005, 0.0005, "rolling guides: 1 to 100 um")
 FITTED = (

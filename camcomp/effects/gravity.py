@@ -8,6 +8,8 @@ from camcomp.model.effect import Load, Motion, Parameter
 
 STAGE = "structure"
 TARGET = "machine"
+PLAIN = "weight that the model leaves out"
+REMEDY = "weigh what hangs at the platform (spindle, hoses, gripper) and state it in the machine file"
 SOURCE = "definition"
 PARAMETERS = (
     Parameter("weight_N", "N", 0.0, 0.0, 5000.0, 30.0, 0.1, "spindles and platforms of 0.5 to 10 kg", sign=1),

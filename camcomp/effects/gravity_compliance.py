@@ -8,6 +8,8 @@ from camcomp.model.statics.description import Actuator, Robot
 
 STAGE = "structure"
 TARGET = "actuator"
+PLAIN = "a joint that gives way under the arm's weight"
+REMEDY = "keep the compliance in the machine file; a joint far softer than its like wants its gear looked at"
 ARM_ONLY = True
 SOURCE = "definition: compliance in series with the spring of the joint; the load is the weight of the links behind it"
 PARAMETERS = (

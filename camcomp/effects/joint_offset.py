@@ -7,6 +7,8 @@ from camcomp.model.effect import Motion, Parameter
 
 STAGE = "drive"
 TARGET = "actuator"
+PLAIN = "a wrong zero of the axis"
+REMEDY = "run the reference again and correct the home offset in the control"
 SOURCE = "definition: carriage minus encoder; offset_mm for slides, offset_rad for hinges"
 FITTED = (Parameter("offset_mm", "mm", 0.0, -5.0, 5.0, 0.1, 0.0003, "reference runs repeat within 0.02 to 0.5 mm"),)
 ROTARY = (Parameter("offset_rad", "rad", 0.0, -0.1, 0.1, 1e-3, 1e-5, "joints of arms are mastered to 0.1 to 2 mrad"),)

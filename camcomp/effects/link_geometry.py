@@ -14,6 +14,8 @@ from camcomp.model.statics.rotation import exp_rotation
 
 STAGE = "structure"
 TARGET = "actuator"
+PLAIN = "a link other than its table says"
+REMEDY = "keep the found geometry in the machine file, or in the robot's own calibration"
 ARM_ONLY = True
 SOURCE = (
     "link errors of robot calibration in the frame of the next joint: Hayati, Mirmirani, J. Robotic Systems 2 (1985) 397; "

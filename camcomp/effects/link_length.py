@@ -11,6 +11,8 @@ from camcomp.model.statics.description import Actuator, Element, Parallelogram, 
 
 STAGE = "structure"
 TARGET = "actuator"
+PLAIN = "a link longer than stated"
+REMEDY = "measure the link and state its length in the machine file"
 SOURCE = "definition: the link that the actuator drives, lengthened along itself"
 PARAMETERS = (Parameter("length_mm", "mm", 0.0, -10.0, 10.0, 0.1, 0.0003, "links made to 0.02 to 0.3 mm"),)
 

@@ -8,6 +8,8 @@ from camcomp.model.statics.description import Link, Parallelogram, Robot
 
 STAGE = "structure"
 TARGET = "machine"
+PLAIN = "links softer or stiffer than stated"
+REMEDY = "check the joints of the legs for play and screws for torque, then keep the factor in the machine file"
 SOURCE = "definition: one factor on every six-dof link spring"
 PARAMETERS = (
     Parameter("factor", "1", 1.0, 0.02, 20.0, 0.4, 0.003, "beam theory leaves out joints: -50 .. +50 %", log=True),

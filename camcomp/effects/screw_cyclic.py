@@ -9,6 +9,12 @@ from camcomp.model.effect import Motion, Parameter
 
 STAGE = "drive"
 TARGET = "actuator"
+SLIDES_ONLY = True
+PLAIN = "a screw that runs out"
+REMEDY = (
+    "check the alignment of the screw and its coupling; a compensation table of the control or camcomp removes "
+    "what stays"
+)
 SOURCE = "carriage minus encoder = amplitude sin(2 pi encoder / pitch + phase); v2pi of ISO 3408-3"
 # even in frequency: neighbours differ by a quarter turn over 100 mm
 _PITCHES = tuple(float(1.0 / f) for f in np.linspace(1.0, 1.0 / 40.0, 130))

@@ -9,6 +9,8 @@ from camcomp.model.effect import Motion, Parameter
 
 STAGE = "drive"
 TARGET = "either"
+PLAIN = "growth with temperature"
+REMEDY = "warm the machine up before it works, log its temperature, and keep the coefficient in the machine file"
 SOURCE = "linear expansion; first-order warm-up where no temperature is logged"
 WARMS = True  # compensate asks for the machine's temperature
 REFERENCE_C = 20.0

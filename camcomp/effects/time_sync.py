@@ -7,6 +7,8 @@ from camcomp.model.effect import Parameter
 
 STAGE = "sensor"
 TARGET = "machine"
+PLAIN = "clocks of logger and control apart"
+REMEDY = "trigger both from one signal; the machine itself needs no repair"
 SOURCE = "definition: a row's tip is the one that the machine had offset_s earlier"
 PARAMETERS = (Parameter("offset_s", "s", 0.0, -1.0, 1.0, 0.006, 0.000005, "unsynchronised loggers: 0.5 to 20 ms"),)
 

@@ -9,6 +9,8 @@ from camcomp.model.effect import Load, Motion, Parameter
 
 STAGE = "tool"
 TARGET = "machine"
+PLAIN = "a tool that bends"
+REMEDY = "take a shorter or thicker tool, or less depth; compensate removes what stays"
 SOURCE = "cantilever, deflection = force L^3 / (3 E I), across the tool axis (machine z)"
 PARAMETERS = (
     Parameter(

@@ -10,6 +10,8 @@ from camcomp.model.statics.description import Robot
 
 STAGE = "tool"
 TARGET = "machine"
+PLAIN = "a tool length other than stated"
+REMEDY = "measure the tool on a presetter and correct the tool table"
 SOURCE = "definition"
 PARAMETERS = (Parameter("length_mm", "mm", 0.0, -20.0, 20.0, 0.1, 0.0003, "tool setting: 0.02 to 0.5 mm"),)
 

@@ -6,6 +6,8 @@ from camcomp.model.effect import Load, Motion, Parameter
 
 STAGE = "process"
 TARGET = "machine"
+PLAIN = "a tool that wears"
+REMEDY = "change the tool earlier, or halve its time in the cut; the force grows while it cuts"
 SOURCE = "linear middle part of the wear curve (ISO 8688-2)"
 PARAMETERS = (
     Parameter("growth_per_min", "1/min", 0.0, 0.0, 20.0, 0.2, 0.0005, "tool lives of 5 to 60 minutes", sign=1),

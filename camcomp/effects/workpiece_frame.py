@@ -9,6 +9,8 @@ from camcomp.model.effect import Parameter
 
 STAGE = "workpiece"
 TARGET = "machine"
+PLAIN = "a workpiece clamped off its place"
+REMEDY = "probe the workpiece again and correct the work offset (G54)"
 SOURCE = "rigid displacement of the workpiece, in the axes of its stated frame"
 _SHIFT = "probing and clamping: 0.05 to 0.5 mm"
 PARAMETERS = (

@@ -1,0 +1,51 @@
+"""Something shifts or pushes a carriage for a while: a cover that jams, a hose that pulls, a drive that trips and recovers."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from camcomp.ground.datatypes import Floats
+from camcomp.model.effect import Motion, Parameter
+
+STAGE = "drive"
+TARGET = "actuator"
+PLAIN = "disturbance of a drive for a while"
+REMEDY = "look at what touched the axis at that time: covers, chips, hoses, the drive's own log"
+SOURCE = (
+    "definition: shift, and force over the spring of the drive, between two instants of the clock common to all runs"
+)
+RISE_S = 0.005  # no drive jumps
+_CLOCK = (-1e9, 1e9, 1.0, 0.0)
+_WHEN = "any time on the common clock"
+FITTED = (
+    Parameter("shift_mm", "mm", 0.0, -5.0, 5.0, 0.03, 0.0003, "disturbances that are noticed afterwards: 5 to 200 um"),
+    Parameter("from_s", "s", 0.0, *_CLOCK, _WHEN, scan=(0.0,), placed=True),
+    Parameter("to_s", "s", 0.0, *_CLOCK, _WHEN, scan=(0.0,), placed=True),
+)
+PARAMETERS = (
+    FITTED[0],
+    Parameter("force_N", "N", 0.0, -5000.0, 5000.0, 100.0, 0.5, "hoses and covers: 10 to 500 N"),
+    *FITTED[1:],
+)
+
+
+def _share(motion: Motion, p: Mapping[str, float]) -> Floats:
+    """How much of the disturbance is there (n,), 0 to 1: straight up from its begin, and down to its end."""
+    since, left = motion.common - p["from_s"], p["to_s"] - motion.common
+    return np.clip(np.minimum(since, left) / RISE_S, 0.0, 1.0)
+
+
+def on_drive(error: Floats, motion: Motion, which: Floats, p: Mapping[str, float]) -> Floats:
+    """Carriage minus encoder (n, m), mm: the shift, and the way that the force winds up the drive."""
+    force = p.get("force_N", 0.0)
+    if (p["shift_mm"] == 0.0 and force == 0.0) or p["to_s"] <= p["from_s"]:
+        return error
+    return error + _share(motion, p)[:, None] * which * (p["shift_mm"] + force / motion.stiffness)
+
+
+def on_drive_force(effort: Floats, motion: Motion, which: Floats, p: Mapping[str, float]) -> Floats:
+    """Force of the drive on its carriage (n, m), N: it holds against what pushes."""
+    force = p.get("force_N", 0.0)
+    if force == 0.0 or p["to_s"] <= p["from_s"]:
+        return effort
+    return effort - _share(motion, p)[:, None] * which * force

@@ -1,0 +1,135 @@
+"""What a law may depend on, row by row: names with units, and their values from the motion, the load and the tip."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from camcomp.ground.datatypes import Floats
+from camcomp.model.effect import Load, Motion
+
+_TIME = {
+    "temp_C": "temperature of the drives",
+    "t_s": "time since the run began",
+    "common_s": "time on the clock that all runs share",
+    "cut_min": "minutes that the tool has cut",
+}
+AT_TIP = {
+    **{f"{a}_mm": f"place of the tip along program {a}" for a in "xyz"},
+    **{f"v{a}_mm_per_s": f"velocity of the tip along program {a}" for a in "xyz"},
+    "feed_mm_per_s": "speed of the tip",
+    "heading_rad": "direction of travel in the program's XY plane, from X towards Y",
+    **{f"f{a}_N": f"cutting force on the tool along machine {a}" for a in "xyz"},
+    **_TIME,
+}
+AT_DRIVE = {
+    "act_mm": "position of a slide",
+    "act_mm_per_s": "its velocity",
+    "act_mm_per_s2": "its acceleration",
+    "act_rad": "position of a hinge",
+    "act_rad_per_s": "its velocity",
+    "act_rad_per_s2": "its acceleration",
+    **_TIME,
+}
+REFERENCE_C = 20.0
+
+
+@dataclass(frozen=True, eq=False)
+class TipRows(Mapping[str, Floats]):
+    """Covariates of n rows at the tip: tip (n, 3) mm in the program frame; each is worked out when it is asked for."""
+
+    tip: Floats
+    load: Load
+    motion: Motion
+    _known: dict[str, Floats] = field(default_factory=dict)
+
+    def __getitem__(self, name: str) -> Floats:
+        if name not in self._known:
+            self._known[name] = self._of(name)
+        return self._known[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(AT_TIP)
+
+    def __len__(self) -> int:
+        return len(AT_TIP)
+
+    @property
+    def rows(self) -> int:
+        """How many, n."""
+        return len(self.tip)
+
+    def _of(self, name: str) -> Floats:
+        if name in _TIME:
+            return _of_time(name, self.motion)
+        if name[1:] == "_mm":
+            return self.tip[:, "xyz".index(name[0])]
+        if name[0] == "f" and name[2:] == "_N":
+            return self.load.force[:, "xyz".index(name[1])]
+        velocity = rate(self.tip, self.motion)
+        if name[0] == "v":
+            return velocity[:, "xyz".index(name[1])]
+        if name == "feed_mm_per_s":
+            return np.asarray(np.linalg.norm(velocity, axis=1))
+        if name == "heading_rad":
+            return _kept_angle(velocity)
+        raise KeyError(name)
+
+
+@dataclass(frozen=True, eq=False)
+class DriveRows(Mapping[str, Floats]):
+    """Covariates of n rows at drive j: its set-points where the control is meant, else its encoder."""
+
+    motion: Motion
+    j: int
+
+    def __getitem__(self, name: str) -> Floats:
+        if name in _TIME:
+            return _of_time(name, self.motion)
+        position = self.motion.encoder[:, self.j]
+        order = {"": 0, "_per_s": 1, "_per_s2": 2}[name.removeprefix("act_mm").removeprefix("act_rad")]
+        for _ in range(order):
+            position = rate(position[:, None], self.motion)[:, 0]
+        return position
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(AT_DRIVE)
+
+    def __len__(self) -> int:
+        return len(AT_DRIVE)
+
+    @property
+    def rows(self) -> int:
+        """How many, n."""
+        return len(self.motion.time)
+
+
+def rate(values: Floats, motion: Motion) -> Floats:
+    """Change per second (n, k) of values (n, k); 0 for poses that are no movement."""
+    t = motion.time
+    if not motion.ordered or len(t) < 2:
+        return np.zeros_like(values)
+    apart = np.concatenate([[True], np.diff(t) > 1e-9])  # instants that stand twice count once
+    if apart.sum() < 2:
+        return np.zeros_like(values)
+    found = np.gradient(values[apart], t[apart], axis=0)
+    return np.asarray(found[np.cumsum(apart) - 1])
+
+
+def _kept_angle(velocity: Floats) -> Floats:
+    """Heading (n,) rad; at standstill that of the last move, at first that of the first."""
+    speed = np.hypot(velocity[:, 0], velocity[:, 1])
+    moving = speed > 1e-3 * max(float(speed.max(initial=0.0)), 1e-9)
+    if not moving.any():
+        return np.zeros(len(velocity))
+    last = np.maximum.accumulate(np.where(moving, np.arange(len(velocity)), -1))
+    last = np.where(last < 0, int(np.argmax(moving)), last)
+    return np.asarray(np.arctan2(velocity[last, 1], velocity[last, 0]))
+
+
+def _of_time(name: str, motion: Motion) -> Floats:
+    if name == "temp_C":
+        return np.full(len(motion.time), REFERENCE_C) if motion.temperature is None else motion.temperature
+    return {"t_s": motion.time, "common_s": motion.common, "cut_min": motion.cut_min}[name]
