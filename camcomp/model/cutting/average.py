@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import beta, betainc
 
-from camcomp.ground.datatypes import Bools, Floats
+from camcomp.ground.datatypes import Bools, Floats, Ints
 
 
 def linear_edge(
@@ -34,7 +34,7 @@ def linear_edge(
     """Mean (Fx, Fy, Fz) (n, 3) in N of the linear-edge model dF = (Kc h + Ke) dz (Altintas, section 2.7.1).
 
     chip (n,) mm per tooth, depth (n,) mm, start and stop (n,) rad; cutting (Ktc, Krc, Kac) in N/mm2, edge
-    (Kte, Kre, Kae) in N/mm.
+    (Kte, Kre, Kae) in N/mm; each may be (n,).
     """
     c, a = np.asarray(chip, float), np.asarray(depth, float)
     ktc, krc, kac = np.asarray(cutting, float)
@@ -56,15 +56,15 @@ def power_law(
     teeth: int,
     start: ArrayLike,
     stop: ArrayLike,
-    kc11: float,
+    kc11: ArrayLike,
     mc: float,
     ratios: ArrayLike,
 ) -> Floats:
     """Mean (Fx, Fy, Fz) (n, 3) in N of Kienzle's law dFt = kc11 h^(1-mc) dz, h in mm, kc11 in N/mm2.
 
-    ratios: radial and axial force over tangential force; Kienzle's law says nothing about them.
+    ratios: radial and axial force over tangential force, which Kienzle's law says nothing about; they and kc11 may be (n,).
     """
-    c, a = np.asarray(chip, float), np.asarray(depth, float)
+    c, a, kc11 = np.asarray(chip, float), np.asarray(depth, float), np.asarray(kc11, float)
     radial, axial = np.asarray(ratios, float)
     # Integrals over the engagement of sin^(2-mc), sin^(1-mc) cos and sin^(1-mc).
     square = sine_power(2 - mc, start, stop)
@@ -73,6 +73,20 @@ def power_law(
     law = np.stack([-mixed - radial * square, square - radial * mixed, -axial * single], axis=-1)
     out: Floats = (teeth * a * kc11 * c ** (1 - mc) / (2 * np.pi))[..., None] * law
     return out
+
+
+def slanted(radial: ArrayLike, axial: ArrayLike, rise: Floats, run: Floats) -> tuple[Floats, Floats]:
+    """Radial and axial parts (n,), about the tool's axis, of what acts normal to a slanting surface and along its edge.
+
+    rise, run (n,): of the surface per length of its edge; (1, 0) at the side of a cylinder, (0, 1) under a tool's tip.
+    """
+    normal, along = np.asarray(radial, float), np.asarray(axial, float)
+    return normal * rise + along * run, along * rise - normal * run
+
+
+def summed(force: Floats, place: Ints, places: int) -> Floats:
+    """Forces (b, 3) of parts of the tool's edges added up at their places (places, 3)."""
+    return np.column_stack([np.bincount(place, each, places) for each in force.T])
 
 
 def sine_power(power: float, start: ArrayLike, stop: ArrayLike) -> Floats:

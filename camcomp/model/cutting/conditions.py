@@ -1,5 +1,6 @@
 """Cutting conditions of the averaged models, taken from a Cut, with errors that name the key to add."""
 
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -7,6 +8,7 @@ import numpy as np
 from camcomp.ground.datatypes import Bools, Floats
 from camcomp.ground.errors import ConfigError
 from camcomp.model.cutting.cut import Cut
+from camcomp.model.cutting.engaged import Bites
 from camcomp.model.cutting.engagement import Milling, immersion
 from camcomp.model.cutting.frame import lateral
 
@@ -68,3 +70,16 @@ def engagement(cut: Cut, milling: Milling | None) -> tuple[Floats, Floats]:
     if milling is None:
         _refuse("CC256", given & (cut.width < d), cut, "the tool cuts on one side, and up or down milling is not said")
     return immersion(cut.width, d, milling or "up")
+
+
+def bites_of(cut: Cut, milling: Milling | None, clockwise: Bools) -> Bites:
+    """The arcs in which the tool cuts, in the sense of its rotation: of the stock, or one to a point from width and depth.
+
+    Raises what `axial_depth` and `engagement` raise, where the stock is not known.
+    """
+    if cut.bites is not None:
+        start, stop = cut.bites.turned(clockwise)
+        return replace(cut.bites, start=start, stop=stop)
+    start, stop = engagement(cut, milling)
+    n = len(cut)
+    return Bites(np.arange(n), start, stop, axial_depth(cut), np.ones(n), np.zeros(n))

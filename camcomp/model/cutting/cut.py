@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from camcomp.ground.datatypes import Bools, Floats, Ints, frozen
+from camcomp.model.cutting.engaged import Bites
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,6 +31,8 @@ class Cut:
     ends: Bools = field(default_factory=lambda: np.zeros(0, np.bool_))
     # (n,) sense of the spindle by the program, +1 clockwise, -1, 0 stopped, NaN not said; empty: nowhere said
     turn: Floats = field(default_factory=lambda: np.zeros(0))
+    # What the tool meets, where the stock is known; depth and width then are the highest material and its extent
+    bites: Bites | None = None
 
     def __post_init__(self) -> None:
         n = np.shape(self.line)[0]

@@ -1,7 +1,7 @@
 """The path cut into pieces of one kind of load, and the cutting force at any point of a piece.
 
 A piece is a motion, or the part of a motion on one side of the stock's top, or of the point where an arc passes the
-vertical and the direction across the tool turns over. Rapids and air moves carry no force, and
+vertical and the direction across the tool turns over, or, where the stock is known, between two places of its engagement. Rapids and air moves carry no force, and
 plunges none unless the force model says otherwise. Where two cutting pieces meet at less than JOIN_ANGLE the corner
 takes the force of the bisecting direction and the difference fades linearly along the pieces; where they meet at more,
 where a cut starts or ends, and where the model gives both sides different forces in one direction (another feed, speed
@@ -10,15 +10,18 @@ or sense of the spindle, another tool, a step of a table) the force jumps.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import ARC, RAPID, Bools, Floats, Ints, Path
 from camcomp.model.cutting.cut import Cut
+from camcomp.model.cutting.engaged import Bites, Engage, Engaged
 from camcomp.model.cutting.frame import lateral, to_vector
+from camcomp.model.cutting.grip import Grip, needed
 from camcomp.model.cutting.upright import Verticals
 
 JOIN_ANGLE = np.radians(5.0)
@@ -29,9 +32,19 @@ NO_FORCE = 1e-9  # N
 SAME_FORCE = 1e-6  # of the force: lengths of the path are rounded sums, and a table is looked up by them
 
 
+class Edges(NamedTuple):
+    """What a force model asks of a tool."""
+
+    diameter_mm: float | None
+    teeth: int | None
+
+
 @dataclass(frozen=True, eq=False)
 class Conditions:
-    """What the program does not say about the cut. model: Cut -> (Fr, Ft, Fz) (k, 3) N, None = no force."""
+    """What the program does not say about the cut. model: Cut -> (Fr, Ft, Fz) (k, 3) N, None = no force.
+
+    engage: what the tool meets along a path of which nothing has been seen before, None: the stock is not known.
+    """
 
     model: Callable[[Cut], Floats] | None
     plunges: bool = False
@@ -44,6 +57,12 @@ class Conditions:
     diameter_mm: float | None = None
     teeth: int | None = None
     to_machine: Floats | None = None
+    tools: Mapping[int, Edges] = field(default_factory=dict)  # by T number; others are as said above
+    engage: Engage | None = None
+
+    def edges(self, tool: int) -> Edges:
+        """The tool of a T number."""
+        return self.tools.get(tool, Edges(self.diameter_mm, self.teeth))
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,6 +83,8 @@ class Track:
     corner: Bools  # the tip cannot pass the start of the piece without a stop
     beside0: Floats  # fraction of the motion behind the start of the piece where the direction is that farther in
     beside1: Floats  # the same in front of its end
+    grip: Grip | None = None  # where the stock is known
+    engaged: Engaged | None = None  # the same
 
     @property
     def angle(self) -> Floats:
@@ -95,61 +116,139 @@ class Track:
             fade0=a + begin[:, None] * (b - a), fade1=a + end[:, None] * (b - a), jump=self.jump[of] & ~inner,
             corner=self.corner[of] & ~inner, beside0=np.where(inner, 0.0, self.beside0[of]),
             beside1=np.where(end < 1.0, 0.0, self.beside1[of]),
+            grip=None if self.grip is None else self.grip.cut(of, begin, end),
         )  # fmt: skip
 
-    def force(self, piece: Ints, w: Floats) -> Floats:
-        """Cutting force on the tool (k, 3) N, program frame."""
+    def force(self, piece: Ints, w: Floats, feed: Floats | None = None) -> Floats:
+        """Cutting force on the tool (k, 3) N, program frame; feed (k,) mm/min as driven, else the program's."""
         tangent = path_geometry.tangents(self.path, self.motion[piece], _beside(self, piece, w))
-        out = _force(self.path, self.conditions, self.cutting, self.motion, self.s0, self.length, piece, w, tangent,
-                     self.points(piece, w))  # fmt: skip
+        out = self.force_along(piece, w, tangent, feed)
         return out + (1.0 - w)[:, None] * self.fade0[piece] + w[:, None] * self.fade1[piece]
 
-    def force_along(self, piece: Ints, w: Floats, direction: Floats) -> Floats:
+    def sizes(self, piece: Ints, w: Floats) -> tuple[Floats, Floats]:
+        """Depth of the cut (k,) mm and sum of the engaged arcs (k,) rad, NaN where the stock is not known."""
+        if self.engaged is None:
+            return np.full(len(piece), np.nan), np.full(len(piece), np.nan)
+        return self.engaged.sizes(self.motion[piece], self.u(piece, w), w == 0.0)
+
+    def force_along(self, piece: Ints, w: Floats, direction: Floats, feed: Floats | None = None) -> Floats:
         """Cutting force on the tool (k, 3) N, program frame, where the tip is driven along unit vectors direction (k, 3)."""
-        return _force(self.path, self.conditions, self.cutting, self.motion, self.s0, self.length, piece, w, direction,
-                      self.points(piece, w))  # fmt: skip
+        if self.grip is not None and feed is not None and not self.conditions.plunges:
+            return self._driven(piece, w, direction, feed)
+        return _force(self.path, self.conditions, self.cutting, self.motion, self.s0, self.length, self.grip, piece, w,
+                      direction, self.points(piece, w), feed)  # fmt: skip
+
+    def _driven(self, piece: Ints, w: Floats, direction: Floats, feed: Floats) -> Floats:
+        """Cutting force (k, 3) N at other feeds than the program's: between the places on both sides, asked for these feeds."""
+        assert self.engaged is not None
+        out = np.zeros((len(piece), 3))
+        on = np.flatnonzero(self.cutting[piece] & (np.linalg.norm(direction, axis=1) > 0.0))
+        motion, u = self.motion[piece[on]], self.u(piece[on], w[on])
+        left, right, share = self.engaged.between(motion, u, w[on] == 0.0)
+        s = self.s0[piece[on]] + w[on] * self.length[piece[on]]
+        for rows, part in ((left, 1.0 - share), (right, share)):
+            bites = self.engaged.bites.of(rows)
+            reach, depth = bites.reach(len(rows)), self.engaged.depth[rows]
+            found = _components(self.path, self.conditions, motion, direction[on], depth, reach, s, w[on] == 1.0, bites,
+                                feed[on])  # fmt: skip
+            out[on] += part[:, None] * to_vector(found, direction[on], self.conditions.tool_axis)
+        return out
 
 
 def _force(
-    path: Path, c: Conditions, cutting: Bools, motion: Ints, s0: Floats, length: Floats, piece: Ints, w: Floats,
-    direction: Floats, tip: Floats,
+    path: Path, c: Conditions, cutting: Bools, motion: Ints, s0: Floats, length: Floats, grip: Grip | None, piece: Ints,
+    w: Floats, direction: Floats, tip: Floats, driven: Floats | None = None,
 ) -> Floats:  # fmt: skip
     """Model force (k, 3) N for given feed directions, program frame."""
     out = np.zeros((len(piece), 3))
     on = cutting[piece] & (np.linalg.norm(direction, axis=1) > 0.0)
     if c.model is None or not on.any():
         return out
+    if grip is not None and not c.plunges:
+        out[on] = to_vector(grip.base(piece[on], w[on]), direction[on], c.tool_axis)
+        return out
     rows = motion[piece[on]]
     fill = np.full(len(rows), np.nan)
     depth = fill if c.depth_mm is None else np.full(len(rows), c.depth_mm)
     if c.depth_mm is None and c.stock_top_mm is not None:
         depth = c.stock_top_mm - tip[on][:, 2]
-    feed, speed = path.feed[rows], path.speed[rows]
-    cut = Cut(
-        tangent=direction[on],
-        tool_axis=np.asarray(c.tool_axis, float),
-        feed=np.where(np.isnan(feed), c.feed_mm_per_min or np.nan, feed),
-        speed=np.where(speed > 0.0, speed, c.spindle_rpm or 0.0),
-        depth=depth,
-        width=fill if c.width_mm is None else np.full(len(rows), c.width_mm),
-        arc_length=s0[piece[on]] + w[on] * length[piece[on]],
-        line=path.line[rows],
-        diameter_mm=c.diameter_mm,
-        teeth=c.teeth,
-        to_machine=np.eye(3) if c.to_machine is None else c.to_machine,
-        ends=w[on] == 1.0,
-        turn=path.turn[rows],
-    )
-    out[on] = to_vector(c.model(cut), cut.tangent, cut.tool_axis)
+    width = fill if c.width_mm is None else np.full(len(rows), c.width_mm)
+    s = s0[piece[on]] + w[on] * length[piece[on]]
+    feed = None if driven is None else driven[on]
+    found = _components(path, c, rows, direction[on], depth, width, s, w[on] == 1.0, None, feed)
+    out[on] = to_vector(found, direction[on], c.tool_axis)
     return out
 
 
-def lay_track(path: Path, conditions: Conditions, length: Floats | None = None) -> Track:
-    """Pieces of a path with the loads at their corners. Raises what the force model raises."""
-    length = path_geometry.lengths(path) if length is None else length
+def _components(
+    path: Path, c: Conditions, motion: Ints, direction: Floats, depth: Floats, width: Floats, s: Floats, ends: Bools,
+    bites: Bites | None = None, driven: Floats | None = None,
+) -> Floats:  # fmt: skip
+    """Fr, Ft, Fz (k, 3) N of the model, asked tool by tool. width (k,) mm, in radii of the tool where there are bites."""
+    if c.model is None:
+        return np.zeros((len(motion), 3))
+    feed, speed = path.feed[motion] if driven is None else driven, path.speed[motion]
+    feed = np.where(np.isnan(feed), c.feed_mm_per_min or np.nan, feed)
+    speed = np.where(speed > 0.0, speed, c.spindle_rpm or 0.0)
+    tool = path.tool[motion]
+    out = np.zeros((len(motion), 3))
+    for number in np.unique(tool) if c.tools else [None]:
+        at = np.flatnonzero(tool == number) if number is not None else np.arange(len(motion))
+        edges = c.edges(int(number)) if number is not None else Edges(c.diameter_mm, c.teeth)
+        out[at] = c.model(
+            Cut(
+                tangent=direction[at],
+                tool_axis=np.asarray(c.tool_axis, float),
+                feed=feed[at],
+                speed=speed[at],
+                depth=depth[at],
+                width=width[at] * (1.0 if bites is None else 0.5 * (edges.diameter_mm or np.nan)),
+                arc_length=s[at],
+                line=path.line[motion[at]],
+                diameter_mm=edges.diameter_mm,
+                teeth=edges.teeth,
+                to_machine=np.eye(3) if c.to_machine is None else c.to_machine,
+                ends=ends[at],
+                turn=path.turn[motion[at]],
+                bites=None if bites is None else bites.of(at),
+            )
+        )
+    return out
+
+
+def _base(path: Path, c: Conditions, engaged: Engaged, length: Floats) -> Floats:
+    """Fr, Ft, Fz (k, 3) N of the model at the places of the engagement where the tool cuts, and at those next to them."""
+    near = engaged.turn > 0.0
+    on, beside = near.copy(), engaged.motion[1:] == engaged.motion[:-1]
+    near[1:] |= on[:-1] & beside
+    near[:-1] |= on[1:] & beside
+    rows = np.flatnonzero(near)
+    base = np.zeros((len(engaged.u), 3))
+    if len(rows) and not c.plunges:
+        where, u, bites = engaged.motion[rows], engaged.u[rows], engaged.bites.of(rows)
+        direction = path_geometry.tangents(path, where, u)
+        s = np.concatenate(([0.0], np.cumsum(length)))[where] + u * length[where]
+        reach = bites.reach(len(rows))
+        base[rows] = _components(path, c, where, direction, engaged.depth[rows], reach, s, u == 1.0, bites)
+    return base
+
+
+def lay_track(path: Path, conditions: Conditions, engaged: Engaged | None = None) -> Track:
+    """Pieces of a path with the loads at their corners. Raises what the force model raises.
+
+    engaged: what the tool meets along the path, when somebody has followed it before.
+    """
+    length = path_geometry.lengths(path)
     axis = np.asarray(conditions.tool_axis, float)
     upright = Verticals.none() if conditions.model is None else Verticals.of(path, axis)
-    motion, u0, u1, over = _pieces(path, conditions, upright)
+    if engaged is None and conditions.engage is not None and conditions.model is not None:
+        engaged = conditions.engage(path)
+    places = None
+    if engaged is not None:
+        base = _base(path, conditions, engaged, length)
+        rows = needed(engaged, base)
+        places, base = engaged.take(rows), base[rows]
+    motion, u0, u1, over = _pieces(path, conditions, upright, places)
     beside0, beside1 = upright.beside(path, axis, motion, u0, u1)
     n = len(motion)
     piece_length = length[motion] * (u1 - u0)
@@ -160,12 +259,16 @@ def lay_track(path: Path, conditions: Conditions, length: Floats | None = None) 
     feeding = (path.kind[motion] != RAPID) & path.known[motion] & ~path.machine[motion] & (piece_length > 0.0)
     sine = np.maximum(lateral(first, axis), lateral(path_geometry.tangents(path, motion, middle), axis))
     cutting = feeding & ((sine > PLUNGE_SINE) | conditions.plunges)
-    if conditions.stock_top_mm is not None:
+    grip = None
+    if places is not None:
+        grip = Grip.of(places, base, motion, u0, u1)
+        cutting &= grip.on | (sine <= PLUNGE_SINE)
+    elif conditions.stock_top_mm is not None:
         cutting &= path_geometry.points(path, motion, middle)[:, 2] < conditions.stock_top_mm
 
     def force(piece: Ints, w: Floats, direction: Floats) -> Floats:
         tip = path_geometry.points(path, motion[piece], np.where(w == 0.0, u0[piece], u1[piece]))
-        return _force(path, conditions, cutting, motion, s0, piece_length, piece, w, direction, tip)
+        return _force(path, conditions, cutting, motion, s0, piece_length, grip, piece, w, direction, tip)
 
     every = np.arange(n)
     own0, own1 = force(every, np.zeros(n), first), force(every, np.ones(n), last)
@@ -192,7 +295,22 @@ def lay_track(path: Path, conditions: Conditions, length: Floats | None = None) 
     fade0[b] = shared - own0[b]
     _carry_over((piece_length > 0.0) | rapid, own1 + fade1, fade0, fade1)
     track = Track(
-        path, conditions, motion, u0, u1, cutting, piece_length, s0, fade0, fade1, jump, corner, beside0, beside1
+        path,
+        conditions,
+        motion,
+        u0,
+        u1,
+        cutting,
+        piece_length,
+        s0,
+        fade0,
+        fade1,
+        jump,
+        corner,
+        beside0,
+        beside1,
+        grip,
+        engaged,
     )
     return _cut_at_swings(track, upright)
 
@@ -219,17 +337,20 @@ def _beside(track: Track, piece: Ints, w: Floats) -> Floats:
     return np.clip(track.u(piece, w), (track.u0 + track.beside0)[piece], (track.u1 - track.beside1)[piece])
 
 
-def _pieces(path: Path, conditions: Conditions, upright: Verticals) -> tuple[Ints, Floats, Floats, Bools]:
+def _pieces(
+    path: Path, conditions: Conditions, upright: Verticals, engaged: Engaged | None
+) -> tuple[Ints, Floats, Floats, Bools]:
     """Every motion once, or in parts where a feed motion crosses the stock's top or an arc passes the vertical.
 
-    The last result says which parts begin at the vertical.
+    Where the stock is known there are parts between the places of its engagement instead of parts below its top. The
+    last result says which parts begin at the vertical.
     """
     n = len(path)
     whole = np.arange(n), np.zeros(n), np.ones(n), np.zeros(n, np.bool_)
     if conditions.model is None or n == 0:
         return whole
     over = upright.overturns(path)
-    cuts = sorted({*over, *_crossings(path, conditions.stock_top_mm)})
+    cuts = {*over, *(_crossings(path, conditions.stock_top_mm) if engaged is None else _inner(engaged))}
     if not cuts:
         return whole
     motion = np.concatenate((whole[0], [i for i, _ in cuts]))
@@ -239,8 +360,16 @@ def _pieces(path: Path, conditions: Conditions, upright: Verticals) -> tuple[Int
     u1 = np.ones(len(u0))
     same = motion[1:] == motion[:-1]
     u1[:-1][same] = u0[1:][same]
-    begins = {*over}
-    return motion, u0, u1, np.array([(int(i), float(u)) in begins for i, u in zip(motion, u0, strict=True)], np.bool_)
+    turned = np.zeros(len(motion), np.bool_)
+    for i, at in over:
+        turned |= (motion == i) & (u0 == at)
+    return motion, u0, u1, turned
+
+
+def _inner(engaged: Engaged) -> list[tuple[int, float]]:
+    """Places of the engagement between the ends of motions."""
+    inner = (engaged.u > 0.0) & (engaged.u < 1.0)
+    return list(zip(engaged.motion[inner].tolist(), engaged.u[inner].tolist(), strict=True))
 
 
 def _crossings(path: Path, top: float | None) -> list[tuple[int, float]]:

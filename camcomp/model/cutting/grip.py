@@ -1,0 +1,65 @@
+"""The load of pieces of a path whose stock is known: a straight line between the places where the engagement was found."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from camcomp.ground.datatypes import Bools, Floats, Ints
+from camcomp.model.cutting.engaged import Engaged
+
+STRAIGHT = 1e-9  # of the force: a place on the line between its neighbours is not needed
+
+
+@dataclass(frozen=True, eq=False)
+class Grip:
+    """Pieces (p,): force of the model (p, 3) N as Fr, Ft, Fz at both ends, and whether the tool meets material."""
+
+    base0: Floats
+    base1: Floats
+    on: Bools
+
+    @classmethod
+    def of(cls, engaged: Engaged, base: Floats, motion: Ints, u0: Floats, u1: Floats) -> Grip:
+        """From the forces (k, 3) at the places, for parts u0 to u1 of motions (p,); a place stands at every jump."""
+        left, right, known = engaged.around(motion, 0.5 * (u0 + u1))
+        if not len(engaged.u):
+            return cls(np.zeros((len(motion), 3)), np.zeros((len(motion), 3)), np.zeros(len(motion), np.bool_))
+        span = np.where(known, engaged.u[right] - engaged.u[left], 1.0)
+        ends = []
+        for u in (u0, u1):
+            w = np.clip((u - engaged.u[left]) / np.where(span > 0.0, span, 1.0), 0.0, 1.0)[:, None]
+            ends.append(np.where(known[:, None], base[left] * (1.0 - w) + base[right] * w, 0.0))
+        on = known & ((engaged.turn[left] > 0.0) | (engaged.turn[right] > 0.0))
+        return cls(ends[0], ends[1], on)
+
+    def base(self, piece: Ints, w: Floats) -> Floats:
+        """Fr, Ft, Fz (k, 3) N at fractions w (k,) of pieces (k,)."""
+        return self.base0[piece] * (1.0 - w)[:, None] + self.base1[piece] * w[:, None]
+
+    def cut(self, of: Ints, begin: Floats, end: Floats) -> Grip:
+        """The same for parts `begin` to `end` (q,) of pieces (q,)."""
+        return Grip(self.base(of, begin), self.base(of, end), self.on[of])
+
+
+def needed(engaged: Engaged, base: Floats) -> Ints:
+    """The places (q,) without which the force would not be the same; a cut begins or ends there, or the force bends."""
+    rows = np.flatnonzero(engaged.bends)
+    return rows[_bent(engaged.take(rows), base[rows])]
+
+
+def _bent(engaged: Engaged, base: Floats) -> Ints:
+    n = len(engaged.u)
+    if n < 3:
+        return np.arange(n)
+    before, after = np.arange(n - 2), np.arange(2, n)
+    inner = (engaged.motion[before] == engaged.motion[after]) & (engaged.u[before] < engaged.u[1:-1])
+    inner &= engaged.u[1:-1] < engaged.u[after]
+    span = np.where(inner, engaged.u[after] - engaged.u[before], 1.0)
+    w = ((engaged.u[1:-1] - engaged.u[before]) / span)[:, None]
+    off = np.abs(base[1:-1] - base[before] * (1.0 - w) - base[after] * w).max(axis=1)
+    on = engaged.turn > 0.0
+    same = (on[before] == on[1:-1]) & (on[1:-1] == on[after])
+    straight = inner & same & (off <= STRAIGHT * np.abs(base[1:-1]).max(axis=1))
+    return np.flatnonzero(~np.concatenate(([False], straight, [False])))

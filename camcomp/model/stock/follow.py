@@ -1,0 +1,45 @@
+"""A whole program through its stock: the engagement, and what is wrong with it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from camcomp.gcode.program import Program
+from camcomp.ground.datatypes import Floats, Ints, Path
+from camcomp.ground.errors import ConfigError, Location, ProgramError, raise_all
+from camcomp.model.config.spec import Config
+from camcomp.model.cutting.engaged import Engaged
+from camcomp.model.stock.from_config import Bounds, memory_of
+from camcomp.model.stock.memory import StockMemory
+
+MOST_ERRORS = 20
+
+
+def followed(
+    config: Config, tool_axis: Floats, path: Path, program: Program | None = None
+) -> tuple[Engaged, StockMemory]:
+    """The engagement along a path, and the stock behind it.
+
+    Raises ProgramError CC142 for rapids through material, at their places in the program; ConfigError CC295 to CC298.
+    """
+    memory = memory_of(config, tool_axis, Bounds().add(path))
+    engaged, crashes = memory.follow(path)
+    refuse_crashes(path, crashes, program)
+    refuse_untouched(config, memory)
+    return engaged, memory
+
+
+def refuse_crashes(path: Path, crashes: Ints, program: Program | None) -> None:
+    """Raises ProgramError CC142 for rapids that go through material."""
+    errors = []
+    for line in np.unique(path.line[crashes])[:MOST_ERRORS].tolist():
+        at: Location | None = program.text.place(line - 1, 0) if program is not None else None
+        errors.append(ProgramError("CC142", f"line {line}: the rapid goes through material of the stock", at=at))
+    raise_all(errors)
+
+
+def refuse_untouched(config: Config, memory: StockMemory) -> None:
+    """Raises ConfigError CC298 when nothing has been cut of the stock."""
+    if not memory.touched:
+        message = "the program never touches the stock"
+        raise ConfigError("CC298", message, at=config.at("workpiece", "stock"))

@@ -1,0 +1,249 @@
+"""Where the tool meets material at one place of its path: arcs of the turn, with the height of tool that cuts in each.
+
+Angles count as in camcomp/model/cutting/engagement.py for a clockwise spindle: 0 left of the feed, pi/2 along it, pi
+right of it. Material counts on the front half of the tool, where its surface moves towards it, when it is thicker than
+EDGE across the tool's axis and stands higher than FLOOR: a finished wall or floor is not cut again because numbers are
+rounded. What was taken on the last bit of the way lies against the tool all round its front; such sweeps, `recent`, are
+put to the test one by one, with a tool slimmer by EDGE.
+"""
+
+# mypy: disallow-untyped-defs=False, disallow-incomplete-defs=False
+# numba infers the types of these functions; written by hand they would only be repeated.
+
+import math
+from typing import Any, NamedTuple
+
+from camcomp.ground.datatypes import Floats
+from camcomp.model.statics.compiled import inner
+from camcomp.model.stock.field import CELL, XMAX, XMIN, YMAX, YMIN, ZMAX, ZMIN, height
+from camcomp.model.stock.sweeps import FLAT, KIND, RADIUS, bottom, radius_at
+
+EDGE, FLOOR = 0.002, 0.001  # mm
+FEWEST, MOST = 16, 48  # angles at which the front of a tool is looked at
+TURNS = 9  # halvings of the step between them
+SCAN, SLICES = 12, 12  # heights of a tool that is no cylinder: to find where it cuts, and there
+END_ANGLE = 1e-4  # rad from the sides of the front half
+BITE = 5  # columns of an arc: entry, exit (rad), height (mm), rise and run of the tool's surface per length of its edge
+DEPTH, ENGAGED, ARCS, WHAT = 5, 6, 7, 8  # of what is told of a place; in front: five integrals over the engagement
+
+
+class Place(NamedTuple):
+    """Room to work in at a place, and what was found there."""
+
+    at: Floats  # (6,) tip (mm), direction of the feed in the plane, climb per mm
+    row: Any  # (1,) int64, row of the tool
+    recent: Any  # (n,) int64, sweeps that are not cut away yet
+    many: Any  # (1,) int64, how many of them count
+    told: Floats  # (WHAT,)
+    arcs: Floats  # (r, 2) arcs of a place, to be united
+
+
+@inner
+def stands(nodes, place, radius, z, psi):
+    """Height of material over z at an angle of the tool's front, mm; 0 when it does not count."""
+    ex, ey = place.at[3], place.at[4]
+    c, s = math.cos(psi), math.sin(psi)
+    x = place.at[0] + radius * (s * ex - c * ey)
+    y = place.at[1] + radius * (s * ey + c * ex)
+    floor = max(z, nodes.place[ZMIN])
+    top = height(nodes, x, y, floor + FLOOR)
+    for r in range(place.many[0]):
+        if top <= floor + FLOOR:
+            return 0.0
+        top = min(top, bottom(nodes.sweeps, nodes.tools, place.recent[r], 1, x, y))
+    return top - floor if top > floor + FLOOR else 0.0
+
+
+@inner
+def edge_between(nodes, place, radius, z, a, b, level):
+    """Angle between a and b at which the material passes a height `level` over z."""
+    above = stands(nodes, place, radius, z, a) > level
+    for _ in range(TURNS):
+        middle = 0.5 * (a + b)
+        if (stands(nodes, place, radius, z, middle) > level) == above:
+            a = middle
+        else:
+            b = middle
+    return 0.5 * (a + b)
+
+
+@inner
+def add_bite(place, bites, n, start, stop, tall, rise, run):
+    """Puts down an arc; the number of arcs."""
+    if stop <= start or n >= bites.shape[0]:
+        return n
+    bites[n, 0], bites[n, 1], bites[n, 2], bites[n, 3], bites[n, 4] = start, stop, tall, rise, run
+    told = place.told
+    told[0] += tall * (stop - start)
+    told[1] += tall * (math.cos(start) - math.cos(stop))
+    told[2] += tall * (math.sin(stop) - math.sin(start))
+    told[3] += tall * 0.5 * (math.sin(2.0 * stop) - math.sin(2.0 * start))
+    told[4] += tall * 0.5 * (math.cos(2.0 * start) - math.cos(2.0 * stop))
+    k = int(told[ARCS])
+    if k < place.arcs.shape[0]:
+        place.arcs[k, 0], place.arcs[k, 1] = start, stop
+        told[ARCS] += 1
+    return n + 1
+
+
+@inner
+def united(place):
+    """Sum of the angles that lie in any arc, rad."""
+    arcs, n = place.arcs, int(place.told[ARCS])
+    for i in range(1, n):  # few, and mostly in order
+        a, b = arcs[i, 0], arcs[i, 1]
+        j = i - 1
+        while j >= 0 and arcs[j, 0] > a:
+            arcs[j + 1, 0], arcs[j + 1, 1] = arcs[j, 0], arcs[j, 1]
+            j -= 1
+        arcs[j + 1, 0], arcs[j + 1, 1] = a, b
+    total, reach = 0.0, -1.0
+    for i in range(n):
+        total += max(arcs[i, 1] - max(arcs[i, 0], reach), 0.0)
+        reach = max(reach, arcs[i, 1])
+    return total
+
+
+@inner
+def angles_of(nodes, radius):
+    """At how many angles the front is looked at."""
+    return min(max(int(math.pi * radius / (2.0 * nodes.place[CELL])), FEWEST), MOST)
+
+
+@inner
+def look_round(nodes, place, bites, n, radius, z, tall, rise, run, least):
+    """Arcs at one height of the tool. tall: height of the slice that they stand for, 0: as high as the material is.
+
+    least (rad): angle at both sides at which the surface begins to move towards the material.
+    """
+    count = angles_of(nodes, radius)
+    begin, end = least + END_ANGLE, math.pi - least - END_ANGLE
+    start, top, sum_, members = -1.0, 0.0, 0.0, 0
+    before, last = 0.0, begin
+    for k in range(count + 2):
+        psi = end if k == count + 1 else (begin if k == 0 else begin + (k - 0.5) / count * (end - begin))
+        now = stands(nodes, place, radius, z, psi)
+        same = (
+            abs(now - before) <= 2.0 * EDGE + 0.02 * max(now, before) if tall == 0.0 else (now > 0.0) == (before > 0.0)
+        )
+        if k == 0:
+            if now > 0.0:
+                start, sum_, members = least, now, 1
+        elif same and (now > 0.0) == (before > 0.0):
+            if now > 0.0:
+                sum_ += now
+                members += 1
+        else:
+            at = edge_between(
+                nodes, place, radius, z, last, psi, 0.5 * (now + before) if min(now, before) > 0.0 else 0.0
+            )
+            if before > 0.0:
+                n = add_bite(place, bites, n, start, at, tall if tall > 0.0 else sum_ / members, rise, run)
+            start, sum_, members = at, now, 1
+        top = max(top, now)
+        before, last = now, psi
+    if before > 0.0:
+        n = add_bite(place, bites, n, start, math.pi - least, tall if tall > 0.0 else sum_ / members, rise, run)
+    place.told[DEPTH] = max(place.told[DEPTH], top)
+    return n
+
+
+@inner
+def cuts_at(nodes, place, row, lift, k, count):
+    """Whether a tool that is no cylinder meets material at a height over its tip and at an angle of its front."""
+    radius = radius_at(nodes.tools, row, lift)
+    step = 1e-3
+    run = (radius_at(nodes.tools, row, lift + step) - radius) / step
+    least = least_angle(place.at[5], run)
+    psi = least + (k + 0.5) / count * (math.pi - 2.0 * least)
+    return least < 0.5 * math.pi and stands(nodes, place, max(radius - EDGE, 0.0), place.at[2] + lift, psi) > 0.0
+
+
+@inner
+def least_angle(climb, run):
+    """From which angle on a surface with this run per rise moves towards what is in front of it, on a climbing way."""
+    if climb <= 0.0:
+        return 0.0
+    sine = climb * run
+    return math.asin(sine) if sine < 1.0 else 0.5 * math.pi
+
+
+@inner
+def limit(nodes, place, row, inside, outside, count):
+    """Height over the tip between one where the tool cuts and one where it does not, to which it cuts at any angle."""
+    best = inside
+    step = 1.0 if outside > inside else -1.0
+    for k in range(count):
+        if step * (outside - best) <= 1e-5 or not cuts_at(nodes, place, row, best + step * 1e-5, k, count):
+            continue
+        a, b = best, outside
+        while abs(b - a) > 1e-4:
+            middle = 0.5 * (a + b)
+            if cuts_at(nodes, place, row, middle, k, count):
+                a = middle
+            else:
+                b = middle
+        best = a
+    return best
+
+
+@inner
+def look_over(nodes, place, bites, n, row):
+    """Arcs of a tool that is no cylinder, slice by slice."""
+    z = place.at[2]
+    highest = nodes.place[ZMAX] - z
+    count = angles_of(nodes, nodes.tools[row, RADIUS])
+    low, high, above, below = -1.0, -1.0, highest, 0.0
+    before = 0.0
+    for j in range(SCAN):
+        lift = highest * ((j + 0.5) / SCAN) ** 2
+        found = False
+        for k in range(count):
+            if cuts_at(nodes, place, row, lift, k, count):
+                found = True
+                break
+        if found:
+            if low < 0.0:
+                low, below = lift, before
+            high, above = lift, highest
+        elif high == before and high > 0.0:
+            above = lift
+        before = lift
+    if low < 0.0:
+        return n
+    high = limit(nodes, place, row, high, above, count)
+    low = limit(nodes, place, row, low, below, count)
+    if low < 1e-3:
+        low = 0.0
+    for j in range(SLICES):
+        a, b = low + (high - low) * j / SLICES, low + (high - low) * (j + 1) / SLICES
+        run = radius_at(nodes.tools, row, b) - radius_at(nodes.tools, row, a)
+        edge = math.sqrt(run * run + (b - a) * (b - a))
+        middle = 0.5 * (a + b)
+        least = least_angle(place.at[5], run / max(b - a, 1e-12))
+        radius = radius_at(nodes.tools, row, middle) - EDGE
+        if least < 0.5 * math.pi and radius > 0.0:
+            n = look_round(nodes, place, bites, n, radius, z + middle, b - a, (b - a) / edge, run / edge, least)
+    place.told[DEPTH] = high if place.told[ARCS] > 0.0 else 0.0
+    return n
+
+
+@inner
+def measure(nodes, place, bites, n):
+    """What the tool meets at a place: arcs into `bites` from row n on, sums into place.told; the number of rows."""
+    told = place.told
+    for k in range(WHAT):
+        told[k] = 0.0
+    row, bounds = int(place.row[0]), nodes.place
+    radius, z = nodes.tools[row, RADIUS], place.at[2]
+    if z >= bounds[ZMAX] - FLOOR:
+        return n
+    x, y = place.at[0], place.at[1]
+    if x < bounds[XMIN] - radius or x > bounds[XMAX] + radius or y < bounds[YMIN] - radius or y > bounds[YMAX] + radius:
+        return n
+    if nodes.tools[row, KIND] == FLAT:
+        n = look_round(nodes, place, bites, n, radius - EDGE, z, 0.0, 1.0, 0.0, 0.0)
+    else:
+        n = look_over(nodes, place, bites, n, row)
+    told[ENGAGED] = united(place)
+    return n

@@ -1,0 +1,209 @@
+"""The stock while a program is followed: what every motion meets, and what it leaves."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from camcomp.ground.datatypes import Floats, Ints, Path
+from camcomp.model.cutting.engaged import Bites, Engaged
+from camcomp.model.stock.facets import facets_on
+from camcomp.model.stock.field import TOUCHED, USED, XMAX, XMIN, ZMAX, ZMIN, room_for
+from camcomp.model.stock.legs import LegBefore, Legs, legs_of
+from camcomp.model.stock.march import (
+    CUT_LEG,
+    DEEP,
+    MOST_RECENT,
+    PLACES,
+    ROOM_FOR_ARCS,
+    ROOM_FOR_PLACES,
+    ROWS,
+    Found,
+    march,
+    peek,
+    settle,
+    thin,
+)
+from camcomp.model.stock.measure import BITE, DEPTH, EDGE, ENGAGED, WHAT, Place
+from camcomp.model.stock.shapes import StockShape, ToolShape
+
+COARSEST_MM, FINEST_MM = 0.25, 0.05
+MOST_NODES = 1 << 26  # of 8 bytes, and only those count that a tool has touched
+MARGIN = 5  # nodes around the stock
+ARCS = 256  # of one place
+NO_TOOL = -1
+
+
+def cell_for(stock: StockShape, tools: Mapping[int, ToolShape]) -> float:
+    """Distance of the nodes, mm: so small that no wall bulges by EDGE between them."""
+    radius = min((0.5 * each.diameter_mm for each in tools.values()), default=1.0)
+    fine = float(np.clip(0.9 * np.sqrt(8.0 * radius * EDGE), FINEST_MM, COARSEST_MM))
+    area = float(np.prod(np.maximum(stock.high[:2] - stock.low[:2], fine)))
+    return max(fine, float(np.sqrt(area / MOST_NODES)))
+
+
+class StockMemory:
+    """A stock from which motions take material, in the order in which they are shown."""
+
+    def __init__(self, stock: StockShape, tools: Mapping[int, ToolShape], cell_mm: float | None = None) -> None:
+        """tools: by T number; NO_TOOL stands for all others. cell_mm: distance of the nodes, None: cell_for."""
+        self.cell = cell_for(stock, tools) if cell_mm is None else cell_mm
+        self._number = {number: k for k, number in enumerate(tools)}
+        rows = np.array([row for each in tools.values() for row in each.rows()])
+        size = np.ceil((stock.high - stock.low)[:2] / self.cell).astype(int) + 2 * MARGIN
+        place = np.concatenate(
+            (stock.low[:2] - (MARGIN - 0.5) * self.cell, [self.cell, stock.form], stock.low, stock.high)
+        )
+        facet, mesh = facets_on(stock, place, size)
+        self.nodes = room_for(place, int(size[1]), int(size[0]), rows, 1 << 12, facet, mesh)
+        self._place = Place(
+            np.zeros(6), np.zeros(1, np.int64), np.zeros(MOST_RECENT, np.int64), np.zeros(1, np.int64), np.zeros(WHAT),
+            np.zeros((ARCS, 2)),
+        )  # fmt: skip
+        n, r = 4 * ROOM_FOR_PLACES, 2 * ROOM_FOR_ARCS
+        self._found = Found(
+            np.zeros(n, np.int64), np.zeros(n), np.zeros(n, np.int64), np.zeros(n, np.int64), np.zeros((n, WHAT)),
+            np.zeros((r, BITE)), np.zeros(0, np.bool_), np.zeros(MOST_RECENT), np.zeros(2), np.zeros(3, np.int64),
+            np.zeros(DEEP), np.zeros((DEEP, WHAT)), np.zeros((DEEP, 2), np.int64),
+        )  # fmt: skip
+        self._before = LegBefore()
+        self._kept = self._kept_rows = 0  # places and arcs that stand in the room from before
+
+    @property
+    def touched(self) -> bool:
+        """Whether anything has been cut away yet."""
+        return bool(self.nodes.counts[TOUCHED])
+
+    @property
+    def bounds(self) -> tuple[Floats, Floats]:
+        """Corners (3,) mm of the uncut stock."""
+        return self.nodes.place[XMIN : ZMIN + 1].copy(), self.nodes.place[XMAX : ZMAX + 1].copy()
+
+    def settle(self) -> None:
+        """Cuts away what was taken last, too."""
+        settle(self.nodes, self._place, self._found)
+
+    def follow(self, path: Path, *, ahead: int = 0) -> tuple[Engaged, Ints]:
+        """What the motions meet, and which rapids go through material.
+
+        ahead: so many motions at the end are only looked at: they tell how the one before them goes on.
+        """
+        legs = legs_of(path, self._before)
+        tool = np.array([self._number.get(int(t), self._number.get(NO_TOOL, 0)) for t in np.unique(path.tool)])
+        tool = tool[np.searchsorted(np.unique(path.tool), path.tool[legs.motion])] if len(legs.motion) else legs.motion
+        own = int(np.searchsorted(legs.motion, len(path) - ahead))
+        crash = np.zeros(max(own, 1), np.bool_)
+        found = self._found._replace(crash=crash)
+        joined = np.append(legs.joined[:own], legs.joined[own : own + 1]) if own else np.zeros(1, np.bool_)
+        parts: list[_Places] = []
+        leg = 0
+        self._carry_over()
+        while leg < own:
+            at = march(self.nodes, self._place, found, legs.kind[:own], legs.table[:own], tool[:own], joined, leg)
+            parts.append(self._taken())
+            self._make_room()
+            leg = at
+        if ahead and own < len(legs.motion):
+            peek(self.nodes, self._place, found, legs.table, tool, own)
+            parts.append(self._taken(keep=False))
+        if len(path) > ahead:
+            self._before = self._behind(path, legs, own, len(path) - ahead - 1)
+        return _engaged(parts, legs), np.unique(legs.motion[:own][crash[:own]])
+
+    def _behind(self, path: Path, legs: Legs, own: int, motion: int) -> LegBefore:
+        """What the next legs go on from; motions without length change nothing but the position."""
+        known = bool(path.known[motion] & ~path.machine[motion])
+        if own == 0:
+            return replace(self._before, known=known)
+        if legs.kind[own - 1] != CUT_LEG:
+            return LegBefore(known)
+        return LegBefore(known, legs.ends[own - 1], int(path.tool[legs.motion[own - 1]]))
+
+    def _carry_over(self) -> None:
+        """The last place of what was shown before belongs to the leg in front of the next ones."""
+        if self._found.told_of[PLACES]:
+            self._found.leg[0] = -1
+
+    def _taken(self, *, keep: bool = True) -> _Places:
+        """The places found since the last time; the last of them stays, for the next leg may go on from there."""
+        found = self._found
+        n, r = int(found.told_of[PLACES]), int(found.told_of[ROWS])
+        first = self._kept
+        out = _Places(
+            found.leg[first:n].copy(),
+            found.u[first:n].copy(),
+            found.first[first:n].copy(),
+            found.many[first:n].copy(),
+            found.told[first:n].copy(),
+            found.bites[:r].copy(),
+        )
+        if not keep:
+            found.told_of[PLACES] = self._kept
+            found.told_of[ROWS] = self._kept_rows
+            return out
+        if n:
+            a, many = int(found.first[n - 1]), int(found.many[n - 1])
+            found.bites[:many] = found.bites[a : a + many].copy()
+            for each in (found.leg, found.u, found.told):
+                each[0] = each[n - 1]
+            found.first[0], found.many[0] = 0, many
+            self._kept, self._kept_rows = 1, many
+            found.told_of[PLACES], found.told_of[ROWS] = 1, many
+        return out
+
+    def _make_room(self) -> None:
+        """Twice as many sweeps when those there are will soon be used up."""
+        nodes = self.nodes
+        if nodes.counts[USED] + 1024 < len(nodes.sweeps):
+            return
+        more = len(nodes.sweeps)
+        self.nodes = nodes._replace(
+            sweeps=np.concatenate((nodes.sweeps, np.empty((more, nodes.sweeps.shape[1])))),
+            kept=np.concatenate((nodes.kept, np.zeros(more, np.int32))),
+            free=np.concatenate((nodes.free, np.zeros(more, np.int32))),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class _Places:
+    """Places of some legs as they were found."""
+
+    leg: Ints
+    u: Floats
+    first: Ints
+    many: Ints
+    told: Floats
+    bites: Floats
+
+
+def _engaged(parts: list[_Places], legs: Legs) -> Engaged:
+    """All places that are needed, in order."""
+    rows = np.cumsum([0] + [len(each.bites) for each in parts])
+    leg, u, told = (
+        np.concatenate([getattr(each, name) for each in parts] or [empty])
+        for name, empty in (("leg", np.zeros(0, np.int64)), ("u", np.zeros(0)), ("told", np.zeros((0, WHAT))))
+    )
+    first = np.concatenate([each.first + n for each, n in zip(parts, rows, strict=False)] or [np.zeros(0, np.int64)])
+    many = np.concatenate([each.many for each in parts] or [np.zeros(0, np.int64)])
+    bites = np.concatenate([each.bites for each in parts] or [np.zeros((0, BITE))])
+    motion = legs.motion[leg]
+    at = np.where(u == 1.0, legs.u1[leg], legs.u0[leg] + u * (legs.u1[leg] - legs.u0[leg]))
+    # Two legs of an arc share the place between them.
+    same = np.zeros(len(leg), np.bool_)
+    same[1:] = (motion[1:] == motion[:-1]) & (at[1:] == at[:-1]) & (np.abs(told[1:] - told[:-1])[:, :DEPTH].max(axis=1, initial=0.0) == 0.0)  # fmt: skip
+    keep = np.zeros(len(leg), np.bool_)
+    rest = np.flatnonzero(~same)
+    kept = np.zeros(len(rest), np.bool_)
+    stack = np.zeros((2 * len(rest) + 2, 2), np.int64)
+    thin(motion[rest], at[rest], told[rest], DEPTH, kept, stack)
+    bends = kept.copy()
+    thin(motion[rest], at[rest], told[rest], DEPTH + 2, kept, stack)
+    keep[rest] = kept
+    motion, at, told, first, many = motion[keep], at[keep], told[keep], first[keep], many[keep]
+    place = np.repeat(np.arange(len(many)), many)
+    row = np.repeat(first - (np.cumsum(many) - many), many) + np.arange(int(many.sum()))
+    start, stop, height, rise, run = bites[row].T
+    bites_of = Bites(place, start, stop, height, rise, run)
+    return Engaged(motion, at, told[:, DEPTH], told[:, ENGAGED], bends[kept], bites_of)

@@ -1,0 +1,47 @@
+"""The shapes that the engine works with: tools as rows of numbers, the stock before the first cut."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from camcomp.ground.datatypes import Floats
+from camcomp.model.stock.field import BOX
+from camcomp.model.stock.measure import EDGE
+from camcomp.model.stock.sweeps import BALL, BULL, DRILL, FLAT
+
+KINDS = {"flat": FLAT, "ball": BALL, "bull": BULL, "drill": DRILL}
+SLIMMER = 1e-7  # mm
+POINT_DEG = 118.0  # of a drill
+
+
+@dataclass(frozen=True)
+class ToolShape:
+    """A tool; flute_mm: length of its cutting edges, None: not known."""
+
+    kind: str
+    diameter_mm: float
+    corner_mm: float = 0.0
+    point_deg: float = POINT_DEG
+    flute_mm: float | None = None
+
+    def rows(self) -> list[list[float]]:
+        """The tool, and the same slimmer by EDGE, in columns of sweeps.py."""
+        radius = 0.5 * self.diameter_mm
+        corner = radius if self.kind == "ball" else self.corner_mm if self.kind == "bull" else 0.0
+        cone = float(np.tan(np.radians(0.5 * self.point_deg)))
+        less = min(EDGE + SLIMMER, 0.5 * radius)
+        slim = [radius - less, KINDS[self.kind], corner - less if self.kind == "ball" else corner, cone]
+        lift = less if self.kind == "ball" else 0.0
+        return [[radius, KINDS[self.kind], corner, cone, 0.0], [*slim, lift]]
+
+
+@dataclass(frozen=True, eq=False)
+class StockShape:
+    """What the tool begins with, program frame. low, high (3,) mm; mesh (f, 3, 3): triangles of a stock from a file."""
+
+    low: Floats
+    high: Floats
+    form: int = BOX
+    mesh: Floats | None = None

@@ -1,0 +1,61 @@
+"""Where a stock and what the machine file says beside it do not go together."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from camcomp.ground import path_geometry
+from camcomp.ground.datatypes import Bools, Floats, Ints, Path
+from camcomp.model.config.spec import Config
+from camcomp.model.cutting.engaged import Engaged
+
+MOST_LINES = 10
+SHARE, HAIR_MM = 0.01, 0.005  # by which a stated depth or width may be off
+
+
+Remarks = dict[str, Ints]  # what is wrong, and the source lines, ascending
+
+
+def stock_remarks(config: Config, path: Path, engaged: Engaged | None) -> Remarks:
+    """What to say of a path whose engagement is known; nothing where no stock is."""
+    if engaged is None:
+        return {}
+    on = np.flatnonzero(engaged.turn > 0.0)
+    motion, depth = engaged.motion[on], engaged.depth[on]
+    process, top = config.process, config.workpiece.stock_top_mm
+    off: dict[str, Bools] = {}
+    if process.depth_mm is not None:
+        off["process: depth_mm contradicts the stock, which counts instead,"] = _off(depth, process.depth_mm)
+    if process.width_mm is not None:
+        wide = _widths(config, path, engaged, on)
+        off["process: width_mm contradicts the stock, which counts instead,"] = _off(wide, process.width_mm)
+    if top is not None:
+        height = path_geometry.points(path, motion, engaged.u[on])[:, 2]
+        off["workpiece: stock_top_mm contradicts the stock, which counts instead,"] = _off(depth, top - height)
+    flutes = {number: each.flute_length_mm for number, each in config.tools.items()}
+    length = np.array([flutes.get(int(t), config.tool.flute_length_mm) or np.inf for t in path.tool[motion]])
+    off["material is left above the flutes of the tool"] = depth > length + HAIR_MM
+    return {text: np.unique(path.line[motion[rows]]) for text, rows in off.items() if rows.any()}
+
+
+def stock_warnings(remarks: Remarks) -> list[str]:
+    """The remarks as warnings."""
+    return [f"{text} at source lines {_named(lines)}" for text, lines in remarks.items()]
+
+
+def _widths(config: Config, path: Path, engaged: Engaged, on: Ints) -> Floats:
+    """Extent of the cut across the feed, mm."""
+    diameters = {number: each.diameter_mm for number, each in config.tools.items()}
+    own = config.tool.diameter_mm
+    diameter = np.array([diameters.get(int(t), own) or np.nan for t in path.tool[engaged.motion[on]]])
+    out: Floats = engaged.bites.of(on).reach(len(on)) * 0.5 * diameter
+    return out
+
+
+def _off(found: Floats, stated: Floats | float) -> Bools:
+    out: Bools = np.abs(found - stated) > SHARE * np.abs(stated) + HAIR_MM
+    return out
+
+
+def _named(lines: Ints) -> str:
+    return ", ".join(str(line) for line in lines[:MOST_LINES]) + (" ..." if len(lines) > MOST_LINES else "")

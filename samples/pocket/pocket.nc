@@ -1,0 +1,71 @@
+%
+(square pocket of 44 mm, three depths from the inside to the outside, and a finishing lap)
+(program origin: middle of the pocket, on top of the block; tool T1, flat, 10 mm)
+N10 G21 G90 G17 G94
+N20 T1 M6
+N30 S8000 M3
+N40 G0 X0 Y0 Z5
+(first depth)
+N100 G1 Z-2 F200
+N110 G1 X6 Y-6 F600
+N120 Y6
+N130 X-6
+N140 Y-6
+N150 X11.5
+N160 Y11.5
+N170 X-11.5
+N180 Y-11.5
+N190 X16.8
+N200 Y16.8
+N210 X-16.8
+N220 Y-16.8
+N230 X16.8
+N240 G0 Z5
+N250 G0 X0 Y0
+(second depth)
+N300 G1 Z-4 F200
+N310 G1 X6 Y-6 F600
+N320 Y6
+N330 X-6
+N340 Y-6
+N350 X11.5
+N360 Y11.5
+N370 X-11.5
+N380 Y-11.5
+N390 X16.8
+N400 Y16.8
+N410 X-16.8
+N420 Y-16.8
+N430 X16.8
+N440 G0 Z5
+N450 G0 X0 Y0
+(third depth)
+N500 G1 Z-6 F200
+N510 G1 X6 Y-6 F600
+N520 Y6
+N530 X-6
+N540 Y-6
+N550 X11.5
+N560 Y11.5
+N570 X-11.5
+N580 Y-11.5
+N590 X16.8
+N600 Y16.8
+N610 X-16.8
+N620 Y-16.8
+N630 X16.8
+(finishing lap, and once more round as a spring pass)
+N700 G1 X17 Y-17 F400
+N710 Y17
+N720 X-17
+N730 Y-17
+N740 X17
+N750 Y17
+N760 X-17
+N770 Y-17
+N780 X17
+N790 G1 X0 Y0
+N800 G0 Z5
+N810 M5
+N820 M30
+%
