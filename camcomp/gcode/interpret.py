@@ -57,6 +57,7 @@ def read_program(data: bytes, *, name: str, setup: Setup | None = None, dialect:
         setup=setup,
         language=language,
         feed_point=points_in_feeds(text.line(row) for row in range(len(text))),
+        modes=tuple(reader.record.modes),
         straight=reader.straight and not reader.record.cycles,
     )
 

@@ -21,9 +21,12 @@ class Output:
     angle: Floats  # (N,) rad, signed, for arcs; the axis is that of the motion
     feed: Floats  # (N,) mm/min; NaN: as programmed
     joining: Bools  # (N,) a line added between two motions, before or after the motion's own rows
+    rest: Bools | None = None  # (N,) ends at rest, whatever the path mode of the program says; None: none does
 
     def __post_init__(self) -> None:
         n = len(self.motion)
+        if self.rest is None:
+            object.__setattr__(self, "rest", np.zeros(n, np.bool_))
         for name, dtype, row in (
             ("motion", np.int64, ()),
             ("kind", np.int8, ()),
@@ -32,6 +35,7 @@ class Output:
             ("angle", np.float64, ()),
             ("feed", np.float64, ()),
             ("joining", np.bool_, ()),
+            ("rest", np.bool_, ()),
         ):
             array = frozen(getattr(self, name), dtype)
             if array.shape != (n, *row):
@@ -109,4 +113,5 @@ class Rewritten:
     end: Floats  # (N, 3) mm, program frame: where the words, rounded as they are, lead
     line: Ints  # (N,) line of the output, from 1
     centre: Floats  # (N, 3) mm, of rows that came out as arcs, as rounded; else NaN
+    feed: Floats  # (N,) mm/min in force, NaN for rapids
     behind: Standing | None = None  # of a part

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camcomp.gcode.dialect import Dialect
+from camcomp.gcode.path_mode import PathMode
 from camcomp.gcode.setup import Setup, Triple
 from camcomp.gcode.text import Text
 from camcomp.ground.datatypes import Bools, Floats, Ints, Path
@@ -67,6 +68,7 @@ class Program:
     setup: Setup
     language: Dialect
     feed_point: bool  # feeds are written with a point; some controls read whole numbers in smaller units
+    modes: tuple[PathMode, ...]  # (n,) whether the control stops behind each motion, and how far it may leave the path
     straight: bool  # no loops, subprograms, parameters, cycles: a line means at most one motion, as it stands
 
     def step_mm(self, resolution_mm: float) -> float:

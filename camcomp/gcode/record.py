@@ -8,6 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from camcomp.gcode.arcs import PLANES
+from camcomp.gcode.path_mode import PathMode
 from camcomp.gcode.program import LETTERS, Sites
 from camcomp.gcode.state import ControlState
 from camcomp.gcode.text import Text
@@ -40,6 +41,7 @@ class Recorder:
         self.modes_changed = False
         self.stops = False
         self._fixed: list[int] = []
+        self.modes: list[PathMode] = []  # by motion
         self.cycles: dict[int, tuple[list[tuple[str, list[float]]], bool]] = {}  # by first motion
 
     def __len__(self) -> int:
@@ -123,6 +125,7 @@ class Recorder:
             self._spans.extend((base + word.begin, base + word.end) if word else (-1, -1))
         g = block.groups.get(1)
         self._spans.extend((base + g[1].begin, base + g[1].end) if g else (-1, -1))
+        self.modes.append(state.path_mode)
         self._count += 1
         if code >= 0:
             self.code_stated = self.feed_stated = False

@@ -35,18 +35,26 @@ def rewrite(
         writer = Writer(program, out, resolution_mm)
         behind = writer.run_part(part)
         data = program.text.encode(writer.edits.apply(program.text.string))
-        return Rewritten(data=data, end=writer.ends, line=writer.lines + 1, centre=writer.centres, behind=behind)
+        return Rewritten(
+            data=data, end=writer.ends, line=writer.lines + 1, centre=writer.centres, feed=writer.feeds, behind=behind
+        )
     stamp = stamp_line(program.data, version, *program.language.comment, model)
     if out.repeats(program.path, resolution_mm):
         data = _stamped(program.text, Edits(), stamp)
         line = program.path.line[out.motion] + 1
-        return Rewritten(data=data, end=program.path.end[out.motion], line=line, centre=program.path.centre[out.motion])
+        return Rewritten(
+            data=data,
+            end=program.path.end[out.motion],
+            line=line,
+            centre=program.path.centre[out.motion],
+            feed=program.path.feed[out.motion],
+        )
     if not program.straight:
         program = flatten(program, resolution_mm)
     writer = Writer(program, out, resolution_mm)
     writer.run()
     data = _stamped(program.text, writer.edits, stamp)
-    return Rewritten(data=data, end=writer.ends, line=writer.lines + 2, centre=writer.centres)
+    return Rewritten(data=data, end=writer.ends, line=writer.lines + 2, centre=writer.centres, feed=writer.feeds)
 
 
 def _stamped(text: Text, edits: Edits, stamp: str) -> bytes:
@@ -62,9 +70,11 @@ class Writer(LineEditor):
         self.out = out
         self.turns = program.language.writes_turns
         self.inserted = 0  # new lines so far
+        self.resting = False  # G61 of our own is in force
         self.ends = np.empty((len(out.motion), 3))
         self.lines = np.empty(len(out.motion), np.int64)
         self.centres = np.full((len(out.motion), 3), np.nan)
+        self.feeds = np.full(len(out.motion), np.nan)
 
     def run(self) -> None:
         """Fill `edits`, `ends` (N, 3) and `lines` (N,), which counts from 0 and without the stamp."""
@@ -132,6 +142,7 @@ class Writer(LineEditor):
     def _pass(self, first: int, last: int) -> None:
         """Keep the line as it is, and follow the control through it."""
         k = self.k
+        self._path_mode(first, behind=False)
         start, end = self.path.start[k], self.path.end[k]
         if self.sites.code[k] >= 0:
             self._code_on_line(int(self.sites.code[k]))
@@ -147,6 +158,7 @@ class Writer(LineEditor):
                     self.position[axis] = float(end[axis])
         self._append()
         self.ends[first:last] = self.position
+        self.feeds[first:last] = self.path.feed[k]
         self.lines[first:last] = self.row + self.inserted
 
     # --- one row -----------------------------------------------------------------------------------------------
@@ -161,6 +173,7 @@ class Writer(LineEditor):
             moves = plan(self.position, moves[0], end, plane, self.step, self.unit, self.turns)
             if moves[-1].kind == ARC:
                 self.centres[row] = self._centre_said(moves[0])
+        self._path_mode(row, behind=new and after)
         at_line = 0
         if not new and self.sites.stops[self.k]:
             at_line = len(moves) - 1
@@ -172,6 +185,34 @@ class Writer(LineEditor):
             else:
                 self._line(each, row, before=number < at_line)
         self.ends[row] = self.position
+        self.feeds[row] = self._feed_held(row)
+
+    def _path_mode(self, row: int, behind: bool) -> None:
+        """G61 in front of a row that has to end at rest, the program's own mode again in front of the next that has not.
+
+        behind: the row stands on a line of its own behind that of the motion.
+        """
+        assert self.out.rest is not None
+        if bool(self.out.rest[row]) == self.resting:
+            return
+        self.resting = not self.resting
+        string = self._cased("G61" if self.resting else self.program.modes[self.k].said(self.unit))
+        eol = self.text.end_of_line(self.row)
+        if behind:
+            self.edits.insert(int(self.text.ends[self.row]), eol + string)
+        else:
+            self.edits.insert(int(self.text.starts[self.row]), string + eol)
+        self.inserted += 1
+
+    def _feed_held(self, row: int) -> float:
+        """Feed in force behind a row, mm/min; NaN for rapids."""
+        if self.out.kind[row] == RAPID:
+            return math.nan
+        mode, value = self.feed or (93, 0.0)
+        if mode == 93:
+            wanted = float(self.out.feed[row])
+            return float(self.path.feed[self.k]) if math.isnan(wanted) else wanted
+        return value * float(self.path.speed[self.k]) if mode == 95 else value
 
     def _landing(self, point: Point, new: bool) -> Point:
         """Where the control goes for `point`: to the rounded words, or where no word has to change, as it was."""

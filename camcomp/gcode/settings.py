@@ -2,6 +2,7 @@
 
 from camcomp.gcode.block import Block, BlockReader
 from camcomp.gcode.codes import code_name
+from camcomp.gcode.path_mode import path_mode
 from camcomp.gcode.program import Rebase
 from camcomp.gcode.spelling import RS274
 from camcomp.gcode.words import Word
@@ -46,6 +47,9 @@ class Settings(BlockReader):
             state.relative = groups[3][0] == 910
         if 4 in groups:
             state.centre_absolute = groups[4][0] == 901
+        if 13 in groups:
+            p, q = (words[each].value * state.unit if each in words else None for each in "PQ")
+            state.path_mode = path_mode(groups[13][0], p, q)
         if 10 in groups:
             state.retract_to_start = groups[10][0] == 980
         state.update()

@@ -3,7 +3,10 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from camcomp.gcode.path_mode import PathMode
+
 Triple = tuple[float, float, float]
+ASSUMED = PathMode(stated=False)
 ZERO: Triple = (0.0, 0.0, 0.0)
 
 
@@ -19,4 +22,5 @@ class Setup:
     tool: int = 0  # in the spindle
     increment_mm: float | None = None  # what a number without a point counts, on a control that has it so
     table_axes: frozenset[str] = frozenset()  # A, B, C that turn the workpiece and only position it
+    path_mode: PathMode = ASSUMED  # until the program says one
     skip_deleted: bool = False  # the block delete switch: lines that start with `/` are not executed

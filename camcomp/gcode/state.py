@@ -43,6 +43,7 @@ class ControlState:
         self.centre_absolute = False
         self.feed_mode = 94
         self.unit = 1.0  # mm per programmed unit
+        self.path_mode = setup.path_mode
         self.retract_to_start = dialect.retract_to_start  # G98
         self.feed: float | None = None  # G94: mm/min, G93: 1/min, G95: mm/rev
         self.speed = 0.0

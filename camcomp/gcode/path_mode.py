@@ -1,0 +1,48 @@
+"""G61, G61.1, G64: whether a control stops at the ends of moves, and how far it may leave the path when it does not."""
+
+import re
+from dataclasses import dataclass
+from functools import cached_property
+
+NUMBER = r"\d+(?:\.\d*)?|\.\d+"
+PATTERN = rf"^G(61|61\.1|64)( P({NUMBER}))?( Q({NUMBER}))?$"
+
+
+@dataclass(frozen=True)
+class PathMode:
+    """A mode of the modal group 13, lengths in mm."""
+
+    exact: bool = False  # G61, G61.1: every move ends at rest
+    tolerance_mm: float = 0.0  # P of G64: how far a corner may be cut; 0: as far as the speed asks for
+    merge_mm: float = 0.0  # Q of G64, else P: lines that are straight within it become one; 0: never
+    code: int = 640
+    stated: bool = True  # False: nobody said so, it is what a control does when it is switched on
+
+    @cached_property
+    def name(self) -> str:
+        """As a program says it, in mm."""
+        return self.said(1.0)
+
+    def said(self, unit: float) -> str:
+        """As a program says it, in units of so many mm."""
+        if self.exact:
+            return "G61.1" if self.code == 611 else "G61"
+        words = [f"P{self.tolerance_mm / unit:g}"] if self.tolerance_mm or self.merge_mm else []
+        words += [f"Q{self.merge_mm / unit:g}"] if self.merge_mm != self.tolerance_mm else []
+        return " ".join(["G64", *words])
+
+
+def path_mode(code: int, tolerance: float | None, merge: float | None) -> PathMode:
+    """The mode of a code in tenths with its P and Q in mm; None: not given."""
+    if code != 640:
+        return PathMode(exact=True, code=code)
+    allowed = tolerance or 0.0
+    return PathMode(tolerance_mm=allowed, merge_mm=allowed if merge is None else merge)
+
+
+def stated_mode(text: str) -> PathMode:
+    """The mode that a text of PATTERN names, lengths in mm."""
+    found = re.match(PATTERN, text)
+    assert found is not None
+    code, p, q = found[1], found[3], found[5]
+    return path_mode(round(10 * float(code)), float(p) if p else None, float(q) if q else None)

@@ -1,0 +1,200 @@
+"""How a control takes the corner between two segments, compiled: at rest, straight on, by an arc, or overlapping in time.
+
+The rules are those of the planner of LinuxCNC 2.9, which goes the way that lets it be fastest: straight on where the jump of
+direction is a small acceleration within one cycle; else by an arc that touches both segments; else the next segment
+starts while the one before still slows down.
+"""
+
+# mypy: disallow-untyped-defs=False, disallow-incomplete-defs=False
+# numba infers the types of these functions; written by hand they would only be repeated.
+
+import numpy as np
+
+from camcomp.model.statics.compiled import entry, inner
+
+REST, ON, ROUND, OVERLAP = 0, 1, 2, 3
+NORMAL = 0.5 * np.sqrt(3.0)  # of the acceleration may go into turning; the other half is kept for speeding up
+KINK = 0.1  # of the acceleration that a jump of direction may be
+BACK = (2.0 * np.pi / 180.0) ** 2  # square of the angle to a turn on the spot that counts as one
+OPEN = 0.25  # of a segment's length that a corner may be cut by when no tolerance is given
+CYCLES = 1.02  # that a segment takes at least
+PARALLEL = 1e-12  # square of the angle between planes that are the same
+LATE = 0.7  # cycles that an overlap is longer than its speed says, as measured: it begins and ends with a cycle
+ANGLE, LENGTH = 1e-6, 1e-6  # rad, mm: no arc is smaller
+
+
+@inner
+def pace(acceleration, fast, radius):
+    """What of an acceleration is left along the way when the segment is an arc, radius 0 for lines, mm/s²."""
+    if radius > 0.0:
+        turning = min(fast * fast / radius / acceleration, NORMAL)
+        acceleration *= np.sqrt(1.0 - turning * turning)
+    return acceleration
+
+
+@inner
+def overlap_speed(part, acceleration, next_acceleration, tolerance, sine, cosine, length, ahead, fast, fast_ahead):
+    """Speed at which one segment begins to give way to the next, mm/s, and how fast that is through the corner.
+
+    part: of both lengths that is left; half of it while corners behind them may still take the other half.
+    """
+    reach = min(np.sqrt(acceleration * part * length), fast)
+    reach_ahead = min(np.sqrt(next_acceleration * part * ahead), fast_ahead)
+    longest = min(length / reach, ahead / reach_ahead)
+    time = min(longest, max(reach / acceleration, reach_ahead / next_acceleration))
+    speed, next_speed = min(reach, time * acceleration), min(reach_ahead, time * next_acceleration)
+    if tolerance > 0.0 and cosine > 1e-3:
+        allowed = 2.0 * np.sqrt(acceleration * tolerance / cosine)
+        speed, next_speed = min(speed, allowed), min(next_speed, allowed)
+    return speed, 0.5 * sine * (speed + next_speed)
+
+
+@inner
+def overlap_gap(time, acceleration, next_acceleration, cosine):
+    """How near the sum of a motion that slows down to rest within `time` and of one that begins comes to the corner, mm."""
+    straight = 2.0 * cosine * cosine - 1.0  # minus the cosine of the turn
+    nearest = np.inf
+    for k in range(33):
+        spent = time * k / 32.0
+        x, y = 0.5 * acceleration * (time - spent) ** 2, 0.5 * next_acceleration * spent**2
+        nearest = min(nearest, x * x + y * y + 2.0 * straight * x * y)
+    return np.sqrt(max(nearest, 0.0))
+
+
+@entry
+def corners(leave, arrive, axis, radius, angle, nominal, fast, acceleration, rapid, exact, stop, tolerance, limit, cycle,
+            way, speed, reach, bend, around, centre, end):  # fmt: skip
+    """Fills way, speed, reach, bend, around (m,), centre (m, 3) of the corners behind segments (m,); the last is at rest.
+
+    leave, arrive (m, 3): unit directions at the start and at the end. axis (m, 3), radius, angle (m,): of arcs, radius 0 for
+    lines. nominal (m,) mm lengths, fast (m,) mm/s, acceleration (m,) along it mm/s². rapid, exact (path is kept), stop
+    (m,): rest behind it. tolerance (m,) mm, 0: open. limit: acceleration of an axis, mm/s². cycle: s.
+    end (m, 3) mm: corners. way: REST, ON, ROUND or OVERLAP; speed: mm/s through it (OVERLAP: where it begins);
+    reach: mm of both segments that an arc takes; bend, around: its radius and length, mm.
+    """
+    m = nominal.shape[0]
+    left = nominal[0]
+    for i in range(m):
+        way[i], speed[i], reach[i], bend[i], around[i] = REST, 0.0, 0.0, 0.0, 0.0
+        if i == m - 1:
+            break
+        j = i + 1
+        u, v = arrive[i], leave[j]
+        bx, by, bz = v[0] + u[0], v[1] + u[1], v[2] + u[2]
+        if stop[i] or rapid[i] != rapid[j] or bx * bx + by * by + bz * bz < BACK:
+            left = nominal[j]
+            continue
+        slower = min(fast[i], fast[j])
+        jump = slower / cycle + acceleration[j]
+        scale = max(abs(v[0] - u[0]), abs(v[1] - u[1]), abs(v[2] - u[2])) * jump / limit
+        if radius[i] > 0.0 or radius[j] > 0.0:
+            scale *= 2.0
+        if scale < KINK:
+            way[i], speed[i] = ON, slower
+            left = nominal[j]
+            continue
+        if exact[i]:
+            left = nominal[j]
+            continue
+        straight = slower * KINK / scale
+        # half the angle between the segments
+        half = 0.5 * np.arccos(min(max(-(u[0] * v[0] + u[1] * v[1] + u[2] * v[2]), -1.0), 1.0))
+        sine, cosine = np.sin(half), np.cos(half)
+        turn = np.pi - 2.0 * half
+        first = tolerance[i] if tolerance[i] > 0.0 else OPEN * nominal[i]
+        second = tolerance[j] if tolerance[j] > 0.0 else OPEN * nominal[j]
+        allowed = min(first, second, OPEN * nominal[i], OPEN * nominal[j])
+        half_pace = 0.5 * pace(acceleration[i], fast[i], radius[i])
+        next_half_pace = 0.5 * pace(acceleration[j], fast[j], radius[j])
+        _, overlap = overlap_speed(
+            0.5, half_pace, next_half_pace, tolerance[i], sine, cosine, left, nominal[j], fast[i], fast[j]
+        )
+        arc = 0.0
+        size = distance = 0.0
+        if ANGLE < half < 0.5 * np.pi - ANGLE:
+            nx, ny, nz = u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]
+            norm = np.sqrt(nx * nx + ny * ny + nz * nz)
+            nx, ny, nz = nx / norm, ny / norm, nz / norm
+            flat = True
+            for k in (i, j):
+                if radius[k] > 0.0:
+                    along = abs(nx * axis[k, 0] + ny * axis[k, 1] + nz * axis[k, 2])
+                    flat = flat and 2.0 - 2.0 * along < PARALLEL
+            inner_length = (
+                min(left, 0.5 * nominal[i]) if radius[i] == 0.0 else min(2.0 / 3.0 * angle[i], half) * radius[i]
+            )
+            outer_length = 0.5 * nominal[j] if radius[j] == 0.0 else min(angle[j] / 3.0, half) * radius[j]
+            if flat and sine < 1.0:
+                plane = limit / np.sqrt(1.0 - min(nx * nx, ny * ny, nz * nz))
+                normal = NORMAL * plane
+                room = min(inner_length, outer_length, cosine * allowed / (1.0 - sine))
+                widest = sine / cosine * room
+                fastest = min(np.sqrt(normal * widest), max(fast[i], fast[j]))
+                time = min(np.sqrt(plane * room), fastest) / (0.5 * plane)
+                size = max(fastest * fastest / normal, min(time * fastest / turn, widest))
+                distance = size * cosine / sine
+                length = size * turn
+                if length > LENGTH:
+                    rest = left - distance
+                    if radius[i] == 0.0 and rest < 4.0 * cycle * fastest:
+                        length += max(rest, 0.0)
+                    arc = min(fastest, length / (CYCLES * cycle))
+        if arc > straight and arc > 0.5 * overlap:
+            way[i], speed[i], reach[i], bend[i], around[i] = ROUND, arc, distance, size, size * turn
+            wx, wy, wz = v[0] - u[0], v[1] - u[1], v[2] - u[2]
+            norm = np.sqrt(wx * wx + wy * wy + wz * wz)
+            out = size / sine / norm
+            centre[i, 0], centre[i, 1], centre[i, 2] = end[i, 0] + out * wx, end[i, 1] + out * wy, end[i, 2] + out * wz
+            left = nominal[j] - distance
+        elif 0.5 * overlap > straight:
+            begin, _ = overlap_speed(
+                1.0, half_pace, next_half_pace, tolerance[i], sine, cosine, left, nominal[j], fast[i], fast[j]
+            )
+            way[i], speed[i] = OVERLAP, begin
+            # an arc that passes the corner as far away as the sum of the two motions does
+            time = begin / half_pace + (LATE * cycle if begin < fast[i] else 0.0)
+            gap = overlap_gap(time, half_pace, next_half_pace, cosine)
+            distance = gap * cosine / (1.0 - sine) if sine < 1.0 else 0.0
+            reach[i], bend[i] = distance, distance * sine / cosine if cosine > 0.0 else 0.0
+            wx, wy, wz = v[0] - u[0], v[1] - u[1], v[2] - u[2]
+            norm = max(np.sqrt(wx * wx + wy * wy + wz * wz), 1e-300)
+            out = bend[i] / sine / norm
+            centre[i, 0], centre[i, 1], centre[i, 2] = end[i, 0] + out * wx, end[i, 1] + out * wy, end[i, 2] + out * wz
+            left = nominal[j]
+        else:
+            way[i], speed[i] = ON, straight
+            left = nominal[j]
+
+
+@entry
+def nearest(points, segment, start, end, arc, way, reach, bend, centre, out):
+    """Fills out (k, 3) mm: from points (k, 3) mm on segments (k,) to the nearest places where the control goes.
+
+    start, end (m, 3) mm, arc (m,), way, reach, bend (m,) and centre (m, 3) of the corners behind the segments (m,). The points of
+    an arc are on it, those of a line may lie beside it.
+    """
+    for k in range(points.shape[0]):
+        s = segment[k]
+        x, y, z = points[k, 0], points[k, 1], points[k, 2]
+        if not arc[s]:
+            mx, my, mz = end[s, 0] - start[s, 0], end[s, 1] - start[s, 1], end[s, 2] - start[s, 2]
+            square = mx * mx + my * my + mz * mz
+            t = (
+                ((x - start[s, 0]) * mx + (y - start[s, 1]) * my + (z - start[s, 2]) * mz) / square
+                if square > 0.0
+                else 0.0
+            )
+            t = min(max(t, 0.0), 1.0)
+            x, y, z = start[s, 0] + t * mx, start[s, 1] + t * my, start[s, 2] + t * mz
+        fx, fy, fz = x, y, z
+        for side in range(2):
+            c = s - 1 + side
+            if c < 0 or (way[c] != ROUND and way[c] != OVERLAP):
+                continue
+            dx, dy, dz = fx - end[c, 0], fy - end[c, 1], fz - end[c, 2]
+            if dx * dx + dy * dy + dz * dz > reach[c] * reach[c]:
+                continue
+            bx, by, bz = fx - centre[c, 0], fy - centre[c, 1], fz - centre[c, 2]
+            share = bend[c] / max(np.sqrt(bx * bx + by * by + bz * bz), 1e-300)
+            x, y, z = centre[c, 0] + share * bx, centre[c, 1] + share * by, centre[c, 2] + share * bz
+        out[k, 0], out[k, 1], out[k, 2] = x - points[k, 0], y - points[k, 1], z - points[k, 2]

@@ -1,0 +1,88 @@
+"""What a control is asked to do, and what it keeps to."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from camcomp.gcode.path_mode import PathMode
+from camcomp.ground.datatypes import Bools, Floats, Ints, Path
+
+
+@dataclass(frozen=True)
+class ControlLimits:
+    """What a control keeps to."""
+
+    acceleration: float  # mm/s², of every axis
+    velocity: float  # mm/s, of every axis; infinite when it is not stated
+    cycle_s: float  # no segment takes less
+    look_ahead: int  # segments
+
+
+@dataclass(frozen=True, eq=False)
+class ToolMoves:
+    """Moves (n,) of the tip as a control reads them; program frame."""
+
+    kind: Ints
+    start: Floats  # (n, 3) mm
+    end: Floats  # (n, 3) mm
+    centre: Floats  # (n, 3) mm, of arcs
+    axis: Floats  # (n, 3)
+    angle: Floats  # (n,) rad
+    feed: Floats  # (n,) mm/min, NaN for rapids
+    exact: Bools  # G61, G61.1
+    stop: Bools  # at rest behind the move, whatever its direction: G61.1, moves in machine coordinates
+    tolerance: Floats  # (n,) mm
+    merge: Floats  # (n,) mm
+
+    def __len__(self) -> int:
+        return len(self.kind)
+
+    def take(self, rows: np.ndarray | slice) -> ToolMoves:
+        """Some of them."""
+        return ToolMoves(**{each.name: getattr(self, each.name)[rows] for each in fields(self)})
+
+    @classmethod
+    def joined(cls, parts: Sequence[ToolMoves]) -> ToolMoves:
+        """One behind the other."""
+        return cls(**{each.name: np.concatenate([getattr(part, each.name) for part in parts]) for each in fields(cls)})
+
+    def path(self) -> Path:
+        """The same as a path, for its geometry."""
+        n = len(self)
+        return Path(
+            line=np.ones(n, np.int64), kind=self.kind.astype(np.int8), start=self.start, end=self.end, centre=self.centre,
+            axis=self.axis, angle=self.angle, feed=self.feed, speed=np.zeros(n), turn=np.zeros(n),
+            tool=np.zeros(n, np.int64), known=np.ones(n, np.bool_), machine=self.stop,
+        )  # fmt: skip
+
+
+def moves_of(path: Path, modes: Sequence[PathMode], feed: Floats | None = None) -> ToolMoves:
+    """The motions of a path, each in its mode; feed (n,) mm/min where it is not that of the path."""
+    exact, stop, tolerance, merged = mode_columns(modes)
+    return ToolMoves(
+        path.kind.astype(np.int64), path.start, path.end, path.centre, path.axis, path.angle,
+        path.feed if feed is None else feed, exact, stop | path.machine, tolerance, merged,
+    )  # fmt: skip
+
+
+def line_moves(kind: np.ndarray, start: Floats, end: Floats, feed: Floats, mode: PathMode) -> ToolMoves:
+    """Rapids and straight cuts (n,) in one mode; feed (n,) mm/min."""
+    n = len(kind)
+    none = np.zeros((n, 3))
+    return ToolMoves(
+        kind.astype(np.int64), start, end, none, none, none[:, 0], feed, np.full(n, mode.exact), np.full(n, mode.code == 611),
+        np.full(n, mode.tolerance_mm), np.full(n, mode.merge_mm),
+    )  # fmt: skip
+
+
+def mode_columns(modes: Sequence[PathMode]) -> tuple[Bools, Bools, Floats, Floats]:
+    """exact, stop, tolerance and merge (n,) of ToolMoves."""
+    known = list(dict.fromkeys(modes))
+    at = {each: i for i, each in enumerate(known)}
+    which = np.fromiter((at[each] for each in modes), np.int64, len(modes))
+    table = [(each.exact, each.code == 611, each.tolerance_mm, each.merge_mm) for each in known]
+    columns = np.array(table, float).reshape(-1, 4)[which]
+    return columns[:, 0] > 0.0, columns[:, 1] > 0.0, columns[:, 2].copy(), columns[:, 3].copy()

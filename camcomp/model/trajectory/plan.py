@@ -1,0 +1,101 @@
+"""What a control does with the moves of a program: the way it takes and the time it needs.
+
+The model is that of a planner that reads some segments ahead and keeps to the acceleration of every axis: lines are merged
+(merging.py), corners taken (corners.py), speeds laid along them (speeds.py).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from camcomp.ground import path_geometry
+from camcomp.ground.datatypes import ARC, LINE, RAPID, Bools, Floats, Ints
+from camcomp.model.trajectory.corners import CYCLES, NORMAL, corners, nearest
+from camcomp.model.trajectory.merging import merge, straight
+from camcomp.model.trajectory.moves import ControlLimits, ToolMoves
+from camcomp.model.trajectory.speeds import durations, pieces
+
+RAPID_MM_PER_S = 10_000.0 / 60.0  # where no velocity is stated
+SHORTEST = 1e-9  # mm; a move to where the tip is takes no time
+
+
+@dataclass(frozen=True, eq=False)
+class ControlPlan:
+    """The way and the time of moves (n,) as m segments; corners are those behind the segments."""
+
+    moves: ToolMoves
+    group: Ints  # (n,) segment of every move
+    start: Floats  # (m, 3) mm
+    end: Floats  # (m, 3) mm
+    arc: Bools  # (m,)
+    way: Ints  # (m,) of the corner: REST, ON, ROUND, OVERLAP
+    reach: Floats  # (m,) mm of either segment that the corner takes
+    bend: Floats  # (m,) mm, radius of its arc
+    centre: Floats  # (m, 3) mm
+    time: Floats  # (m,) s
+    passes: Floats  # (m,) mm/s where the straight part of a segment begins
+
+    @property
+    def duration_s(self) -> float:
+        """Of all moves."""
+        return float(self.time.sum())
+
+    def leaves_by(self, move: Ints, points: Floats) -> Floats:
+        """From points (k, 3) mm on moves (k,) to the nearest ones on the control's way, (k, 3) mm."""
+        out = np.zeros((len(move), 3))
+        if len(self.time):
+            nearest(np.ascontiguousarray(points), self.group[move], self.start, self.end, self.arc, self.way, self.reach,
+                    self.bend, self.centre, out)  # fmt: skip
+        return out
+
+
+def plan_of(moves: ToolMoves, limits: ControlLimits, arrives: float = 0.0) -> ControlPlan:
+    """What the control makes of moves (n,) that end at rest. arrives: mm/s at the start of the first one."""
+    n = len(moves)
+    size, way_of, most = np.empty(n), np.empty((n, 3)), np.empty(n)
+    straight(moves.start, moves.end, size, way_of, most)
+    bent = np.flatnonzero(moves.kind == ARC)
+    size[bent] = path_geometry.lengths(moves.take(bent).path())
+    group, first, last = (np.zeros(n, np.int64) for _ in range(3))
+    joins = (moves.kind == LINE) & ~moves.exact
+    m = merge(moves.start, moves.end, size > SHORTEST, joins, moves.feed, moves.merge, group, first, last)
+    first, last = first[:m], last[:m]
+    start, end = moves.start[first], moves.end[last]
+    kind, feed = moves.kind[last], moves.feed[last]
+    nominal, leave, most = np.empty(m), np.empty((m, 3)), np.empty(m)
+    straight(start, end, nominal, leave, most)
+    arrive, axis, radius, angle = leave, leave, np.zeros(m), np.zeros(m)
+    arc = kind == ARC
+    if len(bent):
+        at = np.flatnonzero(arc)
+        path = moves.take(last[at]).path()
+        every, zeros = np.arange(len(at)), np.zeros(len(at))
+        arrive, axis = leave.copy(), np.zeros((m, 3))
+        leave[at], arrive[at] = (path_geometry.tangents(path, every, zeros + u) for u in (0.0, 1.0))
+        nominal[at], most[at], axis[at], angle[at] = path_geometry.lengths(path), 1.0, path.axis, np.abs(path.angle)
+        radius[at] = np.linalg.norm(path.start - path.centre, axis=1)
+    acceleration = limits.acceleration * most
+    fast = _speeds(kind, feed, nominal, radius, most, limits)
+    way, centre = np.zeros(m, np.int64), np.zeros((m, 3))
+    speed, reach, bend, around, time = np.zeros((5, m))
+    length, slope, fastest, passes = np.empty((4, 2 * m))
+    if m:
+        corners(leave, arrive, axis, radius, angle, nominal, fast, acceleration, kind == RAPID, moves.exact[last], moves.stop[last],
+                moves.tolerance[last],
+                limits.acceleration, limits.cycle_s, way, speed, reach, bend, around, centre, end)  # fmt: skip
+        pieces(nominal, fast, acceleration, radius, way, speed, reach, bend, around, length, slope, fastest)
+        durations(length, slope, fastest, way, speed, limits.cycle_s, limits.look_ahead, arrives, passes, time)
+    return ControlPlan(moves, group, start, end, arc, way, reach, bend, centre, time, passes[::2])
+
+
+def _speeds(kind: Ints, feed: Floats, nominal: Floats, radius: Floats, most: Floats, limits: ControlLimits) -> Floats:
+    """Largest speeds (m,) mm/s along segments, of which one axis may be at its limit."""
+    velocity = limits.velocity * most
+    rapid = np.where(np.isinf(velocity), RAPID_MM_PER_S, velocity)
+    out = np.minimum(np.where(kind == RAPID, rapid, feed / 60.0), velocity)
+    out = np.minimum(out, nominal / (CYCLES * limits.cycle_s))
+    turning = np.sqrt(NORMAL * limits.acceleration * np.where(radius > 0.0, radius, np.inf))
+    speeds: Floats = np.minimum(np.where(out > 0.0, out, RAPID_MM_PER_S), turning)
+    return speeds

@@ -1,0 +1,102 @@
+"""How long a control takes for segments and the corners between them, compiled: as fast as acceleration lets it be."""
+
+# mypy: disallow-untyped-defs=False, disallow-incomplete-defs=False
+# numba infers the types of these functions; written by hand they would only be repeated.
+
+import numpy as np
+
+from camcomp.model.statics.compiled import entry, inner
+from camcomp.model.trajectory.corners import ON, OVERLAP, REST, ROUND, pace
+
+STOP = 2.0  # cycles that a stop takes beside slowing down and speeding up, as measured
+
+
+@inner
+def along(i, fast, acceleration, radius, way):
+    """Acceleration of segment i along its way, mm/s²: what turning and neighbours that overlap with it leave."""
+    a = pace(acceleration[i], fast[i], radius[i])
+    if way[i] == OVERLAP or (i > 0 and way[i - 1] == OVERLAP):
+        a *= 0.5
+    return a
+
+
+@inner
+def straight_part(i, nominal, way, reach):
+    """Length of segment i without the arcs that round its corners, mm."""
+    length = nominal[i]
+    if way[i] == ROUND:
+        length -= reach[i]
+    if i > 0 and way[i - 1] == ROUND:
+        length -= reach[i - 1]
+    return max(length, 0.0)
+
+
+@entry
+def pieces(nominal, fast, acceleration, radius, way, speed, reach, bend, around, length, slope, most):
+    """Fills length mm, slope mm/s² and most mm/s (2 m,) of the pieces that m segments and the corners behind them are.
+
+    Segments are even, corners odd. nominal (m,) mm, fast (m,) mm/s, acceleration (m,) mm/s² along the way, radius (m,) mm of arcs,
+    0 for lines; way, speed, reach, bend, around (m,): of the corners (corners.py).
+    """
+    for i in range(nominal.shape[0]):
+        length[2 * i] = straight_part(i, nominal, way, reach)
+        slope[2 * i] = along(i, fast, acceleration, radius, way)
+        most[2 * i] = fast[i]
+        length[2 * i + 1], slope[2 * i + 1], most[2 * i + 1] = 0.0, acceleration[i], 0.0
+        if way[i] == ON:
+            most[2 * i + 1] = speed[i]
+        elif way[i] == ROUND:
+            length[2 * i + 1], most[2 * i + 1] = around[i], speed[i]
+            slope[2 * i + 1] = pace(acceleration[i], speed[i], bend[i])
+
+
+@entry
+def durations(length, slope, most, way, speed, cycle, depth, arrives, limit, time):
+    """Fills time (m,) s of segments (m,), each with the corner behind it.
+
+    length mm, slope mm/s², most mm/s (2 m,): of pieces. way, speed (m,): of corners. cycle: s. depth: segments that the control
+    looks ahead. arrives: mm/s at the start of the first one. limit (2 m,): is filled with the speeds at the start of every piece.
+    """
+    count = length.shape[0]
+    ahead = 0.0  # what the control sees adds to the square of a speed
+    behind = count - 1
+    leaves = 0.0  # mm/s
+    for k in range(count - 1, -1, -1):
+        gain = 2.0 * slope[k] * length[k]
+        ahead += gain
+        if behind - k >= 2 * depth:
+            ahead -= 2.0 * slope[behind] * length[behind]
+            behind -= 1
+        leaves = min(leaves, most[k])
+        leaves = min(np.sqrt(min(leaves * leaves + gain, max(ahead, 0.0))), most[k])
+        limit[k] = leaves
+    now = min(arrives, limit[0])
+    for k in range(count):
+        a, way_long, fastest = slope[k], length[k], most[k]
+        limit[k] = now
+        goal = 0.0
+        if k + 1 < count:
+            goal = min(limit[k + 1], fastest)
+        spent = 0.0
+        if way_long > 0.0:
+            gain = 2.0 * a * way_long
+            if goal * goal > now * now + gain:
+                goal = np.sqrt(now * now + gain)
+            top = fastest
+            if now * now + goal * goal + gain < 2.0 * top * top:
+                top = np.sqrt(0.5 * (now * now + goal * goal + gain))
+            top = max(top, now, goal)
+            cruise = max(way_long - (2.0 * top * top - now * now - goal * goal) / (2.0 * a), 0.0)
+            spent = (2.0 * top - now - goal) / a + (cruise / top if top > 0.0 else 0.0)
+        else:
+            goal = min(goal, now)
+        i = k // 2
+        if k % 2 == 0:
+            time[i] = spent
+        else:
+            time[i] += spent
+            if way[i] == OVERLAP:
+                time[i] = max(time[i] - speed[i] / (0.5 * a), 0.0)
+            elif way[i] == REST:
+                time[i] += STOP * cycle
+        now = goal

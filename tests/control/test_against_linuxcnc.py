@@ -1,0 +1,43 @@
+"""What the model says of the control against what LinuxCNC's planner did: accuracy by the truth plant, and the time.
+
+The long version records anew: `python -m pytest -m campaign tests/control -s`.
+"""
+
+import shutil
+
+import pytest
+
+from tests.control import driven
+from tests.control.programs import LONG, SHORT
+from tests.control.record import record
+
+UM, SHARE, TIME = 0.5, 0.2, 0.05
+
+
+def near(measured, modelled):
+    return abs(modelled - measured) <= max(UM, SHARE * measured)
+
+
+@pytest.fixture(scope="module")
+def machine():
+    return driven.job()
+
+
+@pytest.mark.parametrize("name", SHORT)
+def test_accuracy_and_time_are_those_of_the_control(name, machine):
+    found = driven.account(driven.load(name), machine)
+    assert near(*found.most) and near(*found.rms), found.row()
+    assert found.time[1] == pytest.approx(found.time[0], rel=TIME), found.row()
+
+
+@pytest.mark.campaign
+@pytest.mark.skipif(shutil.which("linuxcnc") is None, reason="needs LinuxCNC")
+def test_the_same_of_every_shape_mode_and_feed(machine, tmp_path):
+    record(LONG, tmp_path)
+    wrong = []
+    for name in LONG:
+        found = driven.account(driven.load(name, tmp_path), machine)
+        print(f"{name:24s} {found.row()}")
+        good = near(*found.most) and near(*found.rms) and abs(found.time[1] / found.time[0] - 1.0) <= TIME
+        wrong += [] if good else [name]
+    assert not wrong

@@ -1,0 +1,157 @@
+"""Path modes as programs and machine files state them, and what a compensation makes of them."""
+
+import io
+import json
+
+import numpy as np
+import pytest
+
+from camcomp.compensation.long import control_account
+from camcomp.compensation.long.program import Bulk
+from camcomp.compensation.program.compensate import compensate
+from camcomp.compensation.report.tables import summary
+from camcomp.gcode.interpret import read_program
+from camcomp.ground.datatypes import ARC
+from camcomp.ground.files import shipped
+from camcomp.model.config.load import load_config
+from camcomp.model.control import program_of, setup_of
+from camcomp.model.job import Job
+from tests.commandline import camcomp
+from tests.control.programs import circle, raster, rectangle
+
+HEAD = "G21 G90 G17 G94\n"
+
+
+def job_of(name="orthoglide-1deg", **control):
+    config = load_config([shipped(f"config/{name}.yaml")])
+    return Job(config.model_copy(update={"control": config.control.model_copy(update=control)}))
+
+
+@pytest.fixture(scope="module")
+def orthoglide():
+    return job_of()
+
+
+def compensated(job, lines, mode="", **options):
+    text = "\n".join([HEAD + mode, "S8000 M3", *lines, "M2", ""])
+    program = program_of(text.encode(), "p.nc", job.config)
+    return compensate(program, job, method="newton", tolerance_um=1.0, version="1", **options)
+
+
+@pytest.mark.parametrize(
+    ("text", "names"),
+    [
+        ("G1 X1 F100\n", ["G64"]),
+        ("G61\nG1 X1 F100\nG64 P0.02\nX2\nX3\n", ["G61", "G64 P0.02", "G64 P0.02"]),
+        ("G61.1 G1 X1 F100\n", ["G61.1"]),
+        ("G64 P0.02 Q0.005 G1 X1 F100\n", ["G64 P0.02 Q0.005"]),
+        ("G64 P0.02 Q0 G1 X1 F100\n", ["G64 P0.02 Q0"]),
+        ("G64 P0.02\nG64\nG1 X1 F100\n", ["G64"]),
+        ("G20 G64 P0.001\nG1 X1 F10\n", ["G64 P0.0254"]),
+    ],
+)
+def test_modes_are_read_with_their_lengths_in_mm(text, names):
+    program = read_program((text + "M2\n").encode(), name="p.nc")
+    assert [each.name for each in program.modes] == names
+
+
+def test_a_mode_of_the_machine_file_is_in_force_until_the_program_says_another(tmp_path):
+    (tmp_path / "mode.yaml").write_text("control: {path_mode: G64 P0.05 Q0}\n")
+    (tmp_path / "p.nc").write_text(HEAD + "G0 X0 Y0 Z0\nG1 X9 F100\nG61\nG1 X0\nM2\n")
+    config = ("--config", shipped("config/cartesian.yaml"), "--config", tmp_path / "mode.yaml")
+    done = camcomp("compensate", tmp_path / "p.nc", *config, "--summary", tmp_path / "s.json")
+    figures = json.loads((tmp_path / "s.json").read_text())
+    assert figures["control_mode"] == "G64 P0.05 Q0, G61" and figures["control_mode_stated"]
+    assert set(figures["cycle_time_s"]) == {"before", "after"} and b"control in G64 P0.05 Q0, G61: " in done.stderr
+
+
+def test_what_is_no_mode_is_refused_with_its_place(tmp_path):
+    (tmp_path / "mode.yaml").write_text("control:\n  path_mode: G62\n")
+    done = camcomp("config", "show", "--config", shipped("config/cartesian.yaml"), "--config", tmp_path / "mode.yaml")
+    assert done.returncode == 2 and b"mode.yaml:2:14" in done.stderr
+
+
+@pytest.mark.parametrize("mode", ["G61", "G64 P0.01"])
+def test_arcs_come_out_as_arcs_where_the_control_is_better_off(orthoglide, mode):
+    free = compensated(orthoglide, circle(25.0, 3000), mode)
+    lines = compensated(orthoglide, circle(25.0, 3000), mode, arcs=False)
+    assert (free.rows.kind == ARC).any() and not (lines.rows.kind == ARC).any()
+    assert free.control.after_s < 1.02 * lines.control.after_s
+    assert free.control.off_joins <= 1.05 * max(lines.control.off_joins, 1e-3)
+    assert free.control.after_s < 0.5 * lines.control.after_s or free.control.off_joins < 0.9 * lines.control.off_joins
+
+
+def test_lines_stay_where_the_mode_is_only_assumed(orthoglide):
+    assumed = compensated(orthoglide, circle(25.0, 3000))
+    assert not assumed.control.stated and not (assumed.rows.kind == ARC).any()
+    assert not any("the control goes" in each for each in assumed.warnings)
+
+
+def test_lines_stay_where_the_control_leaves_them_within_the_tolerance(orthoglide):
+    free = compensated(orthoglide, circle(25.0, 3000), "G64")
+    assert free.control.stated and not (free.rows.kind == ARC).any()
+    assert free.control.off_joins <= 1e-3 and free.control.after_s < 1.03 * free.control.before_s
+
+
+def test_the_stops_of_g61_cost_what_the_lines_cost(orthoglide):
+    lines = compensated(orthoglide, circle(25.0, 3000), "G61", arcs=False).control
+    assert lines.before_s < 5.0 and lines.after_s > 10.0
+    assert np.linalg.norm(lines.error, axis=1).max() < 1e-3
+
+
+def test_where_the_control_goes_off_is_told_with_its_lines(orthoglide):
+    done = compensated(orthoglide, rectangle(3000), "G64 P0.01")
+    told = [each for each in done.warnings if "the control goes" in each]
+    assert told and all(each.startswith("in G64 P0.01 the control goes up to ") for each in told)
+    assert told[-1].endswith("source lines 6, 8, 9")  # whose divisions it makes one line again
+    exact = compensated(orthoglide, rectangle(3000), "G61")
+    assert not any("the control goes" in each for each in exact.warnings)
+
+
+@pytest.mark.parametrize("mode", ["G61", "G64", "G64 P0.01"])
+def test_long_programs_take_the_same_time_and_go_as_far_off(orthoglide, mode, monkeypatch):
+    monkeypatch.setattr(control_account, "STRETCH", 100)
+    text = "\n".join([HEAD + mode, "S8000 M3", *raster(3000, 2000), "M2", ""]).encode()
+    bulk = Bulk(orthoglide, "p.nc", setup_of(orthoglide.config), 1.0, "1")
+    mine = bulk.run(io.BytesIO(text), len).summary()
+    program = program_of(text, "p.nc", orthoglide.config)
+    whole = compensate(program, orthoglide, method="newton", tolerance_um=1.0, version="1")
+    theirs = summary(whole, orthoglide)
+    assert mine.control_mode == theirs.control_mode == mode
+    assert mine.cycle_time_s.before == pytest.approx(theirs.cycle_time_s.before, rel=1e-6)
+    assert mine.cycle_time_s.after == pytest.approx(theirs.cycle_time_s.after, rel=5e-3)
+    assert mine.under_control.max_um == pytest.approx(theirs.under_control.max_um, abs=0.1)
+    assert mine.under_control.rms_um == pytest.approx(theirs.under_control.rms_um, rel=0.02)
+
+
+def test_the_control_rests_between_cuts_and_joining_lines(orthoglide):
+    """Mode lines stand around joining lines, and the cut beside them stays within the tolerance."""
+    done = compensated(orthoglide, circle(25.0, 3000), "G64")
+    text = done.written.data.decode().splitlines()
+    assert [each for each in text if each.startswith("G6")] == ["G64", "G61", "G64", "G61", "G64"]
+    assert done.control.resting == 4 and done.control.at_joins <= 1e-3
+    assert any(each.startswith("G61 at 4 ends") for each in done.warnings)
+    read = read_program(done.written.data, name="out.nc", setup=setup_of(orthoglide.config))
+    rests = np.flatnonzero([mode.exact for mode in read.modes])
+    joins = np.flatnonzero(done.rows.joining)
+    assert rests.tolist() == sorted({*joins.tolist(), *(joins - 1).tolist()})
+
+
+@pytest.mark.parametrize("text", ["G20\nG64 P0.001\n", "G64 P0.02 Q0\n"])
+def test_behind_a_joining_line_the_program_s_own_mode_is_in_force_again(orthoglide, text):
+    k = 25.4 if "G20" in text else 1.0
+    lines = [
+        f"G0 X{20 / k:.4f} Y0 Z{5 / k:.4f}",
+        f"G1 Z0 F{400 / k:.1f}",
+        f"G1 X{-20 / k:.4f} F{900 / k:.2f}",
+        f"G1 Z{5 / k:.4f}",
+    ]
+    done = compensated(orthoglide, lines, text.strip())
+    read = read_program(done.written.data, name="out.nc", setup=setup_of(orthoglide.config))
+    own = done.program.modes[0]
+    assert {mode for mode in read.modes if not mode.exact} == {own} and any(mode.exact for mode in read.modes)
+
+
+def test_a_program_without_a_stated_mode_gets_none(orthoglide):
+    done = compensated(orthoglide, rectangle(3000))
+    assert b"G61" not in done.written.data and done.control.resting == 0
