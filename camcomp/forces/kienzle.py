@@ -2,13 +2,14 @@
 
 from typing import Literal
 
+import numpy as np
 from pydantic import Field
 
 from camcomp.ground.datatypes import Floats
 from camcomp.ground.errors import ConfigError
 from camcomp.model.config.base import Spec
-from camcomp.model.cutting.average import power_law, to_path
-from camcomp.model.cutting.conditions import axial_depth, clockwise, engagement, feed_per_tooth
+from camcomp.model.cutting.average import power_law, slanted, summed, to_path
+from camcomp.model.cutting.conditions import bites_of, clockwise, feed_per_tooth
 from camcomp.model.cutting.cut import Cut
 
 SOURCES = (
@@ -40,8 +41,10 @@ def force(cut: Cut, params: Params) -> Floats:
         missing = "radial_ratio" if params.radial_ratio is None else "axial_ratio"
         raise ConfigError("CC257", f"Kienzle's law needs the key process: force: {missing}")
     kc11 = params.kc11_N_per_mm2 * (1 - RAKE_LOSS_PER_DEG * params.rake_deg)
-    ratios = (params.radial_ratio, params.axial_ratio)
-    chip, depth = feed_per_tooth(cut), axial_depth(cut)
-    start, stop = engagement(cut, params.milling)
-    mean = power_law(chip, depth, cut.teeth or 0, start, stop, kc11, params.mc, ratios)
-    return to_path(mean, clockwise(cut, params.spindle))
+    chip, sense = feed_per_tooth(cut), clockwise(cut, params.spindle)
+    bites = bites_of(cut, params.milling, sense)
+    ratios = np.stack(slanted(params.radial_ratio, params.axial_ratio, bites.rise, bites.run))
+    # On an edge that slants the chip is thinner by `rise`, and longer.
+    thin = kc11 * bites.rise**-params.mc
+    mean = power_law(chip[bites.place], bites.height, cut.teeth or 0, bites.start, bites.stop, thin, params.mc, ratios)
+    return to_path(summed(mean, bites.place, len(cut)), sense)

@@ -2,12 +2,13 @@
 
 from typing import Literal
 
+import numpy as np
 from pydantic import Field
 
 from camcomp.ground.datatypes import Floats
 from camcomp.model.config.base import Spec
-from camcomp.model.cutting.average import linear_edge, to_path
-from camcomp.model.cutting.conditions import axial_depth, clockwise, engagement, feed_per_tooth
+from camcomp.model.cutting.average import linear_edge, slanted, summed, to_path
+from camcomp.model.cutting.conditions import bites_of, clockwise, feed_per_tooth
 from camcomp.model.cutting.cut import Cut
 
 SOURCES = (
@@ -34,8 +35,15 @@ class Params(Spec):
 
 def force(cut: Cut, params: Params) -> Floats:
     """(Fr, Ft, Fz) (n, 3) in N. Raises ConfigError CC250 to CC256 when the Cut lacks data."""
-    cutting = (params.Ktc_N_per_mm2, params.Krc_N_per_mm2, params.Kac_N_per_mm2)
-    edge = (params.Kte_N_per_mm, params.Kre_N_per_mm, params.Kae_N_per_mm)
-    chip, depth = feed_per_tooth(cut), axial_depth(cut)
-    start, stop = engagement(cut, params.milling)
-    return to_path(linear_edge(chip, depth, cut.teeth or 0, start, stop, cutting, edge), clockwise(cut, params.spindle))
+    chip, sense = feed_per_tooth(cut), clockwise(cut, params.spindle)
+    bites = bites_of(cut, params.milling, sense)
+    rise, run = bites.rise, bites.run
+    cutting = np.stack(
+        [params.Ktc_N_per_mm2 * np.ones_like(rise), *slanted(params.Krc_N_per_mm2, params.Kac_N_per_mm2, rise, run)]
+    )
+    # An edge that slants is longer than the height on which it cuts.
+    edge = np.stack(
+        [params.Kte_N_per_mm * np.ones_like(rise), *slanted(params.Kre_N_per_mm, params.Kae_N_per_mm, rise, run)]
+    )
+    mean = linear_edge(chip[bites.place], bites.height, cut.teeth or 0, bites.start, bites.stop, cutting, edge / rise)
+    return to_path(summed(mean, bites.place, len(cut)), sense)

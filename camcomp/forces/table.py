@@ -25,6 +25,11 @@ class Params(Spec):
     on_workpiece: bool = Field(False, description="true when a dynamometer under the work measured; all signs change")
 
 
+def check(params: Params) -> None:
+    """Raise what `force` would raise for the table itself."""
+    _table(params.file)
+
+
 def force(cut: Cut, params: Params) -> Floats:
     """(Fr, Ft, Fz) (n, 3) in N. Raises ConfigError CC260 to CC264, FileError CC500."""
     table = _table(params.file)

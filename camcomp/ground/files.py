@@ -5,7 +5,6 @@ import os
 import shutil
 import stat
 import sys
-import tempfile
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
@@ -90,6 +89,8 @@ def open_source(path: str | Path) -> BinaryIO:
 
 def _aside() -> BinaryIO:
     """A file without a name, in memory as long as it is small: a folder for such files is needed by large ones only."""
+    import tempfile  # only streams and pipes need it
+
     return cast(BinaryIO, tempfile.SpooledTemporaryFile(max_size=1 << 24))
 
 

@@ -3,7 +3,6 @@
 import contextlib
 import io
 import os
-import secrets
 from pathlib import Path
 from types import TracebackType
 from typing import Any, BinaryIO, Self
@@ -21,7 +20,7 @@ class Replacement:
     def __init__(self, name: str) -> None:
         self.name = name
         self._target = Path(name).resolve()
-        self._aside = self._target.with_name(f".camcomp-{secrets.token_hex(8)}")
+        self._aside = self._target.with_name(f".camcomp-{os.urandom(8).hex()}")
         self._named = False
         try:
             handle = self._open()

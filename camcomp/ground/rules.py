@@ -194,6 +194,18 @@ RULES: dict[str, Rule] = {
         "of line.",
         "is this the right file?",
     ),
+    "CC141": Rule(
+        "no NC program",
+        "Hardly a line of the file looks like one of an NC program. Nothing of it is shown, for it may be a file that was "
+        "never meant to be read aloud.",
+        "is this the right file? YAML files have to end in .yaml or .yml",
+    ),
+    "CC142": Rule(
+        "rapid through material",
+        "By the stock of the machine file a rapid leads the tool through material that has not been cut away by then: on the "
+        "machine that is a crash. Rapids are taken to be straight.",
+        "retract before the rapid, or correct workpiece: stock",
+    ),
     # --- CC2xx usage, YAML, config -----------------------------------------------------------------------------
     "CC200": Rule(
         "YAML cannot be read",
@@ -271,6 +283,11 @@ RULES: dict[str, Rule] = {
         "None of the sections of a machine file or of an experiment stands in the file. Nothing of it is shown, for it may "
         "be a file that was never meant to be read aloud.",
         "check the path; `camcomp init DIR` writes a machine file",
+    ),
+    "CC219": Rule(
+        "machine not shipped",
+        "`camcomp init --machine` starts from a machine file that camcomp brings along; this name is none of them.",
+        "`camcomp init --list` names them",
     ),
     "CC240": Rule(
         "robot description not usable",
@@ -357,6 +374,12 @@ RULES: dict[str, Rule] = {
         "The fit draws a straight line through mean slot forces at two or more feeds per tooth.",
         "measure slots at three or more feeds, everything else unchanged",
     ),
+    "CC266": Rule(
+        "error table not readable",
+        "An error table is CSV text with a column position_mm that rises and the errors there: error_um, or forward_um and "
+        "reverse_um (mm, um, rad, mrad, urad). LinuxCNC's screw file has three numbers per line.",
+        "a screw file needs comp_type: 0 or 1 beside it, as COMP_FILE_TYPE says",
+    ),
     "CC270": Rule(
         "set-point not readable",
         "A line of `camcomp stream` is a JSON object or CSV: x_mm, y_mm, z_mm, fx_N, fy_N, fz_N and, if wanted, t_s.",
@@ -378,6 +401,49 @@ RULES: dict[str, Rule] = {
         "A function of the user's plug-in raised an error in the middle of the work, or returned what it must not: "
         "another shape than it was given, or a value that is no number where all that it was given were numbers.",
         "CAMCOMP_DEBUG=1 shows the traceback; `diagnose --without NAME` leaves an effect out",
+    ),
+    "CC284": Rule(
+        "number cannot be uncertain",
+        "Numbers of robot, workpiece, tool, process and effects may be written `{value, sd}`, or `{low, high}` for a 95 % "
+        "interval. What the control and the compensation are told is known, and a count, such as the teeth of a tool, has no "
+        "deviation.",
+        "write the value alone, or a smaller sd",
+    ),
+    "CC290": Rule(
+        "formula not readable",
+        "The formula of a law is made of numbers, + - * / ^, brackets, a few functions and the covariates that are known where "
+        "it acts; their names end in their units. Nothing else can be said in it.",
+        "the functions and covariates stand in camcomp/data/library.md",
+    ),
+    "CC291": Rule(
+        "map not usable",
+        "A map is a grid of coefficients over one or two covariates, and its envelope says over which range.",
+        "write the map as `camcomp diagnose --write-config` does",
+    ),
+    "CC292": Rule(
+        "learned law not usable",
+        "A file law_*.json in the folder of --library is not what `camcomp diagnose --library` writes there.",
+        "delete the file, or restore it",
+    ),
+    "CC295": Rule(
+        "tool without a diameter",
+        "What a tool cuts of a stock depends on its diameter and form.",
+        "add tool: diameter_mm, or tools: {1: {diameter_mm: ...}} for the tool of that T number",
+    ),
+    "CC296": Rule(
+        "tool not along Z",
+        "The stock is kept as heights along the program's Z, and the tool has to stand along it.",
+        "take workpiece: stock out for this program",
+    ),
+    "CC297": Rule(
+        "stock file not usable",
+        "A stock from a file is an STL with at least one body, in mm in the program frame; reading it needs the package trimesh.",
+        "pip install 'camcomp[stock]', and check the file",
+    ),
+    "CC298": Rule(
+        "stock never touched",
+        "No motion of the program takes anything off the stock, so the stock lies elsewhere or the program is another one.",
+        "the stock is given in the program frame of G54: check min_mm and max_mm, and the zero of the program",
     ),
     # --- CC3xx physics -----------------------------------------------------------------------------------------
     "CC301": Rule(
@@ -533,6 +599,17 @@ RULES: dict[str, Rule] = {
         "files of one run cannot be joined",
         "Files of one run are joined row by row where they have equally many rows, else on a time that they have in common.",
         "cut both to the same rows, or bring their times to one clock",
+    ),
+    "CC454": Rule(
+        "no kept diagnosis",
+        "The folder of a machine's history holds results of camcomp diagnose, each in a file that camcomp history --add has "
+        "written, with the day of its runs.",
+        "write the result with `camcomp diagnose EXPERIMENT --json RESULT.json`, then `camcomp history DIR --add RESULT.json`",
+    ),
+    "CC455": Rule(
+        "diagnosis kept already",
+        "The same result stands in the folder already; counted twice it would look like two measurements that agree.",
+        "nothing is to be done",
     ),
     "CC500": Rule("file cannot be read", "The file is not there, or may not be read.", "check the path"),
     "CC501": Rule(

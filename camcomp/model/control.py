@@ -1,12 +1,17 @@
 """NC programs from disk, read as the control of a machine file would read them."""
 
+import math
 from pathlib import Path
 
 from camcomp.gcode.interpret import read_program
+from camcomp.gcode.likeness import like_a_program
+from camcomp.gcode.path_mode import stated_mode
 from camcomp.gcode.program import Program
-from camcomp.gcode.setup import Setup
+from camcomp.gcode.setup import ASSUMED, Setup
+from camcomp.ground.errors import Location, ProgramError
 from camcomp.ground.files import display_name, read_bytes
 from camcomp.model.config.spec import Config
+from camcomp.model.trajectory.moves import ControlLimits
 
 
 def setup_of(config: Config) -> Setup:
@@ -26,7 +31,15 @@ def setup_of(config: Config) -> Setup:
         increment_mm=control.input_increment_mm,
         table_axes=frozenset(control.table_axes),
         skip_deleted=control.block_delete,
+        path_mode=stated_mode(control.path_mode) if control.path_mode else ASSUMED,
     )
+
+
+def limits_of(config: Config) -> ControlLimits:
+    """What the control keeps to."""
+    control = config.control
+    velocity = math.inf if control.velocity_mm_per_s is None else control.velocity_mm_per_s
+    return ControlLimits(control.acceleration_mm_per_s2, velocity, control.block_time_s, control.look_ahead_blocks)
 
 
 def open_program(path: str | Path, config: Config | None = None) -> Program:
@@ -38,10 +51,17 @@ def open_program(path: str | Path, config: Config | None = None) -> Program:
 
 
 def program_of(data: bytes, name: str, config: Config | None = None) -> Program:
-    """A program from its bytes, read with the control of `config`. Raises ProgramError with every mistake in it."""
+    """A program from its bytes, read with the control of `config`. Raises ProgramError with every mistake in it, or with one
+    where it is no program at all.
+    """
     setup = setup_of(config) if config else Setup()
     dialect = config.control.dialect if config else None
-    return read_program(data, name=name, setup=setup, dialect=dialect)
+    try:
+        return read_program(data, name=name, setup=setup, dialect=dialect)
+    except ProgramError as error:
+        if error.rule != "CC100" and not like_a_program(data):
+            raise ProgramError("CC141", "this is no NC program", at=Location(name, 1, 1)) from error
+        raise
 
 
 def _triple(values: list[float]) -> tuple[float, float, float]:

@@ -13,7 +13,7 @@ import numpy as np
 from camcomp.ground.datatypes import Floats
 from camcomp.ground.errors import Location
 
-Target = Literal["actuator", "machine", "either"]
+Target = Literal["actuator", "machine", "either", "named"]
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,7 @@ class Parameter:
     `scale` is the size that is typical where the effect is present, `tolerance` the size that every healthy machine
     has and no model states; both in `unit`, or as differences of the natural logarithm where `log` (factors). `sign` +1: never below
     nominal. `scan`: a shape (a pitch, a time constant) that nothing shows while the effect is absent; the values to
-    try first.
+    try first. `placed`: such a shape is an instant on the common clock, found where something begins or ends.
     """
 
     name: str
@@ -37,6 +37,7 @@ class Parameter:
     sign: int = 0
     log: bool = False
     scan: tuple[float, ...] = ()
+    placed: bool = False
 
     def value(self, coordinate: float) -> float:
         """Physical value at a fitting coordinate (0 = nominal), kept inside the bounds."""
@@ -82,14 +83,29 @@ class Load:
     wrench: Floats  # (n, 6) N, N mm
 
 
+@dataclass(frozen=True, eq=False)
+class Axes:
+    """Where the axes X, Y, Z of a machine stand in n instants: what hooks of guideways may depend on; mm, machine frame.
+
+    `position` is that of the platform reference, which on a machine of slides is what their scales read. `direction` is
+    the sign of travel with its memory, 0 where no slide moves along the axis. `arm` leads from the carriage of an axis to
+    the tip: along the tool, and along the axes that the carriage bears.
+    """
+
+    place: Floats  # (n, 3) of the tip, from the program's origin
+    position: Floats  # (n, 3)
+    direction: Floats  # (n, 3)
+    arm: Floats  # (n, 3 axes, 3)
+
+
 @dataclass(frozen=True)
 class Cause:
-    """An effect at work: the module, its target (actuator name or None), its parameter values, where a config names it."""
+    """An effect at work: the module, its target, its parameter values, where a config names it."""
 
     name: str
     effect: Any
-    target: str | None
-    values: Mapping[str, float] = field(default_factory=dict)
+    target: str | None  # an actuator, one of the effect's TARGETS, or None
+    values: Mapping[str, Any] = field(default_factory=dict)
     at: Location | None = field(default=None, compare=False)
 
     def which(self, actuators: tuple[str, ...]) -> Floats:

@@ -49,6 +49,22 @@ def play(x: Floats, width: float) -> Floats:
 
 
 @kept
+def _play_between(x, low, high):  # type: ignore[no-untyped-def]  # pragma: no cover
+    y = np.empty_like(x)
+    state = x[0] + 0.5 * (low[0] + high[0])
+    for i in range(x.shape[0]):
+        state = min(max(state, x[i] + low[i]), x[i] + high[i])
+        y[i] = state - x[i]
+    return y
+
+
+def play_between(x: Floats, low: Floats, high: Floats) -> Floats:
+    """Carriage minus encoder (n,) of one drive at x (n,) mm whose play reaches from low to high (n,), centred at the start."""
+    out: Floats = _play_between(*(np.ascontiguousarray(each) for each in (x, low, high)))
+    return out
+
+
+@kept
 def _direction(x, distance):  # type: ignore[no-untyped-def]  # pragma: no cover
     y = np.zeros_like(x)
     for j in range(x.shape[1]):

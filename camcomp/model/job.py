@@ -7,18 +7,20 @@ import json
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from pathlib import Path
+from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
 
+from camcomp.gcode.program import Program
 from camcomp.ground import shelf
-from camcomp.ground.datatypes import Floats
+from camcomp.ground.datatypes import Floats, Path
 from camcomp.ground.errors import ConfigError, PhysicsError
 from camcomp.model import signal_path
 from camcomp.model.config.spec import Config
 from camcomp.model.cutting.cut import Cut
-from camcomp.model.cutting.track import Conditions
+from camcomp.model.cutting.engaged import Engaged
+from camcomp.model.cutting.track import Conditions, Edges
 from camcomp.model.effect import Cause
 from camcomp.model.statics.build import build_robot, held_orientation, rotation_of
 from camcomp.model.statics.description import Robot
@@ -58,6 +60,13 @@ class Job:
         Files that a section names count by their content, remarks about sources do not.
         """
         parts = self.config.model_dump(mode="json", include={"robot", "workpiece", "tool", "process", "effects"})
+        if self.config.tools:
+            parts["tools"] = self.config.model_dump(mode="json", include={"tools"})["tools"]
+        for section, keys in _LATER.items():  # what was not there before changes nothing where it is not given
+            parts[section] = {key: v for key, v in parts[section].items() if v is not None or key not in keys}
+        if self.config.uncertain and self.config.compensation.policy != "full":  # then the program depends on them
+            parts["policy"] = [self.config.compensation.policy]
+            parts["policy"] += [[each.name, each.sd, each.group] for each in self.config.spreads]
         return hashlib.sha256(json.dumps(_bare(parts), sort_keys=True).encode()).hexdigest()[:16]
 
     @cached_property
@@ -121,7 +130,7 @@ class Job:
         return Conditions(
             model=None if none else partial(_forces, member.force, choice.params, c),
             plunges=bool(getattr(member, "PLUNGES", False)),
-            tool_axis=self.frame.rotation.T @ self.machine.nominal.held_rotation[:, 2],
+            tool_axis=self.tool_axis,
             stock_top_mm=c.workpiece.stock_top_mm,
             depth_mm=c.process.depth_mm,
             width_mm=c.process.width_mm,
@@ -130,7 +139,32 @@ class Job:
             diameter_mm=c.tool.diameter_mm,
             teeth=c.tool.teeth,
             to_machine=self.frame.rotation,
+            tools={number: Edges(each.diameter_mm, each.teeth) for number, each in c.tools.items()},
+            engage=self._engage if c.workpiece.stock else None,
         )
+
+    def engaged(self, program: Program) -> Engaged | None:
+        """What the tool meets along a program, None where no stock is known.
+
+        Raises ProgramError CC142 for rapids through material, ConfigError CC295 to CC298.
+        """
+        if self.config.workpiece.stock is None:
+            return None
+        return self._engage(program.path, program)
+
+    def _engage(self, path: Path, program: Program | None = None) -> Engaged:
+        from camcomp.model.stock.follow import followed  # only those with a stock wait for it
+
+        return followed(self.config, self.tool_axis, path, program)[0]
+
+    @property
+    def tool_axis(self) -> Floats:
+        """(3,) of the tool in the program frame, away from the workpiece."""
+        out: Floats = self.frame.rotation.T @ self.machine.nominal.held_rotation[:, 2]
+        return out
+
+
+_LATER = {"workpiece": {"stock"}, "tool": {"type", "corner_radius_mm", "point_deg", "flute_length_mm"}}
 
 
 def _bare(value: Any) -> Any:
@@ -139,8 +173,8 @@ def _bare(value: Any) -> Any:
         return {key: _bare(each) for key, each in value.items() if key != "source"}
     if isinstance(value, list):
         return [_bare(each) for each in value]
-    if isinstance(value, str) and Path(value).is_absolute() and Path(value).is_file():
-        return hashlib.sha256(Path(value).read_bytes()).hexdigest()
+    if isinstance(value, str) and FilePath(value).is_absolute() and FilePath(value).is_file():
+        return hashlib.sha256(FilePath(value).read_bytes()).hexdigest()
     return value
 
 

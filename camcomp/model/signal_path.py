@@ -15,6 +15,7 @@ import numpy as np
 
 from camcomp.ground.datatypes import Floats
 from camcomp.ground.errors import PhysicsError
+from camcomp.model.axes import axes_of
 from camcomp.model.effect import Cause, Load, Motion
 from camcomp.model.statics.description import Robot
 
@@ -23,8 +24,8 @@ ORDER = (
     ("drive", ("on_drive", "on_drive_force")),
     ("structure", ("on_robot",)),
     ("process", ("on_load",)),
-    ("tool", ("on_pose",)),
-    ("workpiece", ("on_workpiece",)),
+    ("tool", ("on_guideway", "on_pose")),
+    ("workpiece", ("on_workpiece", "on_place")),
     ("sensor", ("on_clock", "on_reading")),
 )
 STAGES = tuple(stage for stage, _ in ORDER)
@@ -98,6 +99,18 @@ def loaded(causes: Sequence[Cause], motion: Motion, force: Floats) -> Load:
     return load
 
 
+def led(causes: Sequence[Cause], tip: Floats, motion: Motion, robot: Robot, origin: Floats) -> Floats:
+    """Tips (n, 3), machine frame, where guideways that are neither straight nor square lead them.
+
+    origin (3,): of the program; all hooks see the axes where perfect guideways have them.
+    """
+    hooks = list(_hooks(causes, "on_guideway"))
+    axes = axes_of(robot, motion, tip, origin) if hooks else None
+    for hook, cause in hooks:
+        tip = hook(tip, axes, cause.target, cause.values)
+    return tip
+
+
 def posed(causes: Sequence[Cause], tip: Floats, load: Load, motion: Motion) -> Floats:
     """Tips (n, 3), machine frame, behind the tool."""
     for hook, cause in _hooks(causes, "on_pose"):
@@ -109,6 +122,13 @@ def clamped(causes: Sequence[Cause], tip: Floats) -> Floats:
     """Tips (n, 3), program frame, as the workpiece meets them where it is clamped."""
     for hook, cause in _hooks(causes, "on_workpiece"):
         tip = hook(tip, cause.values)
+    return tip
+
+
+def placed(causes: Sequence[Cause], tip: Floats, load: Load, motion: Motion) -> Floats:
+    """Tips (n, 3), program frame, with what depends on place, load and motion there."""
+    for hook, cause in _hooks(causes, "on_place"):
+        tip = hook(tip, load, motion, cause.values)
     return tip
 
 

@@ -6,13 +6,14 @@ One file per shelf says what its plug-ins have to be, as a protocol, and holds a
 from camcomp.gcode.dialect import Dialect
 from camcomp.model.config.base import Positive, Spec
 from camcomp.model.cutting.cut import Cut
-from camcomp.model.effect import Load, Motion, Parameter
+from camcomp.model.effect import Axes, Load, Motion, Parameter
 from camcomp.plugins.dialects import DialectPlugin
 from camcomp.plugins.effects import EffectHooks, EffectPlugin
 from camcomp.plugins.forces import ForcePlugin
 from camcomp.plugins.robots import RobotPlugin
 
 __all__ = [
+    "Axes",
     "Cut",
     "Dialect",
     "DialectPlugin",

@@ -12,7 +12,7 @@ import numpy as np
 from camcomp.ground.datatypes import Floats
 from camcomp.ground.errors import ConfigError
 from camcomp.model.config.load import params_of
-from camcomp.model.effect import Load, Motion, Parameter, Target, nominal
+from camcomp.model.effect import Axes, Load, Motion, Parameter, Target, nominal
 from camcomp.model.signal_path import STAGES
 from camcomp.model.statics.description import Robot
 from camcomp.plugins.contract import (
@@ -28,6 +28,7 @@ from camcomp.plugins.contract import (
     with_functions,
     wrong_array,
 )
+from camcomp.plugins.parameters import check_params
 
 if TYPE_CHECKING:  # the solver is not needed to say what an effect is
     from camcomp.model.motion.twin import Reading
@@ -40,13 +41,16 @@ class EffectPlugin(Protocol):
     """One way in which a machine differs from its model: a module with these names and at least one hook of EffectHooks.
 
     At their nominal values the parameters do nothing: every hook returns its input unchanged, bit for bit. May also have
+    PLAIN (what it is, in the words of a workshop: "play in the drive"), REMEDY (what to do about it, without a capital),
     FITTED (tuple of Parameter: the ones a diagnosis fits, where others are easier to fit) with the function `public`
-    (their values -> those of PARAMETERS), ROTARY (those that a hinge has), ARM_ONLY (for serial arms), WARMS (compensate
-    asks for the temperature).
+    (their values -> those of PARAMETERS), TARGETS (tuple of names, where TARGET is "named"), ROTARY (those that a hinge
+    has), ARM_ONLY (for serial arms), SLIDES_ONLY (for slides), WARMS (compensate asks for the temperature), Params (Spec:
+    keys in YAML beside PARAMETERS, never fitted); where TARGET is "named", OF_TARGET (target -> those of its keys that make
+    sense there) and SOUGHT (target -> the parameters that a diagnosis fits there).
     """
 
     STAGE: str  # control | drive | structure | process | tool | workpiece | sensor: where the difference arises
-    TARGET: Target  # "actuator": one cause per actuator; "machine": target null; "either"
+    TARGET: Target  # "actuator": one cause per actuator; "machine": target null; "either"; "named": one of TARGETS
     PARAMETERS: tuple[Parameter, ...]
     SOURCE: str  # where the formula comes from
 
@@ -73,11 +77,17 @@ class EffectHooks(Protocol):
     def on_load(self, load: Load, motion: Motion, p: Mapping[str, float]) -> Load:
         """Load at the tool."""
 
+    def on_guideway(self, tip: Floats, axes: Axes, target: str, p: Mapping[str, float]) -> Floats:
+        """Tips (n, 3) in the machine frame of axes X, Y, Z that are neither straight nor square; target: as in YAML."""
+
     def on_pose(self, tip: Floats, load: Load, motion: Motion, p: Mapping[str, float]) -> Floats:
         """Tips (n, 3) in the machine frame."""
 
     def on_workpiece(self, tip: Floats, p: Mapping[str, float]) -> Floats:
         """Tips (n, 3) in the program frame."""
+
+    def on_place(self, tip: Floats, load: Load, motion: Motion, p: Mapping[str, float]) -> Floats:
+        """Tips (n, 3) in the program frame, behind the workpiece."""
 
     def on_clock(self, time: Floats, p: Mapping[str, float]) -> Floats:
         """Times (n,) of rows -> times at which the tip stood where the rows say."""
@@ -94,15 +104,20 @@ def checked(name: str, found: Any, who: str) -> ModuleType:
     for key, allowed in (("STAGE", STAGES), ("TARGET", get_args(Target))):
         if (value := getattr(module, key)) not in allowed:
             raise refusal(who, f"{key} is '{value}', not one of {', '.join(allowed)}")
+    if module.TARGET == "named" and not _are_names(getattr(module, "TARGETS", None)):
+        raise refusal(who, "TARGET is 'named', and TARGETS is no tuple of names")
     hooks = check_functions(who, module, EffectHooks, _ALSO)
     if not hooks:
         raise refusal(
             who, "there is no hook", hint=f"one of {', '.join(each for each in dir(EffectHooks) if each[:3] == 'on_')}"
         )
-    if not module.PARAMETERS:
+    if not module.PARAMETERS and not hasattr(module, "Params"):
         raise refusal(who, "PARAMETERS is empty")
+    check_names(who, module, {key: str for key in ("PLAIN", "REMEDY") if hasattr(module, key)})
     for key in ("PARAMETERS", "FITTED", "ROTARY"):
         _check_parameters(who, key, getattr(module, key, ()))
+    if hasattr(module, "Params"):
+        check_params(who, module.Params, {*_YAML_KEYS, *nominal(module)} - {"source"})
     _check_spec(who, module)
     wrapped = {each: guarded(who, each, getattr(module, each), partial(_wrong, each)) for each in hooks}
     if hasattr(module, "public"):
@@ -110,6 +125,10 @@ def checked(name: str, found: Any, who: str) -> ModuleType:
     effect = with_functions(module, wrapped)
     _try(who, effect, hooks)
     return effect
+
+
+def _are_names(found: Any) -> bool:
+    return isinstance(found, tuple) and bool(found) and all(isinstance(each, str) and each for each in found)
 
 
 def _check_parameters(who: str, key: str, parameters: Any) -> None:
@@ -185,7 +204,8 @@ def _wrong_robot(result: Any, given: Robot) -> str:
 
 
 def _wrong_values(module: ModuleType, result: Any, *_given: Any) -> str:
-    if not isinstance(result, Mapping) or set(result) != {each.name for each in module.PARAMETERS}:
+    names = {each.name for each in module.PARAMETERS}
+    if not isinstance(result, Mapping) or not names <= set(result) <= names | _more_keys(module):
         return f"{described(result)}, not a value for each of PARAMETERS"
     return "a value that is no number" if has_nan(dict(result)) else ""
 
@@ -204,7 +224,9 @@ def _try(who: str, effect: ModuleType, hooks: tuple[str, ...]) -> None:
             with warnings.catch_warnings(), np.errstate(all="ignore"):
                 warnings.simplefilter("ignore")
                 for hook in hooks:
-                    _try_hook(who, effect, hook, trial.inputs(robot, whole=effect.TARGET == "machine"))
+                    named = getattr(effect, "TARGETS", (None,))[0]
+                    given = trial.inputs(robot, whole=effect.TARGET == "machine", named=named)
+                    _try_hook(who, effect, hook, given)
         except ConfigError as error:
             if error.rule == "CC280":
                 raise
@@ -220,13 +242,18 @@ def _try_hook(who: str, effect: ModuleType, hook: str, given: Mapping[str, tuple
     call(*given[hook], _away(who, effect))
 
 
+def _more_keys(effect: Any) -> set[str]:
+    """Keys in YAML of its class Params."""
+    return set(effect.Params.yaml_keys()) if hasattr(effect, "Params") else set()
+
+
 def _away(who: str, effect: ModuleType) -> dict[str, float]:
     """Parameters a typical size from nominal; shapes stay."""
     fitted = getattr(effect, "FITTED", effect.PARAMETERS)
     values = {p.name: p.nominal if p.scan else p.value(p.scale) for p in fitted}
     if hasattr(effect, "public"):
         values = dict(effect.public(values))
-    if unknown := set(values) - set(nominal(effect)):
+    if unknown := set(values) - set(nominal(effect)) - _more_keys(effect):
         raise failure(
             who, f"FITTED has {', '.join(sorted(unknown))}, which is not in PARAMETERS, and there is no `public`"
         )

@@ -21,7 +21,9 @@ from camcomp.plugins.parameters import check_params
 
 
 class ForcePlugin(Protocol):
-    """Which force acts on the tool at the points of a path. May also have PLUNGES (True: it acts in plunges, too)."""
+    """Which force acts on the tool at the points of a path. May also have PLUNGES (True: it acts in plunges, too) and
+    check(params), which raises CamcompError for files that are missing or wrong, before there is a program.
+    """
 
     Params: type[Spec]  # the keys that stand beside `model:` in YAML
     SOURCES: str  # where the law and its numbers come from
@@ -36,7 +38,7 @@ def checked(name: str, found: Any, who: str) -> ModuleType:
     module = check_module(who, found)
     check_names(who, module, {"Params": type, "SOURCES": str})
     check_params(who, module.Params, {"model"})
-    if not check_functions(who, module, ForcePlugin):
+    if not check_functions(who, module, ForcePlugin, ("check",)):
         raise refusal(who, "there is no function force(cut, params)")
     if not isinstance(getattr(module, "PLUNGES", False), bool):
         raise refusal(who, f"PLUNGES is {described(module.PLUNGES)}, not True or False")

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from camcomp.model.axes import axes_of
 from camcomp.model.effect import Load, Motion
 from camcomp.model.motion.twin import Reading
 from camcomp.model.statics.description import Actuator, Chain, Link, Parallelogram, Passive, Robot, Transform
@@ -39,8 +40,10 @@ def arm() -> Robot:
     return Robot("six hinges", (Chain("arm", tuple(elements)),), np.array([0.0, 0.0, -100.0]))
 
 
-def inputs(robot: Robot, *, whole: bool) -> dict[str, tuple[Any, ...]]:
-    """What every hook gets but the parameters. whole: aimed at the machine, else at its first actuator."""
+def inputs(robot: Robot, *, whole: bool, named: str | None = None) -> dict[str, tuple[Any, ...]]:
+    """What every hook gets but the parameters. whole: aimed at the machine, else at its first actuator; named: the target
+    of an effect with names of its own.
+    """
     m = len(robot.actuators)
     time = np.linspace(0.0, 2.0, _ROWS)
     encoder = -200.0 + 20.0 * np.sin(np.outer(3.0 * time, 1.0 + 0.1 * np.arange(m)))
@@ -60,8 +63,10 @@ def inputs(robot: Robot, *, whole: bool) -> dict[str, tuple[Any, ...]]:
         "on_drive_force": (still, motion, which),
         "on_robot": (robot, names if whole else names[:1]),
         "on_load": (load, motion),
+        "on_guideway": (tip, axes_of(robot, motion, tip, np.zeros(3)), named),
         "on_pose": (tip, load, motion),
         "on_workpiece": (tip,),
+        "on_place": (tip, load, motion),
         "on_clock": (time,),
         "on_reading": (Reading(tip, encoder, still, load.force, motion), motion),
     }

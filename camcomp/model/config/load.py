@@ -13,8 +13,9 @@ from camcomp.ground import shelf
 from camcomp.ground.errors import CamcompError, ConfigError, FileError, Location, raise_all
 from camcomp.ground.files import display_name, read_bytes
 from camcomp.model.config.base import Spec
-from camcomp.model.config.robot import RobotSpec
-from camcomp.model.config.spec import Config, Experiment
+from camcomp.model.config.robot import RevoluteActuator, RobotSpec
+from camcomp.model.config.spec import Config, EffectChoice, Experiment
+from camcomp.model.config.spread import Spread, UncertainInput, replaced, without_spreads
 from camcomp.model.config.yaml_check import check, choose
 from camcomp.model.config.yaml_tree import Node, merge, plain, read_tree, tree_of
 
@@ -40,22 +41,48 @@ def load_config(paths: Sequence[Path | str]) -> Config:
         raise ConfigError("CC212", "no configuration is given", hint="name one with --config FILE")
     if _get(tree, "robot") is None:
         errors.append(ConfigError("CC212", "there is no section 'robot'", at=tree.at))
-    config, more = _check_config(tree)
-    _raise([*errors, *more])
+    tree, spreads, more = _certain(tree)
+    config, wrong = _check_config(tree)
+    _raise([*errors, *more, *wrong])
     assert config is not None
+    config._spreads = tuple(spreads)
     return config
 
 
-def check_config(paths: Sequence[Path | str]) -> None:
-    """Raise what is wrong with `paths`, which need not be complete.
+def check_config(paths: Sequence[Path | str]) -> Config | None:
+    """Raise what is wrong with `paths`, which need not be complete; the configuration where they are.
 
-    Without the name of a robot they are overrides of some machine file, where any key may be missing.
+    Without the name of a robot they are overrides of some machine file, where any key may be missing. Files that the
+    force model reads are looked at, too.
     """
     tree, errors = _read_merged(paths)
-    more = _check_config(tree)[1] if tree is not None else []
+    more: list[CamcompError] = []
+    config: Config | None = None
+    if tree is not None:
+        tree, spreads, more = _certain(tree)
+        config, wrong = _check_config(tree)
+        more += wrong
+        if config is not None:
+            config._spreads = tuple(spreads)
     if _get(tree, "robot", "name") is None:
         more = [each for each in more if each.rule != "CC203"]
-    _raise([*errors, *more])
+    _raise([*errors, *more, *_force_files(_get(tree, "process", "force"))])
+    return config
+
+
+def _force_files(node: Node | None) -> list[CamcompError]:
+    """What is wrong with the files of a force model, as far as the model can tell by its function `check`."""
+    params, _ = _plugin("forces", "model", node)
+    if node is None or params is None:
+        return []
+    look = getattr(shelf.load("forces", node.value["model"].value), "check", None)
+    try:
+        if look is not None:
+            look(params)
+    except CamcompError as error:
+        error.at = error.at or node.at
+        return [error]
+    return []
 
 
 def load_experiment(path: Path | str) -> Experiment:
@@ -87,6 +114,35 @@ def _raise(errors: Sequence[CamcompError]) -> None:
 
     files = list(dict.fromkeys(error.at.file for error in errors if error.at))
     raise_all(sorted(errors, key=place))
+
+
+def varied(config: Config, source: UncertainInput, size: float) -> Config | None:
+    """The configuration with one input `size` standard deviations off its value; None where that is not allowed."""
+    assert config._tree is not None  # every loaded config has one
+    found, errors = _check_config(replaced(config._tree, _moved(source.members, size)))
+    return None if errors else found
+
+
+def _moved(spreads: Sequence[Spread], size: float) -> dict[tuple[str | int, ...], float]:
+    return {each.keys: each.value + size * each.sd for each in spreads}
+
+
+def _certain(tree: Node) -> tuple[Node, list[Spread], list[CamcompError]]:
+    """The tree with the values of uncertain numbers, their spreads, and what is wrong with them.
+
+    A number that is refused one deviation above its value and one below it cannot be uncertain, such as a number of teeth.
+    """
+    bare, spreads, errors = without_spreads(tree)
+    if spreads:
+        known = {each.at for each in _check_config(bare)[1]}
+        sides = [
+            {e.at for e in _check_config(replaced(bare, _moved(spreads, size)))[1]} - known for size in (-1.0, 1.0)
+        ]
+        for each in {each.at: each for each in spreads}.values():
+            if each.sd > 0.0 and each.at in sides[0] & sides[1]:
+                message = f"{each.name}: {each.value - each.sd:g} and {each.value + each.sd:g}, one deviation off, are refused"
+                errors.append(ConfigError("CC284", message, at=each.at))
+    return bare, spreads, errors
 
 
 def _read_merged(paths: Sequence[Path | str]) -> tuple[Node | None, list[CamcompError]]:
@@ -192,33 +248,56 @@ def _dialect(chosen: Node | None) -> list[CamcompError]:
 
 
 def params_of(member: Any) -> type[Spec]:
-    """A plug-in's spec: its class Params, or one made from the records PARAMETERS of an effect."""
-    if hasattr(member, "PARAMETERS"):
+    """A plug-in's spec: its class Params, and for an effect one with its records PARAMETERS as well."""
+    if getattr(member, "PARAMETERS", ()) or not hasattr(member, "Params"):
         fields: dict[str, Any] = {
             each.name: (Annotated[float, Field(ge=each.low, le=each.high)], each.nominal) for each in member.PARAMETERS
         }
-        return create_model("Parameters", __base__=Spec, **fields)
+        return create_model("Parameters", __base__=getattr(member, "Params", Spec), **fields)
     out: type[Spec] = member.Params
     return out
 
 
 def _check_targets(config: Config) -> list[CamcompError]:
-    """Whether every effect has the target it needs: an actuator of this robot, or none."""
-    names = list(config.robot.actuators)
+    """Whether every effect has the target it needs: an actuator of this robot, a name of its own, or none."""
+    actuators = list(config.robot.actuators)
     errors: list[CamcompError] = []
     for i, each in enumerate(config.effects):
         at = config.at("effects", i, "target" if each.target is not None else "effect")
-        kind = getattr(shelf.load("effects", each.effect), "TARGET", "either")
-        if each.target is not None and each.target not in names:
+        effect = shelf.load("effects", each.effect)
+        kind = getattr(effect, "TARGET", "either")
+        names = list(effect.TARGETS) if kind == "named" else actuators
+        if kind == "named" and each.target not in names:
+            said = f"has no target '{each.target}'" if each.target is not None else "needs a target"
+            message, hint = f"'{each.effect}' {said}", choose(each.target or "", names)
+        elif strange := _not_of_target(effect, each):
+            at = config.at("effects", i, strange)
+            message, hint = f"'{strange}' is nothing of {each.target}", choose(strange, effect.OF_TARGET[each.target])
+        elif each.target is not None and each.target not in names:
             message, hint = f"there is no actuator '{each.target}'", choose(each.target, names)
         elif kind == "actuator" and each.target is None:
             message, hint = f"'{each.effect}' needs a target", f"add target: one of {', '.join(names)}"
+        elif kind == "actuator" and _turns(config, each.target) and getattr(effect, "SLIDES_ONLY", False):
+            message, hint = f"'{each.target}' is a hinge, and '{each.effect}' is of slides", None
+        elif each.target is not None and getattr(each.params, "axis", None) is not None:
+            message, hint = "a law on the tip has no target", "leave the target out; its axis says where it acts"
         elif kind == "machine" and each.target is not None:
             message, hint = f"'{each.effect}' concerns the machine as a whole", "leave the target out"
         else:
             continue
         errors.append(ConfigError("CC205", f"effects[{i + 1}]: {message}", at=at, hint=hint))
     return errors
+
+
+def _not_of_target(effect: Any, choice: EffectChoice) -> str | None:
+    """A key of an effect that its target does not have."""
+    of = getattr(effect, "OF_TARGET", {})
+    some = {key for keys in of.values() for key in keys}
+    return next((key for key in choice.given if key in some and key not in of.get(choice.target, ())), None)
+
+
+def _turns(config: Config, actuator: str | None) -> bool:
+    return isinstance(config.robot.actuators.get(actuator or ""), RevoluteActuator)
 
 
 def _get(node: Node | None, *keys: str) -> Node | None:

@@ -1,5 +1,7 @@
 """JSON schemas (draft-07) of the YAML files, plug-ins included, for editors, and of results, for those who read them."""
 
+import json
+import re
 from typing import Any
 
 from pydantic import BaseModel
@@ -7,9 +9,23 @@ from pydantic import BaseModel
 from camcomp.ground import shelf
 from camcomp.model.config.load import ROBOT_KEYS, params_of
 from camcomp.model.config.spec import Config, EffectChoice, Experiment, ForceChoice
+from camcomp.model.config.spread import SECTIONS
 
 Schema = dict[str, Any]
 
+_UNCERTAIN = "UncertainNumber"
+_NUMBER = {"type": "number"}
+_SPREAD = {
+    "type": "object",
+    "description": "a number that is not known exactly: normally distributed, with its standard deviation or 95 % interval; "
+    "numbers of one group are drawn together",
+    "properties": {
+        "value": _NUMBER, "sd": {"type": "number", "minimum": 0}, "low": _NUMBER, "high": _NUMBER,
+        "group": {"type": "string", "minLength": 1}, "source": {"type": "string"},
+    },
+    "anyOf": [{"required": ["sd"]}, {"required": ["low", "high"]}],
+    "additionalProperties": False,
+}  # fmt: skip
 _DRAFT = "http://json-schema.org/draft-07/schema#"
 _OLDER = {"$defs": "definitions", "prefixItems": "items"}  # what newer drafts call otherwise
 
@@ -26,7 +42,31 @@ def config_schema() -> Schema:
     _offer(definitions, ForceChoice.__name__, "forces", "model", {}, [])
     target = definitions[EffectChoice.__name__]["properties"]["target"]
     _offer(definitions, EffectChoice.__name__, "effects", "effect", {"target": target}, [])
+    definitions |= _uncertain(definitions, schema["properties"])
+    definitions[_UNCERTAIN] = _SPREAD
     return {"$schema": _DRAFT, **schema, "title": "camcomp machine file"}
+
+
+def _uncertain(definitions: Schema, sections: Schema) -> Schema:
+    """The definitions that the sections with uncertain numbers use, with the choice to write a number that way."""
+    wanted, found = [sections[name] for name in SECTIONS], set[str]()
+    while wanted:
+        names = set(re.findall(r'"#/definitions/([^"]+)"', json.dumps(wanted.pop()))) - found
+        found |= names
+        wanted += [definitions[name] for name in names]
+    return {name: _choice(definitions[name]) for name in found}
+
+
+def _choice(value: Any) -> Any:
+    if isinstance(value, list):
+        return [_choice(each) for each in value]
+    if not isinstance(value, dict):
+        return value
+    if value.get("type") == "number":
+        about = {key: each for key, each in value.items() if key in ("title", "description", "default")}
+        number = {key: each for key, each in value.items() if key not in about}
+        return {**about, "anyOf": [number, {"$ref": f"#/definitions/{_UNCERTAIN}"}]}
+    return {key: _choice(each) for key, each in value.items()}
 
 
 def experiment_schema() -> Schema:

@@ -5,9 +5,12 @@ from typing import Annotated, Any, Literal
 from pydantic import ConfigDict, Field, PrivateAttr, model_validator
 from pydantic_core import PydanticCustomError
 
+from camcomp.gcode.path_mode import PATTERN
 from camcomp.ground.errors import Location
 from camcomp.model.config.base import NotNegative, Positive, Spec, Vector, Zero, exactly_one
+from camcomp.model.config.cutting_tool import Cutter, Stock
 from camcomp.model.config.robot import RobotSpec
+from camcomp.model.config.spread import Spread
 from camcomp.model.config.yaml_tree import Node, find
 
 WorkOffset = Annotated[str, Field(pattern=r"^G5([5-9]|9\.[123])$")]
@@ -24,6 +27,9 @@ class Workpiece(Spec):
     stock_top_mm: float | None = Field(
         None, description="height in the program frame; feed moves at or above it cut air"
     )
+    stock: Stock | None = Field(
+        None, description="what the tool begins with: where and how deep it cuts then follows from what still stands"
+    )
 
     @model_validator(mode="after")
     def _one_rotation(self) -> "Workpiece":
@@ -37,7 +43,7 @@ class Workpiece(Spec):
         return self.rotation_vector_deg or [0.0, 0.0, self.rotation_deg or 0.0]
 
 
-class Tool(Spec):
+class Tool(Cutter):
     """The tool in the spindle."""
 
     length_mm: NotNegative | None = Field(None, description="along platform -z, from its reference point to the tip")
@@ -47,8 +53,6 @@ class Tool(Spec):
         description="of the platform's x axis from program X about the tool axis, for machines with six actuators; "
         "default: what is nearest to the start pose",
     )
-    diameter_mm: Positive | None = None
-    teeth: Annotated[int, Field(ge=1)] | None = None
 
     @model_validator(mode="after")
     def _one_length(self) -> "Tool":
@@ -98,9 +102,11 @@ class EffectChoice(Choice):
     target: str | None = None
 
     @property
-    def values(self) -> dict[str, float]:
+    def values(self) -> dict[str, Any]:
         """Every parameter of the effect by name; what the file leaves out has its nominal value."""
-        out: dict[str, float] = self.params.model_dump(exclude={"source"})
+        if hasattr(self.params, "effect_values"):  # of parameters that are more than numbers
+            return dict(self.params.effect_values())
+        out: dict[str, Any] = self.params.model_dump(exclude={"source"})
         return out
 
 
@@ -144,7 +150,15 @@ class Control(Spec):
         None,
         description="worth of one unit in a number without decimal point (Fanuc IS-B: 0.001); missing = a number is in mm",
     )
-    acceleration_mm_per_s2: Positive = 1500.0
+    acceleration_mm_per_s2: Positive = Field(1500.0, description="largest of every axis")
+    velocity_mm_per_s: Positive | None = Field(None, description="largest of every axis; default: feeds as programmed")
+    path_mode: Annotated[str, Field(pattern=PATTERN)] | None = Field(
+        None,
+        description="in force until the program says another one: G61, G61.1, G64, G64 P0.01, G64 P0.01 Q0 (mm); "
+        "default: G64 is assumed",
+    )
+    block_time_s: Positive = Field(0.001, description="least time that the control takes for a move")
+    look_ahead_blocks: Annotated[int, Field(ge=1)] = Field(50, description="moves that it knows when it sets the speed")
 
 
 class Compensation(Spec):
@@ -152,8 +166,15 @@ class Compensation(Spec):
 
     method: Literal["newton", "stiffness", "fixed-point", "linear"] = "newton"
     tolerance_um: Annotated[float, Field(ge=1e-6)] = 1.0
-    arcs: bool = Field(
-        False, description="programmed arcs come out as arcs (G2, G3) where those are fewer than straight lines"
+    arcs: bool | None = Field(
+        None,
+        description="programmed arcs come out as arcs (G2, G3) where those are fewer than straight lines; default: where "
+        "the path mode of the program, or control.path_mode, makes them faster or more accurate",
+    )
+    policy: Literal["full", "shrink", "skip"] = Field(
+        "full",
+        description="what uncertain numbers do to the correction: nothing; the share of it that is expected to leave least, and "
+        "that harms hardly any machine; lines stay as programmed where the band exceeds the gain",
     )
 
 
@@ -163,12 +184,26 @@ class Config(Spec):
     robot: RobotSpec
     workpiece: Workpiece = Field(default_factory=lambda: Workpiece())
     tool: Tool = Field(default_factory=lambda: Tool())
+    tools: dict[ToolNumber, Cutter] = Field(
+        default_factory=dict, description="cutting parts by T number; other tools are as in the section tool"
+    )
     process: Process = Field(default_factory=lambda: Process())
     control: Control = Field(default_factory=lambda: Control())
     compensation: Compensation = Field(default_factory=lambda: Compensation())
     effects: list[EffectChoice] = Field(default_factory=list)
 
     _tree: Node | None = PrivateAttr(None)
+    _spreads: tuple[Spread, ...] = PrivateAttr(())
+
+    @property
+    def spreads(self) -> tuple[Spread, ...]:
+        """The numbers that are not known exactly; everywhere else they count as their values."""
+        return self._spreads
+
+    @property
+    def uncertain(self) -> bool:
+        """Whether there are any with a deviation."""
+        return any(each.sd > 0.0 for each in self._spreads)
 
     def at(self, *keys: str | int) -> Location | None:
         """Where the value under these keys was written; the nearest mapping above it when it is a default."""

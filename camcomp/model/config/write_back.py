@@ -3,10 +3,13 @@
 import io
 import os
 from collections.abc import Mapping, Sequence
+from math import inf
 from typing import Any, Protocol
 
 from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
+
+from camcomp.model.config.spread import HALF_95
 
 
 class EstimatedValue(Protocol):
@@ -36,6 +39,10 @@ class NamedEffect(Protocol):
     def parameters(self) -> Mapping[str, EstimatedValue]:
         """By name."""
 
+    @property
+    def settings(self) -> Mapping[str, Any]:
+        """What it has in YAML beside its parameters: numbers, and lists of them."""
+
 
 def machine_file(texts: Sequence[str]) -> int:
     """Which of the config files, in the order in which they count, has to gain the causes: a later list of effects replaces
@@ -50,12 +57,19 @@ def machine_file(texts: Sequence[str]) -> int:
 
 
 def with_causes(
-    text: str, causes: Sequence[NamedEffect], *, folder: str = "", moved_to: str = "", note: str = ""
+    text: str,
+    causes: Sequence[NamedEffect],
+    *,
+    folder: str = "",
+    moved_to: str = "",
+    note: str = "",
+    laws: Sequence[Mapping[str, Any]] = (),
 ) -> str:
     """The text of a machine file with the `causes` of a diagnosis appended to its effects.
 
-    Values are those found, intervals go into a comment behind them. folder, moved_to: where
+    Values are those found, intervals are written as their standard deviations, and go into a comment behind them. folder, moved_to: where
     the file stands and where the new one will; relative paths in it are changed to match. note: comment above the causes.
+    laws: more entries, key by key.
     """
     yaml = YAML()
     yaml.preserve_quotes = True
@@ -64,23 +78,53 @@ def with_causes(
     tree = yaml.load(text)
     _move(tree, folder, moved_to)
     effects = tree.get("effects")
-    if effects is None and causes:
+    if effects is None and (causes or laws):
         effects = tree["effects"] = CommentedSeq()
-    for k, cause in enumerate(causes):
+    first = len(effects or ())
+    for cause in causes:
         entry = CommentedMap()
         entry["effect"] = cause.effect
         if cause.target is not None:
             entry["target"] = cause.target
         for name, found in cause.parameters.items():
-            entry[name] = found.value
             low, high = found.ci95
+            sd = (high - low) / (2.0 * HALF_95)
+            entry[name] = _spread(found.value, sd) if 0.0 < sd < inf else found.value
             entry.yaml_add_eol_comment(f"95 %: {low:g} to {high:g}", name)
+        for name, value in cause.settings.items():
+            entry[name] = _in_a_row(value)
         effects.append(entry)
-        if k == 0 and note:
-            effects.yaml_set_comment_before_after_key(len(effects) - 1, before=note, indent=2)
+    for law in laws:
+        effects.append(_entry(law))
+    if note and (causes or laws):
+        effects.yaml_set_comment_before_after_key(first, before=note, indent=2)
     out = io.StringIO()
     yaml.dump(tree, out)
     return out.getvalue()
+
+
+def _entry(law: Mapping[str, Any]) -> CommentedMap:
+    """A law as an entry of `effects:`; lists of numbers stand on one line."""
+    entry = CommentedMap()
+    for key, value in law.items():
+        whole = isinstance(value, Mapping)
+        entry[key] = CommentedMap({n: _in_a_row(pair) for n, pair in value.items()}) if whole else _in_a_row(value)
+    return entry
+
+
+def _in_a_row(value: Any) -> Any:
+    """Lists on one line."""
+    if not isinstance(value, (list, tuple)):
+        return value
+    out = CommentedSeq(_in_a_row(each) for each in value)
+    out.fa.set_flow_style()
+    return out
+
+
+def _spread(value: float, sd: float) -> CommentedMap:
+    out = CommentedMap([("value", value), ("sd", float(f"{sd:.3g}"))])
+    out.fa.set_flow_style()
+    return out
 
 
 def _move(node: Any, folder: str, moved_to: str) -> None:

@@ -1,7 +1,7 @@
 """A YAML tree against a spec: pydantic's findings in words for a machine builder, with rule ids, places and hints."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from typing import Any, TypeVar
 
@@ -107,6 +107,9 @@ class _Findings:
         if kind in ("model_type", "dict_type"):
             what = {type(None): "nothing", list: "a list"}.get(type(node.value), f"'{node.value}'")
             return ConfigError(rule, f"{name}: has to be a mapping (key: value), not {what}", at=at)
+        if at is not None and "offset" in context:  # within a text that is read further
+            quoted = at.source[at.column - 1 : at.column] in ("'", '"')
+            at = replace(at, column=at.column + int(context["offset"]) + quoted)
         words = detail["msg"]
         for theirs, ours in _PYDANTIC_WORDS.items():
             words = words.replace(theirs, ours)

@@ -203,7 +203,12 @@ class _Builder:
 
 
 def merge(base: Node, over: Node) -> Node:
-    """`over` laid on `base` key by key: mappings merge, everything else (lists too) is replaced whole."""
+    """`over` laid on `base` key by key: mappings merge, everything else (lists too) is replaced whole.
+
+    An `sd` alone is laid beside the number that it belongs to.
+    """
+    if isinstance(over.value, dict) and "sd" in over.value and "value" not in over.value and _is_scalar(base):
+        return replace(over, value={"value": base, **over.value})  # the spread of a number that stands in another file
     if not (isinstance(base.value, dict) and isinstance(over.value, dict)):
         return over
     for key in _SELECTORS:
@@ -211,6 +216,10 @@ def merge(base: Node, over: Node) -> Node:
             return over
     both = {key: merge(base.value[key], node) for key, node in over.value.items() if key in base.value}
     return replace(over, value={**base.value, **over.value, **both})
+
+
+def _is_scalar(node: Node) -> bool:
+    return not isinstance(node.value, list | dict)
 
 
 def plain(node: Node) -> Any:

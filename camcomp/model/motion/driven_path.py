@@ -27,20 +27,41 @@ _JUMP_SHARE = 0.1  # of the largest force: what the force changes from row to ro
 _USUAL = 4.0  # times the usual change from row to row
 _PIECE_MM = 60.0
 _PIECE_RAD = np.pi / 3
-_AGREE = np.cos(np.radians(5.0))  # driven and programmed direction are the same
+_AGREE = np.cos(
+    np.radians(2.0)
+)  # driven and programmed direction are the same: digits of set-points turn it by as much
 _STILL_MM_PER_S = 0.05
 BESIDE_MM = 0.6  # from the path: no blended corner leaves it further, and what does so is no cut of it
 _SURE_N = 20.0  # what the force may be off by for the nodes between rows to be led by it
+_SAME_FEED = 0.03  # by which a driven feed may differ from the programmed one and still be it
+LEAST_FEED = 1e-3  # mm/min, of what stands still
 _CHORD_MM = 0.02  # over which a direction is taken: digits and noise of set-points are small beside it
 
 
 @dataclass(frozen=True, eq=False)
 class Forces:
-    """Cutting force at n rows. force, doubt (n, 3) N, program frame: doubt is half of what it may be off by."""
+    """Cutting force at n rows. force, doubt (n, 3) N, program frame: doubt is half of what it may be off by. apart (n - 1,):
+    between a row and the next something was driven that does not cut, and was not logged.
+    """
 
     force: Floats
     doubt: Floats
     cutting: Bools
+    apart: Bools
+
+    @classmethod
+    def none(cls, n: int) -> Forces:
+        """Of a run in which nothing is known to cut."""
+        return cls(np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(n, bool), np.zeros(max(n - 1, 0), bool))
+
+    def cut_at(self, time: Floats, at: Floats) -> Floats:
+        """1 where the tool cuts at times (k,) s, rows at times (n,), else 0."""
+        if len(time) < 2:
+            return np.full(len(at), float(self.cutting.any()))
+        right = np.clip(np.searchsorted(time, at), 1, len(time) - 1)
+        late = at - time[right - 1] > time[right] - at
+        within = (at > time[right - 1]) & (at < time[right])
+        return np.asarray(self.cutting[right - ~late] & ~(self.apart[right - 1] & within), float)
 
 
 def driven_path(
@@ -60,7 +81,6 @@ def driven_path(
 
     to_machine, vectors: program -> machine frame. inverse: machine tips (q, 3) -> set-points (q, m).
     """
-    n = len(time)
     row_tip, row_force = to_machine(tip), vectors(forces.force)
     span = float(time[-1] - time[0])
     grid = np.linspace(time[0], time[-1], max(int(min(np.ceil(span / STEP_S) + 1, MOST_STEPS)), 2))
@@ -74,10 +94,9 @@ def driven_path(
     node_rho = inverse(node_tip)
     sure = np.linalg.norm(forces.doubt, axis=1) <= _SURE_N
     node_force = _of_stretches(time, row_force, sure, jump, node_time, pieces)
-    index = np.clip(np.searchsorted(time, grid), 0, n - 1)
     return RunPath(
         name, time, started, True, node_tip, node_force, node_rho, node_time, grid, grid_rho,
-        forces.cutting[index].astype(float), pieces.of(grid), len(pieces.begin), pieces.at, rho, temperature,
+        forces.cut_at(time, grid), pieces.of(grid), len(pieces.begin), pieces.at, rho, temperature,
         driven=Driven(row_tip, row_force, np.abs(vectors(forces.doubt)), lead_tip),
     )  # fmt: skip
 
@@ -90,29 +109,86 @@ def cutting_forces(track: Track, aligned: Aligned, tip: Floats, time: Floats, lo
     on &= track.cutting[piece]
     if not logged_line:
         on &= aligned.distance < BESIDE_MM
-    n = len(tip)
-    zero = np.zeros((n, 3))
-    if not on.any():
-        return Forces(zero, zero, on)
+    if not on.any() or track.conditions.model is None:
+        return Forces.none(len(tip))
     before, after = driven_directions(tip, time)
     programmed = path_tangents(track, piece, w)
     middle = before + after
     size = np.linalg.norm(middle, axis=1, keepdims=True)
     middle = np.where(size > 0.2, middle / np.maximum(size, 1e-12), after)
     as_told = (np.sum(middle * programmed, axis=1) > _AGREE) | (np.linalg.norm(middle, axis=1) == 0.0)
-    told, chord = track.force(piece, w), track.force_along(piece, w, programmed)
-    force = np.where(as_told[:, None], told, track.force_along(piece, w, middle))
+    feed, behind, ahead = driven_feeds(tip, time, _programmed_feeds(track, motion))
+    told, chord = track.force(piece, w, feed), track.force_along(piece, w, programmed, feed)
+    force = np.where(as_told[:, None], told, track.force_along(piece, w, middle, feed))
     force[~on] = 0.0
     # on fine polygons a control turns somewhere between the corner alone and the whole of its lines
     turning = np.where((as_told & on)[:, None], np.abs(told - chord), 0.0)
+    thicker = np.abs(track.force_along(piece, w, programmed, ahead) - track.force_along(piece, w, programmed, behind))
+    turning = np.maximum(turning, np.where(on[:, None], thicker, 0.0))
+    unsteady = _unsteady(before, after, as_told)[:, None] * np.linalg.norm(force, axis=1, keepdims=True) / np.sqrt(3.0)
+    turning = np.maximum(turning, unsteady)
     # line numbers that were late or early are right to a row
     slack = CLOCK_S + (float(np.median(np.diff(time))) if aligned.lag else 0.0)
-    return Forces(force, np.maximum(_doubt(force, time, on, slack), turning), on)
+    return Forces(force, np.maximum(_doubt(force, time, on, slack), turning), on, _apart(track, motion))
+
+
+def _unsteady(before: Floats, after: Floats, as_told: Bools) -> Floats:
+    """Angle (n,) rad by which a direction between rows may be off where the way is not that of the program.
+
+    before, after (n, 3): directions in which rows were reached and left. A way that turns evenly is known; where it begins or
+    ceases to turn, on which side of a row nobody knows, it is off by half of what the turn changes by.
+    """
+    change = np.linalg.norm(np.diff(after - before, axis=0), axis=1)
+    most = 0.5 * np.maximum(np.append(change, 0.0), np.concatenate([[0.0], change]))
+    near = ~as_told
+    near[1:] |= ~as_told[:-1]
+    near[:-1] |= ~as_told[1:]
+    return np.where(near, most, 0.0)
+
+
+def _apart(track: Track, motion: Ints) -> Bools:
+    """Whether, between rows on motions (n,), one lies that does not cut."""
+    cuts = np.zeros(len(track.path), bool)
+    cuts[track.motion[track.cutting]] = True
+    idle = np.concatenate([[0], np.cumsum(~cuts & (path_geometry.lengths(track.path) > 0.0))])
+    return np.asarray(idle[motion[1:]] > idle[np.minimum(motion[:-1] + 1, len(idle) - 1)], bool)
 
 
 def path_tangents(track: Track, piece: Ints, w: Floats) -> Floats:
     """Programmed direction (n, 3) at fraction w (n,) of pieces (n,)."""
     return path_geometry.tangents(track.path, track.motion[piece], track.u(piece, w))
+
+
+def driven_feeds(tip: Floats, time: Floats, programmed: Floats) -> tuple[Floats, Floats, Floats]:
+    """Feeds (n,) mm/min at which tips (n, 3) were driven at times (n,) s: at the rows, on their way there, and from there on.
+
+    Chips are as thick as the tip is fast. What is as fast as programmed (n,), on one side of a row at least, is programmed:
+    next to a corner or a rapid the other side says nothing. At standstill the edges still rub.
+    """
+    at = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(tip, axis=0), axis=1))])
+    left, right = _beside(at)
+    left, here, right = np.maximum(left, 0), np.arange(len(time)), np.minimum(right, len(time) - 1)
+
+    def speed(a: Ints, b: Ints) -> Floats:
+        found: Floats = np.maximum(60.0 * (at[b] - at[a]) / np.maximum(time[b] - time[a], 1e-9), LEAST_FEED)
+        return np.where(np.abs(found - programmed) < _SAME_FEED * programmed, programmed, found)
+
+    behind, ahead = speed(left, here), speed(here, right)
+    told = (behind == programmed) | (ahead == programmed)
+    return np.where(told, programmed, speed(left, right)), behind, ahead
+
+
+def _programmed_feeds(track: Track, motion: Ints) -> Floats:
+    feed = track.path.feed[motion]
+    return np.where(np.isnan(feed), track.conditions.feed_mm_per_min or np.nan, feed)
+
+
+def _beside(at: Floats) -> tuple[Ints, Ints]:
+    """Rows at least _CHORD_MM away along the way (n,) behind and ahead of each row, neighbours where these are further."""
+    rows = np.arange(len(at))
+    left = np.minimum(np.searchsorted(at, at - _CHORD_MM, side="right") - 1, rows - 1)
+    right = np.maximum(np.searchsorted(at, at + _CHORD_MM, side="left"), rows + 1)
+    return left, right
 
 
 def driven_directions(tip: Floats, time: Floats) -> tuple[Floats, Floats]:
@@ -121,9 +197,7 @@ def driven_directions(tip: Floats, time: Floats) -> tuple[Floats, Floats]:
     length = np.linalg.norm(step, axis=1)
     at = np.concatenate([[0.0], np.cumsum(length)])
     n = len(tip)
-    # rows that are at least _CHORD_MM away along the way, neighbours where these are further
-    left = np.minimum(np.searchsorted(at, at - _CHORD_MM, side="right") - 1, np.arange(n) - 1)
-    right = np.maximum(np.searchsorted(at, at + _CHORD_MM, side="left"), np.arange(n) + 1)
+    left, right = _beside(at)
     before = _unit(tip - tip[np.clip(left, 0, n - 1)])
     after = _unit(tip[np.clip(right, 0, n - 1)] - tip)
     slow = np.concatenate([length / np.maximum(np.diff(time), 1e-9) < _STILL_MM_PER_S, [True]])

@@ -25,6 +25,7 @@ MAX_AIM_STEPS = 50  # friction that turns round in a soft drive leaves up to nin
 REST_S = 60.0
 AHEAD_MM = 2.0  # more than any play
 LEAST_MM = 2e-4  # a drive that comes back by less than this is not led through its play
+HINGE_MM = 1e3  # way per rad of a hinge, where lengths of slides are applied to it: an arm of 1 m
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,8 +76,9 @@ def respond(
     carriage = motion.encoder + error
     state = solve(job.real_machine, FREE, told, force=load.force, wrench=load.wrench, rho=carriage)
     drive = state.drive if effort is None else state.drive + effort
-    tip = job.frame.to_program(signal_path.posed(job.causes, state.tip, load, motion))
-    tip = signal_path.clamped(job.causes, tip)
+    tip = signal_path.led(job.causes, state.tip, motion, job.real_machine.nominal, job.frame.origin)
+    tip = job.frame.to_program(signal_path.posed(job.causes, tip, load, motion))
+    tip = signal_path.placed(job.causes, signal_path.clamped(job.causes, tip), load, motion)
     nominal = control.rho_nominal if aim is None else solve(job.real_machine, FREE, aim, check=False).rho_nominal
     state = replace(state, commanded=told, rho=control.rho_nominal, rho_nominal=nominal, drive=drive)
     return _finite(job, tip, Correction.of(state, state.passes))
@@ -127,8 +129,9 @@ def _through_play(job: Job, found: Correction, travel: Travel) -> Floats:
     """
     solved = found.status == 0
     carriage = found.rho[solved]
-    sense = ways(carriage, LEAST_MM)
-    motion = _motion(job, carriage + AHEAD_MM * sense, travel.take(np.flatnonzero(solved)))
+    length = way_per_unit(job)
+    sense = ways(carriage * length, LEAST_MM)
+    motion = _motion(job, carriage + AHEAD_MM / length * sense, travel.take(np.flatnonzero(solved)))
     still = replace(motion, ordered=False, direction=np.zeros_like(carriage))
     lag, standing = (signal_path.driven(job.causes, job.real_machine.actuators, each)[0] for each in (motion, still))
     lag = lag - standing
@@ -150,6 +153,11 @@ def _tip_way(job: Job, tip: Floats, by: Floats) -> Floats:
     way = np.einsum("nkm,nm->nk", np.linalg.pinv(np.stack(rates, axis=2)), by)
     out: Floats = way @ job.frame.rotation
     return out
+
+
+def way_per_unit(job: Job) -> Floats:
+    """Way (m,) in mm per unit of the actuators: 1 for slides."""
+    return np.where(job.real_machine.revolute, HINGE_MM, 1.0)
 
 
 def plays(job: Job, rho: Floats, travel: Travel) -> Bools:

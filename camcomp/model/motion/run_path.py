@@ -16,6 +16,7 @@ from camcomp.model.motion.timeline import Timeline
 STEP_S = 0.001  # grid of what has memory: 0.2 um of interpolation at 1500 mm/s2
 MOST_STEPS = 40000
 _IN_DOUBT = 0.05  # of the largest force
+_HARDLY_OTHERS = 0.8  # of the rows that cut are in doubt
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,11 +87,18 @@ class RunPath:
 
     @cached_property
     def jumping(self) -> Bools:
-        """Rows (n,) of which nobody knows on which side of a jump of the force they were taken: the tip springs there."""
+        """Rows (n,) of which nobody knows on which side of a jump of the force they were taken: the tip springs there.
+
+        Where hardly any others cut, none: what such rows are off by is all that the run can tell.
+        """
         if self.driven is None:
             return np.zeros(len(self.time), bool)
-        largest = float(np.linalg.norm(self.driven.force, axis=1).max(initial=0.0))
-        return np.asarray(np.linalg.norm(self.driven.doubt, axis=1) > max(_IN_DOUBT * largest, 1e-9))
+        size = np.linalg.norm(self.driven.force, axis=1)
+        doubtful = np.linalg.norm(self.driven.doubt, axis=1) > max(_IN_DOUBT * float(size.max(initial=0.0)), 1e-9)
+        cutting = size > 0.0
+        if doubtful[cutting].sum() > _HARDLY_OTHERS * cutting.sum():
+            return np.zeros(len(self.time), bool)
+        return np.asarray(doubtful)
 
     @property
     def cut_min(self) -> float:

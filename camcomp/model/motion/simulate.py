@@ -7,6 +7,7 @@ import numpy as np
 from camcomp.ground.csv_table import refuse_long
 from camcomp.ground.datatypes import Floats, Ints, Path
 from camcomp.ground.errors import ProgramError
+from camcomp.model.cutting.engaged import Engaged
 from camcomp.model.cutting.spindle import cut_without_spindle, spindle_warning
 from camcomp.model.cutting.track import lay_track
 from camcomp.model.finite import not_finite
@@ -30,10 +31,12 @@ class Simulated:
     warnings: list[str]
 
 
-def simulate(job: Job, path: Path, step_s: float, *, cutting: bool = True, started_s: float = 0.0) -> Simulated:
+def simulate(
+    job: Job, path: Path, step_s: float, *, cutting: bool = True, started_s: float = 0.0, engaged: Engaged | None = None
+) -> Simulated:
     """Rows every step_s seconds from the first feed move to the end of the last, that end included.
 
-    Speed is trapezoidal along every motion and zero at its ends; rapids are not logged. Raises ProgramError CC420 when
+    engaged: what the tool meets along the path, when somebody has followed it through its stock before. Speed is trapezoidal along every motion and zero at its ends; rapids are not logged. Raises ProgramError CC420 when
     the program has no feed move, ConfigError CC425 for too many rows, PhysicsError where the machine cannot be.
     """
     twin = twin_of(job)
@@ -46,7 +49,7 @@ def simulate(job: Job, path: Path, step_s: float, *, cutting: bool = True, start
         time = np.append(time, timeline.end)
     conditions = job.conditions if cutting else replace(job.conditions, model=None)
     warm = job.config.process.temperature_C
-    track = lay_track(path, conditions)
+    track = lay_track(path, conditions, engaged if cutting else None)
     run_path = path_of_program(
         "simulation", timeline, track, time, started=started_s, to_machine=twin.to_machine,
         vectors=job.frame.vectors, inverse=twin.inverse, temperature=None if warm is None else np.full(len(time), warm),

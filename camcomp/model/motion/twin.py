@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 from weakref import WeakKeyDictionary
 
@@ -32,6 +33,8 @@ _MOMENT_STEP = 100.0  # N mm
 _KNOT_MM = 0.25  # or mrad / 4: 0.1 um of a circle of 300 mm
 _FORWARD_PASSES = 12
 _FORWARD_MM = 1e-7
+_FORWARD_FAR_MM = 3.0  # from which on slopes are worked out anew for Newton's method,
+_FORWARD_NEAR_MM = 0.3  # and for what lies between its points
 _SAME_LOAD = 1e-3  # share of the load by which a changed machine's may differ from that it was solved with
 
 
@@ -95,6 +98,11 @@ class Twin:
         """Names in the order of every actuator array."""
         return tuple(each.name for each in self.robot.actuators)
 
+    @cached_property
+    def _control(self) -> Machine:
+        """The machine as its control knows it."""
+        return build_machine(self.nominal, self.nominal)
+
     def to_machine(self, tip: Floats) -> Floats:
         """Tips (n, 3) program -> machine frame."""
         return self.origin + tip @ self.rotation.T
@@ -105,8 +113,7 @@ class Twin:
 
     def inverse(self, tip: Floats) -> Floats:
         """Set-points (n, m) that the control computes for machine tips (n, 3). Raises PhysicsError CC301."""
-        machine = build_machine(self.nominal, self.nominal)
-        state = solve(machine, FREE, tip, check=False)
+        state = solve(self._control, FREE, tip, check=False)
         if (state.status == 3).any():
             bad = int(np.argmax(state.status == 3))
             raise PhysicsError("CC410", f"tip {np.round(tip[bad], 3).tolist()} (machine frame) is {STATUS[3]}")
@@ -115,26 +122,31 @@ class Twin:
     def forward(self, rho: Floats, near: Floats) -> Floats:
         """Machine tips (n, 3) to which actuators rho (n, m) lead the perfect, unloaded machine; near (n, 3): tips near by.
 
-        Newton's method on the inverse kinematics at points some way apart, first order between them: the way is short
-        against the size of the machine. Raises PhysicsError CC410.
+        Newton's method on the inverse kinematics at points some way apart, with the slopes of where it begins, and first
+        order between them: both ways are short against the size of the machine. Raises PhysicsError CC410.
         """
         knots, nearest = _knots(rho * np.where([a.revolute for a in self.robot.actuators], 1000.0, 1.0))
-        tip = near[knots].copy()
+        tip = begun = near[knots]
+        off, back = rho[knots] - self.inverse(tip), self._back(tip)
         for _ in range(_FORWARD_PASSES):
-            off = rho[knots] - self.inverse(tip)
-            ways = np.stack(
-                [
-                    (self.inverse(tip + _RHO_STEP * e) - self.inverse(tip - _RHO_STEP * e)) / (2 * _RHO_STEP)
-                    for e in np.eye(3)
-                ],
-                axis=2,
-            )
-            back = np.linalg.pinv(ways)
             step = np.einsum("nij,nj->ni", back, off)
             tip = tip + step
-            if np.abs(step).max(initial=0.0) < _FORWARD_MM:
+            size = float(np.abs(step).max(initial=0.0))
+            if size < _FORWARD_MM:
                 break
+            if size > _FORWARD_FAR_MM:
+                begun, back = tip, self._back(tip)
+            off = rho[knots] - self.inverse(tip)
+        if np.abs(tip - begun).max(initial=0.0) > _FORWARD_NEAR_MM:
+            back = self._back(tip)
         return np.asarray(tip[nearest] + np.einsum("nij,nj->ni", back[nearest], rho - rho[knots][nearest]))
+
+    def _back(self, tip: Floats) -> Floats:
+        """Derivatives (n, 3, m) of the tip by the actuators of the perfect machine at machine tips (n, 3)."""
+        steps = _RHO_STEP * np.eye(3)
+        ways = [(self.inverse(tip + e) - self.inverse(tip - e)) / (2 * _RHO_STEP) for e in steps]
+        back: Floats = np.linalg.pinv(np.stack(ways, axis=2))
+        return back
 
     def edited(self, causes: Sequence[Cause]) -> tuple[Robot, tuple[Any, ...]]:
         """The machine with the effects on it, and a key that tells equal ones."""
@@ -205,8 +217,9 @@ class Twin:
         if effort is not None:
             drive = drive + _interpolate(run_path, run_path.time, effort)
         # tool, workpiece, sensor
+        tip = signal_path.led(causes, tip, at_tip, self.nominal, self.origin)
         tip = self.to_program(signal_path.posed(causes, tip, load_tip, at_tip))
-        tip = signal_path.clamped(causes, tip)
+        tip = signal_path.placed(causes, signal_path.clamped(causes, tip), load_tip, at_tip)
         return signal_path.read(causes, Reading(tip, encoder, drive, load.force, rows), rows), solved
 
     def _node_load(

@@ -92,7 +92,12 @@ def _load_lightly(cache: Any) -> None:
     def load(signature: Any, context: Any) -> Any:
         with cache._guard_against_spurious_io_errors():
             found = cache._load_overload(signature, context)
-        return whole(signature, context) if found is None else found
+        if found is not None:
+            return found
+        from camcomp.ground import headway
+
+        headway.hold(headway.ONCE)
+        return whole(signature, context)
 
     cache.load_overload = load
 
@@ -108,7 +113,8 @@ def entry(function: Callable[..., Any]) -> Callable[..., Any]:
     from camcomp.ground.machine_code import kept  # only those who compile need it
 
     dispatcher = kept(function, **_OPTIONS)
-    if (file := getattr(dispatcher._cache, "_cache_file", None)) is not None:
+    file = getattr(dispatcher._cache, "_cache_file", None)
+    if file is not None:
         file._source_stamp = (file._source_stamp, digest(Path(function.__code__.co_filename)))
         _load_lightly(dispatcher._cache)
 
@@ -116,11 +122,16 @@ def entry(function: Callable[..., Any]) -> Callable[..., Any]:
     def call(*args: Any) -> Any:
         if dispatcher.overloads:  # not its `signatures`, which makes a list every time
             return dispatcher(*args)
+        from camcomp.ground import headway
+
         resting = gc.isenabled()
         gc.disable()
+        if file is None:
+            headway.hold(headway.COMPILING)
         try:
             return dispatcher(*args)
         finally:
+            headway.hold("")
             if resting:
                 gc.enable()
 

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from camcomp.ground.headway import points
 from camcomp.model.statics import point, rigid, sweep
 from camcomp.model.statics.layout import SPRINGS, new_memory, new_work
 from camcomp.model.statics.machine import Machine
@@ -80,15 +81,15 @@ def threads() -> int:
 
 
 def in_pieces(work: Callable[[slice], None], n: int) -> None:
-    """Runs work on slices of PIECE points, on every core."""
+    """Runs work on slices of PIECE points, on every core; says how many of them are done."""
     pieces = [slice(a, min(a + PIECE, n)) for a in range(0, n, PIECE)]
     workers = min(threads(), len(pieces))
     if workers < 2:
-        for piece in pieces:
+        for piece in points(pieces, len(pieces)):
             work(piece)
         return
     with ThreadPoolExecutor(workers) as pool:
-        list(pool.map(work, pieces))
+        list(points(pool.map(work, pieces), len(pieces)))
 
 
 def solve(

@@ -131,3 +131,11 @@ def test_init_writes_a_machine_that_compensates_once_its_springs_are_filled_in(t
     done = camcomp("compensate", tmp_path / "job" / "groove.nc", "--config", machine, "-o", tmp_path / "out.nc")
     assert done.returncode == 0, done.stderr.decode()
     assert b"tip error before: rms 2" in done.stderr  # 215 N on 10 N/um
+
+
+def test_init_writes_no_machine_of_five_joints(tmp_path):
+    file = tmp_path / "arm.urdf"
+    file.write_bytes(urdf().replace(b'type="prismatic"', b'type="fixed"', 1))
+    done = camcomp("init", tmp_path / "job", "--from-urdf", file)
+    assert done.returncode == 2 and b"CC240" in done.stderr and b"5 joints move" in done.stderr
+    assert not (tmp_path / "job").exists()

@@ -11,14 +11,14 @@ effects:
   - {effect: gravity, weight_N: 20}   # weighed
 """
 WIDTH = SimpleNamespace(value=0.012, ci95=(0.011, 0.013))
-CAUSES = [SimpleNamespace(effect="backlash", target="x", parameters={"width_mm": WIDTH})]
+CAUSES = [SimpleNamespace(effect="backlash", target="x", parameters={"width_mm": WIDTH}, settings={})]
 
 
 def test_comments_and_former_effects_stay_and_the_cause_is_added():
     out = with_causes(TEXT, CAUSES)
     assert "# a machine" in out and "# its name" in out and "# weighed" in out
     assert "effect: gravity, weight_N: 20" in out
-    assert "- effect: backlash" in out and "target: x" in out and "width_mm: 0.012" in out
+    assert "- effect: backlash" in out and "target: x" in out and "width_mm: {value: 0.012, sd: 0.00051}" in out
     assert "0.011 to 0.013" in out
 
 
@@ -33,7 +33,7 @@ def test_what_is_written_reads_back():
     tree = YAML(typ="safe").load(with_causes(TEXT, CAUSES))
     assert tree["effects"] == [
         {"effect": "gravity", "weight_N": 20},
-        {"effect": "backlash", "target": "x", "width_mm": 0.012},
+        {"effect": "backlash", "target": "x", "width_mm": {"value": 0.012, "sd": 0.00051}},
     ]
 
 
