@@ -66,6 +66,48 @@ def test_delta_looks_the_same_from_every_column() -> None:
     np.testing.assert_allclose(there, here @ turn.T, atol=1e-6)
 
 
+INCH = 25.4
+BASE = INCH * np.array([[-22.95, 13.25], [22.95, 13.25], [22.95, 13.25], [0, -26.5], [0, -26.5], [-22.95, 13.25]])
+PLATFORM = INCH * np.array(
+    [[-1, 11.5], [1, 11.5], [10.459, -4.884], [9.459, -6.616], [-9.459, -6.616], [-10.459, -4.884]]
+)  # LinuxCNC, src/emc/kinematics/genhexkins.h
+
+
+def legs(tip: np.ndarray) -> np.ndarray:
+    """From base to platform joint (n, 6, 3) of the upright hexapod."""
+    centre = tip + [0.0, 0.0, 100.0]
+    level = centre[:, None, :2] + PLATFORM - BASE
+    return np.concatenate((level, np.repeat(centre[:, None, 2:], 6, axis=1)), axis=2)
+
+
+def test_hexapod_inverse_kinematics() -> None:
+    hexapod, origin = machine("hexapod")
+    tips = points(origin)
+    _, state = settle(hexapod, tips, np.zeros((25, 3)))
+    assert (state.status == 0).all()
+    np.testing.assert_allclose(state.rho_nominal, np.linalg.norm(legs(tips), axis=2), atol=1e-6)
+    assert (hexapod.limits[:, 0] < state.rho_nominal.min(axis=0)).all()
+    assert (hexapod.limits[:, 1] > state.rho_nominal.max(axis=0)).all()
+
+
+def test_hexapod_gives_way_as_six_springs_along_its_legs() -> None:
+    """To first order: rates of the legs J, leg stiffness k in series, deflection (J' k J)^-1 wrench."""
+    hexapod, origin = machine("hexapod")
+    tips = points(origin)
+    force = np.array([60.0, -90.0, 40.0])
+    loaded, state = settle(hexapod, tips, np.tile(force, (25, 1)))
+    along = legs(tips) / np.linalg.norm(legs(tips), axis=2, keepdims=True)
+    arm = np.concatenate((PLATFORM, np.zeros((6, 1))), axis=1)
+    rates = np.concatenate((along, np.cross(arm[None], along)), axis=2)
+    wrench = np.concatenate((force, np.cross([0.0, 0.0, -100.0], force)))
+    k = 1.0 / (1.0 / 5.0e4 + 1.5e-5)
+    twist = np.linalg.solve(k * np.swapaxes(rates, 1, 2) @ rates, np.tile(wrench, (25, 1))[..., None])[..., 0]
+    moved = twist[:, :3] + np.cross(twist[:, 3:], [0.0, 0.0, -100.0])
+    np.testing.assert_allclose(loaded - tips, moved, rtol=2e-3, atol=2e-6)
+    pushed = -np.linalg.solve(np.swapaxes(rates, 1, 2), np.tile(wrench, (25, 1))[..., None])[..., 0]
+    np.testing.assert_allclose(state.drive, pushed, atol=0.05)
+
+
 def test_router_bends_as_the_energy_plant_says() -> None:
     router, origin = machine("router")
     tips = points(origin)

@@ -102,6 +102,8 @@ class Plan:
             if (key == "file" or key.endswith("_file")) and isinstance(value, str):
                 value = hashlib.sha256(read_bytes(Path(node.at.file).parent / value)).hexdigest()
             digest.update(repr((name, value)).encode())
+        if self.config.spreads:
+            digest.update(repr([(each.name, each.sd, each.group) for each in self.config.spreads]).encode())
         return digest.hexdigest()
 
 

@@ -8,9 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from camcomp.compensation.long.kernel import lay_loads
+from camcomp.compensation.long.met import Met
 from camcomp.compensation.long.plain_run import NotInPieces, PlainRun
 from camcomp.ground.datatypes import LINE, RAPID, Bools, Floats, Ints, Path
 from camcomp.model.cutting.track import JOIN_ANGLE, PLUNGE_SINE, Conditions, lay_track
+from camcomp.model.job import Job
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,12 +39,34 @@ class Loads:
     jump: Bools  # (n + 1,) the force jumps at the start of each move, and behind the last one
     length: Floats  # (n,) mm
     at: Callable[[Ints, Floats], Floats]  # (move (k,), fraction (k,)) -> force (k, 3)
+    run: PlainRun  # the moves, where the stock is known in parts between the places of the engagement
+    of: Ints  # (n,) motion of the program that a move is a part of
+    sizes: Callable[[Ints, Floats], Floats] | None = None  # (move, fraction) -> depth mm, engaged arcs rad (k, 2)
 
 
-def loads_of(run: PlainRun, before: Edge | None, after: Edge | None, c: Conditions, constant: Floats | None) -> Loads:
+def constant_of(job: Job) -> Floats | None:
+    """Fr, Ft, Fz (3,) N of a force model that always gives the same; None: any other model."""
+    force = job.config.process.force
+    if job.config.workpiece.stock is not None:  # not where the tool meets nothing
+        return None
+    if force.model == "none":
+        return np.zeros(3)
+    if force.model == "constant" and job.conditions.stock_top_mm is None:
+        return np.array([force.params.Fr_N, force.params.Ft_N, force.params.Fz_N], float)
+    return None
+
+
+def loads_of(
+    run: PlainRun,
+    before: Edge | None,
+    after: Edge | None,
+    c: Conditions,
+    constant: Floats | None,
+    met: Met | None = None,
+) -> Loads:
     """Forces along a run. constant (3,): Fr, Ft, Fz of a model that always gives the same; None: any other model.
 
-    Raises NotInPieces where the stock's top is too near.
+    met: what the tool meets, where the stock is known. Raises NotInPieces where the stock's top is too near.
     """
     n, plain = run.motions, run.plain
     left, right = ([before] if before else []), ([after] if after else [])
@@ -54,7 +78,7 @@ def loads_of(run: PlainRun, before: Edge | None, after: Edge | None, c: Conditio
     for each, row in beside:
         start[row], end[row] = each.start, each.end
     if constant is None:
-        return _of_model(run, kind, start, end, own, beside, c)
+        return _of_model(run, kind, start, end, own, beside, c, met)
     first, last, length = np.empty(start.shape), np.empty(start.shape), np.empty(len(kind))
     jump = np.zeros(len(kind) + 1, np.bool_)
     axis = np.asarray(c.tool_axis, float)
@@ -64,7 +88,7 @@ def loads_of(run: PlainRun, before: Edge | None, after: Edge | None, c: Conditio
     def at(move: Ints, w: Floats) -> Floats:
         return f0[move] + w[:, None] * (f1[move] - f0[move])
 
-    return Loads(f0, f1, jump[own.start : own.stop + 1], length[own], at)
+    return Loads(f0, f1, jump[own.start : own.stop + 1], length[own], at, run, np.arange(n))
 
 
 def _of_model(
@@ -75,6 +99,7 @@ def _of_model(
     own: slice,
     beside: list[tuple[Edge, int]],
     c: Conditions,
+    met: Met | None,
 ) -> Loads:
     n, plain, state = len(kind), run.plain, run.state
     line, feed, speed, turn, tool = np.zeros(n, np.int64), *np.empty((3, n)), np.empty(n, np.int64)
@@ -88,17 +113,24 @@ def _of_model(
         feed=np.where(kind == RAPID, np.nan, feed), speed=speed, turn=turn, tool=tool,
         known=np.ones(n, np.bool_), machine=np.zeros(n, np.bool_),
     )  # fmt: skip
-    track = lay_track(path, c)
-    if len(track.motion) != n:  # a neighbour crosses the stock's top within NEAR
+    track = lay_track(path, c, None if met is None else met.around(own))
+    if met is None and len(track.motion) != n:  # a neighbour crosses the stock's top within NEAR
         raise NotInPieces
+    first, last = np.searchsorted(track.motion, (own.start, own.stop)).tolist()
 
     def at(move: Ints, w: Floats) -> Floats:
-        return track.force(move + own.start, w)
+        return track.force(move + first, w)
 
-    moves = np.arange(run.motions)
-    jump = np.append(track.jump, False)[own.start : own.stop + 1]
+    def sizes(move: Ints, w: Floats) -> Floats:
+        return np.column_stack(track.sizes(move + first, w))
+
+    moves = np.arange(last - first)
+    jump = np.append(track.jump, False)[first : last + 1]
     zero, one = np.zeros(len(moves)), np.ones(len(moves))
-    return Loads(at(moves, zero), at(moves, one), jump, track.length[own], at)
+    of = track.motion[first:last] - own.start
+    parts = run if met is None else run.parts(of, track.points(moves + first, zero), track.points(moves + first, one))
+    length = track.length[first:last]
+    return Loads(at(moves, zero), at(moves, one), jump, length, at, parts, of, None if met is None else sizes)
 
 
 def joints_at(loads: Loads, kind: np.ndarray, before: Edge | None, after: Edge | None) -> tuple[Bools, Bools]:

@@ -7,13 +7,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from camcomp.compensation.bands.outcome import Bands, BandTotals
+from camcomp.compensation.bands.scatter import best_share
 from camcomp.compensation.long.fastwrite import ROOM, write_rows
 from camcomp.compensation.long.field import Field, Tiles
 from camcomp.compensation.long.kernel import BASIC, follow, look_up
-from camcomp.compensation.long.loads import Edge, Loads, joints_at, loads_of
+from camcomp.compensation.long.loads import Edge, Loads, constant_of, joints_at, loads_of
+from camcomp.compensation.long.met import Met
 from camcomp.compensation.long.plain_run import NotInPieces, PlainRun
+from camcomp.compensation.long.run_bands import RunUncertainty
 from camcomp.compensation.program.chords import divide, second_derivative, trial_nodes
 from camcomp.compensation.program.moves import chord_budget
+from camcomp.compensation.program.policy import left_alone
+from camcomp.compensation.program.under_control import rests_of, rounds
 from camcomp.gcode.dialect import Dialect
 from camcomp.gcode.output import Standing
 from camcomp.ground.datatypes import LINE, RAPID, Bools, Floats, Ints
@@ -65,6 +71,7 @@ class PlainRows:
     target: Floats  # (N, 3) mm
     force: Floats  # (N, 3) N
     shift: Floats  # (N, 3) mm added to the correction at division points
+    engagement: Floats | None  # (N, 2) depth of the cut mm, engaged arcs rad; None: no stock is known
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,12 +91,24 @@ class Done:
     """A corrected run."""
 
     data: bytes
+    run: PlainRun  # the moves that the rows count
     rows: PlainRows
     answers: Answers
     commanded: Floats  # (N, 3) mm before rounding, program frame
     written: Floats  # (N, 3) mm
     before: Floats  # (k, 3) mm at the end points and the middles of lines
     after: Floats
+    begin: Floats  # (3,) mm where the written run starts
+    feed: Floats  # (N,) mm/min in force
+    rest: Bools  # (N,) ends at rest because of a joining line
+    seen: Ints  # (k,) rows of before and after
+    bands: Bands | None = None
+    left: Floats | None = None  # (k, 3) mm of `after` that a policy leaves on purpose
+
+    @property
+    def missed(self) -> Floats:
+        """What `after` (k, 3) mm has beside that."""
+        return self.after if self.left is None else self.after - self.left
 
 
 class Unsolved(Exception):
@@ -117,18 +136,29 @@ class PlainCorrector:
         self.tolerance = 1e-3 * tolerance_um
         self.field: Field | None = None
         self.exact = 0  # rows that had to be solved one by one
-        self._constant: Floats | None = None
-        if force.model == "none":
-            self._constant = np.zeros(3)
-        elif force.model == "constant" and job.conditions.stock_top_mm is None:
-            self._constant = np.array([force.params.Fr_N, force.params.Ft_N, force.params.Fz_N], float)
+        self._constant = constant_of(job)
 
-    def correct(self, run: PlainRun, before: Edge | None, after: Edge | None, carry: Carry) -> Done:
-        """The run corrected and written; `carry` is moved along. Raises Unsolved, NotInPieces."""
-        loads = loads_of(run, before, after, self.job.conditions, self._constant)
+    def correct(
+        self, whole: PlainRun, before: Edge | None, after: Edge | None, carry: Carry, met: Met | None = None
+    ) -> Done:
+        """The run corrected and written; `carry` is moved along. met: what the tool meets. Raises Unsolved, NotInPieces."""
+        loads = loads_of(whole, before, after, self.job.conditions, self._constant, met)
+        try:
+            return self._corrected(whole, met, loads, before, after, carry)
+        except Unsolved as error:
+            raise Unsolved(loads.of[error.move], error.target, error.status) from None
+
+    def _corrected(
+        self, whole: PlainRun, met: Met | None, loads: Loads, before: Edge | None, after: Edge | None, carry: Carry
+    ) -> Done:
+        run = loads.run
+        uncertainty = RunUncertainty.of(self.job, whole, before, after, met) if self.job.config.uncertain else None
+        policy = self.job.config.compensation.policy if uncertainty is not None else "full"
         if self.field is None:
             force = self.job.frame.vectors(np.concatenate((loads.first, loads.last)))
             self.field = Field(self.machine, force, self.job.frame.origin)
+        if uncertainty is not None and policy == "skip":
+            loads = self._left_lines(run, loads, uncertainty)
         lead, trail = joints_at(loads, run.plain.kind, before, after)
         self.resolution = self.language.step_mm(self.job.config.control.resolution_mm, run.state.unit)
         self.budget = chord_budget(1e3 * self.tolerance, self.resolution)
@@ -138,19 +168,19 @@ class PlainCorrector:
         for left in range(ROUNDS, 0, -1):
             rows = self._rows(run, loads, lead, trail, hard, tolerance)
             answers = self._answers(rows)
-            commanded, kept = self._commanded(rows, answers)
+            commanded, kept, share = self._commanded(rows, answers, loads.of, uncertainty, policy)
             if not settled:
                 settled = True
                 if self._drop_small_joints(rows, commanded, carry, lead, trail):
                     continue
-            middles = self._middles(run, loads, rows)
+            middles = self._middles(run, loads, rows, share)
             told = self._halfway(commanded, carry.commanded)[middles.rows] - middles.wanted
             bent = (_sizes(told) > self.budget) & ~hard[middles.move]
             if bent.any() and left > 1:
                 hard[middles.move[bent]] = True
                 continue
             trial = replace(carry)
-            data, written = self._write(run, rows, commanded, kept, trial)
+            data, written, held, rest = self._write(whole, loads, rows, commanded, kept, trial)
             judged = self._judged(run, rows)
             error = self._after(rows, judged, answers, middles, commanded, written, carry.written)
             worst = np.zeros(run.motions)
@@ -162,9 +192,46 @@ class PlainCorrector:
             hard |= missed
             shrink = np.clip(0.9 * self.tolerance / np.maximum(worst, 1e-300), 0.3, 0.9)
             tolerance = np.where(missed, tolerance * shrink, tolerance)
+        begin = carry.written
         carry.__dict__.update(trial.__dict__)
+        meant: Floats | None = None
+        if share is not None:
+            meant = self._left(judged, answers, middles, share)
+            error = error + meant
+        bands = None if uncertainty is None else self._bands(uncertainty, rows, answers, judged, error, written, share)
         unloaded = np.concatenate((answers.unloaded[judged], middles.unloaded))
-        return Done(data, rows, answers, commanded, written, self._back(unloaded), error)
+        seen = np.concatenate((np.flatnonzero(judged), middles.rows))
+        back = self._back(unloaded)
+        return Done(data, run, rows, answers, commanded, written, back, error, begin, held, rest, seen, bands, meant)
+
+    def _bands(
+        self, uncertainty: RunUncertainty, rows: PlainRows, answers: Answers, judged: Bools, error: Floats, written: Floats,
+        share: Floats | None,
+    ) -> Bands:  # fmt: skip
+        moves = uncertainty.moves(written, rows.move, rows.w, rows.force, rows.joining & (rows.w > 0.0))
+        left = np.zeros_like(written) if share is None else (1.0 - share)[:, None] * self._back(answers.unloaded)
+        left[judged] = error[: int(judged.sum())]
+        totals = BandTotals(uncertainty.inputs)
+        taken = np.ones(len(left)) if share is None else share
+        totals.add(left[judged], moves.take(np.flatnonzero(judged)), taken[judged])
+        return Bands(self._back(answers.unloaded), left, moves, taken, np.ones(len(left), np.bool_), totals)
+
+    def _left(self, judged: Bools, answers: Answers, middles: _Middles, share: Floats) -> Floats:
+        """Errors (k, 3), program frame, that the policy leaves on purpose."""
+        ends = (1.0 - share[judged])[:, None] * answers.unloaded[judged]
+        between = (1.0 - middles.share)[:, None] * middles.unloaded
+        return self._back(np.concatenate((ends, between)))
+
+    def _left_lines(self, run: PlainRun, loads: Loads, uncertainty: RunUncertainty) -> Loads:
+        """The loads, with jumps where lines that are left alone meet others; which lines those are is kept for `_commanded`."""
+        n, plain = run.motions, run.plain
+        moves, w = np.tile(np.arange(n), 2), np.repeat([0.0, 1.0], n)
+        target, force = np.concatenate((plain.start, plain.end)), np.concatenate((loads.first, loads.last))
+        answer = self.ask(moves, target, force, every=False)[0]
+        there = uncertainty.moves(target + self._back(answer[:, :3]), moves, w, force, np.zeros(2 * n, np.bool_))
+        self._alone = left_alone(np.tile(loads.of, 2), self._back(answer[:, 3:6]), there)[:n]
+        step = np.concatenate(([True], self._alone[1:] != self._alone[:-1], [True]))
+        return replace(loads, jump=loads.jump | step)
 
     # --- rows ----------------------------------------------------------------------------------------------------
 
@@ -194,7 +261,8 @@ class PlainCorrector:
             target[inside] = start + w[inside, None] * (target[inside] - start)
             force[inside] = loads.at(move[inside], w[inside])
         force[kind == 2] = 0.0
-        return PlainRows(move, w, kind != 1, target, force, shift)
+        engagement = None if loads.sizes is None else loads.sizes(move, w)
+        return PlainRows(move, w, kind != 1, target, force, shift, engagement)
 
     def _divided(self, run: PlainRun, loads: Loads, which: Ints, tolerance: Floats) -> tuple[Ints, Floats, Floats]:
         """Division points of some moves: move, w and shift of each."""
@@ -257,14 +325,28 @@ class PlainCorrector:
             answer[lost], nominal[lost if every else []] = self._solved(move[lost], target[lost], force[lost], every)
         return answer, nominal, tile, known.tiles
 
-    def _commanded(self, rows: PlainRows, answers: Answers) -> tuple[Floats, Bools]:
-        """Tips (N, 3) to be commanded, and which rows (N,) stay as programmed: what would be rounded away is left out."""
-        moved = self._back(answers.correction) + rows.shift
+    def _commanded(
+        self, rows: PlainRows, answers: Answers, of: Ints, uncertainty: RunUncertainty | None, policy: str
+    ) -> tuple[Floats, Bools, Floats | None]:
+        """Tips (N, 3) to be commanded, which rows (N,) stay as programmed, and the share (N,) of the correction, None: all of it.
+
+        What would be rounded away is left out.
+        """
+        moved, share = self._back(answers.correction), None
+        if uncertainty is not None and policy == "shrink":
+            free = rows.joining & (rows.w > 0.0)
+            moves = uncertainty.moves(rows.target + moved, rows.move, rows.w, rows.force, free)
+            share = best_share(self._back(answers.unloaded), np.zeros_like(moved), moves)
+        elif uncertainty is not None and policy == "skip":
+            behind = np.minimum(rows.move + (rows.joining & (rows.w > 0.0)), len(self._alone) - 1)
+            share = np.where(self._alone[behind], 0.0, 1.0)
+        moved = moved + rows.shift if share is None else share[:, None] * (moved + rows.shift)
         single = ~rows.joining
-        single[1:] &= rows.move[1:] != rows.move[:-1]
-        single[:-1] &= rows.move[:-1] != rows.move[1:]
+        motion = of[rows.move]
+        single[1:] &= motion[1:] != motion[:-1]
+        single[:-1] &= motion[:-1] != motion[1:]
         kept = single & (np.abs(moved).max(axis=1) <= 0.5 * self.resolution)
-        return rows.target + np.where(kept[:, None], 0.0, moved), kept
+        return rows.target + np.where(kept[:, None], 0.0, moved), kept, share
 
     def _error_of(self, off: Floats, tile: Ints, tiles: Tiles) -> Floats:
         """Errors (n, 3) of tips that are commanded `off` (n, 3) mm beside the right place, machine frame."""
@@ -272,17 +354,29 @@ class PlainCorrector:
         follow(tiles.slope, tile, off, out)
         return out
 
-    def joints(self, done: Done) -> Floats:
-        """Joints (N, m) of the written end points: those of the exact command, and the step that rounding makes."""
+    def off(self, done: Done) -> Floats:
+        """Way (N, 3) mm, machine frame, from the exact command of the whole correction to what is written."""
+        return self.job.frame.vectors(done.written - done.rows.target) - done.answers.correction
+
+    def actuators(self, done: Done) -> tuple[Floats, Floats]:
+        """Joints (N, m) of the written end points and drives there: those of the exact command, and the step that rounding makes.
+
+        Where more than rounding lies between the two, the written point is solved.
+        """
         m, frame = len(self.machine.actuators), self.job.frame
-        tile, off = done.answers.tile, frame.vectors(done.written - done.commanded + done.rows.shift)
-        out = np.zeros((len(tile), m))
+        tile, off = done.answers.tile, self.off(done)
+        out, drive = np.zeros((len(tile), m)), done.answers.rest[:, 3 : 3 + m]
         follow(done.answers.tiles.rates, tile, off, out)
         out += done.answers.nominal + done.answers.rest[:, 3 + m :]
-        lost = np.flatnonzero((tile < 0) | (self.resolution > COARSE_MM))
+        far = np.abs(off).max(axis=1) > COARSE_MM
+        lost = np.flatnonzero((tile < 0) | (self.resolution > COARSE_MM) | far)
         if len(lost):
             out[lost] = solve(self.machine, FREE, frame.to_machine(done.written[lost]), check=False).rho_nominal
-        return out
+        if far.any():
+            told, force = frame.to_machine(done.written[far]), frame.vectors(done.rows.force[far])
+            drive = drive.copy()
+            drive[far] = solve(self.machine, FREE, told, force=force, check=False).drive
+        return out, drive
 
     def _solved(self, move: Ints, target: Floats, force: Floats, every: bool) -> tuple[Floats, Floats]:
         aimed = solve(self.machine, TARGET, target, force=force)
@@ -298,7 +392,7 @@ class PlainCorrector:
 
     # --- middles of lines ----------------------------------------------------------------------------------------
 
-    def _middles(self, run: PlainRun, loads: Loads, rows: PlainRows) -> _Middles:
+    def _middles(self, run: PlainRun, loads: Loads, rows: PlainRows, share: Floats | None) -> _Middles:
         """The middles of the lines that cut."""
         at = np.flatnonzero(self._judged(run, rows) & (loads.length[rows.move] > 0.0))
         move, w = rows.move[at], rows.w[at]
@@ -307,7 +401,11 @@ class PlainCorrector:
         start = run.plain.start[move]
         target = start + middle[:, None] * (run.plain.end[move] - start)
         answer, _, tile, tiles = self.ask(move, target, loads.at(move, middle), every=False)
-        return _Middles(at, move, target + self._back(answer[:, :3]), answer[:, 3:6], tile, tiles)
+        taken = np.ones(len(at))
+        if share is not None:
+            taken = 0.5 * (share[at] + share[np.maximum(at - 1, 0)])
+        wanted = target + taken[:, None] * self._back(answer[:, :3])
+        return _Middles(at, move, wanted, taken, answer[:, 3:6], tile, tiles)
 
     def _halfway(self, ends: Floats, first: Floats) -> Floats:
         return 0.5 * (ends + np.concatenate((first[None], ends[:-1])))
@@ -333,23 +431,32 @@ class PlainCorrector:
     # --- writing -------------------------------------------------------------------------------------------------
 
     def _write(
-        self, run: PlainRun, rows: PlainRows, commanded: Floats, kept: Bools, carry: Carry
-    ) -> tuple[bytes, Floats]:
+        self, run: PlainRun, loads: Loads, rows: PlainRows, commanded: Floats, kept: Bools, carry: Carry
+    ) -> tuple[bytes, Floats, Floats, Bools]:
         plain, N = run.plain, len(rows.move)
-        first = np.searchsorted(rows.move, np.arange(run.motions + 1))
-        out = np.empty(run.text_end - run.text_at + ROOM * N, np.uint8)
-        written = np.empty((N, 3))
+        rest = self._rests(loads.run, rows)
+        modes = [np.frombuffer(each.encode(), np.uint8) for each in ("G61", run.state.path_mode.said(run.state.unit))]
+        first = np.searchsorted(loads.of[rows.move], np.arange(run.motions + 1))
+        out = np.empty(run.text_end - run.text_at + ROOM * (N + int(rest.sum())), np.uint8)
+        written, held = np.empty((N, 3)), np.empty(N)
         position, state = carry.written.copy(), np.array([carry.code, carry.feed])
         unit = run.state.unit
         size = write_rows(
             run.data, run.text_at, run.text_end, plain.line, plain.begin, plain.finish, plain.kind, plain.end,
-            plain.code_stated, plain.feed_stated, plain.feed, first, rows.joining, commanded, self._feeds(run, rows, commanded, kept, carry),
+            plain.code_stated, plain.feed_stated, plain.feed, first, rows.joining, rest, *modes, commanded,
+            self._feeds(loads.run, rows, commanded, kept, carry),
             position, state, unit, np.array(run.state.offset), self.language.digits(self.job.config.control.resolution_mm, unit),
-            0.5 * self.resolution * (1.0 + 1e-9), self.feed_point, out, written,
+            0.5 * self.resolution * (1.0 + 1e-9), self.feed_point, out, written, held,
         )  # fmt: skip
         carry.written, carry.commanded = position, commanded[-1].copy()
         carry.code, carry.feed = float(state[0]), float(state[1])
-        return out[:size].tobytes(), written
+        return out[:size].tobytes(), written, held, rest
+
+    def _rests(self, run: PlainRun, rows: PlainRows) -> Bools:
+        """Rows (N,) at which the control has to rest; those at the run's end are left to it."""
+        if not rounds(run.state.path_mode, 1e3 * self.tolerance):
+            return np.zeros(len(rows.move), np.bool_)
+        return rests_of((run.plain.kind[rows.move] == LINE) & ~rows.joining, rows.joining)
 
     def _feeds(self, run: PlainRun, rows: PlainRows, commanded: Floats, kept: Bools, carry: Carry) -> Floats:
         """Feed (N,) so that the tip keeps its programmed speed, as in compensate.py."""
@@ -372,6 +479,7 @@ class _Middles:
     rows: Ints  # the end point of the line
     move: Ints
     wanted: Floats  # (k, 3) mm to be commanded there, program frame
+    share: Floats  # (k,) of the correction
     unloaded: Floats  # (k, 3) mm, machine frame
     tile: Ints  # (k,)
     tiles: Tiles

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from copy import deepcopy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from camcomp.compensation.long.fastread import Plain
 from camcomp.gcode.state import ControlState
+from camcomp.ground.datatypes import Floats, Ints
 
 
 class NotInPieces(Exception):
@@ -30,6 +31,11 @@ class PlainRun:
     def motions(self) -> int:
         """Number of motions."""
         return len(self.plain.row)
+
+    def parts(self, of: Ints, start: Floats, end: Floats) -> PlainRun:
+        """A run of parts (n,) of these motions, from start (n, 3) to end (n, 3)."""
+        plain = Plain(*(each[of] for each in self.plain))  # type: ignore[arg-type]
+        return replace(self, plain=plain._replace(start=start, end=end))
 
     def before(self, motion: int) -> ControlState:
         """The control in front of a motion."""

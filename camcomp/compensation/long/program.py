@@ -11,11 +11,12 @@ import hashlib
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import BinaryIO
+from typing import TYPE_CHECKING, BinaryIO
 
 import numpy as np
 
 from camcomp.compensation.long.loads import Edge
+from camcomp.compensation.long.met import Met, path_of_run
 from camcomp.compensation.long.plain import Carry, PlainCorrector, Unsolved
 from camcomp.compensation.long.plain_run import NotInPieces, PlainRun
 from camcomp.compensation.long.runs import OddRun, Runs
@@ -27,10 +28,16 @@ from camcomp.gcode.setup import Setup
 from camcomp.gcode.stamp import is_stamped, stamp_index, stamp_text
 from camcomp.gcode.text import Text
 from camcomp.ground import path_geometry
-from camcomp.ground.datatypes import LINE, RAPID
+from camcomp.ground.datatypes import LINE, RAPID, Path
 from camcomp.ground.errors import CheckFailed, Location, PhysicsError, raise_all
+from camcomp.ground.headway import done
+from camcomp.ground.headway import part as part_of_work
+from camcomp.model.cutting.engaged import Engaged
 from camcomp.model.job import Job
 from camcomp.model.statics.solve import STATUS
+
+if TYPE_CHECKING:
+    from camcomp.compensation.long.followed_runs import FollowedRuns
 
 HASHED = 1 << 22  # bytes at once
 LINE_OF_STAMP = 256  # bytes
@@ -51,10 +58,11 @@ class Bulk:
 
     def run(self, source: BinaryIO, sink: Callable[[bytes], object]) -> Totals:
         """Reads the seekable source twice: once for its hash. Raises NotInPieces before or in the middle of writing."""
-        digest, size, rest = hashlib.sha256(), 0, b""
+        digest, size, lines, rest = hashlib.sha256(), 0, 0, b""
         while block := source.read(HASHED):
             digest.update(block)
             size += len(block)
+            lines += block.count(b"\n")
             if b"sha256:" in (seen := rest + block) and is_stamped(seen):
                 raise CheckFailed("CC603", f"{self.name} was compensated before")
             rest = block[-LINE_OF_STAMP:]
@@ -62,8 +70,10 @@ class Bulk:
         self._carry = Carry(np.array(self.setup.start_mm, float), np.array(self.setup.start_mm, float))
         self._told: Future[None] = Future()
         self._told.set_result(None)
-        self.totals = Totals(self.job, digest.hexdigest(), size)
-        top = self.job.conditions.stock_top_mm if self.job.conditions.model else None
+        self.totals = Totals(self.job, digest.hexdigest(), size, self.tolerance_um)
+        self._lines = max(lines, 1)
+        self._stock = _stock_of(self.job, source, self.name, self.setup)
+        top = self.job.conditions.stock_top_mm if self.job.conditions.model and self._stock is None else None
         self._runs = Runs(
             source, self.name, self.setup, self.job.config.control.dialect, np.nan if top is None else top
         )
@@ -75,6 +85,8 @@ class Bulk:
                 sink(data)
             self._told.result()
         self.totals.finish(self._corrector, self._runs.warnings)
+        if self._stock is not None:
+            self.totals.warnings += self._stock.finish()
         return self.totals
 
     # --- order ---------------------------------------------------------------------------------------------------
@@ -92,14 +104,26 @@ class Bulk:
                     behind = []
                 continue
             piece = _Piece(item, self._runs)
+            done(item.row0 / self._lines)
             if current is not None:
+                self._follow(current, piece)
                 yield self._stamped(self._corrected(current, before, piece))
                 yield from behind
                 behind, before = [], current
             current = piece
         if current is not None:
+            self._follow(current, None)
             yield self._stamped(self._corrected(current, before, None))
         yield from behind
+
+    def _follow(self, piece: _Piece, after: _Piece | None) -> None:
+        """Leads a piece, and only then, through the stock."""
+        if self._stock is None:
+            return
+        ahead = None if after is None else after.path().take(np.arange(after.ends[0] + 1))
+        piece.engaged, found = self._stock.follow(piece.path(), ahead)
+        if after is not None:
+            after.engaged = found
 
     def _stamped(self, data: bytes) -> bytes:
         if self._stamp is None or not data:
@@ -112,19 +136,35 @@ class Bulk:
 
     def _corrected(self, piece: _Piece, before: _Piece | None, after: _Piece | None) -> bytes:
         if isinstance(piece.run, OddRun):
-            return self._odd(piece.run, before, after)
-        return self._plain(piece.run, before, after)
+            return self._odd(piece.run, piece, before, after)
+        return self._plain(piece.run, piece, before, after)
 
     # --- plain lines ---------------------------------------------------------------------------------------------
 
-    def _plain(self, run: PlainRun, before: _Piece | None, after: _Piece | None) -> bytes:
+    def _plain(self, run: PlainRun, piece: _Piece, before: _Piece | None, after: _Piece | None) -> bytes:
         try:
             edges = (before.last if before else None, after.first if after else None)
-            done = self._corrector.correct(run, *edges, self._carry)
+            done = self._corrector.correct(run, *edges, self._carry, self._met(piece, before, after))
         except Unsolved as error:
             self._refuse(run, error)
         self._tell(lambda: self.totals.plain(run, done, self._corrector))
         return done.data
+
+    def _met(self, piece: _Piece, before: _Piece | None, after: _Piece | None) -> Met | None:
+        """What the tool meets on a piece and next to it."""
+        if piece.engaged is None:
+            return None
+        last = (
+            None
+            if before is None or before.engaged is None
+            else before.engaged.of_motions(before.ends[1], before.ends[1] + 1)
+        )
+        first = (
+            None
+            if after is None or after.engaged is None
+            else after.engaged.of_motions(after.ends[0], after.ends[0] + 1)
+        )
+        return Met(piece.engaged, last, first)
 
     def _tell(self, batch: Callable[[], Batch]) -> None:
         """Adds up a piece and passes its rows on, beside the work on the next piece; one piece at a time, in order."""
@@ -154,7 +194,7 @@ class Bulk:
 
     # --- other lines ---------------------------------------------------------------------------------------------
 
-    def _odd(self, run: OddRun, before: _Piece | None, after: _Piece | None) -> bytes:
+    def _odd(self, run: OddRun, piece: _Piece, before: _Piece | None, after: _Piece | None) -> bytes:
         """Through the exact way, with the motions on either side in sight."""
         head, state, row0 = b"", run.state, run.row0
         first = behind = 0
@@ -172,20 +212,32 @@ class Bulk:
         part = Part(first, len(program.path) - behind, self._carry.standing())
         if part.last - part.first != run.motions:
             raise NotInPieces
-        result = compensate(
-            program,
-            self.job,
-            method="newton",
-            tolerance_um=self.tolerance_um,
-            version=self.version,
-            part=part,
-            arcs=self.arcs,
-        )
+        met = self._met(piece, before, after)
+        here = row0 / self._lines
+        with part_of_work(here, here):
+            result = compensate(
+                program,
+                self.job,
+                method="newton",
+                tolerance_um=self.tolerance_um,
+                version=self.version,
+                part=part,
+                arcs=self.arcs,
+                engaged=None if met is None else met.within(first, len(program.path) - 1),
+            )
         own = (result.rows.motion >= part.first) & (result.rows.motion < part.last)
         assert result.written.behind is not None
         self._carry.take(result.written.behind, result.rows.end[np.flatnonzero(own)[-1]])
-        self._tell(lambda: self.totals.odd(result, own, run.motions))
+        self._tell(lambda: self.totals.odd(result, own, part))
         return result.written.data[len(head) : len(result.written.data) - len(tail)]
+
+
+def _stock_of(job: Job, source: BinaryIO, name: str, setup: Setup) -> FollowedRuns | None:
+    if job.config.workpiece.stock is None:
+        return None
+    from camcomp.compensation.long.followed_runs import FollowedRuns  # only those with a stock wait for it
+
+    return FollowedRuns.of(job, source, name, setup)
 
 
 def _text_of(run: PlainRun | OddRun) -> bytes:
@@ -197,6 +249,8 @@ class _Piece:
 
     def __init__(self, run: PlainRun | OddRun, runs: Runs) -> None:
         self.run = run
+        self.engaged: Engaged | None = None  # what the tool meets, or, as long as it is only looked at, at its begin
+        self._path: Path | None = None
         if isinstance(run, PlainRun):
             plain = run.plain
             real = np.flatnonzero((plain.kind == RAPID) | (plain.start != plain.end).any(axis=1))
@@ -217,7 +271,7 @@ class _Piece:
                 for k in self.ends
             )
             return
-        path = runs.program(run.text, run.row0, run.state).path
+        path = self._path = runs.program(run.text, run.row0, run.state).path
         real = np.flatnonzero((path.kind == RAPID) | (path_geometry.lengths(path) > 0.0))
         if not len(real):
             raise NotInPieces
@@ -242,3 +296,10 @@ class _Piece:
                 )
             )
         self.first, self.last = edges
+
+    def path(self) -> Path:
+        """The motions."""
+        if self._path is not None:
+            return self._path
+        assert isinstance(self.run, PlainRun)
+        return path_of_run(self.run)

@@ -219,7 +219,8 @@ class Runs:
         path, sites = reader.record.finish()
         return Program(
             data=text, name=self.name, dialect=self.language.name, path=replace(path, line=path.line + row0), warnings=(),
-            text=piece, sites=sites, rebases=tuple(reader.rebases), setup=self.setup, language=self.language, feed_point=self.feed_point, straight=True,
+            text=piece, sites=sites, rebases=tuple(reader.rebases), setup=self.setup, language=self.language, feed_point=self.feed_point,
+            modes=tuple(reader.record.modes), straight=True,
         )  # fmt: skip
 
 

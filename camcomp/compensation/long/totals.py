@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from camcomp.compensation.bands.outcome import Bands, BandTotals, band_figures
+from camcomp.compensation.long.control_account import ControlAccount, SeenPoints
 from camcomp.compensation.long.plain import Done, PlainCorrector
 from camcomp.compensation.long.plain_run import PlainRun
 from camcomp.compensation.program.compensate import Compensated
-from camcomp.compensation.program.result import ErrorSize, Interpolation, Summary
-from camcomp.ground.datatypes import LINE, Bools, Floats, Ints
+from camcomp.compensation.program.result import CycleTime, ErrorSize, Interpolation, Summary
+from camcomp.compensation.program.under_control import mode_name, rest_warning, warnings_of, written_moves
+from camcomp.gcode.output import Part
+from camcomp.gcode.path_mode import PathMode
+from camcomp.ground.datatypes import LINE, RAPID, Bools, Floats, Ints
+from camcomp.model.control import limits_of
 from camcomp.model.cutting.spindle import MOST_LINES, spindle_warning
 from camcomp.model.job import Job
 from camcomp.model.statics.target import correct, settle
+from camcomp.model.trajectory.moves import line_moves, moves_of
 
 BOUND_UM = 0.05  # no point may differ by more from its exact solution
 SAMPLE = 1000  # points that are solved exactly
@@ -32,6 +39,7 @@ class Batch:
     nominal: Floats  # (N, m)
     joints: Floats  # (N, m)
     drive: Floats  # (N, m)
+    behind: Floats | None = None  # (N, e) columns behind the others
 
 
 class _Errors:
@@ -55,27 +63,32 @@ class _Errors:
 class Totals:
     """Everything that the summary of a run says."""
 
-    def __init__(self, job: Job, digest: str, size: int) -> None:
+    def __init__(self, job: Job, digest: str, size: int, tolerance_um: float) -> None:
         """Digest and size are those of the program; they decide which points are checked."""
         self.job = job
-        self.before, self.after = _Errors(), _Errors()
+        self.before, self.after, self.missed = _Errors(), _Errors(), _Errors()
         self.points = self.motions = self.lines_out = self.joins = self.iterations = 0
         self.change = self.force = np.zeros(len(job.machine.actuators))
         self.tilt = 0.0
         self.warnings: list[str] = []
         self.interpolated: Interpolation | None = None
+        self.bands: BandTotals | None = None
         self._s = self._t = 0.0
         self._beyond: list[list[int]] = [[] for _ in job.machine.actuators]
         self._random = np.random.default_rng(int(digest[:16], 16))
         self._share = min(1.0, 3.0 * SAMPLE * 24.0 / max(size, 1))  # a line has some 24 bytes
         self._sample: list[Floats] = []
+        limits = limits_of(job.config)
+        self._control = ControlAccount(limits, 1e-3 * tolerance_um), ControlAccount(limits, 1e-3 * tolerance_um)
+        self.modes: dict[PathMode, None] = {}  # in which it cuts
+        self.resting = 0  # end points at which the control rests because of joining lines
         self._still: list[int] = []  # source lines that cut while the spindle stands, the first ones
 
     # --- pieces --------------------------------------------------------------------------------------------------
 
-    def plain(self, run: PlainRun, done: Done, corrector: PlainCorrector) -> Batch:
+    def plain(self, whole: PlainRun, done: Done, corrector: PlainCorrector) -> Batch:
         """Adds a run of plain lines."""
-        rows, answers, m = done.rows, done.answers, len(self.job.machine.actuators)
+        run, rows, answers = done.run, done.rows, done.answers
         plain, frame = run.plain, self.job.frame
         way = plain.end - plain.start
         length = np.sqrt(np.einsum("ni,ni->n", way, way))
@@ -85,22 +98,65 @@ class Totals:
         moving = (plain.kind[rows.move] == LINE) & (feed > 0.0)
         t = self._t + np.cumsum(np.where(moving, np.diff(s, prepend=self._s) / np.where(moving, feed, 1.0) * 60.0, 0.0))
         self._s, self._t = self._s + float(length.sum()), float(t[-1])
-        drive, joints = answers.rest[:, 3 : 3 + m], corrector.joints(done)
-        self._common(run.motions, rows.joining, np.ones(len(s), np.bool_), plain.row[rows.move] + run.row0 + 1, answers.nominal,
-                     joints, drive, answers.rest[:, :3], done.before, done.after)  # fmt: skip
+        joints, drive = corrector.actuators(done)
+        self._common(whole.motions, rows.joining, np.ones(len(s), np.bool_), plain.row[rows.move] + run.row0 + 1, answers.nominal,
+                     joints, drive, answers.rest[:, :3], done.before, done.after, done.missed)  # fmt: skip
+        self._plain_control(run, done)
         if run.state.sense == 0.0:
             self._stands(np.unique(plain.row[rows.move[rows.force.any(axis=1)]]) + run.row0 + 1)
         force = frame.vectors(rows.force)
         chosen = np.flatnonzero(self._random.random(len(s)) < self._share)
         if len(chosen):
-            off = frame.vectors(done.written - done.commanded + rows.shift)
+            off = corrector.off(done)
             parts = (frame.to_machine(rows.target), force, answers.correction, answers.unloaded, joints, drive, off)
             self._sample.append(np.concatenate([each[chosen] for each in parts], axis=1))
         return Batch(
-            plain.row[rows.move] + run.row0 + 1, s, t, rows.target, done.written, force, answers.nominal, joints, drive
+            plain.row[rows.move] + run.row0 + 1,
+            s,
+            t,
+            rows.target,
+            done.written,
+            force,
+            answers.nominal,
+            joints,
+            drive,
+            self._behind(self._known(done.bands), rows.engagement),
         )
 
-    def odd(self, result: Compensated, own: Bools, motions: int) -> Batch:
+    def _plain_control(self, run: PlainRun, done: Done) -> None:
+        """What the control makes of plain lines."""
+        plain, rows, mode = run.plain, done.rows, run.state.path_mode
+        before, after = self._control
+        default = self.job.config.process.feed_mm_per_min or np.nan
+        self.modes[mode] = None
+        before.add(
+            line_moves(plain.kind, plain.start, plain.end, np.where(np.isnan(plain.feed), default, plain.feed), mode)
+        )
+        start = np.concatenate((done.begin[None], done.written[:-1]))
+        moves = line_moves(plain.kind[rows.move], start, done.written, done.feed, mode)
+        moves = replace(moves, exact=moves.exact | done.rest)
+        self.resting += int(done.rest.sum())
+        ends = len(rows.move) - np.count_nonzero(rows.joining | (plain.kind[rows.move] != LINE))
+        seen = done.seen
+        told = np.concatenate((done.written[seen[:ends]], 0.5 * (start + done.written)[seen[ends:]]))
+        joining = np.concatenate((rows.joining, [False]))
+        line = plain.row[rows.move[seen]] + run.row0 + 1
+        after.add(moves, SeenPoints(seen, told, done.missed, line, joining[seen - 1] | joining[seen + 1]))
+
+    def _odd_control(self, result: Compensated, own: Bools, part: Part) -> None:
+        """What the control makes of lines that were corrected exactly."""
+        path, modes, control = result.program.path, result.program.modes, result.control
+        before, after = self._control
+        default = self.job.config.process.feed_mm_per_min or np.nan
+        mine = slice(part.first, part.last)
+        self.modes |= {modes[k]: None for k in range(part.first, part.last) if path.kind[k] != RAPID}
+        before.add(moves_of(path, modes, np.where(np.isnan(path.feed), default, path.feed)).take(mine))
+        first = int(np.flatnonzero(own)[0])
+        moves = written_moves(path, modes, result.rows, result.written, default).take(own)
+        points = SeenPoints(control.row - first, control.told, result.missed, result.lines[control.row], control.joined)
+        after.add(moves, points)
+
+    def odd(self, result: Compensated, own: Bools, part: Part) -> Batch:
         """Adds a piece that was corrected exactly; own (N,): its rows without the context's."""
         first = int(np.flatnonzero(own)[0])
         s0, t0 = (result.s[first - 1], result.t[first - 1]) if first else (0.0, 0.0)
@@ -108,17 +164,32 @@ class Totals:
         self._s, self._t = float(s[-1]), float(t[-1])
         state, rows = result.state, result.rows
         corrected = rows.corrected[own]
-        self._common(motions, rows.joining[own], corrected, result.lines[own], result.nominal[own], state.rho[own], state.drive[own],
-                     state.tilt[own], result.before, result.after)  # fmt: skip
+        self._odd_control(result, own, part)
+        self._common(part.last - part.first, rows.joining[own], corrected, result.lines[own], result.nominal[own], state.rho[own], state.drive[own],
+                     state.tilt[own], result.before, result.after, result.missed)  # fmt: skip
         self.iterations = max(self.iterations, result.iterations)
         self._stands(result.without_spindle)
         force = self.job.frame.vectors(rows.force[own])
         return Batch(result.lines[own], s, t, rows.target[own], result.written.end[own], force, result.nominal[own], state.rho[own],
-                     state.drive[own])  # fmt: skip
+                     state.drive[own], self._behind(self._known(result.bands, own), rows.engagement[own]))  # fmt: skip
+
+    def _behind(self, bands: Floats | None, engagement: Floats | None) -> Floats | None:
+        """Columns behind the others: bands, and with a stock the engagement."""
+        parts = [] if bands is None else [bands]
+        if self.job.config.workpiece.stock is not None and engagement is not None:
+            parts.append(engagement)
+        return np.column_stack(parts) if parts else None
+
+    def _known(self, bands: Bands | None, own: Bools | slice = slice(None)) -> Floats | None:
+        """Adds up what is expected of a piece; the columns of its own rows."""
+        if bands is None:
+            return None
+        self.bands = bands.totals if self.bands is None else self.bands.join(bands.totals)
+        return bands.columns(with_share=self.job.config.compensation.policy != "full")[own]
 
     def _common(
         self, motions: int, joining: Bools, corrected: Bools, line: Ints, nominal: Floats, joints: Floats, drive: Floats,
-        tilt: Floats, before: Floats, after: Floats,
+        tilt: Floats, before: Floats, after: Floats, missed: Floats,
     ) -> None:  # fmt: skip
         self.points += len(line)
         self.motions += motions
@@ -129,6 +200,7 @@ class Totals:
             self.tilt = max(self.tilt, float(np.sqrt(np.einsum("ni,ni->n", tilt, tilt)[corrected].max())))
         self.before.add(before)
         self.after.add(after)
+        self.missed.add(missed)
         for a, (low, high) in enumerate(self.job.machine.limits):
             over = np.flatnonzero((joints[:, a] < low) | (joints[:, a] > high))
             if len(over) and len(self._beyond[a]) < 10:
@@ -146,6 +218,10 @@ class Totals:
             self.warnings.append(
                 f"{self.joins} joining lines where the cutting force jumps; they are not part of before and after"
             )
+        self.warnings += rest_warning(self.resting)
+        for each in self._control:
+            each.finish()
+        self.warnings += warnings_of(tuple(self.modes), self._control[1].beside, self._control[1].elsewhere)
         self.warnings += spindle_warning(np.array(self._still, np.int64))
         known, m = corrector.field, len(self.job.machine.actuators)
         if known is None or not self._sample:
@@ -173,6 +249,7 @@ class Totals:
 
     def summary(self) -> Summary:
         """The figures, as report.tables.summary has them for short programs, and those of the interpolation."""
+        before, after = self._control
         rotary = self.job.machine.revolute
         sizes = {
             "actuator_change_max_mm": float(self.change[~rotary].max(initial=0.0)),
@@ -195,6 +272,13 @@ class Totals:
                 "method": "newton",
                 "platform_tilt_max_mrad": 1e3 * self.tilt,
                 "joining_lines": self.joins,
+                "cycle_time_s": CycleTime(before=before.seconds, after=after.seconds),
+                "control_mode": mode_name(tuple(self.modes)),
+                "control_mode_stated": all(each.stated for each in self.modes),
+                "under_control": ErrorSize(
+                    rms_um=1e3 * float(np.sqrt(after.squares / max(after.count, 1))), max_um=1e3 * after.most
+                ),
+                **({} if self.bands is None else band_figures(self.bands, self.job.config.compensation.policy)),
                 "interpolation": self.interpolated,
                 "warnings": self.warnings,
             }
@@ -203,7 +287,7 @@ class Totals:
     def failed_checks(self, tolerance_um: float) -> list[tuple[str, str]]:
         """Rule id and text of every check that the program does not pass."""
         out = []
-        worst = 1e3 * self.after.most
+        worst = 1e3 * self.missed.most
         if not worst <= tolerance_um * (1.0 + 1e-9):
             out.append(("CC601", f"{worst:.3f} um are left, more than the tolerance of {tolerance_um:g} um"))
         for a, name in enumerate(self.job.machine.actuators):

@@ -7,29 +7,39 @@ bends, solve again at the division points, write, and put the written program th
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
+from camcomp.compensation.bands.outcome import Bands
 from camcomp.compensation.program import arcs_out
 from camcomp.compensation.program.arcs_out import Arcs, Bend
 from camcomp.compensation.program.chords import Nodes, second_derivative, trial_nodes
 from camcomp.compensation.program.corrected_rows import CorrectedRows, corrected_rows, output_of
 from camcomp.compensation.program.judged_points import JudgedPoints, Seen, judged_points, see, see_original
 from camcomp.compensation.program.moves import WITHIN_RAPID, chord_budget, corrected_pieces, refuse_unsolved, travel_of
+from camcomp.compensation.program.policy import Shares, shares_of
 from camcomp.compensation.program.posture import check_posture, whole_pose
+from camcomp.compensation.program.program_bands import bands_of
 from camcomp.compensation.program.reversals import cut_at_reversals
+from camcomp.compensation.program.table_knots import cut_at_knots
+from camcomp.compensation.program.under_control import UnderControl, rest_warning, rests, under_control
 from camcomp.gcode.output import Part, Rewritten
 from camcomp.gcode.program import Program
 from camcomp.gcode.rewrite import rewrite
-from camcomp.ground.datatypes import RAPID, Bools, Floats, Ints
+from camcomp.ground.datatypes import ARC, RAPID, Bools, Floats, Ints
+from camcomp.ground.headway import part as part_of_work
+from camcomp.model.cutting.engaged import Engaged
 from camcomp.model.cutting.spindle import cut_without_spindle, spindle_warning
 from camcomp.model.cutting.track import Track, lay_track
 from camcomp.model.job import Job
 from camcomp.model.motion.response import aim_at
 from camcomp.model.statics.target import Correction, settle
+from camcomp.model.stock.warnings import stock_remarks, stock_warnings
 
 MAX_ROUNDS, ARC_ROUNDS = 6, 4
 STUCK = 0.95  # of the miss is left by a finer division that is no use, as where an arc passes the vertical
+WITH_SHARES = 0.7  # of the tolerance at the points looked at: where the share bends, more is missed between them
 COARSE_MM, FINE_MM = 8.0, 0.5  # distance of trial points on straight lines, without and with effects
 
 
@@ -47,11 +57,19 @@ class Compensated:
     uncorrected: Floats  # (N, 3) loaded tip of the original program, program frame
     before: Floats  # errors (k, 3) mm of the original program along feed motions
     after: Floats  # errors (k, 3) mm of the corrected program along feed motions
+    control: UnderControl  # what the control makes of both programs
     judged: Ints  # (k,) end point to which the move leads on which an error was found
     iterations: int
     method: str
     without_spindle: Ints  # source lines that cut while the spindle stands
     warnings: list[str]
+    bands: Bands | None = None  # None: every number of the config is exact
+    left: Floats | None = None  # (k, 3) mm of `after` that a policy leaves on purpose
+
+    @property
+    def missed(self) -> Floats:
+        """What `after` (k, 3) mm has beside what a policy leaves on purpose."""
+        return self.after if self.left is None else self.after - self.left
 
     @property
     def lines(self) -> Ints:
@@ -61,7 +79,7 @@ class Compensated:
     def failed_checks(self, job: Job, tolerance_um: float) -> list[tuple[str, str]]:
         """Rule id and text of every check that the finished program does not pass."""
         out = []
-        size = 1e3 * np.linalg.norm(self.after, axis=1)
+        size = 1e3 * np.linalg.norm(self.missed, axis=1)
         worst = float(np.nanmax(size)) if len(size) else 0.0
         if not worst <= tolerance_um * (1.0 + 1e-9):
             out.append(("CC601", f"{worst:.3f} um are left, more than the tolerance of {tolerance_um:g} um"))
@@ -96,18 +114,52 @@ def trajectories(result: Compensated, job: Job) -> Trajectories:
 
 def compensate(
     program: Program, job: Job, *, method: str, tolerance_um: float, version: str, part: Part | None = None,
-    arcs: bool | None = None,
+    arcs: bool | None = None, engaged: Engaged | None = None,
 ) -> Compensated:  # fmt: skip
     """The corrected program. Raises PhysicsError where the machine cannot do what is asked.
 
-    arcs: programmed arcs come out as arcs where those are fewer than lines; None asks the machine file.
+    arcs: programmed arcs come out as arcs where those are fewer than lines; None asks the machine file. Where that does
+    not say either they do when the control, in a path mode that is stated, is then faster or nearer to the path.
 
     part: the motions to be corrected and written, when the program is a part of a longer one. The others are only there
-    because their neighbours depend on them: they are not divided, and their errors do not count.
+    because their neighbours depend on them: they are not divided, and their errors do not count. engaged: what the tool
+    meets along the path, when the program has been followed through its stock before.
     """
+    wanted = job.config.compensation.arcs if arcs is None else arcs
+    engaged = engaged or job.engaged(program)
+    asked = partial(
+        _compensated, program, job, engaged, method=method, tolerance_um=tolerance_um, version=version, part=part
+    )
+    found = asked(arcs=bool(wanted))
+    own = slice(None) if part is None else slice(part.first, part.last)
+    able = bool((program.path.kind[own] == ARC).any()) and not job.causes
+    if wanted is None and able and found.control.leaves_room(tolerance_um):
+        other = asked(arcs=True)
+        if other.control.better_than(found.control, tolerance_um):
+            return other
+    return found
+
+
+def _compensated(
+    program: Program,
+    job: Job,
+    engaged: Engaged | None,
+    *,
+    method: str,
+    tolerance_um: float,
+    version: str,
+    part: Part | None,
+    arcs: bool,
+) -> Compensated:
+    """The corrected program, its arcs as arcs or as lines."""
     path, resolution = program.path, program.step_mm(job.config.control.resolution_mm)
     spacing = FINE_MM if job.causes else COARSE_MM  # a screw's error has waves of a few mm
-    track, turning = cut_at_reversals(job, lay_track(path, job.conditions), spacing)
+    base = lay_track(path, job.conditions, engaged)
+    track, turning = cut_at_reversals(job, cut_at_knots(job, base, spacing), spacing)
+    shares = shares_of(job, base)
+    if shares is not None:
+        track, of = shares.divided(shares.with_jumps(track))
+        turning = turning[of]
     corrected = corrected_pieces(path, track)
     feeding = corrected & (path.kind[track.motion] != RAPID)
     if part is not None:
@@ -116,12 +168,12 @@ def compensate(
     tolerance = np.full(len(track.motion), budget)
 
     trial = trial_nodes(track.length, track.angle, feeding & ~turning & (track.length > 0.0), spacing)
-    aimed = _aim(program, job, track, trial, corrected, method)
+    with part_of_work(0.0, 0.4, points=True):
+        aimed = _aim(program, job, track, trial, corrected, method, shares)
     second = second_derivative(trial, aimed.commanded)
     kept = _kept(track, trial, aimed.commanded, 0.5 * resolution)
     tolerance[kept | turning] = np.inf
-    wanted = job.config.compensation.arcs if arcs is None else arcs
-    able = feeding & ~kept & (wanted and not job.causes)  # what drives leave over has waves that no arc follows
+    able = feeding & ~kept & (arcs and not job.causes)  # what drives leave over has waves that no arc follows
     bend = Bend.of(track, trial, aimed.commanded, second, tolerance, able)
     tolerance[bend.use] = max(budget - np.sqrt(0.5) * resolution, 0.1 * budget)  # the centre is rounded, too
     last, last_count = np.full(len(tolerance), np.inf), np.zeros(len(tolerance), np.int64)
@@ -131,9 +183,10 @@ def compensate(
             bend.use &= ~gone
             tolerance[gone] = budget
             nodes, shift = bend.divided(trial, tolerance)
-        commanded, circles = _bent(program, job, track, nodes, shift, corrected, method, bend)
+        with part_of_work(1.0 - 0.6 * 0.5**round_, 1.0 - 0.35 * 0.5**round_, points=True):
+            commanded, circles = _bent(program, job, track, nodes, shift, corrected, method, bend, shares)
         rows = corrected_rows(
-            program, job, track, nodes, commanded, kept, circles, begins=part is None or part.first == 0
+            program, job, track, nodes, commanded, kept, circles, begins=part is None or part.first == 0, shares=shares
         )
         written = rewrite(
             program,
@@ -145,10 +198,15 @@ def compensate(
         )
         points = judged_points(job, track, rows, feeding)
         after = see(job, points, written.end, replace(rows.arcs, centre=written.centre))
+        left = None
+        if shares is not None:
+            left = shares.left(job, track, points.piece, points.w, points.travel, points.before)
         worst = np.zeros(len(tolerance))
-        size = np.where(after.status == 0, np.linalg.norm(after.error, axis=1), np.inf)
+        missed_by = after.error if left is None else after.error - left
+        size = np.where(after.status == 0, np.linalg.norm(missed_by, axis=1), np.inf)
         np.maximum.at(worst, points.piece[points.judged], size[points.judged])
-        missed = (worst > 1e-3 * tolerance_um) & ~kept
+        goal = 1e-3 * tolerance_um * (1.0 if shares is None else WITH_SHARES)
+        missed = (worst > goal) & ~kept
         count = np.diff(nodes.first)
         stuck = missed & (worst >= STUCK * last) & (count > last_count)
         straighten = missed & bend.use & (stuck | (round_ >= ARC_ROUNDS - 1))
@@ -158,17 +216,37 @@ def compensate(
         last, last_count = np.where(straighten, np.inf, worst), count
         bend.use &= ~straighten
         tolerance[straighten] = budget
-        tolerance = np.where(
-            missed, tolerance * np.clip(0.9e-3 * tolerance_um / np.maximum(worst, 1e-12), 0.3, 0.9), tolerance
-        )
-    before = see_original(job, points)
+        tolerance = np.where(missed, tolerance * np.clip(0.9 * goal / np.maximum(worst, 1e-12), 0.3, 0.9), tolerance)
+    with part_of_work(0.8, 1.0, points=True):
+        before = see_original(job, points)
     for seen in (after, before):
         judged = points.judged
         refuse_unsolved(program, track, points.piece[judged], points.target[judged], seen.status[judged])
     still = np.intersect1d(cut_without_spindle(track), path.line[track.motion[feeding]])
-    warnings = _warnings(job, rows) + spindle_warning(still)
+    rest = np.zeros(len(rows.piece), np.bool_) if part is not None else rests(program, rows, tolerance_um)
+    if rest.any():
+        written = rewrite(
+            program,
+            output_of(path, rows, rest),
+            resolution_mm=job.config.control.resolution_mm,
+            version=version,
+            model=job.fingerprint,
+        )
+    control = under_control(program, job, rows, written, points, replace(after, error=missed_by), rest)
+    warnings = _warnings(job, rows, control.resting) + control.warnings(
+        path.line[track.motion[points.piece[points.judged]]], tolerance_um
+    )
+    warnings += spindle_warning(still)
+    if part is None:
+        warnings += stock_warnings(stock_remarks(job.config, path, track.engaged))
     iterations = int(aimed.iterations.max(initial=0))
-    return _assemble(program, job, track, rows, written, points, before, after, iterations, method, still, warnings)
+    done = _assemble(
+        program, job, track, rows, written, points, before, after, control, iterations, method, still, warnings
+    )
+    told = points.along(written.end, replace(rows.arcs, centre=written.centre))
+    share = None if shares is None else shares.of_ends(track, rows.piece, rows.w, rows.joining)
+    bands = bands_of(job, track, rows, points, told, before, after, share)
+    return replace(done, bands=bands, left=None if left is None else left[points.judged])
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,7 +255,9 @@ class _Aimed:
     iterations: Ints
 
 
-def _aim(program: Program, job: Job, track: Track, nodes: Nodes, corrected: Bools, method: str) -> _Aimed:
+def _aim(
+    program: Program, job: Job, track: Track, nodes: Nodes, corrected: Bools, method: str, shares: Shares | None
+) -> _Aimed:
     """Modified targets at nodes, program frame; nodes of uncorrected pieces stay as programmed."""
     on = corrected[nodes.piece]
     piece, w = nodes.piece[on], nodes.w[on]
@@ -193,17 +273,27 @@ def _aim(program: Program, job: Job, track: Track, nodes: Nodes, corrected: Bool
     refuse_unsolved(program, track, piece, target, result.status)
     out = track.points(nodes.piece, nodes.w)
     out[on] = result.commanded[asked]
+    if shares is not None:
+        out = shares.taken(track, nodes.piece, nodes.w, track.points(nodes.piece, nodes.w), out)
     iterations = np.zeros(len(out), np.int64)
     iterations[on] = result.iterations[asked]
     return _Aimed(out, iterations)
 
 
 def _bent(
-    program: Program, job: Job, track: Track, nodes: Nodes, shift: Floats, corrected: Bools, method: str, bend: Bend
+    program: Program,
+    job: Job,
+    track: Track,
+    nodes: Nodes,
+    shift: Floats,
+    corrected: Bools,
+    method: str,
+    bend: Bend,
+    shares: Shares | None,
 ) -> tuple[Floats, Arcs]:
     """Commanded tips (k, 3) at nodes, and the circles of the moves that lead there as arcs. Turns off what cannot bend."""
     both, middle = arcs_out.middles(nodes, bend.use)
-    solved = _aim(program, job, track, both, corrected, method).commanded
+    solved = _aim(program, job, track, both, corrected, method, shares).commanded
     commanded = solved[~middle] + shift
     circles = Arcs.none(len(commanded))
     to = np.flatnonzero((np.diff(nodes.piece, prepend=-1) == 0) & bend.use[nodes.piece])
@@ -227,11 +317,12 @@ def _kept(track: Track, nodes: Nodes, commanded: Floats, half: float) -> Bools:
     return out
 
 
-def _warnings(job: Job, rows: CorrectedRows) -> list[str]:
+def _warnings(job: Job, rows: CorrectedRows, resting: int) -> list[str]:
     joins = int(rows.joining.sum())
     out = (
         [f"{joins} joining lines where the cutting force jumps; they are not part of before and after"] if joins else []
     )
+    out += rest_warning(resting)
     if job.config.process.temperature_C is None:
         warm = dict.fromkeys(cause.name for cause in job.causes if getattr(cause.effect, "WARMS", False))
         out += [
@@ -242,7 +333,7 @@ def _warnings(job: Job, rows: CorrectedRows) -> list[str]:
 
 def _assemble(
     program: Program, job: Job, track: Track, rows: CorrectedRows, written: Rewritten, points: JudgedPoints, before: Seen,
-    after: Seen, iterations: int, method: str, still: Ints, warnings: list[str],
+    after: Seen, control: UnderControl, iterations: int, method: str, still: Ints, warnings: list[str],
 ) -> Compensated:  # fmt: skip
     s = track.s0[rows.piece] + rows.w * track.length[rows.piece]
     feed = program.path.feed[rows.motion]
@@ -257,4 +348,4 @@ def _assemble(
     warnings += check_posture(program, job, program.path.line[rows.motion], target, nominal)
     state = after.state if method == "linear" else whole_pose(job, rows.corrected, target, force, after.state)
     return Compensated(program, written, rows, s, t, nominal, state, before.tip, before.error[points.judged],
-                       after.error[points.judged], points.row[points.judged], iterations, method, still, warnings)  # fmt: skip
+                       after.error[points.judged], control, points.row[points.judged], iterations, method, still, warnings)  # fmt: skip

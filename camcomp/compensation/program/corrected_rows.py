@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,6 +17,9 @@ from camcomp.ground.datatypes import ARC, LINE, RAPID, Bools, Floats, Ints, Path
 from camcomp.model.cutting.track import Track
 from camcomp.model.job import Job
 from camcomp.model.motion.response import aim_at
+
+if TYPE_CHECKING:
+    from camcomp.compensation.program.policy import Shares
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +37,7 @@ class CorrectedRows:
     end: Floats  # (N, 3) mm commanded tip, program frame
     feed: Floats  # (N,) mm/min
     arcs: Arcs  # (N,) circles of corrected arcs that come out as arcs
+    engagement: Floats  # (N, 2) depth of the cut mm, sum of the engaged arcs rad; NaN where no stock is known
 
 
 def corrected_rows(
@@ -45,6 +50,7 @@ def corrected_rows(
     circles: Arcs,
     *,
     begins: bool,
+    shares: Shares | None = None,
 ) -> CorrectedRows:
     """End points of the corrected program: the nodes but the first of each piece, and joining lines at jumps."""
     path = program.path
@@ -65,7 +71,9 @@ def corrected_rows(
         unloaded = replace(travel_of(job, track, extra, np.ones(len(extra))), force=np.zeros((len(extra), 3)))
         result = aim_at(job, free, unloaded, "newton")
         refuse_unsolved(program, track, extra, free, result.status)
-        free = result.commanded
+        aimed = result.commanded
+        behind = np.minimum(extra + 1, len(kind) - 1)  # where the next piece begins, with its share
+        free = aimed if shares is None else shares.taken(track, behind, np.zeros(len(extra)), free, aimed)
     end = np.concatenate((commanded[keep], free))
     circles = circles.take(np.flatnonzero(keep)).followed_by(len(extra))
     order = np.lexsort((joining & (w > 0.0), w, piece))
@@ -79,8 +87,20 @@ def corrected_rows(
     whole = (passed | kept[piece]) & ~joining & (np.bincount(piece, minlength=len(kind)) == 1)[piece]
     rows_kind = np.where(circles.on, ARC, np.where(whole, kind[piece], rows_kind))
     end[whole & ~circles.on] = target[whole & ~circles.on]
+    engagement = np.column_stack(track.sizes(piece, w))
     rows = CorrectedRows(
-        piece, track.motion[piece], w, rows_kind, joining, ~passed, force, target, end, np.empty(len(piece)), circles
+        piece,
+        track.motion[piece],
+        w,
+        rows_kind,
+        joining,
+        ~passed,
+        force,
+        target,
+        end,
+        np.empty(len(piece)),
+        circles,
+        engagement,
     )
     return replace(rows, feed=_feeds(program, track, rows))
 
@@ -98,8 +118,8 @@ def _feeds(program: Program, track: Track, rows: CorrectedRows) -> Floats:
     return np.where(plain, feed, feed * np.clip(scale, 0.2, 5.0))
 
 
-def output_of(path: Path, rows: CorrectedRows) -> Output:
-    """The rows as the writer wants them."""
+def output_of(path: Path, rows: CorrectedRows, rest: Bools | None = None) -> Output:
+    """The rows as the writer wants them; rest (N,): those that end at rest in any case."""
     arc, bent = rows.kind == ARC, rows.arcs.on
     centre = np.where(bent[:, None], rows.arcs.centre, path.centre[rows.motion])
     angle = np.where(bent, rows.arcs.angle, path.angle[rows.motion])
@@ -111,4 +131,5 @@ def output_of(path: Path, rows: CorrectedRows) -> Output:
         angle=np.where(arc, angle, 0.0),
         feed=rows.feed,
         joining=rows.joining,
+        rest=rest,
     )

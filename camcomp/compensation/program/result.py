@@ -16,6 +16,13 @@ class ErrorSize(Result):
     max_um: Size
 
 
+class CycleTime(Result):
+    """Time that the control takes for all moves of a program, as it is modelled; pauses and tool changes not counted."""
+
+    before: float
+    after: float
+
+
 class Interpolation(Result):
     """Of a long program: how many points were solved exactly, and how far a sample is from its exact solution."""
 
@@ -25,6 +32,30 @@ class Interpolation(Result):
     worst_drive_force: Size
     tiles: int
     exact_solutions: int
+
+
+class ExpectedError(Result):
+    """Error after compensation of machines drawn from the uncertain numbers of the config, at the points of the program."""
+
+    rms_um: Annotated[Size, Field(description="over points and machines")]
+    p95_um: Annotated[Size, Field(description="95 % of all points of all machines have an error below it")]
+    rms_ci95_um: Annotated[tuple[Size, Size], Field(description="holds the rms of 95 % of the machines")]
+
+
+class BandShare(Result):
+    """How much of the band an uncertain input makes."""
+
+    input: Annotated[str, Field(description="its group, or the key of the number")]
+    share: Annotated[float, Field(description="of the mean square")]
+
+
+class TakenCorrection(Result):
+    """What a policy other than `full` did, at points that cut."""
+
+    policy: str
+    points: int
+    shrunk: Annotated[int, Field(description="points that take less than all of the correction")]
+    left_alone: Annotated[int, Field(description="points that take none of it")]
 
 
 class Summary(Result):
@@ -45,6 +76,22 @@ class Summary(Result):
     method: str
     platform_tilt_max_mrad: float
     joining_lines: int
+    cycle_time_s: CycleTime
+    control_mode: Annotated[
+        str, Field(description="path modes in which the program cuts: G61, G61.1, G64 with P and Q in mm")
+    ]
+    control_mode_stated: Annotated[bool, Field(description="by the program or the machine file; else it is assumed")]
+    under_control: Annotated[
+        ErrorSize,
+        Field(
+            description="like after, with what the control's merging and rounding adds, beside joining lines, too, and without "
+            "what a policy leaves on purpose"
+        ),
+    ]
+    taken: Annotated[TakenCorrection | None, Field(description="with a policy other than full")] = None
+    expected: Annotated[ExpectedError | None, Field(description="with uncertain numbers in the config")] = None
+    band: Annotated[tuple[BandShare, ...] | None, Field(description="the largest share first")] = None
+    advice: Annotated[str | None, Field(description="what would make the band smaller")] = None
     interpolation: Annotated[Interpolation | None, Field(description="null where no point was interpolated")] = None
     warnings: list[str]
 
@@ -60,6 +107,8 @@ class LineResult(Result):
     of moves, where rounding and the sharing of the chord's miss show. chord: what the straight lines between them add.
     """
 
+    model_config = ConfigDict(json_schema_serialization_defaults_required=False)
+
     line: int
     moves: int
     residual_um: Size
@@ -67,14 +116,30 @@ class LineResult(Result):
     rounding_um: Size
     vertex_um: Size
     chord_um: Size
+    missed_um: Annotated[Size | None, Field(description="beside what a policy leaves on purpose")] = None
+
+    @property
+    def judged_um(self) -> float:
+        """What the tolerance is held against."""
+        return self.residual_um if self.missed_um is None else self.missed_um
 
 
 class Verification(Result):
     """The figures of `camcomp verify`."""
+
+    model_config = ConfigDict(json_schema_serialization_defaults_required=False)
 
     tolerance_um: float
     residual: ErrorSize
     points: Annotated[int, Field(description="looked at along the feed moves")]
     joining_lines: int
     warnings: list[str]
+    taken: Annotated[TakenCorrection | None, Field(description="with a policy other than full")] = None
+    expected: Annotated[ExpectedError | None, Field(description="with uncertain numbers in the config")] = None
+    band: Annotated[tuple[BandShare, ...] | None, Field(description="the largest share first")] = None
+    advice: Annotated[str | None, Field(description="what would make the band smaller")] = None
     lines: tuple[LineResult, ...]
+
+    def as_json(self) -> dict[str, Any]:
+        """As a mapping of what JSON knows, without the keys that exact numbers and whole corrections have no use for."""
+        return self.model_dump(mode="json", exclude_unset=True)

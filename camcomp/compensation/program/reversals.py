@@ -17,7 +17,7 @@ from camcomp.ground.datatypes import RAPID, Bools, Floats, Ints
 from camcomp.model.cutting.track import Track
 from camcomp.model.hysteresis import turning_points
 from camcomp.model.job import Job
-from camcomp.model.motion.response import LEAST_MM, plays, winds_up, without_drives
+from camcomp.model.motion.response import LEAST_MM, plays, way_per_unit, winds_up, without_drives
 
 STANDING_MM = 2e-4  # way that the carriage should have gone at the end of such a line
 WINDING_MM = (2e-3, 6e-3, 0.015, 0.04)  # ways over which friction turns round, where the correction bends most
@@ -41,6 +41,7 @@ def cut_at_reversals(job: Job, track: Track, spacing: float) -> tuple[Track, Boo
         return track, none
     feed = track.path.kind[track.motion] != RAPID
     memory, friction = plays(job, carriage, travel), winds_up(job, carriage, travel)
+    carriage = carriage * way_per_unit(job)
     lines: set[tuple[int, float, float]] = set()
     cuts: set[tuple[int, float]] = set()
     for j in np.flatnonzero(memory):

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from camcomp.compensation.bands.outcome import BandTotals, band_figures
 from camcomp.compensation.program.chords import trial_nodes
 from camcomp.compensation.program.matching import match_moves
 from camcomp.compensation.program.moves import (
@@ -20,11 +21,14 @@ from camcomp.compensation.program.moves import (
     row_layout,
     travel_of,
 )
+from camcomp.compensation.program.policy import Shares, shares_of
 from camcomp.compensation.program.result import ErrorSize, LineResult, Verification
+from camcomp.compensation.program.uncertainty import Uncertainty
 from camcomp.gcode.program import Program
 from camcomp.gcode.stamp import is_stamped, stamped_model
 from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import ARC, RAPID, Bools, Floats, Ints, Path
+from camcomp.ground.headway import part, steps
 from camcomp.model.cutting.track import Track, lay_track
 from camcomp.model.job import Job
 from camcomp.model.motion.response import aim_at, respond
@@ -36,6 +40,7 @@ ALONG = 180  # sections of a piece to measure the path that ought to be commande
 UNEVEN = 0.02  # change of a piece's length by the correction from which that is worth while
 PROBE_MM = 1e-4  # fraction of a piece
 LARGEST_GAP_MM = 0.05  # of a piece, in one pass
+ALLOWED_SHARE = 0.05  # of the correction, between the share that was taken and that of the policy
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +51,9 @@ class Verified:
     lines: list[LineResult]
     joining: int
     warnings: list[str] = field(default_factory=list)
+    missed: Floats | None = None  # (k,) mm beside what a policy leaves on purpose; None: it leaves nothing
+    totals: BandTotals | None = None  # None: every number of the config is exact
+    policy: str = "full"
 
     def figures(self, tolerance_um: float) -> Verification:
         """The figures of a verification."""
@@ -60,15 +68,25 @@ class Verified:
             points=len(size),
             joining_lines=self.joining,
             warnings=self.warnings,
+            **({} if self.totals is None else band_figures(self.totals, self.policy)),
             lines=tuple(self.lines),
         )
+
+    @property
+    def worst_um(self) -> float:
+        """The largest distance from where the policy of the config wants the tip."""
+        return 1e3 * float((self.residual if self.missed is None else self.missed).max(initial=0.0))
 
 
 def verify(corrected: Program, original: Program, job: Job) -> Verified:
     """Residual of a corrected program. Raises CheckFailed CC604 when it is not one of this original."""
-    track = lay_track(original.path, job.conditions)
+    track = lay_track(original.path, job.conditions, job.engaged(original))
+    shares = shares_of(job, track)
+    if shares is not None:
+        track = shares.with_jumps(track)
     corrected_ones = corrected_pieces(original.path, track)
-    begin, expected = (_expected(original, job, track, corrected_ones, w) for w in (0.0, 1.0))
+    with part(0.0, 0.3, points=True):
+        begin, expected = (_expected(original, job, track, corrected_ones, w, shares) for w in (0.0, 1.0))
     step = np.linalg.norm(begin - np.concatenate((original.path.start[:1], expected[:-1])), axis=1)
     layout = row_layout(original.path, track, step, original.step_mm(job.config.control.resolution_mm))
     reach = _reach(original, job, track, corrected_ones)
@@ -79,13 +97,54 @@ def verify(corrected: Program, original: Program, job: Job) -> Verified:
     moving = np.flatnonzero(layout.corrected & (track.length > 0.0))
     piece, move, f = _samples(corrected.path, moving, first[moving], last[moving])
     commanded = path_geometry.points(corrected.path, move, f)
-    residual, w = _residual(job, track, piece, commanded, _fraction(job, track, reach, corrected.path, piece, move, f))
+    guess = _fraction(job, track, reach, corrected.path, piece, move, f)
+    with part(0.3, 0.9):
+        residual, w = _residual(job, track, piece, commanded, guess, shares)
     # Rapids and starts are only there because drives remember them.
     judged = (f > 0.0) & (original.path.kind[track.motion[piece]] != RAPID)
+    end = judged & (f == 1.0)
+    missed, totals = None, None
+    if shares is not None:
+        residual, missed = _beside(job, track, piece, commanded, w, shares)
+        missed = missed[judged]
+    if job.config.uncertain:
+        totals = _expected_error(job, track, piece, commanded, w, end, shares)
     piece, residual, w, vertex = piece[judged], residual[judged], w[judged], f[judged] == 1.0
     convergence = _convergence(job, track, piece[vertex], w[vertex])
-    lines = _per_line(original, job, track, piece, vertex, residual, convergence)
-    return Verified(residual, lines, joins, warnings)
+    lines = _per_line(original, job, track, piece, vertex, residual, convergence, missed)
+    return Verified(residual, lines, joins, warnings, missed, totals, job.config.compensation.policy)
+
+
+def _beside(job: Job, track: Track, piece: Ints, commanded: Floats, w: Floats, shares: Shares) -> tuple[Floats, Floats]:
+    """Distances (k,) mm of the loaded tip from its place on the programmed path, and from where the policy wants it.
+
+    The share that was taken may be another than the policy's by ALLOWED_SHARE: it rests on derivatives, and the rest of the distance on
+    the solver.
+    """
+    travel, target = travel_of(job, track, piece, w), track.points(piece, w)
+    tip, _ = respond(job, commanded, travel)
+    off = aim_at(job, target, travel, "newton").commanded - target
+    beside = tip - target - shares.left(job, track, piece, w, travel)
+    size = np.maximum(np.linalg.norm(off, axis=1), 1e-12)
+    along = np.einsum("ni,ni->n", beside, off) / size
+    along = np.clip(along, -ALLOWED_SHARE * size, ALLOWED_SHARE * size)
+    return np.linalg.norm(tip - target, axis=1), np.linalg.norm(beside - (along / size)[:, None] * off, axis=1)
+
+
+def _expected_error(
+    job: Job, track: Track, piece: Ints, commanded: Floats, w: Floats, end: Bools, shares: Shares | None
+) -> BandTotals:
+    """What machines that may be leave at the ends (k,) of moves; the other points are only there because drives remember."""
+    uncertainty = Uncertainty(job, track)
+    at = np.arange(len(piece)) if job.causes else np.flatnonzero(end)
+    piece, w, commanded, end = piece[at], w[at], commanded[at], end[at]
+    travel = travel_of(job, track, piece, w)
+    tip, _ = respond(job, commanded, travel)
+    moves = uncertainty.moves(piece, w, commanded, travel, np.zeros(len(at), np.bool_), tip)
+    taken = None if shares is None else shares.at(track, piece, w)[end]
+    totals = BandTotals(uncertainty.inputs)
+    totals.add((tip - track.points(piece, w))[end], moves.take(np.flatnonzero(end)), taken)
+    return totals
 
 
 def _other_model(corrected: Program, job: Job) -> list[str]:
@@ -112,7 +171,7 @@ def _samples(path: Path, pieces: Ints, first: Ints, last: Ints) -> tuple[Ints, I
     return np.repeat(piece, points), np.repeat(move, points), k / np.repeat(count, points)
 
 
-def _expected(program: Program, job: Job, track: Track, corrected: Bools, w: float) -> Floats:
+def _expected(program: Program, job: Job, track: Track, corrected: Bools, w: float, shares: Shares | None) -> Floats:
     """Commanded tip (p, 3) at fraction w of every piece, as compensate would have it."""
     pieces = np.arange(len(track.motion))
     at = np.full(len(pieces), w)
@@ -121,7 +180,7 @@ def _expected(program: Program, job: Job, track: Track, corrected: Bools, w: flo
     result = aim_at(job, out[on], travel_of(job, track, on, at[on]), "newton")
     refuse_unsolved(program, track, on, out[on], result.status)
     out[on] = result.commanded
-    return out
+    return out if shares is None else shares.taken(track, pieces, at, track.points(pieces, at), out)
 
 
 def _reach(program: Program, job: Job, track: Track, corrected: Bools) -> Floats:
@@ -165,13 +224,21 @@ def _fraction(job: Job, track: Track, reach: Floats, path: Path, piece: Ints, mo
     return out
 
 
-def _residual(job: Job, track: Track, piece: Ints, commanded: Floats, w: Floats) -> tuple[Floats, Floats]:
-    """Distance (k,) mm of the loaded tip from the programmed path, and the fraction of the nearest point."""
+def _residual(
+    job: Job, track: Track, piece: Ints, commanded: Floats, w: Floats, shares: Shares | None
+) -> tuple[Floats, Floats]:
+    """Distance (k,) mm of the loaded tip from the programmed path, and the fraction of the nearest point.
+
+    With shares of the correction: from the path on which they want it.
+    """
 
     def seen(w: Floats) -> tuple[Floats, Floats]:
         """Distance from the place, and how far the tip lies ahead of it, mm."""
-        tip, _ = respond(job, commanded, travel_of(job, track, piece, w))
+        travel = travel_of(job, track, piece, w)
+        tip, _ = respond(job, commanded, travel)
         gap = tip - track.points(piece, w)
+        if shares is not None:
+            gap = gap - shares.left(job, track, piece, w, travel)
         tangent = path_geometry.tangents(track.path, track.motion[piece], track.u(piece, w))
         return np.linalg.norm(gap, axis=1), np.sum(gap * tangent, axis=1)
 
@@ -179,7 +246,7 @@ def _residual(job: Job, track: Track, piece: Ints, commanded: Floats, w: Floats)
     last_w = np.where(w < 0.5, w + PROBE_MM, w - PROBE_MM)
     nearest, last_along = seen(last_w)
     best = last_w
-    for _ in range(MATCH_PASSES):
+    for _ in steps(range(MATCH_PASSES), MATCH_PASSES):
         size, along = seen(w)
         best, nearest = np.where(size < nearest, w, best), np.fmin(size, nearest)
         change = along - last_along
@@ -200,7 +267,14 @@ def _convergence(job: Job, track: Track, piece: Ints, w: Floats) -> Floats:
 
 
 def _per_line(
-    original: Program, job: Job, track: Track, piece: Ints, vertex: Bools, residual: Floats, convergence: Floats
+    original: Program,
+    job: Job,
+    track: Track,
+    piece: Ints,
+    vertex: Bools,
+    residual: Floats,
+    convergence: Floats,
+    missed: Floats | None,
 ) -> list[LineResult]:
     line = original.path.line[track.motion[piece]]
     rounding = 0.5 * np.sqrt(3.0) * 1e3 * original.step_mm(job.config.control.resolution_mm)
@@ -219,6 +293,7 @@ def _per_line(
                 rounding_um=rounding,
                 vertex_um=1e3 * v,
                 chord_um=1e3 * chord,
+                **({} if missed is None else {"missed_um": 1e3 * float(missed[on].max())}),
             )
         )
     return out

@@ -199,12 +199,12 @@ def figure_path(drawn: DrawnPath) -> Figure:
         f"Feed moves of the program in space, {words}. Drag to turn.",
         f"Three-dimensional plot of the tool path, coloured by the size of the correction: {words}.",
         [trace],
-        {"scene": _scene(drawn.target[~drawn.hidden]), "margin": {"l": 0, "r": 0, "t": 0, "b": 0}},
+        {"scene": scene_of(drawn.target[~drawn.hidden]), "margin": {"l": 0, "r": 0, "t": 0, "b": 0}},
         height=520,
     )
 
 
-def _scene(points: Floats) -> dict[str, Any]:
+def scene_of(points: Floats) -> dict[str, Any]:
     """Axes of one scale, a flat path with some room above and below, and an eye that sees all of it."""
     middle, span = 0.5 * (points.max(axis=0) + points.min(axis=0)), np.ptp(points, axis=0)
     half = 0.55 * np.maximum(span, 0.2 * max(float(span.max()), 1e-6))

@@ -12,7 +12,7 @@ from camcomp.compensation.long.fastwrite import csv_rows
 from camcomp.compensation.long.totals import Batch
 from camcomp.compensation.program.compensate import Compensated
 from camcomp.compensation.report.parquet import SUFFIX, ParquetTable
-from camcomp.compensation.report.tables import decimals_of, joint_columns, joint_csv
+from camcomp.compensation.report.tables import decimals_of, joint_columns, joint_csv, values_behind
 from camcomp.ground.datatypes import Floats, Ints
 from camcomp.model.job import Job
 
@@ -33,7 +33,8 @@ class JointTable:
         """Adds rows."""
         m = batch.nominal.shape[1]
         actuators = np.stack((batch.nominal, batch.joints, batch.drive), axis=2).reshape(-1, 3 * m)
-        values = np.column_stack((batch.s, batch.t, batch.target, batch.written, batch.force, actuators))
+        behind = [] if batch.behind is None else [batch.behind]
+        values = np.column_stack((batch.s, batch.t, batch.target, batch.written, batch.force, actuators, *behind))
         self._sink.rows(batch.line, values)
 
     def close(self) -> None:
@@ -69,6 +70,6 @@ def joint_bytes(result: Compensated, job: Job, name: str) -> bytes:
     file = BytesIO()
     table = joint_table(file, name, job)
     table.batch(Batch(result.lines, result.s, result.t, result.rows.target, result.written.end, force, result.nominal, state.rho,
-                      state.drive))  # fmt: skip
+                      state.drive, values_behind(result, job)))  # fmt: skip
     table.close()
     return file.getvalue()

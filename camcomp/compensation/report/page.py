@@ -10,6 +10,7 @@ import numpy as np
 from camcomp.compensation.program.compensate import Compensated, Trajectories, trajectories
 from camcomp.compensation.program.result import LineResult, Summary
 from camcomp.compensation.program.verify import Verified, verify
+from camcomp.compensation.report.band_section import band_section
 from camcomp.compensation.report.figures import (
     DrawnPath,
     drawn_path_of,
@@ -20,7 +21,9 @@ from camcomp.compensation.report.figures import (
     figure_trajectories,
     figures_actuators,
 )
+from camcomp.compensation.report.machine_drawing import figure_machine
 from camcomp.gcode.interpret import read_program
+from camcomp.ground.datatypes import Floats
 from camcomp.model.config.in_force import values_in_force
 from camcomp.model.control import setup_of
 from camcomp.model.job import Job
@@ -68,6 +71,8 @@ def compensation_html(
     any_feed = bool((~drawn.hidden).any())
     sections = [Section("warnings", "Warnings", items=notes)] if notes else []
     if any_feed:
+        if result.bands is not None:
+            sections.append(band_section(drawn, result.bands, figures))
         sections += _plots(result, found, job, drawn, checked, tolerance_um)
         sections.append(Section("lines", "Line by line", tables=[_lines(drawn, job, checked)]))
     sections += [_machine(job), inputs_section(inputs, result.written.data)]
@@ -77,13 +82,15 @@ def compensation_html(
         f"{figures.segments_in} motions",
         verdict=verdict,
         good=not failed,
-        cards=_cards(figures, tolerance_um),
+        cards=_cards(figures, tolerance_um, drawn, result.state.rho, job, len(notes)),
         sections=sections,
     )
     return render(page)
 
 
-def _cards(figures: Summary, tolerance_um: float) -> list[tuple[str, str, str]]:
+def _cards(
+    figures: Summary, tolerance_um: float, drawn: DrawnPath, rho: Floats, job: Job, warnings: int
+) -> list[tuple[str, str, str]]:
     cards = [
         (
             "Tip error before",
@@ -92,11 +99,20 @@ def _cards(figures: Summary, tolerance_um: float) -> list[tuple[str, str, str]]:
         ),
         ("Tip error after", f"{brief(figures.after.max_um)} µm", f"tolerance {tolerance_um:g} µm"),
     ]
+    mode = figures.control_mode + ("" if figures.control_mode_stated else " (assumed)")
+    times = figures.cycle_time_s
+    cards += [
+        (f"Under the control, {mode}", f"{brief(figures.under_control.max_um)} µm",
+         f"rms {brief(figures.under_control.rms_um)} µm, with what it merges and rounds, beside joining lines, too"),
+        ("Cycle time", f"{brief(times.after)} s", f"before {brief(times.before)} s; pauses and tool changes not counted"),
+    ]  # fmt: skip
+    if expected := figures.expected:
+        cards.append(("To be expected", f"{brief(expected.p95_um)} µm", "95 % of all points of machines that may be"))
     for most, what, unit in (
         (figures.actuator_change_max_mm, "Largest change of a slide", "mm"),
-        (figures.actuator_change_max_rad, "Largest change of a hinge", "rad"),
+        (1e3 * (figures.actuator_change_max_rad or 0.0), "Largest change of a hinge", "mrad"),
         (figures.actuator_force_max_N, "Largest drive force", "N"),
-        (figures.actuator_torque_max_Nmm, "Largest drive torque", "N·mm"),
+        (1e-3 * (figures.actuator_torque_max_Nmm or 0.0), "Largest drive torque", "N·m"),
     ):
         if most:
             cards.append((what, f"{brief(most)} {unit}", ""))
@@ -104,7 +120,25 @@ def _cards(figures: Summary, tolerance_um: float) -> list[tuple[str, str, str]]:
     cards.append(
         ("Platform tilt left", f"{brief(tilt)} mrad", "not corrected with three actuators" if tilt > 1e-6 else "")
     )
+    cards.append(("Joining lines", str(figures.joining_lines), "where the correction jumps"))
+    cards += _travel(drawn, rho, job)
+    cards.append(("Warnings", str(warnings), "read them below" if warnings else "nothing to look at"))
     return cards
+
+
+def _travel(drawn: DrawnPath, rho: Floats, job: Job) -> list[tuple[str, str, str]]:
+    """How near an actuator comes to the end of its travel; nothing where no ends are stated. rho (N, m): commanded."""
+    low, high = np.array(job.machine.limits, float).T
+    ends = np.flatnonzero(np.isfinite(high - low))
+    if not len(ends) or not np.isfinite(rho[:, ends]).any():
+        return []
+    share = np.minimum(rho - low, high - rho)[:, ends] / (high - low)[ends]
+    row, nearest = np.unravel_index(int(np.nanargmin(share)), share.shape)
+    a = ends[nearest]
+    rotary = bool(job.machine.revolute[a])
+    size = float(min(rho[row, a] - low[a], high[a] - rho[row, a]))
+    text = f"{brief(np.degrees(size))} deg" if rotary else f"{brief(size)} mm"
+    return [("Travel left", text, f"actuator {job.machine.actuators[a]}, line {drawn.line[row]}")]
 
 
 def _plots(
@@ -116,7 +150,9 @@ def _plots(
         text=[BUDGET],
         figures=[figure_budget(checked, tolerance_um)] if checked.lines else [],
     )
+    machine = figure_machine(result, job, drawn)
     return [
+        *([Section("drawing", "The machine", figures=[machine])] if machine else []),
         Section("paths", "Trajectories", figures=[figure_trajectories(result, found), figure_path(drawn)]),
         Section("errors", "Tip error and shift", figures=[figure_error(drawn, tolerance_um), figure_shift(drawn)]),
         Section("actuators", "Actuators", figures=[

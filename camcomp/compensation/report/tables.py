@@ -6,14 +6,17 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from camcomp.compensation.bands.outcome import Bands, band_figures
 from camcomp.compensation.program.compensate import Compensated, Trajectories
-from camcomp.compensation.program.result import ErrorSize, Summary
+from camcomp.compensation.program.result import CycleTime, ErrorSize, Summary
+from camcomp.compensation.program.under_control import mode_name
 from camcomp.ground.datatypes import Floats
 from camcomp.model.job import Job
 
 CHUNK_ROWS = 20_000
 DECIMALS = 6
 DECIMALS_RAD = 9  # 2 m of reach make 2 nm of it
+ENGAGEMENT = ["depth_mm", "engaged_rad"]  # where a stock is known
 
 
 def actuator_columns(job: Job) -> tuple[list[str], list[str], list[str]]:
@@ -30,7 +33,28 @@ def actuator_columns(job: Job) -> tuple[list[str], list[str], list[str]]:
 def joint_columns(job: Job) -> list[str]:
     """Column names of the joint table."""
     head = ["line", "s_mm", "t_s", "x_mm", "y_mm", "z_mm", "xc_mm", "yc_mm", "zc_mm", "fx_N", "fy_N", "fz_N"]
-    return head + [name for trio in zip(*actuator_columns(job), strict=True) for name in trio]
+    head += [name for trio in zip(*actuator_columns(job), strict=True) for name in trio]
+    return head + band_columns(job) + (ENGAGEMENT if job.config.workpiece.stock is not None else [])
+
+
+def band_columns(job: Job) -> list[str]:
+    """Column names of what is known of the error that is left; none where every number of the config is exact."""
+    if not job.config.uncertain:
+        return []
+    return ["band_um", "gain_um"] + (["share"] if job.config.compensation.policy != "full" else [])
+
+
+def band_values(bands: Bands | None, job: Job) -> list[Floats]:
+    """These columns (N, 2 or 3), or none of them."""
+    return [bands.columns(with_share=job.config.compensation.policy != "full")] if bands is not None else []
+
+
+def values_behind(result: Compensated, job: Job) -> Floats | None:
+    """The columns (N, e) behind those of the actuators, None where there are none."""
+    parts = band_values(result.bands, job)
+    if job.config.workpiece.stock is not None:
+        parts.append(result.rows.engagement)
+    return np.column_stack(parts) if parts else None
 
 
 def decimals_of(names: Sequence[str]) -> list[int]:
@@ -42,9 +66,13 @@ def joint_csv(result: Compensated, job: Job) -> bytes:
     """One row per end point of every motion of the corrected program."""
     head, m = joint_columns(job), len(job.machine.actuators)
     actuators = np.stack((result.nominal, result.state.rho, result.state.drive), axis=2).reshape(-1, 3 * m)
+    behind = values_behind(result, job)
     values = np.column_stack(
-        (result.s, result.t, result.rows.target, result.written.end, job.frame.vectors(result.rows.force), actuators)
-    )
+        (
+            result.s, result.t, result.rows.target, result.written.end, job.frame.vectors(result.rows.force), actuators,
+            *([] if behind is None else [behind]),
+        )
+    )  # fmt: skip
     return _csv(head, result.lines, values)
 
 
@@ -102,6 +130,11 @@ def summary(result: Compensated, job: Job) -> Summary:
             "method": result.method,
             "platform_tilt_max_mrad": 1e3 * _most(np.linalg.norm(result.state.tilt, axis=1)[result.rows.corrected]),
             "joining_lines": int(result.rows.joining.sum()),
+            "cycle_time_s": CycleTime(before=result.control.before_s, after=result.control.after_s),
+            "control_mode": mode_name(result.control.modes),
+            "control_mode_stated": result.control.stated,
+            "under_control": _size(result.control.error),
+            **({} if result.bands is None else band_figures(result.bands.totals, job.config.compensation.policy)),
             "warnings": result.warnings,
         }
     )

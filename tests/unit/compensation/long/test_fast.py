@@ -173,10 +173,12 @@ def test_lines_are_written_as_the_writer_of_whole_programs_writes_them(seed):
     path = whole.path
     motion, end, joining, feed = random_output(rng, path, 1)
     kind = np.where(path.kind[motion] == RAPID, RAPID, LINE)
+    rest = rng.random(len(motion)) < rng.choice([0.0, 0.2])
+    modes = [np.frombuffer(each, np.uint8) for each in (b"G61", b"G64")]
     one = Output(
         motion=np.append(0, motion), kind=np.append(RAPID, kind), end=np.vstack((path.end[:1], end)),
         centre=np.full((len(end) + 1, 3), np.nan), angle=np.zeros(len(end) + 1), feed=np.append(np.nan, feed),
-        joining=np.append(False, joining),
+        joining=np.append(False, joining), rest=np.append(False, rest),
     )  # fmt: skip
     expected = rewrite(whole, one, resolution_mm=RESOLUTION, version="1")
 
@@ -184,13 +186,13 @@ def test_lines_are_written_as_the_writer_of_whole_programs_writes_them(seed):
     _, read = scanned(body)
     data = np.frombuffer(body.encode(), np.uint8)
     out = np.empty(len(data) + ROOM * len(motion), np.uint8)
-    written = np.empty((len(motion), 3))
+    written, held = np.empty((len(motion), 3)), np.empty(len(motion))
     first = np.searchsorted(motion - 1, np.arange(len(read.row) + 1))
     position, state = np.array([1.0, 2.0, 3.0]), np.array([0.0, 500.0])
     size = write_rows(
         data, 0, len(data), read.line, read.begin, read.finish, read.kind, read.end, read.code_stated, read.feed_stated,
-        read.feed, first, joining, end, feed, position, state, 1.0, np.zeros(3), decimals(RESOLUTION, 1.0),
-        0.5 * RESOLUTION * (1 + 1e-9), False, out, written,
+        read.feed, first, joining, rest, *modes, end, feed, position, state, 1.0, np.zeros(3), decimals(RESOLUTION, 1.0),
+        0.5 * RESOLUTION * (1 + 1e-9), False, out, written, held,
     )  # fmt: skip
     text_out = out[:size].tobytes().decode()
     reference = expected.data.decode()
@@ -198,6 +200,8 @@ def test_lines_are_written_as_the_writer_of_whole_programs_writes_them(seed):
     assert reference[: -len(text_out)].count("\n") == 3  # the head and the stamp
     np.testing.assert_allclose(written, expected.end[1:], rtol=0, atol=1e-12)
     np.testing.assert_allclose(position, expected.end[-1], atol=1e-12)
+    cuts = np.isfinite(expected.feed[1:])
+    np.testing.assert_array_equal(held[cuts], expected.feed[1:][cuts])
 
 
 def _first_difference(reference, text):

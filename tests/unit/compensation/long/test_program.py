@@ -57,8 +57,8 @@ def both(job, text, tolerance=1.0):
     return (out.getvalue().decode("latin-1"), totals, batches), exact
 
 
-def assert_same(job, text, tolerance=1.0):
-    """The two ways agree: text, rows and figures."""
+def assert_same(job, text, tolerance=1.0, feed=2e-4):
+    """The two ways agree: text, rows and figures; feeds by the share `feed`."""
     (ours, totals, batches), exact = both(job, text, tolerance)
     theirs = exact.written.data.decode("latin-1")
     assert NUMBER.sub("#", ours) == NUMBER.sub("#", theirs)
@@ -67,7 +67,7 @@ def assert_same(job, text, tolerance=1.0):
             assert a == b
             continue
         for (x, u), (y, v) in zip(*(re.findall(r"([A-Z])(-?\d+\.?\d*)", each) for each in (a, b)), strict=True):
-            assert x == y and abs(float(u) - float(v)) <= (LAST_DIGIT if x != "F" else 2e-4 * float(v)), (a, b)
+            assert x == y and abs(float(u) - float(v)) <= (LAST_DIGIT if x != "F" else feed * float(v)), (a, b)
     everything = {
         "line": exact.lines, "s": exact.s, "t": exact.t, "target": exact.rows.target, "written": exact.written.end,
         "force": job.frame.vectors(exact.rows.force), "nominal": exact.nominal, "joints": exact.state.rho,

@@ -1,0 +1,167 @@
+"""Bands of a program: what is known of every row, and what is expected of the program as a whole."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from camcomp.compensation.bands.scatter import LEVEL, TipMoves, gained, size_below
+from camcomp.ground.datatypes import Bools, Floats
+from camcomp.model.config.spread import UncertainInput
+from camcomp.model.drawn import UncertainJob
+
+MACHINES = 1000  # drawn for what is expected of the program
+LITTLE = 0.005  # of a correction
+POINTS = 600  # points of the program that they are judged on
+
+
+@dataclass(frozen=True)
+class Expected:
+    """The error of the machines drawn at the points of the program, um."""
+
+    rms: float  # over points and machines
+    p95: float  # LEVEL of all points of all machines stay below
+    rms_interval: tuple[float, float]  # that holds the rms of LEVEL of the machines
+
+
+class BandTotals:
+    """Adds up what is expected of a program, piece by piece."""
+
+    def __init__(self, inputs: Sequence[UncertainJob]) -> None:
+        self.inputs = [each.source for each in inputs]
+        self._count, self._square, self._by_input = 0, 0.0, np.zeros(len(inputs))
+        self._kept: list[tuple[Floats, TipMoves]] = []
+        self._weight: list[int] = []
+        self.shrunk = self.alone = 0  # points that take less than all of the correction, and none of it
+
+    @property
+    def points(self) -> int:
+        """How many points count."""
+        return self._count
+
+    def add(self, error: Floats, moves: TipMoves, share: Floats | None = None) -> None:
+        """Points that count: errors (n, 3) mm of the machine at its stated values, the moves there, shares (n,) of the correction."""
+        if share is not None:
+            self.alone += int((share <= LITTLE).sum())
+            self.shrunk += int(((share > LITTLE) & (share < 1.0 - LITTLE)).sum())
+        known = np.isfinite(error).all(axis=1)
+        error, moves = error[known], moves.take(np.flatnonzero(known))
+        if not len(error):
+            return
+        self._count += len(error)
+        mean = error + moves.mean
+        self._square += float((mean**2).sum() + np.trace(moves.covariance, axis1=1, axis2=2).sum())
+        self._by_input += moves.squares.sum(axis=0)
+        some = np.unique(np.linspace(0, len(error) - 1, min(len(error), POINTS)).astype(int))
+        self._kept.append((error[some], moves.take(some)))
+        self._weight.append(len(error))
+
+    def join(self, other: BandTotals) -> BandTotals:
+        """Itself, with what another part of the program has added up."""
+        self._count, self._square = self._count + other._count, self._square + other._square
+        self._by_input = self._by_input + other._by_input
+        self._kept += other._kept
+        self._weight += other._weight
+        self.shrunk, self.alone = self.shrunk + other.shrunk, self.alone + other.alone
+        return self
+
+    def expected(self) -> Expected:
+        """The error to be expected; zero where nothing counts."""
+        if not self._count:
+            return Expected(0.0, 0.0, (0.0, 0.0))
+        z = np.random.default_rng(0).standard_normal((len(self.inputs), MACHINES))
+        total, sizes, weights = np.zeros(MACHINES), [], []
+        for (error, moves), count in zip(self._thinned(), self._weight, strict=True):
+            square = ((error[:, :, None] + moves.drawn(z)) ** 2).sum(axis=1)
+            total += count * square.mean(axis=0)
+            sizes.append(square.ravel())
+            weights.append(np.full(square.size, count / square.size))
+        rms = np.sqrt(total / self._count)
+        tail = 0.5 * (1.0 - LEVEL)
+        low, high = np.quantile(rms, (tail, 1.0 - tail))
+        p95 = np.sqrt(_weighted_quantile(np.concatenate(sizes), np.concatenate(weights), LEVEL))
+        mean = np.sqrt(self._square / self._count)
+        return Expected(1e3 * float(mean), 1e3 * float(p95), (1e3 * float(low), 1e3 * float(high)))
+
+    def shares(self) -> list[tuple[str, float]]:
+        """Every input's share of the mean square of the band, the largest first."""
+        total = float(self._by_input.sum())
+        shares = self._by_input / total if total > 0.0 else self._by_input
+        order = np.argsort(-shares, kind="stable")
+        return [(self.inputs[k].name, float(shares[k])) for k in order]
+
+    def _thinned(self) -> list[tuple[Floats, TipMoves]]:
+        """Of every piece as many points as keep them all together near POINTS."""
+        stride = max(1, sum(len(error) for error, _ in self._kept) // POINTS)
+        return [(error[::stride], moves.take(np.arange(0, len(error), stride))) for error, moves in self._kept]
+
+
+@dataclass(frozen=True, eq=False)
+class Bands:
+    """What is known of the end points (N,) of a program, or of a piece of one, and what adds up to its expected error."""
+
+    before: Floats  # (N, 3) mm error of the original program at the stated values
+    after: Floats  # (N, 3) mm of the corrected one
+    moves: TipMoves
+    share: Floats  # (N,) of the correction that was taken
+    known: Bools  # (N,) False: passes as programmed
+    totals: BandTotals
+
+    def band_um(self, level: float = LEVEL) -> Floats:
+        """Error (N,) after compensation below which `level` of the machines drawn stay."""
+        size = size_below(self.after + self.moves.mean, self.moves.covariance, level)
+        return np.where(self.known, 1e3 * size, np.nan)
+
+    def gain_um(self, level: float = LEVEL) -> Floats:
+        """By how much (N,) the error of `level` of the machines drawn is smaller, at least, than without compensation."""
+        return np.where(self.known, 1e3 * gained(self.before, self.after, self.moves, level), np.nan)
+
+    def columns(self, *, with_share: bool) -> Floats:
+        """Columns (N, 2 or 3) of the joint table."""
+        parts = (self.band_um(), self.gain_um()) + ((np.where(self.known, self.share, np.nan),) if with_share else ())
+        return np.column_stack(parts)
+
+
+def _weighted_quantile(values: Floats, weights: Floats, level: float) -> float:
+    order = np.argsort(values)
+    reached = np.cumsum(weights[order])
+    return float(values[order][np.searchsorted(reached, level * reached[-1])])
+
+
+ADVICE = (
+    ("process.force", "cut two slots with different feeds and run camcomp diagnose"),
+    ("effects", "log more runs and run camcomp diagnose"),
+    ("tool.length", "measure the tool on a presetter"),
+    ("tool", "measure the tool"),
+    ("workpiece", "probe the workpiece"),
+    ("process", "measure it during the cut"),
+    ("robot", "log runs with and without load and run camcomp diagnose"),
+)  # fmt: skip
+
+
+def in_words(inputs: Sequence[UncertainInput], shares: Sequence[tuple[str, float]]) -> str:
+    """What makes most of the band, and what would make it smaller."""
+    name, share = shares[0]
+    source = next(each for each in inputs if each.name == name)
+    first = source.members[0].name
+    what = next(text for start, text in ADVICE if first.startswith(start))
+    meant = (
+        "the cutting force" if first.startswith("process.force") else "the machine" if first.startswith("robot") else ""
+    )
+    called = f"{meant} ({name})" if meant else name
+    return f"{100.0 * share:.0f} % of the band is {called}: {what}"
+
+
+def band_figures(totals: BandTotals, policy: str) -> dict[str, Any]:
+    """The figures of a summary that uncertain numbers add."""
+    expected, shares = totals.expected(), totals.shares()
+    taken = {"policy": policy, "points": totals.points, "shrunk": totals.shrunk, "left_alone": totals.alone}
+    return {
+        **({} if policy == "full" else {"taken": taken}),
+        "expected": {"rms_um": expected.rms, "p95_um": expected.p95, "rms_ci95_um": expected.rms_interval},
+        "band": [{"input": name, "share": share} for name, share in shares],
+        "advice": in_words(totals.inputs, shares),
+    }

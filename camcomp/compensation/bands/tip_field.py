@@ -1,0 +1,225 @@
+"""How the loaded tip moves with uncertain inputs, anywhere on a program: solved at some points, interpolated at many.
+
+For machines without effects, whose tip depends on the commanded tip and the force alone. The moves are smooth and
+need a hundredth of their size, so low polynomials do where corrections need tiles.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from camcomp.compensation.bands.scatter import TipMoves
+from camcomp.ground.datatypes import Bools, Floats, Ints
+from camcomp.ground.errors import PhysicsError
+from camcomp.model.drawn import UncertainJob, uncertain_jobs
+from camcomp.model.job import Job
+from camcomp.model.statics.machine import Machine
+from camcomp.model.statics.solve import FREE, solve
+
+DEGREES = (2, 3, 4)  # in position, tried in this order
+TESTS = 40  # points that are not used in the fit
+SURPLUS = 1.5  # points per term
+ACCURATE = 0.01  # of the root mean square of the moves, at the test points
+ENDURED = 0.05  # at the highest degree; worse: every point is solved
+MOST_LEVERAGE = 1.5  # of a point that is interpolated; the points of the fit have 1 at most
+LONE = 0.02  # of the points may be solved by themselves before the fit is made anew
+PUSH_N = 1.0  # to find the compliance, beside a hundredth of the largest force
+
+
+class TipField:
+    """Moves of the tip with the inputs that concern the machine, and its compliance for those that concern the force."""
+
+    def __init__(self, job: Job) -> None:
+        self._job, self.inputs = job, uncertain_jobs(job)
+        self._moves = 6 * len(self.inputs)  # columns of slopes and bends
+        self._on_force = any(each.moves_force for each in self.inputs)
+        self._fit: _Fit | None = None
+        self.solved = 0
+
+    def at(self, commanded: Floats, force: Floats) -> tuple[TipMoves, Floats]:
+        """Moves at commanded tips (n, 3), program frame, under forces (n, 3) N, machine frame, and compliances (n, 3, 3).
+
+        The moves are those of the machine under the same force, zero for inputs that change the force alone. Raises
+        PhysicsError CC301 where an input's deviation leaves the machine without a solution.
+        """
+        points = np.concatenate((commanded, force), axis=1)
+        if len(points) <= _samples(DEGREES[0]):
+            return self._split(self._exact(points))
+        found = None if self._fit is None else self._interpolated(self._fit, points, check=True)
+        if found is None:
+            self._fit = self._fitted(points)
+            found = self._exact(points) if self._fit is None else self._interpolated(self._fit, points, check=False)
+        assert found is not None
+        return self._split(found)
+
+    def _interpolated(self, fit: _Fit, points: Floats, *, check: bool) -> Floats | None:
+        """Values at points, solved where the fit says nothing. check: None where it does not hold for these points."""
+        terms = fit.terms(points)
+        lone = np.flatnonzero(~fit.supports(terms))
+        if check:
+            some = np.random.default_rng(0).choice(len(points), TESTS // 2, replace=False)
+            few = len(lone) <= LONE * len(points)
+            if not few or fit.misses(points[some], self._exact(points[some]), self._moves) > 2.0 * ACCURATE:
+                return None
+        values = terms @ fit.coefficients
+        if len(lone):
+            values[lone] = self._exact(points[lone])
+        return values
+
+    def _fitted(self, points: Floats) -> _Fit | None:
+        """Polynomials through exact solutions at some of the points, the extreme ones among them."""
+        random = np.random.default_rng(0)
+        order = np.concatenate((points.argmin(axis=0), points.argmax(axis=0), random.permutation(len(points))))
+        _, first = np.unique(order, return_index=True)
+        order = order[np.sort(first)]
+        values = np.zeros((0, 0))
+        for degree in DEGREES:
+            count = _samples(degree)
+            if count >= len(points):
+                return None
+            more = self._exact(points[order[len(values) : count]])
+            values = np.concatenate((values, more)) if len(values) else more
+            rows = order[:count]
+            used, tests = rows[:-TESTS], rows[-TESTS:]
+            fit = _Fit.of(points[used], values[:-TESTS], degree, points)
+            missed = fit.misses(points[tests], values[-TESTS:], self._moves)
+            if missed <= (ACCURATE if degree < DEGREES[-1] else ENDURED):
+                return fit
+        return None
+
+    def _exact(self, points: Floats) -> Floats:
+        """Slopes, bends and, where forces are uncertain, compliances (n, 6 k + 9), solved one by one."""
+        told, force = self._job.frame.to_machine(points[:, :3]), points[:, 3:]
+        n = len(points)
+        base = self._tips(self._job.real_machine, told, force, "")
+        slope, bend = np.zeros((2, n, 3, len(self.inputs)))
+        for j, each in enumerate(self.inputs):
+            if not each.moves_machine:
+                continue
+            tips = [self._tips(one.real_machine, told, force, each.source.name) for one in each.sides]
+            tips = [one.on_the_workpiece(tip) for one, tip in zip(each.sides, tips, strict=True)]
+            slope[:, :, j], bend[:, :, j] = of_sides(each, base, tips)
+        parts = [slope.reshape(n, -1), bend.reshape(n, -1)]
+        if self._on_force:
+            push = PUSH_N + 0.01 * float(np.abs(force).max(initial=0.0))
+            columns = [
+                (self._tips(self._job.real_machine, told, force + push * axis, "")
+                 - self._tips(self._job.real_machine, told, force - push * axis, "")) / (2.0 * push)
+                for axis in np.eye(3)
+            ]  # fmt: skip
+            parts.append(np.stack(columns, axis=2).reshape(n, 9))
+        return np.concatenate(parts, axis=1)
+
+    def _tips(self, machine: Machine, told: Floats, force: Floats, name: str) -> Floats:
+        """Loaded tips (n, 3), program frame."""
+        state = solve(machine, FREE, told, force=force, check=False)
+        self.solved += len(told)
+        if state.status.any():
+            raise unsolved(self._job, name)
+        return self._job.frame.to_program(state.tip)
+
+    def _split(self, values: Floats) -> tuple[TipMoves, Floats]:
+        n, k = len(values), len(self.inputs)
+        slope, bend, rest = np.split(values, [3 * k, 6 * k], axis=1)
+        compliance = rest.reshape(n, 3, 3) if self._on_force else np.zeros((n, 3, 3))
+        return TipMoves(slope.reshape(n, 3, k), bend.reshape(n, 3, k)), compliance
+
+
+@lru_cache(maxsize=2)
+def tip_field_of(job: Job) -> TipField:
+    """The field of a job; parts of one program share what it has learnt."""
+    return TipField(job)
+
+
+def of_sides(each: UncertainJob, base: Floats, tips: Sequence[Floats]) -> tuple[Floats, Floats]:
+    """Slope and bend (n, 3) from tips at the stated values and at the allowed sides of an input."""
+    if len(tips) == 2:
+        return 0.5 * (tips[0] - tips[1]), tips[0] + tips[1] - 2.0 * base
+    sign = 1.0 if each.above is not None else -1.0
+    return sign * (tips[0] - base), np.zeros_like(base)
+
+
+def unsolved(job: Job, name: str) -> PhysicsError:
+    """What is said where a machine at one deviation of an input has no solution."""
+    at = next((each.at for each in job.config.spreads if name in (each.name, each.group)), None)
+    text = (
+        f"one deviation of '{name}' off its value the machine cannot be solved"
+        if name
+        else "the machine cannot be solved"
+    )
+    return PhysicsError("CC301", text, at=at, hint="a smaller sd, if that is what is known")
+
+
+def _samples(degree: int) -> int:
+    return int(SURPLUS * len(_exponents(degree))) + TESTS
+
+
+def _exponents(degree: int) -> Ints:
+    """Exponents (t, 6) of position and force: forces act almost linearly."""
+    out = [
+        (i, j, k, *f)
+        for i in range(degree + 1)
+        for j in range(degree + 1 - i)
+        for k in range(degree + 1 - i - j)
+        for f in [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]
+    ]
+    squares = [(2, 0, 0), (0, 2, 0), (0, 0, 2), (1, 1, 0), (1, 0, 1), (0, 1, 1)]
+    out += [(*p, *f) for p in [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)] for f in squares]
+    return np.array(out, np.int64)
+
+
+@dataclass(frozen=True, eq=False)
+class _Fit:
+    """Polynomials in position and force, each scaled to [-1, 1] over the program."""
+
+    middle: Floats  # (6,)
+    half: Floats  # (6,)
+    exponents: Ints
+    coefficients: Floats  # (t, q)
+    spread: Floats  # (t, t) turns terms into vectors whose square is the leverage of the point
+
+    @staticmethod
+    def of(points: Floats, values: Floats, degree: int, everywhere: Floats) -> _Fit:
+        low, high = everywhere.min(axis=0), everywhere.max(axis=0)
+        nothing = np.zeros((0, 0))
+        blank = _Fit(0.5 * (low + high), np.maximum(0.5 * (high - low), 1e-9), _exponents(degree), nothing, nothing)
+        u, size, v = np.linalg.svd(blank.terms(points), full_matrices=False)
+        inverse = 1.0 / np.maximum(size, 1e-6 * size[0])  # what the points say nothing about has a large leverage
+        solved = np.where(size > 1e-6 * size[0], inverse, 0.0)
+        coefficients: Floats = v.T @ (solved[:, None] * (u.T @ values))
+        return _Fit(blank.middle, blank.half, blank.exponents, coefficients, v.T * inverse)
+
+    def terms(self, points: Floats) -> Floats:
+        """Terms (n, t) at points (n, 6)."""
+        x = (points - self.middle) / self.half
+        powers = np.stack([np.ones_like(x), *np.cumprod(np.repeat(x[None], DEGREES[-1], axis=0), axis=0)])
+        out = powers[self.exponents[:, 0], :, 0]
+        for axis in range(1, 6):
+            out = out * powers[self.exponents[:, axis], :, axis]
+        return np.ascontiguousarray(out.T)
+
+    def supports(self, terms: Floats) -> Bools:
+        """Whether points (n,) lie where the fit is held by points of its own."""
+        out: Bools = np.square(terms @ self.spread).sum(axis=1) <= MOST_LEVERAGE
+        return out
+
+    def misses(self, points: Floats, values: Floats, moves: int) -> float:
+        """Largest root mean square of what is missed in a column, over that of the largest column of its kind.
+
+        Only of points that the fit supports. moves: the first columns, which are slopes and bends; the others are compliances.
+        """
+        terms = self.terms(points)
+        held = self.supports(terms)
+        if not held.any():
+            return np.inf
+        missed = np.sqrt(((terms[held] @ self.coefficients - values[held]) ** 2).mean(axis=0))
+        size = np.sqrt((values**2).mean(axis=0))
+        out = 0.0
+        for part in (slice(0, moves), slice(moves, None)):
+            if (most := float(size[part].max(initial=0.0))) > 0.0:
+                out = max(out, float(missed[part].max()) / most)
+        return out

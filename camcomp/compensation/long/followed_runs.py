@@ -1,0 +1,74 @@
+"""A long program through its stock, run by run."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import BinaryIO
+
+import numpy as np
+
+from camcomp.compensation.long.met import path_of_run
+from camcomp.compensation.long.plain_run import PlainRun
+from camcomp.compensation.long.runs import OddRun, Runs
+from camcomp.gcode.setup import Setup
+from camcomp.ground.datatypes import Path
+from camcomp.ground.errors import Location, ProgramError, raise_all
+from camcomp.model.cutting.engaged import Engaged
+from camcomp.model.job import Job
+from camcomp.model.stock.follow import refuse_untouched
+from camcomp.model.stock.from_config import Bounds, memory_of
+from camcomp.model.stock.memory import StockMemory
+from camcomp.model.stock.warnings import Remarks, stock_remarks, stock_warnings
+
+
+@dataclass(eq=False)
+class FollowedRuns:
+    """The stock of a long program, and what there is to say of it."""
+
+    job: Job
+    name: str
+    memory: StockMemory
+    remarks: Remarks
+
+    @classmethod
+    def of(cls, job: Job, source: BinaryIO, name: str, setup: Setup) -> FollowedRuns | None:
+        """None where no stock is known. Reads the program for its bounds where the stock depends on them."""
+        stock = job.config.workpiece.stock
+        if stock is None:
+            return None
+        bounds = Bounds()
+        if stock.type == "program" or job.config.tools:
+            runs = Runs(source, name, setup, job.config.control.dialect)
+            for run in runs:
+                if isinstance(run, PlainRun):
+                    bounds.add(path_of_run(run))
+                elif isinstance(run, OddRun) and run.motions:
+                    bounds.add(runs.program(run.text, run.row0, run.state).path)
+            source.seek(0)
+        return cls(job, name, memory_of(job.config, job.tool_axis, bounds), {})
+
+    def follow(self, path: Path, ahead: Path | None) -> tuple[Engaged, Engaged]:
+        """What the motions of a run meet, and what the tool meets at the begin of those behind it (`ahead`).
+
+        Raises ProgramError CC142 for rapids through material.
+        """
+        both = path if ahead is None else _joined(path, ahead)
+        found, crashes = self.memory.follow(both, ahead=0 if ahead is None else len(ahead))
+        text = "the rapid goes through material of the stock"
+        lines = np.unique(path.line[crashes]).tolist()
+        raise_all([ProgramError("CC142", f"line {n}: {text}", at=Location(self.name, n, 1)) for n in lines[:20]])
+        own = found.of_motions(0, len(path))
+        for key, seen in stock_remarks(self.job.config, path, own).items():
+            self.remarks[key] = np.union1d(self.remarks.get(key, seen[:0]), seen)
+        return own, found.of_motions(len(path), len(both))
+
+    def finish(self) -> list[str]:
+        """Warnings at the end. Raises ConfigError CC298 when nothing was cut."""
+        refuse_untouched(self.job.config, self.memory)
+        return stock_warnings(self.remarks)
+
+
+def _joined(first: Path, second: Path) -> Path:
+    return Path(
+        **{name: np.concatenate((getattr(first, name), getattr(second, name))) for name in Path.__dataclass_fields__}
+    )

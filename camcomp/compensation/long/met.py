@@ -1,0 +1,55 @@
+"""What the tool meets on a run of a long program and next to it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from camcomp.compensation.long.plain_run import PlainRun
+from camcomp.ground.datatypes import RAPID, Path
+from camcomp.model.cutting.engaged import Engaged
+
+
+def path_of_run(run: PlainRun) -> Path:
+    """The motions of a run of plain lines."""
+    plain, n, state = run.plain, run.motions, run.state
+    return Path(
+        line=plain.row + run.row0 + 1, kind=plain.kind, start=plain.start, end=plain.end, centre=np.full((n, 3), np.nan),
+        axis=np.zeros((n, 3)), angle=np.zeros(n), feed=np.where(plain.kind == RAPID, np.nan, plain.feed),
+        speed=np.full(n, state.speed), turn=np.full(n, state.sense), tool=np.full(n, state.tool),
+        known=np.ones(n, np.bool_), machine=np.zeros(n, np.bool_),
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Met:
+    """What the tool meets on a run, at the end of the motion before it, and at the begin of the motion behind it."""
+
+    own: Engaged
+    before: Engaged | None
+    after: Engaged | None
+
+    def around(self, own: slice) -> Engaged:
+        """For a path in which the motions of the run are `own`, with one motion on either side where there is any."""
+        parts = [] if own.start == 0 or self.before is None else [_still(self.before, -1, own.start - 1)]
+        parts.append(replace(self.own, motion=self.own.motion + own.start))
+        parts += [] if self.after is None else [_still(self.after, 0, own.stop)]
+        return Engaged.joined(parts)
+
+    def within(self, first: int, last: int) -> Engaged:
+        """For a path whose first motion is the one before the run, whose motions first on are the run's, and which ends at
+        motion `last` with the one behind it.
+        """
+        parts = [] if first == 0 or self.before is None else [_still(self.before, -1, 0)]
+        parts.append(replace(self.own, motion=self.own.motion + first))
+        parts += [] if self.after is None else [_still(self.after, 0, last)]
+        return Engaged.joined(parts)
+
+
+def _still(engaged: Engaged, row: int, motion: int) -> Engaged:
+    """A motion on which nothing changes: as at one of the places."""
+    if not len(engaged.u):
+        return engaged
+    out = engaged.take(np.array([row % len(engaged.u)] * 2))
+    return replace(out, motion=np.array([motion, motion]), u=np.array([0.0, 1.0]), bends=np.ones(2, np.bool_))

@@ -1,0 +1,209 @@
+"""What the control makes of a program before and after its compensation: the time it takes, and how far off it goes.
+
+It merges lines, rounds corners, stops at ends (model/trajectory); what this leaves stands beside what the text leaves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from camcomp.compensation.program import arcs_out
+from camcomp.gcode.output import Rewritten
+from camcomp.gcode.path_mode import PathMode
+from camcomp.gcode.program import Program
+from camcomp.ground.datatypes import ARC, RAPID, Bools, Floats, Ints, Path
+from camcomp.model.control import limits_of
+from camcomp.model.job import Job
+from camcomp.model.trajectory.moves import ToolMoves, mode_columns, moves_of
+from camcomp.model.trajectory.plan import plan_of
+
+if TYPE_CHECKING:
+    from camcomp.compensation.program.corrected_rows import CorrectedRows
+    from camcomp.compensation.program.judged_points import JudgedPoints, Seen
+
+LOST_TIME = 1.02  # factor of the cycle time from which a faster way is looked for
+MOST_LINES = 10  # that a warning names
+
+
+@dataclass(frozen=True)
+class FarOff:
+    """Source lines on which the control goes further off than the tolerance, and how far: the worst ones."""
+
+    um: tuple[tuple[float, int], ...] = ()  # error and line, falling
+
+    def with_more(self, lines: Ints, um: Floats) -> FarOff:
+        """With errors (k,) of lines (k,)."""
+        worst = np.argsort(-um, kind="stable")
+        found: dict[int, float] = {line: size for size, line in self.um}
+        for line, size in zip(lines[worst].tolist(), um[worst].tolist(), strict=True):
+            if len(found) > MOST_LINES + len(self.um) and line not in found:
+                break
+            found[line] = max(size, found.get(line, 0.0))
+        return FarOff(tuple(sorted(((size, line) for line, size in found.items()), reverse=True)[: MOST_LINES + 1]))
+
+    def told(self, mode: str, what: str) -> list[str]:
+        """As a warning; none when there is nothing to tell."""
+        if not self.um:
+            return []
+        lines = ", ".join(str(line) for line in sorted(line for _, line in self.um[:MOST_LINES]))
+        more = " ..." if len(self.um) > MOST_LINES else ""
+        plural = "s" if len(self.um) > 1 else ""
+        return [f"in {mode} the control goes up to {self.um[0][0]:.1f} um off{what}: source line{plural} {lines}{more}"]
+
+
+def warnings_of(modes: tuple[PathMode, ...], beside: FarOff, elsewhere: FarOff) -> list[str]:
+    """What there is to say about errors beside joining lines and elsewhere, in modes that were stated."""
+    if not all(each.stated for each in modes):
+        return []
+    mode = mode_name(modes)
+    return beside.told(mode, " beside joining lines") + elsewhere.told(mode, "")
+
+
+@dataclass(frozen=True, eq=False)
+class UnderControl:
+    """What the control makes of a program."""
+
+    before_s: float
+    after_s: float
+    modes: tuple[PathMode, ...]  # of the cuts, in the order in which they come
+    error: Floats  # (k, 3) mm, at the points of `after`
+    joined: Bools  # (k,) beside a joining line
+    row: Ints  # (k,) end point to which the move leads on which a point lies
+    told: Floats  # (k, 3) mm, the points as commanded
+    resting: int = 0  # end points at which the control rests because of a joining line
+
+    @property
+    def stated(self) -> bool:
+        """Whether the program or the machine file says the mode."""
+        return all(each.stated for each in self.modes)
+
+    def better_than(self, other: UnderControl, tolerance_um: float) -> bool:
+        """Whether it is nearer to the path apart from joining lines without losing time, or faster and as near."""
+        mine, theirs = (max(1e3 * each.off_joins, tolerance_um) for each in (self, other))
+        if mine < 0.9 * theirs:
+            return self.after_s < LOST_TIME * other.after_s
+        return mine <= 1.05 * theirs and LOST_TIME * self.after_s < other.after_s
+
+    @property
+    def at_joins(self) -> float:
+        """Largest error beside joining lines, mm."""
+        size = np.linalg.norm(self.error[self.joined], axis=1)
+        return float(np.nanmax(size, initial=0.0))
+
+    @property
+    def off_joins(self) -> float:
+        """Largest error apart from joining lines, mm."""
+        size = np.linalg.norm(self.error[~self.joined], axis=1)
+        return float(np.nanmax(size, initial=0.0))
+
+    def warnings(self, lines: Ints, tolerance_um: float) -> list[str]:
+        """Where the control goes further off than the tolerance; lines (k,): source lines of the errors."""
+        size = 1e3 * np.linalg.norm(self.error, axis=1)
+        found = []
+        for of in (self.joined, ~self.joined):
+            far = of & (size > tolerance_um * (1.0 + 1e-9))
+            found.append(FarOff().with_more(lines[far], size[far]))
+        return warnings_of(self.modes, *found)
+
+    def leaves_room(self, tolerance_um: float) -> bool:
+        """Whether another way to write the program might be faster or nearer to the path."""
+        return self.stated and (
+            self.after_s > LOST_TIME * self.before_s or 1e3 * self.off_joins > tolerance_um * (1.0 + 1e-9)
+        )
+
+
+def rests_of(cut: Bools, joining: Bools) -> Bools:
+    """End points (N,) between a cut and a joining line; cut, joining (N,): what the moves to the end points are."""
+    out = np.zeros(len(cut), np.bool_)
+    out[:-1] = cut[:-1] & joining[1:] | joining[:-1] & cut[1:]
+    return out
+
+
+def rounds(mode: PathMode, tolerance_um: float) -> bool:
+    """Whether a mode that was stated rounds corners by more than the tolerance."""
+    return mode.stated and not mode.exact and not 0.0 < 1e3 * mode.tolerance_mm <= tolerance_um
+
+
+def rests(program: Program, rows: CorrectedRows, tolerance_um: float) -> Bools:
+    """End points (N,) at which the control has to rest, or it would round the corner of a cut and a joining line.
+
+    A line that sets the mode itself is left alone.
+    """
+    modes = program.modes
+    free = np.array([rounds(mode, tolerance_um) for mode in modes], bool)
+    free[1:] &= np.array([a == b for a, b in pairwise(modes)], bool)
+    cut = (rows.kind != RAPID) & ~rows.joining & rows.corrected
+    out: Bools = rests_of(cut, rows.joining) & free[rows.motion]
+    return out
+
+
+def under_control(
+    program: Program, job: Job, rows: CorrectedRows, written: Rewritten, points: JudgedPoints, after: Seen,
+    rest: Bools,
+) -> UnderControl:  # fmt: skip
+    """The account of a corrected program; rest (N,): end points at which the control rests in any case."""
+    path, limits = program.path, limits_of(job.config)
+    default = job.config.process.feed_mm_per_min or np.nan
+    feed = np.where(np.isnan(path.feed), default, path.feed)
+    before = plan_of(moves_of(path, program.modes, feed), limits)
+    moves = written_moves(path, program.modes, rows, written, default)
+    plan = plan_of(replace(moves, exact=moves.exact | rest), limits)
+    judged = np.flatnonzero(points.judged)
+    told = points.along(written.end, arcs_out.Arcs(written.centre, rows.arcs.angle))[judged]
+    row = points.row[judged]
+    joining = np.concatenate((rows.joining, [False]))
+    beside = joining[row - 1] | joining[row + 1]
+    cuts = np.flatnonzero((path.kind != RAPID) & ~path.machine)
+    error = after.error[judged] + plan.leaves_by(row, told)
+    return UnderControl(
+        before.duration_s,
+        plan.duration_s,
+        distinct(program.modes[k] for k in cuts),
+        error,
+        beside,
+        row,
+        told,
+        int(rest.sum()),
+    )
+
+
+def rest_warning(resting: int) -> list[str]:
+    """What there is to say about end points at which the control rests because of joining lines."""
+    if not resting:
+        return []
+    return [f"G61 at {resting} ends of cuts and joining lines, so that the control does not round these corners"]
+
+
+def distinct(modes: Iterable[PathMode]) -> tuple[PathMode, ...]:
+    """Every mode once, in the order in which they come."""
+    return tuple(dict.fromkeys(modes))
+
+
+def written_moves(
+    path: Path, modes: tuple[PathMode, ...], rows: CorrectedRows, written: Rewritten, feed: float
+) -> ToolMoves:
+    """The moves of a corrected program as they are written; feed: mm/min where none is in force."""
+    motion, arc = rows.motion, rows.kind == ARC
+    bent = np.isfinite(written.centre[:, 0])
+    end = written.end
+    start = np.concatenate((path.start[motion[:1]], end[:-1]))
+    centre = np.where(bent[:, None], written.centre, path.centre[motion])
+    axis = path.axis[motion]
+    angle = np.where(arc, path.angle[motion], 0.0)
+    angle[bent] = arcs_out.sweeps(start[bent], end[bent], centre[bent], axis[bent], rows.arcs.angle[bent])
+    exact, stop, tolerance, merged = mode_columns(modes)
+    told = np.where(np.isnan(written.feed), feed, written.feed)
+    return ToolMoves(
+        np.where(arc & ~np.isfinite(centre[:, 0]), 1, rows.kind).astype(np.int64), start, end, centre, axis, angle, told,
+        exact[motion], (stop | path.machine)[motion], tolerance[motion], merged[motion],
+    )  # fmt: skip
+
+
+def mode_name(modes: tuple[PathMode, ...]) -> str:
+    """Modes as a program says them."""
+    return ", ".join(dict.fromkeys(each.name for each in modes)) or PathMode().name

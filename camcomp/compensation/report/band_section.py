@@ -1,0 +1,125 @@
+"""The part of a compensation report that says how far to trust it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from camcomp.compensation.bands.outcome import LITTLE, Bands
+from camcomp.compensation.program.result import Summary
+from camcomp.compensation.report.figures import DrawnPath, scene_of
+from camcomp.ground.datatypes import Bools, Floats
+from camcomp.report.page import Section, Table
+from camcomp.report.plot import STYLES, Figure, Json, axis, brief, broken, gapped, line, thin
+
+FLOOR_UM = 1e-4  # below what a logarithmic axis can show
+KINDS = ("trusted", "doubtful", "shrunk", "left alone")
+
+
+def band_section(drawn: DrawnPath, bands: Bands, figures: Summary) -> Section:
+    """Bands along the path, where the correction is trusted, and which input makes how much."""
+    expected = figures.expected
+    assert expected is not None and figures.band is not None  # there are bands
+    low, high = expected.rms_ci95_um
+    text = (
+        f"Numbers of the machine file are uncertain. Machines drawn from them leave {brief(expected.rms_um)} µm rms after "
+        f"compensation (95 % of the machines: {brief(low)} to {brief(high)} µm); 95 % of all points stay below "
+        f"{brief(expected.p95_um)} µm. {figures.advice}."
+    )
+    rows: list[list[str | tuple[float, str]]] = [
+        [each.input, (each.share, f"{100.0 * each.share:.1f}")] for each in figures.band
+    ]
+    table = Table("What makes the band: share of the mean square", ("uncertain input", "share %"), rows, sortable=True)
+    return Section(
+        "bands",
+        "How far to trust it",
+        text=[text],
+        figures=[_figure_band(drawn, bands), _figure_trust(drawn, bands)],
+        tables=[table],
+    )
+
+
+def kinds_of(bands: Bands) -> dict[str, Bools]:
+    """End points (N,) by what became of their correction: all of it was taken and gains more than it may leave, or not."""
+    band, gain, share = bands.band_um(), bands.gain_um(), bands.share
+    alone, whole = share <= LITTLE, share >= 1.0 - LITTLE
+    doubtful = whole & (band > gain)
+    return dict(zip(KINDS, (whole & ~doubtful, doubtful, ~alone & ~whole, alone), strict=True))
+
+
+def _figure_band(drawn: DrawnPath, bands: Bands) -> Figure:
+    band = bands.band_um()
+    index, gap = broken(thin(np.column_stack((drawn.after, np.nan_to_num(band)))), drawn.hidden)
+    s = gapped(drawn.s, index, gap, 4)
+
+    def curve(values: Floats) -> list[float | None]:
+        return gapped(np.where(values > 0.0, np.maximum(values, FLOOR_UM), np.nan), index, gap, 6)
+
+    after = line("corrected, model exact", s, curve(drawn.after), 1)
+    upper = line("corrected, 95 % of machines below", s, curve(band), 2)
+    between = _area(s, curve(drawn.after), curve(band))
+    before = line("original program", s, curve(drawn.before), 0)
+    at = drawn.worst(band)
+    words = f"up to {brief(band[at])} µm, in source line {drawn.line[at]}"
+    return Figure(
+        "band",
+        "Band around the residual",
+        f"Between what the corrected program leaves if every number of the machine file is right, and the error that 95 % of the "
+        f"machines that may be stay below: {words}. Logarithmic scale.",
+        f"Plot of the residual and its 95 % band along the path: {words}.",
+        [between, after, upper, before],
+        {"xaxis": axis("path length in mm"), "yaxis": axis("error in µm", type="log", dtick=1, exponentformat="power")},
+    )
+
+
+def _area(x: list[float | None], low: list[float | None], high: list[float | None]) -> Json:
+    """The area between two curves, section by section where both are drawn."""
+    outline: tuple[list[float | None], list[float | None]] = ([], [])
+    section: list[tuple[float, float, float]] = []
+    for at, bottom, top in (*zip(x, low, high, strict=True), (None, None, None)):
+        if at is not None and bottom is not None and top is not None:
+            section.append((at, bottom, top))
+            continue
+        if section:
+            outline[0].extend([*(each[0] for each in section), *(each[0] for each in reversed(section)), None])
+            outline[1].extend([*(each[1] for each in section), *(each[2] for each in reversed(section)), None])
+        section = []
+    style = {
+        "type": "scatter",
+        "mode": "lines",
+        "fill": "toself",
+        "fillcolor": "rgba(128,128,128,0.25)",
+        "line": {"width": 0},
+    }
+    return {**style, "name": "between the two", "x": outline[0], "y": outline[1], "hoverinfo": "skip"}
+
+
+def _figure_trust(drawn: DrawnPath, bands: Bands) -> Figure:
+    traces, told = [], []
+    shown = ~drawn.hidden
+    whole = max(int(shown.sum()), 1)
+    order, gap = broken(thin(drawn.target), drawn.hidden)
+    for i, (name, mine) in enumerate(kinds_of(bands).items()):
+        count = int((mine & shown).sum())
+        if not count:
+            continue
+        told.append(f"{name} {100.0 * count / whole:.0f} %")
+        start = np.concatenate((mine[1:], [False])) & ~mine  # a move is drawn from the point before it
+        off = gap | ~(mine | start)[order]
+        x, y, z = (gapped(drawn.target[:, k], order, off, 4) for k in range(3))
+        color = STYLES[i][0]
+        traces.append({
+            "type": "scatter3d", "mode": "lines", "name": name, "x": x, "y": y, "z": z, "showlegend": True,
+            "line": {"width": 6, "color": color}, "hovertemplate": f"{name}<br>x %{{x}} y %{{y}} z %{{z}} mm<extra></extra>",
+        })  # fmt: skip
+    words = ", ".join(told) or "nothing is cut"
+    return Figure(
+        "trust",
+        "Where the correction is trusted",
+        "Trusted: all of the correction is taken, and at least 95 % of the machines gain more than it may leave. Doubtful: all "
+        "of it is taken, and the band exceeds the gain. Shrunk and left alone: what the policy of the machine file made of "
+        f"it. Of the end points: {words}.",
+        f"Three-dimensional plot of the tool path by how far the correction is trusted: {words}.",
+        traces,
+        {"scene": scene_of(drawn.target[shown]), "margin": {"l": 0, "r": 0, "t": 0, "b": 0}},
+        height=520,
+    )

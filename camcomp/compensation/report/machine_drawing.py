@@ -1,0 +1,181 @@
+"""The machine at one place of a program, as lines: legs, tool and path, with what the load does to them enlarged."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from camcomp.compensation.program.compensate import Compensated
+from camcomp.compensation.report.figures import DrawnPath
+from camcomp.ground.datatypes import Floats
+from camcomp.model.job import Job
+from camcomp.model.statics.description import Actuator, Chain, Parallelogram, Passive, Robot, Transform
+from camcomp.model.statics.rotation import exp_rotation, rotation_vectors
+from camcomp.report.plot import INK, Figure, Json, axis, brief, numbers, thin
+
+_LENGTH_MM = 300.0  # by which angles are weighed against lengths
+_OPEN_MM = 20.0  # a leg that misses its platform by more was not drawn right and is left out
+_LONGEST = 3.0  # times the size of the machine: a travel that is longer would leave nothing else to see
+_SHOWN = 0.1  # of the machine's size: how large the largest deviation is drawn at first
+
+
+@dataclass(frozen=True, eq=False)
+class DrawnLeg:
+    """A chain as lines: nodes (k, 3) mm from base to platform, bars of a parallelogram (b, 2, 3), way of a slide (2, 3)."""
+
+    name: str
+    nodes: Floats
+    bars: Floats
+    way: Floats | None
+
+
+def leg_of(chain: Chain, rho: Floats, rotation: Floats, reference: Floats) -> DrawnLeg | None:
+    """A chain whose actuators stand at rho, closed on the platform pose by its passive joints; None where it cannot be.
+
+    rotation (3, 3), reference (3,): of the platform, machine frame. Springs are drawn as they are without load.
+    """
+    joints = [each for each in chain.elements if isinstance(each, Passive | Parallelogram)]
+    goal = chain.frame.T @ rotation @ chain.frame
+    at = chain.frame.T @ reference
+
+    def gap(angles: Floats) -> Floats:
+        nodes, turn, _ = _walk(chain, rho, angles)
+        lean: Floats = rotation_vectors((turn @ goal.T)[None])[0]
+        return np.concatenate((nodes[-1] - at, _LENGTH_MM * lean))
+
+    angles = np.array([each.start for each in joints])
+    if len(angles):
+        angles = least_squares(gap, angles).x
+        if np.linalg.norm(gap(angles)) > _OPEN_MM:
+            return None
+    nodes, _, bars = _walk(chain, rho, angles)
+    turn, way = chain.frame.T, _way(chain)
+    if way is None:
+        return DrawnLeg(chain.name, nodes @ turn, bars @ turn, None)
+    behind = [k for k, each in enumerate(nodes) if np.linalg.norm(np.cross(each - way[0], way[1] - way[0])) < 1e-6]
+    return DrawnLeg(chain.name, nodes[max(behind) :] @ turn, bars @ turn, way @ turn)  # a leg begins at its carriage
+
+
+def _walk(chain: Chain, rho: Floats, angles: Floats) -> tuple[Floats, Floats, Floats]:
+    """Nodes (k, 3), end rotation (3, 3) and bars (b, 2, 3) of a chain in its local axes."""
+    point, turn = np.zeros(3), np.eye(3)
+    nodes, bars = [point], list[Floats]()
+    drives, passive = iter(rho), iter(angles)
+    for each in chain.elements:
+        start = point
+        if isinstance(each, Transform):
+            point, turn = point + turn @ each.translation, turn @ each.rotation
+        elif isinstance(each, Actuator | Passive):
+            value = float(next(drives if isinstance(each, Actuator) else passive))
+            if each.revolute:
+                turn = turn @ exp_rotation(value * each.axis)
+            else:
+                point = point + value * turn @ each.axis
+        elif isinstance(each, Parallelogram):
+            point = point + turn @ exp_rotation(float(next(passive)) * each.hinge) @ each.arm
+            half = 0.5 * each.width * turn @ each.crossbar
+            bars += [np.array([start + side * half, point + side * half]) for side in (-1.0, 1.0)]
+        if np.linalg.norm(point - start) > 0.0:
+            nodes.append(point)
+    return np.array(nodes), turn, np.array(bars).reshape(-1, 2, 3)
+
+
+def _way(chain: Chain) -> Floats | None:
+    """Ends (2, 3) of the travel of a slide that stands on the base, local axes; None where there is none."""
+    before: list[Transform] = []
+    for each in chain.elements:
+        if isinstance(each, Transform):
+            before.append(each)
+        elif isinstance(each, Actuator) and not each.revolute and np.isfinite(each.limits).all():
+            ends = [
+                _walk(Chain(chain.name, (*before, each)), np.array([rho]), np.zeros(0))[0][-1] for rho in each.limits
+            ]
+            return np.array(ends)
+        else:
+            return None
+    return None
+
+
+def figure_machine(result: Compensated, job: Job, drawn: DrawnPath) -> Figure | None:
+    """The machine where the original program is off most; a slider enlarges what the load does. None without legs to draw."""
+    row = drawn.worst(drawn.before)
+    robot = job.machine.nominal
+    turn, origin = job.frame.rotation, job.frame.origin
+    held = robot.held_rotation
+    tip = origin + turn @ result.rows.target[row]
+    off = turn @ (result.uncorrected[row] - result.rows.target[row])
+    legs = _legs(robot, result.nominal[row], held, tip - held @ robot.tool)
+    bent = _legs(robot, result.nominal[row], held, tip + off - held @ robot.tool)
+    if not legs or len(bent) != len(legs) or not np.isfinite(off).all():
+        return None
+    size = float(np.ptp(np.concatenate([tip[None], *(leg.nodes for leg in legs)]), axis=0).max())
+    traces: list[Json] = []
+    base: list[dict[str, list[float | None]]] = []
+    shifts: list[dict[str, list[float | None]]] = []
+
+    def add(name: str, points: Floats, shift: Floats, style: Json, *, legend: bool = True) -> None:
+        traces.append({
+            "type": "scatter3d", "mode": "lines", "name": name, "line": style, "showlegend": legend, "hoverinfo": "name",
+        })  # fmt: skip
+        base.append({a: numbers(points[:, i], 4) for i, a in enumerate("xyz")})
+        shifts.append({a: numbers(shift[:, i], 6) for i, a in enumerate("xyz")})
+
+    for i, (leg, other) in enumerate(zip(legs, bent, strict=True)):
+        style: Json = {"color": f"var(--c{i % 6 + 1})", "width": 7}
+        moved = other.nodes - leg.nodes
+        missed = leg.nodes[-1] + off - other.nodes[-1]  # what springs give way by, which no joint can follow
+        add(f"leg {leg.name}", leg.nodes, moved + np.linspace(0.0, 1.0, len(moved))[:, None] * missed, style)
+        for bar, bent_bar in zip(leg.bars, other.bars, strict=True):
+            add(f"leg {leg.name}, bar", bar, bent_bar - bar, style | {"width": 3}, legend=False)
+        if leg.way is not None and np.linalg.norm(leg.way[1] - leg.way[0]) < _LONGEST * size:
+            add(f"travel of {leg.name}", leg.way, np.zeros((2, 3)), {"color": "var(--c6)", "width": 2}, legend=False)
+    tool = np.array([tip - held @ robot.tool, tip])
+    add("tool", tool, np.tile(off, (2, 1)), {"color": INK, "width": 9})
+    shown = np.flatnonzero(~drawn.hidden)
+    shown = shown[thin(result.rows.target[shown])]
+    path = origin + result.rows.target[shown] @ turn.T
+    add("programmed path", path, 0.0 * path, {"color": INK, "width": 3})
+    deviation = np.nan_to_num(result.uncorrected[shown] - result.rows.target[shown]) @ turn.T
+    add("original program under load", path, deviation, {"color": "var(--bad)", "width": 4})
+    shift = (result.written.end[shown] - result.rows.target[shown]) @ turn.T
+    add("commanded instead", path, shift, {"color": "var(--good)", "width": 4})
+    largest = float(np.linalg.norm(off))
+    words = f"{brief(1e3 * largest)} µm in line {drawn.line[row]}"
+    return Figure(
+        "machine-drawn",
+        "The machine where the original program is off most",
+        f"Legs, tool and path where the load takes the tip off by {words}. Legs follow the platform; its tilt is not drawn. The "
+        "slider says how much deviations are enlarged. Drag to turn.",
+        f"Three-dimensional drawing of the machine at the place of the largest error, {words}.",
+        traces,
+        {"scene": _scene(np.concatenate([path, *(leg.nodes for leg in legs)])),
+         "margin": {"l": 0, "r": 0, "t": 0, "b": 0}},
+        height=560,
+        exaggerate={
+            "base": base, "shifts": shifts, "planes": [],
+            "first": float(np.clip(_SHOWN * size / max(largest, 1e-9), 1.0, 1e5)), "most": 1e6,
+        },
+    )  # fmt: skip
+
+
+def _scene(points: Floats) -> Json:
+    """Axes of one scale about points (n, 3) with room for what is enlarged, all of them in sight."""
+    middle, half = 0.5 * (points.max(axis=0) + points.min(axis=0)), 0.5 * np.ptp(points, axis=0)
+    half = half + _SHOWN * 2.0 * half.max()
+    ranges = np.column_stack((middle - half, middle + half)).round(3).tolist()
+    ratio = dict(zip("xyz", (half / half.max()).round(6).tolist(), strict=True))
+    axes = {f"{a}axis": axis(f"{a} in mm", range=ranges[i]) for i, a in enumerate("xyz")}
+    return axes | {"aspectmode": "manual", "aspectratio": ratio, "camera": {"eye": {"x": 0.9, "y": -1.5, "z": 0.8}}}
+
+
+def _legs(robot: Robot, rho: Floats, rotation: Floats, reference: Floats) -> list[DrawnLeg]:
+    out, first = [], 0
+    for chain in robot.chains:
+        count = sum(isinstance(each, Actuator) for each in chain.elements)
+        leg = leg_of(chain, rho[first : first + count], rotation, reference)
+        first += count
+        if leg is not None:
+            out.append(leg)
+    return out
