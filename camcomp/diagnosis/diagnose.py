@@ -11,13 +11,17 @@ from typing import Any
 import numpy as np
 
 from camcomp.diagnosis.answer.held_out import shrinkage_of
-from camcomp.diagnosis.answer.intervals import joint_covariance
 from camcomp.diagnosis.answer.locate import channel_axes, patterns_of, run_gaps
 from camcomp.diagnosis.answer.minor import minor_effects, outlying_rows
+from camcomp.diagnosis.answer.stretch import with_stretches
 from camcomp.diagnosis.fit.bench import Bench, Run
 from camcomp.diagnosis.fit.columns import candidate_causes, working_causes
 from camcomp.diagnosis.fit.gap import gap_of, main_channels, rest_by_actuator
+from camcomp.diagnosis.fit.intervals import joint_covariance
+from camcomp.diagnosis.fit.lookalikes import without_lookalikes
 from camcomp.diagnosis.fit.problem import Problem, open_problem
+from camcomp.diagnosis.law.answer import LawAnswer, answer_law
+from camcomp.diagnosis.law.library import LearnedLaw
 from camcomp.diagnosis.next_experiment.after_unknown import explore
 from camcomp.diagnosis.next_experiment.information_gain import Proposal, propose
 from camcomp.diagnosis.result.types import (
@@ -42,12 +46,18 @@ from camcomp.diagnosis.statistics.cause_sets import Fitted
 from camcomp.diagnosis.statistics.periods import frequencies
 from camcomp.diagnosis.statistics.probability import probability_of_chance, stated
 from camcomp.ground.datatypes import Floats
+from camcomp.ground.headway import part as part_of_work
 from camcomp.model.effect import Cause
 from camcomp.model.job import Job
 from camcomp.model.motion.twin import Twin
 
 MOSTLY_ONE_ACTUATOR = 0.6  # share of what is unknown from which on it is one actuator's
 VIBRATION_SHARE = 0.4  # of the gap in one line of the spectrum
+LEAST_RIVAL = 0.02  # probability of a set that an experiment is to exclude
+UNTESTED = 0.1  # of the leader's probability: what a set that explains alike counts as at least
+LEAST_DRIVER = 0.02  # share of what is left, below which nothing is a driver
+MOST_ALTERNATIVES = 4  # sets that are listed (contract, section 6)
+ROWS_OF_AN_INSTANT = 2.0  # to both sides, between which something may have begun or ended
 RIVALS = 8  # sets that one experiment is asked to tell from the answer
 
 
@@ -59,6 +69,7 @@ class Diagnosis:
     problem: Problem
     search: CauseSearch
     proposal: Proposal | None
+    law: LawAnswer | None = None
 
 
 def diagnose(
@@ -69,24 +80,31 @@ def diagnose(
     holdout: Sequence[str] = (),
     without: Sequence[str] = (),
     stated_mm: float | None = None,
+    learned: Sequence[LearnedLaw] = (),
 ) -> Diagnosis:
-    """The diagnosis of an experiment; `without` names effects that the library is to do without."""
+    """The diagnosis of an experiment; `without` names effects that the library is to do without, learned are laws found before."""
     used = [run for run in runs if run.name not in holdout] or list(runs)
     bench = Bench(twin, used)
-    causes = working_causes(bench, candidate_causes(twin.actuators, without))
-    problem = open_problem(bench, causes, stated_mm)
-    found = search_causes(problem)
+    laws = [each.candidate(twin.actuators) for each in learned if each.name not in without]
+    found_before = [each for each in laws if each is not None]
+    offered = [*candidate_causes(twin.robot, without), *found_before]
+    causes = without_lookalikes(bench, working_causes(bench, offered))
+    with part_of_work(0.0, 0.5):
+        problem = open_problem(bench, causes, stated_mm)
+    with part_of_work(0.5, 0.95):
+        found = search_causes(problem)
     best = found.fits[found.verdict.best]
     gap = gap_of(problem)
     word: Any = "unknown" if found.unknown_in else found.verdict.word
     shrinkage = _shrinkage(twin, runs, holdout, problem, best)
+    law = answer_law(problem, best, found.unknown_in) if found.unknown_in else None
     unseen = len(used) < len(runs) or (len(used) > 1 and not holdout)
     proposal = _next(problem, found, word, job)
     result = DiagnosisResult(
         verdict=word,
         gap=GapSize(**gap),
         where=_where(problem, found, best),
-        causes=_causes(problem, found),
+        causes=_causes(problem, found, law),
         alternatives=_alternatives(problem, found) if word == "ambiguous" else (),
         shrinkage=UnseenShrinkage.model_validate(shrinkage) if unseen else None,
         next_experiment=_proposed(proposal) if proposal is not None else None,
@@ -95,7 +113,7 @@ def diagnose(
         floor=Floor(um=gap["noise_floor_um"], source=problem.floor.source),
         equivalent=tuple(tuple(_named(problem, i) for i in group) for group in classes(likeness(problem))),
     )
-    return Diagnosis(result, problem, found, proposal)
+    return Diagnosis(result, problem, found, proposal, law)
 
 
 def _proposed(proposal: Proposal) -> NextExperiment:
@@ -116,10 +134,10 @@ def _next(problem: Problem, found: CauseSearch, word: str, job: Job) -> Proposal
     best = found.verdict.best
     close = [best, *sorted(found.verdict.rivals, key=lambda j: -found.probability[j])[:RIVALS]]
     if len(close) == 1:
-        close += [j for j in np.argsort(-found.probability) if j != best and found.probability[j] > 0.02][:3]
+        close += [j for j in np.argsort(-found.probability) if j != best and found.probability[j] > LEAST_RIVAL][:3]
     p = found.probability[close]
     if found.verdict.rivals:
-        p = np.maximum(p, 0.1 * p.max())  # alike by construction: their prior is no reason to leave them untested
+        p = np.maximum(p, UNTESTED * p.max())  # alike by construction: their prior is no reason to leave them untested
     return propose(problem, [found.fits[j] for j in close], p / p.sum(), job)
 
 
@@ -139,7 +157,7 @@ def _unknown_energy(found: CauseSearch) -> float:
     return max(each.excess_um, 1e-3) ** 2
 
 
-def _causes(problem: Problem, found: CauseSearch) -> tuple[FoundCause, ...]:
+def _causes(problem: Problem, found: CauseSearch, law: LawAnswer | None) -> tuple[FoundCause, ...]:
     """Causes by probability, the unknown one last: its probability is that of the chance of what is left."""
     best = found.fits[found.verdict.best]
     energy = _energies(problem, best)
@@ -168,6 +186,7 @@ def _causes(problem: Problem, found: CauseSearch) -> tuple[FoundCause, ...]:
                 target=target,
                 probability=stated(probability_of_chance(worst(found.beyond).log10_chance)),
                 share=round(left / whole, 4) if whole > 0 else 1.0,
+                law=None if law is None else law.law,
             )
         )
     return tuple(out)
@@ -201,6 +220,8 @@ def _parameters(problem: Problem, f: Fitted, covariance: Floats, j: int, cause: 
             change = np.angle(np.exp(1j * change))
         slope = change / steps
         half = 1.96 * float(np.sqrt(slope @ covariance @ slope))
+        if kinds[name].placed:
+            half = ROWS_OF_AN_INSTANT * max(float(np.median(np.diff(t))) for t in problem.times if len(t) > 1)
         ends = [here[name] - half, here[name] + half]
         low, high = np.exp(ends) if kinds[name].log else ends
         if name != "phase_rad":
@@ -212,7 +233,8 @@ def _parameters(problem: Problem, f: Fitted, covariance: Floats, j: int, cause: 
 def _idle_shapes(problem: Problem, cause: Cause) -> set[str]:
     """Scanned parameters that nothing depends on here: a warm-up time where temperatures are logged."""
     logged = all(run.run_path.temperature is not None for run in problem.bench.runs)
-    return {p.name for p in cause.effect.PARAMETERS if p.scan and p.unit == "s"} if logged else set()
+    warming = {p.name for p in cause.effect.PARAMETERS if p.scan and p.unit == "s" and not p.placed}
+    return warming if logged else set()
 
 
 def _round(value: float) -> float:
@@ -220,7 +242,8 @@ def _round(value: float) -> float:
 
 
 def _alternatives(problem: Problem, found: CauseSearch) -> tuple[tuple[NamedCause, ...], ...]:
-    sets = [found.fits[found.verdict.best], *(found.fits[j] for j in found.verdict.rivals)]
+    rivals = sorted(found.verdict.rivals, key=lambda j: -found.probability[j])
+    sets = [found.fits[j] for j in (found.verdict.best, *rivals[: MOST_ALTERNATIVES - 1])]
     return tuple(tuple(_named(problem, i) for i in f.members) for f in sets)
 
 
@@ -234,13 +257,16 @@ def _named(problem: Problem, i: int) -> NamedCause:
 def _where(problem: Problem, found: CauseSearch, best: Fitted) -> Where:
     gaps = run_gaps(problem)
     at = places.axes(gaps, channel_axes(problem))
+    left = gaps  # what is unknown acts where the known causes leave something
+    if found.unknown_in and best.members:
+        left = run_gaps(problem, problem.causes(best.members, best.theta, best.extra))
     return Where.model_validate({
         "stage": _stage(problem, best, found),
         "axes": {axis: at.get(axis, 0.0) for axis in "xyz"},
         "actuators": places.actuators(gaps, problem.bench.actuators),
         "lines": places.lines(gaps),
-        "intervals": places.intervals(gaps),
-        "drivers": _drivers(problem, found),
+        "intervals": places.intervals(left),
+        "drivers": with_stretches(_drivers(problem, found), problem, best),
         **patterns_of(problem, gaps),
     })  # fmt: skip
 
@@ -276,7 +302,7 @@ def _drivers(problem: Problem, found: CauseSearch) -> list[Driver]:
         null = problem.refit(())
         at_null = residual_tests(problem, null, firm_prior(problem))
         labels = max(at_null.values(), key=lambda each: each.energy).labels if at_null else ()
-    return [Driver(covariate=name, share=round(share, 4)) for name, share in labels[:6] if share > 0.02]
+    return [Driver(covariate=name, share=round(share, 4)) for name, share in labels[:6] if share > LEAST_DRIVER]
 
 
 def _vibrations(problem: Problem) -> tuple[tuple[str, float], ...]:

@@ -6,7 +6,9 @@ no tips) have studies of their own. Everything else goes to the general diagnosi
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -14,13 +16,15 @@ from pydantic import ValidationError
 
 from camcomp.diagnosis.arm.noise_floor import StatedDeviation
 from camcomp.diagnosis.arm.plausible import check_poses
-from camcomp.diagnosis.arm.poses import Poses
+from camcomp.diagnosis.arm.poses import Poses, approached
+from camcomp.diagnosis.arm.study import merged
 from camcomp.diagnosis.arm.study import study as study_arm
 from camcomp.diagnosis.axis.findings import AxisDeviation, AxisRun
 from camcomp.diagnosis.axis.plausible import check_axes
-from camcomp.diagnosis.axis.study import study as study_axes
+from camcomp.diagnosis.axis.study import studied as study_axes
 from camcomp.diagnosis.experiment.open_experiment import open_log, read_log
 from camcomp.diagnosis.fit.measured import Measured
+from camcomp.diagnosis.residuals import Columns, of_axes, of_poses
 from camcomp.diagnosis.result.types import DiagnosisResult
 from camcomp.ground import shelf
 from camcomp.ground.errors import ConfigError, Location
@@ -35,8 +39,16 @@ from camcomp.model.statics.build import build_robot
 MOSTLY = 0.5  # share of rows with a value from which on a channel counts as logged, and rows without it as lost
 
 
-def study_of(path: str | Path, without: Sequence[str] = ()) -> DiagnosisResult | None:
-    """Result of an experiment of static poses or of axis logs; None where it is for the general diagnosis.
+@dataclass(frozen=True, eq=False)
+class LogStudy:
+    """The result of logs without programs. residuals: what it leaves, row by row (`camcomp.diagnosis.residuals`)."""
+
+    result: DiagnosisResult
+    residuals: Callable[[], Columns]
+
+
+def study_of(path: str | Path, without: Sequence[str] = ()) -> LogStudy | None:
+    """The study of an experiment of static poses or of axis logs; None where it is for the general diagnosis.
 
     Raises ConfigError CC420 where the logs say too little, CC407, CC408, CC412, CC413 where they cannot be of this machine
     as they are read.
@@ -57,7 +69,9 @@ def study_of(path: str | Path, without: Sequence[str] = ()) -> DiagnosisResult |
                 check_poses(display_name(run.log), run.name, robot, each.q, each.tip)
             sd = experiment.sd
             stated = StatedDeviation(sd.tip_mm, sd.encoder_mm) if sd else StatedDeviation()
-            return study_arm(robot, _causes(config), runs, holdout=experiment.holdout, without=without, stated=stated)
+            own = _causes(config)
+            result = study_arm(robot, own, runs, holdout=experiment.holdout, without=without, stated=stated)
+            return LogStudy(result, partial(of_poses, robot, own, merged(runs), result))
         if not any(m.has("tip") for m in logs) and all(m.has("encoder") for m in logs):
             axes = {
                 a.name: [_axis(run, log, k, a.revolute) for run, log in zip(experiment.runs, logs, strict=True)]
@@ -67,7 +81,8 @@ def study_of(path: str | Path, without: Sequence[str] = ()) -> DiagnosisResult |
                 check_axes(display_name(run.log), {name: own[i] for name, own in axes.items()})
             sd = experiment.sd
             deviation = AxisDeviation(sd.encoder_mm, sd.force_N) if sd else AxisDeviation()
-            return study_axes(axes, holdout=experiment.holdout, without=without, stated=deviation)
+            result, found = study_axes(axes, holdout=experiment.holdout, without=without, stated=deviation)
+            return LogStudy(result, partial(of_axes, found, {a.name: a.revolute for a in robot.actuators}))
     except ValidationError:  # a ValueError too, and a fault of ours
         raise
     except ValueError as error:
@@ -91,8 +106,8 @@ def _poses(run: RunSpec, log: Measured) -> Poses:
     sd = log.tip_sd if np.isfinite(log.tip_sd).any() else None
     every = Poses(
         label, log.encoder, log.tip, run.started_s + log.time, heat, np.full(n, run.name), sd, np.arange(1, n + 1)
-    )
-    return every.take(known)
+    ).take(known)
+    return replace(every, approach=approached(every.q, every.time))
 
 
 def _axis(run: RunSpec, log: Measured, k: int, revolute: bool) -> AxisRun:

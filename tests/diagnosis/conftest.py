@@ -25,10 +25,10 @@ class Workshop:
 
     def _answer(self, plan):
         """Everything behind the diagnosis of a plan: (result as JSON has it, diagnosis, experiment)."""
-        from camcomp.terminal.commands.diagnose import examine
+        from camcomp.api.diagnosis import diagnose
 
-        result, *behind = examine(self.made(plan)[0])
-        return result.as_json(), *behind
+        done = diagnose(self.made(plan)[0])
+        return done.result.as_json(), done.behind, done.opened
 
 
 @pytest.fixture(scope="session")

@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from camcomp.api.diagnosis import diagnose
 from camcomp.diagnosis.next_experiment.information_gain import propose
 from camcomp.diagnosis.search.indistinguishable import classes, likeness, stand_ins
-from camcomp.terminal.commands.diagnose import examine
 from tests.campaign.cases import EQUAL
 from tests.diagnosis.conftest import plan_of
 from tests.plants.more import add_run
@@ -60,7 +60,7 @@ def follow(workshop, plan, tmp_path, candidate):
             channels=channels,
             started_s=round(candidate.started, 1),
         )
-    return examine(folder / "experiment.yaml", without)[0].as_json()
+    return diagnose(folder / "experiment.yaml", without).result.as_json()
 
 
 def test_the_classes_are_known_without_residuals(workshop):

@@ -2,7 +2,7 @@
 
 import pytest
 
-from camcomp.terminal.commands.diagnose import _machine_with_causes
+from camcomp.api.diagnosis import machine_with_causes
 from tests.campaign import runner
 from tests.diagnosis.conftest import plan_of
 from tests.diagnosis.test_where import SCREW
@@ -17,7 +17,7 @@ def test_the_corrected_program_shrinks_the_error_as_predicted(workshop, tmp_path
     path, made = workshop.made(plan)
     result, better = workshop.answer(plan)[0], tmp_path / "better.yaml"
     better.write_text(
-        _machine_with_causes([str(path.parent / "machine.yaml")], workshop.answer(plan)[1].result, str(better))
+        machine_with_causes([str(path.parent / "machine.yaml")], workshop.answer(plan)[1].result, str(better))
     )
     assert "# found by camcomp diagnose" in better.read_text()
     program = next(p for p, r in zip(made.programs, made.runs, strict=True) if r.cutting and "G3" in p)

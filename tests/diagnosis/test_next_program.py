@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from camcomp.api.diagnosis import next_program
 from camcomp.diagnosis.experiment.open_experiment import open_experiment
 from camcomp.diagnosis.fit.bench import Bench
 from camcomp.diagnosis.next_experiment.candidates import candidates, site_of
@@ -14,7 +15,6 @@ from camcomp.gcode.interpret import read_program
 from camcomp.ground import path_geometry
 from camcomp.ground.errors import CheckFailed
 from camcomp.ground.files import shipped
-from camcomp.terminal.commands.diagnose import _next_program
 from tests.campaign.runner import invoke
 from tests.oracles import rs274
 
@@ -92,7 +92,7 @@ def test_the_spindle_is_that_of_the_runs(opened):
 def test_where_there_is_no_program_an_error_says_so():
     for done, opened in ((None, None), (SimpleNamespace(proposal=None), SimpleNamespace())):
         with pytest.raises(CheckFailed) as caught:
-            _next_program(done, opened)
+            next_program(done, opened)
         assert caught.value.rule == "CC608"
 
 

@@ -12,7 +12,7 @@ from tests.campaign import runner
 from tests.plants import designs
 
 SOURCE = '''
-"""The spindle leans: the tip moves along machine x with the height at which it works."""
+"""The ram is wavy: the tip sways along machine x with the height at which it works."""
 
 import numpy as np
 
@@ -22,24 +22,24 @@ STAGE = "tool"
 TARGET = "machine"
 SOURCE = "definition"
 PARAMETERS = (
-    Parameter("lean_mm_per_mm", "1", 0.0, -0.1, 0.1, 2e-3, 2e-6, "spindles are square to 0.1 to 5 mrad"),
+    Parameter("wave_mm", "mm", 0.0, -1.0, 1.0, 0.02, 2e-5, "rams are straight to 2 to 50 um"),
 )
 
 
 def on_pose(tip, load, motion, p):
     """Tip (n, 3), machine frame."""
-    lean = p["lean_mm_per_mm"]
-    return tip if lean == 0.0 else tip + lean * (tip[:, 2:3] + 173.0) * np.array([1.0, 0.0, 0.0])
+    wave = p["wave_mm"]
+    return tip if wave == 0.0 else tip + wave * np.sin(0.6 * (tip[:, 2:3] + 173.0)) * np.array([1.0, 0.0, 0.0])
 '''
-LEAN = 0.004
+WAVE = 0.03
 
 
 @pytest.fixture
 def own(tmp_path, monkeypatch):
     """The user's package is installed."""
-    (tmp_path / "leaning_spindle.py").write_text(SOURCE)
+    (tmp_path / "wavy_ram.py").write_text(SOURCE)
     monkeypatch.syspath_prepend(str(tmp_path))
-    points = [EntryPoint("leaning_spindle", "leaning_spindle", "camcomp.effects")]
+    points = [EntryPoint("wavy_ram", "wavy_ram", "camcomp.effects")]
     theirs = shelf.entry_points
 
     def entry_points(group, name=None):
@@ -48,7 +48,7 @@ def own(tmp_path, monkeypatch):
 
     monkeypatch.setattr(shelf, "entry_points", entry_points)
     yield
-    sys.modules.pop("leaning_spindle", None)
+    sys.modules.pop("wavy_ram", None)
 
 
 def slope(feed):
@@ -61,18 +61,18 @@ def slope(feed):
 def test_it_is_listed_fitted_and_compensated(own, tmp_path):
     code, said = runner.invoke(["effects", "--json"])
     assert code == 0
-    [mine] = [e for e in json.loads(said) if e["effect"] == "leaning_spindle"]
-    assert mine["stage"] == "tool" and mine["parameters"][0]["name"] == "lean_mm_per_mm"
+    [mine] = [e for e in json.loads(said) if e["effect"] == "wavy_ram"]
+    assert mine["stage"] == "tool" and mine["parameters"][0]["name"] == "wave_mm"
     # the machine that has it, with the tracker's noise
-    leaning = tmp_path / "leaning.yaml"
-    leaning.write_text(f"effects: [{{effect: leaning_spindle, lean_mm_per_mm: {LEAN}}}]\n")
+    wavy = tmp_path / "wavy.yaml"
+    wavy.write_text(f"effects: [{{effect: wavy_ram, wave_mm: {WAVE}}}]\n")
     runs = {"slope": slope(900), "fast": slope(2400), "circle": designs.circle(20.0, 900.0, True, plunge=False)}
     rng = np.random.default_rng(3)
     text = f"config: [{runner.CONFIG}]\nruns:\n"
     for k, (name, program) in enumerate(runs.items()):
         nc, log = tmp_path / f"{name}.nc", tmp_path / f"{name}.csv"
         nc.write_text(program)
-        line = ["simulate", str(nc), "--config", str(runner.CONFIG), "--config", str(leaning), "--step-s", "0.06"]
+        line = ["simulate", str(nc), "--config", str(runner.CONFIG), "--config", str(wavy), "--step-s", "0.06"]
         code, said = runner.invoke([*line, "-o", str(log)])
         assert code == 0, said
         head, *rows = log.read_text().splitlines()
@@ -89,15 +89,15 @@ def test_it_is_listed_fitted_and_compensated(own, tmp_path):
     )
     assert code == 0, said
     result = json.loads(out.read_text())
-    assert [(c["effect"], c["target"]) for c in result["causes"]] == [("leaning_spindle", None)]
-    assert result["causes"][0]["parameters"]["lean_mm_per_mm"]["value"] == pytest.approx(LEAN, rel=0.03)
+    assert [(c["effect"], c["target"]) for c in result["causes"]] == [("wavy_ram", None)]
+    assert result["causes"][0]["parameters"]["wave_mm"]["value"] == pytest.approx(WAVE, rel=0.03)
     # the program corrected with what was found is right on the machine that has it, and the plain one is not
     corrected = tmp_path / "corrected.nc"
     code, said = runner.invoke(
         ["compensate", str(tmp_path / "slope.nc"), "--config", str(better), "-o", str(corrected)]
     )
     assert code == 0, said
-    truth = ["--config", str(runner.CONFIG), "--config", str(leaning)]
+    truth = ["--config", str(runner.CONFIG), "--config", str(wavy)]
     line = ["verify", str(corrected), "--against", str(tmp_path / "slope.nc"), *truth, "--tolerance-um", "5"]
     code, said = runner.invoke(line)
     assert code == 0, said

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from camcomp.api.diagnosis import diagnose
 from camcomp.terminal.cli import run as camcomp
-from camcomp.terminal.commands.diagnose import examine
 from tests.campaign import runner
 from tests.diagnosis.conftest import plan_of
 from tests.plants.experiments import make, write
@@ -34,7 +34,7 @@ def test_rows_on_the_wrong_side_of_a_corner_change_no_answer(tmp_path, cause):
     plan = plan_of(cause, design="six", samples=250, ratio=10.0)
     made, count = stamped_early(make(plan))
     assert count
-    result = examine(write(made, plan, tmp_path / "e", runner.CONFIG))[0].as_json()
+    result = diagnose(write(made, plan, tmp_path / "e", runner.CONFIG)).result.as_json()
     assert result["verdict"] == "identified"
     assert [(each["effect"], each["target"]) for each in result["causes"]] == [cause]
     assert result["gap"]["max_um"] < 8 * result["gap"]["rms_um"]
@@ -54,7 +54,7 @@ def missing(folder, moves):
         f"config: [{runner.CONFIG}]\nruns:\n  - {{name: a, program: p.nc, log: l.csv, cutting: true, started_s: 0}}\n"
     )
     (folder / "experiment.yaml").write_text(text)
-    _, diagnosis, _ = examine(folder / "experiment.yaml")
+    diagnosis = diagnose(folder / "experiment.yaml").behind
     return float(np.isnan(diagnosis.problem.bench.observed(0)[:, 0]).mean())
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from camcomp.terminal.commands.diagnose import examine
+from camcomp.api.diagnosis import diagnose
 from tests.diagnosis.test_loop import PAIR
 from tests.diagnosis.test_poor_input import PLAN
 from tests.diagnosis.test_where import SCREW
@@ -35,7 +35,7 @@ def test_the_frame_of_another_clamping_is_refitted_on_the_held_out_run_and_named
     file = folder / "experiment.yaml"
     text = file.read_text().replace("started_s: 9000.0}", "started_s: 9000.0, clamping: second}")
     file.write_text(text + "holdout: [run-3]\n")
-    found = examine(file)[0].shrinkage.as_json()
+    found = diagnose(file).result.shrinkage.as_json()
     assert found["holdout"] == ["run-3"]
     assert found["refitted"] == ["workpiece frame of run-3 (clamping second)"]
     assert found["before_rms_um"] < 40.0  # the 230 um of the clamping are no part of the gap

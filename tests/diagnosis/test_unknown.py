@@ -2,7 +2,7 @@
 
 import pytest
 
-from camcomp.terminal.commands.diagnose import examine
+from camcomp.api.diagnosis import diagnose
 from tests.diagnosis.conftest import plan_of
 from tests.plants.causes import Cause
 from tests.plants.experiments import Plan
@@ -44,6 +44,6 @@ def test_after_an_unknown_effect_one_thing_is_changed_and_the_rest_left(workshop
 def test_members_that_undo_each_other_explain_nothing(workshop):
     """Soft links tilt the platform; beside each other, a longer tool and a lower workpiece do so with any lever."""
     plan = Plan(81015, (Cause("link_stiffness", None, 88934),), (10.0,), world=8)
-    result = examine(workshop.made(plan)[0], without=("link_stiffness",))[0].as_json()
+    result = diagnose(workshop.made(plan)[0], without=("link_stiffness",)).result.as_json()
     assert result["verdict"] == "unknown"
     assert "tool_length" not in [cause["effect"] for cause in result["causes"]]

@@ -1,5 +1,6 @@
 """The gap of every run as the place-finding engines want it, and what they find: sizes, directions, periods, places."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -11,15 +12,16 @@ from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.statistics import places
 from camcomp.diagnosis.statistics.noise_model import effective_rows
 from camcomp.diagnosis.statistics.periods import SpectralLine, frequencies, screws
+from camcomp.model.effect import Cause
 
 
-def run_gaps(problem: Problem) -> list[places.RunGap]:
-    """Every run's gap in the main channels, with where the machine was and how it moved."""
+def run_gaps(problem: Problem, causes: Sequence[Cause] = ()) -> list[places.RunGap]:
+    """Every run's gap, or what causes leave of it, in the main channels, with where the machine was and how it moved."""
     part = main_channels(problem)
     m = len(problem.bench.actuators)
     out = []
     for k, run in enumerate(problem.bench.runs):
-        gap = problem.bench.gap(k)[:, part]
+        gap = problem.bench.gap(k, causes)[:, part]
         noise = problem.noise.sigma[k, part]
         thin = float(np.mean([1.0 / effective_rows(problem.noise, c, 1) for c in range(part.start, part.stop)]))
         line = thinned(run.measured.line[:, None], run.thin)[:, 0]

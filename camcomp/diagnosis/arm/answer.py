@@ -8,17 +8,21 @@ from typing import Any
 
 import numpy as np
 
+from camcomp.diagnosis.arm.curves import curve_of
 from camcomp.diagnosis.arm.dependence import turns
 from camcomp.diagnosis.arm.discrepancy import regions, without_nuisance
 from camcomp.diagnosis.arm.fit import ArmFit
 from camcomp.diagnosis.arm.forward_selection import LEAST_GAIN, Step, odds, rms
 from camcomp.diagnosis.arm.gate import MINOR, Gate, standing_out, windows
+from camcomp.diagnosis.arm.next_poses import POSES_SEED, proposed, unseen_share
 from camcomp.diagnosis.arm.noise_floor import TipFloor
-from camcomp.diagnosis.arm.poses import ArmBench, Poses
+from camcomp.diagnosis.arm.poses import CURVE, ArmBench, Poses
 from camcomp.diagnosis.arm.unseen import Court, Rival
 from camcomp.diagnosis.result.types import (
     UNKNOWN,
+    CurveCause,
     Driver,
+    ErrorCurve,
     Estimate,
     FoundCause,
     GapSize,
@@ -27,16 +31,18 @@ from camcomp.diagnosis.result.types import (
     NamedCause,
     NextExperiment,
     PlaceShare,
+    PosesToMeasure,
     UnknownCause,
     Where,
 )
 from camcomp.diagnosis.statistics.probability import EVEN, probability_of_chance, stated
 from camcomp.ground.datatypes import Floats
-from camcomp.model.statics.arm import jacobian
 
+STEADY_K = 0.1  # by which a temperature has to change to drive anything
 FAINT = 0.01  # of the floor: what moves the tip less is not worth a line
 LEAST_TARGET = 0.5  # probability above which an actuator is named
 PLACES = 8  # parts of the workspace
+REPEATS = 20  # poses to be visited again: a floor known to a sixth
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,15 +96,14 @@ def causes(told: Told, gaps: Sequence[Floats]) -> tuple[tuple[FoundCause, ...], 
                 if size >= FAINT * told.floor.um:
                     minor.append(MinorEffect(effect=step.group, target=target, size_um=_round(size)))
             elif probability >= LEAST_TARGET:
-                out.append(
-                    FoundCause(
-                        effect=step.group,
-                        target=target,
-                        probability=stated(min(sure, probability)),
-                        share=round(float(share * e / energy), 4),
-                        parameters=parameters,
-                    )
+                cause = FoundCause(
+                    effect=step.group,
+                    target=target,
+                    probability=stated(min(sure, probability)),
+                    share=round(float(share * e / energy), 4),
+                    parameters=parameters,
                 )
+                out.append(cause if step.group != CURVE else _curve(told, cause))
         before = step
     order = [s.group for s in found.taken.steps]
     out.sort(key=lambda c: (-c.probability, order.index(c.effect), -c.share))
@@ -107,6 +112,33 @@ def causes(told: Told, gaps: Sequence[Floats]) -> tuple[tuple[FoundCause, ...], 
         chance = probability_of_chance(told.gate.chance) if told.verdict == "unknown" else EVEN
         out.append(UnknownCause(target=None, probability=stated(chance), share=left))
     return tuple(out), (*minor, *_slight(told))
+
+
+def _curve(told: Told, cause: FoundCause) -> CurveCause:
+    """The cause with the curve of its joint."""
+    found = curve_of(told.bench, told.found, str(cause.target))
+    low, high = (max(found.amplitude + s * 1.96 * found.amplitude_sd, 0.0) for s in (-1.0, 1.0))
+    size = Estimate(value=_digits(found.amplitude), ci95=(_digits(low), _digits(high)))
+    out = CurveCause(
+        effect=cause.effect,
+        target=cause.target,
+        probability=cause.probability,
+        share=cause.share,
+        parameters={"amplitude_rad": size},
+        curve=ErrorCurve(
+            angle_deg=tuple(found.angle),
+            error_rad=tuple(_digits(e) for e in found.error),
+            sd_rad=tuple(_digits(s) for s in found.sd),
+            seen_deg=found.seen,
+            seen_share=round(found.seen_share, 4),
+        ),
+    )
+    lists = {key: value for key, value in found.values.items() if isinstance(value, list)}
+    out._settings = {
+        key: [each if isinstance(each, list) else float(f"{each:.4g}") for each in value]
+        for key, value in lists.items()
+    }
+    return out
 
 
 def _weights(told: Told) -> dict[str, float]:
@@ -262,9 +294,7 @@ def patterns(bench: ArmBench, campaigns: Sequence[Poses]) -> dict[str, list[Floa
     out: dict[str, list[Floats]] = {}
     for campaign in campaigns:
         hung = bench.standing(campaign, ()).hung
-        lever = bench.start[0].tips(hung.point, hung.rotation) - hung.point
-        J = np.array([jacobian(bench.arm, q) for q in campaign.q])
-        moves = J[:, :3] + np.cross(J[:, 3:], lever[:, :, None], axis=1)
+        moves = bench.joint_motion(campaign, (), bench.start[0])
         for a, drive in enumerate(bench.robot.actuators):
             own = moves[:, :, a]
             if drive.revolute:
@@ -281,7 +311,7 @@ def patterns(bench: ArmBench, campaigns: Sequence[Poses]) -> dict[str, list[Floa
         wide = np.stack([slow, slow**2], axis=1)
         every = np.concatenate([np.eye(3)[None] * 0.3 * f[:, None, None] for f in wide.T], axis=2)
         out.setdefault("time", []).append(every)
-    if all(c.temperature is not None and np.ptp(c.temperature) > 0.1 for c in campaigns):
+    if all(c.temperature is not None and np.ptp(c.temperature) > STEADY_K for c in campaigns):
         out["temperature"] = [
             np.eye(3)[None] * 0.1 * (c.temperature - c.temperature.mean())[:, None, None]  # type: ignore[union-attr]
             for c in campaigns
@@ -293,18 +323,83 @@ def patterns(bench: ArmBench, campaigns: Sequence[Poses]) -> dict[str, list[Floa
 
 
 def next_experiment(told: Told) -> NextExperiment | None:
-    """A campaign in other postures where there is one only; repeats where there is no floor. gain: nats, at most."""
+    """Poses that tell most, as a campaign of their own; repeats where there is no floor. gain: nats."""
     if told.verdict in ("none", "identified"):
         return None
-    if not told.judges.whole and told.found.taken.steps:
-        effects = list(dict.fromkeys(g for s in told.sets for g in s.groups))
-        action = "measure a second campaign in other postures, with a clamping of its own"
-        return NextExperiment(action=action, separates=tuple(effects), gain=round(float(np.log(len(told.sets) + 1)), 4))
-    if told.floor is None:
-        effects = [*dict.fromkeys(s.group for s in told.found.taken.steps), UNKNOWN]
-        action = "visit 20 of the poses once more, other poses in between, so that the floor is known"
-        return NextExperiment(action=action, separates=tuple(effects), gain=round(float(np.log(2.0)), 4))
-    return None
+    if told.floor is None and told.judges.whole:
+        return _again(told)
+    found = told.found
+    noise = told.floor.sd if told.floor else max(found.discrepancy.noise, 1e-6)
+    q, place, gain = proposed(told.bench, found, noise)
+    if not len(q):
+        return None if told.judges.whole or not found.taken.steps else _second_campaign(told, q, place)
+    if not told.judges.whole:
+        return _second_campaign(told, q, place)
+    new = 100.0 * unseen_share(told.bench, found, q)
+    effects = [*dict.fromkeys(s.group for s in found.taken.steps), UNKNOWN]
+    action = f"measure {len(q)} more poses with a clamping of their own"
+    if new:
+        action += f", {new:.0f} % of them with a joint at angles that no pose had"
+    return NextExperiment(
+        action=f"{action}; try them slowly first: collisions are not checked",
+        separates=tuple(effects),
+        gain=round(gain, 4),
+        outcomes=(
+            (
+                "If the causes found leave no more on these poses than on the others, they hold there as well and their "
+                "intervals become narrower."
+            ),
+            (
+                "If they leave more, and the curves of the joints explain it once these poses are fitted, it was the angles "
+                "that nobody had seen."
+            ),
+            "If they leave as much after that, what is unknown does not go by the angle of one joint.",
+        ),
+        poses=_listed(told, q, place),
+    )
+
+
+def _second_campaign(told: Told, q: Floats, place: Floats) -> NextExperiment:
+    """Other postures, where there is one campaign only: within it, effects stand in for each other."""
+    effects = list(dict.fromkeys(g for s in told.sets for g in s.groups))
+    sets = ["; ".join(s.groups) for s in told.sets]
+    return NextExperiment(
+        action="measure a second campaign in other postures, with a clamping of its own",
+        separates=tuple(effects),
+        gain=round(float(np.log(len(told.sets) + 1)), 4),
+        outcomes=(
+            *(f"If {one} alone foretell the new poses, they are the cause." for one in sets[:2]),
+            "If no set foretells them, something unknown is at work.",
+        ),
+        poses=_listed(told, q, place) if len(q) else None,
+    )
+
+
+def _again(told: Told) -> NextExperiment:
+    """Repeats: every other quantile of the poses there are, in an order that does not stay in one place."""
+    effects = [*dict.fromkeys(s.group for s in told.found.taken.steps), UNKNOWN]
+    campaign = told.bench.campaigns[0]
+    some = np.unique(np.linspace(0, len(campaign.q) - 1, REPEATS).astype(int))
+    some = some[np.random.default_rng(POSES_SEED).permutation(len(some))]
+    again = campaign.take(some)
+    return NextExperiment(
+        action=f"visit {REPEATS} of the poses once more, other poses in between, so that the floor is known",
+        separates=tuple(effects),
+        gain=round(float(np.log(2.0)), 4),
+        outcomes=(
+            "If visits of one pose differ by as much as the causes leave, nothing is left to explain.",
+            "If they differ by less, something unknown is at work.",
+        ),
+        poses=_listed(told, again.q, told.bench.standing(again, ()).hung.point),
+    )
+
+
+def _listed(told: Told, q: Floats, place: Floats) -> PosesToMeasure:
+    return PosesToMeasure(
+        joints=told.bench.actuators,
+        positions=tuple(tuple(round(float(v), 6) for v in row) for row in q),
+        platform_mm=tuple((_round(x), _round(y), _round(z)) for x, y, z in place),
+    )
 
 
 def _size(parts: Sequence[Floats]) -> float:

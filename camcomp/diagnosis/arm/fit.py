@@ -40,6 +40,7 @@ class ArmFit:
     rest: tuple[Floats, ...]  # (n, 3) mm per campaign, machine frame
     chosen: Taken  # before anything held out had a say
     outliers: tuple[tuple[str, int], ...] = ()  # run and row of poses that were left out
+    rough: Discrepancy | None = None  # beside the groups alone, where waves of joints were taken as well
 
     def signed(self, evidence: Evidence, widths: Floats, blocks: Sequence[int]) -> Floats:
         """Widths (k,) without those of positive amounts that want to be negative on some blocks: they are none."""
@@ -71,21 +72,24 @@ def investigate(bench: ArmBench, without: Sequence[str] = ()) -> ArmFit:
         outliers += named_rows(campaigns[k], far)
         campaigns[k], linear[k] = campaigns[k].take(~far), taken_rows(linear[k], ~far).loosened(left[~far])
     bench.campaigns = campaigns
-    discrepancy = _discrepancy(linear)
+    discrepancy = fit_of_leftovers(linear)
     taken = take(Evidence.of(parts(linear), discrepancy), groups)
     return replace(fitted(bench, columns, groups, linear, discrepancy, taken), outliers=tuple(outliers))
 
 
 def fitted(
     bench: ArmBench, columns: Sequence[Column], groups: dict[str, list[int]], linear: Sequence[ResidualBlock],
-    discrepancy: Discrepancy, taken: Taken,
+    discrepancy: Discrepancy, taken: Taken, passes: int = 2,
 ) -> ArmFit:  # fmt: skip
-    """Amplitudes of the groups taken, by the model itself instead of its derivative at nominal."""
+    """Amplitudes of the groups taken, by the model itself instead of its derivative at nominal.
+
+    passes: how often the derivatives are taken anew; one will do where they were taken at these groups already.
+    """
     amount = np.zeros(len(columns))
     covariance = np.zeros((len(columns), len(columns)))
     widths = taken.widths.copy()
     evidence = Evidence.of(linear, discrepancy)
-    for _ in range(2 if taken.steps else 0):
+    for _ in range(passes if taken.steps else 0):
         amount, covariance = evidence.fit(widths)
         wrong = [j for j, c in enumerate(columns) if c.parameter.sign > 0 and amount[j] < 0.0]
         widths[wrong] = 0.0  # a positive amount that wants to be negative is none
@@ -160,7 +164,7 @@ def _beside_everything(blocks: Sequence[ResidualBlock]) -> list[Floats]:
     return [without_nuisance(b.r - b.X @ amount, b.N) for b in blocks]
 
 
-def _discrepancy(blocks: Sequence[ResidualBlock]) -> Discrepancy:
+def fit_of_leftovers(blocks: Sequence[ResidualBlock]) -> Discrepancy:
     """Discrepancy beside the richest model, from regions small enough to be quick."""
     features, rest = [], []
     for b, left in zip(blocks, _beside_everything(blocks), strict=True):

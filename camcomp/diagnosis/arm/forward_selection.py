@@ -48,7 +48,7 @@ def take(evidence: Evidence, groups: Mapping[str, Sequence[int]]) -> Taken:
     none = Step("", 0.0, density, squares)
     steps: list[Step] = []
     while True:
-        widths = _widths(evidence, groups, steps)
+        widths = widths_of(evidence, groups, steps)
         last = (none, *steps)[-1]
         tried = [
             best_width(evidence, widths, name, columns)
@@ -64,7 +64,8 @@ def take(evidence: Evidence, groups: Mapping[str, Sequence[int]]) -> Taken:
             return Taken(none, tuple(steps), tuple(sorted(tried, key=lambda s: -s.density)), widths)
 
 
-def _widths(evidence: Evidence, groups: Mapping[str, Sequence[int]], steps: Sequence[Step]) -> Floats:
+def widths_of(evidence: Evidence, groups: Mapping[str, Sequence[int]], steps: Sequence[Step]) -> Floats:
+    """Widths (k,) of all columns, 0 where nothing was taken."""
     widths = np.zeros(evidence.effects)
     for step in steps:
         widths[list(groups[step.group])] = step.width
@@ -81,7 +82,7 @@ def _exchanged(evidence: Evidence, groups: Mapping[str, Sequence[int]], steps: S
     for i in range(len(steps)):
         for name in (each for each in groups if each not in names):
             rest = [*steps[:i], *steps[i + 1 :]]
-            step = best_width(evidence, _widths(evidence, groups, rest), name, groups[name])
+            step = best_width(evidence, widths_of(evidence, groups, rest), name, groups[name])
             gain = step.density - steps[-1].density
             if gain < LEAST_GAIN or rms(step.squares) > (1.0 + LEAST_SHARE) * rms(steps[-1].squares):
                 continue
@@ -96,7 +97,7 @@ def in_order(evidence: Evidence, groups: Mapping[str, Sequence[int]], some: Sequ
     """Groups with their widths as steps: what each leaves beside those in front of it."""
     steps: list[Step] = []
     for name, width in some:
-        density, squares = evidence.predict(_widths(evidence, groups, [*steps, Step(name, width, 0.0, np.zeros(0))]))
+        density, squares = evidence.predict(widths_of(evidence, groups, [*steps, Step(name, width, 0.0, np.zeros(0))]))
         steps.append(Step(name, width, density, squares))
     return steps
 

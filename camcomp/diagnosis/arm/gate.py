@@ -11,7 +11,7 @@ from typing import Literal
 
 import numpy as np
 from scipy.spatial import KDTree
-from scipy.stats import chi2, norm
+from scipy.stats import binom, chi2, norm
 
 from camcomp.diagnosis.arm.dependence import Dependence, dependences
 from camcomp.diagnosis.arm.discrepancy import Evidence, design, regions
@@ -21,6 +21,7 @@ from camcomp.ground.datatypes import Floats
 MINOR = 0.3  # of the floor: what moves the tip less is no cause and no unknown
 ABOVE = 1.25  # of the floor's square: instruments do not know themselves to better than an eighth
 LEVEL = 1.5  # of the floor's square that a leftover has to stay below to be the floor
+SURE, LIKELY = 0.99, 0.95  # that a leftover is above the floor; that it is at it
 CHANCE = 1e-3  # of a structure in noise alone, over all that is tried
 FALSE = 0.01  # of what is named as a driver
 STEPS = 16  # stretches of time, regions of postures
@@ -92,11 +93,13 @@ def judge(
     if floor is None:
         return Gate("above" if structured else "open", min(chance, 0.0), drivers, left, floor is not None)
     mean, spread = level(left, features, floor)
-    if structured or mean - norm.ppf(0.99) * spread > ABOVE:
-        if mean - norm.ppf(0.99) * spread > ABOVE:
+    many = regions_above(left, features)
+    if structured or mean - norm.ppf(SURE) * spread > ABOVE or many < np.log10(FALSE):
+        if mean - norm.ppf(SURE) * spread > ABOVE:
             chance = min(chance, float(norm.logsf((mean - ABOVE) / spread) / np.log(10.0)))
+        chance = min(chance, many)
         return Gate("above", min(chance, 0.0), drivers, left, floor is not None)
-    return Gate("at" if mean + norm.ppf(0.95) * spread < LEVEL else "open", 0.0, drivers, left, True)
+    return Gate("at" if mean + norm.ppf(LIKELY) * spread < LEVEL else "open", 0.0, drivers, left, True)
 
 
 def _discovered(tried: Sequence[Dependence]) -> list[Dependence]:
@@ -108,17 +111,31 @@ def _discovered(tried: Sequence[Dependence]) -> list[Dependence]:
 
 def level(left: LeftOver, features: Sequence[Floats], floor: TipFloor) -> tuple[float, float]:
     """Mean square in units of the floor's, and its standard error: between regions of postures, and of the floor itself."""
+    total, n = _by_region(left, features)
+    mean = float(total.sum() / n.sum())
+    between = float(np.sqrt(((total - mean * n) ** 2).sum() * len(n) / max(len(n) - 1, 1)) / n.sum())
+    even = mean * float(np.sqrt(2.0 / (3.0 * n.sum())))  # the least that noise does
+    return mean, float(np.hypot(max(between, even), mean * np.sqrt(2.0 / floor.freedom)))
+
+
+def regions_above(left: LeftOver, features: Sequence[Floats]) -> float:
+    """log10 of the chance that so many regions of postures have a mean square above ABOVE, where half of them would.
+
+    A sign test, for leftovers of which a few regions have nearly all: means and their spread then say little.
+    """
+    total, n = _by_region(left, features)
+    return float(binom.logsf((total > ABOVE * n).sum() - 1, len(n), 0.5) / np.log(10.0))
+
+
+def _by_region(left: LeftOver, features: Sequence[Floats]) -> tuple[Floats, Floats]:
+    """Sums of squares in units of the floor's (regions,), and numbers of poses (regions,)."""
     sums, counts = [], []
     for s, f in zip(left.squares, features, strict=True):
         group = regions(f, min(STEPS, max(len(s) // 4, 2)))
         for g in np.unique(group):
             sums.append(float(s[group == g].sum() / 3.0))
             counts.append(float((group == g).sum()))
-    total, n = np.array(sums), np.array(counts)
-    mean = float(total.sum() / n.sum())
-    between = float(np.sqrt(((total - mean * n) ** 2).sum() * len(n) / max(len(n) - 1, 1)) / n.sum())
-    even = mean * float(np.sqrt(2.0 / (3.0 * n.sum())))  # the least that noise does
-    return mean, float(np.hypot(max(between, even), mean * np.sqrt(2.0 / floor.freedom)))
+    return np.array(sums), np.array(counts)
 
 
 def neighbours(rest: Sequence[Floats], features: Sequence[Floats]) -> Dependence:
@@ -178,6 +195,6 @@ def standing_out(size: Floats, groups: Sequence[np.ndarray]) -> list[int]:
         if not n or not m:
             continue
         z = (rank[own].sum() - n * (n + m + 1) / 2.0) / np.sqrt(n * m * (n + m + 1) / 12.0)
-        if norm.sf(z) < 0.01 / len(groups):
+        if norm.sf(z) < FALSE / len(groups):
             out.append(i)
     return out

@@ -7,8 +7,9 @@ sensor to say. Nothing cuts, so the drives push nothing but the load.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,9 @@ from camcomp.model.statics.description import Actuator, Link, Robot
 from camcomp.model.statics.hanging import Hung, hang
 
 _SHARE_OF_SCALE = 0.05  # step of a difference
+_JOINT_STEP = 1e-5  # rad or mm
+CURVE = "joint_curve"
+_WRIST = {"joint_coupling": 2}  # effects of the last joints only: of how many
 _VISIBLE = 1e-9  # mm per scale: a column smaller than this is none
 # Effects of these hooks stand still, or are part of the registration.
 _UNSEEN = ("time_sync", "workpiece_frame", "tool_length", "chain_error", "servo_lag", "backlash", "friction", "none")
@@ -33,7 +37,8 @@ _UNSEEN = ("time_sync", "workpiece_frame", "tool_length", "chain_error", "servo_
 class Poses:
     """Poses of one campaign: joints q (n, m), measured tips (n, 3) mm, time (n,) s, temperature (n,) or None, run (n,).
 
-    sd (n, 3) mm: what the instrument states of itself, NaN or None where it says nothing; row (n,): of the run's log, from 1.
+    sd (n, 3) mm: what the instrument states of itself, NaN or None where it says nothing; row (n,): of the run's log, from 1;
+    approach (n, m): way in which every joint turned last, +1 or -1, 0 where nobody knows.
     """
 
     label: str
@@ -44,13 +49,15 @@ class Poses:
     run: np.ndarray
     sd: Floats | None = None
     row: np.ndarray | None = None
+    approach: Floats | None = None
 
     def take(self, rows: np.ndarray) -> Poses:
         """The poses of a mask or of indices."""
         heat = None if self.temperature is None else self.temperature[rows]
         sd = None if self.sd is None else self.sd[rows]
+        way = None if self.approach is None else self.approach[rows]
         return Poses(
-            self.label, self.q[rows], self.tip[rows], self.time[rows], heat, self.run[rows], sd, self.rows[rows]
+            self.label, self.q[rows], self.tip[rows], self.time[rows], heat, self.run[rows], sd, self.rows[rows], way
         )
 
     @property
@@ -129,14 +136,24 @@ class ArmBench:
         return self.standing(self.campaigns[k], causes).tips(at)
 
     def columns(self, without: Sequence[str] = ()) -> list[Column]:
-        """Every parameter of the shelf that may move a standing arm."""
+        """Every parameter of the shelf that may move a standing arm, without the waves of joints."""
+        return self._of_effects(shelf.usable("effects", (*_UNSEEN, CURVE, *without)))
+
+    def waves(self) -> list[Column]:
+        """The waves of every hinge."""
+        return self._of_effects([(CURVE, shelf.load("effects", CURVE))])
+
+    def _of_effects(self, effects: Iterable[tuple[str, Any]]) -> list[Column]:
         springs = any(a.stiffness is not None for a in self.robot.actuators)
         links = any(isinstance(e, Link) for e in self.arm.chain.elements)
         found: list[Column] = []
-        for name, module in shelf.usable("effects", (*_UNSEEN, *without)):
+        for name, module in effects:
             if (name == "drive_stiffness" and not springs) or (name == "link_stiffness" and not links):
                 continue
+            if module.TARGET == "named":  # of axes that arms do not have
+                continue
             targets: list[str | None] = [None] if module.TARGET == "machine" else list(self.actuators)
+            targets = targets[-_WRIST[name] :] if name in _WRIST else targets
             for target in targets:
                 turns = target is None or self.drive(target).revolute
                 for p in _parameters(module, turns):
@@ -158,7 +175,11 @@ class ArmBench:
             here = stood.tips(frame)
             measured = frame.to_machine(campaign.tip)
             X = np.empty((*here.shape, len(columns)))
-            for j in range(len(columns)):
+            waves = [j for j, column in enumerate(columns) if column.effect == CURVE]
+            if waves:
+                joints = self.joint_motion(campaign, causes, frame)
+                X[:, :, waves] = wave_motion(joints, self.actuators, campaign.q, [columns[j] for j in waves])
+            for j in sorted(set(range(len(columns))) - set(waves)):
                 step = _SHARE_OF_SCALE
                 moved = combined(columns, {**amounts, j: amounts.get(j, 0.0) + step})
                 X[:, :, j] = (self.tips(k, moved, frame) - here) / step
@@ -166,6 +187,13 @@ class ArmBench:
             left = measured - here + X @ np.array([amounts.get(j, 0.0) for j in range(len(columns))])
             out.append(ResidualBlock(campaign.features, X, N, left, k, True))
         return out
+
+    def joint_motion(self, poses: Poses, causes: Sequence[Cause], at: Registration) -> Floats:
+        """Motion (n, 3, m) of tips, machine frame, mm per rad (mm) by which a joint stands off its encoder."""
+        here = self.standing(poses, causes).tips(at)
+        step = _JOINT_STEP * np.eye(len(self.actuators))
+        moved = [self.standing(replace(poses, q=poses.q + each), causes).tips(at) - here for each in step]
+        return np.stack(moved, axis=2) / _JOINT_STEP
 
     def registration(self, k: int, causes: Sequence[Cause]) -> Registration:
         """Frame and tool vector of campaign k that fit best with causes."""
@@ -195,7 +223,49 @@ def combined(columns: Sequence[Column], amounts: Mapping[int, float]) -> list[Ca
         one, key = column.cause(amount), (column.effect, column.target)
         values = {**merged[key].values, **one.values} if key in merged else one.values
         merged[key] = replace(one, values=values)
-    return list(merged.values())
+    return [_public(cause) for cause in merged.values()]
+
+
+def wave_motion(joints: Floats, actuators: Sequence[str], q: Floats, columns: Sequence[Column]) -> Floats:
+    """Motion (n, 3, k) of tips by waves of joints, in units of their scales. joints (n, 3, m): per rad of every joint."""
+    out = np.empty((*joints.shape[:2], len(columns)))
+    for j, column in enumerate(columns):
+        a = list(actuators).index(str(column.target))
+        out[:, :, j] = joints[:, :, a] * wave(column, q[:, a])[:, None]
+    return out
+
+
+def wave(column: Column, angle: Floats) -> Floats:
+    """A wave (n,) of a joint over its angle (n,), rad, in units of its scale."""
+    name, order, _ = column.parameter.name.split("_")
+    turn = np.sin if name == "sine" else np.cos
+    return np.asarray(column.parameter.scale * turn(int(order) * angle), float)
+
+
+def approached(q: Floats, time: Floats, least: float = 1e-4) -> Floats:
+    """Way (n, m), +1 or -1, in which joints q (n, m) turned last when a log stopped in them; 0 where it does not show.
+
+    Taken as straight from row to row; turns below `least` rad (mm) are none. Rows without an order say nothing.
+    """
+    out = np.zeros_like(q)
+    order = np.argsort(time, kind="stable")
+    if len(time) < 2 or not np.ptp(time) > 0.0:
+        return out
+    way = np.zeros(q.shape[1])
+    for before, row in pairwise(order):
+        step = q[row] - q[before]
+        way = np.where(np.abs(step) > least, np.sign(step), way)
+        out[row] = way
+    return out
+
+
+def _public(cause: Cause) -> Cause:
+    """With the parameters that YAML has, where others are easier to fit."""
+    public = getattr(cause.effect, "public", None)
+    if public is None:
+        return cause
+    fitted = getattr(cause.effect, "FITTED", cause.effect.PARAMETERS)
+    return replace(cause, values=public({**{p.name: p.nominal for p in fitted}, **cause.values}))
 
 
 def visible(blocks: Sequence[ResidualBlock], columns: Sequence[Column]) -> list[int]:
@@ -209,7 +279,8 @@ def visible(blocks: Sequence[ResidualBlock], columns: Sequence[Column]) -> list[
 
 def _parameters(module: Any, turns: bool) -> tuple[Parameter, ...]:
     """The parameters that make sense for a hinge (turns) or a slide, without scanned shapes."""
-    own = getattr(module, "ROTARY", module.PARAMETERS) if turns else getattr(module, "FITTED", module.PARAMETERS)
+    rotary, own = getattr(module, "ROTARY", None), getattr(module, "FITTED", module.PARAMETERS)
+    own = (own if rotary is None else rotary) if turns else tuple(p for p in own if p not in (rotary or ()))
     if turns and "drive" in signal_path.stages_of(module) and not hasattr(module, "ROTARY"):
         own = tuple(p for p in own if p.unit == "ppm")  # lengths of a slide mean nothing to a hinge
     if any(p.scan for p in own):
@@ -226,8 +297,9 @@ def _standing(robot: Robot, campaign: Poses) -> Motion:
     """The motion of poses that do not move."""
     zero = np.zeros_like(campaign.q)
     home, worn = np.array([a.home for a in robot.actuators]), np.zeros(len(campaign.q))
+    way = zero if campaign.approach is None else campaign.approach
     return Motion(
-        campaign.time, campaign.time, worn, campaign.temperature, campaign.q, zero, zero, home,
+        campaign.time, campaign.time, worn, campaign.temperature, campaign.q, zero, way, home,
         signal_path.springs(robot), False,
     )  # fmt: skip
 

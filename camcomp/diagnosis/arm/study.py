@@ -15,12 +15,24 @@ from typing import Any
 import numpy as np
 
 from camcomp.diagnosis.arm import answer
+from camcomp.diagnosis.arm.curves import with_curves
 from camcomp.diagnosis.arm.discrepancy import Discrepancy
 from camcomp.diagnosis.arm.fit import ArmFit, fitted, investigate, named_rows
 from camcomp.diagnosis.arm.gate import Gate, judge, unseen
 from camcomp.diagnosis.arm.noise_floor import StatedDeviation, TipFloor, far_off, tip_floor
-from camcomp.diagnosis.arm.poses import ArmBench, Poses
-from camcomp.diagnosis.arm.unseen import Court, Rival, adopted, court, holding, rivals, shrinkage
+from camcomp.diagnosis.arm.poses import CURVE, ArmBench, Poses
+from camcomp.diagnosis.arm.unseen import (
+    Court,
+    Rival,
+    adopted,
+    beside_curves,
+    borne_out,
+    court,
+    court_of_curves,
+    holding,
+    rivals,
+    shrinkage,
+)
 from camcomp.diagnosis.result.types import UNKNOWN, DiagnosisResult, Floor, Outlier
 from camcomp.ground.datatypes import Floats
 from camcomp.model.effect import Cause
@@ -58,9 +70,11 @@ def study(
     held = ArmBench(robot, tuple(causes), every[len(own) :]) if more else None
     if held is not None:
         outliers += _without_outliers(held, found)
+    curved = found if CURVE in without else with_curves(bench, found)
     judges = court(bench, found, held)
+    curve_judges = judges if curved is found else court_of_curves(judges, bench, curved, held)
     seen_names = sorted({str(r.run[0]) for r in runs if not holdout or str(r.run[0]) in holdout})
-    shrunk = shrinkage(judges, found, seen_names)
+    shrunk = shrinkage(curve_judges, curved, seen_names, bench)
     floor_mm = None if floor is None else 1e-3 * floor.um
     sets = rivals(judges, found, floor_mm)
     kept = holding(judges, found) if held is not None else found.taken
@@ -73,6 +87,14 @@ def study(
         )
         judges = court(bench, found, held)
         sets = rivals(judges, found, floor_mm)
+        if curved.rough is not None:
+            curved = replace(with_curves(bench, found), chosen=curved.chosen)
+            curve_judges = court_of_curves(judges, bench, curved, held)
+    if curved.rough is not None:
+        if held is None or borne_out(curve_judges, curved):
+            found, judges, sets = curved, curve_judges, beside_curves(sets, curved)
+        else:
+            found = replace(found, chosen=curved.chosen)
     gate = _gate(bench, held, found, judges, floor)
     word = verdict(found, judges, gate, sets)
     first = [bench.gap(k, ()) for k in range(len(bench.campaigns))]
@@ -124,7 +146,8 @@ def merged(runs: Sequence[Poses]) -> list[Poses]:
         q, tip, time, run, row = (
             np.concatenate([getattr(r, f) for r in own]) for f in ("q", "tip", "time", "run", "rows")
         )
-        every = Poses(label, q, tip, time, heat, run, None if all(d is None for d in deviations) else sd, row)
+        way = np.concatenate([np.zeros_like(r.q) if r.approach is None else r.approach for r in own])
+        every = Poses(label, q, tip, time, heat, run, None if all(d is None for d in deviations) else sd, row, way)
         _, first = np.unique(np.concatenate([q, tip], axis=1), axis=0, return_index=True)  # sorted by joints
         every = every.take(first)
         if len(every.q) < LEAST_POSES:

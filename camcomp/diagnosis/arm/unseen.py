@@ -9,6 +9,7 @@ from itertools import combinations
 import numpy as np
 from scipy.stats import t as student
 
+from camcomp.diagnosis.arm.curves import covered, curved_joints, curves_taken, seen_angles, without_waves
 from camcomp.diagnosis.arm.discrepancy import (
     Discrepancy,
     Evidence,
@@ -28,12 +29,13 @@ from camcomp.diagnosis.arm.forward_selection import (
     rms,
     take,
 )
-from camcomp.diagnosis.arm.poses import ArmBench, Poses
+from camcomp.diagnosis.arm.poses import CURVE, ArmBench, Poses
 from camcomp.diagnosis.result.types import ShrinkageStep, UnseenShrinkage
 from camcomp.ground.datatypes import Floats
 
 # Sets of one campaign that leave up to this many times as much: effects that differ by 6 % of the rms within a campaign
 # of the UR10 differ by a factor of two on the next one.
+AT_FLOOR = 1.25  # of the floor: as good as it, because floors are known to no better
 ALIKE_INSIDE = 2.0
 MOST_SETS = 4
 REGIONS = 16  # of postures per campaign
@@ -68,6 +70,18 @@ def court(bench: ArmBench, found: ArmFit, held: ArmBench | None) -> Court:
     poses = tuple(bench.campaigns[k].take(mask) for k, mask in masks(own))
     blocks = tuple(parts(own))
     return Court(blocks, each_withheld(len(blocks)), poses, len(own) > 1)
+
+
+def court_of_curves(judges: Court, bench: ArmBench, found: ArmFit, held: ArmBench | None) -> Court:
+    """The court of a fit without waves of joints for the same fit with them."""
+    if held is None:
+        return court(bench, found, None)
+    own, waves = len(found.linear), [found.columns[j] for j in found.groups[CURVE]]
+    more = []
+    for b, w in zip(judges.blocks[own:], held.blocks(waves), strict=True):
+        wide = replace(b, X=np.concatenate([b.X, w.X], axis=2))
+        more.append(wide.loosened(without_nuisance(wide.r - wide.X @ found.amount, wide.N)))
+    return replace(judges, blocks=(*found.linear, *more))
 
 
 @dataclass(frozen=True)
@@ -133,7 +147,7 @@ def rivals(court: Court, found: ArmFit, floor_mm: float | None) -> list[Rival]:
     else:
         none = _rival(evidence, (), np.zeros(len(found.columns)))
         least = min([first.left, *(s.left for s in sets.values())])
-        near = 1.0 + LEAST_SHARE if floor_mm is not None and least < 1.25 * floor_mm else ALIKE_INSIDE
+        near = 1.0 + LEAST_SHARE if floor_mm is not None and least < AT_FLOOR * floor_mm else ALIKE_INSIDE
         close = [s for s in sets.values() if s.left < min(near * least, (1.0 - LEAST_SHARE) * none.left)]
     unlike = {frozenset(first.groups): first}
     for each in sorted(close, key=lambda s: -s.density if court.whole else (len(s.groups), s.left)):
@@ -162,10 +176,32 @@ def _rival(evidence: Evidence, names: tuple[str, ...], widths: Floats) -> Rival:
     return Rival(names, tuple(widths), density, rms(squares))
 
 
+def beside_curves(sets: Sequence[Rival], found: ArmFit) -> list[Rival]:
+    """Sets that were compared without waves of joints, with those of the fit beside each of them."""
+    step = next((s for s in found.taken.steps if s.group == CURVE), None)
+    if step is None:
+        return list(sets)
+    out = []
+    for each in sets:
+        widths = np.zeros(len(found.columns))
+        widths[: len(each.widths)] = each.widths
+        widths[found.groups[CURVE]] = step.width
+        out.append(Rival((*each.groups, CURVE), tuple(widths), each.density, each.left))
+    return out
+
+
+def borne_out(court: Court, found: ArmFit) -> bool:
+    """Whether held-out campaigns bear out the waves of joints: they have to lower their rms by LEAST_SHARE."""
+    evidence = court.evidence(found.discrepancy)
+    less = only(found, [s.group for s in found.taken.steps if s.group != CURVE])
+    with_them, without = (rms(evidence.predict(each.widths)[1]) for each in (found.taken, less))
+    return with_them <= (1.0 - LEAST_SHARE) * without
+
+
 # -- shrinkage --------------------------------------------------------------------------------------------------------
 
 
-def shrinkage(court: Court, found: ArmFit, names: Sequence[str]) -> UnseenShrinkage | None:
+def shrinkage(court: Court, found: ArmFit, names: Sequence[str], bench: ArmBench) -> UnseenShrinkage | None:
     """How far campaigns shrink by groups that were chosen and fitted without them; None where no campaign is unseen."""
     if not court.whole:
         return None
@@ -183,6 +219,7 @@ def shrinkage(court: Court, found: ArmFit, names: Sequence[str]) -> UnseenShrink
     stages = [[*each, *each[-1:] * (len(order) + 1 - len(each))] for each in stages]
     size = [float(np.sqrt(np.mean([s[i].mean() for s in stages]))) for i in range(len(order) + 1)]
     ratio = 1.0 - size[-1] / size[0] if size[0] > 0.0 else 0.0
+    covered_share, covered_rms = _where_covered(court, found, bench, [s[-1] for s in stages])
     low, high = _interval([s[0] for s in stages], [s[-1] for s in stages], [p.features for p in court.poses])
     return UnseenShrinkage(
         holdout=tuple(names),
@@ -195,7 +232,27 @@ def shrinkage(court: Court, found: ArmFit, names: Sequence[str]) -> UnseenShrink
             for g, s in zip(order, size[1:], strict=True)
         ),
         refitted=("frame of the instrument", "place of its target"),
+        covered_share=covered_share,
+        covered_rms_um=covered_rms,
     )
+
+
+def _where_covered(
+    court: Court, found: ArmFit, bench: ArmBench, after: Sequence[Floats]
+) -> tuple[float | None, float | None]:
+    """Share of unseen poses whose joints with a curve stand where it was seen, and what is left there, um."""
+    joints = curved_joints(bench, found)
+    if not joints:
+        return None, None
+    squares, count = [], 0
+    for fold, poses, left in zip(court.folds, court.poses, after, strict=True):
+        q = np.concatenate([bench.campaigns[i].q for i in fold.others])
+        inside = covered({a: seen_angles(q[:, a]) for a in joints}, poses.q)
+        squares.append(left[inside])
+        count += len(left)
+    every = np.concatenate(squares)
+    rest = round(1e3 * float(np.sqrt(every.mean())), 3) if len(every) else None
+    return round(len(every) / count, 4), rest
 
 
 def _without(court: Court, fold: Fold, found: ArmFit) -> Taken:
@@ -204,8 +261,12 @@ def _without(court: Court, fold: Fold, found: ArmFit) -> Taken:
     if len(fitted) == len(found.linear):
         return found.chosen
     frames = {b.frame: k for k, b in enumerate(fitted)}
-    own = [replace(b, frame=frames[b.frame]) for b in fitted]
-    return take(Evidence.of(parts(own), found.discrepancy), found.groups)
+    own = parts([replace(b, frame=frames[b.frame]) for b in fitted])
+    if found.rough is None:
+        return take(Evidence.of(own, found.discrepancy), found.groups)
+    groups = {name: columns for name, columns in found.groups.items() if name != CURVE}
+    plain = take(Evidence.of(without_waves(own, found.groups), found.rough), groups)
+    return curves_taken(Evidence.of(own, found.discrepancy), found.groups, plain)
 
 
 def _interval(before: Sequence[Floats], after: Sequence[Floats], features: Sequence[Floats]) -> tuple[float, float]:

@@ -18,6 +18,9 @@ MINOR = 0.3  # of the floor: what is smaller is no unknown, however sure it is
 ABOVE = 1.25  # of the floor's square: rows do not tell it to better than an eighth
 LEVEL = 1.5  # of the floor's square that a leftover has to stay below to be the floor
 STRETCH_S = 0.5  # in which a leftover is looked for
+FALSE = 0.01  # of the stretches that are named
+LEAST_STRETCHES = 8  # of which one can stand out
+JOINED = 0.1  # of a stretch between two that are one
 LEAST_ROWS = 20  # of a stretch
 BINS = 16
 LEAST_Z = 4.0  # mean gain over its standard error
@@ -73,7 +76,7 @@ def intervals(left: Sequence[Floats], times: Sequence[Floats], floor: float) -> 
         for rows in np.array_split(np.arange(len(t)), max(_count(t), 1))
         if len(rows) >= LEAST_ROWS
     ]
-    if len(stretches) < 8:
+    if len(stretches) < LEAST_STRETCHES:
         return (), 0.0
     whole = sum(float((r**2).sum()) for r in left)
     energy = np.array([float((left[k][rows] ** 2).mean()) for k, rows in stretches])
@@ -81,16 +84,16 @@ def intervals(left: Sequence[Floats], times: Sequence[Floats], floor: float) -> 
     middle = float(np.median(log))
     spread = 1.4826 * float(np.median(np.abs(log - middle)))
     rows_each = np.array([len(rows) for _, rows in stretches])
-    pure = chi2.isf(0.01 / len(stretches), rows_each) / rows_each  # what even white noise reaches
+    pure = chi2.isf(FALSE / len(stretches), rows_each) / rows_each  # what even white noise reaches
     chances = norm.logsf((log - middle) / max(spread, 1e-12)) / np.log(10.0) + np.log10(len(stretches))
-    out = (chances < -2.0) & (energy > ABOVE * floor**2) & (energy > pure * np.exp(middle))
+    out = (chances < np.log10(FALSE)) & (energy > ABOVE * floor**2) & (energy > pure * np.exp(middle))
     joined: list[Interval] = []
     for (k, rows), e, on in zip(stretches, energy, out, strict=True):
         if not on:
             continue
         t0, t1, share = float(times[k][rows[0]]), float(times[k][rows[-1]]), float(e * len(rows)) / max(whole, 1e-300)
         last = joined[-1] if joined else None
-        if last is not None and last.run == k and t0 - last.t1 < 0.1 * STRETCH_S:
+        if last is not None and last.run == k and t0 - last.t1 < JOINED * STRETCH_S:
             joined[-1] = Interval(k, last.t0, t1, last.share + share)
         else:
             joined.append(Interval(k, t0, t1, share))

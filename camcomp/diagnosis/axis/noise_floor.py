@@ -9,6 +9,7 @@ from scipy.stats import median_abs_deviation
 
 from camcomp.ground.datatypes import Floats
 
+STAYING = 0.1  # of the rows that do not move, from which on steps are a resolution
 REPEATABILITY_MM = 1e-3  # by which runs differ, and positions drift, unless stated otherwise
 SPIKE = 12.0  # deviations from the neighbours' median
 LEAST_SPIKE_MM = 0.1  # no machine jumps so far and back from one row to the next
@@ -25,7 +26,7 @@ def rows_floor(channels: Sequence[Floats]) -> float:
     for y in channels:
         steps = np.abs(np.diff(y))
         quantum = float(np.min(steps[steps > 1e-9 * max(float(np.ptp(y)), 1e-300)], initial=np.inf))
-        often = np.mean(steps < 0.5 * quantum) > 0.1  # rows that stay on a value: it is a resolution
+        often = np.mean(steps < 0.5 * quantum) > STAYING  # rows that stay on a value: it is a resolution
         scatter = float(median_abs_deviation(np.diff(y, 4), scale="normal")) / np.sqrt(70.0) if len(y) > 5 else 0.0
         noise.append(max(scatter, quantum / np.sqrt(12.0) if often and np.isfinite(quantum) else 0.0))
     return float(np.sqrt(np.mean(np.square(noise)))) if noise else 0.0

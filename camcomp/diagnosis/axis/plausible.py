@@ -15,6 +15,10 @@ from camcomp.ground.errors import ConfigError, Location
 
 HEAVIEST_KG = 2e4  # of what one drive moves
 SLOWEST_S = 0.5  # of a loop that still follows its set-points
+LARGE, BETTER = (
+    0.5,
+    0.2,
+)  # of the travel: a gap that is no lag; of the gap: what another encoder leaves that is the right one
 NEAR = 0.1  # of a factor between set-points and encoder
 _FACTORS = {1e3: "m", 1e-3: "um", 25.4: "inches", 180.0 / np.pi: "degrees where radians are due"}
 
@@ -61,7 +65,7 @@ def _check_order(log: str, name: str, runs: Mapping[str, AxisRun]) -> None:
 
     own = off(run)
     for other, each in runs.items():
-        if other != name and own > 0.5 * float(np.nanstd(run.encoder)) and off(each) < 0.2 * own:
+        if other != name and own > LARGE * float(np.nanstd(run.encoder)) and off(each) < BETTER * own:
             raise _refused("CC408", log, f"the set-points of {name} fit the encoder of {other}: columns are exchanged")
 
 

@@ -69,6 +69,17 @@ def study(
 
     Raises ValueError where no run of any axis has enough rows.
     """
+    return studied(axes, holdout=holdout, without=without, stated=stated)[0]
+
+
+def studied(
+    axes: Mapping[str, Sequence[AxisRun]],
+    *,
+    holdout: Sequence[str] = (),
+    without: Sequence[str] = (),
+    stated: AxisDeviation | None = None,
+) -> tuple[DiagnosisResult, list[AxisFindings]]:
+    """As study, with what the result was drawn from."""
     outliers: set[tuple[str, int]] = set()
     found, cleaned = [], {}
     for name, runs in axes.items():
@@ -94,7 +105,7 @@ def study(
     held = [n for n in names if n in holdout] if holdout else names if len(names) >= WHOLE_RUNS else []
     judged = [main] if len(held) == 1 and holdout else _judged(cleaned, held, set(without), stated or AxisDeviation())
     every = [c for a in found for c in a.channels]
-    return DiagnosisResult(
+    result = DiagnosisResult(
         verdict=verdict,
         gap=gap,
         where=answer.where(found, causes),
@@ -105,6 +116,7 @@ def study(
         outliers=tuple(Outlier(run=run, row=row) for run, row in sorted(outliers)),
         axes_in_detail={a.name: a.details for a in found},
     )
+    return result, found
 
 
 def _verdict(found: Sequence[AxisFindings]) -> Any:

@@ -12,6 +12,7 @@ from camcomp.model.hysteresis import direction
 
 PRESLIDING_GRID_MM = (1e-4, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1)  # the first is a step
 TURNING_GRID_MM_PER_S = (0.1, 0.2, 0.35, 0.5, 0.7, 1.0, 1.5, 2.5, 5.0, 10.0)
+STANDS_OUT = 1.6  # times the next line of a spectrum
 STRIBECK_MM_PER_S = 10.0
 WIDE = (5, 10, 20, 40)  # samples on either side of a local cubic
 
@@ -119,7 +120,7 @@ def ripple(at: list[AxisTravel], left: list[Floats], shortest: float = 0.5, long
     best = int(np.argmax(both))
     strength = np.sqrt(both)
     far = np.abs(frequency - frequency[best]) > 2.0 / span
-    if not far.any() or strength[best] < 1.6 * strength[far].max():
+    if not far.any() or strength[best] < STANDS_OUT * strength[far].max():
         return None
     f = frequency[best]
     A = np.stack([np.sin(2 * np.pi * f * x), np.cos(2 * np.pi * f * x)], axis=1)

@@ -23,6 +23,7 @@ SAMPLE_MM = 2.0  # of the program, where places are compared
 GAP_ROWS = 3.0  # usual steps between rows over which a motion is not led
 STILL_S = 0.1  # from which on standing at the end of a line may be idleness
 STILL_MM = 0.005
+_UPRIGHT = 0.9  # cosine beyond which a path goes along z, and its sides are found from x
 LED_PASSES = 2  # of a tip along its program: the second knows how the machine bends
 
 
@@ -83,8 +84,7 @@ def drive(
     aligned = None if program is None else _aligned(log, name, program, tip, measured)
     unsure = ~_close(measured.time, known)
     if program is None or aligned is None:
-        zero = np.zeros_like(tip)
-        forces = Forces(zero, zero, np.zeros(len(tip), bool))
+        forces = Forces.none(len(tip))
     else:
         forces = cutting_forces(program.track, aligned, tip, measured.time, bool(np.isfinite(measured.line).any()))
         unsure |= _idle_or_not(forces, aligned, program, tip, measured.time)
@@ -199,7 +199,7 @@ def _led_by_tip(
 def _across(track: Track, aligned: Aligned) -> Floats:
     """Axes (n, 3, 3) along the path and across it."""
     along = path_geometry.tangents(track.path, aligned.motion, aligned.share)
-    other = np.where(np.abs(along[:, 2:3]) < 0.9, [[0.0, 0.0, 1.0]], [[1.0, 0.0, 0.0]])
+    other = np.where(np.abs(along[:, 2:3]) < _UPRIGHT, [[0.0, 0.0, 1.0]], [[1.0, 0.0, 0.0]])
     side = np.cross(along, other)
     side /= np.maximum(np.linalg.norm(side, axis=1, keepdims=True), 1e-12)
     return np.stack([along, side, np.cross(along, side)], axis=1)

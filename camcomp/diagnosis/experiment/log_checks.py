@@ -20,6 +20,8 @@ _LENGTH_UNITS = {1e-3: "m", 25.4: "mm where inches are due", 1.0 / 25.4: "inches
 _TURNS = {180.0 / np.pi: "degrees"}
 _TIMES = {1e3: "ms", 1e6: "us", 1.0 / 60.0: "minutes"}
 _FORCES = {1e-3: "kN", 1e3: "mN"}
+SAME_TIME = (0.7, 1.4)  # times a program that a log takes, whose clock counts in another unit
+SAME_FORCE = (0.1, 10.0)  # times the modelled force: whatever is wrong with it, a unit is a thousand
 _HOT_C = 150.0
 _STRONG_N = 20.0
 
@@ -47,7 +49,7 @@ def check_length(name: str, run: str, measured: Measured, due_s: float) -> None:
         raise ConfigError("CC409", message, at=Location(name, rows + 1, 1))
     took = float(measured.time[-1] - measured.time[0])
     for factor, unit in _TIMES.items():
-        if due_s > 0.0 and 0.7 < took / (factor * due_s) < 1.4:
+        if due_s > 0.0 and SAME_TIME[0] < took / (factor * due_s) < SAME_TIME[1]:
             message = (
                 f"run '{run}': the log takes {took:g} s and the program {due_s:.3g} s: t_s looks as if logged in {unit}"
             )
@@ -63,7 +65,7 @@ def check_forces(name: str, run: str, measured: Measured, force: Floats) -> None
         rows = np.isfinite(found).all(axis=1)
         size = float(np.sqrt((found[rows] ** 2).sum(axis=1).mean())) if rows.any() else due
         for factor, unit in _FORCES.items():
-            if 0.1 < size / (factor * due) < 10.0:
+            if SAME_FORCE[0] < size / (factor * due) < SAME_FORCE[1]:
                 raise ConfigError(
                     "CC407", f"run '{run}': the {what} look as if logged in {unit}", at=Location(name, 1, 1)
                 )

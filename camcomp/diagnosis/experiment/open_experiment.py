@@ -18,8 +18,9 @@ from camcomp.ground.csv_table import CsvTable, TableRules, read_csv
 from camcomp.ground.datatypes import Floats
 from camcomp.ground.errors import ConfigError
 from camcomp.ground.files import display_name, read_bytes
+from camcomp.ground.headway import steps
 from camcomp.model.config.load import load_config, load_experiment
-from camcomp.model.config.spec import Experiment, RunSpec
+from camcomp.model.config.spec import Config, Experiment, RunSpec
 from camcomp.model.control import open_program
 from camcomp.model.job import Job
 from camcomp.model.motion.log_columns import DYNO, LINE, TEMPERATURE, TIME, TIP, TIP_SD, LogColumns, log_columns
@@ -49,7 +50,7 @@ def open_experiment(path: str | FilePath) -> OpenExperiment:
     job = Job(config)
     twin = twin_of(job)
     notes: list[str] = []
-    runs = [open_run(spec, job, twin, notes) for spec in experiment.runs]
+    runs = [open_run(spec, job, twin, notes) for spec in steps(experiment.runs, len(experiment.runs))]
     order = sorted(range(len(runs)), key=lambda k: experiment.runs[k].started_s)
     worn = 0.0
     for k in order:
@@ -141,6 +142,14 @@ def unread(table: CsvTable, columns: LogColumns) -> list[str]:
 def columns_of(twin: Twin) -> LogColumns:
     """Names of the columns of this machine's logs."""
     return log_columns(twin.actuators, [a.revolute for a in twin.robot.actuators])
+
+
+def check_log(path: str, config: Config | None) -> None:
+    """Raise what is wrong with a log on its own: no table, no times, cells that are no numbers; with a machine, of its columns."""
+    table = open_log(path)
+    if config is not None:
+        actuators = config.robot.actuators
+        read_log(table, log_columns(list(actuators), [each.rotary for each in actuators.values()]))
 
 
 def open_log(path: str) -> CsvTable:

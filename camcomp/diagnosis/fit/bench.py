@@ -22,21 +22,25 @@ _KEPT = 12  # changed machines whose structures are kept per run
 
 @dataclass(frozen=True)
 class CandidateCause:
-    """One possible cause: an effect at a target. Fitted parameters in order; shape holds the scanned ones."""
+    """One possible cause: an effect at a target. Fitted parameters in order; shape holds the scanned ones.
+
+    hinge: the target is a rotary actuator, for which an effect may have parameters of its own.
+    """
 
     name: str
     target: str | None
     effect: Any
+    hinge: bool = False
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         """The fitted parameters whose nominal value means no effect, i.e. all but the scanned shapes."""
-        return tuple(p for p in fitted(self.effect) if not p.scan)
+        return tuple(p for p in fitted(self) if not p.scan)
 
     @property
     def shapes(self) -> tuple[Parameter, ...]:
         """The scanned parameters."""
-        return tuple(p for p in fitted(self.effect) if p.scan)
+        return tuple(p for p in fitted(self) if p.scan)
 
     @property
     def label(self) -> str:
@@ -44,9 +48,13 @@ class CandidateCause:
         return f"{self.name}({self.target})" if self.target else self.name
 
 
-def fitted(effect: Any) -> tuple[Parameter, ...]:
+def fitted(candidate: CandidateCause) -> tuple[Parameter, ...]:
     """The parameters in which an effect is fitted; those of its file unless it says otherwise."""
-    return tuple(getattr(effect, "FITTED", effect.PARAMETERS))
+    effect = candidate.effect
+    if hasattr(effect, "SOUGHT"):
+        return tuple(effect.SOUGHT.get(candidate.target, ()))
+    own = getattr(effect, "FITTED", effect.PARAMETERS)
+    return tuple(getattr(effect, "ROTARY", own) if candidate.hinge else own)
 
 
 def public_values(effect: Any, values: Mapping[str, float]) -> dict[str, float]:
@@ -79,6 +87,8 @@ class Bench:
     solved: list[Solved] = field(default_factory=list)
     slopes: list[Slopes] = field(default_factory=list)
     nominal: list[Reading] = field(default_factory=list)
+    # of candidates at nominal, worked out before: parameters, then runs (n, c)
+    columns: dict[tuple[Any, ...], list[list[Floats]]] = field(default_factory=dict)
     _row_slopes: dict[int, Floats] = field(default_factory=dict)
     _out: list[Bools] = field(default_factory=list)
     # structures of changed machines, by run and change
@@ -195,9 +205,7 @@ def thinned(values: Floats, factor: int) -> Floats:
 
 def cause_of(candidate: CandidateCause, coordinates: Mapping[str, float]) -> Cause:
     """The cause at fitting coordinates by parameter name; what is missing is nominal."""
-    values = {
-        p.name: p.value(coordinates.get(p.name, 0.0 if not p.scan else p.nominal)) for p in fitted(candidate.effect)
-    }
+    values = {p.name: p.value(coordinates.get(p.name, 0.0 if not p.scan else p.nominal)) for p in fitted(candidate)}
     return Cause(candidate.name, candidate.effect, candidate.target, public_values(candidate.effect, values))
 
 

@@ -18,6 +18,8 @@ from camcomp.diagnosis.statistics.evidence import Prior
 from camcomp.ground import shelf
 from camcomp.ground.datatypes import Floats, Ints
 from camcomp.ground.errors import ConfigError
+from camcomp.ground.headway import steps
+from camcomp.model.axes import slides_of
 from camcomp.model.effect import Cause, Load
 from camcomp.model.statics.description import Link, Parallelogram, Robot
 
@@ -35,14 +37,21 @@ _EDIT = 0.05  # step of the allowances' differences
 FORCE_TURN_RAD = 0.005  # direction of the cutting force in the plane of the work
 
 
-def candidate_causes(actuators: Sequence[str], without: Sequence[str] = ()) -> list[CandidateCause]:
-    """All causes that the shelf knows for a machine with these actuators."""
+def candidate_causes(robot: Robot, without: Sequence[str] = ()) -> list[CandidateCause]:
+    """All causes that the shelf knows for a machine."""
+    cartesian = {axis for axis, _, _ in slides_of(robot)} == {0, 1, 2}
     found: list[CandidateCause] = []
     for name, effect in shelf.usable("effects", ("none", *without)):
-        if getattr(effect, "ARM_ONLY", False):
+        if getattr(effect, "ARM_ONLY", False) or not effect.PARAMETERS:
             continue
         if effect.TARGET in ("actuator", "either"):
-            found += [CandidateCause(name, a, effect) for a in actuators]
+            found += [
+                CandidateCause(name, a.name, effect, a.revolute)
+                for a in robot.actuators
+                if not (a.revolute and getattr(effect, "SLIDES_ONLY", False))
+            ]
+        if effect.TARGET == "named" and (cartesian or not getattr(effect, "SLIDES_ONLY", False)):
+            found += [CandidateCause(name, each, effect) for each in getattr(effect, "SOUGHT", effect.TARGETS)]
         if effect.TARGET in ("machine", "either"):
             found.append(CandidateCause(name, None, effect))
     return found
@@ -97,6 +106,9 @@ class Columns:
 
 def candidate_columns(bench: Bench, candidate: CandidateCause, shape: Mapping[str, float]) -> list[list[Floats]]:
     """Columns at nominal of an candidate's parameters, per run (n, c), in units of their scales; shape: scanned values."""
+    key = (candidate.label, *sorted(shape.items()))
+    if key in bench.columns:
+        return bench.columns[key]
     out = []
     for p in candidate.parameters:
         after = cause_of(candidate, {**shape, p.name: step_of(p)})
@@ -105,6 +117,8 @@ def candidate_columns(bench: Bench, candidate: CandidateCause, shape: Mapping[st
             change = bench.channels(k, bench.read(k, [after])) - bench.channels(k, bench.nominal[k])
             per_run.append(thinned(change * (p.scale / step_of(p)), run.thin))
         out.append(per_run)
+    if not candidate.shapes:
+        bench.columns[key] = out
     return out
 
 
@@ -139,15 +153,19 @@ def build(
         flexible.append(float(loose))
         parts.append(per_run)
 
-    for i, candidate in enumerate(candidates):
+    for i, candidate in enumerate(steps(candidates, len(candidates))):
         for p, per_run in zip(
             candidate.parameters,
             candidate_columns(bench, candidate, shapes.get(i, shape_default(candidate))),
             strict=True,
         ):
             healthy = min(HEALTHY * floor_um / max(tip_um(bench, per_run), 1e-9), MOST_HEALTHY)
+            if any(each.placed for each in candidate.shapes):  # nothing happens for a while to every healthy machine
+                healthy = p.tolerance / p.scale
             put(i, f"{candidate.label}.{p.name}", healthy, per_run, p.sign, True)
     for name, size, per_run, loose in _nuisances(bench):
+        if name.startswith("spring."):  # a soft machine has no more of it than of anything else
+            size = min(size, HEALTHY * floor_um / max(tip_um(bench, per_run), 1e-9))
         put(-1, name, size, per_run, 0, loose)
     blocks = tuple(np.stack([each[r] for each in parts], axis=2) for r in range(len(bench.runs)))
     k = len(owner)

@@ -16,6 +16,8 @@ from camcomp.model.effect import Motion
 _KNOTS = 12  # hats along the travel of an actuator
 _PLACES = 20  # hats along an axis of the workpiece: a bump of a tenth of the travel is still seen
 _MOMENTS = 24  # hats along the time of all runs
+_MOVES = 1e-3  # of the highest speed, from which on something moves
+_LEAST_SPAN_MM = 1e-3  # of an axis of the workpiece on which something can depend on it
 _RELAX_MM = (0.5, 3.0)
 KINDS = ("tip", "encoder", "drive", "dyno")
 
@@ -116,7 +118,7 @@ def _of_time(g: Ground, size: _Sizes) -> dict[str, list[Floats]]:
 def _of_direction(g: Ground) -> list[Floats]:
     """Functions (n,) of the feed direction in the plane of the workpiece."""
     speed = np.linalg.norm(g.velocity, axis=1)
-    moving = speed > 1e-3 * max(float(speed.max()), 1e-9)
+    moving = speed > _MOVES * max(float(speed.max()), 1e-9)
     angle = np.arctan2(g.velocity[:, 1], g.velocity[:, 0])
     return [np.where(moving, f(k * angle), 0.0) for k in (1, 2) for f in (np.cos, np.sin)]
 
@@ -192,7 +194,7 @@ def dictionary(grounds: Sequence[Ground], actuators: Sequence[str]) -> list[Dict
     places = np.concatenate([g.tip for g in grounds])
     low, span = places.min(axis=0), np.ptp(places, axis=0)
     for axis, name in enumerate("xyz"):
-        if not found["tip"] or span[axis] < 1e-3:
+        if not found["tip"] or span[axis] < _LEAST_SPAN_MM:
             continue
         per_place = [hats((g.tip[:, axis] - low[axis]) / span[axis], places_of) for g in grounds]
         for i in range(places_of):

@@ -9,7 +9,8 @@ import numpy as np
 from camcomp.diagnosis.fit.bench import Bench, CandidateCause, cause_of, step_of, thinned
 from camcomp.diagnosis.fit.columns import Columns, build, candidate_columns, patterns, shape_default
 from camcomp.diagnosis.fit.floor import NoiseFloor, least_noise, measure_floor
-from camcomp.diagnosis.fit.grid_parameters import beside, best_shape, reach
+from camcomp.diagnosis.fit.grid_parameters import beside, best_shape, quick_columns, reach
+from camcomp.diagnosis.fit.intervals_in_time import LOOK_ELSEWHERE, best_interval
 from camcomp.diagnosis.fit.noise import inflation, instrument_noise, less_certain
 from camcomp.diagnosis.fit.outliers import outlying, tails
 from camcomp.diagnosis.fit.patterns import Dictionary
@@ -17,12 +18,14 @@ from camcomp.diagnosis.statistics.cause_sets import CausePrior, Fitted, Members,
 from camcomp.diagnosis.statistics.evidence import Gram, Prior, estimate, gram
 from camcomp.diagnosis.statistics.noise_model import Noise
 from camcomp.ground.datatypes import Bools, Floats
+from camcomp.ground.errors import PhysicsError
 from camcomp.model.effect import Cause, Parameter
 from camcomp.model.motion.twin import Reading
 from camcomp.model.signal_path import stages_of
 
 BENT = 9.0  # chi-square by which the model may miss a straight line before all columns are worked out anew
 SETTLED = 0.05  # chi-square that one more pass may cost
+HALVED = 6  # times that a step is halved which no machine can take
 STRAIGHT = 0.3  # chi-square that the bend of the model may cost before it is followed
 
 
@@ -93,8 +96,7 @@ class Problem:
         bent = False
         passes += 1 if shapes else 0
         for step in range(passes):
-            causes = self.causes(members, theta, shapes)
-            readings = [self.bench.read(k, causes) for k in range(len(self.bench.runs))]
+            theta, readings = self._readings(members, theta, shapes)
             now = [self.whitened(k, self.bench.difference(k, r)[:, :, None])[:, 0] for k, r in enumerate(readings)]
             bend = self._bend(now, index, theta)
             if step == 0 and not shapes and bend < STRAIGHT:
@@ -111,7 +113,7 @@ class Problem:
             change = after - theta
             theta = after
             size = float(change @ np.linalg.solve(full[np.ix_(index, index)] + 1e-18 * np.eye(len(index)), change))
-            if shapes and step < passes - 1:
+            if self.shapes_of(members) and step < passes - 1:
                 size = self._move_shapes(members, theta, shapes, left, white, mean)
             if step > 0 and size < SETTLED:
                 break
@@ -120,6 +122,19 @@ class Problem:
         mean, full = estimate(total(grams), self.prior, index, factor)
         theta, covariance = self._bounded(members, mean[index]), full[np.ix_(index, index)]
         return Fitted(members, theta, covariance, scale(members), grams, shapes, factor, tuple(white), tuple(left))
+
+    def _readings(
+        self, members: Members, theta: Floats, shapes: Mapping[int, Mapping[str, float]]
+    ) -> tuple[Floats, list[Reading]]:
+        """Readings of all runs, and the coordinates that they are of: halved as often as no machine stands at what was asked for."""
+        for _ in range(HALVED):
+            causes = self.causes(members, theta, shapes)
+            try:
+                return theta, [self.bench.read(k, causes) for k in range(len(self.bench.runs))]
+            except PhysicsError:
+                theta = 0.5 * theta
+        causes = self.causes(members, theta, shapes)
+        return theta, [self.bench.read(k, causes) for k in range(len(self.bench.runs))]
 
     def theta_without(self, f: Fitted, k: int) -> Floats:
         """The members' coordinates fitted without run k, about the fit to all runs."""
@@ -213,8 +228,12 @@ class Problem:
         return [self.whitened(k, np.stack([m[k] for m in moved], axis=2)) for k in range(len(readings))]
 
     def shapes_of(self, members: Members) -> list[tuple[int, Parameter]]:
-        """(candidate, shape) of a set in order."""
-        return [(i, p) for i in members for p in self.columns.candidates[i].shapes]
+        """(candidate, shape) of a set in order; instants are not refined."""
+        return [(i, p) for i in members for p in self.columns.candidates[i].shapes if not p.placed]
+
+    def passing(self, i: int) -> bool:
+        """Whether a candidate acts for a while only: other runs tell nothing of it."""
+        return any(p.placed for p in self.columns.candidates[i].shapes)
 
     def row_places(self, k: int) -> Floats:
         """Where in the time of run k each white row (w,) lies, 0 to 1."""
@@ -316,7 +335,8 @@ def cause_prior(columns: Columns) -> CausePrior:
         share = (
             1.0 / len(same) if not common or len(same) == 1 else (0.5 if a.target is None else 0.5 / (len(same) - 1))
         )
-        weight.append(np.log(share / len(names)))
+        sought = LOOK_ELSEWHERE if any(p.placed for p in a.shapes) else 0.0
+        weight.append(np.log(share / len(names)) - sought)
 
     def exclusive(i: int, j: int) -> bool:
         a, b = columns.candidates[i], columns.candidates[j]
@@ -332,10 +352,18 @@ def _scan(problem: Problem) -> Columns:
     rest = beside(problem.base_grams, problem.white, problem.white_residual, problem.columns, others)
     changed: dict[int, list[Floats]] = {}
     for i in problem.shapes:
-        best = best_shape(problem.bench, problem.columns.candidates[i], rest, problem.whitened)
+        candidate = problem.columns.candidates[i]
+        if problem.passing(i):
+            never_ends = dict(zip((p.name for p in candidate.shapes), (-1e9, 1e9), strict=True))
+            always = quick_columns(problem.bench, candidate, never_ends)
+            if always is None:
+                continue
+            best = best_interval(problem.bench, candidate, always[0], rest, problem.whitened, problem.row_places)
+        else:
+            best = best_shape(problem.bench, candidate, rest, problem.whitened)
         if best is None:
             continue
         problem.shapes[i] = best
-        columns = candidate_columns(problem.bench, problem.columns.candidates[i], best)
+        columns = candidate_columns(problem.bench, candidate, best)
         changed.update(zip(problem.candidates.columns[i], columns, strict=True))
     return problem.columns.with_blocks(changed)

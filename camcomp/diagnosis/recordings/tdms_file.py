@@ -50,15 +50,19 @@ def _remarks_of(nptdms: Any) -> Iterator[list[str]]:
     remarks: list[str] = []
     handler = logging.Handler()
     handler.emit = lambda record: remarks.append(record.getMessage()[:120])  # type: ignore[method-assign]
-    logger, manager = logging.getLogger("nptdms"), nptdms.log.log_manager
+    manager = nptdms.log.log_manager
     manager.console_handler.setLevel(logging.CRITICAL)
-    for name in [each for each in logging.root.manager.loggerDict if each.split(".")[0] == "nptdms"]:
-        logging.getLogger(name).disabled = False  # other libraries silence all that were there before them
-    logger.addHandler(handler)
+    silenced = logging.root.manager.disable
+    logging.disable(logging.NOTSET)  # other libraries silence everybody, or all that were there before them
+    for logger in manager.loggers.values():
+        logger.disabled = False
+        logger.addHandler(handler)
     try:
         yield remarks
     finally:
-        logger.removeHandler(handler)
+        for logger in manager.loggers.values():
+            logger.removeHandler(handler)
+        logging.disable(silenced)
         manager.console_handler.setLevel(manager.log_level)
 
 

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from camcomp.diagnosis.result.types import DiagnosisResult, Estimate, GapSize, NamedCause
+from camcomp.diagnosis.report.words import depends, micrometres, percent, plain, remedy, sizes
+from camcomp.diagnosis.result.types import UNKNOWN, DiagnosisResult, GapSize, Law, NamedCause
 from camcomp.report.plot import brief
+
+HALF = 0.5  # of what is left: what goes with less is told only where nothing goes with more
+MOST_CAUSES = 3  # that the terminal tells
 
 
 def cause_name(cause: NamedCause) -> str:
@@ -18,15 +22,15 @@ def verdict_text(result: DiagnosisResult) -> str:
     gap, shrink = result.gap, result.shrinkage
     floor = floor_text(gap)
     told = (
-        f"On runs that the fit has not seen the gap goes from {brief(shrink.before_rms_um)} µm to "
-        f"{brief(shrink.after_rms_um)} µm (rms); the noise floor is {floor}."
+        f"On runs that the fit has not seen the gap goes from {micrometres(shrink.before_rms_um)} to "
+        f"{micrometres(shrink.after_rms_um)} (rms); the noise floor is {floor}."
         if shrink
         else f"There is no run that the fit has not seen; the noise floor is {floor}."
     )
     known = [cause_name(each) for each in result.known]
     if result.verdict == "none":
         return (
-            f"Measurement and model differ by {brief(gap.rms_um)} µm (rms), which is the noise floor of {floor}: there "
+            f"Measurement and model differ by {micrometres(gap.rms_um)} (rms), which is the noise floor of {floor}: there "
             "is nothing to explain."
         )
     if result.verdict == "identified":
@@ -35,14 +39,18 @@ def verdict_text(result: DiagnosisResult) -> str:
         sets = [together([cause_name(each) for each in one]) or "nothing but noise" for one in result.alternatives]
         return f"These runs cannot tell apart: {'; or '.join(sets)}. {told}"
     rest = f" {together(known)} {'are' if len(known) > 1 else 'is'} identified." if known else ""
-    drivers = ", ".join(each.covariate for each in result.where.drivers[:3])
-    what = f" The rest depends on {drivers}." if drivers else ""
+    drivers = [depends(each) for each in result.where.drivers if each.share >= HALF][:2] or [
+        depends(each) for each in result.where.drivers[:1]
+    ]
+    unknown = next((each for each in result.causes if each.effect == UNKNOWN), None)
+    aimed = f" of {unknown.target}" if unknown is not None and unknown.target else ""
+    what = f" The rest{aimed} depends on {together(drivers)}." if drivers else ""
     return f"Something is at work that no effect of the library explains.{rest}{what} {told}"
 
 
 def floor_text(gap: GapSize) -> str:
     """The noise floor, or that nothing tells it."""
-    return "not known" if gap.noise_floor_um is None else f"{brief(gap.noise_floor_um)} µm"
+    return "not known" if gap.noise_floor_um is None else micrometres(gap.noise_floor_um)
 
 
 def together(names: Sequence[str]) -> str:
@@ -50,21 +58,38 @@ def together(names: Sequence[str]) -> str:
     return ", ".join(names[:-1]) + " and " + names[-1] if len(names) > 1 else "".join(names)
 
 
-def parameter_text(name: str, each: Estimate) -> str:
-    """A value with its 95 % interval."""
-    low, high = each.ci95
-    return f"{name} = {brief(each.value, 4)} ({brief(low, 4)} to {brief(high, 4)})"
+def told_chance(probability: float) -> str:
+    """A probability that is worth a word; nothing where there is no doubt."""
+    return "" if probability > 0.995 else f", probability {100 * probability:.0f} %"
+
+
+def law_lines(law: Law) -> list[str]:
+    """A law in a few lines: what it says, the formula with the size of every term, where it was seen, what it takes away."""
+    seen = ", ".join(f"{name} {brief(low, 4)} to {brief(high, 4)}" for name, (low, high) in law.envelope.items())
+    gone = f"from {brief(law.before_rms_um)} µm to {brief(law.after_rms_um)} µm"
+    lines = [f"{law.says} On parts of the data that it was not fitted to it takes the gap {gone} (rms).", law.formula]
+    if law.kind == "formula":
+        for each in law.terms:
+            low, high = each.ci95
+            lines.append(f"{each.term}: {brief(each.value, 4)} {each.unit} ({brief(low, 4)} to {brief(high, 4)})")
+    return [*lines, f"seen for {seen}"] if seen else lines
 
 
 def answer_lines(result: DiagnosisResult) -> list[str]:
-    """The answer in a few lines: verdict, causes with their values, what to measure next."""
+    """The answer in ten lines at most: verdict, causes with their sizes and what to do, what to measure next."""
     lines = [f"{result.verdict}: {verdict_text(result)}"]
-    for cause in result.causes:
-        share, chance = f"{100 * cause.share:.0f} % of the gap", f"probability {100 * cause.probability:.1f} %"
-        lines.append(f"  {cause_name(cause)}: {share}, {chance}")
-        lines += [f"    {parameter_text(name, each)}" for name, each in cause.parameters.items()]
+    for cause in result.known[:MOST_CAUSES]:
+        size = f"; {found}" if (found := sizes(cause)) else ""
+        share = f"{percent(cause.share)} of the gap{told_chance(cause.probability)}"
+        lines.append(f"  {cause_name(cause)}: {plain(cause)}{size}; {share}")
+        if result.verdict != "ambiguous" and (what := remedy(cause)):
+            lines.append(f"    do: {what}")
+    if more := result.known[MOST_CAUSES:]:
+        lines.append(f"  and {len(more)} more with {percent(sum(each.share for each in more))} of the gap together")
+    if law := result.law:
+        lines += [f"  {each}" for each in law_lines(law)]
     shrink = result.shrinkage
-    if result.causes and shrink:
+    if result.known and shrink:
         low, high = shrink.ci95
         lines.append(f"  removed on unseen runs: {100 * shrink.ratio:.0f} % ({100 * low:.0f} to {100 * high:.0f} %)")
     if proposal := result.next_experiment:

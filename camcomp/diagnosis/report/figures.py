@@ -41,30 +41,53 @@ def figure_ladder(shrink: UnseenShrinkage, floor: float | None) -> Figure:
     )
 
 
-def figure_run(view: RunView, number: int, floor: float | None, *, along: str) -> Figure:
-    """The gap of one run along time or path, before and after."""
+def figure_signed(view: RunView, number: int) -> Figure:
+    """The gap of one run along time with its sign, channel by channel, before and after."""
+    index = thin(np.column_stack((view.before, view.after)))
+    x = numbers(view.time[index], 4)
+    curves = []
+    for c, channel in enumerate(view.channels):
+        color = STYLES[c % len(STYLES)][0]
+        for name, values, dash in (("before", view.before, "solid"), ("with the causes found", view.after, "dot")):
+            style = {"color": color, "dash": dash, "width": 2 if dash == "solid" else 1.5}
+            curves.append(line(f"{channel}, {name}", x, numbers(values[index, c], 3), c) | {"line": style})
+    means = [float(np.nanmean(each)) if np.isfinite(each).any() else 0.0 for each in view.before.T]
+    words = ", ".join(f"{channel} {brief(mean)} µm" for channel, mean in zip(view.channels, means, strict=True))
+    return Figure(
+        f"time-{number}",
+        f"Run {view.name}: gap along the time, with its sign",
+        f"Measured minus modelled in each direction; mean before: {words}. {_told(view)}",
+        f"Plot of the signed gap of run {view.name} along the time; mean before: {words}.",
+        curves,
+        {"xaxis": axis("time in s"), "yaxis": axis("gap in µm", zerolinecolor=INK)},
+    )
+
+
+def figure_size(view: RunView, number: int, floor: float | None) -> Figure:
+    """The size of the gap of one run along its path, before and after."""
     before, after = view.sizes
     index = thin(np.column_stack((before, after)))
-    where = view.time if along == "time" else view.path
-    unit = "time in s" if along == "time" else "path length in mm"
-    x = numbers(where[index], 4)
+    x = numbers(view.path[index], 4)
     curves = [
         line("before", x, numbers(before[index], 3), 0),
         line("with the causes found", x, numbers(after[index], 3), 1),
     ]
     if floor is not None:
-        curves.append(level("noise floor", [float(where[0]), float(where[-1])], floor))
+        curves.append(level("noise floor", [float(view.path[0]), float(view.path[-1])], floor))
     words = f"rms {brief(rms(before))} µm before, {brief(rms(after))} µm with the causes found"
-    told = "not used for the fit" if view.held_out else "used for the fit"
     return Figure(
-        f"{along}-{number}",
-        f"Run {view.name}: gap along the {along}",
-        f"Size of measured minus modelled: {words}. This run was {told}.",
-        f"Plot of the gap of run {view.name} along the {along}: {words}.",
+        f"path-{number}",
+        f"Run {view.name}: size of the gap along the path",
+        f"Size of measured minus modelled: {words}. {_told(view)}",
+        f"Plot of the size of the gap of run {view.name} along the path: {words}.",
         curves,
-        {"xaxis": axis(unit), "yaxis": axis("gap in µm", rangemode="tozero")},
+        {"xaxis": axis("path length in mm"), "yaxis": axis("gap in µm", rangemode="tozero")},
         height=300,
     )
+
+
+def _told(view: RunView) -> str:
+    return f"This run was {'not used for the fit' if view.held_out else 'used for the fit'}."
 
 
 def figure_map(views: Sequence[RunView]) -> Figure:

@@ -2,22 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
-from camcomp.diagnosis.report.answer import cause_name, floor_text, parameter_text, together, verdict_text
+from numpy.typing import NDArray
+
+from camcomp.diagnosis.report.answer import cause_name, floor_text, together, told_chance, verdict_text
+from camcomp.diagnosis.report.circles import circles_section
 from camcomp.diagnosis.report.figures import (
     figure_causes,
     figure_ladder,
     figure_map,
     figure_rivals,
-    figure_run,
     figure_shares,
+    figure_signed,
+    figure_size,
     figure_spectrum,
 )
+from camcomp.diagnosis.report.joints import joints_section
+from camcomp.diagnosis.report.law_section import LawView, law_section
 from camcomp.diagnosis.report.run_view import RivalSignals, RunView, rms
-from camcomp.diagnosis.result.types import DiagnosisResult, NextExperiment, UnseenShrinkage, Where
+from camcomp.diagnosis.report.words import micrometres, percent, plain, remedy, sizes
+from camcomp.diagnosis.result.types import UNKNOWN, DiagnosisResult, NextExperiment, UnseenShrinkage, Where
 from camcomp.report.inputs import Input, inputs_section
-from camcomp.report.page import Page, Section, Table, render
+from camcomp.report.page import Listing, Page, Section, Table, render
 from camcomp.report.plot import brief
 
 MOST_RUNS = 4
@@ -26,6 +34,13 @@ ALIKE_TEXT = (
     "Each of these sets explains the logs as well as the others. They stay together because, in the runs that were made, "
     "they do the same to what was measured: the same columns, the same places, the same times."
 )
+NOTHING_TO_DO = "Nothing: machine and model agree as far as these runs can tell."
+WAIT = "Repair nothing yet: these runs cannot tell which of the causes it is. The next experiment below is made to decide it."
+COMPENSATE = (
+    "What stays after a repair can be compensated: camcomp diagnose --write-config writes the machine file with these causes "
+    "in it, and compensate then takes them out of every program."
+)
+LOOK = "Part of the gap is none of the effects that camcomp knows; below stands where it shows and what it goes with."
 WORDS = {"none": "No gap", "identified": "Identified", "ambiguous": "Ambiguous", "unknown": "Unknown cause"}
 
 
@@ -38,31 +53,40 @@ def diagnosis_html(
     inputs: Sequence[Input] = (),
     notes: Sequence[str] = (),
     rivals: Sequence[RivalSignals] = (),
+    next_program: str | None = None,
+    law: LawView | None = None,
+    residuals: Mapping[str, NDArray[Any]] | None = None,
 ) -> bytes:
     """One HTML file. result: of any kind of study; views: runs to draw, those held out of the fit first.
 
     rivals: sets of causes that explain the logs alike, the most probable first, with what each does to the runs of
-    `views`. Raises ConfigError CC216 when the plot library is not installed.
+    `views`. next_program: NC text of the proposed experiment. law: what the law of an unknown effect explains. residuals: rows
+    of poses, as `--residuals` writes them. Raises ConfigError CC216 when the plot library is not installed.
     """
     seen = [view for view in views if view.held_out] or list(views)
     seen = sorted(seen, key=lambda view: -rms(view.sizes[0]))
     floor = result.gap.noise_floor_um
     sections = [Section("notes", "Notes", items=notes)] if notes else []
+    sections.append(_to_do(result, next_program))
+    if (circles := circles_section(views)) is not None:
+        sections.append(circles)
     sections.append(_causes(result))
+    if result.law is not None:
+        sections.append(law_section(result.law, law))
     if len(result.alternatives) > 1:
         sections.append(_apart(result, rivals, views))
     if result.shrinkage and result.shrinkage.steps:
         ladder = figure_ladder(result.shrinkage, floor)
         sections.append(Section("shrinkage", "How far the gap shrinks", [_shrinkage(result.shrinkage)], [ladder]))
-    if result.next_experiment:
-        sections.append(_next(result.next_experiment))
+    if (joints := joints_section(result, residuals)) is not None:
+        sections.append(joints)
     shown = seen[:MOST_RUNS]
     if shown:
         left_out = len(seen) - len(shown)
         text = [f"The {len(shown)} runs with the largest gap; {left_out} more are not drawn."] if left_out else []
         sections += [
-            Section("time", "Gap along the time", text, [figure_run(v, i, floor, along="time") for i, v in enumerate(shown, 1)]),
-            Section("path", "Gap along the path", text, [figure_run(v, i, floor, along="path") for i, v in enumerate(shown, 1)]),
+            Section("time", "Gap along the time", text, [figure_signed(v, i) for i, v in enumerate(shown, 1)]),
+            Section("path", "Gap along the path", text, [figure_size(v, i, floor) for i, v in enumerate(shown, 1)]),
             Section("map", "On the workpiece", figures=[figure_map(seen)]),
         ]  # fmt: skip
     sections.append(_where(result.where, shown))
@@ -84,14 +108,14 @@ def diagnosis_html(
 def _cards(result: DiagnosisResult) -> list[tuple[str, str, str]]:
     gap = result.gap
     cards = [
-        ("Gap", f"{brief(gap.rms_um)} µm", f"rms; 95 % below {brief(gap.p95_um)} µm, max {brief(gap.max_um)} µm"),
+        ("Gap", micrometres(gap.rms_um), f"rms; 95 % below {micrometres(gap.p95_um)}, max {micrometres(gap.max_um)}"),
         ("Noise floor", floor_text(gap), "what no model can explain"),
     ]
     if shrink := result.shrinkage:
         low, high = shrink.ci95
         interval = f"95 % interval {100 * low:.1f} to {100 * high:.1f} %"
         cards += [
-            ("Gap on unseen runs", f"{brief(shrink.after_rms_um)} µm", f"was {brief(shrink.before_rms_um)} µm"),
+            ("Gap on unseen runs", micrometres(shrink.after_rms_um), f"was {micrometres(shrink.before_rms_um)}"),
             ("Part of the gap removed", f"{100 * shrink.ratio:.1f} %", interval),
         ]
     return [*cards, ("Stage", result.where.stage, "where in the machine")]
@@ -103,10 +127,8 @@ def _causes(result: DiagnosisResult) -> Section:
         return Section("causes", "Causes", ["None: the gap is at the noise floor."])
     rows = []
     for i, cause in enumerate(causes, 1):
-        values = "; ".join(parameter_text(name, each) for name, each in cause.parameters.items())
         rows.append([
-            str(i), cause.effect, cause.target or "–", f"{100 * cause.probability:.1f} %", f"{100 * cause.share:.1f} %",
-            values,
+            str(i), cause.effect, cause.target or "–", f"{100 * cause.probability:.1f} %", percent(cause.share), sizes(cause),
         ])  # fmt: skip
     heads = ("rank", "effect", "target", "probability", "share of the gap", "parameters with 95 % intervals")
     return Section(
@@ -128,18 +150,40 @@ def _shrinkage(shrink: UnseenShrinkage) -> str:
     )
 
 
-def _next(proposal: NextExperiment) -> Section:
-    separates = together(proposal.separates)
-    text = [proposal.action]
+def _to_do(result: DiagnosisResult, next_program: str | None) -> Section:
+    """What to do about each cause, and what to measure next."""
+    rows: list[Row] = []
+    for cause in result.known:
+        share = percent(cause.share) + told_chance(cause.probability)
+        rows.append([f"{cause_name(cause)}: {plain(cause)}", sizes(cause), share, remedy(cause)])
+    tables = [Table("Causes and what helps", ("cause", "size", "share of the gap", "what to do"), rows)] if rows else []
+    text = [NOTHING_TO_DO] if result.verdict == "none" else []
+    if result.verdict == "ambiguous":
+        text.append(WAIT)
+    elif result.known:
+        text.append(COMPENSATE)
+    if any(each.effect == UNKNOWN for each in result.causes):
+        text.append(LOOK)
+    listings = []
+    if result.next_experiment:
+        text += _next(result.next_experiment)
+        if next_program is not None:
+            listings.append(Listing("next-experiment.nc", next_program))
+    return Section("do", "What to do", text, tables=tables, listings=listings)
+
+
+def _next(proposal: NextExperiment) -> list[str]:
+    text = [f"Measure next: {proposal.action}"]
     if "unknown" in proposal.separates:
-        text.append(
-            f"It changes what the unknown effect may depend on, and nothing else. Expected gain: {proposal.gain:.2f} bits."
-        )
-    elif separates:
+        return [
+            *text,
+            f"It changes what the unknown effect may depend on, and nothing else. Expected gain: {proposal.gain:.2f} bits.",
+        ]
+    if separates := together(proposal.separates):
         text.append(
             f"It separates {separates}. Expected gain: {proposal.gain:.2f} (0: none, 1: the question is settled)."
         )
-    return Section("next", "Next experiment", text)
+    return text
 
 
 def _where(where: Where, shown: Sequence[RunView]) -> Section:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from camcomp.ground.datatypes import Floats
+from camcomp.ground.datatypes import Floats, Path
 
 
 @dataclass(frozen=True, eq=False)
@@ -15,6 +15,8 @@ class RunView:
 
     time (n,) s; line (n,) source line, NaN where unknown; position (n, 3) mm modelled tip in the program frame; channels:
     names of the c columns. held_out: the causes were fitted without this run. NaN where nothing was measured.
+    commanded (n, 3): tip where the set-points lead, program frame; program: what the control was given; cutting: any row
+    was under a cutting force.
     """
 
     name: str
@@ -25,6 +27,9 @@ class RunView:
     before: Floats
     after: Floats
     channels: tuple[str, ...]
+    commanded: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+    program: Path | None = None
+    cutting: bool = False
 
     @property
     def sizes(self) -> tuple[Floats, Floats]:

@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import PurePath
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from camcomp.diagnosis.experiment.open_experiment import OpenExperiment
 from camcomp.diagnosis.fit.bench import Bench, Run, thinned
 from camcomp.diagnosis.fit.gap import main_channels
 from camcomp.diagnosis.fit.measured import channel_names
 from camcomp.diagnosis.fit.problem import Problem
+from camcomp.diagnosis.next_experiment.ready_program import ready_program
 from camcomp.diagnosis.report.answer import cause_name
+from camcomp.diagnosis.report.law_view import law_view
 from camcomp.diagnosis.report.page import diagnosis_html
 from camcomp.diagnosis.report.run_view import RivalSignals, RunView
 from camcomp.diagnosis.result.types import DiagnosisResult, NamedCause
 from camcomp.diagnosis.statistics.cause_sets import Fitted
 from camcomp.ground.datatypes import Floats
+from camcomp.ground.errors import CheckFailed
 from camcomp.ground.files import read_bytes
 from camcomp.model.config.load import load_config, load_experiment
 from camcomp.model.motion.twin import Twin
@@ -28,7 +34,13 @@ if TYPE_CHECKING:
     from camcomp.diagnosis.diagnose import Diagnosis
 
 
-def report_of(path: str, result: DiagnosisResult, done: Diagnosis | None, opened: OpenExperiment | None) -> bytes:
+def report_of(
+    path: str,
+    result: DiagnosisResult,
+    done: Diagnosis | None,
+    opened: OpenExperiment | None,
+    residuals: Mapping[str, NDArray[Any]] | None = None,
+) -> bytes:
     """The report of an experiment file. Without `done` (studies of logs that have no program) no runs are drawn."""
     experiment = load_experiment(path)
     inputs = [Input("experiment", str(path), read_bytes(path))]
@@ -39,7 +51,9 @@ def report_of(path: str, result: DiagnosisResult, done: Diagnosis | None, opened
         inputs.append(Input(f"log of {run.name}", run.log, read_bytes(run.log)))
     views: list[RunView] = []
     rivals: list[RivalSignals] = []
+    program = None
     if done is not None and opened is not None:
+        program = _next_program(done, opened)
         views = views_of(done, opened.twin, opened.runs, experiment.holdout)
         rivals = rivals_of(done)
     return diagnosis_html(
@@ -50,7 +64,20 @@ def report_of(path: str, result: DiagnosisResult, done: Diagnosis | None, opened
         inputs=inputs,
         notes=opened.notes if opened is not None else (),
         rivals=rivals,
+        next_program=program,
+        law=law_view(done.problem, done.law) if done is not None and done.law is not None else None,
+        residuals=residuals,
     )
+
+
+def _next_program(done: Diagnosis, opened: OpenExperiment) -> str | None:
+    """NC text of the proposed experiment, where there is one that the machine can run."""
+    if done.proposal is None:
+        return None
+    try:
+        return ready_program(done.proposal.candidate, opened.runs, opened.job, opened.twin)
+    except CheckFailed:
+        return None
 
 
 def views_of(done: Diagnosis, twin: Twin, runs: Sequence[Run], holdout: Sequence[str]) -> list[RunView]:
@@ -94,6 +121,8 @@ def _view(problem: Problem, bench: Bench, k: int, fit: Fitted, theta: Floats, *,
     causes = problem.causes(fit.members, theta, fit.extra)
     before = bench.gap(k)
     after = bench.gap(k, causes) if causes else before
+    path = run.run_path
+    told = path.row_place.of(path.node_tip) if path.driven is None else path.driven.tip
     return RunView(
         run.name,
         held_out,
@@ -102,5 +131,10 @@ def _view(problem: Problem, bench: Bench, k: int, fit: Fitted, theta: Floats, *,
         thinned(bench.nominal[k].tip, run.thin),
         MICRO * before[:, part],
         MICRO * after[:, part],
-        tuple(each.replace("_", " ") for each in channel_names(bench.actuators)[part]),
+        ("along the path", "across the path", "normal to both")
+        if run.turn is not None and part.start == 0
+        else tuple(each.replace("_", " ") for each in channel_names(bench.actuators)[part]),
+        commanded=thinned(bench.twin.to_program(told), run.thin),
+        program=run.program,
+        cutting=bool(np.any(path.row_force)),
     )

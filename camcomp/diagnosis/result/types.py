@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import Field
+from pydantic import Field, PrivateAttr
 
 from camcomp.ground.result import Result
 
@@ -61,6 +61,14 @@ class RippleDriver(Driver):
     backward_N: float
 
 
+class StretchDriver(Driver):
+    """A position on which the gap depends, and the stretch of travel where it stands out."""
+
+    low: float
+    high: float
+    unit: Literal["mm", "rad"]
+
+
 class DirectionShares(Result):
     """How the gap, as motion of one actuator, goes with its direction: not at all, turning round, close behind reversals."""
 
@@ -105,7 +113,7 @@ class Where(Result):
     actuators: dict[str, Share]
     lines: tuple[LineShare, ...] = ()
     intervals: tuple[IntervalShare, ...] = ()
-    drivers: tuple[RippleDriver | Driver, ...] = ()
+    drivers: tuple[RippleDriver | StretchDriver | Driver, ...] = ()
     travel: dict[str, DirectionShares] = Field(default_factory=dict)
     screws: tuple[ScrewLine, ...] = ()
     frequencies: tuple[FrequencyLine, ...] = ()
@@ -133,6 +141,33 @@ class FoundCause(NamedCause):
     share: Share
     parameters: dict[str, Estimate] = Field(default_factory=dict)
 
+    @property
+    def settings(self) -> dict[str, Any]:
+        """What a machine file says of it beside its parameters."""
+        return {}
+
+
+class ErrorCurve(Result):
+    """The error of a joint over its turn: at angles, with its deviation, and where some pose saw it."""
+
+    angle_deg: tuple[float, ...]
+    error_rad: Annotated[tuple[float, ...], Field(description="as it is taken out: 0 where nothing was seen")]
+    sd_rad: Annotated[tuple[float, ...], Field(description="one deviation; wide where nothing was seen")]
+    seen_deg: tuple[Pair, ...]
+    seen_share: Annotated[float, Field(description="of a turn")]
+
+
+class CurveCause(FoundCause):
+    """The error curve of a joint."""
+
+    curve: ErrorCurve
+    _settings: dict[str, Any] = PrivateAttr(default_factory=dict)
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """Shape of the curve, as YAML has it."""
+        return self._settings
+
 
 class LawTerm(Result):
     """A term of a law, with its coefficient."""
@@ -143,6 +178,19 @@ class LawTerm(Result):
     unit: str
 
 
+class LawPart(Result):
+    """An effect `formula` or `map` that puts a part of a law to work, key by key as in a machine file."""
+
+    effect: Literal["formula", "map"]
+    stage: Stage
+    target: str | None
+    axis: str | None
+    envelope: dict[str, Pair]
+    formula: str | None = None
+    over: tuple[str, ...] | None = None
+    coefficients_mm: tuple[float, ...] | tuple[tuple[float, ...], ...] | None = None
+
+
 class Law(Result):
     """What the unknown follows, and within which bounds that was seen."""
 
@@ -150,7 +198,12 @@ class Law(Result):
     on: Stage
     terms: tuple[LawTerm, ...]
     envelope: dict[str, Pair]
-    after_rms_um: float
+    after_rms_um: Annotated[float, Field(description="of the gap on parts of the data that it was not fitted to")]
+    before_rms_um: Annotated[float, Field(description="the same without it")] = 0.0
+    kind: Literal["formula", "map"] = "formula"
+    says: str = ""
+    alike: Annotated[tuple[str, ...], Field(description="terms that these data cannot tell from those found")] = ()
+    parts: Annotated[tuple[LawPart, ...], Field(description="what puts it to work in a machine file")] = ()
 
 
 class UnknownCause(FoundCause):
@@ -178,7 +231,19 @@ class UnseenShrinkage(Result):
     noise_floor_um: float | None = None
     ceiling_rms_um: Annotated[float | None, Field(description="left when the causes are fitted to these runs")] = None
     ceiling_ratio: float | None = None
+    covered_share: Annotated[
+        float | None, Field(description="of unseen poses of an arm: every joint at angles its error curve was seen at")
+    ] = None
+    covered_rms_um: Annotated[float | None, Field(description="left on these")] = None
     refitted: Annotated[tuple[str, ...], Field(description="what only the unseen runs themselves can tell")] = ()
+
+
+class PosesToMeasure(Result):
+    """Poses of an arm in the order of measuring: joints by name, rad (mm), and where the platform stands, machine frame."""
+
+    joints: tuple[str, ...]
+    positions: tuple[tuple[float, ...], ...]
+    platform_mm: tuple[tuple[float, float, float], ...]
 
 
 class NextExperiment(Result):
@@ -188,6 +253,10 @@ class NextExperiment(Result):
     separates: tuple[str, ...]
     gain: float
     minutes: float | None = None
+    outcomes: Annotated[tuple[str, ...], Field(description="what each outcome would mean, a sentence each")] = ()
+    poses: Annotated[
+        PosesToMeasure | None, Field(description="studies of arms: the list that --next-program writes")
+    ] = None
 
 
 class MinorEffect(NamedCause):
@@ -218,7 +287,7 @@ class DiagnosisResult(Result):
     verdict: Literal["none", "identified", "ambiguous", "unknown"]
     gap: GapSize
     where: Where
-    causes: tuple[UnknownCause | FoundCause, ...]
+    causes: tuple[UnknownCause | CurveCause | FoundCause, ...]
     alternatives: tuple[tuple[NamedCause, ...], ...] = ()
     shrinkage: UnseenShrinkage | None
     next_experiment: NextExperiment | None = None
@@ -229,6 +298,11 @@ class DiagnosisResult(Result):
         tuple[tuple[NamedCause, ...], ...], Field(description="causes that these runs cannot tell apart")
     ] = ()
     axes_in_detail: dict[str, dict[str, Any]] = Field(default_factory=dict, description="studies of axes: every fit")
+
+    @property
+    def law(self) -> Law | None:
+        """What the unknown follows, where that was found."""
+        return next((each.law for each in self.causes if isinstance(each, UnknownCause)), None)
 
     @property
     def known(self) -> tuple[FoundCause, ...]:

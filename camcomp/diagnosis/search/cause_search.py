@@ -2,11 +2,13 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 
 from camcomp.diagnosis.fit.gap import rest_by_actuator
 from camcomp.diagnosis.fit.problem import Problem
+from camcomp.diagnosis.search.established import MINOR, weakest
 from camcomp.diagnosis.search.indistinguishable import Likeness, likeness, stand_ins
 from camcomp.diagnosis.search.unexplained import Unexplained, size_um, unexplained, worst
 from camcomp.diagnosis.search.unknown import firm_prior, foretelling, residual_tests, signal_rms
@@ -23,14 +25,15 @@ from camcomp.diagnosis.statistics.cause_sets import (
 from camcomp.diagnosis.statistics.evidence import Gram, estimate
 from camcomp.diagnosis.statistics.score_test import ResidualTest
 from camcomp.diagnosis.statistics.verdict import Verdict, judge
+from camcomp.ground import headway
 from camcomp.ground.datatypes import Floats
 
 SINGLES, PAIRS, TRIPLES, MORE = 6, 6, 3, 3  # sets that are tried of each size; beyond three one is added at a time
 TEMPERATURE = (
     1.5  # what evidence is divided by before it becomes a probability, where the model is as good as its noise
 )
-MINOR = 0.3  # of the noise floor at the tip: what moves it by less is no cause, whatever its significance (contract, section 6)
 CANCELLING = 8.0  # size of a member, in units of the whole set, above which the set lives on differences of its members
+OPPOSED = 4.0  # the same of two members against both together
 BEYOND_DOUBT = (
     20.0  # log evidence of a member, all tolerances strained as far as they like, above which no run vetoes it
 )
@@ -42,6 +45,10 @@ GATE_LOCAL = 1.5  # of the floor: the same for what acts for a while only
 SURE_Z = 5.0  # standard deviations of chance
 LEAST_BESIDE = 0.4  # size in units of an unknown effect below which nothing is named beside it
 PART_OF_UNKNOWN = 2.0  # size in units of an unknown effect below which a cause at its place is taken for a part of it
+LARGE_SCALES = 3.0  # size of an effect, in its typical ones, that would show at least if it can be seen at all
+MOST_SCALES = 8.0  # the same that nobody believes of a stand-in
+HOPELESS_LOG = 12.0  # log evidence behind the best at which a set is not fitted any more
+LEAST_PROBABILITY = 0.02  # of a set whose foretelling is looked at
 POINTED = 0.85  # share of what is left that one actuator has to have to be that place
 
 
@@ -71,6 +78,7 @@ def search_causes(problem: Problem) -> CauseSearch:
                 index = problem.member_columns(members)
                 theta = estimate(total(near.grams), problem.prior, index)[0][index]
             done[members] = problem.refit(members, theta)
+            headway.done(len(done) / (SINGLES + PAIRS + TRIPLES))
         return done[members]
 
     def value(f: Fitted) -> float:
@@ -107,6 +115,7 @@ def search_causes(problem: Problem) -> CauseSearch:
     temperature = TEMPERATURE * overdispersion(problem, fits[0])
     probability = probabilities(fits, problem.candidates, temperature)
     fits, probability = _prune(problem, fits, probability)
+    fits, probability = _established(problem, fits, fit, temperature, probability)
     design = likeness(problem)
     fits, probability, same = _with_stand_ins(problem, design, fits, probability, fit, temperature)
     verdict = judge(fits, probability, same)
@@ -193,7 +202,7 @@ def _with_stand_ins(
 def visible(problem: Problem, i: int) -> bool:
     """Whether an effect of three scales would show at all in the channels present."""
     energy = sum(float((W[:, list(problem.candidates.columns[i])] ** 2).sum()) for W in problem.white)
-    return energy * 9.0 > 1.0
+    return energy * LARGE_SCALES**2 > 1.0
 
 
 def _matters(problem: Problem, f: Fitted) -> bool:
@@ -205,7 +214,10 @@ def _cancels(problem: Problem, f: Fitted) -> bool:
     """Whether members undo each other nearly: by chance that hardly happens, but a fit of what is unknown seeks it."""
     whole = signal_rms(problem, f)
     each = [signal_rms(problem, f, (i,)) for i in f.members]
-    return any(one[kind] > max(1.0, CANCELLING * whole[kind]) for one in each for kind in whole)
+    if any(one[kind] > max(1.0, CANCELLING * whole[kind]) for one in each for kind in whole):
+        return True
+    alone = {i: size_um(problem, f, (i,)) for i in f.members}
+    return any(min(alone[i], alone[j]) > OPPOSED * size_um(problem, f, (i, j)) for i, j in combinations(f.members, 2))
 
 
 def _same_name(problem: Problem, members: Members, every: list[int]) -> list[Members]:
@@ -217,7 +229,7 @@ def _same_name(problem: Problem, members: Members, every: list[int]) -> list[Mem
 def _fit_best(found, fit, count: int, best: float) -> None:  # type: ignore[no-untyped-def]
     tried: set[Members] = set()
     for v, members, near in sorted(found, key=lambda each: -each[0]):
-        if members in tried or v < best - 12.0 or len(tried) >= count:
+        if members in tried or v < best - HOPELESS_LOG or len(tried) >= count:
             continue
         tried.add(members)
         fit(members, near)
@@ -230,7 +242,7 @@ def _prune(problem: Problem, fits: tuple[Fitted, ...], probability: Floats) -> t
     keep = list(range(len(fits)))
     for j in list(np.argsort(-probability)[:4]):
         f = fits[j]
-        if not f.members or probability[j] < 0.02:
+        if not f.members or probability[j] < LEAST_PROBABILITY:
             continue
         less = [g.log_evidence for g in fits if set(g.members) < set(f.members)]
         if less and f.log_evidence - max(less) > BEYOND_DOUBT:
@@ -241,6 +253,22 @@ def _prune(problem: Problem, fits: tuple[Fitted, ...], probability: Floats) -> t
             keep.remove(j)
     kept = tuple(fits[j] for j in keep)
     return kept, probability[keep] / probability[keep].sum()
+
+
+def _established(
+    problem: Problem,
+    fits: tuple[Fitted, ...],
+    fit: Callable[[Members], Fitted],
+    temperature: float,
+    probability: Floats,
+) -> tuple[tuple[Fitted, ...], Floats]:
+    """The fits without leaders that have a member which may as well be minor; what they are without it takes their place."""
+    while (weak := weakest(problem, fits[best := int(np.argmax(probability))])) is not None:
+        less = fit(tuple(i for i in fits[best].members if i != weak))
+        fits = tuple(f for j, f in enumerate(fits) if j != best and f.members != less.members)
+        fits = (*fits, less)
+        probability = probabilities(fits, problem.candidates, temperature)
+    return fits, probability
 
 
 def _same(problem: Problem, fits: tuple[Fitted, ...], probability: Floats) -> list[tuple[Members, Members]]:
@@ -265,4 +293,4 @@ def misfit(problem: Problem, f: Fitted) -> float:
 
 def _plausible(problem: Problem, f: Fitted) -> bool:
     parameters = [p for i in f.members for p in problem.columns.candidates[i].parameters]
-    return all(abs(t) < 8.0 and (p.sign == 0 or t > 0) for t, p in zip(f.theta, parameters, strict=True))
+    return all(abs(t) < MOST_SCALES and (p.sign == 0 or t > 0) for t, p in zip(f.theta, parameters, strict=True))

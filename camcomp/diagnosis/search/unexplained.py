@@ -63,7 +63,10 @@ def _left(problem: Problem, f: Fitted, k: int) -> Floats:
     """Channels (n, c) of run k that the causes, fitted to the other runs, and the usual small errors leave."""
     bench = problem.bench
     several = len(bench.runs) >= FEW_RUNS
-    theta = problem.theta_without(f, k) if several else f.theta
+    passing = np.repeat(
+        [problem.passing(i) for i in f.members], [len(problem.candidates.columns[i]) for i in f.members]
+    ).astype(bool)
+    theta = np.where(passing, f.theta, problem.theta_without(f, k)) if several else f.theta
     left = bench.difference(k, bench.read(k, problem.causes(f.members, theta, f.extra)))
     index = problem.member_columns(f.members)
     usual = estimate(total(f.grams), problem.prior, index, 1.0)[0]
@@ -109,6 +112,8 @@ def _judged(problem: Problem, kind: str, at_tip: Sequence[Floats]) -> Unexplaine
         values = np.where(inflate < 3.0, values, np.nan)
         noise = np.array([row_scatter(x, t) for x in values.T])
         noise = np.where(np.isfinite(noise), noise, 0.0)
+        if kind == "encoder":  # no encoder is worse than the tip's instrument: what shakes from row to row is motion
+            noise = np.minimum(noise, problem.floor.axis_mm)
         for a in range(0, len(values), BLOCK):
             rows = values[a : a + BLOCK]
             count = np.isfinite(rows).sum(axis=0)

@@ -16,6 +16,7 @@ from camcomp.diagnosis.statistics.score_test import (
 )
 from camcomp.ground.datatypes import Floats, Ints
 
+SEEN_SHARE = 0.1  # of the energy of the run that shows a cause best, from which on a run says something about it
 CONFIRMED = 0.8  # share of its own signal that a cause beside an unknown one has to take away from unseen runs
 
 
@@ -86,9 +87,13 @@ def foretelling(problem: Problem, f: Fitted) -> Members:
         return members
     while members:
         now = _unforetold(problem, f, members)
+        if all(problem.passing(i) for i in members):
+            break
         own = [_own(problem, f, i) for i in members]
         gains = [
-            _gain(_unforetold(problem, f, tuple(each for each in members if each != i)), now, signal)
+            CONFIRMED
+            if problem.passing(i)
+            else _gain(_unforetold(problem, f, tuple(each for each in members if each != i)), now, signal)
             for i, signal in zip(members, own, strict=True)
         ]
         if min(gains) >= CONFIRMED:
@@ -102,7 +107,7 @@ def _gain(before: Mapping[str, Floats], after: Mapping[str, Floats], own: Mappin
     """Share of its own signal that a member takes away from unseen runs, in the kind of channel that shows it best."""
     kind = max(own, key=lambda each: float(own[each].sum()))
     change, whole = before[kind] - after[kind], own[kind]
-    seen = whole > 0.1 * whole.max(initial=0.0)
+    seen = whole > SEEN_SHARE * whole.max(initial=0.0)
     if not seen.any():
         return 0.0
     # no run may speak against it

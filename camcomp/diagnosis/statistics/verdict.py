@@ -28,19 +28,22 @@ def judge(fits: Sequence[Fitted], probability: Floats, twins: Sequence[tuple[Mem
     order = np.argsort(-probability)
     best = int(order[0])
     leader = fits[best]
-    inclusion: dict[int, float] = {}
-    for fit, p in zip(fits, probability, strict=True):
-        for i in fit.members:
-            inclusion[i] = inclusion.get(i, 0.0) + float(p)
-    if not leader.members:
-        return Verdict("none", best, (), inclusion)
-    rivals = []
-    for j in order[1:]:
+    rivals, twin = [], [best]
+    for j in order[1:] if leader.members else ():
         fit = fits[j]
-        alike = np.log(max(probability[best], 1e-300)) - np.log(max(probability[j], 1e-300)) < EQUAL_LOG_ODDS
-        alike = alike or (leader.members, fit.members) in twins or (fit.members, leader.members) in twins
+        same = (leader.members, fit.members) in twins or (fit.members, leader.members) in twins
+        alike = same or np.log(max(probability[best], 1e-300) / max(probability[j], 1e-300)) < EQUAL_LOG_ODDS
         # A set with a superfluous member, or one too few, is no rival but the same answer less well put.
         nested = set(fit.members) >= set(leader.members) or set(fit.members) <= set(leader.members)
         if alike and not nested and len(fit.members) <= len(leader.members):
             rivals.append(int(j))
-    return Verdict("ambiguous" if rivals else "identified", best, tuple(rivals), inclusion)
+            twin += [int(j)] if same else []
+    # what no data of this kind can tell apart is as probable as each other: a prior is no reason to believe in one
+    even = probability.copy()
+    even[twin] = probability[twin].mean()
+    inclusion: dict[int, float] = {}
+    for fit, p in zip(fits, even, strict=True):
+        for i in fit.members:
+            inclusion[i] = inclusion.get(i, 0.0) + float(p)
+    word = "none" if not leader.members else "ambiguous" if rivals else "identified"
+    return Verdict(word, best, tuple(rivals), inclusion)

@@ -1,0 +1,157 @@
+"""Which poses to measure next: those that tell most about what is still uncertain, chosen one by one and then exchanged.
+
+What a pose tells is its expected information about the effects of a linearised model, beside a frame of its own that the
+new campaign brings along (log det; Fedorov, Theory of Optimal Experiments, 1972), or, where poses of interest are given, by
+how much it narrows the error of the tip there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from camcomp.diagnosis.arm.curves import curved_joints, seen_angles
+from camcomp.diagnosis.arm.fit import ArmFit
+from camcomp.diagnosis.arm.poses import ArmBench, Poses
+from camcomp.ground.datatypes import Floats
+
+POSES = 40  # of a proposal: an hour with a tracker
+CANDIDATES = 400  # postures that are looked at
+EXCHANGES = 2  # rounds in which every pose may be exchanged for a better one
+FRAME = 10.0  # prior deviation of the new campaign's frame and target, in mm, and mm at ARM_MM for its turns
+ARM_MM = 1000.0
+POSES_SEED = 20201110  # the same answer twice
+
+
+@dataclass(frozen=True, eq=False)
+class Design:
+    """Poses chosen, as indices of the candidates in the order of choice, and their information (nats)."""
+
+    chosen: tuple[int, ...]
+    gain: float
+
+
+def designed(X: Floats, covariance: Floats, noise: float, count: int, interest: Floats | None = None) -> Design:
+    """`count` of n candidates with rows X (n, 3, k) under a prior covariance (k, k), noise mm per coordinate.
+
+    interest (m, 3, k): rows of poses whose error is to become small; without them the information itself counts.
+    """
+    belief = _Belief(X, covariance, noise, interest)
+    chosen: list[int] = []
+    for _ in range(min(count, len(X))):
+        chosen.append(belief.take(belief.best(chosen)))
+    for _ in range(EXCHANGES):
+        for i in range(len(chosen)):
+            belief.give_back(chosen[i])
+            rest = chosen[:i] + chosen[i + 1 :]
+            chosen[i] = belief.take(belief.best(rest))
+    return Design(
+        tuple(chosen), 0.5 * float(np.linalg.slogdet(covariance)[1] - np.linalg.slogdet(belief.covariance)[1])
+    )
+
+
+class _Belief:
+    """What is known of the effects after some poses, updated pose by pose."""
+
+    def __init__(self, X: Floats, covariance: Floats, noise: float, interest: Floats | None) -> None:
+        self.X, self.covariance = X, covariance.copy()
+        self.square = noise**2 * np.eye(3)
+        self.interest = interest
+        self.spread = np.einsum("nik,kl,njl->nij", X, covariance, X, optimize=True)  # of every candidate's tip
+
+    def best(self, without: list[int]) -> int:
+        """The candidate that tells most."""
+        if self.interest is None:
+            value = np.linalg.slogdet(np.eye(3) + self.spread / self.square[0, 0])[1]
+        else:
+            toward = np.einsum("mik,kl,njl->minj", self.interest, self.covariance, self.X, optimize=True)
+            narrow = np.linalg.inv(self.spread + self.square)
+            value = np.einsum("minj,njl,minl->n", toward, narrow, toward, optimize=True)
+        value = np.array(value)
+        value[without] = -np.inf
+        return int(np.argmax(value))
+
+    def take(self, k: int) -> int:
+        """Measures a candidate."""
+        self._move(k, np.linalg.inv(self.spread[k] + self.square), -1.0)
+        return k
+
+    def give_back(self, k: int) -> None:
+        """As if a candidate had not been measured."""
+        self._move(k, np.linalg.inv(self.square - self.spread[k]), 1.0)
+
+    def _move(self, k: int, weight: Floats, sign: float) -> None:
+        along = self.covariance @ self.X[k].T
+        self.covariance += sign * along @ weight @ along.T
+        ahead = self.X @ along
+        self.spread += sign * ahead @ weight @ np.swapaxes(ahead, 1, 2)
+
+
+def candidates(bench: ArmBench, count: int = CANDIDATES) -> Floats:
+    """Postures (n, m) inside the limits of the joints whose platform stands in the box that measured ones span.
+
+    Fewer where few of what is drawn stand there; the seed is fixed. Nobody here knows of collisions.
+    """
+    rng = np.random.default_rng(POSES_SEED)
+    drives = bench.robot.actuators
+    seen = np.concatenate([each.q for each in bench.campaigns])
+    points = np.concatenate([bench.standing(each, ()).hung.point for each in bench.campaigns])
+    box = points.min(axis=0), points.max(axis=0)
+    ends = []
+    for a, drive in enumerate(drives):
+        low, high = drive.limits
+        if drive.revolute:
+            low, high = max(low, -np.pi), min(high, np.pi)
+        elif not np.isfinite([low, high]).all():
+            low, high = float(seen[:, a].min()), float(seen[:, a].max())
+        ends.append((low, high) if low < high else (float(seen[:, a].min()), float(seen[:, a].max())))
+    lowest, highest = np.array(ends).T
+    q = lowest + (highest - lowest) * rng.random((20 * count, len(drives)))
+    point = bench.standing(_as_poses(q), ()).hung.point
+    inside = np.flatnonzero(((point >= box[0]) & (point <= box[1])).all(axis=1))
+    return np.asarray(q[inside[:count]], float)
+
+
+def proposed(bench: ArmBench, found: ArmFit, noise: float) -> tuple[Floats, Floats, float]:
+    """Joints (POSES, m) to measure in a new campaign, their platform points (POSES, 3), and the information (nats).
+
+    Empty where nothing was taken or no candidate stands where poses stood.
+    """
+    on = [j for s in found.taken.steps for j in found.groups[s.group] if found.amount[j] != 0.0]
+    q = candidates(bench)
+    if not on or not len(q):
+        return np.zeros((0, len(bench.actuators))), np.zeros((0, 3)), 0.0
+    poses = _as_poses(q)
+    place = bench.standing(poses, ()).hung.point
+    poses = replace(poses, tip=bench.start[0].tips(place, bench.standing(poses, ()).hung.rotation))
+    there = ArmBench(bench.robot, bench.causes, [poses])
+    block = there.blocks([found.columns[j] for j in on])[0]
+    frame = np.diag([FRAME / ARM_MM] * 3 + [FRAME] * 6) ** 2
+    covariance = np.zeros((len(on) + 9,) * 2)
+    covariance[: len(on), : len(on)] = found.covariance[np.ix_(on, on)] + 1e-12 * np.eye(len(on))
+    covariance[len(on) :, len(on) :] = frame
+    rows = np.concatenate([block.X, block.N], axis=2)
+    design = designed(rows, covariance, noise, POSES)
+    chosen = list(design.chosen)
+    return q[chosen], place[chosen], design.gain
+
+
+def unseen_share(bench: ArmBench, found: ArmFit, q: Floats) -> float:
+    """Share of poses q (n, m) in which some joint with a curve stands where no pose was."""
+    joints = curved_joints(bench, found)
+    if not joints or not len(q):
+        return 0.0
+    out = np.zeros(len(q), bool)
+    for a in joints:
+        seen = seen_angles(np.concatenate([each.q[:, a] for each in bench.campaigns]))
+        inside = np.zeros(len(q), bool)
+        for low, high in seen:
+            inside |= (np.degrees(q[:, a]) - low) % 360.0 <= high - low
+        out |= ~inside
+    return float(out.mean())
+
+
+def _as_poses(q: Floats) -> Poses:
+    n = len(q)
+    return Poses("next", q, np.zeros((n, 3)), np.arange(float(n)), None, np.full(n, "next"))

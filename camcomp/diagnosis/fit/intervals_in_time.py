@@ -1,0 +1,71 @@
+"""When something acted for a while: the interval of one run in which a column explains most of a leftover.
+
+The gain of every interval between blocks of rows comes from running sums; the best is refined row by row. Intervals that are
+not far beyond what chance makes of so many are none.
+"""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from camcomp.diagnosis.fit.bench import Bench, CandidateCause
+from camcomp.ground.datatypes import Floats
+
+LEAST_GAIN = 60.0  # chi-square of one interval; the best of 1e5 by chance is 20
+LOOK_ELSEWHERE = (
+    10.0  # log of how many intervals there are to choose from, against a cause that has to be sought in time
+)
+LONGEST = 0.5  # of a run: what acts for longer is no disturbance
+LEAST_ROWS = 5
+_BLOCKS = 60
+
+
+def best_interval(
+    bench: Bench, candidate: CandidateCause, always: Sequence[Floats], rest: Sequence[Floats],
+    whitened: Callable[[int, Floats], Floats], places: Callable[[int], Floats],
+) -> dict[str, float] | None:  # fmt: skip
+    """The two instants, by the names of the candidate's shapes, between which it explains most of `rest` (white, per run).
+
+    always: columns (n, c) per run of the candidate as if it never ended. places: where in the time of a run its white rows lie, 0 to 1. None where no interval stands out.
+    """
+    start, end = (each.name for each in candidate.shapes)
+    found: list[tuple[float, float, float]] = []
+    for k, run in enumerate(bench.runs):
+        column = whitened(k, always[k][:, :, None])[:, 0]
+        order = np.argsort(places(k), kind="stable")
+        at = run.run_path.started + run.run_path.time[0] + places(k)[order] * np.ptp(run.run_path.time)
+        instants, rows = np.unique(at, return_inverse=True)
+        if len(instants) < 4 * LEAST_ROWS:
+            continue
+        hits = np.concatenate([[0.0], np.cumsum(np.bincount(rows, (column * rest[k])[order]))])
+        size = np.concatenate([[0.0], np.cumsum(np.bincount(rows, (column * column)[order]))])
+        gain, i, j = _best(hits, size, len(instants))
+        # half way to the rows outside, and early enough for the rows inside to see all of it
+        before, behind = (
+            0.5 * (instants[b] - instants[a]) for a, b in ((max(i - 1, 0), i), (j - 1, min(j, len(instants) - 1)))
+        )
+        rise = getattr(candidate.effect, "RISE_S", 0.0)
+        found.append((gain, float(instants[i] - max(before, rise)), float(instants[j - 1] + max(behind, rise))))
+    gain, begin, over = max(found, default=(0.0, 0.0, 0.0))
+    return {start: begin, end: over} if gain > LEAST_GAIN else None
+
+
+def _best(hits: Floats, size: Floats, n: int) -> tuple[float, int, int]:
+    """Gain, first instant and the one behind the last of the best interval; running sums (n + 1,)."""
+    edges = np.unique(np.linspace(0, n, min(_BLOCKS, n) + 1).astype(np.int64))
+    gain, i, j = _among(hits, size, edges, edges, n)
+    near = int(np.ceil(n / _BLOCKS))
+    for _ in range(2):
+        firsts, lasts = (np.arange(max(at - near, 0), min(at + near, n) + 1) for at in (i, j))
+        gain, i, j = _among(hits, size, firsts, lasts, n)
+    return gain, i, j
+
+
+def _among(hits: Floats, size: Floats, firsts: np.ndarray, lasts: np.ndarray, n: int) -> tuple[float, int, int]:
+    length = lasts[None, :] - firsts[:, None]
+    energy = size[lasts][None, :] - size[firsts][:, None]
+    sums = hits[lasts][None, :] - hits[firsts][:, None]
+    fair = (length >= LEAST_ROWS) & (length <= LONGEST * n) & (energy > 0.0)
+    gain = np.where(fair, sums**2 / np.where(fair, energy, 1.0), 0.0)
+    a, b = np.unravel_index(int(np.argmax(gain)), gain.shape)
+    return float(gain[a, b]), int(firsts[a]), int(lasts[b])

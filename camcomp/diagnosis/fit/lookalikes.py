@@ -1,0 +1,73 @@
+"""Candidates that these runs could not tell from a simpler one are not asked about: each would make an answer ambiguous.
+
+An angle of a carriage whose arm hardly changes is a slope, that is a squareness or a pitch; all of the paths that show it
+would have to be long in two directions. Computed from the model and the runs alone, residuals are not looked at.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from camcomp.diagnosis.fit.bench import Bench, CandidateCause
+from camcomp.diagnosis.fit.columns import candidate_columns, shape_default
+from camcomp.ground.datatypes import Floats
+from camcomp.model import signal_path
+
+ALIKE = 0.3  # share of its own size that a candidate has to keep beside another one and the workpiece's frame
+_FRAME = "workpiece_frame"
+
+
+def without_lookalikes(bench: Bench, candidates: Sequence[CandidateCause]) -> list[CandidateCause]:
+    """The candidates less those of effects with parameters by target that move the tip as another one does.
+
+    And less slopes of the guideways that these runs show as one shift each, because a run stays on one level: a
+    clamping that slips between runs does the same.
+    """
+    candidates = [each for each in candidates if not _a_shift_per_run(bench, each)]
+    asked = [each for each in candidates if hasattr(each.effect, "SOUGHT")]
+    if not asked or not any(run.measured.has("tip") for run in bench.runs):
+        return [each for each in candidates if each not in asked]
+    simple = [each for each in candidates if each not in asked and _geometric(each)]
+    frame = _tips(bench, [each for each in simple if each.name == _FRAME])
+    others = [_tips(bench, [each]) for each in simple if each.name != _FRAME]
+    kept: list[CandidateCause] = []
+    for each in asked:
+        own = _tips(bench, [each])
+        if np.abs(own).max(initial=0.0) > 0.0 and not any(_alike(own, np.hstack([frame, o])) for o in others):
+            kept.append(each)
+            others.append(own)
+    return [each for each in candidates if each not in asked or each in kept]
+
+
+def _a_shift_per_run(bench: Bench, candidate: CandidateCause) -> bool:
+    """Whether an effect with targets of its own does to every run but one shift of the tip."""
+    if candidate.effect.TARGET != "named" or not any(run.measured.has("tip") for run in bench.runs):
+        return False
+    for column in candidate_columns(bench, candidate, shape_default(candidate)):
+        tips = [run[:, :3][np.isfinite(run[:, :3]).all(axis=1)] for run in column]
+        whole = sum(float(np.sum(each**2)) for each in tips)
+        within = sum(float(np.sum((each - each.mean(axis=0)) ** 2)) for each in tips if len(each))
+        if whole > 0.0 and within > ALIKE**2 * whole:
+            return False
+    return True
+
+
+def _geometric(candidate: CandidateCause) -> bool:
+    """Whether a cause may depend on the place alone."""
+    return bool(signal_path.stages_of(candidate.effect) & {"drive", "tool", "workpiece"}) and not candidate.shapes
+
+
+def _tips(bench: Bench, candidates: Sequence[CandidateCause]) -> Floats:
+    """Tips' columns (rows of all runs, k) of candidates, in units of their scales."""
+    columns = [c for each in candidates for c in candidate_columns(bench, each, shape_default(each))]
+    if not columns:
+        return np.zeros((sum(3 * len(bench.observed(k)) // run.thin for k, run in enumerate(bench.runs)), 0))
+    return np.stack([np.concatenate([run[:, :3].ravel() for run in each]) for each in columns], axis=1)
+
+
+def _alike(own: Floats, others: Floats) -> bool:
+    """Whether `others` (n, k) follow some direction of `own` (n, d) but for ALIKE of its size."""
+    size = np.linalg.norm(others, axis=0)
+    basis = np.linalg.qr(others[:, size > 0.0] / size[size > 0.0])[0]
+    rest = own - basis @ (basis.T @ own)
+    return bool((np.linalg.norm(rest, axis=0) < ALIKE * np.linalg.norm(own, axis=0)).any())

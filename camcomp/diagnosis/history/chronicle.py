@@ -1,0 +1,134 @@
+"""A machine over the days: for every parameter that was ever found its values, its course, and when to measure again."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from datetime import date, timedelta
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import Field
+
+from camcomp.diagnosis.history.drift import Course, course_of, days_until, drift_bound
+from camcomp.diagnosis.history.folder import Kept
+from camcomp.ground.result import Result
+
+NORMAL = 3.92  # widths of a 95 % interval in standard deviations
+
+
+class DatedValue(Result):
+    """A parameter as one diagnosis found it."""
+
+    day: date
+    value: float
+    ci95: tuple[float, float]
+
+
+class ParameterCourse(Result):
+    """A parameter over the days."""
+
+    effect: str
+    target: str | None
+    parameter: str
+    values: tuple[DatedValue, ...]
+    course: Literal["steady", "drift", "jumps", "too few"]
+    level: Annotated[float, Field(description="at the last day")]
+    rate_per_year: float
+    rate_ci95: tuple[float, float]
+    changed: Annotated[tuple[date, ...], Field(description="first days after a jump")]
+    measure_again: Annotated[date | None, Field(description="null where its size at the tip is not known")]
+
+
+class DatedVerdict(Result):
+    """What one diagnosis said."""
+
+    day: date
+    verdict: Literal["none", "identified", "ambiguous", "unknown"]
+    gap_rms_um: float
+    floor_um: float | None
+    causes: tuple[str, ...]
+
+
+class Chronicle(Result):
+    """The history of a machine."""
+
+    verdicts: tuple[DatedVerdict, ...]
+    parameters: tuple[ParameterCourse, ...]
+    measure_again: Annotated[date | None, Field(description="the earliest of those of the parameters")]
+
+
+def chronicle_of(kept: Sequence[Kept], tolerance_um: float) -> Chronicle:
+    """The history of diagnoses in order; tolerance_um: how far the tip may have drifted since the last one."""
+    found: dict[tuple[str, str | None, str], list[tuple[Kept, Any, float]]] = {}
+    for each in kept:
+        for cause in each.result.known:
+            size = (
+                cause.share**0.5
+                * max(each.result.gap.rms_um**2 - (each.result.gap.noise_floor_um or 0.0) ** 2, 0.0) ** 0.5
+            )
+            for name, estimate in cause.parameters.items():
+                found.setdefault((cause.effect, cause.target, name), []).append((each, estimate, size))
+    courses = [_course(key, rows, tolerance_um) for key, rows in found.items()]
+    due = [each.measure_again for each in courses if each.measure_again is not None]
+    return Chronicle(
+        verdicts=tuple(_verdict(each) for each in kept), parameters=tuple(courses), measure_again=min(due, default=None)
+    )
+
+
+def _verdict(kept: Kept) -> DatedVerdict:
+    result = kept.result
+    names = (f"{c.effect} ({c.target})" if c.target else c.effect for c in result.causes)
+    return DatedVerdict(
+        day=kept.day,
+        verdict=result.verdict,
+        gap_rms_um=result.gap.rms_um,
+        floor_um=result.gap.noise_floor_um,
+        causes=tuple(names),
+    )
+
+
+def _course(
+    key: tuple[str, str | None, str], rows: Sequence[tuple[Kept, Any, float]], tolerance_um: float
+) -> ParameterCourse:
+    effect, target, name = key
+    days = np.array([kept.day.toordinal() for kept, _, _ in rows], float)
+    values = np.array([each.value for _, each, _ in rows])
+    deviations = np.array([max(each.ci95[1] - each.ci95[0], 0.0) / NORMAL for _, each, _ in rows])
+    deviations = np.maximum(deviations, 1e-9 * max(float(np.abs(values).max()), 1e-300))
+    course = course_of(days, values, deviations)
+    rate_sd = course.rate_sd if course.kind == "drift" else 0.0
+    return ParameterCourse(
+        effect=effect,
+        target=target,
+        parameter=name,
+        values=tuple(
+            DatedValue(day=kept.day, value=each.value, ci95=each.ci95) for kept, each, _ in rows
+        ),
+        course=course.kind,
+        level=course.level,
+        rate_per_year=365.25 * course.rate,
+        rate_ci95=(365.25 * (course.rate - 1.96 * rate_sd), 365.25 * (course.rate + 1.96 * rate_sd)),
+        changed=tuple(rows[k][0].day for k in course.jumps),
+        measure_again=_due(course, days, deviations, rows, tolerance_um),
+    )  # fmt: skip
+
+
+def _due(
+    course: Course,
+    days: np.ndarray,
+    deviations: np.ndarray,
+    rows: Sequence[tuple[Kept, Any, float]],
+    tolerance_um: float,
+) -> date | None:
+    """The day on which what the parameter does at the tip may have changed by more than the tolerance."""
+    last, estimate, size = rows[-1]
+    if not size > 0.0 or not abs(estimate.value) > 0.0:
+        return None
+    limit = tolerance_um * abs(estimate.value) / size  # its share at the tip grows with its value
+    if course.kind != "drift":
+        since = slice(course.jumps[-1] if course.jumps else 0, None)
+        bound = drift_bound(days[since], deviations[since])
+        if bound == 0.0:  # one measurement tells nothing of what comes
+            return None
+        course = Course(course.kind, course.level, course.level_sd, 0.0, bound, course.jumps, course.spread)
+    return last.day + timedelta(days=int(days_until(course, limit)))

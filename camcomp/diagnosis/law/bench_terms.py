@@ -1,0 +1,132 @@
+"""Terms on the bench: where a form acts, what it does to the channels of every run, and that in white rows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from camcomp.diagnosis.fit.bench import Bench, thinned
+from camcomp.diagnosis.law.forms import Form
+from camcomp.diagnosis.law.rows import Rows, drive_rows, sizes, tip_rows
+from camcomp.diagnosis.law.sizes import Sizes
+from camcomp.diagnosis.law.white import White
+from camcomp.diagnosis.statistics.noise_model import Noise
+from camcomp.ground.datatypes import Floats, Ints
+from camcomp.model.law.expression import parse
+
+
+@dataclass(frozen=True)
+class Spot:
+    """Where a law acts: on control or drive of an actuator (its index), or on the tip along a program axis (0 to 2)."""
+
+    on: str
+    index: int
+
+
+@dataclass(frozen=True)
+class Term:
+    """A form at a spot: one or two columns that belong together."""
+
+    spot: Spot
+    form: Form
+
+
+def spots(actuators: int, kind: str) -> list[Spot]:
+    """Where a law may act that shows in a kind of channel: behind encoders that were logged, or in front of them."""
+    if kind == "encoder":
+        return [Spot("control", j) for j in range(actuators)]
+    return [Spot("structure", a) for a in range(3)] + [Spot("drive", j) for j in range(actuators)]
+
+
+class TermBench:
+    """Evaluates terms on the runs of a bench; noise, inflate, times: of its rows, as a Problem has them."""
+
+    def __init__(self, bench: Bench, noise: Noise, inflate: Sequence[Floats], times: Sequence[Floats]) -> None:
+        self.bench, self.noise, self.inflate, self.times = bench, noise, inflate, times
+        self._rows: dict[tuple[str, int], list[Rows]] = {}
+        self._ways: dict[Spot, list[Floats]] = {}
+
+    def rows(self, spot: Spot) -> Sequence[Rows]:
+        """Covariates per run where the spot is."""
+        key = (spot.on, spot.index) if spot.on in ("control", "drive") else ("tip", 0)
+        if key not in self._rows:
+            bench = self.bench
+            self._rows[key] = (
+                list(tip_rows(bench))
+                if key[0] == "tip"
+                else list(drive_rows(bench, spot.index, setpoints=spot.on == "control"))
+            )
+        return self._rows[key]
+
+    def sizes(self, spot: Spot) -> Sizes:
+        """Reach of the covariates there."""
+        return sizes(self.rows(spot))
+
+    def values(self, spot: Spot, form: Form) -> list[Floats]:
+        """Functions of a form (n, f) per run, mm or rad per unit of their coefficients; 0 where they are none."""
+        rows = self.rows(spot)
+        parsed = [parse(text, dict.fromkeys(rows[0])) for text in form.said]
+        return [np.nan_to_num(np.stack([each(r, r.rows) for each in parsed], axis=1)) for r in rows]
+
+    def tip_ways(self, spot: Spot) -> list[Floats]:
+        """By how much the tip (n, 3), program frame, moves per unit at the spot, per run."""
+        if spot not in self._ways:
+            self._ways[spot] = self._tip_ways(spot)
+        return self._ways[spot]
+
+    def _tip_ways(self, spot: Spot) -> list[Floats]:
+        bench = self.bench
+        if spot.on in ("control", "drive"):
+            return [bench.row_slopes(k)[:, :, spot.index] for k in range(len(bench.runs))]
+        return [np.tile(np.eye(3)[spot.index], (len(run.run_path.time), 1)) for run in bench.runs]
+
+    def moves(self, spot: Spot, values: Sequence[Floats]) -> list[Floats]:
+        """What functions (n, f) at a spot do to the tip (n', 3, f), thinned, per run."""
+        out = []
+        for way, v, run in zip(self.tip_ways(spot), values, self.bench.runs, strict=True):
+            moved = way[:, :, None] * v[:, None, :]
+            out.append(thinned(moved.reshape(len(v), -1), run.thin).reshape(-1, 3, v.shape[1]))
+        return out
+
+    def _seen_by_encoders(self, k: int) -> bool:
+        run = self.bench.runs[k]
+        return run.by == "setpoint" and run.measured.has("encoder")
+
+    @cached_property
+    def _slices(self) -> list[dict[int, Ints]]:
+        """Per run: the white rows of every channel."""
+        out = []
+        for k, inflate in enumerate(self.inflate):
+            at, found = 0, {}
+            for c in range(inflate.shape[1]):
+                count = int(np.isfinite(inflate[:, c]).sum())
+                if count and np.isfinite(self.noise.sigma[k, c]):
+                    found[c] = np.arange(at, at + count)
+                    at += count
+            out.append(found)
+        return out
+
+    def white(self, spot: Spot, values: Sequence[Floats]) -> White:
+        """Functions (n, f) per run as white columns of the channels that the spot reaches."""
+        bench = self.bench
+        rows, columns = [], []
+        for k, (v, run) in enumerate(zip(values, bench.runs, strict=True)):
+            parts: dict[int, Floats] = {}
+            if spot.on == "control" and self._seen_by_encoders(k):
+                parts[3 + spot.index] = thinned(v, run.thin)
+            else:
+                way = bench.turned(k, self.tip_ways(spot)[k])
+                for c in range(3):
+                    if np.abs(way[:, c]).max() > 1e-9:
+                        parts[c] = thinned(way[:, c : c + 1] * v, run.thin)
+            found = [
+                (self._slices[k][c], self.noise.rows(k, each[:, None, :], self.inflate[k], self.times[k], c))
+                for c, each in parts.items()
+                if c in self._slices[k]
+            ]
+            rows.append(np.concatenate([r for r, _ in found]) if found else np.zeros(0, int))
+            columns.append(np.concatenate([x for _, x in found]) if found else np.zeros((0, v.shape[1])))
+        return White(tuple(rows), tuple(columns))

@@ -1,0 +1,338 @@
+"""The search for a law: forward selection over all terms, shapes refined, small sets tried exhaustively.
+
+A term enters where it makes withheld runs more probable and where chance hardly could: its gain in evidence has to exceed what
+the best of all terms gains when the signs of stretches of the residual are drawn at random (a false law in FALSE_RATE of such
+data). Source: forward selection as in sparse regression of dynamics; wild bootstrap of the maximum.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from scipy.optimize import minimize
+
+from camcomp.diagnosis.law.bench_terms import Spot, Term, TermBench, spots
+from camcomp.diagnosis.law.folds import WIDE_MM, Folds, gains, withheld
+from camcomp.diagnosis.law.forms import Form, at_drive, at_tip
+from camcomp.diagnosis.law.white import White
+from camcomp.ground.datatypes import Floats
+
+FALSE_RATE = 0.02  # of a law where there is none
+AT_ONCE = 100  # forms that are evaluated together
+DRAWS, BLOCK = 40, 8  # of signs; rows that share one
+MOST_TERMS = 6
+REFINED = 7  # kinds of terms whose shapes are followed at every step
+PER_SHAPE = 3.0  # log density that a number of a shape has to bring: it was looked for among many
+PER_TERM = 4.0
+POOL = 14  # terms among which all sets of up to three are tried
+SAME = 3.0  # log density by which a term may be worse and is still as good
+LEAST_GAIN = 0.01  # of the log density that a law has brought: less is not worth a term
+LEAST_SHARE = 0.03  # of a law's energy at the tip, below which a term goes again
+CONSTANT = Form("constant", (), ("1",), ("",))
+_PLAIN = ("line", "power", "product", "rate", "force")  # simpler kinds of the same value come first
+
+
+@dataclass(frozen=True, eq=False)
+class FoundLaw:
+    """terms with theta (c,), covariance (c, c) of their columns in order, theta_without (f, c): fitted without each run;
+    gain: log density on withheld parts; alike: other terms for each that the data cannot tell from it.
+    """
+
+    terms: tuple[Term, ...]
+    theta: Floats
+    covariance: Floats
+    theta_without: Floats
+    gain: float
+    alike: tuple[tuple[Term, ...], ...]
+    folds: Folds
+
+
+@dataclass(frozen=True, eq=False)
+class _Block:
+    """All grid terms of one spot, white."""
+
+    spot: Spot
+    forms: tuple[Form, ...]
+    first: np.ndarray  # (forms,) column at which each begins
+    white: White
+
+
+def find_law(bench: TermBench, folds: Folds, firm: Folds, kind: str, *, seed: int = 0) -> FoundLaw | None:
+    """The law that what is left in a kind of channel follows; None where none holds on withheld parts.
+
+    folds: with a free constant at every spot of the tip, which no law is asked for; firm: without.
+    """
+    blocks = [_block(bench, spot) for spot in spots(len(bench.bench.actuators), kind)]
+    return _Search(bench, folds, firm, blocks, np.random.default_rng(seed)).run()
+
+
+def _block(bench: TermBench, spot: Spot) -> _Block:
+    size = bench.sizes(spot)
+    if spot.on in ("control", "drive"):
+        forms = at_drive(size, bench.bench.twin.robot.actuators[spot.index].revolute)
+    else:
+        forms = at_tip(size)
+    whites = []
+    for some in range(0, len(forms), AT_ONCE):  # rows before thinning are many
+        values = [bench.values(spot, each) for each in forms[some : some + AT_ONCE]]
+        whites.append(bench.white(spot, [np.concatenate(of_run, axis=1) for of_run in zip(*values, strict=True)]))
+    columns = tuple(np.concatenate(of_run, axis=1) for of_run in zip(*(w.columns for w in whites), strict=True))
+    first = np.cumsum([0, *(len(each.texts) for each in forms[:-1])])
+    return _Block(spot, tuple(forms), first, White(whites[0].rows, columns))
+
+
+class _Search:
+    def __init__(
+        self,
+        bench: TermBench,
+        folds: Folds,
+        firm: Folds,
+        blocks: list[_Block],
+        rng: np.random.Generator,
+    ) -> None:
+        self.firm = firm
+        self.bench, self.folds, self.blocks, self.rng = bench, folds, blocks, rng
+        self._seen: dict[Term, tuple[White, Floats]] = {}
+
+    def run(self) -> FoundLaw | None:
+        chosen: list[Term] = []
+        pool: list[Term] = []
+        score = 0.0
+        while len(chosen) < MOST_TERMS:
+            step = self._beside(chosen)
+            ranked = self._singles(step)
+            threshold = self._by_chance(step)
+            if not ranked or ranked[0][0] < threshold:
+                break
+            fine = [self._refined(step, term) for _, term in self._leaders(ranked)]
+            fine += [self._refined(step, Term(spot, t.form)) for t in chosen for spot in self._spots_beside(t)]
+            if not fine:
+                break
+            fine.sort(key=lambda each: -each[0])
+            pool += [term for _, term in fine[: 2 * REFINED]]
+            best = self._simplest(fine)
+            after = self._score((*chosen, best))
+            if after < score + max(PER_TERM, LEAST_GAIN * score):
+                break
+            chosen, score = [*chosen, best], after
+        if not chosen:
+            return None
+        chosen = self._exhaustive(chosen, pool, score)
+        chosen = self._without_idle(chosen)
+        self.folds = self.firm
+        return self._answer(self._with_constants(chosen), pool)
+
+    def _with_constants(self, chosen: list[Term]) -> list[Term]:
+        """The terms, and where the law does not swing about zero, what it swings about."""
+        for spot in dict.fromkeys(term.spot for term in chosen):
+            more = [*chosen, Term(spot, CONSTANT)]
+            if self._score(more) > self._score(chosen) + PER_TERM:
+                chosen = more
+        return chosen
+
+    def _spots_beside(self, term: Term) -> list[Spot]:
+        """The other spots at which the same function of the same covariates can act."""
+        same = [
+            b.spot for b in self.blocks if (b.spot.on in ("control", "drive")) == (term.spot.on in ("control", "drive"))
+        ]
+        return [s for s in same if s != term.spot and s.on == term.spot.on and s.on == "structure"]
+
+    # -- one step ------------------------------------------------------------------------------------------------------
+
+    def _beside(self, chosen: Sequence[Term]) -> Folds:
+        """The base with the terms chosen so far in it."""
+        if not chosen:
+            return self.folds
+        more = [self._white(term) for term in chosen]
+        return self.folds.beside(more, np.concatenate([self._precision(term) for term in chosen]))
+
+    def _known(self, term: Term) -> tuple[White, Floats]:
+        """White columns of a term, and their prior precision: WIDE_MM at the tip."""
+        if term not in self._seen:
+            self._seen[term] = self._worked_out(term)
+        return self._seen[term]
+
+    def _worked_out(self, term: Term) -> tuple[White, Floats]:
+        values = self.bench.values(term.spot, term.form)
+        size = np.full(len(term.form.texts), (self._rms(term.spot, values) / WIDE_MM) ** 2 + 1e-12)
+        return self.bench.white(term.spot, values), size
+
+    def _white(self, term: Term) -> White:
+        return self._known(term)[0]
+
+    def _precision(self, term: Term) -> Floats:
+        return self._known(term)[1]
+
+    def _rms(self, spot: Spot, values: Sequence[Floats]) -> float:
+        ways = [np.sum(way**2, axis=1) for way in self.bench.tip_ways(spot)]
+        energy = [float(np.sum(way[:, None] * v**2)) / v.shape[1] for way, v in zip(ways, values, strict=True)]
+        return float(np.sqrt(sum(energy) / sum(len(v) for v in values)))
+
+    def _singles(self, step: Folds) -> list[tuple[float, Term]]:
+        """(gain in evidence, term) of all grid terms, best first."""
+        out: list[tuple[float, Term]] = []
+        for block in self.blocks:
+            data = step.diagonals(block.white)
+            G, h = data.G[0], data.h[0]
+            own = np.concatenate([np.einsum("rc,rc->c", c, c)[None] for c in block.white.columns]).sum(axis=0)
+            good = G > 1e-4 * own + 1e-9
+            count = np.array([len(each.texts) for each in block.forms])
+            one = np.flatnonzero(count == 1)
+            i = block.first[one]
+            gain = np.where(good[i], 0.5 * h[i] ** 2 / np.maximum(G[i], 1e-12), 0.0)
+            out += [(float(g), Term(block.spot, block.forms[k])) for g, k in zip(gain, one, strict=True)]
+            two = np.flatnonzero(count == 2)
+            if len(two):
+                i = block.first[two]
+                cross = step.pairs(block.white, i)[0]
+                det = G[i] * G[i + 1] - cross**2
+                fit = (h[i] ** 2 * G[i + 1] - 2 * h[i] * h[i + 1] * cross + h[i + 1] ** 2 * G[i]) / np.maximum(
+                    det, 1e-12
+                )
+                usable = good[i] & good[i + 1] & (det > 1e-4 * G[i] * G[i + 1])
+                gain = np.where(usable, 0.5 * fit, 0.0)
+                out += [(float(g), Term(block.spot, block.forms[k])) for g, k in zip(gain, two, strict=True)]
+        return sorted(out, key=lambda each: -each[0])
+
+    def _by_chance(self, step: Folds) -> float:
+        """Gain that the best of all terms has with signs drawn at random, exceeded in FALSE_RATE of draws."""
+        rest = step.rest()
+        draws = []
+        for r in rest:
+            signs = self.rng.choice([-1.0, 1.0], size=(-(-len(r) // BLOCK), DRAWS))
+            draws.append(r[:, None] * np.repeat(signs, BLOCK, axis=0)[: len(r)])
+        most = np.zeros(DRAWS)
+        half = step.projected(draws)
+        for block in self.blocks:
+            G = step.diagonals(block.white).G[0]
+            h = sum(c.T @ e[rows] for c, rows, e in zip(block.white.columns, block.white.rows, draws, strict=True))
+            h = h - step.half_cross(block.white).T @ half
+            own = np.concatenate([np.einsum("rc,rc->c", c, c)[None] for c in block.white.columns]).sum(axis=0)
+            gain = np.where((G > 1e-4 * own + 1e-9)[:, None], 0.5 * h**2 / np.maximum(G, 1e-12)[:, None], 0.0)
+            most = np.maximum(most, gain.max(axis=0, initial=0.0))
+        beta = float(most.std()) * np.sqrt(6.0) / np.pi
+        return float(most.mean() - 0.5772 * beta - beta * np.log(-np.log(1.0 - FALSE_RATE)))
+
+    @staticmethod
+    def _leaders(ranked: Sequence[tuple[float, Term]]) -> list[tuple[float, Term]]:
+        """The best of every kind of term at every spot, as far as they are near the best of all."""
+        out: dict[tuple[object, ...], tuple[float, Term]] = {}
+        for gain, term in ranked:
+            key = (term.spot, term.form.family, term.form.about)
+            if gain < 0.4 * ranked[0][0] or len(out) >= 3 * REFINED:
+                break
+            out.setdefault(key, (gain, term))
+        shaped = [each for each in out.values() if each[1].form.shape][:REFINED]
+        plain = [each for each in out.values() if not each[1].form.shape]
+        return [*shaped, *plain]
+
+    def _gain(self, step: Folds, term: Term) -> Floats:
+        data = step.columns(self._white(term))
+        return gains(data.G[:, None], data.h[:, None], self._precision(term)[None])[:, 0]
+
+    def _refined(self, step: Folds, term: Term) -> tuple[float, Term]:
+        """(log density on withheld parts less what shapes cost, term with the shape that the data want)."""
+        if term.form.shape:
+            start = np.array(term.form.shape)
+            scale = np.array([0.03 * (high - low) for low, high in term.form.bounds])
+            if term.form.family == "wave":
+                size = self.bench.sizes(term.spot).span(term.form.about[0])
+                scale = np.array([0.1 * start[0] ** 2 / size])
+            scale = np.minimum(scale, 0.3 * np.abs(start) + 1e-3 * scale)
+
+            def cost(u: Floats) -> float:
+                return -float(self._gain_of_all(step, Term(term.spot, term.form.at(start + scale * u))))
+
+            simplex = np.concatenate([np.zeros((1, len(start))), np.eye(len(start))])
+            found = minimize(
+                cost, np.zeros(len(start)), method="Nelder-Mead",
+                options={"maxfev": 30 if len(start) == 1 else 55, "xatol": 0.01, "fatol": 0.05, "initial_simplex": simplex},
+            )  # fmt: skip
+            term = Term(term.spot, term.form.at(start + scale * found.x))
+        return float(withheld(self._gain(step, term)[:, None])[0]) - self._costs([term]), term
+
+    def _gain_of_all(self, step: Folds, term: Term) -> float:
+        white, size = self._worked_out(term)
+        data = step.of_all(white)
+        return float(gains(data.G[:, None], data.h[:, None], size[None])[0, 0])
+
+    @staticmethod
+    def _costs(terms: Sequence[Term]) -> float:
+        return sum(PER_SHAPE * len(t.form.shape) + PER_TERM for t in terms)
+
+    @staticmethod
+    def _simplest(fine: Sequence[tuple[float, Term]]) -> Term:
+        """Of the terms that are as good as the best, one of a plain kind."""
+        near = [term for score, term in fine if score > fine[0][0] - SAME]
+        return min(near, key=lambda t: (t.form.family not in _PLAIN, len(t.form.shape), _unlikely(t)))
+
+    # -- sets ----------------------------------------------------------------------------------------------------------
+
+    def _score(self, terms: Sequence[Term]) -> float:
+        data = self.folds.together([self._white(t) for t in terms])
+        size = np.concatenate([self._precision(t) for t in terms])
+        return float(withheld(gains(data.G[:, None], data.h[:, None], size[None]))[0]) - self._costs(terms)
+
+    def _exhaustive(self, chosen: list[Term], pool: Sequence[Term], score: float) -> list[Term]:
+        """The best of all sets of up to three terms of the pool, where it is better than what was chosen."""
+        terms = list(dict.fromkeys([*chosen, *sorted(pool, key=lambda t: -self._score([t]))]))[: max(POOL, len(chosen))]
+        data = self.folds.together([self._white(t) for t in terms])
+        size = np.concatenate([self._precision(t) for t in terms])
+        ends = np.cumsum([len(t.form.texts) for t in terms])
+        own = [np.arange(end - len(t.form.texts), end) for end, t in zip(ends, terms, strict=True)]
+        best, value = chosen, score
+        for count in (1, 2, 3):
+            for some in combinations(range(len(terms)), count):
+                at = np.concatenate([own[i] for i in some])
+                G, h = data.G[:, at][:, :, at], data.h[:, at]
+                gain = float(withheld(gains(G[:, None], h[:, None], size[at][None]))[0])
+                gain -= self._costs([terms[i] for i in some])
+                if gain > value + (0.5 if count >= len(best) else -SAME):
+                    best, value = [terms[i] for i in some], gain
+        return best
+
+    def _without_idle(self, chosen: list[Term]) -> list[Term]:
+        """The terms that do something beside the others."""
+        while len(chosen) > 1:
+            theta = self._theta(chosen)[0]
+            size, at = [], 0
+            for t in chosen:
+                values = self.bench.values(t.spot, t.form)
+                own = [v @ theta[at : at + v.shape[1]][:, None] for v in values]
+                size.append(self._rms(t.spot, own) ** 2)
+                at += len(t.form.texts)
+            if min(size) > LEAST_SHARE * sum(size):
+                break
+            chosen.pop(int(np.argmin(size)))
+        return chosen
+
+    def _theta(self, terms: Sequence[Term]) -> tuple[Floats, Floats, Floats]:
+        data = self.folds.together([self._white(t) for t in terms])
+        size = np.concatenate([self._precision(t) for t in terms])
+        M = data.G + np.diag(size)
+        each = np.asarray(np.linalg.solve(M, data.h[..., None])[..., 0], float)
+        return each[0], np.asarray(np.linalg.inv(M[0]), float), each[1:]
+
+    def _answer(self, chosen: list[Term], pool: Sequence[Term]) -> FoundLaw:
+        theta, covariance, without = self._theta(chosen)
+        gain = self._score(chosen)
+        alike = []
+        for i, term in enumerate(chosen):
+            others = []
+            for other in dict.fromkeys(pool):
+                same = (other.spot, other.form.family, other.form.about)
+                if other in chosen or same == (term.spot, term.form.family, term.form.about):
+                    continue
+                if self._score([*chosen[:i], other, *chosen[i + 1 :]]) > gain - SAME:
+                    others.append(other)
+            alike.append(tuple(others))
+        return FoundLaw(tuple(chosen), theta, covariance, without, gain, tuple(alike), self.folds)
+
+
+def _unlikely(term: Term) -> bool:
+    """Of a drive that leads one axis of the tip: what follows its own travel, or acts for a while, is its own; else the tip's."""
+    own = term.form.family == "while" or term.form.about[0].startswith(("act", *"xyz"))
+    return (term.spot.on == "drive") != own

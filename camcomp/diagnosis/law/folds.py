@@ -1,0 +1,201 @@
+"""Withheld parts: how much more probable a part becomes when columns were fitted to all others, in closed form.
+
+Everything that is no law (small errors, offsets, causes found) stands in the base, within its stated tolerance, and is
+integrated out; the log density of a part given the others is the evidence of all less that of the others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from copy import copy
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import solve_triangular
+
+from camcomp.diagnosis.law.white import White
+from camcomp.ground.datatypes import Floats, Ints
+
+FEW_RUNS = 4  # from which on runs are withheld, else stretches of them
+PARTS = 6
+WIDE_MM = 0.2  # what a law may move the tip by, standard deviation before any data
+
+
+Part = tuple[int, Ints]  # a run, and its white rows
+
+
+@dataclass(frozen=True, eq=False)
+class FoldedColumns:
+    """Columns (c) with the base taken out, for all data and for all but one part each: G (f, c, c), h (f, c)."""
+
+    G: Floats
+    h: Floats
+
+
+class Folds:
+    """The base of a law search: white columns and residual beside which laws are sought."""
+
+    def __init__(
+        self, white: Sequence[Floats], residual: Sequence[Floats], precision: Floats, parts: Sequence[Part],
+        constants: Sequence[White],
+    ) -> None:  # fmt: skip
+        """White (w, k), residual (w,) per run; precision (k,) of the prior; constants: columns that are free beside the law."""
+        loose = np.full(sum(each.columns[0].shape[1] for each in constants), 1e-6)
+        self.precision = np.concatenate([precision, loose])
+        self.white = [
+            np.concatenate([W, *(_spread(c, k, len(W)) for c in constants)], axis=1) for k, W in enumerate(white)
+        ]
+        self.residual = list(residual)
+        self.parts = list(parts)
+        self._prepare()
+
+    def beside(self, more: Sequence[White], precision: Floats) -> Folds:
+        """The same with more columns in the base, of that prior precision."""
+        out = copy(self)
+        out.precision = np.concatenate([self.precision, precision])
+        out.white = [
+            np.concatenate([W, *(_spread(x, k, len(W)) for x in more)], axis=1) for k, W in enumerate(self.white)
+        ]
+        out._prepare()
+        return out
+
+    def _prepare(self) -> None:
+        self._grams = [self._gram(k, rows) for k, rows in self.parts]
+        self._halves = [self._half(A) for A in _without_each([A for A, _ in self._grams])]
+        self._targets = [
+            np.asarray(solve_triangular(L, b, lower=True))
+            for L, b in zip(self._halves, _without_each([b for _, b in self._grams]), strict=True)
+        ]
+
+    def _gram(self, k: int, rows: Ints) -> tuple[Floats, Floats]:
+        W = self.white[k][rows]
+        return W.T @ W, W.T @ self.residual[k][rows]
+
+    def _half(self, A: Floats) -> Floats:
+        M = A + np.diag(self.precision)
+        return np.asarray(np.linalg.cholesky(M + 1e-12 * np.diag(np.diag(M))))
+
+    def rest(self) -> list[Floats]:
+        """White residual (w,) per run that the base leaves, all data together."""
+        mean = solve_triangular(self._halves[0].T, self._targets[0], lower=False)
+        return [r - W @ mean for r, W in zip(self.residual, self.white, strict=True)]
+
+    def half_cross(self, x: White) -> Floats:
+        """Columns of a spot against the base (k, c), for `projected`."""
+        cross = np.sum([W[rows].T @ X for W, rows, X in zip(self.white, x.rows, x.columns, strict=True)], axis=0)
+        return np.asarray(solve_triangular(self._halves[0], cross, lower=True))
+
+    def projected(self, draws: Sequence[Floats]) -> Floats:
+        """White residuals (w, b) per run against the base (k, b)."""
+        cross = np.sum([W.T @ e for W, e in zip(self.white, draws, strict=True)], axis=0)
+        return np.asarray(solve_triangular(self._halves[0], cross, lower=True))
+
+    def of_all(self, x: White) -> FoldedColumns:
+        """As `columns`, for all data alone: (1, c, c), (1, c)."""
+        half = self.half_cross(x)
+        gram = sum(X.T @ X for X in x.columns)
+        target = sum(X.T @ r[rows] for X, rows, r in zip(x.columns, x.rows, self.residual, strict=True))
+        return FoldedColumns((gram - half.T @ half)[None], (target - half.T @ self._targets[0])[None])
+
+    def _parts_of(self, x: White) -> list[tuple[Floats, Ints, int]]:
+        """Per part: columns (r, c) in it, their white rows, the run."""
+        out = []
+        for k, rows in self.parts:
+            mine = np.zeros(len(self.residual[k]), bool)
+            mine[rows] = True
+            keep = mine[x.rows[k]]
+            out.append((x.columns[k][keep], x.rows[k][keep], k))
+        return out
+
+    def columns(self, x: White) -> FoldedColumns:
+        """Columns of one spot with the base taken out, in full."""
+        return self.together([x])
+
+    def together(self, xs: Sequence[White]) -> FoldedColumns:
+        """The same for columns of several spots, one behind the other."""
+        dense = [np.concatenate([_spread(x, k, len(r)) for x in xs], axis=1) for k, r in enumerate(self.residual)]
+        crosses, grams, targets = [], [], []
+        for k, rows in self.parts:
+            X = dense[k][rows]
+            crosses.append(self.white[k][rows].T @ X)
+            grams.append(X.T @ X)
+            targets.append(X.T @ self.residual[k][rows])
+        return self._folded(crosses, grams, targets, diagonal=False)
+
+    def diagonals(self, x: White) -> FoldedColumns:
+        """As `columns`, but of G only the diagonal: (f, c)."""
+        crosses, grams, targets = [], [], []
+        for X, rows, k in self._parts_of(x):
+            crosses.append(self.white[k][rows].T @ X)
+            grams.append(np.einsum("rc,rc->c", X, X))
+            targets.append(X.T @ self.residual[k][rows])
+        return self._folded(crosses, grams, targets, diagonal=True)
+
+    def pairs(self, x: White, first: Ints) -> Floats:
+        """Products (f, p) of columns first and first + 1, with the base taken out."""
+        crosses, grams = [], []
+        for X, rows, k in self._parts_of(x):
+            crosses.append(self.white[k][rows].T @ X)
+            grams.append(np.einsum("rc,rc->c", X[:, first], X[:, first + 1]))
+        out = []
+        for L, g, c in zip(self._halves, _without_each(grams), _without_each(crosses), strict=True):
+            half = solve_triangular(L, c, lower=True)
+            out.append(g - np.einsum("kc,kc->c", half[:, first], half[:, first + 1]))
+        return np.array(out)
+
+    def _folded(
+        self, crosses: Sequence[Floats], grams: Sequence[Floats], targets: Sequence[Floats], *, diagonal: bool
+    ) -> FoldedColumns:
+        G, h = [], []
+        every = zip(
+            self._halves,
+            self._targets,
+            _without_each(crosses),
+            _without_each(grams),
+            _without_each(targets),
+            strict=True,
+        )
+        for L, t, c, g, b in every:
+            half = solve_triangular(L, c, lower=True)
+            G.append(g - (np.einsum("kc,kc->c", half, half) if diagonal else half.T @ half))
+            h.append(b - half.T @ t)
+        return FoldedColumns(np.array(G), np.array(h))
+
+
+def _without_each(parts: Sequence[Floats]) -> list[Floats]:
+    """The sum of all, and the sums of all but one."""
+    whole = np.asarray(np.sum(parts, axis=0))
+    return [whole, *(whole - each for each in parts)]
+
+
+def _spread(x: White, k: int, rows: int) -> Floats:
+    """Columns (rows, c) over all white rows of run k."""
+    out = np.zeros((rows, x.columns[k].shape[1]))
+    out[x.rows[k]] = x.columns[k]
+    return out
+
+
+def parts_of(places: Sequence[Floats]) -> list[Part]:
+    """What is withheld, one after the other: runs, or stretches of time where there are few; places (w,) 0 to 1 of white rows
+    in the time of their run.
+    """
+    if len(places) >= FEW_RUNS:
+        return [(k, np.arange(len(place))) for k, place in enumerate(places)]
+    each, out = -(-PARTS // len(places)), list[Part]()
+    for k, own in enumerate(places):
+        place = np.minimum((own * each).astype(int), each - 1)
+        out += [(k, np.flatnonzero(place == i)) for i in range(each) if (place == i).any()]
+    return out
+
+
+def gains(G: Floats, h: Floats, size: Floats) -> Floats:
+    """Log evidence (f, s) that sets of columns add: G (f, s, d, d), h (f, s, d), prior precision size (s, d)."""
+    M = G + size[None, :, :, None] * np.eye(h.shape[2])
+    _, log_det = np.linalg.slogdet(M)
+    fit = np.einsum("fsd,fsd->fs", h, np.linalg.solve(M, h[..., None])[..., 0])
+    return np.asarray(0.5 * fit - 0.5 * log_det + 0.5 * np.log(size).sum(axis=1))
+
+
+def withheld(gain: Floats) -> Floats:
+    """Log density (s,) gained on withheld parts, from log evidences (f, s), all data first."""
+    return np.asarray((gain[0] - gain[1:]).sum(axis=0))

@@ -1,0 +1,168 @@
+"""Forms that a law may take: functions of covariates with units, some with a shape (a period, a place, a length) to be found."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from camcomp.diagnosis.law.sizes import Sizes
+
+MOST_WAVES = 240  # periods of one covariate that are tried
+LEAST_SPAN_MM = 2.0
+_HARD_MM = 0.02  # a reversal that is over at once
+_CENTRES, _MOMENTS = 13, 40
+_LASTS = (0.5, 1.0, 2.0, 4.0, 8.0)  # s that something acts for
+
+
+@dataclass(frozen=True)
+class Form:
+    """texts: one or two functions that belong together, with {0}, {1} for the shape; units of their coefficients per mm.
+
+    bounds: of every number of the shape; family: what kind of law it is; about: the covariates.
+    """
+
+    family: str
+    about: tuple[str, ...]
+    texts: tuple[str, ...]
+    units: tuple[str, ...]
+    shape: tuple[float, ...] = ()
+    bounds: tuple[tuple[float, float], ...] = ()
+
+    @property
+    def said(self) -> tuple[str, ...]:
+        """The functions as a formula has them."""
+        return tuple(text.format(*(f"{each:.6g}" for each in self.shape)) for text in self.texts)
+
+    def at(self, shape: Sequence[float]) -> Form:
+        """The same with another shape, held within its bounds."""
+        held = tuple(float(np.clip(v, low, high)) for v, (low, high) in zip(shape, self.bounds, strict=True))
+        return replace(self, shape=held)
+
+
+def _waves(name: str, low: float, span: float, shortest: float) -> list[Form]:
+    """Sines and cosines of one covariate; neighbours differ by a quarter of a turn over its span."""
+    del low
+    most = min(int(4.0 * span / shortest), MOST_WAVES)
+    texts = (f"sin(2*pi*{name}/{{0}})", f"cos(2*pi*{name}/{{0}})")
+    bounds = ((0.5 * shortest, 4.0 * span),)
+    return [Form("wave", (name,), texts, ("", ""), (4.0 * span / k,), bounds) for k in range(2, max(most, 2) + 1)]
+
+
+def _bumps(name: str, low: float, span: float) -> list[Form]:
+    text, out = f"gauss(({name} - {{0}})/{{1}})", []
+    for centre in np.linspace(low, low + span, _CENTRES):
+        for width in (0.06 * span, 0.12 * span, 0.24 * span):
+            bounds = ((low - 0.1 * span, low + 1.1 * span), (0.02 * span, 0.5 * span))
+            out.append(Form("bump", (name,), (text,), ("",), (float(centre), width), bounds))
+    return out
+
+
+def _powers(name: str, unit: str, most: int) -> list[Form]:
+    return [
+        Form(
+            "power" if k > 1 else "line",
+            (name,),
+            (name if k == 1 else f"{name}^{k}",),
+            (f"{unit}{k if k > 1 else ''}",),
+        )
+        for k in range(1, most + 1)
+    ]
+
+
+def _senses(name: str, span: float) -> list[Form]:
+    """What goes with the sense of travel: at once, over a length, as play has it, or fading behind a reversal."""
+    out = []
+    for length in (_HARD_MM, 0.02 * span, 0.06 * span, 0.18 * span):
+        bounds = ((0.2 * _HARD_MM, 0.5 * span),)
+        out.append(Form("sense", (name,), (f"way({name}, {{0}})",), ("",), (length,), bounds))
+    for width in (0.04 * span, 0.12 * span, 0.3 * span):
+        out.append(Form("drag", (name,), (f"drag({name}, {{0}})",), ("mm",), (width,), ((0.005 * span, 0.8 * span),)))
+    for length in (0.02 * span, 0.06 * span, 0.2 * span):
+        text = f"way({name}, {_HARD_MM})*exp(-since({name})/{{0}})"
+        out.append(Form("reversal", (name,), (text,), ("",), (length,), ((0.005 * span, 0.8 * span),)))
+    return out
+
+
+def _times(size: Sizes) -> list[Form]:
+    """What goes with the clock: drift, a step, something that acts for a while, warming up, a slow swing; and with wear."""
+    low, high = size.limits["common_s"]
+    span = max(high - low, 1e-9)
+    out = _powers("common_s", "s", 2)
+    for a, b in size.stretches:
+        bounds = ((a, b),)
+        for moment in np.linspace(a, b, max(_MOMENTS // len(size.stretches), 6))[1:-1]:
+            out.append(Form("step", ("common_s",), ("step(common_s - {0})",), ("",), (float(moment),), bounds))
+            for last in _LASTS:
+                text = "step(common_s - {0})*step({0} + {1} - common_s)"
+                out.append(Form("while", ("common_s",), (text,), ("",), (float(moment), last), ((a, b), (0.2, 30.0))))
+    out += [
+        Form("step", ("common_s",), ("step(common_s - {0})",), ("",), (a,), ((low, high),))
+        for a, _ in size.stretches[1:]
+    ]
+    out += [
+        Form("settling", ("common_s",), ("exp(-common_s/{0})",), ("",), (share * span,), ((0.01 * span, 10.0 * span),))
+        for share in (0.1, 0.3, 1.0)
+    ]
+    longest = max((b - a for a, b in size.stretches), default=span)
+    periods = 1.0 / np.linspace(1.0 / (8.0 * longest), 1.0 / max(0.15 * longest, 1.0), 200)
+    wave = ("sin(2*pi*common_s/{0})", "cos(2*pi*common_s/{0})")
+    out += [Form("wave", ("common_s",), wave, ("", ""), (float(p),), ((0.5, 4.0 * span),)) for p in periods]
+    if size.wide("cut_min"):
+        out += _powers("cut_min", "min", 1)
+        worn = size.limits["cut_min"][1]
+        for share in (0.05, 0.2):
+            form = Form(
+                "settling", ("cut_min",), ("log(1 + cut_min/{0})",), ("",), (share * worn,), ((1e-3 * worn, worn),)
+            )
+            out.append(form)
+    if size.wide("temp_C"):
+        out.append(Form("line", ("temp_C",), ("(temp_C - 20)",), ("K",)))
+        out.append(Form("power", ("temp_C",), ("(temp_C - 20)^2",), ("K2",)))
+    return out
+
+
+def at_tip(size: Sizes) -> list[Form]:
+    """Forms of what moves the tip."""
+    out: list[Form] = []
+    axes = [a for a in "xyz" if size.span(f"{a}_mm") > LEAST_SPAN_MM]
+    for a in axes:
+        name = f"{a}_mm"
+        low, span = size.limits[name][0], size.span(name)
+        out += _powers(name, "mm", 4) + _waves(name, low, span, max(3.0 * size.apart[name], span / 25.0))
+        out += _bumps(name, low, span) + _senses(name, span)
+        out.append(Form("rate", (f"v{a}_mm_per_s",), (f"v{a}_mm_per_s",), ("mm/s",)))
+        out.append(Form("rate", (f"v{a}_mm_per_s",), (f"v{a}_mm_per_s*abs(v{a}_mm_per_s)",), ("(mm/s)2",)))
+    for a, b in [(a, b) for a in axes for b in axes if a < b]:
+        out.append(Form("product", (f"{a}_mm", f"{b}_mm"), (f"{a}_mm*{b}_mm",), ("mm2",)))
+        out.append(Form("product", (f"{a}_mm", f"{b}_mm"), (f"{a}_mm^2*{b}_mm",), ("mm3",)))
+        out.append(Form("product", (f"{a}_mm", f"{b}_mm"), (f"{a}_mm*{b}_mm^2",), ("mm3",)))
+    if size.wide("feed_mm_per_s"):
+        out += [Form("rate", ("feed_mm_per_s",), ("feed_mm_per_s",), ("mm/s",))]
+        out += [Form("rate", ("feed_mm_per_s",), ("feed_mm_per_s^2",), ("(mm/s)2",))]
+    if len(axes) > 1:
+        for k in range(1, 5):
+            angle = "heading_rad" if k == 1 else f"{k}*heading_rad"
+            out.append(Form(f"heading {k}", ("heading_rad",), (f"sin({angle})", f"cos({angle})"), ("", "")))
+    for f in [f"f{a}_N" for a in "xyz" if size.wide(f"f{a}_N")]:
+        out.append(Form("force", (f,), (f,), ("N",)))
+        out.append(Form("force squared", (f,), (f"{f}*abs({f})",), ("N2",)))
+        out += [Form("force by place", (f, f"{a}_mm"), (f"{f}*{a}_mm",), ("N mm",)) for a in axes]
+    return out + _times(size)
+
+
+def at_drive(size: Sizes, revolute: bool) -> list[Form]:
+    """Forms of what shifts an actuator."""
+    unit = "rad" if revolute else "mm"
+    name = f"act_{unit}"
+    low, span = size.limits[name][0], size.span(name)
+    if span < (1e-3 if revolute else LEAST_SPAN_MM):
+        return _times(size)
+    shortest = max(3.0 * size.apart[name], span / 40.0)
+    out = _powers(name, unit, 3) + _waves(name, low, span, shortest) + _bumps(name, low, span) + _senses(name, span)
+    speed = f"{name}_per_s"
+    for text, of in ((speed, f"{unit}/s"), (f"abs({speed})", f"{unit}/s"), (f"{speed}*abs({speed})", f"({unit}/s)2")):
+        out.append(Form("rate", (speed,), (text,), (of,)))
+    out.append(Form("acceleration", (f"{speed}2",), (f"{speed}2",), (f"{unit}/s2",)))
+    return out + _times(size)

@@ -1,0 +1,171 @@
+"""Laws that were found before: a folder of them, offered as candidates for the next machine.
+
+Every term of a law has its own factor on the next machine, so that a wave may have another phase there; periods, places and
+lengths stay.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from camcomp.diagnosis.fit.bench import CandidateCause
+from camcomp.diagnosis.result.types import Law, LawPart
+from camcomp.ground.datatypes import Floats
+from camcomp.ground.errors import ConfigError, Location
+from camcomp.ground.files import display_name, read_bytes, write_all
+from camcomp.model.effect import Load, Motion, Parameter
+from camcomp.model.law.covariates import DriveRows, TipRows
+from camcomp.model.law.expression import FormulaError
+from camcomp.model.law.law import EmpiricalLaw
+from camcomp.model.law.spec import FormulaSpec, MapSpec
+
+_SOURCE = "the law found before, 1: as large as there"
+
+
+@dataclass(frozen=True)
+class LearnedLaw:
+    """A law by its name in the library, and the machine on which it was found."""
+
+    name: str
+    machine: str
+    law: Law
+
+    def pieces(self) -> list[tuple[LawPart, float]]:
+        """Its terms as parts of their own, each with the size that it had."""
+        if self.law.kind == "map":
+            return [(each, 1.0) for each in self.law.parts]
+        out = []
+        for term in self.law.terms:
+            where, text = term.term.split(": ", 1)
+            if text == "1":  # effects of the library say what does not depend on anything
+                continue
+            part = next(each for each in self.law.parts if _where(each) == where)
+            out.append((part.model_copy(update={"formula": text}), term.value))
+        return out
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """One factor per term."""
+        count = len(self.pieces())
+        names = ["factor"] if count == 1 else [f"factor_{k}" for k in range(1, count + 1)]
+        return tuple(Parameter(name, "1", 0.0, -20.0, 20.0, 1.0, 0.01, _SOURCE) for name in names)
+
+    def candidate(self, actuators: Sequence[str]) -> CandidateCause | None:
+        """The law as a cause that may be at work on a machine with these actuators; None where it has no place there."""
+        pieces = self.pieces()
+        if any(part.target is not None and part.target not in actuators for part, _ in pieces):
+            return None
+        laws = [_placed(part, size) for part, size in pieces]
+        at = [None if part.target is None else list(actuators).index(part.target) for part, _ in pieces]
+        placed = [_Piece(p.name, law, j) for p, law, j in zip(self.parameters, laws, at, strict=True)]
+        stages = {"control": _OnControl, "drive": _OnDrive}
+        kinds = tuple(dict.fromkeys(stages.get(law.on, _OnTip) for law in laws))
+        effect = type("LearnedEffect", kinds, {"__doc__": self.law.says})(placed)
+        effect.STAGE, effect.PARAMETERS = self.law.on, self.parameters
+        return CandidateCause(self.name, None, effect)
+
+    def entries(self, factors: Mapping[str, float]) -> list[dict[str, Any]]:
+        """What puts the law to work in a machine file, its terms as large as found."""
+        out = []
+        for (part, size), parameter in zip(self.pieces(), self.parameters, strict=True):
+            factor = factors.get(parameter.name, 0.0)
+            if part.effect == "map":
+                own: Any = part.coefficients_mm
+                scaled = [[factor * v for v in row] if isinstance(row, tuple | list) else factor * row for row in own]
+                part = part.model_copy(update={"coefficients_mm": scaled})
+            else:
+                part = part.model_copy(update={"formula": f"{factor * size:.6g}*{part.formula}"})
+            out.append(part.model_dump(exclude_none=True))
+        return out
+
+
+@dataclass(frozen=True)
+class _Piece:
+    """A term at work: its factor's name, the law, and the index of its actuator."""
+
+    factor: str
+    law: EmpiricalLaw
+    actuator: int | None
+
+
+class _Learned:
+    """What effects of learned laws have in common."""
+
+    TARGET, SOURCE = "machine", _SOURCE
+    STAGE: str
+    PARAMETERS: tuple[Parameter, ...]
+
+    def __init__(self, pieces: Sequence[_Piece]) -> None:
+        self.pieces = pieces
+
+    def shifted(self, on: str, values: Floats, motion: Motion, p: Mapping[str, float]) -> Floats:
+        """Values (n, m) of actuators with the pieces on that stage."""
+        out = values
+        for each in self.pieces:
+            if each.law.on == on and each.actuator is not None and p[each.factor] != 0.0:
+                out = out.copy() if out is values else out
+                out[:, each.actuator] += p[each.factor] * each.law.values(DriveRows(motion, each.actuator))
+        return out
+
+
+class _OnControl(_Learned):
+    def on_servo(self, position: Floats, motion: Motion, which: Floats, p: Mapping[str, float]) -> Floats:
+        return self.shifted("control", position, motion, p)
+
+
+class _OnDrive(_Learned):
+    def on_drive(self, error: Floats, motion: Motion, which: Floats, p: Mapping[str, float]) -> Floats:
+        return self.shifted("drive", error, motion, p)
+
+
+class _OnTip(_Learned):
+    def on_place(self, tip: Floats, load: Load, motion: Motion, p: Mapping[str, float]) -> Floats:
+        rows, out = TipRows(tip, load, motion), tip
+        for each in self.pieces:
+            if each.actuator is None and p[each.factor] != 0.0:
+                out = out.copy() if out is tip else out
+                out[:, each.law.axis] += p[each.factor] * each.law.values(rows)
+        return out
+
+
+def _where(part: LawPart) -> str:
+    return f"tip {part.axis}" if part.axis else f"{part.stage} {part.target}"
+
+
+def _placed(part: LawPart, size: float) -> EmpiricalLaw:
+    keys = part.model_dump(exclude_none=True, exclude={"effect", "target"}, mode="json")
+    found = (MapSpec if part.effect == "map" else FormulaSpec).model_validate(keys).law
+    return EmpiricalLaw(found.on, found.shape, found.envelope, found.axis, size, found.label)
+
+
+def keep(folder: str, law: Law, machine: str) -> str:
+    """Writes a law into the library; its name there. The same law twice is one. Raises FileError."""
+    name = "law_" + hashlib.sha256(law.formula.encode()).hexdigest()[:8]
+    text = json.dumps({"name": name, "machine": machine, "law": law.model_dump(mode="json")}, indent=1)
+    Path(folder).mkdir(parents=True, exist_ok=True)
+    write_all({str(Path(folder) / f"{name}.json"): (text + "\n").encode()})
+    return name
+
+
+def learned(folder: str) -> list[LearnedLaw]:
+    """The laws of a library, by name; none where the folder is not there yet. Raises ConfigError CC292, FileError."""
+    out = []
+    for path in sorted(Path(folder).glob("law_*.json")):
+        try:
+            data = json.loads(read_bytes(path))
+            found = LearnedLaw(str(data["name"]), str(data["machine"]), Law.model_validate(data["law"]))
+            for part, size in found.pieces():
+                _placed(part, size)
+        except (ValueError, KeyError, TypeError, StopIteration, ValidationError, FormulaError) as error:
+            what = str(error).split("\n")[0]
+            at = Location(display_name(str(path)), getattr(error, "lineno", 1), getattr(error, "colno", 1))
+            raise ConfigError("CC292", f"no law of a library: {what}", at=at) from None
+        out.append(found)
+    return out

@@ -1,0 +1,48 @@
+"""Rows of all runs as laws see them: covariates at the tip and at the drives, and how far they reach."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from camcomp.diagnosis.fit.bench import Bench
+from camcomp.diagnosis.law.sizes import Sizes
+from camcomp.ground.datatypes import Floats
+from camcomp.model.effect import Load
+from camcomp.model.law.covariates import DriveRows, TipRows
+
+Rows = TipRows | DriveRows
+
+
+def tip_rows(bench: Bench) -> list[TipRows]:
+    """Per run."""
+    readings = bench.nominal
+    return [TipRows(r.tip, Load(r.dyno, np.zeros((len(r.tip), 6))), r.motion) for r in readings]
+
+
+def drive_rows(bench: Bench, j: int, *, setpoints: bool) -> list[DriveRows]:
+    """Per run, of actuator j; setpoints: what the control was told instead of where the encoder was."""
+    out = []
+    for run, reading in zip(bench.runs, bench.nominal, strict=True):
+        motion = reading.motion
+        if setpoints:
+            motion = replace(motion, encoder=run.run_path.row_rho)
+        elif run.by == "setpoint" and run.measured.has("encoder"):
+            seen = run.measured.encoder
+            motion = replace(motion, encoder=np.where(np.isfinite(seen), seen, motion.encoder))
+        out.append(DriveRows(motion, j))
+    return out
+
+
+def sizes(rows: Sequence[Rows]) -> Sizes:
+    """Reach of every covariate."""
+    limits, apart = {}, {}
+    for name in rows[0]:
+        every = [each[name] for each in rows]
+        limits[name] = (min(float(v.min()) for v in every), max(float(v.max()) for v in every))
+        steps: Floats = np.concatenate([np.abs(np.diff(v)) for v in every])
+        apart[name] = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
+    stretches = tuple((float(each["common_s"][0]), float(each["common_s"][-1])) for each in rows)
+    return Sizes(limits, apart, tuple(sorted(stretches)))

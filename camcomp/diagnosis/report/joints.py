@@ -1,0 +1,113 @@
+"""Joints that turn unevenly: a curve each, with its band and where it was seen, and what that does on unseen poses."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from camcomp.diagnosis.result.types import CurveCause, DiagnosisResult, ErrorCurve
+from camcomp.ground.datatypes import Floats
+from camcomp.report.page import Section, Table
+from camcomp.report.plot import STYLES, Figure, Json, axis, brief, line, numbers
+
+MICRO = 1e6  # rad -> urad
+HALF_95 = 1.96
+SHARES = np.linspace(0.0, 1.0, 101)
+TEXT = (
+    "What each joint stands off its encoder over a turn. The band holds the curve with 95 % at every angle; it is wide where "
+    "no pose had the joint, and there nothing is taken out."
+)
+
+
+def joints_section(result: DiagnosisResult, residuals: Mapping[str, NDArray[Any]] | None = None) -> Section | None:
+    """Curves of the joints, None where none were found. residuals: rows of the poses, as `--residuals` writes them."""
+    causes = [each for each in result.causes if isinstance(each, CurveCause)]
+    if not causes:
+        return None
+    shrunk = result.shrinkage
+    text = [TEXT]
+    if shrunk is not None and shrunk.covered_share is not None and shrunk.covered_rms_um is not None:
+        text.append(
+            f"{100.0 * shrunk.covered_share:.0f} % of the unseen poses have every such joint at angles that were seen: "
+            f"{brief(shrunk.covered_rms_um)} µm are left there, {brief(shrunk.after_rms_um)} µm on all of them."
+        )
+    rows = [[str(c.target), *_amplitude(c), f"{100.0 * c.curve.seen_share:.0f} %", _intervals(c.curve)] for c in causes]
+    table = Table("Curves of the joints", ("joint", "amplitude µrad", "95 %", "of a turn seen", "seen at deg"), rows)
+    figures = [_curve(str(c.target), c.curve) for c in causes]
+    if residuals is not None and shrunk is not None and (spread := _spread(residuals, shrunk.holdout)) is not None:
+        figures.insert(0, spread)
+    return Section("joints", "Errors of the joints over their turn", text, figures, [table])
+
+
+def _amplitude(cause: CurveCause) -> tuple[str, str]:
+    size = cause.parameters["amplitude_rad"]
+    low, high = size.ci95
+    return f"{MICRO * size.value:.0f}", f"{MICRO * low:.0f} to {MICRO * high:.0f}"
+
+
+def _intervals(curve: ErrorCurve) -> str:
+    return ", ".join(f"{low:.0f} to {high:.0f}" if high - low >= 1.0 else f"{low:.0f}" for low, high in curve.seen_deg)
+
+
+def _curve(name: str, curve: ErrorCurve) -> Figure:
+    """One joint from -180 to 180 deg."""
+    turn = (np.array(curve.angle_deg) + 180.0) % 360.0 - 180.0
+    order = np.argsort(turn)
+    angle = turn[order]
+    error, half = MICRO * np.array(curve.error_rad)[order], HALF_95 * MICRO * np.array(curve.sd_rad)[order]
+    seen = np.any([(angle - low) % 360.0 <= high - low for low, high in curve.seen_deg], axis=0)
+    x = numbers(angle, 1)
+    edge: Json = {"type": "scatter", "mode": "lines", "x": x, "line": {"width": 0}, "hoverinfo": "skip"}
+    band: list[Json] = [
+        edge | {"y": numbers(error - half, 1), "showlegend": False, "name": "low"},
+        edge | {"y": numbers(error + half, 1), "name": "95 % band", "fill": "tonexty", "fillcolor": "rgba(128,128,128,0.25)"},
+    ]  # fmt: skip
+    bottom = float((error - half).min())
+    marks: Json = {
+        "type": "scatter", "mode": "markers", "name": "seen by poses", "x": numbers(angle[seen], 1), "y": [bottom] * int(seen.sum()),
+        "marker": {"symbol": "square", "size": 5, "color": STYLES[2][0]},
+    }  # fmt: skip
+    words = f"seen over {100.0 * curve.seen_share:.0f} % of its turn, largest error {brief(float(np.abs(error).max()))} µrad"
+    return Figure(
+        f"joint-{name}",
+        f"Joint {name}",
+        f"Error over the angle, {words}.",
+        f"Curve of the error of joint {name} over its turn with a band: {words}.",
+        [*band, line("taken out", x, numbers(np.where(seen, error, np.nan), 2), 0), marks],
+        {"xaxis": axis("angle in deg", range=[-180, 180], dtick=45), "yaxis": axis("error in µrad")},
+        height=280,
+    )
+
+
+def _spread(residuals: Mapping[str, NDArray[Any]], runs: Sequence[str]) -> Figure | None:
+    """Which share of the unseen poses is below which gap, before and after."""
+    unseen = np.isin(residuals["run"], list(runs))
+    if not unseen.any() or unseen.all():  # without a run held out, all were fitted
+        return None
+    before, after = (_sizes(residuals, kind, unseen) for kind in ("gap", "rest"))
+    curves = [
+        line(name, numbers(np.quantile(size, SHARES), 2), numbers(100.0 * SHARES, 1), k)
+        for k, (name, size) in enumerate((("before", before), ("with the causes found", after)))
+    ]
+    words = f"rms {brief(_rms(before))} µm before, {brief(_rms(after))} µm with the causes found"
+    return Figure(
+        "unseen-poses",
+        f"Unseen poses of {', '.join(runs)}: before and after",
+        f"Share of the poses whose gap is smaller: {words}. None of them was used for the fit.",
+        f"Cumulative distribution of the gap on unseen poses: {words}.",
+        curves,
+        {"xaxis": axis("gap in µm", rangemode="tozero"), "yaxis": axis("% of the poses", range=[0, 100])},
+        height=300,
+    )
+
+
+def _sizes(residuals: Mapping[str, NDArray[Any]], kind: str, rows: NDArray[np.bool_]) -> Floats:
+    parts = [np.asarray(residuals[f"{kind}_{axis_name}_mm"], float)[rows] for axis_name in "xyz"]
+    return np.asarray(1e3 * np.linalg.norm(parts, axis=0), float)
+
+
+def _rms(size: Floats) -> float:
+    return float(np.sqrt(np.mean(size**2)))

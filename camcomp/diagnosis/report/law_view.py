@@ -1,0 +1,36 @@
+"""What the report draws of a law."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from camcomp.diagnosis.fit.bench import thinned
+from camcomp.diagnosis.fit.problem import Problem
+from camcomp.diagnosis.law.answer import LawAnswer, term_bench
+from camcomp.diagnosis.law.bench_terms import Spot
+from camcomp.diagnosis.report.law_section import LawView
+from camcomp.ground.datatypes import Floats
+
+MICRO = 1e3  # mm -> um
+
+
+def law_view(problem: Problem, answer: LawAnswer) -> LawView:
+    """Over the first covariate of the law, along the axis of the tip that it moves most."""
+    bench = problem.bench
+    part = answer.law.parts[0]
+    drive = part.target is not None
+    index = bench.actuators.index(part.target) if part.target is not None else 0
+    rows = term_bench(problem).rows(Spot(part.stage if drive else "structure", index))
+    covariate = next(iter(part.envelope))
+    axis = int(np.argmax(np.sum([np.sum(s**2, axis=0) for s in answer.signal], axis=0)))
+    runs, sizes = [], []
+    for run, own, gap, signal in zip(bench.runs, rows, answer.gaps, answer.signal, strict=True):
+        x = thinned(own[covariate][:, None], run.thin)[:, 0]
+        runs.append((run.name, x, MICRO * gap[:, axis], MICRO * signal[:, axis]))
+        sizes.append((_rms(gap), _rms(gap - signal)))
+    return LawView(covariate, "xyz"[axis], tuple(runs), np.array(sizes))
+
+
+def _rms(gap: Floats) -> float:
+    known = np.isfinite(gap).any(axis=1)
+    return MICRO * float(np.sqrt(np.mean(np.nansum(gap[known] ** 2, axis=1)))) if known.any() else 0.0

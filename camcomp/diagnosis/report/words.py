@@ -1,0 +1,106 @@
+"""What is found, in the words of a workshop: effects, sizes with as many digits as their intervals allow, places."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+from typing import Any
+
+from camcomp.diagnosis.result.types import Driver, Estimate, FoundCause, NamedCause, StretchDriver
+from camcomp.ground import shelf
+from camcomp.ground.errors import ConfigError
+from camcomp.report.plot import brief
+
+_SMALLER = {"mm": (1e3, "µm"), "rad": (1e3, "mrad"), "s": (1e3, "ms")}  # units that small values are told in
+_NOTHING = " not told from "
+_COVARIATES = {
+    "position": "where {0} stands",
+    "velocity": "the speed of {0}",
+    "acceleration": "the acceleration of {0}",
+    "reversal": "the reversals of {0}",
+    "direction": "the direction in which {0} moves",
+    "force": "the force along {0}",
+    "time": "time ({0})",
+    "temperature": "the temperature",
+}
+
+
+@cache
+def _effect(name: str) -> Any:
+    try:
+        return shelf.load("effects", name)
+    except ConfigError:  # a law that has no file, or an effect of another installation
+        return None
+
+
+def plain(cause: NamedCause) -> str:
+    """The effect as a workshop calls it."""
+    return str(getattr(_effect(cause.effect), "PLAIN", cause.effect.replace("_", " ")))
+
+
+def remedy(cause: NamedCause) -> str:
+    """What to do about an effect; empty where it says nothing."""
+    return str(getattr(_effect(cause.effect), "REMEDY", ""))
+
+
+def micrometres(value: float) -> str:
+    """A length in um for people: never smaller than a hundredth."""
+    return "below 0.01 µm" if 0.0 <= value < 0.01 else f"{brief(value)} µm"
+
+
+def percent(share: float) -> str:
+    """A share for people: never 0 % of something that is there."""
+    return "less than 1 %" if 0.0 < share < 0.01 else f"{100.0 * share:.0f} %"
+
+
+def sizes(cause: FoundCause) -> str:
+    """The parameters of a cause with their 95 % intervals; those that may as well be nothing come last, by name alone."""
+    kinds = {each.name: each for each in getattr(_effect(cause.effect), "PARAMETERS", ())}
+    told = {name: size(name, each, kinds.get(name)) for name, each in cause.parameters.items()}
+    nothing = [name for name, text in told.items() if _NOTHING in text]
+    if len(nothing) in (0, len(told)):
+        return "; ".join(told.values())
+    rest = " and ".join(title(name, kinds.get(name)) for name in nothing)
+    return "; ".join([*(text for name, text in told.items() if name not in nothing), f"{rest}{_NOTHING}nothing"])
+
+
+def title(name: str, parameter: Any = None) -> str:
+    """The name of a parameter without its unit."""
+    unit = parameter.unit.replace("/", "_per_") if parameter is not None else ""
+    return name.removesuffix(f"_{unit}").replace("_", " ") if unit else name.replace("_", " ")
+
+
+def size(name: str, each: Estimate, parameter: Any = None) -> str:
+    """A value with its 95 % interval, or how large it is at most where the interval holds `nothing at all`."""
+    unit = parameter.unit if parameter is not None else ""
+    nominal = parameter.nominal if parameter is not None else 0.0
+    low, high = each.ci95
+    largest = max(abs(low), abs(high), abs(each.value))
+    scale = 1.0
+    if unit in _SMALLER and largest < 1.0:
+        scale, unit = _SMALLER[unit]
+    behind = "" if unit in ("", "1") else f" {unit}"
+    value, low, high = scale * each.value, scale * low, scale * high
+    shape = parameter is not None and (bool(parameter.scan) or parameter.tolerance == 0.0)
+    told, least, most = _alike(value, low, high)
+    if low <= scale * nominal <= high and not shape:
+        return f"{title(name, parameter)}{_NOTHING}{nominal:g} ({least} to {most}{behind})"
+    return f"{title(name, parameter)} {told}{behind} ({least} to {most})"
+
+
+def _alike(value: float, low: float, high: float) -> list[str]:
+    """A value and the ends of its interval, with decimals that show two digits of the doubt."""
+    doubt = 0.5 * (high - low)
+    if not doubt > 0.0 or not math.isfinite(doubt) or doubt < 1e-4:
+        return [brief(each) for each in (value, low, high)]
+    places = max(1 - math.floor(math.log10(doubt)), 0)
+    return [f"{each:.{places}f}" for each in (value, low, high)]
+
+
+def depends(driver: Driver) -> str:
+    """What a gap depends on, and where it stands out."""
+    kind, _, name = driver.covariate.partition(":")
+    text = _COVARIATES.get(kind, driver.covariate).format(name or "the machine")
+    if isinstance(driver, StretchDriver):
+        text += f", most of it from {driver.low:.1f} to {driver.high:.1f} {driver.unit} of its travel"
+    return text

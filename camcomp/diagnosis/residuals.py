@@ -1,0 +1,114 @@
+"""What was measured minus what is modelled, row by row, as columns: the gap, and the rest that the causes leave of it.
+
+Every kind of study fills the same columns: `run`, where they are known `row` (of the log, from 1), `t_s` and `line`, and
+per channel `gap_<channel>` and `rest_<channel>`, called and measured as in logs. Channels that nobody logged are left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from camcomp.diagnosis.arm.poses import ArmBench, Poses
+from camcomp.diagnosis.axis.findings import AxisChannel, AxisFindings
+from camcomp.diagnosis.experiment.open_experiment import columns_of
+from camcomp.diagnosis.fit.bench import Bench, Run, thinned
+from camcomp.diagnosis.result.types import DiagnosisResult
+from camcomp.ground import shelf
+from camcomp.ground.datatypes import Floats
+from camcomp.model.effect import Cause
+from camcomp.model.motion.log_columns import DYNO, LINE, TIME, TIP, log_columns
+from camcomp.model.motion.twin import Twin
+from camcomp.model.statics.description import Robot
+
+if TYPE_CHECKING:
+    from camcomp.diagnosis.diagnose import Diagnosis
+
+Columns = dict[str, NDArray[Any]]
+
+
+def of_runs(done: Diagnosis, twin: Twin, runs: Sequence[Run]) -> Columns:
+    """Runs of programs in their order, those held out too: the causes are those fitted to the others."""
+    problem, names = done.problem, columns_of(twin)
+    best = done.search.fits[done.search.verdict.best]
+    causes = problem.causes(best.members, best.theta, best.extra)
+    channels = (*TIP, *names.encoder, *names.drive, *DYNO)
+    seen = {run.name: (problem.bench, k) for k, run in enumerate(problem.bench.runs)}
+    unseen = [run for run in runs if run.name not in seen]
+    if unseen:
+        bench = Bench(twin, unseen)
+        seen |= {run.name: (bench, k) for k, run in enumerate(unseen)}
+    parts = list[Columns]()
+    for run in runs:
+        bench, k = seen[run.name]
+        gap = bench.gap(k)
+        rest = bench.gap(k, causes) if causes else gap
+        places = thinned(np.column_stack([run.run_path.time, run.measured.line]), run.thin)
+        head = {"run": np.full(len(gap), run.name), TIME: places[:, 0], LINE: places[:, 1]}
+        parts.append({**head, **_both(channels, gap, rest)})
+    return _stacked(parts)
+
+
+def of_poses(robot: Robot, own: Sequence[Cause], campaigns: Sequence[Poses], result: DiagnosisResult) -> Columns:
+    """Static poses without the outliers; tips in machine axes, with the tracker's frame of every campaign fitted again."""
+    out = {(each.run, each.row) for each in result.outliers}
+    kept = [
+        each.take(np.array([(str(r), int(n)) not in out for r, n in zip(each.run, each.rows, strict=True)]))
+        for each in campaigns
+    ]
+    bench = ArmBench(robot, tuple(own), kept)
+    found = [
+        Cause(each.effect, shelf.load("effects", each.effect), each.target, _values(each.parameters) | each.settings)
+        for each in result.known
+    ]
+    parts = list[Columns]()
+    for k, poses in enumerate(kept):
+        gap = bench.gap(k, ())
+        rest = bench.gap(k, found) if found else gap
+        parts.append({"run": poses.run, "row": poses.rows, **_both(TIP, gap, rest)})
+    return _stacked(parts)
+
+
+def of_axes(found: Sequence[AxisFindings], revolute: Mapping[str, bool]) -> Columns:
+    """Logs of axes: encoder minus set-point, and drive force, each about its mean over the runs of the fit."""
+    cells: dict[tuple[str, float], dict[str, float]] = {}
+    for axis in found:
+        names = log_columns([axis.name], [revolute[axis.name]])
+        for channel, name, sign in ((axis.following, names.encoder[0], -1.0), (axis.force, names.drive[0], 1.0)):
+            if channel is not None:
+                _lay(cells, channel, name, sign)
+    heads = list(dict.fromkeys(name for each in cells.values() for name in each))
+    order = sorted(cells)
+    out: Columns = {"run": np.array([run for run, _ in order]), TIME: np.array([time for _, time in order])}
+    return out | {name: np.array([cells[key].get(name, np.nan) for key in order]) for name in heads}
+
+
+def _lay(cells: dict[tuple[str, float], dict[str, float]], channel: AxisChannel, name: str, sign: float) -> None:
+    """Adds the gap and the rest of one channel to the rows of its runs."""
+    ends = np.cumsum([len(each.time) for each in channel.moves])[:-1]
+    gaps = np.split(channel.data.y - channel.data.y.mean(), ends)
+    for k, move, gap, rest in zip(channel.runs, channel.moves, gaps, channel.left, strict=True):
+        for time, first, last in zip(move.time.tolist(), gap.tolist(), rest.tolist(), strict=True):
+            row = cells.setdefault((channel.all_names[k], time), {})
+            row[f"gap_{name}"], row[f"rest_{name}"] = sign * first, sign * last
+
+
+def _values(parameters: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: each.value for name, each in parameters.items()}
+
+
+def _both(names: Sequence[str], gap: Floats, rest: Floats) -> Columns:
+    return {
+        f"{kind}_{name}": values[:, j]
+        for kind, values in (("gap", gap), ("rest", rest))
+        for j, name in enumerate(names)
+    }
+
+
+def _stacked(parts: Sequence[Columns]) -> Columns:
+    """Runs below each other, without channels that hold no number."""
+    whole = {name: np.concatenate([each[name] for each in parts]) for name in parts[0]}
+    return {name: values for name, values in whole.items() if values.dtype.kind != "f" or np.isfinite(values).any()}

@@ -1,0 +1,80 @@
+"""The parts of a law search: forms that can be read, evidence in closed form, a library that gives back what it was given."""
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal
+
+from camcomp.diagnosis.law.folds import gains, withheld
+from camcomp.diagnosis.law.forms import at_drive, at_tip
+from camcomp.diagnosis.law.library import keep, learned
+from camcomp.diagnosis.law.sizes import Sizes
+from camcomp.diagnosis.result.types import Law, LawPart, LawTerm
+from camcomp.model.law.covariates import AT_DRIVE, AT_TIP
+from camcomp.model.law.expression import parse
+from camcomp.model.law.spline_map import splines, tensor
+
+
+def sizes(names):
+    limits = {name: (-20.0, 30.0) for name in names} | {"common_s": (0.0, 130.0), "cut_min": (0.0, 3.0)}
+    return Sizes(limits, dict.fromkeys(names, 1.0), ((0.0, 20.0), (100.0, 130.0)))
+
+
+@pytest.mark.parametrize(
+    ("forms", "names"), [(at_tip(sizes(AT_TIP)), AT_TIP), (at_drive(sizes(AT_DRIVE), False), AT_DRIVE)]
+)
+def test_every_form_is_a_formula_over_what_is_known_there(forms, names):
+    assert len({each.said for each in forms}) > 0.9 * len(forms) > 300
+    for each in forms:
+        assert len(each.texts) == len(each.units) and len(each.shape) == len(each.bounds)
+        for text in each.said:
+            assert set(parse(text, names).names) <= set(names)
+        assert all(low <= value <= high for value, (low, high) in zip(each.shape, each.bounds, strict=True)), each
+
+
+def test_the_gain_is_that_of_the_marginal_density():
+    rng = np.random.default_rng(1)
+    X, r, size = rng.normal(size=(12, 2)), rng.normal(size=12), np.array([0.5, 2.0])
+    with_law = multivariate_normal(np.zeros(12), np.eye(12) + X @ np.diag(1 / size) @ X.T).logpdf(r)
+    without = multivariate_normal(np.zeros(12), np.eye(12)).logpdf(r)
+    got = gains((X.T @ X)[None, None], (X.T @ r)[None, None], size[None])
+    assert got[0, 0] == pytest.approx(with_law - without)
+
+
+def test_what_is_withheld_is_judged_by_what_the_others_say():
+    gain = np.array([[10.0], [6.0], [7.0]])
+    assert withheld(gain) == pytest.approx([(10.0 - 6.0) + (10.0 - 7.0)])
+
+
+def test_splines_add_up_to_one_and_stay_within_their_limits():
+    basis = splines(np.linspace(-3.0, 13.0, 50), 0.0, 10.0, 7)
+    assert basis.sum(axis=1) == pytest.approx(1.0) and basis.min() >= 0.0
+    assert tensor([basis, basis]).sum(axis=1) == pytest.approx(1.0)
+
+
+def law_of(*terms):
+    part = LawPart(
+        effect="formula",
+        stage="drive",
+        target="y",
+        axis=None,
+        envelope={"act_mm": (0.0, 9.0)},
+        formula="2*act_mm - 0.5*act_mm^2",
+    )
+    told = tuple(LawTerm(term=f"drive y: {text}", value=value, ci95=(value, value), unit="mm") for text, value in terms)
+    return Law(formula="drive y = ...", on="drive", terms=told, envelope={}, after_rms_um=1.0, parts=(part,))
+
+
+def test_a_library_gives_back_terms_that_have_their_own_size(tmp_path):
+    folder = str(tmp_path / "laws")
+    assert learned(folder) == []
+    name = keep(folder, law_of(("act_mm", 2.0), ("act_mm^2", -0.5), ("1", 0.3)), "lathe")
+    assert keep(folder, law_of(("act_mm", 2.0), ("act_mm^2", -0.5), ("1", 0.3)), "lathe") == name
+    (found,) = learned(folder)
+    assert (found.name, found.machine) == (name, "lathe")
+    assert [p.name for p in found.parameters] == ["factor_1", "factor_2"]  # what is constant is no law
+    entries = found.entries({"factor_1": 0.5, "factor_2": 2.0})
+    assert [each["formula"] for each in entries] == ["1*act_mm", "-1*act_mm^2"]
+    assert entries[0]["target"] == "y" and entries[0]["stage"] == "drive"
+    assert found.candidate(("x", "z")) is None
+    cause = found.candidate(("x", "y"))
+    assert cause.name == name and hasattr(cause.effect, "on_drive") and not hasattr(cause.effect, "on_place")
