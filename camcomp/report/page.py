@@ -36,6 +36,14 @@ class Table:
 
 
 @dataclass(frozen=True)
+class Listing:
+    """A text file that the reader may look at and save."""
+
+    name: str
+    text: str
+
+
+@dataclass(frozen=True)
 class Section:
     """A headed part of a page; `text` are paragraphs of plain text."""
 
@@ -45,6 +53,7 @@ class Section:
     figures: Sequence[Figure] = ()
     tables: Sequence[Table] = ()
     items: Sequence[str] = ()  # a bulleted list
+    listings: Sequence[Listing] = ()
 
 
 @dataclass(frozen=True)
@@ -123,9 +132,19 @@ def _section(section: Section) -> str:
     parts += [f"<p>{escape(text)}</p>" for text in section.text]
     if section.items:
         parts.append("<ul>" + "".join(f"<li>{escape(item)}</li>" for item in section.items) + "</ul>")
+    parts += [_listing(each) for each in section.listings]
     parts += [_figure(each) for each in section.figures]
     parts += [_table(each) for each in section.tables]
     return "".join([*parts, "</section>"])
+
+
+def _listing(listing: Listing) -> str:
+    name = escape(listing.name, quote=True)
+    data = base64.b64encode(listing.text.encode()).decode()
+    return (
+        f'<details><summary>{name}</summary><p><a download="{name}" href="data:text/plain;base64,{data}">Save {name}</a></p>'
+        f'<pre tabindex="0">{escape(listing.text)}</pre></details>'
+    )
 
 
 def _figure(figure: Figure) -> str:
@@ -133,11 +152,11 @@ def _figure(figure: Figure) -> str:
     controls = ""
     if figure.exaggerate:
         options = "".join(f"<option>{plane.upper()}</option>" for plane in figure.exaggerate["planes"])
+        plane = f'<label for="{name}-p">Plane</label><select id="{name}-p">{options}</select>' if options else ""
         controls = (
             f'<div class="controls"><label for="{name}-k">Deviation enlarged</label>'
             f'<input type="range" id="{name}-k" min="0" max="100" step="1">'
-            f'<output id="{name}-o" for="{name}-k"></output>'
-            f'<label for="{name}-p">Plane</label><select id="{name}-p">{options}</select></div>'
+            f'<output id="{name}-o" for="{name}-k"></output>{plane}</div>'
         )
     return (
         f'<figure id="{name}"><h3>{escape(figure.title)}</h3>{controls}'

@@ -27,7 +27,8 @@ Json = dict[str, Any]
 class Figure:
     """One plot of a page. label: what a screen reader says; caption: what everybody reads below it.
 
-    exaggerate: base curve and shifts of the plot whose deviations a slider enlarges (see assets/page.js).
+    exaggerate: base curve and shifts of the plot whose deviations a slider enlarges: one base for all curves in one of
+    `planes`, or in space a base for each curve and no planes (see assets/page.js).
     """
 
     name: str

@@ -8,9 +8,16 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
+
+import click
+
+from camcomp.ground.headway import Headway, watched
 
 PATIENCE = 1.0  # s before a work in progress is worth a word
 TICK = 0.5  # s
+STEPS = 1000  # of a bar
+WIDE = 24  # characters of a bar
 
 
 def lively() -> bool:
@@ -20,28 +27,58 @@ def lively() -> bool:
 
 @contextmanager
 def working(on: str, *, quiet: bool = False) -> Iterator[None]:
-    """Say after a moment what is being worked on, and for how long; nothing is left of it afterwards."""
+    """Say after a moment what is being worked on, how much of it is done and how long the rest may take.
+
+    Where nobody can tell that, how long it has taken. Nothing is left of it afterwards.
+    """
     if quiet or not lively():
         yield
         return
-    stream, done, start = sys.stderr, threading.Event(), time.monotonic()
+    stream, finished = sys.stderr, threading.Event()
 
-    def tell() -> None:
-        pause = PATIENCE
-        while not done.wait(pause):
-            stream.write(f"\r\033[K{on} ... {time.monotonic() - start:.0f} s")
+    def tell(headway: Headway) -> None:
+        line, pause = _Line(on), PATIENCE
+        while not finished.wait(pause):
+            stream.write(f"\r\033[K{line.text(headway)}")
             stream.flush()
             pause = TICK
 
-    teller = threading.Thread(target=tell, daemon=True)
-    teller.start()
-    try:
-        yield
-    finally:
-        done.set()
-        teller.join()
-        stream.write("\r\033[K")
-        stream.flush()
+    with watched() as headway:
+        teller = threading.Thread(target=tell, args=(headway,), daemon=True)
+        teller.start()
+        try:
+            yield
+        finally:
+            finished.set()
+            teller.join()
+            stream.write("\r\033[K")
+            stream.flush()
+
+
+class _Line:
+    """The line that is drawn anew: a bar with share and remaining time, or what is known instead."""
+
+    def __init__(self, on: str) -> None:
+        self._on, self._start = on, time.monotonic()
+        bar: Any = click.progressbar(
+            length=STEPS,
+            label=on,
+            width=WIDE,
+            show_percent=True,
+            show_eta=True,
+            file=sys.stderr,
+            fill_char="=",
+            empty_char=" ",
+        )
+        self._bar = bar
+
+    def text(self, headway: Headway) -> str:
+        spent = time.monotonic() - self._start
+        if headway.doing or headway.share is None:
+            return f"{self._on} ... {headway.doing + ', ' if headway.doing else ''}{spent:.0f} s"
+        self._bar.make_step(round(headway.share * STEPS) - self._bar.pos)
+        left = " left" if self._bar.eta_known and not self._bar.finished else ""
+        return f"{self._bar.format_progress_line()}{left}"
 
 
 def say(*lines: str, quiet: bool = False) -> None:

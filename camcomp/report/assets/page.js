@@ -71,6 +71,10 @@
   function exaggerated(spec) {
     const { base, shifts } = spec.exaggerate;
     const k = factorOf(spec);
+    if (Array.isArray(base)) { // in space: every curve has its own points
+      const at = (i, axis) => base[i][axis].map((b, j) => (b === null ? null : b + k * shifts[i][axis][j]));
+      return { ...spec, traces: spec.traces.map((trace, i) => ({ ...trace, x: at(i, "x"), y: at(i, "y"), z: at(i, "z") })) };
+    }
     const [h, v] = byId(spec.name + "-p").value.toLowerCase();
     const along = (i, axis) => {
       const shift = shifts[i] && shifts[i][axis];
@@ -92,7 +96,7 @@
     };
     const change = () => { tell(); draw(spec); };
     slider.addEventListener("input", change);
-    plane.addEventListener("change", change);
+    if (plane) plane.addEventListener("change", change);
     tell();
   }
 

@@ -2,29 +2,17 @@
 
 from __future__ import annotations
 
-import json
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
-from camcomp import __version__
-from camcomp.ground.errors import CamcompError, CheckFailed
-from camcomp.model.config.load import load_config
-from camcomp.report.findings import Case, findings_of_messages
-from camcomp.report.outputs import findings_files
 from camcomp.terminal.commands._options import config_option, findings_options, quiet_option
 from camcomp.terminal.progress import say
 
 if TYPE_CHECKING:
-    from camcomp.compensation.batch.programs import FoundProgram, Plan, Status
-    from camcomp.compensation.batch.worker import Outcome, Task
-
-SUMMARY = "camcomp-batch.json"
-INTERRUPTED = 130  # stands in the summary when a signal or a bug ended the batch
+    from camcomp.api.batch import Status
 
 
 @click.command()
@@ -65,71 +53,17 @@ def command(
         raise click.BadParameter("the address of the scheduler is empty", param_hint="--scheduler")
     if scheduler and jobs:
         raise click.UsageError("--jobs is about this machine; a scheduler has its own workers")
-    config = load_config(configs)
-    from camcomp.compensation.batch import pools
-    from camcomp.compensation.batch.programs import Plan, find_programs, output_tree
-    from camcomp.ground.files import write_all
-    from camcomp.ground.shelf import usable
+    from camcomp.api.batch import compensate_many
 
-    if config.control.dialect is None:
-        list(usable("dialects"))  # says which plug-ins are left out; workers would say it once each
-    plan = Plan(
-        config, Path(output_dir), method or config.compensation.method,
-        tolerance_um or config.compensation.tolerance_um, joints, __version__,
+    done = compensate_many(
+        paths, configs, output_dir, jobs=jobs, scheduler=scheduler, joints=joints, method=method, tolerance_um=tolerance_um,
+        sarif_file=sarif_file, junit_file=junit_file, tell=partial(say, quiet=False),
+        on_status=lambda *args: _tell(*args) if not quiet or args[0].exit_code else None,
     )  # fmt: skip
-    programs = find_programs(paths, plan.output)
-    if scheduler:
-        pool = partial(pools.on_a_cluster, address=scheduler, tell=partial(say, quiet=False))
-    else:
-        pool = partial(pools.on_this_machine, jobs=min(jobs or pools.cores(), len(programs)))
-    statuses: list[Status] = []
-    findings = [each for each in (sarif_file, junit_file) if each is not None]
-    with output_tree(plan, programs, [str(plan.output / SUMMARY), *findings]):
-        try:
-            _work(plan, programs, pool, statuses, quiet)
-        except CamcompError as error:
-            _note_down(plan, statuses, programs, error.exit_code)
-            raise
-        except BaseException:
-            _note_down(plan, statuses, programs, INTERRUPTED)
-            raise
-        figures = _note_down(plan, statuses, programs, 0)
-        cases = [_case(each) for each in sorted(statuses, key=lambda each: each.source)]
-        write_all(findings_files("batch", cases, sarif_file=sarif_file, junit_file=junit_file))
-    counts = ", ".join(f"{count} {name}" for name, count in figures["counts"].items() if count)
-    say(f"{figures['programs']} programs: {counts}", quiet=quiet)
-    out: int = figures["exit_code"]
+    counts = ", ".join(f"{count} {name}" for name, count in done["counts"].items() if count)
+    say(f"{done['programs']} programs: {counts}", quiet=quiet)
+    out: int = done["exit_code"]
     return out
-
-
-def _work(
-    plan: Plan, programs: Sequence[FoundProgram], pool: Callable[[Iterable[Task]], Iterator[Outcome]],
-    statuses: list[Status], quiet: bool,
-) -> None:  # fmt: skip
-    from camcomp.compensation.batch.programs import run_batch
-
-    for status in run_batch(plan, programs, pool):
-        statuses.append(status)
-        if not quiet or status.exit_code:
-            _tell(status, len(statuses), len(programs))
-
-
-def _note_down(
-    plan: Plan, statuses: Sequence[Status], programs: Sequence[FoundProgram], stopped: int
-) -> dict[str, Any]:
-    """Writes what became of every program so far; the figures."""
-    from camcomp.compensation.batch.programs import summary
-    from camcomp.ground.files import write_all
-
-    figures = summary(statuses, programs, stopped)
-    write_all({plan.output / SUMMARY: (json.dumps(figures, indent=2) + "\n").encode()})
-    return figures
-
-
-def _case(status: Status) -> Case:
-    check = status.exit_code == CheckFailed.exit_code
-    findings = findings_of_messages(status.messages, status.source, check=check)
-    return Case(status.source, findings, status.status)
 
 
 def _tell(status: Status, number: int, total: int) -> None:

@@ -3,7 +3,6 @@
 import click
 
 from camcomp.ground.files import display_name
-from camcomp.model.config.load import load_config
 
 
 @click.command()
@@ -15,12 +14,11 @@ def command(program: str, configs: tuple[str, ...]) -> None:
     Source line, kind, end point in mm in the program frame of G54, and for arcs the centre and the sweep; all units,
     offsets, modes, loops and cycles are resolved.
     """
-    from camcomp.gcode.canon import canonical
-    from camcomp.model.control import open_program
+    from camcomp.api.machine import canonical_lines, load_machine, read_program
 
-    read = open_program(program, load_config(configs) if configs else None)
+    read = read_program(program, load_machine(*configs) if configs else None)
     for warning in read.warnings:
         click.echo(f"{display_name(program)}: warning: {warning}", err=True)
     click.echo(f"; {read.dialect}, {len(read.path)} motions")
-    for line in canonical(read.path):
+    for line in canonical_lines(read):
         click.echo(line)

@@ -13,7 +13,7 @@ from camcomp.ground.places import STANDARD
 from camcomp.terminal.commands._options import OUTPUT
 
 if TYPE_CHECKING:
-    from camcomp.diagnosis.compare import Comparison, Difference
+    from camcomp.api.comparison import Comparison, Difference
 
 
 @click.command()
@@ -36,14 +36,10 @@ def command(
     Tells for every column the largest difference and where it is, its root mean square and its mean (A minus B). Rows
     are aligned by source line and path length, or by time; B is interpolated between its rows.
     """
-    from camcomp.diagnosis import compare as story
+    from camcomp.api.comparison import compare
 
     limits = [_limit(each) for each in tolerances]
-    first, second = story.read_columns(a), story.read_columns(b)
-    try:
-        done = story.compare(first, second, {"s": "s_mm", "t": "t_s", "row": "row"}[by] if by else None)
-    except ValueError as error:
-        raise ConfigError("CC451", str(error)) from error
+    done = compare(a, b, by)
     known = [each.column for each in done.differences]
     for name in (*columns, *(name for name, _ in limits if name)):
         if name not in known:

@@ -4,16 +4,13 @@ from typing import TYPE_CHECKING
 
 import click
 
-from camcomp import __version__
 from camcomp.ground.errors import CheckFailed
-from camcomp.ground.files import display_name, open_source, read_bytes, write_all
-from camcomp.ground.places import STANDARD
-from camcomp.model.config.load import load_config
+from camcomp.ground.files import display_name
 from camcomp.terminal.commands._options import OUTPUT, quiet_option
 from camcomp.terminal.progress import say, working
 
 if TYPE_CHECKING:
-    from camcomp.compensation.program.result import Summary
+    from camcomp.api.compensation import Summary
 
 
 @click.command()
@@ -37,7 +34,17 @@ if TYPE_CHECKING:
     help="How the target is found; default: what the machine file says, newton.",
 )
 @click.option("--tolerance-um", type=click.FloatRange(min=1e-6), help="Bound of the error left.")
-@click.option("--arcs/--no-arcs", default=None, help="Arcs come out as arcs where those are fewer than straight lines.")
+@click.option(
+    "--arcs/--no-arcs",
+    default=None,
+    help="Programmed arcs come out as arcs where those are fewer than lines; default: where the control is better off.",
+)
+@click.option(
+    "--mirror",
+    metavar="LOG.csv",
+    multiple=True,
+    help="Log of a test cut: its deviation in reverse instead of the model's; again for a cut of what that gave.",
+)
 @click.option("--dry-run", is_flag=True, help="Do everything but write.")
 @quiet_option
 def command(
@@ -51,6 +58,7 @@ def command(
     method: str | None,
     tolerance_um: float | None,
     arcs: bool | None,
+    mirror: tuple[str, ...],
     dry_run: bool,
     quiet: bool,
 ) -> None:
@@ -59,65 +67,14 @@ def command(
     PROGRAM is a G-code file, - reads standard input. Without any output option the corrected program goes to standard
     output. Exit code 1: everything is written, but a check failed, or the program was compensated before.
     """
-    config = load_config(configs)
-    if report:
-        from camcomp.report.page import plot_library
+    from camcomp.api.compensation import compensate_file
 
-        plot_library()  # a missing library is told before the work, not after it
-    from camcomp.compensation.file_to_file import Wanted, compensate_long
-    from camcomp.gcode.stamp import is_stamped
-    from camcomp.model.job import Job
-
-    job = Job(config)
-    tolerance = tolerance_um or config.compensation.tolerance_um
-    how, name = method or config.compensation.method, display_name(program)
-    with open_source(program) as file:
-        done = None
-        if not (paths or report):
-            standard = None if output or joints or summary_file else STANDARD
-            with working(f"compensating {name}", quiet=quiet):
-                done = compensate_long(
-                    file, name, job, method=how, tolerance_um=tolerance, version=__version__, dry_run=dry_run, arcs=arcs,
-                    wanted=Wanted(output or standard, joints, summary_file), inputs=(program, *configs),
-                )  # fmt: skip
-        if done is not None:
-            _finish(done.figures, done.sizes if dry_run else {}, done.failed, quiet)
-            return
-        data = file.read()
-    from camcomp.compensation.program.compensate import compensate, trajectories
-    from camcomp.compensation.report import tables
-    from camcomp.compensation.report.joint_table import joint_bytes
-    from camcomp.model.control import program_of
-
-    source = program_of(data, name, config)
-    if is_stamped(source.data):
-        raise CheckFailed("CC603", f"{source.name} was compensated before")
-    with working(f"compensating {source.name}", quiet=quiet):
-        result = compensate(source, job, method=how, tolerance_um=tolerance, version=__version__, arcs=arcs)
-    figures = tables.summary(result, job)
-    outputs: dict[str, bytes] = {}
-    if output or not (joints or summary_file or paths or report):
-        outputs[output or STANDARD] = result.written.data
-    if joints:
-        outputs[joints] = joint_bytes(result, job, joints)
-    if paths:
-        outputs[paths] = tables.paths_csv(result, trajectories(result, job))
-    if summary_file:
-        outputs[summary_file] = figures.to_json()
-    failed = result.failed_checks(job, tolerance)
-    if report:
-        from camcomp.compensation.report.page import compensation_html
-        from camcomp.report.inputs import Input
-
-        inputs = [Input("program", source.name, source.data)]
-        inputs += [Input("configuration", display_name(each), read_bytes(each)) for each in configs if each != STANDARD]
-        with working("checking what was written, for the report", quiet=quiet):
-            outputs[report] = compensation_html(
-                result, job, figures, failed=failed, tolerance_um=tolerance, inputs=inputs
-            )
-    if not dry_run:
-        write_all(outputs, inputs=(program, *configs))
-    _finish(figures, {each: len(made) for each, made in outputs.items()} if dry_run else {}, failed, quiet)
+    with working(f"compensating {display_name(program)}", quiet=quiet):
+        done = compensate_file(
+            program, configs, output=output, joints=joints, summary=summary_file, paths=paths, report=report, method=method,
+            tolerance_um=tolerance_um, arcs=arcs, mirror=mirror, dry_run=dry_run,
+        )  # fmt: skip
+    _finish(done.figures, done.sizes if dry_run else {}, done.failed, quiet)
 
 
 def _finish(figures: "Summary", sizes: dict[str, int], failed: list[tuple[str, str]], quiet: bool) -> None:
@@ -142,12 +99,34 @@ def _told(figures: "Summary") -> list[str]:
         f"largest drive force {_either(*efforts)}",
         f"platform tilt left {figures.platform_tilt_max_mrad:.2f} mrad",
     ]
+    if taken := figures.taken:
+        lines.append(
+            f"policy {taken.policy}: of {taken.points} points {taken.shrunk} take less than all of the correction and "
+            f"{taken.left_alone} none"
+        )
+    if expected := figures.expected:
+        low, high = expected.rms_ci95_um
+        lines.append(
+            f"expected of machines that may be: rms {expected.rms_um:.2f} um ({low:.2f} to {high:.2f}), "
+            f"95 % of all points below {expected.p95_um:.2f} um"
+        )
+        lines.append(f"{figures.advice}")
     if checked := figures.interpolation:
         lines.append(
             f"interpolated between {checked.exact_solutions} exact solutions; {checked.checked} points checked: "
             f"{checked.worst_um:.4f} um at most, allowed {checked.bound_um:g} um"
         )
-    return lines + [f"warning: {each}" for each in figures.warnings]
+    return lines + [f"warning: {each}" for each in figures.warnings] + [_control_told(figures)]
+
+
+def _control_told(figures: "Summary") -> str:
+    """What the control makes of the program."""
+    mode = figures.control_mode + ("" if figures.control_mode_stated else " (assumed)")
+    times, left = figures.cycle_time_s, figures.under_control
+    return (
+        f"control in {mode}: {times.before:.1f} s become {times.after:.1f} s; "
+        f"it takes the tip error to rms {left.rms_um:.2f} um, max {left.max_um:.2f} um"
+    )
 
 
 def _either(*figures: tuple[float | None, str]) -> str:

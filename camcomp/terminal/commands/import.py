@@ -1,19 +1,10 @@
 """camcomp import."""  # noqa: N999 - the file is called like the verb
 
-import os
-from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
-from camcomp.ground.errors import FileError
-from camcomp.ground.files import display_name, read_bytes, write_all
-from camcomp.model.config.load import load_config
 from camcomp.terminal.commands._options import config_option
-
-if TYPE_CHECKING:
-    from camcomp.diagnosis.recordings.sampled import SampledColumns
 
 
 @click.command()
@@ -66,72 +57,13 @@ def command(
     joined row by row where they have equally many rows, else on their common time. The experiment is judged by: camcomp
     diagnose DIR/experiment.yaml
     """
-    from camcomp.diagnosis.recordings.axis_file import read_axis
-    from camcomp.diagnosis.recordings.experiment_file import experiment_yaml, run_names
-    from camcomp.diagnosis.recordings.naming import told_columns
-    from camcomp.diagnosis.recordings.run_log import Recording, Wishes, log_of
+    from camcomp.api.recordings import import_recordings
 
-    actuators = load_config(configs).robot.actuators
-    groups = [_files_of(each) for each in files]
-    called = run_names([group[0] for group in groups])
-    run_programs = _programs(programs, called)
-    told = told_columns(columns, list(actuators), [each.rotary for each in actuators.values()])
-    recordings = list[Recording]()
-    for run, group in zip(called, groups, strict=True):
-        wishes = Wishes(told, rows, degrees, period_s, by, run in run_programs)
-        if len(group) == 1 and Path(group[0]).suffix.lower() == ".mat":
-            read = read_axis(read_bytes(group[0]), display_name(group[0]), run, actuators, actuator, wishes)
-        else:
-            read = log_of(run, _parts(group, [each.split() for each in names], period_s), actuators, wishes)
-        recordings.append(read)
-    out = Path(output_dir)
-    outputs: dict[Path, bytes] = {out / f"{each.name}.csv": each.log for each in recordings}
-    outputs[out / "experiment.yaml"] = experiment_yaml(
-        recordings, configs, out, holdout, run_programs, cutting=cutting, one_clamping=one_clamping
-    )
-    _write(out, outputs, [*(file for group in groups for file in group), *configs, *run_programs.values()])
-    for each, file in zip(recordings, files, strict=True):
+    runs, experiment = import_recordings(
+        files, configs, output_dir, actuator=actuator, columns=columns, names=names, period_s=period_s, degrees=degrees,
+        by=by, programs=programs, cutting=cutting, one_clamping=one_clamping, holdout=holdout, rows=rows,
+    )  # fmt: skip
+    for each, file in zip(runs, files, strict=True):
         renamed = "" if each.name == Path(file.split("+")[0]).stem or file == "-" else f" ({file})"
         click.echo(f"{each.name}{renamed}: {each.rows} rows; {'; '.join(each.notes) or 'complete'}", err=True)
-    click.echo(f"next: camcomp diagnose {out / 'experiment.yaml'}", err=True)
-
-
-def _files_of(word: str) -> list[str]:
-    """Files of one run: a file, or several joined by +."""
-    return [word] if os.path.lexists(word) else word.split("+")
-
-
-def _parts(group: Sequence[str], names: Sequence[Sequence[str]], period_s: float | None) -> "list[SampledColumns]":
-    """What the files of one run hold; names: of columns of tables without header, by file, the last for all others."""
-    from camcomp.diagnosis.recordings.formats import read_sampled
-    from camcomp.diagnosis.recordings.sampled import refuse_names
-
-    parts = list["SampledColumns"]()
-    for k, file in enumerate(group):
-        own = names[min(k, len(names) - 1)] if names else ()
-        parts += read_sampled(read_bytes(file), display_name(file), own, period_s)
-    refuse_names(parts, names)
-    return parts
-
-
-def _programs(words: Sequence[str], runs: Sequence[str]) -> dict[str, str]:
-    """Program by run. Raises FileError CC500 for one that is not there."""
-    out: dict[str, str] = {}
-    for word in words:
-        run, mark, file = word.partition("=")
-        named = bool(mark) and not os.path.lexists(word)
-        file = file if named else word
-        read_bytes(file)
-        out |= {run: file} if named else dict.fromkeys(runs, file)
-    return out
-
-
-def _write(out: Path, outputs: dict[Path, bytes], inputs: Sequence[str]) -> None:
-    for path in outputs:
-        if os.path.lexists(path):
-            raise FileError("CC501", f"{path} is there already", hint="choose another folder")
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise FileError("CC501", f"cannot make {out}: {error.strerror}") from error
-    write_all(outputs, inputs=inputs)
+    click.echo(f"next: camcomp diagnose {experiment}", err=True)

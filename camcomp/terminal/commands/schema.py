@@ -4,8 +4,6 @@ import json
 
 import click
 
-from camcomp.model.config.schema import Schema, config_schema, experiment_schema, result_schema
-
 
 @click.command()
 @click.option("--experiment", is_flag=True, help="The schema of experiment files instead of machine files.")
@@ -21,17 +19,7 @@ def command(experiment: bool, result: str | None) -> None:
     """
     if experiment and result:
         raise click.UsageError("--experiment and --result are two schemas; ask for one")
-    schema = _schema_of(result) if result else experiment_schema() if experiment else config_schema()
+    from camcomp.api.settings import schema_of
+
+    schema = schema_of(result or ("experiment" if experiment else "config"))
     click.echo(json.dumps(schema, indent=1, ensure_ascii=False))
-
-
-def _schema_of(result: str) -> Schema:
-    if result == "diagnosis":
-        from camcomp.diagnosis.result.types import DiagnosisResult
-
-        return result_schema(DiagnosisResult, "camcomp diagnose --json")
-    from camcomp.compensation.program.result import Summary, Verification
-
-    if result == "summary":
-        return result_schema(Summary, "camcomp compensate --summary")
-    return result_schema(Verification, "camcomp verify --json")

@@ -4,7 +4,6 @@ import click
 
 from camcomp.ground.files import write_all
 from camcomp.ground.places import STANDARD
-from camcomp.model.config.load import load_config
 from camcomp.terminal.commands._options import OUTPUT
 from camcomp.terminal.progress import say
 
@@ -13,23 +12,39 @@ from camcomp.terminal.progress import say
 @click.argument("program")
 @click.option("--config", "configs", metavar="FILE", multiple=True, required=True, help="Machine; later files win.")
 @click.option("-o", "--output", metavar="LOG.csv", type=OUTPUT, help="The log; default and -: standard output.")
+@click.option(
+    "--surface",
+    metavar="OUT.stl",
+    type=OUTPUT,
+    help="What is left of the stock: a body, or with the suffix .csv heights. Needs workpiece: stock.",
+)
 @click.option("--step-s", type=click.FloatRange(min=1e-5), default=0.02, show_default=True, help="Time between rows.")
 @click.option("--air", is_flag=True, help="The tool does not cut.")
 @click.option("--started-s", type=float, default=0.0, help="Start on the common clock, for effects of warming up.")
 def command(
-    program: str, configs: tuple[str, ...], output: str | None, step_s: float, air: bool, started_s: float
+    program: str,
+    configs: tuple[str, ...],
+    output: str | None,
+    surface: str | None,
+    step_s: float,
+    air: bool,
+    started_s: float,
 ) -> None:
     """Write the log that the modelled machine would produce.
 
-    The model is the config with its `effects:`; there is no noise. Columns and frames are those that diagnose reads.
+    The model is the config with its `effects:`; there is no noise. Columns and frames are those that diagnose reads. With
+    --surface alone, what the loaded tool leaves of the stock is written and no log.
     """
-    config = load_config(configs)
-    from camcomp.model.control import open_program
-    from camcomp.model.job import Job
-    from camcomp.model.motion.simulate import log_table, simulate
+    from camcomp.api.machine import load_machine
+    from camcomp.api.simulation import simulate, simulate_cut
 
-    source = open_program(program, config)
-    run = simulate(Job(config), source.path, step_s, cutting=not air, started_s=started_s)
-    for each in run.warnings:
-        say(f"warning: {each}")
-    write_all({output or STANDARD: log_table(run).encode()}, inputs=(program, *configs))
+    machine, outputs = load_machine(*configs), {}
+    if output or not surface:
+        log = simulate(program, machine, step_s, cutting=not air, started_s=started_s)
+        for each in log.warnings:
+            say(f"warning: {each}")
+        outputs[output or STANDARD] = log.to_csv()
+    if surface:
+        left = simulate_cut(program, machine)
+        outputs[surface] = left.to_csv() if surface.endswith(".csv") else left.to_stl()
+    write_all(outputs, inputs=(program, *configs))

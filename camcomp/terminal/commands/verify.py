@@ -4,7 +4,6 @@ import click
 
 from camcomp.ground.errors import CamcompError, CheckFailed
 from camcomp.ground.files import display_name, write_all
-from camcomp.model.config.load import load_config
 from camcomp.report.findings import Case, Finding, findings_of
 from camcomp.report.outputs import findings_files
 from camcomp.terminal.commands._options import OUTPUT, findings_options, quiet_option
@@ -33,21 +32,20 @@ def command(
 
     Only the text of CORRECTED counts. Exit code 1 when the residual is over the tolerance.
     """
-    config = load_config(configs)
-    from camcomp.compensation.program.verify import verify
-    from camcomp.model.control import open_program
-    from camcomp.model.job import Job
+    from camcomp.api.machine import load_machine, read_program
+    from camcomp.api.verification import verify
 
-    tolerance = tolerance_um or config.compensation.tolerance_um
+    machine = load_machine(*configs)
+    tolerance = tolerance_um or machine.config.compensation.tolerance_um
     inputs = (corrected, original, *configs)
     findings: list[Finding] = []
     outputs: dict[str, bytes] = {}
     failure: CamcompError | None = None
     note = ""
     try:
-        source = open_program(original, config)
+        source = read_program(original, machine)
         with working("settling the corrected program", quiet=quiet):
-            done = verify(open_program(corrected, config), source, Job(config))
+            done = verify(corrected, source, machine)
         figures = done.figures(tolerance)
         if json_file:
             outputs[json_file] = figures.to_json()
@@ -62,14 +60,17 @@ def command(
             )
         for each_warning in done.warnings:
             say(f"warning: {each_warning}", quiet=quiet)
-        over = [each for each in done.lines if each.residual_um > tolerance]
+        if expected := figures.expected:
+            text = f"expected of machines that may be: rms {expected.rms_um:.2f} um, 95 % of all points below {expected.p95_um:.2f} um"
+            say(text, f"{figures.advice}", quiet=quiet)
+        over, worst = [each for each in done.lines if each.judged_um > tolerance], done.worst_um
         if not worst <= tolerance * (1.0 + 1e-9):
             lines = ", ".join(str(each.line) for each in over)
             text = f"{worst:.3f} um are left, more than {tolerance:g} um, at source lines {lines}"
             failure = CheckFailed("CC601", text)
             for each in over:
                 at = source.text.place(each.line - 1, 0)
-                text = f"{each.residual_um:.3f} um are left, more than {tolerance:g} um"
+                text = f"{each.judged_um:.3f} um are left, more than {tolerance:g} um"
                 findings.append(Finding("CC601", text, at.file, at.line, at.column, at.source, check=True))
     except CamcompError as error:
         failure, findings = error, findings_of(error, display_name(corrected))

@@ -1,0 +1,1 @@
+"""camcomp for programs: what `import camcomp` offers, and what every verb of the command line calls."""

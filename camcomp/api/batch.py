@@ -1,0 +1,97 @@
+"""Many programs at once, in parallel, here or on a cluster, resumed where an earlier batch has ended."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from camcomp import __version__
+from camcomp.compensation.batch import pools
+from camcomp.compensation.batch.programs import (
+    FoundProgram,
+    Plan,
+    Status,
+    find_programs,
+    output_tree,
+    run_batch,
+    summary,
+)
+from camcomp.compensation.batch.worker import Outcome, Task
+from camcomp.ground.errors import CamcompError, CheckFailed
+from camcomp.ground.files import write_all
+from camcomp.ground.shelf import usable
+from camcomp.model.config.load import load_config
+from camcomp.report.findings import Case, findings_of_messages
+from camcomp.report.outputs import findings_files
+
+__all__ = ["Status", "compensate_many"]
+
+SUMMARY = "camcomp-batch.json"
+INTERRUPTED = 130  # stands in the summary when a signal or a bug ended the batch
+OnStatus = Callable[[Status, int, int], Any]
+
+
+def compensate_many(
+    paths: Sequence[str], configs: Sequence[str], output_dir: str, *, jobs: int | None = None, scheduler: str | None = None,
+    joints: bool = False, method: str | None = None, tolerance_um: float | None = None, sarif_file: str | None = None,
+    junit_file: str | None = None, tell: Callable[[str], None] = lambda _text: None, on_status: OnStatus = lambda *_: None,
+) -> dict[str, Any]:  # fmt: skip
+    """Corrects the programs of files, folders and patterns into a tree; the figures that DIR/camcomp-batch.json holds.
+
+    on_status: called with what became of a program, its number and how many there are. tell: called with what is to be
+    said while a cluster is waited for. Raises what stops the whole batch; a program that fails does not.
+    """
+    config = load_config(configs)
+    if config.control.dialect is None:
+        list(usable("dialects"))  # says which plug-ins are left out; workers would say it once each
+    plan = Plan(
+        config, Path(output_dir), method or config.compensation.method,
+        tolerance_um or config.compensation.tolerance_um, joints, __version__,
+    )  # fmt: skip
+    programs = find_programs(paths, plan.output)
+    if scheduler:
+        pool = partial(pools.on_a_cluster, address=scheduler, tell=tell)
+    else:
+        pool = partial(pools.on_this_machine, jobs=min(jobs or pools.cores(), len(programs)))
+    statuses: list[Status] = []
+    findings = [each for each in (sarif_file, junit_file) if each is not None]
+    with output_tree(plan, programs, [str(plan.output / SUMMARY), *findings]):
+        try:
+            _work(plan, programs, pool, statuses, on_status)
+        except CamcompError as error:
+            _note_down(plan, statuses, programs, error.exit_code)
+            raise
+        except BaseException:
+            _note_down(plan, statuses, programs, INTERRUPTED)
+            raise
+        figures = _note_down(plan, statuses, programs, 0)
+        cases = [_case(each) for each in sorted(statuses, key=lambda each: each.source)]
+        write_all(findings_files("batch", cases, sarif_file=sarif_file, junit_file=junit_file))
+    return figures
+
+
+def _work(
+    plan: Plan, programs: Sequence[FoundProgram], pool: Callable[[Iterable[Task]], Iterator[Outcome]],
+    statuses: list[Status], on_status: OnStatus,
+) -> None:  # fmt: skip
+    for status in run_batch(plan, programs, pool):
+        statuses.append(status)
+        on_status(status, len(statuses), len(programs))
+
+
+def _note_down(
+    plan: Plan, statuses: Sequence[Status], programs: Sequence[FoundProgram], stopped: int
+) -> dict[str, Any]:
+    """Writes what became of every program so far; the figures."""
+    figures = summary(statuses, programs, stopped)
+    write_all({plan.output / SUMMARY: (json.dumps(figures, indent=2) + "\n").encode()})
+    return figures
+
+
+def _case(status: Status) -> Case:
+    check = status.exit_code == CheckFailed.exit_code
+    findings = findings_of_messages(status.messages, status.source, check=check)
+    return Case(status.source, findings, status.status)

@@ -1,0 +1,166 @@
+"""Why a machine and its model differ: the result of an experiment file, and everything that is drawn from it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from camcomp.api.result_table import ResultTable
+from camcomp.diagnosis.result.types import DiagnosisResult
+from camcomp.ground.errors import CheckFailed
+from camcomp.ground.files import read_bytes
+from camcomp.ground.headway import part
+from camcomp.ground.places import STANDARD
+from camcomp.model.config.load import load_experiment
+from camcomp.model.config.write_back import machine_file, with_causes
+
+if TYPE_CHECKING:
+    from camcomp.diagnosis.diagnose import Diagnosis
+    from camcomp.diagnosis.experiment.open_experiment import OpenExperiment
+    from camcomp.diagnosis.law.library import LearnedLaw
+
+
+@dataclass(frozen=True, eq=False)
+class ExperimentDiagnosis:
+    """The diagnosis of an experiment file. result: as `diagnose --json` writes it.
+
+    behind, opened: what it was drawn from; None for logs that have a study of their own (poses of arms, axes).
+    """
+
+    experiment: str
+    result: DiagnosisResult
+    behind: Diagnosis | None
+    opened: OpenExperiment | None
+    _residuals: Callable[[], dict[str, Any]]
+    _learned: tuple[LearnedLaw, ...] = ()
+
+    @property
+    def verdict(self) -> str:
+        """`none`, `identified`, `ambiguous` or `unknown`."""
+        return self.result.verdict
+
+    @cached_property
+    def residuals(self) -> ResultTable:
+        """Measured minus modelled at every row, before (`gap_...`) and with the causes (`rest_...`), by column of the log."""
+        return ResultTable(self._residuals())
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What the reader should know about the logs."""
+        return () if self.opened is None else self.opened.notes
+
+    @property
+    def configs(self) -> list[str]:
+        """Machine files of the experiment."""
+        return load_experiment(self.experiment).config
+
+    @property
+    def answer(self) -> list[str]:
+        """The result in sentences, as the terminal shows it."""
+        from camcomp.diagnosis.report.answer import answer_lines
+
+        return answer_lines(self.result)
+
+    def report(self) -> bytes:
+        """One HTML page with plots. Raises ConfigError CC216 when the plot library is not installed."""
+        from camcomp.diagnosis.report.views import report_of
+
+        rows = self._residuals() if self.behind is None else None
+        return report_of(self.experiment, self.result, self.behind, self.opened, rows)
+
+    def machine_with_causes(self, target: str = STANDARD) -> str:
+        """Text of the machine file with the causes in it, for a file called `target`."""
+        return machine_with_causes(self.configs, self.result, target, self._learned)
+
+    @property
+    def next_program_cuts(self) -> bool:
+        """Whether the proposed program cuts."""
+        proposal = None if self.behind is None else self.behind.proposal
+        return proposal is not None and proposal.candidate.cutting
+
+    def next_program(self, target: str = "") -> str:
+        """NC program of the proposed next experiment; of an arm's poses their list, for a file called `target` (.json, else CSV).
+
+        Raises CheckFailed CC608 where there is none.
+        """
+        proposal = self.result.next_experiment
+        if proposal is not None and proposal.poses is not None:
+            from camcomp.diagnosis.next_experiment.pose_list import pose_list
+            from camcomp.model.config.load import load_config
+            from camcomp.model.statics.build import build_robot
+
+            config = load_config(self.configs)
+            robot, _ = build_robot(config.robot, config.tool.tip)
+            return pose_list(proposal.poses, tuple(a.revolute for a in robot.actuators), target)
+        if self.behind is None and proposal is None:
+            raise CheckFailed("CC608", "nothing is left to separate, so no next experiment is proposed")
+        return next_program(self.behind, self.opened)
+
+
+def diagnose(
+    experiment: str | Path, without: Sequence[str] = (), library: str | Path | None = None
+) -> ExperimentDiagnosis:
+    """Why the machine of an experiment file differs from its model; `without`: effects that count as unknown.
+
+    library: a folder of laws found before, which are candidates too; a law that is found is added to it.
+
+    Raises ConfigError, ProgramError, FileError, PhysicsError.
+    """
+    from camcomp.diagnosis.studies import study_of
+
+    if (study := study_of(experiment, without)) is not None:
+        return ExperimentDiagnosis(str(experiment), study.result, None, None, study.residuals)
+    from camcomp.diagnosis.diagnose import diagnose as judge
+    from camcomp.diagnosis.experiment.open_experiment import open_experiment
+    from camcomp.diagnosis.law.library import keep, learned
+    from camcomp.diagnosis.residuals import of_runs
+
+    with part(0.0, 0.3):
+        opened = open_experiment(experiment)
+    sd = opened.experiment.sd
+    known = [] if library is None else learned(str(library))
+    with part(0.3, 1.0):
+        done = judge(
+            opened.job, opened.twin, opened.runs, holdout=opened.experiment.holdout, without=without,
+            stated_mm=None if sd is None else sd.tip_mm, learned=known,
+        )  # fmt: skip
+    if library is not None and done.result.law is not None:
+        keep(str(library), done.result.law, opened.job.config.robot.name)
+    return ExperimentDiagnosis(
+        str(experiment), done.result, done, opened, lambda: of_runs(done, opened.twin, opened.runs), tuple(known)
+    )
+
+
+def machine_with_causes(
+    configs: Sequence[str], result: DiagnosisResult, target: str, learned: Sequence[LearnedLaw] = ()
+) -> str:
+    """Text of the machine file of `configs` with the causes in it, for a file called `target`; learned: laws by name."""
+    before = {each.name: each for each in learned}
+    laws = [] if result.law is None else [each.model_dump(exclude_none=True) for each in result.law.parts]
+    for cause in result.known:
+        if cause.effect in before:
+            laws += before[cause.effect].entries({name: each.value for name, each in cause.parameters.items()})
+    texts = [read_bytes(each).decode("utf-8-sig") for each in configs]
+    k = machine_file(texts)
+    note = f"found by camcomp diagnose, verdict {result.verdict}"
+    if result.verdict == "ambiguous":
+        note += f": the likeliest of {len(result.alternatives)} sets that explain the data alike"
+    to = Path.cwd() if target == STANDARD else Path(target).absolute().parent
+    return with_causes(
+        texts[k], [each for each in result.known if each.effect not in before], folder=str(Path(configs[k]).absolute().parent), moved_to=str(to), note=note,
+        laws=laws,
+    )  # fmt: skip
+
+
+def next_program(done: Any, opened: Any) -> str:
+    """Text of the proposed program of a diagnosis. Raises CheckFailed CC608 where there is none."""
+    if done is None or opened is None:
+        raise CheckFailed("CC608", "experiments without programs get no program for the next one")
+    if done.proposal is None:
+        raise CheckFailed("CC608", "nothing is left to separate, so no next experiment is proposed")
+    from camcomp.diagnosis.next_experiment.ready_program import ready_program
+
+    return ready_program(done.proposal.candidate, opened.runs, opened.job, opened.twin)

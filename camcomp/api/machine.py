@@ -1,0 +1,43 @@
+"""A machine from its files, and programs as its control reads them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from camcomp.gcode.canon import canonical
+from camcomp.gcode.program import Program
+from camcomp.model.config.load import load_config
+from camcomp.model.control import open_program, program_of
+from camcomp.model.job import Job
+
+__all__ = ["Job", "Program", "canonical_lines", "load_machine", "program_in", "read_program"]
+
+
+def load_machine(*files: str | Path) -> Job:
+    """The machine that YAML files make together, later ones over earlier ones key by key.
+
+    Its parts are worked out when they are asked for: `.config`, `.machine`, `.frame`. Raises ConfigError, FileError.
+    """
+    return Job(load_config(files))
+
+
+def read_program(program: str | Path | bytes, machine: Job | None = None) -> Program:
+    """An NC program from its file or its bytes, read as the control of `machine` does, or as controls do by default.
+
+    Its motions are the arrays of `.path` (mm, program frame of G54). Raises FileError, ProgramError.
+    """
+    config = machine.config if machine is not None else None
+    if isinstance(program, bytes):
+        return program_of(program, "<bytes>", config)
+    return open_program(program, config)
+
+
+def program_in(program: Program | str | Path | bytes, machine: Job) -> Program:
+    """A program that is one already, or is read."""
+    return program if isinstance(program, Program) else read_program(program, machine)
+
+
+def canonical_lines(program: Program) -> Iterable[str]:
+    """What a program was understood to do, one line per motion."""
+    return canonical(program.path)

@@ -1,0 +1,87 @@
+"""Recordings of others turned into logs and an experiment file."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+from camcomp.diagnosis.recordings.axis_file import read_axis
+from camcomp.diagnosis.recordings.experiment_file import experiment_yaml, run_names
+from camcomp.diagnosis.recordings.formats import read_sampled
+from camcomp.diagnosis.recordings.naming import told_columns
+from camcomp.diagnosis.recordings.run_log import Recording, Wishes, log_of
+from camcomp.diagnosis.recordings.sampled import SampledColumns, refuse_names
+from camcomp.ground.errors import FileError
+from camcomp.ground.files import display_name, read_bytes, write_all
+from camcomp.model.config.load import load_config
+
+
+def import_recordings(
+    files: Sequence[str], configs: Sequence[str], output_dir: str | Path, *, actuator: str | None = None,
+    columns: Sequence[str] = (), names: Sequence[str] = (), period_s: float | None = None, degrees: bool | None = None,
+    by: str | None = None, programs: Sequence[str] = (), cutting: bool = False, one_clamping: bool = False,
+    holdout: Sequence[str] = (), rows: int | None = None,
+) -> tuple[list[Recording], Path]:  # fmt: skip
+    """Writes a log for every file (or FILE+FILE) and an experiment file; what was read, run by run, and that file.
+
+    The options are those of `camcomp import`. Raises ConfigError where a recording cannot be understood, FileError.
+    """
+    actuators = load_config(configs).robot.actuators
+    groups = [_files_of(each) for each in files]
+    called = run_names([group[0] for group in groups])
+    run_programs = _programs(programs, called)
+    told = told_columns(columns, list(actuators), [each.rotary for each in actuators.values()])
+    recordings = list[Recording]()
+    for run, group in zip(called, groups, strict=True):
+        wishes = Wishes(told, rows, degrees, period_s, by, run in run_programs)
+        if len(group) == 1 and Path(group[0]).suffix.lower() == ".mat":
+            read = read_axis(read_bytes(group[0]), display_name(group[0]), run, actuators, actuator, wishes)
+        else:
+            read = log_of(run, _parts(group, [each.split() for each in names], period_s), actuators, wishes)
+        recordings.append(read)
+    out = Path(output_dir)
+    outputs: dict[Path, bytes] = {out / f"{each.name}.csv": each.log for each in recordings}
+    outputs[out / "experiment.yaml"] = experiment_yaml(
+        recordings, configs, out, holdout, run_programs, cutting=cutting, one_clamping=one_clamping
+    )
+    _write(out, outputs, [*(file for group in groups for file in group), *configs, *run_programs.values()])
+    return recordings, out / "experiment.yaml"
+
+
+def _files_of(word: str) -> list[str]:
+    """Files of one run: a file, or several joined by +."""
+    return [word] if os.path.lexists(word) else word.split("+")
+
+
+def _parts(group: Sequence[str], names: Sequence[Sequence[str]], period_s: float | None) -> list[SampledColumns]:
+    """What the files of one run hold; names: of columns of tables without header, by file, the last for all others."""
+    parts = list[SampledColumns]()
+    for k, file in enumerate(group):
+        own = names[min(k, len(names) - 1)] if names else ()
+        parts += read_sampled(read_bytes(file), display_name(file), own, period_s)
+    refuse_names(parts, names)
+    return parts
+
+
+def _programs(words: Sequence[str], runs: Sequence[str]) -> dict[str, str]:
+    """Program by run. Raises FileError CC500 for one that is not there."""
+    out: dict[str, str] = {}
+    for word in words:
+        run, mark, file = word.partition("=")
+        named = bool(mark) and not os.path.lexists(word)
+        file = file if named else word
+        read_bytes(file)
+        out |= {run: file} if named else dict.fromkeys(runs, file)
+    return out
+
+
+def _write(out: Path, outputs: dict[Path, bytes], inputs: Sequence[str]) -> None:
+    for path in outputs:
+        if os.path.lexists(path):
+            raise FileError("CC501", f"{path} is there already", hint="choose another folder")
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise FileError("CC501", f"cannot make {out}: {error.strerror}") from error
+    write_all(outputs, inputs=inputs)

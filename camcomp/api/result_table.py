@@ -1,0 +1,101 @@
+"""Tables of results: columns as NumPy arrays, and from there to CSV, Parquet and pandas."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from camcomp.ground.errors import ConfigError
+
+if TYPE_CHECKING:
+    import pandas
+
+PARQUET = ".parquet"
+DECIMALS, DECIMALS_RAD = 6, 9  # as joint tables and logs have them
+COUNTS = ("line", "row")
+
+
+class ResultTable(Mapping[str, NDArray[Any]]):
+    """Columns by name in their order, all (n,): numbers with NaN where there is none, or text."""
+
+    def __init__(self, columns: Mapping[str, NDArray[Any]]) -> None:
+        """Raises ValueError where columns differ in length."""
+        self._columns = {name: np.asarray(values) for name, values in columns.items()}
+        lengths = {len(values) for values in self._columns.values()}
+        if len(lengths) > 1:
+            raise ValueError(f"columns of different lengths: {sorted(lengths)}")
+        self.rows = lengths.pop() if lengths else 0
+
+    @classmethod
+    def of_csv(cls, data: bytes) -> ResultTable:
+        """The table that `to_csv` and the commands write: numbers, whole columns of text where they are none."""
+        head, *rows = csv.reader(io.StringIO(data.decode("utf-8")))
+        columns = zip(*rows, strict=True) if rows else ((),) * len(head)
+        return cls({name: _numbers(cells) for name, cells in zip(head, columns, strict=True)})
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        return self._columns[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._columns)
+
+    def __len__(self) -> int:
+        return len(self._columns)
+
+    def __repr__(self) -> str:
+        return f"ResultTable of {self.rows} rows: {', '.join(self)}"
+
+    def array(self, *names: str) -> NDArray[np.float64]:
+        """Columns side by side (n, k)."""
+        return np.column_stack([np.asarray(self[name], float) for name in names])
+
+    def to_csv(self) -> bytes:
+        """One row of names, then the numbers with six decimals, angles with nine; an empty cell where there is none."""
+        out = io.StringIO()
+        write = csv.writer(out, lineterminator="\n")
+        write.writerow(self)
+        write.writerows(zip(*(_cells(name, values) for name, values in self.items()), strict=True))
+        return out.getvalue().encode("utf-8")
+
+    def to_parquet(self) -> bytes:
+        """As a Parquet file in full precision. Raises ConfigError CC216 when pyarrow is not installed."""
+        from camcomp.compensation.report.parquet import library
+
+        arrow, parquet = library()
+        file = io.BytesIO()
+        parquet.write_table(arrow.table(dict(self.items())), file, compression="zstd")
+        return file.getvalue()
+
+    def to_file(self, name: str) -> bytes:
+        """What the file called `name` is to hold: Parquet by its suffix, else CSV."""
+        return self.to_parquet() if name.endswith(PARQUET) else self.to_csv()
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """As a data frame. Raises ConfigError CC216 when pandas is not installed."""
+        try:
+            import pandas
+        except ImportError as error:
+            hint = "pip install 'camcomp[pandas]'; the columns themselves are NumPy arrays: table['x_mm']"
+            raise ConfigError("CC216", "data frames need the package pandas", hint=hint) from error
+        return pandas.DataFrame(dict(self.items()))
+
+
+def _numbers(cells: tuple[str, ...]) -> NDArray[Any]:
+    try:
+        return np.array([float(cell) if cell else np.nan for cell in cells])
+    except ValueError:
+        return np.array(cells)
+
+
+def _cells(name: str, values: NDArray[Any]) -> list[str]:
+    if values.dtype.kind not in "fiu":
+        return [str(value) for value in values]
+    digits = 0 if name in COUNTS else DECIMALS_RAD if name.endswith("_rad") else DECIMALS
+    zero = f"-{0.0:.{digits}f}"
+    texts = ("" if np.isnan(value) else f"{value:.{digits}f}" for value in values.astype(float))
+    return [text.removeprefix("-") if text == zero else text for text in texts]

@@ -1,0 +1,55 @@
+"""Logs that the modelled machine would write."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from camcomp.api.machine import Job, Program, program_in
+from camcomp.api.result_table import ResultTable
+from camcomp.compensation.program.cut_surface import cut_surface
+from camcomp.model.motion import simulate as story
+from camcomp.model.motion.simulate import Simulated
+from camcomp.model.stock.surface import Surface
+
+
+@dataclass(frozen=True, eq=False)
+class SimulatedLog:
+    """A log without noise. outcome: its signals as arrays."""
+
+    outcome: Simulated
+
+    @property
+    def warnings(self) -> list[str]:
+        """What the reader of the log should know."""
+        return self.outcome.warnings
+
+    @cached_property
+    def table(self) -> ResultTable:
+        """The log, with the columns that `diagnose` reads."""
+        return ResultTable.of_csv(self.to_csv())
+
+    def to_csv(self) -> bytes:
+        """The log as a file."""
+        return story.log_table(self.outcome).encode()
+
+
+def simulate(
+    program: Program | str | Path | bytes, machine: Job, step_s: float = 0.02, *, cutting: bool = True, started_s: float = 0.0
+) -> SimulatedLog:  # fmt: skip
+    """What the machine with its `effects:` would log in rows every step_s seconds.
+
+    started_s: on the common clock, for effects of warming up. Raises what reading raises, PhysicsError where the machine
+    cannot be.
+    """
+    source = program_in(program, machine)
+    engaged = machine.engaged(source) if cutting else None
+    return SimulatedLog(
+        story.simulate(machine, source.path, step_s, cutting=cutting, started_s=started_s, engaged=engaged)
+    )
+
+
+def simulate_cut(program: Program | str | Path | bytes, machine: Job) -> Surface:
+    """What the loaded machine leaves of the stock of its machine file. Raises as `simulate`, ConfigError CC298."""
+    return cut_surface(machine, program_in(program, machine))

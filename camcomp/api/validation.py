@@ -1,0 +1,76 @@
+"""YAML files and NC programs checked for what a run would stumble over, and for what is hardly meant."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+from typing import TypeVar
+
+from camcomp.ground.errors import CamcompError, raise_all
+from camcomp.ground.files import read_bytes
+from camcomp.model.config.load import check_config, is_experiment, load_config, load_experiment
+from camcomp.model.config.plausible import Doubt, doubts
+from camcomp.model.config.spec import Config
+
+__all__ = ["Doubt", "check_file"]
+
+T = TypeVar("T")
+
+
+def check_file(file: str, configs: Sequence[str] = ()) -> tuple[str, list[Doubt]]:
+    """What a file is, and warnings about it; configs: the machine whose control reads programs.
+
+    Raises CamcompError with all that is wrong with it.
+    """
+    if Path(file).suffix.lower() not in (".yaml", ".yml"):
+        return _check_program(file, configs)
+    if is_experiment(read_bytes(file)):
+        return _check_experiment(file)
+    config = check_config([file])
+    if config is None:
+        return "configuration", []
+    _build(config)
+    return "configuration", doubts(config)
+
+
+def _build(config: Config) -> None:
+    """The machine of a file, with its effects. Raises ConfigError where it cannot be built."""
+    from camcomp.model.job import Job
+
+    job = Job(config)
+    _ = job.machine, job.real_machine
+
+
+def _check_program(file: str, configs: Sequence[str]) -> tuple[str, list[Doubt]]:
+    from camcomp.model.control import open_program  # NumPy and the reader: only when there is a program
+
+    program = open_program(file, load_config(configs) if configs else None)
+    warnings = [Doubt(each, None) for each in program.warnings]
+    return f"program, {program.dialect}, {len(program.path)} motions", warnings
+
+
+def _check_experiment(file: str) -> tuple[str, list[Doubt]]:
+    from camcomp.diagnosis.experiment.open_experiment import check_log
+    from camcomp.model.control import open_program
+
+    experiment = load_experiment(file)
+    errors: list[CamcompError] = []
+    config = _collect(errors, partial(check_config, experiment.config))
+    if config is not None:
+        _collect(errors, partial(_build, config))
+    for run in experiment.runs:
+        _collect(errors, partial(check_log, run.log, config))
+        if run.program is not None:
+            _collect(errors, partial(open_program, run.program, config))
+    raise_all(errors)
+    return f"experiment, {len(experiment.runs)} runs", [] if config is None else doubts(config)
+
+
+def _collect(errors: list[CamcompError], read: Callable[[], T]) -> T | None:
+    """What `read` gives, or None and one more of `errors`."""
+    try:
+        return read()
+    except CamcompError as error:
+        errors.append(error)
+        return None

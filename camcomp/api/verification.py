@@ -1,0 +1,20 @@
+"""Corrected programs put through the model again, from their text alone."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from camcomp.api.machine import Job, Program, program_in
+from camcomp.compensation.program import verify as story
+from camcomp.compensation.program.verify import Verified
+
+__all__ = ["Verified", "verify"]
+
+
+def verify(corrected: Program | str | Path | bytes, original: Program | str | Path | bytes, machine: Job) -> Verified:
+    """What is left of the error: `.residual` (k,) mm at the points looked at, `.figures(tolerance_um)` as JSON has them.
+
+    Raises CheckFailed CC604 when `corrected` is not one of `original`.
+    """
+    source = program_in(original, machine)
+    return story.verify(program_in(corrected, machine), source, machine)
