@@ -268,3 +268,33 @@ def test_a_diagnosis_of_six_runs(tmp_path, rows):
         "-m", "camcomp", "diagnose", write_experiment(make(plan), plan, tmp_path / "experiment", CONFIG), "--quiet"
     )
     tell(f"diagnosis of six runs of {rows} rows", f"{took[0]:.1f} s wall, {took[1]:.1f} s processor")
+
+
+@pytest.mark.parametrize("moves", [0, 8_000, SHARE], ids=["groove", "8 000 lines", "100 000 lines"])
+def test_bands(tmp_path, moves):
+    """What bands cost: uncertain stiffness, bars, three rolls and three forces, against none."""
+    program = shipped("samples/groove-circle-50.nc")
+    if moves:
+        program = tmp_path / "p.nc"
+        write(program, moves)
+    text = (
+        Path(MACHINE[1])
+        .read_text()
+        .replace("stiffness_N_per_mm: 1.0e+4", "stiffness_N_per_mm: {value: 1.0e+4, sd: 1000}")
+    )
+    text = text.replace("E_N_per_mm2: 70000", "E_N_per_mm2: {value: 70000, sd: 5000}").replace(
+        "rotation_deg: [1, 0, 0]", "rotation_deg: [{value: 1, sd: 0.05}, 0, 0]"
+    )
+    (tmp_path / "machine.yaml").write_text(text)
+    (tmp_path / "force.yaml").write_text("process: {force: {Fr_N: {sd: 30}, Ft_N: {sd: 3}, Fz_N: {sd: 5}}}\n")
+    uncertain = ["--config", tmp_path / "machine.yaml", "--config", tmp_path / "force.yaml"]
+    words = ["-o", tmp_path / "o.nc", "--joints", tmp_path / "j.csv", "--summary", tmp_path / "s.json"]
+    for machine in (MACHINE, uncertain):
+        compensate(program, *machine, *words)
+    made = np.array([[compensate(program, *machine, *words) for machine in (MACHINE, uncertain)] for _ in range(3)])
+    plain, bands = np.median(made, axis=0)
+    tell(
+        f"bands, {program.name}: times a compensation without them (wanted: 3 at most)",
+        f"{bands[0] / plain[0]:.2f} (by processor time {bands[1] / plain[1]:.2f}, {bands[0]:.1f} s)",
+    )
+    assert bands[1] < 3.0 * plain[1]

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from camcomp.ground import shelf
+from camcomp.model.axes import axes_of
 from camcomp.model.effect import Cause, Load, Motion, nominal
 from camcomp.model.signal_path import HOOKS, STAGES
 from camcomp.model.statics.description import Actuator, Chain, Link, Parallelogram, Passive, Robot
@@ -11,12 +12,12 @@ from camcomp.model.statics.description import Actuator, Chain, Link, Parallelogr
 CONTRACT = {
     "servo_lag", "backlash", "friction", "joint_offset", "screw_pitch", "screw_cyclic", "thermal_growth", "drive_stiffness",
     "link_stiffness", "chain_error", "link_length", "gravity", "cutting_force", "tool_length", "tool_deflection", "tool_wear",
-    "workpiece_frame", "time_sync",
+    "workpiece_frame", "time_sync", "squareness",
 }  # fmt: skip
 NAMES = [
     name
     for name in shelf.members("effects")
-    if name != "none" and not getattr(shelf.load("effects", name), "ARM_ONLY", False)
+    if shelf.load("effects", name).PARAMETERS and not getattr(shelf.load("effects", name), "ARM_ONLY", False)
 ]
 ACTUATORS = ("x", "y", "z")
 
@@ -41,7 +42,7 @@ def motion():
     return Motion(t, 100.0 + t, t / 60.0, 22.0 + t, encoder, speed, np.sign(speed), np.full(3, -300.0), np.full(3, 1e4))
 
 
-def inputs(hook):
+def inputs(hook, named=None):
     m = motion()
     n = len(m.time)
     load = Load(np.tile([200.0, -10.0, -25.0], (n, 1)), np.zeros((n, 6)))
@@ -49,7 +50,8 @@ def inputs(hook):
     tip = m.encoder.copy()
     return {
         "on_servo": (tip, m, which), "on_drive": (np.zeros((n, 3)), m, which), "on_drive_force": (np.zeros((n, 3)), m, which),
-        "on_robot": (robot(), ("x",)), "on_load": (load, m), "on_pose": (tip, load, m), "on_workpiece": (tip,),
+        "on_guideway": (tip, axes_of(robot(), m, tip, np.zeros(3)), named),
+        "on_robot": (robot(), ("x",)), "on_load": (load, m), "on_pose": (tip, load, m), "on_workpiece": (tip,), "on_place": (tip, load, m),
         "on_clock": (m.time,), "on_reading": ({"tip": tip}, m),
     }[hook]  # fmt: skip
 
@@ -59,10 +61,14 @@ def hooks(effect):
 
 
 def away(effect):
-    """Parameters one typical size from nominal; shapes and phases stay."""
+    """Parameters one typical size from nominal; shapes and phases stay, and what acts for a while acts in the middle."""
     values = nominal(effect)
     fitted = getattr(effect, "FITTED", effect.PARAMETERS)
     out = {p.name: p.nominal if p.scan else p.value(p.scale) for p in fitted}
+    if instants := [p.name for p in fitted if p.placed]:
+        out |= {p.name: p.value(p.scale) for p in effect.PARAMETERS if not p.scan} | dict(
+            zip(instants, (100.5, 101.5), strict=True)
+        )
     return {**values, **(effect.public(out) if hasattr(effect, "public") else out)}
 
 
@@ -83,7 +89,7 @@ def test_the_library_has_what_the_contract_asks_for():
 @pytest.mark.parametrize("name", NAMES)
 def test_every_effect_says_what_it_is(name):
     effect = shelf.load("effects", name)
-    assert effect.STAGE in STAGES and effect.TARGET in ("actuator", "machine", "either")
+    assert effect.STAGE in STAGES and effect.TARGET in ("actuator", "machine", "either", "named")
     assert effect.__doc__ and effect.SOURCE and hooks(effect)
     for p in effect.PARAMETERS:
         assert p.low <= p.nominal <= p.high and p.scale > 0 and p.source and p.unit
@@ -95,7 +101,7 @@ def test_every_effect_says_what_it_is(name):
 def test_at_nominal_every_hook_returns_its_input_bit_for_bit(name):
     effect = shelf.load("effects", name)
     for hook in hooks(effect):
-        given = inputs(hook)
+        given = inputs(hook, *getattr(effect, "TARGETS", ())[:1])
         assert same(getattr(effect, hook)(*given, nominal(effect)), given[0]), hook
 
 
@@ -104,7 +110,7 @@ def test_away_from_nominal_some_hook_changes_something_finite(name):
     effect = shelf.load("effects", name)
     changed = False
     for hook in hooks(effect):
-        given = inputs(hook)
+        given = inputs(hook, *getattr(effect, "TARGETS", ())[:1])
         got = getattr(effect, hook)(*given, away(effect))
         changed |= not same(got, given[0])
         if isinstance(got, np.ndarray):

@@ -226,6 +226,8 @@ BROKEN = {
         ("[1.0, 0.0, 0.0])\n", "[1.0, 0.0, 0.0])[:2]\n", "ValueError"),
         ("    return tip if", "    if p['lean']:\n        return tip[:, :2]\n    return tip if", "an array (41, 2), not an array (41, 3)"),
         ("PARAMETERS =", "PARAMETERS = ()\nOTHERS =", "PARAMETERS is empty"),
+        ("SOURCE =", "Params = dict\nSOURCE =", "not a class made from camcomp.plugins.Spec"),
+        ("SOURCE =", "from camcomp.plugins import Spec\nclass Params(Spec):\n    lean: list[float] = []\n\nSOURCE =", "'lean'"),
     ],
     "forces": [
         ("def force", "def forces", "did you mean 'force'"),
@@ -322,6 +324,24 @@ def test_a_good_plugin_works(shelf_name, put, capsys):
     assert name in dict(shelf.usable(shelf_name))
     assert simulate(*USED, machine=shelf_name != "robots") == 0
     assert capsys.readouterr().err == ""
+
+
+def test_an_effect_may_have_lists_beside_its_numbers(put, capsys):
+    table = "from camcomp.plugins import Spec\n\nclass Params(Spec):\n    table: list[float] = []\n\nSOURCE ="
+    source = changed(changed(EFFECT, "SOURCE =", table), "tip[:, 2:3] + 173.0", "sum(p.get('table', ()))")
+    name = put("effects", source)
+    assert name in dict(shelf.usable("effects"))
+    told = []
+    for more in ("", ", table: [3, 4.5]"):
+        with open("use.yaml", "w") as stream:
+            stream.write(f"effects: [{{effect: {name}, lean: 0.01{more}}}]\n")
+        assert simulate(*USED) == 0
+        told.append([float(line.split(",")[2]) for line in capsys.readouterr().out.splitlines()[1:]])
+    assert np.array(told[1]) - told[0] == pytest.approx(0.075, abs=2e-6)
+    with open("use.yaml", "w") as stream:
+        stream.write(f"effects: [{{effect: {name}, table: [a]}}]\n")
+    assert simulate(*USED) == 2
+    assert "table[1]" in capsys.readouterr().err
 
 
 def test_helpers_imports_and_names_of_arguments_are_free(put):

@@ -17,6 +17,7 @@ FLOORS = (
     {"gcode", "report"},
     {"model", "dialects"},
     {"compensation", "diagnosis", "effects", "forces", "robots", "plugins"},
+    {"api"},
     {"terminal"},
     {"__main__"},
 )  # rooms of one floor do not import each other

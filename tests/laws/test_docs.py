@@ -7,8 +7,10 @@ import pytest
 
 from camcomp import __version__
 from camcomp.ground import shelf
+from camcomp.model.config.schema import config_schema, experiment_schema
 from camcomp.terminal import reference
 from camcomp.terminal.cli import VERBS
+from camcomp.terminal.key_reference import ROOTS, rows, sections
 from tests.documents import ROOT, Command, Reader, TypedFile, missing, steps, text_blocks
 
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -135,6 +137,48 @@ def test_the_reference_leaves_nothing_out():
     for path in (ROOT / "config/materials").glob("*.yaml"):
         assert f"`{path.stem}`" in pages["library.md"]
     assert "`orthoglide-1deg.yaml`" in pages["library.md"]
+
+
+KEYS = [(root, section, row) for _, root in ROOTS for section in sections(root) for row in rows(section)]
+
+
+def test_every_key_of_the_yaml_files_has_an_example_and_its_unit():
+    """A new key without an example: give it one in camcomp/terminal/key_reference.py."""
+    bare = [
+        (section.paths[0], row.key) for _, section, row in KEYS if not row.example and not row.value.endswith("below")
+    ]
+    assert bare == []
+    units = {row.key: row.unit for _, _, row in KEYS}
+    asked = {"origin_mm": "mm", "E_N_per_mm2": "N/mm²", "rotation_Nmm_per_rad": "Nmm/rad", "acceleration_mm_per_s2": "mm/s²",
+             "temperature_C": "°C", "spindle_rpm": "rpm", "mass_kg": "kg", "compliance_mm_N_rad": "mm, N, rad", "teeth": ""}  # fmt: skip
+    assert {key: units[key] for key in asked} == asked
+
+
+def test_the_page_of_keys_has_every_key_of_the_schema():
+    page = reference.pages()["keys.md"]
+
+    def keys(node):
+        if isinstance(node, dict):
+            for name, each in node.get("properties", {}).items():
+                yield name
+                yield from keys(each)
+            for name, each in node.items():
+                if name != "properties":
+                    yield from keys(each)
+        elif isinstance(node, list):
+            for each in node:
+                yield from keys(each)
+
+    effects = {p.name for name, each in shelf.usable("effects") for p in each.PARAMETERS}
+    text = {"machine": config_schema(), "experiment": experiment_schema()}
+    definitions = text["machine"]["definitions"]
+    del definitions["EffectChoice"]
+    for name in [name for name in definitions if name.startswith("effects.")]:
+        del definitions[name]
+    missing = (
+        {name for name in keys(text) if f"`{name}`" not in page and f"`{name}: " not in page} - {"source"} - effects
+    )
+    assert missing == set()
 
 
 # --- the reader itself ------------------------------------------------------------------------------------------------

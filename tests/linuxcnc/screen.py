@@ -204,7 +204,7 @@ class Recorder:
         self.marks = {}
         time.sleep(0.2)
 
-    def mark(self, name, what=lambda: time.sleep(0.1)):
+    def mark(self, name, what):
         """Carries out something until it comes through undisturbed, and marks when."""
 
         def marked():
@@ -213,6 +213,11 @@ class Recorder:
             self.marks[name] = [began, period()]
 
         patiently(marked)
+
+    def mark_rest(self, name):
+        """Marks a tenth of a second of standstill, from when the offsets are taken up, however late they come."""
+        patiently(settled)
+        self.mark(name, lambda: time.sleep(0.1))
 
     def close(self):
         """Ends the recording."""
@@ -289,10 +294,10 @@ def orthoglide(task):
     switch_on()
     time.sleep(0.2)
     home()
-    recorder.mark("homed after on")
+    recorder.mark_rest("homed after on")
     switch_off()
     switch_on()
-    recorder.mark("on after homed")
+    recorder.mark_rest("on after homed")
     patiently(lambda: mdi("G21 G90 G64", task["work_offset"], "G54", "T1 M6 G43", "G0 X25 Y0 Z10"))
     recorder.mark("pause", lambda: with_pause(program))
     recorder.mark("override", lambda: with_override(program))
@@ -305,7 +310,7 @@ def orthoglide(task):
         faults.append([name, began, hurt(program, word, number)])
         if word == "stream":
             recover()
-            recorder.mark(f"after {name}")
+            recorder.mark_rest(f"after {name}")
     recorder.close()
     return {"marks": recorder.marks, "faults": faults}
 

@@ -18,7 +18,7 @@ from tests.schemas import check as check_schema
 
 DATA = Path(os.environ.get("CAMCOMP_DATA", "/nowhere")) / "ipa_ur10"
 WHOLE = pytest.mark.skipif(not DATA.is_dir(), reason="the whole data set is not here: CAMCOMP_DATA")
-GEOMETRY, GRAVITY = "link_geometry", "gravity_compliance"
+GEOMETRY, GRAVITY, CURVE = "link_geometry", "gravity_compliance", "joint_curve"
 
 
 def diagnosed(experiment, tmp_path):
@@ -35,19 +35,29 @@ def check(result, floor, least):
     assert result["verdict"] == "unknown"
     assert result["floor"] == {"um": result["gap"]["noise_floor_um"], "source": "repeats"}
     assert 30 < result["floor"]["um"] < 45
-    assert effects(result)[:2] == [GEOMETRY, GRAVITY]
-    assert effects(result)[-1] == "unknown"
-    assert "joint_offset" not in effects(result)
+    assert set(effects(result)) == {GEOMETRY, GRAVITY, CURVE, "unknown"}
     shrunk = result["shrinkage"]
     assert floor[0] < shrunk["after_rms_um"] < floor[1]
     assert shrunk["ci95"][0] < shrunk["ratio"] < shrunk["ci95"][1]
     assert shrunk["ratio"] > least
-    assert [s["effect"] for s in shrunk["steps"]] == [GEOMETRY, GRAVITY]
+    assert [s["effect"] for s in shrunk["steps"]] == [GEOMETRY, GRAVITY, CURVE]
     assert shrunk["steps"][0]["after_rms_um"] > 1.05 * shrunk["steps"][1]["after_rms_um"]
-    drivers = [d["covariate"] for d in result["where"]["drivers"]]
-    assert drivers[0] == "position:shoulder_lift"
+    assert shrunk["steps"][1]["after_rms_um"] > 1.3 * shrunk["steps"][2]["after_rms_um"]
+    assert shrunk["covered_rms_um"] < 0.9 * shrunk["after_rms_um"]
+    for cause in (c for c in result["causes"] if c["effect"] == CURVE):
+        seen = seen_at(cause["curve"])
+        assert 0.25 < cause["curve"]["seen_share"] < 0.75
+        assert np.median(np.array(cause["curve"]["sd_rad"])[~seen]) > 2 * np.median(
+            np.array(cause["curve"]["sd_rad"])[seen]
+        )
     shares = [c["share"] for c in result["causes"]]
     assert 0.9 < sum(shares) < 1.1
+
+
+def seen_at(curve):
+    """Which angles of a curve lie in its intervals."""
+    angle = np.array(curve["angle_deg"])
+    return np.any([(angle - low) % 360.0 <= high - low for low, high in curve["seen_deg"]], axis=0)
 
 
 def test_sample(tmp_path):
@@ -56,10 +66,10 @@ def test_sample(tmp_path):
     assert result["floor"]["source"] == "repeats"  # 37 poses of B were visited again
     assert 20 < result["floor"]["um"] == result["gap"]["noise_floor_um"] < 40
     assert result["verdict"] == "unknown"
-    assert effects(result)[:2] == [GEOMETRY, GRAVITY]
-    assert "joint_offset" not in effects(result)
+    assert effects(result) == [GEOMETRY, GRAVITY, CURVE, "unknown"]
     assert result["shrinkage"]["holdout"] == ["series_B"]
-    assert 400 < result["shrinkage"]["after_rms_um"] < 520
+    assert 400 < result["shrinkage"]["steps"][1]["after_rms_um"] < 520
+    assert result["shrinkage"]["after_rms_um"] < 333
     compliance = next(c for c in result["causes"] if c["effect"] == GRAVITY and c["target"] == "shoulder_lift")
     low, high = compliance["parameters"]["compliance_rad_per_Nmm"]["ci95"]
     assert 3e-9 < low < 1.03e-8 < high < 2e-8  # what all poses of both campaigns say
@@ -68,7 +78,7 @@ def test_sample(tmp_path):
 def test_without_the_true_effects_they_are_not_made_up_from_offsets(tmp_path):
     done = camcomp(
         "diagnose", "samples/ur10/experiment.yaml", "--json", tmp_path / "o.json", "--without", GEOMETRY,
-        "--without", GRAVITY, "--without", "link_length", "--without", "screw_pitch",
+        "--without", GRAVITY, "--without", "link_length", "--without", "screw_pitch", "--without", CURVE,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr.decode()
     result = json.loads((tmp_path / "o.json").read_text())
@@ -76,8 +86,11 @@ def test_without_the_true_effects_they_are_not_made_up_from_offsets(tmp_path):
 
 
 @WHOLE
-@pytest.mark.parametrize("held", ["measurements_joint_configurations", "measurements_grid"])
-def test_whole_campaigns(tmp_path, held):
+@pytest.mark.parametrize(
+    ("held", "most_um", "covered_um"),
+    [("measurements_joint_configurations", 333, 260), ("measurements_grid", 235, 170)],
+)
+def test_whole_campaigns(tmp_path, held, most_um, covered_um):
     tables = [DATA / "Series_A/measurements_grid.csv", DATA / "Series_B/measurements_joint_configurations.csv"]
     done = camcomp("import", *tables, "--config", "config/ur10.yaml", "-o", tmp_path / "x", "--holdout", held)
     assert done.returncode == 0, done.stderr.decode()
@@ -85,7 +98,9 @@ def test_whole_campaigns(tmp_path, held):
     assert len(log["t_s"]) == 11911
     assert log["x_mm"][0] == pytest.approx(2361.9831)
     assert log["act_wrist_1_rad"][1] == pytest.approx(-0.218756)
-    check(diagnosed(tmp_path / "x" / "experiment.yaml", tmp_path), (400, 480), 0.4)
+    result = diagnosed(tmp_path / "x" / "experiment.yaml", tmp_path)
+    check(result, (200, most_um), 0.6)
+    assert result["shrinkage"]["covered_rms_um"] < covered_um
 
 
 def campaigns():

@@ -126,3 +126,20 @@ def test_a_report_alone_writes_no_program_to_the_terminal(tmp_path, capsysbinary
 
 def test_no_clock_goes_into_the_packed_library():
     assert base64.b64decode(page_module.plot_library())[4:8] == bytes(4)
+
+
+def test_bands_and_trust_are_drawn(tmp_path):
+    spread = tmp_path / "spread.yaml"
+    spread.write_text("process: {force: {Fr_N: {sd: 60}}}\ncompensation: {policy: shrink}\n")
+    joints = tmp_path / "j.csv"
+    html = compensate(tmp_path, "--config", spread, "--joints", joints, "-q")
+    words, figures, columns = text_of(html), figures_of(html), table(joints)
+    assert "Machines drawn from them leave" in words and "100 % of the band is the cutting force" in words
+    assert re.search(r"process\.force\.Fr_N\s+100\.0", words)
+    upper = next(each for each in figures["band"]["traces"] if each["name"].startswith("corrected, 95 %"))
+    drawn = np.array(upper["y"], float)
+    assert np.nanmax(drawn) == pytest.approx(np.nanmax(columns["band_um"]), rel=0.01)
+    area = figures["band"]["traces"][0]
+    assert area["fill"] == "toself" and max(y for y in area["y"] if y is not None) == pytest.approx(np.nanmax(drawn))
+    kinds = {each["name"] for each in figures["trust"]["traces"]}
+    assert "trusted" in kinds and kinds <= {"trusted", "doubtful", "shrunk", "left alone"}

@@ -2,6 +2,7 @@
 
 import json
 import re
+from base64 import b64decode
 from hashlib import sha256
 from html import unescape
 
@@ -48,7 +49,7 @@ def figures(html):
         ("ambiguous", "cannot tell apart: backlash (x); or friction (x) and gravity."),
         (
             "unknown",
-            "no effect of the library explains. gravity is identified. The rest depends on reversal:x, velocity:y.",
+            "no effect of the library explains. gravity is identified. The rest of y depends on the reversals of x.",
         ),
     ],
 )
@@ -58,7 +59,8 @@ def test_the_verdict_is_a_sentence(verdict, told):
 
 def test_causes_with_intervals_next_experiment_and_notes():
     text = words(html_of("ambiguous", notes=["run b has no temperature"]))
-    assert "backlash x 97.0 % 90.0 % width_mm = 0.02130 (0.01917 to 0.02343)" in text
+    assert "backlash x 97.0 % 90 % width 21.3 µm (19.2 to 23.4)" in text
+    assert "Repair nothing yet" in text and "play in the drive" in text
     assert "Mill the circle in air at 2000 mm/min. It separates backlash(x) and friction(x)." in text
     assert "run b has no temperature" in text
     # 14.1 um become 3.525 um: three quarters are gone
@@ -70,11 +72,16 @@ def test_held_out_runs_are_drawn_the_worst_first():
     drawn = figures(html_of("identified"))
     assert [name for name in drawn if name.startswith("time-")] == ["time-1", "time-2"]
     first = drawn["time-1"]["traces"]
-    assert [each["name"] for each in first] == ["before", "with the causes found", "noise floor"]
-    assert max(first[0]["y"]) == pytest.approx(np.nanmax(views()[1].sizes[0]), abs=1e-3)
-    assert max(first[1]["y"]) == pytest.approx(np.nanmax(views()[1].sizes[1]), abs=1e-3)
-    assert set(first[2]["y"]) == {0.87}
-    path = drawn["path-1"]["traces"][0]["x"]
+    assert [each["name"] for each in first[:2]] == ["tip x, before", "tip x, with the causes found"]
+    assert [min(first[0]["y"]), max(first[0]["y"])] == pytest.approx(
+        [views()[1].before[:, 0].min(), views()[1].before[:, 0].max()], abs=1e-3
+    ), "with its sign"
+    sizes = drawn["path-1"]["traces"]
+    assert [each["name"] for each in sizes] == ["before", "with the causes found", "noise floor"]
+    assert max(sizes[0]["y"]) == pytest.approx(np.nanmax(views()[1].sizes[0]), abs=1e-3)
+    assert max(sizes[1]["y"]) == pytest.approx(np.nanmax(views()[1].sizes[1]), abs=1e-3)
+    assert set(sizes[2]["y"]) == {0.87}
+    path = sizes[0]["x"]
     assert path[-1] == pytest.approx(2 * np.pi * 25, rel=1e-4)
     ladder = drawn["ladder"]["traces"][0]
     assert ladder["y"] == ["+ gravity", "+ backlash (x)", "as it was"] and ladder["x"][-1] == 14.1
@@ -170,3 +177,21 @@ def test_in_a_browser(browser, tmp_path, verdict):
     assert browser.console() == []
     labels = browser.run("return [...document.querySelectorAll('.plot')].map(p => p.ariaLabel)")
     assert len(set(labels)) == len(labels) and all(len(each) > 30 for each in labels)
+
+
+def test_the_next_program_stands_on_the_page_ready_to_be_saved():
+    html = html_of("ambiguous", next_program="G0 X1 <\nM2\n")
+    assert '<pre tabindex="0">G0 X1 &lt;\nM2\n</pre>' in html
+    (data,) = re.findall(r'download="next-experiment.nc" href="data:text/plain;base64,([^"]+)"', html)
+    assert b64decode(data) == b"G0 X1 <\nM2\n"
+
+
+def test_the_first_part_says_what_to_do():
+    text = words(html_of("identified"))
+    at = [
+        text.index(each)
+        for each in ("What to do What stays after a repair", "adjust the preload", "Causes by probability")
+    ]
+    assert at == sorted(at)
+    assert "Nothing: machine and model agree" in words(html_of("none"))
+    assert "none of the effects that camcomp knows" in words(html_of("unknown"))

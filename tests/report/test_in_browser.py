@@ -34,7 +34,7 @@ def test_every_plot_is_drawn_and_nothing_complains(page):
         "return [...document.querySelectorAll('.plot')].map(p => [p.id, p.querySelectorAll('.main-svg').length,"
         " p.querySelectorAll('path.js-line, .bars path, canvas').length, p.dataset.drawn])"
     )
-    assert len(drawn) == 7
+    assert len(drawn) == 8
     for name, pictures, marks, done in drawn:
         assert pictures and marks and done == "yes", name
     assert complaints(page) == []

@@ -11,6 +11,7 @@ import numpy as np
 
 from tests.trials import laws as law
 from tests.trials import score as judging
+from tests.trials import sensitivity as changes
 from tests.trials.experiment import Plan, make, truth_json, write
 from tests.trials.faults import every
 from tests.trials.machines import MACHINES
@@ -150,6 +151,21 @@ def score_(folder, results, jobs, only, listed):
     if listed:
         click.echo(judging.listing(rows) + "\n")
     click.echo(judging.render(rows))
+    click.echo("\nright answers\n" + judging.by_machine(rows))
+
+
+@main.command("sensitivity")
+@click.option("--out", type=click.Path(path_type=Path), required=True, help="Folder of the fixed set, made if missing.")
+@click.argument("constants", nargs=-1, metavar="MODULE:NAME...")
+def sensitivity_(out, constants):
+    """Halve and double constants below camcomp/diagnosis, e.g. search.cause_search:GATE, and count answers that differ."""
+    experiments = changes.written(out)
+    usual = [changes.answer(each) for each in experiments]
+    for each, said in zip(experiments, usual, strict=True):
+        click.echo(f"{each.parent.name} {said}", err=True)
+    for each in constants:
+        half, double = changes.differing(experiments, usual, *each.split(":"))
+        click.echo(f"{each} {half} {double} of {len(experiments)}")
 
 
 if __name__ == "__main__":

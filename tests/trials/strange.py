@@ -85,6 +85,8 @@ def _at_carriage(
 def at_tip(fault: Fault, s: State) -> np.ndarray:
     """What is added to the tip (n, 3), mm, program frame."""
     value, size, out = fault.parameters, fault.parameters["size"], np.zeros((len(s.t), 3))
+    if fault.effect in ON_ACTUATORS:
+        return out
     axis = "xyz".index(fault.target or "x")
     across = (axis + 1) % 3 if axis < 2 else 0
     here = s.commanded[:, across]

@@ -8,6 +8,7 @@ from tests.trials import drives
 from tests.trials.faults import LIBRARY, Fault, Faults, every, sized
 from tests.trials.machines import MACHINES
 from tests.trials.plant import Character, Motion, Run, cutting_lines, observe
+from tests.trials.strange import ON_ACTUATORS, strange
 
 ORTHOGLIDE = MACHINES["orthoglide"]
 WAYS = Character()
@@ -165,3 +166,12 @@ def test_every_effect_moves_the_tip_or_the_drives():
     for effect, target in every(ORTHOGLIDE):
         got = tips("zigzag-10um", wrong(effect, target, LIBRARY[effect].fair), cutting=True, t=t)
         assert np.abs(got.tip - plain.tip).max() > 1e-4, (effect, target)
+
+
+@pytest.mark.parametrize("effect", ON_ACTUATORS)
+def test_strange_faults_have_actuators_of_any_name(effect):
+    machine, run = MACHINES["delta"], Run(recording.load("circles-exact"), True, 100.0)
+    odd = Faults((strange(effect, "b", 1.0, 3, (102.0, 103.0)),))
+    t = rows("circles-exact")
+    plain, changed = (observe(machine, run, each, WAYS, t) for each in (NOTHING, odd))
+    assert np.abs(changed.tip - plain.tip).max() > 1e-3

@@ -1,10 +1,16 @@
 """Progress on a terminal, silence elsewhere."""
 
 import io
+import os
+import re
+import subprocess
+import sys
 import time
 
 import pytest
 
+import camcomp
+from camcomp.ground import headway
 from camcomp.terminal import progress
 from camcomp.terminal.cli import run
 from tests.commandline import ROOT
@@ -46,6 +52,115 @@ def test_nothing_moves_where_it_should_not(screen, is_terminal, term, quiet):
     with progress.working("turning", quiet=quiet):
         time.sleep(0.05)
     assert seen.getvalue() == ""
+
+
+def lines(seen):
+    """What stood on the screen, one after the other."""
+    return [each.removeprefix("\033[K") for each in seen.getvalue().split("\r") if each not in ("", "\033[K")]
+
+
+def test_share_and_remaining_time_are_told(screen, monkeypatch):
+    seen = screen()
+    with progress.working("turning"), headway.part(0.0, 0.5):
+        began = time.time()
+        monkeypatch.setattr("click._termui_impl.time.time", lambda: began + 3.0)
+        headway.done(0.5)
+        time.sleep(0.1)
+    told = lines(seen)
+    assert any("turning  [======                  ]   25%" in each for each in told)
+    assert any(re.search(r"25%  00:00:0[89] left$", each) for each in told), told  # 3 s for a quarter
+
+
+def test_what_holds_up_the_work_is_told_instead(screen):
+    seen = screen()
+    with progress.working("turning"):
+        headway.done(0.5)
+        headway.hold(headway.ONCE)
+        time.sleep(0.1)
+        headway.hold("")
+        time.sleep(0.1)
+    told = lines(seen)
+    assert told[0] == "turning ... compiling, once per installation, 0 s"
+    assert "50%" in told[-1]
+
+
+@pytest.mark.parametrize("verb", ["compensate", "diagnose", "verify"])
+def test_verbs_say_how_far_they_are(monkeypatch, tmp_path, verb):
+    """Shares rise to the end, in more than a few steps."""
+    seen = []
+    original = headway.done
+
+    def note(share):
+        original(share)
+        if headway._watched:
+            seen.append(headway._watched[-1].share)
+
+    monkeypatch.setattr(headway, "done", note)
+    monkeypatch.setattr("camcomp.diagnosis.search.cause_search.headway.done", note)
+    groove, machine = WORDS[1], camcomp.load_machine(WORDS[3])
+    with headway.watched() as watched:
+        if verb == "diagnose":
+            camcomp.diagnose(ROOT / "samples/diagnosis/ambiguous/experiment.yaml")
+        else:
+            done = camcomp.compensate(groove, machine)
+            if verb == "verify":
+                watched.share = None
+                seen.clear()
+                camcomp.verify(done.data, groove, machine)
+    assert seen == sorted(seen) and 0.0 < seen[0] < 0.5 and 0.85 < watched.share <= 1.0
+    assert len({round(each, 3) for each in seen}) >= 3
+
+
+def test_long_programs_say_how_far_they_are(tmp_path):
+    program = tmp_path / "long.nc"
+    moves = (f"G1 X{k % 97 / 10:.4f} Y{k % 89 / 10:.4f} F600" for k in range(45_000))
+    program.write_text("G21 G90 G17 G94\nS8000 M3\nG0 X0 Y0 Z0\n" + "\n".join(moves) + "\nM2\n")
+    shares = []
+    with headway.watched() as watched:
+        rest = headway.done
+
+        def note(share):
+            rest(share)
+            shares.append(watched.share)
+
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr("camcomp.compensation.long.program.done", note)
+            patch.setattr("camcomp.compensation.long.runs.CHUNK_BYTES", 1 << 18)
+            assert run(["compensate", str(program), *WORDS[2:], "-q", "-o", str(tmp_path / "out.nc")]) == 0
+    assert shares == sorted(shares) and shares[0] < 0.1 and 0.5 < shares[-1] < 1.0
+
+
+def test_pipes_stay_silent_while_the_share_is_known(screen):
+    seen = screen(is_terminal=False)
+    with progress.working("turning"):
+        headway.done(0.5)
+        time.sleep(0.05)
+    assert seen.getvalue() == ""
+
+
+def test_compiling_is_told_for_what_it_is(tmp_path):
+    """A first run in an installation without machine code says so; the second has nothing to compile."""
+    code = """
+import numpy as np, sys
+from camcomp.ground import headway
+told = []
+headway.hold = told.append
+from camcomp.model.statics import compiled
+sys.path.insert(0, sys.argv[1])
+import kernel
+kernel.twice(np.zeros(3))
+print("|".join(told))
+"""
+    kernel = "from camcomp.model.statics.compiled import entry\n@entry\ndef twice(x):\n    x[0] = 2.0 * x[0]\n"
+    (tmp_path / "kernel.py").write_text(kernel)
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": str(ROOT)}
+    first, second = (
+        subprocess.run(
+            [sys.executable, "-c", code, str(tmp_path)], env=environment, capture_output=True, text=True, check=True
+        )
+        for _ in range(2)
+    )
+    assert first.stdout.strip() == f"{headway.ONCE}|" and second.stdout.strip() == ""
 
 
 def test_the_line_is_wiped_when_the_work_fails(screen):

@@ -1,0 +1,96 @@
+"""A diagnosis in the words of a workshop."""
+
+import pytest
+
+from camcomp.diagnosis.report.answer import MOST_CAUSES, answer_lines
+from camcomp.diagnosis.report.words import depends, micrometres, percent, plain, remedy, size, sizes
+from camcomp.diagnosis.result.types import DiagnosisResult, Driver, Estimate, FoundCause, StretchDriver
+from camcomp.ground import shelf
+from tests.report.diagnoses import cause, result
+
+OWN = [name for name in shelf.members("effects") if getattr(shelf.load("effects", name), "PARAMETERS", ())]
+
+
+def found(effect, target=None, share=0.5, probability=0.99, **parameters):
+    values = {name: {"value": v, "ci95": [lo, hi]} for name, (v, lo, hi) in parameters.items()}
+    return FoundCause.model_validate(
+        {"effect": effect, "target": target, "probability": probability, "share": share, "parameters": values}
+    )
+
+
+@pytest.mark.parametrize("name", OWN)
+def test_every_effect_says_what_it_is_and_what_helps(name):
+    """The formula and the map of an unknown effect have no remedy that is known before they are found."""
+    effect = shelf.load("effects", name)
+    assert effect.PLAIN and not effect.PLAIN.endswith(".")
+    assert effect.REMEDY and not effect.REMEDY.endswith(".")
+    each = found(name)
+    assert plain(each) == effect.PLAIN and remedy(each) == effect.REMEDY
+
+
+def test_an_effect_of_another_installation_has_its_name_alone():
+    assert plain(found("spindle_growth")) == "spindle growth" and remedy(found("spindle_growth")) == ""
+
+
+@pytest.mark.parametrize(
+    ("value", "low", "high", "told"),
+    [
+        (0.0243949, 0.0232628, 0.025527, "width 24.4 µm (23.3 to 25.5)"),
+        (0.0243949, 0.02438, 0.02441, "width 24.395 µm (24.380 to 24.410)"),
+        (1.5, 1.2, 1.8, "width 1.50 mm (1.20 to 1.80)"),
+        (0.0004, 0.0, 0.0012, "width not told from 0 (0.00 to 1.20 µm)"),
+    ],
+)
+def test_digits_follow_the_interval(value, low, high, told):
+    assert sizes(found("backlash", "x", width_mm=(value, low, high))) == told
+
+
+def test_a_factor_that_may_be_one_is_not_told_from_one():
+    assert sizes(found("cutting_force", factor=(1.02, 0.98, 1.06))) == "factor not told from 1 (0.980 to 1.060)"
+    assert sizes(found("cutting_force", factor=(1.30, 1.28, 1.32))) == "factor 1.300 (1.280 to 1.320)"
+
+
+def test_a_phase_may_be_zero_and_is_told():
+    text = sizes(found("screw_cyclic", "x", amplitude_mm=(0.004, 0.0035, 0.0045), phase_rad=(0.1, -0.1, 0.3)))
+    assert "phase" in text and "phase not told" not in text
+
+
+def test_parameters_that_may_be_nothing_come_last_by_name():
+    frame = found("workpiece_frame", shift_x_mm=(0.05, 0.04, 0.06), shift_y_mm=(0.001, -0.002, 0.004),
+                  shift_z_mm=(0.0, -0.003, 0.003))  # fmt: skip
+    assert sizes(frame) == "shift x 50 µm (40 to 60); shift y and shift z not told from nothing"
+
+
+def test_a_parameter_of_an_unknown_unit_is_told_as_it_stands():
+    assert size("strength", Estimate(value=2e-9, ci95=(1e-9, 3e-9))) == "strength 2.00e-09 (1.00e-09 to 3.00e-09)"
+
+
+def test_small_lengths_and_shares():
+    assert micrometres(1.42e-9) == "below 0.01 µm" and micrometres(3.094) == "3.09 µm"
+    assert percent(0.002) == "less than 1 %" and percent(0.0) == "0 %" and percent(0.976) == "98 %"
+
+
+def test_what_a_gap_depends_on():
+    assert depends(Driver(covariate="reversal:x", share=0.9)) == "the reversals of x"
+    bump = StretchDriver(covariate="position:y", share=0.9, low=12.04, high=18.0, unit="mm")
+    assert depends(bump) == "where y stands, most of it from 12.0 to 18.0 mm of its travel"
+
+
+def test_ten_lines_at_most_and_no_cause_of_nothing():
+    many = [cause("backlash", a, 0.99, 0.2, width_mm=0.02) for a in "xyz"]
+    many += [cause("joint_offset", a, 0.99, 0.001, offset_mm=0.02) for a in "xyz"]
+    full = DiagnosisResult.model_validate(result("ambiguous").model_dump() | {"verdict": "identified", "causes": many})
+    lines = answer_lines(full)
+    assert len(lines) <= 10
+    assert sum("do: " in each for each in lines) == MOST_CAUSES
+    assert "  and 3 more with less than 1 % of the gap together" in lines
+    assert not any(" 0 %" in each for each in lines)
+
+
+def test_nothing_is_to_be_done_while_the_cause_is_open():
+    lines = answer_lines(result("ambiguous"))
+    assert not any("do: " in each for each in lines) and any("measure next" in each for each in lines)
+
+
+def test_an_unknown_effect_says_what_it_goes_with():
+    assert "The rest of y depends on the reversals of x." in answer_lines(result("unknown"))[0]
