@@ -26,7 +26,10 @@ from camcomp.model.statics.description import Link, Parallelogram, Robot
 RUN_OFFSET_MM = 0.001  # repeatability of a run
 RUN_OFFSET_N = 0.3
 STARTED_MM, STARTED_RAD = 0.1, 1e-4  # by which an actuator has to move before its play is taken up
-START_MM, START_RAD = 0.005, 5e-6  # where its carriage may stand until then
+START_MM, START_RAD = 0.1, 5e-5  # where its carriage may stand until then: play and guides as bad as they come
+START_N = 1000.0  # and how hard its guide may hold it there
+ALWAYS_MM, ALWAYS_RAD = 0.005, 5e-6  # the same where it hardly ever moves: little, or nothing would be known of it
+ALWAYS = 0.2  # of a run: what has not moved for so long hardly ever moves
 STARTING_ROWS = 5
 CLOCK_JITTER_S = 1e-5
 CLOCK_RATE = 1e-5
@@ -227,9 +230,10 @@ def _nuisances(bench: Bench) -> list[tuple[str, float, list[Floats], bool]]:
 def _starts(bench: Bench, only: Callable[[int, Floats], list[Floats]]) -> list[tuple[str, float, list[Floats], bool]]:
     """Where play and guides stood when a run began, nobody knows: until an actuator has moved, its carriage may be anywhere.
 
-    One column per run and actuator for the rows before that, where there are enough of them.
+    One column per run and actuator for the rows before that, where there are enough of them, and one for the force with
+    which its guide holds it.
     """
-    found = []
+    found, m = [], len(bench.actuators)
     for r, run in enumerate(bench.runs):
         if not run.run_path.ordered:
             continue
@@ -239,16 +243,15 @@ def _starts(bench: Bench, only: Callable[[int, Floats], list[Floats]]) -> list[t
             still = np.maximum.accumulate(moved[:, j]) < (STARTED_RAD if revolute else STARTED_MM)
             if still.sum() < STARTING_ROWS:
                 continue
-            values = np.zeros_like(bench.observed(r))
-            values[:, :3] = bench.turned(r, bench.row_slopes(r)[:, :, j] * still[:, None])
-            found.append(
-                (
-                    f"start.{run.name}.{a}",
-                    START_RAD if revolute else START_MM,
-                    only(r, thinned(values, run.thin)),
-                    False,
-                )
-            )
+            shift = np.zeros_like(bench.observed(r))
+            shift[:, :3] = bench.turned(r, bench.row_slopes(r)[:, :, j] * still[:, None])
+            begins = still.mean() < ALWAYS
+            width = (START_RAD if revolute else START_MM) if begins else (ALWAYS_RAD if revolute else ALWAYS_MM)
+            found.append((f"start.{run.name}.{a}", width, only(r, thinned(shift, run.thin)), False))
+            if begins and run.measured.has("drive"):
+                held = np.zeros_like(shift)
+                held[:, 3 + m + j] = still
+                found.append((f"held.{run.name}.{a}", START_N, only(r, thinned(held, run.thin)), False))
     return found
 
 

@@ -13,7 +13,7 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import Akima1DInterpolator
+from scipy.interpolate import Akima1DInterpolator, PchipInterpolator
 
 from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import Bools, Floats, Ints
@@ -35,6 +35,7 @@ BESIDE_MM = 0.6  # from the path: no blended corner leaves it further, and what 
 _SURE_N = 20.0  # what the force may be off by for the nodes between rows to be led by it
 _SAME_FEED = 0.03  # by which a driven feed may differ from the programmed one and still be it
 LEAST_FEED = 1e-3  # mm/min, of what stands still
+_MISSING = 1.5  # usual steps between rows from which on rows are missing between them
 _CHORD_MM = 0.02  # over which a direction is taken: digits and noise of set-points are small beside it
 
 
@@ -268,11 +269,23 @@ def _jumps(force: Floats, cutting: Bools) -> Ints:
 
 
 def _smooth(time: Floats, values: Floats) -> Callable[[Floats], Floats]:
-    """Values (n, c) between rows: smooth, and without overshoot where a line begins or ends (Akima 1970)."""
+    """Values (n, c) between rows: smooth, and without overshoot where a line begins or ends (Akima 1970).
+
+    Where rows are missing the way leads from one to the next without turning round (Fritsch, Carlson 1980): a reversal that
+    nobody saw would leave play and friction on the wrong side for all that follows.
+    """
     if len(time) < 3:
         return lambda at: np.column_stack([np.interp(at, time, v) for v in values.T])
-    lead = Akima1DInterpolator(time, values, axis=0)
-    return lambda at: np.asarray(lead(np.clip(at, time[0], time[-1])))
+    step = np.diff(time)
+    missing = step > _MISSING * float(np.median(step))
+    lead, over = Akima1DInterpolator(time, values, axis=0), PchipInterpolator(time, values, axis=0)
+
+    def between(at: Floats) -> Floats:
+        t = np.clip(at, time[0], time[-1])
+        piece = np.clip(np.searchsorted(time, t, side="right") - 1, 0, len(step) - 1)
+        return np.where(missing[piece][:, None], over(t), lead(t))
+
+    return between
 
 
 @dataclass(frozen=True, eq=False)
