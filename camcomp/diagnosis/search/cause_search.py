@@ -1,7 +1,7 @@
 """The search for causes on one problem: which sets are tried, in which order, and how they are ranked."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
@@ -9,6 +9,7 @@ import numpy as np
 from camcomp.diagnosis.fit.gap import rest_by_actuator
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.search.established import MINOR, weakest
+from camcomp.diagnosis.search.imitation import credibility
 from camcomp.diagnosis.search.indistinguishable import Likeness, likeness, stand_ins
 from camcomp.diagnosis.search.unexplained import Unexplained, size_um, unexplained, worst
 from camcomp.diagnosis.search.unknown import firm_prior, foretelling, residual_tests, signal_rms
@@ -23,6 +24,7 @@ from camcomp.diagnosis.statistics.cause_sets import (
     total,
 )
 from camcomp.diagnosis.statistics.evidence import Gram, estimate
+from camcomp.diagnosis.statistics.probability import EVEN
 from camcomp.diagnosis.statistics.score_test import ResidualTest
 from camcomp.diagnosis.statistics.verdict import Verdict, judge
 from camcomp.ground import headway
@@ -122,20 +124,41 @@ def search_causes(problem: Problem) -> CauseSearch:
     best = fits[verdict.best]
     beyond = unexplained(problem, best)
     kind = unknown_kind(problem, best, beyond)
-    if kind is None:
-        return CauseSearch(fits, probability, verdict, residual_tests(problem, best, problem.prior), None, beyond)
-    known = best
-    while (kept := beside_unknown(problem, known, beyond)) != known.members:
-        known = fit(kept)
-        beyond = unexplained(problem, known)
-    kind = unknown_kind(problem, known, beyond) or worst(beyond).kind
+    known, credible = _credible(problem, best, beyond, fit)
     if known.members != best.members:
+        beyond = unexplained(problem, known)
+        kind = unknown_kind(problem, known, beyond) or (worst(beyond).kind if kind else None)
         fits = (known, *(f for f in fits if f.members != known.members))
         probability = probabilities(fits, problem.candidates, temperature)
-        inclusion = {i: verdict.inclusion.get(i, 0.0) for i in known.members}
-        verdict = Verdict("identified", 0, (), inclusion)
-    left = residual_tests(problem, known, firm_prior(problem))
-    return CauseSearch(fits, probability, verdict, left, kind if kind in left else next(iter(left)), beyond)
+        word = "identified" if known.members else "none"
+        verdict = replace(verdict, word=word, best=0, rivals=())
+    sure = {i: min(p, credible.get(i, 1.0)) for i, p in verdict.inclusion.items()}
+    verdict = replace(verdict, inclusion=sure)
+    prior = problem.prior if kind is None else firm_prior(problem)
+    left = residual_tests(problem, known, prior)
+    shown = kind if kind is None or kind in left else next(iter(left))
+    return CauseSearch(fits, probability, verdict, left, shown, beyond)
+
+
+def _credible(
+    problem: Problem, f: Fitted, beyond: Mapping[str, Unexplained], fit: Callable[[Members], Fitted]
+) -> tuple[Fitted, dict[int, float]]:
+    """What is left of a set when members that something unknown does as well have gone, one by one, and how sure they are.
+
+    Where something unknown shows, those that do not foretell unseen runs beside it go first.
+    """
+    while True:
+        unknown = unknown_kind(problem, f, beyond) is not None
+        kept = beside_unknown(problem, f, beyond) if unknown else f.members
+        credible: dict[int, float] = {}
+        if kept == f.members:
+            credible = credibility(problem, f, surely=unknown, temperature=TEMPERATURE)
+            least = min(credible, key=lambda i: credible[i], default=None)
+            if least is None or credible[least] > EVEN:
+                return f, credible
+            kept = tuple(i for i in f.members if i != least)
+        f = fit(kept)
+        beyond = unexplained(problem, f)
 
 
 def beside_unknown(problem: Problem, f: Fitted, beyond: Mapping[str, Unexplained]) -> Members:

@@ -1,144 +1,201 @@
-"""How sure a cause is beside an unknown effect, which may do what the cause does.
+"""How sure a cause is where something unknown may be: instead of it, or beside it.
 
-What no library states may depend on one covariate, in any way: a family of generic patterns (position of one drive,
-forces, moments in time ...), as large as all that is seen. The evidence of a set is the mean over these families, with
-the set and without a member: a cause that one family does as well beside the rest of the unknown has none. What still
-remains is no white noise, and evidence counts as much less as it varies more from one block of time to the next.
-Source: model averaging (Hoeting et al., Statistical Science 14, 1999); composite likelihood with the sandwich's
-information (Varin, Reid, Firth, Statistica Sinica 21, 2011).
+What no library states may depend on one thing, in any way: a family of functions (of a place, of a drive's position, of
+force, of time within each run ...), together as large as all that is seen. The probability of a cause is that of all
+sets that have it, alone and with each family, over that of all sets: what one family does as well, no cause did surely.
+What the best of them still leaves is no white noise, and evidence counts as much less as it varies more from one block
+of time to the next. Sources: model averaging (Hoeting et al., Statistical Science 14, 1999); composite likelihood with
+the sandwich's information (Varin, Reid, Firth, Statistica Sinica 21, 2011).
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import product
+from itertools import combinations, product
 
 import numpy as np
-from scipy.special import expit, logsumexp
+from scipy.special import logsumexp
 
 from camcomp.diagnosis.fit.columns import grounds
 from camcomp.diagnosis.fit.intervals import BLOCKS
+from camcomp.diagnosis.fit.patterns import Ground
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.search.unknown import about
 from camcomp.diagnosis.statistics.cause_sets import Fitted, Members
-from camcomp.diagnosis.statistics.evidence import Gram, Prior, base, estimate, log_bayes
-from camcomp.ground.datatypes import Floats, Ints
+from camcomp.diagnosis.statistics.evidence import Base, Gram, Prior, base, estimate, gram, log_bayes
+from camcomp.ground.datatypes import Bools, Floats, Ints
 
-SIZES = (0.3, 1.0)  # of an unknown effect, in units of all that is seen
-DEGREE = 4  # of the polynomials of the place: what depends on two axes at once
+UNKNOWN = 0.1  # prior probability of something that the library does not have
+WAVES = 24  # half waves along a travel: a bump of a twentieth of it is still followed
+DEGREE = 4  # of the polynomials of what depends on several axes at once
+IN_A_RUN = 8  # degree of those of time, for every run anew
+ALL_SETS = 3  # members up to which every subset is looked at; of larger ones each alone, and all but one
+OF_WHAT_MOVES = ("velocity", "reversal", "force", "acceleration", "direction", "temperature")
 
 
 @dataclass(frozen=True, eq=False)
-class _Rows:
-    """All runs: white columns W (w, k), patterns D (w, p) by family, residual r (w,), block (w,) of time per way to count."""
+class _Family:
+    """Functions of one thing: name, which of all white rows (w,) they touch, their white columns there (rows, p)."""
 
-    W: Floats
-    r: Floats
-    D: Floats
-    families: tuple[Ints, ...]
-    blocks: tuple[Ints, ...]
+    name: str
+    at: Bools
+    columns: Floats
 
 
-def credibility(problem: Problem, f: Fitted) -> dict[int, float]:
-    """Probability of every member of f, where something unknown acts beside or instead of it."""
+def credibility(problem: Problem, f: Fitted, *, surely: bool, temperature: float) -> dict[int, float]:
+    """Probability of every member of f; surely: whether something unknown is there for certain."""
     if not f.members:
         return {}
-    rows = _rows(problem, f)
-    k = rows.W.shape[1]
-    nothing = float(rows.r @ rows.r - len(rows.r))
-    found: list[tuple[list[float], float, Floats, Ints]] = []
-    sets = [f.members, *(tuple(j for j in f.members if j != i) for i in f.members)]
-    for family, size in product(rows.families, SIZES):
-        D = rows.D[:, family]
-        energy = float(np.sum(D**2))
-        if energy <= 0.0 or nothing <= 0.0:
-            continue
-        joint = np.concatenate([rows.W, D], axis=1)
-        prior = _wider(problem.prior, len(family), size * np.sqrt(nothing / energy))
-        data = Gram(joint.T @ joint, joint.T @ rows.r, float(rows.r @ rows.r), len(rows.r))
-        at = base(data, prior, f.factor)
-        evidence = [
-            at.log_evidence + log_bayes(at, prior, [problem.candidates.columns[i] for i in each] if each else []) if each else at.log_evidence
-            for each in sets
-        ]
-        mean, covariance = estimate(data, prior, problem.member_columns(f.members), f.factor)
-        found.append((evidence, 0.0, mean, family))
-        found[-1] = (evidence, 0.0, (joint @ covariance[:, problem.member_columns(f.members)], rows.r - joint @ mean, covariance), family)
-    best = max(found, key=lambda each: each[0][0])
-    value = np.array([each[0] for each in found])  # (families, sets)
-    whole = logsumexp(value, axis=0)
-    pull, rest, covariance = best[2]
+    own, residual = about(problem, f)
+    W, r = np.concatenate(own), np.concatenate(residual)
+    data, index = gram(W, r), problem.member_columns(f.members)
+    sets, candidates = _subsets(f.members), problem.candidates
+    families = list(_families(problem))
+    hypotheses: list[tuple[Floats, float]] = []  # evidence per set, log prior
+    best: tuple[float, _Family | None] = (-np.inf, None)
+    if not surely:
+        hypotheses.append((_evidence(problem, base(data, problem.prior, 1.0), problem.prior, sets), np.log(1.0 - UNKNOWN)))
+        best = (hypotheses[0][0][0], None)
+    for family in families:
+        joint, prior = _with(problem, data, W, r, family)
+        value = _evidence(problem, base(joint, prior, 1.0), prior, sets)
+        hypotheses.append((value, np.log(UNKNOWN / len(families))))
+        best = max(best, (float(value[0]), family), key=lambda each: each[0])
+    strain = _strain(problem, data, W, r, best[1], index)
+    log_prior = np.array([candidates.prior(each) for each in sets])
     out, at = {}, 0
-    for n, i in enumerate(f.members):
-        mine = slice(at, at + len(problem.candidates.columns[i]))
+    for i in f.members:
+        mine = slice(at, at + len(candidates.columns[i]))
         at = mine.stop
-        index = problem.candidates.columns[i]
-        strain = 1.0
-        own = covariance[index, index]
-        for block in rows.blocks:
-            sums = np.zeros((block.max() + 1, len(index)))
-            np.add.at(sums, block, pull[:, mine] * rest[:, None])
-            strain = max(strain, float((np.sum(sums**2, axis=0) / own).max()))
-        odds = (whole[0] - whole[n + 1]) / strain + problem.candidates.prior(f.members) - problem.candidates.prior(sets[n + 1])
-        out[i] = float(expit(odds))
+        value = np.array([e / (temperature * strain[mine].max()) + log_prior + odds for e, odds in hypotheses])
+        has = np.array([i in each for each in sets])
+        out[i] = float(np.exp(logsumexp(value[:, has]) - logsumexp(value)))
     return out
 
 
-def _wider(prior: Prior, count: int, size: float) -> Prior:
-    """The prior with `count` more columns of that size."""
-    ones = np.ones(count)
-    return Prior(
-        np.concatenate([prior.tolerance, size * ones]),
-        np.concatenate([prior.scale, ones]),
-        np.concatenate([prior.sign, 0.0 * ones]),
-        np.concatenate([prior.flexible, 0.0 * ones]),
+def _subsets(members: Members) -> list[Members]:
+    """The set itself, and sets of some of its members."""
+    n = len(members)
+    sizes = range(n - 1, -1, -1) if n <= ALL_SETS else (n - 1, 1, 0)
+    return [members, *(each for size in sizes for each in combinations(members, size))]
+
+
+def _evidence(problem: Problem, at: Base, prior: Prior, sets: Sequence[Members]) -> Floats:
+    columns = problem.candidates.columns
+    return np.array([
+        at.log_evidence + (log_bayes(at, prior, [columns[i] for i in each]) if each else 0.0) for each in sets
+    ])  # fmt: skip
+
+
+def _with(problem: Problem, data: Gram, W: Floats, r: Floats, family: _Family) -> tuple[Gram, Prior]:
+    """Gram matrix and prior with the columns of a family behind all others, as large as all that its rows show."""
+    D, seen = family.columns, r[family.at]
+    cross = W[family.at].T @ D
+    joint = Gram(
+        np.block([[data.A, cross], [cross.T, D.T @ D]]), np.concatenate([data.b, D.T @ seen]), data.c, data.rows
+    )
+    energy = max(float(seen @ seen) - len(seen), 1.0)
+    size = np.full(D.shape[1], np.sqrt(energy / float(np.sum(D**2))))
+    prior, more = problem.prior, np.ones(D.shape[1])
+    return joint, Prior(
+        np.concatenate([prior.tolerance, size]),
+        np.concatenate([prior.scale, more]),
+        np.concatenate([prior.sign, 0.0 * more]),
+        np.concatenate([prior.flexible, 0.0 * more]),
     )
 
 
-def _rows(problem: Problem, f: Fitted) -> _Rows:
-    white, residual = about(problem, f)
-    patterns, labels = [], []
-    for k, parts in enumerate(problem.white_patterns):
-        D, row, at = np.zeros((len(white[k]), sum(p.shape[1] for p in parts))), 0, 0
-        for part in parts:
-            D[row : row + len(part), at : at + part.shape[1]] = part
-            row, at = row + len(part), at + part.shape[1]
-        patterns.append(D)
-    labels = [name for words in problem.dictionaries for name in words.labels]
-    places = _places(problem)
-    D = np.concatenate([np.concatenate(patterns), places], axis=1)
-    names = np.array([*labels, *["place"] * places.shape[1]])
-    of = np.array([name.split(":")[0] for name in names])
-    whole = {"time", "temperature", "direction", "acceleration", "force", "velocity", "reversal", "place"}
-    groups = [np.flatnonzero(names == name) for name in dict.fromkeys(names)]
-    groups += [np.flatnonzero(of == name) for name in dict.fromkeys(of) if name in whole]
-    blocks = []
+def _strain(
+    problem: Problem, data: Gram, W: Floats, r: Floats, family: _Family | None, index: Sequence[int]
+) -> Floats:
+    """How much more than noise what is left varies from block to block of time, along each member's column (d,)."""
+    prior = problem.prior
+    if family is not None:
+        data, prior = _with(problem, data, W, r, family)
+        more = np.zeros((len(r), family.columns.shape[1]))
+        more[family.at] = family.columns
+        W = np.concatenate([W, more], axis=1)
+    mean, covariance = estimate(data, prior, index)
+    pull = (W @ covariance[:, index]) * (r - W @ mean)[:, None]
+    at = [problem.row_places(k) for k in range(len(problem.white))]
+    worst = np.ones(len(index))
     for count in BLOCKS:
-        each = [
-            np.minimum((problem.row_places(k) * count).astype(int), count - 1) + k * count
-            for k in range(len(white))
-        ]
-        blocks.append(np.concatenate(each))
-    return _Rows(np.concatenate(white), np.concatenate(residual), D, tuple(groups), tuple(blocks))
+        block = np.concatenate([np.minimum((x * count).astype(int), count - 1) + k * count for k, x in enumerate(at)])
+        sums = np.zeros((count * len(at), len(index)))
+        np.add.at(sums, block, pull)
+        worst = np.maximum(worst, np.sum(sums**2, axis=0) / np.diag(covariance)[index])
+    return worst
 
 
-def _places(problem: Problem) -> Floats:
-    """White polynomials (w, p) of the place in the workpiece, for each axis of the tip."""
-    tips = [g.tip for g in grounds(problem.bench)]
-    if not any(run.measured.has("tip") for run in problem.bench.runs):
-        return np.zeros((sum(len(W) for W in problem.white), 0))
-    everywhere = np.concatenate(tips)
-    middle, half = 0.5 * (everywhere.max(axis=0) + everywhere.min(axis=0)), 0.5 * np.ptp(everywhere, axis=0)
-    degrees = [d for d in product(range(DEGREE + 1), repeat=3) if 0 < sum(d) <= DEGREE and all(half[a] > 1e-3 or not d[a] for a in range(3))]
+def _families(problem: Problem) -> Iterator[_Family]:
+    """Of all that something unknown may depend on."""
+    sizes = [[len(part) for part in parts] for parts in problem.white_patterns]
+    kinds = [np.repeat(np.arange(len(parts)), parts) for parts in sizes]
+    everywhere = np.concatenate(kinds)
+    kinds_of = [words.kind for words in problem.dictionaries]
+    names = [name for words in problem.dictionaries for name in words.labels]
+    whole = np.array([name.split(":")[0] for name in names])
+    # the first of an axis' functions of time is one throughout: an unknown effect has some mean
+    constant = [words.kind == "tip" and name.startswith("time:") and name not in words.labels[:n]
+                for words in problem.dictionaries for n, name in enumerate(words.labels)]  # fmt: skip
+    of = np.repeat(np.arange(len(problem.dictionaries)), [len(words.labels) for words in problem.dictionaries])
+    for word in OF_WHAT_MOVES:
+        mine = np.flatnonzero(whole == word)
+        each = [mine[np.array(names)[mine] == name] for name in dict.fromkeys(np.array(names)[mine])]
+        for picked in [mine, *(each if len(each) > 1 else [])]:
+            if len(picked):
+                picked = np.concatenate([picked, np.flatnonzero(constant)])
+                yield _Family(word, np.ones(len(everywhere), bool), _patterns(problem, picked, of, everywhere, kinds))
+    if "tip" not in kinds_of:
+        return
+    at = everywhere == kinds_of.index("tip")
+    for name, values in _of_place(grounds(problem.bench)):
+        yield _Family(name, at, _white_tip(problem, values))
+
+
+def _patterns(problem: Problem, picked: Ints, of: Ints, everywhere: Ints, kinds: Sequence[Ints]) -> Floats:
+    """White columns (w, p) of some of the patterns of all kinds of channels."""
+    out = np.zeros((len(everywhere), len(picked)))
+    start = 0
+    for k, parts in enumerate(problem.white_patterns):
+        row = start
+        for kind, part in enumerate(parts):
+            first = int(np.searchsorted(of, kind))
+            mine = np.flatnonzero(of[picked] == kind)
+            out[row : row + len(part), mine] = part[:, picked[mine] - first]
+            row += len(part)
+        start += len(kinds[k])
+    return out
+
+
+def _of_place(every: Sequence[Ground]) -> Iterator[tuple[str, list[Floats]]]:
+    """Names, and functions (n, p) per run, of places, of positions, of several axes at once, and of time in each run."""
+    tips, drives = [g.tip for g in every], [g.motion.encoder for g in every]
+    places = [np.concatenate([tip, drive], axis=1) for tip, drive in zip(tips, drives, strict=True)]
+    low, span = np.min([p.min(axis=0) for p in places], axis=0), 0.0
+    span = np.max([p.max(axis=0) for p in places], axis=0) - low
+    u = [(p - low) / np.maximum(span, 1e-9) for p in places]
+    moving, seen = [a for a in range(len(span)) if span[a] > 1e-3 or (a >= 3 and span[a] > 1e-6)], np.concatenate(u)
+    k = np.arange(WAVES + 1)
+    for n, a in enumerate(moving):
+        if any(abs(np.corrcoef(seen[:, a], seen[:, b])[0, 1]) > 1.0 - 1e-9 for b in moving[:n]):
+            continue  # of a machine of slides: the axis is the drive's
+        yield f"position {a}", [np.cos(np.pi * k * x[:, a, None]) / np.maximum(k, 1) for x in u]
+    axes = [a for a in moving if a < 3]
+    powers = [d for d in product(range(DEGREE + 1), repeat=len(axes)) if sum(d) <= DEGREE]
+    leg = np.polynomial.legendre.legvander
+    yield "place", [
+        np.stack([np.prod([leg(2 * x[:, a] - 1, DEGREE)[:, e] for a, e in zip(axes, d, strict=True)], axis=0)
+                  for d in powers], axis=1) for x in u
+    ]  # fmt: skip
+    yield "time", [
+        np.kron(np.eye(len(every))[r], leg(np.linspace(-1, 1, len(g.tip)), IN_A_RUN)) for r, g in enumerate(every)
+    ]
+
+
+def _white_tip(problem: Problem, values: Sequence[Floats]) -> Floats:
+    """White rows of the tip (rows, 3 p) of functions (n, p) per run, each on each axis, in um."""
     out = []
-    for k, tip in enumerate(tips):
-        u = (tip - middle) / np.maximum(half, 1e-9)
-        values = np.zeros((len(tip), 3, 3 * len(degrees)))
-        for n, d in enumerate(degrees):
-            one = np.prod([np.polynomial.legendre.legval(u[:, a], np.eye(DEGREE + 1)[d[a]]) for a in range(3)], axis=0)
-            for a in range(3):
-                values[:, a, 3 * n + a] = 1e-3 * one
-        white = problem.noise.rows(k, values, problem.inflate[k], problem.times[k])
-        full = np.zeros((len(problem.white[k]), values.shape[2]))
-        full[: len(white)] = white
-        out.append(full)
+    for k, one in enumerate(values):
+        columns = 1e-3 * np.einsum("np,ac->nacp", one, np.eye(3)).reshape(len(one), 3, -1)
+        out.append(problem.noise.rows(k, columns, problem.inflate[k], problem.times[k]))
     return np.concatenate(out)
