@@ -94,9 +94,8 @@ def _of_actuator(g: Ground, size: _Sizes, j: int, knots: int) -> dict[str, list[
         "reversal": [m.direction[:, j], *(_reversal(m, each, j) for each in _RELAX_MM)],
         "force": [d, d * np.abs(d)],
     }
-    if m.ordered and len(m.time) > 2:
-        push = np.gradient(m.speed[:, j], m.time)
-        out["acceleration"] = [push / max(float(np.abs(push).max()), 1e-9)]
+    push = np.gradient(m.speed[:, j], m.time) if m.ordered and len(m.time) > 2 else np.zeros(len(m.time))
+    out["acceleration"] = [push / max(float(np.abs(push).max(initial=0.0)), 1e-9)]
     return out
 
 
@@ -105,13 +104,15 @@ def hats(x: Floats, knots: int) -> list[Floats]:
     return [np.maximum(1.0 - np.abs(x * (knots - 1) - n), 0.0) for n in range(knots)]
 
 
-def _of_time(g: Ground, size: _Sizes) -> dict[str, list[Floats]]:
+def _of_time(g: Ground, size: _Sizes, *, warmth: bool) -> dict[str, list[Floats]]:
+    """Functions (n,) of time, and of temperature where some run logged it: one that did not says nothing of it."""
     t = 2.0 * (g.motion.common - size.start) / size.length - 1.0
     own = g.motion.time - g.motion.time[0]
     u = 2.0 * own / max(float(own[-1]), 1e-9) - 1.0
     out = {"time": [np.ones_like(t), t, 0.5 * (3 * t**2 - 1), u, 0.5 * (3 * u**2 - 1)]}
-    if g.motion.temperature is not None:
-        out["temperature"] = [(g.motion.temperature - 20.0) / 10.0]
+    if warmth:
+        logged = g.motion.temperature
+        out["temperature"] = [np.zeros_like(t) if logged is None else (logged - 20.0) / 10.0]
     return out
 
 
@@ -170,7 +171,8 @@ def dictionary(grounds: Sequence[Ground], actuators: Sequence[str]) -> list[Dict
                     # a carriage that strays, strays in any direction: the tip is given all three axes
                     for channel in range(3) if kind == "tip" else (j,):
                         stores[kind].put(f"{name}:{a}", channel, values, 1.0 if kind == "drive" else 1e-3)
-    times = [_of_time(g, size) for g in grounds]
+    warmth = any(g.motion.temperature is not None for g in grounds)
+    times = [_of_time(g, size, warmth=warmth) for g in grounds]
     names = {"tip": "xyz", "encoder": actuators, "drive": actuators, "dyno": "xyz"}
     for kind in KINDS:
         if not found[kind]:
