@@ -51,6 +51,7 @@ LARGE_SCALES = 3.0  # size of an effect, in its typical ones, that would show at
 MOST_SCALES = 8.0  # the same that nobody believes of a stand-in
 HOPELESS_LOG = 12.0  # log evidence behind the best at which a set is not fitted any more
 LEAST_PROBABILITY = 0.02  # of a set whose foretelling is looked at
+INSTEAD = 0.95  # probability of something unknown in place of a cause, where without it nothing unknown would show
 POINTED = 0.85  # share of what is left that one actuator has to have to be that place
 
 
@@ -152,11 +153,11 @@ def _credible(
         kept = beside_unknown(problem, f, beyond) if unknown else f.members
         credible: dict[int, float] = {}
         if kept == f.members:
-            credible = credibility(problem, f, surely=unknown, temperature=TEMPERATURE)
-            least = min(credible, key=lambda i: credible[i], default=None)
-            if least is None or credible[least] > EVEN:
+            credible, replaced = credibility(problem, f, surely=unknown, temperature=TEMPERATURE)
+            most = max(replaced, key=lambda i: replaced[i], default=None)
+            if most is None or replaced[most] < (EVEN if unknown else INSTEAD):
                 return f, credible
-            kept = tuple(i for i in f.members if i != least)
+            kept = tuple(i for i in f.members if i != most)
         f = fit(kept)
         beyond = unexplained(problem, f)
 

@@ -9,7 +9,7 @@ the sandwich's information (Varin, Reid, Firth, Statistica Sinica 21, 2011).
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations, product
 
 import numpy as np
@@ -19,6 +19,7 @@ from camcomp.diagnosis.fit.columns import grounds
 from camcomp.diagnosis.fit.intervals import BLOCKS
 from camcomp.diagnosis.fit.patterns import Ground
 from camcomp.diagnosis.fit.problem import Problem
+from camcomp.diagnosis.search.established import MINOR
 from camcomp.diagnosis.search.unknown import about
 from camcomp.diagnosis.statistics.cause_sets import Fitted, Members
 from camcomp.diagnosis.statistics.evidence import Base, Gram, Prior, base, estimate, gram, log_bayes
@@ -26,6 +27,8 @@ from camcomp.ground.datatypes import Bools, Floats, Ints
 
 UNKNOWN = 0.1  # prior probability of something that the library does not have
 WAVES = 24  # half waves along a travel: a bump of a twentieth of it is still followed
+MOVES_MM, MOVES_DRIVE = 1e-3, 1e-6  # of an axis, of a drive (mm or rad), on which something can depend
+SAME = 1.0 - 1e-9  # correlation of two places that are one
 DEGREE = 4  # of the polynomials of what depends on several axes at once
 IN_A_RUN = 8  # degree of those of time, for every run anew
 ALL_SETS = 3  # members up to which every subset is looked at; of larger ones each alone, and all but one
@@ -41,19 +44,24 @@ class _Family:
     columns: Floats
 
 
-def credibility(problem: Problem, f: Fitted, *, surely: bool, temperature: float) -> dict[int, float]:
-    """Probability of every member of f; surely: whether something unknown is there for certain."""
+def credibility(
+    problem: Problem, f: Fitted, *, surely: bool, temperature: float
+) -> tuple[dict[int, float], dict[int, float]]:
+    """Probability of every member of f, and of something unknown in its place; surely: whether that is there for certain."""
     if not f.members:
-        return {}
+        return {}, {}
     own, residual = about(problem, f)
-    W, r = np.concatenate(own), np.concatenate(residual)
+    weight = _at_the_tip(problem)
+    W, r = weight[:, None] * np.concatenate(own), weight * np.concatenate(residual)
     data, index = gram(W, r), problem.member_columns(f.members)
     sets, candidates = _subsets(f.members), problem.candidates
-    families = list(_families(problem))
+    families = [replace(each, columns=weight[each.at, None] * each.columns) for each in _families(problem)]
     hypotheses: list[tuple[Floats, float]] = []  # evidence per set, log prior
     best: tuple[float, _Family | None] = (-np.inf, None)
     if not surely:
-        hypotheses.append((_evidence(problem, base(data, problem.prior, 1.0), problem.prior, sets), np.log(1.0 - UNKNOWN)))
+        hypotheses.append(
+            (_evidence(problem, base(data, problem.prior, 1.0), problem.prior, sets), np.log(1.0 - UNKNOWN))
+        )
         best = (hypotheses[0][0][0], None)
     for family in families:
         joint, prior = _with(problem, data, W, r, family)
@@ -62,14 +70,35 @@ def credibility(problem: Problem, f: Fitted, *, surely: bool, temperature: float
         best = max(best, (float(value[0]), family), key=lambda each: each[0])
     strain = _strain(problem, data, W, r, best[1], index)
     log_prior = np.array([candidates.prior(each) for each in sets])
-    out, at = {}, 0
+    present, replaced, at = dict[int, float](), dict[int, float](), 0
     for i in f.members:
         mine = slice(at, at + len(candidates.columns[i]))
         at = mine.stop
         value = np.array([e / (temperature * strain[mine].max()) + log_prior + odds for e, odds in hypotheses])
         has = np.array([i in each for each in sets])
-        out[i] = float(np.exp(logsumexp(value[:, has]) - logsumexp(value)))
-    return out
+        whole = logsumexp(value)
+        present[i] = float(np.exp(logsumexp(value[:, has]) - whole))
+        replaced[i] = float(np.exp(logsumexp(value[0 if surely else 1 :, ~has]) - whole))
+    return present, replaced
+
+
+def _at_the_tip(problem: Problem) -> Floats:
+    """Weight (w,) of every white row: no channel counts for more than what is not minor at the tip.
+
+    An encoder tells a hundredth of it; there any formula is wrong, and any family better.
+    """
+    bench, m = problem.bench, len(problem.bench.actuators)
+    springs = np.array([np.inf if a.stiffness is None else a.stiffness for a in bench.twin.robot.actuators])
+    out = []
+    for k, parts in enumerate(problem.white_patterns):
+        way = np.sqrt(np.mean(np.sum(bench.row_slopes(k) ** 2, axis=1), axis=0))  # (m,) of the tip per way of a drive
+        sigma = problem.noise.sigma[k]
+        at_tip = {"encoder": sigma[3 : 3 + m] * way, "drive": sigma[3 + m : 3 + 2 * m] / springs * way}
+        for words, part in zip(problem.dictionaries, parts, strict=True):
+            seen = at_tip.get(words.kind, np.array([np.inf]))
+            size = 1e3 * float(np.median(seen[np.isfinite(seen)])) if np.isfinite(seen).any() else np.inf
+            out.append(np.full(len(part), min(1.0, size / (MINOR * problem.floor.tip_um))))
+    return np.concatenate(out)
 
 
 def _subsets(members: Members) -> list[Members]:
@@ -104,9 +133,7 @@ def _with(problem: Problem, data: Gram, W: Floats, r: Floats, family: _Family) -
     )
 
 
-def _strain(
-    problem: Problem, data: Gram, W: Floats, r: Floats, family: _Family | None, index: Sequence[int]
-) -> Floats:
+def _strain(problem: Problem, data: Gram, W: Floats, r: Floats, family: _Family | None, index: Sequence[int]) -> Floats:
     """How much more than noise what is left varies from block to block of time, along each member's column (d,)."""
     prior = problem.prior
     if family is not None:
@@ -139,12 +166,10 @@ def _families(problem: Problem) -> Iterator[_Family]:
                 for words in problem.dictionaries for n, name in enumerate(words.labels)]  # fmt: skip
     of = np.repeat(np.arange(len(problem.dictionaries)), [len(words.labels) for words in problem.dictionaries])
     for word in OF_WHAT_MOVES:
-        mine = np.flatnonzero(whole == word)
-        each = [mine[np.array(names)[mine] == name] for name in dict.fromkeys(np.array(names)[mine])]
-        for picked in [mine, *(each if len(each) > 1 else [])]:
-            if len(picked):
-                picked = np.concatenate([picked, np.flatnonzero(constant)])
-                yield _Family(word, np.ones(len(everywhere), bool), _patterns(problem, picked, of, everywhere, kinds))
+        picked = np.flatnonzero(whole == word)
+        if len(picked):
+            picked = np.concatenate([picked, np.flatnonzero(constant)])
+            yield _Family(word, np.ones(len(everywhere), bool), _patterns(problem, picked, of, everywhere, kinds))
     if "tip" not in kinds_of:
         return
     at = everywhere == kinds_of.index("tip")
@@ -171,25 +196,27 @@ def _of_place(every: Sequence[Ground]) -> Iterator[tuple[str, list[Floats]]]:
     """Names, and functions (n, p) per run, of places, of positions, of several axes at once, and of time in each run."""
     tips, drives = [g.tip for g in every], [g.motion.encoder for g in every]
     places = [np.concatenate([tip, drive], axis=1) for tip, drive in zip(tips, drives, strict=True)]
-    low, span = np.min([p.min(axis=0) for p in places], axis=0), 0.0
+    low = np.min([p.min(axis=0) for p in places], axis=0)
     span = np.max([p.max(axis=0) for p in places], axis=0) - low
     u = [(p - low) / np.maximum(span, 1e-9) for p in places]
-    moving, seen = [a for a in range(len(span)) if span[a] > 1e-3 or (a >= 3 and span[a] > 1e-6)], np.concatenate(u)
+    least, seen = np.repeat([MOVES_MM, MOVES_DRIVE], [3, len(span) - 3]), np.concatenate(u)
+    moving = np.flatnonzero(span > least)
     k = np.arange(WAVES + 1)
     for n, a in enumerate(moving):
-        if any(abs(np.corrcoef(seen[:, a], seen[:, b])[0, 1]) > 1.0 - 1e-9 for b in moving[:n]):
+        if any(abs(np.corrcoef(seen[:, a], seen[:, b])[0, 1]) > SAME for b in moving[:n]):
             continue  # of a machine of slides: the axis is the drive's
         yield f"position {a}", [np.cos(np.pi * k * x[:, a, None]) / np.maximum(k, 1) for x in u]
     axes = [a for a in moving if a < 3]
     powers = [d for d in product(range(DEGREE + 1), repeat=len(axes)) if sum(d) <= DEGREE]
     leg = np.polynomial.legendre.legvander
-    yield "place", [
-        np.stack([np.prod([leg(2 * x[:, a] - 1, DEGREE)[:, e] for a, e in zip(axes, d, strict=True)], axis=0)
-                  for d in powers], axis=1) for x in u
-    ]  # fmt: skip
-    yield "time", [
-        np.kron(np.eye(len(every))[r], leg(np.linspace(-1, 1, len(g.tip)), IN_A_RUN)) for r, g in enumerate(every)
-    ]
+    if axes:
+        high = [leg(2.0 * x[:, axes] - 1.0, DEGREE) for x in u]  # (n, axes, degrees)
+        yield (
+            "place",
+            [np.stack([np.prod([h[:, n, e] for n, e in enumerate(d)], axis=0) for d in powers], 1) for h in high],
+        )
+    runs = range(len(every))
+    yield "time", [np.kron(np.eye(len(every))[r], leg(np.linspace(-1, 1, len(every[r].tip)), IN_A_RUN)) for r in runs]
 
 
 def _white_tip(problem: Problem, values: Sequence[Floats]) -> Floats:

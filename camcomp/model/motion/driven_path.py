@@ -36,6 +36,7 @@ _SURE_N = 20.0  # what the force may be off by for the nodes between rows to be 
 _SAME_FEED = 0.03  # by which a driven feed may differ from the programmed one and still be it
 LEAST_FEED = 1e-3  # mm/min, of what stands still
 _MISSING = 1.5  # usual steps between rows from which on rows are missing between them
+_RESTS = 1e-3  # of the longest way between two rows: less, twice in a row, is rest
 _CHORD_MM = 0.02  # over which a direction is taken: digits and noise of set-points are small beside it
 
 
@@ -271,19 +272,21 @@ def _jumps(force: Floats, cutting: Bools) -> Ints:
 def _smooth(time: Floats, values: Floats) -> Callable[[Floats], Floats]:
     """Values (n, c) between rows: smooth, and without overshoot where a line begins or ends (Akima 1970).
 
-    Where rows are missing the way leads from one to the next without turning round (Fritsch, Carlson 1980): a reversal that
-    nobody saw would leave play and friction on the wrong side for all that follows.
+    Where rows are missing, and where it comes to rest or leaves it, the way leads from one row to the next without turning
+    round (Fritsch, Carlson 1980): a reversal that nobody saw would leave play and friction on the wrong side.
     """
     if len(time) < 3:
         return lambda at: np.column_stack([np.interp(at, time, v) for v in values.T])
-    step = np.diff(time)
+    step, way = np.diff(time), np.abs(np.diff(values, axis=0))
     missing = step > _MISSING * float(np.median(step))
+    rest = np.pad(way <= _RESTS * way.max(axis=0), ((2, 2), (0, 0)))
+    held = missing[:, None] | (rest[3:-1] & rest[4:]) | (rest[1:-3] & rest[:-4])
     lead, over = Akima1DInterpolator(time, values, axis=0), PchipInterpolator(time, values, axis=0)
 
     def between(at: Floats) -> Floats:
         t = np.clip(at, time[0], time[-1])
         piece = np.clip(np.searchsorted(time, t, side="right") - 1, 0, len(step) - 1)
-        return np.where(missing[piece][:, None], over(t), lead(t))
+        return np.asarray(np.where(held[piece], over(t), lead(t)), float)
 
     return between
 

@@ -17,6 +17,14 @@ def test_a_way_over_missing_rows_stays_between_them():
     assert np.diff(between).min() > -1e-9
 
 
+def test_a_way_that_ends_between_two_rows_stays_before_its_end():
+    """A hold stops a drive of 18 mm/s at once, soon after a row."""
+    time = np.arange(0.0, 2.0, PERIOD)
+    place = np.minimum(18.0 * time, 18.0 * (1.0 + 0.05 * PERIOD))
+    between = _smooth(time, place[:, None])(np.arange(0.0, 2.0, 0.001))[:, 0]
+    assert between.max() < place.max() + 1e-9
+
+
 def test_a_circle_is_followed_beyond_its_rows():
     time = np.arange(0.0, 4.0, PERIOD)
     fine = np.arange(0.5, 3.5, 0.001)
