@@ -11,12 +11,10 @@ from tests.trials.experiment import Plan, make, write
 SMALL = {"runs": 3, "rows": 250, "paths": ("circles-blended", "zigzag-blended", "pocket-10um"), "stated": False}
 
 
-def answer(plan, folder, *options, before=lambda folder: None):
-    """What the tool says and what the plant knows; before(folder) may change what was written."""
+def answer(plan, folder, *options):
+    """What the tool says and what the plant knows."""
     made, said = make(plan), folder / "result.json"
-    experiment = write(made, plan, folder)
-    before(folder)
-    code, text = runner.invoke(["diagnose", str(experiment), "--json", str(said), *options])
+    code, text = runner.invoke(["diagnose", str(write(made, plan, folder)), "--json", str(said), *options])
     assert code == 0, text
     return json.loads(said.read_text()), made.record
 

@@ -1,0 +1,29 @@
+"""Patterns of what a leftover may depend on: runs need not have logged the same."""
+
+import numpy as np
+
+from camcomp.diagnosis.fit.patterns import Ground, dictionary
+from camcomp.model.effect import Motion
+
+ROWS = 50
+
+
+def ground(temperature):
+    """One run of a drive that moves evenly."""
+    time = np.linspace(0.0, 5.0, ROWS)
+    place = 10.0 * time[:, None]
+    still = np.zeros_like(place)
+    motion = Motion(
+        time, time, time, temperature, place, still + 10.0, still + 1.0, np.zeros(1), np.full(1, np.inf), True
+    )
+    tip = np.column_stack([place, still, still])
+    measured = {"tip": True, "encoder": False, "drive": False, "dyno": False}
+    return Ground(motion, still, np.zeros((ROWS, 3)), tip, np.gradient(tip, time, axis=0), measured)
+
+
+def test_a_run_without_temperatures_says_nothing_of_them():
+    (tip,) = dictionary([ground(np.linspace(20.0, 25.0, ROWS)), ground(None)], ["x"])
+    warm = [n for n, label in enumerate(tip.labels) if label.startswith("temperature")]
+    assert warm
+    assert np.abs(tip.blocks[0][:, :, warm]).max() > 0.0
+    assert np.abs(tip.blocks[1][:, :, warm]).max() == 0.0
