@@ -7,6 +7,7 @@ import pytest
 
 from camcomp.diagnosis.experiment.open_experiment import open_experiment
 from camcomp.diagnosis.fit.bench import Bench
+from camcomp.diagnosis.fit.columns import build
 from tests.recordings import recording
 from tests.trials.experiment import Plan, row_times
 from tests.trials.faults import Faults
@@ -57,3 +58,14 @@ def test_minutes_of_cutting_are_those_of_the_plant(path, cutting, tmp_path):
     t = row_times(run, Plan(0, rows=200), False, np.random.default_rng(1))
     opened = logged(tmp_path, machine, run, observe(machine, run, Faults(), Character(), t))
     assert opened.runs[0].run_path.cut_min == pytest.approx(run.cuts.sum() * recording.STEP_S / 60, abs=0.15 / 60)
+
+
+def test_where_a_guide_holds_its_carriage_when_a_log_begins_is_not_known(tmp_path):
+    """Friction of 150 N winds the drives of the router up by 25 to 50 um, and pulls at them until they have moved: either way."""
+    machine, run = MACHINES["router"], Run(recording.load("zigzag-10um"), True, 100.0)
+    t = row_times(run, Plan(0, rows=150), False, np.random.default_rng(1))
+    opened = logged(tmp_path, machine, run, observe(machine, run, Faults(), Character(), t))
+    columns = build(Bench(opened.twin, opened.runs), [], {}, 3.0)
+    within = dict(zip(columns.names, columns.prior.tolerance, strict=True))
+    assert within["start.one.x"] > 0.05
+    assert within["held.one.x"] > 150.0
