@@ -84,6 +84,7 @@ class Bulk:
                 self.totals.lines_out += data.count(b"\n")
                 sink(data)
             self._told.result()
+        self.totals.waiting_s = self._runs.waiting_s(self.job.config)
         self.totals.finish(self._corrector, self._runs.warnings)
         if self._stock is not None:
             self.totals.warnings += self._stock.finish()

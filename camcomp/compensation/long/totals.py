@@ -81,6 +81,7 @@ class Totals:
         limits = limits_of(job.config)
         self._control = ControlAccount(limits, 1e-3 * tolerance_um), ControlAccount(limits, 1e-3 * tolerance_um)
         self.modes: dict[PathMode, None] = {}  # in which it cuts
+        self.waiting_s = 0.0  # beside its moves
         self.resting = 0  # end points at which the control rests because of joining lines
         self._still: list[int] = []  # source lines that cut while the spindle stands, the first ones
 
@@ -274,7 +275,7 @@ class Totals:
                 "method": "newton",
                 "platform_tilt_max_mrad": 1e3 * self.tilt,
                 "joining_lines": self.joins,
-                "cycle_time_s": CycleTime(before=before.seconds, after=after.seconds),
+                "cycle_time_s": CycleTime(before=before.seconds + self.waiting_s, after=after.seconds + self.waiting_s),
                 "control_mode": mode_name(tuple(self.modes)),
                 "control_mode_stated": all(each.stated for each in self.modes),
                 "under_control": ErrorSize(
