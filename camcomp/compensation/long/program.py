@@ -70,7 +70,7 @@ class Bulk:
         self._carry = Carry(np.array(self.setup.start_mm, float), np.array(self.setup.start_mm, float))
         self._told: Future[None] = Future()
         self._told.set_result(None)
-        self.totals = Totals(self.job, digest.hexdigest(), size, self.tolerance_um)
+        self.totals = Totals(self.job, digest.hexdigest(), size, self.tolerance_um, self.on_rows is not None)
         self._lines = max(lines, 1)
         self._stock = _stock_of(self.job, source, self.name, self.setup)
         top = self.job.conditions.stock_top_mm if self.job.conditions.model and self._stock is None else None
@@ -85,6 +85,7 @@ class Bulk:
                 self.totals.lines_out += data.count(b"\n")
                 sink(data)
             self._told.result()
+        self.totals.waiting_s = self._runs.waiting_s(self.job.config)
         self.totals.finish(self._corrector, self._runs.warnings)
         if self._stock is not None:
             self.totals.warnings += self._stock.finish()

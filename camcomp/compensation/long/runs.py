@@ -23,6 +23,8 @@ from camcomp.gcode.state import ControlState
 from camcomp.gcode.text import Text
 from camcomp.gcode.words import points_in_feeds
 from camcomp.ground.errors import Location, ProgramError
+from camcomp.model.config.spec import Config
+from camcomp.model.control import waiting_s
 
 CHUNK_BYTES = 1 << 22  # bytes read at once
 RUN = 1 << 16  # motions of a plain run at most
@@ -107,6 +109,10 @@ class Runs:
         if not self.motions:
             raise ProgramError("CC100", "the program moves nothing", at=Location(self.name, 1, 1))
         yield from self._rest()
+
+    def waiting_s(self, config: Config) -> float:
+        """Time of what was read so far beside its moves."""
+        return waiting_s(config, self._state.dwelt_s, self._state.tool_changes)
 
     # --- bytes ---------------------------------------------------------------------------------------------------
 
