@@ -15,6 +15,7 @@ from camcomp.diagnosis.fit.bench import Bench, thinned
 from camcomp.ground.datatypes import Bools, Floats
 
 REPEATABILITY_MM = 0.001  # of a run, per axis, where nothing is stated (contract, section 5)
+MINOR = 0.3  # of the noise floor at the tip: what moves it by less is no cause, whatever its significance (contract, section 6)
 LEAST_SHARE = 0.05  # of the floor: what moves the tip by less is the resolution of a channel and no finding
 CLIPPED = 6.0  # robust deviations beyond which a difference of rows says nothing about the noise
 LEAST_ROWS = 20

@@ -6,9 +6,10 @@ from itertools import combinations
 
 import numpy as np
 
+from camcomp.diagnosis.fit.floor import MINOR
 from camcomp.diagnosis.fit.gap import rest_by_actuator
 from camcomp.diagnosis.fit.problem import Problem
-from camcomp.diagnosis.search.established import MINOR, weakest
+from camcomp.diagnosis.search.established import weakest
 from camcomp.diagnosis.search.imitation import credibility
 from camcomp.diagnosis.search.indistinguishable import Likeness, likeness, stand_ins
 from camcomp.diagnosis.search.unexplained import Unexplained, size_um, unexplained, worst

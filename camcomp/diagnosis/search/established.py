@@ -3,12 +3,12 @@
 import numpy as np
 from scipy.stats import chi2
 
+from camcomp.diagnosis.fit.floor import MINOR
 from camcomp.diagnosis.fit.intervals import joint_covariance
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.search.unexplained import size_um
 from camcomp.diagnosis.statistics.cause_sets import Fitted
 
-MINOR = 0.3  # of the noise floor at the tip: what moves it by less is no cause, whatever its significance (contract, section 6)
 CHANCE = 0.16  # of a member that looks as large as it does although it is minor: one standard deviation
 
 

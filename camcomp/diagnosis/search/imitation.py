@@ -16,10 +16,10 @@ import numpy as np
 from scipy.special import logsumexp
 
 from camcomp.diagnosis.fit.columns import grounds
+from camcomp.diagnosis.fit.floor import MINOR
 from camcomp.diagnosis.fit.intervals import BLOCKS
 from camcomp.diagnosis.fit.patterns import Ground
 from camcomp.diagnosis.fit.problem import Problem
-from camcomp.diagnosis.search.established import MINOR
 from camcomp.diagnosis.search.unknown import about
 from camcomp.diagnosis.statistics.cause_sets import Fitted, Members
 from camcomp.diagnosis.statistics.evidence import Base, Gram, Prior, base, estimate, gram, log_bayes
