@@ -15,6 +15,7 @@ from camcomp.compensation.program.moves import refuse_unsolved, travel_of
 from camcomp.gcode.program import Program
 from camcomp.ground.datatypes import LINE, RAPID, Floats, Path
 from camcomp.ground.errors import ConfigError
+from camcomp.ground.headway import steps
 from camcomp.model.cutting.engaged import Engaged
 from camcomp.model.cutting.track import Track, lay_track
 from camcomp.model.job import Job
@@ -40,7 +41,7 @@ def cut_surface(job: Job, program: Program) -> Surface:
     memory = memory_of(job.config, job.tool_axis, bounds)
     engaged = memory.follow(path)[0]
     before = path.end
-    for _ in range(ROUNDS):
+    for _ in steps(range(ROUNDS), ROUNDS):
         track = lay_track(path, job.conditions, engaged)
         nodes = trial_nodes(track.length, track.angle, track.length > 0.0, SECTION_MM)
         tips = _loaded_tips(job, program, track, nodes)
