@@ -41,6 +41,7 @@ from camcomp.diagnosis.search.cause_search import CauseSearch, search_causes
 from camcomp.diagnosis.search.indistinguishable import classes, likeness
 from camcomp.diagnosis.search.unexplained import size_um, worst
 from camcomp.diagnosis.search.unknown import firm_prior, residual_tests
+from camcomp.diagnosis.standards import of_runs
 from camcomp.diagnosis.statistics import places
 from camcomp.diagnosis.statistics.cause_sets import Fitted
 from camcomp.diagnosis.statistics.periods import frequencies
@@ -114,6 +115,7 @@ def diagnose(
         outliers=outlying_rows(problem),
         floor=Floor(um=gap["noise_floor_um"], source=problem.floor.source),
         equivalent=tuple(tuple(_named(problem, i) for i in group) for group in classes(likeness(problem))),
+        standards=of_runs(twin, runs),
     )
     return Diagnosis(result, problem, found, proposal, law)
 

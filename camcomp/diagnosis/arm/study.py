@@ -34,6 +34,7 @@ from camcomp.diagnosis.arm.unseen import (
     shrinkage,
 )
 from camcomp.diagnosis.result.types import UNKNOWN, DiagnosisResult, Floor, Outlier
+from camcomp.diagnosis.standards import of_poses
 from camcomp.ground.datatypes import Floats
 from camcomp.ground.headway import done, part
 from camcomp.model.effect import Cause
@@ -64,6 +65,7 @@ def study(
     own, more = merged(fitted_runs), merged([r for r in runs if str(r.run[0]) in holdout])
     every, gaps, outliers = _cleaned(robot, tuple(causes), [*own, *more])
     floor = tip_floor(robot, every, gaps, StatedDeviation() if stated is None else stated)
+    values = of_poses(robot, every, gaps)
     every = [drawn(each) for each in every]
     bench = ArmBench(robot, tuple(causes), every[: len(own)])
     with part(0.0, 0.3):
@@ -122,6 +124,7 @@ def study(
         next_experiment=answer.next_experiment(told),
         floor=Floor(um=round(floor.um, 3), source=floor.source) if floor else Floor(um=None, source="not identifiable"),
         outliers=tuple(Outlier(run=run, row=row) for run, row in sorted(set(outliers))),
+        standards=values,
     )
 
 

@@ -40,6 +40,7 @@ from camcomp.diagnosis.axis.terms import (
     strangers,
     travel,
 )
+from camcomp.diagnosis.result.standards import StandardValues
 from camcomp.diagnosis.result.types import (
     UNKNOWN,
     DiagnosisResult,
@@ -49,6 +50,7 @@ from camcomp.diagnosis.result.types import (
     NamedCause,
     Outlier,
 )
+from camcomp.diagnosis.standards import NO_TIPS
 from camcomp.diagnosis.statistics.probability import probability_of_chance, stated
 from camcomp.ground import headway
 from camcomp.ground.datatypes import Floats
@@ -118,6 +120,7 @@ def studied(
         floor=Floor(um=gap.noise_floor_um, source="stated" if all(c.stated for c in every) else "rows"),
         outliers=tuple(Outlier(run=run, row=row) for run, row in sorted(outliers)),
         axes_in_detail={a.name: a.details for a in found},
+        standards=StandardValues(absent=(NO_TIPS,)),
     )
     return result, found
 

@@ -22,6 +22,7 @@ from camcomp.diagnosis.report.figures import (
 from camcomp.diagnosis.report.joints import joints_section
 from camcomp.diagnosis.report.law_section import LawView, law_section
 from camcomp.diagnosis.report.run_view import RivalSignals, RunView, rms
+from camcomp.diagnosis.report.standards import standards_section
 from camcomp.diagnosis.report.words import micrometres, percent, plain, remedy, sizes
 from camcomp.diagnosis.result.types import UNKNOWN, DiagnosisResult, NextExperiment, UnseenShrinkage, Where
 from camcomp.report.inputs import Input, inputs_section
@@ -90,6 +91,8 @@ def diagnosis_html(
             Section("map", "On the workpiece", figures=[figure_map(seen)]),
         ]  # fmt: skip
     sections.append(_where(result.where, shown))
+    if (standards := standards_section(result.standards)) is not None:
+        sections.append(standards)
     if inputs:
         sections.append(inputs_section(inputs))
     verdict = result.verdict

@@ -157,7 +157,9 @@ def test_a_simulation_says_how_far_it_is(shares):
 def test_an_import_says_how_far_it_is(shares, tmp_path):
     rows = "".join(f"{k / 100},{k},{k},{k},{k},{k},{k},0,0,0\n" for k in range(50))
     for name in "abc":
-        (tmp_path / f"{name}.csv").write_text("t_s,cmd_x_mm,cmd_y_mm,cmd_z_mm,act_x_mm,act_y_mm,act_z_mm,act_x_N,act_y_N,act_z_N\n" + rows)
+        (tmp_path / f"{name}.csv").write_text(
+            "t_s,cmd_x_mm,cmd_y_mm,cmd_z_mm,act_x_mm,act_y_mm,act_z_mm,act_x_N,act_y_N,act_z_N\n" + rows
+        )
     files = [str(tmp_path / f"{name}.csv") for name in "abc"]
     with headway.watched() as watched:
         import_recordings(files, [WORDS[3]], tmp_path / "out", columns=[])
