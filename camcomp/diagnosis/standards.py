@@ -1,7 +1,5 @@
-"""Values of ISO 230-2 and ISO 9283 from the logs of a diagnosis, where these hold what the standards ask for.
-
-ISO 230-2 asks for stops at five targets or more on a line that one axis drives, each approached five times from either
-side, without load. ISO 9283 asks for 30 visits of a pose.
+"""Values of ISO 230-2 from the runs of a diagnosis, where these hold what the standard asks for: stops at five targets or
+more on a line that one axis drives, each approached five times from either side, without load.
 """
 
 from __future__ import annotations
@@ -11,23 +9,17 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from camcomp.diagnosis.arm.noise_floor import visits_of
-from camcomp.diagnosis.arm.poses import Poses
 from camcomp.diagnosis.fit.bench import Run
-from camcomp.diagnosis.result.standards import AxisPositioning, PoseValues, StandardValues
-from camcomp.diagnosis.statistics.standard_values import pose_accuracy, pose_repeatability, positioning
+from camcomp.diagnosis.result.standards import AxisPositioning, StandardValues
+from camcomp.diagnosis.statistics.standard_values import positioning
 from camcomp.ground.datatypes import Floats
 from camcomp.model.motion.twin import Twin
-from camcomp.model.statics.description import Robot
 
 TARGETS, APPROACHES = 5, 5  # ISO 230-2:2014, 5.3.2: at least
-VISITS = 30  # ISO 9283:1998, table 12
 _STILL_MM = 1e-4  # between rows in which the axes stand
 _SAME_MM = 1e-3  # between targets that are one
 _ALONE = 1e-3  # largest share of an approach that other axes may make
 NO_STOPS = "ISO 230-2: no axis without load stopped at five targets, approached five times from either side, with the tip measured"
-NO_TIPS = "ISO 230-2: the tip was not measured"
-NO_VISITS = "ISO 9283: no pose was visited 30 times"
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,35 +82,3 @@ def _positioning(axis: int, beside: Sequence[float], found: Sequence[_Stop]) -> 
         approaches=min(len(way) for ways in whole for way in ways),
         **{f"{name}_um": round(1e3 * value, 3) for name, value in asdict(values).items()},
     )
-
-
-def of_poses(robot: Robot, campaigns: Sequence[Poses], gaps: Sequence[Floats]) -> StandardValues:
-    """What poses hold of ISO 9283; gaps (n, 3) mm to the nominal arm, by campaign."""
-    found = []
-    for poses, gap in zip(campaigns, gaps, strict=True):
-        for rows in visits_of(robot, poses):
-            visits = _apart(poses.time, rows)
-            if len(visits) >= VISITS:
-                joints = poses.q[rows].mean(axis=0)
-                shown = [np.degrees(q) if a.revolute else q for q, a in zip(joints, robot.actuators, strict=True)]
-                found.append(
-                    PoseValues(
-                        campaign=poses.label,
-                        pose=", ".join(f"{each + 0.0:.1f}" for each in shown),
-                        visits=len(visits),
-                        AP_um=round(1e3 * pose_accuracy(_means(gap, visits)), 3),
-                        RP_um=round(1e3 * pose_repeatability(_means(poses.tip, visits)), 3),
-                    )
-                )
-    return StandardValues(poses=tuple(found), absent=() if found else (NO_VISITS,))
-
-
-def _apart(time: Floats, rows: np.ndarray) -> list[np.ndarray]:
-    """Rows of a pose by visit: those between which the arm was nowhere else are one."""
-    order = np.argsort(np.argsort(time, kind="stable"), kind="stable")
-    rows = rows[np.argsort(order[rows])]
-    return np.split(rows, np.flatnonzero(np.diff(order[rows]) > 1) + 1)
-
-
-def _means(values: Floats, visits: Sequence[np.ndarray]) -> Floats:
-    return np.array([values[rows].mean(axis=0) for rows in visits])

@@ -20,6 +20,7 @@ from camcomp.diagnosis.arm.discrepancy import Discrepancy
 from camcomp.diagnosis.arm.fit import ArmFit, fitted, investigate, named_rows
 from camcomp.diagnosis.arm.gate import Gate, judge, unseen
 from camcomp.diagnosis.arm.noise_floor import StatedDeviation, TipFloor, far_off, tip_floor
+from camcomp.diagnosis.arm.pose_values import of_poses
 from camcomp.diagnosis.arm.poses import CURVE, ArmBench, Poses
 from camcomp.diagnosis.arm.unseen import (
     Court,
@@ -34,7 +35,6 @@ from camcomp.diagnosis.arm.unseen import (
     shrinkage,
 )
 from camcomp.diagnosis.result.types import UNKNOWN, DiagnosisResult, Floor, Outlier
-from camcomp.diagnosis.standards import of_poses
 from camcomp.ground.datatypes import Floats
 from camcomp.ground.headway import done, part
 from camcomp.model.effect import Cause

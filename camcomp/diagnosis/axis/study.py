@@ -50,7 +50,6 @@ from camcomp.diagnosis.result.types import (
     NamedCause,
     Outlier,
 )
-from camcomp.diagnosis.standards import NO_TIPS
 from camcomp.diagnosis.statistics.probability import probability_of_chance, stated
 from camcomp.ground import headway
 from camcomp.ground.datatypes import Floats
@@ -58,6 +57,7 @@ from camcomp.ground.datatypes import Floats
 LEAST_Z = 4.0  # mean gain over its standard error
 LEAST_RIPPLE = 0.02  # share of the leftover's energy
 ROWS = 50  # below which a run says nothing
+NO_TIPS = "ISO 230-2: the tip was not measured"
 WHOLE_RUNS = 4  # from which on runs are withheld as wholes
 
 

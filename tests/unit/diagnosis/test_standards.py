@@ -5,11 +5,12 @@ import json
 import numpy as np
 import pytest
 
+from camcomp.diagnosis.arm.pose_values import NO_VISITS, of_poses
 from camcomp.diagnosis.arm.poses import Poses
 from camcomp.diagnosis.experiment.open_experiment import open_experiment
 from camcomp.diagnosis.report.standards import standards_section
 from camcomp.diagnosis.result.standards import StandardValues
-from camcomp.diagnosis.standards import NO_STOPS, NO_VISITS, of_poses, of_runs
+from camcomp.diagnosis.standards import NO_STOPS, of_runs
 from camcomp.diagnosis.statistics.standard_values import pose_accuracy, pose_repeatability, positioning
 from camcomp.model.config.load import load_config
 from camcomp.model.statics.build import build_robot
