@@ -24,13 +24,15 @@ _KEPT = 12  # changed machines whose structures are kept per run
 class CandidateCause:
     """One possible cause: an effect at a target. Fitted parameters in order; shape holds the scanned ones.
 
-    hinge: the target is a rotary actuator, for which an effect may have parameters of its own.
+    hinge: the target is a rotary actuator, for which an effect may have parameters of its own. without: parameters that
+    stay nominal, because these runs do not tell them from the others.
     """
 
     name: str
     target: str | None
     effect: Any
     hinge: bool = False
+    without: tuple[str, ...] = ()
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -59,7 +61,8 @@ def fitted(candidate: CandidateCause) -> tuple[Parameter, ...]:
     if hasattr(effect, "SOUGHT"):
         return tuple(effect.SOUGHT.get(candidate.target, ()))
     own = getattr(effect, "FITTED", effect.PARAMETERS)
-    return tuple(getattr(effect, "ROTARY", own) if candidate.hinge else own)
+    own = getattr(effect, "ROTARY", own) if candidate.hinge else own
+    return tuple(each for each in own if each.name not in candidate.without)
 
 
 def public_values(effect: Any, values: Mapping[str, float]) -> dict[str, float]:

@@ -52,7 +52,10 @@ def candidate_causes(robot: Robot, without: Sequence[str] = ()) -> list[Candidat
             ]
         if effect.TARGET == "named" and (cartesian or not getattr(effect, "SLIDES_ONLY", False)):
             found += [CandidateCause(name, each, effect) for each in getattr(effect, "SOUGHT", effect.TARGETS)]
-        if effect.TARGET in ("machine", "either"):
+        slides = not any(a.revolute for a in robot.actuators)
+        if effect.TARGET == "machine" or (
+            effect.TARGET == "either" and (slides or not getattr(effect, "SLIDES_ONLY", False))
+        ):
             found.append(CandidateCause(name, None, effect))
     return found
 

@@ -10,7 +10,7 @@ from camcomp.diagnosis.fit.bench import Bench, CandidateCause, cause_of, step_of
 from camcomp.diagnosis.fit.columns import Columns, build, candidate_columns, patterns, shape_default
 from camcomp.diagnosis.fit.floor import NoiseFloor, least_noise, measure_floor
 from camcomp.diagnosis.fit.grid_parameters import beside, best_shape, quick_columns, reach
-from camcomp.diagnosis.fit.intervals_in_time import LOOK_ELSEWHERE, best_interval
+from camcomp.diagnosis.fit.intervals_in_time import LOOK_ELSEWHERE, best_interval, never_ending
 from camcomp.diagnosis.fit.noise import inflation, instrument_noise, less_certain
 from camcomp.diagnosis.fit.outliers import outlying, tails
 from camcomp.diagnosis.fit.patterns import Dictionary
@@ -375,11 +375,10 @@ def _scan(problem: Problem) -> Columns:
     for i in problem.shapes:
         candidate = problem.columns.candidates[i]
         if problem.passing(i):
-            never_ends = dict(zip((p.name for p in candidate.shapes), (-1e9, 1e9), strict=True))
-            always = quick_columns(problem.bench, candidate, never_ends)
+            always = quick_columns(problem.bench, candidate, never_ending(candidate))
             if always is None:
                 continue
-            best = best_interval(problem.bench, candidate, always[0], rest, problem.whitened, problem.row_places)
+            best = best_interval(problem.bench, candidate, always, rest, problem.whitened, problem.row_places)
         else:
             best = best_shape(problem.bench, candidate, rest, problem.whitened)
         if best is None:
