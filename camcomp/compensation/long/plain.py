@@ -19,12 +19,14 @@ from camcomp.compensation.long.run_bands import RunUncertainty
 from camcomp.compensation.program.chords import divide, second_derivative, trial_nodes
 from camcomp.compensation.program.moves import chord_budget
 from camcomp.compensation.program.policy import left_alone
-from camcomp.compensation.program.under_control import rests_of, rounds
+from camcomp.compensation.program.under_control import apart_pays, merging, rests_of, rounds
 from camcomp.gcode.dialect import Dialect
 from camcomp.gcode.output import Standing
 from camcomp.ground.datatypes import LINE, RAPID, Bools, Floats, Ints
+from camcomp.model.control import limits_of
 from camcomp.model.job import Job
 from camcomp.model.statics.solve import FREE, TARGET, solve, threads
+from camcomp.model.trajectory.moves import line_moves
 
 ROUNDS = 5
 EASY_MM = 8.0  # longer lines are divided at trial points; shorter ones when their middle says so
@@ -46,6 +48,7 @@ class Carry:
     commanded: Floats  # (3,) mm the same before rounding
     code: float = -1.0  # motion code in force in the output, -1: not known
     feed: float = np.nan  # feed in force, mm/min; NaN: not known
+    apart: bool | None = False  # lines are kept from being made one; None: not known
 
     def standing(self) -> Standing:
         """The same for the writer of other lines."""
@@ -59,6 +62,7 @@ class Carry:
         self.written, self.commanded = np.array(behind.position), commanded.copy()
         self.code = -1.0 if behind.code is None else float(behind.code)
         self.feed = behind.feed[1] if behind.feed is not None and behind.feed[0] == 94 else np.nan
+        self.apart = None if self.apart is not False else False
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,6 +108,7 @@ class Done:
     seen: Ints  # (k,) rows of before and after
     bands: Bands | None = None
     left: Floats | None = None  # (k, 3) mm of `after` that a policy leaves on purpose
+    apart: bool = False  # the control is kept from making one line of several
 
     @property
     def missed(self) -> Floats:
@@ -202,7 +207,23 @@ class PlainCorrector:
         unloaded = np.concatenate((answers.unloaded[judged], middles.unloaded))
         seen = np.concatenate((np.flatnonzero(judged), middles.rows))
         back = self._back(unloaded)
-        return Done(data, run, rows, answers, commanded, written, back, error, begin, held, rest, seen, bands, meant)
+        return Done(
+            data,
+            run,
+            rows,
+            answers,
+            commanded,
+            written,
+            back,
+            error,
+            begin,
+            held,
+            rest,
+            seen,
+            bands,
+            meant,
+            bool(carry.apart),
+        )
 
     def _bands(
         self, uncertainty: RunUncertainty, rows: PlainRows, answers: Answers, judged: Bools, error: Floats, written: Floats,
@@ -443,16 +464,21 @@ class PlainCorrector:
         self, run: PlainRun, loads: Loads, rows: PlainRows, commanded: Floats, kept: Bools, carry: Carry
     ) -> tuple[bytes, Floats, Floats, Bools]:
         plain, N = run.plain, len(rows.move)
-        rest = self._rests(loads.run, rows)
-        modes = [np.frombuffer(each.encode(), np.uint8) for each in ("G61", run.state.path_mode.said(run.state.unit))]
+        rest, mode = self._rests(loads.run, rows), run.state.path_mode
+        able = merging(mode, self.language)
+        apart = able and self._apart(loads.run, rows, commanded, rest, kept, carry)
+        begins = -1 if able and apart != carry.apart else 0
+        carry.apart = apart
+        own = (mode.apart if apart else mode).said(run.state.unit)
+        modes = [np.frombuffer(each.encode(), np.uint8) for each in ("G61", own)]
         first = np.searchsorted(loads.of[rows.move], np.arange(run.motions + 1))
-        out = np.empty(run.text_end - run.text_at + ROOM * (N + int(rest.sum())), np.uint8)
+        out = np.empty(run.text_end - run.text_at + ROOM * (N + 1 + int(rest.sum())), np.uint8)
         written, held = np.empty((N, 3)), np.empty(N)
         position, state = carry.written.copy(), np.array([carry.code, carry.feed])
         unit = run.state.unit
         size = write_rows(
             run.data, run.text_at, run.text_end, plain.line, plain.begin, plain.finish, plain.kind, plain.end,
-            plain.code_stated, plain.feed_stated, plain.feed, first, rows.joining, rest, *modes, commanded,
+            plain.code_stated, plain.feed_stated, plain.feed, first, rows.joining, rest, begins, *modes, commanded,
             self._feeds(loads.run, rows, commanded, kept, carry),
             position, state, unit, np.array(run.state.offset), self.language.digits(self.job.config.control.resolution_mm, unit),
             0.5 * self.resolution * (1.0 + 1e-9), self.feed_point, out, written, held,
@@ -466,6 +492,15 @@ class PlainCorrector:
         if not rounds(run.state.path_mode, 1e3 * self.tolerance):
             return np.zeros(len(rows.move), np.bool_)
         return rests_of((run.plain.kind[rows.move] == LINE) & ~rows.joining, rows.joining)
+
+    def _apart(self, run: PlainRun, rows: PlainRows, commanded: Floats, rest: Bools, kept: Bools, carry: Carry) -> bool:
+        """Whether the control is kept from making one line of several; changes of feed that may do so are left out."""
+        kind, feed = run.plain.kind[rows.move], run.plain.feed[rows.move]
+        cut = (kind == LINE) & ~rows.joining & ~kept
+        start = np.concatenate((carry.commanded[None], commanded[:-1]))
+        moves = line_moves(kind, start, commanded, feed, run.state.path_mode)
+        moves = replace(moves, exact=moves.exact | rest)
+        return bool(cut.any()) and apart_pays(moves, cut, limits_of(self.job.config), 1e3 * self.tolerance)
 
     def _feeds(self, run: PlainRun, rows: PlainRows, commanded: Floats, kept: Bools, carry: Carry) -> Floats:
         """Feed (N,) so that the tip keeps its programmed speed, as in compensate.py."""
