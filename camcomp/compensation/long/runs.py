@@ -61,6 +61,7 @@ class Runs:
     setup: Setup
     dialect: str | None
     top_mm: float = np.nan  # of the stock: where cutting begins
+    most: int = RUN  # motions of a plain run
     warnings: list[str] = field(default_factory=list)
     motions: int = 0
 
@@ -87,7 +88,7 @@ class Runs:
         ended = False
         while not ended:
             row, before = self._row, None if odd.lines else self._state
-            found = self._plain(PROBE_MOTIONS if odd.lines else RUN)
+            found = self._plain(PROBE_MOTIONS if odd.lines else min(RUN, self.most))
             if found is not None:
                 if odd.lines and found.motions < PROBE_MOTIONS:
                     odd.add(found.data[found.text_at : found.text_end].tobytes(), found.motions)
