@@ -9,19 +9,19 @@ import numpy as np
 
 from camcomp.compensation.bands.outcome import Bands, BandTotals
 from camcomp.compensation.bands.scatter import best_share, excess
+from camcomp.compensation.long.carry import Carry
 from camcomp.compensation.long.fastwrite import ROOM, write_rows
 from camcomp.compensation.long.field import Field, Tiles
 from camcomp.compensation.long.kernel import BASIC, follow, look_up
 from camcomp.compensation.long.loads import Edge, Loads, constant_of, joints_at, loads_of
 from camcomp.compensation.long.met import Met
-from camcomp.compensation.long.plain_run import NotInPieces, PlainRun
+from camcomp.compensation.long.plain_run import NotInPieces, PlainRun, Unsolved
 from camcomp.compensation.long.run_bands import RunUncertainty
 from camcomp.compensation.program.chords import divide, second_derivative, trial_nodes
 from camcomp.compensation.program.moves import chord_budget
 from camcomp.compensation.program.policy import left_alone
 from camcomp.compensation.program.under_control import apart_pays, merging, rests_of, rounds
 from camcomp.gcode.dialect import Dialect
-from camcomp.gcode.output import Standing
 from camcomp.ground.datatypes import LINE, RAPID, Bools, Floats, Ints
 from camcomp.model.control import limits_of
 from camcomp.model.job import Job
@@ -38,31 +38,6 @@ MODELS = (
 )  # whose force does not depend on the way from the program's start
 COARSE_MM = 1e-3  # a control with larger steps moves the joints by more than first order tells
 SLICE = 4096  # rows that a thread takes at once
-
-
-@dataclass
-class Carry:
-    """What one piece of the program leaves for the next; program frame."""
-
-    written: Floats  # (3,) mm where the written program stands
-    commanded: Floats  # (3,) mm the same before rounding
-    code: float = -1.0  # motion code in force in the output, -1: not known
-    feed: float = np.nan  # feed in force, mm/min; NaN: not known
-    apart: bool | None = False  # lines are kept from being made one; None: not known
-
-    def standing(self) -> Standing:
-        """The same for the writer of other lines."""
-        x, y, z = self.written.tolist()
-        return Standing(
-            (x, y, z), None if self.code < 0.0 else int(self.code), None if np.isnan(self.feed) else (94, self.feed)
-        )
-
-    def take(self, behind: Standing, commanded: Floats) -> None:
-        """Go on behind other lines."""
-        self.written, self.commanded = np.array(behind.position), commanded.copy()
-        self.code = -1.0 if behind.code is None else float(behind.code)
-        self.feed = behind.feed[1] if behind.feed is not None and behind.feed[0] == 94 else np.nan
-        self.apart = None if self.apart is not False else False
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,14 +89,6 @@ class Done:
     def missed(self) -> Floats:
         """What `after` (k, 3) mm has beside that."""
         return self.after if self.left is None else self.after - self.left
-
-
-class Unsolved(Exception):
-    """Points of a run without a solution: motions (k,), targets (k, 3) mm in the machine frame, the solver's status."""
-
-    def __init__(self, move: Ints, target: Floats, status: Ints) -> None:
-        super().__init__()
-        self.move, self.target, self.status = move, target, status
 
 
 def _sizes(vectors: Floats) -> Floats:
