@@ -55,7 +55,7 @@ def _pull(s: State, axis: int) -> np.ndarray:
 def _tangle(s: State, axis: int) -> np.ndarray:
     """What no form of the search can express."""
     x, y = s.commanded[:, 0], s.commanded[:, 1]
-    return np.sin(x * y / 17.0) * np.cos((x - 0.7 * y) / 3.0) + 0.5 * np.sin(x**2 / 40.0 - y)
+    return np.sin((x + 0.6 * y) / 6.0) * np.tanh((y - 0.4 * x) / 8.0)
 
 
 # name -> what it adds to the tip along an axis (n,), of size 1
