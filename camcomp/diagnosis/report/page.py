@@ -173,17 +173,18 @@ def _to_do(result: DiagnosisResult, next_program: str | None) -> Section:
 
 
 def _next(proposal: NextExperiment) -> list[str]:
-    text = [f"Measure next: {proposal.action}"]
-    if "unknown" in proposal.separates:
-        return [
-            *text,
-            f"It changes what the unknown effect may depend on, and nothing else. Expected gain: {proposal.gain:.2f} bits.",
-        ]
-    if separates := together(proposal.separates):
-        text.append(
-            f"It separates {separates}. Expected gain: {proposal.gain:.2f} (0: none, 1: the question is settled)."
-        )
-    return text
+    text = [f"Measure next: {proposal.action}", *proposal.outcomes]
+    time = f", {brief(proposal.minutes, 2)} minutes with setting up" if proposal.minutes else ""
+    if proposal.minutes is None:  # poses of an arm
+        return [*text, f"Expected gain: {brief(proposal.gain)} nats."]
+    if UNKNOWN in proposal.separates:
+        text.append("It changes what the unknown effect may depend on, and as little else as can be.")
+    elif separates := together(proposal.separates):
+        text.append(f"It is about {separates}.")
+    return [
+        *text,
+        f"Expected gain: {proposal.gain:.2f} bits{time}. Add its log to the experiment as one more run and diagnose again.",
+    ]
 
 
 def _where(where: Where, shown: Sequence[RunView]) -> Section:
