@@ -24,7 +24,7 @@ SMALL = 0.3  # of the reach: the radius of a circle out there
 NEIGHBOUR_MM, NEIGHBOUR_TIMES = 12.0, 1.5  # steps to a neighbouring design
 _NEEDS = {
     "tip": ("the tip with a tracker", 30.0),
-    "encoder": ("the encoders", 5.0),
+    "encoder": ("the set-points and the encoders", 5.0),
     "drive": ("the drive forces", 5.0),
     "dyno": ("the force on the tool with a dynamometer", 20.0),
 }

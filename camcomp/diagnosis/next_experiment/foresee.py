@@ -29,6 +29,7 @@ from camcomp.model.motion.timeline import schedule
 
 ROWS = 2500  # of a foreseen log
 WARMS_K = 5.0  # by how much a temperature may still drift
+UPRIGHT = 0.9  # of a direction along Z, beyond which another axis says what lies across
 USUAL_NOISE = (0.002, 0.0005, 1.0, 2.0)  # mm, mm, N, N: tip, encoders, drives, dynamometer, where never measured
 
 
@@ -217,7 +218,29 @@ def _run(problem: Problem, candidate: Candidate, job: Job) -> Run:
         time, nan, np.zeros((n, 3)), np.full((n, m), np.nan), encoder, np.zeros((n, m)), np.zeros((n, 3)), nan,
         np.full((n, 3), np.nan),
     )  # fmt: skip
-    return Run("candidate", run_path, measured, None, None)
+    by = _motion(problem, candidate)
+    tips = twin.to_program(run_path.row_place.of(run_path.node_tip))
+    return Run("candidate", run_path, measured, None, None, by=by, turn=_across(tips) if by == "tip" else None)
+
+
+def _motion(problem: Problem, candidate: Candidate) -> str:
+    """The channel that says what moved: as in the runs, or the set-points that come with encoders that they did not log."""
+    runs = problem.bench.runs
+    known = {run.by for run in runs}
+    added = "encoder" in candidate.channels and not any(run.measured.has("encoder") for run in runs)
+    return "setpoint" if added or "setpoint" in known else "encoder" if "encoder" in known else "tip"
+
+
+def _across(tips: Floats) -> Floats:
+    """Axes (n, 3, 3) along the way of tips (n, 3) and across it."""
+    step = np.gradient(tips, axis=0)
+    moving = np.linalg.norm(step, axis=1) > 0.0
+    last = np.maximum.accumulate(np.where(moving, np.arange(len(tips)), int(np.argmax(moving))))
+    along = step[last] / np.maximum(np.linalg.norm(step[last], axis=1, keepdims=True), 1e-12)
+    other = np.where(np.abs(along[:, 2:3]) < UPRIGHT, [[0.0, 0.0, 1.0]], [[1.0, 0.0, 0.0]])
+    side = np.cross(along, other)
+    side /= np.maximum(np.linalg.norm(side, axis=1, keepdims=True), 1e-12)
+    return np.stack([along, side, np.cross(along, side)], axis=1)
 
 
 def _temperature(problem: Problem, common: Floats) -> Floats | None:

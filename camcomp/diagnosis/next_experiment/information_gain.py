@@ -112,6 +112,8 @@ def program_weight(problem: Problem) -> Floats:
         if run.by == "setpoint" and run.measured.has("encoder"):
             ways = thinned(bench.row_slopes(r).reshape(-1, 3 * m), run.thin).reshape(-1, 3, m)
             tip = tip + np.einsum("nij,njk->nik", ways, block[:, 3 : 3 + m])
+        if run.turn is not None:  # how far along the path nobody knows, and no surface shows
+            tip = tip * np.array([0.0, 1.0, 1.0])[:, None]
         flat = np.nan_to_num(tip).reshape(-1, k)
         out += flat.T @ flat
         rows += len(tip)
