@@ -23,8 +23,9 @@ from camcomp.diagnosis.fit.problem import Problem, open_problem
 from camcomp.diagnosis.law.answer import LawAnswer, answer_law
 from camcomp.diagnosis.law.library import LearnedLaw
 from camcomp.diagnosis.next_experiment.after_unknown import explore
-from camcomp.diagnosis.next_experiment.designed import Proposal, propose
+from camcomp.diagnosis.next_experiment.designed import propose
 from camcomp.diagnosis.next_experiment.outcomes import with_outcomes
+from camcomp.diagnosis.next_experiment.proposal import Proposal
 from camcomp.diagnosis.result.types import (
     DiagnosisResult,
     Driver,

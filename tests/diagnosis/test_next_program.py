@@ -10,9 +10,9 @@ from camcomp.api.diagnosis import next_program
 from camcomp.diagnosis.experiment.open_experiment import open_experiment
 from camcomp.diagnosis.fit.bench import Bench
 from camcomp.diagnosis.next_experiment.candidates import by_other_means, candidate, coarse, single_changes, usual
-from camcomp.diagnosis.next_experiment.design import Design
+from camcomp.diagnosis.next_experiment.design import MotionDesign
 from camcomp.diagnosis.next_experiment.ready_program import CUTS, ready_program
-from camcomp.diagnosis.next_experiment.site import Room, commanded, site_of
+from camcomp.diagnosis.next_experiment.site import commanded, room_of, site_of
 from camcomp.gcode.interpret import read_program
 from camcomp.ground import path_geometry
 from camcomp.ground.errors import CheckFailed
@@ -35,8 +35,7 @@ def bench(opened):
 
 @pytest.fixture(scope="module")
 def every(opened, bench):
-    site, tips = site_of(bench), np.concatenate([commanded(bench, run) for run in bench.runs])
-    room = Room(opened.twin, np.array(opened.job.machine.limits), tips)
+    site, room = site_of(bench), room_of(bench, opened.job)
     return [*coarse(site, room), *by_other_means(site), *single_changes(site, room)]
 
 
@@ -52,9 +51,9 @@ def first(bench):
 
 def test_every_experiment_is_a_program_that_a_machine_can_run(proposals):
     assert len(proposals) > 20
-    for candidate, text in proposals:
+    for proposed, text in proposals:
         path = read_program(text.encode(), name="n.nc").path
-        core = read_program(candidate.program.encode(), name="c.nc").path
+        core = read_program(proposed.program.encode(), name="c.nc").path
         ends, above = path.end, core.end[:, 2].max() + 2.0
         np.testing.assert_array_equal(path.kind[:3], [0, 0, 1])  # up, across, down
         assert list(path.known[:2]) == [False, True]
@@ -64,7 +63,7 @@ def test_every_experiment_is_a_program_that_a_machine_can_run(proposals):
         lines = text.splitlines()
         assert lines.index("M3 S8000") < lines.index(next(line for line in lines if line.startswith("G1")))
         assert lines[-2:] == ["M5", "M2"]
-        assert (f"({CUTS})" in lines) == candidate.cutting
+        assert (f"({CUTS})" in lines) == proposed.cutting
 
 
 @rs274.needs_rs274
@@ -92,7 +91,7 @@ def test_in_the_air_nothing_is_met_that_the_runs_did_not_pass(bench, every):
 
 def test_the_same_in_the_language_of_the_control(opened):
     """Dwell in seconds, remarks and units as each control has them; the motion is read alike."""
-    design = Design((5.0, -3.0, 2.0), 11.0, 700.0, plane="YZ", dwell_s=90.0)
+    design = MotionDesign((5.0, -3.0, 2.0), 11.0, 700.0, plane="YZ", dwell_s=90.0)
     each = replace(candidate(SimpleNamespace(channels=(), end=0.0), design), action="a (remark)")
     said = {
         "rs274": ("(a remark)", "G4 P90", "G21 G90 G19 G54"),

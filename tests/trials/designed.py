@@ -25,7 +25,7 @@ from camcomp.diagnosis.fit.bench import Bench
 from camcomp.diagnosis.fit.columns import candidate_causes, working_causes
 from camcomp.diagnosis.fit.lookalikes import without_lookalikes
 from camcomp.diagnosis.fit.problem import open_problem
-from camcomp.diagnosis.next_experiment.design import Design
+from camcomp.diagnosis.next_experiment.design import MotionDesign
 from camcomp.diagnosis.next_experiment.designed import Desk, propose
 from camcomp.diagnosis.next_experiment.foresee import Question
 from tests.campaign import runner
@@ -83,7 +83,7 @@ class World:
         clean, *both = self.truths
         return [1.0 / float(np.linalg.norm(self._over_runs(clean, each))) for each in both]
 
-    def tells(self, design: Design) -> float:
+    def tells(self, design: MotionDesign) -> float:
         """Bits of one log between the causes."""
         last = self.made.runs[-1]
         run = Run(Timeline(read(design.program("design"))), design.cutting, last.started_s + 900.0, last.cut_before_min)
@@ -95,7 +95,7 @@ class World:
         left = gap - free @ np.linalg.solve(free.T @ free + np.eye(2), free.T @ gap)
         return told_of_two(max(float(gap @ left), 0.0))
 
-    def value(self, design: Design) -> float:
+    def value(self, design: MotionDesign) -> float:
         """Bits less the price of the time."""
         return self.tells(design) - PRICE * design.minutes
 
@@ -138,7 +138,7 @@ def opened_question(folder: Path, world: World) -> Desk:
     return Desk(Question(problem, [problem.refit((i,)) for i in at], np.array([0.5, 0.5]), opened.job))
 
 
-def random_designs(desk: Desk, count: int, seed: int) -> list[Design]:
+def random_designs(desk: Desk, count: int, seed: int) -> list[MotionDesign]:
     """Designs that the machine can do, drawn evenly over place, plane, radius, feed, direction and load."""
     rng = np.random.default_rng(seed)
     site, out = desk.site, []
@@ -147,19 +147,21 @@ def random_designs(desk: Desk, count: int, seed: int) -> list[Design]:
         turns = [(1,), (-1,), (1, -1)][rng.integers(3)]
         if rng.uniform() < 0.25:
             centre, radius = site.cut.centre, site.cut.radius * rng.uniform(0.2, 1.0)
-            design = Design(tuple(centre), radius, site.cut.feed * rng.uniform(0.5, 1.5), turns=turns, cutting=True)
+            design = MotionDesign(
+                tuple(centre), radius, site.cut.feed * rng.uniform(0.5, 1.5), turns=turns, cutting=True
+            )
         else:
             centre = site.work.centre + site.farther * rng.uniform(-1.0, 1.0, 3)
             way = rng.normal(size=3)
             line = tuple(way / np.linalg.norm(way)) if rng.uniform() < 0.25 else None
             plane = ("XY", "XZ", "YZ")[rng.integers(3)]
-            design = Design(tuple(centre), 3.0 * (site.farther / 3.0) ** rng.uniform(), feed, plane, turns, line)
+            design = MotionDesign(tuple(centre), 3.0 * (site.farther / 3.0) ** rng.uniform(), feed, plane, turns, line)
         if allowed(desk, design):
             out.append(design.tidy())
     return out
 
 
-def every_design(desk: Desk, steps: int) -> list[Design]:
+def every_design(desk: Desk, steps: int) -> list[MotionDesign]:
     """A grid over places (steps each way), planes, radii, feeds, lines, and cuts."""
     site, out = desk.site, []
     at = np.linspace(-0.9, 0.9, steps) * site.farther
@@ -168,16 +170,18 @@ def every_design(desk: Desk, steps: int) -> list[Design]:
     radii = site.farther * np.array([0.2, 0.45, 0.7, 0.9] if steps > 3 else [0.3, 0.8])
     for x, y, z, radius, plane, feed in product(at, at, up, radii, ("XY", "XZ", "YZ"), feeds):
         centre = site.work.centre + [x, y, z + (0.0 if plane == "XY" else radius)]
-        out.append(Design(tuple(centre), float(radius), float(feed), plane))
+        out.append(MotionDesign(tuple(centre), float(radius), float(feed), plane))
     for way in ((1, 0, 0), (0, 1, 0), (1, 1, 0), (1, -1, 0)):
         unit = np.array(way) / np.linalg.norm(way)
-        out += [Design(tuple(site.work.centre), float(r), float(f), along=tuple(unit)) for r in radii for f in feeds]
+        out += [
+            MotionDesign(tuple(site.work.centre), float(r), float(f), along=tuple(unit)) for r in radii for f in feeds
+        ]
     for share, feed in product((0.3, 0.6, 1.0), (0.5, 1.0, 1.5)):
-        out.append(Design(tuple(site.cut.centre), share * site.cut.radius, feed * site.cut.feed, cutting=True))
+        out.append(MotionDesign(tuple(site.cut.centre), share * site.cut.radius, feed * site.cut.feed, cutting=True))
     return [each.tidy() for each in out if allowed(desk, each)]
 
 
-def allowed(desk: Desk, design: Design) -> bool:
+def allowed(desk: Desk, design: MotionDesign) -> bool:
     """Whether the machine can do it, and nothing stands in the way."""
     return desk.within(design) and (design.cutting or design.points()[:, 2].min() >= desk.site.low - 0.05)
 

@@ -11,11 +11,11 @@ import numpy as np
 
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.next_experiment.candidates import single_changes
-from camcomp.diagnosis.next_experiment.designed import WORTH, Proposal, room_of
 from camcomp.diagnosis.next_experiment.foresee import feasible
 from camcomp.diagnosis.next_experiment.outcomes import after_unknown
+from camcomp.diagnosis.next_experiment.proposal import WORTH, Proposal
 from camcomp.diagnosis.next_experiment.ready_program import can_be_run
-from camcomp.diagnosis.next_experiment.site import site_of
+from camcomp.diagnosis.next_experiment.site import room_of, site_of
 from camcomp.model.job import Job
 
 
@@ -30,7 +30,7 @@ def explore(problem: Problem, labels: Sequence[tuple[str, float]], job: Job) -> 
         weight[family] = max(weight.get(family, 0.0), share)
     whole = sum(weight.values())
     found = []
-    for candidate in single_changes(site_of(problem.bench), room_of(problem, job)):
+    for candidate in single_changes(site_of(problem.bench), room_of(problem.bench, job)):
         p = sum(weight.get(family, 0.0) for family in candidate.varies) / whole if whole > 0 else 0.0
         gain = -float(sum(q * np.log2(q) for q in (p, 1.0 - p) if q > 0.0))
         if gain > WORTH:

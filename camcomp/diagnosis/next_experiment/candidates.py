@@ -11,7 +11,7 @@ from itertools import product
 
 import numpy as np
 
-from camcomp.diagnosis.next_experiment.design import PLANES, Design
+from camcomp.diagnosis.next_experiment.design import PLANES, MotionDesign
 from camcomp.diagnosis.next_experiment.site import Room, Site
 from camcomp.ground.datatypes import Floats
 
@@ -20,7 +20,7 @@ DWELL_S = 900.0  # of a rest that shows a drift
 FASTER = (0.25, 1.0, 4.0)  # times the feed of the runs, in the air
 CUT_FASTER = (0.5, 1.0, 1.5)  # times the feed of the runs, cutting
 OUT = (0.5, 0.9)  # of the reach: where circles are tried
-SMALL = 0.3  # of the reach: the radius of a circle out there
+SMALL = 0.3  # of the reach: the radius of a circle out there; of the radius at work: that of a small one
 NEIGHBOUR_MM, NEIGHBOUR_TIMES = 12.0, 1.5  # steps to a neighbouring design
 _NEEDS = {
     "tip": ("the tip with a tracker", 30.0),
@@ -44,7 +44,7 @@ class Candidate:
     """
 
     action: str
-    design: Design
+    design: MotionDesign
     channels: tuple[str, ...]
     started: float
     minutes: float
@@ -62,17 +62,17 @@ class Candidate:
         return self.design.cutting
 
 
-def candidate(site: Site, design: Design, varies: tuple[str, ...] = ()) -> Candidate:
+def candidate(site: Site, design: MotionDesign, varies: tuple[str, ...] = ()) -> Candidate:
     """A design as an experiment that logs what the runs logged."""
     design = design.tidy()
     return Candidate(design.action, design, site.channels, site.end + design.wait_s, design.minutes, varies=varies)
 
 
-def usual(site: Site) -> Design:
+def usual(site: Site) -> MotionDesign:
     """What the runs did, as a circle."""
     if site.cut is not None:
-        return Design(_triple(site.cut.centre), site.cut.radius, site.cut.feed, cutting=True)
-    return _in_air(site, Design(_triple(site.work.centre), site.work.radius, site.work.feed))
+        return MotionDesign(_triple(site.cut.centre), site.cut.radius, site.cut.feed, cutting=True)
+    return _in_air(site, MotionDesign(_triple(site.work.centre), site.work.radius, site.work.feed))
 
 
 def coarse(site: Site, room: Room) -> Iterator[Candidate]:
@@ -81,7 +81,7 @@ def coarse(site: Site, room: Room) -> Iterator[Candidate]:
     here = _in_air(site, replace(base, cutting=False))
     if site.cut is not None:
         yield from (candidate(site, replace(base, feed=times * site.cut.feed)) for times in CUT_FASTER)
-        yield candidate(site, replace(base, radius=0.3 * base.radius))
+        yield candidate(site, replace(base, radius=SMALL * base.radius))
     for times in FASTER:
         yield candidate(site, replace(here, feed=times * here.feed))
     middle = np.array(here.centre)
@@ -92,9 +92,9 @@ def coarse(site: Site, room: Room) -> Iterator[Candidate]:
             if far > 0.0:
                 centre = middle + share * (1.0 - SMALL) * far * np.array(way)
                 yield candidate(site, _in_air(site, replace(here, centre=_triple(centre), radius=SMALL * far)))
-    flat = 0.9 * min(reaches[way] for way in reaches if abs(way[0]) + abs(way[1]) == 1.0 and way[2] == 0.0)
+    flat = OUT[-1] * min(reaches[way] for way in reaches if abs(way[0]) + abs(way[1]) == 1.0 and way[2] == 0.0)
     for plane in PLANES:
-        radius = flat if plane == "XY" else min(flat, 0.45 * reaches[(0.0, 0.0, 1.0)])
+        radius = flat if plane == "XY" else min(flat, 0.5 * OUT[-1] * reaches[(0.0, 0.0, 1.0)])
         if radius > 0.0:
             yield candidate(site, _in_air(site, replace(here, radius=radius, plane=plane)))
     for way in (
@@ -104,7 +104,7 @@ def coarse(site: Site, room: Room) -> Iterator[Candidate]:
         (0.5**0.5, 0.5**0.5, 0.0),
         (0.5**0.5, -(0.5**0.5), 0.0),
     ):
-        ends = 0.9 * room.reaches(middle, np.array([way, [-v for v in way]]), site.farther, site.low)
+        ends = OUT[-1] * room.reaches(middle, np.array([way, [-v for v in way]]), site.farther, site.low)
         if (half := 0.5 * float(ends.sum())) > 0.0:
             centre = middle + 0.5 * float(ends[0] - ends[1]) * np.array(way)
             yield candidate(site, _in_air(site, replace(here, centre=_triple(centre), radius=half, along=way)))
@@ -154,7 +154,7 @@ def single_changes(site: Site, room: Room) -> Iterator[Candidate]:
     yield from in_time(site)
 
 
-def neighbours(site: Site, design: Design, step: float) -> Iterator[Design]:
+def neighbours(site: Site, design: MotionDesign, step: float) -> Iterator[MotionDesign]:
     """Designs beside one; step: 1 far to 0 near."""
     for axis, sign in product(range(3), (1.0, -1.0)):
         if not design.cutting:
@@ -176,7 +176,7 @@ def _ways() -> Floats:
     return np.asarray(every / np.linalg.norm(every, axis=1)[:, None], float)
 
 
-def _in_air(site: Site, design: Design) -> Design:
+def _in_air(site: Site, design: MotionDesign) -> MotionDesign:
     """As high as it takes not to meet what may stand below."""
     if design.cutting:
         return design

@@ -17,7 +17,7 @@ SOON_S = 60.0  # after the last run, at the earliest
 
 
 @dataclass(frozen=True)
-class Design:
+class MotionDesign:
     """A full circle in a plane, or a straight line there and back through its centre; then a rest.
 
     centre mm and radius mm (half the length of a line), program frame; feed mm/min; turns: senses of the circles, one after
@@ -35,11 +35,11 @@ class Design:
     wait_s: float = SOON_S
     dwell_s: float = 0.0
 
-    def tidy(self) -> Design:
+    def tidy(self) -> MotionDesign:
         """The same in round numbers: 0.1 mm, three digits of feed."""
         x, y, z = (round(v, 1) + 0.0 for v in self.centre)  # no -0
         feed = float(f"{self.feed:.3g}")
-        return Design(
+        return MotionDesign(
             (x, y, z), max(round(self.radius, 1), 0.1), feed, self.plane, self.turns, self.along, self.cutting, self.wait_s,
             self.dwell_s,
         )  # fmt: skip

@@ -1,6 +1,6 @@
 """The next experiment, designed: a coarse grid over place, plane, radius, feed, direction, load and rest, then the best refined.
 
-What counts is the information less the price of the machine's time (`PRICE`), so that half an answer does not win by being
+What counts is the information less the price of the machine's time (`proposal.PRICE`), so that half an answer does not win by being
 quick. No chance is in it: the same runs have the same next experiment.
 """
 
@@ -20,37 +20,19 @@ from camcomp.diagnosis.next_experiment.candidates import (
     coarse,
     neighbours,
 )
-from camcomp.diagnosis.next_experiment.design import Design
+from camcomp.diagnosis.next_experiment.design import MotionDesign
 from camcomp.diagnosis.next_experiment.foresee import Question, foresee
-from camcomp.diagnosis.next_experiment.information_gain import Told, most_narrowed, program_weight, told
+from camcomp.diagnosis.next_experiment.information_gain import most_narrowed, program_weight, told
+from camcomp.diagnosis.next_experiment.proposal import WORTH, Proposal
 from camcomp.diagnosis.next_experiment.ready_program import can_be_run
-from camcomp.diagnosis.next_experiment.site import Room, Site, commanded, site_of
+from camcomp.diagnosis.next_experiment.site import Room, Site, room_of, site_of
 from camcomp.diagnosis.statistics.cause_sets import Fitted
 from camcomp.ground.datatypes import Floats
 from camcomp.model.job import Job
 
-WORTH = 0.1  # bits below which an experiment is not worth proposing
-PRICE = 0.5 / 60.0  # bits that a minute of machine time has to bring
 STEPS = (1.0, 0.5)  # of the refinement
 MOST_REFINED = 16  # designs that are looked at while refining
 MOST_JUDGED_WHOLE = 3  # of the best, with every effect of the library within its tolerance
-
-
-@dataclass(frozen=True, eq=False)
-class Proposal:
-    """An experiment, the effects that it separates, what it tells; gain: bits. rivals: names of the sets of causes."""
-
-    candidate: Candidate
-    gain: float
-    separates: tuple[str, ...]
-    outcomes: tuple[str, ...] = ()
-    told: Told | None = None
-    rivals: tuple[str, ...] = ()
-
-    @property
-    def value(self) -> float:
-        """Bits less the price of the time."""
-        return self.gain - PRICE * self.candidate.minutes
 
 
 @dataclass(eq=False)
@@ -65,7 +47,7 @@ class Desk:
     def __post_init__(self) -> None:
         problem = self.question.problem
         self.site = site_of(problem.bench)
-        self.room = room_of(problem, self.question.job)
+        self.room = room_of(problem.bench, self.question.job)
         self.weight = program_weight(problem)
 
     def judged(self, each: Candidate, *, whole: bool = False) -> Proposal | None:
@@ -99,17 +81,11 @@ class Desk:
         bench = self.question.problem.bench
         return can_be_run(each, bench.runs, self.question.job, bench.twin)
 
-    def within(self, design: Design) -> bool:
+    def within(self, design: MotionDesign) -> bool:
         """Whether the machine can be there, and it is no farther from the work than experiments go."""
         points = design.points()
         near = np.abs(points - self.site.work.centre).max() <= self.site.farther + self.site.work.half.max()
         return bool(near and self.room.allowed(points).all())
-
-
-def room_of(problem: Problem, job: Job) -> Room:
-    """The room about the runs of a problem."""
-    tips = np.concatenate([commanded(problem.bench, run) for run in problem.bench.runs])
-    return Room(problem.bench.twin, np.array(job.machine.limits, float), tips)
 
 
 def separated(problem: Problem, rivals: Sequence[Fitted]) -> tuple[str, ...]:

@@ -19,6 +19,7 @@ from camcomp.diagnosis.next_experiment.site import CHANNELS, STRETCH
 from camcomp.diagnosis.search.indistinguishable import HIDDEN, LARGE
 from camcomp.diagnosis.statistics.cause_sets import Fitted, total
 from camcomp.diagnosis.statistics.evidence import estimate
+from camcomp.diagnosis.statistics.seen import seen_apart
 from camcomp.gcode.interpret import read_program
 from camcomp.ground.datatypes import Floats, Ints
 from camcomp.ground.errors import CamcompError
@@ -105,12 +106,6 @@ def feasible(problem: Problem, candidate: Candidate, job: Job) -> bool:
     return True
 
 
-def seen(signals: Floats, i: int, j: int, left: Floats) -> float:
-    """Chi-square of white rows left (w,) beyond what no model gets right of signals (w, r), however many rows there are."""
-    own = np.maximum(signals[:, i] ** 2, signals[:, j] ** 2) / LARGE**2
-    return max(float((left**2).sum()) - HIDDEN**2 * (len(left) + float(own.sum())), 0.0)
-
-
 def _on_bench(problem: Problem, candidate: Candidate, job: Job) -> Bench:
     run = _run(problem, candidate, job)
     low, high = np.array(job.machine.limits).T
@@ -129,7 +124,7 @@ def _lay(question: Question, candidate: Candidate, whole: bool) -> Foreseen:
     changes = [bench.channels(0, bench.read(0, problem.causes(f.members, f.theta, f.extra))) - nominal for f in rivals]
     alone = _whitened(problem, bench, np.stack(changes, axis=2))
     if len(rivals) > 1 and not candidate.knows and all(
-        not seen(each, i, j, each[:, i] - each[:, j])
+        not seen_apart(each[:, [i, j]], each[:, i] - each[:, j], HIDDEN, LARGE)
         for each in alone.values() for i, j in combinations(range(len(rivals)), 2)
     ):  # fmt: skip
         raise ValueError("nothing to see")

@@ -13,15 +13,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from camcomp.diagnosis.fit.bench import thinned
 from camcomp.diagnosis.fit.problem import Problem
-from camcomp.diagnosis.next_experiment.candidates import Candidate
-from camcomp.diagnosis.next_experiment.foresee import Foreseen, Question, seen
+from camcomp.diagnosis.search.indistinguishable import HIDDEN, LARGE
 from camcomp.diagnosis.statistics.cause_sets import Fitted
+from camcomp.diagnosis.statistics.seen import seen_apart
 from camcomp.ground.datatypes import Floats
+
+if TYPE_CHECKING:
+    from camcomp.diagnosis.next_experiment.candidates import Candidate
+    from camcomp.diagnosis.next_experiment.foresee import Foreseen, Question
 
 _OUTCOME_DRAWS = 64
 _SEED = 20120624
@@ -29,7 +34,7 @@ _TEMPERATURE = 1.5  # what evidence is divided by before it becomes a probabilit
 
 
 @dataclass(frozen=True, eq=False)
-class Told:
+class ExpectedGain:
     """What an experiment tells. separated, narrowed: bits of which cause and of how large; before_um, after_um: rms that the
     uncertainty of the answer moves the tip by on the runs' programs; shows (r,): rms of what every rival lets one expect
     beyond the machine file, in the kind of channel that tells most, mm or N; left (r, r): of what rival j leaves of rival i there.
@@ -49,7 +54,7 @@ class Told:
         return self.separated + self.narrowed
 
 
-def told(question: Question, candidate: Candidate, there: Foreseen, weight: Floats) -> Told:
+def told(question: Question, candidate: Candidate, there: Foreseen, weight: Floats) -> ExpectedGain:
     """What a foreseen candidate tells. weight: of the columns' amplitudes on the programs (k, k), as `program_weight` has it."""
     problem, rivals, probability = question.problem, question.rivals, question.probability
     kinds = [k for k in candidate.channels if k in there.signals]
@@ -73,7 +78,7 @@ def told(question: Question, candidate: Candidate, there: Foreseen, weight: Floa
             gap = signals[:, i] - signals[:, j]
             move = np.linalg.solve(M, D.T @ gap)
             left = gap - D @ move
-            by_kind[i, j] = [seen(signals[a:b], i, j, left[a:b]) for a, b in pairwise(ends)]
+            by_kind[i, j] = [seen_apart(signals[a:b][:, [i, j]], left[a:b], HIDDEN, LARGE) for a, b in pairwise(ends)]
             rests[i, j] = [np.sqrt(np.mean(left[a:b] ** 2)) if b > a else 0.0 for a, b in pairwise(ends)]
             apart[i, j] = float(by_kind[i, j].sum()) + float(move @ move)
             apart[i, j] += _by_other_means(problem, rivals[i], rivals[j], candidate)
@@ -81,7 +86,7 @@ def told(question: Question, candidate: Candidate, there: Foreseen, weight: Floa
     k = int(np.argmax(by_kind.sum(axis=(0, 1)))) if kinds else 0
     size = there.size[kinds[k]] if kinds else 0.0
     a, b = (int(ends[k]), int(ends[k + 1])) if kinds else (0, 0)
-    return Told(
+    return ExpectedGain(
         expected_gain(apart, probability) if n > 1 else 0.0,
         0.5 * float(np.log2((before + noise) / (after + noise))),
         1e3 * before**0.5,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from camcomp.diagnosis.next_experiment.designed import Proposal
+from camcomp.diagnosis.next_experiment.proposal import Proposal
 from camcomp.report.plot import brief
 
 MOST_TOLD = 3  # rival sets that have a sentence of their own

@@ -9,6 +9,7 @@ import numpy as np
 from camcomp.diagnosis.fit.bench import Bench, Run
 from camcomp.ground.datatypes import RAPID, Bools, Floats
 from camcomp.ground.errors import PhysicsError
+from camcomp.model.job import Job
 from camcomp.model.motion.twin import Twin
 
 CHANNELS = ("tip", "encoder", "drive", "dyno")
@@ -23,7 +24,7 @@ USUAL_FEED = 1000.0  # mm/min, where no program says one
 
 
 @dataclass(frozen=True, eq=False)
-class Place:
+class WorkPlace:
     """Middle (3,) mm, half widths (3,) mm and feed mm/min of what was done there."""
 
     centre: Floats
@@ -42,8 +43,8 @@ class Site:
     end: of the last run, s on the common clock; channels: that were logged.
     """
 
-    work: Place
-    cut: Place | None
+    work: WorkPlace
+    cut: WorkPlace | None
     low: float
     end: float
     channels: tuple[str, ...]
@@ -71,11 +72,11 @@ def site_of(bench: Bench) -> Site:
     )
 
 
-def _place(tips: Floats, feeds: list[float]) -> Place:
+def _place(tips: Floats, feeds: list[float]) -> WorkPlace:
     low, high = np.quantile(tips, 0.02, axis=0), np.quantile(tips, 0.98, axis=0)
     known = [f for f in feeds if np.isfinite(f)]
     feed = round(float(np.median(known))) if known else USUAL_FEED
-    return Place(np.round(0.5 * (low + high), 1) + 0.0, 0.5 * (high - low), feed)
+    return WorkPlace(np.round(0.5 * (low + high), 1) + 0.0, 0.5 * (high - low), feed)
 
 
 def commanded(bench: Bench, run: Run) -> Floats:
@@ -144,3 +145,9 @@ class Room:
         rho = self.twin.inverse(self.twin.to_machine(moved)).reshape(3, 2, len(points), -1)
         slopes = np.moveaxis((rho[:, 0] - rho[:, 1]) / (2.0 * _DIFFERENCE_MM), 0, 2)  # (n, m, 3)
         return np.asarray(1.0 / np.maximum(np.linalg.svd(slopes, compute_uv=False)[:, -1], 1e-12), float)
+
+
+def room_of(bench: Bench, job: Job) -> Room:
+    """The room about the runs of a bench."""
+    tips = np.concatenate([commanded(bench, run) for run in bench.runs])
+    return Room(bench.twin, np.array(job.machine.limits, float), tips)
