@@ -109,13 +109,16 @@ def diagnose(
 
     Raises ConfigError, ProgramError, FileError, PhysicsError.
     """
+    from camcomp.diagnosis.law.library import keep, learned
     from camcomp.diagnosis.studies import study_of
+    from camcomp.model.config.load import load_config
 
     if (study := study_of(experiment, without)) is not None:
+        if library is not None and study.result.law is not None and study.result.law.parts:
+            keep(str(library), study.result.law, load_config(load_experiment(experiment).config).robot.name)
         return ExperimentDiagnosis(str(experiment), study.result, None, None, study.residuals)
     from camcomp.diagnosis.diagnose import diagnose as judge
     from camcomp.diagnosis.experiment.open_experiment import open_experiment
-    from camcomp.diagnosis.law.library import keep, learned
     from camcomp.diagnosis.residuals import of_runs
 
     with part(0.0, 0.3):

@@ -98,15 +98,17 @@ def diagnose(
     best = found.fits[found.verdict.best]
     gap = gap_of(problem)
     word: Any = "unknown" if found.unknown_in else found.verdict.word
-    shrinkage = _shrinkage(twin, runs, holdout, problem, best)
     law = answer_law(problem, best, found.unknown_in) if found.unknown_in else None
+    if law is not None and law.alone:  # the causes had only followed what the law says
+        best = problem.refit(())
+    shrinkage = _shrinkage(twin, runs, holdout, problem, best)
     unseen = len(used) < len(runs) or (len(used) > 1 and not holdout)
     proposal = _next(problem, found, word, job)
     result = DiagnosisResult(
         verdict=word,
         gap=GapSize(**gap),
         where=_where(problem, found, best),
-        causes=_causes(problem, found, law),
+        causes=_causes(problem, found, best, law),
         alternatives=_alternatives(problem, found) if word == "ambiguous" else (),
         shrinkage=UnseenShrinkage.model_validate(shrinkage) if unseen else None,
         next_experiment=_proposed(proposal) if proposal is not None else None,
@@ -170,9 +172,8 @@ def _unknown_energy(found: CauseSearch) -> float:
     return max(each.excess_um, 1e-3) ** 2
 
 
-def _causes(problem: Problem, found: CauseSearch, law: LawAnswer | None) -> tuple[FoundCause, ...]:
+def _causes(problem: Problem, found: CauseSearch, best: Fitted, law: LawAnswer | None) -> tuple[FoundCause, ...]:
     """Causes by probability, the unknown one last: its probability is that of the chance of what is left."""
-    best = found.fits[found.verdict.best]
     energy = _energies(problem, best)
     left = _unknown_energy(found)
     whole = sum(energy) + left

@@ -32,6 +32,7 @@ DIALECT = Dialect(
     machine_moves_rapid=True,
     home_beside_motion=True,
     dwell="PXU",
+    dwell_p_s=1e-3,
     modal_length=True,
     own_local_frame=True,
     extended_offsets=True,

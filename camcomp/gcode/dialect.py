@@ -29,6 +29,7 @@ class Dialect:
     machine_moves_rapid: bool = False  # G53 moves at rapid speed, whatever motion code is in force
     home_beside_motion: bool = False  # `G0 G28 Z0`: the axis words are those of G28
     dwell: str = "P"  # letters that may give the time of G4
+    dwell_p_s: float = 1.0  # worth of one unit of its P; X, U and F count seconds, S revolutions of the spindle
     modal_length: bool = False  # H changes the tool length offset without G43 in its block
     own_local_frame: bool = False  # G52 and G92 add up instead of sharing one offset
     extended_offsets: bool = False  # G54.1 P1 ..., G10 L20 sets them

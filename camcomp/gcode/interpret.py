@@ -59,6 +59,8 @@ def read_program(data: bytes, *, name: str, setup: Setup | None = None, dialect:
         feed_point=points_in_feeds(text.line(row) for row in range(len(text))),
         modes=tuple(reader.record.modes),
         straight=reader.straight and not reader.record.cycles,
+        dwelt_s=reader.state.dwelt_s,
+        tool_changes=reader.state.tool_changes,
     )
 
 

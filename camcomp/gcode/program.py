@@ -70,6 +70,8 @@ class Program:
     feed_point: bool  # feeds are written with a point; some controls read whole numbers in smaller units
     modes: tuple[PathMode, ...]  # (n,) whether the control stops behind each motion, and how far it may leave the path
     straight: bool  # no loops, subprograms, parameters, cycles: a line means at most one motion, as it stands
+    dwelt_s: float = 0.0  # G4 in all
+    tool_changes: int = 0  # M6 in all
 
     def step_mm(self, resolution_mm: float) -> float:
         """The coarsest step of its lengths, written for a control of this resolution."""

@@ -73,6 +73,7 @@ class Settings(BlockReader):
         for code, word in block.m:
             if code == 6:
                 state.tool = state.next_tool
+                state.tool_changes += 1
             elif code == 61:
                 if "Q" not in words:
                     self.refuse("CC133", "M61 needs the tool number as Q", word)
@@ -113,8 +114,11 @@ class Settings(BlockReader):
         """A code of group 0 that moves nothing."""
         state = self.state
         if code == 40:
-            if not any(block.number(letter) is not None for letter in self.dialect.dwell + "P"):
+            given = [(letter, block.number(letter)) for letter in dict.fromkeys(self.dialect.dwell + "P")]
+            times = [(letter, value) for letter, value in given if value is not None]
+            if not times:
                 self.refuse("CC131", "G4 has no time", block.groups[0][1])
+            self.dwell(*times[0])
         elif code == 100:
             self._set_offset(block)
         elif code in (281, 301):
@@ -128,6 +132,14 @@ class Settings(BlockReader):
             state.shift = list(state.saved_shift) if code == 923 else [0.0, 0.0, 0.0]
             self.record.modes_changed = True
         state.update()
+
+    def dwell(self, letter: str, value: float) -> None:
+        """The control waits as long as a word of G4 says."""
+        if letter == "S":
+            seconds = 60.0 * value / self.state.speed if self.state.speed > 0.0 else 0.0
+        else:
+            seconds = value * (self.dialect.dwell_p_s if letter == "P" else 1.0)
+        self.state.dwelt_s += max(seconds, 0.0)
 
     def _shift(self, block: Block, code: int) -> None:
         state = self.state

@@ -3,6 +3,10 @@
 numba trusts its files. A damaged one ends the process or computes something else, and two processes that fill an empty
 cache at once can each put its code under the other's name. Here every file has a checksum and one name for all that it
 depends on, and whatever goes wrong with it is a note, never an error.
+
+An installed camcomp brings code along that numba has already been through: what is left for the first run is to make
+machine code of it, for the processor it finds. hatch_build.py makes these files; where they are missing or of other
+sources, Python or numba, everything is compiled.
 """
 
 from __future__ import annotations
@@ -19,6 +23,8 @@ import llvmlite
 import numba
 from numba.core import caching
 
+from camcomp.ground import headway
+from camcomp.ground.linked_code import Entry, finished
 from camcomp.ground.notes import note
 from camcomp.ground.replacement import Replacement
 
@@ -26,15 +32,31 @@ _numba: Any = numba  # its annotations leave out what it has
 _caching: Any = caching
 _SUM = hashlib.sha256().digest_size
 _ANEW = "it is compiled anew, which takes half a minute"
+BROUGHT_ALONG = Path(__file__).parents[1] / "data" / "linked"
 
 
-def kept(function: Callable[..., Any], **options: Any) -> Any:
-    """Numba's dispatcher of `function`, its code kept on disk where there is a place for it; options as for njit."""
-    dispatcher = _numba.njit(**options)(function)
+class _Bringing:
+    """Where code to bring along is put while it is made, or None."""
+
+    folder: Path | None = None
+
+
+def bring_along(folder: Path) -> None:
+    """What is compiled from now on in this process is also put there as code to bring along."""
+    _Bringing.folder = folder
+
+
+def kept(function: Callable[..., Any], *, digest: str | None = None, **options: Any) -> Any:
+    """Numba's dispatcher of `function`, its code kept on disk where there is a place for it; options as for njit.
+
+    digest: of all sources of the code; without it the code depends on the function's own file only, and is not brought
+    along.
+    """
     if _numba.config.DISABLE_JIT:  # for the debugger
-        return dispatcher
+        return _numba.njit(**options)(function)
+    dispatcher = _numba.njit(pipeline_class=Entry, **options)(function)
     try:
-        dispatcher._cache = _Cache(function)
+        dispatcher._cache = _Cache(function, digest)
     except (OSError, RuntimeError):  # numba has found no place
         _not_kept("no folder for it can be written to")
     return dispatcher
@@ -63,22 +85,44 @@ class _Place(_caching.CompileResultCacheImpl):  # type: ignore[misc]
 class _Cache(_caching.FunctionCache):  # type: ignore[misc]
     _impl_class = _Place
 
-    def __init__(self, function: Callable[..., Any]) -> None:
+    def __init__(self, function: Callable[..., Any], digest: str | None) -> None:
         super().__init__(function)
-        self._cache_file = _CodeFiles(
-            Path(self._cache_path), self._impl.filename_base, self._impl.locator.get_source_stamp()
-        )
+        self._base, self._digest = self._impl.filename_base, digest
+        stamp = self._impl.locator.get_source_stamp()
+        self._cache_file = _CodeFiles(Path(self._cache_path), self._base, (stamp, digest) if digest else stamp)
 
     def _load_overload(self, signature: Any, context: Any) -> Any:
         try:
-            return super()._load_overload(signature, context)
+            return super()._load_overload(signature, context) or self._load_linked(signature, context)
         except Exception:  # noqa: BLE001 - whatever a file makes numba do, there is another way
             note("compiled code", f"compiled code on the disk is damaged: {_ANEW}")
             return None
 
+    def _load_linked(self, signature: Any, context: Any) -> Any:
+        """Code that was brought along, made machine code and kept like other code; None when there is none."""
+        codegen = context.codegen()
+        data = self._linked_in(BROUGHT_ALONG).load(self._linked_key(signature, codegen)) if self._digest else None
+        if data is None:
+            return None
+        headway.hold(headway.ONCE)
+        result = finished(context, data)
+        self._save_overload(signature, result)
+        return result
+
+    def _linked_in(self, folder: Path) -> _CodeFiles:
+        return _CodeFiles(folder, self._base, self._digest)
+
+    def _linked_key(self, signature: Any, codegen: Any) -> tuple[Any, ...]:
+        """The key of machine code without the processor; what is left of it is the kind of machine."""
+        signature, (machine, *_), code = self._index_key(signature, codegen)
+        return signature, machine, code
+
     def _save_overload(self, signature: Any, data: Any) -> None:
         try:
             super()._save_overload(signature, data)
+            if _Bringing.folder is not None and self._digest:
+                linked = (data.library.linked, *self._impl.reduce(data)[1:])
+                self._linked_in(_Bringing.folder).save(self._linked_key(signature, data.codegen), linked)
         except Exception as error:  # noqa: BLE001 - the code itself is there and works
             _not_kept(getattr(error, "strerror", None) or str(error))
 

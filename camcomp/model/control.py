@@ -42,6 +42,11 @@ def limits_of(config: Config) -> ControlLimits:
     return ControlLimits(control.acceleration_mm_per_s2, velocity, control.block_time_s, control.look_ahead_blocks)
 
 
+def waiting_s(config: Config, dwelt_s: float, tool_changes: int) -> float:
+    """Time of a program beside its moves."""
+    return dwelt_s + tool_changes * config.control.tool_change_s
+
+
 def open_program(path: str | Path, config: Config | None = None) -> Program:
     """A program read with the control of `config`, or with a control's defaults.
 

@@ -9,13 +9,15 @@ import pytest
 from camcomp.compensation.long import control_account
 from camcomp.compensation.long.program import Bulk
 from camcomp.compensation.program.compensate import compensate
+from camcomp.compensation.program.verify import verify
 from camcomp.compensation.report.tables import summary
 from camcomp.gcode.interpret import read_program
 from camcomp.ground.datatypes import ARC
 from camcomp.ground.files import shipped
 from camcomp.model.config.load import load_config
-from camcomp.model.control import program_of, setup_of
+from camcomp.model.control import program_of, setup_of, waiting_s
 from camcomp.model.job import Job
+from tests import schemas
 from tests.commandline import camcomp
 from tests.control.programs import circle, raster, rectangle
 
@@ -155,3 +157,61 @@ def test_behind_a_joining_line_the_program_s_own_mode_is_in_force_again(orthogli
 def test_a_program_without_a_stated_mode_gets_none(orthoglide):
     done = compensated(orthoglide, rectangle(3000))
     assert b"G61" not in done.written.data and done.control.resting == 0
+
+
+@pytest.mark.parametrize(
+    ("lines", "seconds", "dialect"),
+    [
+        ("G4 P1.5\nG1 X5\nG4 P0.25\n", 1.75, "rs274"),
+        ("T1 M6\nG1 X5\nT2 M6\nG4 P1\n", 17.0, "rs274"),
+        ("G82 X0 Y0 Z-1 R2 P0.5 F200\nX5\nG80\n", 1.0, "rs274"),
+        ("o1 repeat [3]\nG4 P2\no1 endrepeat\n", 6.0, "rs274"),
+        ("G4 P1500\nG4 X0.5\n", 2.0, "fanuc"),
+        ("G4 F1.5\nS60 M3\nG4 S2\n", 3.5, "sinumerik"),
+        ("M0\nM8\nG1 X5\n", 0.0, "rs274"),
+    ],
+)
+def test_pauses_and_tool_changes_are_part_of_the_cycle_time(lines, seconds, dialect):
+    job = job_of("cartesian", dialect=dialect, tool_change_s=8.0)
+    head = "G90\n" if dialect == "sinumerik" else HEAD
+    program = program_of((head + "G0 X0 Y0 Z3\nG1 Z2 F100\n" + lines + "M30\n").encode(), "p.nc", job.config)
+    assert waiting_s(job.config, program.dwelt_s, program.tool_changes) == pytest.approx(seconds)
+
+
+def test_long_programs_wait_as_long(monkeypatch, orthoglide):
+    text = "\n".join([HEAD + "T1 M6 G4 P2", "S8000 M3", *raster(3000, 300), "G4 P0.5", "M2", ""]).encode()
+    job = job_of(tool_change_s=8.0)
+    with_waits, without = (
+        Bulk(each, "p.nc", setup_of(each.config), 1.0, "1").run(io.BytesIO(what), len).summary().cycle_time_s
+        for each, what in (
+            (job, text),
+            (job, text.replace(b"G4 P2", b"").replace(b"G4 P0.5", b"").replace(b"T1 M6", b"")),
+        )
+    )
+    assert with_waits.before - without.before == pytest.approx(10.5)
+    assert with_waits.after - without.after == pytest.approx(10.5)
+
+
+@pytest.mark.parametrize("mode", ["G61", "G64 P0.01"])
+def test_verify_repeats_what_the_control_makes_of_it(orthoglide, mode):
+    """Its points lie closer than those of the summary and count what is left across the path only."""
+    done = compensated(orthoglide, ["G4 P3", *circle(25.0, 3000)], mode, arcs=False)
+    text = program_of(done.written.data, "out.nc", orthoglide.config)
+    told, mine = verify(text, done.program, orthoglide).figures(1.0), summary(done, orthoglide)
+    assert told.control_mode == mine.control_mode == mode and told.control_mode_stated
+    assert told.cycle_time_s.before == pytest.approx(mine.cycle_time_s.before) and told.cycle_time_s.before > 3.0
+    assert told.cycle_time_s.after == pytest.approx(mine.cycle_time_s.after, rel=1e-4)
+    assert told.under_control.max_um == pytest.approx(mine.under_control.max_um, rel=0.1, abs=0.2)
+    assert (told.under_control.max_um > 5.0) == (mode == "G64 P0.01")
+
+
+def test_verify_says_so_in_text_and_json(tmp_path):
+    (tmp_path / "p.nc").write_text(HEAD + "G64 P0.01\nG0 X0 Y0 Z0\nG1 X9 F100\nG4 P2\nM2\n")
+    config = ("--config", shipped("config/cartesian.yaml"))
+    assert camcomp("compensate", tmp_path / "p.nc", *config, "-o", tmp_path / "o.nc").returncode == 0
+    words = ("--against", tmp_path / "p.nc", *config, "--json", tmp_path / "v.json")
+    done = camcomp("verify", tmp_path / "o.nc", *words)
+    figures = json.loads((tmp_path / "v.json").read_text())
+    schemas.check("verify", figures)
+    assert done.returncode == 0 and b"control in G64 P0.01: " in done.stderr
+    assert figures["cycle_time_s"]["after"] > 2.0 and set(figures["under_control"]) == {"rms_um", "max_um"}

@@ -12,6 +12,17 @@ import pytest
 
 from tests.commandline import ROOT
 
+COUNTING = """
+import sys
+from numba.core import event
+from camcomp.terminal.cli import main
+with event.install_recorder("numba:compile") as compiled:
+    try:
+        main(sys.argv[1:])
+    finally:
+        print(sum(each.is_start for _, each in compiled.buffer))
+"""
+
 
 def call(*words, cwd, **environment):
     done = subprocess.run(
@@ -87,10 +98,10 @@ def test_an_installed_camcomp_needs_no_checkout(built, tmp_path):
     config = site / "camcomp/data/config/cartesian.yaml"
     program, out = tmp_path / "p.nc", tmp_path / "out.nc"
     program.write_text("G21 G90 G17 G94\nS8000 M3\nG0 X0 Y0 Z5\nG1 X10 F600\nM30\n")
-    # Compiling the solver in a new place takes long; a line or two are solved sooner without.
-    paths["NUMBA_DISABLE_JIT"] = "1"
-    call(command, "compensate", program, "--config", config, "-o", out, cwd=tmp_path, **paths)
+    words = ["compensate", str(program), "--config", str(config), "-o", str(out)]
+    compiled = call(sys.executable, "-c", COUNTING, *words, cwd=tmp_path, NUMBA_CACHE_DIR=tmp_path / "cache", **paths)
     assert b"camcomp" in out.read_bytes()
+    assert compiled.split()[-1] == "0", "the wheel brings compiled code along"
 
 
 @pytest.mark.campaign

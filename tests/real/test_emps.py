@@ -2,9 +2,11 @@
 
 import json
 import os
+import re
 from pathlib import Path
 
 import pytest
+import yaml
 
 from tests.commandline import camcomp, table
 
@@ -20,8 +22,14 @@ def result(tmp_path_factory):
     log = table(folder / "x" / "DATA_EMPS.csv")
     assert len(log["t_s"]) == 24841
     assert list(log) == ["t_s", "cmd_x_mm", "act_x_mm", "act_x_N"]
-    done = camcomp("diagnose", folder / "x" / "experiment.yaml", "--json", folder / "o.json")
+    done = camcomp(
+        "diagnose", folder / "x" / "experiment.yaml", "--json", folder / "o.json", "--library", folder / "learned",
+        "--write-config", folder / "better.yaml",
+    )  # fmt: skip
     assert done.returncode == 0, done.stderr.decode()
+    assert list((folder / "learned").glob("law_*.json"))
+    (entry,) = [e for e in yaml.safe_load((folder / "better.yaml").read_text())["effects"] if e["effect"] == "formula"]
+    assert (entry["stage"], entry["target"]) == ("control", "x")
     return json.loads((folder / "o.json").read_text())
 
 
@@ -59,6 +67,17 @@ def test_ripple_of_the_screw_is_located_in_the_drive_force(result):
     assert line["period_mm"] == pytest.approx(2.50, rel=0.004)
     assert 0.8 < line["forward_N"] < 1.4 and 0.8 < line["backward_N"] < 1.4
     assert result["verdict"] == "unknown"
+
+
+def test_the_ripple_is_a_law_that_shrinks_withheld_stretches(result):
+    law = cause(result, "unknown")["law"]
+    periods = {float(each) for each in re.findall(r"act_mm/([\d.]+)", law["formula"])}
+    assert all(each == pytest.approx(2.50, rel=0.004) for each in periods)
+    force = [each["value"] for each in law["terms"] if each["term"].startswith("force x") and each["unit"] == "N"]
+    ways = [each["term"] for each in law["terms"]]
+    assert len(force) == 4 and "max(way" in ways[0] and "max(-way" in ways[2]
+    assert all(0.8 < (a * a + b * b) ** 0.5 < 1.4 for a, b in (force[:2], force[2:]))
+    assert law["after_rms_um"] < 0.95 * law["before_rms_um"]
 
 
 def test_presliding_is_no_step(result):

@@ -140,6 +140,8 @@ def test_bands_and_trust_are_drawn(tmp_path):
     drawn = np.array(upper["y"], float)
     assert np.nanmax(drawn) == pytest.approx(np.nanmax(columns["band_um"]), rel=0.01)
     area = figures["band"]["traces"][0]
+    for name in ("band", "error"):
+        assert any(each["name"].startswith("corrected, as the control drives it") for each in figures[name]["traces"])
     assert area["fill"] == "toself" and max(y for y in area["y"] if y is not None) == pytest.approx(np.nanmax(drawn))
     kinds = {each["name"] for each in figures["trust"]["traces"]}
     assert "trusted" in kinds and kinds <= {"trusted", "doubtful", "shrunk", "left alone"}

@@ -52,8 +52,16 @@ def _pull(s: State, axis: int) -> np.ndarray:
     return s.force[:, (axis + 1) % 2] / 200.0
 
 
+def _tangle(s: State, axis: int) -> np.ndarray:
+    """What no form of the search can express."""
+    x, y = s.commanded[:, 0], s.commanded[:, 1]
+    return np.sin((x + 0.6 * y) / 6.0) * np.tanh((y - 0.4 * x) / 8.0)
+
+
 # name -> what it adds to the tip along an axis (n,), of size 1
-OWN: dict[str, Callable[[State, int], np.ndarray]] = {"bow": _bow, "shear": _shear, "parity": _parity, "pull": _pull}
+OWN: dict[str, Callable[[State, int], np.ndarray]] = {
+    "bow": _bow, "shear": _shear, "parity": _parity, "pull": _pull, "tangle": _tangle,
+}  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -47,14 +47,15 @@ class BandTotals:
         if share is not None:
             self.alone += int((share <= LITTLE).sum())
             self.shrunk += int(((share > LITTLE) & (share < 1.0 - LITTLE)).sum())
-        known = np.isfinite(error).all(axis=1)
-        error, moves = error[known], moves.take(np.flatnonzero(known))
+        if not (known := np.isfinite(error).all(axis=1)).all():
+            error, moves = error[known], moves.take(np.flatnonzero(known))
         if not len(error):
             return
         self._count += len(error)
         mean = error + moves.mean
-        self._square += float((mean**2).sum() + np.trace(moves.covariance, axis1=1, axis2=2).sum())
-        self._by_input += moves.squares.sum(axis=0)
+        squares = moves.squares
+        self._square += float((mean**2).sum() + squares.sum())
+        self._by_input += squares
         some = np.unique(np.linspace(0, len(error) - 1, min(len(error), POINTS)).astype(int))
         self._kept.append((error[some], moves.take(some)))
         self._weight.append(len(error))

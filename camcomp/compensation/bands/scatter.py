@@ -44,9 +44,9 @@ class TipMoves:
 
     @property
     def squares(self) -> Floats:
-        """What every input adds to the mean square of the error (n, k) mm^2."""
-        out: Floats = (self.slope**2 + 0.5 * self.bend**2).sum(axis=1)
-        return out
+        """What every input adds to the sum of squares of the errors, in the mean of machines (k,) mm^2."""
+        slope, bend = (np.einsum("nik,nik->k", each, each) for each in (self.slope, self.bend))
+        return np.asarray(slope + 0.5 * bend)
 
     def drawn(self, z: Floats) -> Floats:
         """Moves (n, 3, d) of d machines, z (k, d)."""
@@ -91,6 +91,11 @@ def gained(before: Floats, after: Floats, moves: TipMoves, level: float = LEVEL)
     sizes = np.sqrt((x**2).sum(axis=1) + across) + np.sqrt(((x - off) ** 2).sum(axis=1) + across)
     less = 2.0 * np.einsum("ni,ni->n", x, off) - (off**2).sum(axis=1)
     return np.asarray(less / np.maximum(sizes, 1e-300))
+
+
+def excess(before: Floats, moves: TipMoves) -> Floats:
+    """By how much (n,) mm the band of a correction that leaves nothing of errors before (n, 3) mm exceeds its gain."""
+    return size_below(moves.mean, moves.covariance) - gained(before, np.zeros_like(before), moves)
 
 
 def best_share(before: Floats, after: Floats, moves: TipMoves) -> Floats:

@@ -27,6 +27,8 @@ ACCURATE = 0.01  # of the root mean square of the moves, at the test points
 ENDURED = 0.05  # at the highest degree; worse: every point is solved
 MOST_LEVERAGE = 1.5  # of a point that is interpolated; the points of the fit have 1 at most
 LONE = 0.02  # of the points may be solved by themselves before the fit is made anew
+FEW = 0.005  # of the points may be left to that by a new fit
+EXTENSIONS, EXTENSION = 6, 40  # times that a fit learns so many more points where it says nothing
 PUSH_N = 1.0  # to find the compliance, beside a hundredth of the largest force
 
 
@@ -38,6 +40,7 @@ class TipField:
         self._moves = 6 * len(self.inputs)  # columns of slopes and bends
         self._on_force = any(each.moves_force for each in self.inputs)
         self._fit: _Fit | None = None
+        self._known, self._values = np.zeros((0, 6)), np.zeros((0, 0))  # what fits rest on
         self.solved = 0
 
     def at(self, commanded: Floats, force: Floats) -> tuple[TipMoves, Floats]:
@@ -71,25 +74,39 @@ class TipField:
         return values
 
     def _fitted(self, points: Floats) -> _Fit | None:
-        """Polynomials through exact solutions at some of the points, the extreme ones among them."""
+        """Polynomials through exact solutions at some of the points, the extreme ones among them, and at those of earlier fits."""
         random = np.random.default_rng(0)
-        order = np.concatenate((points.argmin(axis=0), points.argmax(axis=0), random.permutation(len(points))))
-        _, first = np.unique(order, return_index=True)
-        order = order[np.sort(first)]
-        values = np.zeros((0, 0))
+        order = random.permutation(len(points))
+        tests, order = points[order[:TESTS]], order[TESTS:]
+        judged = self._exact(tests)
+        self._learn(points[np.unique(np.concatenate((points.argmin(axis=0), points.argmax(axis=0))))])
         for degree in DEGREES:
-            count = _samples(degree)
-            if count >= len(points):
+            wanted = _samples(degree) - TESTS - len(self._known)
+            if wanted > len(order):
                 return None
-            more = self._exact(points[order[len(values) : count]])
-            values = np.concatenate((values, more)) if len(values) else more
-            rows = order[:count]
-            used, tests = rows[:-TESTS], rows[-TESTS:]
-            fit = _Fit.of(points[used], values[:-TESTS], degree, points)
-            missed = fit.misses(points[tests], values[-TESTS:], self._moves)
-            if missed <= (ACCURATE if degree < DEGREES[-1] else ENDURED):
+            self._learn(points[order[: max(wanted, 0)]])
+            order = order[max(wanted, 0) :]
+            fit = self._supporting(points, degree, random)
+            if fit.misses(tests, judged, self._moves) <= (ACCURATE if degree < DEGREES[-1] else ENDURED):
                 return fit
         return None
+
+    def _supporting(self, points: Floats, degree: int, random: np.random.Generator) -> _Fit:
+        """A fit of what is known, after learning more where it says nothing of the points."""
+        for left in range(EXTENSIONS, -1, -1):
+            fit = _Fit.of(self._known, self._values, degree, np.concatenate((self._known, points)))
+            lone = np.flatnonzero(~fit.supports(fit.terms(points)))
+            if not left or len(lone) <= FEW * len(points):
+                break
+            self._learn(points[random.choice(lone, min(len(lone), EXTENSION), replace=False)])
+        return fit
+
+    def _learn(self, points: Floats) -> None:
+        if not len(points):
+            return
+        values = self._exact(points)
+        self._values = np.concatenate((self._values, values)) if len(self._known) else values
+        self._known = np.concatenate((self._known, points))
 
     def _exact(self, points: Floats) -> Floats:
         """Slopes, bends and, where forces are uncertain, compliances (n, 6 k + 9), solved one by one."""

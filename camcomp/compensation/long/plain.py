@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from camcomp.compensation.bands.outcome import Bands, BandTotals
-from camcomp.compensation.bands.scatter import best_share
+from camcomp.compensation.bands.scatter import best_share, excess
 from camcomp.compensation.long.fastwrite import ROOM, write_rows
 from camcomp.compensation.long.field import Field, Tiles
 from camcomp.compensation.long.kernel import BASIC, follow, look_up
@@ -225,11 +225,20 @@ class PlainCorrector:
     def _left_lines(self, run: PlainRun, loads: Loads, uncertainty: RunUncertainty) -> Loads:
         """The loads, with jumps where lines that are left alone meet others; which lines those are is kept for `_commanded`."""
         n, plain = run.motions, run.plain
-        moves, w = np.tile(np.arange(n), 2), np.repeat([0.0, 1.0], n)
-        target, force = np.concatenate((plain.start, plain.end)), np.concatenate((loads.first, loads.last))
+        fresh = loads.jump[:-1].copy()  # the other lines begin as the line before ends
+        fresh[0] = True
+        fresh[1:] |= (plain.start[1:] != plain.end[:-1]).any(axis=1)
+        at = np.flatnonzero(fresh)
+        moves, w = np.concatenate((at, np.arange(n))), np.repeat([0.0, 1.0], (len(at), n))
+        order = np.lexsort((w, moves))
+        moves, w = moves[order], w[order]
+        ends = w == 1.0
+        target = np.where(ends[:, None], plain.end[moves], plain.start[moves])
+        force = np.where(ends[:, None], loads.last[moves], loads.first[moves])
         answer = self.ask(moves, target, force, every=False)[0]
-        there = uncertainty.moves(target + self._back(answer[:, :3]), moves, w, force, np.zeros(2 * n, np.bool_))
-        self._alone = left_alone(np.tile(loads.of, 2), self._back(answer[:, 3:6]), there)[:n]
+        there = uncertainty.moves(target + self._back(answer[:, :3]), moves, w, force, np.zeros(len(moves), np.bool_))
+        found, behind = excess(self._back(answer[:, 3:6]), there), np.flatnonzero(ends)
+        self._alone = left_alone(np.tile(loads.of, 2), np.concatenate((found[behind - 1], found[behind])))[:n]
         step = np.concatenate(([True], self._alone[1:] != self._alone[:-1], [True]))
         return replace(loads, jump=loads.jump | step)
 

@@ -19,7 +19,7 @@ from camcomp.compensation.long.loads import Edge
 from camcomp.compensation.long.met import Met, path_of_run
 from camcomp.compensation.long.plain import Carry, PlainCorrector, Unsolved
 from camcomp.compensation.long.plain_run import NotInPieces, PlainRun
-from camcomp.compensation.long.runs import OddRun, Runs
+from camcomp.compensation.long.runs import RUN, OddRun, Runs
 from camcomp.compensation.long.totals import Batch, Totals
 from camcomp.compensation.program.compensate import compensate
 from camcomp.compensation.program.moves import MOST_ERRORS, RULE_OF_STATUS
@@ -70,13 +70,14 @@ class Bulk:
         self._carry = Carry(np.array(self.setup.start_mm, float), np.array(self.setup.start_mm, float))
         self._told: Future[None] = Future()
         self._told.set_result(None)
-        self.totals = Totals(self.job, digest.hexdigest(), size, self.tolerance_um)
+        self.totals = Totals(self.job, digest.hexdigest(), size, self.tolerance_um, self.on_rows is not None)
         self._lines = max(lines, 1)
         self._stock = _stock_of(self.job, source, self.name, self.setup)
         top = self.job.conditions.stock_top_mm if self.job.conditions.model and self._stock is None else None
         self._runs = Runs(
-            source, self.name, self.setup, self.job.config.control.dialect, np.nan if top is None else top
-        )
+            source, self.name, self.setup, self.job.config.control.dialect, np.nan if top is None else top,
+            RUN if self._stock is None else RUN // 4,  # every motion has many arcs then
+        )  # fmt: skip
         self._corrector = PlainCorrector(self.job, self.tolerance_um, self._runs.language, self._runs.feed_point)
         self._stamp: str | None = stamp_text(digest.hexdigest(), self.version, self.job.fingerprint)
         with ThreadPoolExecutor(1) as self._beside:
@@ -84,6 +85,7 @@ class Bulk:
                 self.totals.lines_out += data.count(b"\n")
                 sink(data)
             self._told.result()
+        self.totals.waiting_s = self._runs.waiting_s(self.job.config)
         self.totals.finish(self._corrector, self._runs.warnings)
         if self._stock is not None:
             self.totals.warnings += self._stock.finish()

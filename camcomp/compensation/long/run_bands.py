@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from camcomp.compensation.bands.scatter import TipMoves
+from camcomp.compensation.bands.stations import Stations
 from camcomp.compensation.bands.tip_field import TipField, of_sides, tip_field_of
 from camcomp.compensation.long.loads import Edge, Loads, constant_of, loads_of
 from camcomp.compensation.long.met import Met
@@ -44,16 +45,18 @@ class RunUncertainty:
     def moves(self, commanded: Floats, move: Ints, w: Floats, force: Floats, free: Bools) -> TipMoves:
         """Moves of the loaded tip at points (n,) of moves, with commanded tips (n, 3) mm and forces (n, 3) N, program frame.
 
-        free (n,): points that carry no cutting force.
+        free (n,): points that carry no cutting force. Asked at stations.
         """
-        moves, compliance = self.field.at(commanded, self.job.frame.vectors(force))
-        for j, (each, loads) in enumerate(zip(self.inputs, self.loads, strict=True)):
-            if not loads:
+        changes = [[load.at(move, w) - force for load in loads] for loads in self.loads]
+        for change in (each for sides in changes for each in sides):
+            change[free] = 0.0
+        stations = Stations.along(commanded, [force, *(each for sides in changes for each in sides)])
+        at = stations.rows
+        moves, compliance = self.field.at(commanded[at], self.job.frame.vectors(force[at]))
+        for j, (each, sides) in enumerate(zip(self.inputs, changes, strict=True)):
+            if not sides:
                 continue
-            changes = [each_load.at(move, w) - force for each_load in loads]
-            for change in changes:
-                change[free] = 0.0
-            slope, bend = of_sides(each, np.zeros_like(force), changes)
+            slope, bend = of_sides(each, np.zeros_like(force[at]), [change[at] for change in sides])
             moves.slope[:, :, j] += np.einsum("nij,nj->ni", compliance, self.job.frame.vectors(slope))
             moves.bend[:, :, j] += np.einsum("nij,nj->ni", compliance, self.job.frame.vectors(bend))
-        return moves
+        return TipMoves(stations.spread(moves.slope), stations.spread(moves.bend))

@@ -23,6 +23,8 @@ from camcomp.gcode.state import ControlState
 from camcomp.gcode.text import Text
 from camcomp.gcode.words import points_in_feeds
 from camcomp.ground.errors import Location, ProgramError
+from camcomp.model.config.spec import Config
+from camcomp.model.control import waiting_s
 
 CHUNK_BYTES = 1 << 22  # bytes read at once
 RUN = 1 << 16  # motions of a plain run at most
@@ -59,6 +61,7 @@ class Runs:
     setup: Setup
     dialect: str | None
     top_mm: float = np.nan  # of the stock: where cutting begins
+    most: int = RUN  # motions of a plain run
     warnings: list[str] = field(default_factory=list)
     motions: int = 0
 
@@ -85,7 +88,7 @@ class Runs:
         ended = False
         while not ended:
             row, before = self._row, None if odd.lines else self._state
-            found = self._plain(PROBE_MOTIONS if odd.lines else RUN)
+            found = self._plain(PROBE_MOTIONS if odd.lines else min(RUN, self.most))
             if found is not None:
                 if odd.lines and found.motions < PROBE_MOTIONS:
                     odd.add(found.data[found.text_at : found.text_end].tobytes(), found.motions)
@@ -106,6 +109,10 @@ class Runs:
         if not self.motions:
             raise ProgramError("CC100", "the program moves nothing", at=Location(self.name, 1, 1))
         yield from self._rest()
+
+    def waiting_s(self, config: Config) -> float:
+        """Time of what was read so far beside its moves."""
+        return waiting_s(config, self._state.dwelt_s, self._state.tool_changes)
 
     # --- bytes ---------------------------------------------------------------------------------------------------
 

@@ -63,9 +63,9 @@ class _Errors:
 class Totals:
     """Everything that the summary of a run says."""
 
-    def __init__(self, job: Job, digest: str, size: int, tolerance_um: float) -> None:
-        """Digest and size are those of the program; they decide which points are checked."""
-        self.job = job
+    def __init__(self, job: Job, digest: str, size: int, tolerance_um: float, tabled: bool = True) -> None:
+        """Digest and size are those of the program; they decide which points are checked. tabled: rows are asked for."""
+        self.job, self._tabled = job, tabled
         self.before, self.after, self.missed = _Errors(), _Errors(), _Errors()
         self.points = self.motions = self.lines_out = self.joins = self.iterations = 0
         self.change = self.force = np.zeros(len(job.machine.actuators))
@@ -81,6 +81,7 @@ class Totals:
         limits = limits_of(job.config)
         self._control = ControlAccount(limits, 1e-3 * tolerance_um), ControlAccount(limits, 1e-3 * tolerance_um)
         self.modes: dict[PathMode, None] = {}  # in which it cuts
+        self.waiting_s = 0.0  # beside its moves
         self.resting = 0  # end points at which the control rests because of joining lines
         self._still: list[int] = []  # source lines that cut while the spindle stands, the first ones
 
@@ -181,10 +182,12 @@ class Totals:
         return np.column_stack(parts) if parts else None
 
     def _known(self, bands: Bands | None, own: Bools | slice = slice(None)) -> Floats | None:
-        """Adds up what is expected of a piece; the columns of its own rows."""
+        """Adds up what is expected of a piece; the columns of its own rows, where they are asked for."""
         if bands is None:
             return None
         self.bands = bands.totals if self.bands is None else self.bands.join(bands.totals)
+        if not self._tabled:
+            return None
         return bands.columns(with_share=self.job.config.compensation.policy != "full")[own]
 
     def _common(
@@ -272,7 +275,7 @@ class Totals:
                 "method": "newton",
                 "platform_tilt_max_mrad": 1e3 * self.tilt,
                 "joining_lines": self.joins,
-                "cycle_time_s": CycleTime(before=before.seconds, after=after.seconds),
+                "cycle_time_s": CycleTime(before=before.seconds + self.waiting_s, after=after.seconds + self.waiting_s),
                 "control_mode": mode_name(tuple(self.modes)),
                 "control_mode_stated": all(each.stated for each in self.modes),
                 "under_control": ErrorSize(

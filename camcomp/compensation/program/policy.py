@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from camcomp.compensation.bands.scatter import TipMoves, best_share, gained, size_below
+from camcomp.compensation.bands.scatter import best_share, excess
 from camcomp.compensation.program.chords import trial_nodes
 from camcomp.compensation.program.moves import corrected_pieces, travel_of
 from camcomp.compensation.program.uncertainty import Uncertainty, same_place
@@ -95,7 +95,7 @@ def shares_of(job: Job, track: Track) -> Shares | None:
     if policy == "shrink":
         value = best_share(error, np.zeros_like(error), moves)
     else:
-        value = np.where(left_alone(track.motion[piece], error, moves), 0.0, 1.0)
+        value = np.where(left_alone(track.motion[piece], excess(error, moves)), 0.0, 1.0)
     from scipy.interpolate import (
         PchipInterpolator,  # a quarter of a second that programs without a policy need not spend
     )
@@ -106,10 +106,8 @@ def shares_of(job: Job, track: Track) -> Shares | None:
     return Shares(track, PchipInterpolator(2.0 * piece + w, value), (track.motion[piece] + track.u(piece, w))[bent])
 
 
-def left_alone(line: Ints, before: Floats, moves: TipMoves) -> Bools:
-    """Points (n,) of lines on which, in the mean of their points, the band of the corrected program exceeds its gain."""
-    zero = np.zeros_like(before)
-    excess = (size_below(moves.mean, moves.covariance) - gained(before, zero, moves)).astype(np.float64)
+def left_alone(line: Ints, over: Floats) -> Bools:
+    """Points (n,) of lines on which, in the mean of their points, the band exceeds the gain; over (n,): by how much."""
     _, number = np.unique(line, return_inverse=True)
-    out: Bools = (np.bincount(number, excess) > 0.0)[number]
+    out: Bools = (np.bincount(number, over) > 0.0)[number]
     return out

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
+import numpy as np
 from pydantic import ConfigDict, Field
 
+from camcomp.ground.datatypes import Floats
 from camcomp.ground.result import Result, Size
 
 
@@ -16,8 +18,20 @@ class ErrorSize(Result):
     max_um: Size
 
 
+def error_size(error: Floats) -> ErrorSize:
+    """Size of errors (k, 3) mm; those that are not known do not count."""
+    size = np.linalg.norm(error, axis=1)
+    size = 1e3 * size[np.isfinite(size)]
+    if not len(size):
+        return ErrorSize(rms_um=0.0, max_um=0.0)
+    return ErrorSize(rms_um=float(np.sqrt(np.mean(size**2))), max_um=float(size.max()))
+
+
 class CycleTime(Result):
-    """Time that the control takes for all moves of a program, as it is modelled; pauses and tool changes not counted."""
+    """Time that the control takes for a program: its moves as they are modelled, G4, and M6 by control.tool_change_s.
+
+    Spindle, coolant and stops (M0, M1) take none.
+    """
 
     before: float
     after: float
@@ -133,6 +147,18 @@ class Verification(Result):
     residual: ErrorSize
     points: Annotated[int, Field(description="looked at along the feed moves")]
     joining_lines: int
+    cycle_time_s: CycleTime
+    control_mode: Annotated[
+        str, Field(description="path modes in which the program cuts: G61, G61.1, G64 with P and Q in mm")
+    ]
+    control_mode_stated: Annotated[bool, Field(description="by the program or the machine file; else it is assumed")]
+    under_control: Annotated[
+        ErrorSize,
+        Field(
+            description="like residual, with what the control's merging and rounding adds, beside joining lines, too, and without "
+            "what a policy leaves on purpose"
+        ),
+    ]
     warnings: list[str]
     taken: Annotated[TakenCorrection | None, Field(description="with a policy other than full")] = None
     expected: Annotated[ExpectedError | None, Field(description="with uncertain numbers in the config")] = None

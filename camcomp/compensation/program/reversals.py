@@ -13,14 +13,20 @@ import numpy as np
 
 from camcomp.compensation.program.chords import trial_nodes
 from camcomp.compensation.program.moves import corrected_pieces, travel_of
+from camcomp.compensation.program.taken_up import Cuts, cut_at, taken_up
 from camcomp.ground.datatypes import RAPID, Bools, Floats, Ints
 from camcomp.model.cutting.track import Track
 from camcomp.model.hysteresis import turning_points
 from camcomp.model.job import Job
-from camcomp.model.motion.response import LEAST_MM, plays, way_per_unit, winds_up, without_drives
+from camcomp.model.motion.response import LEAST_MM, WORDS, plays, way_per_unit, winds_up, without_drives
 
 STANDING_MM = 2e-4  # way that the carriage should have gone at the end of such a line
-WINDING_MM = (2e-3, 6e-3, 0.015, 0.04)  # ways over which friction turns round, where the correction bends most
+WINDING_MM = (
+    2e-3,
+    6e-3,
+    0.015,
+    0.04,
+)  # ways over which friction turns round, where the correction bends most; on arms all
 
 
 def cut_at_reversals(job: Job, track: Track, spacing: float) -> tuple[Track, Bools]:
@@ -43,20 +49,25 @@ def cut_at_reversals(job: Job, track: Track, spacing: float) -> tuple[Track, Boo
     memory, friction = plays(job, carriage, travel), winds_up(job, carriage, travel)
     carriage = carriage * way_per_unit(job)
     lines: set[tuple[int, float, float]] = set()
-    cuts: set[tuple[int, float]] = set()
+    cuts: Cuts = set()
+    arm = carriage.shape[1] > WORDS
     for j in np.flatnonzero(memory):
         for k in turning_points(carriage[:, j], LEAST_MM)[0]:
             k += int(k + 1 < len(w) and piece[k + 1] != piece[k])  # it turns round where the next piece starts
             if not feed[piece[k]] or k + 1 == len(w) or piece[k + 1] != piece[k]:
                 continue
-            begin, *ends = _fractions(piece, w, carriage[:, j], k, (STANDING_MM, *(WINDING_MM if friction[j] else ())))
+            begin, *ends = _fractions(
+                piece, w, carriage[:, j], k, (STANDING_MM, *(WINDING_MM if friction[j] or arm else ()))
+            )
             if not _short(track, int(piece[k]), begin, ends[0]):
                 continue  # a line that is not divided cannot stand for it
             lines.add((int(piece[k]), begin, ends[0]))
             cuts.update((int(piece[k]), at) for at in (begin, *ends) if 0.0 < at < 1.0)
     if not cuts:
         return track, none
-    divided = track.cut(np.array([i for i, _ in sorted(cuts)]), np.array([at for _, at in sorted(cuts)]))
+    if arm:
+        cuts |= taken_up(job, track, cuts, np.flatnonzero(memory), spacing)
+    divided = cut_at(track, cuts)
     middle = 0.5 * (divided.u0 + divided.u1)
     out = np.zeros(len(middle), np.bool_)
     for i, a, b in lines:

@@ -8,16 +8,17 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from camcomp.compensation.program import arcs_out
+from camcomp.compensation.program.result import CycleTime, error_size
 from camcomp.gcode.output import Rewritten
 from camcomp.gcode.path_mode import PathMode
 from camcomp.gcode.program import Program
 from camcomp.ground.datatypes import ARC, RAPID, Bools, Floats, Ints, Path
-from camcomp.model.control import limits_of
+from camcomp.model.control import limits_of, waiting_s
 from camcomp.model.job import Job
 from camcomp.model.trajectory.moves import ToolMoves, mode_columns, moves_of
 from camcomp.model.trajectory.plan import plan_of
@@ -202,6 +203,31 @@ def written_moves(
         np.where(arc & ~np.isfinite(centre[:, 0]), 1, rows.kind).astype(np.int64), start, end, centre, axis, angle, told,
         exact[motion], (stop | path.machine)[motion], tolerance[motion], merged[motion],
     )  # fmt: skip
+
+
+def of_text(original: Program, corrected: Program, job: Job, move: Ints, told: Floats, error: Floats) -> dict[str, Any]:
+    """The figures of a verification that the control adds.
+
+    error (k, 3) mm: what the text of the corrected program leaves at points told (k, 3) mm on its moves (k,).
+    """
+    config, limits = job.config, limits_of(job.config)
+    default = config.process.feed_mm_per_min or np.nan
+    plans = [
+        plan_of(moves_of(each.path, each.modes, np.where(np.isnan(each.path.feed), default, each.path.feed)), limits)
+        for each in (original, corrected)
+    ]
+    before, after = (
+        plan.duration_s + waiting_s(config, each.dwelt_s, each.tool_changes)
+        for plan, each in zip(plans, (original, corrected), strict=True)
+    )
+    path = original.path
+    modes = distinct(original.modes[k] for k in np.flatnonzero((path.kind != RAPID) & ~path.machine))
+    return {
+        "cycle_time_s": CycleTime(before=before, after=after),
+        "control_mode": mode_name(modes),
+        "control_mode_stated": all(each.stated for each in modes),
+        "under_control": error_size(error + plans[1].leaves_by(move, told)),
+    }
 
 
 def mode_name(modes: tuple[PathMode, ...]) -> str:

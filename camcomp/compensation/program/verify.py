@@ -8,6 +8,7 @@ not counted.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -24,6 +25,7 @@ from camcomp.compensation.program.moves import (
 from camcomp.compensation.program.policy import Shares, shares_of
 from camcomp.compensation.program.result import ErrorSize, LineResult, Verification
 from camcomp.compensation.program.uncertainty import Uncertainty
+from camcomp.compensation.program.under_control import of_text
 from camcomp.gcode.program import Program
 from camcomp.gcode.stamp import is_stamped, stamped_model
 from camcomp.ground import path_geometry
@@ -50,6 +52,7 @@ class Verified:
     residual: Floats
     lines: list[LineResult]
     joining: int
+    control: dict[str, Any]  # figures of what the control makes of it
     warnings: list[str] = field(default_factory=list)
     missed: Floats | None = None  # (k,) mm beside what a policy leaves on purpose; None: it leaves nothing
     totals: BandTotals | None = None  # None: every number of the config is exact
@@ -67,6 +70,7 @@ class Verified:
             residual=residual,
             points=len(size),
             joining_lines=self.joining,
+            **self.control,
             warnings=self.warnings,
             **({} if self.totals is None else band_figures(self.totals, self.policy)),
             lines=tuple(self.lines),
@@ -103,6 +107,7 @@ def verify(corrected: Program, original: Program, job: Job) -> Verified:
     # Rapids and starts are only there because drives remember them.
     judged = (f > 0.0) & (original.path.kind[track.motion[piece]] != RAPID)
     end = judged & (f == 1.0)
+    control = _under_control(original, corrected, job, track, piece, move, commanded, w, judged, shares)
     missed, totals = None, None
     if shares is not None:
         residual, missed = _beside(job, track, piece, commanded, w, shares)
@@ -112,7 +117,19 @@ def verify(corrected: Program, original: Program, job: Job) -> Verified:
     piece, residual, w, vertex = piece[judged], residual[judged], w[judged], f[judged] == 1.0
     convergence = _convergence(job, track, piece[vertex], w[vertex])
     lines = _per_line(original, job, track, piece, vertex, residual, convergence, missed)
-    return Verified(residual, lines, joins, warnings, missed, totals, job.config.compensation.policy)
+    return Verified(residual, lines, joins, control, warnings, missed, totals, job.config.compensation.policy)
+
+
+def _under_control(
+    original: Program, corrected: Program, job: Job, track: Track, piece: Ints, move: Ints, commanded: Floats, w: Floats,
+    judged: Bools, shares: Shares | None,
+) -> dict[str, Any]:  # fmt: skip
+    """What the control adds to the error at the points (k,) that are judged, without what a policy leaves on purpose."""
+    travel = travel_of(job, track, piece, w)
+    error = respond(job, commanded, travel)[0] - track.points(piece, w)
+    if shares is not None:
+        error = error - shares.left(job, track, piece, w, travel)
+    return of_text(original, corrected, job, move[judged], commanded[judged], error[judged])
 
 
 def _beside(job: Job, track: Track, piece: Ints, commanded: Floats, w: Floats, shares: Shares) -> tuple[Floats, Floats]:

@@ -48,7 +48,7 @@ def kinds_of(bands: Bands) -> dict[str, Bools]:
 
 def _figure_band(drawn: DrawnPath, bands: Bands) -> Figure:
     band = bands.band_um()
-    index, gap = broken(thin(np.column_stack((drawn.after, np.nan_to_num(band)))), drawn.hidden)
+    index, gap = broken(thin(np.column_stack((drawn.after, drawn.driven, np.nan_to_num(band)))), drawn.hidden)
     s = gapped(drawn.s, index, gap, 4)
 
     def curve(values: Floats) -> list[float | None]:
@@ -56,6 +56,7 @@ def _figure_band(drawn: DrawnPath, bands: Bands) -> Figure:
 
     after = line("corrected, model exact", s, curve(drawn.after), 1)
     upper = line("corrected, 95 % of machines below", s, curve(band), 2)
+    driven = line(f"corrected, as the control drives it in {drawn.mode}", s, curve(drawn.driven), 3)
     between = _area(s, curve(drawn.after), curve(band))
     before = line("original program", s, curve(drawn.before), 0)
     at = drawn.worst(band)
@@ -64,9 +65,9 @@ def _figure_band(drawn: DrawnPath, bands: Bands) -> Figure:
         "band",
         "Band around the residual",
         f"Between what the corrected program leaves if every number of the machine file is right, and the error that 95 % of the "
-        f"machines that may be stay below: {words}. Logarithmic scale.",
+        f"machines that may be stay below: {words}. What the control merges and rounds is a curve of its own. Logarithmic scale.",
         f"Plot of the residual and its 95 % band along the path: {words}.",
-        [between, after, upper, before],
+        [between, after, driven, upper, before],
         {"xaxis": axis("path length in mm"), "yaxis": axis("error in µm", type="log", dtick=1, exponentformat="power")},
     )
 

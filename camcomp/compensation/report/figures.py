@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from camcomp.compensation.program.compensate import Compensated, Trajectories
+from camcomp.compensation.program.under_control import mode_name
 from camcomp.compensation.program.verify import Verified
 from camcomp.ground.datatypes import RAPID, Bools, Floats, Ints
 from camcomp.model.job import Job
@@ -29,6 +30,8 @@ class DrawnPath:
     drive: Floats  # (N, m) N or N m
     before: Floats  # (N,) um, the largest error on the move that ends there; 0 where none counts
     after: Floats  # (N,) um
+    driven: Floats  # (N,) um the same with what the control merges and rounds
+    mode: str  # of the control
 
     def worst(self, size: Floats) -> int:
         """Row where `size` (N,) is largest among what is drawn."""
@@ -39,9 +42,9 @@ def drawn_path_of(result: Compensated, job: Job) -> DrawnPath:
     """Everything that is drawn along the path."""
     rows = result.rows
 
-    def largest(error: Floats) -> Floats:
+    def largest(error: Floats, row: Ints) -> Floats:
         out = np.zeros(len(rows.w))
-        np.fmax.at(out, result.judged, 1e3 * np.linalg.norm(error, axis=1))
+        np.fmax.at(out, row, 1e3 * np.linalg.norm(error, axis=1))
         return out
 
     drive_scale = np.where(job.machine.revolute, 1e-3, 1.0)
@@ -53,8 +56,10 @@ def drawn_path_of(result: Compensated, job: Job) -> DrawnPath:
         shift=1e3 * (result.written.end - rows.target),
         change=1e3 * (result.state.rho - result.nominal),
         drive=result.state.drive * drive_scale,
-        before=largest(result.before),
-        after=largest(result.after),
+        before=largest(result.before, result.judged),
+        after=largest(result.after, result.judged),
+        driven=largest(result.control.error, result.control.row),
+        mode=mode_name(result.control.modes),
     )
 
 
@@ -104,17 +109,23 @@ def _planes(points: Floats) -> list[str]:
 
 def figure_error(drawn: DrawnPath, tolerance_um: float) -> Figure:
     """Tip error along the path, original and corrected program."""
-    index, gap = broken(thin(np.column_stack((drawn.before, drawn.after))), drawn.hidden)
+    index, gap = broken(thin(np.column_stack((drawn.before, drawn.after, drawn.driven))), drawn.hidden)
     s = gapped(drawn.s, index, gap, 4)
     floor = 1e-4  # um: below what the drawing can show on its logarithmic axis
     curves = []
-    for i, (name, size) in enumerate((("original program", drawn.before), ("corrected program", drawn.after))):
+    named = (
+        ("original program", drawn.before),
+        ("corrected program", drawn.after),
+        (f"corrected, as the control drives it in {drawn.mode}", drawn.driven),
+    )
+    for i, (name, size) in enumerate(named):
         curves.append(line(name, s, gapped(np.maximum(size, floor), index, gap, 6), i))
     curves.append(level("tolerance", [float(drawn.s[0]), float(drawn.s[-1])], tolerance_um))
-    a, b = drawn.worst(drawn.before), drawn.worst(drawn.after)
+    a, b, c = (drawn.worst(each) for each in (drawn.before, drawn.after, drawn.driven))
     words = (
         f"original program up to {brief(drawn.before[a])} µm (line {drawn.line[a]}), corrected program up to "
-        f"{brief(drawn.after[b])} µm (line {drawn.line[b]}), tolerance {tolerance_um:g} µm"
+        f"{brief(drawn.after[b])} µm (line {drawn.line[b]}), as the control drives it up to {brief(drawn.driven[c])} µm "
+        f"(line {drawn.line[c]}), tolerance {tolerance_um:g} µm"
     )
     return Figure(
         "error",

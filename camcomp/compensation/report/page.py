@@ -104,7 +104,7 @@ def _cards(
     cards += [
         (f"Under the control, {mode}", f"{brief(figures.under_control.max_um)} µm",
          f"rms {brief(figures.under_control.rms_um)} µm, with what it merges and rounds, beside joining lines, too"),
-        ("Cycle time", f"{brief(times.after)} s", f"before {brief(times.before)} s; pauses and tool changes not counted"),
+        ("Cycle time", f"{brief(times.after)} s", f"before {brief(times.before)} s; with pauses (G4)"),
     ]  # fmt: skip
     if expected := figures.expected:
         cards.append(("To be expected", f"{brief(expected.p95_um)} µm", "95 % of all points of machines that may be"))

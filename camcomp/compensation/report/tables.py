@@ -8,9 +8,10 @@ import numpy as np
 
 from camcomp.compensation.bands.outcome import Bands, band_figures
 from camcomp.compensation.program.compensate import Compensated, Trajectories
-from camcomp.compensation.program.result import CycleTime, ErrorSize, Summary
+from camcomp.compensation.program.result import CycleTime, Summary, error_size
 from camcomp.compensation.program.under_control import mode_name
 from camcomp.ground.datatypes import Floats
+from camcomp.model.control import waiting_s
 from camcomp.model.job import Job
 
 CHUNK_ROWS = 20_000
@@ -109,6 +110,7 @@ def summary(result: Compensated, job: Job) -> Summary:
     change = np.abs(result.state.rho - result.nominal)[result.rows.corrected]
     force = np.abs(result.state.drive)[result.rows.corrected]
     rotary = job.machine.revolute
+    waiting = waiting_s(job.config, result.program.dwelt_s, result.program.tool_changes)
     sizes = {
         "actuator_change_max_mm": _most(change[:, ~rotary]),
         "actuator_force_max_N": _most(force[:, ~rotary]),
@@ -123,17 +125,17 @@ def summary(result: Compensated, job: Job) -> Summary:
             "points": len(result.rows.piece),
             "segments_in": len(result.program.path),
             "lines_out": result.written.data.count(b"\n"),
-            "before": _size(result.before),
-            "after": _size(result.after),
+            "before": error_size(result.before),
+            "after": error_size(result.after),
             **sizes,
             "iterations_max": result.iterations,
             "method": result.method,
             "platform_tilt_max_mrad": 1e3 * _most(np.linalg.norm(result.state.tilt, axis=1)[result.rows.corrected]),
             "joining_lines": int(result.rows.joining.sum()),
-            "cycle_time_s": CycleTime(before=result.control.before_s, after=result.control.after_s),
+            "cycle_time_s": CycleTime(before=result.control.before_s + waiting, after=result.control.after_s + waiting),
             "control_mode": mode_name(result.control.modes),
             "control_mode_stated": result.control.stated,
-            "under_control": _size(result.control.error),
+            "under_control": error_size(result.control.error),
             **({} if result.bands is None else band_figures(result.bands.totals, job.config.compensation.policy)),
             "warnings": result.warnings,
         }
@@ -142,11 +144,3 @@ def summary(result: Compensated, job: Job) -> Summary:
 
 def _most(values: Floats) -> float:
     return float(np.nanmax(values)) if np.isfinite(values).any() else 0.0
-
-
-def _size(error: Floats) -> ErrorSize:
-    size = np.linalg.norm(error, axis=1)
-    size = 1e3 * size[np.isfinite(size)]
-    if not len(size):
-        return ErrorSize(rms_um=0.0, max_um=0.0)
-    return ErrorSize(rms_um=float(np.sqrt(np.mean(size**2))), max_um=float(size.max()))

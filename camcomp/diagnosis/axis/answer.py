@@ -37,7 +37,8 @@ def unknown(axis: AxisFindings, whole: int) -> UnknownCause:
             parts.append(max(1.0 - channel.floor**2 / max(left, 1e-300), 0.0))
         shares.append(max(parts, default=0.0) * left / first)
     probability = stated(probability_of_chance(axis.unknown_chance)) if axis.strange else EVEN
-    return UnknownCause(target=axis.name, probability=probability, share=round(min(sum(shares) / whole, 1.0), 6))
+    share = round(min(sum(shares) / whole, 1.0), 6)
+    return UnknownCause(target=axis.name, probability=probability, share=share, law=axis.law)
 
 
 def gap(channels: Sequence[AxisChannel]) -> GapSize:

@@ -11,7 +11,7 @@ from camcomp.diagnosis.axis.block_least_squares import Series
 from camcomp.diagnosis.axis.gate import AxisGate
 from camcomp.diagnosis.axis.noise_floor import LEAST_SPIKE_MM, spikes
 from camcomp.diagnosis.axis.terms import WIDE, AxisTravel, Ripple
-from camcomp.diagnosis.result.types import FoundCause
+from camcomp.diagnosis.result.types import FoundCause, Law
 from camcomp.ground.datatypes import Floats
 
 
@@ -85,6 +85,7 @@ class AxisFindings:
     unknown_in: list[tuple[str, float]] = field(default_factory=list)  # covariate kind, share
     unknown_chance: float = 0.0  # log10, the least of all that is unknown
     details: dict[str, Any] = field(default_factory=dict)
+    law: Law | None = None
 
     @property
     def channels(self) -> list[AxisChannel]:

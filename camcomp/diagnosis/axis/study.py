@@ -27,6 +27,7 @@ from camcomp.diagnosis.axis.block_least_squares import (
 )
 from camcomp.diagnosis.axis.findings import AxisChannel, AxisDeviation, AxisFindings, AxisRun
 from camcomp.diagnosis.axis.gate import MINOR, dependences, judge
+from camcomp.diagnosis.axis.law import LEAST_SHARE, axis_law
 from camcomp.diagnosis.axis.noise_floor import REPEATABILITY_MM, rows_floor
 from camcomp.diagnosis.axis.terms import (
     PRESLIDING_GRID_MM,
@@ -52,7 +53,6 @@ from camcomp.diagnosis.statistics.probability import probability_of_chance, stat
 from camcomp.ground.datatypes import Floats
 
 LEAST_Z = 4.0  # mean gain over its standard error
-LEAST_SHARE = 0.03  # of the rms of withheld blocks
 LEAST_RIPPLE = 0.02  # share of the leftover's energy
 ROWS = 50  # below which a run says nothing
 WHOLE_RUNS = 4  # from which on runs are withheld as wholes
@@ -143,6 +143,10 @@ def _axis(name: str, runs: list[AxisRun], holdout: set[str], without: set[str], 
     if train and all(np.isfinite(usable[k].force).all() for k in train):
         _force(found, usable, moves, train, test, without)
     _name_rest(found)
+    if found.strange:
+        asked = [usable[k] for k in found.following.runs] if found.following else []
+        told = [travel(r.time, r.setpoint, found.wide) for r in asked]
+        found.law = axis_law(name, found.force, found.following, told)
     return found
 
 

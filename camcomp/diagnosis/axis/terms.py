@@ -137,6 +137,11 @@ def ripple(at: list[AxisTravel], left: list[Floats], shortest: float = 0.5, long
 
 
 def _lines(x: Floats, y: Floats, weight: Floats, frequency: Floats) -> np.ndarray:
-    """Weighted Fourier sums (f,) of y (n,) at places x (n,)."""
+    """Weighted Fourier sums (f,) of y (n,) at places x (n,), frequencies evenly apart."""
     w = weight**2 / (weight**2).sum()
-    return np.array([(w * y * np.exp(-2j * np.pi * f * x)).sum() for f in frequency])
+    turn, further = np.exp(-2j * np.pi * frequency[0] * x), np.exp(-2j * np.pi * float(np.ptp(frequency[:2])) * x)
+    out = np.empty(len(frequency), complex)
+    for k in range(len(frequency)):
+        out[k] = turn @ (w * y)
+        turn = turn * further
+    return out

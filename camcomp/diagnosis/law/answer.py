@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,52 +12,77 @@ from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.law.bench_terms import TermBench, spots
 from camcomp.diagnosis.law.describe import law_result, moved_without, terms_of
 from camcomp.diagnosis.law.find import FoundLaw, find_law
-from camcomp.diagnosis.law.folds import Folds, parts_of
+from camcomp.diagnosis.law.folds import Folds, Split, usual_split
 from camcomp.diagnosis.law.smooth import FoundMap, find_map, map_values
 from camcomp.diagnosis.result.types import Law
-from camcomp.diagnosis.search.unknown import about
+from camcomp.diagnosis.search.unknown import about, firm_prior
 from camcomp.diagnosis.statistics.cause_sets import Fitted
 from camcomp.ground.datatypes import Floats
 
 GOOD_ENOUGH = 0.4  # of the floor, or of what was there: what a law may leave before a map is tried
-BETTER = 0.8  # of what a law leaves: what a map has to leave to be told instead
+BETTER = 0.8  # of what a law leaves: what another one or a map has to leave to be told instead
 LEAST_SHRINKAGE = 0.1  # of the gap on withheld parts, below which nothing was found
 
 
 @dataclass(frozen=True, eq=False)
 class LawAnswer:
-    """law: as in the result; gaps (n, 3) mm of the tip per run, without it; signal: what it does to the tip (n, 3) mm per run, fitted without what it is judged on; found:
-    its terms.
+    """law: as in the result; before: gaps (n, 3) mm of the tip per run that the causes alone leave; gaps: what they leave as they
+    stand beside the law; signal: what it does to the tip (n, 3) mm per run; all fitted without what they are judged on; found: its
+    terms; alone: it explains more without the causes, which had only followed it.
     """
 
     law: Law
+    before: tuple[Floats, ...]
     gaps: tuple[Floats, ...]
     signal: tuple[Floats, ...]
     found: FoundLaw | FoundMap
+    alone: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class _Tried:
+    """A law or map beside the causes of a fit, or None: beside nothing; gaps, signal as in LawAnswer; after: rms, um."""
+
+    f: Fitted | None
+    found: FoundLaw | FoundMap
+    gaps: list[Floats]
+    signal: list[Floats]
+    after: float
 
 
 def answer_law(problem: Problem, f: Fitted, kind: str) -> LawAnswer | None:
-    """The law or map that an unknown effect in a kind of channel follows; None where none holds on withheld parts."""
+    """The law or map that an unknown effect in a kind of channel follows; None where none holds on withheld parts.
+
+    Where a law beside the causes leaves much, causes and tolerances may have stretched to follow the unknown effect: then it is
+    sought without them. Where that leaves much too, a map is.
+    """
     if main_channels(problem).start != 0 or kind not in ("tip", "encoder"):
         return None
     bench = term_bench(problem)
-    gaps = _gaps(problem, f)
-    before = _rms(gaps)
-    floor = problem.floor.tip_um
-    folds, firm = _folds(problem, f, bench, kind)
-    found: FoundLaw | FoundMap | None = find_law(bench, folds, firm, kind)
-    signal = _signal(bench, found) if found is not None else []
-    after = _rms(gaps, signal) if found is not None else before
-    left, room = max(after**2 - floor**2, 0.0) ** 0.5, max(before**2 - floor**2, 0.0) ** 0.5
-    if left > GOOD_ENOUGH * floor and left > GOOD_ENOUGH * room and kind == "tip":
-        smooth = find_map(bench, firm, kind)
-        if smooth is not None:
-            other = _signal(bench, smooth)
-            if _rms(gaps, other) < BETTER * after:
-                found, signal, after = smooth, other, _rms(gaps, other)
-    if found is None or after > (1.0 - LEAST_SHRINKAGE) * before:
+    known, nothing = _gaps(problem, f), _gaps(problem, None)
+    floor, before = problem.floor.tip_um, _rms(known)
+    room = float(np.sqrt(max(before**2 - floor**2, 0.0)))
+
+    def much(best: _Tried | None) -> bool:
+        left = float(np.sqrt(max((before if best is None else best.after) ** 2 - floor**2, 0.0)))
+        return left > GOOD_ENOUGH * floor and left > GOOD_ENOUGH * room
+
+    best = _tried(problem, f, bench, find_law(bench, _base(problem, f, bench, kind), kind))
+    if much(best) and room > floor:  # what is small may be the usual small errors
+        other = _tried(problem, None, bench, find_law(bench, _base(problem, None, bench, kind), kind))
+        if other is not None and other.after < BETTER * (before if best is None else best.after):
+            best = other
+    if much(best) and kind == "tip":
+        split = usual_split(len(problem.bench.runs))
+        smooth = _tried(problem, f, bench, find_map(bench, _base(problem, f, bench, kind)(split, False), kind))
+        if smooth is not None and smooth.after < BETTER * (before if best is None else best.after):
+            best = smooth
+    if best is None or best.after > (1.0 - LEAST_SHRINKAGE) * before:
         return None
-    return LawAnswer(law_result(bench, found, before, after), tuple(gaps), tuple(signal), found)
+    alone = best.f is None
+    without = nothing if alone else known
+    law = law_result(bench, best.found, _rms(without), best.after)
+    return LawAnswer(law, tuple(without), tuple(best.gaps), tuple(best.signal), best.found, alone)
 
 
 def term_bench(problem: Problem) -> TermBench:
@@ -65,24 +90,43 @@ def term_bench(problem: Problem) -> TermBench:
     return TermBench(problem.bench, problem.noise, problem.inflate, problem.times)
 
 
-def _folds(problem: Problem, f: Fitted, bench: TermBench, kind: str) -> tuple[Folds, Folds]:
-    """What stands beside a law: everything of the problem, with a free constant at every spot of the tip, and without."""
-    white, residual = about(problem, f)
-    precision, members = problem.prior.precision(1.0), problem.member_columns(f.members)
-    precision[members] = 1.0 / (10.0 * problem.prior.scale[members]) ** 2
-    parts = parts_of([problem.row_places(k) for k in range(len(residual))])
+def _base(problem: Problem, f: Fitted | None, bench: TermBench, kind: str) -> Callable[[Split, bool], Folds]:
+    """What stands beside a law: causes and everything within its tolerance, or where f is None what has none; and where asked
+    a free constant at every spot of the tip.
+    """
+    if f is None:
+        white, residual, precision = problem.white, problem.white_residual, firm_prior(problem).precision(1.0)
+    else:
+        white, residual = about(problem, f)
+        precision, members = problem.prior.precision(1.0), problem.member_columns(f.members)
+        precision[members] = 1.0 / (10.0 * problem.prior.scale[members]) ** 2
+    places = [problem.row_places(k) for k in range(len(residual))]
     tips = [s for s in spots(len(problem.bench.actuators), kind) if s.on != "drive"]
     ones = [bench.white(s, [np.ones((r.rows, 1)) for r in bench.rows(s)]) for s in tips]
-    return Folds(white, residual, precision, parts, ones), Folds(white, residual, precision, parts, [])
+    return lambda split, free: Folds(white, residual, precision, places, split, ones if free else [])
 
 
-def _gaps(problem: Problem, f: Fitted) -> list[Floats]:
-    """Gap (n, 3) mm of the tip per run that the causes, fitted without it, leave."""
-    out = []
-    for k in range(len(problem.bench.runs)):
-        causes = problem.causes(f.members, problem.theta_without(f, k), f.extra)
-        out.append(problem.bench.gap(k, causes)[:, :3])
-    return out
+def _gaps(problem: Problem, f: Fitted | None) -> list[Floats]:
+    """Gaps (n, 3) mm of the tip per run that the causes, fitted without it, leave."""
+    if f is None:
+        return [problem.bench.gap(k)[:, :3] for k in range(len(problem.bench.runs))]
+    return [_gap(problem, f, k, problem.theta_without(f, k)) for k in range(len(problem.bench.runs))]
+
+
+def _gap(problem: Problem, f: Fitted, k: int, theta: Floats) -> Floats:
+    return problem.bench.gap(k, problem.causes(f.members, theta, f.extra))[:, :3]
+
+
+def _tried(problem: Problem, f: Fitted | None, bench: TermBench, found: FoundLaw | FoundMap | None) -> _Tried | None:
+    """What a law leaves where the causes have the values that they have beside it."""
+    if found is None:
+        return None
+    signal, gaps = _signal(bench, found), _gaps(problem, None)
+    if f is not None and f.members:
+        theta = found.folds.means(found.columns, found.precision)[:, problem.member_columns(f.members)]
+        whole = found.folds.split.parts == 1  # runs are withheld
+        gaps = [_gap(problem, f, k, theta[1 + k] if whole else theta[0]) for k in range(len(problem.bench.runs))]
+    return _Tried(f, found, gaps, signal, _rms(gaps, signal))
 
 
 def _signal(bench: TermBench, found: FoundLaw | FoundMap) -> list[Floats]:
@@ -91,6 +135,7 @@ def _signal(bench: TermBench, found: FoundLaw | FoundMap) -> list[Floats]:
 
 
 def _rms(gaps: Sequence[Floats], signal: Sequence[Floats] = ()) -> float:
+    """Of all rows, um."""
     left = [g - s for g, s in zip(gaps, signal, strict=True)] if signal else gaps
     each = np.concatenate([np.nansum(g**2, axis=1)[np.isfinite(g).any(axis=1)] for g in left])
     return 1e3 * float(np.sqrt(np.mean(each))) if len(each) else 0.0

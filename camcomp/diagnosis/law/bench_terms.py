@@ -10,8 +10,8 @@ import numpy as np
 
 from camcomp.diagnosis.fit.bench import Bench, thinned
 from camcomp.diagnosis.law.forms import Form
-from camcomp.diagnosis.law.rows import Rows, drive_rows, sizes, tip_rows
-from camcomp.diagnosis.law.sizes import Sizes
+from camcomp.diagnosis.law.rows import Rows, drive_rows, tip_rows
+from camcomp.diagnosis.law.sizes import Sizes, sizes
 from camcomp.diagnosis.law.white import White
 from camcomp.diagnosis.statistics.noise_model import Noise
 from camcomp.ground.datatypes import Floats, Ints

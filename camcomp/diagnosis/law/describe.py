@@ -13,17 +13,11 @@ from camcomp.diagnosis.law.bench_terms import Spot, TermBench
 from camcomp.diagnosis.law.find import FoundLaw
 from camcomp.diagnosis.law.forms import Form
 from camcomp.diagnosis.law.smooth import FoundMap
+from camcomp.diagnosis.law.words import law_sentence, law_sum, listed
 from camcomp.diagnosis.result.types import Law, LawPart, LawTerm, Stage
 from camcomp.ground.datatypes import Floats, Ints
 from camcomp.model.law.expression import parse
 
-WORDS = {
-    "line": "rises evenly with", "power": "follows a power of", "wave": "repeats over", "bump": "is a bump at one place of",
-    "sense": "turns round with the sense of", "drag": "is dragged behind", "reversal": "fades behind reversals of",
-    "rate": "goes with", "acceleration": "goes with", "product": "follows the product of", "force": "goes with",
-    "force squared": "goes with the square of", "force by place": "goes with", "step": "steps at one moment of",
-    "while": "acts for a while of", "settling": "settles with", "constant": "is a constant",
-}  # fmt: skip
 _AXES = "xyz"
 
 
@@ -33,17 +27,17 @@ def law_result(bench: TermBench, found: FoundLaw | FoundMap, before_um: float, a
     if isinstance(found, FoundMap):
         parts, terms, about = _map_parts(bench, found, actuators)
         first, kind = found.maps[0].spot, "map"
-        says = f"No short law fits; a smooth map over {_listed(about)} does."
+        says = f"No short law fits; a smooth map over {listed(about)} does."
         alike: tuple[str, ...] = ()
     else:
         parts, terms = _formula_parts(bench, found, actuators)
         first, kind = _strongest(bench, found), "formula"
-        says = _sentence(found)
+        says = law_sentence([t.form for t in found.terms])
         alike = tuple(
             dict.fromkeys(f"{_where(o.spot, actuators)}: {_said(o.form)}" for each in found.alike for o in each)
         )
         if alike:
-            says += f" These data cannot tell it from {_listed(alike[:3])}."
+            says += f" These data cannot tell it from {listed(alike[:3])}."
     on: Stage = _stage(first, found)
     formula = "; ".join(f"{_where_of(each)} = {_equation(each)}" for each in parts)
     envelope = {name: limits for each in parts for name, limits in each.envelope.items()}
@@ -93,7 +87,7 @@ def _formula_parts(bench: TermBench, found: FoundLaw, actuators: Sequence[str]) 
             at += 1
     parts = []
     for spot, pairs in texts.items():
-        formula = _sum(pairs)
+        formula = law_sum(pairs)
         names = parse(formula, dict.fromkeys(bench.rows(spot)[0])).names
         parts.append(
             LawPart(effect="formula", formula=formula, envelope=_envelope(bench, spot, names), **_at(spot, actuators))
@@ -125,7 +119,7 @@ def _map_parts(
         low, high = float(own.min()), float(own.max())
         terms.append(
             LawTerm(
-                term=f"{_where(term.spot, actuators)}: map over {_listed(term.names)}", value=_round(most),
+                term=f"{_where(term.spot, actuators)}: map over {listed(term.names)}", value=_round(most),
                 ci95=(_round(low), _round(high)), unit=_unit(bench, term.spot, ""),
             )
         )  # fmt: skip
@@ -145,20 +139,6 @@ def _envelope(bench: TermBench, spot: Spot, names: Iterable[str]) -> dict[str, t
         low, high = size.limits[name]
         if high > low:
             out[name] = (_round(low), _round(high))
-    return out
-
-
-def _sentence(found: FoundLaw) -> str:
-    said = [f"{WORDS.get(t.form.family, 'goes with')} {_listed(t.form.about)}" for t in found.terms if t.form.about]
-    return f"What is left {_listed(list(dict.fromkeys(said)))}."
-
-
-def _sum(pairs: Sequence[tuple[float, str]]) -> str:
-    out = ""
-    for value, text in pairs:
-        sign = ("-" if value < 0 else "") if not out else (" - " if value < 0 else " + ")
-        size = f"{abs(value):.6g}"
-        out += sign + (size if text == "1" else f"{size}*{text}")
     return out
 
 
@@ -182,17 +162,13 @@ def _where_of(part: LawPart) -> str:
 
 
 def _equation(part: LawPart) -> str:
-    return part.formula or f"map over {_listed(part.over or ())}"
+    return part.formula or f"map over {listed(part.over or ())}"
 
 
 def _unit(bench: TermBench, spot: Spot, per: str) -> str:
     hinge = spot.on in ("control", "drive") and bench.bench.twin.robot.actuators[spot.index].revolute
     own = "rad" if hinge else "mm"
     return f"{own}/{per}" if per else own
-
-
-def _listed(names: Sequence[str]) -> str:
-    return ", ".join(names[:-1]) + " and " + names[-1] if len(names) > 1 else "".join(names)
 
 
 def _round(value: float) -> float:
@@ -216,9 +192,8 @@ def moved_without(
 
 def _part_of_rows(found: FoundLaw | FoundMap, time: Floats, k: int) -> Ints:
     """Which part every row (n,) of run k belongs to."""
-    mine = [i for i, (run, _) in enumerate(found.folds.parts) if run == k]
     place = (time - time[0]) / max(float(time[-1] - time[0]), 1e-12)
-    return np.asarray(np.array(mine)[np.minimum((place * len(mine)).astype(int), len(mine) - 1)])
+    return k * found.folds.split.parts + found.folds.split.of(place)
 
 
 def terms_of(

@@ -7,7 +7,7 @@ data). Source: forward selection as in sparse regression of dynamics; wild boots
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -15,7 +15,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from camcomp.diagnosis.law.bench_terms import Spot, Term, TermBench, spots
-from camcomp.diagnosis.law.folds import WIDE_MM, Folds, gains, withheld
+from camcomp.diagnosis.law.folds import ALTERNATING, WIDE_MM, Folds, Split, gains, usual_split, withheld
 from camcomp.diagnosis.law.forms import Form, at_drive, at_tip
 from camcomp.diagnosis.law.white import White
 from camcomp.ground.datatypes import Floats
@@ -37,8 +37,9 @@ _PLAIN = ("line", "power", "product", "rate", "force")  # simpler kinds of the s
 
 @dataclass(frozen=True, eq=False)
 class FoundLaw:
-    """terms with theta (c,), covariance (c, c) of their columns in order, theta_without (f, c): fitted without each run;
-    gain: log density on withheld parts; alike: other terms for each that the data cannot tell from it.
+    """terms with theta (c,), covariance (c, c) of their columns in order, theta_without (f, c): fitted without each part;
+    gain: log density on withheld parts; alike: other terms for each that the data cannot tell from it; columns: white, with
+    their prior precision (c,).
     """
 
     terms: tuple[Term, ...]
@@ -48,6 +49,8 @@ class FoundLaw:
     gain: float
     alike: tuple[tuple[Term, ...], ...]
     folds: Folds
+    columns: tuple[White, ...]
+    precision: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,13 +63,14 @@ class _Block:
     white: White
 
 
-def find_law(bench: TermBench, folds: Folds, firm: Folds, kind: str, *, seed: int = 0) -> FoundLaw | None:
+def find_law(bench: TermBench, base: Callable[[Split, bool], Folds], kind: str, *, seed: int = 0) -> FoundLaw | None:
     """The law that what is left in a kind of channel follows; None where none holds on withheld parts.
 
-    folds: with a free constant at every spot of the tip, which no law is asked for; firm: without.
+    base: what stands beside a law when time is split so, with a free constant at every spot of the tip, which no law is
+    asked for, or without.
     """
     blocks = [_block(bench, spot) for spot in spots(len(bench.bench.actuators), kind)]
-    return _Search(bench, folds, firm, blocks, np.random.default_rng(seed)).run()
+    return _Search(bench, base, usual_split(len(bench.bench.runs)), blocks, np.random.default_rng(seed)).run()
 
 
 def _block(bench: TermBench, spot: Spot) -> _Block:
@@ -88,13 +92,13 @@ class _Search:
     def __init__(
         self,
         bench: TermBench,
-        folds: Folds,
-        firm: Folds,
+        base: Callable[[Split, bool], Folds],
+        split: Split,
         blocks: list[_Block],
         rng: np.random.Generator,
     ) -> None:
-        self.firm = firm
-        self.bench, self.folds, self.blocks, self.rng = bench, folds, blocks, rng
+        self.base, self.split, self.folds = base, split, base(split, True)
+        self.bench, self.blocks, self.rng = bench, blocks, rng
         self._seen: dict[Term, tuple[White, Floats]] = {}
 
     def run(self) -> FoundLaw | None:
@@ -122,7 +126,8 @@ class _Search:
             return None
         chosen = self._exhaustive(chosen, pool, score)
         chosen = self._without_idle(chosen)
-        self.folds = self.firm
+        # runs say nothing of what acts in one of them alone
+        self.folds = self.base(ALTERNATING if any(t.form.passing for t in chosen) else self.split, False)
         return self._answer(self._with_constants(chosen), pool)
 
     def _with_constants(self, chosen: list[Term]) -> list[Term]:
@@ -175,8 +180,7 @@ class _Search:
         """(gain in evidence, term) of all grid terms, best first."""
         out: list[tuple[float, Term]] = []
         for block in self.blocks:
-            data = step.diagonals(block.white)
-            G, h = data.G[0], data.h[0]
+            G, h = step.diagonals(block.white)
             own = np.concatenate([np.einsum("rc,rc->c", c, c)[None] for c in block.white.columns]).sum(axis=0)
             good = G > 1e-4 * own + 1e-9
             count = np.array([len(each.texts) for each in block.forms])
@@ -187,7 +191,7 @@ class _Search:
             two = np.flatnonzero(count == 2)
             if len(two):
                 i = block.first[two]
-                cross = step.pairs(block.white, i)[0]
+                cross = step.pairs(block.white, i)
                 det = G[i] * G[i + 1] - cross**2
                 fit = (h[i] ** 2 * G[i + 1] - 2 * h[i] * h[i + 1] * cross + h[i + 1] ** 2 * G[i]) / np.maximum(
                     det, 1e-12
@@ -207,7 +211,7 @@ class _Search:
         most = np.zeros(DRAWS)
         half = step.projected(draws)
         for block in self.blocks:
-            G = step.diagonals(block.white).G[0]
+            G = step.diagonals(block.white)[0]
             h = sum(c.T @ e[rows] for c, rows, e in zip(block.white.columns, block.white.rows, draws, strict=True))
             h = h - step.half_cross(block.white).T @ half
             own = np.concatenate([np.einsum("rc,rc->c", c, c)[None] for c in block.white.columns]).sum(axis=0)
@@ -329,7 +333,8 @@ class _Search:
                 if self._score([*chosen[:i], other, *chosen[i + 1 :]]) > gain - SAME:
                     others.append(other)
             alike.append(tuple(others))
-        return FoundLaw(tuple(chosen), theta, covariance, without, gain, tuple(alike), self.folds)
+        columns, precision = tuple(map(self._white, chosen)), np.concatenate([self._precision(t) for t in chosen])
+        return FoundLaw(tuple(chosen), theta, covariance, without, gain, tuple(alike), self.folds, columns, precision)
 
 
 def _unlikely(term: Term) -> bool:

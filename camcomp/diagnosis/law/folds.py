@@ -18,10 +18,33 @@ from camcomp.ground.datatypes import Floats, Ints
 
 FEW_RUNS = 4  # from which on runs are withheld, else stretches of them
 PARTS = 6
+SHORT = 48  # stretches of a run, every other one of which is withheld where something acts for a while only
 WIDE_MM = 0.2  # what a law may move the tip by, standard deviation before any data
 
 
 Part = tuple[int, Ints]  # a run, and its white rows
+
+
+@dataclass(frozen=True)
+class Split:
+    """How the time of a run is divided into what is withheld: stretches of equal length, of which every `parts`-th belong together."""
+
+    stretches: int
+    parts: int
+
+    def of(self, place: Floats) -> Ints:
+        """Number of the part (n,) of places (n,) 0 to 1 in the time of a run."""
+        number = np.minimum((place * self.stretches).astype(int), self.stretches - 1) % self.parts
+        return np.asarray(number)
+
+
+ALTERNATING = Split(SHORT, 2)
+
+
+def usual_split(runs: int) -> Split:
+    """Whole runs, one after the other, or stretches of time where there are few."""
+    each = 1 if runs >= FEW_RUNS else -(-PARTS // runs)
+    return Split(each, each)
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,17 +59,22 @@ class Folds:
     """The base of a law search: white columns and residual beside which laws are sought."""
 
     def __init__(
-        self, white: Sequence[Floats], residual: Sequence[Floats], precision: Floats, parts: Sequence[Part],
-        constants: Sequence[White],
+        self, white: Sequence[Floats], residual: Sequence[Floats], precision: Floats, places: Sequence[Floats],
+        split: Split, constants: Sequence[White],
     ) -> None:  # fmt: skip
-        """White (w, k), residual (w,) per run; precision (k,) of the prior; constants: columns that are free beside the law."""
+        """White (w, k), residual (w,) per run; precision (k,) of the prior; places (w,) 0 to 1 of white rows in the time of their
+        run; constants: columns that are free beside the law.
+        """
         loose = np.full(sum(each.columns[0].shape[1] for each in constants), 1e-6)
         self.precision = np.concatenate([precision, loose])
         self.white = [
             np.concatenate([W, *(_spread(c, k, len(W)) for c in constants)], axis=1) for k, W in enumerate(white)
         ]
         self.residual = list(residual)
-        self.parts = list(parts)
+        self.split = split
+        self.parts: list[Part] = [
+            (k, np.flatnonzero(split.of(own) == i)) for k, own in enumerate(places) for i in range(split.parts)
+        ]
         self._prepare()
 
     def beside(self, more: Sequence[White], precision: Floats) -> Folds:
@@ -80,6 +108,14 @@ class Folds:
         mean = solve_triangular(self._halves[0].T, self._targets[0], lower=False)
         return [r - W @ mean for r, W in zip(self.residual, self.white, strict=True)]
 
+    def means(self, more: Sequence[White], precision: Floats) -> Floats:
+        """Coordinates (f, k) of what stands beside a law, law columns of that prior precision fitted with it: of all data, and
+        without each part.
+        """
+        both = self.beside(more, precision)
+        found = [solve_triangular(L.T, t, lower=False) for L, t in zip(both._halves, both._targets, strict=True)]
+        return np.array(found)[:, : len(self.precision)]
+
     def half_cross(self, x: White) -> Floats:
         """Columns of a spot against the base (k, c), for `projected`."""
         cross = np.sum([W[rows].T @ X for W, rows, X in zip(self.white, x.rows, x.columns, strict=True)], axis=0)
@@ -97,16 +133,6 @@ class Folds:
         target = sum(X.T @ r[rows] for X, rows, r in zip(x.columns, x.rows, self.residual, strict=True))
         return FoldedColumns((gram - half.T @ half)[None], (target - half.T @ self._targets[0])[None])
 
-    def _parts_of(self, x: White) -> list[tuple[Floats, Ints, int]]:
-        """Per part: columns (r, c) in it, their white rows, the run."""
-        out = []
-        for k, rows in self.parts:
-            mine = np.zeros(len(self.residual[k]), bool)
-            mine[rows] = True
-            keep = mine[x.rows[k]]
-            out.append((x.columns[k][keep], x.rows[k][keep], k))
-        return out
-
     def columns(self, x: White) -> FoldedColumns:
         """Columns of one spot with the base taken out, in full."""
         return self.together([x])
@@ -120,32 +146,22 @@ class Folds:
             crosses.append(self.white[k][rows].T @ X)
             grams.append(X.T @ X)
             targets.append(X.T @ self.residual[k][rows])
-        return self._folded(crosses, grams, targets, diagonal=False)
+        return self._folded(crosses, grams, targets)
 
-    def diagonals(self, x: White) -> FoldedColumns:
-        """As `columns`, but of G only the diagonal: (f, c)."""
-        crosses, grams, targets = [], [], []
-        for X, rows, k in self._parts_of(x):
-            crosses.append(self.white[k][rows].T @ X)
-            grams.append(np.einsum("rc,rc->c", X, X))
-            targets.append(X.T @ self.residual[k][rows])
-        return self._folded(crosses, grams, targets, diagonal=True)
+    def diagonals(self, x: White) -> tuple[Floats, Floats]:
+        """As `of_all`, but of G only the diagonal: (c,), (c,)."""
+        half = self.half_cross(x)
+        gram = np.sum([np.einsum("rc,rc->c", X, X) for X in x.columns], axis=0)
+        target = np.sum([X.T @ r[rows] for X, rows, r in zip(x.columns, x.rows, self.residual, strict=True)], axis=0)
+        return gram - np.einsum("kc,kc->c", half, half), target - half.T @ self._targets[0]
 
     def pairs(self, x: White, first: Ints) -> Floats:
-        """Products (f, p) of columns first and first + 1, with the base taken out."""
-        crosses, grams = [], []
-        for X, rows, k in self._parts_of(x):
-            crosses.append(self.white[k][rows].T @ X)
-            grams.append(np.einsum("rc,rc->c", X[:, first], X[:, first + 1]))
-        out = []
-        for L, g, c in zip(self._halves, _without_each(grams), _without_each(crosses), strict=True):
-            half = solve_triangular(L, c, lower=True)
-            out.append(g - np.einsum("kc,kc->c", half[:, first], half[:, first + 1]))
-        return np.array(out)
+        """Products (p,) of columns first and first + 1, with the base taken out, all data."""
+        half = self.half_cross(x)
+        gram = np.sum([np.einsum("rc,rc->c", X[:, first], X[:, first + 1]) for X in x.columns], axis=0)
+        return np.asarray(gram - np.einsum("kc,kc->c", half[:, first], half[:, first + 1]))
 
-    def _folded(
-        self, crosses: Sequence[Floats], grams: Sequence[Floats], targets: Sequence[Floats], *, diagonal: bool
-    ) -> FoldedColumns:
+    def _folded(self, crosses: Sequence[Floats], grams: Sequence[Floats], targets: Sequence[Floats]) -> FoldedColumns:
         G, h = [], []
         every = zip(
             self._halves,
@@ -157,7 +173,7 @@ class Folds:
         )
         for L, t, c, g, b in every:
             half = solve_triangular(L, c, lower=True)
-            G.append(g - (np.einsum("kc,kc->c", half, half) if diagonal else half.T @ half))
+            G.append(g - half.T @ half)
             h.append(b - half.T @ t)
         return FoldedColumns(np.array(G), np.array(h))
 
@@ -172,19 +188,6 @@ def _spread(x: White, k: int, rows: int) -> Floats:
     """Columns (rows, c) over all white rows of run k."""
     out = np.zeros((rows, x.columns[k].shape[1]))
     out[x.rows[k]] = x.columns[k]
-    return out
-
-
-def parts_of(places: Sequence[Floats]) -> list[Part]:
-    """What is withheld, one after the other: runs, or stretches of time where there are few; places (w,) 0 to 1 of white rows
-    in the time of their run.
-    """
-    if len(places) >= FEW_RUNS:
-        return [(k, np.arange(len(place))) for k, place in enumerate(places)]
-    each, out = -(-PARTS // len(places)), list[Part]()
-    for k, own in enumerate(places):
-        place = np.minimum((own * each).astype(int), each - 1)
-        out += [(k, np.flatnonzero(place == i)) for i in range(each) if (place == i).any()]
     return out
 
 

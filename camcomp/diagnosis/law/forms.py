@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from camcomp.diagnosis.law.sizes import Sizes
+from camcomp.ground.datatypes import Floats
 
 MOST_WAVES = 240  # periods of one covariate that are tried
 LEAST_SPAN_MM = 2.0
@@ -35,7 +36,12 @@ class Form:
         """The functions as a formula has them."""
         return tuple(text.format(*(f"{each:.6g}" for each in self.shape)) for text in self.texts)
 
-    def at(self, shape: Sequence[float]) -> Form:
+    @property
+    def passing(self) -> bool:
+        """Whether it begins or ends at some moment."""
+        return self.family in ("step", "while")
+
+    def at(self, shape: Sequence[float] | Floats) -> Form:
         """The same with another shape, held within its bounds."""
         held = tuple(float(np.clip(v, low, high)) for v, (low, high) in zip(shape, self.bounds, strict=True))
         return replace(self, shape=held)
@@ -112,11 +118,13 @@ def _times(size: Sizes) -> list[Form]:
     if size.wide("cut_min"):
         out += _powers("cut_min", "min", 1)
         worn = size.limits["cut_min"][1]
-        for share in (0.05, 0.2):
-            form = Form(
-                "settling", ("cut_min",), ("log(1 + cut_min/{0})",), ("",), (share * worn,), ((1e-3 * worn, worn),)
-            )
-            out.append(form)
+        settled = "log(1 + cut_min/{0})"
+        kinds: list[tuple[tuple[str, ...], ...]] = [(("cut_min",), (settled,), ("",))]
+        if "force_N" in size.limits and size.wide("force_N"):  # what creeps gives way to the force of the moment too
+            kinds.append((("cut_min", "force_N"), (settled, f"{settled}*force_N"), ("", "N")))
+        for share in (0.02, 0.05, 0.2):
+            bounds = ((1e-3 * worn, worn),)
+            out += [Form("settling", about, texts, units, (share * worn,), bounds) for about, texts, units in kinds]
     if size.wide("temp_C"):
         out.append(Form("line", ("temp_C",), ("(temp_C - 20)",), ("K",)))
         out.append(Form("power", ("temp_C",), ("(temp_C - 20)^2",), ("K2",)))

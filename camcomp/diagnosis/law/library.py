@@ -46,8 +46,8 @@ class LearnedLaw:
             where, text = term.term.split(": ", 1)
             if text == "1":  # effects of the library say what does not depend on anything
                 continue
-            part = next(each for each in self.law.parts if _where(each) == where)
-            out.append((part.model_copy(update={"formula": text}), term.value))
+            for part in (each for each in self.law.parts if _where(each) == where):  # a force is put to work nowhere
+                out.append((part.model_copy(update={"formula": text}), term.value))
         return out
 
     @property
@@ -60,7 +60,7 @@ class LearnedLaw:
     def candidate(self, actuators: Sequence[str]) -> CandidateCause | None:
         """The law as a cause that may be at work on a machine with these actuators; None where it has no place there."""
         pieces = self.pieces()
-        if any(part.target is not None and part.target not in actuators for part, _ in pieces):
+        if not pieces or any(part.target is not None and part.target not in actuators for part, _ in pieces):
             return None
         laws = [_placed(part, size) for part, size in pieces]
         at = [None if part.target is None else list(actuators).index(part.target) for part, _ in pieces]

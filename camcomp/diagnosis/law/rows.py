@@ -1,15 +1,12 @@
-"""Rows of all runs as laws see them: covariates at the tip and at the drives, and how far they reach."""
+"""Rows of all runs as laws see them: covariates at the tip and at the drives."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from camcomp.diagnosis.fit.bench import Bench
-from camcomp.diagnosis.law.sizes import Sizes
-from camcomp.ground.datatypes import Floats
 from camcomp.model.effect import Load
 from camcomp.model.law.covariates import DriveRows, TipRows
 
@@ -34,15 +31,3 @@ def drive_rows(bench: Bench, j: int, *, setpoints: bool) -> list[DriveRows]:
             motion = replace(motion, encoder=np.where(np.isfinite(seen), seen, motion.encoder))
         out.append(DriveRows(motion, j))
     return out
-
-
-def sizes(rows: Sequence[Rows]) -> Sizes:
-    """Reach of every covariate."""
-    limits, apart = {}, {}
-    for name in rows[0]:
-        every = [each[name] for each in rows]
-        limits[name] = (min(float(v.min()) for v in every), max(float(v.max()) for v in every))
-        steps: Floats = np.concatenate([np.abs(np.diff(v)) for v in every])
-        apart[name] = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
-    stretches = tuple((float(each["common_s"][0]), float(each["common_s"][-1])) for each in rows)
-    return Sizes(limits, apart, tuple(sorted(stretches)))

@@ -14,6 +14,7 @@ import numpy as np
 from camcomp.diagnosis.law.bench_terms import Spot, TermBench, spots
 from camcomp.diagnosis.law.folds import Folds, gains, withheld
 from camcomp.diagnosis.law.sizes import Sizes
+from camcomp.diagnosis.law.white import White
 from camcomp.ground.datatypes import Floats
 from camcomp.model.law.spline_map import SplineMap, splines, tensor
 
@@ -26,13 +27,17 @@ _SINGLE = ("heading_rad", "temp_C", "cut_min", "fx_N", "fy_N", "fz_N")
 
 @dataclass(frozen=True, eq=False)
 class FoundMap:
-    """Maps (spot, covariates, limits, counts) with theta of all their coefficients, and theta_without (f, c) each part."""
+    """Maps (spot, covariates, limits, counts) with theta of all their coefficients, and theta_without (f, c) each part; columns:
+    white, with their prior precision (c,).
+    """
 
     maps: tuple[MapTerm, ...]
     theta: Floats
     theta_without: Floats
     gain: float
     folds: Folds
+    columns: tuple[White, ...]
+    precision: Floats
 
 
 @dataclass(frozen=True)
@@ -89,11 +94,12 @@ def find_map(bench: TermBench, folds: Folds, kind: str) -> FoundMap | None:
         step = folds.beside([bench.white(each.spot, map_values(bench, each)) for each in chosen], _precision(chosen))
     if not chosen:
         return None
-    data = folds.together([bench.white(each.spot, map_values(bench, each)) for each in chosen])
+    columns = tuple(bench.white(each.spot, map_values(bench, each)) for each in chosen)
+    data = folds.together(columns)
     size_of = _precision(chosen)
     theta = np.asarray(np.linalg.solve(data.G + np.diag(size_of), data.h[..., None])[..., 0], float)
     gain = float(withheld(gains(data.G[:, None], data.h[:, None], size_of[None]))[0])
-    return FoundMap(tuple(chosen), theta[0], theta[1:], gain, folds)
+    return FoundMap(tuple(chosen), theta[0], theta[1:], gain, folds, columns, size_of)
 
 
 def _precision(chosen: Sequence[MapTerm]) -> Floats:

@@ -24,10 +24,11 @@ def law_view(problem: Problem, answer: LawAnswer) -> LawView:
     covariate = next(iter(part.envelope))
     axis = int(np.argmax(np.sum([np.sum(s**2, axis=0) for s in answer.signal], axis=0)))
     runs, sizes = [], []
-    for run, own, gap, signal in zip(bench.runs, rows, answer.gaps, answer.signal, strict=True):
+    every = zip(bench.runs, rows, answer.before, answer.gaps, answer.signal, strict=True)
+    for run, own, before, gap, signal in every:
         x = thinned(own[covariate][:, None], run.thin)[:, 0]
         runs.append((run.name, x, MICRO * gap[:, axis], MICRO * signal[:, axis]))
-        sizes.append((_rms(gap), _rms(gap - signal)))
+        sizes.append((_rms(before), _rms(gap - signal)))
     return LawView(covariate, "xyz"[axis], tuple(runs), np.array(sizes))
 
 

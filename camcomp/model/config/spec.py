@@ -159,6 +159,7 @@ class Control(Spec):
     )
     block_time_s: Positive = Field(0.001, description="least time that the control takes for a move")
     look_ahead_blocks: Annotated[int, Field(ge=1)] = Field(50, description="moves that it knows when it sets the speed")
+    tool_change_s: Annotated[float, Field(ge=0.0)] = Field(0.0, description="that an M6 takes, for the cycle time")
 
 
 class Compensation(Spec):

@@ -46,20 +46,18 @@ class Grip:
 def needed(engaged: Engaged, base: Floats) -> Ints:
     """The places (q,) without which the force would not be the same; a cut begins or ends there, or the force bends."""
     rows = np.flatnonzero(engaged.bends)
-    return rows[_bent(engaged.take(rows), base[rows])]
+    return rows[_bent(engaged.motion[rows], engaged.u[rows], engaged.turn[rows] > 0.0, base[rows])]
 
 
-def _bent(engaged: Engaged, base: Floats) -> Ints:
-    n = len(engaged.u)
+def _bent(motion: Ints, u: Floats, on: Bools, base: Floats) -> Ints:
+    n = len(u)
     if n < 3:
         return np.arange(n)
-    before, after = np.arange(n - 2), np.arange(2, n)
-    inner = (engaged.motion[before] == engaged.motion[after]) & (engaged.u[before] < engaged.u[1:-1])
-    inner &= engaged.u[1:-1] < engaged.u[after]
-    span = np.where(inner, engaged.u[after] - engaged.u[before], 1.0)
-    w = ((engaged.u[1:-1] - engaged.u[before]) / span)[:, None]
+    before, after = slice(None, -2), slice(2, None)
+    inner = (motion[before] == motion[after]) & (u[before] < u[1:-1]) & (u[1:-1] < u[after])
+    span = np.where(inner, u[after] - u[before], 1.0)
+    w = ((u[1:-1] - u[before]) / span)[:, None]
     off = np.abs(base[1:-1] - base[before] * (1.0 - w) - base[after] * w).max(axis=1)
-    on = engaged.turn > 0.0
     same = (on[before] == on[1:-1]) & (on[1:-1] == on[after])
     straight = inner & same & (off <= STRAIGHT * np.abs(base[1:-1]).max(axis=1))
     return np.flatnonzero(~np.concatenate(([False], straight, [False])))

@@ -22,6 +22,7 @@ AT_TIP = {
     "feed_mm_per_s": "speed of the tip",
     "heading_rad": "direction of travel in the program's XY plane, from X towards Y",
     **{f"f{a}_N": f"cutting force on the tool along machine {a}" for a in "xyz"},
+    "force_N": "size of the cutting force on the tool",
     **_TIME,
 }
 AT_DRIVE = {
@@ -66,6 +67,8 @@ class TipRows(Mapping[str, Floats]):
             return _of_time(name, self.motion)
         if name[1:] == "_mm":
             return self.tip[:, "xyz".index(name[0])]
+        if name == "force_N":
+            return np.asarray(np.linalg.norm(self.load.force, axis=1))
         if name[0] == "f" and name[2:] == "_N":
             return self.load.force[:, "xyz".index(name[1])]
         velocity = rate(self.tip, self.motion)

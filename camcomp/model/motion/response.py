@@ -25,6 +25,8 @@ MAX_AIM_STEPS = 50  # friction that turns round in a soft drive leaves up to nin
 REST_S = 60.0
 AHEAD_MM = 2.0  # more than any play
 LEAST_MM = 2e-4  # a drive that comes back by less than this is not led through its play
+WORDS = 3  # actuators that X, Y, Z can move one by one
+GOES_ALONG = 1e-2  # weight of the others
 HINGE_MM = 1e3  # way per rad of a hinge, where lengths of slides are applied to it: an arm of 1 m
 
 
@@ -142,15 +144,30 @@ def _through_play(job: Job, found: Correction, travel: Travel) -> Floats:
     return out
 
 
+def behind_encoders(job: Job, commanded: Floats, travel: Travel) -> tuple[Floats, Floats]:
+    """Encoders (n, m) of commanded tips (n, 3), program frame, and what drives' memory makes of carriage minus encoder (n, m)."""
+    rho = solve(job.real_machine, FREE, job.frame.to_machine(commanded), check=False).rho_nominal
+    motion = _motion(job, rho, travel)
+    still = replace(motion, ordered=False, direction=np.zeros_like(rho))
+    moving, standing = (signal_path.driven(job.causes, job.real_machine.actuators, each)[0] for each in (motion, still))
+    return motion.encoder, moving - standing
+
+
 def _tip_way(job: Job, tip: Floats, by: Floats) -> Floats:
-    """Way (n, 3) mm of the tip, program frame, that moves the actuators by `by` (n, m), to first order."""
+    """Way (n, 3) mm of the tip, program frame, that moves the actuators by `by` (n, m), to first order.
+
+    Where they are more than X, Y, Z can move one by one, those go along that are not asked to move.
+    """
     h = 1e-3
     rates = [
         (solve(job.real_machine, FREE, tip + h * axis, check=False).rho_nominal
          - solve(job.real_machine, FREE, tip - h * axis, check=False).rho_nominal) / (2.0 * h)
         for axis in np.eye(3)
     ]  # fmt: skip
-    way = np.einsum("nkm,nm->nk", np.linalg.pinv(np.stack(rates, axis=2)), by)
+    slopes = np.stack(rates, axis=2)
+    if by.shape[1] > WORDS:
+        slopes = np.where((by != 0.0)[:, :, None], slopes, GOES_ALONG * slopes)
+    way = np.einsum("nkm,nm->nk", np.linalg.pinv(slopes), by)
     out: Floats = way @ job.frame.rotation
     return out
 

@@ -69,7 +69,9 @@ def inner(function: Callable[..., Any], *, fastmath: bool = False) -> Any:
     """
     if _numba.config.DISABLE_JIT:  # for the debugger
         return function
-    dispatcher = _numba.njit(no_cpython_wrapper=True, fastmath=fastmath, **_OPTIONS)(function)
+    from camcomp.ground.linked_code import Inner
+
+    dispatcher = _numba.njit(no_cpython_wrapper=True, fastmath=fastmath, pipeline_class=Inner, **_OPTIONS)(function)
     template = dispatcher.get_call_template
 
     def plain(args: Any, kws: Any) -> Any:
@@ -112,10 +114,9 @@ def entry(function: Callable[..., Any]) -> Callable[..., Any]:
         return function
     from camcomp.ground.machine_code import kept  # only those who compile need it
 
-    dispatcher = kept(function, **_OPTIONS)
+    dispatcher = kept(function, digest=digest(Path(function.__code__.co_filename)), **_OPTIONS)
     file = getattr(dispatcher._cache, "_cache_file", None)
     if file is not None:
-        file._source_stamp = (file._source_stamp, digest(Path(function.__code__.co_filename)))
         _load_lightly(dispatcher._cache)
 
     @functools.wraps(function)

@@ -9,7 +9,7 @@ import numpy as np
 from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import ARC, RAPID, Bools, Floats, Ints, Path
 from camcomp.model.cutting.track import JOIN_ANGLE, PLUNGE_SINE
-from camcomp.model.stock.march import CUT_LEG, PLUNGE_LEG, RAPID_LEG, UNSEEN_LEG
+from camcomp.model.stock.places import CUT_LEG, PLUNGE_LEG, RAPID_LEG, UNSEEN_LEG
 
 SAGITTA_MM = 5e-4  # by which a chord may miss its arc
 MOST_CHORDS = 20_000
@@ -23,7 +23,7 @@ class Legs:
     u0: Floats
     u1: Floats
     kind: Ints
-    table: Floats  # (m, 10), columns of march.py
+    table: Floats  # (m, 10), columns of places.py
     joined: Bools  # (m + 1,) a leg goes on from the one before without a corner
     ends: Floats  # (m, 3) direction in which a leg ends
 

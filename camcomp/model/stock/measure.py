@@ -20,8 +20,9 @@ from camcomp.model.stock.sweeps import FLAT, KIND, RADIUS, bottom, radius_at
 
 EDGE, FLOOR = 0.002, 0.001  # mm
 FEWEST, MOST = 16, 48  # angles at which the front of a tool is looked at
-TURNS = 9  # halvings of the step between them
-SCAN, SLICES = 12, 12  # heights of a tool that is no cylinder: to find where it cuts, and there
+TURNS = 8  # halvings of the step between them
+ASIDE = 0.02  # of such a step: beside an edge
+SCAN, SLICES = 12, 8  # heights of a tool that is no cylinder: to find where it cuts, and there
 END_ANGLE = 1e-4  # rad from the sides of the front half
 BITE = 5  # columns of an arc: entry, exit (rad), height (mm), rise and run of the tool's surface per length of its edge
 DEPTH, ENGAGED, ARCS, WHAT = 5, 6, 7, 8  # of what is told of a place; in front: five integrals over the engagement
@@ -111,6 +112,16 @@ def angles_of(nodes, radius):
 
 
 @inner
+def step_beside(nodes, place, radius, z, edge, psi, here):
+    """Angle between an edge and an angle psi at which the material, `here` mm high at psi, steps, and its height before."""
+    first = edge + ASIDE * (psi - edge)
+    high = stands(nodes, place, radius, z, first)
+    if high <= 0.0 or abs(high - here) <= 2.0 * EDGE + 0.02 * max(high, here):
+        return edge, 0.0
+    return edge_between(nodes, place, radius, z, first, psi, 0.5 * (high + here)), high
+
+
+@inner
 def look_round(nodes, place, bites, n, radius, z, tall, rise, run, least):
     """Arcs at one height of the tool. tall: height of the slice that they stand for, 0: as high as the material is.
 
@@ -134,12 +145,20 @@ def look_round(nodes, place, bites, n, radius, z, tall, rise, run, least):
                 sum_ += now
                 members += 1
         else:
-            at = edge_between(
-                nodes, place, radius, z, last, psi, 0.5 * (now + before) if min(now, before) > 0.0 else 0.0
-            )
+            both = min(now, before) > 0.0
+            at = edge_between(nodes, place, radius, z, last, psi, 0.5 * (now + before) if both else 0.0)
             if before > 0.0:
-                n = add_bite(place, bites, n, start, at, tall if tall > 0.0 else sum_ / members, rise, run)
+                step, high = at, 0.0
+                if tall == 0.0 and not both:
+                    step, high = step_beside(nodes, place, radius, z, at, last, before)
+                n = add_bite(place, bites, n, start, step, tall if tall > 0.0 else sum_ / members, rise, run)
+                n = add_bite(place, bites, n, step, at, high, rise, run)
+                top = max(top, high)
             start, sum_, members = at, now, 1
+            if now > 0.0 and tall == 0.0 and not both:
+                start, high = step_beside(nodes, place, radius, z, at, psi, now)
+                n = add_bite(place, bites, n, at, start, high, rise, run)
+                top = max(top, high)
         top = max(top, now)
         before, last = now, psi
     if before > 0.0:
@@ -194,13 +213,14 @@ def look_over(nodes, place, bites, n, row):
     highest = nodes.place[ZMAX] - z
     count = angles_of(nodes, nodes.tools[row, RADIUS])
     low, high, above, below = -1.0, -1.0, highest, 0.0
-    before = 0.0
+    before, last = 0.0, 0
     for j in range(SCAN):
         lift = highest * ((j + 0.5) / SCAN) ** 2
         found = False
-        for k in range(count):
+        for turn in range(count):
+            k = (last + turn) % count  # where it cuts a little lower it mostly does here
             if cuts_at(nodes, place, row, lift, k, count):
-                found = True
+                found, last = True, k
                 break
         if found:
             if low < 0.0:
@@ -215,8 +235,9 @@ def look_over(nodes, place, bites, n, row):
     low = limit(nodes, place, row, low, below, count)
     if low < 1e-3:
         low = 0.0
-    for j in range(SLICES):
-        a, b = low + (high - low) * j / SLICES, low + (high - low) * (j + 1) / SLICES
+    for j in range(SLICES):  # thinner towards both ends, where the arcs change most
+        a = low + (high - low) * 0.5 * (1.0 - math.cos(math.pi * j / SLICES))
+        b = low + (high - low) * 0.5 * (1.0 - math.cos(math.pi * (j + 1) / SLICES))
         run = radius_at(nodes.tools, row, b) - radius_at(nodes.tools, row, a)
         edge = math.sqrt(run * run + (b - a) * (b - a))
         middle = 0.5 * (a + b)

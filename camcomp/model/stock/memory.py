@@ -12,25 +12,14 @@ from camcomp.model.cutting.engaged import Bites, Engaged
 from camcomp.model.stock.facets import facets_on
 from camcomp.model.stock.field import TOUCHED, USED, XMAX, XMIN, ZMAX, ZMIN, room_for
 from camcomp.model.stock.legs import LegBefore, Legs, legs_of
-from camcomp.model.stock.march import (
-    CUT_LEG,
-    DEEP,
-    MOST_RECENT,
-    PLACES,
-    ROOM_FOR_ARCS,
-    ROOM_FOR_PLACES,
-    ROWS,
-    Found,
-    march,
-    peek,
-    settle,
-    thin,
-)
+from camcomp.model.stock.march import ROOM_FOR_ARCS, ROOM_FOR_PLACES, march, peek, settle
 from camcomp.model.stock.measure import BITE, DEPTH, EDGE, ENGAGED, WHAT, Place
+from camcomp.model.stock.places import CHAIN_DEEP, CUT_LEG, DEEP, MOST_CHAIN, MOST_RECENT, PLACES, ROWS, Found
 from camcomp.model.stock.shapes import StockShape, ToolShape
+from camcomp.model.stock.thinning import thin
 
 COARSEST_MM, FINEST_MM = 0.25, 0.05
-MOST_NODES = 1 << 26  # of 8 bytes, and only those count that a tool has touched
+MOST_NODES = 1 << 25  # of 16 bytes, and only those count that a tool has touched
 MARGIN = 5  # nodes around the stock
 ARCS = 256  # of one place
 NO_TOOL = -1
@@ -62,11 +51,12 @@ class StockMemory:
             np.zeros(6), np.zeros(1, np.int64), np.zeros(MOST_RECENT, np.int64), np.zeros(1, np.int64), np.zeros(WHAT),
             np.zeros((ARCS, 2)),
         )  # fmt: skip
-        n, r = 4 * ROOM_FOR_PLACES, 2 * ROOM_FOR_ARCS
+        n, r, deep = 4 * ROOM_FOR_PLACES, 2 * ROOM_FOR_ARCS, DEEP + CHAIN_DEEP
         self._found = Found(
             np.zeros(n, np.int64), np.zeros(n), np.zeros(n, np.int64), np.zeros(n, np.int64), np.zeros((n, WHAT)),
             np.zeros((r, BITE)), np.zeros(0, np.bool_), np.zeros(MOST_RECENT), np.zeros(2), np.zeros(3, np.int64),
-            np.zeros(DEEP), np.zeros((DEEP, WHAT)), np.zeros((DEEP, 2), np.int64),
+            np.zeros(deep), np.zeros((deep, WHAT)), np.zeros((deep, 2), np.int64), np.zeros(MOST_CHAIN + 1),
+            np.zeros(CHAIN_DEEP, np.int64),
         )  # fmt: skip
         self._before = LegBefore()
         self._kept = self._kept_rows = 0  # places and arcs that stand in the room from before

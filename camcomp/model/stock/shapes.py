@@ -8,7 +8,7 @@ import numpy as np
 
 from camcomp.ground.datatypes import Floats
 from camcomp.model.stock.field import BOX
-from camcomp.model.stock.measure import EDGE
+from camcomp.model.stock.measure import EDGE, FLOOR
 from camcomp.model.stock.sweeps import BALL, BULL, DRILL, FLAT
 
 KINDS = {"flat": FLAT, "ball": BALL, "bull": BULL, "drill": DRILL}
@@ -27,13 +27,18 @@ class ToolShape:
     flute_mm: float | None = None
 
     def rows(self) -> list[list[float]]:
-        """The tool, and the same slimmer by EDGE, in columns of sweeps.py."""
+        """The tool, and the same slimmer by EDGE, in columns of sweeps.py.
+
+        What slants is as much higher as it has to be for the skin between both to count as material, which is looked
+        for EDGE inside the tool and FLOOR over its surface.
+        """
         radius = 0.5 * self.diameter_mm
         corner = radius if self.kind == "ball" else self.corner_mm if self.kind == "bull" else 0.0
         cone = float(np.tan(np.radians(0.5 * self.point_deg)))
         less = min(EDGE + SLIMMER, 0.5 * radius)
         slim = [radius - less, KINDS[self.kind], corner - less if self.kind == "ball" else corner, cone]
-        lift = less if self.kind == "ball" else 0.0
+        higher = {"flat": 0.0, "ball": less, "bull": 0.0, "drill": less / cone}[self.kind]
+        lift = 0.0 if self.kind == "flat" else higher + FLOOR + SLIMMER
         return [[radius, KINDS[self.kind], corner, cone, 0.0], [*slim, lift]]
 
 

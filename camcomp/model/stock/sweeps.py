@@ -17,7 +17,7 @@ X0, Y0, Z0, X1, Y1, Z1, TOOL, LENGTH, UX, UY, CLIMB = range(11)
 RADIUS, KIND, CORNER, CONE, LIFT = range(5)
 NOWHERE = 1e30  # mm, the height of what is not there
 LEVEL = 1e-12  # climb per mm
-HALVINGS = 40
+HALVINGS = 30
 
 
 @inner
@@ -80,6 +80,13 @@ def beside(sweeps, k, x, y):
 
 
 @inner
+def rises(tools, row, climb, aside, along):
+    """Whether the tool's surface over a point rises while it goes on; aside, along: from the point to the tool, mm."""
+    rho = math.sqrt(aside * aside + along * along)
+    return climb + slope(tools, row, rho) * along / max(rho, 1e-12) > 0.0
+
+
+@inner
 def bottom(sweeps, tools, k, slim, x, y):
     """Lowest height of sweep k over a point, mm; NOWHERE where it does not pass. slim: 1 for the slimmer tool."""
     row = 2 * int(sweeps[k, TOOL]) + slim
@@ -112,13 +119,17 @@ def bottom(sweeps, tools, k, slim, x, y):
         t = min(max(s - climb * half / math.sqrt(1.0 + climb * climb), low), high)
     else:  # the height is convex along the way
         a, b = low, high
-        for _ in range(HALVINGS):
-            t = 0.5 * (a + b)
-            rho = math.sqrt(n * n + (t - s) * (t - s))
-            if climb + slope(tools, row, rho) * (t - s) / max(rho, 1e-12) > 0.0:
-                b = t
-            else:
-                a = t
+        if rises(tools, row, climb, n, a - s):
+            b = a
+        elif not rises(tools, row, climb, n, b - s):
+            a = b
+        else:
+            for _ in range(HALVINGS):
+                t = 0.5 * (a + b)
+                if rises(tools, row, climb, n, t - s):
+                    b = t
+                else:
+                    a = t
         t = 0.5 * (a + b)
     rho = min(math.sqrt(n * n + (t - s) * (t - s)), radius)
     return sweeps[k, Z0] + climb * t + profile(tools, row, rho)

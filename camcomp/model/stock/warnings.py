@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from camcomp.ground import path_geometry
@@ -33,7 +35,7 @@ def stock_remarks(config: Config, path: Path, engaged: Engaged | None) -> Remark
         height = path_geometry.points(path, motion, engaged.u[on])[:, 2]
         off["workpiece: stock_top_mm contradicts the stock, which counts instead,"] = _off(depth, top - height)
     flutes = {number: each.flute_length_mm for number, each in config.tools.items()}
-    length = np.array([flutes.get(int(t), config.tool.flute_length_mm) or np.inf for t in path.tool[motion]])
+    length = _by_tool(path.tool[motion], flutes, config.tool.flute_length_mm, np.inf)
     off["material is left above the flutes of the tool"] = depth > length + HAIR_MM
     return {text: np.unique(path.line[motion[rows]]) for text, rows in off.items() if rows.any()}
 
@@ -47,9 +49,15 @@ def _widths(config: Config, path: Path, engaged: Engaged, on: Ints) -> Floats:
     """Extent of the cut across the feed, mm."""
     diameters = {number: each.diameter_mm for number, each in config.tools.items()}
     own = config.tool.diameter_mm
-    diameter = np.array([diameters.get(int(t), own) or np.nan for t in path.tool[engaged.motion[on]]])
+    diameter = _by_tool(path.tool[engaged.motion[on]], diameters, own, np.nan)
     out: Floats = engaged.bites.of(on).reach(len(on)) * 0.5 * diameter
     return out
+
+
+def _by_tool(tool: Ints, of: Mapping[int, float | None], other: float | None, unknown: float) -> Floats:
+    """What the tools of some places (n,) have, `other` those that are not in the table."""
+    numbers, which = np.unique(tool, return_inverse=True)
+    return np.array([of.get(int(t), other) or unknown for t in numbers], float)[which]
 
 
 def _off(found: Floats, stated: Floats | float) -> Bools:

@@ -55,17 +55,17 @@ def plan_of(moves: ToolMoves, limits: ControlLimits, arrives: float = 0.0) -> Co
     """What the control makes of moves (n,) that end at rest. arrives: mm/s at the start of the first one."""
     n = len(moves)
     size, way_of, most = np.empty(n), np.empty((n, 3)), np.empty(n)
-    straight(moves.start, moves.end, size, way_of, most)
+    straight(*_read_only(moves.start, moves.end), size, way_of, most)
     bent = np.flatnonzero(moves.kind == ARC)
     size[bent] = path_geometry.lengths(moves.take(bent).path())
     group, first, last = (np.zeros(n, np.int64) for _ in range(3))
     joins = (moves.kind == LINE) & ~moves.exact
-    m = merge(moves.start, moves.end, size > SHORTEST, joins, moves.feed, moves.merge, group, first, last)
+    m = merge(*_read_only(moves.start, moves.end), size > SHORTEST, joins, moves.feed, moves.merge, group, first, last)
     first, last = first[:m], last[:m]
     start, end = moves.start[first], moves.end[last]
     kind, feed = moves.kind[last], moves.feed[last]
     nominal, leave, most = np.empty(m), np.empty((m, 3)), np.empty(m)
-    straight(start, end, nominal, leave, most)
+    straight(*_read_only(start, end), nominal, leave, most)
     arrive, axis, radius, angle = leave, leave, np.zeros(m), np.zeros(m)
     arc = kind == ARC
     if len(bent):
@@ -88,6 +88,14 @@ def plan_of(moves: ToolMoves, limits: ControlLimits, arrives: float = 0.0) -> Co
         pieces(nominal, fast, acceleration, radius, way, speed, reach, bend, around, length, slope, fastest)
         durations(length, slope, fastest, way, speed, limits.cycle_s, limits.look_ahead, arrives, passes, time)
     return ControlPlan(moves, group, start, end, arc, way, reach, bend, centre, time, passes[::2])
+
+
+def _read_only(*points: Floats) -> list[Floats]:
+    """Views that cannot be written to, as those of paths cannot: of two kinds of arrays numba would compile for each."""
+    views = [each.view() for each in points]
+    for each in views:
+        each.flags.writeable = False
+    return views
 
 
 def _speeds(kind: Ints, feed: Floats, nominal: Floats, radius: Floats, most: Floats, limits: ControlLimits) -> Floats:

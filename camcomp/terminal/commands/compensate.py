@@ -7,6 +7,7 @@ import click
 from camcomp.ground.errors import CheckFailed
 from camcomp.ground.files import display_name
 from camcomp.terminal.commands._options import OUTPUT, quiet_option
+from camcomp.terminal.commands._told import control_told
 from camcomp.terminal.progress import say, working
 
 if TYPE_CHECKING:
@@ -116,17 +117,7 @@ def _told(figures: "Summary") -> list[str]:
             f"interpolated between {checked.exact_solutions} exact solutions; {checked.checked} points checked: "
             f"{checked.worst_um:.4f} um at most, allowed {checked.bound_um:g} um"
         )
-    return lines + [f"warning: {each}" for each in figures.warnings] + [_control_told(figures)]
-
-
-def _control_told(figures: "Summary") -> str:
-    """What the control makes of the program."""
-    mode = figures.control_mode + ("" if figures.control_mode_stated else " (assumed)")
-    times, left = figures.cycle_time_s, figures.under_control
-    return (
-        f"control in {mode}: {times.before:.1f} s become {times.after:.1f} s; "
-        f"it takes the tip error to rms {left.rms_um:.2f} um, max {left.max_um:.2f} um"
-    )
+    return lines + [f"warning: {each}" for each in figures.warnings] + [control_told(figures)]
 
 
 def _either(*figures: tuple[float | None, str]) -> str:

@@ -7,6 +7,7 @@ import shutil
 
 import numba
 import pytest
+from numba.core import event
 
 from camcomp.ground import machine_code, notes
 
@@ -102,6 +103,53 @@ def test_a_full_disk_is_no_error(folder, capsys, monkeypatch):
     said = capsys.readouterr().err
     assert said.count("note:") == 1 and "No space left on device" in said
     assert [each for each in folder.rglob("*") if each.is_file()] == []
+
+
+@pytest.fixture
+def along(folder, tmp_path, monkeypatch):
+    """Code of `twice` that an installation brings along, and no code of the user's."""
+    place = tmp_path / "along"
+    place.mkdir()
+    monkeypatch.setattr(machine_code._Bringing, "folder", place)
+    assert machine_code.kept(twice, digest="sources")(21) == 42
+    monkeypatch.setattr(machine_code._Bringing, "folder", None)
+    monkeypatch.setattr(machine_code, "BROUGHT_ALONG", place)
+    shutil.rmtree(folder)
+    (path,) = files(place)
+    return path
+
+
+def compiled_for(value, digest):
+    """(What `twice` of a value is, how often numba had to compile for it)."""
+    with event.install_recorder("numba:compile") as compiled:
+        made = machine_code.kept(twice, digest=digest)(value)
+    return made, sum(each.is_start for _, each in compiled.buffer)
+
+
+def test_code_that_was_brought_along_is_not_compiled_and_then_the_users_own(along, folder, capsys):
+    assert compiled_for(21, "sources") == (42, 0)
+    assert len(files(folder)) == 1
+    along.unlink()
+    assert compiled_for(21, "sources") == (42, 0)
+    assert capsys.readouterr().err == ""
+
+
+@pytest.mark.parametrize(("value", "digest"), [(1.5, "sources"), (21, "other sources"), (21, None)])
+def test_code_that_was_brought_along_for_something_else_is_not_taken(along, value, digest):
+    assert compiled_for(value, digest) == (2 * value, 1)
+
+
+def test_code_for_another_kind_of_machine_is_not_taken(along, monkeypatch):
+    key = machine_code._Cache._linked_key
+    monkeypatch.setattr(machine_code._Cache, "_linked_key", lambda *args: (*key(*args)[:1], "z80", *key(*args)[2:]))
+    assert compiled_for(21, "sources") == (42, 1)
+
+
+def test_damaged_code_that_was_brought_along_is_one_note(along, folder, capsys):
+    along.write_bytes(along.read_bytes()[:-1])
+    assert compiled_for(21, "sources") == (42, 1)
+    assert capsys.readouterr().err.count("note:") == 1
+    assert compiled_for(21, "sources") == (42, 0)
 
 
 def test_who_has_no_home_gets_no_folder_called_tilde(tmp_path, monkeypatch):

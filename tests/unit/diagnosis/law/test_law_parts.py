@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from camcomp.diagnosis.law.folds import gains, withheld
+from camcomp.diagnosis.law.folds import ALTERNATING, Folds, Split, gains, usual_split, withheld
 from camcomp.diagnosis.law.forms import at_drive, at_tip
 from camcomp.diagnosis.law.library import keep, learned
 from camcomp.diagnosis.law.sizes import Sizes
+from camcomp.diagnosis.law.white import White
 from camcomp.diagnosis.result.types import Law, LawPart, LawTerm
 from camcomp.model.law.covariates import AT_DRIVE, AT_TIP
 from camcomp.model.law.expression import parse
@@ -43,6 +44,29 @@ def test_the_gain_is_that_of_the_marginal_density():
 def test_what_is_withheld_is_judged_by_what_the_others_say():
     gain = np.array([[10.0], [6.0], [7.0]])
     assert withheld(gain) == pytest.approx([(10.0 - 6.0) + (10.0 - 7.0)])
+
+
+def test_few_runs_are_withheld_in_stretches_and_what_lasts_a_while_in_every_other_one():
+    assert usual_split(5) == Split(1, 1) and usual_split(2) == Split(3, 3)
+    assert Split(3, 3).of(np.array([0.0, 0.4, 0.7, 1.0])).tolist() == [0, 1, 2, 2]
+    place = (np.arange(ALTERNATING.stretches) + 0.5) / ALTERNATING.stretches
+    assert ALTERNATING.of(place).tolist() == [0, 1] * (ALTERNATING.stretches // 2)
+
+
+def test_what_stands_beside_a_law_gives_way_to_it():
+    rng = np.random.default_rng(2)
+    known, law = rng.normal(size=(400, 1)), rng.normal(size=(400, 1))
+    known = known + 2.0 * law  # looks like the law, where nothing else may
+    residual = 3.0 * law[:, 0] + 0.1 * rng.normal(size=400)
+    folds = Folds([known], [residual], np.array([1e-4]), [np.linspace(0.0, 1.0, 400)], Split(2, 2), [])
+    alone = float(known[:, 0] @ residual / (known[:, 0] @ known[:, 0]))
+    beside = folds.means([White((np.arange(400),), (law,))], np.array([1e-4]))
+    assert alone > 1.0 and beside.shape == (3, 1) and np.abs(beside).max() < 0.02
+
+
+def test_creep_under_load_is_a_form():
+    (form,) = [f for f in at_tip(sizes(AT_TIP)) if f.family == "settling" and len(f.about) == 2][:1]
+    assert form.about == ("cut_min", "force_N") and form.units == ("", "N") and form.said[1].endswith("*force_N")
 
 
 def test_splines_add_up_to_one_and_stay_within_their_limits():

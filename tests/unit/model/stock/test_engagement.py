@@ -1,11 +1,15 @@
 """The engagement against closed forms, at the default resolution: angles within 0.5 degrees, depths within 5 um."""
 
+import itertools
+
 import numpy as np
 import pytest
 
 from camcomp.ground import path_geometry
 from camcomp.model.stock.memory import NO_TOOL, StockMemory
+from camcomp.model.stock.places import BENT
 from camcomp.model.stock.shapes import StockShape, ToolShape
+from camcomp.model.stock.surface import read_heights
 from tests.paths import path_of
 
 DEGREES, MICROMETRES = np.radians(0.5), 5e-3
@@ -86,6 +90,33 @@ def test_the_engagement_rises_in_corners_as_it_does():
     assert np.ptp(wanted) > 1.0
 
 
+def cut_up(path, length):
+    """The straight moves of a path in parts of at most so many mm, and of which move and where on it every part ends."""
+    moves, ends = [], []
+    for k, whole in enumerate(path_geometry.lengths(path)):
+        count = int(np.ceil(whole / length))
+        for u in np.arange(1, count + 1) / count:
+            moves.append(("line", path.start[k] + u * (path.end[k] - path.start[k])))
+            ends.append((k, u))
+    return path_of(*moves, start=path.start[0]), ends
+
+
+def test_corners_are_the_same_in_short_moves():
+    corners = [
+        (3.5 * k * x, 3.5 * k * y, -2.0) for k in range(1, 4) for x, y in ((1, -0.9), (0.9, 1), (-1, 1), (-1, -1))
+    ]
+    path = path_of(*(("line", each) for each in corners), start=(0, 0, -2))
+    short, ends = cut_up(path, 0.15)
+    engaged = follow(short)
+    rows = np.flatnonzero(engaged.u == 1.0)
+    assert len(rows) == len(short)
+    for row in rows[::7]:
+        k, u = ends[engaged.motion[row]]
+        beside = 0.02 / path_geometry.lengths(path)[k]  # where it jumps is known to so much
+        near = [front_left(path, k, each, 4001) for each in np.clip([u - beside, u, u + beside], 0.0, 1.0)]
+        assert min(near) - DEGREES < engaged.turn[row] < max(near) + DEGREES, (k, u)
+
+
 def test_a_circle_inside_a_circle():
     first, second = 12.0, 13.0
     full = 2.0 * np.pi
@@ -163,6 +194,62 @@ def test_other_tips_cut_to_the_same_depth(kind, more):
     _, arcs, depth = arcs_at(engaged, 0, 0.5)
     assert depth == pytest.approx(3.0, abs=MICROMETRES)
     np.testing.assert_allclose(arcs[:, 1] - arcs[:, 0], np.pi, atol=2.0 * DEGREES)
+
+
+TIPS = [("flat", {}), ("ball", {}), ("bull", {"corner_mm": 1.5}), ("drill", {})]
+
+
+@pytest.mark.parametrize("slope", [0.0, 0.05, -0.05])
+@pytest.mark.parametrize(("kind", "more"), TIPS)
+def test_a_move_in_parts_meets_what_it_meets_whole(kind, more, slope):
+    """Beside a groove, where one side of the tool is free."""
+    begin = [("line", (30, 0, -2)), ("line", (30, 0.7, -2))]
+    whole = path_of(*begin, ("line", (20, 0.7, -2 + 10 * slope)), start=(-30, 0, -2))
+    parts = [("line", (30 - x, 0.7, -2 + x * slope)) for x in np.linspace(0, 10, 51)[1:]]
+    one, many = follow(whole, kind=kind, **more), follow(path_of(*begin, *parts, start=(-30, 0, -2)), kind=kind, **more)
+    own = one.motion == 2
+    rows = np.flatnonzero((many.u == 1.0) & (many.motion > 11))  # both begin beside where the groove was widened
+    u = (many.motion[rows] - 1) / 50
+    np.testing.assert_allclose(many.depth[rows], np.interp(u, one.u[own], one.depth[own]), atol=MICROMETRES)
+    size = [np.bincount(e.bites.place, e.bites.height * (e.bites.stop - e.bites.start), len(e.u)) for e in (one, many)]
+    missed = 2.0 * BENT * 2.0 * np.pi  # of the slot, the largest engagement; either may miss as much
+    np.testing.assert_allclose(size[1][rows], np.interp(u, one.u[own], size[0][own]), atol=missed)
+
+
+@pytest.mark.parametrize(("kind", "more"), TIPS)
+def test_what_many_moves_leave_is_what_the_tool_was_over(kind, more):
+    """Short moves with turns, climbs and dives that go on from each other; heights by trying very many places of the tip."""
+    rng = np.random.default_rng(1)
+    angle = np.cumsum(rng.normal(0.0, 0.4, 60))
+    at = np.cumsum(np.column_stack((np.cos(angle), np.sin(angle), rng.normal(0.0, 0.1, 60))) * 0.7, axis=0)
+    at = at - at.mean(axis=0) - [0, 0, 2]
+    own = memory(kind=kind, radius=2.0, stock=StockShape(np.array([-20.0, -20, -9]), np.array([20.0, 20, 0])), **more)
+    own.follow(path_of(*(("line", each) for each in at[1:]), start=at[0]))
+    own.settle()
+    x = rng.uniform(-12, 12, 300)
+    y = rng.uniform(-12, 12, 300)
+    found = np.array([[0.0]])
+    tips = np.concatenate([a + np.linspace(0, 1, 600)[:, None] * (b - a) for a, b in itertools.pairwise(at)])
+    checked = 0
+    for px, py in zip(x, y, strict=True):
+        read_heights(own.nodes, np.array([px]), np.array([py]), found)
+        rho = np.hypot(tips[:, 0] - px, tips[:, 1] - py)
+        over = rho <= 2.0
+        wanted = min(0.0, float((tips[over, 2] + height_of(kind, rho[over], 2.0)).min(initial=0.0)))
+        if abs(rho.min() - 2.0) > 0.01:  # a wall stands there
+            assert found[0, 0] == pytest.approx(wanted, abs=MICROMETRES)
+            checked += wanted < 0.0
+    assert checked > 60
+
+
+def height_of(kind, rho, radius):
+    """Of the tool over its tip."""
+    if kind == "flat":
+        return np.zeros(len(rho))
+    if kind == "drill":
+        return rho / np.tan(np.radians(59.0))
+    corner = {"ball": radius, "bull": 1.5}[kind]
+    return corner - np.sqrt(np.maximum(corner**2 - np.maximum(rho - radius + corner, 0.0) ** 2, 0.0))
 
 
 def test_a_finer_field_comes_nearer_in_the_first_order():

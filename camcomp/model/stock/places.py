@@ -1,0 +1,169 @@
+"""Places on a leg: they lie so close that the engagement between two of them is a straight line, or a jump.
+
+A leg is a straight way of the tip: a line, or a chord of an arc. Places are added until the engagement between two of
+them is a straight line, or until they are JUMP_MM apart and it still differs by much: there it jumps.
+"""
+
+# mypy: disallow-untyped-defs=False, disallow-incomplete-defs=False
+# numba infers the types of these functions; written by hand they would only be repeated.
+
+import math
+from typing import Any, NamedTuple
+
+from camcomp.ground.datatypes import Floats
+from camcomp.model.statics.compiled import inner
+from camcomp.model.stock.measure import DEPTH, WHAT, measure
+
+RAPID_LEG, CUT_LEG, PLUNGE_LEG, UNSEEN_LEG = 0, 1, 2, 3
+FX, FY, FZ, TX, TY, TZ, AX, AY, BX, BY = range(10)  # of a leg: from, to (mm); directions in the plane at both ends
+JUMP_MM = 0.02  # less than a tooth goes on in a turn
+JUMP = 0.2  # of the largest engagement: a steep rise by less is no jump
+FINE_MM = 0.0015  # places are no closer than that
+BENT = 2e-3  # of it: what a straight line between two places may miss
+SHORT, CALM = 0.05, 0.02  # a leg of this share of the radius whose ends differ by this share is not looked at between
+MOST_RECENT, DEEP = 64, 64
+PATH, SCALE = 0, 1  # of `way`: mm gone, largest engagement so far
+RECENT, PLACES, ROWS = range(3)  # of `told`
+MOST_CHAIN, CHAIN_DEEP = 32, 8  # short legs that are looked at together
+FIRST = DEEP  # slot of the stack from which on they are kept
+STEP = 0.5  # of the radius: places at first
+
+
+class Found(NamedTuple):
+    """Places (n,) found on legs, and their arcs."""
+
+    leg: Any  # (n,) int64
+    u: Floats  # (n,) fraction of the leg
+    first: Any  # (n,) int64 row in `bites`
+    many: Any  # (n,) int64
+    told: Floats  # (n, WHAT), the last one: largest engagement so far
+    bites: Floats  # (r, BITE)
+    crash: Any  # (legs,) bool
+    recent_end: Floats  # (MOST_RECENT,) mm of the way
+    way: Floats  # (2,)
+    told_of: Any  # (3,) int64
+    stack_u: Floats  # (DEEP + CHAIN_DEEP,)
+    stack: Floats  # (DEEP + CHAIN_DEEP, WHAT)
+    stack_rows: Any  # (DEEP + CHAIN_DEEP, 2) int64
+    chain_way: Floats  # (MOST_CHAIN + 1,) mm to the ends of short legs
+    chain_number: Any  # (CHAIN_DEEP,) int64
+
+
+@inner
+def leg_length(legs, k):
+    """Length of leg k, mm."""
+    return math.sqrt(
+        (legs[k, TX] - legs[k, FX]) ** 2 + (legs[k, TY] - legs[k, FY]) ** 2 + (legs[k, TZ] - legs[k, FZ]) ** 2
+    )
+
+
+@inner
+def look(nodes, place, found, legs, k, u, many, slot):
+    """Measures at fraction u of leg k into a slot of the stack."""
+    at = place.at
+    for i in range(3):
+        at[i] = legs[k, FX + i] + u * (legs[k, TX + i] - legs[k, FX + i])
+    dx, dy = legs[k, TX] - legs[k, FX], legs[k, TY] - legs[k, FY]
+    at[5] = (legs[k, TZ] - legs[k, FZ]) / math.sqrt(dx * dx + dy * dy)
+    side = AX if u == 0.0 else BX
+    if 0.0 < u < 1.0:
+        at[3] = (1.0 - u) * legs[k, AX] + u * legs[k, BX]
+        at[4] = (1.0 - u) * legs[k, AY] + u * legs[k, BY]
+        size = math.sqrt(at[3] * at[3] + at[4] * at[4])
+        at[3] /= size
+        at[4] /= size
+    else:
+        at[3], at[4] = legs[k, side], legs[k, side + 1]
+    place.many[0] = many
+    rows = found.told_of[ROWS]
+    n = measure(nodes, place, found.bites, rows)
+    found.told_of[ROWS] = n
+    found.stack_u[slot] = u
+    found.stack_rows[slot, 0], found.stack_rows[slot, 1] = rows, n - rows
+    found.way[SCALE] = max(found.way[SCALE], place.told[0])
+    for i in range(WHAT - 1):
+        found.stack[slot, i] = place.told[i]
+    found.stack[slot, WHAT - 1] = found.way[SCALE]
+
+
+@inner
+def copy_slot(found, a, b):
+    """Copies slot a of the stack to slot b."""
+    found.stack_u[b] = found.stack_u[a]
+    found.stack_rows[b, 0], found.stack_rows[b, 1] = found.stack_rows[a, 0], found.stack_rows[a, 1]
+    for i in range(WHAT):
+        found.stack[b, i] = found.stack[a, i]
+
+
+@inner
+def put_place(found, k, slot, u, at):
+    """Writes a slot down as place number `at` of the program."""
+    found.leg[at] = k
+    found.u[at] = u
+    found.first[at], found.many[at] = found.stack_rows[slot, 0], found.stack_rows[slot, 1]
+    for i in range(WHAT):
+        found.told[at, i] = found.stack[slot, i]
+
+
+@inner
+def apart(found, a, b):
+    """How much the engagement in two slots differs."""
+    most = 0.0
+    for i in range(DEPTH):
+        most = max(most, abs(found.stack[a, i] - found.stack[b, i]))
+    return most
+
+
+@inner
+def bent(found, a, middle, b, w):
+    """How far the engagement in the slot `middle` is from the straight line between its neighbours, at share w of it."""
+    most = 0.0
+    for i in range(DEPTH):
+        line = found.stack[a, i] + w * (found.stack[b, i] - found.stack[a, i])
+        most = max(most, abs(found.stack[middle, i] - line))
+    return most
+
+
+@inner
+def between(nodes, place, found, legs, k, length, radius, before):
+    """Puts down the places behind slot 0 up to slot 1, which is the last one put on the stack."""
+    top = 1
+    jumped = False
+    while top > 0:
+        a, b = found.stack_u[0], found.stack_u[top]
+        gap = (b - a) * length
+        scale = found.way[SCALE]
+        differ = apart(found, 0, top)
+        room = (
+            top + 2 < DEEP
+            and found.told_of[PLACES] + 64 < found.leg.shape[0]
+            and found.told_of[ROWS] + 1024 < found.bites.shape[0]
+        )
+        jumps = gap <= JUMP_MM and differ > JUMP * scale
+        if room and not jumps and gap > FINE_MM and (differ > CALM * scale or gap > SHORT * radius):
+            rows = found.told_of[ROWS]
+            look(nodes, place, found, legs, k, 0.5 * (a + b), before, top + 1)
+            if bent(found, 0, top + 1, top, 0.5) > BENT * scale:
+                top += 1
+                continue
+            found.told_of[ROWS] = rows
+        at = found.told_of[PLACES]
+        if jumps:
+            if a == 0.0 or jumped:  # one jump, at the first of these places
+                put_place(found, k, top, found.u[at - 1], at - 1)
+                if b == 1.0:
+                    put_place(found, k, top, b, at)
+                    found.told_of[PLACES] = at + 1
+            elif b == 1.0:
+                put_place(found, k, 0, b, at)
+                found.told_of[PLACES] = at + 1
+            else:
+                put_place(found, k, 0, b, at)
+                put_place(found, k, top, b, at + 1)
+                found.told_of[PLACES] = at + 2
+        else:
+            put_place(found, k, top, b, at)
+            found.told_of[PLACES] = at + 1
+        jumped = jumps
+        copy_slot(found, top, 0)
+        top -= 1

@@ -1,0 +1,53 @@
+"""Laws that act in one run alone, and what no form can express: found as what it is, or a map that an unseen run confirms."""
+
+import numpy as np
+
+from camcomp.diagnosis.diagnose import diagnose
+from camcomp.diagnosis.experiment.open_experiment import open_experiment
+from camcomp.diagnosis.fit.bench import Bench
+from camcomp.diagnosis.law.library import LearnedLaw
+from camcomp.model.effect import Cause
+from camcomp.model.law.covariates import AT_DRIVE
+from camcomp.model.law.expression import parse
+from tests.trials.lawful import Experiment
+
+
+def opened(folder, *how):
+    made = Experiment(*how)
+    made.write(folder)
+    return made, open_experiment(folder / "experiment.yaml")
+
+
+def test_what_acts_in_one_run_alone_is_a_while_on_its_drive(tmp_path):
+    made, files = opened(tmp_path, "disturbed_drive", "x", "router", 910021, 10.0, 130)
+    law = diagnose(files.job, files.twin, files.runs, without=("disturbance",), stated_mm=0.003).result.law
+    truth = made.fault.parameters
+    (part,) = law.parts
+    assert (law.on, part.target) == ("drive", "x") and set(part.envelope) == {"common_s"}
+    clock = np.concatenate([run.started_s + t for run, t in zip(made.runs, made.times, strict=True)])
+    acts = (clock >= truth["when_s"]) & (clock < truth["when_s"] + truth["last_s"])
+    said = parse(part.formula, dict.fromkeys(AT_DRIVE))({"common_s": clock}, len(clock)) != 0.0
+    assert acts.sum() > 10 and (acts & ~said).sum() <= 2 and (said & ~acts).sum() <= 0.2 * acts.sum()
+    assert abs(law.terms[0].value - 0.06 * made.size) < 0.1 * 0.06 * made.size
+    assert law.after_rms_um < 0.25 * law.before_rms_um
+
+
+def test_what_no_form_expresses_is_better_on_an_unseen_run_than_nothing(tmp_path):
+    _, files = opened(tmp_path, "tangle", "x", "router", 910022, 10.0, 130)
+    unseen = files.runs[2]
+    law = diagnose(files.job, files.twin, files.runs, holdout=[unseen.name], stated_mm=0.003).result.law
+    bench = Bench(files.twin, [unseen])
+    before = rms(bench.gap(0))
+    assert before > 30.0
+    learned = LearnedLaw("found", "router", law)
+    found = learned.candidate(files.twin.actuators)
+
+    def with_it(size):
+        cause = Cause("found", found.effect, None, {p.name: size for p in found.parameters})
+        return rms(bench.gap(0, [cause]))
+
+    assert with_it(1.0) < before < with_it(-1.0)
+
+
+def rms(gap):
+    return 1e3 * float(np.sqrt(np.nanmean(np.nansum(gap[:, :3] ** 2, axis=1))))
