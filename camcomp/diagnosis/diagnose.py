@@ -18,7 +18,7 @@ from camcomp.diagnosis.fit.bench import Bench, Run
 from camcomp.diagnosis.fit.columns import candidate_causes, working_causes
 from camcomp.diagnosis.fit.gap import gap_of, main_channels, rest_by_actuator
 from camcomp.diagnosis.fit.intervals import joint_covariance
-from camcomp.diagnosis.fit.lookalikes import without_lookalikes
+from camcomp.diagnosis.fit.lookalikes import without_lookalikes, without_twins
 from camcomp.diagnosis.fit.problem import Problem, open_problem
 from camcomp.diagnosis.law.answer import LawAnswer, answer_law
 from camcomp.diagnosis.law.library import LearnedLaw
@@ -90,7 +90,7 @@ def diagnose(
     laws = [each.candidate(twin.actuators) for each in learned if each.name not in without]
     found_before = [each for each in laws if each is not None]
     offered = [*candidate_causes(twin.robot, without), *found_before]
-    causes = without_lookalikes(bench, working_causes(bench, offered))
+    causes = without_twins(bench, without_lookalikes(bench, working_causes(bench, offered)))
     with part_of_work(0.0, 0.5):
         problem = open_problem(bench, causes, stated_mm)
     with part_of_work(0.5, 0.95):
@@ -245,10 +245,11 @@ def _parameters(problem: Problem, f: Fitted, covariance: Floats, j: int, cause: 
 
 
 def _idle_shapes(problem: Problem, cause: Cause) -> set[str]:
-    """Scanned parameters that nothing depends on here: a warm-up time where temperatures are logged."""
+    """Shapes that say nothing here: a warm-up time where temperatures are logged, a law that is the usual one."""
+    usual = {p.name for p in cause.effect.PARAMETERS if p.either and cause.values.get(p.name) == p.nominal}
     logged = all(run.run_path.temperature is not None for run in problem.bench.runs)
     warming = {p.name for p in cause.effect.PARAMETERS if p.scan and p.unit == "s" and not p.placed}
-    return warming if logged else set()
+    return usual | (warming if logged else set())
 
 
 def _round(value: float) -> float:
