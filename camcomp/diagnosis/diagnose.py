@@ -232,10 +232,11 @@ def _parameters(problem: Problem, f: Fitted, covariance: Floats, j: int, cause: 
 
 
 def _idle_shapes(problem: Problem, cause: Cause) -> set[str]:
-    """Scanned parameters that nothing depends on here: a warm-up time where temperatures are logged."""
+    """Shapes that say nothing here: a warm-up time where temperatures are logged, a law that is the usual one."""
+    usual = {p.name for p in cause.effect.PARAMETERS if p.either and cause.values.get(p.name) == p.nominal}
     logged = all(run.run_path.temperature is not None for run in problem.bench.runs)
     warming = {p.name for p in cause.effect.PARAMETERS if p.scan and p.unit == "s" and not p.placed}
-    return warming if logged else set()
+    return usual | (warming if logged else set())
 
 
 def _round(value: float) -> float:

@@ -37,12 +37,17 @@ class CandidateCause:
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         """The fitted parameters whose nominal value means no effect, i.e. all but the scanned shapes."""
-        return tuple(p for p in fitted(self) if not p.scan)
+        return tuple(p for p in fitted(self) if not p.shape)
 
     @property
     def shapes(self) -> tuple[Parameter, ...]:
         """The scanned parameters."""
         return tuple(p for p in fitted(self) if p.scan)
+
+    @property
+    def switches(self) -> tuple[Parameter, ...]:
+        """The shapes that are one of a few values."""
+        return tuple(p for p in fitted(self) if p.either)
 
     @property
     def label(self) -> str:
@@ -208,7 +213,7 @@ def thinned(values: Floats, factor: int) -> Floats:
 
 def cause_of(candidate: CandidateCause, coordinates: Mapping[str, float]) -> Cause:
     """The cause at fitting coordinates by parameter name; what is missing is nominal."""
-    values = {p.name: p.value(coordinates.get(p.name, 0.0 if not p.scan else p.nominal)) for p in fitted(candidate)}
+    values = {p.name: p.value(coordinates.get(p.name, p.nominal if p.shape else 0.0)) for p in fitted(candidate)}
     return Cause(candidate.name, candidate.effect, candidate.target, public_values(candidate.effect, values))
 
 

@@ -126,8 +126,8 @@ def candidate_columns(bench: Bench, candidate: CandidateCause, shape: Mapping[st
 
 
 def shape_default(candidate: CandidateCause) -> dict[str, float]:
-    """Nominal values of the scanned parameters."""
-    return {p.name: p.nominal for p in candidate.shapes}
+    """Nominal values of the shapes."""
+    return {p.name: p.nominal for p in (*candidate.shapes, *candidate.switches)}
 
 
 def build(

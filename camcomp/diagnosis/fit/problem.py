@@ -26,6 +26,7 @@ from camcomp.model.signal_path import stages_of
 BENT = 9.0  # chi-square by which the model may miss a straight line before all columns are worked out anew
 SETTLED = 0.05  # chi-square that one more pass may cost
 HALVED = 6  # times that a step is halved which no machine can take
+OTHER_LAW_LOG = 3.0  # log evidence by which another law than the nominal one has to be better
 STRAIGHT = 0.3  # chi-square that the bend of the model may cost before it is followed
 
 
@@ -80,9 +81,29 @@ class Problem:
         """Columns of a set in the order of theta."""
         return [c for i in members for c in self.candidates.columns[i]]
 
-    def refit(self, members: Members, theta: Floats | None = None, passes: int = 5) -> Fitted:
-        """Gauss-Newton through the twin from theta, or from the linear answer."""
-        shapes = {i: dict(self.shapes[i]) for i in members if i in self.shapes}
+    def refit(self, members: Members, theta: Floats | None = None) -> Fitted:
+        """Gauss-Newton through the twin from theta, or from the linear answer, under the laws that explain most."""
+        best = self._refit(members, theta, {})
+        if best.grams is self.base_grams:
+            return best  # so small that no law of its turning can be seen
+        for i in members:
+            for p in self.columns.candidates[i].switches:
+                for value in p.either:
+                    if value == best.extra.get(i, {}).get(p.name, p.nominal):
+                        continue
+                    laws = {m: {q.name: best.extra[m][q.name] for q in self.columns.candidates[m].switches}
+                            for m in best.extra}  # fmt: skip
+                    laws[i] = {**laws.get(i, {}), p.name: value}
+                    other = self._refit(members, best.theta, laws)
+                    if other.log_evidence > best.log_evidence + OTHER_LAW_LOG:
+                        best = other
+        return best
+
+    def _refit(
+        self, members: Members, theta: Floats | None, laws: Mapping[int, Mapping[str, float]], passes: int = 5
+    ) -> Fitted:
+        """The same under given laws: values of switches by candidate."""
+        shapes = {i: {**self.shapes[i], **laws.get(i, {})} for i in members if i in self.shapes}
         index = self.member_columns(members)
         grams = self.base_grams
         if not members:
