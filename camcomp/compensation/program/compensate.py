@@ -23,7 +23,15 @@ from camcomp.compensation.program.posture import check_posture, whole_pose
 from camcomp.compensation.program.program_bands import bands_of
 from camcomp.compensation.program.reversals import cut_at_reversals
 from camcomp.compensation.program.table_knots import cut_at_knots
-from camcomp.compensation.program.under_control import UnderControl, rest_warning, rests, under_control
+from camcomp.compensation.program.under_control import (
+    UnderControl,
+    apart_warning,
+    merging,
+    rest_warning,
+    rests,
+    stays_apart,
+    under_control,
+)
 from camcomp.gcode.output import Part, Rewritten
 from camcomp.gcode.program import Program
 from camcomp.gcode.rewrite import rewrite
@@ -134,9 +142,11 @@ def compensate(
     found = asked(arcs=bool(wanted))
     own = slice(None) if part is None else slice(part.first, part.last)
     able = bool((program.path.kind[own] == ARC).any()) and not job.causes
-    if wanted is None and able and found.control.leaves_room(tolerance_um):
+    if wanted is None and able and (found.control.leaves_room(tolerance_um) or found.control.apart):
         other = asked(arcs=True)
-        if other.control.better_than(found.control, tolerance_um):
+        as_good = found.control.apart and not other.control.apart  # in the program's own mode
+        as_good = as_good and not found.control.better_than(other.control, tolerance_um)
+        if as_good or other.control.better_than(found.control, tolerance_um):
             return other
     return found
 
@@ -233,10 +243,26 @@ def _compensated(
             version=version,
             model=job.fingerprint,
         )
-    control = under_control(program, job, rows, written, points, replace(after, error=missed_by), rest)
+    seen = replace(after, error=missed_by)
+    control = under_control(program, job, rows, written, points, seen, rest)
+    if part is None and control.stated and 1e3 * control.off_joins > tolerance_um * (1.0 + 1e-9):
+        apart = stays_apart(program, rows)
+        if apart.any():
+            other = under_control(program, job, rows, written, points, seen, rest, apart)
+            if other.better_than(control, tolerance_um):
+                control = other
+                written = rewrite(
+                    program,
+                    output_of(path, rows, rest, apart),
+                    resolution_mm=job.config.control.resolution_mm,
+                    version=version,
+                    model=job.fingerprint,
+                )
     warnings = _warnings(job, rows, control.resting) + control.warnings(
         path.line[track.motion[points.piece[points.judged]]], tolerance_um
     )
+    if control.apart:
+        warnings += apart_warning(mode for mode in control.modes if merging(mode, program.language))
     warnings += spindle_warning(still)
     if part is None:
         warnings += stock_warnings(stock_remarks(job.config, path, track.engaged))
