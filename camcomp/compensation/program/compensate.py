@@ -49,6 +49,7 @@ MAX_ROUNDS, ARC_ROUNDS = 6, 4
 STUCK = 0.95  # of the miss is left by a finer division that is no use, as where an arc passes the vertical
 WITH_SHARES = 0.7  # of the tolerance at the points looked at: where the share bends, more is missed between them
 COARSE_MM, FINE_MM = 8.0, 0.5  # distance of trial points on straight lines, without and with effects
+SHARE_OF_WAVE = 0.15  # between them, at most: no row of points meets a wave at its zeros alone
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,7 +164,7 @@ def _compensated(
 ) -> Compensated:
     """The corrected program, its arcs as arcs or as lines."""
     path, resolution = program.path, program.step_mm(job.config.control.resolution_mm)
-    spacing = FINE_MM if job.causes else COARSE_MM  # a screw's error has waves of a few mm
+    spacing = _spacing(job)
     base = lay_track(path, job.conditions, engaged)
     track, turning = cut_at_reversals(job, cut_at_knots(job, base, spacing), spacing)
     shares = shares_of(job, base)
@@ -273,6 +274,12 @@ def _compensated(
     share = None if shares is None else shares.of_ends(track, rows.piece, rows.w, rows.joining)
     bands = bands_of(job, track, rows, points, told, before, after, share)
     return replace(done, bands=bands, left=None if left is None else left[points.judged])
+
+
+def _spacing(job: Job) -> float:
+    """Distance of trial points, mm: a screw's error has waves of a few mm, the scale of an encoder shorter ones."""
+    waves = [SHARE_OF_WAVE * each for each in (cause.values.get("pitch_mm", 0.0) for cause in job.causes) if each > 0.0]
+    return min([FINE_MM, *waves]) if job.causes else COARSE_MM
 
 
 @dataclass(frozen=True, eq=False)
