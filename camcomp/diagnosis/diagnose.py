@@ -23,7 +23,9 @@ from camcomp.diagnosis.fit.problem import Problem, open_problem
 from camcomp.diagnosis.law.answer import LawAnswer, answer_law
 from camcomp.diagnosis.law.library import LearnedLaw
 from camcomp.diagnosis.next_experiment.after_unknown import explore
-from camcomp.diagnosis.next_experiment.information_gain import Proposal, propose
+from camcomp.diagnosis.next_experiment.designed import propose
+from camcomp.diagnosis.next_experiment.outcomes import with_outcomes
+from camcomp.diagnosis.next_experiment.proposal import Proposal
 from camcomp.diagnosis.result.types import (
     DiagnosisResult,
     Driver,
@@ -126,11 +128,15 @@ def _proposed(proposal: Proposal) -> NextExperiment:
         separates=tuple(proposal.separates),
         gain=round(proposal.gain, 4),
         minutes=round(proposal.candidate.minutes, 1),
+        outcomes=proposal.outcomes,
     )
 
 
 def _next(problem: Problem, found: CauseSearch, word: str, job: Job) -> Proposal | None:
-    """What separates the answer from its rivals: those that explain alike, or else those that are not yet excluded."""
+    """What separates the answer from its rivals: those that explain alike, or else those that are not yet excluded.
+
+    Where nothing rivals it, what narrows the error that its uncertainty leaves on the runs' programs.
+    """
     if word == "none":
         return None
     if found.unknown_in:
@@ -142,7 +148,14 @@ def _next(problem: Problem, found: CauseSearch, word: str, job: Job) -> Proposal
     p = found.probability[close]
     if found.verdict.rivals:
         p = np.maximum(p, UNTESTED * p.max())  # alike by construction: their prior is no reason to leave them untested
-    return propose(problem, [found.fits[j] for j in close], p / p.sum(), job)
+    fits = [found.fits[j] for j in close]
+    proposal = propose(problem, fits, p / p.sum(), job)
+    return None if proposal is None else with_outcomes(proposal, [_set_name(problem, f) for f in fits])
+
+
+def _set_name(problem: Problem, f: Fitted) -> str:
+    """A set of causes in words."""
+    return " and ".join(problem.columns.candidates[i].label for i in f.members) or "nothing but noise"
 
 
 # -- causes -----------------------------------------------------------------------------------------------------------

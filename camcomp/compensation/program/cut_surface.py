@@ -22,6 +22,7 @@ from camcomp.model.job import Job
 from camcomp.model.motion.response import respond
 from camcomp.model.stock.from_config import Bounds, memory_of
 from camcomp.model.stock.surface import Surface, surface_of
+from camcomp.model.stock.thinning import thinned
 
 SECTION_MM = 1.0  # of a piece in which the loaded tip goes straight
 ROUNDS = 8
@@ -89,4 +90,4 @@ def _met(track: Track, nodes: Nodes, driven: Engaged) -> Engaged:
     found = driven.take(np.flatnonzero(inside))
     piece, a, b = nodes.piece[found.motion], nodes.w[found.motion], nodes.w[found.motion + 1]
     u = track.u(piece, a + found.u * (b - a))
-    return replace(found, motion=track.motion[piece], u=u)
+    return thinned(replace(found, motion=track.motion[piece], u=u))

@@ -41,6 +41,7 @@ COMPENSATE = (
     "What stays after a repair can be compensated: camcomp diagnose --write-config writes the machine file with these causes "
     "in it, and compensate then takes them out of every program."
 )
+ADD_IT = "Add its log to the experiment file as one more run, and diagnose again."
 LOOK = "Part of the gap is none of the effects that camcomp knows; below stands where it shows and what it goes with."
 WORDS = {"none": "No gap", "identified": "Identified", "ambiguous": "Ambiguous", "unknown": "Unknown cause"}
 
@@ -177,16 +178,14 @@ def _to_do(result: DiagnosisResult, next_program: str | None) -> Section:
 
 def _next(proposal: NextExperiment) -> list[str]:
     text = [f"Measure next: {proposal.action}"]
-    if "unknown" in proposal.separates:
-        return [
-            *text,
-            f"It changes what the unknown effect may depend on, and nothing else. Expected gain: {proposal.gain:.2f} bits.",
-        ]
-    if separates := together(proposal.separates):
-        text.append(
-            f"It separates {separates}. Expected gain: {proposal.gain:.2f} (0: none, 1: the question is settled)."
-        )
-    return text
+    if UNKNOWN in proposal.separates and proposal.poses is None:
+        text.append("It changes what the unknown effect may depend on, and as little else as can be.")
+    elif separates := together(proposal.separates):
+        text.append(f"It separates {separates}.")
+    time = f", {brief(proposal.minutes, 2)} minutes with setting up" if proposal.minutes else ""
+    unit = "bits" if proposal.poses is None else "nats"
+    text += [*proposal.outcomes, f"Expected gain: {brief(proposal.gain)} {unit}{time}."]
+    return [*text, ADD_IT] if proposal.minutes else text
 
 
 def _where(where: Where, shown: Sequence[RunView]) -> Section:
