@@ -95,8 +95,8 @@ class ExperimentDiagnosis:
             config = load_config(self.configs)
             robot, _ = build_robot(config.robot, config.tool.tip)
             return pose_list(proposal.poses, tuple(a.revolute for a in robot.actuators), target)
-        if self.behind is None and proposal is None:
-            raise CheckFailed("CC608", "nothing is left to separate, so no next experiment is proposed")
+        if proposal is None:
+            raise CheckFailed("CC608", why_none(self.result.verdict, logs_only=self.behind is None))
         return next_program(self.behind, self.opened)
 
 
@@ -158,12 +158,22 @@ def machine_with_causes(
     )  # fmt: skip
 
 
+def why_none(verdict: str, *, logs_only: bool = False) -> str:
+    """Why a diagnosis proposes nothing; logs_only: of logs that have a study of their own."""
+    if verdict == "none":
+        return "machine and model agree as far as these runs can tell, so no next experiment is proposed"
+    if verdict == "identified":
+        return "nothing is left to separate, and what stays uncertain of the causes is below the noise: no next experiment is proposed"
+    if logs_only:
+        return "experiments without programs get no program for the next one"
+    return "no motion that this machine can do would separate what is left, so no next experiment is proposed"
+
+
 def next_program(done: Any, opened: Any) -> str:
     """Text of the proposed program of a diagnosis. Raises CheckFailed CC608 where there is none."""
-    if done is None or opened is None:
-        raise CheckFailed("CC608", "experiments without programs get no program for the next one")
-    if done.proposal is None:
-        raise CheckFailed("CC608", "nothing is left to separate, so no next experiment is proposed")
-    from camcomp.diagnosis.next_experiment.ready_program import ready_program
+    if done is None or opened is None or done.proposal is None:
+        raise CheckFailed("CC608", "what is proposed is no motion of the machine: next_experiment says what to measure")
+    from camcomp.diagnosis.next_experiment.ready_program import dialect_of_runs, ready_program
 
-    return ready_program(done.proposal.candidate, opened.runs, opened.job, opened.twin)
+    dialect = dialect_of_runs(opened.experiment, opened.job)
+    return ready_program(done.proposal.candidate, opened.runs, opened.job, opened.twin, dialect)

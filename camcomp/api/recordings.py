@@ -14,6 +14,7 @@ from camcomp.diagnosis.recordings.run_log import Recording, Wishes, log_of
 from camcomp.diagnosis.recordings.sampled import SampledColumns, refuse_names
 from camcomp.ground.errors import FileError
 from camcomp.ground.files import display_name, read_bytes, write_all
+from camcomp.ground.headway import steps
 from camcomp.model.config.load import load_config
 
 
@@ -33,7 +34,7 @@ def import_recordings(
     run_programs = _programs(programs, called)
     told = told_columns(columns, list(actuators), [each.rotary for each in actuators.values()])
     recordings = list[Recording]()
-    for run, group in zip(called, groups, strict=True):
+    for run, group in steps(zip(called, groups, strict=True), len(groups)):
         wishes = Wishes(told, rows, degrees, period_s, by, run in run_programs)
         if len(group) == 1 and Path(group[0]).suffix.lower() == ".mat":
             read = read_axis(read_bytes(group[0]), display_name(group[0]), run, actuators, actuator, wishes)

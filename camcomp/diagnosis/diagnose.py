@@ -18,12 +18,14 @@ from camcomp.diagnosis.fit.bench import Bench, Run
 from camcomp.diagnosis.fit.columns import candidate_causes, working_causes
 from camcomp.diagnosis.fit.gap import gap_of, main_channels, rest_by_actuator
 from camcomp.diagnosis.fit.intervals import joint_covariance
-from camcomp.diagnosis.fit.lookalikes import without_lookalikes
+from camcomp.diagnosis.fit.lookalikes import without_lookalikes, without_twins
 from camcomp.diagnosis.fit.problem import Problem, open_problem
 from camcomp.diagnosis.law.answer import LawAnswer, answer_law
 from camcomp.diagnosis.law.library import LearnedLaw
 from camcomp.diagnosis.next_experiment.after_unknown import explore
-from camcomp.diagnosis.next_experiment.information_gain import Proposal, propose
+from camcomp.diagnosis.next_experiment.designed import propose
+from camcomp.diagnosis.next_experiment.outcomes import with_outcomes
+from camcomp.diagnosis.next_experiment.proposal import Proposal
 from camcomp.diagnosis.result.types import (
     DiagnosisResult,
     Driver,
@@ -41,6 +43,7 @@ from camcomp.diagnosis.search.cause_search import CauseSearch, search_causes
 from camcomp.diagnosis.search.indistinguishable import classes, likeness
 from camcomp.diagnosis.search.unexplained import size_um, worst
 from camcomp.diagnosis.search.unknown import firm_prior, residual_tests
+from camcomp.diagnosis.standards import of_runs
 from camcomp.diagnosis.statistics import places
 from camcomp.diagnosis.statistics.cause_sets import Fitted
 from camcomp.diagnosis.statistics.periods import frequencies
@@ -88,7 +91,7 @@ def diagnose(
     laws = [each.candidate(twin.actuators) for each in learned if each.name not in without]
     found_before = [each for each in laws if each is not None]
     offered = [*candidate_causes(twin.robot, without), *found_before]
-    causes = without_lookalikes(bench, working_causes(bench, offered))
+    causes = without_twins(bench, without_lookalikes(bench, working_causes(bench, offered)))
     with part_of_work(0.0, 0.5):
         problem = open_problem(bench, causes, stated_mm)
     with part_of_work(0.5, 0.95):
@@ -114,6 +117,7 @@ def diagnose(
         outliers=outlying_rows(problem),
         floor=Floor(um=gap["noise_floor_um"], source=problem.floor.source),
         equivalent=tuple(tuple(_named(problem, i) for i in group) for group in classes(likeness(problem))),
+        standards=of_runs(twin, runs),
     )
     return Diagnosis(result, problem, found, proposal, law)
 
@@ -124,11 +128,15 @@ def _proposed(proposal: Proposal) -> NextExperiment:
         separates=tuple(proposal.separates),
         gain=round(proposal.gain, 4),
         minutes=round(proposal.candidate.minutes, 1),
+        outcomes=proposal.outcomes,
     )
 
 
 def _next(problem: Problem, found: CauseSearch, word: str, job: Job) -> Proposal | None:
-    """What separates the answer from its rivals: those that explain alike, or else those that are not yet excluded."""
+    """What separates the answer from its rivals: those that explain alike, or else those that are not yet excluded.
+
+    Where nothing rivals it, what narrows the error that its uncertainty leaves on the runs' programs.
+    """
     if word == "none":
         return None
     if found.unknown_in:
@@ -140,7 +148,14 @@ def _next(problem: Problem, found: CauseSearch, word: str, job: Job) -> Proposal
     p = found.probability[close]
     if found.verdict.rivals:
         p = np.maximum(p, UNTESTED * p.max())  # alike by construction: their prior is no reason to leave them untested
-    return propose(problem, [found.fits[j] for j in close], p / p.sum(), job)
+    fits = [found.fits[j] for j in close]
+    proposal = propose(problem, fits, p / p.sum(), job)
+    return None if proposal is None else with_outcomes(proposal, [_set_name(problem, f) for f in fits])
+
+
+def _set_name(problem: Problem, f: Fitted) -> str:
+    """A set of causes in words."""
+    return " and ".join(problem.columns.candidates[i].label for i in f.members) or "nothing but noise"
 
 
 # -- causes -----------------------------------------------------------------------------------------------------------
@@ -232,10 +247,11 @@ def _parameters(problem: Problem, f: Fitted, covariance: Floats, j: int, cause: 
 
 
 def _idle_shapes(problem: Problem, cause: Cause) -> set[str]:
-    """Scanned parameters that nothing depends on here: a warm-up time where temperatures are logged."""
+    """Shapes that say nothing here: a warm-up time where temperatures are logged, a law that is the usual one."""
+    usual = {p.name for p in cause.effect.PARAMETERS if p.either and cause.values.get(p.name) == p.nominal}
     logged = all(run.run_path.temperature is not None for run in problem.bench.runs)
     warming = {p.name for p in cause.effect.PARAMETERS if p.scan and p.unit == "s" and not p.placed}
-    return warming if logged else set()
+    return usual | (warming if logged else set())
 
 
 def _round(value: float) -> float:

@@ -18,4 +18,5 @@ DIALECT = Dialect(
     flow="o-words",
     more={740: 1},
     retract_to_start=False,
+    merges=True,
 )

@@ -17,15 +17,11 @@ SOURCE = (
 RISE_S = 0.005  # no drive jumps
 _CLOCK = (-1e9, 1e9, 1.0, 0.0)
 _WHEN = "any time on the common clock"
-FITTED = (
+PARAMETERS = (
     Parameter("shift_mm", "mm", 0.0, -5.0, 5.0, 0.03, 0.0003, "disturbances that are noticed afterwards: 5 to 200 um"),
+    Parameter("force_N", "N", 0.0, -5000.0, 5000.0, 100.0, 0.5, "hoses and covers: 10 to 500 N"),
     Parameter("from_s", "s", 0.0, *_CLOCK, _WHEN, scan=(0.0,), placed=True),
     Parameter("to_s", "s", 0.0, *_CLOCK, _WHEN, scan=(0.0,), placed=True),
-)
-PARAMETERS = (
-    FITTED[0],
-    Parameter("force_N", "N", 0.0, -5000.0, 5000.0, 100.0, 0.5, "hoses and covers: 10 to 500 N"),
-    *FITTED[1:],
 )
 
 

@@ -17,7 +17,11 @@ _LENGTH = (1e-4, 1.0, 0.005, 0.0005, "rolling guides: 1 to 100 um")
 FITTED = (
     Parameter("force_N", "N", 0.0, 0.0, 2000.0, 60.0, 0.2, "guides and seals of feed drives: 5 to 300 N", sign=1),
     Parameter("presliding_mm", "mm", PRESLIDING_MM, *_LENGTH, scan=(0.001, 0.003, 0.008, 0.02, 0.06)),
-)
+    Parameter(
+        "carriage_way", "1", 1.0, 0.0, 1.0, 1.0, 0.0,
+        "way that turns the friction round: 1 the carriage's, behind its spring; 0 the encoder's", either=(1.0, 0.0),
+    ),
+)  # fmt: skip
 # Known where drive forces are logged; the other channels hardly see them.
 _MORE = (
     Parameter("viscous_Ns_per_mm", "Ns/mm", 0.0, 0.0, 100.0, 0.2, 0.002, "grease and seals: 0.01 to 1 N s/mm", sign=1),
@@ -25,7 +29,7 @@ _MORE = (
         "asymmetry_Ns_per_mm", "Ns/mm", 0.0, -100.0, 100.0, 0.05, 0.001, "viscous forward minus mean of both ways"
     ),
 )
-PARAMETERS = (FITTED[0], *_MORE, FITTED[1])
+PARAMETERS = (FITTED[0], *_MORE, *FITTED[1:])
 
 
 def _pull(motion: Motion, which: Floats, p: Mapping[str, float]) -> Floats | None:
@@ -40,7 +44,9 @@ def _pull(motion: Motion, which: Floats, p: Mapping[str, float]) -> Floats | Non
     if motion.ordered:
         aimed = which > 0
         turned = np.zeros_like(nut)
-        turned[:, aimed] = held_back(nut[:, aimed], motion.stiffness[aimed], force, length)
+        with np.errstate(divide="ignore"):
+            holding = motion.stiffness[aimed] / p.get("carriage_way", 1.0)
+        turned[:, aimed] = held_back(nut[:, aimed], holding, force, length)
     return which * (force * turned + viscous * motion.speed + lopsided * np.abs(motion.speed))
 
 

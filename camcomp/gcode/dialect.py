@@ -39,6 +39,7 @@ class Dialect:
     cycles_apart: bool = False  # G80 leaves the motion code in force that was so before the cycle
     peck_clearance_mm: float = 0.254
     idle_letters: str = "DN"  # letters that mean nothing for the path wherever they stand
+    merges: bool = False  # G64 takes the tolerance of corners as P and that of lines made one as Q
     brackets_comment: bool = True  # `(...)` is a comment
     comment: tuple[str, str] = ("(", ")")
     decimals_max: int = 9  # behind the point of a length, in either unit

@@ -22,11 +22,13 @@ class Output:
     feed: Floats  # (N,) mm/min; NaN: as programmed
     joining: Bools  # (N,) a line added between two motions, before or after the motion's own rows
     rest: Bools | None = None  # (N,) ends at rest, whatever the path mode of the program says; None: none does
+    apart: Bools | None = None  # (N,) the control does not make one line of it and others; None: as the program says
 
     def __post_init__(self) -> None:
         n = len(self.motion)
-        if self.rest is None:
-            object.__setattr__(self, "rest", np.zeros(n, np.bool_))
+        for each in ("rest", "apart"):
+            if getattr(self, each) is None:
+                object.__setattr__(self, each, np.zeros(n, np.bool_))
         for name, dtype, row in (
             ("motion", np.int64, ()),
             ("kind", np.int8, ()),
@@ -36,6 +38,7 @@ class Output:
             ("feed", np.float64, ()),
             ("joining", np.bool_, ()),
             ("rest", np.bool_, ()),
+            ("apart", np.bool_, ()),
         ):
             array = frozen(getattr(self, name), dtype)
             if array.shape != (n, *row):

@@ -1,7 +1,7 @@
 """G61, G61.1, G64: whether a control stops at the ends of moves, and how far it may leave the path when it does not."""
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 NUMBER = r"\d+(?:\.\d*)?|\.\d+"
@@ -22,6 +22,11 @@ class PathMode:
     def name(self) -> str:
         """As a program says it, in mm."""
         return self.said(1.0)
+
+    @property
+    def apart(self) -> "PathMode":
+        """The same without making one line of several."""
+        return replace(self, merge_mm=0.0)
 
     def said(self, unit: float) -> str:
         """As a program says it, in units of so many mm."""

@@ -70,7 +70,8 @@ class Writer(LineEditor):
         self.out = out
         self.turns = program.language.writes_turns
         self.inserted = 0  # new lines so far
-        self.resting = False  # G61 of our own is in force
+        self.ours = ""  # the path mode of our own that is in force; none: the program's
+        self.stated = program.setup.path_mode  # by the program, where that was
         self.ends = np.empty((len(out.motion), 3))
         self.lines = np.empty(len(out.motion), np.int64)
         self.centres = np.full((len(out.motion), 3), np.nan)
@@ -190,13 +191,20 @@ class Writer(LineEditor):
     def _path_mode(self, row: int, behind: bool) -> None:
         """G61 in front of a row that has to end at rest, the program's own mode again in front of the next that has not.
 
-        behind: the row stands on a line of its own behind that of the motion.
+        The own mode without merging where rows have to stay apart. behind: the row stands on a line of its own behind that
+        of the motion.
         """
-        assert self.out.rest is not None
-        if bool(self.out.rest[row]) == self.resting:
+        out, mode = self.out, self.program.modes[self.k]
+        assert out.rest is not None and out.apart is not None
+        if mode is not self.stated and self.ours != "G61":
+            self.ours = ""
+        self.stated = mode
+        apart = mode.apart.said(self.unit) if out.apart[row] else ""
+        ours = "G61" if out.rest[row] else apart
+        if ours == self.ours:
             return
-        self.resting = not self.resting
-        string = self._cased("G61" if self.resting else self.program.modes[self.k].said(self.unit))
+        self.ours = ours
+        string = self._cased(ours or mode.said(self.unit))
         eol = self.text.end_of_line(self.row)
         if behind:
             self.edits.insert(int(self.text.ends[self.row]), eol + string)

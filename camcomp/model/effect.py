@@ -23,7 +23,8 @@ class Parameter:
     `scale` is the size that is typical where the effect is present, `tolerance` the size that every healthy machine
     has and no model states; both in `unit`, or as differences of the natural logarithm where `log` (factors). `sign` +1: never below
     nominal. `scan`: a shape (a pitch, a time constant) that nothing shows while the effect is absent; the values to
-    try first. `placed`: such a shape is an instant on the common clock, found where something begins or ends.
+    try first. `placed`: such a shape is an instant on the common clock, found where something begins or ends. `either`: a
+    shape that is one of a few values (which of two laws holds); the fit takes the one that explains more.
     """
 
     name: str
@@ -38,10 +39,16 @@ class Parameter:
     log: bool = False
     scan: tuple[float, ...] = ()
     placed: bool = False
+    either: tuple[float, ...] = ()
+
+    @property
+    def shape(self) -> bool:
+        """Whether nothing shows of it while the effect is absent."""
+        return bool(self.scan or self.either)
 
     def value(self, coordinate: float) -> float:
         """Physical value at a fitting coordinate (0 = nominal), kept inside the bounds."""
-        if self.scan:
+        if self.shape:
             value = coordinate
         else:
             value = self.nominal * float(np.exp(min(coordinate, 700.0))) if self.log else self.nominal + coordinate
@@ -49,7 +56,7 @@ class Parameter:
 
     def coordinate(self, value: float) -> float:
         """Fitting coordinate of a physical value."""
-        if self.scan:
+        if self.shape:
             return value
         return float(np.log(value / self.nominal)) if self.log else value - self.nominal
 

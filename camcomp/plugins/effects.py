@@ -151,7 +151,7 @@ def _wrong_parameter(p: Any) -> str:
         return "cannot be a key in YAML"
     if not (isinstance(p.unit, str) and isinstance(p.source, str)):
         return "needs unit and source as text"
-    numbers = (p.nominal, p.low, p.high, p.scale, p.tolerance, *p.scan)
+    numbers = (p.nominal, p.low, p.high, p.scale, p.tolerance, *p.scan, *p.either)
     if not all(isinstance(each, (int, float)) and not math.isnan(each) for each in numbers):
         return "has something in place of a number"
     if not p.low <= p.nominal <= p.high or not math.isfinite(p.nominal):
@@ -162,8 +162,8 @@ def _wrong_parameter(p: Any) -> str:
         return f"has the sign {p.sign}, not 0 or +1"
     if p.log and not p.low > 0.0:
         return "is a factor (log) with a bound that is not above zero"
-    if not all(p.low <= each <= p.high for each in p.scan):
-        return "has a value to scan outside its bounds"
+    if not all(p.low <= each <= p.high for each in (*p.scan, *p.either)):
+        return "has a value to scan or to choose outside its bounds"
     return ""
 
 
@@ -250,7 +250,7 @@ def _more_keys(effect: Any) -> set[str]:
 def _away(who: str, effect: ModuleType) -> dict[str, float]:
     """Parameters a typical size from nominal; shapes stay."""
     fitted = getattr(effect, "FITTED", effect.PARAMETERS)
-    values = {p.name: p.nominal if p.scan else p.value(p.scale) for p in fitted}
+    values = {p.name: p.nominal if p.shape else p.value(p.scale) for p in fitted}
     if hasattr(effect, "public"):
         values = dict(effect.public(values))
     if unknown := set(values) - set(nominal(effect)) - _more_keys(effect):

@@ -30,6 +30,13 @@ def test_accuracy_and_time_are_those_of_the_control(name, machine):
     assert found.time[1] == pytest.approx(found.time[0], rel=TIME), found.row()
 
 
+@pytest.mark.parametrize("shape", ["raster500", "surface300"])
+def test_lines_that_are_kept_apart_stay_near_the_path_on_the_control(shape, machine):
+    merged, apart = (driven.account(driven.load(f"{shape}{way}-p10-f3000"), machine) for way in ("", "apart"))
+    assert merged.most[0] > 9.0 and apart.most[0] < 0.3 * merged.most[0], (merged.row(), apart.row())
+    assert apart.time[0] < 1.02 * merged.time[0]
+
+
 @pytest.mark.campaign
 @pytest.mark.skipif(shutil.which("linuxcnc") is None, reason="needs LinuxCNC")
 def test_the_same_of_every_shape_mode_and_feed(machine, tmp_path):

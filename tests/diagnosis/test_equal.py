@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from camcomp.api.diagnosis import diagnose
-from camcomp.diagnosis.next_experiment.information_gain import propose
+from camcomp.diagnosis.next_experiment.designed import propose
 from camcomp.diagnosis.search.indistinguishable import classes, likeness, stand_ins
 from tests.campaign.cases import EQUAL
 from tests.diagnosis.conftest import plan_of

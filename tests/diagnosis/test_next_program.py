@@ -9,8 +9,10 @@ import pytest
 from camcomp.api.diagnosis import next_program
 from camcomp.diagnosis.experiment.open_experiment import open_experiment
 from camcomp.diagnosis.fit.bench import Bench
-from camcomp.diagnosis.next_experiment.candidates import candidates, site_of
+from camcomp.diagnosis.next_experiment.candidates import by_other_means, candidate, coarse, single_changes, usual
+from camcomp.diagnosis.next_experiment.design import MotionDesign
 from camcomp.diagnosis.next_experiment.ready_program import CUTS, ready_program
+from camcomp.diagnosis.next_experiment.site import commanded, room_of, site_of
 from camcomp.gcode.interpret import read_program
 from camcomp.ground import path_geometry
 from camcomp.ground.errors import CheckFailed
@@ -27,16 +29,31 @@ def opened():
 
 
 @pytest.fixture(scope="module")
-def proposals(opened):
-    site = site_of(Bench(opened.twin, opened.runs[:2]))
-    return [(each, ready_program(each, opened.runs, opened.job, opened.twin)) for each in candidates(site)]
+def bench(opened):
+    return Bench(opened.twin, opened.runs[:2])
+
+
+@pytest.fixture(scope="module")
+def every(opened, bench):
+    site, room = site_of(bench), room_of(bench, opened.job)
+    return [*coarse(site, room), *by_other_means(site), *single_changes(site, room)]
+
+
+@pytest.fixture(scope="module")
+def proposals(opened, every):
+    return [(each, ready_program(each, opened.runs, opened.job, opened.twin)) for each in every]
+
+
+@pytest.fixture(scope="module")
+def first(bench):
+    return candidate(site_of(bench), usual(site_of(bench)))
 
 
 def test_every_experiment_is_a_program_that_a_machine_can_run(proposals):
-    assert len(proposals) > 10
-    for candidate, text in proposals:
+    assert len(proposals) > 20
+    for proposed, text in proposals:
         path = read_program(text.encode(), name="n.nc").path
-        core = read_program(candidate.program.encode(), name="c.nc").path
+        core = read_program(proposed.program.encode(), name="c.nc").path
         ends, above = path.end, core.end[:, 2].max() + 2.0
         np.testing.assert_array_equal(path.kind[:3], [0, 0, 1])  # up, across, down
         assert list(path.known[:2]) == [False, True]
@@ -46,7 +63,7 @@ def test_every_experiment_is_a_program_that_a_machine_can_run(proposals):
         lines = text.splitlines()
         assert lines.index("M3 S8000") < lines.index(next(line for line in lines if line.startswith("G1")))
         assert lines[-2:] == ["M5", "M2"]
-        assert (CUTS in lines) == candidate.cutting
+        assert (f"({CUTS})" in lines) == proposed.cutting
 
 
 @rs274.needs_rs274
@@ -58,34 +75,64 @@ def test_linuxcnc_reads_them(proposals):
         np.testing.assert_allclose(seen.motions[-1].end, path.end[-1], atol=1e-3)
 
 
-def test_heights_stay_inside_the_travel_or_an_error_says_so(opened):
-    candidate = next(iter(candidates(site_of(Bench(opened.twin, opened.runs[:2])))))
-    first = read_program(candidate.program.encode(), name="c.nc").path
+def test_in_the_air_nothing_is_met_that_the_runs_did_not_pass(bench, every):
+    """No design without cutting goes below where a run went without cutting; what cuts stays where the runs cut."""
+    runs = dict(zip(("cut", "air"), bench.runs, strict=True))
+    lowest = commanded(bench, runs["air"])[:, 2].min()
+    been = commanded(bench, runs["cut"])
+    for each in every:
+        ends = each.design.points()
+        if each.cutting:
+            assert (np.abs(ends) <= np.abs(been).max(axis=0) + 0.1).all()
+            assert each.design.plane == "XY"
+        else:
+            assert ends[:, 2].min() >= lowest - 0.1
 
-    around = path_geometry.points(first, np.ones(200, int), np.linspace(0.0, 1.0, 200))
+
+def test_the_same_in_the_language_of_the_control(opened):
+    """Dwell in seconds, remarks and units as each control has them; the motion is read alike."""
+    design = MotionDesign((5.0, -3.0, 2.0), 11.0, 700.0, plane="YZ", dwell_s=90.0)
+    each = replace(candidate(SimpleNamespace(channels=(), end=0.0), design), action="a (remark)")
+    said = {
+        "rs274": ("(a remark)", "G4 P90", "G21 G90 G19 G54"),
+        "grbl": ("(a remark)", "G4 P90.0", "G21 G90 G19 G54"),
+        "fanuc": ("(a remark)", "G4 X90.0", "G21 G90 G19 G54"),
+        "sinumerik": (";a remark", "G4 F90.0", "G71 G90 G19 G54"),
+    }
+    plain = read_program(each.program.encode(), name="plain").path.end
+    for dialect, lines in said.items():
+        text = ready_program(each, (), opened.job, opened.twin, dialect)
+        assert set(lines) <= set(text.splitlines())
+        path = read_program(text.encode(), name="n.nc", dialect=dialect).path
+        np.testing.assert_array_equal(path.end[2:-1], plain)
+
+
+def test_heights_stay_inside_the_travel_or_an_error_says_so(opened, first):
+    path = read_program(first.program.encode(), name="c.nc").path
+
+    around = path_geometry.points(path, np.ones(200, int), np.linspace(0.0, 1.0, 200))
 
     def limited(above):
         z = opened.twin.inverse(opened.twin.to_machine(around + [0.0, 0.0, above]))[:, 2].max()
         return SimpleNamespace(machine=SimpleNamespace(limits=[(-1e3, 1e3), (-1e3, 1e3), (-1e3, z)]))
 
-    low = ready_program(candidate, opened.runs, limited(3.0), opened.twin)
-    high = ready_program(candidate, opened.runs, opened.job, opened.twin)
+    low = ready_program(first, opened.runs, limited(3.0), opened.twin)
+    high = ready_program(first, opened.runs, opened.job, opened.twin)
     heights = [read_program(each.encode(), name="n.nc").path.end[0, 2] for each in (low, high)]
     assert heights[0] < heights[1]
     with pytest.raises(CheckFailed) as caught:
-        ready_program(candidate, opened.runs, limited(-1.0), opened.twin)
+        ready_program(first, opened.runs, limited(-1.0), opened.twin)
     assert caught.value.rule == "CC608"
 
 
-def test_the_spindle_is_that_of_the_runs(opened):
-    candidate = next(iter(candidates(site_of(Bench(opened.twin, opened.runs[:2])))))
+def test_the_spindle_is_that_of_the_runs(opened, first):
 
     def with_turn(turn):
         path = opened.runs[0].program
         return [replace(opened.runs[0], program=replace(path, turn=np.full(len(path), turn)))]
 
-    assert "M4 S8000" in ready_program(candidate, with_turn(-1.0), opened.job, opened.twin)
-    silent = ready_program(candidate, with_turn(np.nan), opened.job, opened.twin)
+    assert "M4 S8000" in ready_program(first, with_turn(-1.0), opened.job, opened.twin)
+    silent = ready_program(first, with_turn(np.nan), opened.job, opened.twin)
     assert "M3" not in silent and "M5" not in silent
 
 

@@ -53,12 +53,14 @@ TOLERANCE_N = 0.5  # rows of 5 ms and instants of 1 ms meet a drive that turns r
 LEAST_MM = 1e-3  # an effect that moves less tells nothing
 # Ramps of the speed are only in the twin: the model along a program has pauses at stops and one speed between them. Both
 # have a tip that lags, or rubs by its speed, where the speed has been the programmed one for a while.
-BY_SPEED = ("servo_lag", "viscous friction", "all together")
+BY_SPEED = ("servo_lag", "servo_overshoot", "viscous friction", "all together")
 SETTLED_S = 0.15
 
 # Not nominal, and not one typical size either: what would hardly show in ten seconds, or has a size of its own.
 VALUES = {
     "thermal_growth": {"growth_mm_per_K": 0.004, "warm_up_s": 300.0},
+    "screw_growth": {"expansion_ppm_per_K": 100.0, "warm_up_s": 300.0},
+    "servo_overshoot": {"period_ms": 60.0, "damping": 0.7},
     "friction": {"force_N": 60.0, "presliding_mm": 0.005},
     "joint_offset": {"offset_mm": 0.1},
     # all the time: along a program no time is lost in ramps, so that it would begin elsewhere

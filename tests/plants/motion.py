@@ -1,7 +1,7 @@
 """Programs in time for the truth plants: a reader for plain G-code and the speed profile of the reference controller.
 
 Every line is run with a trapezoidal speed (1500 mm/s² up and down) and an exact stop at its end, or, where the control looks
-ahead, only where the path bends by more than 5°; t = 0 is the start of the first feed move.  The reader knows what the plants' own programs and corrected ones contain: G0-G3 in the XY plane, I and J
+ahead, only where the path bends by more than 5°; t = 0 is the start of the first feed move.  The reader knows what the plants' own programs and corrected ones contain: G0-G3, I, J and K
 relative to the start, absolute millimetres, modal words, comments, N words.  Anything else is an error, never a guess.
 """
 
@@ -17,12 +17,17 @@ ACCELERATION = 1500.0  # mm/s²
 RAPID = 200.0  # mm/s, never logged
 SMOOTH = np.cos(np.deg2rad(5.0))  # of the bend that a control that looks ahead passes without a stop
 _WORD = re.compile(r"([A-Z])\s*([-+]?(?:\d+\.?\d*|\.\d+))")
-_HARMLESS_G = {17, 21, 40, 49, 54, 64, 80, 90, 94, 91.1}
+_PLANES = {
+    17: (0, 1),
+    18: (2, 0),
+    19: (1, 2),
+}  # axes of a plane, so that turning from the first to the second is positive
+_HARMLESS_G = {21, 40, 49, 54, 64, 80, 90, 94, 91.1}
 
 
 @dataclass(frozen=True)
 class Move:
-    """One motion: end points (3,) mm, arc centre (2,) and signed sweep (0 for lines), speed mm/s."""
+    """One motion: end points (3,) mm, arc centre (2,) in the plane of `axes` and signed sweep (0 for lines), speed mm/s."""
 
     line: int
     feed: bool
@@ -31,25 +36,28 @@ class Move:
     centre: np.ndarray
     sweep: float
     speed: float
+    axes: tuple[int, int] = (0, 1)
 
     @property
     def length(self) -> float:
         """Path length, mm."""
         if self.sweep == 0.0:
             return float(np.linalg.norm(self.end - self.start))
-        radius = float(np.hypot(*(self.start[:2] - self.centre)))
-        return float(np.hypot(radius * self.sweep, self.end[2] - self.start[2]))
+        radius = float(np.hypot(*(self.start[list(self.axes)] - self.centre)))
+        third = 3 - sum(self.axes)
+        return float(np.hypot(radius * self.sweep, self.end[third] - self.start[third]))
 
     def at(self, share: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Points and unit directions (n, 3) at shares (n,) of the way."""
         chord = self.end - self.start
         tip, along = self.start + share[:, None] * chord, np.tile(chord / self.length, (len(share), 1))
         if self.sweep != 0.0:
-            out = self.start[:2] - self.centre
+            plane = list(self.axes)
+            out = self.start[plane] - self.centre
             c, d = np.cos(share * self.sweep), np.sin(share * self.sweep)
             arm = np.stack([c * out[0] - d * out[1], d * out[0] + c * out[1]], 1)
-            tip[:, :2] = self.centre + arm
-            along[:, :2] = np.stack([-arm[:, 1], arm[:, 0]], 1) * self.sweep / self.length
+            tip[:, plane] = self.centre + arm
+            along[:, plane] = np.stack([-arm[:, 1], arm[:, 0]], 1) * self.sweep / self.length
         return tip, along
 
     def leads_into(self, other: Move) -> bool:
@@ -61,7 +69,7 @@ class Move:
 def read(text: str, start: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> list[Move]:
     """Moves of a program; raises ValueError on words it does not know."""
     moves: list[Move] = []
-    here, motion, feed = np.array(start, float), 0, 0.0
+    here, motion, feed, plane = np.array(start, float), 0, 0.0, (0, 1)
     for number, source in enumerate(text.splitlines(), 1):
         bare = re.sub(r"\([^)]*\)|;.*|%.*", "", source).upper()
         words = _WORD.findall(bare)
@@ -73,6 +81,8 @@ def read(text: str, start: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> list
             if letter == "G":
                 if value in (0, 1, 2, 3):
                     motion = int(value)
+                elif value in _PLANES:
+                    plane = _PLANES[value]
                 elif value not in _HARMLESS_G:
                     raise ValueError(f"line {number}: G{digits} is not known to this plant")
             elif letter == "F":
@@ -84,9 +94,10 @@ def read(text: str, start: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> list
         end = np.array([values.pop(k, here[i]) for i, k in enumerate("XYZ")])
         centre, sweep = np.zeros(2), 0.0
         if motion in (2, 3):
-            centre = here[:2] + [values.pop("I", 0.0), values.pop("J", 0.0)]
-            a = np.arctan2(*(here[:2] - centre)[::-1])
-            b = np.arctan2(*(end[:2] - centre)[::-1])
+            axes = list(plane)
+            centre = here[axes] + [values.pop("IJK"[i], 0.0) for i in axes]
+            a = np.arctan2(*(here[axes] - centre)[::-1])
+            b = np.arctan2(*(end[axes] - centre)[::-1])
             sweep = (b - a) % (2 * np.pi)
             sweep = sweep if sweep > 1e-9 else 2 * np.pi
             if motion == 2:
@@ -95,7 +106,7 @@ def read(text: str, start: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> list
             raise ValueError(f"line {number}: {values} left over")
         if motion and feed <= 0:
             raise ValueError(f"line {number}: no feed")
-        move = Move(number, motion > 0, here, end, centre, sweep, feed if motion else RAPID)
+        move = Move(number, motion > 0, here, end, centre, sweep, feed if motion else RAPID, plane)
         if move.length > 0:
             moves.append(move)
         here = end

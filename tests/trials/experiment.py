@@ -16,6 +16,7 @@ import numpy as np
 from tests.recordings import recording
 from tests.recordings.recording import Recording
 from tests.trials import faults as library
+from tests.trials import later
 from tests.trials.faults import Fault, Faults, Target
 from tests.trials.machines import MACHINES
 from tests.trials.plant import Character, Run, State, observe
@@ -151,6 +152,8 @@ class Bench:
         """A fault of the library or a strange one."""
         if effect in STRANGE:
             return strange(effect, target or self.machine.actuators[0], size, seed, self.span)
+        if effect in later.KNOWN_AS:
+            return later.fault(effect, target, size, seed, self.span)
         return library.sized(effect, target, size, seed, self.machine.reach if self.machine.rotary else None)
 
     def sized(self, base: tuple[Fault, ...], effect: str, target: Target, goal_mm: float, seed: int) -> Fault:
@@ -158,7 +161,7 @@ class Bench:
         before = self.see(base)
         low, high = library.bounds(effect)
         sign = library.sign(effect, seed)
-        size = sign * (1.0 if effect in STRANGE else library.LIBRARY[effect].fair)
+        size = sign * (library.LIBRARY[effect].fair if effect in library.LIBRARY else 1.0)
         for _ in range(5):
             size = float(np.clip(size, low, high))
             got = rms(before, self.see((*base, self.fault(effect, target, size, seed))))

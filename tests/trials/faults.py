@@ -21,6 +21,10 @@ class Fault:
     target: Target
     parameters: dict[str, float] = field(hash=False)
 
+    def aimed(self, actuators: tuple[str, ...]) -> list[int]:
+        """Indices of the actuators that have it."""
+        return [i for i, each in enumerate(actuators) if self.target in (None, each)]
+
 
 class Faults(tuple[Fault, ...]):
     """Everything that is wrong at once; sizes of the same kind add up, factors multiply."""

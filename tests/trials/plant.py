@@ -26,7 +26,7 @@ import numpy as np
 
 from tests.plants.drives import play
 from tests.recordings.recording import Recording
-from tests.trials import drives, strange
+from tests.trials import drives, later, strange
 from tests.trials.faults import Faults
 from tests.trials.machines import Machine
 
@@ -161,6 +161,9 @@ class Motion:
             if each.effect in strange.STRANGE and each.target in names:
                 i = names.index(each.target)
                 self.encoder[:, i] += strange.at_encoder(each, i, c)
+            elif each.effect in later.KNOWN_AS:
+                for i in each.aimed(names):
+                    self.encoder[:, i] += later.at_encoder(each, i, c)
         width = faults.sum("backlash", "width_mm", names)
         columns = [
             play(np.ascontiguousarray(self.encoder[:, i]), width[i], character.play_start[i]) for i in range(len(names))
@@ -205,11 +208,15 @@ class Motion:
             machine.inverse(machine.origin[None])[0], machine.reach, self.dragged[k],
         )  # fmt: skip
         nut = self.at(self.nut, t)
+        recent = [each for each in faults if each.effect in later.KNOWN_AS]
         carriage = nut + faults.sum("screw_pitch", "error_ppm", names) * 1e-6 * (nut - machine.home)
         for each in faults.of("screw_cyclic"):
             i, value = names.index(each.target), each.parameters
             turn = 2 * np.pi * nut[:, i] / value["pitch_mm"] + value["phase_rad"]
             carriage[:, i] += value["amplitude_mm"] * np.sin(turn)
+        for each in recent:
+            for i in each.aimed(names):
+                carriage[:, i] += later.at_carriage(each, nut[:, i], machine.home, warm)
         carriage += faults.sum("joint_offset", "offset_rad" if machine.rotary else "offset_mm", names)
         carriage += faults.sum("thermal_growth", "growth_mm_per_K", names) * warm[:, None]
         force = self.force(t, character.followed)
@@ -235,6 +242,9 @@ class Motion:
                 STRIBECK_MM_PER_S,
             )
             friction[:, i] = np.interp(t, run.recording.t, held)
+        for each in recent:
+            for i in each.aimed(names):
+                friction[:, i] -= later.push(each, common)
         tip, drive = machine.settle(faults, carriage - friction / spring, force)
         s.drive = drive + friction
         soft = faults.sum("tool_deflection", "compliance_mm_per_N", (None,))[0]

@@ -15,12 +15,13 @@ from typing import Any
 
 import numpy as np
 
+from tests.trials import later
 from tests.trials import laws as law
 
 NAMED = 0.3  # of the noise: a cause of at least this size may be named
 DUE = 2.7  # from which on it has to be: what was made as 3
 SURE = 0.8
-KNOWN_AS = {"disturbed_drive": "disturbance"}  # strange faults that the tool has learnt to name
+KNOWN_AS = {"disturbed_drive": "disturbance", **later.KNOWN_AS}  # strange faults that the tool has learnt to name
 Row = dict[str, Any]
 
 

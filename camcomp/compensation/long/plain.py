@@ -9,22 +9,24 @@ import numpy as np
 
 from camcomp.compensation.bands.outcome import Bands, BandTotals
 from camcomp.compensation.bands.scatter import best_share, excess
+from camcomp.compensation.long.carry import Carry
 from camcomp.compensation.long.fastwrite import ROOM, write_rows
 from camcomp.compensation.long.field import Field, Tiles
 from camcomp.compensation.long.kernel import BASIC, follow, look_up
 from camcomp.compensation.long.loads import Edge, Loads, constant_of, joints_at, loads_of
 from camcomp.compensation.long.met import Met
-from camcomp.compensation.long.plain_run import NotInPieces, PlainRun
+from camcomp.compensation.long.plain_run import NotInPieces, PlainRun, Unsolved
 from camcomp.compensation.long.run_bands import RunUncertainty
 from camcomp.compensation.program.chords import divide, second_derivative, trial_nodes
 from camcomp.compensation.program.moves import chord_budget
 from camcomp.compensation.program.policy import left_alone
-from camcomp.compensation.program.under_control import rests_of, rounds
+from camcomp.compensation.program.under_control import apart_pays, merging, rests_of, rounds
 from camcomp.gcode.dialect import Dialect
-from camcomp.gcode.output import Standing
 from camcomp.ground.datatypes import LINE, RAPID, Bools, Floats, Ints
+from camcomp.model.control import limits_of
 from camcomp.model.job import Job
 from camcomp.model.statics.solve import FREE, TARGET, solve, threads
+from camcomp.model.trajectory.moves import line_moves
 
 ROUNDS = 5
 EASY_MM = 8.0  # longer lines are divided at trial points; shorter ones when their middle says so
@@ -36,29 +38,6 @@ MODELS = (
 )  # whose force does not depend on the way from the program's start
 COARSE_MM = 1e-3  # a control with larger steps moves the joints by more than first order tells
 SLICE = 4096  # rows that a thread takes at once
-
-
-@dataclass
-class Carry:
-    """What one piece of the program leaves for the next; program frame."""
-
-    written: Floats  # (3,) mm where the written program stands
-    commanded: Floats  # (3,) mm the same before rounding
-    code: float = -1.0  # motion code in force in the output, -1: not known
-    feed: float = np.nan  # feed in force, mm/min; NaN: not known
-
-    def standing(self) -> Standing:
-        """The same for the writer of other lines."""
-        x, y, z = self.written.tolist()
-        return Standing(
-            (x, y, z), None if self.code < 0.0 else int(self.code), None if np.isnan(self.feed) else (94, self.feed)
-        )
-
-    def take(self, behind: Standing, commanded: Floats) -> None:
-        """Go on behind other lines."""
-        self.written, self.commanded = np.array(behind.position), commanded.copy()
-        self.code = -1.0 if behind.code is None else float(behind.code)
-        self.feed = behind.feed[1] if behind.feed is not None and behind.feed[0] == 94 else np.nan
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,19 +83,12 @@ class Done:
     seen: Ints  # (k,) rows of before and after
     bands: Bands | None = None
     left: Floats | None = None  # (k, 3) mm of `after` that a policy leaves on purpose
+    apart: bool = False  # the control is kept from making one line of several
 
     @property
     def missed(self) -> Floats:
         """What `after` (k, 3) mm has beside that."""
         return self.after if self.left is None else self.after - self.left
-
-
-class Unsolved(Exception):
-    """Points of a run without a solution: motions (k,), targets (k, 3) mm in the machine frame, the solver's status."""
-
-    def __init__(self, move: Ints, target: Floats, status: Ints) -> None:
-        super().__init__()
-        self.move, self.target, self.status = move, target, status
 
 
 def _sizes(vectors: Floats) -> Floats:
@@ -202,7 +174,23 @@ class PlainCorrector:
         unloaded = np.concatenate((answers.unloaded[judged], middles.unloaded))
         seen = np.concatenate((np.flatnonzero(judged), middles.rows))
         back = self._back(unloaded)
-        return Done(data, run, rows, answers, commanded, written, back, error, begin, held, rest, seen, bands, meant)
+        return Done(
+            data,
+            run,
+            rows,
+            answers,
+            commanded,
+            written,
+            back,
+            error,
+            begin,
+            held,
+            rest,
+            seen,
+            bands,
+            meant,
+            bool(carry.apart),
+        )
 
     def _bands(
         self, uncertainty: RunUncertainty, rows: PlainRows, answers: Answers, judged: Bools, error: Floats, written: Floats,
@@ -443,16 +431,21 @@ class PlainCorrector:
         self, run: PlainRun, loads: Loads, rows: PlainRows, commanded: Floats, kept: Bools, carry: Carry
     ) -> tuple[bytes, Floats, Floats, Bools]:
         plain, N = run.plain, len(rows.move)
-        rest = self._rests(loads.run, rows)
-        modes = [np.frombuffer(each.encode(), np.uint8) for each in ("G61", run.state.path_mode.said(run.state.unit))]
+        rest, mode = self._rests(loads.run, rows), run.state.path_mode
+        able = merging(mode, self.language)
+        apart = able and self._apart(loads.run, rows, commanded, rest, kept, carry)
+        begins = -1 if able and apart != carry.apart else 0
+        carry.apart = apart
+        own = (mode.apart if apart else mode).said(run.state.unit)
+        modes = [np.frombuffer(each.encode(), np.uint8) for each in ("G61", own)]
         first = np.searchsorted(loads.of[rows.move], np.arange(run.motions + 1))
-        out = np.empty(run.text_end - run.text_at + ROOM * (N + int(rest.sum())), np.uint8)
+        out = np.empty(run.text_end - run.text_at + ROOM * (N + 1 + int(rest.sum())), np.uint8)
         written, held = np.empty((N, 3)), np.empty(N)
         position, state = carry.written.copy(), np.array([carry.code, carry.feed])
         unit = run.state.unit
         size = write_rows(
             run.data, run.text_at, run.text_end, plain.line, plain.begin, plain.finish, plain.kind, plain.end,
-            plain.code_stated, plain.feed_stated, plain.feed, first, rows.joining, rest, *modes, commanded,
+            plain.code_stated, plain.feed_stated, plain.feed, first, rows.joining, rest, begins, *modes, commanded,
             self._feeds(loads.run, rows, commanded, kept, carry),
             position, state, unit, np.array(run.state.offset), self.language.digits(self.job.config.control.resolution_mm, unit),
             0.5 * self.resolution * (1.0 + 1e-9), self.feed_point, out, written, held,
@@ -466,6 +459,15 @@ class PlainCorrector:
         if not rounds(run.state.path_mode, 1e3 * self.tolerance):
             return np.zeros(len(rows.move), np.bool_)
         return rests_of((run.plain.kind[rows.move] == LINE) & ~rows.joining, rows.joining)
+
+    def _apart(self, run: PlainRun, rows: PlainRows, commanded: Floats, rest: Bools, kept: Bools, carry: Carry) -> bool:
+        """Whether the control is kept from making one line of several; changes of feed that may do so are left out."""
+        kind, feed = run.plain.kind[rows.move], run.plain.feed[rows.move]
+        cut = (kind == LINE) & ~rows.joining & ~kept
+        start = np.concatenate((carry.commanded[None], commanded[:-1]))
+        moves = line_moves(kind, start, commanded, feed, run.state.path_mode)
+        moves = replace(moves, exact=moves.exact | rest)
+        return bool(cut.any()) and apart_pays(moves, cut, limits_of(self.job.config), 1e3 * self.tolerance)
 
     def _feeds(self, run: PlainRun, rows: PlainRows, commanded: Floats, kept: Bools, carry: Carry) -> Floats:
         """Feed (N,) so that the tip keeps its programmed speed, as in compensate.py."""

@@ -16,6 +16,14 @@ class NotInPieces(Exception):
     """The program has to be read as a whole."""
 
 
+class Unsolved(Exception):
+    """Points of a run without a solution: motions (k,), targets (k, 3) mm in the machine frame, the solver's status."""
+
+    def __init__(self, move: Ints, target: Floats, status: Ints) -> None:
+        super().__init__()
+        self.move, self.target, self.status = move, target, status
+
+
 @dataclass(frozen=True, eq=False)
 class PlainRun:
     """Plain lines: bytes text_at to text_end of `data`."""

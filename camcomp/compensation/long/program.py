@@ -15,10 +15,11 @@ from typing import TYPE_CHECKING, BinaryIO
 
 import numpy as np
 
+from camcomp.compensation.long.carry import Carry
 from camcomp.compensation.long.loads import Edge
 from camcomp.compensation.long.met import Met, path_of_run
-from camcomp.compensation.long.plain import Carry, PlainCorrector, Unsolved
-from camcomp.compensation.long.plain_run import NotInPieces, PlainRun
+from camcomp.compensation.long.plain import PlainCorrector
+from camcomp.compensation.long.plain_run import NotInPieces, PlainRun, Unsolved
 from camcomp.compensation.long.runs import RUN, OddRun, Runs
 from camcomp.compensation.long.totals import Batch, Totals
 from camcomp.compensation.program.compensate import compensate

@@ -12,7 +12,13 @@ from camcomp.compensation.long.plain import Done, PlainCorrector
 from camcomp.compensation.long.plain_run import PlainRun
 from camcomp.compensation.program.compensate import Compensated
 from camcomp.compensation.program.result import CycleTime, ErrorSize, Interpolation, Summary
-from camcomp.compensation.program.under_control import mode_name, rest_warning, warnings_of, written_moves
+from camcomp.compensation.program.under_control import (
+    apart_warning,
+    mode_name,
+    rest_warning,
+    warnings_of,
+    written_moves,
+)
 from camcomp.gcode.output import Part
 from camcomp.gcode.path_mode import PathMode
 from camcomp.ground.datatypes import LINE, RAPID, Bools, Floats, Ints
@@ -81,6 +87,7 @@ class Totals:
         limits = limits_of(job.config)
         self._control = ControlAccount(limits, 1e-3 * tolerance_um), ControlAccount(limits, 1e-3 * tolerance_um)
         self.modes: dict[PathMode, None] = {}  # in which it cuts
+        self.apart: dict[PathMode, None] = {}  # in which lines are kept from being made one
         self.waiting_s = 0.0  # beside its moves
         self.resting = 0  # end points at which the control rests because of joining lines
         self._still: list[int] = []  # source lines that cut while the spindle stands, the first ones
@@ -136,6 +143,9 @@ class Totals:
         start = np.concatenate((done.begin[None], done.written[:-1]))
         moves = line_moves(plain.kind[rows.move], start, done.written, done.feed, mode)
         moves = replace(moves, exact=moves.exact | done.rest)
+        if done.apart:
+            self.apart[mode] = None
+            moves = replace(moves, merge=np.zeros(len(moves)))
         self.resting += int(done.rest.sum())
         ends = len(rows.move) - np.count_nonzero(rows.joining | (plain.kind[rows.move] != LINE))
         seen = done.seen
@@ -225,6 +235,7 @@ class Totals:
         for each in self._control:
             each.finish()
         self.warnings += warnings_of(tuple(self.modes), self._control[1].beside, self._control[1].elsewhere)
+        self.warnings += apart_warning(self.apart)
         self.warnings += spindle_warning(np.array(self._still, np.int64))
         known, m = corrector.field, len(self.job.machine.actuators)
         if known is None or not self._sample:

@@ -23,7 +23,15 @@ from camcomp.compensation.program.posture import check_posture, whole_pose
 from camcomp.compensation.program.program_bands import bands_of
 from camcomp.compensation.program.reversals import cut_at_reversals
 from camcomp.compensation.program.table_knots import cut_at_knots
-from camcomp.compensation.program.under_control import UnderControl, rest_warning, rests, under_control
+from camcomp.compensation.program.under_control import (
+    UnderControl,
+    apart_warning,
+    merging,
+    rest_warning,
+    rests,
+    stays_apart,
+    under_control,
+)
 from camcomp.gcode.output import Part, Rewritten
 from camcomp.gcode.program import Program
 from camcomp.gcode.rewrite import rewrite
@@ -41,6 +49,7 @@ MAX_ROUNDS, ARC_ROUNDS = 6, 4
 STUCK = 0.95  # of the miss is left by a finer division that is no use, as where an arc passes the vertical
 WITH_SHARES = 0.7  # of the tolerance at the points looked at: where the share bends, more is missed between them
 COARSE_MM, FINE_MM = 8.0, 0.5  # distance of trial points on straight lines, without and with effects
+SHARE_OF_WAVE = 0.15  # between them, at most: no row of points meets a wave at its zeros alone
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,9 +142,11 @@ def compensate(
     found = asked(arcs=bool(wanted))
     own = slice(None) if part is None else slice(part.first, part.last)
     able = bool((program.path.kind[own] == ARC).any()) and not job.causes
-    if wanted is None and able and found.control.leaves_room(tolerance_um):
+    if wanted is None and able and (found.control.leaves_room(tolerance_um) or found.control.apart):
         other = asked(arcs=True)
-        if other.control.better_than(found.control, tolerance_um):
+        as_good = found.control.apart and not other.control.apart  # in the program's own mode
+        as_good = as_good and not found.control.better_than(other.control, tolerance_um)
+        if as_good or other.control.better_than(found.control, tolerance_um):
             return other
     return found
 
@@ -153,7 +164,7 @@ def _compensated(
 ) -> Compensated:
     """The corrected program, its arcs as arcs or as lines."""
     path, resolution = program.path, program.step_mm(job.config.control.resolution_mm)
-    spacing = FINE_MM if job.causes else COARSE_MM  # a screw's error has waves of a few mm
+    spacing = _spacing(job)
     base = lay_track(path, job.conditions, engaged)
     track, turning = cut_at_reversals(job, cut_at_knots(job, base, spacing), spacing)
     shares = shares_of(job, base)
@@ -232,10 +243,26 @@ def _compensated(
             version=version,
             model=job.fingerprint,
         )
-    control = under_control(program, job, rows, written, points, replace(after, error=missed_by), rest)
+    seen = replace(after, error=missed_by)
+    control = under_control(program, job, rows, written, points, seen, rest)
+    if part is None and control.stated and 1e3 * control.off_joins > tolerance_um * (1.0 + 1e-9):
+        apart = stays_apart(program, rows)
+        if apart.any():
+            other = under_control(program, job, rows, written, points, seen, rest, apart)
+            if other.better_than(control, tolerance_um):
+                control = other
+                written = rewrite(
+                    program,
+                    output_of(path, rows, rest, apart),
+                    resolution_mm=job.config.control.resolution_mm,
+                    version=version,
+                    model=job.fingerprint,
+                )
     warnings = _warnings(job, rows, control.resting) + control.warnings(
         path.line[track.motion[points.piece[points.judged]]], tolerance_um
     )
+    if control.apart:
+        warnings += apart_warning(mode for mode in control.modes if merging(mode, program.language))
     warnings += spindle_warning(still)
     if part is None:
         warnings += stock_warnings(stock_remarks(job.config, path, track.engaged))
@@ -247,6 +274,12 @@ def _compensated(
     share = None if shares is None else shares.of_ends(track, rows.piece, rows.w, rows.joining)
     bands = bands_of(job, track, rows, points, told, before, after, share)
     return replace(done, bands=bands, left=None if left is None else left[points.judged])
+
+
+def _spacing(job: Job) -> float:
+    """Distance of trial points, mm: a screw's error has waves of a few mm, the scale of an encoder shorter ones."""
+    waves = [SHARE_OF_WAVE * each for each in (cause.values.get("pitch_mm", 0.0) for cause in job.causes) if each > 0.0]
+    return min([FINE_MM, *waves]) if job.causes else COARSE_MM
 
 
 @dataclass(frozen=True, eq=False)

@@ -118,8 +118,8 @@ def _feeds(program: Program, track: Track, rows: CorrectedRows) -> Floats:
     return np.where(plain, feed, feed * np.clip(scale, 0.2, 5.0))
 
 
-def output_of(path: Path, rows: CorrectedRows, rest: Bools | None = None) -> Output:
-    """The rows as the writer wants them; rest (N,): those that end at rest in any case."""
+def output_of(path: Path, rows: CorrectedRows, rest: Bools | None = None, apart: Bools | None = None) -> Output:
+    """The rows as the writer wants them; rest, apart (N,): those that end at rest, and stay apart, in any case."""
     arc, bent = rows.kind == ARC, rows.arcs.on
     centre = np.where(bent[:, None], rows.arcs.centre, path.centre[rows.motion])
     angle = np.where(bent, rows.arcs.angle, path.angle[rows.motion])
@@ -132,4 +132,5 @@ def output_of(path: Path, rows: CorrectedRows, rest: Bools | None = None) -> Out
         feed=rows.feed,
         joining=rows.joining,
         rest=rest,
+        apart=apart,
     )

@@ -15,12 +15,14 @@ from camcomp.compensation.program.moves import refuse_unsolved, travel_of
 from camcomp.gcode.program import Program
 from camcomp.ground.datatypes import LINE, RAPID, Floats, Path
 from camcomp.ground.errors import ConfigError
+from camcomp.ground.headway import steps
 from camcomp.model.cutting.engaged import Engaged
 from camcomp.model.cutting.track import Track, lay_track
 from camcomp.model.job import Job
 from camcomp.model.motion.response import respond
 from camcomp.model.stock.from_config import Bounds, memory_of
 from camcomp.model.stock.surface import Surface, surface_of
+from camcomp.model.stock.thinning import thinned
 
 SECTION_MM = 1.0  # of a piece in which the loaded tip goes straight
 ROUNDS = 8
@@ -40,7 +42,7 @@ def cut_surface(job: Job, program: Program) -> Surface:
     memory = memory_of(job.config, job.tool_axis, bounds)
     engaged = memory.follow(path)[0]
     before = path.end
-    for _ in range(ROUNDS):
+    for _ in steps(range(ROUNDS), ROUNDS):
         track = lay_track(path, job.conditions, engaged)
         nodes = trial_nodes(track.length, track.angle, track.length > 0.0, SECTION_MM)
         tips = _loaded_tips(job, program, track, nodes)
@@ -88,4 +90,4 @@ def _met(track: Track, nodes: Nodes, driven: Engaged) -> Engaged:
     found = driven.take(np.flatnonzero(inside))
     piece, a, b = nodes.piece[found.motion], nodes.w[found.motion], nodes.w[found.motion + 1]
     u = track.u(piece, a + found.u * (b - a))
-    return replace(found, motion=track.motion[piece], u=u)
+    return thinned(replace(found, motion=track.motion[piece], u=u))

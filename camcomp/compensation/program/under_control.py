@@ -14,14 +14,15 @@ import numpy as np
 
 from camcomp.compensation.program import arcs_out
 from camcomp.compensation.program.result import CycleTime, error_size
+from camcomp.gcode.dialect import Dialect
 from camcomp.gcode.output import Rewritten
 from camcomp.gcode.path_mode import PathMode
 from camcomp.gcode.program import Program
 from camcomp.ground.datatypes import ARC, RAPID, Bools, Floats, Ints, Path
 from camcomp.model.control import limits_of, waiting_s
 from camcomp.model.job import Job
-from camcomp.model.trajectory.moves import ToolMoves, mode_columns, moves_of
-from camcomp.model.trajectory.plan import plan_of
+from camcomp.model.trajectory.moves import ControlLimits, ToolMoves, mode_columns, moves_of
+from camcomp.model.trajectory.plan import ControlPlan, plan_of
 
 if TYPE_CHECKING:
     from camcomp.compensation.program.corrected_rows import CorrectedRows
@@ -77,6 +78,7 @@ class UnderControl:
     row: Ints  # (k,) end point to which the move leads on which a point lies
     told: Floats  # (k, 3) mm, the points as commanded
     resting: int = 0  # end points at which the control rests because of a joining line
+    apart: bool = False  # lines are kept from being made one
 
     @property
     def stated(self) -> bool:
@@ -143,17 +145,44 @@ def rests(program: Program, rows: CorrectedRows, tolerance_um: float) -> Bools:
     return out
 
 
+def merging(mode: PathMode, language: Dialect) -> bool:
+    """Whether a mode that was stated makes one line of several, and can be told not to."""
+    return mode.stated and not mode.exact and mode.merge_mm > 0.0 and language.merges
+
+
+def stays_apart(program: Program, rows: CorrectedRows) -> Bools:
+    """Moves (N,) that can be kept from being made one: from the first cut that is moved on.
+
+    Behind every line that sets the mode itself they begin anew with the motion after it.
+    """
+    modes = (program.setup.path_mode, *program.modes)
+    begins = np.array([a is not b for a, b in pairwise(modes)], bool)
+    able = np.array([merging(mode, program.language) for mode in program.modes], bool) & ~begins
+    cut = np.zeros(len(begins), np.bool_)
+    moved = (rows.end != rows.target).any(axis=1)
+    cut[rows.motion[(rows.kind != RAPID) & moved]] = True
+    section = np.cumsum(begins)
+    first = np.full(int(section[-1]) + 1, len(begins))
+    at = np.flatnonzero(cut & able)
+    np.minimum.at(first, section[at], at)
+    out: Bools = (able & (np.arange(len(begins)) >= first[section]))[rows.motion]
+    return out
+
+
 def under_control(
     program: Program, job: Job, rows: CorrectedRows, written: Rewritten, points: JudgedPoints, after: Seen,
-    rest: Bools,
+    rest: Bools, apart: Bools | None = None,
 ) -> UnderControl:  # fmt: skip
-    """The account of a corrected program; rest (N,): end points at which the control rests in any case."""
+    """The account of a corrected program; rest, apart (N,): rows at which the control rests, and that stay apart, in any case."""
     path, limits = program.path, limits_of(job.config)
     default = job.config.process.feed_mm_per_min or np.nan
     feed = np.where(np.isnan(path.feed), default, path.feed)
     before = plan_of(moves_of(path, program.modes, feed), limits)
     moves = written_moves(path, program.modes, rows, written, default)
-    plan = plan_of(replace(moves, exact=moves.exact | rest), limits)
+    moves = replace(moves, exact=moves.exact | rest)
+    if apart is not None:
+        moves = replace(moves, merge=np.where(apart, 0.0, moves.merge))
+    plan = plan_of(moves, limits)
     judged = np.flatnonzero(points.judged)
     told = points.along(written.end, arcs_out.Arcs(written.centre, rows.arcs.angle))[judged]
     row = points.row[judged]
@@ -170,6 +199,7 @@ def under_control(
         row,
         told,
         int(rest.sum()),
+        apart is not None,
     )
 
 
@@ -178,6 +208,26 @@ def rest_warning(resting: int) -> list[str]:
     if not resting:
         return []
     return [f"G61 at {resting} ends of cuts and joining lines, so that the control does not round these corners"]
+
+
+def apart_pays(moves: ToolMoves, cut: Bools, limits: ControlLimits, tolerance_um: float) -> bool:
+    """Whether merging goes too far off on moves (n,) that cut, and they are as fast and nearer to their ends without it."""
+
+    def off(plan: ControlPlan) -> float:
+        at = np.flatnonzero(cut)
+        return 1e3 * float(np.linalg.norm(plan.leaves_by(at, moves.end[at]), axis=1).max(initial=0.0))
+
+    merged = plan_of(moves, limits)
+    if off(merged) <= tolerance_um:
+        return False
+    free = plan_of(replace(moves, merge=np.zeros(len(moves))), limits)
+    return off(free) < 0.9 * off(merged) and free.duration_s < LOST_TIME * merged.duration_s
+
+
+def apart_warning(modes: Iterable[PathMode]) -> list[str]:
+    """What there is to say where lines are kept from being made one in these modes."""
+    said = ", ".join(mode.apart.name for mode in distinct(modes))
+    return [f"{said} around the cuts, so that the control does not make one line of several"] if said else []
 
 
 def distinct(modes: Iterable[PathMode]) -> tuple[PathMode, ...]:

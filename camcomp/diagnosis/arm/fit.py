@@ -18,6 +18,7 @@ from camcomp.diagnosis.arm.discrepancy import (
 from camcomp.diagnosis.arm.forward_selection import Taken, take
 from camcomp.diagnosis.arm.noise_floor import far_off
 from camcomp.diagnosis.arm.poses import ArmBench, Column, Poses, combined, visible
+from camcomp.ground import headway
 from camcomp.ground.datatypes import Floats
 from camcomp.model.effect import Cause
 
@@ -58,7 +59,8 @@ class ArmFit:
 def investigate(bench: ArmBench, without: Sequence[str] = ()) -> ArmFit:
     """Groups that predict withheld blocks, fitted through the model itself. Poses far off are taken from the bench."""
     columns = bench.columns(without)
-    linear = bench.blocks(columns)
+    with headway.part(0.0, 0.1):
+        linear = bench.blocks(columns)
     seen = visible(linear, columns)
     columns = [columns[j] for j in seen]
     linear = [replace(b, X=b.X[:, :, seen]) for b in linear]
@@ -73,8 +75,10 @@ def investigate(bench: ArmBench, without: Sequence[str] = ()) -> ArmFit:
         campaigns[k], linear[k] = campaigns[k].take(~far), taken_rows(linear[k], ~far).loosened(left[~far])
     bench.campaigns = campaigns
     discrepancy = fit_of_leftovers(linear)
-    taken = take(Evidence.of(parts(linear), discrepancy), groups)
-    return replace(fitted(bench, columns, groups, linear, discrepancy, taken), outliers=tuple(outliers))
+    with headway.part(0.1, 0.6):
+        taken = take(Evidence.of(parts(linear), discrepancy), groups)
+    with headway.part(0.6, 1.0):
+        return replace(fitted(bench, columns, groups, linear, discrepancy, taken), outliers=tuple(outliers))
 
 
 def fitted(
@@ -89,7 +93,8 @@ def fitted(
     covariance = np.zeros((len(columns), len(columns)))
     widths = taken.widths.copy()
     evidence = Evidence.of(linear, discrepancy)
-    for _ in range(passes if taken.steps else 0):
+    passes = passes if taken.steps else 0
+    for _ in headway.steps(range(passes), passes):
         amount, covariance = evidence.fit(widths)
         wrong = [j for j, c in enumerate(columns) if c.parameter.sign > 0 and amount[j] < 0.0]
         widths[wrong] = 0.0  # a positive amount that wants to be negative is none

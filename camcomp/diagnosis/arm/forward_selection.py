@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from camcomp.diagnosis.arm.discrepancy import KERNEL_WIDTHS, Evidence
+from camcomp.ground import headway
 from camcomp.ground.datatypes import Floats
 
 LEAST_GAIN = 3.0  # log predictive density: odds of 20
@@ -47,14 +48,14 @@ def take(evidence: Evidence, groups: Mapping[str, Sequence[int]]) -> Taken:
     density, squares = evidence.predict(np.zeros(evidence.effects))
     none = Step("", 0.0, density, squares)
     steps: list[Step] = []
+    turn = 0
     while True:
         widths = widths_of(evidence, groups, steps)
         last = (none, *steps)[-1]
-        tried = [
-            best_width(evidence, widths, name, columns)
-            for name, columns in groups.items()
-            if name not in {s.group for s in steps}
-        ]
+        left = [name for name in groups if name not in {s.group for s in steps}]
+        with headway.part(1.0 - 0.5**turn, 1.0 - 0.5 ** (turn + 1)):  # nobody knows how many turns there will be
+            tried = [best_width(evidence, widths, name, groups[name]) for name in headway.steps(left, len(left))]
+        turn += 1
         best = max(tried, key=lambda s: s.density, default=last)
         if best.density - last.density >= LEAST_GAIN and rms(best.squares) <= (1.0 - LEAST_SHARE) * rms(last.squares):
             steps.append(best)

@@ -81,7 +81,7 @@ def _repeated(robot: Robot, campaigns: Sequence[Poses], gaps: Sequence[Floats]) 
     for each, gap in zip(campaigns, gaps, strict=True):
         order = np.empty(len(each.q), int)
         order[np.argsort(each.time, kind="stable")] = np.arange(len(each.q))
-        for visits in _visits(robot, each):
+        for visits in visits_of(robot, each):
             square = float(((gap[visits] - gap[visits].mean(axis=0)) ** 2).sum())
             stood = np.ptp(order[visits]) == len(visits) - 1
             (still if stood else anew).append((square, len(visits) - 1))
@@ -99,7 +99,7 @@ def _scatter(groups: Sequence[tuple[float, int]], source: Literal["repeats", "re
     return TipFloor(sd, freedom, source) if sd > 0.0 else None
 
 
-def _visits(robot: Robot, poses: Poses) -> list[np.ndarray]:
+def visits_of(robot: Robot, poses: Poses) -> list[np.ndarray]:
     """Groups of indices of poses at the same joint coordinates, two or more each."""
     scale = np.array([1.0 if a.revolute else 1e-3 for a in robot.actuators])
     near = KDTree(poses.q * scale).query_pairs(SAME_POSE, output_type="ndarray")

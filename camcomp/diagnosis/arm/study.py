@@ -20,6 +20,7 @@ from camcomp.diagnosis.arm.discrepancy import Discrepancy
 from camcomp.diagnosis.arm.fit import ArmFit, fitted, investigate, named_rows
 from camcomp.diagnosis.arm.gate import Gate, judge, unseen
 from camcomp.diagnosis.arm.noise_floor import StatedDeviation, TipFloor, far_off, tip_floor
+from camcomp.diagnosis.arm.pose_values import of_poses
 from camcomp.diagnosis.arm.poses import CURVE, ArmBench, Poses
 from camcomp.diagnosis.arm.unseen import (
     Court,
@@ -35,6 +36,7 @@ from camcomp.diagnosis.arm.unseen import (
 )
 from camcomp.diagnosis.result.types import UNKNOWN, DiagnosisResult, Floor, Outlier
 from camcomp.ground.datatypes import Floats
+from camcomp.ground.headway import done, part
 from camcomp.model.effect import Cause
 from camcomp.model.statics.description import Robot
 
@@ -63,14 +65,17 @@ def study(
     own, more = merged(fitted_runs), merged([r for r in runs if str(r.run[0]) in holdout])
     every, gaps, outliers = _cleaned(robot, tuple(causes), [*own, *more])
     floor = tip_floor(robot, every, gaps, StatedDeviation() if stated is None else stated)
+    values = of_poses(robot, every, gaps)
     every = [drawn(each) for each in every]
     bench = ArmBench(robot, tuple(causes), every[: len(own)])
-    found = investigate(bench, without)
+    with part(0.0, 0.3):
+        found = investigate(bench, without)
     outliers += found.outliers
     held = ArmBench(robot, tuple(causes), every[len(own) :]) if more else None
     if held is not None:
         outliers += _without_outliers(held, found)
-    curved = found if CURVE in without else with_curves(bench, found)
+    with part(0.3, 0.7):
+        curved = found if CURVE in without else with_curves(bench, found)
     judges = court(bench, found, held)
     curve_judges = judges if curved is found else court_of_curves(judges, bench, curved, held)
     seen_names = sorted({str(r.run[0]) for r in runs if not holdout or str(r.run[0]) in holdout})
@@ -95,11 +100,14 @@ def study(
             found, judges, sets = curved, curve_judges, beside_curves(sets, curved)
         else:
             found = replace(found, chosen=curved.chosen)
+    done(0.75)
     gate = _gate(bench, held, found, judges, floor)
     word = verdict(found, judges, gate, sets)
     first = [bench.gap(k, ()) for k in range(len(bench.campaigns))]
     told = answer.Told(bench, found, gate, floor, sets, word, judges)
+    done(0.8)
     named, minor = answer.causes(told, first)
+    done(0.9)
     if word == "identified" and not named:  # all that was taken turned out minor
         word = "none"
     known = any(c.effect != UNKNOWN for c in named)
@@ -116,6 +124,7 @@ def study(
         next_experiment=answer.next_experiment(told),
         floor=Floor(um=round(floor.um, 3), source=floor.source) if floor else Floor(um=None, source="not identifiable"),
         outliers=tuple(Outlier(run=run, row=row) for run, row in sorted(set(outliers))),
+        standards=values,
     )
 
 

@@ -40,6 +40,7 @@ from camcomp.diagnosis.axis.terms import (
     strangers,
     travel,
 )
+from camcomp.diagnosis.result.standards import StandardValues
 from camcomp.diagnosis.result.types import (
     UNKNOWN,
     DiagnosisResult,
@@ -50,11 +51,13 @@ from camcomp.diagnosis.result.types import (
     Outlier,
 )
 from camcomp.diagnosis.statistics.probability import probability_of_chance, stated
+from camcomp.ground import headway
 from camcomp.ground.datatypes import Floats
 
 LEAST_Z = 4.0  # mean gain over its standard error
 LEAST_RIPPLE = 0.02  # share of the leftover's energy
 ROWS = 50  # below which a run says nothing
+NO_TIPS = "ISO 230-2: the tip was not measured"
 WHOLE_RUNS = 4  # from which on runs are withheld as wholes
 
 
@@ -82,7 +85,10 @@ def studied(
     """As study, with what the result was drawn from."""
     outliers: set[tuple[str, int]] = set()
     found, cleaned = [], {}
-    for name, runs in axes.items():
+    names = sorted({r.name for runs in axes.values() for r in runs})
+    held = [n for n in names if n in holdout] if holdout else names if len(names) >= WHOLE_RUNS else []
+    again = 0 if len(held) == 1 and holdout else len(held)  # fits that leave out one run each
+    for name, runs in headway.steps(axes.items(), len(axes) * (1 + again)):
         clean = [r.without_spikes() for r in runs]
         outliers |= {(r.name, int(row)) for r, rows in clean for row in rows}
         cleaned[name] = [r for r, _ in clean]
@@ -100,10 +106,9 @@ def studied(
     verdict = _verdict(found)
     if verdict == "unknown" or (verdict == "ambiguous" and not causes):
         causes += [answer.unknown(a, whole) for a in found if a.strange or verdict == "ambiguous"]
-    names = sorted({r.name for runs in axes.values() for r in runs})
     gap = answer.gap(main)
-    held = [n for n in names if n in holdout] if holdout else names if len(names) >= WHOLE_RUNS else []
-    judged = [main] if len(held) == 1 and holdout else _judged(cleaned, held, set(without), stated or AxisDeviation())
+    with headway.part(1.0 / (1 + again), 1.0):
+        judged = _judged(cleaned, held, set(without), stated or AxisDeviation()) if again else [main] if held else []
     every = [c for a in found for c in a.channels]
     result = DiagnosisResult(
         verdict=verdict,
@@ -115,6 +120,7 @@ def studied(
         floor=Floor(um=gap.noise_floor_um, source="stated" if all(c.stated for c in every) else "rows"),
         outliers=tuple(Outlier(run=run, row=row) for run, row in sorted(outliers)),
         axes_in_detail={a.name: a.details for a in found},
+        standards=StandardValues(absent=(NO_TIPS,)),
     )
     return result, found
 
@@ -168,7 +174,10 @@ def _judged(
     axes: Mapping[str, Sequence[AxisRun]], held: Sequence[str], without: set[str], stated: AxisDeviation
 ) -> list[list[AxisChannel]]:
     """Main channels of every axis with each of the runs held out in turn: chosen and fitted without it."""
-    every = [[_axis(name, list(runs), {one}, without, stated) for name, runs in axes.items()] for one in held]
+    every = [
+        [_axis(name, list(runs), {one}, without, stated) for name, runs in headway.steps(axes.items(), len(axes))]
+        for one in headway.steps(held, len(held))
+    ]
     return [[a.channels[0] for a in found if a.channels] for found in every]
 
 

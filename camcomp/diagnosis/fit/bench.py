@@ -24,23 +24,30 @@ _KEPT = 12  # changed machines whose structures are kept per run
 class CandidateCause:
     """One possible cause: an effect at a target. Fitted parameters in order; shape holds the scanned ones.
 
-    hinge: the target is a rotary actuator, for which an effect may have parameters of its own.
+    hinge: the target is a rotary actuator, for which an effect may have parameters of its own. without: parameters that
+    stay nominal, because these runs do not tell them from the others.
     """
 
     name: str
     target: str | None
     effect: Any
     hinge: bool = False
+    without: tuple[str, ...] = ()
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         """The fitted parameters whose nominal value means no effect, i.e. all but the scanned shapes."""
-        return tuple(p for p in fitted(self) if not p.scan)
+        return tuple(p for p in fitted(self) if not p.shape)
 
     @property
     def shapes(self) -> tuple[Parameter, ...]:
         """The scanned parameters."""
         return tuple(p for p in fitted(self) if p.scan)
+
+    @property
+    def switches(self) -> tuple[Parameter, ...]:
+        """The shapes that are one of a few values."""
+        return tuple(p for p in fitted(self) if p.either)
 
     @property
     def label(self) -> str:
@@ -54,7 +61,8 @@ def fitted(candidate: CandidateCause) -> tuple[Parameter, ...]:
     if hasattr(effect, "SOUGHT"):
         return tuple(effect.SOUGHT.get(candidate.target, ()))
     own = getattr(effect, "FITTED", effect.PARAMETERS)
-    return tuple(getattr(effect, "ROTARY", own) if candidate.hinge else own)
+    own = getattr(effect, "ROTARY", own) if candidate.hinge else own
+    return tuple(each for each in own if each.name not in candidate.without)
 
 
 def public_values(effect: Any, values: Mapping[str, float]) -> dict[str, float]:
@@ -205,7 +213,7 @@ def thinned(values: Floats, factor: int) -> Floats:
 
 def cause_of(candidate: CandidateCause, coordinates: Mapping[str, float]) -> Cause:
     """The cause at fitting coordinates by parameter name; what is missing is nominal."""
-    values = {p.name: p.value(coordinates.get(p.name, 0.0 if not p.scan else p.nominal)) for p in fitted(candidate)}
+    values = {p.name: p.value(coordinates.get(p.name, p.nominal if p.shape else 0.0)) for p in fitted(candidate)}
     return Cause(candidate.name, candidate.effect, candidate.target, public_values(candidate.effect, values))
 
 

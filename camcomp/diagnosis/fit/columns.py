@@ -55,7 +55,10 @@ def candidate_causes(robot: Robot, without: Sequence[str] = ()) -> list[Candidat
             ]
         if effect.TARGET == "named" and (cartesian or not getattr(effect, "SLIDES_ONLY", False)):
             found += [CandidateCause(name, each, effect) for each in getattr(effect, "SOUGHT", effect.TARGETS)]
-        if effect.TARGET in ("machine", "either"):
+        slides = not any(a.revolute for a in robot.actuators)
+        if effect.TARGET == "machine" or (
+            effect.TARGET == "either" and (slides or not getattr(effect, "SLIDES_ONLY", False))
+        ):
             found.append(CandidateCause(name, None, effect))
     return found
 
@@ -126,8 +129,8 @@ def candidate_columns(bench: Bench, candidate: CandidateCause, shape: Mapping[st
 
 
 def shape_default(candidate: CandidateCause) -> dict[str, float]:
-    """Nominal values of the scanned parameters."""
-    return {p.name: p.nominal for p in candidate.shapes}
+    """Nominal values of the shapes."""
+    return {p.name: p.nominal for p in (*candidate.shapes, *candidate.switches)}
 
 
 def build(

@@ -1,4 +1,4 @@
-"""When something acted for a while: the interval of one run in which a column explains most of a leftover.
+"""When something acted for a while: the interval of one run in which its columns explain most of a leftover.
 
 The gain of every interval between blocks of rows comes from running sums; the best is refined row by row. Intervals that are
 not far beyond what chance makes of so many are none.
@@ -20,25 +20,34 @@ LEAST_ROWS = 5
 _BLOCKS = 60
 
 
+def never_ending(candidate: CandidateCause) -> dict[str, float]:
+    """The instants of what is always there."""
+    return dict(zip((p.name for p in candidate.shapes), (-1e9, 1e9), strict=True))
+
+
 def best_interval(
-    bench: Bench, candidate: CandidateCause, always: Sequence[Floats], rest: Sequence[Floats],
+    bench: Bench, candidate: CandidateCause, always: Sequence[Sequence[Floats]], rest: Sequence[Floats],
     whitened: Callable[[int, Floats], Floats], places: Callable[[int], Floats],
 ) -> dict[str, float] | None:  # fmt: skip
     """The two instants, by the names of the candidate's shapes, between which it explains most of `rest` (white, per run).
 
-    always: columns (n, c) per run of the candidate as if it never ended. places: where in the time of a run its white rows lie, 0 to 1. None where no interval stands out.
+    always: columns (n, c), per parameter and run, of the candidate as if it never ended. places: where in the time of a run its white rows lie, 0 to 1. None where no interval stands out.
     """
     start, end = (each.name for each in candidate.shapes)
     found: list[tuple[float, float, float]] = []
     for k, run in enumerate(bench.runs):
-        column = whitened(k, always[k][:, :, None])[:, 0]
+        columns = whitened(k, np.stack([each[k] for each in always], axis=2))
         order = np.argsort(places(k), kind="stable")
         at = run.run_path.started + run.run_path.time[0] + places(k)[order] * np.ptp(run.run_path.time)
         instants, rows = np.unique(at, return_inverse=True)
         if len(instants) < 4 * LEAST_ROWS:
             continue
-        hits = np.concatenate([[0.0], np.cumsum(np.bincount(rows, (column * rest[k])[order]))])
-        size = np.concatenate([[0.0], np.cumsum(np.bincount(rows, (column * column)[order]))])
+        d = columns.shape[1]
+        hits, size = np.zeros((len(instants) + 1, d)), np.zeros((len(instants) + 1, d, d))
+        for a in range(d):
+            hits[1:, a] = np.cumsum(np.bincount(rows, (columns[:, a] * rest[k])[order]))
+            for b in range(d):
+                size[1:, a, b] = np.cumsum(np.bincount(rows, (columns[:, a] * columns[:, b])[order]))
         gain, i, j = _best(hits, size, len(instants))
         # half way to the rows outside, and early enough for the rows inside to see all of it
         before, behind = (
@@ -51,7 +60,7 @@ def best_interval(
 
 
 def _best(hits: Floats, size: Floats, n: int) -> tuple[float, int, int]:
-    """Gain, first instant and the one behind the last of the best interval; running sums (n + 1,)."""
+    """Gain, first instant and the one behind the last of the best interval; running sums (n + 1, d), (n + 1, d, d)."""
     edges = np.unique(np.linspace(0, n, min(_BLOCKS, n) + 1).astype(np.int64))
     gain, i, j = _among(hits, size, edges, edges, n)
     near = int(np.ceil(n / _BLOCKS))
@@ -65,7 +74,10 @@ def _among(hits: Floats, size: Floats, firsts: np.ndarray, lasts: np.ndarray, n:
     length = lasts[None, :] - firsts[:, None]
     energy = size[lasts][None, :] - size[firsts][:, None]
     sums = hits[lasts][None, :] - hits[firsts][:, None]
-    fair = (length >= LEAST_ROWS) & (length <= LONGEST * n) & (energy > 0.0)
-    gain = np.where(fair, sums**2 / np.where(fair, energy, 1.0), 0.0)
+    whole = np.trace(energy, axis1=2, axis2=3)
+    fair = (length >= LEAST_ROWS) & (length <= LONGEST * n) & (whole > 0.0)
+    eye = np.eye(sums.shape[2])
+    energy = np.where(fair[:, :, None, None], energy + 1e-9 * whole[:, :, None, None] * eye, eye)
+    gain = np.where(fair, np.sum(sums * np.linalg.solve(energy, sums[..., None])[..., 0], axis=2), 0.0)
     a, b = np.unravel_index(int(np.argmax(gain)), gain.shape)
     return float(gain[a, b]), int(firsts[a]), int(lasts[b])

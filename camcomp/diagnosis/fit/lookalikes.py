@@ -5,11 +5,14 @@ would have to be long in two directions. Computed from the model and the runs al
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from camcomp.diagnosis.fit.bench import Bench, CandidateCause
 from camcomp.diagnosis.fit.columns import candidate_columns, shape_default
+from camcomp.diagnosis.fit.grid_parameters import quick_columns
+from camcomp.diagnosis.fit.intervals_in_time import never_ending
 from camcomp.ground.datatypes import Floats
 from camcomp.model import signal_path
 
@@ -37,6 +40,29 @@ def without_lookalikes(bench: Bench, candidates: Sequence[CandidateCause]) -> li
             kept.append(each)
             others.append(own)
     return [each for each in candidates if each not in asked or each in kept]
+
+
+def without_twins(bench: Bench, candidates: Sequence[CandidateCause]) -> list[CandidateCause]:
+    """The candidates that act for a while, less those of their parameters that do in every channel what an earlier one does.
+
+    A force on a drive shifts its carriage through the spring: without the drive's force in the log it is a shift.
+    """
+    out = []
+    for each in candidates:
+        columns = None
+        if len(each.parameters) > 1 and any(p.placed for p in each.shapes):
+            columns = quick_columns(bench, each, never_ending(each))
+        if columns is not None:
+            seen = [np.isfinite(bench.residual(k)) for k in range(len(bench.runs))]
+            flat = [np.concatenate([c[s] for c, s in zip(per, seen, strict=True)]) for per in columns]
+            twins = [
+                p.name
+                for i, p in enumerate(each.parameters)
+                if i and np.abs(flat[i]).max(initial=0.0) > 0.0 and _alike(flat[i][:, None], np.stack(flat[:i], axis=1))
+            ]
+            each = replace(each, without=tuple(twins))
+        out.append(each)
+    return out
 
 
 def _a_shift_per_run(bench: Bench, candidate: CandidateCause) -> bool:

@@ -10,7 +10,7 @@ from camcomp.diagnosis.fit.bench import Bench, CandidateCause, cause_of, step_of
 from camcomp.diagnosis.fit.columns import Columns, build, candidate_columns, patterns, shape_default
 from camcomp.diagnosis.fit.floor import NoiseFloor, least_noise, measure_floor
 from camcomp.diagnosis.fit.grid_parameters import beside, best_shape, quick_columns, reach
-from camcomp.diagnosis.fit.intervals_in_time import LOOK_ELSEWHERE, best_interval
+from camcomp.diagnosis.fit.intervals_in_time import LOOK_ELSEWHERE, best_interval, never_ending
 from camcomp.diagnosis.fit.noise import inflation, instrument_noise, less_certain
 from camcomp.diagnosis.fit.outliers import outlying, tails
 from camcomp.diagnosis.fit.patterns import Dictionary
@@ -26,6 +26,7 @@ from camcomp.model.signal_path import stages_of
 BENT = 9.0  # chi-square by which the model may miss a straight line before all columns are worked out anew
 SETTLED = 0.05  # chi-square that one more pass may cost
 HALVED = 6  # times that a step is halved which no machine can take
+OTHER_LAW_LOG = 3.0  # log evidence by which another law than the nominal one has to be better
 STRAIGHT = 0.3  # chi-square that the bend of the model may cost before it is followed
 
 
@@ -80,9 +81,29 @@ class Problem:
         """Columns of a set in the order of theta."""
         return [c for i in members for c in self.candidates.columns[i]]
 
-    def refit(self, members: Members, theta: Floats | None = None, passes: int = 5) -> Fitted:
-        """Gauss-Newton through the twin from theta, or from the linear answer."""
-        shapes = {i: dict(self.shapes[i]) for i in members if i in self.shapes}
+    def refit(self, members: Members, theta: Floats | None = None) -> Fitted:
+        """Gauss-Newton through the twin from theta, or from the linear answer, under the laws that explain most."""
+        best = self._refit(members, theta, {})
+        if best.grams is self.base_grams:
+            return best  # so small that no law of its turning can be seen
+        for i in members:
+            for p in self.columns.candidates[i].switches:
+                for value in p.either:
+                    if value == best.extra.get(i, {}).get(p.name, p.nominal):
+                        continue
+                    laws = {m: {q.name: best.extra[m][q.name] for q in self.columns.candidates[m].switches}
+                            for m in best.extra}  # fmt: skip
+                    laws[i] = {**laws.get(i, {}), p.name: value}
+                    other = self._refit(members, best.theta, laws)
+                    if other.log_evidence > best.log_evidence + OTHER_LAW_LOG:
+                        best = other
+        return best
+
+    def _refit(
+        self, members: Members, theta: Floats | None, laws: Mapping[int, Mapping[str, float]], passes: int = 5
+    ) -> Fitted:
+        """The same under given laws: values of switches by candidate."""
+        shapes = {i: {**self.shapes[i], **laws.get(i, {})} for i in members if i in self.shapes}
         index = self.member_columns(members)
         grams = self.base_grams
         if not members:
@@ -354,11 +375,10 @@ def _scan(problem: Problem) -> Columns:
     for i in problem.shapes:
         candidate = problem.columns.candidates[i]
         if problem.passing(i):
-            never_ends = dict(zip((p.name for p in candidate.shapes), (-1e9, 1e9), strict=True))
-            always = quick_columns(problem.bench, candidate, never_ends)
+            always = quick_columns(problem.bench, candidate, never_ending(candidate))
             if always is None:
                 continue
-            best = best_interval(problem.bench, candidate, always[0], rest, problem.whitened, problem.row_places)
+            best = best_interval(problem.bench, candidate, always, rest, problem.whitened, problem.row_places)
         else:
             best = best_shape(problem.bench, candidate, rest, problem.whitened)
         if best is None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from datetime import date, timedelta
 from typing import Annotated, Any, Literal
 
@@ -49,12 +49,22 @@ class DatedVerdict(Result):
     causes: tuple[str, ...]
 
 
+class StandardCourse(Result):
+    """A value of an acceptance test over the days: of one line of an axis, or one pose of an arm."""
+
+    standard: Literal["ISO 230-2", "ISO 9283"]
+    name: str
+    place: str
+    values: Annotated[tuple[tuple[date, float], ...], Field(description="um")]
+
+
 class Chronicle(Result):
     """The history of a machine."""
 
     verdicts: tuple[DatedVerdict, ...]
     parameters: tuple[ParameterCourse, ...]
     measure_again: Annotated[date | None, Field(description="the earliest of those of the parameters")]
+    standards: tuple[StandardCourse, ...] = ()
 
 
 def chronicle_of(kept: Sequence[Kept], tolerance_um: float) -> Chronicle:
@@ -71,8 +81,26 @@ def chronicle_of(kept: Sequence[Kept], tolerance_um: float) -> Chronicle:
     courses = [_course(key, rows, tolerance_um) for key, rows in found.items()]
     due = [each.measure_again for each in courses if each.measure_again is not None]
     return Chronicle(
-        verdicts=tuple(_verdict(each) for each in kept), parameters=tuple(courses), measure_again=min(due, default=None)
+        verdicts=tuple(_verdict(each) for each in kept),
+        parameters=tuple(courses),
+        measure_again=min(due, default=None),
+        standards=tuple(_standards(kept)),
     )
+
+
+def _standards(kept: Sequence[Kept]) -> Iterator[StandardCourse]:
+    """Values of acceptance tests by name and place, in the order in which they were first found."""
+    found: dict[tuple[Any, str, str], list[tuple[date, float]]] = {}
+    for each in kept:
+        held = each.result.standards
+        rows: list[tuple[str, str, Result]] = [("ISO 230-2", f"{a.axis} at {a.line}", a) for a in held.positioning]
+        rows += [("ISO 9283", f"{p.campaign} {p.pose}", p) for p in held.poses]
+        for standard, place, row in rows:
+            for name, value in row:
+                if name.endswith("_um"):
+                    found.setdefault((standard, name.removesuffix("_um"), place), []).append((each.day, value))
+    for (standard, name, place), values in found.items():
+        yield StandardCourse(standard=standard, name=name, place=place, values=tuple(values))
 
 
 def _verdict(kept: Kept) -> DatedVerdict:

@@ -10,15 +10,17 @@ from collections.abc import Sequence
 import numpy as np
 
 from camcomp.diagnosis.fit.problem import Problem
-from camcomp.diagnosis.next_experiment.candidates import candidates, site_of
-from camcomp.diagnosis.next_experiment.information_gain import WORTH, Proposal, feasible
+from camcomp.diagnosis.next_experiment.candidates import single_changes
+from camcomp.diagnosis.next_experiment.foresee import feasible
+from camcomp.diagnosis.next_experiment.outcomes import after_unknown
+from camcomp.diagnosis.next_experiment.proposal import WORTH, Proposal
+from camcomp.diagnosis.next_experiment.ready_program import can_be_run
+from camcomp.diagnosis.next_experiment.site import room_of, site_of
 from camcomp.model.job import Job
-
-ENOUGH = 0.6  # share of the best gain from which on the shorter experiment is the better one
 
 
 def explore(problem: Problem, labels: Sequence[tuple[str, float]], job: Job) -> Proposal | None:
-    """The experiment that tells most about what an unknown effect depends on, per minute; None where nothing would.
+    """The experiment that tells most about what an unknown effect depends on; None where nothing would.
 
     labels: covariates (`time:x`) with the share of the leftover that each carries alone.
     """
@@ -28,11 +30,16 @@ def explore(problem: Problem, labels: Sequence[tuple[str, float]], job: Job) -> 
         weight[family] = max(weight.get(family, 0.0), share)
     whole = sum(weight.values())
     found = []
-    for candidate in candidates(site_of(problem.bench)):
+    for candidate in single_changes(site_of(problem.bench), room_of(problem.bench, job)):
         p = sum(weight.get(family, 0.0) for family in candidate.varies) / whole if whole > 0 else 0.0
         gain = -float(sum(q * np.log2(q) for q in (p, 1.0 - p) if q > 0.0))
         if gain > WORTH:
-            found.append(Proposal(candidate, gain, ("unknown",)))
-    most = max((each.gain for each in found), default=0.0)
-    ranked = sorted(found, key=lambda each: (each.gain < ENOUGH * most, -each.gain / each.candidate.minutes))
-    return next((each for each in ranked if feasible(problem, each.candidate, job)), None)
+            others = [
+                family for family in sorted(weight, key=lambda each: -weight[each]) if family not in candidate.varies
+            ]
+            outcomes = after_unknown([v for v in candidate.varies if v in weight] or candidate.varies, others)
+            found.append(Proposal(candidate, gain, ("unknown",), outcomes))
+    ranked = sorted(found, key=lambda each: -each.value)
+    bench = problem.bench
+    can = (each for each in ranked if can_be_run(each.candidate, bench.runs, job, bench.twin))
+    return next((each for each in can if feasible(problem, each.candidate, job)), None)

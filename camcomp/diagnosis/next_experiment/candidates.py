@@ -1,26 +1,33 @@
-"""Experiments that a machine can do next: small NC programs about the place where it has worked, and what they cost.
+"""Experiments that a machine can do next: a coarse grid of designs about the place of work, what else can be measured, neighbours.
 
-Costs are minutes of machine time, setting up included; they weigh one experiment against another and need no precision.
+In the air the tool stays above `Site.low`; it cuts only where the runs have cut, as fast as they did.
 """
 
-from collections.abc import Iterator, Sequence
+from __future__ import annotations
+
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 
-from camcomp.diagnosis.fit.bench import Bench
+from camcomp.diagnosis.next_experiment.design import PLANES, MotionDesign
+from camcomp.diagnosis.next_experiment.site import Room, Site
 from camcomp.ground.datatypes import Floats
 
-CHANNELS = ("tip", "encoder", "drive", "dyno")
+LATER_S = 3600.0  # to a run that is made later
+DWELL_S = 900.0  # of a rest that shows a drift
+FASTER = (0.25, 1.0, 4.0)  # times the feed of the runs, in the air
+CUT_FASTER = (0.5, 1.0, 1.5)  # times the feed of the runs, cutting
+OUT = (0.5, 0.9)  # of the reach: where circles are tried
+SMALL = 0.3  # of the reach: the radius of a circle out there; of the radius at work: that of a small one
+NEIGHBOUR_MM, NEIGHBOUR_TIMES = 12.0, 1.5  # steps to a neighbouring design
 _NEEDS = {
     "tip": ("the tip with a tracker", 30.0),
-    "encoder": ("the encoders", 5.0),
+    "encoder": ("the set-points and the encoders", 5.0),
     "drive": ("the drive forces", 5.0),
     "dyno": ("the force on the tool with a dynamometer", 20.0),
 }
-_SETUP_MIN = 1.0
-_LATER_MIN = 60.0
-_DWELL_S = 900.0
 # What can be measured by other means: effect, parameter, what to measure, minutes, deviation.
 _BY_HAND = (
     ("tool_length", "length_mm", "the tool on a presetter", 5.0, 0.003),
@@ -31,126 +38,153 @@ _BY_HAND = (
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """A feasible experiment. program: NC text; channels: what it logs; minutes: what it costs; stay_s: how long it is
-    logged after the last motion; knows: parameters (effect, name) that it measures by other means, with their deviation;
-    varies: covariates that it changes while the others stay as they were.
+    """A feasible experiment. channels: what it logs; started: s on the common clock; minutes: of machine time and hands;
+    knows: parameters (effect, name) that are measured by other means, with their deviation; varies: covariates that it
+    changes while the others stay as they were.
     """
 
     action: str
-    program: str
-    cutting: bool
+    design: MotionDesign
     channels: tuple[str, ...]
     started: float
     minutes: float
-    stay_s: float = 0.0
     knows: tuple[tuple[str, str, float], ...] = ()
     varies: tuple[str, ...] = ()
 
-
-@dataclass(frozen=True, eq=False)
-class Site:
-    """Where and how the machine has worked: centre (3,) mm, radius mm, feed mm/min, end of the last run s, channels."""
-
-    centre: Floats
-    radius: float
-    feed: float
-    end: float
-    channels: tuple[str, ...]
+    @property
+    def program(self) -> str:
+        """NC text of the motion itself."""
+        return self.design.program(self.action)
 
     @property
-    def minutes(self) -> float:
-        """Cost of a circle."""
-        return 2.0 * np.pi * self.radius / self.feed + _SETUP_MIN
+    def cutting(self) -> bool:
+        """Whether it cuts."""
+        return self.design.cutting
 
 
-def site_of(bench: Bench) -> Site:
-    """The place where the runs of a bench have been."""
-    runs = bench.runs
-    tips = np.concatenate([reading.tip for reading in bench.nominal])
-    low, high = np.quantile(tips, 0.02, axis=0), np.quantile(tips, 0.98, axis=0)
-    feeds = [run.run_path.feed_mm_per_min for run in runs if np.isfinite(run.run_path.feed_mm_per_min)]
-    return Site(
-        np.round(0.5 * (low + high), 1),
-        round(float(np.clip(0.5 * np.min((high - low)[:2]), 5.0, 40.0)), 1),
-        round(float(np.median(feeds))) if feeds else 1000.0,
-        max(run.run_path.started + float(run.run_path.time[-1]) for run in runs),
-        tuple(c for c in CHANNELS if any(run.measured.has(c) for run in runs)),
-    )
+def candidate(site: Site, design: MotionDesign, varies: tuple[str, ...] = ()) -> Candidate:
+    """A design as an experiment that logs what the runs logged."""
+    design = design.tidy()
+    return Candidate(design.action, design, site.channels, site.end + design.wait_s, design.minutes, varies=varies)
 
 
-def candidates(site: Site) -> Iterator[Candidate]:
-    """Feasible experiments, cheap ones first. Away from the place of work the machine moves in the air."""
-    have, soon = site.channels, site.end + 60.0
+def usual(site: Site) -> MotionDesign:
+    """What the runs did, as a circle."""
+    if site.cut is not None:
+        return MotionDesign(_triple(site.cut.centre), site.cut.radius, site.cut.feed, cutting=True)
+    return _in_air(site, MotionDesign(_triple(site.work.centre), site.work.radius, site.work.feed))
 
-    def circle(action: str, turn: int = 1, cutting: bool = True, at: Sequence[float] = (0.0, 0.0, 0.0), faster: float = 1.0,
-               wider: float = 1.0, plane: str = "G17", varies: tuple[str, ...] = ()) -> Candidate:  # fmt: skip
-        text = circle_program(action, site.centre + np.array(at), wider * site.radius, faster * site.feed, turn, plane)
-        minutes = _SETUP_MIN + (site.minutes - _SETUP_MIN) * wider / faster
-        return Candidate(action, text, cutting, have, soon, minutes, varies=varies)
 
-    usual = circle("circle, counter-clockwise")
-    yield circle("circle in the reverse direction, clockwise", turn=-1, varies=("reversal", "direction"))
-    yield circle("circle at another feed, four times as fast", faster=4.0, varies=("velocity", "acceleration"))
-    yield circle("circle at another feed, half as fast", faster=0.5, varies=("velocity", "acceleration"))
-    yield circle("circle in the air, without cutting", cutting=False, varies=("force",))
-    yield circle("circle of twice the radius, in the air", cutting=False, wider=2.0)
-    for x, y, z in ((60, 60, 0), (-40, -40, 0), (-60, -60, 0), (60, -60, 0), (0, 0, 60)):
-        action = f"circle in the air at another place, off by X{x} Y{y} Z{z} mm"
-        yield circle(action, cutting=False, at=(x, y, z), varies=("position",))
-    yield circle("circle in another plane (XZ), in the air", cutting=False, plane="G18")
-    for axis, name in enumerate("XYZ"):
-        action = f"single-axis ladder along {name}, up and down, in the air"
-        text = ladder_program(action, site.centre, site.radius, site.feed, axis)
-        yield Candidate(action, text, False, have, soon, 4.0 * site.radius / site.feed + _SETUP_MIN)
+def coarse(site: Site, room: Room) -> Iterator[Candidate]:
+    """Designs that differ in everything: at work, far out, large, in other planes, straight, slow and fast, later."""
+    base = usual(site)
+    here = _in_air(site, replace(base, cutting=False))
+    if site.cut is not None:
+        yield from (candidate(site, replace(base, feed=times * site.cut.feed)) for times in CUT_FASTER)
+        yield candidate(site, replace(base, radius=SMALL * base.radius))
+    for times in FASTER:
+        yield candidate(site, replace(here, feed=times * here.feed))
+    middle = np.array(here.centre)
+    ways = _ways()
+    reaches = dict(zip(map(tuple, ways), room.reaches(middle, ways, site.farther, site.low), strict=True))
+    for way, far in reaches.items():
+        for share in OUT if sum(map(bool, way)) == 1 else OUT[-1:]:
+            if far > 0.0:
+                centre = middle + share * (1.0 - SMALL) * far * np.array(way)
+                yield candidate(site, _in_air(site, replace(here, centre=_triple(centre), radius=SMALL * far)))
+    flat = OUT[-1] * min(reaches[way] for way in reaches if abs(way[0]) + abs(way[1]) == 1.0 and way[2] == 0.0)
+    for plane in PLANES:
+        radius = flat if plane == "XY" else min(flat, 0.5 * OUT[-1] * reaches[(0.0, 0.0, 1.0)])
+        if radius > 0.0:
+            yield candidate(site, _in_air(site, replace(here, radius=radius, plane=plane)))
+    for way in (
+        (1.0, 0.0, 0.0),
+        (0.0, 1.0, 0.0),
+        (0.0, 0.0, 1.0),
+        (0.5**0.5, 0.5**0.5, 0.0),
+        (0.5**0.5, -(0.5**0.5), 0.0),
+    ):
+        ends = OUT[-1] * room.reaches(middle, np.array([way, [-v for v in way]]), site.farther, site.low)
+        if (half := 0.5 * float(ends.sum())) > 0.0:
+            centre = middle + 0.5 * float(ends[0] - ends[1]) * np.array(way)
+            yield candidate(site, _in_air(site, replace(here, centre=_triple(centre), radius=half, along=way)))
+    yield from in_time(site)
+
+
+def in_time(site: Site) -> Iterator[Candidate]:
+    """What shows what passes: rests, and the same once more, later."""
+    base = usual(site)
+    still = _in_air(site, replace(base, cutting=False, dwell_s=DWELL_S))
+    yield candidate(site, still, varies=("time", "temperature"))
+    yield candidate(site, replace(base, wait_s=LATER_S), varies=("time", "temperature"))
+
+
+def by_other_means(site: Site) -> Iterator[Candidate]:
+    """The usual circle with one more channel in the log, or with something measured by hand before it."""
+    design = usual(site)
+    base = candidate(site, design)
     for channel, (name, cost) in _NEEDS.items():
-        if channel not in have:
-            action = f"circle, counter-clockwise, and log {name} as well"
-            text = circle_program(action, site.centre, site.radius, site.feed, 1)
-            yield Candidate(action, text, True, (*have, channel), soon, usual.minutes + cost)
-    for effect, parameter, what, minutes, deviation in _BY_HAND:
+        if channel not in site.channels:
+            action = f"{base.action}, and log {name} as well"
+            yield replace(base, action=action, channels=(*site.channels, channel), minutes=base.minutes + cost)
+    base = candidate(site, _in_air(site, replace(design, cutting=False)))
+    for effect, parameter, what, cost, deviation in _BY_HAND:
         action = f"measure {what}, state what is found under effects: in the config, diagnose again --without {effect}"
-        text = circle_program(action, site.centre, site.radius, site.feed, 1)
-        yield replace(
-            usual, action=action, program=text, minutes=minutes + usual.minutes, knows=((effect, parameter, deviation),)
-        )
-    action = "dwell: stand still for 15 minutes and log"
-    yield Candidate(
-        action, dwell_program(action, site.centre, site.feed, _DWELL_S), False, have, soon, _DWELL_S / 60.0 + _SETUP_MIN,
-        stay_s=_DWELL_S, varies=("time", "temperature"),
-    )  # fmt: skip
-    later = "repeat later: the same circle after one hour of running"
-    yield replace(
-        usual, action=later, program=circle_program(later, site.centre, site.radius, site.feed, 1),
-        started=site.end + 60.0 * _LATER_MIN, minutes=usual.minutes + _LATER_MIN, varies=("time", "temperature"),
-    )  # fmt: skip
+        yield replace(base, action=action, minutes=base.minutes + cost, knows=((effect, parameter, deviation),))
 
 
-def circle_program(action: str, centre: Floats, radius: float, feed: float, turn: int, plane: str = "G17") -> str:
-    """NC text of one full circle; turn +1 counter-clockwise, -1 clockwise, seen from the plane's positive axis."""
-    x, y, z = (float(v) for v in centre)
-    word = "G3" if turn > 0 else "G2"
-    offset = f"I{-radius:.4f} J0" if plane == "G17" else f"I{-radius:.4f} K0"
-    place = f"X{x + radius:.4f} Y{y:.4f} Z{z:.4f}"
-    return _program(action, plane, f"G0 {place}\n{word} {place} {offset} F{feed:.0f}\n")
+def single_changes(site: Site, room: Room) -> Iterator[Candidate]:
+    """What the runs did with one thing changed, for what nobody knows."""
+    base = usual(site)
+    yield candidate(site, replace(base, turns=(-1,)), ("reversal", "direction"))
+    if not base.cutting:
+        yield candidate(site, replace(base, feed=4.0 * base.feed), ("velocity", "acceleration"))
+    yield candidate(site, replace(base, feed=0.5 * base.feed), ("velocity", "acceleration"))
+    if base.cutting:
+        yield candidate(site, _in_air(site, replace(base, cutting=False)), ("force",))
+    here = _in_air(site, replace(base, cutting=False))
+    middle = np.array(here.centre)
+    ways = _ways()
+    reaches = room.reaches(middle, ways, site.farther, site.low)
+    way, far = ways[int(np.argmax(reaches))], float(reaches.max())
+    centre = _triple(middle + (1.0 - SMALL) * far * way)
+    yield candidate(
+        site, _in_air(site, replace(here, centre=centre, radius=min(here.radius, SMALL * far))), ("position",)
+    )
+    yield from in_time(site)
 
 
-def ladder_program(action: str, centre: Floats, reach: float, feed: float, axis: int) -> str:
-    """NC text of five steps up and five down along one axis."""
-    letter = "XYZ"[axis]
-    start = centre.copy()
-    start[axis] -= reach
-    x, y, z = (float(v) for v in start)
-    stops = [start[axis] + 2.0 * reach * i / 5.0 for i in (1, 2, 3, 4, 5, 4, 3, 2, 1, 0)]
-    moves = "".join(f"G1 {letter}{s:.4f} F{feed:.0f}\n" for s in stops)
-    return _program(action, "G17", f"G0 X{x:.4f} Y{y:.4f} Z{z:.4f}\n{moves}")
+def neighbours(site: Site, design: MotionDesign, step: float) -> Iterator[MotionDesign]:
+    """Designs beside one; step: 1 far to 0 near."""
+    for axis, sign in product(range(3), (1.0, -1.0)):
+        if not design.cutting:
+            moved = np.array(design.centre) + sign * step * NEIGHBOUR_MM * np.eye(3)[axis]
+            yield _in_air(site, replace(design, centre=_triple(moved)))
+    for factor in (NEIGHBOUR_TIMES**step, NEIGHBOUR_TIMES**-step):
+        radius, feed = factor * design.radius, factor * design.feed
+        if not design.cutting or (site.cut is not None and radius <= site.cut.radius):
+            yield _in_air(site, replace(design, radius=radius))
+        slowest, fastest = (CUT_FASTER if design.cutting else FASTER)[:: len(FASTER) - 1]
+        place = site.cut if design.cutting and site.cut is not None else site.work
+        if slowest * place.feed <= feed <= fastest * place.feed:
+            yield replace(design, feed=feed)
 
 
-def dwell_program(action: str, centre: Floats, feed: float, seconds: float) -> str:
-    """NC text of one short move and a dwell at its end."""
-    x, y, z = (float(v) for v in centre)
-    return _program(action, "G17", f"G0 X{x - 1.0:.4f} Y{y:.4f} Z{z:.4f}\nG1 X{x:.4f} F{feed:.0f}\nG4 P{seconds:.0f}\n")
+def _ways() -> Floats:
+    """Unit directions (k, 3) along the axes and to the corners."""
+    every = np.array([w for w in product((1.0, 0.0, -1.0), repeat=3) if sum(map(abs, w)) in (1.0, 3.0)])
+    return np.asarray(every / np.linalg.norm(every, axis=1)[:, None], float)
 
 
-def _program(action: str, plane: str, body: str) -> str:
-    say = action.replace("(", "").replace(")", "")
-    return f"(experiment proposed by camcomp)\n({say})\nG21 G90 {plane} G54\n{body}M2\n"
+def _in_air(site: Site, design: MotionDesign) -> MotionDesign:
+    """As high as it takes not to meet what may stand below."""
+    if design.cutting:
+        return design
+    x, y, z = design.centre
+    low = float(design.points()[:, 2].min())
+    return replace(design, centre=(x, y, z + max(site.low - low, 0.0)))
+
+
+def _triple(point: Floats) -> tuple[float, float, float]:
+    x, y, z = (float(v) for v in point)
+    return x, y, z

@@ -1,4 +1,6 @@
-"""A proposed experiment as a program that a machine can run: from above, with the spindle as in the runs, inside the travel."""
+"""A proposed experiment as a program that a machine can run: from above, with the spindle as in the runs, inside the travel, in
+the language of the control.
+"""
 
 from __future__ import annotations
 
@@ -8,19 +10,24 @@ import numpy as np
 
 from camcomp.diagnosis.fit.bench import Run
 from camcomp.diagnosis.next_experiment.candidates import Candidate
+from camcomp.gcode.detect import DEFAULT, dialect_of
 from camcomp.gcode.interpret import read_program
+from camcomp.gcode.text import Text
 from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import Path
 from camcomp.ground.errors import CheckFailed, PhysicsError
+from camcomp.ground.files import read_bytes
+from camcomp.model.config.spec import Experiment
 from camcomp.model.job import Job
 from camcomp.model.motion.twin import Twin
 
 CLEAR_MM = (10.0, 5.0, 2.0)  # above all that the runs and the experiment do, where their programs went no higher
 SAMPLES = 65  # points of a motion at which it is looked whether the drives reach it
-CUTS = "(WARNING: THIS PROGRAM CUTS, as the runs with cutting did: clamp stock and check the depth)"
+CUTS = "WARNING: THIS PROGRAM CUTS, as the runs with cutting did: clamp stock and check the depth"
+_METRIC = 710  # G71: what some controls call G21
 
 
-def ready_program(candidate: Candidate, runs: Sequence[Run], job: Job, twin: Twin) -> str:
+def ready_program(candidate: Candidate, runs: Sequence[Run], job: Job, twin: Twin, dialect: str = DEFAULT) -> str:
     """The candidate's NC text with retraction, approach, spindle and end. Raises CheckFailed CC608 out of the travel."""
     head, _, body = candidate.program.partition("G54\n")
     lines = body.splitlines()
@@ -29,15 +36,54 @@ def ready_program(candidate: Candidate, runs: Sequence[Run], job: Job, twin: Twi
     paths = [run.program for run in runs if run.program is not None]
     feed = next(word for line in lines for word in line.split() if word[0] == "F")
     on, off = _spindle(paths)
-    warning = [CUTS] if candidate.cutting else []
+    warning = [f"({CUTS})"] if candidate.cutting else []
     for height in _heights(candidate, paths):
         above = f"G0 Z{height:.4f}"
         moves = [above, *on, f"G0 X{x} Y{y}", f"G1 Z{z} {feed}", *lines, above, *off, "M2"]
         remarks, _, modes = head.rpartition("\n")
-        program = "\n".join([remarks, *warning, f"{modes}G54", *moves]) + "\n"
-        if within_travel(read_program(program.encode(), name="next experiment").path, job, twin):
+        program = spelt("\n".join([remarks, *warning, f"{modes}G54", *moves]) + "\n", dialect)
+        if within_travel(read_program(program.encode(), name="next experiment", dialect=dialect).path, job, twin):
             return program
     raise CheckFailed("CC608", f"'{candidate.action}' leads an actuator out of its travel on the way from above")
+
+
+def can_be_run(candidate: Candidate, runs: Sequence[Run], job: Job, twin: Twin) -> bool:
+    """Whether there is such a program."""
+    try:
+        ready_program(candidate, runs, job, twin)
+    except CheckFailed:
+        return False
+    return True
+
+
+def dialect_of_runs(experiment: Experiment, job: Job) -> str:
+    """Name of the language of the control: as the machine file says, else that of the last program."""
+    if job.config.control.dialect is not None:
+        return job.config.control.dialect
+    programs = [run.program for run in experiment.runs if run.program is not None]
+    return dialect_of(Text.read(read_bytes(programs[-1]), programs[-1])).name if programs else DEFAULT
+
+
+def spelt(program: str, dialect: str) -> str:
+    """A proposed program, RS274, in another language: remarks, dwell, units, points in feeds."""
+    if dialect == DEFAULT:
+        return program
+    language = dialect_of(Text.read(program.encode(), "next experiment"), dialect)
+    begins, ends = language.comment
+    out = []
+    for line in program.splitlines():
+        if line.startswith("("):
+            out.append(f"{begins}{line[1:-1]}{ends}")
+            continue
+        words = line.split()
+        if words[0] == "G4":  # in seconds: X of some, where P counts milliseconds
+            words[1] = f"{'X' if 'X' in language.dwell else language.dwell[0]}{float(words[1][1:]):.1f}"
+        if words[0] == "G21" and _METRIC in language.more:
+            words[0] = "G71"
+        if language.increments:
+            words = [f"{word}." if word[0] in "FIJK" and "." not in word else word for word in words]
+        out.append(" ".join(words))
+    return "\n".join(out) + "\n"
 
 
 def within_travel(path: Path, job: Job, twin: Twin) -> bool:
@@ -56,7 +102,7 @@ def within_travel(path: Path, job: Job, twin: Twin) -> bool:
 
 def _heights(candidate: Candidate, paths: Sequence[Path]) -> list[float]:
     """Heights of retraction to try, mm: that of the runs' own rapids, else some clearance above everything."""
-    here = read_program(candidate.program.encode(), name="candidate").path.end[:, 2].max()
+    here = read_program(candidate.program.encode(), name="candidate", dialect=DEFAULT).path.end[:, 2].max()
     been = [float(path.end[path.known & ~path.machine, 2].max()) for path in paths]
     top = max([float(here), *been])
     clear = top - float(here) >= CLEAR_MM[-1]

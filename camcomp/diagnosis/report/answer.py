@@ -10,6 +10,7 @@ from camcomp.report.plot import brief
 
 HALF = 0.5  # of what is left: what goes with less is told only where nothing goes with more
 MOST_CAUSES = 3  # that the terminal tells
+MOST_LINES = 10  # of the terminal, before what outcomes mean is left to the page
 
 
 def cause_name(cause: NamedCause) -> str:
@@ -94,4 +95,5 @@ def answer_lines(result: DiagnosisResult) -> list[str]:
         lines.append(f"  removed on unseen runs: {100 * shrink.ratio:.0f} % ({100 * low:.0f} to {100 * high:.0f} %)")
     if proposal := result.next_experiment:
         lines.append(f"  measure next: {proposal.action}")
+        lines += [f"    {each}" for each in proposal.outcomes[: max(MOST_LINES - len(lines), 0)]]
     return [each.replace("µm", "um") for each in lines]

@@ -22,6 +22,7 @@ from camcomp.diagnosis.report.figures import (
 from camcomp.diagnosis.report.joints import joints_section
 from camcomp.diagnosis.report.law_section import LawView, law_section
 from camcomp.diagnosis.report.run_view import RivalSignals, RunView, rms
+from camcomp.diagnosis.report.standards import standards_section
 from camcomp.diagnosis.report.words import micrometres, percent, plain, remedy, sizes
 from camcomp.diagnosis.result.types import UNKNOWN, DiagnosisResult, NextExperiment, UnseenShrinkage, Where
 from camcomp.report.inputs import Input, inputs_section
@@ -40,6 +41,7 @@ COMPENSATE = (
     "What stays after a repair can be compensated: camcomp diagnose --write-config writes the machine file with these causes "
     "in it, and compensate then takes them out of every program."
 )
+ADD_IT = "Add its log to the experiment file as one more run, and diagnose again."
 LOOK = "Part of the gap is none of the effects that camcomp knows; below stands where it shows and what it goes with."
 WORDS = {"none": "No gap", "identified": "Identified", "ambiguous": "Ambiguous", "unknown": "Unknown cause"}
 
@@ -90,6 +92,8 @@ def diagnosis_html(
             Section("map", "On the workpiece", figures=[figure_map(seen)]),
         ]  # fmt: skip
     sections.append(_where(result.where, shown))
+    if (standards := standards_section(result.standards)) is not None:
+        sections.append(standards)
     if inputs:
         sections.append(inputs_section(inputs))
     verdict = result.verdict
@@ -174,16 +178,14 @@ def _to_do(result: DiagnosisResult, next_program: str | None) -> Section:
 
 def _next(proposal: NextExperiment) -> list[str]:
     text = [f"Measure next: {proposal.action}"]
-    if "unknown" in proposal.separates:
-        return [
-            *text,
-            f"It changes what the unknown effect may depend on, and nothing else. Expected gain: {proposal.gain:.2f} bits.",
-        ]
-    if separates := together(proposal.separates):
-        text.append(
-            f"It separates {separates}. Expected gain: {proposal.gain:.2f} (0: none, 1: the question is settled)."
-        )
-    return text
+    if UNKNOWN in proposal.separates and proposal.poses is None:
+        text.append("It changes what the unknown effect may depend on, and as little else as can be.")
+    elif separates := together(proposal.separates):
+        text.append(f"It separates {separates}.")
+    time = f", {brief(proposal.minutes, 2)} minutes with setting up" if proposal.minutes else ""
+    unit = "bits" if proposal.poses is None else "nats"
+    text += [*proposal.outcomes, f"Expected gain: {brief(proposal.gain)} {unit}{time}."]
+    return [*text, ADD_IT] if proposal.minutes else text
 
 
 def _where(where: Where, shown: Sequence[RunView]) -> Section:

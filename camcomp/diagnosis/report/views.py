@@ -14,7 +14,7 @@ from camcomp.diagnosis.fit.bench import Bench, Run, thinned
 from camcomp.diagnosis.fit.gap import main_channels
 from camcomp.diagnosis.fit.measured import channel_names
 from camcomp.diagnosis.fit.problem import Problem
-from camcomp.diagnosis.next_experiment.ready_program import ready_program
+from camcomp.diagnosis.next_experiment.ready_program import dialect_of_runs, ready_program
 from camcomp.diagnosis.report.answer import cause_name
 from camcomp.diagnosis.report.law_view import law_view
 from camcomp.diagnosis.report.page import diagnosis_html
@@ -75,7 +75,8 @@ def _next_program(done: Diagnosis, opened: OpenExperiment) -> str | None:
     if done.proposal is None:
         return None
     try:
-        return ready_program(done.proposal.candidate, opened.runs, opened.job, opened.twin)
+        dialect = dialect_of_runs(opened.experiment, opened.job)
+        return ready_program(done.proposal.candidate, opened.runs, opened.job, opened.twin, dialect)
     except CheckFailed:
         return None
 

@@ -56,7 +56,9 @@ def percent(share: float) -> str:
 def sizes(cause: FoundCause) -> str:
     """The parameters of a cause with their 95 % intervals; those that may as well be nothing come last, by name alone."""
     kinds = {each.name: each for each in getattr(_effect(cause.effect), "PARAMETERS", ())}
-    told = {name: size(name, each, kinds.get(name)) for name, each in cause.parameters.items()}
+    # which of two laws holds is no size
+    sized = {name: each for name, each in cause.parameters.items() if not (name in kinds and kinds[name].either)}
+    told = {name: size(name, each, kinds.get(name)) for name, each in sized.items()}
     nothing = [name for name, text in told.items() if _NOTHING in text]
     if len(nothing) in (0, len(told)):
         return "; ".join(told.values())

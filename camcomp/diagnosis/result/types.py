@@ -9,6 +9,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, PrivateAttr
 
+from camcomp.diagnosis.result.standards import StandardValues
 from camcomp.ground.result import Result
 
 Stage = Literal["control", "drive", "structure", "process", "tool", "workpiece", "sensor"]
@@ -298,6 +299,7 @@ class DiagnosisResult(Result):
         tuple[tuple[NamedCause, ...], ...], Field(description="causes that these runs cannot tell apart")
     ] = ()
     axes_in_detail: dict[str, dict[str, Any]] = Field(default_factory=dict, description="studies of axes: every fit")
+    standards: Annotated[StandardValues, Field(description="ISO 230-2 and ISO 9283")] = StandardValues()
 
     @property
     def law(self) -> Law | None:

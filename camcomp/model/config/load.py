@@ -277,8 +277,8 @@ def _check_targets(config: Config) -> list[CamcompError]:
             message, hint = f"there is no actuator '{each.target}'", choose(each.target, names)
         elif kind == "actuator" and each.target is None:
             message, hint = f"'{each.effect}' needs a target", f"add target: one of {', '.join(names)}"
-        elif kind == "actuator" and _turns(config, each.target) and getattr(effect, "SLIDES_ONLY", False):
-            message, hint = f"'{each.target}' is a hinge, and '{each.effect}' is of slides", None
+        elif kind != "named" and getattr(effect, "SLIDES_ONLY", False) and (hinge := _hinge(config, each.target)):
+            message, hint = f"'{hinge}' is a hinge, and '{each.effect}' is of slides", None
         elif each.target is not None and getattr(each.params, "axis", None) is not None:
             message, hint = "a law on the tip has no target", "leave the target out; its axis says where it acts"
         elif kind == "machine" and each.target is not None:
@@ -296,8 +296,10 @@ def _not_of_target(effect: Any, choice: EffectChoice) -> str | None:
     return next((key for key in choice.given if key in some and key not in of.get(choice.target, ())), None)
 
 
-def _turns(config: Config, actuator: str | None) -> bool:
-    return isinstance(config.robot.actuators.get(actuator or ""), RevoluteActuator)
+def _hinge(config: Config, target: str | None) -> str | None:
+    """The first hinge among the actuators that an effect with that target acts on."""
+    every = config.robot.actuators
+    return next((a for a in every if target in (None, a) and isinstance(every[a], RevoluteActuator)), None)
 
 
 def _get(node: Node | None, *keys: str) -> Node | None:

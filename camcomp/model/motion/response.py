@@ -22,6 +22,7 @@ from camcomp.model.statics.target import Correction, correct, settle
 
 SETTLED_MM = 2e-5  # the correction of effects ends here
 MAX_AIM_STEPS = 50  # friction that turns round in a soft drive leaves up to nine tenths per step
+FARTHER = 2.0  # times the square of what was left before, from which on steps are halved
 REST_S = 60.0
 AHEAD_MM = 2.0  # more than any play
 LEAST_MM = 2e-4  # a drive that comes back by less than this is not led through its play
@@ -102,10 +103,18 @@ def aim_at(job: Job, target: Floats, travel: Travel, method: str) -> Correction:
     commanded = job.frame.to_program(found.commanded)
     if job.causes and method != "linear":
         commanded = commanded + _through_play(job, found, travel)
+        share, least, near = 1.0, np.inf, commanded
+        rings = bool(signal_path.acting(job.causes, "control"))
         for _ in range(MAX_AIM_STEPS):
             tip, state = respond(job, commanded, travel, target)
             left = target - tip
-            commanded = commanded + np.where(np.isfinite(left), left, 0.0)
+            size = float(np.nansum(left**2))
+            if rings and size > FARTHER * least:  # a loop that swings answers to a step by more than the step
+                share, commanded, least = 0.5 * share, near, np.inf
+                continue
+            if size < least:
+                least, near = size, commanded
+            commanded = commanded + share * np.where(np.isfinite(left), left, 0.0)
             found = replace(found, status=np.where(found.status == 0, state.status, found.status))
             if not np.abs(left).max(initial=0.0) > SETTLED_MM:
                 break

@@ -108,11 +108,13 @@ class Bounds:
         arcs = feeds[np.isfinite(path.centre[feeds, 0])]
         points = path_geometry.points(path, np.repeat(arcs, len(u)), np.tile(u, len(arcs)))
         reach = np.linalg.norm(path.start[arcs] - path.centre[arcs], axis=1) if len(arcs) else np.zeros(0)
-        bulge = np.repeat(reach * (1.0 - np.cos(np.abs(path.angle[arcs]) / 16.0)), len(u))[:, None]
+        lean = np.sqrt(np.maximum(1.0 - path.axis[arcs] ** 2, 0.0))  # an arc does not bulge along its axis
+        bulge = np.repeat((reach * (1.0 - np.cos(np.abs(path.angle[arcs]) / 16.0)))[:, None] * lean, len(u), axis=0)
         ends = np.concatenate((path.start[feeds], path.end[feeds], points - bulge, points + bulge))
         if len(ends):
             self.low, self.high = np.minimum(self.low, ends.min(axis=0)), np.maximum(self.high, ends.max(axis=0))
         way = path.end[feeds] - path.start[feeds]
-        lateral = feeds[np.hypot(way[:, 0], way[:, 1]) > PLUNGE_SINE * np.linalg.norm(way, axis=1)]
+        across = np.hypot(way[:, 0], way[:, 1]) > PLUNGE_SINE * np.linalg.norm(way, axis=1)
+        lateral = feeds[across | np.isfinite(path.centre[feeds, 0])]  # a full circle ends where it begins
         self.across = max(self.across, float(path.end[lateral, 2].max(initial=-np.inf)))
         return self

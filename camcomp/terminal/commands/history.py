@@ -13,6 +13,8 @@ from camcomp.terminal.commands._options import OUTPUT
 if TYPE_CHECKING:
     from camcomp.api.history import Chronicle, ParameterCourse
 
+SHOWN = ("A", "R", "B", "E", "M", "AP", "RP")  # values of standards; those of one direction are in the JSON
+
 
 @click.command()
 @click.argument("folder", metavar="DIR")
@@ -31,7 +33,8 @@ def command(
     """Keep the diagnoses of a machine and show what drifts in them.
 
     DIR is a folder of one machine; --add puts results of `camcomp diagnose --json` into it. For every parameter that was
-    ever found: its values over the days, whether it stays, drifts or has jumped, and when to measure again.
+    ever found: its values over the days, whether it stays, drifts or has jumped, and when to measure again. So are values of
+    ISO 230-2 (positioning of an axis) and ISO 9283 (pose of an arm) where the logs held them.
     """
     from camcomp.api.history import history, keep_diagnosis
 
@@ -60,6 +63,11 @@ def _text(found: "Chronicle") -> list[str]:
         out.append(
             f"{name} {each.parameter}: {last.value:.4g} ({low:.4g} to {high:.4g}) on {last.day}; {_course(each)}"
         )
+    for value in found.standards:
+        if value.name in SHOWN:
+            (first, before), (latest, now) = value.values[0], value.values[-1]
+            since = f", {now - before:+.3g} since {first}" if len(value.values) > 1 else ""
+            out.append(f"{value.standard} {value.name}, {value.place}: {now:.4g} um on {latest}{since}")
     if found.measure_again:
         out.append(f"measure again by {found.measure_again}")
     return out

@@ -5,6 +5,7 @@ from pathlib import Path
 import click
 
 from camcomp.terminal.commands._options import config_option
+from camcomp.terminal.progress import working
 
 
 @click.command()
@@ -59,10 +60,11 @@ def command(
     """
     from camcomp.api.recordings import import_recordings
 
-    runs, experiment = import_recordings(
-        files, configs, output_dir, actuator=actuator, columns=columns, names=names, period_s=period_s, degrees=degrees,
-        by=by, programs=programs, cutting=cutting, one_clamping=one_clamping, holdout=holdout, rows=rows,
-    )  # fmt: skip
+    with working(f"reading {len(files)} recordings" if len(files) > 1 else f"reading {files[0]}"):
+        runs, experiment = import_recordings(
+            files, configs, output_dir, actuator=actuator, columns=columns, names=names, period_s=period_s, degrees=degrees,
+            by=by, programs=programs, cutting=cutting, one_clamping=one_clamping, holdout=holdout, rows=rows,
+        )  # fmt: skip
     for each, file in zip(runs, files, strict=True):
         renamed = "" if each.name == Path(file.split("+")[0]).stem or file == "-" else f" ({file})"
         click.echo(f"{each.name}{renamed}: {each.rows} rows; {'; '.join(each.notes) or 'complete'}", err=True)

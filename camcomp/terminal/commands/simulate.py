@@ -3,9 +3,10 @@
 import click
 
 from camcomp.ground.files import write_all
+from camcomp.ground.headway import part
 from camcomp.ground.places import STANDARD
 from camcomp.terminal.commands._options import OUTPUT
-from camcomp.terminal.progress import say
+from camcomp.terminal.progress import say, working
 
 
 @click.command()
@@ -40,11 +41,15 @@ def command(
 
     machine, outputs = load_machine(*configs), {}
     if output or not surface:
-        log = simulate(program, machine, step_s, cutting=not air, started_s=started_s)
+        with working(f"simulating {program}"):
+            with part(0.0, 0.5):
+                log = simulate(program, machine, step_s, cutting=not air, started_s=started_s)
+            with part(0.5, 1.0):
+                outputs[output or STANDARD] = log.to_csv()
         for each in log.warnings:
             say(f"warning: {each}")
-        outputs[output or STANDARD] = log.to_csv()
     if surface:
-        left = simulate_cut(program, machine)
+        with working(f"cutting {program}"):
+            left = simulate_cut(program, machine)
         outputs[surface] = left.to_csv() if surface.endswith(".csv") else left.to_stl()
     write_all(outputs, inputs=(program, *configs))

@@ -105,3 +105,18 @@ def test_play_is_made_up_for_where_drives_turn_round_too(tmp_path, axis, width):
     assert groove.sum() > 600
     assert np.abs(np.hypot(tip[:, 0], tip[:, 1]) - 25.0).max() < 1.2e-3
     assert np.abs(tip[:, 2]).max() < 1.2e-3
+
+
+@pytest.mark.parametrize("period", [0.6, 1.0, 2.0])
+def test_a_short_wave_of_a_scale_is_made_up_for(tmp_path, period):
+    """The signal period of an encoder in the loop: as a screw that runs out; points half a millimetre apart miss it at 1 mm."""
+    program = tmp_path / "in.nc"
+    program.write_text("G21 G90 G17 G94\nG0 X0 Y0 Z0\nG1 X20 F600\nM2\n")
+    effect = f"{{effect: screw_cyclic, target: x, amplitude_mm: 0.01, pitch_mm: {period}}}]\nprocess: {{force: {{model: none}}}}\n#"
+    result, _ = done(tmp_path, effect, program, "cartesian")
+    assert np.linalg.norm(result.before, axis=1).max() > 9e-3
+    ends = np.concatenate(([0.0], result.written.end[:, 0]))
+    told = np.interp(np.linspace(0.0, len(ends) - 1.0, 20 * len(ends)), np.arange(len(ends)), ends)
+    tip = told + 0.01 * np.sin(2.0 * np.pi * told / period)
+    asked = np.interp(told, ends, np.concatenate(([0.0], result.rows.target[:, 0])))
+    assert np.abs(tip - asked).max() < 1.2e-3

@@ -11,6 +11,8 @@ from camcomp.model.effect import Motion
 from tests.campaign import runner
 from tests.plants.guideways import Guideways, experiment
 from tests.plants.motion import Timeline, read
+from tests.plants.slides import Axes
+from tests.plants.slides import experiment as slides
 
 EFFECT = shelf.load("effects", "disturbance")
 
@@ -50,6 +52,7 @@ def test_it_is_found_and_located_in_time(tmp_path):
     [cause] = result["causes"]
     assert (result["verdict"], cause["effect"], cause["target"]) == ("identified", "disturbance", "y")
     found = cause["parameters"]
+    assert "force_N" not in found, "without the force of the drives a force is a shift"
     for name, value in (("shift_mm", 0.025), ("from_s", 203.0), ("to_s", 204.5)):
         low, high = found[name]["ci95"]
         assert low <= value <= high
@@ -59,6 +62,23 @@ def test_it_is_found_and_located_in_time(tmp_path):
     text = path.read_text().replace("tool.yaml]", "tool.yaml, known.yaml]")
     path.write_text(text)
     assert runner.ask(path)["verdict"] == "none"
+
+
+def test_a_push_is_a_force_where_drives_log_theirs(tmp_path):
+    """300 N push y along + for a second of the second run: 15 um through its spring, and the drive holds against them."""
+    moves = "G0 X0 Y0 Z0\nG1 X40 F900\nY25\nX0 Y5\nY0\n"
+
+    def moved(common, asked):
+        here = np.clip(np.minimum(common - 103.0, 104.0 - common) / 0.004, 0.0, 1.0)[:, None]
+        return Axes(asked, asked + here * [0.0, 0.015, 0.0], here * [0.0, -300.0, 0.0])
+
+    result = runner.ask(slides(tmp_path, [(moves, 0.0), (moves, 100.0), (moves, 200.0)], moved))
+    [cause] = result["causes"]
+    assert (result["verdict"], cause["effect"], cause["target"]) == ("identified", "disturbance", "y")
+    for name, value in (("force_N", 300.0), ("shift_mm", 0.0), ("from_s", 103.0), ("to_s", 104.0)):
+        low, high = cause["parameters"][name]["ci95"]
+        assert low <= value <= high
+    assert cause["parameters"]["force_N"]["value"] == pytest.approx(300.0, rel=0.02)
 
 
 def test_the_program_makes_room_for_what_is_known_to_happen(tmp_path):

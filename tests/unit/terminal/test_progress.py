@@ -7,13 +7,22 @@ import subprocess
 import sys
 import time
 
+import numpy as np
 import pytest
 
 import camcomp
+from camcomp.api.recordings import import_recordings
+from camcomp.diagnosis.arm.poses import Poses
+from camcomp.diagnosis.arm.study import study as arm_study
+from camcomp.diagnosis.axis.findings import AxisRun
+from camcomp.diagnosis.axis.study import study as axis_study
 from camcomp.ground import headway
+from camcomp.model.config.load import load_config
+from camcomp.model.statics.build import build_robot
 from camcomp.terminal import progress
 from camcomp.terminal.cli import run
 from tests.commandline import ROOT
+from tests.plants.arm_poses import measured
 
 WORDS = ["compensate", str(ROOT / "samples/groove-circle-2.nc"), "--config", str(ROOT / "config/cartesian.yaml")]
 
@@ -84,9 +93,9 @@ def test_what_holds_up_the_work_is_told_instead(screen):
     assert "50%" in told[-1]
 
 
-@pytest.mark.parametrize("verb", ["compensate", "diagnose", "verify"])
-def test_verbs_say_how_far_they_are(monkeypatch, tmp_path, verb):
-    """Shares rise to the end, in more than a few steps."""
+@pytest.fixture
+def shares(monkeypatch):
+    """Shares of the work around the test, as they were said."""
     seen = []
     original = headway.done
 
@@ -96,19 +105,89 @@ def test_verbs_say_how_far_they_are(monkeypatch, tmp_path, verb):
             seen.append(headway._watched[-1].share)
 
     monkeypatch.setattr(headway, "done", note)
-    monkeypatch.setattr("camcomp.diagnosis.search.cause_search.headway.done", note)
+    return seen
+
+
+def test_programs_say_how_far_they_are(shares):
+    """Shares rise to the end, in more than a few steps."""
     groove, machine = WORDS[1], camcomp.load_machine(WORDS[3])
     with headway.watched() as watched:
-        if verb == "diagnose":
-            camcomp.diagnose(ROOT / "samples/diagnosis/ambiguous/experiment.yaml")
-        else:
-            done = camcomp.compensate(groove, machine)
-            if verb == "verify":
-                watched.share = None
-                seen.clear()
-                camcomp.verify(done.data, groove, machine)
-    assert seen == sorted(seen) and 0.0 < seen[0] < 0.5 and 0.85 < watched.share <= 1.0
-    assert len({round(each, 3) for each in seen}) >= 3
+        done = camcomp.compensate(groove, machine)
+        assert_rising(shares, watched)
+        watched.share = None
+        shares.clear()
+        camcomp.verify(done.data, groove, machine)
+    assert_rising(shares, watched)
+
+
+def test_a_diagnosis_says_how_far_it_is(shares):
+    with headway.watched() as watched:
+        camcomp.diagnose(ROOT / "samples/diagnosis/ambiguous/experiment.yaml")
+    assert_rising(shares, watched)
+
+
+def test_an_arm_says_how_far_it_is(shares):
+    q = np.random.default_rng(1).uniform(-1.0, 1.0, (60, 6))
+    poses = Poses("A", q, measured(q, 1, longer=0.7), np.arange(60.0), None, np.full(60, "A"))
+    robot = build_robot(load_config([ROOT / "config/ur10.yaml"]).robot, [0.0, 0.0, 0.0])[0]
+    with headway.watched() as watched:
+        arm_study(robot, (), [poses], without=["joint_curve"])
+    assert_rising(shares, watched)
+
+
+def test_axes_say_how_far_they_are(shares):
+    t = np.arange(0.0, 4.0, 0.01)
+    where, force = 100.0 * np.sin(2.0 * t), 50.0 * np.sign(np.cos(2.0 * t))
+    runs = [AxisRun(f"r{k}", t, where, where - 0.01 * np.cos(2.0 * t), force, np.arange(400)) for k in range(2)]
+    with headway.watched() as watched:
+        axis_study({"x": runs, "y": runs}, holdout=["r1"])
+    assert_rising(shares, watched, least=2)
+
+
+def test_a_simulation_says_how_far_it_is(shares):
+    with headway.watched() as watched:
+        log = camcomp.simulate(WORDS[1], camcomp.load_machine(WORDS[3]))
+    assert_rising(shares, watched)
+    with headway.watched() as watched:
+        shares.clear()
+        log.to_csv()
+    assert shares == [0.0] and watched.share == 0.0  # of a short log
+
+
+def test_an_import_says_how_far_it_is(shares, tmp_path):
+    rows = "".join(f"{k / 100},{k},{k},{k},{k},{k},{k},0,0,0\n" for k in range(50))
+    for name in "abc":
+        (tmp_path / f"{name}.csv").write_text(
+            "t_s,cmd_x_mm,cmd_y_mm,cmd_z_mm,act_x_mm,act_y_mm,act_z_mm,act_x_N,act_y_N,act_z_N\n" + rows
+        )
+    files = [str(tmp_path / f"{name}.csv") for name in "abc"]
+    with headway.watched() as watched:
+        import_recordings(files, [WORDS[3]], tmp_path / "out", columns=[])
+    assert_rising(shares, watched)
+
+
+def assert_rising(shares, watched, least=3):
+    assert shares == sorted(shares) and 0.0 <= shares[0] < 0.6 and 0.85 < watched.share <= 1.0
+    assert len({round(each, 3) for each in shares}) >= least
+
+
+@pytest.mark.parametrize("verb", ["simulate", "import"])
+def test_verbs_tell_it_on_a_terminal_and_nowhere_else(screen, tmp_path, monkeypatch, verb):
+    """The work takes as long as it takes; what is watched is that somebody watches."""
+    told = []
+    monkeypatch.setattr(progress._Line, "text", lambda self, headway: told.append(self._on) or self._on)
+    pause = headway.done
+    monkeypatch.setattr(headway, "done", lambda share: (time.sleep(0.05), pause(share)))
+    log = tmp_path / "a.csv"
+    words = ["simulate", WORDS[1], *WORDS[2:], "--step-s", "0.5"]
+    assert run([*words, "-o", str(log)]) == 0
+    if verb == "import":
+        words = ["import", str(log), *WORDS[2:]]
+    for is_terminal in (True, False):
+        screen(is_terminal)
+        told.clear()
+        assert run([*words, "-o", str(tmp_path / f"out-{is_terminal}")]) == 0
+        assert bool(told) == is_terminal
 
 
 def test_long_programs_say_how_far_they_are(tmp_path):

@@ -191,7 +191,7 @@ def test_lines_are_written_as_the_writer_of_whole_programs_writes_them(seed):
     position, state = np.array([1.0, 2.0, 3.0]), np.array([0.0, 500.0])
     size = write_rows(
         data, 0, len(data), read.line, read.begin, read.finish, read.kind, read.end, read.code_stated, read.feed_stated,
-        read.feed, first, joining, rest, *modes, end, feed, position, state, 1.0, np.zeros(3), decimals(RESOLUTION, 1.0),
+        read.feed, first, joining, rest, 0, *modes, end, feed, position, state, 1.0, np.zeros(3), decimals(RESOLUTION, 1.0),
         0.5 * RESOLUTION * (1 + 1e-9), False, out, written, held,
     )  # fmt: skip
     text_out = out[:size].tobytes().decode()

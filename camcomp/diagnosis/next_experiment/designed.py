@@ -1,0 +1,123 @@
+"""The next experiment, designed: a coarse grid over place, plane, radius, feed, direction, load and rest, then the best refined.
+
+What counts is the information less the price of the machine's time (`proposal.PRICE`), so that half an answer does not win by being
+quick. No chance is in it: the same runs have the same next experiment.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from itertools import islice
+
+import numpy as np
+
+from camcomp.diagnosis.fit.problem import Problem
+from camcomp.diagnosis.next_experiment.candidates import (
+    Candidate,
+    by_other_means,
+    candidate,
+    coarse,
+    neighbours,
+)
+from camcomp.diagnosis.next_experiment.design import MotionDesign
+from camcomp.diagnosis.next_experiment.foresee import Question, foresee
+from camcomp.diagnosis.next_experiment.information_gain import most_narrowed, program_weight, told
+from camcomp.diagnosis.next_experiment.proposal import WORTH, Proposal
+from camcomp.diagnosis.next_experiment.ready_program import can_be_run
+from camcomp.diagnosis.next_experiment.site import Room, Site, room_of, site_of
+from camcomp.diagnosis.statistics.cause_sets import Fitted
+from camcomp.ground.datatypes import Floats
+from camcomp.model.job import Job
+
+STEPS = (1.0, 0.5)  # of the refinement
+MOST_REFINED = 16  # designs that are looked at while refining
+MOST_JUDGED_WHOLE = 3  # of the best, with every effect of the library within its tolerance
+
+
+@dataclass(eq=False)
+class Desk:
+    """Where designs are judged by what they tell of a question."""
+
+    question: Question
+    site: Site = field(init=False)
+    room: Room = field(init=False)
+    weight: Floats = field(init=False)
+
+    def __post_init__(self) -> None:
+        problem = self.question.problem
+        self.site = site_of(problem.bench)
+        self.room = room_of(problem.bench, self.question.job)
+        self.weight = program_weight(problem)
+
+    def judged(self, each: Candidate, *, whole: bool = False) -> Proposal | None:
+        """A candidate with what it tells; None where the machine cannot do it or nothing would be told."""
+        there = foresee(self.question, each, whole=whole)
+        if there is None:
+            return None
+        found = told(self.question, each, there, self.weight)
+        return Proposal(each, found.gain, separated(self.question.problem, self.question.rivals), told=found)
+
+    def refined(self, first: Proposal) -> Proposal:
+        """The best design near one, step by step downhill."""
+        best, looked, been = first, 0, {first.candidate.design}
+        for step in STEPS:
+            improved = True
+            while improved and looked < MOST_REFINED:
+                improved = False
+                for design in neighbours(self.site, best.candidate.design, step):
+                    design = design.tidy()
+                    if design in been or looked >= MOST_REFINED or not self.within(design):
+                        continue
+                    been.add(design)
+                    looked += 1
+                    other = self.judged(candidate(self.site, design, best.candidate.varies))
+                    if other is not None and other.value > best.value:
+                        best, improved = other, True
+        return best
+
+    def can_run(self, each: Candidate) -> bool:
+        """Whether there is a program that leads there from above."""
+        bench = self.question.problem.bench
+        return can_be_run(each, bench.runs, self.question.job, bench.twin)
+
+    def within(self, design: MotionDesign) -> bool:
+        """Whether the machine can be there, and it is no farther from the work than experiments go."""
+        points = design.points()
+        near = np.abs(points - self.site.work.centre).max() <= self.site.farther + self.site.work.half.max()
+        return bool(near and self.room.allowed(points).all())
+
+
+def separated(problem: Problem, rivals: Sequence[Fitted]) -> tuple[str, ...]:
+    """Effects that are in some of the rivals and not in all; of a single set all of it."""
+    sets = [set(f.members) for f in rivals]
+    common = set.intersection(*sets) if len(sets) > 1 else set()
+    return tuple(dict.fromkeys(problem.columns.candidates[i].name for s in sets for i in sorted(s - common)))
+
+
+def propose(problem: Problem, rivals: Sequence[Fitted], probability: Floats, job: Job) -> Proposal | None:
+    """The best next experiment between fitted sets of causes; None where nothing is left that is worth it."""
+    if not any(f.members for f in rivals):
+        return None
+    desk = Desk(Question(problem, rivals, probability, job))
+    if len(rivals) == 1 and most_narrowed(desk.question, desk.weight) <= WORTH:
+        return None
+    found = ranked(desk, (*coarse(desk.site, desk.room), *by_other_means(desk.site)))
+    moving = next(
+        (each for each in found if not each.candidate.knows and each.candidate.channels == desk.site.channels), None
+    )
+    if moving is not None:
+        found.append(desk.refined(moving))
+    can = (each for each in sorted(found, key=lambda each: -each.value) if desk.can_run(each.candidate))
+    whole = [desk.judged(each.candidate, whole=True) for each in islice(can, MOST_JUDGED_WHOLE)]
+    worth = [each for each in whole if each is not None and each.gain > WORTH]
+    return max(worth, key=lambda each: each.value, default=None)
+
+
+def ranked(desk: Desk, tried: Iterable[Candidate]) -> list[Proposal]:
+    """Of candidates those that are worth it, best first."""
+    names = separated(desk.question.problem, desk.question.rivals)
+    useful = (each for each in tried if all(effect in names for effect, *_ in each.knows))
+    judged = (desk.judged(each) for each in useful if desk.within(each.design))
+    found = [each for each in judged if each is not None and each.gain > WORTH]
+    return sorted(found, key=lambda each: -each.value)

@@ -1,0 +1,250 @@
+"""What the logs of an experiment would show: the twin runs its program for every rival set of causes, before anybody else does."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import combinations, pairwise
+
+import numpy as np
+
+from camcomp.diagnosis.fit.bench import Bench, Run
+from camcomp.diagnosis.fit.columns import build
+from camcomp.diagnosis.fit.measured import Measured
+from camcomp.diagnosis.fit.noise import inflation
+from camcomp.diagnosis.fit.problem import Problem
+from camcomp.diagnosis.next_experiment.candidates import Candidate
+from camcomp.diagnosis.next_experiment.site import CHANNELS, STRETCH
+from camcomp.diagnosis.search.indistinguishable import HIDDEN, LARGE
+from camcomp.diagnosis.statistics.cause_sets import Fitted, total
+from camcomp.diagnosis.statistics.evidence import estimate
+from camcomp.diagnosis.statistics.seen import seen_apart
+from camcomp.gcode.interpret import read_program
+from camcomp.ground.datatypes import Floats, Ints
+from camcomp.ground.errors import CamcompError
+from camcomp.model.cutting.track import lay_track
+from camcomp.model.job import Job
+from camcomp.model.motion.run_path import path_of_program
+from camcomp.model.motion.timeline import schedule
+
+ROWS = 2500  # of a foreseen log
+WARMS_K = 5.0  # by how much a temperature may still drift
+UPRIGHT = 0.9  # of a direction along Z, beyond which another axis says what lies across
+USUAL_NOISE = (0.002, 0.0005, 1.0, 2.0)  # mm, mm, N, N: tip, encoders, drives, dynamometer, where never measured
+
+
+@dataclass(frozen=True, eq=False)
+class Question:
+    """Which of the rivals, fitted sets of causes with their probability (r,), it is, and how large."""
+
+    problem: Problem
+    rivals: Sequence[Fitted]
+    probability: Floats
+    job: Job
+
+    @cached_property
+    def members(self) -> tuple[int, ...]:
+        """All that is in some rival."""
+        return tuple(sorted({i for f in self.rivals for i in f.members}))
+
+    @cached_property
+    def beliefs(self) -> tuple[tuple[Floats, Floats], ...]:
+        """Per rival what is known of the amplitudes of all columns of the problem: mean (k,), members at zero, and covariance (k, k).
+
+        The members act through the twin itself. A fit is no better than the model that it was made with.
+        """
+        out = []
+        for f in self.rivals:
+            index = self.problem.member_columns(f.members)
+            mean, covariance = estimate(total(f.grams), self.problem.prior, index, f.factor)
+            mean[index] = 0.0
+            covariance[index, index] += (HIDDEN / LARGE * f.theta) ** 2
+            out.append((mean, covariance))
+        return tuple(out)
+
+    @cached_property
+    def shapes(self) -> dict[int, dict[str, float]]:
+        """Scanned parameters by candidate."""
+        own = {i: dict(shape) for f in self.rivals for i, shape in f.extra.items()}
+        return {**self.problem.shapes, **own}
+
+
+@dataclass(frozen=True, eq=False)
+class Foreseen:
+    """A candidate with every channel logged. Per kind of channel: white rows (w, r) of what each rival lets one expect,
+    and white columns (w, k) of all that may differ, in units of their standard deviation `reach`: per rival (k, k), columns
+    that vary together are combined. mine, theirs: places of the same columns here and in the problem; size: one standard
+    deviation of a kind's rows, mm or N.
+    """
+
+    signals: dict[str, Floats]
+    columns: dict[str, Floats]
+    reach: list[Floats]
+    mine: Ints
+    theirs: Ints
+    size: dict[str, float]
+
+
+def foresee(question: Question, candidate: Candidate, *, whole: bool) -> Foreseen | None:
+    """None where the machine cannot do it, the force model does not know the cut, or rivals look alike there.
+
+    whole: with every effect of the library within its tolerance, not only with those that are in question.
+    """
+    try:
+        return _lay(question, candidate, whole)
+    except (CamcompError, ValueError):
+        return None
+
+
+def feasible(problem: Problem, candidate: Candidate, job: Job) -> bool:
+    """Whether the machine can do a candidate, at a place where its model is to be trusted."""
+    try:
+        _on_bench(problem, candidate, job)
+    except (CamcompError, ValueError):
+        return False
+    return True
+
+
+def _on_bench(problem: Problem, candidate: Candidate, job: Job) -> Bench:
+    run = _run(problem, candidate, job)
+    low, high = np.array(job.machine.limits).T
+    if (run.run_path.grid_rho < low).any() or (run.run_path.grid_rho > high).any():
+        raise ValueError("out of the travel of an actuator")
+    bench = Bench(problem.bench.twin, [run])
+    if _transmission(bench) > STRETCH * _transmission(problem.bench):
+        raise ValueError("too near a singular pose for the model to be trusted")
+    return bench
+
+
+def _lay(question: Question, candidate: Candidate, whole: bool) -> Foreseen:
+    problem, rivals = question.problem, question.rivals
+    bench = _on_bench(problem, candidate, question.job)
+    nominal = bench.channels(0, bench.nominal[0])
+    changes = [bench.channels(0, bench.read(0, problem.causes(f.members, f.theta, f.extra))) - nominal for f in rivals]
+    alone = _whitened(problem, bench, np.stack(changes, axis=2))
+    if len(rivals) > 1 and not candidate.knows and all(
+        not seen_apart(each[:, [i, j]], each[:, i] - each[:, j], HIDDEN, LARGE)
+        for each in alone.values() for i, j in combinations(range(len(rivals)), 2)
+    ):  # fmt: skip
+        raise ValueError("nothing to see")
+    every = problem.columns.candidates
+    some = range(len(every)) if whole else question.members
+    shapes = {n: question.shapes[i] for n, i in enumerate(some) if i in question.shapes}
+    columns = build(bench, [every[i] for i in some], shapes, problem.floor.tip_um)
+    known = {name: i for i, name in enumerate(problem.columns.names)}
+    mine = np.array([i for i, name in enumerate(columns.names) if name in known], int)
+    theirs = np.array([known[columns.names[i]] for i in mine], int)
+    block = columns.blocks[0]
+    tolerance = np.minimum(columns.prior.tolerance, 1.0)
+    signals, reach = [], []
+    for (mean, covariance), change in zip(question.beliefs, changes, strict=True):
+        size = np.diag(tolerance)
+        size[np.ix_(mine, mine)] = _root(covariance[np.ix_(theirs, theirs)])
+        signals.append(change + block[:, :, mine] @ mean[theirs])
+        reach.append(size)
+    return Foreseen(
+        _whitened(problem, bench, np.stack(signals, axis=2)), _whitened(problem, bench, block), reach, mine, theirs,
+        _sizes(problem),
+    )  # fmt: skip
+
+
+def _root(covariance: Floats) -> Floats:
+    """A square root (k, k) of a covariance that may be singular."""
+    size = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    value, vector = np.linalg.eigh(covariance / size[:, None] / size)
+    return np.asarray(size[:, None] * vector * np.sqrt(np.maximum(value, 0.0)), float)
+
+
+def _transmission(bench: Bench) -> float:
+    """Largest motion of the tip per motion of the drives."""
+    return float(max(np.linalg.norm(bench.row_slopes(k), 2, axis=(1, 2)).max() for k in range(len(bench.runs))))
+
+
+def _noise(problem: Problem) -> Floats:
+    """Standard deviation (c,) of every channel in the mean of the runs; a usual one where never measured."""
+    m = len(problem.bench.actuators)
+    known = np.isfinite(problem.noise.sigma)
+    sigma = np.where(known, problem.noise.sigma, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
+    return np.where(known.any(axis=0), sigma, np.repeat(np.array(USUAL_NOISE), [3, m, m, 3]))
+
+
+def _parts(problem: Problem) -> dict[str, tuple[int, int]]:
+    m = len(problem.bench.actuators)
+    ends = [int(v) for v in np.cumsum((0, 3, m, m, 3))]
+    return dict(zip(CHANNELS, pairwise(ends), strict=True))
+
+
+def _sizes(problem: Problem) -> dict[str, float]:
+    sigma = _noise(problem)
+    return {kind: float(np.sqrt(np.mean(sigma[a:b] ** 2))) for kind, (a, b) in _parts(problem).items()}
+
+
+def _whitened(problem: Problem, bench: Bench, values: Floats) -> dict[str, Floats]:
+    """White rows (w, k) of values (n, c, k), per kind of channel."""
+    noise = replace(problem.noise, sigma=_noise(problem)[None, :])
+    inflate = np.sqrt(1.0 + (inflation(bench)[0] / noise.sigma) ** 2)
+    time = bench.runs[0].run_path.time
+    return {
+        kind: noise.rows(0, values[:, a:b], inflate, time, a)
+        for kind, (a, b) in _parts(problem).items()
+        if np.isfinite(inflate[:, a:b]).any()
+    }
+
+
+def _run(problem: Problem, candidate: Candidate, job: Job) -> Run:
+    """The candidate on the bench with every channel that it could log; what it does log is picked later."""
+    twin = problem.bench.twin
+    path = read_program(candidate.program.encode(), name="candidate", dialect="rs274").path
+    timeline = schedule(path, job.config.control.acceleration_mm_per_s2)
+    last = timeline.end + candidate.design.dwell_s
+    steps = [float(np.median(np.diff(t))) for t in problem.times if len(t) > 1]
+    usual = float(np.median(steps)) if steps else 0.02
+    time = np.arange(0.0, last, max(usual, last / ROWS))
+    conditions = job.conditions if candidate.cutting else replace(job.conditions, model=None)
+    run_path = path_of_program(
+        "candidate", timeline, lay_track(path, conditions), time, started=candidate.started, to_machine=twin.to_machine,
+        vectors=job.frame.vectors, inverse=twin.inverse, temperature=_temperature(problem, candidate.started + time),
+    )  # fmt: skip
+    n, m = len(time), len(twin.actuators)
+    nan = np.full(n, np.nan)
+    encoder = run_path.row_rho if "encoder" in candidate.channels else np.full((n, m), np.nan)
+    measured = Measured(
+        time, nan, np.zeros((n, 3)), np.full((n, m), np.nan), encoder, np.zeros((n, m)), np.zeros((n, 3)), nan,
+        np.full((n, 3), np.nan),
+    )  # fmt: skip
+    by = _motion(problem, candidate)
+    tips = twin.to_program(run_path.row_place.of(run_path.node_tip))
+    return Run("candidate", run_path, measured, None, None, by=by, turn=_across(tips) if by == "tip" else None)
+
+
+def _motion(problem: Problem, candidate: Candidate) -> str:
+    """The channel that says what moved: as in the runs, or the set-points that come with encoders that they did not log."""
+    runs = problem.bench.runs
+    known = {run.by for run in runs}
+    added = "encoder" in candidate.channels and not any(run.measured.has("encoder") for run in runs)
+    return "setpoint" if added or "setpoint" in known else "encoder" if "encoder" in known else "tip"
+
+
+def _across(tips: Floats) -> Floats:
+    """Axes (n, 3, 3) along the way of tips (n, 3) and across it."""
+    step = np.gradient(tips, axis=0)
+    moving = np.linalg.norm(step, axis=1) > 0.0
+    last = np.maximum.accumulate(np.where(moving, np.arange(len(tips)), int(np.argmax(moving))))
+    along = step[last] / np.maximum(np.linalg.norm(step[last], axis=1, keepdims=True), 1e-12)
+    other = np.where(np.abs(along[:, 2:3]) < UPRIGHT, [[0.0, 0.0, 1.0]], [[1.0, 0.0, 0.0]])
+    side = np.cross(along, other)
+    side /= np.maximum(np.linalg.norm(side, axis=1, keepdims=True), 1e-12)
+    return np.stack([along, side, np.cross(along, side)], axis=1)
+
+
+def _temperature(problem: Problem, common: Floats) -> Floats | None:
+    """Temperatures (n,) expected at common times, s: the drift so far goes on, but not by more than some kelvin."""
+    courses = [run.run_path for run in problem.bench.runs]
+    if any(c.temperature is None for c in courses):
+        return None
+    t = np.concatenate([c.started + c.time for c in courses])
+    warm = np.concatenate([c.temperature for c in courses if c.temperature is not None])
+    slope = np.polyfit(t - t.mean(), warm, 1)[0] if np.ptp(t) > 0 else 0.0
+    out: Floats | None = warm[int(np.argmax(t))] + np.clip(slope * (common - t.max()), -WARMS_K, WARMS_K)
+    return out

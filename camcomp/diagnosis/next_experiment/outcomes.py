@@ -1,0 +1,70 @@
+"""What each outcome of a proposed experiment would mean, a sentence each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from camcomp.diagnosis.next_experiment.proposal import Proposal
+from camcomp.report.plot import brief
+
+MOST_TOLD = 3  # rival sets that have a sentence of their own
+_WHAT = {
+    "tip": ("the tip is", 1e3, "µm"),
+    "encoder": ("the encoders are", 1e3, "µm"),
+    "drive": ("the drive forces are", 1.0, "N"),
+    "dyno": ("the cutting force is", 1.0, "N"),
+}
+NEITHER = "If what is left stays above the noise whichever it is, something unknown is at work as well."
+
+
+def with_outcomes(proposal: Proposal, names: Sequence[str]) -> Proposal:
+    """The proposal with its outcomes; names: of the rival sets of causes, in their order."""
+    found = proposal.told
+    if found is None:
+        return proposal
+    if len(names) == 1:
+        sentences = [
+            (
+                f"If {names[0]} leaves no more than the noise on it, it holds; what stays uncertain then moves the tip by "
+                f"{_um(found.after_um)} (rms) on the runs' programs instead of {_um(found.before_um)}."
+            ),
+            "If it leaves more, something acts there that these runs did not show.",
+        ]
+    elif proposal.candidate.knows:
+        [(effect, *_)] = proposal.candidate.knows
+        sentences = [_by_hand(name, effect) for name in names[:MOST_TOLD]]
+    else:
+        sentences = [_by_log(proposal, names, i) for i in range(min(len(names), MOST_TOLD))]
+    if len(names) > 1:
+        sentences.append(NEITHER)
+    return replace(proposal, outcomes=tuple(sentences), rivals=tuple(names))
+
+
+def _by_hand(name: str, effect: str) -> str:
+    if effect in name:
+        return f"If it is off by what {name} says, that is the cause, and with it in the config the gap is gone."
+    return f"If it is as the machine file states, and the gap stays with --without {effect}, the cause is {name}."
+
+
+def _by_log(proposal: Proposal, names: Sequence[str], i: int) -> str:
+    found = proposal.told
+    assert found is not None
+    what, scale, unit = _WHAT[found.kind]
+    rest = min((float(found.left[i, j]), j) for j in range(len(names)) if j != i)
+    off = f"{brief(scale * float(found.shows[i]), 2)} {unit}"
+    left = f"{brief(scale * rest[0], 2)} {unit}"
+    return f"If it is {names[i]}, {what} off by {off} (rms) on it, of which {names[rest[1]]} cannot explain {left}."
+
+
+def after_unknown(varies: Sequence[str], others: Sequence[str]) -> tuple[str, ...]:
+    """The same for an unknown effect; varies: covariates that are changed, others: that may be its drivers and stay."""
+    changed, stays = " and ".join(varies), " or ".join(others[:MOST_TOLD])
+    return (
+        f"If what is left changes, it goes with {changed}.",
+        f"If it stays as it is, it does not go with {changed}" + (f" but with {stays}." if stays else "."),
+    )
+
+
+def _um(value: float) -> str:
+    return f"{brief(value, 2)} µm"

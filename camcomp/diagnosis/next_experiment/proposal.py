@@ -1,0 +1,31 @@
+"""A proposed experiment and what it is worth."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from camcomp.diagnosis.next_experiment.candidates import Candidate
+
+if TYPE_CHECKING:
+    from camcomp.diagnosis.next_experiment.information_gain import ExpectedGain
+
+WORTH = 0.1  # bits below which an experiment is not worth proposing
+PRICE = 0.5 / 60.0  # bits that a minute of machine time has to bring
+
+
+@dataclass(frozen=True, eq=False)
+class Proposal:
+    """An experiment, the effects that it separates, what it tells; gain: bits. rivals: names of the sets of causes."""
+
+    candidate: Candidate
+    gain: float
+    separates: tuple[str, ...]
+    outcomes: tuple[str, ...] = ()
+    told: ExpectedGain | None = None
+    rivals: tuple[str, ...] = ()
+
+    @property
+    def value(self) -> float:
+        """Bits less the price of the time."""
+        return self.gain - PRICE * self.candidate.minutes

@@ -1,0 +1,153 @@
+"""Where the machine has worked, and how far from there it may go: travel, singular poses, what may stand below."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from camcomp.diagnosis.fit.bench import Bench, Run
+from camcomp.ground.datatypes import RAPID, Bools, Floats
+from camcomp.ground.errors import PhysicsError
+from camcomp.model.job import Job
+from camcomp.model.motion.twin import Twin
+
+CHANNELS = ("tip", "encoder", "drive", "dyno")
+STRETCH = 2.5  # by how much a new place may be nearer to a singular pose
+FARTHER = 2.0  # half widths of the work by which an experiment may leave it
+FARTHER_MM = 80.0  # or this far, where the work was small
+RADII_MM = (3.0, 40.0)  # of a circle at the place of work
+_STEPS = 8  # at which it is looked how far a way leads
+_DIFFERENCE_MM = 0.01
+_POSES = 40  # of the runs at which their nearness to singular poses is looked at
+USUAL_FEED = 1000.0  # mm/min, where no program says one
+
+
+@dataclass(frozen=True, eq=False)
+class WorkPlace:
+    """Middle (3,) mm, half widths (3,) mm and feed mm/min of what was done there."""
+
+    centre: Floats
+    half: Floats
+    feed: float
+
+    @property
+    def radius(self) -> float:
+        """Of a circle in it, mm."""
+        return round(float(np.clip(np.min(self.half[:2]), *RADII_MM)), 1)
+
+
+@dataclass(frozen=True, eq=False)
+class Site:
+    """work: where the runs have been; cut: where they cut, None where none did. low: height that nothing stands above, mm;
+    end: of the last run, s on the common clock; channels: that were logged.
+    """
+
+    work: WorkPlace
+    cut: WorkPlace | None
+    low: float
+    end: float
+    channels: tuple[str, ...]
+
+    @property
+    def farther(self) -> float:
+        """How far from the middle of the work an experiment may lead, mm."""
+        return float(max(FARTHER_MM, FARTHER * self.work.half.max()))
+
+
+def site_of(bench: Bench) -> Site:
+    """The place where the runs of a bench have been."""
+    each = [commanded(bench, run) for run in bench.runs]
+    tips = np.concatenate(each)
+    loaded = [np.abs(run.run_path.row_force).sum(axis=1) > 0.0 for run in bench.runs]
+    every = np.concatenate(loaded)
+    feeds = [run.run_path.feed_mm_per_min for run in bench.runs]
+    cutting = [f for f, load in zip(feeds, loaded, strict=True) if load.any()]
+    return Site(
+        _place(tips, feeds),
+        _place(tips[every], cutting) if every.any() else None,
+        _low(bench, each, loaded),
+        max(run.run_path.started + float(run.run_path.time[-1]) for run in bench.runs),
+        tuple(c for c in CHANNELS if any(run.measured.has(c) for run in bench.runs)),
+    )
+
+
+def _place(tips: Floats, feeds: list[float]) -> WorkPlace:
+    low, high = np.quantile(tips, 0.02, axis=0), np.quantile(tips, 0.98, axis=0)
+    known = [f for f in feeds if np.isfinite(f)]
+    feed = round(float(np.median(known))) if known else USUAL_FEED
+    return WorkPlace(np.round(0.5 * (low + high), 1) + 0.0, 0.5 * (high - low), feed)
+
+
+def commanded(bench: Bench, run: Run) -> Floats:
+    """Tips (n, 3), program frame, where the set-points of a run lead the unloaded machine."""
+    path = run.run_path
+    tips = path.row_place.of(path.node_tip) if path.driven is None else path.driven.tip
+    return bench.twin.to_program(tips)
+
+
+def _low(bench: Bench, tips: list[Floats], loaded: list[Bools]) -> float:
+    """Height, mm, above which the tool moved freely: where runs without cutting were, else where rapids crossed, else the top of all."""
+    free = [tip[:, 2].min() for tip, load in zip(tips, loaded, strict=True) if not load.any()]
+    if free:
+        return round(float(min(free)), 1)
+    crossed = [z for run in bench.runs for z in _crossings(run)]
+    return float(min(crossed)) if crossed else float(max(tip[:, 2].max() for tip in tips))
+
+
+def _crossings(run: Run) -> Floats:
+    """Heights of rapids across, mm."""
+    path = run.program
+    if path is None or len(path) < 2:
+        return np.zeros(0)
+    across = np.linalg.norm((path.end - path.start)[:, :2], axis=1) > 0.0
+    rapid = (path.kind == RAPID) & path.known & ~path.machine & across
+    rapid[1:] &= path.known[:-1]  # from a place that is known
+    rapid[0] = False
+    return np.asarray(np.minimum(path.start, path.end)[rapid, 2], float)
+
+
+class Room:
+    """How far the machine may go: within travel, and no nearer to a singular pose than STRETCH times what the runs were."""
+
+    def __init__(self, twin: Twin, limits: Floats, tips: Floats) -> None:
+        """Limits (m, 2) of the actuators; tips (n, 3) of the runs, program frame."""
+        self.twin, self.limits = twin, limits
+        self.most = np.inf
+        some = tips[np.unique(np.linspace(0, len(tips) - 1, _POSES).astype(int))]
+        self.most = STRETCH * float(np.max(self._stretch(some)))
+
+    def allowed(self, points: Floats) -> Bools:
+        """Which (n,) of points (n, 3), program frame, are within."""
+        try:
+            rho = self.twin.inverse(self.twin.to_machine(points))
+            near = self._stretch(points) <= self.most
+        except PhysicsError:  # of one of them
+            half = len(points) // 2
+            if half == 0:
+                return np.zeros(1, bool)
+            return np.concatenate([self.allowed(points[:half]), self.allowed(points[half:])])
+        inside = np.isfinite(rho) & (rho >= self.limits[:, 0]) & (rho <= self.limits[:, 1])
+        return np.asarray(inside.all(axis=1) & near)
+
+    def reaches(self, start: Floats, directions: Floats, most: float, low: float) -> Floats:
+        """How far (k,), mm, straight ways from `start` (3,) along unit directions (k, 3) may lead, and not below `low`."""
+        far = most * np.arange(1, _STEPS + 1) / _STEPS
+        points = start + far[None, :, None] * directions[:, None, :]
+        good = self.allowed(points.reshape(-1, 3)).reshape(len(directions), _STEPS) & (
+            points[:, :, 2] >= low - _DIFFERENCE_MM
+        )
+        return np.asarray(most * np.cumprod(good, axis=1).sum(axis=1) / _STEPS, float)
+
+    def _stretch(self, points: Floats) -> Floats:
+        """Motion (n,) of the tip per motion of the drives, at most; by differences of the inverse kinematics."""
+        moved = np.concatenate([points + s * _DIFFERENCE_MM * axis for axis in np.eye(3) for s in (1.0, -1.0)])
+        rho = self.twin.inverse(self.twin.to_machine(moved)).reshape(3, 2, len(points), -1)
+        slopes = np.moveaxis((rho[:, 0] - rho[:, 1]) / (2.0 * _DIFFERENCE_MM), 0, 2)  # (n, m, 3)
+        return np.asarray(1.0 / np.maximum(np.linalg.svd(slopes, compute_uv=False)[:, -1], 1e-12), float)
+
+
+def room_of(bench: Bench, job: Job) -> Room:
+    """The room about the runs of a bench."""
+    tips = np.concatenate([commanded(bench, run) for run in bench.runs])
+    return Room(bench.twin, np.array(job.machine.limits, float), tips)
