@@ -163,7 +163,7 @@ def _wrong_parameter(p: Any) -> str:
     if p.log and not p.low > 0.0:
         return "is a factor (log) with a bound that is not above zero"
     if not all(p.low <= each <= p.high for each in (*p.scan, *p.either)):
-        return "has a value to scan or to choose outside its bounds"
+        return "has a value to scan outside its bounds"
     return ""
 
 

@@ -35,8 +35,9 @@ from camcomp.diagnosis.arm.unseen import (
     shrinkage,
 )
 from camcomp.diagnosis.result.types import UNKNOWN, DiagnosisResult, Floor, Outlier
+from camcomp.ground import headway
 from camcomp.ground.datatypes import Floats
-from camcomp.ground.headway import done, part
+from camcomp.ground.headway import part
 from camcomp.model.effect import Cause
 from camcomp.model.statics.description import Robot
 
@@ -100,14 +101,14 @@ def study(
             found, judges, sets = curved, curve_judges, beside_curves(sets, curved)
         else:
             found = replace(found, chosen=curved.chosen)
-    done(0.75)
+    headway.done(0.75)
     gate = _gate(bench, held, found, judges, floor)
     word = verdict(found, judges, gate, sets)
     first = [bench.gap(k, ()) for k in range(len(bench.campaigns))]
     told = answer.Told(bench, found, gate, floor, sets, word, judges)
-    done(0.8)
+    headway.done(0.8)
     named, minor = answer.causes(told, first)
-    done(0.9)
+    headway.done(0.9)
     if word == "identified" and not named:  # all that was taken turned out minor
         word = "none"
     known = any(c.effect != UNKNOWN for c in named)

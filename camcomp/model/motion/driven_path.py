@@ -281,7 +281,9 @@ def _smooth(time: Floats, values: Floats) -> Callable[[Floats], Floats]:
     missing = step > _MISSING * float(np.median(step))
     rest = np.pad(way <= _RESTS * way.max(axis=0), ((2, 2), (0, 0)))
     held = missing[:, None] | (rest[3:-1] & rest[4:]) | (rest[1:-3] & rest[:-4])
-    lead, over = Akima1DInterpolator(time, values, axis=0), PchipInterpolator(time, values, axis=0)
+    lead = Akima1DInterpolator(time, values, axis=0)
+    with np.errstate(over="ignore"):  # beside slopes of round-off, whose harmonic mean is nothing
+        over = PchipInterpolator(time, values, axis=0)
 
     def between(at: Floats) -> Floats:
         t = np.clip(at, time[0], time[-1])

@@ -4,10 +4,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from camcomp.ground import headway
 from camcomp.ground.csv_table import refuse_long
 from camcomp.ground.datatypes import Floats, Ints, Path
 from camcomp.ground.errors import ProgramError
-from camcomp.ground.headway import done, part
 from camcomp.model.cutting.engaged import Engaged
 from camcomp.model.cutting.spindle import cut_without_spindle, spindle_warning
 from camcomp.model.cutting.track import lay_track
@@ -53,15 +53,15 @@ def simulate(
     conditions = job.conditions if cutting else replace(job.conditions, model=None)
     warm = job.config.process.temperature_C
     track = lay_track(path, conditions, engaged if cutting else None)
-    done(0.1)
+    headway.done(0.1)
     run_path = path_of_program(
         "simulation", timeline, track, time, started=started_s, to_machine=twin.to_machine,
         vectors=job.frame.vectors, inverse=twin.inverse, temperature=None if warm is None else np.full(len(time), warm),
     )  # fmt: skip
-    with part(0.3, 0.7, points=True):
+    with headway.part(0.3, 0.7, points=True):
         _, solved = twin.sense(run_path)
     slopes = twin.slopes(run_path, (), solved)
-    with part(0.8, 1.0):
+    with headway.part(0.8, 1.0):
         reading, _ = twin.sense(run_path, solved=solved, slopes=slopes)
     motion, _ = timeline.locate(time)
     line = path.line[timeline.index[motion]]
@@ -82,7 +82,7 @@ def log_table(run: Simulated) -> str:
     rows = [",".join(log_columns(run.actuators, run.rotary).simulated)]
     for k, (t, line, values) in enumerate(zip(run.time, run.line, table, strict=True)):
         if k % TOLD_ROWS == 0:
-            done(k / len(table))
+            headway.done(k / len(table))
         cells = ",".join(f"{value:.6f}".replace("-0.000000", "0.000000") for value in values)
         rows.append(f"{t:.6f},{int(line)},{cells}")
     return "\n".join(rows) + "\n"

@@ -30,3 +30,9 @@ def test_a_circle_is_followed_beyond_its_rows():
     fine = np.arange(0.5, 3.5, 0.001)
     between = _smooth(time, 25.0 * np.sin(time)[:, None])(fine)[:, 0]
     assert np.abs(between - 25.0 * np.sin(fine)).max() < 1e-3
+
+
+def test_slopes_of_round_off_are_none():
+    time = np.arange(6.0)
+    place = np.array([0.0, 5e-324, 1e-323, 1.0, 2.0, 3.0])
+    assert _smooth(time, place[:, None])(np.array([0.5, 4.5]))[:, 0].tolist() == [0.0, 2.5]
