@@ -88,6 +88,7 @@ def test_a_member_in_its_own_direction_is_what_counts(workshop):
     assert (tool,) not in stand_ins(design, (frame,), np.array([1.0, 0.5, 0.0, 0.3]))
 
 
+@pytest.mark.campaign
 def test_a_tip_alone_has_no_time_to_be_late_by(workshop):
     """Without set-points and encoders the time along the path is free: a lag shows only where it cuts a corner."""
     result = workshop.answer(FREE)[0]
@@ -99,6 +100,7 @@ def swapped(one, true, other):
     return frozenset({*(one - {true}), other})
 
 
+@pytest.mark.campaign
 def test_a_long_tool_is_a_lifted_workpiece_until_somebody_measures_the_tool(workshop, tmp_path):
     result = workshop.answer(LONG)[0]
     assert result["verdict"] == "ambiguous"

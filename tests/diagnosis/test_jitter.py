@@ -18,6 +18,7 @@ def test_jitter_is_measured(workshop, unsteady):
     assert jitter(Bench(campaign.twin, campaign.runs)) == pytest.approx(unsteady, rel=0.35)
 
 
+@pytest.mark.campaign
 def test_jitter_is_no_effect(workshop):
     plan = plan_of(design="six", samples=250)
     plan = replace(plan, noise=replace(plan.noise, jitter_s=3e-4))

@@ -12,7 +12,9 @@ from tests.plants.measure import path_error
 PAIR = plan_of(("drive_stiffness", "y"), ("cutting_force", None), ratio=30.0, seed=42)
 
 
-@pytest.mark.parametrize("plan", [SCREW, PAIR], ids=["single", "pair"])
+@pytest.mark.parametrize(
+    "plan", [pytest.param(SCREW, id="single"), pytest.param(PAIR, id="pair", marks=pytest.mark.campaign)]
+)
 def test_the_corrected_program_shrinks_the_error_as_predicted(workshop, tmp_path, plan):
     path, made = workshop.made(plan)
     result, better = workshop.answer(plan)[0], tmp_path / "better.yaml"

@@ -41,6 +41,7 @@ def test_after_an_unknown_effect_one_thing_is_changed_and_the_rest_left(workshop
     assert "M2" in diagnosis.proposal.candidate.program
 
 
+@pytest.mark.campaign
 def test_members_that_undo_each_other_explain_nothing(workshop):
     """Soft links tilt the platform; beside each other, a longer tool and a lower workpiece do so with any lever."""
     plan = Plan(81015, (Cause("link_stiffness", None, 88934),), (10.0,), world=8)

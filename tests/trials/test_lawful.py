@@ -150,6 +150,7 @@ def test_a_log_of_something_else_is_no_test_cut(lathe):
     assert code == 2 and "CC406" in said
 
 
+@pytest.mark.campaign
 def test_the_next_machine_starts_with_what_was_learned(lathe, tmp_path):
     code, said = runner.invoke(["effects", "--library", str(lathe.library)])
     assert code == 0 and lathe.result["causes"][-1]["law"]["formula"] in said
