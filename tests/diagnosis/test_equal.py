@@ -63,6 +63,7 @@ def follow(workshop, plan, tmp_path, candidate):
     return diagnose(folder / "experiment.yaml", without).result.as_json()
 
 
+@pytest.mark.campaign
 def test_the_classes_are_known_without_residuals(workshop):
     """The same runs and channels with another fault, or none, have the same classes."""
     design = workshop.answer(LONG)[1].problem

@@ -29,6 +29,7 @@ FAULTS = [
 ]
 LATEST = 20  # servo periods
 BEHIND = 2  # servo periods by which the cubics of LinuxCNC lead positions and offsets to the joints
+RUNS = 4  # at the most
 AT_REST = 0.2  # um: counts of 0.1 um on three axes, and what the plant and camcomp agree to
 SLOPE = 3.5e-3  # mm per mm: correction over way; measured below 3.2e-3 on this machine and path
 FOLLOWED = 16  # servo periods: two for the cubics, and 2 sqrt(3 um / 200 mm/s2) for what LATEST periods amount to
@@ -36,15 +37,16 @@ RAMP = 0.6  # um by which LinuxCNC's planner of offsets stays behind: (v + a T)^
 
 
 def test_orthoglide():
-    """What the kernel does to a simulated control between two servo periods is not all recorded: one run may be disturbed.
+    """What the kernel does to a simulated control between two servo periods is not all recorded: runs may be disturbed.
 
-    A defect of camcomp or of the sample shows in every run, so the second one decides.
+    A defect of camcomp or of the sample shows in every run, so the last one decides.
     """
-    try:
-        check(simulated())
-    except AssertionError as disturbed:
-        print(f"run again after: {disturbed}")
-        check(simulated())
+    for _ in range(RUNS - 1):
+        try:
+            return check(simulated())
+        except AssertionError as disturbed:
+            print(f"run again after: {disturbed}")
+    check(simulated())
 
 
 def check(run):
