@@ -70,7 +70,7 @@ def diagnosis_html(
     floor = result.gap.noise_floor_um
     sections = [Section("notes", "Notes", items=notes)] if notes else []
     sections.append(_to_do(result, next_program))
-    if (circles := circles_section(views)) is not None:
+    if (circles := circles_section(views, result.standards.circles)) is not None:
         sections.append(circles)
     sections.append(_causes(result))
     if result.law is not None:

@@ -299,7 +299,7 @@ class DiagnosisResult(Result):
         tuple[tuple[NamedCause, ...], ...], Field(description="causes that these runs cannot tell apart")
     ] = ()
     axes_in_detail: dict[str, dict[str, Any]] = Field(default_factory=dict, description="studies of axes: every fit")
-    standards: Annotated[StandardValues, Field(description="ISO 230-2 and ISO 9283")] = StandardValues()
+    standards: Annotated[StandardValues, Field(description="ISO 230-2, ISO 230-4 and ISO 9283")] = StandardValues()
 
     @property
     def law(self) -> Law | None:
