@@ -183,8 +183,7 @@ def _next(proposal: NextExperiment) -> list[str]:
     elif separates := together(proposal.separates):
         text.append(f"It separates {separates}.")
     time = f", {brief(proposal.minutes, 2)} minutes with setting up" if proposal.minutes else ""
-    unit = "bits" if proposal.poses is None else "nats"
-    text += [*proposal.outcomes, f"Expected gain: {brief(proposal.gain)} {unit}{time}."]
+    text += [*proposal.outcomes, f"Expected gain: {brief(proposal.gain)} bits{time}."]
     return [*text, ADD_IT] if proposal.minutes else text
 
 
