@@ -41,8 +41,15 @@ class Likeness:
 
         direction (d,): of the parameters of i; the most alike one when it is not given.
         """
+        return self._beyond(i, (j, *free), direction)
+
+    def alone(self, i: int) -> float:
+        """The same without any other candidate: little where nuisances do the like, and then nothing else is its rival."""
+        return self._beyond(i, (), None)
+
+    def _beyond(self, i: int, free: Sequence[int], direction: Floats | None) -> float:
         columns = self.problem.candidates.columns
-        mine, others = list(columns[i]), [c for each in (j, *free) for c in columns[each]]
+        mine, others = list(columns[i]), [c for each in free for c in columns[each]]
         index, d = [*mine, *others], len(mine)
         known = np.linalg.inv(self.covariance[np.ix_(index, index)]) - np.diag(self.precision[index])
         rest = known[d:, d:] + np.diag(1.0 / (10.0 * self.problem.prior.scale[others]) ** 2)
@@ -84,7 +91,8 @@ def likeness(problem: Problem) -> Likeness:
 
 def classes(design: Likeness) -> list[tuple[int, ...]]:
     """Atoms that share a signature, in groups of two and more."""
-    shown = [i for i in range(len(design.problem.columns.candidates)) if design.shows(i)]
+    every = range(len(design.problem.columns.candidates))
+    shown = [i for i in every if design.shows(i) and design.alone(i) >= HIDDEN]
     group = {i: {i} for i in shown}
     for i in shown:
         for j in shown:
@@ -98,6 +106,7 @@ def classes(design: Likeness) -> list[tuple[int, ...]]:
 def stand_ins(design: Likeness, members: Members, theta: Floats) -> list[Members]:
     """Sets in which one member is replaced by an candidate that does the same in these runs; theta (d,): the members' coordinates."""
     candidates = design.problem.candidates
+    told = [design.shows(j) and design.alone(j) >= HIDDEN for j in range(len(candidates.columns))]
     found: list[Members] = []
     at = 0
     for i in members:
@@ -105,10 +114,12 @@ def stand_ins(design: Likeness, members: Members, theta: Floats) -> list[Members
         direction = theta[at : at + d]
         at += d
         others = tuple(m for m in members if m != i)
+        if not told[i]:
+            continue
         for j in range(len(candidates.columns)):
             if (
                 j in members
-                or not design.shows(j)
+                or not told[j]
                 or any(candidates.exclusive(j, m) for m in others)
                 or candidates.exclusive(i, j)
             ):
