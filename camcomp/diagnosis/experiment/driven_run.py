@@ -97,7 +97,10 @@ def drive(
     if program is None or aligned is None:
         forces = Forces.none(len(tip))
     else:
-        forces = cutting_forces(program.track, aligned, tip, measured.time, bool(np.isfinite(measured.line).any()))
+        cut = _behind(measured, rho, tip, program, twin) if by == "setpoint" else None
+        forces = cutting_forces(
+            program.track, cut or aligned, tip, measured.time, bool(np.isfinite(measured.line).any())
+        )
         unsure |= _idle_or_not(forces, aligned, program, tip, measured.time)
     run_path = driven_path(
         name, measured.time, rho, tip, forces, started=started, to_machine=twin.to_machine, vectors=vectors,
@@ -150,6 +153,20 @@ def _aligned(
     check_followed(log, name, found.distance, _agreement(path, found, tip), aside_mm)
     check_lines(log, name, way_from_lines(path, found))
     return found
+
+
+def _behind(measured: Measured, rho: Floats, tip: Floats, program: _Program, twin: Twin) -> Aligned | None:
+    """Where on the program the drives are, behind set-points rho (n, m) of tips (n, 3) mm: the force turns when they do.
+
+    None where no encoders are logged, or where they lie beside the path because of more than a delay.
+    """
+    known = np.isfinite(measured.encoder).all(axis=1)
+    if known.sum() < 2:
+        return None
+    late = np.column_stack([np.interp(measured.time, measured.time[known], v[known]) for v in measured.encoder.T])
+    driven = twin.to_program(twin.forward(late, twin.to_machine(tip)))
+    found = align(program.track.path, driven, measured.line)
+    return found if float(np.median(found.distance)) < ASIDE_MM else None
 
 
 def _agreement(path: Path, found: Aligned, tip: Floats) -> float:
