@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 
 from camcomp.diagnosis.fit.bench import Bench, CandidateCause, Run, cause_of, step_of, thinned
-from camcomp.diagnosis.fit.floor import MINOR
 from camcomp.diagnosis.fit.labels import EFFECT_OF, apart, label_name
 from camcomp.diagnosis.fit.measured import channel_names
 from camcomp.diagnosis.fit.patterns import Dictionary, Ground, dictionary
@@ -38,9 +37,7 @@ CLOCK_RATE = 1e-5
 SPRING_LOG = 0.01  # one link's spring against its stated value
 HEALTHY = 0.08  # of the noise floor at the tip: what of every effect is within tolerance
 MOST_HEALTHY = 0.3  # of an effect's typical size
-REACH = (
-    MINOR / HEALTHY
-)  # tolerances beyond which it is no tolerance: at the tip no longer minor, by chance once in 5600
+# tolerances beyond which it is no tolerance: at the tip no longer minor, by chance once in 5600
 _EDIT = 0.05  # step of the allowances' differences
 FORCE_TURN_RAD = 0.005  # direction of the cutting force in the plane of the work
 
@@ -150,12 +147,15 @@ def build(
     candidates: Sequence[CandidateCause],
     shapes: Mapping[int, Mapping[str, float]],
     floor_um: float,
+    minor_um: float,
 ) -> Columns:
     """All columns at nominal. Candidates that no channel can see have columns of zeros and stay.
 
     Every healthy machine has a little of everything: what moves the tip by HEALTHY of the noise floor is within tolerance,
-    whatever other channels see of it; what moves it by MINOR of the floor is a cause.
+    whatever other channels see of it; what moves it by more than minor_um is a cause. Nuisances reach as many of their
+    tolerances: a healthy one goes beyond once in 5600.
     """
+    reached = minor_um / (HEALTHY * floor_um)
     owner: list[int] = []
     names: list[str] = []
     tolerance: list[float] = []
@@ -185,11 +185,11 @@ def build(
             if any(each.placed for each in candidate.shapes):  # nothing happens for a while to every healthy machine
                 healthy = p.tolerance / p.scale
             name = f"{candidate.label}.{p.name}"
-            put(i, name, min(healthy, MOST_HEALTHY), REACH * healthy, per_run, p.sign, True)
+            put(i, name, min(healthy, MOST_HEALTHY), reached * healthy, per_run, p.sign, True)
     for name, size, per_run, loose in _nuisances(bench):
         if name.startswith("spring."):  # a soft machine has no more of it than of anything else
             size = min(size, HEALTHY * floor_um / max(tip_um(bench, per_run), 1e-9))
-        put(-1, name, size, REACH * size, per_run, 0, loose)
+        put(-1, name, size, reached * size, per_run, 0, loose)
     blocks = tuple(np.stack([each[r] for each in parts], axis=2) for r in range(len(bench.runs)))
     k = len(owner)
     prior = Prior(np.array(tolerance), np.ones(k), np.array(sign), np.array(flexible), np.array(reach))

@@ -19,8 +19,11 @@ STATED = 0.03  # share by which stated springs and forces are off on any machine
 BLOCKS = (6, 24, 96)  # per run
 
 
-def joint_covariance(problem: Problem, f: Fitted) -> Floats:
-    """Covariance (d + s, d + s) of the members' coordinates and, behind them, of their shapes in their own units."""
+def joint_covariance(problem: Problem, f: Fitted, *, as_stated: bool = False) -> Floats:
+    """Covariance (d + s, d + s) of the members' coordinates and, behind them, of their shapes in their own units.
+
+    as_stated: of what the members do at the tip, rather than of springs and forces behind it.
+    """
     index = problem.member_columns(f.members)
     names = problem.shapes_of(f.members)
     d, s = len(index), len(names)
@@ -33,7 +36,9 @@ def joint_covariance(problem: Problem, f: Fitted) -> Floats:
         every = np.concatenate([W, D * reach], axis=1)
         every[:, index] = own
         G.append(every)
-    usual, most = _stated(problem, f)
+    usual, most = problem.prior.precision(f.factor), problem.prior.reach.copy()
+    if not as_stated:
+        usual, most = _stated(problem, usual, most)
     precision = np.concatenate([usual, np.ones(s)])
     precision[index] = 1e-2 / problem.prior.scale[index] ** 2
     M = sum((g.T @ g for g in G), np.diag(precision))
@@ -61,9 +66,9 @@ def joint_covariance(problem: Problem, f: Fitted) -> Floats:
     return np.asarray(out + np.diag(healthy**2 + formula**2), float)
 
 
-def _stated(problem: Problem, f: Fitted) -> tuple[Floats, Floats]:
+def _stated(problem: Problem, usual: Floats, most: Floats) -> tuple[Floats, Floats]:
     """Precision and reach (k,) of all columns, with springs and forces known to STATED of themselves only."""
-    precision, reach = problem.prior.precision(f.factor), problem.prior.reach.copy()
+    precision, reach = usual.copy(), most.copy()
     for candidate, columns in zip(problem.columns.candidates, problem.candidates.columns, strict=True):
         for p, c in zip(candidate.parameters, columns, strict=True):
             if p.log:
