@@ -13,6 +13,7 @@ from camcomp.diagnosis.experiment.log_checks import (
     FAR_MM,
     check_followed,
     check_forces,
+    check_lines,
     check_on_program,
     check_places,
     check_told,
@@ -23,7 +24,7 @@ from camcomp.ground.datatypes import RAPID, Bools, Floats, Path
 from camcomp.ground.errors import ConfigError, Location
 from camcomp.model.cutting.track import JOIN_ANGLE, Conditions, Track, lay_track
 from camcomp.model.effect import Cause
-from camcomp.model.motion.alignment import Aligned, align
+from camcomp.model.motion.alignment import Aligned, align, way_from_lines
 from camcomp.model.motion.driven_path import BESIDE_MM, Forces, cutting_forces, driven_path
 from camcomp.model.motion.run_path import RunPath
 from camcomp.model.motion.twin import Twin
@@ -87,10 +88,10 @@ def drive(
     rho = np.column_stack([np.interp(measured.time, measured.time[known], v[known]) for v in told.T])
     rotary = all(a.revolute for a in twin.robot.actuators)
     if program is not None:
-        check_told(log, name, by, rho, program.rho, rotary)
+        check_told(log, name, by, rho, program.rho, twin.actuators, rotary)
     near = _near(log, name, measured, rho, program, twin)
     tip = twin.to_program(twin.forward(rho, twin.to_machine(near)))
-    check_places(log, name, measured, rho, tip, rotary)
+    check_places(log, name, measured, rho, tip, twin.actuators, rotary)
     aligned = None if program is None else _aligned(log, name, program, tip, measured)
     unsure = ~_close(measured.time, known)
     if program is None or aligned is None:
@@ -153,6 +154,7 @@ def _aligned(
         raise ConfigError("CC406", message, at=Location(log, 1, 1))
     found = align(path, tip, line)
     check_followed(log, name, found.distance, _agreement(path, found, tip), aside_mm)
+    check_lines(log, name, way_from_lines(path, found))
     return found
 
 

@@ -17,7 +17,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from camcomp.diagnosis.fit.bench import thinned
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.search.indistinguishable import HIDDEN, LARGE
 from camcomp.diagnosis.statistics.cause_sets import Fitted
@@ -112,7 +111,7 @@ def program_weight(problem: Problem) -> Floats:
     for r, (run, block) in enumerate(zip(bench.runs, problem.columns.blocks, strict=True)):
         tip = block[:, :3]
         if run.by == "setpoint" and run.measured.has("encoder"):
-            ways = thinned(bench.row_slopes(r).reshape(-1, 3 * m), run.thin).reshape(-1, 3, m)
+            ways = bench.thin_slopes(r)
             tip = tip + np.einsum("nij,njk->nik", ways, block[:, 3 : 3 + m])
         if run.turn is not None:  # how far along the path nobody knows, and no surface shows
             tip = tip * np.array([0.0, 1.0, 1.0])[:, None]

@@ -16,7 +16,6 @@ import numpy as np
 from scipy.stats import norm
 
 from camcomp.diagnosis.fit.bench import thinned
-from camcomp.diagnosis.fit.columns import tip_um
 from camcomp.diagnosis.fit.floor import row_scatter
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.statistics.cause_sets import Fitted, total
@@ -169,7 +168,7 @@ def size_um(problem: Problem, f: Fitted, members: Sequence[int] | None = None) -
     index = problem.member_columns(f.members)
     mine = set(problem.member_columns(tuple(f.members if members is None else members)))
     theta = np.array([t if c in mine else 0.0 for c, t in zip(index, f.theta, strict=True)])
-    return tip_um(problem.bench, [block[:, :, index] @ theta for block in problem.columns.blocks])
+    return problem.size_um(index, theta)
 
 
 def worst(left: Mapping[str, Unexplained]) -> Unexplained:
