@@ -16,11 +16,15 @@ from camcomp.ground.headway import part
 from camcomp.ground.places import STANDARD
 from camcomp.model.config.load import load_experiment
 from camcomp.model.config.write_back import machine_file, with_causes
+from camcomp.report.page import Listing
 
 if TYPE_CHECKING:
     from camcomp.diagnosis.diagnose import Diagnosis
     from camcomp.diagnosis.experiment.open_experiment import OpenExperiment
     from camcomp.diagnosis.law.library import LearnedLaw
+
+
+MOST_LISTED = 200_000  # characters of a next experiment's file that a page holds
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +73,19 @@ class ExperimentDiagnosis:
         from camcomp.diagnosis.report.views import report_of
 
         rows = self._residuals() if self.behind is None else None
-        return report_of(self.experiment, self.result, self.behind, self.opened, rows)
+        return report_of(self.experiment, self.result, self.behind, self.opened, rows, self._next_listing())
+
+    def _next_listing(self) -> Listing | None:
+        """The file of the next experiment for the page; None where there is none, or it is too long for a page."""
+        proposal = self.result.next_experiment
+        if proposal is None:
+            return None
+        name = "next-experiment.nc" if proposal.poses is None and proposal.moves is None else "next-experiment.csv"
+        try:
+            text = self.next_program(name)
+        except CheckFailed:
+            return None
+        return Listing(name, text) if len(text) <= MOST_LISTED else None
 
     def machine_with_causes(self, target: str = STANDARD) -> str:
         """Text of the machine file with the causes in it, for a file called `target`."""
@@ -82,7 +98,8 @@ class ExperimentDiagnosis:
         return proposal is not None and proposal.candidate.cutting
 
     def next_program(self, target: str = "") -> str:
-        """NC program of the proposed next experiment; of an arm's poses their list, for a file called `target` (.json, else CSV).
+        """NC program of the proposed next experiment, for a file called `target`; of an arm its poses (.json, else CSV), of an axis
+        its set-points (CSV).
 
         Raises CheckFailed CC608 where there is none.
         """
@@ -95,6 +112,10 @@ class ExperimentDiagnosis:
             config = load_config(self.configs)
             robot, _ = build_robot(config.robot, config.tool.tip)
             return pose_list(proposal.poses, tuple(a.revolute for a in robot.actuators), target)
+        if proposal is not None and proposal.moves is not None:
+            from camcomp.diagnosis.axis.next_moves import stroke_table
+
+            return stroke_table(proposal.moves)
         if proposal is None:
             raise CheckFailed("CC608", why_none(self.result.verdict, logs_only=self.behind is None))
         return next_program(self.behind, self.opened)
@@ -165,7 +186,7 @@ def why_none(verdict: str, *, logs_only: bool = False) -> str:
     if verdict == "identified":
         return "nothing is left to separate, and what stays uncertain of the causes is below the noise: no next experiment is proposed"
     if logs_only:
-        return "experiments without programs get no program for the next one"
+        return "no pose or stroke that the logs show would tell more, so no next experiment is proposed"
     return "no motion that this machine can do would separate what is left, so no next experiment is proposed"
 
 

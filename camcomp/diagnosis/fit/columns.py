@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from camcomp.diagnosis.fit.bench import Bench, CandidateCause, Run, cause_of, step_of, thinned
+from camcomp.diagnosis.fit.labels import EFFECT_OF, apart, label_name
 from camcomp.diagnosis.fit.measured import channel_names
 from camcomp.diagnosis.fit.patterns import Dictionary, Ground, dictionary
 from camcomp.diagnosis.statistics.evidence import Prior
@@ -36,6 +37,7 @@ CLOCK_RATE = 1e-5
 SPRING_LOG = 0.01  # one link's spring against its stated value
 HEALTHY = 0.08  # of the noise floor at the tip: what of every effect is within tolerance
 MOST_HEALTHY = 0.3  # of an effect's typical size
+# tolerances beyond which it is no tolerance: at the tip no longer minor, by chance once in 5600
 _EDIT = 0.05  # step of the allowances' differences
 FORCE_TURN_RAD = 0.005  # direction of the cutting force in the plane of the work
 
@@ -94,20 +96,17 @@ class Columns:
         return [int(i) for i in np.flatnonzero(self.candidate == candidate)]
 
     @cached_property
+    def of_labels(self) -> Ints:
+        """Columns by which clampings and clocks differ."""
+        return np.flatnonzero(
+            np.array([n.startswith(tuple(f"{each} " for each in EFFECT_OF)) for n in self.names], bool)
+        )
+
+    @cached_property
     def run_offsets(self) -> Ints:
         """Columns by which the measured tip of one run may differ from that of the next."""
         firm = (self.prior.flexible == 0) & np.isfinite(self.prior.tolerance)
         return np.flatnonzero(firm & np.array([n.startswith("offset.") for n in self.names], bool))
-
-    def with_blocks(self, changed: Mapping[int, Sequence[Floats]]) -> "Columns":
-        """A copy with some columns (index -> per run (n, c)) replaced."""
-        blocks = []
-        for r, block in enumerate(self.blocks):
-            block = block.copy()
-            for i, per_run in changed.items():
-                block[:, :, i] = per_run[r]
-            blocks.append(block)
-        return replace(self, blocks=tuple(blocks))
 
 
 def candidate_columns(bench: Bench, candidate: CandidateCause, shape: Mapping[str, float]) -> list[list[Floats]]:
@@ -138,23 +137,30 @@ def build(
     candidates: Sequence[CandidateCause],
     shapes: Mapping[int, Mapping[str, float]],
     floor_um: float,
+    minor_um: float,
 ) -> Columns:
     """All columns at nominal. Candidates that no channel can see have columns of zeros and stay.
 
     Every healthy machine has a little of everything: what moves the tip by HEALTHY of the noise floor is within tolerance,
-    whatever other channels see of it.
+    whatever other channels see of it; what moves it by more than minor_um is a cause. Nuisances reach as many of their
+    tolerances: a healthy one goes beyond once in 5600.
     """
+    reached = minor_um / (HEALTHY * floor_um)
     owner: list[int] = []
     names: list[str] = []
     tolerance: list[float] = []
+    reach: list[float] = []
     sign: list[float] = []
     flexible: list[float] = []
     parts: list[list[Floats]] = []
 
-    def put(who: int, name: str, size: float, per_run: list[Floats], signed: int = 0, loose: bool = False) -> None:
+    def put(
+        who: int, name: str, size: float, most: float, per_run: list[Floats], signed: int = 0, loose: bool = False
+    ) -> None:
         owner.append(who)
         names.append(name)
         tolerance.append(size)
+        reach.append(most)
         sign.append(float(signed))
         flexible.append(float(loose))
         parts.append(per_run)
@@ -165,17 +171,18 @@ def build(
             candidate_columns(bench, candidate, shapes.get(i, shape_default(candidate))),
             strict=True,
         ):
-            healthy = min(HEALTHY * floor_um / max(tip_um(bench, per_run), 1e-9), MOST_HEALTHY)
+            healthy = HEALTHY * floor_um / max(tip_um(bench, per_run), 1e-9)
             if any(each.placed for each in candidate.shapes):  # nothing happens for a while to every healthy machine
                 healthy = p.tolerance / p.scale
-            put(i, f"{candidate.label}.{p.name}", healthy, per_run, p.sign, True)
+            name = f"{candidate.label}.{p.name}"
+            put(i, name, min(healthy, MOST_HEALTHY), reached * healthy, per_run, p.sign, True)
     for name, size, per_run, loose in _nuisances(bench):
         if name.startswith("spring."):  # a soft machine has no more of it than of anything else
             size = min(size, HEALTHY * floor_um / max(tip_um(bench, per_run), 1e-9))
-        put(-1, name, size, per_run, 0, loose)
+        put(-1, name, size, reached * size, per_run, 0, loose)
     blocks = tuple(np.stack([each[r] for each in parts], axis=2) for r in range(len(bench.runs)))
     k = len(owner)
-    prior = Prior(np.array(tolerance), np.ones(k), np.array(sign), np.array(flexible))
+    prior = Prior(np.array(tolerance), np.ones(k), np.array(sign), np.array(flexible), np.array(reach))
     return Columns(tuple(candidates), np.array(owner), tuple(names), prior, blocks)
 
 
@@ -184,15 +191,17 @@ def tip_um(bench: Bench, per_run: Sequence[Floats]) -> float:
 
     What encoders see moves it too, although a model that follows logged encoders says nothing of it.
     """
-    m = len(bench.actuators)
-    whole = rows = 0.0
-    for k, each in enumerate(per_run):
-        moved = each[:, :3]
-        if bench.runs[k].by == "setpoint" and bench.runs[k].measured.has("encoder"):
-            ways = thinned(bench.row_slopes(k).reshape(-1, 3 * m), bench.runs[k].thin).reshape(-1, 3, m)
-            moved = moved + np.einsum("nij,nj->ni", ways, each[:, 3 : 3 + m])
-        whole, rows = whole + float(np.sum(moved**2)), rows + len(each)
-    return 1e3 * float(np.sqrt(whole / max(rows, 1.0)))
+    whole = sum(float(np.sum(moved_tip(bench, k, each[:, :, None]) ** 2)) for k, each in enumerate(per_run))
+    return 1e3 * float(np.sqrt(whole / max(sum(map(len, per_run)), 1)))
+
+
+def moved_tip(bench: Bench, k: int, changes: Floats) -> Floats:
+    """How far changes (n, c, j) of the channels of run k move the tip (n, 3, j), mm, whatever channel shows them."""
+    moved = changes[:, :3]
+    if bench.runs[k].by == "setpoint" and bench.runs[k].measured.has("encoder"):
+        ways = bench.thin_slopes(k)
+        moved = moved + ways @ changes[:, 3 : 3 + ways.shape[2]]
+    return moved
 
 
 def _nuisances(bench: Bench) -> list[tuple[str, float, list[Floats], bool]]:
@@ -223,7 +232,7 @@ def _nuisances(bench: Bench) -> list[tuple[str, float, list[Floats], bool]]:
             time = thinned(run.run_path.time[:, None], run.thin)
             found.append((f"clock.{run.name}", CLOCK_JITTER_S, only(r, second), True))
             found.append((f"rate.{run.name}", CLOCK_RATE, only(r, second * time), True))
-        _by_label(found, bench, "clock", [("clock", ticks)])
+        _by_label(found, bench, "clock", [(clock.parameters[0].name, ticks)])
         frames = candidate_columns(bench, frame, {})
         _by_label(found, bench, "clamping", [(p.name, f) for p, f in zip(frame.parameters, frames, strict=True)])
     found += _allowances(bench)
@@ -259,12 +268,12 @@ def _starts(bench: Bench, only: Callable[[int, Floats], list[Floats]]) -> list[t
 
 
 def _by_label(found: list[Any], bench: Bench, label: str, columns: Sequence[tuple[str, list[Floats]]]) -> None:
-    """Free columns for every label after the first: only differences between labels are nuisances."""
+    """Free columns for every label that differs from others: only differences between labels are nuisances."""
     labels = [getattr(run, label) for run in bench.runs]
-    for other in list(dict.fromkeys(labels))[1:]:
+    for other in apart(labels):
         for name, per_run in columns:
             masked = [f if mine == other else 0.0 * f for mine, f in zip(labels, per_run, strict=True)]
-            found.append((f"{label} {other}.{name}", np.inf, masked, False))
+            found.append((label_name(label, other, name), np.inf, masked, False))
 
 
 def _allowances(bench: Bench) -> list[tuple[str, float, list[Floats], bool]]:

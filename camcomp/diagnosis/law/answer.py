@@ -9,7 +9,7 @@ import numpy as np
 
 from camcomp.diagnosis.fit.gap import main_channels
 from camcomp.diagnosis.fit.problem import Problem
-from camcomp.diagnosis.law.bench_terms import TermBench, spots
+from camcomp.diagnosis.law.bench_terms import TermBench, spots, term_grids
 from camcomp.diagnosis.law.describe import law_result, moved_without, terms_of
 from camcomp.diagnosis.law.find import FoundLaw, find_law
 from camcomp.diagnosis.law.folds import Folds, Split, usual_split
@@ -59,6 +59,7 @@ def answer_law(problem: Problem, f: Fitted, kind: str) -> LawAnswer | None:
     if main_channels(problem).start != 0 or kind not in ("tip", "encoder"):
         return None
     bench = term_bench(problem)
+    grids = term_grids(bench, kind)
     known, nothing = _gaps(problem, f), _gaps(problem, None)
     floor, before = problem.floor.tip_um, _rms(known)
     room = float(np.sqrt(max(before**2 - floor**2, 0.0)))
@@ -67,9 +68,9 @@ def answer_law(problem: Problem, f: Fitted, kind: str) -> LawAnswer | None:
         left = float(np.sqrt(max((before if best is None else best.after) ** 2 - floor**2, 0.0)))
         return left > GOOD_ENOUGH * floor and left > GOOD_ENOUGH * room
 
-    best = _tried(problem, f, bench, find_law(bench, _base(problem, f, bench, kind), kind))
+    best = _tried(problem, f, bench, find_law(bench, _base(problem, f, bench, kind), grids))
     if much(best) and room > floor:  # what is small may be the usual small errors
-        other = _tried(problem, None, bench, find_law(bench, _base(problem, None, bench, kind), kind))
+        other = _tried(problem, None, bench, find_law(bench, _base(problem, None, bench, kind), grids))
         if other is not None and other.after < BETTER * (before if best is None else best.after):
             best = other
     if much(best) and kind == "tip":

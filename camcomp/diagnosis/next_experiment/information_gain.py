@@ -17,10 +17,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from camcomp.diagnosis.fit.bench import thinned
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.search.indistinguishable import HIDDEN, LARGE
 from camcomp.diagnosis.statistics.cause_sets import Fitted
+from camcomp.diagnosis.statistics.expected_gain import expected_gain
 from camcomp.diagnosis.statistics.seen import seen_apart
 from camcomp.ground.datatypes import Floats
 
@@ -28,16 +28,13 @@ if TYPE_CHECKING:
     from camcomp.diagnosis.next_experiment.candidates import Candidate
     from camcomp.diagnosis.next_experiment.foresee import Foreseen, Question
 
-_OUTCOME_DRAWS = 64
-_SEED = 20120624
-_TEMPERATURE = 1.5  # what evidence is divided by before it becomes a probability, as in the survey
-
 
 @dataclass(frozen=True, eq=False)
 class ExpectedGain:
     """What an experiment tells. separated, narrowed: bits of which cause and of how large; before_um, after_um: rms that the
     uncertainty of the answer moves the tip by on the runs' programs; shows (r,): rms of what every rival lets one expect
-    beyond the machine file, in the kind of channel that tells most, mm or N; left (r, r): of what rival j leaves of rival i there.
+    beyond the machine file, in the kind of channel that tells most, mm or N; left (r, r): of what rival j leaves of rival i there;
+    apart (r, r): chi-square by which rival j misses the mean log of rival i.
     """
 
     separated: float
@@ -47,6 +44,7 @@ class ExpectedGain:
     kind: str
     shows: Floats
     left: Floats
+    apart: Floats
 
     @property
     def gain(self) -> float:
@@ -94,6 +92,7 @@ def told(question: Question, candidate: Candidate, there: Foreseen, weight: Floa
         kinds[k] if kinds else "",
         size * np.sqrt(np.mean(signals[a:b] ** 2, axis=0)) if b > a else np.zeros(n),
         size * rests[:, :, k] if kinds else np.zeros((n, n)),
+        apart,
     )
 
 
@@ -115,7 +114,7 @@ def program_weight(problem: Problem) -> Floats:
     for r, (run, block) in enumerate(zip(bench.runs, problem.columns.blocks, strict=True)):
         tip = block[:, :3]
         if run.by == "setpoint" and run.measured.has("encoder"):
-            ways = thinned(bench.row_slopes(r).reshape(-1, 3 * m), run.thin).reshape(-1, 3, m)
+            ways = bench.thin_slopes(r)
             tip = tip + np.einsum("nij,njk->nik", ways, block[:, 3 : 3 + m])
         if run.turn is not None:  # how far along the path nobody knows, and no surface shows
             tip = tip * np.array([0.0, 1.0, 1.0])[:, None]
@@ -127,23 +126,6 @@ def program_weight(problem: Problem) -> Floats:
         if each.effect.STAGE in ("workpiece", "sensor"):
             machine[problem.columns.of(i)] = False
     return np.asarray(out * np.outer(machine, machine) / max(rows, 1), float)
-
-
-def expected_gain(apart: Floats, probability: Floats) -> float:
-    """Expected fall of the entropy, bits. apart (r, r): chi-square by which rival j misses the mean log of rival i."""
-    rng = np.random.default_rng(_SEED)
-    after = 0.0
-    for i, p in enumerate(probability):
-        scatter = np.sqrt(apart[i]) * rng.standard_normal((_OUTCOME_DRAWS, len(probability)))
-        logs = np.log(np.maximum(probability, 1e-12)) - (0.5 * apart[i] + scatter) / _TEMPERATURE
-        weight = np.exp(logs - logs.max(axis=1, keepdims=True))
-        after += p * float(np.mean([_entropy(w / w.sum()) for w in weight]))
-    return max(_entropy(probability) - float(after), 0.0)
-
-
-def _entropy(p: Floats) -> float:
-    p = p[p > 1e-12]
-    return float(-(p * np.log2(p)).sum())
 
 
 def _by_other_means(problem: Problem, truth: Fitted, other: Fitted, candidate: Candidate) -> float:

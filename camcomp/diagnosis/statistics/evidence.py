@@ -3,14 +3,18 @@
 The white residual is r = D a + e. Columns D belong to effects, to nuisances and to what every healthy machine has.
 An effect that is a cause has the wide prior of its own size (a mixture of four widths), one that is not has the narrow
 prior of its tolerance: a machine is never exactly its model, and what is within tolerance is no finding. Everything
-but the amplitudes of the causes is integrated out exactly.
+but the amplitudes of the causes is integrated out exactly. A tolerance has an end, its reach: what is farther off is a
+cause by definition, and a set that would need it without naming it pays for holding it back (Laplace's approximation
+of the normal distributions that are cut off there; the mode by active sets, Nocedal and Wright, Numerical
+Optimization, 16.5).
 
 Source: group selection with amplitude mixtures; the widths 0.1 to 3 and the half-normal signs follow the priors that
 the effects state. Positive parameters enter by the posterior probability of their sign.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cache
 from itertools import product
 
 import numpy as np
@@ -18,10 +22,12 @@ from scipy.linalg.lapack import dpotrf, dpotri
 from scipy.special import log_ndtr, logsumexp
 
 from camcomp.ground.datatypes import Floats, Ints
+from camcomp.ground.machine_code import kept
 
 PRIOR_WIDTHS = np.array([0.1, 0.3, 1.0, 3.0])
 _WEIGHTS = np.log([0.15, 0.3, 0.35, 0.2])
 TOLERANCES = (0.2, 0.5, 1.0, 2.0)  # by how much the tolerances may be off, all together
+PASSES = 30  # of the search for columns at the end of their reach
 TOLERANCE_LOG = (0.0, 0.0, 0.0, -6.0)  # and the log odds of it: an effect is not to hide in them
 
 
@@ -41,6 +47,13 @@ class Gram:
         return Gram(self.A - other.A, self.b - other.b, self.c - other.c, self.rows - other.rows)
 
 
+def log_sum(values: Sequence[float] | Floats) -> float:
+    """Logarithm of the sum of the exponentials of values (n,): scipy's costs more than all else that is done with a few of them."""
+    v = np.asarray(values)
+    most = float(v.max())
+    return most + float(np.log(np.exp(v - most).sum())) if np.isfinite(most) else most
+
+
 def gram(D: Floats, r: Floats) -> Gram:
     """From white columns D (w, k) and residual r (w,)."""
     return Gram(D.T @ D, D.T @ r, float(r @ r), len(r))
@@ -49,13 +62,14 @@ def gram(D: Floats, r: Floats) -> Gram:
 @dataclass(frozen=True, eq=False)
 class Prior:
     """For every column (k,): tolerance = narrow size (inf = free nuisance), scale = wide size, sign; flexible (k,) bool
-    = its tolerance is one of those that may be off together.
+    = its tolerance is one of those that may be off together; reach = farthest that it goes without being a cause.
     """
 
     tolerance: Floats
     scale: Floats
     sign: Floats
     flexible: Floats
+    reach: Floats
 
     def precision(self, factor: float) -> Floats:
         """Narrow precision (k,) with the flexible tolerances taken `factor` times."""
@@ -99,29 +113,70 @@ def log_bayes(at: Base, prior: Prior, candidates: Sequence[Sequence[int]]) -> fl
     """Log Bayes factor of `candidates` (each the columns of one cause) being causes, against no cause."""
     index = [i for candidate in candidates for i in candidate]
     group = np.array([g for g, candidate in enumerate(candidates) for _ in candidate])
-    d = len(index)
     C = at.covariance[np.ix_(index, index)]
     mean = at.mean[index]
     inverse = np.linalg.inv(C)
     narrow = at.precision[index]
-    likelihood = inverse - np.diag(narrow)
     h = inverse @ mean
-    widths = np.array(list(product(range(len(PRIOR_WIDTHS)), repeat=len(candidates))))  # (w, candidates)
-    wide = 1.0 / (prior.scale[index] * PRIOR_WIDTHS[widths][:, group]) ** 2  # (w, d)
+    sizes, weight = _widths(len(candidates))
+    wide = 1.0 / (prior.scale[index] * sizes[:, group]) ** 2  # (w, d)
     # a cause is at least as wide as its tolerance
     wide = np.minimum(wide, narrow)
-    M = likelihood + wide[:, None, :] * np.eye(d)
-    sign, log_det = np.linalg.slogdet(M)
-    covariance = np.linalg.inv(M)
-    posterior = covariance @ h
-    fit = 0.5 * (posterior * h).sum(axis=1) - 0.5 * float(mean @ inverse @ mean)
+    posterior, spread, fit, log_det = _posteriors(inverse - np.diag(narrow), h, wide)
     volume = 0.5 * np.log(wide).sum(axis=1) - 0.5 * log_det
     volume -= 0.5 * np.log(narrow).sum() - 0.5 * np.linalg.slogdet(inverse)[1]
-    signs = prior.sign[index]
-    spread = np.sqrt(np.maximum(np.diagonal(covariance, axis1=1, axis2=2), 1e-300))
-    positive = np.where(signs > 0, log_ndtr(posterior / spread) + np.log(2.0), 0.0).sum(axis=1)
-    value = fit + volume + positive + _WEIGHTS[widths].sum(axis=1)
-    return float(logsumexp(np.where(sign > 0, value, -np.inf)))
+    signed = prior.sign[index] > 0
+    positive = (log_ndtr(posterior[:, signed] / spread[:, signed]) + np.log(2.0)).sum(axis=1)
+    value = 0.5 * fit - 0.5 * float(mean @ inverse @ mean) + volume + positive + weight
+    return log_sum(value)
+
+
+def _widths(count: int) -> tuple[Floats, Floats]:
+    """Widths (w, count) that so many causes may have, in units of their scales, and the log weight (w,) of each."""
+    which = _choices(count, len(PRIOR_WIDTHS))
+    return PRIOR_WIDTHS[which], _WEIGHTS[which].sum(axis=1)
+
+
+@cache
+def _choices(count: int, widths: int) -> Ints:
+    return np.array(list(product(range(widths), repeat=count)))
+
+
+@kept
+def _posteriors(likelihood, h, wide):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Per prior precision wide (w, d): mean and deviation (w, d), h's mean (w,) and log determinant (w,) of the precision.
+
+    The inverse by Gauss and Jordan; the determinant is infinite where the precision is none.
+    """
+    n, d = wide.shape
+    mean, spread = np.zeros((n, d)), np.ones((n, d))
+    fit, log_det = np.zeros(n), np.zeros(n)
+    for w in range(n):
+        A = likelihood.copy()
+        for i in range(d):
+            A[i, i] += wide[w, i]
+        for k in range(d):
+            pivot = A[k, k]
+            if not pivot > 0.0:
+                log_det[w] = np.inf
+                break
+            log_det[w] += np.log(pivot)
+            A[k, k] = 1.0
+            for j in range(d):
+                A[k, j] /= pivot
+            for i in range(d):
+                if i != k:
+                    factor = A[i, k]
+                    A[i, k] = 0.0
+                    for j in range(d):
+                        A[i, j] -= factor * A[k, j]
+        if log_det[w] < np.inf:
+            for i in range(d):
+                spread[w, i] = np.sqrt(max(A[i, i], 1e-300))
+                for j in range(d):
+                    mean[w, i] += A[i, j] * h[j]
+                fit[w] += h[i] * mean[w, i]
+    return mean, spread, fit, log_det
 
 
 def log_bayes_pairs(at: Base, prior: Prior, first: Ints, second: Ints) -> Floats:
@@ -134,8 +189,8 @@ def log_bayes_pairs(at: Base, prior: Prior, first: Ints, second: Ints) -> Floats
     h = np.einsum("pij,pj->pi", inverse, mean)
     eye = np.eye(2)
     likelihood = inverse - narrow[:, :, None] * eye
-    widths = np.array(list(product(range(len(PRIOR_WIDTHS)), repeat=2)))
-    wide = 1.0 / (prior.scale[i][:, None, :] * PRIOR_WIDTHS[widths][None]) ** 2  # (p, w, 2)
+    sizes, weight = _widths(2)
+    wide = 1.0 / (prior.scale[i][:, None, :] * sizes[None]) ** 2  # (p, w, 2)
     wide = np.minimum(wide, narrow[:, None, :])
     M = likelihood[:, None] + wide[..., None] * eye
     det = M[..., 0, 0] * M[..., 1, 1] - M[..., 0, 1] * M[..., 1, 0]
@@ -150,17 +205,67 @@ def log_bayes_pairs(at: Base, prior: Prior, first: Ints, second: Ints) -> Floats
     for k, (mid, var) in enumerate(((post0, c00), (post1, c11))):
         chance = log_ndtr(mid / np.sqrt(np.maximum(var, 1e-300))) + np.log(2.0)
         volume = volume + np.where(signs[:, k, None] > 0, chance, 0.0)
-    value = fit + volume + _WEIGHTS[widths].sum(axis=1)
+    value = fit + volume + weight
     out: Floats = logsumexp(np.where(good, value, -np.inf), axis=1)
     return out
 
 
 def estimate(data: Gram, prior: Prior, members: Sequence[int], factor: float = 1.0) -> tuple[Floats, Floats]:
-    """Mean (k,) and covariance (k, k) with the columns `members` free within 10 scales, the others within tolerance."""
+    """Mode (k,) and covariance (k, k) with the columns `members` free within 10 scales, the others within tolerance and reach.
+
+    The covariance is that without the ends of the reaches: never too small.
+    """
     precision = prior.precision(factor)
     members = list(members)
-    precision[members] = 1.0 / (10.0 * prior.scale[members]) ** 2
+    precision[members] = _free(prior, members)
     size = 1.0 / np.sqrt(np.diag(data.A) + precision)
     scaled = size[:, None] * data.A * size + np.diag(precision * size**2)
     covariance, _ = _inverse(scaled, size)
-    return covariance @ data.b, covariance
+    return within(covariance @ data.b, lambda held: covariance[:, held], _reach(prior, members))[0], covariance
+
+
+def holding_back(at: Base, prior: Prior, members: Sequence[int]) -> float:
+    """Log evidence >= 0 that it costs a set with the columns `members` to keep all others within reach."""
+    index = list(members)
+    own = at.covariance[:, index]
+    # those columns' prior widens
+    gain = np.linalg.inv(np.diag(1.0 / (_free(prior, index) - at.precision[index])) + own[index])
+    mean = at.mean - own @ (gain @ at.mean[index])
+    return within(mean, lambda held: at.covariance[:, held] - own @ (gain @ own[held].T), _reach(prior, index))[1]
+
+
+def _free(prior: Prior, members: Sequence[int]) -> Floats:
+    """Precision (d,) of columns that are free within 10 scales."""
+    return np.asarray(1.0 / (10.0 * prior.scale[list(members)]) ** 2)
+
+
+def _reach(prior: Prior, members: Sequence[int]) -> Floats:
+    """Reach (k,), without end for `members`."""
+    out = prior.reach.copy()
+    out[list(members)] = np.inf
+    return out
+
+
+def within(mean: Floats, columns: Callable[[Ints], Floats], reach: Floats) -> tuple[Floats, float]:
+    """Mode (k,) of a normal distribution that is cut off at +-reach (k,), and by how much its log density is lower there.
+
+    columns: those of its covariance (k, h) that are asked for.
+    Columns that are too far off are held at the end of their reach, all at once; those that would go back by themselves
+    are let go again.
+    """
+    mode, held, side = mean, np.zeros(0, np.int64), np.zeros(0)
+    pull = side
+    for _ in range(PASSES):
+        far = np.setdiff1d(np.flatnonzero(np.abs(mode) > reach * (1.0 + 1e-9)), held)
+        loose = pull * side > 0.0
+        if not len(far) and not loose.any():
+            break
+        held = np.concatenate([held[~loose], far])
+        side = np.concatenate([side[~loose], np.sign(mode[far])])
+        ways = columns(held)
+        unit = np.sqrt(np.diag(ways[held]))
+        scaled = ways[held] / unit[:, None] / unit + 1e-12 * np.eye(len(held))
+        pull = np.linalg.solve(scaled, (side * reach[held] - mean[held]) / unit) / unit
+        mode = mean + ways @ pull
+    cost = 0.5 * float(pull @ (side * reach[held] - mean[held])) if len(held) else 0.0
+    return np.asarray(np.clip(mode, -reach, reach)), cost

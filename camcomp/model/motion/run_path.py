@@ -59,11 +59,23 @@ class RunPath:
     driven: Driven | None = None
     feed_mm_per_min: float = np.nan  # of the program, in the middle
     cut_before_min: float = 0.0
+    clock_s: float = 0.0  # by which the clock of the tip is known to be late
+    led: bool = False  # the motion is that of the measured tip, which has no clock beside it then
+
+    @cached_property
+    def tip_time(self) -> Floats:
+        """Times (n,) s at which the tips of the rows stood there, as far as that is known."""
+        return self.time - self.clock_s if self.clock_s else self.time
 
     @cached_property
     def row_place(self) -> Places:
         """Where the rows lie between the nodes."""
         return self.place(self.time)
+
+    @cached_property
+    def tip_place(self) -> Places:
+        """Where the rows' tips lie between the nodes."""
+        return self.place(self.tip_time) if self.clock_s else self.row_place
 
     @cached_property
     def row_force(self) -> Floats:
@@ -82,8 +94,13 @@ class RunPath:
         """
         if self.driven is None:
             return place.of(at_nodes)
-        nominal = self.driven.tip if at is self.time else self.driven.lead(at)
+        nominal = self._row_tip if at is self.tip_time else self.driven.lead(at)
         return np.asarray(nominal + place.of(at_nodes - self.node_tip))
+
+    @cached_property
+    def _row_tip(self) -> Floats:
+        assert self.driven is not None
+        return self.driven.lead(self.tip_time) if self.clock_s else self.driven.tip
 
     @cached_property
     def jumping(self) -> Bools:
