@@ -65,8 +65,8 @@ def _text(found: "Chronicle") -> list[str]:
     for each in found.parameters:
         name = f"{each.effect} ({each.target})" if each.target else each.effect
         last = each.values[-1]
-        value, low, high = digits_alike(last.value, *last.ci95)
-        out.append(f"{name} {each.parameter}: {value} ({low} to {high}) on {last.day}; {_course(each)}")
+        told, low, high = digits_alike(last.value, *last.ci95)
+        out.append(f"{name} {each.parameter}: {told} ({low} to {high}) on {last.day}; {_course(each)}")
     places: dict[str, list[str]] = {}
     for value in found.standards:
         if value.name in SHOWN:
