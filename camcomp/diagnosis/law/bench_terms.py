@@ -109,22 +109,31 @@ class TermBench:
             out.append(found)
         return out
 
+    def _reached(self, spot: Spot, k: int, values: Floats) -> dict[int, Floats]:
+        """Functions (n, f) of run k in the channels that the spot reaches, thinned: (n', f) each."""
+        thin = self.bench.runs[k].thin
+        if spot.on == "control" and self._seen_by_encoders(k):
+            return {3 + spot.index: thinned(values, thin)}
+        way = self.bench.turned(k, self.tip_ways(spot)[k])
+        return {c: thinned(way[:, c : c + 1] * values, thin) for c in range(3) if np.abs(way[:, c]).max() > 1e-9}
+
+    def channels(self, spot: Spot, values: Sequence[Floats]) -> list[Floats]:
+        """Functions (n, f) per run as changes of all channels, thinned: (n', c, f)."""
+        out = []
+        for k, v in enumerate(values):
+            every = np.zeros((len(self.times[k]), self.inflate[k].shape[1], v.shape[1]))
+            for c, each in self._reached(spot, k, v).items():
+                every[:, c] = each
+            out.append(every)
+        return out
+
     def white(self, spot: Spot, values: Sequence[Floats]) -> White:
         """Functions (n, f) per run as white columns of the channels that the spot reaches."""
-        bench = self.bench
         rows, columns = [], []
-        for k, (v, run) in enumerate(zip(values, bench.runs, strict=True)):
-            parts: dict[int, Floats] = {}
-            if spot.on == "control" and self._seen_by_encoders(k):
-                parts[3 + spot.index] = thinned(v, run.thin)
-            else:
-                way = bench.turned(k, self.tip_ways(spot)[k])
-                for c in range(3):
-                    if np.abs(way[:, c]).max() > 1e-9:
-                        parts[c] = thinned(way[:, c : c + 1] * v, run.thin)
+        for k, v in enumerate(values):
             found = [
                 (self._slices[k][c], self.noise.rows(k, each[:, None, :], self.inflate[k], self.times[k], c))
-                for c, each in parts.items()
+                for c, each in self._reached(spot, k, v).items()
                 if c in self._slices[k]
             ]
             rows.append(np.concatenate([r for r, _ in found]) if found else np.zeros(0, int))

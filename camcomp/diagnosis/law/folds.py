@@ -68,7 +68,7 @@ class Folds:
         loose = np.full(sum(each.columns[0].shape[1] for each in constants), 1e-6)
         self.precision = np.concatenate([precision, loose])
         self.white = [
-            np.concatenate([W, *(_spread(c, k, len(W)) for c in constants)], axis=1) for k, W in enumerate(white)
+            np.concatenate([W, *(spread(c, k, len(W)) for c in constants)], axis=1) for k, W in enumerate(white)
         ]
         self.residual = list(residual)
         self.split = split
@@ -82,7 +82,7 @@ class Folds:
         out = copy(self)
         out.precision = np.concatenate([self.precision, precision])
         out.white = [
-            np.concatenate([W, *(_spread(x, k, len(W)) for x in more)], axis=1) for k, W in enumerate(self.white)
+            np.concatenate([W, *(spread(x, k, len(W)) for x in more)], axis=1) for k, W in enumerate(self.white)
         ]
         out._prepare()
         return out
@@ -116,6 +116,13 @@ class Folds:
         found = [solve_triangular(L.T, t, lower=False) for L, t in zip(both._halves, both._targets, strict=True)]
         return np.array(found)[:, : len(self.precision)]
 
+    def coefficients(self, columns: Sequence[White], precision: Floats) -> tuple[Floats, Floats]:
+        """Those (f, c) of law columns of that prior precision, of all data and without each part, and their covariance (c, c)."""
+        data = self.together(columns)
+        M = data.G + np.diag(precision)
+        each = np.asarray(np.linalg.solve(M, data.h[..., None])[..., 0], float)
+        return each, np.asarray(np.linalg.inv(M[0]), float)
+
     def half_cross(self, x: White) -> Floats:
         """Columns of a spot against the base (k, c), for `projected`."""
         cross = np.sum([W[rows].T @ X for W, rows, X in zip(self.white, x.rows, x.columns, strict=True)], axis=0)
@@ -139,7 +146,7 @@ class Folds:
 
     def together(self, xs: Sequence[White]) -> FoldedColumns:
         """The same for columns of several spots, one behind the other."""
-        dense = [np.concatenate([_spread(x, k, len(r)) for x in xs], axis=1) for k, r in enumerate(self.residual)]
+        dense = [np.concatenate([spread(x, k, len(r)) for x in xs], axis=1) for k, r in enumerate(self.residual)]
         crosses, grams, targets = [], [], []
         for k, rows in self.parts:
             X = dense[k][rows]
@@ -184,7 +191,7 @@ def _without_each(parts: Sequence[Floats]) -> list[Floats]:
     return [whole, *(whole - each for each in parts)]
 
 
-def _spread(x: White, k: int, rows: int) -> Floats:
+def spread(x: White, k: int, rows: int) -> Floats:
     """Columns (rows, c) over all white rows of run k."""
     out = np.zeros((rows, x.columns[k].shape[1]))
     out[x.rows[k]] = x.columns[k]
