@@ -82,7 +82,8 @@ class ExperimentDiagnosis:
         return proposal is not None and proposal.candidate.cutting
 
     def next_program(self, target: str = "") -> str:
-        """NC program of the proposed next experiment; of an arm's poses their list, for a file called `target` (.json, else CSV).
+        """NC program of the proposed next experiment, for a file called `target`; of an arm its poses (.json, else CSV), of an axis
+        its set-points (CSV).
 
         Raises CheckFailed CC608 where there is none.
         """
@@ -95,6 +96,10 @@ class ExperimentDiagnosis:
             config = load_config(self.configs)
             robot, _ = build_robot(config.robot, config.tool.tip)
             return pose_list(proposal.poses, tuple(a.revolute for a in robot.actuators), target)
+        if proposal is not None and proposal.moves is not None:
+            from camcomp.diagnosis.axis.next_moves import stroke_table
+
+            return stroke_table(proposal.moves)
         if proposal is None:
             raise CheckFailed("CC608", why_none(self.result.verdict, logs_only=self.behind is None))
         return next_program(self.behind, self.opened)
@@ -165,7 +170,7 @@ def why_none(verdict: str, *, logs_only: bool = False) -> str:
     if verdict == "identified":
         return "nothing is left to separate, and what stays uncertain of the causes is below the noise: no next experiment is proposed"
     if logs_only:
-        return "experiments without programs get no program for the next one"
+        return "no pose or stroke that the logs show would tell more, so no next experiment is proposed"
     return "no motion that this machine can do would separate what is left, so no next experiment is proposed"
 
 

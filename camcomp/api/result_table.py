@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from camcomp.ground.bounds import number_of
+from camcomp.ground.csv_table import TableRules, read_csv
 from camcomp.ground.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -18,6 +20,7 @@ if TYPE_CHECKING:
 PARQUET = ".parquet"
 DECIMALS, DECIMALS_RAD = 6, 9  # as joint tables and logs have them
 COUNTS = ("line", "row")
+_RULES = TableRules(table="CC450", column="CC450", cell="CC450")
 
 
 class ResultTable(Mapping[str, NDArray[Any]]):
@@ -33,10 +36,13 @@ class ResultTable(Mapping[str, NDArray[Any]]):
 
     @classmethod
     def of_csv(cls, data: bytes) -> ResultTable:
-        """The table that `to_csv` and the commands write: numbers, whole columns of text where they are none."""
-        head, *rows = csv.reader(io.StringIO(data.decode("utf-8")))
-        columns = zip(*rows, strict=True) if rows else ((),) * len(head)
-        return cls({name: _numbers(cells) for name, cells in zip(head, columns, strict=True)})
+        """The table that `to_csv` and the commands write: numbers, whole columns of text where they are none.
+
+        Raises ConfigError CC450.
+        """
+        table = read_csv(data, "table", _RULES, rowless=True)
+        table.refuse_twice()
+        return cls({name: _numbers(table.texts(j)) for j, name in enumerate(table.header)})
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         return self._columns[name]
@@ -85,11 +91,9 @@ class ResultTable(Mapping[str, NDArray[Any]]):
         return pandas.DataFrame(dict(self.items()))
 
 
-def _numbers(cells: tuple[str, ...]) -> NDArray[Any]:
-    try:
-        return np.array([float(cell) if cell else np.nan for cell in cells])
-    except ValueError:
-        return np.array(cells)
+def _numbers(cells: list[str]) -> NDArray[Any]:
+    numbers = [number_of(cell) if cell else np.nan for cell in cells]
+    return np.array(cells) if None in numbers else np.array(numbers, float)
 
 
 def _cells(name: str, values: NDArray[Any]) -> list[str]:

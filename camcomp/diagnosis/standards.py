@@ -1,5 +1,5 @@
-"""Values of ISO 230-2 from the runs of a diagnosis, where these hold what the standard asks for: stops at five targets or
-more on a line that one axis drives, each approached five times from either side, without load.
+"""Values of ISO 230-2 and ISO 230-4 from the runs of a diagnosis, where these hold what the standards ask for: stops at five
+targets or more on a line that one axis drives, each approached five times from either side, without load; whole circles.
 """
 
 from __future__ import annotations
@@ -9,9 +9,10 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
+from camcomp.diagnosis.circles import Turn, points, turns_of
 from camcomp.diagnosis.fit.bench import Run
-from camcomp.diagnosis.result.standards import AxisPositioning, StandardValues
-from camcomp.diagnosis.statistics.standard_values import positioning
+from camcomp.diagnosis.result.standards import AxisPositioning, CircularTest, CircularTurn, StandardValues
+from camcomp.diagnosis.statistics.standard_values import circular_deviation, positioning
 from camcomp.ground.datatypes import Floats
 from camcomp.model.motion.twin import Twin
 
@@ -20,6 +21,9 @@ _STILL_MM = 1e-4  # between rows in which the axes stand
 _SAME_MM = 1e-3  # between targets that are one
 _ALONE = 1e-3  # largest share of an approach that other axes may make
 NO_STOPS = "ISO 230-2: no axis without load stopped at five targets, approached five times from either side, with the tip measured"
+NO_CIRCLES = (
+    "ISO 230-4: no program drove a whole circle with the tip measured in X, Y and Z and the motion known beside it"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,19 +36,37 @@ class _Stop:
     off: float
 
 
+@dataclass(frozen=True, eq=False)
+class _Round:
+    """A circle in one direction in one run, with how far its radius is off, um at every degree (360,)."""
+
+    run: str
+    turn: Turn
+    off: Floats
+
+
 def of_runs(twin: Twin, runs: Sequence[Run]) -> StandardValues:
-    """What runs with programs hold of ISO 230-2."""
+    """What runs with programs hold of ISO 230-2 and ISO 230-4."""
     lines: dict[tuple[int, tuple[float, ...]], list[_Stop]] = {}
+    rounds: dict[tuple[str, bool], list[_Round]] = {}
     for run in runs:
-        path = run.run_path
-        if run.turn is not None or np.any(path.row_force):
+        path, tip = run.run_path, run.measured.tip
+        if run.turn is not None:
             continue
         told = twin.to_program(path.row_place.of(path.node_tip) if path.driven is None else path.driven.tip)
-        for stop in stops(told, run.measured.tip):
+        loaded = bool(np.any(path.row_force))
+        if run.program is not None:
+            for turn in turns_of(run.program, told, tip):
+                rounds.setdefault((turn.circle.name, loaded), []).append(_Round(run.name, turn, turn.off(tip)))
+        if loaded:
+            continue
+        for stop in stops(told, tip):
             beside = np.delete(np.round(stop.target / _SAME_MM) * _SAME_MM, stop.axis)
             lines.setdefault((stop.axis, tuple(beside + 0.0)), []).append(stop)
     found = [each for (axis, beside), own in lines.items() if (each := _positioning(axis, beside, own)) is not None]
-    return StandardValues(positioning=tuple(found), absent=() if found else (NO_STOPS,))
+    circles = tuple(_circular(name, loaded, own) for (name, loaded), own in rounds.items())
+    absent = ((NO_STOPS,) if not found else ()) + ((NO_CIRCLES,) if not circles else ())
+    return StandardValues(positioning=tuple(found), circles=circles, absent=absent)
 
 
 def stops(commanded: Floats, tip: Floats) -> Iterator[_Stop]:
@@ -64,6 +86,32 @@ def stops(commanded: Floats, tip: Floats) -> Iterator[_Stop]:
         yield _Stop(axis, commanded[end], bool(way[axis] > 0.0), off)
 
 
+def _circular(circle: str, loaded: bool, rounds: Sequence[_Round]) -> CircularTest:
+    """Values of a circle that was driven under one load."""
+    shapes = [points(each.turn.circle, each.off) for each in rounds]
+    return CircularTest(
+        circle=circle,
+        cutting=loaded,
+        turns=tuple(
+            CircularTurn(
+                run=each.run,
+                direction="counter-clockwise" if each.turn.counter_clockwise else "clockwise",
+                G_um=_um(1e3 * circular_deviation([shape])),
+                F_max_um=_um(each.off.max()),
+                F_min_um=_um(each.off.min()),
+            )
+            for each, shape in zip(rounds, shapes, strict=True)
+        ),
+        G_both_um=_um(1e3 * circular_deviation(shapes))
+        if len({each.turn.counter_clockwise for each in rounds}) == 2
+        else None,
+    )
+
+
+def _um(value: float) -> float:
+    return round(float(value), 3)
+
+
 def _positioning(axis: int, beside: Sequence[float], found: Sequence[_Stop]) -> AxisPositioning | None:
     """Values of a line, None where the standard asks for more."""
     by_target: dict[int, tuple[list[float], list[float]]] = {}
@@ -80,5 +128,5 @@ def _positioning(axis: int, beside: Sequence[float], found: Sequence[_Stop]) -> 
         line=" ".join(f"{name}{value:g}" for name, value in zip(others, beside, strict=True)),
         targets=len(whole),
         approaches=min(len(way) for ways in whole for way in ways),
-        **{f"{name}_um": round(1e3 * value, 3) for name, value in asdict(values).items()},
+        **{f"{name}_um": _um(1e3 * value) for name, value in asdict(values).items()},
     )

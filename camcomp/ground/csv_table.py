@@ -17,7 +17,7 @@ import numpy as np
 
 from camcomp.ground.bounds import number_of
 from camcomp.ground.datatypes import Floats
-from camcomp.ground.errors import ConfigError, Location
+from camcomp.ground.errors import CamcompError, ConfigError, Location
 
 MOST_TABLE_ROWS = 5_000_000  # more than an hour at 1 kHz
 MOST_TABLE_BYTES = 1 << 30
@@ -60,6 +60,10 @@ class CsvTable:
         cells = self.rows[row]
         return cells[column].strip() if column < len(cells) else ""
 
+    def texts(self, column: int) -> list[str]:
+        """A column, as `text` has its cells."""
+        return [self.text(row, column) for row in range(len(self.rows))]
+
     def value(self, row: int, column: int) -> float:
         """A number, NaN where there is none. Raises ConfigError."""
         cell = self.text(row, column)
@@ -70,6 +74,19 @@ class CsvTable:
             message = f"'{cell}' in column {self.header[column]} is not a number"
             raise ConfigError(self.rules.cell, message, at=self.at(row, column))
         return number
+
+    def required(self, row: int, column: int, errors: list[CamcompError]) -> float:
+        """A number; where there is none an error is added to those given, and NaN is the answer."""
+        try:
+            value = self.value(row, column)
+        except ConfigError as error:
+            errors.append(error)
+            return float("nan")
+        if np.isnan(value):
+            cell = self.text(row, column)
+            message = f"'{cell}' in column {self.header[column]} is not a number" if cell else "the cell is empty"
+            errors.append(ConfigError(self.rules.cell, message, at=self.at(row, column)))
+        return value
 
     def values(self, columns: Sequence[int] | None = None) -> Floats:
         """Numbers (n, k) of some columns, of all without names. Raises ConfigError."""
@@ -89,11 +106,13 @@ class CsvTable:
                 raise ConfigError(self.rules.column, message, at=self.at(-1, again))
 
 
-def read_csv(data: bytes | str, name: str, rules: TableRules, *, spreadsheet: bool = False) -> CsvTable:
+def read_csv(
+    data: bytes | str, name: str, rules: TableRules, *, spreadsheet: bool = False, rowless: bool = False
+) -> CsvTable:
     """Cells of a CSV file; `name` is the file's for messages. Raises ConfigError.
 
     spreadsheet: cells may be parted by semicolons, tabs or blanks, and then numbers may have decimal commas; a first row
-    of numbers, most of its cells at least, is no header.
+    of numbers, most of its cells at least, is no header. rowless: a header alone is a table, too.
     """
     if len(data) > MOST_TABLE_BYTES:
         raise ConfigError("CC425", f"more than {MOST_TABLE_BYTES} bytes", at=Location(name, 1, 1))
@@ -113,7 +132,7 @@ def read_csv(data: bytes | str, name: str, rules: TableRules, *, spreadsheet: bo
     at = Location(name, lines[0], 1, source[lines[0] - 1])
     if len(header) == 1 and ";" in header[0]:
         raise ConfigError(rules.table, "cells are separated by commas, not by semicolons", at=at)
-    if len(rows) < 2:
+    if len(rows) < 2 and not rowless:
         raise ConfigError(rules.table, "the table has no rows", at=at)
     table = CsvTable(name, rules, mark, header, tuple(rows[1:]), tuple(lines), source, headed)
     for i, row in enumerate(table.rows):

@@ -247,11 +247,15 @@ def test_verify_says_so_in_text_and_json(tmp_path):
     (tmp_path / "p.nc").write_text(HEAD + "G64 P0.01\nG0 X0 Y0 Z0\nG1 X9 F100\nG4 P2\nM2\n")
     config = ("--config", shipped("config/cartesian.yaml"))
     assert camcomp("compensate", tmp_path / "p.nc", *config, "-o", tmp_path / "o.nc").returncode == 0
-    words = ("--against", tmp_path / "p.nc", *config, "--json", tmp_path / "v.json")
+    waits_longer = tmp_path / "longer.nc"
+    waits_longer.write_text((tmp_path / "p.nc").read_text().replace("G4 P2", "G4 P7"))
+    words = ("--against", waits_longer, *config, "--json", tmp_path / "v.json")
     done = camcomp("verify", tmp_path / "o.nc", *words)
     figures = json.loads((tmp_path / "v.json").read_text())
     schemas.check("verify", figures)
-    assert done.returncode == 0 and b"control in G64 P0.01: " in done.stderr
+    before, after = (figures["cycle_time_s"][each] for each in ("before", "after"))
+    assert before - after == pytest.approx(5.0, abs=0.1)
+    assert done.returncode == 0 and f"control in G64 P0.01: {before:.1f} s become {after:.1f} s".encode() in done.stderr
     assert figures["cycle_time_s"]["after"] > 2.0 and set(figures["under_control"]) == {"rms_um", "max_um"}
 
 

@@ -1,12 +1,15 @@
-"""Circles of a report: what is found in the runs, and values of ISO 230-4 against closed forms."""
+"""Circles of a report: what is found in the runs and drawn of it, and the circular deviation against closed forms."""
 
 import dataclasses
 
 import numpy as np
 import pytest
 
-from camcomp.diagnosis.report.circles import OUTWARD, circles_section, circular_deviation, turns_of
+from camcomp.diagnosis.circles import OUTWARD, turns_of
+from camcomp.diagnosis.report.circles import circles_section, gaps_of
 from camcomp.diagnosis.report.run_view import RunView
+from camcomp.diagnosis.result.standards import CircularTest, CircularTurn
+from camcomp.diagnosis.statistics.standard_values import circular_deviation
 from camcomp.gcode.interpret import read_program
 
 CIRCLE = "G21 G90 G17\nF1000\nG0 X25 Y0 Z0\n{way} X25 Y0 I-25 J0\n{way} X25 Y0 I-25 J0\nM2\n"
@@ -24,19 +27,14 @@ def view(name, *, clockwise, radial, rows=1441, cutting=False):
     )  # fmt: skip
 
 
-def cells(section):
-    heads = section.tables[0].heads
-    return [dict(zip(heads, row, strict=True)) for row in section.tables[0].rows]
-
-
 def test_a_ring_of_points_about_any_centre_has_no_deviation():
-    assert circular_deviation([25.0 * OUTWARD + [0.3, -0.2]]) == pytest.approx(0.0, abs=1e-6)
+    assert circular_deviation([25.0 * OUTWARD + [0.3, -0.2]]) == pytest.approx(0.0, abs=1e-9)
 
 
 def test_an_oval_deviates_by_twice_its_amplitude():
     """r = R + a cos(2 angle): least-squares centre in the middle, radii from R - a to R + a."""
     angle = np.radians(np.arange(360) + 0.5)
-    assert circular_deviation([(25.0 + 0.01 * np.cos(2 * angle))[:, None] * OUTWARD]) == pytest.approx(20.0, rel=2e-3)
+    assert circular_deviation([(25.0 + 0.01 * np.cos(2 * angle))[:, None] * OUTWARD]) == pytest.approx(0.020, rel=2e-3)
 
 
 def test_half_a_circle_too_large_deviates_about_its_own_centre():
@@ -46,21 +44,14 @@ def test_half_a_circle_too_large_deviates_about_its_own_centre():
     points = (25.0 + 0.01 * (OUTWARD[:, 1] > 0))[:, None] * OUTWARD
     best = least_squares(lambda c: np.hypot(*(points - c[:2]).T) - c[2], [0.0, 0.0, 25.0], xtol=1e-15, ftol=1e-15).x
     assert best[1] == pytest.approx(2 * 0.01 / np.pi, rel=1e-2)
-    assert circular_deviation([points]) == pytest.approx(1e3 * np.ptp(np.hypot(*(points - best[:2]).T)), rel=1e-4)
+    assert circular_deviation([points]) == pytest.approx(np.ptp(np.hypot(*(points - best[:2]).T)), rel=1e-4)
 
 
-def test_both_directions_stand_in_the_table_and_on_one_plot():
-    """Out by 5 um one way round, in by 3 um the other: each is round, both together deviate by the 8 um between them."""
+def test_both_directions_stand_on_one_plot():
+    """Out by 5 um one way round, in by 3 um the other."""
     ccw = view("a", clockwise=False, radial=lambda t: 5.0 + 0.0 * t)
     cw = view("b", clockwise=True, radial=lambda t: -3.0 + 0.0 * t)
-    section = circles_section([ccw, cw])
-    told = cells(section)
-    assert [(row["run"], row["direction"]) for row in told] == [("a", "counter-clockwise"), ("b", "clockwise")]
-    for row in told:
-        assert row["G µm"][0] == pytest.approx(0.0, abs=1e-3)
-        assert row["G(b) µm"][0] == pytest.approx(8.0, rel=1e-4)
-    assert [row["F max µm"][0] for row in told] == pytest.approx([5.0, -3.0], rel=1e-4)
-    (figure,) = section.figures
+    (figure,) = circles_section([ccw, cw], ()).figures
     names = [each["name"] for each in figure.traces]
     assert {"counter-clockwise, measured", "clockwise, measured", "ring at +5 µm"} <= set(names)
     shifts = dict(zip(names, figure.exaggerate["shifts"], strict=True))
@@ -70,27 +61,42 @@ def test_both_directions_stand_in_the_table_and_on_one_plot():
     assert shifts["clockwise, measured"]["x"][0] == pytest.approx(-3e-3, rel=1e-3), "inwards at angle zero"
 
 
-def test_both_directions_need_the_same_load():
+def test_loads_do_not_share_a_plot():
     ccw = view("a", clockwise=False, radial=np.cos, cutting=True)
-    told = cells(circles_section([ccw, view("b", clockwise=True, radial=np.cos)]))
-    assert {row["G(b) µm"] for row in told} == {"–"}
-    assert {row["load"] for row in told} == {"cutting", "in air"}
+    figures = circles_section([ccw, view("b", clockwise=True, radial=np.sin)], ()).figures
+    assert {each.title.rsplit(", ", 1)[1] for each in figures} == {"cutting", "in air"}
+
+
+def test_values_stand_beside_the_plots():
+    turn = CircularTurn(run="a", direction="clockwise", G_um=12.34, F_max_um=5.0, F_min_um=-7.0)
+    name = "R 25 mm in XY about (0, 0, 0)"
+    table = circles_section([], [CircularTest(circle=name, cutting=False, turns=(turn,), G_both_um=None)]).tables[0]
+    (row,) = (dict(zip(table.heads, each, strict=True)) for each in table.rows)
+    assert [row[head] for head in ("circle", "run", "direction", "load", "G(b) µm")] == [
+        name,
+        "a",
+        "clockwise",
+        "in air",
+        "–",
+    ]
+    assert row["G µm"] == (12.34, "12.3") and row["F min µm"][0] == -7.0
 
 
 def test_few_rows_make_no_polygon():
     """Sixty rows a turn: chords between them would make a round path deviate by 34 um."""
-    (turn,) = turns_of([view("a", clockwise=False, radial=lambda t: 4.0 + 0.0 * t, rows=121)])
-    assert turn.off == pytest.approx(4.0, abs=1e-6)
+    one = view("a", clockwise=False, radial=lambda t: 4.0 + 0.0 * t, rows=121)
+    (turn,) = turns_of(one.program, one.commanded, one.before)
+    assert turn.off(one.position + 1e-3 * one.before) == pytest.approx(4.0, abs=1e-6)
+    assert gaps_of([one])[0].before == pytest.approx(4.0, abs=1e-6)
 
 
 def test_half_a_circle_is_none():
     whole = view("a", clockwise=False, radial=np.cos)
     whole.before[np.sin(ANGLES) > 0.3] = np.nan
-    assert turns_of([whole]) == [] and circles_section([whole]) is None
+    assert gaps_of([whole]) == [] and circles_section([whole], ()) is None
 
 
 def test_a_run_whose_tip_was_not_measured_in_x_y_z_has_no_circle():
     whole = view("a", clockwise=False, radial=np.cos)
-    assert (
-        turns_of([dataclasses.replace(whole, channels=("along the path", "across the path", "normal to both"))]) == []
-    )
+    across = ("along the path", "across the path", "normal to both")
+    assert gaps_of([dataclasses.replace(whole, channels=across)]) == []

@@ -145,3 +145,15 @@ def test_bands_and_trust_are_drawn(tmp_path):
     assert area["fill"] == "toself" and max(y for y in area["y"] if y is not None) == pytest.approx(np.nanmax(drawn))
     kinds = {each["name"] for each in figures["trust"]["traces"]}
     assert "trusted" in kinds and kinds <= {"trusted", "doubtful", "shrunk", "left alone"}
+
+
+def test_what_a_policy_leaves_is_no_riddle_beside_the_tolerance(tmp_path):
+    spread = tmp_path / "spread.yaml"
+    spread.write_text("process: {force: {Fr_N: {sd: 150}}}\ncompensation: {policy: shrink}\n")
+    words = text_of(compensate(tmp_path, "--config", spread, "--summary", tmp_path / "s.json", "-q"))
+    taken = json.loads((tmp_path / "s.json").read_text())["taken"]
+    less = taken["shrunk"] + taken["left_alone"]
+    assert less > 0
+    assert f"on purpose: with the policy shrink {less} of {taken['points']} points take less than the whole" in words
+    spread.write_text("process: {force: {Fr_N: {sd: 150}}}\n")
+    assert "on purpose" not in text_of(compensate(tmp_path, "--config", spread, "-q"))

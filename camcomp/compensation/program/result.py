@@ -72,6 +72,18 @@ class TakenCorrection(Result):
     left_alone: Annotated[int, Field(description="points that take none of it")]
 
 
+_CONTROL_ADDS = "with what the control's merging and rounding adds, beside joining lines, too, and without what a policy leaves on purpose"
+# Figures that a compensation and a verification share.
+ControlMode = Annotated[
+    str, Field(description="path modes in which the program cuts: G61, G61.1, G64 with P and Q in mm")
+]
+ControlModeStated = Annotated[bool, Field(description="by the program or the machine file; else it is assumed")]
+Taken = Annotated[TakenCorrection | None, Field(description="with a policy other than full")]
+Expected = Annotated[ExpectedError | None, Field(description="with uncertain numbers in the config")]
+Band = Annotated[tuple[BandShare, ...] | None, Field(description="the largest share first")]
+Advice = Annotated[str | None, Field(description="what would make the band smaller")]
+
+
 class Summary(Result):
     """The figures of `camcomp compensate`; angles and torques where a machine has hinges, `interpolation` of long programs."""
 
@@ -91,21 +103,13 @@ class Summary(Result):
     platform_tilt_max_mrad: float
     joining_lines: int
     cycle_time_s: CycleTime
-    control_mode: Annotated[
-        str, Field(description="path modes in which the program cuts: G61, G61.1, G64 with P and Q in mm")
-    ]
-    control_mode_stated: Annotated[bool, Field(description="by the program or the machine file; else it is assumed")]
-    under_control: Annotated[
-        ErrorSize,
-        Field(
-            description="like after, with what the control's merging and rounding adds, beside joining lines, too, and without "
-            "what a policy leaves on purpose"
-        ),
-    ]
-    taken: Annotated[TakenCorrection | None, Field(description="with a policy other than full")] = None
-    expected: Annotated[ExpectedError | None, Field(description="with uncertain numbers in the config")] = None
-    band: Annotated[tuple[BandShare, ...] | None, Field(description="the largest share first")] = None
-    advice: Annotated[str | None, Field(description="what would make the band smaller")] = None
+    control_mode: ControlMode
+    control_mode_stated: ControlModeStated
+    under_control: Annotated[ErrorSize, Field(description=f"like after, {_CONTROL_ADDS}")]
+    taken: Taken = None
+    expected: Expected = None
+    band: Band = None
+    advice: Advice = None
     interpolation: Annotated[Interpolation | None, Field(description="null where no point was interpolated")] = None
     warnings: list[str]
 
@@ -148,22 +152,14 @@ class Verification(Result):
     points: Annotated[int, Field(description="looked at along the feed moves")]
     joining_lines: int
     cycle_time_s: CycleTime
-    control_mode: Annotated[
-        str, Field(description="path modes in which the program cuts: G61, G61.1, G64 with P and Q in mm")
-    ]
-    control_mode_stated: Annotated[bool, Field(description="by the program or the machine file; else it is assumed")]
-    under_control: Annotated[
-        ErrorSize,
-        Field(
-            description="like residual, with what the control's merging and rounding adds, beside joining lines, too, and without "
-            "what a policy leaves on purpose"
-        ),
-    ]
+    control_mode: ControlMode
+    control_mode_stated: ControlModeStated
+    under_control: Annotated[ErrorSize, Field(description=f"like residual, {_CONTROL_ADDS}")]
     warnings: list[str]
-    taken: Annotated[TakenCorrection | None, Field(description="with a policy other than full")] = None
-    expected: Annotated[ExpectedError | None, Field(description="with uncertain numbers in the config")] = None
-    band: Annotated[tuple[BandShare, ...] | None, Field(description="the largest share first")] = None
-    advice: Annotated[str | None, Field(description="what would make the band smaller")] = None
+    taken: Taken = None
+    expected: Expected = None
+    band: Band = None
+    advice: Advice = None
     lines: tuple[LineResult, ...]
 
     def as_json(self) -> dict[str, Any]:

@@ -67,6 +67,12 @@ def compensation_html(
             f"By the model the original program leaves up to {brief(before)} µm at the tip, the corrected one "
             f"{brief(after)} µm; the tolerance is {tolerance_um:g} µm."
         )
+        taken = figures.taken
+        if taken and (less := taken.shrunk + taken.left_alone):
+            verdict += (
+                f" That is on purpose: with the policy {taken.policy} {less} of {taken.points} points take less than the "
+                "whole correction, because the numbers of the machine file are too uncertain there."
+            )
     notes = [f"{rule}: {text}" for rule, text in failed] + [str(each) for each in figures.warnings]
     any_feed = bool((~drawn.hidden).any())
     sections = [Section("warnings", "Warnings", items=notes)] if notes else []

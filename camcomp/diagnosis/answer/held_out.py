@@ -7,6 +7,7 @@ import numpy as np
 
 from camcomp.diagnosis.fit.bench import Bench, CandidateCause, Run, thinned
 from camcomp.diagnosis.fit.columns import candidate_columns
+from camcomp.diagnosis.fit.labels import EFFECT_OF, apart
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.statistics.cause_sets import Fitted
 from camcomp.diagnosis.statistics.shrinkage import shrinkage
@@ -95,12 +96,10 @@ def _nuisances(seen: Bench, fitted: Sequence[Run], part: slice) -> tuple[list[Fl
     named: list[str] = []
     if part.start != 0:
         return blocks, named
-    for label, effect, what in (
-        ("clamping", "workpiece_frame", "workpiece frame"),
-        ("clock", "time_sync", "clock offset"),
-    ):
-        first = getattr(fitted[0], label)
-        others = [each for each in dict.fromkeys(getattr(run, label) for run in seen.runs) if each != first]
+    for label, what in (("clamping", "workpiece frame"), ("clock", "clock offset")):
+        effect = EFFECT_OF[label]
+        every = [getattr(run, label) for run in (*fitted, *seen.runs)]
+        others = [each for each in apart(every) if each in {getattr(run, label) for run in seen.runs}]
         if not others:
             continue
         columns = candidate_columns(seen, CandidateCause(effect, None, shelf.load("effects", effect)), {})

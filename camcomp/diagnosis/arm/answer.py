@@ -323,7 +323,7 @@ def patterns(bench: ArmBench, campaigns: Sequence[Poses]) -> dict[str, list[Floa
 
 
 def next_experiment(told: Told) -> NextExperiment | None:
-    """Poses that tell most, as a campaign of their own; repeats where there is no floor. gain: nats."""
+    """Poses that tell most, as a campaign of their own; repeats where there is no floor."""
     if told.verdict in ("none", "identified"):
         return None
     if told.floor is None and told.judges.whole:
@@ -366,7 +366,7 @@ def _second_campaign(told: Told, q: Floats, place: Floats) -> NextExperiment:
     return NextExperiment(
         action="measure a second campaign in other postures, with a clamping of its own",
         separates=tuple(effects),
-        gain=round(float(np.log(len(told.sets) + 1)), 4),
+        gain=round(float(np.log2(len(told.sets) + 1)), 4),
         outcomes=(
             *(f"If {one} alone foretell the new poses, they are the cause." for one in sets[:2]),
             "If no set foretells them, something unknown is at work.",
@@ -385,7 +385,7 @@ def _again(told: Told) -> NextExperiment:
     return NextExperiment(
         action=f"visit {REPEATS} of the poses once more, other poses in between, so that the floor is known",
         separates=tuple(effects),
-        gain=round(float(np.log(2.0)), 4),
+        gain=1.0,
         outcomes=(
             "If visits of one pose differ by as much as the causes leave, nothing is left to explain.",
             "If they differ by less, something unknown is at work.",

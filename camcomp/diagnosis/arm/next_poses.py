@@ -26,7 +26,7 @@ POSES_SEED = 20201110  # the same answer twice
 
 @dataclass(frozen=True, eq=False)
 class Design:
-    """Poses chosen, as indices of the candidates in the order of choice, and their information (nats)."""
+    """Poses chosen, as indices of the candidates in the order of choice, and their information (bits)."""
 
     chosen: tuple[int, ...]
     gain: float
@@ -47,7 +47,8 @@ def designed(X: Floats, covariance: Floats, noise: float, count: int, interest: 
             rest = chosen[:i] + chosen[i + 1 :]
             chosen[i] = belief.take(belief.best(rest))
     return Design(
-        tuple(chosen), 0.5 * float(np.linalg.slogdet(covariance)[1] - np.linalg.slogdet(belief.covariance)[1])
+        tuple(chosen),
+        0.5 * float(np.linalg.slogdet(covariance)[1] - np.linalg.slogdet(belief.covariance)[1]) / float(np.log(2.0)),
     )
 
 
@@ -114,7 +115,7 @@ def candidates(bench: ArmBench, count: int = CANDIDATES) -> Floats:
 
 
 def proposed(bench: ArmBench, found: ArmFit, noise: float) -> tuple[Floats, Floats, float]:
-    """Joints (POSES, m) to measure in a new campaign, their platform points (POSES, 3), and the information (nats).
+    """Joints (POSES, m) to measure in a new campaign, their platform points (POSES, 3), and the information (bits).
 
     Empty where nothing was taken or no candidate stands where poses stood.
     """

@@ -19,7 +19,7 @@ from camcomp.ground.datatypes import Floats
 class AxisRun:
     """Log of one axis in one run: time (n,) s; setpoint, encoder mm; force N, each (n,), NaN where nothing was logged.
 
-    row (n,): of the log, from 1.
+    row (n,): of the log, from 1. revolute: rad and N mm in the place of mm and N.
     """
 
     name: str
@@ -28,6 +28,7 @@ class AxisRun:
     encoder: Floats
     force: Floats
     row: np.ndarray | None = None
+    revolute: bool = False
 
     def without_spikes(self) -> tuple[AxisRun, np.ndarray]:
         """The run with neighbours in the place of rows that are no measurement, and these rows' numbers."""

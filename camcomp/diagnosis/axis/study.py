@@ -28,6 +28,7 @@ from camcomp.diagnosis.axis.block_least_squares import (
 from camcomp.diagnosis.axis.findings import AxisChannel, AxisDeviation, AxisFindings, AxisRun
 from camcomp.diagnosis.axis.gate import MINOR, dependences, judge
 from camcomp.diagnosis.axis.law import LEAST_SHARE, axis_law
+from camcomp.diagnosis.axis.next_moves import next_moves
 from camcomp.diagnosis.axis.noise_floor import REPEATABILITY_MM, rows_floor
 from camcomp.diagnosis.axis.terms import (
     PRESLIDING_GRID_MM,
@@ -117,6 +118,7 @@ def studied(
         causes=tuple(causes),
         alternatives=(known, (*known, NamedCause(effect=UNKNOWN, target=None))) if verdict == "ambiguous" else (),
         shrinkage=answer.shrinkage(judged, held) if judged else None,
+        next_experiment=next_moves(found, cleaned, verdict),
         floor=Floor(um=gap.noise_floor_um, source="stated" if all(c.stated for c in every) else "rows"),
         outliers=tuple(Outlier(run=run, row=row) for run, row in sorted(outliers)),
         axes_in_detail={a.name: a.details for a in found},

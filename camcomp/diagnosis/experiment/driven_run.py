@@ -8,14 +8,23 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import KDTree
 
-from camcomp.diagnosis.experiment.log_checks import ASIDE_MM, check_followed, check_forces, check_places, check_told
+from camcomp.diagnosis.experiment.log_checks import (
+    ASIDE_MM,
+    FAR_MM,
+    check_followed,
+    check_forces,
+    check_on_program,
+    check_places,
+    check_told,
+)
 from camcomp.diagnosis.fit.measured import Measured
-from camcomp.ground import path_geometry
+from camcomp.ground import path_geometry, shelf
 from camcomp.ground.datatypes import RAPID, Bools, Floats, Path
 from camcomp.ground.errors import ConfigError, Location
-from camcomp.model.cutting.track import Conditions, Track, lay_track
+from camcomp.model.cutting.track import JOIN_ANGLE, Conditions, Track, lay_track
+from camcomp.model.effect import Cause
 from camcomp.model.motion.alignment import Aligned, align
-from camcomp.model.motion.driven_path import Forces, cutting_forces, driven_path
+from camcomp.model.motion.driven_path import BESIDE_MM, Forces, cutting_forces, driven_path
 from camcomp.model.motion.run_path import RunPath
 from camcomp.model.motion.twin import Twin
 
@@ -23,8 +32,9 @@ SAMPLE_MM = 2.0  # of the program, where places are compared
 GAP_ROWS = 3.0  # usual steps between rows over which a motion is not led
 STILL_S = 0.1  # from which on standing at the end of a line may be idleness
 STILL_MM = 0.005
+SOON_S = 1e-4  # in which a tip moves in one direction
+STANDING_MM_PER_S = 0.05
 _UPRIGHT = 0.9  # cosine beyond which a path goes along z, and its sides are found from x
-LED_PASSES = 2  # of a tip along its program: the second knows how the machine bends
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,9 +67,9 @@ class _Program:
 
 def drive(
     log: str, name: str, measured: Measured, path: Path | None, conditions: Conditions, twin: Twin, started: float,
-    vectors: Callable[[Floats], Floats], temperature: Floats | None,
+    vectors: Callable[[Floats], Floats], temperature: Floats | None, acceleration: float,
 ) -> DrivenRun:  # fmt: skip
-    """The run of a log; path: of its program, None where it has none. Raises ConfigError CC402, CC406 to CC408."""
+    """The run of a log; path: of its program, None where it has none; acceleration: of the control, mm/s2. Raises ConfigError CC402, CC406 to CC408."""
     program = None if path is None else _open(path, conditions, twin)
     by = next((each for each in ("setpoint", "encoder", "tip") if measured.has(each)), "")
     if not by or (by == "tip" and program is None):
@@ -67,7 +77,7 @@ def drive(
         raise ConfigError("CC402", message, at=Location(log, 1, 1))
     if by == "tip":
         assert program is not None
-        return _led_by_tip(log, name, measured, program, twin, started, vectors, temperature)
+        return _led_by_tip(log, name, measured, program, twin, started, vectors, temperature, acceleration)
     told = getattr(measured, by)
     known = np.isfinite(told).all(axis=1)
     if known.sum() < 2:
@@ -124,7 +134,10 @@ def _near(log: str, name: str, measured: Measured, rho: Floats, program: _Progra
     return np.column_stack([np.interp(measured.time, measured.time[known], v[known]) for v in measured.tip.T])
 
 
-def _aligned(log: str, name: str, program: _Program, tip: Floats, measured: Measured) -> Aligned:
+def _aligned(
+    log: str, name: str, program: _Program, tip: Floats, measured: Measured, aside_mm: float = ASIDE_MM
+) -> Aligned:
+    """Where on its program the tip (n, 3) was; most of it within aside_mm of the path. Raises ConfigError CC406."""
     path = program.track.path
     line = measured.line
     known = np.isfinite(line) & (line > 0)
@@ -133,7 +146,7 @@ def _aligned(log: str, name: str, program: _Program, tip: Floats, measured: Meas
         message = f"run '{name}': the rows are on lines that the program does not move on, e.g. {lines}"
         raise ConfigError("CC406", message, at=Location(log, 1, 1))
     found = align(path, tip, line)
-    check_followed(log, name, found.distance, _agreement(path, found, tip))
+    check_followed(log, name, found.distance, _agreement(path, found, tip), aside_mm)
     return found
 
 
@@ -174,31 +187,64 @@ def _idle_or_not(forces: Forces, aligned: Aligned, program: _Program, tip: Float
 
 def _led_by_tip(
     log: str, name: str, measured: Measured, program: _Program, twin: Twin, started: float,
-    vectors: Callable[[Floats], Floats], temperature: Floats | None,
+    vectors: Callable[[Floats], Floats], temperature: Floats | None, acceleration: float,
 ) -> DrivenRun:  # fmt: skip
     """The tip led along the program: its time along the path is free, and only what lies across is evidence."""
     path = program.track.path
     known = np.isfinite(measured.tip).all(axis=1)
+    check_on_program(log, name, measured.tip[known], program.tips)
     whole = np.column_stack([np.interp(measured.time, measured.time[known], v[known]) for v in measured.tip.T])
     bend = np.zeros_like(whole)
-    for _ in range(LED_PASSES):
-        aligned = _aligned(log, name, program, whole - bend, measured)
+    for beside in (np.inf, BESIDE_MM):  # what bends may be beside its program: first nobody knows by how much
+        aligned = _aligned(log, name, program, whole - bend, measured, ASIDE_MM if beside < np.inf else FAR_MM)
         tip = path_geometry.points(path, aligned.motion, aligned.share)
-        check_places(log, name, measured, np.zeros((len(tip), 0)), tip)
-        forces = cutting_forces(program.track, aligned, tip, measured.time, bool(np.isfinite(measured.line).any()))
+        logged = bool(np.isfinite(measured.line).any())
+        forces = cutting_forces(program.track, aligned, tip, measured.time, logged, beside)
         run_path = driven_path(
             name, measured.time, twin.inverse(twin.to_machine(tip)), tip, forces, started=started,
             to_machine=twin.to_machine, vectors=vectors, inverse=twin.inverse, temperature=temperature,
         )  # fmt: skip
-        bend = twin.sense(run_path)[0].tip - tip
+        loaded = twin.sense(run_path)[0].tip
+        bend = loaded - tip
     unsure = ~known | (aligned.distance > ASIDE_MM) | _idle_or_not(forces, aligned, program, tip, measured.time)
-    run_path = replace(run_path, feed_mm_per_min=program.feed)
-    return DrivenRun(run_path, "tip", unsure, _across(program.track, aligned), aligned.lag)
+    unsure |= _from_anywhere(path, aligned) | _at_corners(path, aligned, measured.time, acceleration)
+    later = Cause("time_sync", shelf.load("effects", "time_sync"), None, {"offset_s": -SOON_S})
+    velocity = (twin.sense(run_path, [later])[0].tip - loaded) / SOON_S
+    run_path = replace(run_path, feed_mm_per_min=program.feed, led=True)
+    return DrivenRun(run_path, "tip", unsure, _across(path, aligned, velocity), aligned.lag)
 
 
-def _across(track: Track, aligned: Aligned) -> Floats:
-    """Axes (n, 3, 3) along the path and across it."""
-    along = path_geometry.tangents(track.path, aligned.motion, aligned.share)
+def _from_anywhere(path: Path, aligned: Aligned) -> Bools:
+    """Rows (n,) on their way to the first place that the program names: the machine comes from where it happened to stand."""
+    named = np.concatenate([[False], path.known[:-1]]) if path.known.any() else np.arange(len(path)) > 0
+    begins = named & ~np.concatenate([[False], named[:-1]])
+    return np.asarray(~named[aligned.motion] | (begins[aligned.motion] & (aligned.share <= 0.0)))
+
+
+def _at_corners(path: Path, aligned: Aligned, time: Floats, acceleration: float) -> Bools:
+    """Rows (n,) about the corners of a path that controls round off, from where they brake for it at `acceleration`, mm/s2."""
+    length = path_geometry.lengths(path)
+    moves = np.flatnonzero(length > 0.0)
+    ends = path_geometry.tangents(path, moves[:-1], np.ones(len(moves) - 1))
+    begins = path_geometry.tangents(path, moves[1:], np.zeros(len(moves) - 1))
+    turns = np.sum(ends * begins, axis=1) < np.cos(JOIN_ANGLE)
+    corner = np.cumsum(length)[moves[:-1]][turns]
+    at = np.concatenate([[0.0], np.cumsum(length)])[aligned.motion] + aligned.share * length[aligned.motion]
+    if not len(corner) or len(at) < 2:
+        return np.zeros(len(at), bool)
+    step = np.abs(np.diff(at))
+    braking = (step / np.diff(time)) ** 2 / (2.0 * acceleration)
+    reach = np.maximum(np.append(step + braking, 0.0), np.concatenate([[0.0], step + braking]))
+    next_one = np.clip(np.searchsorted(corner, at), 0, len(corner) - 1)
+    away = np.minimum(np.abs(corner[next_one] - at), np.abs(corner[np.maximum(next_one - 1, 0)] - at))
+    return np.asarray(away < reach)
+
+
+def _across(path: Path, aligned: Aligned, velocity: Floats) -> Floats:
+    """Axes (n, 3, 3) along the way of the loaded tip, velocity (n, 3) mm/s, and across it; where it stands that of the path."""
+    along = path_geometry.tangents(path, aligned.motion, aligned.share)
+    speed = np.linalg.norm(velocity, axis=1, keepdims=True)
+    along = np.where(speed > STANDING_MM_PER_S, velocity / np.maximum(speed, 1e-12), along)
     other = np.where(np.abs(along[:, 2:3]) < _UPRIGHT, [[0.0, 0.0, 1.0]], [[1.0, 0.0, 0.0]])
     side = np.cross(along, other)
     side /= np.maximum(np.linalg.norm(side, axis=1, keepdims=True), 1e-12)

@@ -71,11 +71,11 @@ def check_forces(name: str, run: str, measured: Measured, force: Floats) -> None
                 )
 
 
-def check_followed(name: str, run: str, distance: Floats, agreement: float) -> None:
+def check_followed(name: str, run: str, distance: Floats, agreement: float, aside_mm: float = ASIDE_MM) -> None:
     """Raise CC406 where the motion does not lie along the program: distance (n,) mm from it; share of rows that go its way."""
     off = float(np.median(distance))
-    if off > ASIDE_MM or agreement < LEAST_AGREEMENT:
-        way = f"{off:.3g} mm beside the program" if off > ASIDE_MM else "against the way of the program"
+    if off > aside_mm or agreement < LEAST_AGREEMENT:
+        way = f"{off:.3g} mm beside the program" if off > aside_mm else "against the way of the program"
         raise ConfigError("CC406", f"run '{run}': the motion runs {way}", at=Location(name, 1, 1))
 
 
@@ -102,6 +102,16 @@ def check_told(name: str, run: str, what: str, told: Floats, program: Floats, ro
         return float(np.median(tree.query(found)[0]))
 
     _check(name, run, f"{what}s look", told, distance, FAR_RAD if rotary else FAR_MM, rotary)
+
+
+def check_on_program(name: str, run: str, tip: Floats, program: Floats) -> None:
+    """Like `check_places` where the tip is the motion: tip (n, 3) against points program (s, 3) along the program."""
+    tree = KDTree(program)
+
+    def distance(found: Floats) -> float:
+        return float(np.median(tree.query(found)[0]))
+
+    _check(name, run, "tip looks", tip, distance, FAR_MM, False)
 
 
 def _check(

@@ -13,6 +13,7 @@ from camcomp.diagnosis.experiment.log_checks import (
     check_rows,
 )
 from camcomp.diagnosis.fit.bench import Run
+from camcomp.diagnosis.fit.label_offsets import with_clocks
 from camcomp.diagnosis.fit.measured import Measured
 from camcomp.ground.csv_table import CsvTable, TableRules, read_csv
 from camcomp.ground.datatypes import Floats
@@ -56,7 +57,7 @@ def open_experiment(path: str | FilePath) -> OpenExperiment:
     for k in order:
         runs[k] = replace(runs[k], run_path=replace(runs[k].run_path, cut_before_min=worn))
         worn += runs[k].run_path.cut_min
-    return OpenExperiment(experiment, job, twin, tuple(runs), tuple(notes))
+    return OpenExperiment(experiment, job, twin, tuple(with_clocks(twin, runs)), tuple(notes))
 
 
 def open_run(spec: RunSpec, job: Job, twin: Twin, notes: list[str]) -> Run:
@@ -71,7 +72,7 @@ def open_run(spec: RunSpec, job: Job, twin: Twin, notes: list[str]) -> Run:
         check_length(log, spec.name, measured, schedule(path, job.config.control.acceleration_mm_per_s2).end)
     run = drive(
         log, spec.name, measured, path, conditions, twin, spec.started_s, job.frame.vectors,
-        steadied(measured.time, measured.temperature),
+        steadied(measured.time, measured.temperature), job.config.control.acceleration_mm_per_s2,
     )  # fmt: skip
     if run.lag:
         notes.append(f"{log}: line numbers are {abs(run.lag)} rows {'late' if run.lag > 0 else 'early'}")

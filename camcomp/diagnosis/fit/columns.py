@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from camcomp.diagnosis.fit.bench import Bench, CandidateCause, Run, cause_of, step_of, thinned
+from camcomp.diagnosis.fit.labels import EFFECT_OF, apart, label_name
 from camcomp.diagnosis.fit.measured import channel_names
 from camcomp.diagnosis.fit.patterns import Dictionary, Ground, dictionary
 from camcomp.diagnosis.statistics.evidence import Prior
@@ -92,6 +93,13 @@ class Columns:
     def of(self, candidate: int) -> list[int]:
         """Columns of an candidate."""
         return [int(i) for i in np.flatnonzero(self.candidate == candidate)]
+
+    @cached_property
+    def of_labels(self) -> Ints:
+        """Columns by which clampings and clocks differ."""
+        return np.flatnonzero(
+            np.array([n.startswith(tuple(f"{each} " for each in EFFECT_OF)) for n in self.names], bool)
+        )
 
     @cached_property
     def run_offsets(self) -> Ints:
@@ -223,7 +231,7 @@ def _nuisances(bench: Bench) -> list[tuple[str, float, list[Floats], bool]]:
             time = thinned(run.run_path.time[:, None], run.thin)
             found.append((f"clock.{run.name}", CLOCK_JITTER_S, only(r, second), True))
             found.append((f"rate.{run.name}", CLOCK_RATE, only(r, second * time), True))
-        _by_label(found, bench, "clock", [("clock", ticks)])
+        _by_label(found, bench, "clock", [(clock.parameters[0].name, ticks)])
         frames = candidate_columns(bench, frame, {})
         _by_label(found, bench, "clamping", [(p.name, f) for p, f in zip(frame.parameters, frames, strict=True)])
     found += _allowances(bench)
@@ -259,12 +267,12 @@ def _starts(bench: Bench, only: Callable[[int, Floats], list[Floats]]) -> list[t
 
 
 def _by_label(found: list[Any], bench: Bench, label: str, columns: Sequence[tuple[str, list[Floats]]]) -> None:
-    """Free columns for every label after the first: only differences between labels are nuisances."""
+    """Free columns for every label that differs from others: only differences between labels are nuisances."""
     labels = [getattr(run, label) for run in bench.runs]
-    for other in list(dict.fromkeys(labels))[1:]:
+    for other in apart(labels):
         for name, per_run in columns:
             masked = [f if mine == other else 0.0 * f for mine, f in zip(labels, per_run, strict=True)]
-            found.append((f"{label} {other}.{name}", np.inf, masked, False))
+            found.append((label_name(label, other, name), np.inf, masked, False))
 
 
 def _allowances(bench: Bench) -> list[tuple[str, float, list[Floats], bool]]:

@@ -10,6 +10,7 @@ from camcomp.diagnosis.statistics.noise_model import Noise
 from camcomp.ground.datatypes import Floats
 
 TIMING_S = 0.0015  # how fast a real drive settles after its acceleration has stepped
+BETWEEN_ROWS = 0.25  # of what the acceleration changes from row to row: how far a speed between them may be off
 UNSTEADY_S = 0.002  # more jitter than any log has
 MIDDLE = 0.4549  # median of a squared standard normal number
 PLAIN = 0.3  # share of the noise at rest by which jitter has to add to it at speed
@@ -67,7 +68,9 @@ def inflation(bench: Bench) -> list[Floats]:
             place = run.run_path.place(t)
             slope = np.abs(bench.twin.rotation.T @ place.of(bench.slopes[k].tip_rho))
             m = len(bench.actuators)
-            extra[:, :3] = TIMING_S**2 * np.einsum("nij,nj->ni", slope, change)
+            # where a tip's clock is known to be late, it was read between rows, where nobody saw the speed change
+            unseen = abs(run.run_path.clock_s) * usual * BETWEEN_ROWS
+            extra[:, :3] = (TIMING_S**2 + unseen) * np.einsum("nij,nj->ni", slope, change)
             extra[:, 3 : 3 + m] = TIMING_S**2 * change
             if unsteady > 0.0:
                 extra[:, :3] = np.hypot(extra[:, :3], unsteady * np.abs(_speed(bench, k)))

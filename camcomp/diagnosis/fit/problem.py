@@ -11,6 +11,7 @@ from camcomp.diagnosis.fit.columns import Columns, build, candidate_columns, pat
 from camcomp.diagnosis.fit.floor import NoiseFloor, least_noise, measure_floor
 from camcomp.diagnosis.fit.grid_parameters import beside, best_shape, quick_columns, reach
 from camcomp.diagnosis.fit.intervals_in_time import LOOK_ELSEWHERE, best_interval, never_ending
+from camcomp.diagnosis.fit.label_offsets import with_scatter
 from camcomp.diagnosis.fit.noise import inflation, instrument_noise, less_certain
 from camcomp.diagnosis.fit.outliers import outlying, tails
 from camcomp.diagnosis.fit.patterns import Dictionary
@@ -304,6 +305,9 @@ def open_problem(bench: Bench, candidates: Sequence[CandidateCause], stated_mm: 
     shapes: dict[int, dict[str, float]] = {i: shape_default(a) for i, a in enumerate(candidates) if a.shapes}
     words = patterns(bench)
     problem = _whiten(bench, columns, words, floor, noise, inflate, times, residuals, shapes, outliers)
+    if len(columns.of_labels):
+        columns = with_scatter(columns, bench, estimate(total(problem.base_grams), problem.prior, ())[0])
+        problem = _whiten(bench, columns, words, floor, noise, inflate, times, residuals, shapes, outliers)
     noise = _with_model_error(problem)
     problem = _whiten(bench, columns, words, floor, noise, inflate, times, residuals, shapes, outliers)
     if not shapes:

@@ -50,9 +50,9 @@ class DatedVerdict(Result):
 
 
 class StandardCourse(Result):
-    """A value of an acceptance test over the days: of one line of an axis, or one pose of an arm."""
+    """A value of an acceptance test over the days: of one line of an axis, one circle, or one pose of an arm."""
 
-    standard: Literal["ISO 230-2", "ISO 9283"]
+    standard: Literal["ISO 230-2", "ISO 230-4", "ISO 9283"]
     name: str
     place: str
     values: Annotated[tuple[tuple[date, float], ...], Field(description="um")]
@@ -94,10 +94,14 @@ def _standards(kept: Sequence[Kept]) -> Iterator[StandardCourse]:
     for each in kept:
         held = each.result.standards
         rows: list[tuple[str, str, Result]] = [("ISO 230-2", f"{a.axis} at {a.line}", a) for a in held.positioning]
+        for test in held.circles:
+            place = f"{test.circle}, {'cutting' if test.cutting else 'in air'}"
+            rows.append(("ISO 230-4", place, test))
+            rows += [("ISO 230-4", f"{place}, {turn.direction}", turn) for turn in test.turns]
         rows += [("ISO 9283", f"{p.campaign} {p.pose}", p) for p in held.poses]
         for standard, place, row in rows:
             for name, value in row:
-                if name.endswith("_um"):
+                if name.endswith("_um") and value is not None:
                     found.setdefault((standard, name.removesuffix("_um"), place), []).append((each.day, value))
     for (standard, name, place), values in found.items():
         yield StandardCourse(standard=standard, name=name, place=place, values=tuple(values))

@@ -21,16 +21,13 @@ from camcomp.diagnosis.fit.bench import thinned
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.search.indistinguishable import HIDDEN, LARGE
 from camcomp.diagnosis.statistics.cause_sets import Fitted
+from camcomp.diagnosis.statistics.expected_gain import expected_gain
 from camcomp.diagnosis.statistics.seen import seen_apart
 from camcomp.ground.datatypes import Floats
 
 if TYPE_CHECKING:
     from camcomp.diagnosis.next_experiment.candidates import Candidate
     from camcomp.diagnosis.next_experiment.foresee import Foreseen, Question
-
-_OUTCOME_DRAWS = 64
-_SEED = 20120624
-_TEMPERATURE = 1.5  # what evidence is divided by before it becomes a probability, as in the survey
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,23 +124,6 @@ def program_weight(problem: Problem) -> Floats:
         if each.effect.STAGE in ("workpiece", "sensor"):
             machine[problem.columns.of(i)] = False
     return np.asarray(out * np.outer(machine, machine) / max(rows, 1), float)
-
-
-def expected_gain(apart: Floats, probability: Floats) -> float:
-    """Expected fall of the entropy, bits. apart (r, r): chi-square by which rival j misses the mean log of rival i."""
-    rng = np.random.default_rng(_SEED)
-    after = 0.0
-    for i, p in enumerate(probability):
-        scatter = np.sqrt(apart[i]) * rng.standard_normal((_OUTCOME_DRAWS, len(probability)))
-        logs = np.log(np.maximum(probability, 1e-12)) - (0.5 * apart[i] + scatter) / _TEMPERATURE
-        weight = np.exp(logs - logs.max(axis=1, keepdims=True))
-        after += p * float(np.mean([_entropy(w / w.sum()) for w in weight]))
-    return max(_entropy(probability) - float(after), 0.0)
-
-
-def _entropy(p: Floats) -> float:
-    p = p[p > 1e-12]
-    return float(-(p * np.log2(p)).sum())
 
 
 def _by_other_means(problem: Problem, truth: Fitted, other: Fitted, candidate: Candidate) -> float:

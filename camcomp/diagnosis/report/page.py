@@ -70,7 +70,7 @@ def diagnosis_html(
     floor = result.gap.noise_floor_um
     sections = [Section("notes", "Notes", items=notes)] if notes else []
     sections.append(_to_do(result, next_program))
-    if (circles := circles_section(views)) is not None:
+    if (circles := circles_section(views, result.standards.circles)) is not None:
         sections.append(circles)
     sections.append(_causes(result))
     if result.law is not None:
@@ -183,8 +183,7 @@ def _next(proposal: NextExperiment) -> list[str]:
     elif separates := together(proposal.separates):
         text.append(f"It separates {separates}.")
     time = f", {brief(proposal.minutes, 2)} minutes with setting up" if proposal.minutes else ""
-    unit = "bits" if proposal.poses is None else "nats"
-    text += [*proposal.outcomes, f"Expected gain: {brief(proposal.gain)} {unit}{time}."]
+    text += [*proposal.outcomes, f"Expected gain: {brief(proposal.gain)} bits{time}."]
     return [*text, ADD_IT] if proposal.minutes else text
 
 

@@ -1,4 +1,4 @@
-"""The part of a report on values of acceptance tests: ISO 230-2 and ISO 9283, or why the logs hold none."""
+"""The part of a report on values of acceptance tests, ISO 230-2 and ISO 9283, and why the logs hold no others; circles stand with their plots."""
 
 from __future__ import annotations
 

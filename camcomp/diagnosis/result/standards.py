@@ -1,8 +1,8 @@
-"""Values of ISO 230-2 and ISO 9283 as part of a result: what acceptance tests of machines and robots report."""
+"""Values of ISO 230-2, ISO 230-4 and ISO 9283 as part of a result: what acceptance tests of machines and robots report."""
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import Field
 
@@ -30,6 +30,25 @@ class AxisPositioning(Result):
     M_um: Annotated[float, Field(description="range of the means of both directions")]
 
 
+class CircularTurn(Result):
+    """A circle in one direction in one run, ISO 230-4:2022, um."""
+
+    run: str
+    direction: Literal["counter-clockwise", "clockwise"]
+    G_um: Annotated[float, Field(description="circular deviation, about the least-squares centre")]
+    F_max_um: Annotated[float, Field(description="largest deviation of the radius from the programmed one")]
+    F_min_um: Annotated[float, Field(description="least deviation of the radius from the programmed one")]
+
+
+class CircularTest(Result):
+    """A circle under one load in every run that drove it, ISO 230-4:2022, um."""
+
+    circle: Annotated[str, Field(description="radius, plane and centre in the program frame, mm")]
+    cutting: Annotated[bool, Field(description="under load, which the standard leaves out")]
+    turns: tuple[CircularTurn, ...]
+    G_both_um: Annotated[float | None, Field(description="G(b), both directions; null where one was not driven")]
+
+
 class PoseValues(Result):
     """A pose that was visited again and again, ISO 9283:1998, um. The commanded pose is that of the nominal arm at the encoders,
     in the frame and with the tool vector that fit best.
@@ -46,5 +65,6 @@ class StandardValues(Result):
     """What the logs hold of tests by standards, and why they hold no more."""
 
     positioning: tuple[AxisPositioning, ...] = ()
+    circles: tuple[CircularTest, ...] = ()
     poses: tuple[PoseValues, ...] = ()
     absent: tuple[str, ...] = ()

@@ -247,17 +247,39 @@ class PosesToMeasure(Result):
     platform_mm: tuple[tuple[float, float, float], ...]
 
 
+class StrokeBlock(Result):
+    """Strokes of one axis: between which places, how fast, and how many times there and back."""
+
+    low: float
+    high: float
+    speed: Annotated[float, Field(description="unit per second")]
+    times: int
+
+
+class AxisMoves(Result):
+    """Strokes of one axis alone, block after block, each from rest to rest."""
+
+    axis: str
+    unit: Literal["mm", "rad"]
+    blocks: tuple[StrokeBlock, ...]
+    acceleration: Annotated[float, Field(description="unit per second squared")]
+    step_s: float
+
+
 class NextExperiment(Result):
     """What to measure next: what it separates, what is to be gained, and how long it takes."""
 
     action: str
     separates: tuple[str, ...]
-    gain: float
+    gain: Annotated[float, Field(description="expected information, bits")]
     minutes: float | None = None
     outcomes: Annotated[tuple[str, ...], Field(description="what each outcome would mean, a sentence each")] = ()
     poses: Annotated[
         PosesToMeasure | None, Field(description="studies of arms: the list that --next-program writes")
     ] = None
+    moves: Annotated[AxisMoves | None, Field(description="studies of axes: whose set-points --next-program writes")] = (
+        None
+    )
 
 
 class MinorEffect(NamedCause):
@@ -299,7 +321,7 @@ class DiagnosisResult(Result):
         tuple[tuple[NamedCause, ...], ...], Field(description="causes that these runs cannot tell apart")
     ] = ()
     axes_in_detail: dict[str, dict[str, Any]] = Field(default_factory=dict, description="studies of axes: every fit")
-    standards: Annotated[StandardValues, Field(description="ISO 230-2 and ISO 9283")] = StandardValues()
+    standards: Annotated[StandardValues, Field(description="ISO 230-2, ISO 230-4 and ISO 9283")] = StandardValues()
 
     @property
     def law(self) -> Law | None:

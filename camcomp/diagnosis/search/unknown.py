@@ -133,7 +133,7 @@ def _unforetold(problem: Problem, f: Fitted, members: Members) -> dict[str, Floa
     Beyond noise, beyond what runs differ by anyway, and beyond what the doubt about the members' amplitudes makes.
     """
     index, offsets = problem.member_columns(members), problem.columns.run_offsets
-    free = np.flatnonzero(np.isinf(problem.prior.tolerance))
+    free = problem.columns.of_labels
     whole = total(f.grams)
     out: dict[str, list[float]] = {words.kind: [] for words in problem.dictionaries}
     for g, W, r, parts in zip(f.grams, *about(problem, f), problem.white_patterns, strict=True):

@@ -1,4 +1,4 @@
-"""The formulas of ISO 230-2:2014, 3.11 to 3.25, and of ISO 9283:1998, 7.2: lengths in, values in the same unit out."""
+"""The formulas of ISO 230-2:2014, 3.11 to 3.25, of ISO 230-4:2022, 3.3 to 3.5, and of ISO 9283:1998, 7.2: lengths in, values in the same unit out."""
 
 from __future__ import annotations
 
@@ -53,6 +53,22 @@ def positioning(forward: Sequence[Floats], backward: Sequence[Floats]) -> Positi
         E_backward=float(np.ptp(down)),
         M=float(np.ptp(means.mean(axis=0))),
     )
+
+
+def circular_deviation(points: Sequence[Floats]) -> float:
+    """Range of the radii of points (n, 2) about the centre of their least-squares circle (G, G(b))."""
+    all_points = np.concatenate(points)
+    known = all_points[np.isfinite(all_points).all(axis=1)]
+    middle = known.mean(axis=0)
+    p = known - middle
+    for _ in range(8):  # Gauss-Newton on the distances; the first step is a tenth of the radius at most
+        r = np.hypot(*p.T)
+        matrix = np.column_stack((p / r[:, None], np.ones(len(p))))
+        step = np.linalg.lstsq(matrix, r, rcond=None)[0]
+        p = p - step[:2]
+        if np.linalg.norm(step[:2]) < 1e-9:
+            break
+    return float(np.ptp(np.hypot(*p.T)))
 
 
 def pose_accuracy(off: Floats) -> float:

@@ -51,7 +51,7 @@ def parse_table(text: str, name: str) -> ForceTable:
     found: list[list[float]] = []
     for row in range(len(table.rows)):
         if any(table.text(row, column) for column in columns[1:4]):
-            found.append([_number(table, row, column, errors) for column in columns])
+            found.append([table.required(row, column, errors) for column in columns])
             if key_name == "s_mm" and len(found) > 1 and found[-1][0] < found[-2][0]:
                 text = f"s_mm falls from {found[-2][0]:g} to {found[-1][0]:g}"
                 errors.append(ConfigError("CC263", text, at=table.at(row, columns[0])))
@@ -66,20 +66,6 @@ def parse_table(text: str, name: str) -> ForceTable:
         np.add.at(total, rows, force)
         force = total / np.bincount(rows)[:, None]
     return ForceTable(key, force, key_name == "s_mm", names is MACHINE_COLUMNS, values[:, 4] if also else None)
-
-
-def _number(table: CsvTable, row: int, column: int, errors: list[CamcompError]) -> float:
-    """A number; where there is none an error is added."""
-    try:
-        value = table.value(row, column)
-    except ConfigError as error:
-        errors.append(error)
-        return np.nan
-    if np.isnan(value):
-        cell = table.text(row, column)
-        text = f"'{cell}' in column {table.header[column]} is not a number" if cell else "the cell is empty"
-        errors.append(ConfigError("CC262", text, at=table.at(row, column)))
-    return value
 
 
 def _no_force(table: CsvTable) -> ConfigError:

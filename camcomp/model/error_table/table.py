@@ -85,7 +85,7 @@ def parse_table(text: str, name: str) -> ErrorTable:
     names, unit = _error_columns(table)
     columns = [table.header.index(each) for each in (POSITION, *names)]
     errors: list[CamcompError] = []
-    rows = [[_number(table, row, column, errors) for column in columns] for row in range(len(table.rows))]
+    rows = [[table.required(row, column, errors) for column in columns] for row in range(len(table.rows))]
     raise_all(errors)
     for row in range(1, len(rows)):
         if rows[row][0] <= rows[row - 1][0]:
@@ -108,18 +108,6 @@ def _error_columns(table: CsvTable) -> tuple[tuple[str, ...], str]:
             return both, unit
     message = "no column holds the error: error_um, or forward_um and reverse_um (mm, um, rad, mrad, urad)"
     raise ConfigError("CC266", message, at=table.at(-1))
-
-
-def _number(table: CsvTable, row: int, column: int, errors: list[CamcompError]) -> float:
-    """A number; where there is none an error is added."""
-    try:
-        value = table.value(row, column)
-    except ConfigError as error:
-        errors.append(error)
-        return np.nan
-    if np.isnan(value):
-        errors.append(ConfigError("CC266", "the cell is empty", at=table.at(row, column)))
-    return value
 
 
 def parse_comp(text: str, name: str, comp_type: int) -> ErrorTable:

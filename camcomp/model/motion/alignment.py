@@ -1,8 +1,8 @@
 """Where along its program a machine was, row by row: geometry says it, line numbers settle what geometry leaves open.
 
 Real controls blend corners, merge lines and report line numbers early or late. So rows are led along the path by the
-place of the tip, never back, and the column `line` counts as a hint; by how many rows it leads or lags is found from the
-rows at which it changes.
+place of the tip, all of them together, so that passes over the same place and beam breaks mislead nobody. The column `line`
+counts as a hint; by how many rows it leads or lags is found from the rows at which it changes.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
+from scipy.optimize import isotonic_regression
 
 from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import ARC, Floats, Ints, Path
@@ -19,7 +20,11 @@ _CHORD_RAD = 0.05  # of an arc
 _LINE_MM2 = 0.01  # squared distance that a wrong line number weighs as much as, and by how many times it adds to it
 _LINE_TIMES = 4.0
 _SLACK_MM = 0.5  # by which a row may be further along than the way between two rows says
-_LOST_MM = 2.0  # from the path where the search begins anew
+_LOST_MM = 2.0  # from the path: a row that is further off says nothing about where the machine was
+_JUMP_MM2 = 10.0  # what a place weighs that the row before does not lead to: rows are missing, or the log begins again
+_BACK_MM2 = 10.0  # and every mm back along the path
+_PLACES = 16  # that are followed at a time
+_BOX = 32  # chords that are looked at together
 _MOST_LAG = 25  # rows
 _GAINED = 0.35  # of the shift, in rows per change of line: short lines hide a part of it
 
@@ -43,17 +48,33 @@ def align(path: Path, tip: Floats, line: Floats) -> Aligned:
     begin, end = path_geometry.points(path, motion, u0), path_geometry.points(path, motion, u1)
     length = np.linalg.norm(end - begin, axis=1)
     at = np.concatenate([[0.0], np.cumsum(length)])
-    step = np.linalg.norm(np.diff(tip, axis=0, prepend=tip[:1]), axis=1)
     hint = np.where(np.isfinite(line) & (line > 0), line, -1.0).astype(np.int64)
     hint[~np.isin(hint, path.line)] = -1  # comments, dwells, the end of the program
-    chord, along = _follow(begin, end - begin, length, at, path.line[motion], tip, step, hint)
-    share = np.clip(u0[chord] + along * (u1[chord] - u0[chord]), 0.0, 1.0)
+    way = _onward(_follow(begin, end - begin, length, at, path.line[motion], *_boxes(begin, end), tip, hint))
+    chord = np.clip(np.searchsorted(at, way, side="right") - 1, 0, len(motion) - 1)
+    share = u0[chord] + (way - at[chord]) / length[chord] * (u1[chord] - u0[chord])
     found = motion[chord]
-    share = _nearest(path, found, share, tip)
+    share = _nearest(path, found, np.clip(share, 0.0, 1.0), tip)
     distance = np.linalg.norm(path_geometry.points(path, found, share) - tip, axis=1)
     lag = _lag(path.line[found], hint)
     corrected = line if lag == 0 else _shifted(line, lag)
     return Aligned(found, share, distance, lag, corrected)
+
+
+def _onward(way: Floats) -> Floats:
+    """The way along the path (n,) mm without going back, the nearest such one by squares: noise moves nobody backward.
+
+    Where it goes back by more than _SLACK_MM the log begins again. Source: pool adjacent violators (Barlow et al. 1972).
+    """
+    parts = np.split(way, np.flatnonzero(np.diff(way) < -_SLACK_MM) + 1)
+    return np.concatenate([isotonic_regression(each).x for each in parts])
+
+
+def _boxes(begin: Floats, end: Floats) -> tuple[Floats, Floats]:
+    """Lowest and highest corners (b, 3) of the chords, _BOX of them at a time."""
+    first = np.arange(0, len(begin), _BOX)
+    low = np.minimum.reduceat(np.minimum(begin, end), first)
+    return low, np.maximum.reduceat(np.maximum(begin, end), first)
 
 
 def _chords(path: Path) -> tuple[Ints, Floats, Floats]:
@@ -68,40 +89,106 @@ def _chords(path: Path) -> tuple[Ints, Floats, Floats]:
 
 
 @njit(cache=True)
-def _follow(begin, way, length, at, line, tip, step, hint):  # type: ignore[no-untyped-def]  # pragma: no cover
-    n, k = tip.shape[0], begin.shape[0]
-    chord, along = np.zeros(n, np.int64), np.zeros(n)
-    here, done = 0, 0.0  # chord, and mm along it
-    lost = True
+def _put(place, weight, found, at, weighs):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """One more place, in the stead of the worst one when there are too many; their number."""
+    k = found
+    if found == _PLACES:
+        k = int(np.argmax(weight))
+        if weight[k] <= weighs:
+            return found
+    place[k], weight[k] = at, weighs
+    return min(found + 1, _PLACES)
+
+
+@njit(cache=True)
+def _places(begin, way, length, at, line, low, high, tip, hint):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Where along the path it comes nearest to a tip (3,) and leaves again, mm, and what these places weigh."""
+    place, weight = np.empty(_PLACES), np.empty(_PLACES)
+    found, previous = 0, -2
+    ended = False  # the nearest place on the chord before is its end: the way goes on to fall, or it is the nearest one
+    last_at, last_weight = 0.0, 0.0
+    for box in range(low.shape[0]):
+        gap = 0.0
+        for j in range(3):
+            gap += max(low[box, j] - tip[j], tip[j] - high[box, j], 0.0) ** 2
+        if gap > _LOST_MM**2:
+            continue
+        for c in range(box * _BOX, min(box * _BOX + _BOX, len(length))):
+            x = 0.0
+            for j in range(3):
+                x += (tip[j] - begin[c, j]) * way[c, j]
+            x = min(max(x / length[c], 0.0), length[c])
+            gap = 0.0
+            for j in range(3):
+                gap += (begin[c, j] + x / length[c] * way[c, j] - tip[j]) ** 2
+            if gap > _LOST_MM**2:
+                continue
+            # the line that is said to be executed has a nearest place of its own
+            on = c == previous + 1 and (hint < 0 or (line[c] == hint) == (line[previous] == hint))
+            if ended and (not on or x == 0.0):
+                found = _put(place, weight, found, last_at, last_weight)
+            ended, previous, last_at = x == length[c], c, at[c] + x
+            last_weight = gap if hint < 0 or line[c] == hint else _LINE_TIMES * gap + _LINE_MM2
+            if 0.0 < x < length[c] or (x == 0.0 and not on):
+                found = _put(place, weight, found, last_at, last_weight)
+    if ended:
+        found = _put(place, weight, found, last_at, last_weight)
+    return place[:found], weight[:found]
+
+
+@njit(cache=True)
+def _follow(begin, way, length, at, line, low, high, tip, hint):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Way along the path (n,) mm: of all sequences of places near the rows the one that fits best and leads from row to row.
+
+    Dynamic programming over the nearest places of every row, at most _PLACES of them, each with the row it was last seen at:
+    a row may be no place at all (a beam break), for which it counts as _LOST_MM off.
+    """
+    n = tip.shape[0]
+    where, cost = np.zeros((n, _PLACES)), np.full((n, _PLACES), np.inf)
+    before, seen = np.full((n, _PLACES), -1), np.full((n, _PLACES), -1)
+    held = 0  # places of the row before
     for i in range(n):
-        best = np.inf
-        found, place = here, done
-        # near by at first; rows are missing: anywhere ahead; the log begins again: anywhere
-        for attempt in range(2 if lost else 0, 3):
-            if best <= _LOST_MM**2:
-                break
-            first = 0 if attempt == 2 else here
-            reach = 2.0 * step[i] + _SLACK_MM if attempt == 0 else np.inf
-            for c in range(first, k):
-                if at[c] - at[here] - done > reach:
-                    break
-                low = done if c == here and attempt < 2 else 0.0
-                x = 0.0
-                for j in range(3):
-                    x += (tip[i, j] - begin[c, j]) * way[c, j]
-                x = min(max(x / length[c], low), length[c])
-                gap = 0.0
-                for j in range(3):
-                    gap += (begin[c, j] + x / length[c] * way[c, j] - tip[i, j]) ** 2
-                if hint[i] >= 0 and line[c] != hint[i]:
-                    gap = _LINE_TIMES * gap + _LINE_MM2
-                gap += 1e-9 * max(at[c] + x - at[here] - done, 0.0)  # of two that fit alike the nearer along the path
-                if gap < best - 1e-12:
-                    best, found, place = gap, c, x
-        lost = False
-        here, done = found, place
-        chord[i], along[i] = found, place / length[found]
-    return chord, along
+        near, off = _places(begin, way, length, at, line, low, high, tip[i], hint[i])
+        count = len(near) + held
+        s, c = np.empty(count), np.empty(count)
+        b, last = np.full(count, -1), np.full(count, i)
+        for k in range(len(near)):
+            s[k], c[k] = near[k], np.inf
+            for j in range(held):
+                step = 0.0
+                for a in range(3):
+                    step += (tip[i, a] - tip[seen[i - 1, j], a]) ** 2
+                ahead = near[k] - where[i - 1, j]
+                jump = 0.0
+                if ahead < 0.0:
+                    jump = min(-_BACK_MM2 * ahead, _JUMP_MM2)
+                elif ahead > 2.0 * np.sqrt(step) + _SLACK_MM:
+                    jump = _JUMP_MM2
+                value = (
+                    cost[i - 1, j] + jump + 1e-9 * max(ahead, 0.0)
+                )  # of two that fit alike the nearer along the path
+                if value < c[k]:
+                    c[k], b[k] = value, j
+            if held == 0:
+                c[k] = 1e-9 * near[k]
+            c[k] += off[k]
+        for j in range(held):
+            k = len(near) + j
+            s[k], c[k], b[k], last[k] = where[i - 1, j], cost[i - 1, j] + _LOST_MM**2, j, seen[i - 1, j]
+        held = min(count, _PLACES)
+        best = np.argsort(c, kind="mergesort")[:held]
+        for j in range(held):
+            k = best[j]
+            where[i, j], cost[i, j], before[i, j], seen[i, j] = s[k], c[k], b[k], last[k]
+    out = np.zeros(n)
+    j = 0
+    for i in range(n - 1, -1, -1):
+        out[i] = where[i, j]
+        if before[i, j] < 0:  # rows before the first place: they lie wherever that is
+            out[:i] = out[i]
+            break
+        j = before[i, j]
+    return out
 
 
 def _nearest(path: Path, motion: Ints, share: Floats, tip: Floats) -> Floats:

@@ -103,14 +103,19 @@ def driven_path(
     )  # fmt: skip
 
 
-def cutting_forces(track: Track, aligned: Aligned, tip: Floats, time: Floats, logged_line: bool) -> Forces:
-    """What the model says of the force along the way that the tip (n, 3) mm, program frame, was driven at times (n,) s."""
+def cutting_forces(
+    track: Track, aligned: Aligned, tip: Floats, time: Floats, logged_line: bool, beside_mm: float = BESIDE_MM
+) -> Forces:
+    """What the model says of the force along the way that the tip (n, 3) mm, program frame, was driven at times (n,) s.
+
+    beside_mm: from the path, beyond which nothing is cut, where no line numbers say what is.
+    """
     motion, share, on = _executed(track, aligned, tip, time, logged_line)
     piece = _piece_of(track, motion, share)
     w = np.clip((share - track.u0[piece]) / np.maximum(track.u1[piece] - track.u0[piece], 1e-12), 0.0, 1.0)
     on &= track.cutting[piece]
     if not logged_line:
-        on &= aligned.distance < BESIDE_MM
+        on &= aligned.distance < beside_mm
     if not on.any() or track.conditions.model is None:
         return Forces.none(len(tip))
     before, after = driven_directions(tip, time)

@@ -59,6 +59,13 @@ class RunPath:
     driven: Driven | None = None
     feed_mm_per_min: float = np.nan  # of the program, in the middle
     cut_before_min: float = 0.0
+    clock_s: float = 0.0  # by which the clock of the tip is known to be late
+    led: bool = False  # the motion is that of the measured tip, which has no clock beside it then
+
+    @cached_property
+    def tip_time(self) -> Floats:
+        """Times (n,) s at which the tips of the rows stood there, as far as that is known."""
+        return self.time - self.clock_s if self.clock_s else self.time
 
     @cached_property
     def row_place(self) -> Places:

@@ -180,7 +180,7 @@ class Twin:
         error, guided = signal_path.driven(causes, self.actuators, grid)
         effort = signal_path.drive_forces(causes, self.actuators, guided)
         carriage = grid.encoder + error if error.any() else grid.encoder
-        seen = signal_path.clock(causes, run_path.time)
+        seen = run_path.time if run_path.led else signal_path.clock(causes, run_path.tip_time)
         late = seen is not run_path.time
         encoder = rows.encoder
         ahead = None

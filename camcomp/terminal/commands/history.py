@@ -13,7 +13,11 @@ from camcomp.terminal.commands._options import OUTPUT
 if TYPE_CHECKING:
     from camcomp.api.history import Chronicle, ParameterCourse
 
-SHOWN = ("A", "R", "B", "E", "M", "AP", "RP")  # values of standards; those of one direction are in the JSON
+# Values of standards by their names in the JSON, which has those of one direction of ISO 230-2, too.
+SHOWN = {
+    "A": "A", "R": "R", "B": "B", "E": "E", "M": "M", "G": "G", "G_both": "G(b)", "F_max": "F max", "F_min": "F min",
+    "AP": "AP", "RP": "RP",
+}  # fmt: skip
 
 
 @click.command()
@@ -34,7 +38,7 @@ def command(
 
     DIR is a folder of one machine; --add puts results of `camcomp diagnose --json` into it. For every parameter that was
     ever found: its values over the days, whether it stays, drifts or has jumped, and when to measure again. So are values of
-    ISO 230-2 (positioning of an axis) and ISO 9283 (pose of an arm) where the logs held them.
+    ISO 230-2 (positioning of an axis), ISO 230-4 (circles) and ISO 9283 (pose of an arm) where the logs held them.
     """
     from camcomp.api.history import history, keep_diagnosis
 
@@ -63,11 +67,15 @@ def _text(found: "Chronicle") -> list[str]:
         out.append(
             f"{name} {each.parameter}: {last.value:.4g} ({low:.4g} to {high:.4g}) on {last.day}; {_course(each)}"
         )
+    places: dict[str, list[str]] = {}
     for value in found.standards:
         if value.name in SHOWN:
             (first, before), (latest, now) = value.values[0], value.values[-1]
-            since = f", {now - before:+.3g} since {first}" if len(value.values) > 1 else ""
-            out.append(f"{value.standard} {value.name}, {value.place}: {now:.4g} um on {latest}{since}")
+            since = f" and since {first}" if latest > first else ""
+            change = f" ({now - before:+.3g})" if latest > first else ""
+            head = f"{value.standard}, {value.place}, on {latest}{since}"
+            places.setdefault(head, []).append(f"{SHOWN[value.name]} {now:.4g} um{change}")
+    out += [f"{head}: {', '.join(values)}" for head, values in places.items()]
     if found.measure_again:
         out.append(f"measure again by {found.measure_again}")
     return out

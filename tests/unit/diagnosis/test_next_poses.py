@@ -19,9 +19,9 @@ NOISE = 0.05
 
 
 def information(X, chosen, prior):
-    """Log det of the posterior's precision over the prior's, written down anew."""
+    """Half the log det of the posterior's precision over the prior's, bits, written down anew."""
     rows = X[list(chosen)].reshape(-1, X.shape[2]) / NOISE
-    return 0.5 * np.linalg.slogdet(np.eye(len(prior)) + prior @ rows.T @ rows)[1]
+    return 0.5 * np.linalg.slogdet(np.eye(len(prior)) + prior @ rows.T @ rows)[1] / np.log(2.0)
 
 
 @pytest.fixture(scope="module")

@@ -60,7 +60,8 @@ def test_a_study_of_axes_fills_the_same_keys(axis, ambiguous):
     check("diagnosis", told)
     for part in (lambda r: r, lambda r: r["where"], lambda r: r["gap"]):
         assert list(part(told)) == list(part(ambiguous))
-    assert told["shrinkage"] is None and told["next_experiment"] is None  # one run: none is unseen
+    assert told["shrinkage"] is None  # one run: none is unseen
+    assert told["next_experiment"]["moves"]["axis"] == "x" and told["next_experiment"]["minutes"] > 3.0
     assert told["causes"][-1]["effect"] == "unknown" and "2*pi*act_mm/15" in told["causes"][-1]["law"]["formula"]
     assert told["where"]["drivers"][0]["period_mm"] == pytest.approx(15.0, rel=0.01)
     assert told["axes_in_detail"]["x"]["force"]["mass_kg"]["ci95"][0] < 1.0

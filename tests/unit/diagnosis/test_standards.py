@@ -10,7 +10,7 @@ from camcomp.diagnosis.arm.poses import Poses
 from camcomp.diagnosis.experiment.open_experiment import open_experiment
 from camcomp.diagnosis.report.standards import standards_section
 from camcomp.diagnosis.result.standards import StandardValues
-from camcomp.diagnosis.standards import NO_STOPS, of_runs
+from camcomp.diagnosis.standards import NO_CIRCLES, NO_STOPS, of_runs
 from camcomp.diagnosis.statistics.standard_values import pose_accuracy, pose_repeatability, positioning
 from camcomp.model.config.load import load_config
 from camcomp.model.statics.build import build_robot
@@ -91,7 +91,7 @@ def values_of(tmp_path, **how):
 def test_a_log_that_holds_the_test_gives_its_values(tmp_path):
     values = values_of(tmp_path)
     (axis,) = values.positioning
-    assert (axis.axis, axis.line, axis.targets, axis.approaches, values.absent) == ("X", "Y0 Z0", 5, 5, ())
+    assert (axis.axis, axis.line, axis.targets, axis.approaches, values.absent) == ("X", "Y0 Z0", 5, 5, (NO_CIRCLES,))
     for name, value in PUBLISHED.items():
         assert getattr(axis, f"{name}_um") == pytest.approx(1e3 * value, abs=0.02)
     assert [each.name for each in (standards_section(values),)] == ["standards"]
@@ -100,8 +100,60 @@ def test_a_log_that_holds_the_test_gives_its_values(tmp_path):
 @pytest.mark.parametrize("how", [{"sweeps": 4}, {"targets": 4}], ids=["four approaches", "four targets"])
 def test_a_log_that_holds_less_gives_none_and_says_so(tmp_path, how):
     values = values_of(tmp_path, **how)
-    assert values == StandardValues(absent=(NO_STOPS,))
+    assert values == StandardValues(absent=(NO_STOPS, NO_CIRCLES))
     assert NO_STOPS in standards_section(values).items[0]
+
+
+CIRCLE = "G21 G90 G17\nM3 S8000\nG0 X25 Y0 Z0\n{way} X25 Y0 I-25 J0 F1000\nM2\n"
+LOGGED = {"one": ("G3", 0.005, False), "other": ("G2", -0.003, False), "oval": ("G3", None, True)}
+
+
+@pytest.fixture(scope="module")
+def circles(tmp_path_factory):
+    """A circle one way round out by 5 um, the other way in by 3 um, and cut as an oval of 10 um; 0.1 mm off the middle each."""
+    folder, runs = tmp_path_factory.mktemp("circles"), []
+    for name, (way, off, cutting) in LOGGED.items():
+        (folder / f"{name}.nc").write_text(CIRCLE.format(way=way))
+        angle = np.linspace(0.0, 2.0 * np.pi, 721) * (1.0 if way == "G3" else -1.0)
+        radius = 25.0 + (0.01 * np.cos(2.0 * angle) if off is None else off)
+        rows = np.column_stack(
+            (np.linspace(0, 9.42, 721), np.full(721, 4), 25 * np.cos(angle), 25 * np.sin(angle), 0 * angle,
+             radius * np.cos(angle) + 0.1, radius * np.sin(angle), 0 * angle)
+        )  # fmt: skip
+        head = "t_s,line,cmd_x_mm,cmd_y_mm,cmd_z_mm,x_mm,y_mm,z_mm"
+        np.savetxt(folder / f"{name}.csv", rows, "%.7f", ",", header=head, comments="")
+        cut = str(cutting).lower()
+        runs.append(f"{{name: {name}, program: {name}.nc, log: {name}.csv, cutting: {cut}, started_s: 0}}")
+    machine = ROOT / "config/cartesian.yaml"
+    (folder / "experiment.yaml").write_text(f"config: [{machine}]\nruns: [{', '.join(runs)}]\n")
+    opened = open_experiment(folder / "experiment.yaml")
+    return of_runs(opened.twin, opened.runs)
+
+
+def test_circles_have_the_values_of_a_ballbar(circles):
+    """G about the own centre: the 0.1 mm by which both are off the middle do not count, in F they do."""
+    air, cut = circles.circles
+    assert (air.circle, air.cutting, cut.cutting) == ("R 25 mm in XY about (0, 0, 0)", False, True)
+    assert [(each.run, each.direction) for each in air.turns] == [("one", "counter-clockwise"), ("other", "clockwise")]
+    for turn, off in zip(air.turns, (5.0, -3.0), strict=True):
+        assert turn.G_um == pytest.approx(0.0, abs=0.01)
+        assert (turn.F_max_um, turn.F_min_um) == pytest.approx((off + 100.0, off - 100.0), abs=0.25)
+    assert air.G_both_um == pytest.approx(8.0, abs=0.01)
+    assert cut.turns[0].G_um == pytest.approx(20.0, abs=0.05) and cut.G_both_um is None
+    assert circles.absent == (NO_STOPS,)
+
+
+def test_history_tells_circles_over_the_days(tmp_path, capsys, circles):
+    for day, grown in ((15, 0.0), (16, 2.5)):
+        found = result("none").as_json()
+        found["standards"] = circles.as_json()
+        found["standards"]["circles"][0]["G_both_um"] += grown
+        (tmp_path / "r.json").write_text(json.dumps(found))
+        assert run(["history", str(tmp_path / "m"), "--add", str(tmp_path / "r.json"), "--day", f"2026-01-{day}"]) == 0
+    told = capsys.readouterr().out
+    place = "ISO 230-4, R 25 mm in XY about (0, 0, 0)"
+    assert f"{place}, in air, on 2026-01-16 and since 2026-01-15: G(b) 10.5 um (+2.5)" in told
+    assert f"{place}, cutting, counter-clockwise, on 2026-01-16 and since 2026-01-15: G 20.01 um (+0), F max" in told
 
 
 @pytest.mark.parametrize("visits", [30, 29])
@@ -151,7 +203,8 @@ def test_history_tells_values_over_the_days(tmp_path, capsys):
         (tmp_path / "r.json").write_text(json.dumps(found))
         words = ["history", str(tmp_path / "m"), "--add", str(tmp_path / "r.json"), "--day", f"2026-0{month}-15"]
         assert run(words) == 0
-    assert "ISO 230-2 A, X at Y0 Z0: 14.5 um on 2026-02-15, +4.5 since 2026-01-15" in capsys.readouterr().out
+    told = capsys.readouterr().out
+    assert "ISO 230-2, X at Y0 Z0, on 2026-02-15 and since 2026-01-15: A 14.5 um (+4.5), R 14.5 um" in told
     assert run(["history", str(tmp_path / "m"), "--json", "-"]) == 0
     told = json.loads(capsys.readouterr().out)["standards"]
     assert len(told) == len(names) and told[0]["values"] == [["2026-01-15", 10.0], ["2026-02-15", 14.5]]

@@ -1,0 +1,38 @@
+"""Labels of clampings and clocks: what they differ by is nobody's fault, what all of them have in common is a cause.
+
+Runs without a label share one clamping and one clock, and labels differ from it. Where every run has a label there is
+nothing to differ from: then labels scatter about what they have in common, by as much as they are seen to.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.stats import norm, t
+
+from camcomp.ground.datatypes import Floats
+
+Label = str | int | None
+EFFECT_OF = {"clock": "time_sync", "clamping": "workpiece_frame"}  # what a label may differ by
+SIDE = 0.1587  # of a distribution beyond one standard deviation: Student's tells how little few labels know of theirs
+
+
+def apart(labels: Sequence[Label]) -> list[str | int]:
+    """The labels that have an offset of their own: all but the one that runs without a label share; none if there is but one."""
+    every = list(dict.fromkeys(labels))
+    return [each for each in every if each is not None] if len(every) > 1 else []
+
+
+def scattering(labels: Sequence[Label]) -> bool:
+    """Whether labels scatter about what they have in common, because no run is without."""
+    return len(set(labels)) > 1 and None not in labels
+
+
+def scatter(offsets: Floats) -> float:
+    """Standard deviation of labels about what they have in common, from their offsets (labels,), as large as few may hide."""
+    few = float(t.isf(SIDE, len(offsets) - 1) / norm.isf(SIDE))
+    return float(np.std(offsets, ddof=1)) * few
+
+
+def label_name(label: str, value: str | int, parameter: str) -> str:
+    """Name of the column by which a label's parameter differs."""
+    return f"{label} {value}.{parameter}"
