@@ -8,6 +8,7 @@ below what is minor and below the noise, as in experiment.py.
 from __future__ import annotations
 
 import json
+import os
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -228,21 +229,30 @@ def _rate(name: str, hits: list[bool]) -> str:
 @click.option("--null", "nulls", default=4, help="Experiments without a law, per machine.")
 @click.option("--seed", default=1)
 @click.option("--only", multiple=True, type=click.Choice([*TRUTH, "null"]))
-def main(out, machines, ratios, nulls, seed, only):
+@click.option("--rows", default=220, help="Of every run.")
+@click.option(
+    "--in-turn", is_flag=True, help="Every law on one machine per size, machines in turn, nulls between them."
+)
+def main(out, machines, ratios, nulls, seed, only, rows, in_turn):
     """Make, ask, judge, and print the rates."""
+    for name in ("NUMBA_NUM_THREADS", "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
     results = out / "lawful.jsonl"
     out.mkdir(parents=True, exist_ok=True)
     done = [json.loads(line) for line in results.read_text().splitlines()] if results.exists() else []
     there = {(r["effect"], r["machine"], r["ratio"], r["seed"]) for r in done}
     wanted = [
         (effect, machine, ratio, seed + 100 * i + 10 * j)
-        for ratio in ratios
+        for k, ratio in enumerate(ratios)
         for i, effect in enumerate(TRUTH)
         for j, machine in enumerate(machines)
+        if not in_turn or j == (i + k) % len(machines)
     ]
     wanted += [
         ("null", machine, 0.0, seed + 5000 + 100 * i + j) for i in range(nulls) for j, machine in enumerate(machines)
     ]
+    if in_turn:  # a campaign that is cut short has some of everything
+        wanted = [wanted[i] for i in np.random.default_rng(seed).permutation(len(wanted))]
     for effect, machine, ratio, number in wanted:
         if (effect, machine, ratio, number) in there or (only and effect not in only):
             continue
@@ -250,7 +260,7 @@ def main(out, machines, ratios, nulls, seed, only):
         # along y the laws of strange.py depend on z, of which there is little
         target = str(rng.choice(MACHINES[machine].actuators if effect in ON_ACTUATORS else ["x", "z"]))
         folder = out / f"{effect}-{machine}-{ratio:g}-{number}"
-        row = judged(effect, target, machine, number, ratio, folder)
+        row = judged(effect, target, machine, number, ratio, folder, rows)
         done.append(row)
         with results.open("a") as file:
             file.write(json.dumps(row) + "\n")

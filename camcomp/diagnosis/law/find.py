@@ -256,9 +256,18 @@ class _Search:
                 G, h = data.G[:, at][:, :, at], data.h[:, at]
                 gain = float(withheld(gains(G[:, None], h[:, None], size[at][None]))[0])
                 gain -= self._costs([terms[i] for i in some])
-                if gain > value + (0.5 if count >= len(best) else -SAME):
-                    best, value = [terms[i] for i in some], gain
+                tried = [terms[i] for i in some]
+                if gain > value + self._margin(tried, best):
+                    best, value = tried, gain
         return best
+
+    @staticmethod
+    def _margin(tried: Sequence[Term], best: Sequence[Term]) -> float:
+        """Log density by which a set has to be more probable than another: fewer terms and fewer shapes go before."""
+        shapes = [sum(len(t.form.shape) for t in terms) for terms in (tried, best)]
+        if len(tried) < len(best):
+            return -SAME
+        return SAME if shapes[0] > shapes[1] else 0.5
 
     def _without_idle(self, chosen: list[Term]) -> list[Term]:
         """The terms that do something beside the others."""
