@@ -14,7 +14,7 @@ from camcomp.diagnosis.law.rows import Rows, drive_rows, tip_rows
 from camcomp.diagnosis.law.sizes import Sizes, sizes
 from camcomp.diagnosis.law.white import White
 from camcomp.diagnosis.statistics.noise_model import Noise
-from camcomp.ground.datatypes import Floats, Ints
+from camcomp.ground.datatypes import Bools, Floats, Ints
 from camcomp.model.law.expression import parse
 
 
@@ -116,6 +116,14 @@ class TermBench:
             return {3 + spot.index: thinned(values, thin)}
         way = self.bench.turned(k, self.tip_ways(spot)[k])
         return {c: thinned(way[:, c : c + 1] * values, thin) for c in range(3) if np.abs(way[:, c]).max() > 1e-9}
+
+    def seen(self, spot: Spot) -> list[Bools]:
+        """Rows (n',) per run, thinned, in which some channel that the spot reaches is known."""
+        ones = [np.ones((len(way), 1)) for way in self.tip_ways(spot)]
+        return [
+            np.isfinite(inflate[:, list(self._reached(spot, k, one))]).any(axis=1)
+            for k, (inflate, one) in enumerate(zip(self.inflate, ones, strict=True))
+        ]
 
     def channels(self, spot: Spot, values: Sequence[Floats]) -> list[Floats]:
         """Functions (n, f) per run as changes of all channels, thinned: (n', c, f)."""

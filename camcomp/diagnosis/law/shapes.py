@@ -70,16 +70,20 @@ class Shapes:
 
     def _between_rows(self, step: Folds, term: Term) -> Term:
         """What begins or ends does so between two rows: the density is a staircase there, on which a simplex stops anywhere."""
-        runs = zip(self.bench.bench.runs, self.bench.times, strict=True)
-        between = np.sort(np.concatenate([run.run_path.started + 0.5 * (t[1:] + t[:-1]) for run, t in runs]))
-        best = term.form
+        between, best = self._between(term.spot), term.form
         for _ in range(TURNS):
             for i in range(len(best.shape)):
                 instants = np.cumsum(best.shape)
                 near = between[np.argsort(np.abs(between - instants[i]))[:INSTANTS]]
-                tried = [best, *(_moved(best, i, float(at)) for at in near)]
+                tried = [*(_moved(best, i, float(at)) for at in near), best]
                 best = tried[int(np.argmax(self._gains(step, term.spot, tried)))]
         return Term(term.spot, best)
+
+    def _between(self, spot: Spot) -> Floats:
+        """Instants on the common clock in the middle between rows that show what happens at a spot."""
+        every = zip(self.bench.bench.runs, self.bench.times, self.bench.seen(spot), strict=True)
+        shown = [run.run_path.started + t[seen] for run, t, seen in every]
+        return np.sort(np.concatenate([0.5 * (t[1:] + t[:-1]) for t in shown]))
 
     def _gains(self, step: Folds, spot: Spot, forms: Sequence[Form]) -> Floats:
         """Log evidence (f,) that forms of one column add, each alone."""
