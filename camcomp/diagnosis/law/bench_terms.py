@@ -121,7 +121,7 @@ class TermBench:
         """Rows (n',) per run, thinned, in which some channel that the spot reaches is known."""
         ones = [np.ones((len(way), 1)) for way in self.tip_ways(spot)]
         return [
-            np.isfinite(inflate[:, list(self._reached(spot, k, one))]).any(axis=1)
+            np.asarray(np.isfinite(inflate[:, list(self._reached(spot, k, one))]).any(axis=1))
             for k, (inflate, one) in enumerate(zip(self.inflate, ones, strict=True))
         ]
 
