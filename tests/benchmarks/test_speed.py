@@ -21,10 +21,7 @@ from camcomp.model.config.load import load_config
 from camcomp.model.job import Job
 from camcomp.model.statics.solve import TARGET, solve
 from tests.benchmarks.programs import write
-from tests.campaign.runner import CONFIG
-from tests.plants.causes import Cause
-from tests.plants.experiments import Plan, make
-from tests.plants.experiments import write as write_experiment
+from tests.benchmarks.spent import spent
 
 pytestmark = pytest.mark.benchmarks
 
@@ -55,16 +52,6 @@ def table(request):
 
 def tell(what, figure):
     TOLD.append(f"{what:72s} {figure}")
-
-
-def spent(*args):
-    """Wall time, processor time (s) and peak memory (MB) of a process that has to end well."""
-    begin = time.perf_counter()
-    process = subprocess.Popen([sys.executable, *map(str, args)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    _, status, usage = os.wait4(process.pid, 0)
-    process.returncode = status
-    assert status == 0
-    return np.array([time.perf_counter() - begin, usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024.0])
 
 
 def compensate(program, *options):
@@ -277,16 +264,6 @@ def test_a_diagnosis():
     experiment = min(Path(shipped("samples/diagnosis")).rglob("experiment.yaml"))
     took = spent("-m", "camcomp", "diagnose", experiment, "--quiet")
     tell(f"diagnosis of samples/diagnosis/{experiment.parent.name}", f"{took[0]:.1f} s wall, {took[1]:.1f} s processor")
-
-
-@pytest.mark.parametrize("rows", [500, 13_333])
-def test_a_diagnosis_of_six_runs(tmp_path, rows):
-    """As the campaign makes them, and with eight times 10 000 rows in all."""
-    plan = Plan(777, (Cause("drive_stiffness", "y", 778),), (3.0,), samples=rows)
-    took = spent(
-        "-m", "camcomp", "diagnose", write_experiment(make(plan), plan, tmp_path / "experiment", CONFIG), "--quiet"
-    )
-    tell(f"diagnosis of six runs of {rows} rows", f"{took[0]:.1f} s wall, {took[1]:.1f} s processor")
 
 
 @pytest.mark.parametrize("policy", ["full", "shrink", "skip"])

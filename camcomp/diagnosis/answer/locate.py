@@ -26,7 +26,7 @@ def run_gaps(problem: Problem, causes: Sequence[Cause] = ()) -> list[places.RunG
         thin = float(np.mean([1.0 / effective_rows(problem.noise, c, 1) for c in range(part.start, part.stop)]))
         line = thinned(run.measured.line[:, None], run.thin)[:, 0]
         if part.start == 0:
-            slope = thinned(problem.bench.row_slopes(k).reshape(-1, 3 * m), run.thin).reshape(-1, 3, m)
+            slope = problem.bench.thin_slopes(k)
             clean = np.where(np.isfinite(gap), gap, 0.0)
             drives = np.einsum("nij,nj->ni", np.linalg.pinv(slope), clean)
         else:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from camcomp.diagnosis.fit.columns import tip_um
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.result.types import MinorEffect, Outlier
 from camcomp.diagnosis.statistics.cause_sets import Fitted, total
@@ -22,7 +21,7 @@ def minor_effects(problem: Problem, f: Fitted) -> tuple[MinorEffect, ...]:
         if i in f.members or not columns:
             continue
         index = list(columns)
-        size = tip_um(problem.bench, [block[:, :, index] @ mean[index] for block in problem.columns.blocks])
+        size = problem.size_um(index, mean[index])
         if size > LEAST * problem.floor.tip_um:
             found.append(MinorEffect(effect=candidate.name, target=candidate.target, size_um=round(size, 3)))
     return tuple(sorted(found, key=lambda each: -each.size_um)[:MOST_LISTED])

@@ -13,6 +13,7 @@ from camcomp.diagnosis.experiment.log_checks import (
     FAR_MM,
     check_followed,
     check_forces,
+    check_lines,
     check_on_program,
     check_places,
     check_told,
@@ -23,7 +24,7 @@ from camcomp.ground.datatypes import RAPID, Bools, Floats, Path
 from camcomp.ground.errors import ConfigError, Location
 from camcomp.model.cutting.track import JOIN_ANGLE, Conditions, Track, lay_track
 from camcomp.model.effect import Cause
-from camcomp.model.motion.alignment import Aligned, align
+from camcomp.model.motion.alignment import Aligned, align, way_from_lines
 from camcomp.model.motion.driven_path import BESIDE_MM, Forces, cutting_forces, driven_path
 from camcomp.model.motion.run_path import RunPath
 from camcomp.model.motion.twin import Twin
@@ -87,16 +88,19 @@ def drive(
     rho = np.column_stack([np.interp(measured.time, measured.time[known], v[known]) for v in told.T])
     rotary = all(a.revolute for a in twin.robot.actuators)
     if program is not None:
-        check_told(log, name, by, rho, program.rho, rotary)
+        check_told(log, name, by, rho, program.rho, twin.actuators, rotary)
     near = _near(log, name, measured, rho, program, twin)
     tip = twin.to_program(twin.forward(rho, twin.to_machine(near)))
-    check_places(log, name, measured, rho, tip, rotary)
+    check_places(log, name, measured, rho, tip, twin.actuators, rotary)
     aligned = None if program is None else _aligned(log, name, program, tip, measured)
     unsure = ~_close(measured.time, known)
     if program is None or aligned is None:
         forces = Forces.none(len(tip))
     else:
-        forces = cutting_forces(program.track, aligned, tip, measured.time, bool(np.isfinite(measured.line).any()))
+        cut = _behind(measured, rho, tip, program, twin) if by == "setpoint" else None
+        forces = cutting_forces(
+            program.track, cut or aligned, tip, measured.time, bool(np.isfinite(measured.line).any())
+        )
         unsure |= _idle_or_not(forces, aligned, program, tip, measured.time)
     run_path = driven_path(
         name, measured.time, rho, tip, forces, started=started, to_machine=twin.to_machine, vectors=vectors,
@@ -147,7 +151,22 @@ def _aligned(
         raise ConfigError("CC406", message, at=Location(log, 1, 1))
     found = align(path, tip, line)
     check_followed(log, name, found.distance, _agreement(path, found, tip), aside_mm)
+    check_lines(log, name, way_from_lines(path, found))
     return found
+
+
+def _behind(measured: Measured, rho: Floats, tip: Floats, program: _Program, twin: Twin) -> Aligned | None:
+    """Where on the program the drives are, behind set-points rho (n, m) of tips (n, 3) mm: the force turns when they do.
+
+    None where no encoders are logged, or where they lie beside the path because of more than a delay.
+    """
+    known = np.isfinite(measured.encoder).all(axis=1)
+    if known.sum() < 2:
+        return None
+    late = np.column_stack([np.interp(measured.time, measured.time[known], v[known]) for v in measured.encoder.T])
+    driven = twin.to_program(twin.forward(late, twin.to_machine(tip)))
+    found = align(program.track.path, driven, measured.line)
+    return found if float(np.median(found.distance)) < ASIDE_MM else None
 
 
 def _agreement(path: Path, found: Aligned, tip: Floats) -> float:

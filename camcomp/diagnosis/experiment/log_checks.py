@@ -1,6 +1,6 @@
 """Whether a log can be what its run says: right program, units, axes and order. What cannot is refused with the reason."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from itertools import permutations
 
@@ -22,6 +22,10 @@ _TIMES = {1e3: "ms", 1e6: "us", 1.0 / 60.0: "minutes"}
 _FORCES = {1e-3: "kN", 1e3: "mN"}
 SAME_TIME = (0.7, 1.4)  # times a program that a log takes, whose clock counts in another unit
 SAME_FORCE = (0.1, 10.0)  # times the modelled force: whatever is wrong with it, a unit is a thousand
+AXES = ("x", "y", "z")
+ROWS_APART = (1, -1, 2, -2, 3, -3)  # between channels of one log
+LATEST_S = 0.05  # no clock is further off than that, and no drive later
+TOGETHER = 0.35  # of the distance: what a shift by rows has to leave to be what was meant
 _HOT_C = 150.0
 _STRONG_N = 20.0
 
@@ -79,44 +83,82 @@ def check_followed(name: str, run: str, distance: Floats, agreement: float, asid
         raise ConfigError("CC406", f"run '{run}': the motion runs {way}", at=Location(name, 1, 1))
 
 
-def check_places(name: str, run: str, measured: Measured, rho: Floats, tip: Floats, rotary: bool = False) -> None:
-    """Raise CC407 (units), CC408 (axes), CC406 (another program) where tip or encoders are far from where they were due.
+def check_lines(name: str, run: str, away: Floats) -> None:
+    """Raise CC406 where line numbers are not those of what is driven: away (n,) mm of way from the line that a row names."""
+    known = away[np.isfinite(away)]
+    if len(known) >= LEAST_ROWS and np.median(known) > FAR_MM:
+        message = (
+            f"run '{run}': the rows are {np.median(known):.3g} mm of way from the lines that they name: the column line looks "
+            "like that of another program, or like numbers N in place of lines counted from 1"
+        )
+        raise ConfigError("CC406", message, at=Location(name, 1, 1))
+
+
+def check_rows_together(name: str, run: str, what: str, time: Floats, found: Floats, due: Floats, other: str) -> None:
+    """Raise CC412 where a channel found (n, k) fits what was due (n, k) in the rows before or behind, other, by far better.
+
+    Only where a row lasts longer than clocks are apart and drives late, or that is what it would be.
+    """
+    usual = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
+
+    def off(by: int) -> float:
+        rows = np.arange(max(-by, 0), len(due) - max(by, 0))
+        step = np.linalg.norm(due[np.minimum(rows + by + 1, len(due) - 1)] - due[rows + by], axis=1)
+        apart = (found[rows] - due[rows + by])[(step > 0.0) & np.isfinite(found[rows]).all(axis=1)]
+        if len(apart) < LEAST_ROWS:
+            return np.inf
+        return float(np.median(np.linalg.norm(apart - np.median(apart, axis=0), axis=1)))  # what sags stays where it is
+
+    here = off(0)
+    for by in ROWS_APART:
+        if abs(by) * usual > LATEST_S and off(by) < TOGETHER * here:
+            way = "behind" if by < 0 else "ahead of"
+            message = f"run '{run}': the {what} {abs(by)} row{'s' if abs(by) > 1 else ''} {way} {other}"
+            raise ConfigError("CC412", message, at=Location(name, 1, 1))
+
+
+def check_places(
+    name: str, run: str, measured: Measured, rho: Floats, tip: Floats, actuators: Sequence[str], rotary: bool = False
+) -> None:
+    """Raise CC407 (units), CC408 (axes), CC406 (another program), CC412 (rows) where tip or encoders are far from where they were due.
 
     tip (n, 3) mm, rho (n, m): where tip and actuators should have been; rotary: all actuators are hinges.
     """
     far = FAR_RAD if rotary else FAR_MM
-    for what, found, due, most in (
-        ("tip looks", measured.tip, tip, FAR_MM),
-        ("encoders look", measured.encoder, rho, far),
+    told = "set-point" if measured.has("setpoint") else "encoder"
+    for what, found, due, most, names in (
+        ("tip looks", measured.tip, tip, FAR_MM, AXES),
+        ("encoders look", measured.encoder, rho, far, actuators),
     ):
         rows = np.isfinite(found).all(axis=1)
         if rows.any():
-            _check(name, run, what, found[rows], partial(_distance, due=due[rows]), most, rotary and most == FAR_RAD)
+            check_rows_together(name, run, what, measured.time, found, due, f"the {told}s")
+            _check(
+                name, run, what, found[rows], partial(_distance, due=due[rows]), most, names, rotary and most == FAR_RAD
+            )
 
 
-def check_told(name: str, run: str, what: str, told: Floats, program: Floats, rotary: bool = False) -> None:
+def check_told(
+    name: str, run: str, what: str, told: Floats, program: Floats, actuators: Sequence[str], rotary: bool = False
+) -> None:
     """Like `check_places` for the motion itself: told (n, m) against the actuators program (s, m) along the program."""
-    tree = KDTree(program)
-
-    def distance(found: Floats) -> float:
-        return float(np.median(tree.query(found)[0]))
-
-    _check(name, run, f"{what}s look", told, distance, FAR_RAD if rotary else FAR_MM, rotary)
+    _check(name, run, f"{what}s look", told, _to_nearest(program), FAR_RAD if rotary else FAR_MM, actuators, rotary)
 
 
 def check_on_program(name: str, run: str, tip: Floats, program: Floats) -> None:
     """Like `check_places` where the tip is the motion: tip (n, 3) against points program (s, 3) along the program."""
+    _check(name, run, "tip looks", tip, _to_nearest(program), FAR_MM, AXES, False)
+
+
+def _to_nearest(program: Floats) -> Callable[[Floats], float]:
     tree = KDTree(program)
-
-    def distance(found: Floats) -> float:
-        return float(np.median(tree.query(found)[0]))
-
-    _check(name, run, "tip looks", tip, distance, FAR_MM, False)
+    return lambda found: float(np.median(tree.query(found)[0]))
 
 
 def _check(
-    name: str, run: str, what: str, found: Floats, distance: Callable[[Floats], float], far: float, rotary: bool
-) -> None:
+    name: str, run: str, what: str, found: Floats, distance: Callable[[Floats], float], far: float, names: Sequence[str],
+    rotary: bool,
+) -> None:  # fmt: skip
     off = distance(found)
     if off < far:
         return
@@ -124,15 +166,31 @@ def _check(
     for factor, unit in (_TURNS if rotary else _LENGTH_UNITS).items():
         if distance(found / factor) < far:
             raise ConfigError("CC407", f"run '{run}': the {what} as if logged in {unit}", at=at)
-    m = found.shape[1]
-    for order in permutations(range(m)):
-        for sign in np.ndindex(*(2,) * m) if m <= 3 else ((0,) * m,):
-            if distance(found[:, order] * (1 - 2 * np.array(sign))) < far:
-                message = f"run '{run}': the {what} right when axes are swapped or reversed"
-                raise ConfigError("CC408", message, at=at)
+    for order, sign in _readings(len(names)):
+        if distance(found[:, order] * sign) < far:
+            message = f"run '{run}': the {what} right {_told(names, order, sign)}"
+            raise ConfigError("CC408", message, at=at)
     unit = "rad" if rotary else "mm"
     message = f"run '{run}': {what.split()[0]} {off:.3g} {unit} from where the program goes"
     raise ConfigError("CC406", message, at=at)
+
+
+def _readings(m: int) -> Iterator[tuple[list[int], Floats]]:
+    """Orders of m columns with their signs, simple ones first: of many columns one at a time is reversed, or the order is another."""
+    same = list(range(m))
+    for j in same:
+        yield same, np.where(np.arange(m) == j, -1.0, 1.0)
+    for order in sorted(permutations(same), key=lambda each: sum(a != b for a, b in zip(each, same, strict=True))):
+        for sign in np.ndindex(*(2,) * m) if m <= 3 else ((0,) * m,):
+            yield list(order), 1.0 - 2.0 * np.array(sign)
+
+
+def _told(names: Sequence[str], order: Sequence[int], sign: Floats) -> str:
+    """What a reading does, in words."""
+    moved = [names[i] for i, j in enumerate(order) if i != j]
+    turned = [names[i] for i, s in enumerate(sign) if s < 0.0]
+    out = [f"with {' and '.join(moved)} exchanged"] if len(moved) == 2 else [f"with {', '.join(moved)} in another order"] if moved else []  # fmt: skip
+    return " and ".join([*out, *([f"with {' and '.join(turned)} reversed"] if turned else [])])
 
 
 def _distance(found: Floats, *, due: Floats) -> float:

@@ -98,6 +98,7 @@ class Bench:
     # of candidates at nominal, worked out before: parameters, then runs (n, c)
     columns: dict[tuple[Any, ...], list[list[Floats]]] = field(default_factory=dict)
     _row_slopes: dict[int, Floats] = field(default_factory=dict)
+    _thin_slopes: dict[int, Floats] = field(default_factory=dict)
     _out: list[Bools] = field(default_factory=list)
     # structures of changed machines, by run and change
     _changed: dict[tuple[Any, ...], Solved] = field(default_factory=dict)
@@ -148,6 +149,13 @@ class Bench:
             at_nodes = self.twin.rotation.T @ self.slopes[k].tip_rho
             self._row_slopes[k] = run.run_path.row_place.of(at_nodes)
         return self._row_slopes[k]
+
+    def thin_slopes(self, k: int) -> Floats:
+        """The same (n', 3, m) at the rows that are kept after thinning."""
+        if k not in self._thin_slopes:
+            slopes, thin = self.row_slopes(k), self.runs[k].thin
+            self._thin_slopes[k] = thinned(slopes.reshape(len(slopes), -1), thin).reshape(-1, *slopes.shape[1:])
+        return self._thin_slopes[k]
 
     def channels(self, k: int, reading: Reading) -> Floats:
         """Channels (n, c) of readings of run k; its tip along and across the path where the tip is the motion."""

@@ -107,16 +107,6 @@ class Columns:
         firm = (self.prior.flexible == 0) & np.isfinite(self.prior.tolerance)
         return np.flatnonzero(firm & np.array([n.startswith("offset.") for n in self.names], bool))
 
-    def with_blocks(self, changed: Mapping[int, Sequence[Floats]]) -> "Columns":
-        """A copy with some columns (index -> per run (n, c)) replaced."""
-        blocks = []
-        for r, block in enumerate(self.blocks):
-            block = block.copy()
-            for i, per_run in changed.items():
-                block[:, :, i] = per_run[r]
-            blocks.append(block)
-        return replace(self, blocks=tuple(blocks))
-
 
 def candidate_columns(bench: Bench, candidate: CandidateCause, shape: Mapping[str, float]) -> list[list[Floats]]:
     """Columns at nominal of an candidate's parameters, per run (n, c), in units of their scales; shape: scanned values."""
@@ -192,15 +182,17 @@ def tip_um(bench: Bench, per_run: Sequence[Floats]) -> float:
 
     What encoders see moves it too, although a model that follows logged encoders says nothing of it.
     """
-    m = len(bench.actuators)
-    whole = rows = 0.0
-    for k, each in enumerate(per_run):
-        moved = each[:, :3]
-        if bench.runs[k].by == "setpoint" and bench.runs[k].measured.has("encoder"):
-            ways = thinned(bench.row_slopes(k).reshape(-1, 3 * m), bench.runs[k].thin).reshape(-1, 3, m)
-            moved = moved + np.einsum("nij,nj->ni", ways, each[:, 3 : 3 + m])
-        whole, rows = whole + float(np.sum(moved**2)), rows + len(each)
-    return 1e3 * float(np.sqrt(whole / max(rows, 1.0)))
+    whole = sum(float(np.sum(moved_tip(bench, k, each[:, :, None]) ** 2)) for k, each in enumerate(per_run))
+    return 1e3 * float(np.sqrt(whole / max(sum(map(len, per_run)), 1)))
+
+
+def moved_tip(bench: Bench, k: int, changes: Floats) -> Floats:
+    """How far changes (n, c, j) of the channels of run k move the tip (n, 3, j), mm, whatever channel shows them."""
+    moved = changes[:, :3]
+    if bench.runs[k].by == "setpoint" and bench.runs[k].measured.has("encoder"):
+        ways = bench.thin_slopes(k)
+        moved = moved + ways @ changes[:, 3 : 3 + ways.shape[2]]
+    return moved
 
 
 def _nuisances(bench: Bench) -> list[tuple[str, float, list[Floats], bool]]:

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from camcomp.diagnosis.fit.bench import thinned
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.statistics import places
 from camcomp.diagnosis.statistics.cause_sets import Fitted
@@ -68,11 +67,11 @@ def rest_by_actuator(problem: Problem, f: Fitted, kind: str) -> dict[str, float]
     m = len(names)
     energy = np.zeros(m)
     causes = problem.causes(f.members, f.theta, f.extra)
-    for k, run in enumerate(problem.bench.runs):
+    for k in range(len(problem.bench.runs)):
         rest = problem.bench.difference(k, problem.bench.read(k, causes))
         rest = np.where(np.isfinite(rest), rest, 0.0)
         if kind == "tip":
-            slope = thinned(problem.bench.row_slopes(k).reshape(-1, 3 * m), run.thin).reshape(-1, 3, m)
+            slope = problem.bench.thin_slopes(k)
             rest = np.einsum("nij,nj->ni", np.linalg.pinv(slope), rest[:, :3])
         elif kind in ("encoder", "drive"):
             rest = rest[:, 3:][:, :m] if kind == "encoder" else rest[:, 3 + m :][:, :m]

@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from camcomp.diagnosis.fit.bench import Bench, CandidateCause, cause_of, step_of, thinned
-from camcomp.diagnosis.fit.columns import Columns, build, candidate_columns, patterns, shape_default
+from camcomp.diagnosis.fit.columns import Columns, build, candidate_columns, moved_tip, patterns, shape_default
 from camcomp.diagnosis.fit.floor import NoiseFloor, least_noise, measure_floor
 from camcomp.diagnosis.fit.grid_parameters import beside, best_shape, quick_columns, reach
 from camcomp.diagnosis.fit.intervals_in_time import LOOK_ELSEWHERE, best_interval, never_ending
@@ -49,6 +49,18 @@ class Problem:
     white_residual: list[Floats]
     shapes: dict[int, dict[str, float]]
     candidates: CausePrior
+
+    @cached_property
+    def tip_gram(self) -> Floats:
+        """Products (k, k) of what the columns do to the tip, mean over the rows of all runs, mm2."""
+        rows = sum(len(block) for block in self.columns.blocks)
+        moved = (moved_tip(self.bench, k, block) for k, block in enumerate(self.columns.blocks))
+        parts = (each.reshape(-1, each.shape[2]) for each in moved)
+        return np.asarray(sum(each.T @ each for each in parts) / max(rows, 1))
+
+    def size_um(self, index: Sequence[int], theta: Floats) -> float:
+        """How far (rms over the rows) some columns with coordinates theta (d,) move the tip."""
+        return 1e3 * float(np.sqrt(np.maximum(theta @ self.tip_gram[np.ix_(index, index)] @ theta, 0.0)))
 
     @property
     def prior(self) -> Prior:
@@ -304,16 +316,13 @@ def open_problem(bench: Bench, candidates: Sequence[CandidateCause], stated_mm: 
     columns = build(bench, candidates, {}, floor.tip_um)
     shapes: dict[int, dict[str, float]] = {i: shape_default(a) for i, a in enumerate(candidates) if a.shapes}
     words = patterns(bench)
-    problem = _whiten(bench, columns, words, floor, noise, inflate, times, residuals, shapes, outliers)
+    rough = _whiten(bench, columns, [], floor, noise, inflate, times, residuals, shapes, outliers)
     if len(columns.of_labels):
-        columns = with_scatter(columns, bench, estimate(total(problem.base_grams), problem.prior, ())[0])
-        problem = _whiten(bench, columns, words, floor, noise, inflate, times, residuals, shapes, outliers)
-    noise = _with_model_error(problem)
+        columns = with_scatter(columns, bench, estimate(total(rough.base_grams), rough.prior, ())[0])
+        rough = replace(rough, columns=columns)
+    noise = _with_model_error(rough)
     problem = _whiten(bench, columns, words, floor, noise, inflate, times, residuals, shapes, outliers)
-    if not shapes:
-        return problem
-    columns = _scan(problem)
-    return _whiten(bench, columns, words, floor, noise, inflate, times, residuals, shapes, outliers)
+    return _scanned(problem) if shapes else problem
 
 
 def _with_model_error(problem: Problem) -> Noise:
@@ -341,11 +350,10 @@ def _whiten(
 ) -> Problem:  # fmt: skip
     white, white_patterns, white_residual = [], [], []
     for k in range(len(bench.runs)):
-        present = np.isfinite(inflate[k])
-        clean = np.where(present[:, :, None], columns.blocks[k], 0.0)
-        white.append(noise.rows(k, clean, inflate[k], times[k]))
+        white.append(noise.rows(k, columns.blocks[k], inflate[k], times[k]))
         white_patterns.append([noise.rows(k, w.blocks[k], inflate[k], times[k], w.first) for w in words])
         white_residual.append(noise.rows(k, residuals[k][:, :, None], inflate[k], times[k])[:, 0])
+    words = [replace(each, blocks=()) for each in words]  # white they are enough
     return Problem(bench, columns, words, inflate, times, residuals, floor, noise, outliers, white, white_patterns,
                    white_residual, shapes, cause_prior(columns))  # fmt: skip
 
@@ -370,12 +378,14 @@ def cause_prior(columns: Columns) -> CausePrior:
     return CausePrior(tuple(tuple(columns.of(i)) for i in range(len(columns.candidates))), np.array(weight), exclusive)
 
 
-def _scan(problem: Problem) -> Columns:
-    """Columns with the scanned shapes (pitches, time constants) that explain most of what the others leave."""
+def _scanned(problem: Problem) -> Problem:
+    """The problem with the scanned shapes (pitches, time constants) that explain most of what the others leave: their columns,
+    in channels and in white rows, are exchanged in place.
+    """
     own = [c for i in problem.shapes for c in problem.candidates.columns[i]]
     others = np.setdiff1d(np.arange(len(problem.columns.names)), own)
     rest = beside(problem.base_grams, problem.white, problem.white_residual, problem.columns, others)
-    changed: dict[int, list[Floats]] = {}
+    changed: list[tuple[list[int], list[list[Floats]]]] = []
     for i in problem.shapes:
         candidate = problem.columns.candidates[i]
         if problem.passing(i):
@@ -389,5 +399,9 @@ def _scan(problem: Problem) -> Columns:
             continue
         problem.shapes[i] = best
         columns = candidate_columns(problem.bench, candidate, best)
-        changed.update(zip(problem.candidates.columns[i], columns, strict=True))
-    return problem.columns.with_blocks(changed)
+        changed.append((list(problem.candidates.columns[i]), columns))
+    for index, columns in changed:
+        for k, (block, W) in enumerate(zip(problem.columns.blocks, problem.white, strict=True)):
+            block[:, :, index] = np.stack([each[k] for each in columns], axis=2)
+            W[:, index] = problem.whitened(k, block[:, :, index])
+    return replace(problem)  # what was worked out of the columns is worked out anew

@@ -9,7 +9,7 @@ import numpy as np
 
 from camcomp.diagnosis.fit.gap import main_channels
 from camcomp.diagnosis.fit.problem import Problem
-from camcomp.diagnosis.law.bench_terms import Spot, TermBench, spots
+from camcomp.diagnosis.law.bench_terms import Spot, TermBench, spots, term_grids
 from camcomp.diagnosis.law.beside import fitted_beside, with_law
 from camcomp.diagnosis.law.describe import law_result, moved_without, terms_of
 from camcomp.diagnosis.law.find import FoundLaw, find_law
@@ -46,6 +46,7 @@ def answer_law(problem: Problem, f: Fitted, kind: str) -> LawAnswer | None:
     if main_channels(problem).start != 0 or kind not in ("tip", "encoder"):
         return None
     bench = term_bench(problem)
+    grids = term_grids(bench, kind)
     floor, before = problem.floor.tip_um, _rms(_gaps(problem, f))
     room = float(np.sqrt(max(before**2 - floor**2, 0.0)))
 
@@ -53,9 +54,9 @@ def answer_law(problem: Problem, f: Fitted, kind: str) -> LawAnswer | None:
         left = float(np.sqrt(max((before if best is None else best.after) ** 2 - floor**2, 0.0)))
         return left > GOOD_ENOUGH * floor and left > GOOD_ENOUGH * room
 
-    best = _tried(problem, f, bench, find_law(bench, _base(problem, f, bench, kind), kind))
+    best = _tried(problem, f, bench, find_law(bench, _base(problem, f, bench, kind), grids))
     if much(best) and room > floor:  # what is small may be the usual small errors
-        other = _tried(problem, None, bench, find_law(bench, _base(problem, None, bench, kind), kind))
+        other = _tried(problem, None, bench, find_law(bench, _base(problem, None, bench, kind), grids))
         if other is not None and other.after < BETTER * (before if best is None else best.after):
             best = other
     if much(best) and kind == "tip":

@@ -1,4 +1,6 @@
-"""Terms on the bench: where a form acts, what it does to the channels of every run, and that in white rows."""
+"""Terms on the bench: where a form acts, what it does to the channels of every run, that in white rows, and grids of all that is
+tried.
+"""
 
 from __future__ import annotations
 
@@ -9,13 +11,15 @@ from functools import cached_property
 import numpy as np
 
 from camcomp.diagnosis.fit.bench import Bench, thinned
-from camcomp.diagnosis.law.forms import Form
+from camcomp.diagnosis.law.forms import Form, at_drive, at_tip
 from camcomp.diagnosis.law.rows import Rows, drive_rows, tip_rows
 from camcomp.diagnosis.law.sizes import Sizes, sizes
 from camcomp.diagnosis.law.white import White
 from camcomp.diagnosis.statistics.noise_model import Noise
 from camcomp.ground.datatypes import Bools, Floats, Ints
 from camcomp.model.law.expression import parse
+
+AT_ONCE = 100  # forms that are evaluated together
 
 
 @dataclass(frozen=True)
@@ -48,6 +52,7 @@ class TermBench:
         self.bench, self.noise, self.inflate, self.times = bench, noise, inflate, times
         self._rows: dict[tuple[str, int], list[Rows]] = {}
         self._ways: dict[Spot, list[Floats]] = {}
+        self._squares: dict[Spot, list[Floats]] = {}
 
     def rows(self, spot: Spot) -> Sequence[Rows]:
         """Covariates per run where the spot is."""
@@ -76,6 +81,14 @@ class TermBench:
         if spot not in self._ways:
             self._ways[spot] = self._tip_ways(spot)
         return self._ways[spot]
+
+    def rms(self, spot: Spot, values: Sequence[Floats]) -> Floats:
+        """By how much each of functions (n, f) at a spot moves the tip (f,), per unit of its coefficient: over all rows."""
+        if spot not in self._squares:
+            self._squares[spot] = [np.sum(way**2, axis=1) for way in self.tip_ways(spot)]
+        ways = self._squares[spot]
+        energy = np.sum([way @ v**2 for way, v in zip(ways, values, strict=True)], axis=0)
+        return np.asarray(np.sqrt(energy / sum(len(v) for v in values)))
 
     def _tip_ways(self, spot: Spot) -> list[Floats]:
         bench = self.bench
@@ -147,3 +160,55 @@ class TermBench:
             rows.append(np.concatenate([r for r, _ in found]) if found else np.zeros(0, int))
             columns.append(np.concatenate([x for _, x in found]) if found else np.zeros((0, v.shape[1])))
         return White(tuple(rows), tuple(columns))
+
+
+@dataclass(frozen=True, eq=False)
+class TermGrid:
+    """All terms of one spot that are tried, white (c columns); first (forms,): column at which each begins; own (c,): energy;
+    products (c - 1,): of a column with the next.
+    """
+
+    spot: Spot
+    forms: tuple[Form, ...]
+    first: Ints
+    white: White
+    own: Floats
+    products: Floats
+
+
+def term_grids(bench: TermBench, kind: str) -> list[TermGrid]:
+    """What is tried where a law may act that shows in a kind of channel."""
+    every = spots(len(bench.bench.actuators), kind)
+    tip = [each for each in every if each.on == "structure"]
+    return [*_grids(bench, tip), *(grid for each in every if each not in tip for grid in _grids(bench, [each]))]
+
+
+def _grids(bench: TermBench, where: Sequence[Spot]) -> list[TermGrid]:
+    """Of spots at which the same covariates stand: their functions are evaluated once."""
+    if not where:
+        return []
+    size, first = bench.sizes(where[0]), where[0]
+    on_drive = first.on in ("control", "drive")
+    forms = at_drive(size, bench.bench.twin.robot.actuators[first.index].revolute) if on_drive else at_tip(size)
+    whites: list[list[White]] = [[] for _ in where]
+    for some in range(0, len(forms), AT_ONCE):  # rows before thinning are many
+        each = [bench.values(first, form) for form in forms[some : some + AT_ONCE]]
+        values = [np.concatenate(of_run, axis=1) for of_run in zip(*each, strict=True)]
+        for parts, spot in zip(whites, where, strict=True):
+            parts.append(bench.white(spot, values))
+    begin = np.cumsum([0, *(len(each.texts) for each in forms[:-1])])
+    return [_grid(spot, forms, begin, parts) for spot, parts in zip(where, whites, strict=True)]
+
+
+def _grid(spot: Spot, forms: Sequence[Form], begin: Ints, parts: list[White]) -> TermGrid:
+    rows, columns = parts[0].rows, []
+    for of_run in zip(*(each.columns for each in parts), strict=True):
+        columns.append(np.concatenate(of_run, axis=1))
+    parts.clear()
+    own = np.asarray(np.sum([np.einsum("rc,rc->c", X, X) for X in columns], axis=0))
+    return TermGrid(spot, tuple(forms), begin, White(rows, tuple(columns)), own, following(columns))
+
+
+def following(columns: Sequence[Floats]) -> Floats:
+    """Products (c - 1,) of columns (n, c) with the next ones, over all runs."""
+    return np.asarray(np.sum([np.einsum("rc,rc->c", X[:, :-1], X[:, 1:]) for X in columns], axis=0))

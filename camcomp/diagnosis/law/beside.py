@@ -10,7 +10,7 @@ import numpy as np
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.law.bench_terms import Spot, TermBench
 from camcomp.diagnosis.law.find import FoundLaw
-from camcomp.diagnosis.law.folds import Folds, spread
+from camcomp.diagnosis.law.folds import Folds
 from camcomp.diagnosis.law.smooth import FoundMap
 from camcomp.diagnosis.statistics.evidence import Prior
 from camcomp.ground.datatypes import Floats
@@ -39,7 +39,7 @@ def with_law(
         blocks=blocks,
     )
     white = [
-        np.concatenate([W, *(spread(x, k, len(W)) for x in found.columns)], axis=1) for k, W in enumerate(problem.white)
+        np.concatenate([W, *(x.over(k, 0, len(W)) for x in found.columns)], axis=1) for k, W in enumerate(problem.white)
     ]
     return replace(problem, columns=columns, white=white)
 

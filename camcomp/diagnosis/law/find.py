@@ -13,15 +13,14 @@ from itertools import combinations
 
 import numpy as np
 
-from camcomp.diagnosis.law.bench_terms import Spot, Term, TermBench, spots
+from camcomp.diagnosis.law.bench_terms import Spot, Term, TermBench, TermGrid, following
 from camcomp.diagnosis.law.folds import ALTERNATING, Folds, Split, gains, usual_split, withheld
-from camcomp.diagnosis.law.forms import Form, at_drive, at_tip
+from camcomp.diagnosis.law.forms import Form
 from camcomp.diagnosis.law.shapes import Shapes
 from camcomp.diagnosis.law.white import White
-from camcomp.ground.datatypes import Floats
+from camcomp.ground.datatypes import Bools, Floats
 
 FALSE_RATE = 0.02  # of a law where there is none
-AT_ONCE = 100  # forms that are evaluated together
 DRAWS, BLOCK = 40, 8  # of signs; rows that share one
 MOST_TERMS = 6
 REFINED = 7  # kinds of terms whose shapes are followed at every step
@@ -54,38 +53,24 @@ class FoundLaw:
 
 
 @dataclass(frozen=True, eq=False)
-class _Block:
-    """All grid terms of one spot, white."""
+class _View:
+    """A grid with the base taken out, all data: half (k, c) of what the base's columns take, G, h (c,), usable (c,)."""
 
-    spot: Spot
-    forms: tuple[Form, ...]
-    first: np.ndarray  # (forms,) column at which each begins
-    white: White
+    half: Floats
+    G: Floats
+    h: Floats
+    good: Bools
 
 
-def find_law(bench: TermBench, base: Callable[[Split, bool], Folds], kind: str, *, seed: int = 0) -> FoundLaw | None:
-    """The law that what is left in a kind of channel follows; None where none holds on withheld parts.
+def find_law(
+    bench: TermBench, base: Callable[[Split, bool], Folds], grids: Sequence[TermGrid], *, seed: int = 0
+) -> FoundLaw | None:
+    """The law, of terms like those of the grids, that what is left follows; None where none holds on withheld parts.
 
     base: what stands beside a law when time is split so, with a free constant at every spot of the tip, which no law is
     asked for, or without.
     """
-    blocks = [_block(bench, spot) for spot in spots(len(bench.bench.actuators), kind)]
-    return _Search(bench, base, usual_split(len(bench.bench.runs)), blocks, np.random.default_rng(seed)).run()
-
-
-def _block(bench: TermBench, spot: Spot) -> _Block:
-    size = bench.sizes(spot)
-    if spot.on in ("control", "drive"):
-        forms = at_drive(size, bench.bench.twin.robot.actuators[spot.index].revolute)
-    else:
-        forms = at_tip(size)
-    whites = []
-    for some in range(0, len(forms), AT_ONCE):  # rows before thinning are many
-        values = [bench.values(spot, each) for each in forms[some : some + AT_ONCE]]
-        whites.append(bench.white(spot, [np.concatenate(of_run, axis=1) for of_run in zip(*values, strict=True)]))
-    columns = tuple(np.concatenate(of_run, axis=1) for of_run in zip(*(w.columns for w in whites), strict=True))
-    first = np.cumsum([0, *(len(each.texts) for each in forms[:-1])])
-    return _Block(spot, tuple(forms), first, White(whites[0].rows, columns))
+    return _Search(bench, base, usual_split(len(bench.bench.runs)), grids, np.random.default_rng(seed)).run()
 
 
 class _Search:
@@ -94,11 +79,15 @@ class _Search:
         bench: TermBench,
         base: Callable[[Split, bool], Folds],
         split: Split,
-        blocks: list[_Block],
+        grids: Sequence[TermGrid],
         rng: np.random.Generator,
     ) -> None:
         self.base, self.split, self.folds = base, split, base(split, True)
-        self.bench, self.blocks, self.rng, self.shapes = bench, blocks, rng, Shapes(bench)
+        self.bench, self.grids, self.rng = bench, grids, rng
+        # of every grid against the base: the same at all steps
+        self._cross = [self.folds.cross(each.white) for each in grids]
+        self._target = [self.folds.target(each.white) for each in grids]
+        self.shapes = Shapes(bench)
 
     def run(self) -> FoundLaw | None:
         chosen: list[Term] = []
@@ -106,8 +95,9 @@ class _Search:
         score = 0.0
         while len(chosen) < MOST_TERMS:
             step = self._beside(chosen)
-            ranked = self._singles(step)
-            threshold = self._by_chance(step)
+            views = [self._view(step, n) for n in range(len(self.grids))]
+            ranked = self._singles(views)
+            threshold = self._by_chance(step, views)
             if not ranked or ranked[0][0] < threshold:
                 break
             fine = [self._refined(step, term) for _, term in self._leaders(ranked)]
@@ -140,7 +130,7 @@ class _Search:
     def _spots_beside(self, term: Term) -> list[Spot]:
         """The other spots at which the same function of the same covariates can act."""
         same = [
-            b.spot for b in self.blocks if (b.spot.on in ("control", "drive")) == (term.spot.on in ("control", "drive"))
+            b.spot for b in self.grids if (b.spot.on in ("control", "drive")) == (term.spot.on in ("control", "drive"))
         ]
         return [s for s in same if s != term.spot and s.on == term.spot.on and s.on == "structure"]
 
@@ -159,32 +149,36 @@ class _Search:
     def _precision(self, term: Term) -> Floats:
         return self.shapes.columns(term)[1]
 
-    def _singles(self, step: Folds) -> list[tuple[float, Term]]:
+    def _view(self, step: Folds, n: int) -> _View:
+        grid = self.grids[n]
+        half = step.halved(np.concatenate([self._cross[n], step.cross(grid.white, first=len(self.folds.more))]))
+        G = grid.own - np.einsum("kc,kc->c", half, half)
+        return _View(half, G, self._target[n] - step.of_target(half), G > 1e-4 * grid.own + 1e-9)
+
+    def _singles(self, views: Sequence[_View]) -> list[tuple[float, Term]]:
         """(gain in evidence, term) of all grid terms, best first."""
         out: list[tuple[float, Term]] = []
-        for block in self.blocks:
-            G, h = step.diagonals(block.white)
-            own = np.concatenate([np.einsum("rc,rc->c", c, c)[None] for c in block.white.columns]).sum(axis=0)
-            good = G > 1e-4 * own + 1e-9
-            count = np.array([len(each.texts) for each in block.forms])
+        for grid, view in zip(self.grids, views, strict=True):
+            G, h, good = view.G, view.h, view.good
+            count = np.array([len(each.texts) for each in grid.forms])
             one = np.flatnonzero(count == 1)
-            i = block.first[one]
+            i = grid.first[one]
             gain = np.where(good[i], 0.5 * h[i] ** 2 / np.maximum(G[i], 1e-12), 0.0)
-            out += [(float(g), Term(block.spot, block.forms[k])) for g, k in zip(gain, one, strict=True)]
+            out += [(float(g), Term(grid.spot, grid.forms[k])) for g, k in zip(gain, one, strict=True)]
             two = np.flatnonzero(count == 2)
             if len(two):
-                i = block.first[two]
-                cross = step.pairs(block.white, i)
+                i = grid.first[two]
+                cross = grid.products[i] - following([view.half])[i]
                 det = G[i] * G[i + 1] - cross**2
                 fit = (h[i] ** 2 * G[i + 1] - 2 * h[i] * h[i + 1] * cross + h[i + 1] ** 2 * G[i]) / np.maximum(
                     det, 1e-12
                 )
                 usable = good[i] & good[i + 1] & (det > 1e-4 * G[i] * G[i + 1])
                 gain = np.where(usable, 0.5 * fit, 0.0)
-                out += [(float(g), Term(block.spot, block.forms[k])) for g, k in zip(gain, two, strict=True)]
+                out += [(float(g), Term(grid.spot, grid.forms[k])) for g, k in zip(gain, two, strict=True)]
         return sorted(out, key=lambda each: -each[0])
 
-    def _by_chance(self, step: Folds) -> float:
+    def _by_chance(self, step: Folds, views: Sequence[_View]) -> float:
         """Gain that the best of all terms has with signs drawn at random, exceeded in FALSE_RATE of draws."""
         rest = step.rest()
         draws = []
@@ -193,12 +187,11 @@ class _Search:
             draws.append(r[:, None] * np.repeat(signs, BLOCK, axis=0)[: len(r)])
         most = np.zeros(DRAWS)
         half = step.projected(draws)
-        for block in self.blocks:
-            G = step.diagonals(block.white)[0]
-            h = sum(c.T @ e[rows] for c, rows, e in zip(block.white.columns, block.white.rows, draws, strict=True))
-            h = h - step.half_cross(block.white).T @ half
-            own = np.concatenate([np.einsum("rc,rc->c", c, c)[None] for c in block.white.columns]).sum(axis=0)
-            gain = np.where((G > 1e-4 * own + 1e-9)[:, None], 0.5 * h**2 / np.maximum(G, 1e-12)[:, None], 0.0)
+        for grid, view in zip(self.grids, views, strict=True):
+            white = grid.white
+            h = sum(X.T @ e[white.reach(k)] for k, (X, e) in enumerate(zip(white.columns, draws, strict=True)))
+            h = h - view.half.T @ half
+            gain = np.where(view.good[:, None], 0.5 * h**2 / np.maximum(view.G, 1e-12)[:, None], 0.0)
             most = np.maximum(most, gain.max(axis=0, initial=0.0))
         beta = float(most.std()) * np.sqrt(6.0) / np.pi
         return float(most.mean() - 0.5772 * beta - beta * np.log(-np.log(1.0 - FALSE_RATE)))
@@ -238,25 +231,31 @@ class _Search:
     # -- sets ----------------------------------------------------------------------------------------------------------
 
     def _score(self, terms: Sequence[Term]) -> float:
-        data = self.folds.together([self._white(t) for t in terms])
-        size = np.concatenate([self._precision(t) for t in terms])
-        return float(withheld(gains(data.G[:, None], data.h[:, None], size[None]))[0]) - self._costs(terms)
+        return self._scores(terms)(range(len(terms)))
 
-    def _exhaustive(self, chosen: list[Term], pool: Sequence[Term], score: float) -> list[Term]:
-        """The best of all sets of up to three terms of the pool, where it is better than what was chosen."""
-        terms = list(dict.fromkeys([*chosen, *sorted(pool, key=lambda t: -self._score([t]))]))[: max(POOL, len(chosen))]
+    def _scores(self, terms: Sequence[Term]) -> Callable[[Sequence[int]], float]:
+        """Log density on withheld parts, less what they cost, of some of these terms, by their numbers."""
         data = self.folds.together([self._white(t) for t in terms])
         size = np.concatenate([self._precision(t) for t in terms])
         ends = np.cumsum([len(t.form.texts) for t in terms])
         own = [np.arange(end - len(t.form.texts), end) for end, t in zip(ends, terms, strict=True)]
+
+        def score(some: Sequence[int]) -> float:
+            at = np.concatenate([own[i] for i in some])
+            G, h = data.G[:, at][:, :, at], data.h[:, at]
+            gain = float(withheld(gains(G[:, None], h[:, None], size[at][None]))[0])
+            return gain - self._costs([terms[i] for i in some])
+
+        return score
+
+    def _exhaustive(self, chosen: list[Term], pool: Sequence[Term], score: float) -> list[Term]:
+        """The best of all sets of up to three terms of the pool, where it is better than what was chosen."""
+        terms = list(dict.fromkeys([*chosen, *sorted(pool, key=lambda t: -self._score([t]))]))[: max(POOL, len(chosen))]
+        of = self._scores(terms)
         best, value = chosen, score
         for count in (1, 2, 3):
             for some in combinations(range(len(terms)), count):
-                at = np.concatenate([own[i] for i in some])
-                G, h = data.G[:, at][:, :, at], data.h[:, at]
-                gain = float(withheld(gains(G[:, None], h[:, None], size[at][None]))[0])
-                gain -= self._costs([terms[i] for i in some])
-                tried = [terms[i] for i in some]
+                gain, tried = of(some), [terms[i] for i in some]
                 if gain > value + self._margin(tried, best):
                     best, value = tried, gain
         return best
@@ -277,7 +276,7 @@ class _Search:
             for t in chosen:
                 values = self.bench.values(t.spot, t.form)
                 own = [v @ theta[at : at + v.shape[1]][:, None] for v in values]
-                size.append(self.shapes.rms(t.spot, own)[0] ** 2)
+                size.append(float(self.bench.rms(t.spot, own)[0]) ** 2)
                 at += len(t.form.texts)
             if min(size) > LEAST_SHARE * sum(size):
                 break
@@ -291,17 +290,19 @@ class _Search:
 
     def _answer(self, chosen: list[Term], pool: Sequence[Term]) -> FoundLaw:
         theta, covariance = self._coefficients(chosen)
-        gain = self._score(chosen)
+        own, others = len(chosen), [each for each in dict.fromkeys(pool) if each not in chosen]
+        of = self._scores([*chosen, *others])
+        gain = of(range(own))
         alike = []
         for i, term in enumerate(chosen):
-            others = []
-            for other in dict.fromkeys(pool):
-                same = (other.spot, other.form.family, other.form.about)
-                if other in chosen or same == (term.spot, term.form.family, term.form.about):
+            same = (term.spot, term.form.family, term.form.about)
+            found = []
+            for j, other in enumerate(others):
+                if (other.spot, other.form.family, other.form.about) == same:
                     continue
-                if self._score([*chosen[:i], other, *chosen[i + 1 :]]) > gain - SAME:
-                    others.append(other)
-            alike.append(tuple(others))
+                if of([*range(i), own + j, *range(i + 1, own)]) > gain - SAME:
+                    found.append(other)
+            alike.append(tuple(found))
         columns, precision = tuple(map(self._white, chosen)), np.concatenate([self._precision(t) for t in chosen])
         return FoundLaw(
             tuple(chosen), theta[0], covariance, theta[1:], gain, tuple(alike), self.folds, columns, precision

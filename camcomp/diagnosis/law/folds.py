@@ -22,9 +22,6 @@ SHORT = 48  # stretches of a run, every other one of which is withheld where som
 WIDE_MM = 0.2  # what a law may move the tip by, standard deviation before any data
 
 
-Part = tuple[int, Ints]  # a run, and its white rows
-
-
 @dataclass(frozen=True)
 class Split:
     """How the time of a run is divided into what is withheld: stretches of equal length, of which every `parts`-th belong together."""
@@ -56,7 +53,10 @@ class FoldedColumns:
 
 
 class Folds:
-    """The base of a law search: white columns and residual beside which laws are sought."""
+    """The base of a law search: white columns and residual beside which laws are sought.
+
+    Columns of all rows are those of the diagnosis and never copied; constants and laws reach some rows only, and stand apart.
+    """
 
     def __init__(
         self, white: Sequence[Floats], residual: Sequence[Floats], precision: Floats, places: Sequence[Floats],
@@ -65,39 +65,45 @@ class Folds:
         """White (w, k), residual (w,) per run; precision (k,) of the prior; places (w,) 0 to 1 of white rows in the time of their
         run; constants: columns that are free beside the law.
         """
-        loose = np.full(sum(each.columns[0].shape[1] for each in constants), 1e-6)
-        self.precision = np.concatenate([precision, loose])
-        self.white = [
-            np.concatenate([W, *(spread(c, k, len(W)) for c in constants)], axis=1) for k, W in enumerate(white)
+        self.white, self.residual, self.split = list(white), list(residual), split
+        self.more: tuple[White, ...] = ()
+        self.precision = precision
+        # a run and its white rows, None for all of them
+        self.parts: list[tuple[int, Ints | None]] = [
+            (k, None if split.parts == 1 else np.flatnonzero(split.of(own) == i))
+            for k, own in enumerate(places)
+            for i in range(split.parts)
         ]
-        self.residual = list(residual)
-        self.split = split
-        self.parts: list[Part] = [
-            (k, np.flatnonzero(split.of(own) == i)) for k, own in enumerate(places) for i in range(split.parts)
-        ]
-        self._prepare()
+        self._grams = [self._gram(k, rows) for k, rows in self.parts]
+        if constants:
+            loose = np.full(sum(each.columns[0].shape[1] for each in constants), 1e-6)
+            self._put(constants, loose)
+        self._factorise()
 
     def beside(self, more: Sequence[White], precision: Floats) -> Folds:
         """The same with more columns in the base, of that prior precision."""
         out = copy(self)
-        out.precision = np.concatenate([self.precision, precision])
-        out.white = [
-            np.concatenate([W, *(spread(x, k, len(W)) for x in more)], axis=1) for k, W in enumerate(self.white)
-        ]
-        out._prepare()
+        out._put(more, precision)
+        out._factorise()
         return out
 
-    def _prepare(self) -> None:
-        self._grams = [self._gram(k, rows) for k, rows in self.parts]
+    def _put(self, more: Sequence[White], precision: Floats) -> None:
+        grams = []
+        for (A, b), (cross, gram, target) in zip(self._grams, self._products(more), strict=True):
+            grams.append((np.block([[A, cross], [cross.T, gram]]), np.concatenate([b, target])))
+        self._grams, self.more = grams, (*self.more, *more)
+        self.precision = np.concatenate([self.precision, precision])
+
+    def _factorise(self) -> None:
         self._halves = [self._half(A) for A in _without_each([A for A, _ in self._grams])]
         self._targets = [
             np.asarray(solve_triangular(L, b, lower=True))
             for L, b in zip(self._halves, _without_each([b for _, b in self._grams]), strict=True)
         ]
 
-    def _gram(self, k: int, rows: Ints) -> tuple[Floats, Floats]:
-        W = self.white[k][rows]
-        return W.T @ W, W.T @ self.residual[k][rows]
+    def _gram(self, k: int, rows: Ints | None) -> tuple[Floats, Floats]:
+        W, r = (self.white[k], self.residual[k]) if rows is None else (self.white[k][rows], self.residual[k][rows])
+        return W.T @ W, W.T @ r
 
     def _half(self, A: Floats) -> Floats:
         M = A + np.diag(self.precision)
@@ -106,7 +112,15 @@ class Folds:
     def rest(self) -> list[Floats]:
         """White residual (w,) per run that the base leaves, all data together."""
         mean = solve_triangular(self._halves[0].T, self._targets[0], lower=False)
-        return [r - W @ mean for r, W in zip(self.residual, self.white, strict=True)]
+        out = []
+        for k, (r, W) in enumerate(zip(self.residual, self.white, strict=True)):
+            left, at = r - W @ mean[: W.shape[1]], W.shape[1]
+            for each in self.more:
+                X = each.columns[k]
+                left[each.rows[k]] -= X @ mean[at : at + X.shape[1]]
+                at += X.shape[1]
+            out.append(left)
+        return out
 
     def means(self, more: Sequence[White], precision: Floats) -> Floats:
         """Coordinates (f, k) of what stands beside a law, law columns of that prior precision fitted with it: of all data, and
@@ -123,22 +137,43 @@ class Folds:
         each = np.asarray(np.linalg.solve(M, data.h[..., None])[..., 0], float)
         return each, np.asarray(np.linalg.inv(M[0]), float)
 
-    def half_cross(self, x: White) -> Floats:
-        """Columns of a spot against the base (k, c), for `projected`."""
-        cross = np.sum([W[rows].T @ X for W, rows, X in zip(self.white, x.rows, x.columns, strict=True)], axis=0)
+    def cross(self, x: White, *, first: int = 0) -> Floats:
+        """Products (k, c) of the base's columns, from number `first` of those that stand apart on, with columns of a spot."""
+        return np.asarray(np.sum([self._against(k, x, first) for k in range(len(self.white))], axis=0))
+
+    def _against(self, k: int, x: White, first: int) -> Floats:
+        X, rows = x.columns[k], x.reach(k)
+        parts = [] if first else [self.white[k][rows].T @ X]
+        low, high = x.hull(k)
+        for each in self.more[first:]:
+            near = each.over(k, low, high)
+            parts.append((near if isinstance(rows, slice) else near[rows - low]).T @ X)
+        return np.concatenate(parts) if parts else np.zeros((0, X.shape[1]))
+
+    def halved(self, cross: Floats) -> Floats:
+        """Products (k, c) with the base divided by the root of its precision: what its columns take is half.T @ half."""
         return np.asarray(solve_triangular(self._halves[0], cross, lower=True))
 
     def projected(self, draws: Sequence[Floats]) -> Floats:
         """White residuals (w, b) per run against the base (k, b)."""
-        cross = np.sum([W.T @ e for W, e in zip(self.white, draws, strict=True)], axis=0)
-        return np.asarray(solve_triangular(self._halves[0], cross, lower=True))
+        every = White(tuple(np.arange(len(e)) for e in draws), tuple(draws))
+        return self.halved(self.cross(every))
+
+    def target(self, x: White) -> Floats:
+        """Products (c,) of columns of a spot with the residual."""
+        return np.asarray(
+            sum(X.T @ r[x.reach(k)] for k, (X, r) in enumerate(zip(x.columns, self.residual, strict=True)))
+        )
+
+    def of_target(self, half: Floats) -> Floats:
+        """What of these products (c,) the base explains."""
+        return np.asarray(half.T @ self._targets[0])
 
     def of_all(self, x: White) -> FoldedColumns:
         """As `columns`, for all data alone: (1, c, c), (1, c)."""
-        half = self.half_cross(x)
+        half = self.halved(self.cross(x))
         gram = sum(X.T @ X for X in x.columns)
-        target = sum(X.T @ r[rows] for X, rows, r in zip(x.columns, x.rows, self.residual, strict=True))
-        return FoldedColumns((gram - half.T @ half)[None], (target - half.T @ self._targets[0])[None])
+        return FoldedColumns((gram - half.T @ half)[None], (self.target(x) - self.of_target(half))[None])
 
     def columns(self, x: White) -> FoldedColumns:
         """Columns of one spot with the base taken out, in full."""
@@ -146,29 +181,7 @@ class Folds:
 
     def together(self, xs: Sequence[White]) -> FoldedColumns:
         """The same for columns of several spots, one behind the other."""
-        dense = [np.concatenate([spread(x, k, len(r)) for x in xs], axis=1) for k, r in enumerate(self.residual)]
-        crosses, grams, targets = [], [], []
-        for k, rows in self.parts:
-            X = dense[k][rows]
-            crosses.append(self.white[k][rows].T @ X)
-            grams.append(X.T @ X)
-            targets.append(X.T @ self.residual[k][rows])
-        return self._folded(crosses, grams, targets)
-
-    def diagonals(self, x: White) -> tuple[Floats, Floats]:
-        """As `of_all`, but of G only the diagonal: (c,), (c,)."""
-        half = self.half_cross(x)
-        gram = np.sum([np.einsum("rc,rc->c", X, X) for X in x.columns], axis=0)
-        target = np.sum([X.T @ r[rows] for X, rows, r in zip(x.columns, x.rows, self.residual, strict=True)], axis=0)
-        return gram - np.einsum("kc,kc->c", half, half), target - half.T @ self._targets[0]
-
-    def pairs(self, x: White, first: Ints) -> Floats:
-        """Products (p,) of columns first and first + 1, with the base taken out, all data."""
-        half = self.half_cross(x)
-        gram = np.sum([np.einsum("rc,rc->c", X[:, first], X[:, first + 1]) for X in x.columns], axis=0)
-        return np.asarray(gram - np.einsum("kc,kc->c", half[:, first], half[:, first + 1]))
-
-    def _folded(self, crosses: Sequence[Floats], grams: Sequence[Floats], targets: Sequence[Floats]) -> FoldedColumns:
+        crosses, grams, targets = zip(*self._products(xs), strict=True)
         G, h = [], []
         every = zip(
             self._halves,
@@ -184,18 +197,25 @@ class Folds:
             h.append(b - half.T @ t)
         return FoldedColumns(np.array(G), np.array(h))
 
+    def _products(self, xs: Sequence[White]) -> list[tuple[Floats, Floats, Floats]]:
+        """Per part: columns of several spots (c) against the base (k, c), each other (c, c) and the residual (c,)."""
+        out = []
+        for k, rows in self.parts:
+            ends = [x.hull(k) for x in xs]
+            low, high = min(a for a, _ in ends), max(b for _, b in ends)
+            pick: slice | Ints = slice(low, high) if rows is None else rows[(rows >= low) & (rows < high)]
+            near: slice | Ints = slice(None) if isinstance(pick, slice) else pick - low
+            X = np.concatenate([x.over(k, low, high) for x in xs], axis=1)[near]
+            own = [each.over(k, low, high)[near] for each in self.more]
+            cross = np.concatenate([self.white[k][pick].T @ X, *(each.T @ X for each in own)])
+            out.append((cross, X.T @ X, X.T @ self.residual[k][pick]))
+        return out
+
 
 def _without_each(parts: Sequence[Floats]) -> list[Floats]:
     """The sum of all, and the sums of all but one."""
     whole = np.asarray(np.sum(parts, axis=0))
     return [whole, *(whole - each for each in parts)]
-
-
-def spread(x: White, k: int, rows: int) -> Floats:
-    """Columns (rows, c) over all white rows of run k."""
-    out = np.zeros((rows, x.columns[k].shape[1]))
-    out[x.rows[k]] = x.columns[k]
-    return out
 
 
 def gains(G: Floats, h: Floats, size: Floats) -> Floats:

@@ -32,15 +32,8 @@ class Shapes:
 
     def _worked_out(self, term: Term) -> tuple[White, Floats]:
         values = self.bench.values(term.spot, term.form)
-        size = self.rms(term.spot, values)
-        together = float(np.mean(size**2)) / WIDE_MM**2 + TINY
-        return self.bench.white(term.spot, values), np.full(len(size), together)
-
-    def rms(self, spot: Spot, values: Sequence[Floats]) -> Floats:
-        """How far (f,) functions (n, f) per run move the tip, rms over all rows, mm."""
-        ways = [np.sum(way**2, axis=1) for way in self.bench.tip_ways(spot)]
-        energy = np.sum([way @ v**2 for way, v in zip(ways, values, strict=True)], axis=0)
-        return np.asarray(np.sqrt(energy / sum(len(v) for v in values)))
+        size = float(np.sqrt(np.mean(self.bench.rms(term.spot, values) ** 2)))
+        return self.bench.white(term.spot, values), np.full(len(term.form.texts), (size / WIDE_MM) ** 2 + TINY)
 
     def followed(self, step: Folds, term: Term) -> Term:
         """The term with the shape that the data want beside what is in the base."""
@@ -89,8 +82,11 @@ class Shapes:
         """Log evidence (f,) that forms of one column add, each alone."""
         each = [self.bench.values(spot, form) for form in forms]
         values = [np.concatenate(of_run, axis=1) for of_run in zip(*each, strict=True)]
-        G, h = step.diagonals(self.bench.white(spot, values))
-        size = (self.rms(spot, values) / WIDE_MM) ** 2 + TINY
+        white = self.bench.white(spot, values)
+        half = step.halved(step.cross(white))
+        G = np.sum([np.einsum("rc,rc->c", X, X) for X in white.columns], axis=0) - np.einsum("kc,kc->c", half, half)
+        h = step.target(white) - step.of_target(half)
+        size = (self.bench.rms(spot, values) / WIDE_MM) ** 2 + TINY
         return np.asarray(0.5 * h**2 / (G + size) + 0.5 * np.log(size / (G + size)))
 
 

@@ -17,7 +17,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from camcomp.diagnosis.fit.bench import thinned
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.search.indistinguishable import HIDDEN, LARGE
 from camcomp.diagnosis.statistics.cause_sets import Fitted
@@ -34,7 +33,8 @@ if TYPE_CHECKING:
 class ExpectedGain:
     """What an experiment tells. separated, narrowed: bits of which cause and of how large; before_um, after_um: rms that the
     uncertainty of the answer moves the tip by on the runs' programs; shows (r,): rms of what every rival lets one expect
-    beyond the machine file, in the kind of channel that tells most, mm or N; left (r, r): of what rival j leaves of rival i there.
+    beyond the machine file, in the kind of channel that tells most, mm or N; left (r, r): of what rival j leaves of rival i there;
+    apart (r, r): chi-square by which rival j misses the mean log of rival i.
     """
 
     separated: float
@@ -44,6 +44,7 @@ class ExpectedGain:
     kind: str
     shows: Floats
     left: Floats
+    apart: Floats
 
     @property
     def gain(self) -> float:
@@ -91,6 +92,7 @@ def told(question: Question, candidate: Candidate, there: Foreseen, weight: Floa
         kinds[k] if kinds else "",
         size * np.sqrt(np.mean(signals[a:b] ** 2, axis=0)) if b > a else np.zeros(n),
         size * rests[:, :, k] if kinds else np.zeros((n, n)),
+        apart,
     )
 
 
@@ -112,7 +114,7 @@ def program_weight(problem: Problem) -> Floats:
     for r, (run, block) in enumerate(zip(bench.runs, problem.columns.blocks, strict=True)):
         tip = block[:, :3]
         if run.by == "setpoint" and run.measured.has("encoder"):
-            ways = thinned(bench.row_slopes(r).reshape(-1, 3 * m), run.thin).reshape(-1, 3, m)
+            ways = bench.thin_slopes(r)
             tip = tip + np.einsum("nij,njk->nik", ways, block[:, 3 : 3 + m])
         if run.turn is not None:  # how far along the path nobody knows, and no surface shows
             tip = tip * np.array([0.0, 1.0, 1.0])[:, None]

@@ -47,7 +47,7 @@ SURE_Z = 5.0  # standard deviations of chance
 LEAST_BESIDE = 0.4  # size in units of an unknown effect below which nothing is named beside it
 PART_OF_UNKNOWN = 2.0  # size in units of an unknown effect below which a cause at its place is taken for a part of it
 LARGE_SCALES = 3.0  # size of an effect, in its typical ones, that would show at least if it can be seen at all
-MOST_SCALES = 8.0  # the same that nobody believes of a stand-in
+MOST_SCALES = 8.0  # the same that nobody believes of a rival that fits as well
 HOPELESS_LOG = 12.0  # log evidence behind the best at which a set is not fitted any more
 LEAST_PROBABILITY = 0.02  # of a set whose foretelling is looked at
 INSTEAD = 0.95  # probability of something unknown in place of a cause, where without it nothing unknown would show
@@ -206,7 +206,7 @@ def _with_stand_ins(
     same = _same(problem, fits, probability)
     for members in stand_ins(design, best.members, best.theta):
         other = fit(members)
-        if not _plausible(problem, other) or _cancels(problem, other):
+        if not _possible(problem, other) or _cancels(problem, other):
             continue
         same.append((best.members, members))
         if all(f.members != members for f in fits):
@@ -300,6 +300,21 @@ def _same(problem: Problem, fits: tuple[Fitted, ...], probability: Floats) -> li
     return found
 
 
+def _possible(problem: Problem, f: Fitted) -> bool:
+    """Whether the members are of sizes that their effects can have at all: no fit can exclude by less what is the same by structure."""
+    causes = problem.causes(f.members, f.theta, f.extra)
+    return _of_their_signs(problem, f) and all(
+        p.low < each.values[p.name] < p.high
+        for each, i in zip(causes, f.members, strict=True)
+        for p in problem.columns.candidates[i].parameters
+        if p.name in each.values
+    )
+
+
 def _plausible(problem: Problem, f: Fitted) -> bool:
+    return _of_their_signs(problem, f) and all(abs(t) < MOST_SCALES for t in f.theta)
+
+
+def _of_their_signs(problem: Problem, f: Fitted) -> bool:
     parameters = [p for i in f.members for p in problem.columns.candidates[i].parameters]
-    return all(abs(t) < MOST_SCALES and (p.sign == 0 or t > 0) for t, p in zip(f.theta, parameters, strict=True))
+    return all(p.sign == 0 or t > 0 for t, p in zip(f.theta, parameters, strict=True))

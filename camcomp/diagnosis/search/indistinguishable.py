@@ -7,6 +7,7 @@ Source: principal angles between subspaces (Bjoerck and Golub, Mathematics of Co
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -34,36 +35,61 @@ class Likeness:
 
     def shows(self, i: int) -> bool:
         """Whether the candidate moves any channel."""
-        return self._kind(i)[1] > _SHOWS
+        return self._kinds[i][1] > _SHOWS
 
-    def apart(self, i: int, j: int, free: Sequence[int] = (), direction: Floats | None = None) -> float:
-        """What tells candidate i, `LARGE` times the noise, from the best candidate j can do beside the free candidates: in units of the noise.
+    def apart(self, i: int, others: Sequence[int], free: Sequence[int] = (), direction: Floats | None = None) -> Floats:
+        """What tells candidate i, `LARGE` times the noise, from the best that each other one (j,) can do beside the free candidates: in units of the noise.
 
         direction (d,): of the parameters of i; the most alike one when it is not given.
         """
         columns = self.problem.candidates.columns
-        mine, others = list(columns[i]), [c for each in (j, *free) for c in columns[each]]
-        index, d = [*mine, *others], len(mine)
-        known = np.linalg.inv(self.covariance[np.ix_(index, index)]) - np.diag(self.precision[index])
-        rest = known[d:, d:] + np.diag(1.0 / (10.0 * self.problem.prior.scale[others]) ** 2)
-        left = known[:d, :d] - known[:d, d:] @ np.linalg.solve(rest, known[d:, :d])
-        own = self.grams[self._kind(i)[0]][np.ix_(mine, mine)]
-        if direction is not None and d > 1:
-            whole = float(direction @ own @ direction)
-            return LARGE * float(np.sqrt(max(float(direction @ left @ direction), 0.0) / whole)) if whole > 0 else 0.0
-        half = np.linalg.cholesky(own + 1e-12 * np.trace(own) * np.eye(d))
-        ratio = np.linalg.solve(half, np.linalg.solve(half, left).T)
-        return LARGE * float(np.sqrt(max(float(np.linalg.eigvalsh(0.5 * (ratio + ratio.T))[0]), 0.0)))
+        mine, beside = list(columns[i]), [c for each in free for c in columns[each]]
+        own = self.grams[self._kinds[i][0]][np.ix_(mine, mine)]
+        d, out = len(mine), np.empty(len(others))
+        counts = np.array([len(columns[j]) for j in others])
+        for count in np.unique(counts):
+            these = np.flatnonzero(counts == count)
+            index = np.array([[*mine, *columns[others[int(n)]], *beside] for n in these])
+            every = np.arange(index.shape[1])
+            known = np.linalg.inv(self.covariance[index[:, :, None], index[:, None, :]])
+            known[:, every, every] -= self.precision[index]
+            known[:, every[d:], every[d:]] += 1.0 / (10.0 * self.problem.prior.scale[index[:, d:]]) ** 2
+            left = known[:, :d, :d] - known[:, :d, d:] @ np.linalg.solve(known[:, d:, d:], known[:, d:, :d])
+            out[these] = LARGE * np.sqrt(np.maximum(_share(left, own, direction), 0.0))
+        return out
 
-    def _kind(self, i: int) -> tuple[int, float]:
-        """The kind of channel in which an candidate of its own scale shows best, and its rms there in units of the noise."""
-        columns = list(self.problem.candidates.columns[i])
-        size = [
-            np.sqrt(max(float(np.trace(A[np.ix_(columns, columns)])), 0.0) / max(n, 1))
-            for A, n in zip(self.grams, self.rows, strict=True)
-        ]
-        best = int(np.argmax(size))
-        return best, float(size[best])
+    def told(self, i: int) -> bool:
+        """Whether nuisances leave something of the candidate: where they hide it, nothing else is its rival."""
+        if not self.shows(i):
+            return False
+        mine = list(self.problem.candidates.columns[i])
+        left = np.linalg.inv(self.covariance[np.ix_(mine, mine)]) - np.diag(self.precision[mine])
+        own = self.grams[self._kinds[i][0]][np.ix_(mine, mine)]
+        return bool(LARGE * np.sqrt(max(float(_share(np.asarray(left[None]), own, None)[0]), 0.0)) >= HIDDEN)
+
+    @cached_property
+    def _kinds(self) -> list[tuple[int, float]]:
+        """Per candidate: the kind of channel in which one of its own scale shows best, and its rms there in units of the noise."""
+        energy = np.array([np.diag(A) / max(n, 1) for A, n in zip(self.grams, self.rows, strict=True)])
+        out = []
+        for columns in self.problem.candidates.columns:
+            size = np.sqrt(np.maximum(energy[:, list(columns)].sum(axis=1), 0.0))
+            best = int(np.argmax(size))
+            out.append((best, float(size[best])))
+        return out
+
+
+def _share(left: Floats, own: Floats, direction: Floats | None) -> Floats:
+    """Of the energy own (d, d) in a direction (d,), or in the one that keeps least, what is left (n, d, d) of it, (n,)."""
+    d = len(own)
+    if direction is not None and d > 1:
+        whole = float(direction @ own @ direction)
+        return np.asarray(
+            np.einsum("d,nde,e->n", direction, left, direction) / whole if whole > 0 else np.zeros(len(left))
+        )
+    half = np.linalg.cholesky(own + 1e-12 * np.trace(own) * np.eye(d))
+    ratio = np.linalg.solve(half, np.swapaxes(np.linalg.solve(half, left), 1, 2))
+    return np.asarray(np.linalg.eigvalsh(0.5 * (ratio + np.swapaxes(ratio, 1, 2)))[:, 0])
 
 
 def likeness(problem: Problem) -> Likeness:
@@ -84,20 +110,22 @@ def likeness(problem: Problem) -> Likeness:
 
 def classes(design: Likeness) -> list[tuple[int, ...]]:
     """Atoms that share a signature, in groups of two and more."""
-    shown = [i for i in range(len(design.problem.columns.candidates)) if design.shows(i)]
+    candidates = design.problem.candidates
+    shown = [i for i in range(len(candidates.columns)) if design.told(i)]
     group = {i: {i} for i in shown}
     for i in shown:
-        for j in shown:
-            if j in group[i] or design.problem.candidates.exclusive(i, j) or design.apart(i, j) >= HIDDEN:
-                continue
-            both = group[i] | group[j]
-            group.update(dict.fromkeys(both, both))
+        others = [j for j in shown if j != i and not candidates.exclusive(i, j)]
+        for j, apart in zip(others, design.apart(i, others), strict=True):
+            if apart < HIDDEN and j not in group[i]:
+                both = group[i] | group[j]
+                group.update(dict.fromkeys(both, both))
     return sorted({tuple(sorted(each)) for each in group.values() if len(each) > 1})
 
 
 def stand_ins(design: Likeness, members: Members, theta: Floats) -> list[Members]:
     """Sets in which one member is replaced by an candidate that does the same in these runs; theta (d,): the members' coordinates."""
     candidates = design.problem.candidates
+    told = [design.told(j) for j in range(len(candidates.columns))]
     found: list[Members] = []
     at = 0
     for i in members:
@@ -105,14 +133,16 @@ def stand_ins(design: Likeness, members: Members, theta: Floats) -> list[Members
         direction = theta[at : at + d]
         at += d
         others = tuple(m for m in members if m != i)
-        for j in range(len(candidates.columns)):
-            if (
-                j in members
-                or not design.shows(j)
-                or any(candidates.exclusive(j, m) for m in others)
-                or candidates.exclusive(i, j)
-            ):
-                continue
-            if design.apart(i, j, others, direction) < HIDDEN:
-                found.append(tuple(sorted((*others, j))))
+        if not told[i]:
+            continue
+        free = [
+            j
+            for j in range(len(candidates.columns))
+            if j not in members
+            and told[j]
+            and not any(candidates.exclusive(j, m) for m in others)
+            and not candidates.exclusive(i, j)
+        ]
+        apart = design.apart(i, free, others, direction)
+        found += [tuple(sorted((*others, j))) for j, much in zip(free, apart, strict=True) if much < HIDDEN]
     return found

@@ -16,7 +16,6 @@ import numpy as np
 from scipy.stats import norm
 
 from camcomp.diagnosis.fit.bench import thinned
-from camcomp.diagnosis.fit.columns import tip_um
 from camcomp.diagnosis.fit.floor import row_scatter
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.statistics.cause_sets import Fitted, total
@@ -27,6 +26,7 @@ BLOCK = 8  # rows that are averaged
 STRETCH = 2.5  # tolerances up to which what is always a little wrong may follow the data
 FEW_RUNS = 3  # from which on causes are fitted to the other runs
 KINDS = ("tip", "encoder", "drive", "dyno")
+TINY = 1e-12  # mm2, below which no noise is
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +55,7 @@ def unexplained(problem: Problem, f: Fitted) -> dict[str, Unexplained]:
     for kind in KINDS:
         at_tip = [_at_tip(problem, k, r, kind) for k, r in enumerate(left)]
         if any(np.isfinite(a).any() for a in at_tip):
-            out[kind] = _judged(problem, kind, at_tip)
+            out[kind] = unexplained_of(problem, kind, at_tip)
     return out
 
 
@@ -100,12 +100,13 @@ def _at_tip(problem: Problem, k: int, left: Floats, kind: str) -> Floats:
     return np.asarray(np.einsum("nij,nj->ni", ways, part))
 
 
-def _judged(problem: Problem, kind: str, at_tip: Sequence[Floats]) -> Unexplained:
+def unexplained_of(problem: Problem, kind: str, at_tip: Sequence[Floats]) -> Unexplained:
+    """Of one kind of channel, from left-overs (n, 3) mm of every run at the tip."""
     slow = problem.floor.slow_mm if kind == "tip" else 0.0
     excess: list[Floats] = []
+    chance: list[Floats] = []
     weight: list[Floats] = []
     place: list[tuple[int, float, float]] = []
-    axes = np.zeros(3)
     for k, values in enumerate(at_tip):
         t = problem.times[k]
         inflate = problem.inflate[k][:, :3] if kind == "tip" else np.ones_like(values)
@@ -117,23 +118,32 @@ def _judged(problem: Problem, kind: str, at_tip: Sequence[Floats]) -> Unexplaine
         for a in range(0, len(values), BLOCK):
             rows = values[a : a + BLOCK]
             count = np.isfinite(rows).sum(axis=0)
-            if not (count >= BLOCK // 2).any():
+            enough = count >= BLOCK // 2
+            if not enough.any():
                 continue
             middle = np.nansum(rows, axis=0) / np.maximum(count, 1)
-            beyond = np.where(count >= BLOCK // 2, middle**2 - noise**2 / np.maximum(count, 1) - slow**2, 0.0)
-            excess.append(beyond)
-            axes += beyond
-            weight.append(np.where(count >= BLOCK // 2, noise**2 / np.maximum(count, 1) + slow**2, 0.0))
+            usual = noise**2 / np.maximum(count, 1) + slow**2
+            # rows of which less is known than their noise says (a force that turns between rows) err together
+            more = np.where(np.isfinite(rows), inflate[a : a + BLOCK] ** 2 - 1.0, 0.0).sum(axis=0)
+            allowed = usual + noise**2 * more / np.maximum(count, 1)
+            excess.append(np.where(enough, middle**2 - allowed, 0.0))
+            chance.append(np.where(enough, allowed, 0.0))
+            weight.append(np.where(enough, (usual + TINY) ** 2 / (allowed + TINY) ** 2, 0.0))
             place.append((k, float(t[a]), float(t[min(a + BLOCK, len(t)) - 1])))
-    e, w = np.array(excess), np.array(weight)
+    e, v, w = np.array(excess), np.array(chance), np.array(weight)
     if not len(e):
-        return Unexplained(kind, 0.0, 0.0, 0.0, (0, 0.0, 0.0), axes)
-    each = e.sum(axis=1)
-    mean = float(each.mean())
-    doubt = float(np.sqrt(2.0 * np.sum(w**2) / len(e) ** 2)) + 1e-12
-    local, at = _stretch(each, place)
+        return Unexplained(kind, 0.0, 0.0, 0.0, (0, 0.0, 0.0), np.zeros(3))
+    whole = np.maximum(w.sum(axis=0), 1.0)
+    mean = float((np.sum(w * e, axis=0) / whole).sum())
+    doubt = float(np.sqrt(2.0 * np.sum(np.sum((w * v) ** 2, axis=0) / whole**2))) + TINY
+    local, at = _stretch((w * e).sum(axis=1), place)
     return Unexplained(
-        kind, 1e3 * float(np.sqrt(max(mean, 0.0))), mean / doubt, 1e3 * float(np.sqrt(max(local, 0.0))), at, axes
+        kind,
+        1e3 * float(np.sqrt(max(mean, 0.0))),
+        mean / doubt,
+        1e3 * float(np.sqrt(max(local, 0.0))),
+        at,
+        np.sum(w * e, axis=0),
     )
 
 
@@ -161,7 +171,7 @@ def size_um(problem: Problem, f: Fitted, members: Sequence[int] | None = None) -
     index = problem.member_columns(f.members)
     mine = set(problem.member_columns(tuple(f.members if members is None else members)))
     theta = np.array([t if c in mine else 0.0 for c, t in zip(index, f.theta, strict=True)])
-    return tip_um(problem.bench, [block[:, :, index] @ theta for block in problem.columns.blocks])
+    return problem.size_um(index, theta)
 
 
 def worst(left: Mapping[str, Unexplained]) -> Unexplained:

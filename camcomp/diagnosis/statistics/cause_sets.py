@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 from itertools import combinations
 
 import numpy as np
-from scipy.special import logsumexp
 
 from camcomp.diagnosis.statistics.evidence import (
     TOLERANCE_LOG,
@@ -19,6 +18,7 @@ from camcomp.diagnosis.statistics.evidence import (
     base,
     log_bayes,
     log_bayes_pairs,
+    log_sum,
 )
 from camcomp.ground.datatypes import Floats
 
@@ -76,7 +76,7 @@ class Scale:
     def __call__(self, members: Members) -> float:
         """Log evidence of a set."""
         values = self._by_tolerance(members)
-        return float(logsumexp(values) - np.log(len(values)))
+        return log_sum(values) - float(np.log(len(values)))
 
     def factor(self, members: Members) -> float:
         """How far off the tolerances most likely are, given a set."""
@@ -136,5 +136,5 @@ def pairs(scale: Scale, candidates: Sequence[int], most: int) -> list[tuple[floa
 def probabilities(fits: Sequence[Fitted], candidates: CausePrior, temperature: float = 1.0) -> Floats:
     """Posterior probability of every set among those fitted."""
     value = np.array([f.log_evidence / temperature + candidates.prior(f.members) for f in fits])
-    out: Floats = np.exp(value - logsumexp(value))
+    out: Floats = np.exp(value - log_sum(value))
     return out

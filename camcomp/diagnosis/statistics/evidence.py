@@ -11,6 +11,7 @@ the effects state. Positive parameters enter by the posterior probability of the
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from itertools import product
 
 import numpy as np
@@ -18,6 +19,7 @@ from scipy.linalg.lapack import dpotrf, dpotri
 from scipy.special import log_ndtr, logsumexp
 
 from camcomp.ground.datatypes import Floats, Ints
+from camcomp.ground.machine_code import kept
 
 PRIOR_WIDTHS = np.array([0.1, 0.3, 1.0, 3.0])
 _WEIGHTS = np.log([0.15, 0.3, 0.35, 0.2])
@@ -39,6 +41,13 @@ class Gram:
 
     def __sub__(self, other: "Gram") -> "Gram":
         return Gram(self.A - other.A, self.b - other.b, self.c - other.c, self.rows - other.rows)
+
+
+def log_sum(values: Sequence[float] | Floats) -> float:
+    """Logarithm of the sum of the exponentials of values (n,): scipy's costs more than all else that is done with a few of them."""
+    v = np.asarray(values)
+    most = float(v.max())
+    return most + float(np.log(np.exp(v - most).sum())) if np.isfinite(most) else most
 
 
 def gram(D: Floats, r: Floats) -> Gram:
@@ -99,29 +108,70 @@ def log_bayes(at: Base, prior: Prior, candidates: Sequence[Sequence[int]]) -> fl
     """Log Bayes factor of `candidates` (each the columns of one cause) being causes, against no cause."""
     index = [i for candidate in candidates for i in candidate]
     group = np.array([g for g, candidate in enumerate(candidates) for _ in candidate])
-    d = len(index)
     C = at.covariance[np.ix_(index, index)]
     mean = at.mean[index]
     inverse = np.linalg.inv(C)
     narrow = at.precision[index]
-    likelihood = inverse - np.diag(narrow)
     h = inverse @ mean
-    widths = np.array(list(product(range(len(PRIOR_WIDTHS)), repeat=len(candidates))))  # (w, candidates)
-    wide = 1.0 / (prior.scale[index] * PRIOR_WIDTHS[widths][:, group]) ** 2  # (w, d)
+    sizes, weight = _widths(len(candidates))
+    wide = 1.0 / (prior.scale[index] * sizes[:, group]) ** 2  # (w, d)
     # a cause is at least as wide as its tolerance
     wide = np.minimum(wide, narrow)
-    M = likelihood + wide[:, None, :] * np.eye(d)
-    sign, log_det = np.linalg.slogdet(M)
-    covariance = np.linalg.inv(M)
-    posterior = covariance @ h
-    fit = 0.5 * (posterior * h).sum(axis=1) - 0.5 * float(mean @ inverse @ mean)
+    posterior, spread, fit, log_det = _posteriors(inverse - np.diag(narrow), h, wide)
     volume = 0.5 * np.log(wide).sum(axis=1) - 0.5 * log_det
     volume -= 0.5 * np.log(narrow).sum() - 0.5 * np.linalg.slogdet(inverse)[1]
-    signs = prior.sign[index]
-    spread = np.sqrt(np.maximum(np.diagonal(covariance, axis1=1, axis2=2), 1e-300))
-    positive = np.where(signs > 0, log_ndtr(posterior / spread) + np.log(2.0), 0.0).sum(axis=1)
-    value = fit + volume + positive + _WEIGHTS[widths].sum(axis=1)
-    return float(logsumexp(np.where(sign > 0, value, -np.inf)))
+    signed = prior.sign[index] > 0
+    positive = (log_ndtr(posterior[:, signed] / spread[:, signed]) + np.log(2.0)).sum(axis=1)
+    value = 0.5 * fit - 0.5 * float(mean @ inverse @ mean) + volume + positive + weight
+    return log_sum(value)
+
+
+def _widths(count: int) -> tuple[Floats, Floats]:
+    """Widths (w, count) that so many causes may have, in units of their scales, and the log weight (w,) of each."""
+    which = _choices(count, len(PRIOR_WIDTHS))
+    return PRIOR_WIDTHS[which], _WEIGHTS[which].sum(axis=1)
+
+
+@cache
+def _choices(count: int, widths: int) -> Ints:
+    return np.array(list(product(range(widths), repeat=count)))
+
+
+@kept
+def _posteriors(likelihood, h, wide):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Per prior precision wide (w, d): mean and deviation (w, d), h's mean (w,) and log determinant (w,) of the precision.
+
+    The inverse by Gauss and Jordan; the determinant is infinite where the precision is none.
+    """
+    n, d = wide.shape
+    mean, spread = np.zeros((n, d)), np.ones((n, d))
+    fit, log_det = np.zeros(n), np.zeros(n)
+    for w in range(n):
+        A = likelihood.copy()
+        for i in range(d):
+            A[i, i] += wide[w, i]
+        for k in range(d):
+            pivot = A[k, k]
+            if not pivot > 0.0:
+                log_det[w] = np.inf
+                break
+            log_det[w] += np.log(pivot)
+            A[k, k] = 1.0
+            for j in range(d):
+                A[k, j] /= pivot
+            for i in range(d):
+                if i != k:
+                    factor = A[i, k]
+                    A[i, k] = 0.0
+                    for j in range(d):
+                        A[i, j] -= factor * A[k, j]
+        if log_det[w] < np.inf:
+            for i in range(d):
+                spread[w, i] = np.sqrt(max(A[i, i], 1e-300))
+                for j in range(d):
+                    mean[w, i] += A[i, j] * h[j]
+                fit[w] += h[i] * mean[w, i]
+    return mean, spread, fit, log_det
 
 
 def log_bayes_pairs(at: Base, prior: Prior, first: Ints, second: Ints) -> Floats:
@@ -134,8 +184,8 @@ def log_bayes_pairs(at: Base, prior: Prior, first: Ints, second: Ints) -> Floats
     h = np.einsum("pij,pj->pi", inverse, mean)
     eye = np.eye(2)
     likelihood = inverse - narrow[:, :, None] * eye
-    widths = np.array(list(product(range(len(PRIOR_WIDTHS)), repeat=2)))
-    wide = 1.0 / (prior.scale[i][:, None, :] * PRIOR_WIDTHS[widths][None]) ** 2  # (p, w, 2)
+    sizes, weight = _widths(2)
+    wide = 1.0 / (prior.scale[i][:, None, :] * sizes[None]) ** 2  # (p, w, 2)
     wide = np.minimum(wide, narrow[:, None, :])
     M = likelihood[:, None] + wide[..., None] * eye
     det = M[..., 0, 0] * M[..., 1, 1] - M[..., 0, 1] * M[..., 1, 0]
@@ -150,7 +200,7 @@ def log_bayes_pairs(at: Base, prior: Prior, first: Ints, second: Ints) -> Floats
     for k, (mid, var) in enumerate(((post0, c00), (post1, c11))):
         chance = log_ndtr(mid / np.sqrt(np.maximum(var, 1e-300))) + np.log(2.0)
         volume = volume + np.where(signs[:, k, None] > 0, chance, 0.0)
-    value = fit + volume + _WEIGHTS[widths].sum(axis=1)
+    value = fit + volume + weight
     out: Floats = logsumexp(np.where(good, value, -np.inf), axis=1)
     return out
 

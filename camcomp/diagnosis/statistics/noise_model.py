@@ -4,14 +4,23 @@ A block is one run: residuals (n, c) over c channels, NaN where a channel has no
 The slow part is a first-order autoregression; whitening is the exact innovations form (Kalman 1960).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from camcomp.ground.datatypes import Bools, Floats
+from camcomp.ground.datatypes import Bools, Floats, Ints
 from camcomp.ground.machine_code import kept
 
 _REGULAR = 1.6  # a step longer than this many usual steps is a gap
+
+
+@dataclass(frozen=True, eq=False)
+class _Channel:
+    """Rows (w,) that a channel of a run has, their deviation (w,), and which of them (w,) start afresh."""
+
+    rows: Ints
+    scale: Floats
+    fresh: Bools
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,23 +30,36 @@ class Noise:
     sigma: Floats
     slow: Floats
     memory: Floats
+    _laid: dict[int, tuple[Floats, Floats, dict[int, _Channel]]] = field(default_factory=dict, init=False, repr=False)
 
     def rows(self, run: int, values: Floats, inflate: Floats, time: Floats, first: int = 0) -> Floats:
         """White rows (w, k) of values (n, c, k), channels from `first` on: channel by channel, missing rows left out.
 
         inflate (n, all channels) >= 1: by how much a row is less certain than its channel. time (n,) s.
         """
-        out = []
-        for j in range(first, first + values.shape[1]):
-            present = np.isfinite(inflate[:, j])
-            if not present.any() or not np.isfinite(self.sigma[run, j]):
-                continue
-            scaled = values[present, j - first] / (self.sigma[run, j] * inflate[present, j])[:, None]
-            slow, memory = float(self.slow[run, j]), float(self.memory[run, j])
-            if slow > 0.0:
-                scaled = _innovations(scaled, starts(time, present), slow, memory)
-            out.append(scaled)
-        return np.concatenate(out) if out else np.zeros((0, values.shape[2]))
+        known = self._known(run, inflate, time)
+        parts = [(j, known[j]) for j in range(first, first + values.shape[1]) if j in known]
+        out = np.empty((sum(len(each.rows) for _, each in parts), values.shape[2]))
+        at = 0
+        for j, each in parts:
+            white = out[at : at + len(each.rows)]
+            x = values[:, j - first]
+            _innovations(x, each.rows, each.scale, each.fresh, self.slow[run, j], self.memory[run, j], white)
+            at += len(each.rows)
+        return out
+
+    def _known(self, run: int, inflate: Floats, time: Floats) -> dict[int, _Channel]:
+        """The channels of a run that have rows; those of a problem are asked for again and again."""
+        kept = self._laid.get(run)
+        if kept is None or kept[0] is not inflate or kept[1] is not time:
+            found = {}
+            for j in range(inflate.shape[1]):
+                present = np.isfinite(inflate[:, j])
+                if present.any() and np.isfinite(self.sigma[run, j]):
+                    scale = self.sigma[run, j] * inflate[present, j]
+                    found[j] = _Channel(np.flatnonzero(present), scale, starts(time, present))
+            kept = self._laid[run] = (inflate, time, found)
+        return kept[2]
 
     def rows_of(self, run: int, value: Floats, inflate: Floats) -> Floats:
         """Value (n,) of every white row (w,) of all channels, in the order of `rows`."""
@@ -50,9 +72,8 @@ class Noise:
 
 
 @kept
-def _innovations(x, fresh, slow, memory):  # type: ignore[no-untyped-def]  # pragma: no cover
-    n, k = x.shape
-    out = np.empty((n, k))
+def _innovations(x, rows, scale, fresh, slow, memory, out):  # type: ignore[no-untyped-def]  # pragma: no cover
+    n, k = out.shape
     expected = np.zeros(k)
     unsure = slow
     for t in range(n):
@@ -60,13 +81,12 @@ def _innovations(x, fresh, slow, memory):  # type: ignore[no-untyped-def]  # pra
             expected[:] = 0.0
             unsure = slow
         whole = unsure + 1.0 - slow
-        gain, scale = unsure / whole, 1.0 / np.sqrt(whole)
+        gain, root, row, size = unsure / whole, 1.0 / np.sqrt(whole), rows[t], scale[t]
         for j in range(k):
-            surprise = x[t, j] - expected[j]
-            out[t, j] = surprise * scale
+            surprise = x[row, j] / size - expected[j]
+            out[t, j] = surprise * root
             expected[j] = memory * (expected[j] + gain * surprise)
         unsure = memory * memory * unsure * (1.0 - gain) + slow * (1.0 - memory * memory)
-    return out
 
 
 def starts(time: Floats, present: Bools) -> Bools:

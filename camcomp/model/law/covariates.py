@@ -83,12 +83,18 @@ class TipRows(Mapping[str, Floats]):
 
 @dataclass(frozen=True, eq=False)
 class DriveRows(Mapping[str, Floats]):
-    """Covariates of n rows at drive j: its set-points where the control is meant, else its encoder."""
+    """Covariates of n rows at drive j: its set-points where the control is meant, else its encoder; worked out when asked for."""
 
     motion: Motion
     j: int
+    _known: dict[str, Floats] = field(default_factory=dict)
 
     def __getitem__(self, name: str) -> Floats:
+        if name not in self._known:
+            self._known[name] = self._of(name)
+        return self._known[name]
+
+    def _of(self, name: str) -> Floats:
         if name in _TIME:
             return _of_time(name, self.motion)
         position = self.motion.encoder[:, self.j]

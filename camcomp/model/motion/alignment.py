@@ -25,7 +25,7 @@ _JUMP_MM2 = 10.0  # what a place weighs that the row before does not lead to: ro
 _BACK_MM2 = 10.0  # and every mm back along the path
 _PLACES = 16  # that are followed at a time
 _BOX = 32  # chords that are looked at together
-_MOST_LAG = 25  # rows
+_MOST_LAG = 250  # rows: a quarter of a second where a control logs every millisecond
 _GAINED = 0.35  # of the shift, in rows per change of line: short lines hide a part of it
 
 
@@ -214,7 +214,8 @@ def _lag(geometric: Ints, hint: Ints) -> int:
         return 0
     n = len(hint)
     score = {}
-    for lag in range(-_MOST_LAG, _MOST_LAG + 1):
+    most = min(_MOST_LAG, n // 4)
+    for lag in range(-most, most + 1):
         a, b = max(-lag, 0), n - max(lag, 0)
         if b - a < n // 2:
             continue
@@ -223,6 +224,20 @@ def _lag(geometric: Ints, hint: Ints) -> int:
     best = max(score, key=lambda lag: (score[lag], -abs(lag)))
     gained = (score[best] - score[0]) * n / len(change)  # rows per change of line
     return best if gained > _GAINED * abs(best) and abs(best) > 1 else 0
+
+
+def way_from_lines(path: Path, aligned: Aligned) -> Floats:
+    """Way along the path (n,) mm from where a row lies to the line that it names; NaN where it names none of the program."""
+    length = path_geometry.lengths(path)
+    at = np.concatenate([[0.0], np.cumsum(length)])
+    own = at[aligned.motion] + aligned.share * length[aligned.motion]
+    out = np.full(len(own), np.nan)
+    for line in np.unique(aligned.line[np.isfinite(aligned.line)]):
+        rows, motions = np.flatnonzero(aligned.line == line), np.flatnonzero((path.line == line) & (length > 0.0))
+        if len(motions):
+            before = at[motions] - own[rows, None]
+            out[rows] = np.maximum(np.maximum(before, -before - length[motions]), 0.0).min(axis=1)
+    return out
 
 
 def _shifted(line: Floats, lag: int) -> Floats:

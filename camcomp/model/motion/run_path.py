@@ -73,6 +73,11 @@ class RunPath:
         return self.place(self.time)
 
     @cached_property
+    def tip_place(self) -> Places:
+        """Where the rows' tips lie between the nodes."""
+        return self.place(self.tip_time) if self.clock_s else self.row_place
+
+    @cached_property
     def row_force(self) -> Floats:
         """Cutting force (n, 3) N at the rows, machine frame, as modelled."""
         return self.row_place.of(self.node_force) if self.driven is None else self.driven.force
@@ -89,8 +94,13 @@ class RunPath:
         """
         if self.driven is None:
             return place.of(at_nodes)
-        nominal = self.driven.tip if at is self.time else self.driven.lead(at)
+        nominal = self._row_tip if at is self.tip_time else self.driven.lead(at)
         return np.asarray(nominal + place.of(at_nodes - self.node_tip))
+
+    @cached_property
+    def _row_tip(self) -> Floats:
+        assert self.driven is not None
+        return self.driven.lead(self.tip_time) if self.clock_s else self.driven.tip
 
     @cached_property
     def jumping(self) -> Bools:

@@ -192,7 +192,7 @@ class Twin:
         gap_row = _gap_at(run_path, run_path.time, gap, ahead)
         gap_tip = _gap_at(run_path, seen, gap, ahead) if late else gap_row
         place = run_path.row_place
-        place_tip = run_path.place(seen) if late else place
+        place_tip = place if not late else run_path.tip_place if seen is run_path.tip_time else run_path.place(seen)
         # structure
         known = solved if slopes is not None else None
         if known is None:
