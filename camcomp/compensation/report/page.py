@@ -22,6 +22,7 @@ from camcomp.compensation.report.figures import (
     figures_actuators,
 )
 from camcomp.compensation.report.machine_drawing import figure_machine
+from camcomp.compensation.report.wall_drawing import wall_section
 from camcomp.gcode.interpret import read_program
 from camcomp.ground.datatypes import Floats
 from camcomp.model.config.in_force import values_in_force
@@ -80,6 +81,9 @@ def compensation_html(
         if result.bands is not None:
             sections.append(band_section(drawn, result.bands, figures))
         sections += _plots(result, found, job, drawn, checked, tolerance_um)
+        programs = [("original program", result.program), ("corrected program", written)]
+        if walls := wall_section(job, result.program, programs):
+            sections.append(walls)
         sections.append(Section("lines", "Line by line", tables=[_lines(drawn, job, checked)]))
     sections += [_machine(job), inputs_section(inputs, result.written.data)]
     page = Page(

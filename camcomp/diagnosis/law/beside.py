@@ -26,6 +26,7 @@ def with_law(
         np.concatenate([old.scale, np.ones(more)]),
         np.concatenate([old.sign, np.zeros(more)]),
         np.concatenate([old.flexible, np.zeros(more)]),
+        np.concatenate([old.reach, np.full(more, np.inf)]),
     )
     own = [bench.channels(spot, values) for spot, values in terms]
     blocks = tuple(

@@ -12,7 +12,7 @@ from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.search.established import weakest
 from camcomp.diagnosis.search.imitation import credibility
 from camcomp.diagnosis.search.indistinguishable import Likeness, likeness, stand_ins
-from camcomp.diagnosis.search.tempering import TEMPERATURE, tempering
+from camcomp.diagnosis.search.tempering import TEMPERATURE, misfit, tempering
 from camcomp.diagnosis.search.unexplained import Unexplained, size_um, unexplained, worst
 from camcomp.diagnosis.search.unknown import firm_prior, foretelling, residual_tests, signal_rms
 from camcomp.diagnosis.statistics.cause_sets import (
@@ -289,13 +289,17 @@ def _established(
 
 
 def _same(problem: Problem, fits: tuple[Fitted, ...], probability: Floats) -> list[tuple[Members, Members]]:
-    """Pairs of the leader and a set of its size that fits as well, whatever the priors say of them."""
+    """Pairs of the leader and a set of its size that fits as well, whatever the priors say of them.
+
+    Priors of sizes, and of how far off the tolerances are all together: the rows and the stated tolerances have to tell.
+    """
     best = fits[int(np.argmax(probability))]
     found = []
     for f in fits:
         if f is best or len(f.members) != len(best.members) or not best.members:
             continue
-        if best.log_evidence - f.log_evidence < SAME_EVIDENCE and _plausible(problem, f):
+        behind = 0.5 * (misfit(problem, f) - misfit(problem, best))
+        if min(behind, best.log_evidence - f.log_evidence) < SAME_EVIDENCE and _plausible(problem, f):
             found.append((best.members, f.members))
     return found
 

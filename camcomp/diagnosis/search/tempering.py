@@ -10,11 +10,15 @@ TEMPERATURE = (
 
 
 def tempering(problem: Problem, f: Fitted) -> float:
-    """The temperature where a set is the best: evidence is worth less by as much as it leaves more than noise (quasi-likelihood).
+    """The temperature where a set is the best: evidence is worth less by as much as it leaves more than noise (quasi-likelihood)."""
+    return TEMPERATURE * max(1.0, misfit(problem, f) / max(total(f.grams).rows, 1))
 
-    What it leaves is taken with the members free and everything else within tolerance, penalties included.
-    """
+
+def misfit(problem: Problem, f: Fitted) -> float:
+    """Chi-square left when the members are free and everything else stays within tolerance, penalties included."""
     data = total(f.grams)
-    mean, _ = estimate(data, problem.prior, problem.member_columns(f.members), 1.0)
-    left = data.c - float(data.b @ mean)
-    return TEMPERATURE * max(1.0, left / max(data.rows, 1))
+    index = problem.member_columns(f.members)
+    mean, _ = estimate(data, problem.prior, index, 1.0)
+    precision = problem.prior.precision(1.0)
+    precision[index] = 0.0
+    return float(data.c - 2.0 * data.b @ mean + mean @ data.A @ mean + precision @ mean**2)

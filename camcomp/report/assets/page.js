@@ -76,19 +76,20 @@
 
   // The slider is logarithmic: 0..100 stands for the factors 1..most.
   const factorOf = (spec) => Math.pow(spec.exaggerate.most, Number(byId(spec.name + "-k").value) / 100);
+  const moved = (b, shift, k) => (b === null || shift === null ? null : b + k * shift);
   const shown = (k) => (k < 9.95 ? k.toFixed(1) : String(Math.round(k))) + " times";
 
   function exaggerated(spec) {
     const { base, shifts } = spec.exaggerate;
     const k = factorOf(spec);
     if (Array.isArray(base)) { // in space: every curve has its own points
-      const at = (i, axis) => base[i][axis].map((b, j) => (b === null ? null : b + k * shifts[i][axis][j]));
+      const at = (i, axis) => base[i][axis].map((b, j) => moved(b, shifts[i][axis][j], k));
       return { ...spec, traces: spec.traces.map((trace, i) => ({ ...trace, x: at(i, "x"), y: at(i, "y"), z: at(i, "z") })) };
     }
     const [h, v] = byId(spec.name + "-p").value.toLowerCase();
     const along = (i, axis) => {
       const shift = shifts[i] && shifts[i][axis];
-      return shift ? base[axis].map((b, j) => (b === null ? null : b + k * shift[j])) : base[axis];
+      return shift ? base[axis].map((b, j) => moved(b, shift[j], k)) : base[axis];
     };
     const traces = spec.traces.map((trace, i) => ({ ...trace, x: along(i, h), y: along(i, v) }));
     const layout = { ...spec.layout };
