@@ -16,11 +16,15 @@ from camcomp.ground.headway import part
 from camcomp.ground.places import STANDARD
 from camcomp.model.config.load import load_experiment
 from camcomp.model.config.write_back import machine_file, with_causes
+from camcomp.report.page import Listing
 
 if TYPE_CHECKING:
     from camcomp.diagnosis.diagnose import Diagnosis
     from camcomp.diagnosis.experiment.open_experiment import OpenExperiment
     from camcomp.diagnosis.law.library import LearnedLaw
+
+
+MOST_LISTED = 200_000  # characters of a next experiment's file that a page holds
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +73,19 @@ class ExperimentDiagnosis:
         from camcomp.diagnosis.report.views import report_of
 
         rows = self._residuals() if self.behind is None else None
-        return report_of(self.experiment, self.result, self.behind, self.opened, rows)
+        return report_of(self.experiment, self.result, self.behind, self.opened, rows, self._next_listing())
+
+    def _next_listing(self) -> Listing | None:
+        """The file of the next experiment for the page; None where there is none, or it is too long for a page."""
+        proposal = self.result.next_experiment
+        if proposal is None:
+            return None
+        name = "next-experiment.nc" if proposal.poses is None and proposal.moves is None else "next-experiment.csv"
+        try:
+            text = self.next_program(name)
+        except CheckFailed:
+            return None
+        return Listing(name, text) if len(text) <= MOST_LISTED else None
 
     def machine_with_causes(self, target: str = STANDARD) -> str:
         """Text of the machine file with the causes in it, for a file called `target`."""

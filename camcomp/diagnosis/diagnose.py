@@ -24,7 +24,7 @@ from camcomp.diagnosis.law.answer import LawAnswer, answer_law
 from camcomp.diagnosis.law.library import LearnedLaw
 from camcomp.diagnosis.next_experiment.after_unknown import explore
 from camcomp.diagnosis.next_experiment.designed import propose
-from camcomp.diagnosis.next_experiment.outcomes import with_outcomes
+from camcomp.diagnosis.next_experiment.outcomes import NOTHING, with_outcomes
 from camcomp.diagnosis.next_experiment.proposal import Proposal
 from camcomp.diagnosis.result.types import (
     DiagnosisResult,
@@ -155,7 +155,8 @@ def _next(problem: Problem, found: CauseSearch, word: str, job: Job) -> Proposal
 
 def _set_name(problem: Problem, f: Fitted) -> str:
     """A set of causes in words."""
-    return " and ".join(problem.columns.candidates[i].label for i in f.members) or "nothing but noise"
+    causes = (problem.columns.candidates[i] for i in f.members)
+    return " and ".join(f"{c.name} ({c.target})" if c.target else c.name for c in causes) or NOTHING
 
 
 # -- causes -----------------------------------------------------------------------------------------------------------

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from functools import cache
 from html import escape
 from importlib.resources import files
+from itertools import zip_longest
 
 from camcomp import __version__
 from camcomp.ground.errors import ConfigError
@@ -23,6 +24,9 @@ from camcomp.report.plot import Figure
 _POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"
 
 _UNIT = re.compile(r"(\d) (µm|mm|mrad|rad|N·m|N|s|times)\b")  # number and unit stay on one line
+
+
+WORDY = 24  # characters, from which on a cell is a text that needs some width
 
 
 @dataclass(frozen=True)
@@ -166,14 +170,16 @@ def _figure(figure: Figure) -> str:
 
 
 def _table(table: Table) -> str:
+    kinds = [' class="n"' if isinstance(cell, tuple) else "" for cell in table.rows[0]] if table.rows else []
     if table.sortable:
-        kinds = [' class="n"' if isinstance(cell, tuple) else "" for cell in table.rows[0]]
         heads = "".join(
             f'<th scope="col"{kind} aria-sort="none"><button type="button">{escape(h)}</button></th>'
             for h, kind in zip(table.heads, kinds, strict=True)
         )
     else:
-        heads = "".join(f'<th scope="col">{escape(h)}</th>' for h in table.heads)
+        heads = "".join(
+            f'<th scope="col"{kind}>{escape(h)}</th>' for h, kind in zip_longest(table.heads, kinds, fillvalue="")
+        )
     body = "".join(f"<tr>{''.join(_cell(c, i) for i, c in enumerate(row))}</tr>" for row in table.rows)
     kind = ' class="sortable"' if table.sortable else ""
     return (
@@ -188,5 +194,6 @@ def _cell(cell: str | tuple[float, str], column: int) -> str:
         value, text = cell
         inside = f' class="n" data-v="{value:.9g}">{escape(text)}'
     else:
-        inside = f' class="long">{escape(cell)}' if len(cell) > 60 and " " not in cell else f">{escape(cell)}"
+        kind = "long" if len(cell) > 60 and " " not in cell else "text" if len(cell) > WORDY and " " in cell else ""
+        inside = f' class="{kind}">{escape(cell)}' if kind else f">{escape(cell)}"
     return f'<th scope="row"{inside}</th>' if column == 0 else f"<td{inside}</td>"

@@ -20,6 +20,9 @@ INK = "var(--ink)"
 # From small to large; blue to yellow with rising lightness, which every kind of sight can order.
 SCALE = [[0, "var(--m0)"], [0.5, "var(--m1)"], [1, "var(--m2)"]]
 
+SMALLEST_UM = 0.01  # that people are told
+BAR_MARGIN = {"l": 70, "r": 60, "t": 34, "b": 50}  # room for what stands beside the longest bar
+
 Json = dict[str, Any]
 
 
@@ -108,3 +111,8 @@ def brief(value: float, digits: int = 3) -> str:
         places = max(digits - 1 - int(np.floor(np.log10(abs(value)))), 0)
         return f"{value:.{places}f}"
     return f"{value:.{digits - 1}e}"
+
+
+def micrometres(value: float) -> str:
+    """A length in um for people: never smaller than a hundredth."""
+    return f"below {SMALLEST_UM:g} µm" if 0.0 <= value < SMALLEST_UM else f"{brief(value)} µm"

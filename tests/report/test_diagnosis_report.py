@@ -1,5 +1,6 @@
 """The diagnosis report: what it says, what it draws, and that all of it stands in a real browser."""
 
+import dataclasses
 import json
 import re
 from base64 import b64decode
@@ -9,13 +10,16 @@ from html import unescape
 import numpy as np
 import pytest
 
+from camcomp.diagnosis.report.figures import figure_causes, figure_map, figure_signed, figure_size
 from camcomp.diagnosis.report.page import diagnosis_html, verdict_text
 from camcomp.diagnosis.report.run_view import RivalSignals, likeness, rms, spectrum
+from camcomp.diagnosis.result.types import DiagnosisResult, FoundCause
 from camcomp.report.inputs import Input
+from camcomp.report.page import Listing
 from camcomp.terminal.cli import run
 from tests.commandline import ROOT
 from tests.report.browser import needs_browser
-from tests.report.diagnoses import result, rivals, run_view, views
+from tests.report.diagnoses import cause, result, rivals, run_view, views
 
 VERDICTS = ("none", "identified", "ambiguous", "unknown")
 
@@ -61,7 +65,9 @@ def test_causes_with_intervals_next_experiment_and_notes():
     text = words(html_of("ambiguous", notes=["run b has no temperature"]))
     assert "backlash x 97.0 % 90 % width 21.3 µm (19.2 to 23.4)" in text
     assert "Repair nothing yet" in text and "play in the drive" in text
-    assert "Mill the circle in air at 2000 mm/min. It separates backlash(x) and friction(x)." in text
+    assert (
+        "Mill the circle in air at 2000 mm/min. It separates backlash(x) and friction(x): 0.830 bits expected." in text
+    )
     assert "run b has no temperature" in text
     # 14.1 um become 3.525 um: three quarters are gone
     assert "Part of the gap removed 75.0 % 95 % interval 70.0 to 90.0 %" in text
@@ -180,7 +186,7 @@ def test_in_a_browser(browser, tmp_path, verdict):
 
 
 def test_the_next_program_stands_on_the_page_ready_to_be_saved():
-    html = html_of("ambiguous", next_program="G0 X1 <\nM2\n")
+    html = html_of("ambiguous", next_program=Listing("next-experiment.nc", "G0 X1 <\nM2\n"))
     assert '<pre tabindex="0">G0 X1 &lt;\nM2\n</pre>' in html
     (data,) = re.findall(r'download="next-experiment.nc" href="data:text/plain;base64,([^"]+)"', html)
     assert b64decode(data) == b"G0 X1 <\nM2\n"
@@ -195,3 +201,32 @@ def test_the_first_part_says_what_to_do():
     assert at == sorted(at)
     assert "Nothing: machine and model agree" in words(html_of("none"))
     assert "none of the effects that camcomp knows" in words(html_of("unknown"))
+
+
+def test_where_no_cause_takes_anything_no_curve_says_so():
+    """Before and after are the same then: a second curve on top of the first would look like a result."""
+    one, *_ = views()
+    bare = dataclasses.replace(one, after=one.before)
+    assert [each["name"] for each in figure_size(bare, 1, 0.87).traces] == ["before", "noise floor"]
+    assert "no cause found takes any of it" in figure_size(bare, 1, 0.87).caption
+    assert len(figure_map([bare]).traces) == 1 and len(figure_map([one]).traces) == 2
+    assert not any("with the causes found" in each["name"] for each in figure_signed(bare, 1).traces)
+
+
+def test_no_bar_says_nought_of_what_is_there():
+    faint = result("identified").model_copy(
+        update={"causes": [FoundCause.model_validate(cause("backlash", "x", 0.99, 0.002))]}
+    )
+    share, probability = figure_causes(faint.causes).traces
+    assert (share["text"], probability["text"]) == (["less than 1 %"], ["99 %"])
+
+
+def test_the_law_of_an_unknown_effect_stands_on_the_first_screen():
+    term = {"term": "x_mm", "value": 0.02, "ci95": [0.01, 0.03], "unit": "1/mm"}
+    law = {"formula": "tip y = 0.02*x_mm", "on": "structure", "terms": [term], "envelope": {"x_mm": [-20, 20]},
+           "after_rms_um": 2.9, "before_rms_um": 17.4, "says": "What is left rises evenly with x_mm."}  # fmt: skip
+    unknown = {"effect": "unknown", "target": "y", "probability": 0.99, "share": 0.9, "parameters": {}, "law": law}
+    found = DiagnosisResult.model_validate(result("unknown").model_dump() | {"causes": [unknown]})
+    text = words(diagnosis_html(found, [], title="e", machine="m").decode())
+    first = text[: text.index("Causes by probability")]
+    assert "2.90 µm was 17.4 µm" in first and "83.3 %" in first and "rises evenly with x_mm" in first

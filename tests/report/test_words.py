@@ -3,9 +3,10 @@
 import pytest
 
 from camcomp.diagnosis.report.answer import MOST_CAUSES, answer_lines
-from camcomp.diagnosis.report.words import depends, micrometres, percent, plain, remedy, size, sizes
-from camcomp.diagnosis.result.types import DiagnosisResult, Driver, Estimate, FoundCause, StretchDriver
+from camcomp.diagnosis.report.words import depends, percent, plain, remedy, shortened, size, sizes, term_size
+from camcomp.diagnosis.result.types import DiagnosisResult, Driver, Estimate, FoundCause, LawTerm, StretchDriver
 from camcomp.ground import shelf
+from camcomp.report.plot import micrometres
 from tests.report.diagnoses import cause, result
 
 OWN = [name for name in shelf.members("effects") if getattr(shelf.load("effects", name), "PARAMETERS", ())]
@@ -94,3 +95,24 @@ def test_nothing_is_to_be_done_while_the_cause_is_open():
 
 def test_an_unknown_effect_says_what_it_goes_with():
     assert "The rest of y depends on the reversals of x." in answer_lines(result("unknown"))[0]
+
+
+LAW = "tip y = 0.0466387*gauss((x_mm + 5.15967)/6.00183)"
+
+
+def test_a_law_has_the_digits_that_its_interval_allows():
+    assert shortened(LAW) == "tip y = 0.04664*gauss((x_mm + 5.16)/6.002)"
+    term = LawTerm(term="gauss((x_mm + 5.15967)/6.00183)", value=0.0466387, ci95=(0.0450, 0.0482), unit="mm")
+    assert term_size(term) == "gauss((x_mm + 5.16)/6.002): 46.6 µm (45.0 to 48.2)"
+
+
+def test_ten_lines_at_most_with_a_law_too():
+    term = {"term": "x_mm", "value": 0.02, "ci95": [0.01, 0.03], "unit": "1/mm"}
+    law = {"formula": LAW, "on": "structure", "terms": [term] * 3, "envelope": {"x_mm": [-20, 20]}, "after_rms_um": 2.9,
+           "before_rms_um": 17.4, "says": "What is left is a bump."}  # fmt: skip
+    many = [cause("backlash", a, 0.99, share, width_mm=0.02) for a, share in zip("xyz", (0.1, 0.2, 0.3), strict=True)]
+    many.append({"effect": "unknown", "target": "y", "probability": 0.99, "share": 0.4, "parameters": {}, "law": law})
+    lines = answer_lines(DiagnosisResult.model_validate(result("unknown").model_dump() | {"causes": many}))
+    assert len(lines) <= 10
+    assert lines[1].startswith("  backlash (z)"), "the one with most of the gap is told"
+    assert any("What is left is a bump." in each for each in lines) and "measure next" in lines[-1]

@@ -9,7 +9,7 @@ from camcomp.compensation.program.result import Summary
 from camcomp.compensation.report.figures import DrawnPath, scene_of
 from camcomp.ground.datatypes import Bools, Floats
 from camcomp.report.page import Section, Table
-from camcomp.report.plot import STYLES, Figure, Json, axis, brief, broken, gapped, line, thin
+from camcomp.report.plot import STYLES, Figure, Json, axis, brief, broken, gapped, line, micrometres, thin
 
 FLOOR_UM = 1e-4  # below what a logarithmic axis can show
 KINDS = ("trusted", "doubtful", "shrunk", "left alone")
@@ -21,9 +21,9 @@ def band_section(drawn: DrawnPath, bands: Bands, figures: Summary) -> Section:
     assert expected is not None and figures.band is not None  # there are bands
     low, high = expected.rms_ci95_um
     text = (
-        f"Numbers of the machine file are uncertain. Machines drawn from them leave {brief(expected.rms_um)} µm rms after "
-        f"compensation (95 % of the machines: {brief(low)} to {brief(high)} µm); 95 % of all points stay below "
-        f"{brief(expected.p95_um)} µm. {figures.advice}."
+        f"Numbers of the machine file are uncertain. Machines drawn from them leave {micrometres(expected.rms_um)} rms after "
+        f"compensation (95 % of the machines: {brief(low)} to {micrometres(high)}); 95 % of all points stay below "
+        f"{micrometres(expected.p95_um)}. {figures.advice}."
     )
     rows: list[list[str | tuple[float, str]]] = [
         [each.input, (each.share, f"{100.0 * each.share:.1f}")] for each in figures.band
@@ -60,7 +60,7 @@ def _figure_band(drawn: DrawnPath, bands: Bands) -> Figure:
     between = _area(s, curve(drawn.after), curve(band))
     before = line("original program", s, curve(drawn.before), 0)
     at = drawn.worst(band)
-    words = f"up to {brief(band[at])} µm, in source line {drawn.line[at]}"
+    words = f"up to {micrometres(band[at])}, in source line {drawn.line[at]}"
     return Figure(
         "band",
         "Band around the residual",

@@ -12,7 +12,22 @@ from camcomp.compensation.program.under_control import mode_name
 from camcomp.compensation.program.verify import Verified
 from camcomp.ground.datatypes import RAPID, Bools, Floats, Ints
 from camcomp.model.job import Job
-from camcomp.report.plot import INK, SCALE, STYLES, Figure, axis, brief, broken, gapped, level, line, thin
+from camcomp.report.plot import (
+    BAR_MARGIN,
+    INK,
+    SCALE,
+    SMALLEST_UM,
+    STYLES,
+    Figure,
+    axis,
+    brief,
+    broken,
+    gapped,
+    level,
+    line,
+    micrometres,
+    thin,
+)
 
 AXES = "xyz"
 
@@ -85,7 +100,7 @@ def figure_trajectories(result: Compensated, found: Trajectories) -> Figure:
     drawn = target[cutting] if cutting.any() else target[~hidden]
     extent = float(np.ptp(drawn, axis=0).max())
     first = float(np.clip(0.12 * extent / max(1e-3 * max(off), 1e-9), 1.0, 1e4))
-    words = ", ".join(f"{name} {brief(value)} µm" for (name, _), value in zip(named[1:], off[1:], strict=True))
+    words = ", ".join(f"{name} {micrometres(value)}" for (name, _), value in zip(named[1:], off[1:], strict=True))
     return Figure(
         "trajectories",
         "Five trajectories of the tool tip",
@@ -123,8 +138,8 @@ def figure_error(drawn: DrawnPath, tolerance_um: float) -> Figure:
     curves.append(level("tolerance", [float(drawn.s[0]), float(drawn.s[-1])], tolerance_um))
     a, b, c = (drawn.worst(each) for each in (drawn.before, drawn.after, drawn.driven))
     words = (
-        f"original program up to {brief(drawn.before[a])} µm (line {drawn.line[a]}), corrected program up to "
-        f"{brief(drawn.after[b])} µm (line {drawn.line[b]}), as the control drives it up to {brief(drawn.driven[c])} µm "
+        f"original program up to {micrometres(drawn.before[a])} (line {drawn.line[a]}), corrected program up to "
+        f"{micrometres(drawn.after[b])} (line {drawn.line[b]}), as the control drives it up to {micrometres(drawn.driven[c])} "
         f"(line {drawn.line[c]}), tolerance {tolerance_um:g} µm"
     )
     return Figure(
@@ -145,7 +160,7 @@ def figure_shift(drawn: DrawnPath) -> Figure:
     s = gapped(drawn.s, index, gap, 4)
     curves = [line(f"Δ{a}", s, gapped(drawn.shift[:, i], index, gap, 3), i) for i, a in enumerate(AXES)]
     at = drawn.worst(size)
-    words = f"up to {brief(size[at])} µm, in source line {drawn.line[at]}"
+    words = f"up to {micrometres(size[at])}, in source line {drawn.line[at]}"
     return Figure(
         "shift",
         "Shift of the commanded tip",
@@ -203,7 +218,7 @@ def figure_path(drawn: DrawnPath) -> Figure:
         "hovertemplate": "x %{x} y %{y} z %{z} mm<br>correction %{line.color} µm<extra></extra>",
     }  # fmt: skip
     low = float(np.nanmin(np.where(drawn.hidden, np.nan, size))) if (~drawn.hidden).any() else 0.0
-    words = f"correction from {brief(low)} to {brief(size[drawn.worst(size)])} µm"
+    words = f"correction from {brief(low)} to {micrometres(size[drawn.worst(size)])}"
     return Figure(
         "path",
         "Tool path",
@@ -235,16 +250,16 @@ def figure_budget(checked: Verified, tolerance_um: float) -> Figure:
         "all": max(each.residual_um for each in checked.lines),
     }
     names = list(worst)[::-1]
-    values = [max(worst[name], 1e-7) for name in names]
+    values = [max(worst[name], SMALLEST_UM) for name in names]
     bars = {
         "type": "bar", "orientation": "h", "x": values, "y": names, "showlegend": False, "cliponaxis": False,
-        "marker": {"color": STYLES[0][0]}, "text": [f"{brief(worst[name])} µm" for name in names], "textposition": "outside",
+        "marker": {"color": STYLES[0][0]}, "text": [micrometres(worst[name]) for name in names], "textposition": "outside",
     }  # fmt: skip
     limit = {
         "type": "scatter", "mode": "lines", "x": [tolerance_um] * 2, "y": [names[0], names[-1]],
         "name": "tolerance", "line": {"color": STYLES[1][0], "dash": "dot", "width": 2},
     }  # fmt: skip
-    words = ", ".join(f"{name} {brief(value)} µm" for name, value in worst.items())
+    words = ", ".join(f"{name} {micrometres(value)}" for name, value in worst.items())
     top = max(max(values), tolerance_um)
     span = [float(np.log10(min(values))) - 0.3, float(np.log10(top)) + 1.0]
     return Figure(
@@ -253,6 +268,10 @@ def figure_budget(checked: Verified, tolerance_um: float) -> Figure:
         f"Read back from the text of the corrected program, largest value of each part: {words}.",
         f"Bar chart of the parts of the error that is left: {words}.",
         [bars, limit],
-        {"xaxis": axis("error in µm", type="log", dtick=1, range=span, exponentformat="power"), "yaxis": axis("")},
+        {
+            "xaxis": axis("error in µm", type="log", dtick=1, range=span, exponentformat="power"),
+            "yaxis": axis(""),
+            "margin": BAR_MARGIN,
+        },
         height=300,
     )

@@ -13,11 +13,12 @@ from camcomp.ground.datatypes import Floats
 from camcomp.model.job import Job
 from camcomp.model.statics.description import Actuator, Chain, Parallelogram, Passive, Robot, Transform
 from camcomp.model.statics.rotation import exp_rotation, rotation_vectors
-from camcomp.report.plot import INK, Figure, Json, axis, brief, numbers, thin
+from camcomp.report.plot import INK, Figure, Json, axis, micrometres, numbers, thin
 
 _LENGTH_MM = 300.0  # by which angles are weighed against lengths
 _OPEN_MM = 20.0  # a leg that misses its platform by more was not drawn right and is left out
 _LONGEST = 3.0  # times the size of the machine: a travel that is longer would leave nothing else to see
+TICKS = 7  # along the longest axis
 _SHOWN = 0.1  # of the machine's size: how large the largest deviation is drawn at first
 
 
@@ -126,9 +127,10 @@ def figure_machine(result: Compensated, job: Job, drawn: DrawnPath) -> Figure | 
         style: Json = {"color": f"var(--c{i % 6 + 1})", "width": 7}
         moved = other.nodes - leg.nodes
         missed = leg.nodes[-1] + off - other.nodes[-1]  # what springs give way by, which no joint can follow
-        add(f"leg {leg.name}", leg.nodes, moved + np.linspace(0.0, 1.0, len(moved))[:, None] * missed, style)
+        name = leg.name if len(legs) == 1 or leg.name.startswith("leg") else f"leg {leg.name}"
+        add(name, leg.nodes, moved + np.linspace(0.0, 1.0, len(moved))[:, None] * missed, style)
         for bar, bent_bar in zip(leg.bars, other.bars, strict=True):
-            add(f"leg {leg.name}, bar", bar, bent_bar - bar, style | {"width": 3}, legend=False)
+            add(f"{name}, bar", bar, bent_bar - bar, style | {"width": 3}, legend=False)
         if leg.way is not None and np.linalg.norm(leg.way[1] - leg.way[0]) < _LONGEST * size:
             add(f"travel of {leg.name}", leg.way, np.zeros((2, 3)), {"color": "var(--c6)", "width": 2}, legend=False)
     tool = np.array([tip - held @ robot.tool, tip])
@@ -142,7 +144,7 @@ def figure_machine(result: Compensated, job: Job, drawn: DrawnPath) -> Figure | 
     shift = (result.written.end[shown] - result.rows.target[shown]) @ turn.T
     add("commanded instead", path, shift, {"color": "var(--good)", "width": 4})
     largest = float(np.linalg.norm(off))
-    words = f"{brief(1e3 * largest)} µm in line {drawn.line[row]}"
+    words = f"{micrometres(1e3 * largest)} in line {drawn.line[row]}"
     return Figure(
         "machine-drawn",
         "The machine where the original program is off most",
@@ -166,7 +168,8 @@ def _scene(points: Floats) -> Json:
     half = half + _SHOWN * 2.0 * half.max()
     ranges = np.column_stack((middle - half, middle + half)).round(3).tolist()
     ratio = dict(zip("xyz", (half / half.max()).round(6).tolist(), strict=True))
-    axes = {f"{a}axis": axis(f"{a} in mm", range=ranges[i]) for i, a in enumerate("xyz")}
+    ticks = {a: max(round(TICKS * share), 2) for a, share in ratio.items()}
+    axes = {f"{a}axis": axis(f"{a} in mm", range=ranges[i], nticks=ticks[a]) for i, a in enumerate("xyz")}
     return axes | {"aspectmode": "manual", "aspectratio": ratio, "camera": {"eye": {"x": 0.9, "y": -1.5, "z": 0.8}}}
 
 

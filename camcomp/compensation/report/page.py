@@ -22,6 +22,7 @@ from camcomp.compensation.report.figures import (
     figures_actuators,
 )
 from camcomp.compensation.report.machine_drawing import figure_machine
+from camcomp.compensation.report.wall_drawing import wall_section
 from camcomp.gcode.interpret import read_program
 from camcomp.ground.datatypes import Floats
 from camcomp.model.config.in_force import values_in_force
@@ -29,7 +30,7 @@ from camcomp.model.control import setup_of
 from camcomp.model.job import Job
 from camcomp.report.inputs import Input, inputs_section
 from camcomp.report.page import Page, Section, Table, render
-from camcomp.report.plot import brief
+from camcomp.report.plot import brief, micrometres
 
 MOST_LINES = 1000
 BUDGET = (
@@ -64,8 +65,8 @@ def compensation_html(
         verdict = "The corrected program is written, but a check failed: " + "; ".join(text for _, text in failed) + "."
     else:
         verdict = (
-            f"By the model the original program leaves up to {brief(before)} µm at the tip, the corrected one "
-            f"{brief(after)} µm; the tolerance is {tolerance_um:g} µm."
+            f"By the model the original program leaves up to {micrometres(before)} at the tip, the corrected one "
+            f"{micrometres(after)}; the tolerance is {tolerance_um:g} µm."
         )
         taken = figures.taken
         if taken and (less := taken.shrunk + taken.left_alone):
@@ -80,6 +81,9 @@ def compensation_html(
         if result.bands is not None:
             sections.append(band_section(drawn, result.bands, figures))
         sections += _plots(result, found, job, drawn, checked, tolerance_um)
+        programs = [("original program", result.program), ("corrected program", written)]
+        if walls := wall_section(job, result.program, programs):
+            sections.append(walls)
         sections.append(Section("lines", "Line by line", tables=[_lines(drawn, job, checked)]))
     sections += [_machine(job), inputs_section(inputs, result.written.data)]
     page = Page(
@@ -100,20 +104,22 @@ def _cards(
     cards = [
         (
             "Tip error before",
-            f"{brief(figures.before.max_um)} µm",
-            f"rms {brief(figures.before.rms_um)} µm",
+            f"{micrometres(figures.before.max_um)}",
+            f"rms {micrometres(figures.before.rms_um)}",
         ),
-        ("Tip error after", f"{brief(figures.after.max_um)} µm", f"tolerance {tolerance_um:g} µm"),
+        ("Tip error after", f"{micrometres(figures.after.max_um)}", f"tolerance {tolerance_um:g} µm"),
     ]
     mode = figures.control_mode + ("" if figures.control_mode_stated else " (assumed)")
     times = figures.cycle_time_s
     cards += [
-        (f"Under the control, {mode}", f"{brief(figures.under_control.max_um)} µm",
-         f"rms {brief(figures.under_control.rms_um)} µm, with what it merges and rounds, beside joining lines, too"),
+        (f"Under the control, {mode}", f"{micrometres(figures.under_control.max_um)}",
+         f"rms {micrometres(figures.under_control.rms_um)}, with what it merges and rounds, beside joining lines, too"),
         ("Cycle time", f"{brief(times.after)} s", f"before {brief(times.before)} s; with pauses (G4)"),
     ]  # fmt: skip
     if expected := figures.expected:
-        cards.append(("To be expected", f"{brief(expected.p95_um)} µm", "95 % of all points of machines that may be"))
+        cards.append(
+            ("To be expected", f"{micrometres(expected.p95_um)}", "95 % of all points of machines that may be")
+        )
     for most, what, unit in (
         (figures.actuator_change_max_mm, "Largest change of a slide", "mm"),
         (1e3 * (figures.actuator_change_max_rad or 0.0), "Largest change of a hinge", "mrad"),

@@ -26,10 +26,11 @@ POSES_SEED = 20201110  # the same answer twice
 
 @dataclass(frozen=True, eq=False)
 class Design:
-    """Poses chosen, as indices of the candidates in the order of choice, and their information (bits)."""
+    """Poses chosen, as indices of the candidates in the order of choice, their information (bits), what stays uncertain (k, k)."""
 
     chosen: tuple[int, ...]
     gain: float
+    covariance: Floats
 
 
 def designed(X: Floats, covariance: Floats, noise: float, count: int, interest: Floats | None = None) -> Design:
@@ -46,10 +47,8 @@ def designed(X: Floats, covariance: Floats, noise: float, count: int, interest: 
             belief.give_back(chosen[i])
             rest = chosen[:i] + chosen[i + 1 :]
             chosen[i] = belief.take(belief.best(rest))
-    return Design(
-        tuple(chosen),
-        0.5 * float(np.linalg.slogdet(covariance)[1] - np.linalg.slogdet(belief.covariance)[1]) / float(np.log(2.0)),
-    )
+    told = np.linalg.slogdet(covariance)[1] - np.linalg.slogdet(belief.covariance)[1]
+    return Design(tuple(chosen), 0.5 * float(told) / float(np.log(2.0)), belief.covariance)
 
 
 class _Belief:
@@ -114,28 +113,46 @@ def candidates(bench: ArmBench, count: int = CANDIDATES) -> Floats:
     return np.asarray(q[inside[:count]], float)
 
 
-def proposed(bench: ArmBench, found: ArmFit, noise: float) -> tuple[Floats, Floats, float]:
-    """Joints (POSES, m) to measure in a new campaign, their platform points (POSES, 3), and the information (bits).
-
-    Empty where nothing was taken or no candidate stands where poses stood.
+@dataclass(frozen=True, eq=False)
+class ProposedPoses:
+    """Joints (p, m) to measure in a new campaign, their platform points (p, 3) mm. before_um, after_um: rms that what is uncertain of
+    the effects moves the tip by, over all that was looked at; gain: bits, what stays below the noise left out.
     """
+
+    q: Floats
+    place: Floats
+    before_um: float = 0.0
+    after_um: float = 0.0
+    gain: float = 0.0
+
+
+def proposed(bench: ArmBench, found: ArmFit, noise: float) -> ProposedPoses:
+    """Poses to measure in a new campaign; empty where nothing was taken or no candidate stands where poses stood."""
     on = [j for s in found.taken.steps for j in found.groups[s.group] if found.amount[j] != 0.0]
     q = candidates(bench)
     if not on or not len(q):
-        return np.zeros((0, len(bench.actuators))), np.zeros((0, 3)), 0.0
+        return ProposedPoses(np.zeros((0, len(bench.actuators))), np.zeros((0, 3)))
     poses = _as_poses(q)
     place = bench.standing(poses, ()).hung.point
     poses = replace(poses, tip=bench.start[0].tips(place, bench.standing(poses, ()).hung.rotation))
     there = ArmBench(bench.robot, bench.causes, [poses])
     block = there.blocks([found.columns[j] for j in on])[0]
     frame = np.diag([FRAME / ARM_MM] * 3 + [FRAME] * 6) ** 2
-    covariance = np.zeros((len(on) + 9,) * 2)
-    covariance[: len(on), : len(on)] = found.covariance[np.ix_(on, on)] + 1e-12 * np.eye(len(on))
-    covariance[len(on) :, len(on) :] = frame
+    k = len(on)
+    covariance = np.zeros((k + 9,) * 2)
+    covariance[:k, :k] = found.covariance[np.ix_(on, on)] + 1e-12 * np.eye(k)
+    covariance[k:, k:] = frame
     rows = np.concatenate([block.X, block.N], axis=2)
     design = designed(rows, covariance, noise, POSES)
     chosen = list(design.chosen)
-    return q[chosen], place[chosen], design.gain
+    before, after = (_moves(block.X, each[:k, :k]) for each in (covariance, design.covariance))
+    gain = 0.5 * float(np.log2((before + 3.0 * noise**2) / (after + 3.0 * noise**2)))
+    return ProposedPoses(q[chosen], place[chosen], 1e3 * before**0.5, 1e3 * after**0.5, gain)
+
+
+def _moves(X: Floats, covariance: Floats) -> float:
+    """Mean square, mm2, that what is uncertain (k, k) moves the tip by in rows X (n, 3, k)."""
+    return float(np.mean(np.einsum("nik,kl,nil->n", X, covariance, X, optimize=True)))
 
 
 def unseen_share(bench: ArmBench, found: ArmFit, q: Floats) -> float:

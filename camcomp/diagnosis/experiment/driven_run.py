@@ -101,7 +101,10 @@ def drive(
         forces = cutting_forces(
             program.track, cut or aligned, tip, measured.time, bool(np.isfinite(measured.line).any())
         )
-        unsure |= _idle_or_not(forces, aligned, program, tip, measured.time)
+        idle = _idle_or_not(forces, aligned, program, tip, measured.time)
+        unsure |= idle
+        # the drives of a tool that stands in a cut may bear its force or none
+        forces = replace(forces, doubt=np.where(idle[:, None], 0.5 * np.abs(forces.force), forces.doubt))
     run_path = driven_path(
         name, measured.time, rho, tip, forces, started=started, to_machine=twin.to_machine, vectors=vectors,
         inverse=twin.inverse, temperature=temperature,

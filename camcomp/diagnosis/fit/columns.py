@@ -37,6 +37,7 @@ CLOCK_RATE = 1e-5
 SPRING_LOG = 0.01  # one link's spring against its stated value
 HEALTHY = 0.08  # of the noise floor at the tip: what of every effect is within tolerance
 MOST_HEALTHY = 0.3  # of an effect's typical size
+# tolerances beyond which it is no tolerance: at the tip no longer minor, by chance once in 5600
 _EDIT = 0.05  # step of the allowances' differences
 FORCE_TURN_RAD = 0.005  # direction of the cutting force in the plane of the work
 
@@ -136,23 +137,30 @@ def build(
     candidates: Sequence[CandidateCause],
     shapes: Mapping[int, Mapping[str, float]],
     floor_um: float,
+    minor_um: float,
 ) -> Columns:
     """All columns at nominal. Candidates that no channel can see have columns of zeros and stay.
 
     Every healthy machine has a little of everything: what moves the tip by HEALTHY of the noise floor is within tolerance,
-    whatever other channels see of it.
+    whatever other channels see of it; what moves it by more than minor_um is a cause. Nuisances reach as many of their
+    tolerances: a healthy one goes beyond once in 5600.
     """
+    reached = minor_um / (HEALTHY * floor_um)
     owner: list[int] = []
     names: list[str] = []
     tolerance: list[float] = []
+    reach: list[float] = []
     sign: list[float] = []
     flexible: list[float] = []
     parts: list[list[Floats]] = []
 
-    def put(who: int, name: str, size: float, per_run: list[Floats], signed: int = 0, loose: bool = False) -> None:
+    def put(
+        who: int, name: str, size: float, most: float, per_run: list[Floats], signed: int = 0, loose: bool = False
+    ) -> None:
         owner.append(who)
         names.append(name)
         tolerance.append(size)
+        reach.append(most)
         sign.append(float(signed))
         flexible.append(float(loose))
         parts.append(per_run)
@@ -163,17 +171,18 @@ def build(
             candidate_columns(bench, candidate, shapes.get(i, shape_default(candidate))),
             strict=True,
         ):
-            healthy = min(HEALTHY * floor_um / max(tip_um(bench, per_run), 1e-9), MOST_HEALTHY)
+            healthy = HEALTHY * floor_um / max(tip_um(bench, per_run), 1e-9)
             if any(each.placed for each in candidate.shapes):  # nothing happens for a while to every healthy machine
                 healthy = p.tolerance / p.scale
-            put(i, f"{candidate.label}.{p.name}", healthy, per_run, p.sign, True)
+            name = f"{candidate.label}.{p.name}"
+            put(i, name, min(healthy, MOST_HEALTHY), reached * healthy, per_run, p.sign, True)
     for name, size, per_run, loose in _nuisances(bench):
         if name.startswith("spring."):  # a soft machine has no more of it than of anything else
             size = min(size, HEALTHY * floor_um / max(tip_um(bench, per_run), 1e-9))
-        put(-1, name, size, per_run, 0, loose)
+        put(-1, name, size, reached * size, per_run, 0, loose)
     blocks = tuple(np.stack([each[r] for each in parts], axis=2) for r in range(len(bench.runs)))
     k = len(owner)
-    prior = Prior(np.array(tolerance), np.ones(k), np.array(sign), np.array(flexible))
+    prior = Prior(np.array(tolerance), np.ones(k), np.array(sign), np.array(flexible), np.array(reach))
     return Columns(tuple(candidates), np.array(owner), tuple(names), prior, blocks)
 
 

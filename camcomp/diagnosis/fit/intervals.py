@@ -1,8 +1,9 @@
 """How well the parameters of an answer are known: amplitudes and shapes together, allowing for what no model states.
 
-Three parts: the posterior of the linear fit with everything else within tolerance; the scatter of what the fit leaves,
-block of time by block of time (a model that is a little wrong leaves more than noise, and leaves it in one piece);
-and what every healthy machine has of the same parameter, which is in the data as well.
+Three parts: the posterior of the linear fit with everything else within tolerance, and springs and forces as far off as
+they are on any machine, unless the rows say better; the scatter of what the fit leaves, block of time by block of time (a
+model that is a little wrong leaves more than noise, and leaves it in one piece); and what every healthy machine has of
+the same parameter, which is in the data as well.
 Source of the second part: sandwich covariance over blocks (Liang, Zeger 1986; Newey, West 1987).
 """
 
@@ -10,14 +11,19 @@ import numpy as np
 
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.statistics.cause_sets import Fitted
+from camcomp.diagnosis.statistics.evidence import within
 from camcomp.ground.datatypes import Floats
 
 FORMULA = 0.005  # share of its size by which an effect's formula itself is off: no guide turns round as Dahl wrote
+STATED = 0.03  # share by which stated springs and forces are off on any machine, whether it is a cause or not
 BLOCKS = (6, 24, 96)  # per run
 
 
-def joint_covariance(problem: Problem, f: Fitted) -> Floats:
-    """Covariance (d + s, d + s) of the members' coordinates and, behind them, of their shapes in their own units."""
+def joint_covariance(problem: Problem, f: Fitted, *, as_stated: bool = False) -> Floats:
+    """Covariance (d + s, d + s) of the members' coordinates and, behind them, of their shapes in their own units.
+
+    as_stated: of what the members do at the tip, rather than of springs and forces behind it.
+    """
     index = problem.member_columns(f.members)
     names = problem.shapes_of(f.members)
     d, s = len(index), len(names)
@@ -30,12 +36,17 @@ def joint_covariance(problem: Problem, f: Fitted) -> Floats:
         every = np.concatenate([W, D * reach], axis=1)
         every[:, index] = own
         G.append(every)
-    precision = np.concatenate([problem.prior.precision(f.factor), np.ones(s)])
+    usual, most = problem.prior.precision(f.factor), problem.prior.reach.copy()
+    if not as_stated:
+        usual, most = _stated(problem, usual, most)
+    precision = np.concatenate([usual, np.ones(s)])
     precision[index] = 1e-2 / problem.prior.scale[index] ** 2
     M = sum((g.T @ g for g in G), np.diag(precision))
     size = 1.0 / np.sqrt(np.diag(M))
     C = size[:, None] * np.linalg.inv(size[:, None] * M * size) * size
-    mean = C[:k, :] @ sum(g.T @ r for g, r in zip(G, f.residual, strict=True))
+    most = np.concatenate([most, np.full(s, np.inf)])
+    most[index] = np.inf
+    mean = within(C @ sum(g.T @ r for g, r in zip(G, f.residual, strict=True)), lambda held: C[:, held], most)[0][:k]
     mine = np.array([*index, *range(k, k + s)], int)
     scatter = np.zeros((len(BLOCKS), d + s))
     for run, (g, r) in enumerate(zip(G, f.residual, strict=True)):
@@ -53,3 +64,14 @@ def joint_covariance(problem: Problem, f: Fitted) -> Floats:
     healthy = np.concatenate([problem.prior.tolerance[index], np.zeros(s)])
     formula = np.concatenate([FORMULA * f.theta, np.zeros(s)])
     return np.asarray(out + np.diag(healthy**2 + formula**2), float)
+
+
+def _stated(problem: Problem, usual: Floats, most: Floats) -> tuple[Floats, Floats]:
+    """Precision and reach (k,) of all columns, with springs and forces known to STATED of themselves only."""
+    precision, reach = usual.copy(), most.copy()
+    for candidate, columns in zip(problem.columns.candidates, problem.candidates.columns, strict=True):
+        for p, c in zip(candidate.parameters, columns, strict=True):
+            if p.log:
+                precision[c] = min(precision[c], (p.scale / STATED) ** 2)
+                reach[c] = np.inf
+    return precision, reach

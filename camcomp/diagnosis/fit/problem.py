@@ -8,7 +8,7 @@ import numpy as np
 
 from camcomp.diagnosis.fit.bench import Bench, CandidateCause, cause_of, step_of, thinned
 from camcomp.diagnosis.fit.columns import Columns, build, candidate_columns, moved_tip, patterns, shape_default
-from camcomp.diagnosis.fit.floor import NoiseFloor, least_noise, measure_floor
+from camcomp.diagnosis.fit.floor import MINOR, NoiseFloor, least_noise, measure_floor
 from camcomp.diagnosis.fit.grid_parameters import beside, best_shape, quick_columns, reach
 from camcomp.diagnosis.fit.intervals_in_time import LOOK_ELSEWHERE, best_interval, never_ending
 from camcomp.diagnosis.fit.label_offsets import with_scatter
@@ -313,7 +313,7 @@ def open_problem(bench: Bench, candidates: Sequence[CandidateCause], stated_mm: 
     residuals = [bench.residual(k) for k in range(len(bench.runs))]
     noise = instrument_noise(bench, floor, least_noise(bench, floor), times)
     inflate = less_certain(noise, inflation(bench), tails(bench))
-    columns = build(bench, candidates, {}, floor.tip_um)
+    columns = build(bench, candidates, {}, floor.tip_um, MINOR * floor.tip_um)
     shapes: dict[int, dict[str, float]] = {i: shape_default(a) for i, a in enumerate(candidates) if a.shapes}
     words = patterns(bench)
     rough = _whiten(bench, columns, [], floor, noise, inflate, times, residuals, shapes, outliers)

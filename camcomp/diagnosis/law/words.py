@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from camcomp.diagnosis.law.forms import Form
 
 WORDS = {
@@ -17,8 +19,17 @@ WORDS = {
 
 def law_sentence(forms: Sequence[Form]) -> str:
     """What a law says, in words."""
-    said = [f"{WORDS.get(each.family, 'goes with')} {listed(each.about)}" for each in forms if each.about]
+    said = [f"{WORDS.get(each.family, 'goes with')} {listed(each.about)}{_place(each)}" for each in forms if each.about]
     return f"What is left {listed(list(dict.fromkeys(said)))}."
+
+
+def _place(form: Form) -> str:
+    """Where a bump stands: between its halves of the height."""
+    if form.family != "bump":
+        return ""
+    centre, width = form.shape
+    half = width * float(np.sqrt(np.log(2.0)))  # exp(-u^2)
+    return f", from {centre - half:.3g} to {centre + half:.3g}"
 
 
 def law_sum(pairs: Sequence[tuple[float, str]]) -> str:

@@ -129,7 +129,7 @@ def by_other_means(site: Site) -> Iterator[Candidate]:
             yield replace(base, action=action, channels=(*site.channels, channel), minutes=base.minutes + cost)
     base = candidate(site, _in_air(site, replace(design, cutting=False)))
     for effect, parameter, what, cost, deviation in _BY_HAND:
-        action = f"measure {what}, state what is found under effects: in the config, diagnose again --without {effect}"
+        action = f"measure {what} and state what is found under effects: in the config; {base.action}; diagnose again --without {effect}"
         yield replace(base, action=action, minutes=base.minutes + cost, knows=((effect, parameter, deviation),))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from textwrap import wrap
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from camcomp.ground.datatypes import Floats
 PLANES = {"XY": ("G17", (0, 1)), "XZ": ("G18", (0, 2)), "YZ": ("G19", (1, 2))}
 _WORDS = {0: "I", 1: "J", 2: "K"}
 _SENSES = {1: ("G3", "counter-clockwise"), -1: ("G2", "clockwise")}
+REMARK = 120  # characters of a line that every control reads
 SETUP_MIN = 3.0  # to load a program, start the log and look at it
 STOCK_MIN = 10.0  # to clamp material for a cut
 SOON_S = 60.0  # after the last run, at the earliest
@@ -98,8 +100,9 @@ class MotionDesign:
         if self.dwell_s:
             lines.append(f"G4 P{self.dwell_s:.0f}")
         text = "".join(f"{line}\n" for line in lines)
-        say = say.replace("(", "").replace(")", "")
-        return f"(experiment proposed by camcomp)\n({say})\nG21 G90 {g} G54\n{text}M2\n"
+        said = wrap(say.replace("(", "").replace(")", ""), REMARK)
+        remarks = "".join(f"({line})\n" for line in ("experiment proposed by camcomp", *said))
+        return f"{remarks}G21 G90 {g} G54\n{text}M2\n"
 
 
 def _point(p: Floats) -> str:

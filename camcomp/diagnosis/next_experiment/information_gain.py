@@ -33,7 +33,8 @@ if TYPE_CHECKING:
 class ExpectedGain:
     """What an experiment tells. separated, narrowed: bits of which cause and of how large; before_um, after_um: rms that the
     uncertainty of the answer moves the tip by on the runs' programs; shows (r,): rms of what every rival lets one expect
-    beyond the machine file, in the kind of channel that tells most, mm or N; left (r, r): of what rival j leaves of rival i there.
+    beyond the machine file, in the kind of channel that tells most, mm or N; left (r, r): of what rival j leaves of rival i there;
+    apart (r, r): chi-square by which rival j misses the mean log of rival i.
     """
 
     separated: float
@@ -43,6 +44,7 @@ class ExpectedGain:
     kind: str
     shows: Floats
     left: Floats
+    apart: Floats
 
     @property
     def gain(self) -> float:
@@ -90,6 +92,7 @@ def told(question: Question, candidate: Candidate, there: Foreseen, weight: Floa
         kinds[k] if kinds else "",
         size * np.sqrt(np.mean(signals[a:b] ** 2, axis=0)) if b > a else np.zeros(n),
         size * rests[:, :, k] if kinds else np.zeros((n, n)),
+        apart,
     )
 
 

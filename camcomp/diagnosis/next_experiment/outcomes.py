@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+from camcomp.diagnosis.law.words import listed
 from camcomp.diagnosis.next_experiment.proposal import Proposal
 from camcomp.report.plot import brief
 
 MOST_TOLD = 3  # rival sets that have a sentence of their own
+ALIKE = 4.0  # chi-square: two standard deviations, below which one log tells nothing apart
+NOTHING = "nothing but noise"  # the name of an empty set of causes
 _WHAT = {
     "tip": ("the tip is", 1e3, "µm"),
     "encoder": ("the encoders are", 1e3, "µm"),
@@ -26,10 +29,10 @@ def with_outcomes(proposal: Proposal, names: Sequence[str]) -> Proposal:
     if len(names) == 1:
         sentences = [
             (
-                f"If {names[0]} leaves no more than the noise on it, it holds; what stays uncertain then moves the tip by "
+                f"If no more than the noise is left on it with {names[0]} in the model, that holds; what stays uncertain then moves the tip by "
                 f"{_um(found.after_um)} (rms) on the runs' programs instead of {_um(found.before_um)}."
             ),
-            "If it leaves more, something acts there that these runs did not show.",
+            "If more is left, something acts there that these runs did not show.",
         ]
     elif proposal.candidate.knows:
         [(effect, *_)] = proposal.candidate.knows
@@ -50,11 +53,15 @@ def _by_hand(name: str, effect: str) -> str:
 def _by_log(proposal: Proposal, names: Sequence[str], i: int) -> str:
     found = proposal.told
     assert found is not None
+    if names[i] == NOTHING:
+        return "If nothing but noise is left on it, there is no cause."
     what, scale, unit = _WHAT[found.kind]
-    rest = min((float(found.left[i, j]), j) for j in range(len(names)) if j != i)
-    off = f"{brief(scale * float(found.shows[i]), 2)} {unit}"
-    left = f"{brief(scale * rest[0], 2)} {unit}"
-    return f"If it is {names[i]}, {what} off by {off} (rms) on it, of which {names[rest[1]]} cannot explain {left}."
+    off = f"If it is {names[i]}, {what} off by {brief(scale * float(found.shows[i]), 2)} {unit} (rms) on it"
+    others = [j for j in range(len(names)) if j != i]
+    if alike := [names[j] for j in others if found.apart[i, j] < ALIKE]:
+        return f"{off}; {listed(alike[:MOST_TOLD])} would look the same there."
+    left, nearest = min((float(found.left[i, j]), j) for j in others)
+    return f"{off}, of which {names[nearest]} cannot explain {brief(scale * left, 2)} {unit}."
 
 
 def after_unknown(varies: Sequence[str], others: Sequence[str]) -> tuple[str, ...]:

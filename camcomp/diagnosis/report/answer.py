@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
-from camcomp.diagnosis.report.words import depends, micrometres, percent, plain, remedy, sizes
-from camcomp.diagnosis.result.types import UNKNOWN, DiagnosisResult, GapSize, Law, NamedCause
-from camcomp.report.plot import brief
+from camcomp.diagnosis.law.words import listed
+from camcomp.diagnosis.report.words import depends, percent, plain, remedy, shortened, sizes, term_size
+from camcomp.diagnosis.result.types import UNKNOWN, DiagnosisResult, FoundCause, GapSize, Law, NamedCause
+from camcomp.report.plot import brief, micrometres
 
 HALF = 0.5  # of what is left: what goes with less is told only where nothing goes with more
 MOST_CAUSES = 3  # that the terminal tells
+BESIDE_LAW = 1  # where a law is told, too
 MOST_LINES = 10  # of the terminal, before what outcomes mean is left to the page
 
 
@@ -28,6 +28,8 @@ def verdict_text(result: DiagnosisResult) -> str:
         if shrink
         else f"There is no run that the fit has not seen; the noise floor is {floor}."
     )
+    if not result.known and result.verdict == UNKNOWN:
+        told = f"The gap is {micrometres(gap.rms_um)} (rms), the noise floor {floor}."
     known = [cause_name(each) for each in result.known]
     if result.verdict == "none":
         return (
@@ -35,28 +37,35 @@ def verdict_text(result: DiagnosisResult) -> str:
             "is nothing to explain."
         )
     if result.verdict == "identified":
-        return f"{together(known)} {'explain' if len(known) > 1 else 'explains'} the gap. {told}"
+        return f"{listed(known)} {'explain' if len(known) > 1 else 'explains'} the gap. {told}"
     if result.verdict == "ambiguous":
-        sets = [together([cause_name(each) for each in one]) or "nothing but noise" for one in result.alternatives]
+        sets = [listed([cause_name(each) for each in one]) or "nothing but noise" for one in result.alternatives]
         return f"These runs cannot tell apart: {'; or '.join(sets)}. {told}"
-    rest = f" {together(known)} {'are' if len(known) > 1 else 'is'} identified." if known else ""
+    if len(known) > MOST_CAUSES:
+        known = [*(cause_name(each) for each in by_share(result)[:MOST_CAUSES]), f"{len(known) - MOST_CAUSES} more"]
+    subject = "The rest" if known else "It"
+    rest = f" {listed(known)} {'are' if len(known) > 1 else 'is'} identified." if known else ""
     drivers = [depends(each) for each in result.where.drivers if each.share >= HALF][:2] or [
         depends(each) for each in result.where.drivers[:1]
     ]
     unknown = next((each for each in result.causes if each.effect == UNKNOWN), None)
-    aimed = f" of {unknown.target}" if unknown is not None and unknown.target else ""
-    what = f" The rest{aimed} depends on {together(drivers)}." if drivers else ""
+    aimed = (
+        f"{' of' if known else ' moves'} {unknown.target}{'' if known else ' and'}"
+        if unknown is not None and unknown.target
+        else ""
+    )
+    what = f" {subject}{aimed} depends on {listed(drivers)}." if drivers else ""
     return f"Something is at work that no effect of the library explains.{rest}{what} {told}"
+
+
+def by_share(result: DiagnosisResult) -> list[FoundCause]:
+    """The known causes, those with the largest share of the gap first."""
+    return sorted(result.known, key=lambda each: -each.share)
 
 
 def floor_text(gap: GapSize) -> str:
     """The noise floor, or that nothing tells it."""
     return "not known" if gap.noise_floor_um is None else micrometres(gap.noise_floor_um)
-
-
-def together(names: Sequence[str]) -> str:
-    """`a, b and c`."""
-    return ", ".join(names[:-1]) + " and " + names[-1] if len(names) > 1 else "".join(names)
 
 
 def told_chance(probability: float) -> str:
@@ -68,27 +77,29 @@ def law_lines(law: Law) -> list[str]:
     """A law in a few lines: what it says, the formula with the size of every term, where it was seen, what it takes away."""
     seen = ", ".join(f"{name} {brief(low, 4)} to {brief(high, 4)}" for name, (low, high) in law.envelope.items())
     gone = f"from {brief(law.before_rms_um)} µm to {brief(law.after_rms_um)} µm"
-    lines = [f"{law.says} On parts of the data that it was not fitted to it takes the gap {gone} (rms).", law.formula]
+    lines = [
+        f"{law.says} On parts of the data that it was not fitted to it takes the gap {gone} (rms).",
+        shortened(law.formula),
+    ]
     if law.kind == "formula":
-        for each in law.terms:
-            low, high = each.ci95
-            lines.append(f"{each.term}: {brief(each.value, 4)} {each.unit} ({brief(low, 4)} to {brief(high, 4)})")
+        lines += [term_size(each) for each in law.terms]
     return [*lines, f"seen for {seen}"] if seen else lines
 
 
 def answer_lines(result: DiagnosisResult) -> list[str]:
     """The answer in ten lines at most: verdict, causes with their sizes and what to do, what to measure next."""
     lines = [f"{result.verdict}: {verdict_text(result)}"]
-    for cause in result.known[:MOST_CAUSES]:
+    told = by_share(result)[: BESIDE_LAW if result.law else MOST_CAUSES]
+    for cause in told:
         size = f"; {found}" if (found := sizes(cause)) else ""
         share = f"{percent(cause.share)} of the gap{told_chance(cause.probability)}"
         lines.append(f"  {cause_name(cause)}: {plain(cause)}{size}; {share}")
         if result.verdict != "ambiguous" and (what := remedy(cause)):
             lines.append(f"    do: {what}")
-    if more := result.known[MOST_CAUSES:]:
+    if more := by_share(result)[len(told) :]:
         lines.append(f"  and {len(more)} more with {percent(sum(each.share for each in more))} of the gap together")
     if law := result.law:
-        lines += [f"  {each}" for each in law_lines(law)]
+        lines += [f"  {each}" for each in law_lines(law)[: MOST_LINES - len(lines) - 2]]
     shrink = result.shrinkage
     if result.known and shrink:
         low, high = shrink.ci95

@@ -89,12 +89,13 @@ def _figure(gaps: Sequence[RadialGap], number: int) -> Figure:
     drawn: list[tuple[str, Floats, Json]] = [
         (f"ring at +{ring:g} µm", np.full(361, ring), {"color": INK, "dash": "dot", "width": 1})
     ]
+    explained = any(not np.array_equal(gap.before, gap.after) for gap in gaps)
     for counter_clockwise in (True, False):
         mine = [gap for gap in gaps if gap.turn.counter_clockwise == counter_clockwise]
         if not mine:
             continue
         style = 0 if counter_clockwise else 1
-        for what, faint in (("measured", False), ("with the causes found", True)):
+        for what, faint in (("measured", False), ("with the causes found", True))[: 1 + explained]:
             values = np.array([gap.after if faint else gap.before for gap in mine])
             known = np.isfinite(values)
             mean = np.where(known.any(axis=0), np.nansum(values, axis=0) / np.maximum(known.sum(axis=0), 1), np.nan)

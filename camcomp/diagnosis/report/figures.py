@@ -8,8 +8,9 @@ import numpy as np
 
 from camcomp.diagnosis.report.answer import cause_name
 from camcomp.diagnosis.report.run_view import RivalSignals, RunView, likeness, rms, spectrum
+from camcomp.diagnosis.report.words import percent
 from camcomp.diagnosis.result.types import FoundCause, UnseenShrinkage, Where
-from camcomp.report.plot import INK, SCALE, STYLES, Figure, Json, axis, brief, level, line, numbers, thin
+from camcomp.report.plot import BAR_MARGIN, INK, SCALE, STYLES, Figure, Json, axis, brief, level, line, numbers, thin
 
 MAP_POINTS = 4000
 
@@ -36,7 +37,11 @@ def figure_ladder(shrink: UnseenShrinkage, floor: float | None) -> Figure:
         f"model: {words}. Noise floor {known}.",
         f"Bar chart of the gap that remains: {words}; noise floor {known}.",
         [bars] if floor is None else [bars, noise],
-        {"xaxis": axis("gap in µm (rms)", range=[0.0, 1.15 * max(*values, floor or 0.0)]), "yaxis": axis("")},
+        {
+            "xaxis": axis("gap in µm (rms)", range=[0.0, 1.15 * max(*values, floor or 0.0)]),
+            "yaxis": axis(""),
+            "margin": BAR_MARGIN,
+        },
         height=150 + 42 * len(names),
     )
 
@@ -48,7 +53,9 @@ def figure_signed(view: RunView, number: int) -> Figure:
     curves = []
     for c, channel in enumerate(view.channels):
         color = STYLES[c % len(STYLES)][0]
-        for name, values, dash in (("before", view.before, "solid"), ("with the causes found", view.after, "dot")):
+        for name, values, dash in (("before", view.before, "solid"), ("with the causes found", view.after, "dot"))[
+            : 1 + view.explained
+        ]:
             style = {"color": color, "dash": dash, "width": 2 if dash == "solid" else 1.5}
             curves.append(line(f"{channel}, {name}", x, numbers(values[index, c], 3), c) | {"line": style})
     means = [float(np.nanmean(each)) if np.isfinite(each).any() else 0.0 for each in view.before.T]
@@ -68,13 +75,15 @@ def figure_size(view: RunView, number: int, floor: float | None) -> Figure:
     before, after = view.sizes
     index = thin(np.column_stack((before, after)))
     x = numbers(view.path[index], 4)
-    curves = [
-        line("before", x, numbers(before[index], 3), 0),
-        line("with the causes found", x, numbers(after[index], 3), 1),
-    ]
+    curves = [line("before", x, numbers(before[index], 3), 0)]
+    if view.explained:
+        curves.append(line("with the causes found", x, numbers(after[index], 3), 1))
     if floor is not None:
         curves.append(level("noise floor", [float(view.path[0]), float(view.path[-1])], floor))
-    words = f"rms {brief(rms(before))} µm before, {brief(rms(after))} µm with the causes found"
+    words = f"rms {brief(rms(before))} µm before"
+    words += (
+        f", {brief(rms(after))} µm with the causes found" if view.explained else ", and no cause found takes any of it"
+    )
     return Figure(
         f"path-{number}",
         f"Run {view.name}: size of the gap along the path",
@@ -102,9 +111,10 @@ def figure_map(views: Sequence[RunView]) -> Figure:
     h, v = sorted(np.argsort(-spans, kind="stable")[:2])
     top = float(np.quantile(before, 0.99)) if len(before) else 1.0
     traces: list[Json] = []
-    for i, (name, size) in enumerate((("before", before), ("with the causes found", after))):
+    explained = any(view.explained for view in views)
+    for i, (name, size) in enumerate((("before", before), ("with the causes found", after))[: 1 + explained]):
         marker: Json = {"size": 5, "color": numbers(size, 2), "colorscale": SCALE, "cmin": 0.0, "cmax": round(top, 3)}
-        if i:
+        if i == explained:
             marker |= {"colorbar": {"title": {"text": "gap<br>in µm"}, "thickness": 14}}
         traces.append({
             "type": "scatter", "mode": "markers", "name": name, "x": numbers(position[:, h], 3), "y": numbers(position[:, v], 3),
@@ -112,18 +122,20 @@ def figure_map(views: Sequence[RunView]) -> Figure:
             "hovertemplate": "%{x} %{y} mm: %{marker.color} µm<extra>" + name + "</extra>",
         })  # fmt: skip
     a, b = "xyz"[h], "xyz"[v]
-    layout = {
-        "xaxis": axis(f"{a} in mm (before)", domain=[0.0, 0.47]),
-        "yaxis": axis(f"{b} in mm", scaleanchor="x"),
-        "xaxis2": axis(f"{a} in mm (with the causes found)", domain=[0.53, 1.0], matches="x"),
-        "yaxis2": axis("", anchor="x2", matches="y", showticklabels=False),
-    }
-    words = f"from rms {brief(rms(before))} µm to {brief(rms(after))} µm"
+    layout = {"xaxis": axis(f"{a} in mm"), "yaxis": axis(f"{b} in mm", scaleanchor="x")}
+    words = f"rms {brief(rms(before))} µm"
+    if explained:
+        layout |= {
+            "xaxis": axis(f"{a} in mm (before)", domain=[0.0, 0.47]),
+            "xaxis2": axis(f"{a} in mm (with the causes found)", domain=[0.53, 1.0], matches="x"),
+            "yaxis2": axis("", anchor="x2", matches="y", showticklabels=False),
+        }
+        words = f"before and with the causes found: from {words} to {brief(rms(after))} µm"
     return Figure(
         "map",
         "Map on the workpiece",
-        f"Every measured row where the tip was, coloured by the size of the gap, before and with the causes found: {words}.",
-        f"Two maps of the gap over {a} and {b} of the workpiece: {words}.",
+        f"Every measured row where the tip was, coloured by the size of the gap, {words}.",
+        f"Map of the gap over {a} and {b} of the workpiece, {words}.",
         traces,
         layout,
         height=430,
@@ -139,7 +151,7 @@ def figure_shares(where: Where) -> Figure | None:
         return None
     bars = {
         "type": "bar", "orientation": "h", "x": [100.0 * share for _, share in rows], "y": [name for name, _ in rows],
-        "marker": {"color": STYLES[0][0]}, "text": [f"{100 * share:.0f} %" for _, share in rows], "textposition": "outside",
+        "marker": {"color": STYLES[0][0]}, "text": [percent(share) for _, share in rows], "textposition": "outside",
         "cliponaxis": False, "showlegend": False,
     }  # fmt: skip
     words = ", ".join(f"{name} {100 * share:.0f} %" for name, share in rows[::-1] if share)
@@ -150,7 +162,7 @@ def figure_shares(where: Where) -> Figure | None:
         "actuator; below, how much of the gap follows each quantity. These may overlap.",
         f"Bar chart of shares of the gap: {words}.",
         [bars],
-        {"xaxis": axis("share in %", range=[0, 115]), "yaxis": axis("")},
+        {"xaxis": axis("share in %", range=[0, 115]), "yaxis": axis(""), "margin": BAR_MARGIN},
         height=120 + 26 * len(rows),
     )
 
@@ -159,7 +171,8 @@ def figure_spectrum(view: RunView) -> Figure | None:
     """Amplitudes of the gap over frequency, before and after."""
     curves = []
     peaks = []
-    for i, (name, values) in enumerate((("before", view.before), ("with the causes found", view.after))):
+    pair = (("before", view.before), ("with the causes found", view.after))
+    for i, (name, values) in enumerate(pair[: 1 + view.explained]):
         frequency, amplitude = spectrum(view.time, values)
         if not len(frequency):
             return None
@@ -190,7 +203,7 @@ def figure_causes(causes: Sequence[FoundCause]) -> Figure:
         bars.append({
             "type": "bar", "orientation": "h", "name": label, "x": values, "y": names, "cliponaxis": False,
             "marker": {"color": STYLES[2 * (1 - i)][0], "pattern": {"shape": "" if i else "/"}},
-            "text": [f"{value:.0f} %" for value in values], "textposition": "outside",
+            "text": [percent(each) for each in size], "textposition": "outside",
         })  # fmt: skip
     words = ", ".join(f"{cause_name(c)} {100 * c.probability:.0f} %" for c in causes)
     return Figure(
@@ -199,7 +212,7 @@ def figure_causes(causes: Sequence[FoundCause]) -> Figure:
         "Probability that the cause is at work, given the library of effects, and its share of the gap's energy.",
         f"Bar chart of causes and their probabilities: {words}.",
         bars,
-        {"xaxis": axis("%", range=[0, 115]), "yaxis": axis(""), "barmode": "group", "legend": {
+        {"xaxis": axis("%", range=[0, 115]), "yaxis": axis(""), "margin": BAR_MARGIN, "barmode": "group", "legend": {
             "orientation": "h", "traceorder": "reversed", "x": 0, "y": 1.02, "yanchor": "bottom"}},
         height=150 + 60 * len(names),
     )  # fmt: skip

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from camcomp.diagnosis.report.answer import law_lines
+from camcomp.diagnosis.report.words import shortened
 from camcomp.diagnosis.result.types import Law
 from camcomp.ground.datatypes import Floats
 from camcomp.report.page import Section, Table
@@ -62,7 +63,7 @@ def _figure(law: Law, view: LawView) -> Figure:
     return Figure(
         "law",
         f"What is left of tip {view.axis} over {view.covariate}",
-        f"Every row of all runs: what the known causes leave, and {law.formula}. On runs that it was not fitted to it takes the "
+        f"Every row of all runs: what the known causes leave, and {shortened(law.formula)}. On runs that it was not fitted to it takes the "
         f"gap {words}.",
         f"Scatter plot of what is left of tip {view.axis} over {view.covariate}, with the law on top; {words}.",
         traces,

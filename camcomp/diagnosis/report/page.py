@@ -7,7 +7,8 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from camcomp.diagnosis.report.answer import cause_name, floor_text, together, told_chance, verdict_text
+from camcomp.diagnosis.law.words import listed
+from camcomp.diagnosis.report.answer import by_share, cause_name, floor_text, told_chance, verdict_text
 from camcomp.diagnosis.report.circles import circles_section
 from camcomp.diagnosis.report.figures import (
     figure_causes,
@@ -23,11 +24,11 @@ from camcomp.diagnosis.report.joints import joints_section
 from camcomp.diagnosis.report.law_section import LawView, law_section
 from camcomp.diagnosis.report.run_view import RivalSignals, RunView, rms
 from camcomp.diagnosis.report.standards import standards_section
-from camcomp.diagnosis.report.words import micrometres, percent, plain, remedy, sizes
+from camcomp.diagnosis.report.words import percent, plain, remedy, sizes
 from camcomp.diagnosis.result.types import UNKNOWN, DiagnosisResult, NextExperiment, UnseenShrinkage, Where
 from camcomp.report.inputs import Input, inputs_section
 from camcomp.report.page import Listing, Page, Section, Table, render
-from camcomp.report.plot import brief
+from camcomp.report.plot import brief, micrometres
 
 MOST_RUNS = 4
 Row = list[str | tuple[float, str]]  # of a table: text, or a number to sort by and its text
@@ -42,6 +43,7 @@ COMPENSATE = (
     "in it, and compensate then takes them out of every program."
 )
 ADD_IT = "Add its log to the experiment file as one more run, and diagnose again."
+PUT_IN = "camcomp diagnose --write-config writes the law into the machine file, and compensate then takes it out of every program."
 LOOK = "Part of the gap is none of the effects that camcomp knows; below stands where it shows and what it goes with."
 WORDS = {"none": "No gap", "identified": "Identified", "ambiguous": "Ambiguous", "unknown": "Unknown cause"}
 
@@ -55,14 +57,14 @@ def diagnosis_html(
     inputs: Sequence[Input] = (),
     notes: Sequence[str] = (),
     rivals: Sequence[RivalSignals] = (),
-    next_program: str | None = None,
+    next_program: Listing | None = None,
     law: LawView | None = None,
     residuals: Mapping[str, NDArray[Any]] | None = None,
 ) -> bytes:
     """One HTML file. result: of any kind of study; views: runs to draw, those held out of the fit first.
 
     rivals: sets of causes that explain the logs alike, the most probable first, with what each does to the runs of
-    `views`. next_program: NC text of the proposed experiment. law: what the law of an unknown effect explains. residuals: rows
+    `views`. next_program: file of the proposed experiment. law: what the law of an unknown effect explains. residuals: rows
     of poses, as `--residuals` writes them. Raises ConfigError CC216 when the plot library is not installed.
     """
     seen = [view for view in views if view.held_out] or list(views)
@@ -115,7 +117,13 @@ def _cards(result: DiagnosisResult) -> list[tuple[str, str, str]]:
         ("Gap", micrometres(gap.rms_um), f"rms; 95 % below {micrometres(gap.p95_um)}, max {micrometres(gap.max_um)}"),
         ("Noise floor", floor_text(gap), "what no model can explain"),
     ]
-    if shrink := result.shrinkage:
+    if (law := result.law) is not None and not result.known:
+        share = 1.0 - law.after_rms_um / law.before_rms_um if law.before_rms_um > 0.0 else 0.0
+        cards += [
+            ("Gap with the law found", micrometres(law.after_rms_um), f"was {micrometres(law.before_rms_um)}"),
+            ("Part of the gap removed", f"{100 * share:.1f} %", "by the law, on parts that it was not fitted to"),
+        ]
+    elif shrink := result.shrinkage:
         low, high = shrink.ci95
         interval = f"95 % interval {100 * low:.1f} to {100 * high:.1f} %"
         cards += [
@@ -141,7 +149,7 @@ def _causes(result: DiagnosisResult) -> Section:
 
 
 def _apart(result: DiagnosisResult, rivals: Sequence[RivalSignals], views: Sequence[RunView]) -> Section:
-    items = [together([cause_name(each) for each in one]) for one in result.alternatives]
+    items = [listed([cause_name(each) for each in one]) for one in result.alternatives]
     figure = figure_rivals(rivals, views)
     return Section("apart", "What cannot be told apart, and why", [ALIKE_TEXT], [figure] if figure else [], items=items)
 
@@ -149,15 +157,15 @@ def _apart(result: DiagnosisResult, rivals: Sequence[RivalSignals], views: Seque
 def _shrinkage(shrink: UnseenShrinkage) -> str:
     low, high = shrink.ci95
     return (
-        f"Judged on {together(shrink.holdout)}, with causes fitted without what is judged. {100 * shrink.ratio:.1f} % of the "
+        f"Judged on {listed(shrink.holdout)}, with causes fitted without what is judged. {100 * shrink.ratio:.1f} % of the "
         f"gap goes (95 % interval {100 * low:.1f} to {100 * high:.1f} %)."
     )
 
 
-def _to_do(result: DiagnosisResult, next_program: str | None) -> Section:
+def _to_do(result: DiagnosisResult, next_program: Listing | None) -> Section:
     """What to do about each cause, and what to measure next."""
     rows: list[Row] = []
-    for cause in result.known:
+    for cause in by_share(result):
         share = percent(cause.share) + told_chance(cause.probability)
         rows.append([f"{cause_name(cause)}: {plain(cause)}", sizes(cause), share, remedy(cause)])
     tables = [Table("Causes and what helps", ("cause", "size", "share of the gap", "what to do"), rows)] if rows else []
@@ -168,23 +176,26 @@ def _to_do(result: DiagnosisResult, next_program: str | None) -> Section:
         text.append(COMPENSATE)
     if any(each.effect == UNKNOWN for each in result.causes):
         text.append(LOOK)
+    if result.law is not None:
+        text.append(f"{result.law.says} {PUT_IN}")
     listings = []
     if result.next_experiment:
         text += _next(result.next_experiment)
         if next_program is not None:
-            listings.append(Listing("next-experiment.nc", next_program))
-    return Section("do", "What to do", text, tables=tables, listings=listings)
+            listings.append(Listing(next_program.name, next_program.text))
+    items = result.next_experiment.outcomes if result.next_experiment else ()
+    return Section("do", "What to do", text, tables=tables, items=items, listings=listings)
 
 
 def _next(proposal: NextExperiment) -> list[str]:
-    text = [f"Measure next: {proposal.action}"]
-    if UNKNOWN in proposal.separates and proposal.poses is None:
-        text.append("It changes what the unknown effect may depend on, and as little else as can be.")
-    elif separates := together(proposal.separates):
-        text.append(f"It separates {separates}.")
+    """What to measure, and what that is worth; what its outcomes mean follows as a list."""
     time = f", {brief(proposal.minutes, 2)} minutes with setting up" if proposal.minutes else ""
-    text += [*proposal.outcomes, f"Expected gain: {brief(proposal.gain)} bits{time}."]
-    return [*text, ADD_IT] if proposal.minutes else text
+    gain = f"{brief(proposal.gain)} bits expected{time}."
+    if UNKNOWN in proposal.separates and proposal.poses is None and proposal.moves is None:
+        gain = f"It changes what the unknown effect may depend on, and as little else as can be: {gain}"
+    elif separates := listed(proposal.separates):
+        gain = f"It separates {separates}: {gain}"
+    return [f"Measure next: {proposal.action.rstrip('.')}.", f"{gain} {ADD_IT}"]
 
 
 def _where(where: Where, shown: Sequence[RunView]) -> Section:

@@ -37,6 +37,11 @@ class RunView:
         return np.linalg.norm(self.before, axis=1), np.linalg.norm(self.after, axis=1)
 
     @property
+    def explained(self) -> bool:
+        """Whether there are causes that take something of the gap."""
+        return not np.array_equal(self.before, self.after, equal_nan=True)
+
+    @property
     def path(self) -> Floats:
         """Path length (n,) mm."""
         step = np.linalg.norm(np.diff(self.position, axis=0), axis=1)

@@ -14,7 +14,6 @@ from camcomp.diagnosis.fit.bench import Bench, Run, thinned
 from camcomp.diagnosis.fit.gap import main_channels
 from camcomp.diagnosis.fit.measured import channel_names
 from camcomp.diagnosis.fit.problem import Problem
-from camcomp.diagnosis.next_experiment.ready_program import dialect_of_runs, ready_program
 from camcomp.diagnosis.report.answer import cause_name
 from camcomp.diagnosis.report.law_view import law_view
 from camcomp.diagnosis.report.page import diagnosis_html
@@ -22,11 +21,11 @@ from camcomp.diagnosis.report.run_view import RivalSignals, RunView
 from camcomp.diagnosis.result.types import DiagnosisResult, NamedCause
 from camcomp.diagnosis.statistics.cause_sets import Fitted
 from camcomp.ground.datatypes import Floats
-from camcomp.ground.errors import CheckFailed
 from camcomp.ground.files import read_bytes
 from camcomp.model.config.load import load_config, load_experiment
 from camcomp.model.motion.twin import Twin
 from camcomp.report.inputs import Input
+from camcomp.report.page import Listing
 
 MICRO = 1e3  # mm -> um
 
@@ -40,8 +39,12 @@ def report_of(
     done: Diagnosis | None,
     opened: OpenExperiment | None,
     residuals: Mapping[str, NDArray[Any]] | None = None,
+    next_program: Listing | None = None,
 ) -> bytes:
-    """The report of an experiment file. Without `done` (studies of logs that have no program) no runs are drawn."""
+    """The report of an experiment file. Without `done` (studies of logs that have no program) no runs are drawn.
+
+    next_program: file of the proposed experiment.
+    """
     experiment = load_experiment(path)
     inputs = [Input("experiment", str(path), read_bytes(path))]
     inputs += [Input("configuration", each, read_bytes(each)) for each in experiment.config]
@@ -51,9 +54,7 @@ def report_of(
         inputs.append(Input(f"log of {run.name}", run.log, read_bytes(run.log)))
     views: list[RunView] = []
     rivals: list[RivalSignals] = []
-    program = None
     if done is not None and opened is not None:
-        program = _next_program(done, opened)
         views = views_of(done, opened.twin, opened.runs, experiment.holdout)
         rivals = rivals_of(done)
     return diagnosis_html(
@@ -64,21 +65,10 @@ def report_of(
         inputs=inputs,
         notes=opened.notes if opened is not None else (),
         rivals=rivals,
-        next_program=program,
+        next_program=next_program,
         law=law_view(done.problem, done.law) if done is not None and done.law is not None else None,
         residuals=residuals,
     )
-
-
-def _next_program(done: Diagnosis, opened: OpenExperiment) -> str | None:
-    """NC text of the proposed experiment, where there is one that the machine can run."""
-    if done.proposal is None:
-        return None
-    try:
-        dialect = dialect_of_runs(opened.experiment, opened.job)
-        return ready_program(done.proposal.candidate, opened.runs, opened.job, opened.twin, dialect)
-    except CheckFailed:
-        return None
 
 
 def views_of(done: Diagnosis, twin: Twin, runs: Sequence[Run], holdout: Sequence[str]) -> list[RunView]:

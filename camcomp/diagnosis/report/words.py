@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
+import re
 from functools import cache
 from typing import Any
 
-from camcomp.diagnosis.result.types import Driver, Estimate, FoundCause, NamedCause, StretchDriver
+from camcomp.diagnosis.result.types import Driver, Estimate, FoundCause, LawTerm, NamedCause, StretchDriver
 from camcomp.ground import shelf
 from camcomp.ground.errors import ConfigError
 from camcomp.report.plot import brief
 
 _SMALLER = {"mm": (1e3, "µm"), "rad": (1e3, "mrad"), "s": (1e3, "ms")}  # units that small values are told in
 _NOTHING = " not told from "
+_LONG_NUMBER = re.compile(r"\d+\.\d{3,}(?:e[+-]?\d+)?")
 _COVARIATES = {
     "position": "where {0} stands",
     "velocity": "the speed of {0}",
@@ -43,11 +45,6 @@ def remedy(cause: NamedCause) -> str:
     return str(getattr(_effect(cause.effect), "REMEDY", ""))
 
 
-def micrometres(value: float) -> str:
-    """A length in um for people: never smaller than a hundredth."""
-    return "below 0.01 µm" if 0.0 <= value < 0.01 else f"{brief(value)} µm"
-
-
 def percent(share: float) -> str:
     """A share for people: never 0 % of something that is there."""
     return "less than 1 %" if 0.0 < share < 0.01 else f"{100.0 * share:.0f} %"
@@ -76,18 +73,31 @@ def size(name: str, each: Estimate, parameter: Any = None) -> str:
     """A value with its 95 % interval, or how large it is at most where the interval holds `nothing at all`."""
     unit = parameter.unit if parameter is not None else ""
     nominal = parameter.nominal if parameter is not None else 0.0
-    low, high = each.ci95
-    largest = max(abs(low), abs(high), abs(each.value))
+    shape = parameter is not None and (bool(parameter.scan) or parameter.tolerance == 0.0)
+    return f"{title(name, parameter)}{_told(each.value, each.ci95, unit, None if shape else nominal)}"
+
+
+def term_size(term: LawTerm) -> str:
+    """A term of a law with its coefficient."""
+    return f"{shortened(term.term)}:{_told(term.value, term.ci95, term.unit, 0.0)}"
+
+
+def shortened(formula: str) -> str:
+    """A formula for people, with four digits of every number."""
+    return _LONG_NUMBER.sub(lambda found: f"{float(found.group()):.4g}", formula)
+
+
+def _told(value: float, ci95: tuple[float, float], unit: str, nominal: float | None) -> str:
+    """` 24.4 µm (23.3 to 25.5)`, or that it is not told from what it is nominally."""
+    low, high = ci95
     scale = 1.0
-    if unit in _SMALLER and largest < 1.0:
+    if unit in _SMALLER and max(abs(low), abs(high), abs(value)) < 1.0:
         scale, unit = _SMALLER[unit]
     behind = "" if unit in ("", "1") else f" {unit}"
-    value, low, high = scale * each.value, scale * low, scale * high
-    shape = parameter is not None and (bool(parameter.scan) or parameter.tolerance == 0.0)
-    told, least, most = _alike(value, low, high)
-    if low <= scale * nominal <= high and not shape:
-        return f"{title(name, parameter)}{_NOTHING}{nominal:g} ({least} to {most}{behind})"
-    return f"{title(name, parameter)} {told}{behind} ({least} to {most})"
+    told, least, most = _alike(scale * value, scale * low, scale * high)
+    if nominal is not None and low <= nominal <= high:
+        return f"{_NOTHING}{nominal:g} ({least} to {most}{behind})"
+    return f" {told}{behind} ({least} to {most})"
 
 
 def _alike(value: float, low: float, high: float) -> list[str]:

@@ -297,13 +297,17 @@ def _established(
 
 
 def _same(problem: Problem, fits: tuple[Fitted, ...], probability: Floats) -> list[tuple[Members, Members]]:
-    """Pairs of the leader and a set of its size that fits as well, whatever the priors say of them."""
+    """Pairs of the leader and a set of its size that fits as well, whatever the priors say of them.
+
+    Priors of sizes, and of how far off the tolerances are all together: the rows and the stated tolerances have to tell.
+    """
     best = fits[int(np.argmax(probability))]
     found = []
     for f in fits:
         if f is best or len(f.members) != len(best.members) or not best.members:
             continue
-        if best.log_evidence - f.log_evidence < SAME_EVIDENCE and _plausible(problem, f):
+        behind = 0.5 * (misfit(problem, f) - misfit(problem, best))
+        if min(behind, best.log_evidence - f.log_evidence) < SAME_EVIDENCE and _plausible(problem, f):
             found.append((best.members, f.members))
     return found
 
@@ -313,7 +317,9 @@ def misfit(problem: Problem, f: Fitted) -> float:
     data: Gram = total(f.grams)
     index = problem.member_columns(f.members)
     mean, _ = estimate(data, problem.prior, index, 1.0)
-    return data.c - float(data.b @ mean)
+    precision = problem.prior.precision(1.0)
+    precision[index] = 0.0
+    return float(data.c - 2.0 * data.b @ mean + mean @ data.A @ mean + precision @ mean**2)
 
 
 def _possible(problem: Problem, f: Fitted) -> bool:

@@ -19,7 +19,7 @@ def weakest(problem: Problem, f: Fitted) -> int | None:
     """
     if not f.members:
         return None
-    C = joint_covariance(problem, f)
+    C = joint_covariance(problem, f, as_stated=True)
     least, found, at = MINOR * problem.floor.tip_um, None, 0
     for i in f.members:
         mine = slice(at, at + len(problem.candidates.columns[i]))

@@ -22,7 +22,7 @@ from camcomp.diagnosis.fit.patterns import Ground
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.search.unknown import about
 from camcomp.diagnosis.statistics.cause_sets import Fitted, Members
-from camcomp.diagnosis.statistics.evidence import Base, Gram, Prior, base, estimate, gram, log_bayes
+from camcomp.diagnosis.statistics.evidence import Base, Gram, Prior, base, estimate, gram, holding_back, log_bayes
 from camcomp.ground.datatypes import Bools, Floats, Ints
 
 UNKNOWN = 0.1  # prior probability of something that the library does not have
@@ -111,7 +111,8 @@ def _subsets(members: Members) -> list[Members]:
 def _evidence(problem: Problem, at: Base, prior: Prior, sets: Sequence[Members]) -> Floats:
     columns = problem.candidates.columns
     return np.array([
-        at.log_evidence + (log_bayes(at, prior, [columns[i] for i in each]) if each else 0.0) for each in sets
+        at.log_evidence + (log_bayes(at, prior, [columns[i] for i in each]) if each else 0.0)
+        - holding_back(at, prior, [c for i in each for c in columns[i]]) for each in sets
     ])  # fmt: skip
 
 
@@ -130,6 +131,7 @@ def _with(problem: Problem, data: Gram, W: Floats, r: Floats, family: _Family) -
         np.concatenate([prior.scale, more]),
         np.concatenate([prior.sign, 0.0 * more]),
         np.concatenate([prior.flexible, 0.0 * more]),
+        np.concatenate([prior.reach, np.inf * more]),
     )
 
 

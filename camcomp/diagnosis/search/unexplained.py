@@ -4,7 +4,7 @@ the model with these causes lets one expect it, beyond the noise floor?
 Every kind of channel is read as micrometres at the tip: an encoder through the kinematics, a drive force through the
 spring that it winds up, a dynamometer through the compliance. Fast noise is averaged out over blocks of rows; what the
 instruments are allowed to drift is taken off. Causes are fitted to the other runs; what every healthy machine has, and
-what runs and clampings differ by, is fitted too, but held within reason.
+what runs and clampings differ by, is fitted too, within its reach.
 """
 
 from __future__ import annotations
@@ -23,7 +23,6 @@ from camcomp.diagnosis.statistics.evidence import estimate
 from camcomp.ground.datatypes import Floats
 
 BLOCK = 8  # rows that are averaged
-STRETCH = 2.5  # tolerances up to which what is always a little wrong may follow the data
 FEW_RUNS = 3  # from which on causes are fitted to the other runs
 KINDS = ("tip", "encoder", "drive", "dyno")
 TINY = 1e-12  # mm2, below which no noise is
@@ -70,10 +69,8 @@ def _left(problem: Problem, f: Fitted, k: int) -> Floats:
     left = bench.difference(k, bench.read(k, problem.causes(f.members, theta, f.extra)))
     index = problem.member_columns(f.members)
     usual = estimate(total(f.grams), problem.prior, index, 1.0)[0]
-    tolerance = problem.prior.tolerance
-    held = np.where(np.isfinite(tolerance), np.clip(usual, -STRETCH * tolerance, STRETCH * tolerance), usual)
-    held[index] = 0.0
-    return np.asarray(left - problem.columns.blocks[k] @ held)
+    usual[index] = 0.0
+    return np.asarray(left - problem.columns.blocks[k] @ usual)
 
 
 def _at_tip(problem: Problem, k: int, left: Floats, kind: str) -> Floats:

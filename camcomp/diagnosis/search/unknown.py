@@ -14,10 +14,12 @@ from camcomp.diagnosis.statistics.score_test import (
     project,
     score_test,
 )
-from camcomp.ground.datatypes import Floats, Ints
+from camcomp.ground.datatypes import Bools, Floats, Ints
 
 SEEN_SHARE = 0.1  # of the energy of the run that shows a cause best, from which on a run says something about it
 CONFIRMED = 0.8  # share of its own signal that a cause beside an unknown one has to take away from unseen runs
+NEAR = 0.5  # of what acts for a while: a row that it leaves nearer to nothing than this follows it
+SURE_SD = 3.0  # of the floor: what noise leaves of a row
 
 
 def residual_tests(problem: Problem, f: Fitted, prior: Prior) -> dict[str, ResidualTest]:
@@ -87,11 +89,9 @@ def foretelling(problem: Problem, f: Fitted) -> Members:
         return members
     while members:
         now = _unforetold(problem, f, members)
-        if all(problem.passing(i) for i in members):
-            break
         own = [_own(problem, f, i) for i in members]
         gains = [
-            CONFIRMED
+            (CONFIRMED if followed(problem, f, i) else 0.0)
             if problem.passing(i)
             else _gain(_unforetold(problem, f, tuple(each for each in members if each != i)), now, signal)
             for i, signal in zip(members, own, strict=True)
@@ -101,6 +101,27 @@ def foretelling(problem: Problem, f: Fitted) -> Members:
         least = members[int(np.argmin(gains))]
         members = tuple(each for each in members if each != least)
     return members
+
+
+def followed(problem: Problem, f: Fitted, i: int) -> bool:
+    """Whether the rows for which a member acts follow it, those too that count less because they are far off or unsteady.
+
+    Other runs tell nothing of what acts for a while. A piece of what goes on all the time is found where a few rows go one
+    way by chance; those between them do not.
+    """
+    bench, index = problem.bench, problem.member_columns((i,))
+    at = problem.member_columns(f.members)
+    theta = f.theta[[at.index(c) for c in index]]
+    causes = problem.causes(f.members, f.theta, f.extra)
+    near: list[Bools] = []
+    for k in range(len(bench.runs)):
+        signal = (problem.columns.blocks[k][:, :, index] @ theta)[:, :3]
+        size = np.linalg.norm(signal, axis=1)
+        rest = np.sum(bench.difference(k, bench.read(k, causes))[:, :3] * signal, axis=1) / np.maximum(size, 1e-12)
+        there = (size > 0.0) & np.isfinite(rest)
+        near.append(np.abs(rest[there]) < np.maximum(NEAR * size[there], SURE_SD * problem.floor.axis_mm))
+    rows = np.concatenate(near)
+    return not len(rows) or float(rows.mean()) >= CONFIRMED
 
 
 def _gain(before: Mapping[str, Floats], after: Mapping[str, Floats], own: Mapping[str, Floats]) -> float:

@@ -16,6 +16,7 @@ from camcomp.diagnosis.statistics.evidence import (
     Gram,
     Prior,
     base,
+    holding_back,
     log_bayes,
     log_bayes_pairs,
     log_sum,
@@ -84,8 +85,12 @@ class Scale:
 
     def _by_tolerance(self, members: Members) -> list[float]:
         sets = [self.candidates.columns[i] for i in members]
+        index = [c for each in sets for c in each]
         return [
-            b.log_evidence + odds + (log_bayes(b, self.prior, sets) if sets else 0.0)
+            b.log_evidence
+            + odds
+            + (log_bayes(b, self.prior, sets) if sets else 0.0)
+            - holding_back(b, self.prior, index)
             for b, odds in zip(self.bases, TOLERANCE_LOG, strict=True)
         ]
 

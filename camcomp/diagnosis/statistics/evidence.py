@@ -3,13 +3,16 @@
 The white residual is r = D a + e. Columns D belong to effects, to nuisances and to what every healthy machine has.
 An effect that is a cause has the wide prior of its own size (a mixture of four widths), one that is not has the narrow
 prior of its tolerance: a machine is never exactly its model, and what is within tolerance is no finding. Everything
-but the amplitudes of the causes is integrated out exactly.
+but the amplitudes of the causes is integrated out exactly. A tolerance has an end, its reach: what is farther off is a
+cause by definition, and a set that would need it without naming it pays for holding it back (Laplace's approximation
+of the normal distributions that are cut off there; the mode by active sets, Nocedal and Wright, Numerical
+Optimization, 16.5).
 
 Source: group selection with amplitude mixtures; the widths 0.1 to 3 and the half-normal signs follow the priors that
 the effects state. Positive parameters enter by the posterior probability of their sign.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from itertools import product
@@ -24,6 +27,7 @@ from camcomp.ground.machine_code import kept
 PRIOR_WIDTHS = np.array([0.1, 0.3, 1.0, 3.0])
 _WEIGHTS = np.log([0.15, 0.3, 0.35, 0.2])
 TOLERANCES = (0.2, 0.5, 1.0, 2.0)  # by how much the tolerances may be off, all together
+PASSES = 30  # of the search for columns at the end of their reach
 TOLERANCE_LOG = (0.0, 0.0, 0.0, -6.0)  # and the log odds of it: an effect is not to hide in them
 
 
@@ -58,13 +62,14 @@ def gram(D: Floats, r: Floats) -> Gram:
 @dataclass(frozen=True, eq=False)
 class Prior:
     """For every column (k,): tolerance = narrow size (inf = free nuisance), scale = wide size, sign; flexible (k,) bool
-    = its tolerance is one of those that may be off together.
+    = its tolerance is one of those that may be off together; reach = farthest that it goes without being a cause.
     """
 
     tolerance: Floats
     scale: Floats
     sign: Floats
     flexible: Floats
+    reach: Floats
 
     def precision(self, factor: float) -> Floats:
         """Narrow precision (k,) with the flexible tolerances taken `factor` times."""
@@ -206,11 +211,61 @@ def log_bayes_pairs(at: Base, prior: Prior, first: Ints, second: Ints) -> Floats
 
 
 def estimate(data: Gram, prior: Prior, members: Sequence[int], factor: float = 1.0) -> tuple[Floats, Floats]:
-    """Mean (k,) and covariance (k, k) with the columns `members` free within 10 scales, the others within tolerance."""
+    """Mode (k,) and covariance (k, k) with the columns `members` free within 10 scales, the others within tolerance and reach.
+
+    The covariance is that without the ends of the reaches: never too small.
+    """
     precision = prior.precision(factor)
     members = list(members)
-    precision[members] = 1.0 / (10.0 * prior.scale[members]) ** 2
+    precision[members] = _free(prior, members)
     size = 1.0 / np.sqrt(np.diag(data.A) + precision)
     scaled = size[:, None] * data.A * size + np.diag(precision * size**2)
     covariance, _ = _inverse(scaled, size)
-    return covariance @ data.b, covariance
+    return within(covariance @ data.b, lambda held: covariance[:, held], _reach(prior, members))[0], covariance
+
+
+def holding_back(at: Base, prior: Prior, members: Sequence[int]) -> float:
+    """Log evidence >= 0 that it costs a set with the columns `members` to keep all others within reach."""
+    index = list(members)
+    own = at.covariance[:, index]
+    # those columns' prior widens
+    gain = np.linalg.inv(np.diag(1.0 / (_free(prior, index) - at.precision[index])) + own[index])
+    mean = at.mean - own @ (gain @ at.mean[index])
+    return within(mean, lambda held: at.covariance[:, held] - own @ (gain @ own[held].T), _reach(prior, index))[1]
+
+
+def _free(prior: Prior, members: Sequence[int]) -> Floats:
+    """Precision (d,) of columns that are free within 10 scales."""
+    return np.asarray(1.0 / (10.0 * prior.scale[list(members)]) ** 2)
+
+
+def _reach(prior: Prior, members: Sequence[int]) -> Floats:
+    """Reach (k,), without end for `members`."""
+    out = prior.reach.copy()
+    out[list(members)] = np.inf
+    return out
+
+
+def within(mean: Floats, columns: Callable[[Ints], Floats], reach: Floats) -> tuple[Floats, float]:
+    """Mode (k,) of a normal distribution that is cut off at +-reach (k,), and by how much its log density is lower there.
+
+    columns: those of its covariance (k, h) that are asked for.
+    Columns that are too far off are held at the end of their reach, all at once; those that would go back by themselves
+    are let go again.
+    """
+    mode, held, side = mean, np.zeros(0, np.int64), np.zeros(0)
+    pull = side
+    for _ in range(PASSES):
+        far = np.setdiff1d(np.flatnonzero(np.abs(mode) > reach * (1.0 + 1e-9)), held)
+        loose = pull * side > 0.0
+        if not len(far) and not loose.any():
+            break
+        held = np.concatenate([held[~loose], far])
+        side = np.concatenate([side[~loose], np.sign(mode[far])])
+        ways = columns(held)
+        unit = np.sqrt(np.diag(ways[held]))
+        scaled = ways[held] / unit[:, None] / unit + 1e-12 * np.eye(len(held))
+        pull = np.linalg.solve(scaled, (side * reach[held] - mean[held]) / unit) / unit
+        mode = mean + ways @ pull
+    cost = 0.5 * float(pull @ (side * reach[held] - mean[held])) if len(held) else 0.0
+    return np.asarray(np.clip(mode, -reach, reach)), cost

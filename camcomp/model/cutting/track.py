@@ -138,6 +138,13 @@ class Track:
         return _force(self.path, self.conditions, self.cutting, self.motion, self.s0, self.length, self.grip, piece, w,
                       direction, self.points(piece, w), feed)  # fmt: skip
 
+    def force_meeting(self, piece: Ints, w: Floats, direction: Floats, depth: Floats, bites: Bites) -> Floats:
+        """Cutting force (k, 3) N, program frame, of a tool that meets these arcs (k places) and goes on along `direction`."""
+        c, rows = self.conditions, self.motion[piece]
+        s = self.s0[piece] + w * self.length[piece]
+        found = _components(self.path, c, rows, direction, depth, bites.reach(len(rows)), s, w == 1.0, bites)
+        return to_vector(found, direction, c.tool_axis)
+
     def _driven(self, piece: Ints, w: Floats, direction: Floats, feed: Floats) -> Floats:
         """Cutting force (k, 3) N at other feeds than the program's: between the places on both sides, asked for these feeds."""
         assert self.engaged is not None

@@ -19,6 +19,7 @@ from camcomp.model.stock.places import (
     SHORT,
     STEP,
     apart,
+    begins,
     bent,
     between,
     copy_slot,
@@ -79,13 +80,15 @@ def along_chain(nodes, place, found, legs, k, count, radius, before, joined_on):
         if b - a == 1:
             copy_slot(found, FIRST, 0)
             copy_slot(found, slot, 1)
+            found.stack_u[0] = 0.0  # what was the end of the leg before
             put_place(found, k + a, 0, 0.0, found.told_of[PLACES])
             found.told_of[PLACES] += 1
             between(nodes, place, found, legs, k + a, gap, radius, before + a)
-        elif gap > SHORT * radius or apart(found, FIRST, slot) > CALM * scale:
+        elif gap > SHORT * radius or apart(found, FIRST, slot) > CALM * scale or begins(found, FIRST, slot):
             m = (a + b) // 2
             look(nodes, place, found, legs, k + m - 1, 1.0, before + m, slot + 1)
-            if bent(found, FIRST, slot + 1, slot, (ends[m] - ends[a]) / gap) > BENT * scale:
+            off = bent(found, FIRST, slot + 1, slot, (ends[m] - ends[a]) / gap)
+            if off > BENT * scale or begins(found, FIRST, slot):
                 top += 1
                 number[top] = m
                 continue

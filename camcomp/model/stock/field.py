@@ -108,13 +108,22 @@ def height(nodes, x, y, below):
         if highest - lowest <= TIE:  # a level floor; what bulges in between is thinner than what counts
             return float(highest)
     best = top_at(nodes, x, y, i, j)
+    for corner in range(4):  # most of what nothing stands over is found out here
+        k = (a, b, c, d)[corner]
+        if k > 0:
+            best = min(best, bottom(nodes.sweeps, nodes.tools, k - 1, 0, x, y))
+            if best <= below:
+                return best
     near, over = nodes.near, nodes.over
     for p in range(i - 1, i + 3):
         for q in range(j - 1, j + 3):
             k = own[p, q]
             if k == 0:
                 continue
-            if (q == j - 1 or own[p, q - 1] != k) and (p == i - 1 or own[p - 1, q] != k):
+            if (
+                k != a and k != b and k != c and k != d
+                and (q == j - 1 or own[p, q - 1] != k) and (p == i - 1 or own[p - 1, q] != k)
+            ):  # fmt: skip
                 best = min(best, bottom(nodes.sweeps, nodes.tools, k - 1, 0, x, y))
             n = near[p, q]
             if n != k and (q == j - 1 or near[p, q - 1] != n) and (p == i - 1 or near[p - 1, q] != n):

@@ -16,14 +16,14 @@ from typing import Any, NamedTuple
 from camcomp.ground.datatypes import Floats
 from camcomp.model.statics.compiled import inner
 from camcomp.model.stock.field import CELL, XMAX, XMIN, YMAX, YMIN, ZMAX, ZMIN, height
-from camcomp.model.stock.sweeps import FLAT, KIND, RADIUS, bottom, radius_at
+from camcomp.model.stock.sweeps import FLAT, KIND, RADIUS, bottom, radius_at, slope
 
 EDGE, FLOOR = 0.002, 0.001  # mm
 FEWEST, MOST = 16, 48  # angles at which the front of a tool is looked at
 TURNS = 8  # halvings of the step between them
 ASIDE = 0.02  # of such a step: beside an edge
 SCAN, SLICES = 12, 8  # heights of a tool that is no cylinder: to find where it cuts, and there
-END_ANGLE = 1e-4  # rad from the sides of the front half
+END_ANGLE = 1e-3  # rad from the sides of the front half; on less, a wall just cut lies against the tool
 BITE = 5  # columns of an arc: entry, exit (rad), height (mm), rise and run of the tool's surface per length of its edge
 DEPTH, ENGAGED, ARCS, WHAT = 5, 6, 7, 8  # of what is told of a place; in front: five integrals over the engagement
 
@@ -134,9 +134,8 @@ def look_round(nodes, place, bites, n, radius, z, tall, rise, run, least):
     for k in range(count + 2):
         psi = end if k == count + 1 else (begin if k == 0 else begin + (k - 0.5) / count * (end - begin))
         now = stands(nodes, place, radius, z, psi)
-        same = (
-            abs(now - before) <= 2.0 * EDGE + 0.02 * max(now, before) if tall == 0.0 else (now > 0.0) == (before > 0.0)
-        )
+        mean = sum_ / members if members > 0 else 0.0  # a slope is divided as often as it takes
+        same = abs(now - mean) <= 2.0 * EDGE + 0.02 * max(now, mean) if tall == 0.0 else (now > 0.0) == (before > 0.0)
         if k == 0:
             if now > 0.0:
                 start, sum_, members = least, now, 1
@@ -171,9 +170,7 @@ def look_round(nodes, place, bites, n, radius, z, tall, rise, run, least):
 def cuts_at(nodes, place, row, lift, k, count):
     """Whether a tool that is no cylinder meets material at a height over its tip and at an angle of its front."""
     radius = radius_at(nodes.tools, row, lift)
-    step = 1e-3
-    run = (radius_at(nodes.tools, row, lift + step) - radius) / step
-    least = least_angle(place.at[5], run)
+    least = least_angle(place.at[5], 1.0 / max(slope(nodes.tools, row, radius), 1e-12))
     psi = least + (k + 0.5) / count * (math.pi - 2.0 * least)
     return least < 0.5 * math.pi and stands(nodes, place, max(radius - EDGE, 0.0), place.at[2] + lift, psi) > 0.0
 
@@ -241,8 +238,9 @@ def look_over(nodes, place, bites, n, row):
         run = radius_at(nodes.tools, row, b) - radius_at(nodes.tools, row, a)
         edge = math.sqrt(run * run + (b - a) * (b - a))
         middle = 0.5 * (a + b)
-        least = least_angle(place.at[5], run / max(b - a, 1e-12))
-        radius = radius_at(nodes.tools, row, middle) - EDGE
+        radius = radius_at(nodes.tools, row, middle)
+        least = least_angle(place.at[5], 1.0 / max(slope(nodes.tools, row, radius), 1e-12))
+        radius -= EDGE
         if least < 0.5 * math.pi and radius > 0.0:
             n = look_round(nodes, place, bites, n, radius, z + middle, b - a, (b - a) / edge, run / edge, least)
     place.told[DEPTH] = high if place.told[ARCS] > 0.0 else 0.0

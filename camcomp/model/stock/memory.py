@@ -9,6 +9,7 @@ import numpy as np
 
 from camcomp.ground.datatypes import Floats, Ints, Path
 from camcomp.model.cutting.engaged import Bites, Engaged
+from camcomp.model.stock.at_tip import meet, take_way
 from camcomp.model.stock.facets import facets_on
 from camcomp.model.stock.field import TOUCHED, USED, XMAX, XMIN, ZMAX, ZMIN, room_for
 from camcomp.model.stock.legs import LegBefore, Legs, legs_of
@@ -81,7 +82,7 @@ class StockMemory:
         ahead: so many motions at the end are only looked at: they tell how the one before them goes on.
         """
         legs = legs_of(path, self._before)
-        tool = np.array([self._number.get(int(t), self._number.get(NO_TOOL, 0)) for t in np.unique(path.tool)])
+        tool = np.array([self._tool(int(t)) for t in np.unique(path.tool)])
         tool = tool[np.searchsorted(np.unique(path.tool), path.tool[legs.motion])] if len(legs.motion) else legs.motion
         own = int(np.searchsorted(legs.motion, len(path) - ahead))
         crash = np.zeros(max(own, 1), np.bool_)
@@ -101,6 +102,23 @@ class StockMemory:
         if len(path) > ahead:
             self._before = self._behind(path, legs, own, len(path) - ahead - 1)
         return _engaged(parts, legs), np.unique(legs.motion[:own][crash[:own]])
+
+    def meet(self, tip: Floats, direction: Floats, tool: int) -> tuple[float, Bites]:
+        """What a tool (T number) meets at a tip (3,) mm from where it goes on along a unit direction (3,).
+
+        The depth in mm, and the arcs of this one place. Not to be mixed with `follow`.
+        """
+        n = meet(self.nodes, self._place, self._found, tip, direction, self._tool(tool))
+        start, stop, height, rise, run = self._found.bites[:n].T.copy()
+        return float(self._place.told[DEPTH]), Bites(np.zeros(n, np.int64), start, stop, height, rise, run)
+
+    def take(self, start: Floats, end: Floats, tool: int, lag_mm: float) -> None:
+        """Takes away what a tool goes through on a straight way from tip to tip (3,) mm, once it has gone lag_mm farther."""
+        self._make_room()
+        take_way(self.nodes, self._place, self._found, start, end, self._tool(tool), lag_mm)
+
+    def _tool(self, number: int) -> int:
+        return self._number.get(number, self._number.get(NO_TOOL, 0))
 
     def _behind(self, path: Path, legs: Legs, own: int, motion: int) -> LegBefore:
         """What the next legs go on from; motions without length change nothing but the position."""

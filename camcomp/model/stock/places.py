@@ -115,6 +115,12 @@ def apart(found, a, b):
 
 
 @inner
+def begins(found, a, b):
+    """Whether the tool meets material in one of two slots only: there models of one force for all cuts switch on and off."""
+    return (found.stack[a, 0] > 0.0) != (found.stack[b, 0] > 0.0)
+
+
+@inner
 def bent(found, a, middle, b, w):
     """How far the engagement in the slot `middle` is from the straight line between its neighbours, at share w of it."""
     most = 0.0
@@ -140,10 +146,11 @@ def between(nodes, place, found, legs, k, length, radius, before):
             and found.told_of[ROWS] + 1024 < found.bites.shape[0]
         )
         jumps = gap <= JUMP_MM and differ > JUMP * scale
-        if room and not jumps and gap > FINE_MM and (differ > CALM * scale or gap > SHORT * radius):
+        edge = gap > JUMP_MM and begins(found, 0, top)
+        if room and not jumps and gap > FINE_MM and (differ > CALM * scale or gap > SHORT * radius or edge):
             rows = found.told_of[ROWS]
             look(nodes, place, found, legs, k, 0.5 * (a + b), before, top + 1)
-            if bent(found, 0, top + 1, top, 0.5) > BENT * scale:
+            if edge or bent(found, 0, top + 1, top, 0.5) > BENT * scale:
                 top += 1
                 continue
             found.told_of[ROWS] = rows

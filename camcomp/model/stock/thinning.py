@@ -3,14 +3,9 @@
 # mypy: disallow-untyped-defs=False, disallow-incomplete-defs=False
 # numba infers the types of these functions; written by hand they would only be repeated.
 
-import numpy as np
-
-from camcomp.model.cutting.engaged import Engaged
 from camcomp.model.statics.compiled import entry, inner
-from camcomp.model.stock.measure import DEPTH, ENGAGED, WHAT
+from camcomp.model.stock.measure import DEPTH, WHAT
 from camcomp.model.stock.places import BENT
-
-HAIR = 1e-9  # of a motion
 
 
 @inner
@@ -66,24 +61,3 @@ def thin(motion, u, told, columns, keep, stack):
                 top += 2
         a = b + 1
     return 0
-
-
-def thinned(engaged: Engaged) -> Engaged:
-    """The places without which the engagement would not be the same."""
-    n, bites = len(engaged.u), engaged.bites
-    a, b, tall = bites.start, bites.stop, bites.height
-    told = np.zeros((n, WHAT))
-    for column, size in enumerate(
-        (b - a, np.cos(a) - np.cos(b), np.sin(b) - np.sin(a), 0.5 * (np.sin(2.0 * b) - np.sin(2.0 * a)),
-         0.5 * (np.cos(2.0 * a) - np.cos(2.0 * b)))
-    ):  # fmt: skip
-        told[:, column] = np.bincount(bites.place, tall * size, n)
-    told[:, DEPTH], told[:, ENGAGED] = engaged.depth, engaged.turn
-    told[:, WHAT - 1] = np.maximum.accumulate(told[:, 0]) if n else 0.0
-    again = np.zeros(n, np.bool_)  # the same place once more, where parts of a motion meet
-    again[1:] = (engaged.motion[1:] == engaged.motion[:-1]) & (engaged.u[1:] <= engaged.u[:-1] + HAIR)
-    again[1:] &= np.abs(np.diff(told[:, :DEPTH], axis=0)).max(axis=1, initial=0.0) <= BENT * told[1:, WHAT - 1]
-    rows = np.flatnonzero(~again)
-    keep = np.zeros(len(rows), np.bool_)
-    thin(engaged.motion[rows], engaged.u[rows], told[rows], DEPTH, keep, np.zeros((2 * n + 2, 2), np.int64))
-    return engaged.take(rows[keep])

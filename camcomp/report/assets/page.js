@@ -4,7 +4,8 @@
   const byId = (id) => document.getElementById(id);
   const specs = JSON.parse(byId("figures").textContent);
   const themeButton = byId("theme");
-  const PAPER = { width: 680, height: 400 };
+  const PAPER = { width: 680, height: 300, square: 420 };
+  const NARROW = 640; // below it legends stand above, and drawings in space are seen from farther
 
   function setTheme(name) {
     root.dataset.theme = name;
@@ -46,6 +47,8 @@
       modebar: { bgcolor: "rgba(0,0,0,0)", color: grid, activecolor: ink },
       legend: { orientation: "h", x: 0, y: 1.02, yanchor: "bottom" },
     };
+    const wide = (spec.paper || byId(spec.name + "-plot").clientWidth) >= NARROW;
+    if (square(spec) && wide) base.legend = { x: 1.02, y: 1 };
     const axes = Object.keys(layout).filter((k) => /^[xy]axis\d*$/.test(k));
     const out = { ...base, ...layout };
     for (const key of axes)
@@ -53,8 +56,15 @@
     if (layout.scene)
       for (const key of ["xaxis", "yaxis", "zaxis"])
         out.scene[key] = { gridcolor: grid, zerolinecolor: grid, color: ink, ...layout.scene[key] };
+    if (layout.scene && layout.scene.camera && !wide) {
+      const eye = Object.entries(layout.scene.camera.eye).map(([k, v]) => [k, FARTHER * v]);
+      out.scene.camera = { ...layout.scene.camera, eye: Object.fromEntries(eye) };
+    }
     return out;
   }
+
+  const FARTHER = 1.7;
+  const square = (spec) => Boolean(spec.layout.yaxis && spec.layout.yaxis.scaleanchor);
 
   const CONFIG = { responsive: true, displaylogo: false, modeBarButtonsToRemove: ["sendDataToCloud", "lasso2d", "select2d"] };
 
@@ -66,19 +76,20 @@
 
   // The slider is logarithmic: 0..100 stands for the factors 1..most.
   const factorOf = (spec) => Math.pow(spec.exaggerate.most, Number(byId(spec.name + "-k").value) / 100);
+  const moved = (b, shift, k) => (b === null || shift === null ? null : b + k * shift);
   const shown = (k) => (k < 9.95 ? k.toFixed(1) : String(Math.round(k))) + " times";
 
   function exaggerated(spec) {
     const { base, shifts } = spec.exaggerate;
     const k = factorOf(spec);
     if (Array.isArray(base)) { // in space: every curve has its own points
-      const at = (i, axis) => base[i][axis].map((b, j) => (b === null ? null : b + k * shifts[i][axis][j]));
+      const at = (i, axis) => base[i][axis].map((b, j) => moved(b, shifts[i][axis][j], k));
       return { ...spec, traces: spec.traces.map((trace, i) => ({ ...trace, x: at(i, "x"), y: at(i, "y"), z: at(i, "z") })) };
     }
     const [h, v] = byId(spec.name + "-p").value.toLowerCase();
     const along = (i, axis) => {
       const shift = shifts[i] && shifts[i][axis];
-      return shift ? base[axis].map((b, j) => (b === null ? null : b + k * shift[j])) : base[axis];
+      return shift ? base[axis].map((b, j) => moved(b, shift[j], k)) : base[axis];
     };
     const traces = spec.traces.map((trace, i) => ({ ...trace, x: along(i, h), y: along(i, v) }));
     const layout = { ...spec.layout };
@@ -133,18 +144,30 @@
     let theme;
     addEventListener("beforeprint", () => {
       theme = root.dataset.theme;
+      const paper = getComputedStyle(root).getPropertyValue("--paper");
       setTheme("light");
       for (const spec of specs) {
-        draw(spec);
-        Plotly.relayout(byId(spec.name + "-plot"), {
-          width: PAPER.width, height: Math.min(spec.height, PAPER.height), autosize: false,
-        });
-        byId(spec.name + "-plot").style.height = Math.min(spec.height, PAPER.height) + "px";
+        const plot = byId(spec.name + "-plot");
+        if (spec.layout.scene) { // its canvas follows too late for paper: it becomes smaller as it is, on its own ground
+          const width = plot.clientWidth;
+          plot.style.background = paper;
+          plot.style.width = width + "px";
+          plot.style.zoom = Math.min(PAPER.width / width, 1);
+          continue;
+        }
+        const height = square(spec) ? PAPER.square : Math.min(spec.height, PAPER.height);
+        draw({ ...spec, paper: PAPER.width, height });
+        Plotly.relayout(plot, { width: PAPER.width, height, autosize: false });
+        plot.style.height = height + "px";
       }
     });
-    addEventListener("afterprint", () => { 
+    addEventListener("afterprint", () => {
       setTheme(theme);
-      for (const spec of specs) byId(spec.name + "-plot").style.height = spec.height + "px";
+      for (const spec of specs) {
+        const plot = byId(spec.name + "-plot");
+        plot.style.height = spec.height + "px";
+        plot.style.width = plot.style.zoom = plot.style.background = "";
+      }
       drawAll();
     });
   }

@@ -29,7 +29,7 @@ def test_tolerances_are_not_doubled_to_hide_a_cause():
     """Amplitudes of two and a half tolerances: tolerances twice as wide would fit it best, and are not believed."""
     rng = np.random.default_rng(3)
     D = rng.standard_normal((400, 4))
-    prior = Prior(np.full(4, 0.2), np.ones(4), np.zeros(4), np.ones(4))
+    prior = Prior(np.full(4, 0.2), np.ones(4), np.zeros(4), np.ones(4), np.full(4, np.inf))
     data = gram(D, D @ np.array([0.5, -0.5, 0.5, -0.5]) + 0.1 * rng.standard_normal(400))
     assert Scale(data, prior, candidates(4)).factor(()) < 2.0
 

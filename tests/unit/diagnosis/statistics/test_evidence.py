@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from scipy.integrate import quad
+from scipy.optimize import lsq_linear
 from scipy.stats import norm
 
 from camcomp.diagnosis.statistics.cause_sets import CausePrior, Scale, predictive
@@ -12,6 +13,7 @@ from camcomp.diagnosis.statistics.evidence import (
     base,
     estimate,
     gram,
+    holding_back,
     log_bayes,
     log_bayes_pairs,
 )
@@ -19,8 +21,9 @@ from camcomp.diagnosis.statistics.evidence import (
 RNG = np.random.default_rng(7)
 
 
-def prior(k, sign=None, tolerance=0.01):
-    return Prior(np.full(k, tolerance), np.ones(k), np.zeros(k) if sign is None else np.array(sign), np.ones(k))
+def prior(k, sign=None, tolerance=0.01, reach=np.inf):
+    every = np.ones(k)
+    return Prior(tolerance * every, every, 0.0 * every if sign is None else np.array(sign), every, reach * every)
 
 
 def data(truth, n=300, k=4, seed=1):
@@ -82,3 +85,38 @@ def test_runs_left_out_are_predicted_better_with_the_cause_than_without():
     runs = [data([0, 0.4, 0, 0], seed=s) for s in range(4)]
     with_it, without, wrong = predictive(runs, p, candidates, [(1,), (), (3,)])
     assert with_it > without + 5 and with_it > wrong + 5
+
+
+def strained(reach):
+    """Two columns much alike, both far beyond their tolerances, a third that is not, and a small one."""
+    rng = np.random.default_rng(3)
+    D = rng.standard_normal((200, 4)) @ np.array([[1, 0.9, 0, 0], [0, 0.4, 0, 0], [0, 0, 1, 0.5], [0, 0, 0, 1]])
+    r = D @ np.array([1.5, -1.2, 0.8, 0.02]) + rng.standard_normal(200)
+    return D, r, gram(D, r), prior(4, tolerance=0.1, reach=reach)
+
+
+def test_no_tolerance_goes_beyond_its_reach_and_the_others_follow():
+    D, r, g, p = strained(0.3)
+    for members in ([], [0], [1, 2]):
+        precision = np.where(np.isin(np.arange(4), members), 0.1, 10.0)  # 1 over the prior deviation
+        ends = np.where(np.isin(np.arange(4), members), np.inf, 0.3)
+        asked = lsq_linear(np.vstack([D, np.diag(precision)]), np.append(r, np.zeros(4)), (-ends, ends), tol=1e-14)
+        assert estimate(g, p, members)[0] == pytest.approx(asked.x, abs=1e-6)
+        free = prior(4, tolerance=0.1)
+        mean = estimate(g, free, members)[0]
+        chi2 = [np.sum((r - D @ x) ** 2) + np.sum((precision * x) ** 2) for x in (mean, asked.x)]
+        assert holding_back(base(g, free, 1.0), p, members) == pytest.approx(0.5 * (chi2[1] - chi2[0]), rel=1e-4)
+
+
+def test_what_needs_no_tolerance_beyond_its_reach_wins():
+    """1000 rows strain a tolerance as far as they like for what a prior of sets asks for a second cause."""
+    rng = np.random.default_rng(5)
+    D = rng.standard_normal((1000, 2))
+    g = gram(D, D @ np.array([0.5, 0.35]) + rng.standard_normal(1000))
+    candidates = CausePrior(((0,), (1,)), np.log(np.full(2, 1e-4)), lambda i, j: False)
+
+    def lead(p):
+        scale = Scale(g, p, candidates)
+        return scale((0, 1)) + candidates.prior((0, 1)) - scale((0,)) - candidates.prior((0,))
+
+    assert lead(prior(2, tolerance=0.1)) < 0.0 < lead(prior(2, tolerance=0.1, reach=0.2))

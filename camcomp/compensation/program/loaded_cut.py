@@ -1,0 +1,258 @@
+"""A program in its stock as the loaded machine executes it: the tool cuts where it is, not where it is commanded.
+
+The force depends on what the tip meets, what it meets on where the tip is, and that on the force. What was cut before
+never changes again, so the tip is led node by node in the order of the program, and at every node force and tip are
+brought to rest before anything is cut there. For that the tip is free + slope @ force; what the machine does otherwise
+is put right in the next round.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from camcomp.compensation.program.moves import refuse_unsolved, travel_of
+from camcomp.gcode.program import Program
+from camcomp.ground import path_geometry
+from camcomp.ground.datatypes import RAPID, Bools, Floats, Ints
+from camcomp.ground.headway import done, part
+from camcomp.model.cutting.frame import lateral
+from camcomp.model.cutting.track import PLUNGE_SINE, Track, lay_track
+from camcomp.model.job import Job
+from camcomp.model.motion.response import respond
+from camcomp.model.stock.from_config import Bounds, memory_of
+from camcomp.model.stock.legs import SAGITTA_MM
+from camcomp.model.stock.memory import StockMemory
+
+STEP_MM = 0.25  # between nodes
+PROBE_N = 10.0  # by which the slope is found
+STILL_MM = 5e-4  # what a round may put right without another one
+REST_MM = 2e-4  # change of the tip at a node after which it rests
+ROUNDS, TRIES = 4, 16
+SHARP = np.radians(30.0)
+FARTHER = 1.5  # times its bend: the way on which a tool comes to be bent otherwise
+BASE_MM, LEAST_REACH_MM = 0.15, 0.1
+LEAST_SHARE = 0.03  # of a step towards the force that was found
+
+
+@dataclass(frozen=True, eq=False)
+class LoadedCut:
+    """What a program leaves. unrest (k,) mm: what was left at every place where force and tip were sought, 0 where they rest."""
+
+    memory: StockMemory
+    unrest: Floats
+
+
+def loaded_cut(job: Job, program: Program, step_mm: float = STEP_MM) -> LoadedCut:
+    """The stock behind a program that the loaded machine has executed; the error is of first order in the step.
+
+    Raises PhysicsError where the machine cannot be.
+    """
+    path = program.path
+    bounds = Bounds().add(path)
+    engaged = memory_of(job.config, job.tool_axis, bounds).follow(path)[0]
+    track = lay_track(path, job.conditions, engaged)
+    way = Way.of(track, step_mm)
+    piece, w, on = way.piece, way.w, way.on
+    travel = travel_of(job, track, piece[on], w[on])
+
+    def tips(force: Floats) -> Floats:
+        out = way.told.copy()
+        loaded = replace(travel, force=job.frame.vectors(force[on]))
+        out[on], state = respond(job, way.told[on], loaded)
+        refuse_unsolved(program, track, piece[on], way.told[on], state.status)
+        return out
+
+    none = np.zeros_like(way.told)
+    free = tips(none)
+    bends = tips(track.force(piece, w)) - free  # as if nothing ever bent
+    reach = max(FARTHER * float(np.linalg.norm(bends, axis=1).max(initial=0.0)), LEAST_REACH_MM)
+    slope = np.stack([(tips(none + PROBE_N * axis) - free) / PROBE_N for axis in np.eye(3)], axis=2)
+    for turn in range(ROUNDS):
+        memory = memory_of(job.config, job.tool_axis, bounds)
+        with part(turn / ROUNDS, (turn + 1) / ROUNDS):
+            force, unrest = _lead(memory, track, way, free, slope, reach)
+        off = tips(force) - free - np.einsum("kij,kj->ki", slope, force)
+        if np.abs(off).max(initial=0.0) < STILL_MM:
+            break
+        free = free + off
+    return LoadedCut(memory, unrest)
+
+
+def meant_cut(job: Job, program: Program) -> StockMemory:
+    """The stock behind a program whose tool does not bend and whose machine goes where it is told."""
+    memory = memory_of(job.config, job.tool_axis, Bounds().add(program.path))
+    memory.follow(program.path)
+    memory.settle()
+    return memory
+
+
+def nodes_of(job: Job, program: Program, step_mm: float = STEP_MM) -> int:
+    """About how many nodes `loaded_cut` leads the tip through."""
+    feeds = program.path.kind != RAPID
+    return int(np.ceil(np.nan_to_num(path_geometry.lengths(program.path)[feeds]) / step_mm).sum()) + int(feeds.sum())
+
+
+@dataclass(frozen=True, eq=False)
+class Way:
+    """Nodes (k,) of a track in order, first and last of every piece among them."""
+
+    piece: Ints
+    w: Floats
+    told: Floats  # (k, 3) mm programmed tip
+    direction: Floats  # (k, 3) of the feed; where pieces join it is that between theirs
+    on: Ints  # rows that are in program coordinates
+    feeds: Bools  # (k,) the piece takes material away
+    loads: Bools  # (k,) the force of what the tool meets acts
+    fixed: Floats  # (k, 3) N of models that know the force of a plunge, too
+    s: Floats  # (k,) mm of the program's way
+    run: Ints  # (k,) number of the run of feeds without a sharp corner
+    run_length: Floats  # (k,) mm
+
+    @classmethod
+    def of(cls, track: Track, step_mm: float) -> Way:
+        """Nodes at most step_mm apart where the tool feeds, and so that chords of arcs miss by less than SAGITTA_MM."""
+        path, motion, n = track.path, track.motion, len(track.motion)
+        seen = path.known[motion] & ~path.machine[motion]
+        feeds = (path.kind[motion] != RAPID) & seen & (track.length > 0.0)
+        angle = np.abs(track.angle)
+        radius = np.divide(track.length, angle, out=np.full(n, np.inf), where=angle > 0.0)
+        step = np.minimum(step_mm, np.sqrt(8.0 * SAGITTA_MM * radius))
+        count = np.where(feeds, np.maximum(np.ceil(track.length / np.maximum(step, 1e-3)), 1), 1).astype(np.int64) + 1
+        piece = np.repeat(np.arange(n), count)
+        k = np.arange(len(piece)) - np.repeat(np.cumsum(count) - count, count)
+        w = k / (count[piece] - 1)
+        direction = _directions(track, feeds, piece, w)
+        across = lateral(direction, np.asarray(track.conditions.tool_axis)) > PLUNGE_SINE
+        loads = feeds[piece] & across & (track.conditions.model is not None)
+        fixed = track.force(piece, w) if track.conditions.plunges else np.zeros((len(piece), 3))
+        run = _runs(track, feeds)
+        long = np.bincount(run, track.length).astype(float)[run]
+        s = track.s0[piece] + w * track.length[piece]
+        told, on = track.points(piece, w), np.flatnonzero(seen[piece])
+        return cls(piece, w, told, direction, on, feeds[piece], loads, fixed, s, run[piece], long[piece])
+
+
+def _directions(track: Track, feeds: Bools, piece: Ints, w: Floats) -> Floats:
+    """Unit directions of the feed (k, 3), without a jump where pieces go on from each other."""
+    first, last = _ends(track)
+    more0, more1 = np.zeros_like(first), np.zeros_like(last)
+    real = np.flatnonzero(feeds)
+    a, b = real[:-1], real[1:]
+    joined = ~track.corner[b]
+    a, b = a[joined], b[joined]
+    both = last[a] + first[b]
+    both /= np.maximum(np.linalg.norm(both, axis=1, keepdims=True), 1e-300)
+    more1[a], more0[b] = both - last[a], both - first[b]
+    u = np.clip(track.u(piece, w), (track.u0 + track.beside0)[piece], (track.u1 - track.beside1)[piece])
+    out = path_geometry.tangents(track.path, track.motion[piece], u)
+    return _unit(out + (1.0 - w)[:, None] * more0[piece] + w[:, None] * more1[piece])
+
+
+def _ends(track: Track) -> tuple[Floats, Floats]:
+    """Directions (p, 3) at both ends of all pieces."""
+    first = path_geometry.tangents(track.path, track.motion, track.u0 + track.beside0)
+    return first, path_geometry.tangents(track.path, track.motion, track.u1 - track.beside1)
+
+
+def _unit(vectors: Floats) -> Floats:
+    size = np.linalg.norm(vectors, axis=1, keepdims=True)
+    out: Floats = np.divide(vectors, size, out=np.zeros_like(vectors), where=size > 0.0)
+    return out
+
+
+def _runs(track: Track, feeds: Bools) -> Ints:
+    """Number (p,) of the run of every piece: feeds that go on from each other with no sharp corner."""
+    first, last = _ends(track)
+    real = np.flatnonzero(track.length > 0.0)
+    begins = np.ones(len(track.motion), np.bool_)
+    a, b = real[:-1], real[1:]
+    begins[b] = ~(feeds[a] & feeds[b]) | (np.sum(last[a] * first[b], axis=1) < np.cos(SHARP))
+    begins[np.setdiff1d(np.arange(len(begins)), real)] = False
+    return np.cumsum(begins)
+
+
+def _lead(
+    memory: StockMemory, track: Track, way: Way, free: Floats, slope: Floats, reach: float
+) -> tuple[Floats, Floats]:
+    """Leads the tip through the stock: forces (k, 3) N at the nodes, and what is left (mm) where they were sought.
+
+    A force changes as the tool goes on, and it takes about as much way as the tool is bent: behind a sharp corner the tip
+    goes straight to where it is bent for the new direction, and so it does over runs shorter than `reach` between two
+    sharp corners, by which corrected lines are joined.
+    """
+    n = len(way.piece)
+    tool = track.path.tool[track.motion[way.piece]]
+    force, unrest = np.zeros((n, 3)), list[float]()
+    at, begin = free[0] if n else np.zeros(3), 0.0
+    bend: list[tuple[float, Floats]] = []  # way and bend at the nodes of this run
+    for k in range(n):
+        before = force[max(k - 1, 0)]
+        if k == 0 or way.run[k] != way.run[k - 1]:
+            begin, goes_on = way.s[k], k > 0 and way.feeds[k - 1] and way.feeds[k]
+            rest = FARTHER * float(np.linalg.norm(at - way.told[k])) if goes_on else 0.0
+            rest = np.inf if goes_on and way.run_length[k] < reach else rest
+            bend = []
+        if way.s[k] - begin < rest or (bend and way.s[k] == bend[-1][0]):
+            force[k] = before
+            continue
+        if way.loads[k]:
+            force[k], left = _at_rest(memory, track, way, k, free[k], slope[k], before, bend)
+            unrest.append(left)
+        elif way.feeds[k]:
+            force[k] = way.fixed[k]
+        tip = free[k] + slope[k] @ force[k]
+        if way.feeds[k]:
+            memory.take(at, tip, int(tool[k]), reach)
+        bend.append((way.s[k], tip - way.told[k]))
+        at = tip
+        if k % 256 == 0:
+            done(k / n)
+    return force, np.array(unrest)
+
+
+def _behind(bend: list[tuple[float, Floats]]) -> tuple[float, Floats] | None:
+    """Way and bend on this run from where on its change is taken: over so much way that it turns the feed by little."""
+    if bend:
+        far = bend[-1][0] - max(BASE_MM, FARTHER * float(np.linalg.norm(bend[-1][1])))
+        for each in reversed(bend):
+            if each[0] <= far:
+                return each
+    return None
+
+
+def _at_rest(
+    memory: StockMemory, track: Track, way: Way, k: int, free: Floats, slope: Floats, start: Floats,
+    bend: list[tuple[float, Floats]],
+) -> tuple[Floats, float]:  # fmt: skip
+    """Force (3,) N at node k under which the tip meets what makes this force, and by how much (mm) it does not.
+
+    The tool advances where its tip does: along the program's direction and as its bend changes.
+
+    Steps towards the force found are as long as the last two let hope (Aitken): where the tool begins to touch, the arc
+    grows with the square root of the way, and full steps would go to and fro for ever.
+    """
+    row = np.array([k])
+    tool, piece, w = int(track.path.tool[track.motion[way.piece[k]]]), way.piece[row], way.w[row]
+    force, share, before, behind = start, 1.0, None, _behind(bend)
+    for _ in range(TRIES):
+        tip, direction = free + slope @ force, way.direction[k]
+        if behind is not None:
+            direction = direction + (tip - way.told[k] - behind[1]) / (way.s[k] - behind[0])
+            direction = direction / np.linalg.norm(direction)
+        depth, bites = memory.meet(tip, direction, tool)
+        found = np.zeros(3)
+        if len(bites.start):
+            found = way.fixed[k]
+            if not track.conditions.plunges:
+                found = track.force_meeting(piece, w, direction[None], np.array([depth]), bites)[0]
+        step = found - force
+        left = float(np.abs(slope @ step).max())
+        if left < REST_MM:
+            return found, 0.0
+        if before is not None:
+            change = step - before
+            share = float(np.clip(-share * (before @ change) / max(float(change @ change), 1e-30), LEAST_SHARE, 1.0))
+        force, before = force + share * step, step
+    return force, left

@@ -1,0 +1,36 @@
+"""Sets of causes that rows and stated tolerances do not tell apart are alternatives, whatever is usual of their sizes."""
+
+from types import SimpleNamespace
+
+import numpy as np
+
+from camcomp.diagnosis.search.cause_search import SAME_EVIDENCE, _same
+from camcomp.diagnosis.statistics.cause_sets import CausePrior, Fitted, Scale
+from camcomp.diagnosis.statistics.evidence import Prior, estimate, gram
+
+
+def problem_of(twin):
+    """Rows that follow the first column 0.7 of its scale; the second does the same with 7 of its own, `twin` its share."""
+    rng = np.random.default_rng(2)
+    D = rng.standard_normal((400, 2))
+    D[:, 1] = 0.1 * (twin * D[:, 0] + np.sqrt(1.0 - twin**2) * D[:, 1])
+    data = gram(D, 0.7 * D[:, 0] + rng.standard_normal(400))
+    one = np.ones(2)
+    prior = Prior(1e-3 * one, one, 0.0 * one, one, np.inf * one)
+    candidates = CausePrior(((0,), (1,)), np.log(0.5 * one), lambda i, j: True)
+    scale = Scale(data, prior, candidates)
+    fits = tuple(Fitted((i,), estimate(data, prior, [i])[0][[i]], np.eye(1), scale((i,)), (data,)) for i in range(2))
+    free = SimpleNamespace(parameters=(SimpleNamespace(sign=0),))
+    columns = SimpleNamespace(candidates=(free, free))
+    return SimpleNamespace(prior=prior, columns=columns, member_columns=list), fits
+
+
+def test_an_unusual_size_alone_excludes_no_set():
+    problem, fits = problem_of(twin=1.0)
+    assert fits[0].log_evidence - fits[1].log_evidence > SAME_EVIDENCE
+    assert _same(problem, fits, np.array([0.97, 0.03])) == [((0,), (1,))]
+
+
+def test_rows_that_follow_another_set_worse_exclude_it():
+    problem, fits = problem_of(twin=0.9)
+    assert _same(problem, fits, np.array([0.97, 0.03])) == []
