@@ -94,13 +94,13 @@ def _told(value: float, ci95: tuple[float, float], unit: str, nominal: float | N
     if unit in _SMALLER and max(abs(low), abs(high), abs(value)) < 1.0:
         scale, unit = _SMALLER[unit]
     behind = "" if unit in ("", "1") else f" {unit}"
-    told, least, most = _alike(scale * value, scale * low, scale * high)
+    told, least, most = digits_alike(scale * value, scale * low, scale * high)
     if nominal is not None and low <= nominal <= high:
         return f"{_NOTHING}{nominal:g} ({least} to {most}{behind})"
     return f" {told}{behind} ({least} to {most})"
 
 
-def _alike(value: float, low: float, high: float) -> list[str]:
+def digits_alike(value: float, low: float, high: float) -> list[str]:
     """A value and the ends of its interval, with decimals that show two digits of the doubt."""
     doubt = 0.5 * (high - low)
     if not doubt > 0.0 or not math.isfinite(doubt) or doubt < 1e-4:
