@@ -65,7 +65,7 @@ def sizes(cause: FoundCause) -> str:
 
 def title(name: str, parameter: Any = None) -> str:
     """The name of a parameter without its unit."""
-    unit = parameter.unit.replace("/", "_per_") if parameter is not None else ""
+    unit = parameter.unit.replace("/", "_per_").removeprefix("1_") if parameter is not None else ""
     return name.removesuffix(f"_{unit}").replace("_", " ") if unit else name.replace("_", " ")
 
 
