@@ -20,7 +20,8 @@ from camcomp.diagnosis.fit.gap import gap_of, main_channels, rest_by_actuator
 from camcomp.diagnosis.fit.intervals import joint_covariance
 from camcomp.diagnosis.fit.lookalikes import without_lookalikes, without_twins
 from camcomp.diagnosis.fit.problem import Problem, open_problem
-from camcomp.diagnosis.law.answer import LawAnswer, answer_law
+from camcomp.diagnosis.law.answer import answer_law
+from camcomp.diagnosis.law.law_answer import LawAnswer
 from camcomp.diagnosis.law.library import LearnedLaw
 from camcomp.diagnosis.next_experiment.after_unknown import explore
 from camcomp.diagnosis.next_experiment.designed import propose
@@ -100,20 +101,21 @@ def diagnose(
     gap = gap_of(problem)
     word: Any = "unknown" if found.unknown_in else found.verdict.word
     law = answer_law(problem, best, found.unknown_in) if found.unknown_in else None
-    if law is not None and law.alone:  # the causes had only followed what the law says
-        best = problem.refit(())
-    shrinkage = _shrinkage(twin, runs, holdout, problem, best)
+    stands = problem
+    if law is not None:  # causes have the values that they have beside it; those that had only followed it are gone
+        stands, best = law.problem, law.fit
+    shrinkage = _shrinkage(twin, runs, holdout, stands, best)
     unseen = len(used) < len(runs) or (len(used) > 1 and not holdout)
     proposal = _next(problem, found, word, job)
     result = DiagnosisResult(
         verdict=word,
         gap=GapSize(**gap),
-        where=_where(problem, found, best),
-        causes=_causes(problem, found, best, law),
+        where=_where(problem, found, best, law),
+        causes=_causes(stands, found, best, law),
         alternatives=_alternatives(problem, found) if word == "ambiguous" else (),
         shrinkage=UnseenShrinkage.model_validate(shrinkage) if unseen else None,
         next_experiment=_proposed(proposal) if proposal is not None else None,
-        minor=minor_effects(problem, best),
+        minor=minor_effects(stands, best),
         outliers=outlying_rows(problem),
         floor=Floor(um=gap["noise_floor_um"], source=problem.floor.source),
         equivalent=tuple(tuple(_named(problem, i) for i in group) for group in classes(likeness(problem))),
@@ -272,14 +274,14 @@ def _named(problem: Problem, i: int) -> NamedCause:
 # -- where ------------------------------------------------------------------------------------------------------------
 
 
-def _where(problem: Problem, found: CauseSearch, best: Fitted) -> Where:
+def _where(problem: Problem, found: CauseSearch, best: Fitted, law: LawAnswer | None) -> Where:
     gaps = run_gaps(problem)
     at = places.axes(gaps, channel_axes(problem))
     left = gaps  # what is unknown acts where the known causes leave something
     if found.unknown_in and best.members:
         left = run_gaps(problem, problem.causes(best.members, best.theta, best.extra))
     return Where.model_validate({
-        "stage": _stage(problem, best, found),
+        "stage": _stage(problem, best, found, law),
         "axes": {axis: at.get(axis, 0.0) for axis in "xyz"},
         "actuators": places.actuators(gaps, problem.bench.actuators),
         "lines": places.lines(gaps),
@@ -289,11 +291,13 @@ def _where(problem: Problem, found: CauseSearch, best: Fitted) -> Where:
     })  # fmt: skip
 
 
-def _stage(problem: Problem, best: Fitted, found: CauseSearch) -> str:
-    """The stage of the largest cause; of an unknown one, the stage of the channel that shows it."""
+def _stage(problem: Problem, best: Fitted, found: CauseSearch, law: LawAnswer | None) -> str:
+    """The stage of the largest cause; of an unknown one, that of its law, or else of the channel that shows it."""
     energy = _energies(problem, best)
     left = _unknown_energy(found)
     if found.unknown_in and left > max(energy, default=0.0):
+        if law is not None:
+            return law.law.on
         stage = {"encoder": "control", "dyno": "process"}.get(found.unknown_in)
         return stage or ("structure" if _first_label(found).startswith("force") else "drive")
     if energy:

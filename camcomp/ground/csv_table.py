@@ -21,6 +21,8 @@ from camcomp.ground.errors import CamcompError, ConfigError, Location
 
 MOST_TABLE_ROWS = 5_000_000  # more than an hour at 1 kHz
 MOST_TABLE_BYTES = 1 << 30
+NEEDED = "a table is a row of column names and rows of numbers below it"
+TOO_MANY = "look for a mark too many, or a decimal comma"
 _BLANK = " "  # any number of blanks and tabs between cells
 
 
@@ -124,7 +126,7 @@ def read_csv(
     mark = _mark(first) if spreadsheet else ","
     lines, rows = _rows(text, mark, name, rules, source)
     if not rows:
-        raise ConfigError(rules.table, "the file is empty", at=Location(name, 1, 1))
+        raise ConfigError(rules.table, "the file is empty", at=Location(name, 1, 1), hint=NEEDED)
     headed = not (spreadsheet and _share_of_numbers(rows[0], decimal_comma=mark != ",") > 0.5)
     if not headed:
         rows, lines = [[str(j + 1) for j in range(len(rows[0]))], *rows], [lines[0], *lines]
@@ -133,13 +135,13 @@ def read_csv(
     if len(header) == 1 and ";" in header[0]:
         raise ConfigError(rules.table, "cells are separated by commas, not by semicolons", at=at)
     if len(rows) < 2 and not rowless:
-        raise ConfigError(rules.table, "the table has no rows", at=at)
+        raise ConfigError(rules.table, "the table has no rows", at=at, hint=NEEDED)
     table = CsvTable(name, rules, mark, header, tuple(rows[1:]), tuple(lines), source, headed)
     for i, row in enumerate(table.rows):
         beyond = next((j for j in range(len(header), len(row)) if row[j].strip()), None)
         if beyond is not None:
             message = f"{len(row)} cells under {len(header)} column{' names' if headed else 's'}"
-            raise ConfigError(rules.cell, message, at=table.at(i, beyond))
+            raise ConfigError(rules.cell, message, at=table.at(i, beyond), hint=TOO_MANY)
     return table
 
 

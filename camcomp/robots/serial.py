@@ -74,6 +74,14 @@ class Params(Spec):
     flange: Pose = Field(default_factory=lambda: Pose())
     joints: Annotated[list[Joint], Field(min_length=1)]
 
+    @model_validator(mode="after")
+    def _names(self) -> "Params":
+        names = [row.name for row in self.joints]
+        for i, name in enumerate(names):
+            if name in names[:i]:
+                raise PydanticCustomError("CC205", f"two joints are called '{name}'", {"below": ("joints", i, "name")})
+        return self
+
 
 def chains(params: Params) -> dict[str, Any]:
     """The one chain of the arm, in the words of a machine file."""

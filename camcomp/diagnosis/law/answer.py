@@ -9,12 +9,14 @@ import numpy as np
 
 from camcomp.diagnosis.fit.gap import main_channels
 from camcomp.diagnosis.fit.problem import Problem
-from camcomp.diagnosis.law.bench_terms import TermBench, spots, term_grids
+from camcomp.diagnosis.law.bench_terms import Spot, TermBench, spots, term_grids
+from camcomp.diagnosis.law.beside import fitted_beside, with_law
 from camcomp.diagnosis.law.describe import law_result, moved_without, terms_of
 from camcomp.diagnosis.law.find import FoundLaw, find_law
 from camcomp.diagnosis.law.folds import Folds, Split, usual_split
+from camcomp.diagnosis.law.law_answer import LawAnswer, term_bench
 from camcomp.diagnosis.law.smooth import FoundMap, find_map, map_values
-from camcomp.diagnosis.result.types import Law
+from camcomp.diagnosis.search.established import standing
 from camcomp.diagnosis.search.unknown import about, firm_prior
 from camcomp.diagnosis.statistics.cause_sets import Fitted
 from camcomp.ground.datatypes import Floats
@@ -22,21 +24,6 @@ from camcomp.ground.datatypes import Floats
 GOOD_ENOUGH = 0.4  # of the floor, or of what was there: what a law may leave before a map is tried
 BETTER = 0.8  # of what a law leaves: what another one or a map has to leave to be told instead
 LEAST_SHRINKAGE = 0.1  # of the gap on withheld parts, below which nothing was found
-
-
-@dataclass(frozen=True, eq=False)
-class LawAnswer:
-    """law: as in the result; before: gaps (n, 3) mm of the tip per run that the causes alone leave; gaps: what they leave as they
-    stand beside the law; signal: what it does to the tip (n, 3) mm per run; all fitted without what they are judged on; found: its
-    terms; alone: it explains more without the causes, which had only followed it.
-    """
-
-    law: Law
-    before: tuple[Floats, ...]
-    gaps: tuple[Floats, ...]
-    signal: tuple[Floats, ...]
-    found: FoundLaw | FoundMap
-    alone: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,14 +41,13 @@ def answer_law(problem: Problem, f: Fitted, kind: str) -> LawAnswer | None:
     """The law or map that an unknown effect in a kind of channel follows; None where none holds on withheld parts.
 
     Where a law beside the causes leaves much, causes and tolerances may have stretched to follow the unknown effect: then it is
-    sought without them. Where that leaves much too, a map is.
+    sought without them. Where that leaves much too, a map is. Whichever it is, every cause is judged anew beside it.
     """
     if main_channels(problem).start != 0 or kind not in ("tip", "encoder"):
         return None
     bench = term_bench(problem)
     grids = term_grids(bench, kind)
-    known, nothing = _gaps(problem, f), _gaps(problem, None)
-    floor, before = problem.floor.tip_um, _rms(known)
+    floor, before = problem.floor.tip_um, _rms(_gaps(problem, f))
     room = float(np.sqrt(max(before**2 - floor**2, 0.0)))
 
     def much(best: _Tried | None) -> bool:
@@ -80,15 +66,14 @@ def answer_law(problem: Problem, f: Fitted, kind: str) -> LawAnswer | None:
             best = smooth
     if best is None or best.after > (1.0 - LEAST_SHRINKAGE) * before:
         return None
-    alone = best.f is None
-    without = nothing if alone else known
+    joint = with_law(problem, bench, best.found, _terms(bench, best.found))
+    fit = standing(joint, f.members)
+    if fit.members != (() if best.f is None else best.f.members):
+        base = _base(problem, fit, bench, kind)(best.found.folds.split, False)
+        best = _beside(problem, fit, bench, fitted_beside(best.found, base))
+    without = _gaps(problem, f if fit.members == f.members else problem.refit(fit.members))
     law = law_result(bench, best.found, _rms(without), best.after)
-    return LawAnswer(law, tuple(without), tuple(best.gaps), tuple(best.signal), best.found, alone)
-
-
-def term_bench(problem: Problem) -> TermBench:
-    """Where terms are evaluated for a problem."""
-    return TermBench(problem.bench, problem.noise, problem.inflate, problem.times)
+    return LawAnswer(law, tuple(without), tuple(best.gaps), tuple(best.signal), best.found, joint, fit)
 
 
 def _base(problem: Problem, f: Fitted | None, bench: TermBench, kind: str) -> Callable[[Split, bool], Folds]:
@@ -119,10 +104,12 @@ def _gap(problem: Problem, f: Fitted, k: int, theta: Floats) -> Floats:
 
 
 def _tried(problem: Problem, f: Fitted | None, bench: TermBench, found: FoundLaw | FoundMap | None) -> _Tried | None:
+    return None if found is None else _beside(problem, f, bench, found)
+
+
+def _beside(problem: Problem, f: Fitted | None, bench: TermBench, found: FoundLaw | FoundMap) -> _Tried:
     """What a law leaves where the causes have the values that they have beside it."""
-    if found is None:
-        return None
-    signal, gaps = _signal(bench, found), _gaps(problem, None)
+    signal, gaps = moved_without(bench, found, _terms(bench, found)), _gaps(problem, None)
     if f is not None and f.members:
         theta = found.folds.means(found.columns, found.precision)[:, problem.member_columns(f.members)]
         whole = found.folds.split.parts == 1  # runs are withheld
@@ -130,9 +117,8 @@ def _tried(problem: Problem, f: Fitted | None, bench: TermBench, found: FoundLaw
     return _Tried(f, found, gaps, signal, _rms(gaps, signal))
 
 
-def _signal(bench: TermBench, found: FoundLaw | FoundMap) -> list[Floats]:
-    values = [map_values(bench, each) for each in found.maps] if isinstance(found, FoundMap) else []
-    return moved_without(bench, found, terms_of(bench, found, values))
+def _terms(bench: TermBench, found: FoundLaw | FoundMap) -> list[tuple[Spot, list[Floats]]]:
+    return terms_of(bench, found, [map_values(bench, m) for m in found.maps] if isinstance(found, FoundMap) else [])
 
 
 def _rms(gaps: Sequence[Floats], signal: Sequence[Floats] = ()) -> float:

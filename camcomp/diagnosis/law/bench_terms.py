@@ -16,7 +16,7 @@ from camcomp.diagnosis.law.rows import Rows, drive_rows, tip_rows
 from camcomp.diagnosis.law.sizes import Sizes, sizes
 from camcomp.diagnosis.law.white import White
 from camcomp.diagnosis.statistics.noise_model import Noise
-from camcomp.ground.datatypes import Floats, Ints
+from camcomp.ground.datatypes import Bools, Floats, Ints
 from camcomp.model.law.expression import parse
 
 AT_ONCE = 100  # forms that are evaluated together
@@ -82,13 +82,13 @@ class TermBench:
             self._ways[spot] = self._tip_ways(spot)
         return self._ways[spot]
 
-    def rms(self, spot: Spot, values: Sequence[Floats]) -> float:
-        """By how much functions (n, f) at a spot move the tip, per unit of their coefficients: over all rows and functions."""
+    def rms(self, spot: Spot, values: Sequence[Floats]) -> Floats:
+        """By how much each of functions (n, f) at a spot moves the tip (f,), per unit of its coefficient: over all rows."""
         if spot not in self._squares:
             self._squares[spot] = [np.sum(way**2, axis=1) for way in self.tip_ways(spot)]
         ways = self._squares[spot]
-        energy = [float(np.sum(way[:, None] * v**2)) / v.shape[1] for way, v in zip(ways, values, strict=True)]
-        return float(np.sqrt(sum(energy) / sum(len(v) for v in values)))
+        energy = np.sum([way @ v**2 for way, v in zip(ways, values, strict=True)], axis=0)
+        return np.asarray(np.sqrt(energy / sum(len(v) for v in values)))
 
     def _tip_ways(self, spot: Spot) -> list[Floats]:
         bench = self.bench
@@ -122,22 +122,39 @@ class TermBench:
             out.append(found)
         return out
 
+    def _reached(self, spot: Spot, k: int, values: Floats) -> dict[int, Floats]:
+        """Functions (n, f) of run k in the channels that the spot reaches, thinned: (n', f) each."""
+        thin = self.bench.runs[k].thin
+        if spot.on == "control" and self._seen_by_encoders(k):
+            return {3 + spot.index: thinned(values, thin)}
+        way = self.bench.turned(k, self.tip_ways(spot)[k])
+        return {c: thinned(way[:, c : c + 1] * values, thin) for c in range(3) if np.abs(way[:, c]).max() > 1e-9}
+
+    def seen(self, spot: Spot) -> list[Bools]:
+        """Rows (n',) per run, thinned, in which some channel that the spot reaches is known."""
+        ones = [np.ones((len(way), 1)) for way in self.tip_ways(spot)]
+        return [
+            np.asarray(np.isfinite(inflate[:, list(self._reached(spot, k, one))]).any(axis=1))
+            for k, (inflate, one) in enumerate(zip(self.inflate, ones, strict=True))
+        ]
+
+    def channels(self, spot: Spot, values: Sequence[Floats]) -> list[Floats]:
+        """Functions (n, f) per run as changes of all channels, thinned: (n', c, f)."""
+        out = []
+        for k, v in enumerate(values):
+            every = np.zeros((len(self.times[k]), self.inflate[k].shape[1], v.shape[1]))
+            for c, each in self._reached(spot, k, v).items():
+                every[:, c] = each
+            out.append(every)
+        return out
+
     def white(self, spot: Spot, values: Sequence[Floats]) -> White:
         """Functions (n, f) per run as white columns of the channels that the spot reaches."""
-        bench = self.bench
         rows, columns = [], []
-        for k, (v, run) in enumerate(zip(values, bench.runs, strict=True)):
-            parts: dict[int, Floats] = {}
-            if spot.on == "control" and self._seen_by_encoders(k):
-                parts[3 + spot.index] = thinned(v, run.thin)
-            else:
-                way = bench.turned(k, self.tip_ways(spot)[k])
-                for c in range(3):
-                    if np.abs(way[:, c]).max() > 1e-9:
-                        parts[c] = thinned(way[:, c : c + 1] * v, run.thin)
+        for k, v in enumerate(values):
             found = [
                 (self._slices[k][c], self.noise.rows(k, each[:, None, :], self.inflate[k], self.times[k], c))
-                for c, each in parts.items()
+                for c, each in self._reached(spot, k, v).items()
                 if c in self._slices[k]
             ]
             rows.append(np.concatenate([r for r, _ in found]) if found else np.zeros(0, int))

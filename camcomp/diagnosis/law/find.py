@@ -12,11 +12,11 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from scipy.optimize import minimize
 
 from camcomp.diagnosis.law.bench_terms import Spot, Term, TermBench, TermGrid, following
-from camcomp.diagnosis.law.folds import ALTERNATING, WIDE_MM, Folds, Split, gains, usual_split, withheld
+from camcomp.diagnosis.law.folds import ALTERNATING, Folds, Split, gains, usual_split, withheld
 from camcomp.diagnosis.law.forms import Form
+from camcomp.diagnosis.law.shapes import Shapes
 from camcomp.diagnosis.law.white import White
 from camcomp.ground.datatypes import Bools, Floats
 
@@ -87,7 +87,7 @@ class _Search:
         # of every grid against the base: the same at all steps
         self._cross = [self.folds.cross(each.white) for each in grids]
         self._target = [self.folds.target(each.white) for each in grids]
-        self._seen: dict[Term, tuple[White, Floats]] = {}
+        self.shapes = Shapes(bench)
 
     def run(self) -> FoundLaw | None:
         chosen: list[Term] = []
@@ -143,22 +143,11 @@ class _Search:
         more = [self._white(term) for term in chosen]
         return self.folds.beside(more, np.concatenate([self._precision(term) for term in chosen]))
 
-    def _known(self, term: Term) -> tuple[White, Floats]:
-        """White columns of a term, and their prior precision: WIDE_MM at the tip."""
-        if term not in self._seen:
-            self._seen[term] = self._worked_out(term)
-        return self._seen[term]
-
-    def _worked_out(self, term: Term) -> tuple[White, Floats]:
-        values = self.bench.values(term.spot, term.form)
-        size = np.full(len(term.form.texts), (self.bench.rms(term.spot, values) / WIDE_MM) ** 2 + 1e-12)
-        return self.bench.white(term.spot, values), size
-
     def _white(self, term: Term) -> White:
-        return self._known(term)[0]
+        return self.shapes.columns(term)[0]
 
     def _precision(self, term: Term) -> Floats:
-        return self._known(term)[1]
+        return self.shapes.columns(term)[1]
 
     def _view(self, step: Folds, n: int) -> _View:
         grid = self.grids[n]
@@ -226,29 +215,8 @@ class _Search:
 
     def _refined(self, step: Folds, term: Term) -> tuple[float, Term]:
         """(log density on withheld parts less what shapes cost, term with the shape that the data want)."""
-        if term.form.shape:
-            start = np.array(term.form.shape)
-            scale = np.array([0.03 * (high - low) for low, high in term.form.bounds])
-            if term.form.family == "wave":
-                size = self.bench.sizes(term.spot).span(term.form.about[0])
-                scale = np.array([0.1 * start[0] ** 2 / size])
-            scale = np.minimum(scale, 0.3 * np.abs(start) + 1e-3 * scale)
-
-            def cost(u: Floats) -> float:
-                return -float(self._gain_of_all(step, Term(term.spot, term.form.at(start + scale * u))))
-
-            simplex = np.concatenate([np.zeros((1, len(start))), np.eye(len(start))])
-            found = minimize(
-                cost, np.zeros(len(start)), method="Nelder-Mead",
-                options={"maxfev": 30 if len(start) == 1 else 55, "xatol": 0.01, "fatol": 0.05, "initial_simplex": simplex},
-            )  # fmt: skip
-            term = Term(term.spot, term.form.at(start + scale * found.x))
+        term = self.shapes.followed(step, term)
         return float(withheld(self._gain(step, term)[:, None])[0]) - self._costs([term]), term
-
-    def _gain_of_all(self, step: Folds, term: Term) -> float:
-        white, size = self._worked_out(term)
-        data = step.of_all(white)
-        return float(gains(data.G[:, None], data.h[:, None], size[None])[0, 0])
 
     @staticmethod
     def _costs(terms: Sequence[Term]) -> float:
@@ -287,35 +255,41 @@ class _Search:
         best, value = chosen, score
         for count in (1, 2, 3):
             for some in combinations(range(len(terms)), count):
-                gain = of(some)
-                if gain > value + (0.5 if count >= len(best) else -SAME):
-                    best, value = [terms[i] for i in some], gain
+                gain, tried = of(some), [terms[i] for i in some]
+                if gain > value + self._margin(tried, best):
+                    best, value = tried, gain
         return best
+
+    @staticmethod
+    def _margin(tried: Sequence[Term], best: Sequence[Term]) -> float:
+        """Log density by which a set has to be more probable than another: fewer terms and fewer shapes go before."""
+        shapes = [sum(len(t.form.shape) for t in terms) for terms in (tried, best)]
+        if len(tried) < len(best):
+            return -SAME
+        return SAME if shapes[0] > shapes[1] else 0.5
 
     def _without_idle(self, chosen: list[Term]) -> list[Term]:
         """The terms that do something beside the others."""
         while len(chosen) > 1:
-            theta = self._theta(chosen)[0]
+            theta = self._coefficients(chosen)[0][0]
             size, at = [], 0
             for t in chosen:
                 values = self.bench.values(t.spot, t.form)
                 own = [v @ theta[at : at + v.shape[1]][:, None] for v in values]
-                size.append(self.bench.rms(t.spot, own) ** 2)
+                size.append(float(self.bench.rms(t.spot, own)[0]) ** 2)
                 at += len(t.form.texts)
             if min(size) > LEAST_SHARE * sum(size):
                 break
             chosen.pop(int(np.argmin(size)))
         return chosen
 
-    def _theta(self, terms: Sequence[Term]) -> tuple[Floats, Floats, Floats]:
-        data = self.folds.together([self._white(t) for t in terms])
-        size = np.concatenate([self._precision(t) for t in terms])
-        M = data.G + np.diag(size)
-        each = np.asarray(np.linalg.solve(M, data.h[..., None])[..., 0], float)
-        return each[0], np.asarray(np.linalg.inv(M[0]), float), each[1:]
+    def _coefficients(self, terms: Sequence[Term]) -> tuple[Floats, Floats]:
+        return self.folds.coefficients(
+            [self._white(t) for t in terms], np.concatenate([self._precision(t) for t in terms])
+        )
 
     def _answer(self, chosen: list[Term], pool: Sequence[Term]) -> FoundLaw:
-        theta, covariance, without = self._theta(chosen)
+        theta, covariance = self._coefficients(chosen)
         own, others = len(chosen), [each for each in dict.fromkeys(pool) if each not in chosen]
         of = self._scores([*chosen, *others])
         gain = of(range(own))
@@ -330,7 +304,9 @@ class _Search:
                     found.append(other)
             alike.append(tuple(found))
         columns, precision = tuple(map(self._white, chosen)), np.concatenate([self._precision(t) for t in chosen])
-        return FoundLaw(tuple(chosen), theta, covariance, without, gain, tuple(alike), self.folds, columns, precision)
+        return FoundLaw(
+            tuple(chosen), theta[0], covariance, theta[1:], gain, tuple(alike), self.folds, columns, precision
+        )
 
 
 def _unlikely(term: Term) -> bool:

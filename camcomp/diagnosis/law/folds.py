@@ -130,6 +130,13 @@ class Folds:
         found = [solve_triangular(L.T, t, lower=False) for L, t in zip(both._halves, both._targets, strict=True)]
         return np.array(found)[:, : len(self.precision)]
 
+    def coefficients(self, columns: Sequence[White], precision: Floats) -> tuple[Floats, Floats]:
+        """Those (f, c) of law columns of that prior precision, of all data and without each part, and their covariance (c, c)."""
+        data = self.together(columns)
+        M = data.G + np.diag(precision)
+        each = np.asarray(np.linalg.solve(M, data.h[..., None])[..., 0], float)
+        return each, np.asarray(np.linalg.inv(M[0]), float)
+
     def cross(self, x: White, *, first: int = 0) -> Floats:
         """Products (k, c) of the base's columns, from number `first` of those that stand apart on, with columns of a spot."""
         return np.asarray(np.sum([self._against(k, x, first) for k in range(len(self.white))], axis=0))

@@ -97,7 +97,7 @@ def find_map(bench: TermBench, folds: Folds, kind: str) -> FoundMap | None:
     columns = tuple(bench.white(each.spot, map_values(bench, each)) for each in chosen)
     data = folds.together(columns)
     size_of = _precision(chosen)
-    theta = np.asarray(np.linalg.solve(data.G + np.diag(size_of), data.h[..., None])[..., 0], float)
+    theta = folds.coefficients(columns, size_of)[0]
     gain = float(withheld(gains(data.G[:, None], data.h[:, None], size_of[None]))[0])
     return FoundMap(tuple(chosen), theta[0], theta[1:], gain, folds, columns, size_of)
 

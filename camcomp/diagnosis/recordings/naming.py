@@ -98,6 +98,8 @@ def check_enough(parts: Sequence[SampledColumns], picked: Picked, columns: LogCo
         rivals = picked.doubtful.get(log)
         could = f", it could be {some(rivals)}" if rivals else ""
         hint = f"name it: --column {log}=THEIRS; there are: {some(names, 40)}"
+        if all(name.isdigit() for name in names):  # nothing names them
+            hint += "; or name all of them: --columns 'NAME NAME ...'"
         raise ConfigError("CC421", f"no column for {log}{could}", at=parts[0].at(-1, 0), hint=hint)
 
 

@@ -6,8 +6,8 @@ import numpy as np
 
 from camcomp.diagnosis.fit.bench import thinned
 from camcomp.diagnosis.fit.problem import Problem
-from camcomp.diagnosis.law.answer import LawAnswer, term_bench
 from camcomp.diagnosis.law.bench_terms import Spot
+from camcomp.diagnosis.law.law_answer import LawAnswer, term_bench
 from camcomp.diagnosis.report.law_section import LawView
 from camcomp.ground.datatypes import Floats
 

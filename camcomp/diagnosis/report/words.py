@@ -12,7 +12,9 @@ from camcomp.ground import shelf
 from camcomp.ground.errors import ConfigError
 from camcomp.report.plot import brief
 
-_SMALLER = {"mm": (1e3, "µm"), "rad": (1e3, "mrad"), "s": (1e3, "ms")}  # units that small values are told in
+_SMALLER = {  # units that small values are told in
+    "mm": (1e3, "µm"), "rad": (1e3, "mrad"), "s": (1e3, "ms"), "mm/N": (1e3, "µm/N"), "rad/Nmm": (1e9, "µrad/Nm"),
+}  # fmt: skip
 _NOTHING = " not told from "
 _LONG_NUMBER = re.compile(r"\d+\.\d{3,}(?:e[+-]?\d+)?")
 _COVARIATES = {
@@ -65,7 +67,7 @@ def sizes(cause: FoundCause) -> str:
 
 def title(name: str, parameter: Any = None) -> str:
     """The name of a parameter without its unit."""
-    unit = parameter.unit.replace("/", "_per_") if parameter is not None else ""
+    unit = parameter.unit.replace("/", "_per_").removeprefix("1_") if parameter is not None else ""
     return name.removesuffix(f"_{unit}").replace("_", " ") if unit else name.replace("_", " ")
 
 
@@ -94,13 +96,13 @@ def _told(value: float, ci95: tuple[float, float], unit: str, nominal: float | N
     if unit in _SMALLER and max(abs(low), abs(high), abs(value)) < 1.0:
         scale, unit = _SMALLER[unit]
     behind = "" if unit in ("", "1") else f" {unit}"
-    told, least, most = _alike(scale * value, scale * low, scale * high)
+    told, least, most = digits_alike(scale * value, scale * low, scale * high)
     if nominal is not None and low <= nominal <= high:
         return f"{_NOTHING}{nominal:g} ({least} to {most}{behind})"
     return f" {told}{behind} ({least} to {most})"
 
 
-def _alike(value: float, low: float, high: float) -> list[str]:
+def digits_alike(value: float, low: float, high: float) -> list[str]:
     """A value and the ends of its interval, with decimals that show two digits of the doubt."""
     doubt = 0.5 * (high - low)
     if not doubt > 0.0 or not math.isfinite(doubt) or doubt < 1e-4:

@@ -12,6 +12,7 @@ from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.search.established import weakest
 from camcomp.diagnosis.search.imitation import credibility
 from camcomp.diagnosis.search.indistinguishable import Likeness, likeness, stand_ins
+from camcomp.diagnosis.search.tempering import TEMPERATURE, misfit, tempering
 from camcomp.diagnosis.search.unexplained import Unexplained, size_um, unexplained, worst
 from camcomp.diagnosis.search.unknown import firm_prior, foretelling, residual_tests, signal_rms
 from camcomp.diagnosis.statistics.cause_sets import (
@@ -24,7 +25,7 @@ from camcomp.diagnosis.statistics.cause_sets import (
     probabilities,
     total,
 )
-from camcomp.diagnosis.statistics.evidence import Gram, estimate
+from camcomp.diagnosis.statistics.evidence import estimate
 from camcomp.diagnosis.statistics.probability import EVEN
 from camcomp.diagnosis.statistics.score_test import ResidualTest
 from camcomp.diagnosis.statistics.verdict import Verdict, judge
@@ -32,9 +33,6 @@ from camcomp.ground import headway
 from camcomp.ground.datatypes import Floats
 
 SINGLES, PAIRS, TRIPLES, MORE = 6, 6, 3, 3  # sets that are tried of each size; beyond three one is added at a time
-TEMPERATURE = (
-    1.5  # what evidence is divided by before it becomes a probability, where the model is as good as its noise
-)
 CANCELLING = 8.0  # size of a member, in units of the whole set, above which the set lives on differences of its members
 OPPOSED = 4.0  # the same of two members against both together
 BEYOND_DOUBT = (
@@ -116,7 +114,7 @@ def search_causes(problem: Problem) -> CauseSearch:
             break
     fits = tuple(sorted(done.values(), key=value, reverse=True))
     fits = tuple(f for f in fits if _matters(problem, f) and not _cancels(problem, f))
-    temperature = TEMPERATURE * overdispersion(problem, fits[0])
+    temperature = tempering(problem, fits[0])
     probability = probabilities(fits, problem.candidates, temperature)
     fits, probability = _prune(problem, fits, probability)
     fits, probability = _established(problem, fits, fit, temperature, probability)
@@ -181,12 +179,6 @@ def beside_unknown(problem: Problem, f: Fitted, beyond: Mapping[str, Unexplained
         return where is not None and problem.columns.candidates[i].target in (where, None)
 
     return tuple(i for i in members if sizes[i] > (PART_OF_UNKNOWN if there(i) else LEAST_BESIDE))
-
-
-def overdispersion(problem: Problem, f: Fitted) -> float:
-    """By how much the best set leaves more than noise: all evidence is worth that much less (quasi-likelihood)."""
-    data = total(f.grams)
-    return max(1.0, misfit(problem, f) / max(data.rows, 1))
 
 
 def unknown_kind(problem: Problem, f: Fitted, beyond: Mapping[str, Unexplained]) -> str | None:
@@ -310,16 +302,6 @@ def _same(problem: Problem, fits: tuple[Fitted, ...], probability: Floats) -> li
         if min(behind, best.log_evidence - f.log_evidence) < SAME_EVIDENCE and _plausible(problem, f):
             found.append((best.members, f.members))
     return found
-
-
-def misfit(problem: Problem, f: Fitted) -> float:
-    """Chi-square left when the members are free and everything else stays within tolerance, penalties included."""
-    data: Gram = total(f.grams)
-    index = problem.member_columns(f.members)
-    mean, _ = estimate(data, problem.prior, index, 1.0)
-    precision = problem.prior.precision(1.0)
-    precision[index] = 0.0
-    return float(data.c - 2.0 * data.b @ mean + mean @ data.A @ mean + precision @ mean**2)
 
 
 def _possible(problem: Problem, f: Fitted) -> bool:

@@ -233,8 +233,12 @@ def _plugin(
     except ConfigError as error:
         return None, [error]
     own = {each: below for each, below in node.value.items() if each not in (key, *also)}
-    with shelf.blaming(shelf_name, chosen.value):
-        return check(params_of(member), replace(node, value=own), name=name)
+    try:
+        with shelf.blaming(shelf_name, chosen.value):
+            return check(params_of(member), replace(node, value=own), name=name)
+    except FileError as error:  # a table that its parameters name
+        error.at = error.at or (_get(node, "file") or chosen).at
+        return None, [error]
 
 
 def _dialect(chosen: Node | None) -> list[CamcompError]:

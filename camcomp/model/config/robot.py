@@ -208,11 +208,7 @@ class ChainSpec(Spec):
     def actuators(self, chain: str) -> dict[str, PrismaticActuator | RevoluteActuator]:
         """The actuators in order by name; one that has no name of its own bears the name of the `chain`."""
         found = [each for each in self.elements if isinstance(each, PrismaticActuator | RevoluteActuator)]
-        names = [each.name or chain for each in found]
-        for name in names:
-            if names.count(name) > 1:
-                raise PydanticCustomError("CC205", f"two actuators of chain '{chain}' are called '{name}'")
-        return dict(zip(names, found, strict=True))
+        return {each.name or chain: each for each in found}
 
 
 class RobotSpec(Spec):
@@ -229,11 +225,19 @@ class RobotSpec(Spec):
 
     @model_validator(mode="after")
     def _names(self) -> "RobotSpec":
-        names = [name for key, chain in self.chains.items() for name in chain.actuators(key)]
-        for name in names:
-            if names.count(name) > 1:
-                raise PydanticCustomError("CC205", f"two actuators of the robot are called '{name}'")
-        if not names:
+        chain_of: dict[str, str] = {}
+        for key, chain in self.chains.items():
+            for i, each in enumerate(chain.elements):
+                if not isinstance(each, PrismaticActuator | RevoluteActuator):
+                    continue
+                if (name := each.name or key) in chain_of:
+                    whose = f"chain '{key}'" if chain_of[name] == key else "the robot"
+                    below = ("chains", key, "elements", i, *(("name",) if each.name else ()))
+                    raise PydanticCustomError(
+                        "CC205", f"two actuators of {whose} are called '{name}'", {"below": below}
+                    )
+                chain_of[name] = key
+        if not chain_of:
             raise PydanticCustomError("CC205", "no chain has an actuator")
         return self
 

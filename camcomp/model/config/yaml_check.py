@@ -88,9 +88,11 @@ class _Findings:
         kind, loc, context = detail["type"], detail["loc"], detail.get("ctx", {})
         rule = _rule(detail)
         name, node, value = self._walk(loc)
+        if "below" in context:  # a mistake between parts, told at one of them
+            node = self._walk((*loc, *context["below"]))[1]
         if rule == "CC201":
             return self._unknown_key(str(loc[-1]), loc[:-1], node)
-        at = node.key_at if node.key_at and (isinstance(node.value, dict) or loc[-1] == "[key]") else node.at
+        at = node.key_at if node.key_at and (isinstance(node.value, dict) or loc[-1:] == ("[key]",)) else node.at
         if rule == "CC203":
             key = str(context.get("discriminator", loc[-1])).strip("'")
             return ConfigError(rule, f"{name} lacks the key '{key}'", at=at)

@@ -53,6 +53,8 @@ def command(
 
 
 def _text(found: "Chronicle") -> list[str]:
+    from camcomp.diagnosis.report.words import digits_alike
+
     if not found.verdicts:
         return ["nothing is kept here yet"]
     out = [
@@ -63,10 +65,8 @@ def _text(found: "Chronicle") -> list[str]:
     for each in found.parameters:
         name = f"{each.effect} ({each.target})" if each.target else each.effect
         last = each.values[-1]
-        low, high = last.ci95
-        out.append(
-            f"{name} {each.parameter}: {last.value:.4g} ({low:.4g} to {high:.4g}) on {last.day}; {_course(each)}"
-        )
+        told, low, high = digits_alike(last.value, *last.ci95)
+        out.append(f"{name} {each.parameter}: {told} ({low} to {high}) on {last.day}; {_course(each)}")
     places: dict[str, list[str]] = {}
     for value in found.standards:
         if value.name in SHOWN:

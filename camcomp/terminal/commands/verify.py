@@ -56,7 +56,7 @@ def command(
         for each in sorted(done.lines, key=lambda e: -e.residual_um)[:10]:
             say(
                 f"  line {each.line}: {each.residual_um:.3f} um in {each.moves} moves (vertex {each.vertex_um:.3f}, "
-                f"chord +{each.chord_um:.3f}, rounding <= {each.rounding_um:.3f}, solver {each.convergence_um:.1e})",
+                f"chord +{each.chord_um:.3f}, rounding <= {each.rounding_um:.3f}, solver {each.convergence_um:.3f})",
                 quiet=quiet,
             )
         for each_warning in done.warnings:

@@ -88,7 +88,7 @@ def test_diagnoses_are_kept_and_told(tmp_path, capsys):
         path = written(tmp_path, f"{month}.json", width)
         assert run(["history", str(folder), "--add", str(path), "--day", f"2026-0{month}-15"]) == 0
     told = capsys.readouterr().out
-    assert "backlash (x) width_mm: 0.026 (0.0234 to 0.0286) on 2026-05-15; drifts by" in told
+    assert "backlash (x) width_mm: 0.0260 (0.0234 to 0.0286) on 2026-05-15; drifts by" in told
     assert run(["history", str(folder), "--json", "-"]) == 0
     found = json.loads(capsys.readouterr().out)
     (course,) = found["parameters"]

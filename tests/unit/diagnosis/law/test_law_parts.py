@@ -64,6 +64,19 @@ def test_what_stands_beside_a_law_gives_way_to_it():
     assert alone > 1.0 and beside.shape == (3, 1) and np.abs(beside).max() < 0.02
 
 
+def test_what_is_withheld_has_no_say():
+    rng = np.random.default_rng(3)
+    known, law = rng.normal(size=(400, 1)), rng.normal(size=(400, 1))
+    residual = 2.0 * known[:, 0] + 3.0 * law[:, 0]
+    residual[:200] *= -1.0
+    folds = Folds([known], [residual], np.array([1e-4]), [np.linspace(0.0, 1.0, 400)], Split(2, 2), [])
+    columns, prior = [White((np.arange(400),), (law,))], np.array([1e-4])
+    assert folds.means(columns, prior)[1:, 0] == pytest.approx([2.0, -2.0], abs=1e-3)
+    each, covariance = folds.coefficients(columns, prior)
+    assert each[1:, 0] == pytest.approx([3.0, -3.0], abs=1e-3)
+    assert covariance[0, 0] == pytest.approx(1.0 / 400, rel=0.3)
+
+
 def test_creep_under_load_is_a_form():
     (form,) = [f for f in at_tip(sizes(AT_TIP)) if f.family == "settling" and len(f.about) == 2][:1]
     assert form.about == ("cut_min", "force_N") and form.units == ("", "N") and form.said[1].endswith("*force_N")

@@ -7,6 +7,7 @@ import pytest
 from camcomp.ground.errors import CamcompError
 from camcomp.model.config.links import Beam, Rectangle, Round, Square, Tube
 from camcomp.model.config.load import load_config
+from tests.commandline import ROOT
 
 MACHINE = """\
 robot:
@@ -117,8 +118,7 @@ def test_one_mistake_is_one_error_at_its_place(tmp_path, case):
     assert words in error.message
     lines = text.split("\n")
     changed = [i for i, (a, b) in enumerate(zip(lines, MACHINE.split("\n"), strict=False), 1) if a != b]
-    # Mistakes of a mapping as a whole are told where it begins, a name used twice for the robot.
-    assert error.at.line == (1 if case == "same name twice" else changed[0])
+    assert error.at.line == changed[0]
     assert error.at.source == lines[error.at.line - 1].replace("LINK", BEAM)
 
 
@@ -223,3 +223,21 @@ def test_plug_in_parameters_are_completed(tmp_path):
     assert set(config.effects[0].values) == {"amplitude_mm", "pitch_mm", "phase_rad"}
     assert config.process.force.params.Fr_N == 1
     assert radians(180) == pytest.approx(config.robot.actuators["turn"].home)
+
+
+@pytest.mark.parametrize(("machine", "first", "second"), [("router", "x", "y"), ("kuka-kr210", "A1", "A2")])
+def test_a_name_that_is_there_twice_is_told_at_the_second(tmp_path, machine, first, second):
+    """In chains and in rows of a robot plug-in alike."""
+    text = (ROOT / f"config/{machine}.yaml").read_text()
+    number, line = next((i, line) for i, line in enumerate(text.splitlines(), 1) if f"name: {second}," in line)
+    (error,) = refused(tmp_path, text.replace(f"name: {second},", f"name: {first},"))
+    assert (error.rule, error.at.line) == ("CC205", number)
+    assert error.at.column == line.index(f"name: {second},") + len("name: ") + 1
+
+
+def test_a_table_that_is_missing_is_told_where_it_is_named(tmp_path):
+    text = (
+        ROOT / "config/cartesian.yaml"
+    ).read_text() + "\neffects:\n  - {effect: error_table, target: x, file: no.csv}\n"
+    (error,) = refused(tmp_path, text)
+    assert error.rule == "CC500" and error.at.source[error.at.column - 1 :].startswith("no.csv")

@@ -1,0 +1,53 @@
+"""A law in the problem: causes are fitted and judged with it beside them, and it with them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from camcomp.diagnosis.fit.problem import Problem
+from camcomp.diagnosis.law.bench_terms import Spot, TermBench
+from camcomp.diagnosis.law.find import FoundLaw
+from camcomp.diagnosis.law.folds import Folds
+from camcomp.diagnosis.law.smooth import FoundMap
+from camcomp.diagnosis.statistics.evidence import Prior
+from camcomp.ground.datatypes import Floats
+
+
+def with_law(
+    problem: Problem, bench: TermBench, found: FoundLaw | FoundMap, terms: Sequence[tuple[Spot, list[Floats]]]
+) -> Problem:
+    """The problem with a law among what stands beside causes, as free as its coefficients are; terms: as of terms_of."""
+    more, old = len(found.precision), problem.prior
+    prior = Prior(
+        np.concatenate([old.tolerance, found.precision**-0.5]),
+        np.concatenate([old.scale, np.ones(more)]),
+        np.concatenate([old.sign, np.zeros(more)]),
+        np.concatenate([old.flexible, np.zeros(more)]),
+        np.concatenate([old.reach, np.full(more, np.inf)]),
+    )
+    own = [bench.channels(spot, values) for spot, values in terms]
+    blocks = tuple(
+        np.concatenate([block, *(each[k] for each in own)], axis=2) for k, block in enumerate(problem.columns.blocks)
+    )
+    columns = replace(
+        problem.columns,
+        candidate=np.concatenate([problem.columns.candidate, np.full(more, -1)]),
+        names=(*problem.columns.names, *(f"law.{i}" for i in range(more))),
+        prior=prior,
+        blocks=blocks,
+    )
+    white = [
+        np.concatenate([W, *(x.over(k, 0, len(W)) for x in found.columns)], axis=1) for k, W in enumerate(problem.white)
+    ]
+    return replace(problem, columns=columns, white=white)
+
+
+def fitted_beside(found: FoundLaw | FoundMap, folds: Folds) -> FoundLaw | FoundMap:
+    """The same law with the coefficients that it has beside another base."""
+    theta, covariance = folds.coefficients(found.columns, found.precision)
+    if isinstance(found, FoundMap):
+        return replace(found, theta=theta[0], theta_without=theta[1:], folds=folds)
+    return replace(found, theta=theta[0], covariance=covariance, theta_without=theta[1:], folds=folds)
