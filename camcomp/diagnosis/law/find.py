@@ -31,6 +31,7 @@ SAME = 3.0  # log density by which a term may be worse and is still as good
 LEAST_GAIN = 0.01  # of the log density that a law has brought: less is not worth a term
 LEAST_SHARE = 0.03  # of a law's energy at the tip, below which a term goes again
 CONSTANT = Form("constant", (), ("1",), ("",))
+_ANYWHERE = ("common_s", "temp_C", "cut_min")  # covariates of the tip and of drives alike
 _PLAIN = ("line", "power", "product", "rate", "force")  # simpler kinds of the same value come first
 
 
@@ -114,7 +115,7 @@ class _Search:
         if not chosen:
             return None
         chosen = self._exhaustive(chosen, pool, score)
-        chosen = self._without_idle(chosen)
+        chosen = self._likelier(self._without_idle(chosen))
         # runs say nothing of what acts in one of them alone
         self.folds = self.base(ALTERNATING if any(t.form.passing for t in chosen) else self.split, False)
         return self._answer(self._with_constants(chosen), pool)
@@ -281,6 +282,18 @@ class _Search:
             if min(size) > LEAST_SHARE * sum(size):
                 break
             chosen.pop(int(np.argmin(size)))
+        return chosen
+
+    def _likelier(self, chosen: list[Term]) -> list[Term]:
+        """The terms, each where it more likely acts as far as the data do not speak for where it was found."""
+        for i, term in enumerate(chosen):
+            if not _unlikely(term) or not set(term.form.about) <= set(_ANYWHERE):
+                continue
+            others = [Term(grid.spot, term.form) for grid in self.grids]
+            sets = [[*chosen[:i], each, *chosen[i + 1 :]] for each in others if not _unlikely(each)]
+            best = max(sets, key=self._score, default=chosen)
+            if self._score(best) > self._score(chosen) - SAME:
+                chosen = best
         return chosen
 
     def _coefficients(self, terms: Sequence[Term]) -> tuple[Floats, Floats]:
