@@ -31,7 +31,6 @@ SAME = 3.0  # log density by which a term may be worse and is still as good
 LEAST_GAIN = 0.01  # of the log density that a law has brought: less is not worth a term
 LEAST_SHARE = 0.03  # of a law's energy at the tip, below which a term goes again
 CONSTANT = Form("constant", (), ("1",), ("",))
-_ANYWHERE = ("common_s", "temp_C", "cut_min")  # covariates of the tip and of drives alike
 _PLAIN = ("line", "power", "product", "rate", "force")  # simpler kinds of the same value come first
 
 
@@ -115,7 +114,7 @@ class _Search:
         if not chosen:
             return None
         chosen = self._exhaustive(chosen, pool, score)
-        chosen = self._likelier(self._without_idle(chosen))
+        chosen = self._without_idle(chosen)
         # runs say nothing of what acts in one of them alone
         self.folds = self.base(ALTERNATING if any(t.form.passing for t in chosen) else self.split, False)
         return self._answer(self._with_constants(chosen), pool)
@@ -257,17 +256,9 @@ class _Search:
         for count in (1, 2, 3):
             for some in combinations(range(len(terms)), count):
                 gain, tried = of(some), [terms[i] for i in some]
-                if gain > value + self._margin(tried, best):
+                if gain > value + margin(tried, best):
                     best, value = tried, gain
         return best
-
-    @staticmethod
-    def _margin(tried: Sequence[Term], best: Sequence[Term]) -> float:
-        """Log density by which a set has to be more probable than another: fewer terms and fewer shapes go before."""
-        shapes = [sum(len(t.form.shape) for t in terms) for terms in (tried, best)]
-        if len(tried) < len(best):
-            return -SAME
-        return SAME if shapes[0] > shapes[1] else 0.5
 
     def _without_idle(self, chosen: list[Term]) -> list[Term]:
         """The terms that do something beside the others."""
@@ -282,18 +273,6 @@ class _Search:
             if min(size) > LEAST_SHARE * sum(size):
                 break
             chosen.pop(int(np.argmin(size)))
-        return chosen
-
-    def _likelier(self, chosen: list[Term]) -> list[Term]:
-        """The terms, each where it more likely acts as far as the data do not speak for where it was found."""
-        for i, term in enumerate(chosen):
-            if not _unlikely(term) or not set(term.form.about) <= set(_ANYWHERE):
-                continue
-            others = [Term(grid.spot, term.form) for grid in self.grids]
-            sets = [[*chosen[:i], each, *chosen[i + 1 :]] for each in others if not _unlikely(each)]
-            best = max(sets, key=self._score, default=chosen)
-            if self._score(best) > self._score(chosen) - SAME:
-                chosen = best
         return chosen
 
     def _coefficients(self, terms: Sequence[Term]) -> tuple[Floats, Floats]:
@@ -320,6 +299,14 @@ class _Search:
         return FoundLaw(
             tuple(chosen), theta[0], covariance, theta[1:], gain, tuple(alike), self.folds, columns, precision
         )
+
+
+def margin(tried: Sequence[Term], best: Sequence[Term]) -> float:
+    """Log density by which a set has to be more probable than another: fewer terms and fewer shapes go before."""
+    shapes = [sum(len(t.form.shape) for t in terms) for terms in (tried, best)]
+    if len(tried) < len(best):
+        return -SAME
+    return SAME if shapes[0] > shapes[1] else 0.5
 
 
 def _unlikely(term: Term) -> bool:
