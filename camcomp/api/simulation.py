@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -12,6 +13,7 @@ from camcomp.compensation.program.cut_surface import cut_surface
 from camcomp.model.motion import simulate as story
 from camcomp.model.motion.simulate import Simulated
 from camcomp.model.stock.surface import Surface
+from camcomp.report.inputs import Input
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,3 +55,14 @@ def simulate(
 def simulate_cut(program: Program | str | Path | bytes, machine: Job) -> Surface:
     """What the loaded machine leaves of the stock of its machine file. Raises as `simulate`, ConfigError CC298."""
     return cut_surface(machine, program_in(program, machine))
+
+
+def walls_report(program: Program | str | Path | bytes, machine: Job, inputs: Sequence[Input] = ()) -> bytes:
+    """One HTML page with the walls that the loaded machine leaves, where they are off and by how much.
+
+    Raises as `simulate_cut`, ConfigError CC216 when the plot library is not installed.
+    """
+    from camcomp.compensation.report.wall_page import walls_html
+
+    source = program_in(program, machine)
+    return walls_html(machine, source, [Input("program", source.name, source.data), *inputs])

@@ -26,7 +26,7 @@ _POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inl
 _UNIT = re.compile(r"(\d) (µm|mm|mrad|rad|N·m|N|s|times)\b")  # number and unit stay on one line
 
 
-WORDY = 24  # characters, from which on a cell is a text that needs some width
+WORDY, PROSE = 24, 90  # characters, from which on a cell is a text that needs some width, and more
 
 
 @dataclass(frozen=True)
@@ -194,6 +194,14 @@ def _cell(cell: str | tuple[float, str], column: int) -> str:
         value, text = cell
         inside = f' class="n" data-v="{value:.9g}">{escape(text)}'
     else:
-        kind = "long" if len(cell) > 60 and " " not in cell else "text" if len(cell) > WORDY and " " in cell else ""
+        kind = (
+            "long"
+            if len(cell) > 60 and " " not in cell
+            else "prose"
+            if len(cell) > PROSE
+            else "text"
+            if len(cell) > WORDY and " " in cell
+            else ""
+        )
         inside = f' class="{kind}">{escape(cell)}' if kind else f">{escape(cell)}"
     return f'<th scope="row"{inside}</th>' if column == 0 else f"<td{inside}</td>"

@@ -67,3 +67,20 @@ def test_without_a_stock_there_are_no_walls(files):
     words = ["compensate", files / "slot.nc", "--config", MACHINE, "--report", files / "r.html", "--quiet"]
     assert run([str(each) for each in words]) == 0
     assert "walls-above" not in (files / "r.html").read_text()
+
+
+def test_simulate_draws_the_walls_of_one_program_and_writes_no_log(files, capsys):
+    words = [
+        "simulate",
+        files / "slot.nc",
+        "--config",
+        MACHINE,
+        "--config",
+        files / "stock.yaml",
+        "--report",
+        files / "w.html",
+    ]
+    assert run([str(each) for each in words]) == 0
+    page = (files / "w.html").read_text()
+    assert '"name":"walls-above"' in page and "as written: rms 10.8" in page.replace("\u00a0", " ")
+    assert "slot.nc" in page and capsys.readouterr().out == ""

@@ -51,6 +51,17 @@ def test_a_factor_that_may_be_one_is_not_told_from_one():
     assert sizes(found("cutting_force", factor=(1.30, 1.28, 1.32))) == "factor 1.300 (1.280 to 1.320)"
 
 
+def test_small_compliances_have_no_powers_of_ten():
+    soft = found("gravity_compliance", "elbow", compliance_rad_per_Nmm=(9.36e-9, 7.65e-9, 1.11e-8))
+    assert sizes(soft) == "compliance 9.4 µrad/Nm (7.7 to 11.1)"
+    bent = found("tool_deflection", compliance_mm_per_N=(0.00012, 0.0001, 0.00014))
+    assert sizes(bent) == "compliance 0.120 µm/N (0.100 to 0.140)"
+
+
+def test_a_unit_stands_once():
+    assert sizes(found("tool_wear", growth_per_min=(0.205, 0.136, 0.274))) == "growth 0.205 1/min (0.136 to 0.274)"
+
+
 def test_a_phase_may_be_zero_and_is_told():
     text = sizes(found("screw_cyclic", "x", amplitude_mm=(0.004, 0.0035, 0.0045), phase_rad=(0.1, -0.1, 0.3)))
     assert "phase" in text and "phase not told" not in text

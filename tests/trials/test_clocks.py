@@ -8,7 +8,7 @@ from camcomp.diagnosis.experiment.open_experiment import open_experiment
 from tests.trials.experiment import Bench, Made, Plan, character, row_times, schedule, write
 from tests.trials.faults import Fault
 
-PLAN = Plan(8, machine="router", channels="no-forces", rows=150, runs=4, stated=True, paths=("circles-blended", "zigzag-blended", "pocket-10um", "ramp-exact"))  # fmt: skip
+PLAN = Plan(8, machine="router", channels="no-forces", rows=110, runs=4, stated=True, paths=("circles-blended", "zigzag-blended", "pocket-10um", "ramp-exact"))  # fmt: skip
 
 
 def answer(folder, late_s, labels):

@@ -330,12 +330,11 @@ def next_experiment(told: Told) -> NextExperiment | None:
         return _again(told)
     found = told.found
     noise = told.floor.sd if told.floor else max(found.discrepancy.noise, 1e-6)
-    chosen = proposed(told.bench, found, noise)
-    q = chosen.q
+    q, place, gain = proposed(told.bench, found, noise)
     if not len(q):
-        return None if told.judges.whole or not found.taken.steps else _second_campaign(told, q, chosen.place)
+        return None if told.judges.whole or not found.taken.steps else _second_campaign(told, q, place)
     if not told.judges.whole:
-        return _second_campaign(told, q, chosen.place)
+        return _second_campaign(told, q, place)
     new = 100.0 * unseen_share(told.bench, found, q)
     effects = [*dict.fromkeys(s.group for s in found.taken.steps), UNKNOWN]
     action = f"measure {len(q)} more poses with a clamping of their own"
@@ -344,12 +343,11 @@ def next_experiment(told: Told) -> NextExperiment | None:
     return NextExperiment(
         action=f"{action}; try them slowly first: collisions are not checked",
         separates=tuple(effects),
-        gain=round(chosen.gain, 4),
+        gain=round(gain, 4),
         outcomes=(
             (
-                "If the causes found leave no more on these poses than on the others, they hold there as well; what stays "
-                f"uncertain of them then moves the tip by {_round(chosen.after_um):.3g} µm (rms) instead of "
-                f"{_round(chosen.before_um):.3g} µm."
+                "If the causes found leave no more on these poses than on the others, they hold there as well and their "
+                "intervals become narrower."
             ),
             (
                 "If they leave more, and the curves of the joints explain it once these poses are fitted, it was the angles "
@@ -357,7 +355,7 @@ def next_experiment(told: Told) -> NextExperiment | None:
             ),
             "If they leave as much after that, what is unknown does not go by the angle of one joint.",
         ),
-        poses=_listed(told, q, chosen.place),
+        poses=_listed(told, q, place),
     )
 
 

@@ -47,8 +47,7 @@ def designed(X: Floats, covariance: Floats, noise: float, count: int, interest: 
             belief.give_back(chosen[i])
             rest = chosen[:i] + chosen[i + 1 :]
             chosen[i] = belief.take(belief.best(rest))
-    told = np.linalg.slogdet(covariance)[1] - np.linalg.slogdet(belief.covariance)[1]
-    return Design(tuple(chosen), 0.5 * float(told) / float(np.log(2.0)), belief.covariance)
+    return Design(tuple(chosen), _bits(covariance, belief.covariance), belief.covariance)
 
 
 class _Belief:
@@ -113,46 +112,33 @@ def candidates(bench: ArmBench, count: int = CANDIDATES) -> Floats:
     return np.asarray(q[inside[:count]], float)
 
 
-@dataclass(frozen=True, eq=False)
-class ProposedPoses:
-    """Joints (p, m) to measure in a new campaign, their platform points (p, 3) mm. before_um, after_um: rms that what is uncertain of
-    the effects moves the tip by, over all that was looked at; gain: bits, what stays below the noise left out.
+def proposed(bench: ArmBench, found: ArmFit, noise: float) -> tuple[Floats, Floats, float]:
+    """Joints (POSES, m) to measure in a new campaign, their platform points (POSES, 3), and what they tell of the effects (bits).
+
+    Empty where nothing was taken or no candidate stands where poses stood.
     """
-
-    q: Floats
-    place: Floats
-    before_um: float = 0.0
-    after_um: float = 0.0
-    gain: float = 0.0
-
-
-def proposed(bench: ArmBench, found: ArmFit, noise: float) -> ProposedPoses:
-    """Poses to measure in a new campaign; empty where nothing was taken or no candidate stands where poses stood."""
     on = [j for s in found.taken.steps for j in found.groups[s.group] if found.amount[j] != 0.0]
     q = candidates(bench)
     if not on or not len(q):
-        return ProposedPoses(np.zeros((0, len(bench.actuators))), np.zeros((0, 3)))
+        return np.zeros((0, len(bench.actuators))), np.zeros((0, 3)), 0.0
     poses = _as_poses(q)
     place = bench.standing(poses, ()).hung.point
     poses = replace(poses, tip=bench.start[0].tips(place, bench.standing(poses, ()).hung.rotation))
     there = ArmBench(bench.robot, bench.causes, [poses])
     block = there.blocks([found.columns[j] for j in on])[0]
-    frame = np.diag([FRAME / ARM_MM] * 3 + [FRAME] * 6) ** 2
     k = len(on)
     covariance = np.zeros((k + 9,) * 2)
     covariance[:k, :k] = found.covariance[np.ix_(on, on)] + 1e-12 * np.eye(k)
-    covariance[k:, k:] = frame
+    covariance[k:, k:] = np.diag([FRAME / ARM_MM] * 3 + [FRAME] * 6) ** 2
     rows = np.concatenate([block.X, block.N], axis=2)
     design = designed(rows, covariance, noise, POSES)
     chosen = list(design.chosen)
-    before, after = (_moves(block.X, each[:k, :k]) for each in (covariance, design.covariance))
-    gain = 0.5 * float(np.log2((before + 3.0 * noise**2) / (after + 3.0 * noise**2)))
-    return ProposedPoses(q[chosen], place[chosen], 1e3 * before**0.5, 1e3 * after**0.5, gain)
+    return q[chosen], place[chosen], _bits(covariance[:k, :k], design.covariance[:k, :k])
 
 
-def _moves(X: Floats, covariance: Floats) -> float:
-    """Mean square, mm2, that what is uncertain (k, k) moves the tip by in rows X (n, 3, k)."""
-    return float(np.mean(np.einsum("nik,kl,nil->n", X, covariance, X, optimize=True)))
+def _bits(before: Floats, after: Floats) -> float:
+    """Information gained where a covariance (k, k) becomes another."""
+    return 0.5 * float(np.linalg.slogdet(before)[1] - np.linalg.slogdet(after)[1]) / float(np.log(2.0))
 
 
 def unseen_share(bench: ArmBench, found: ArmFit, q: Floats) -> float:

@@ -30,7 +30,7 @@ STARTED_MM, STARTED_RAD = 0.1, 1e-4  # by which an actuator has to move before i
 START_MM, START_RAD = 0.1, 5e-5  # where its carriage may stand until then: play and guides as bad as they come
 START_N = 1000.0  # and how hard its guide may hold it there
 ALWAYS_MM, ALWAYS_RAD = 0.005, 5e-6  # the same where it hardly ever moves: little, or nothing would be known of it
-ALWAYS = 0.2  # of a run: what has not moved for so long hardly ever moves
+ALWAYS = 0.2  # of a run: what moves for less of it hardly ever moves
 STARTING_ROWS = 5
 CLOCK_JITTER_S = 1e-5
 CLOCK_RATE = 1e-5
@@ -257,7 +257,7 @@ def _starts(bench: Bench, only: Callable[[int, Floats], list[Floats]]) -> list[t
                 continue
             shift = np.zeros_like(bench.observed(r))
             shift[:, :3] = bench.turned(r, bench.row_slopes(r)[:, :, j] * still[:, None])
-            begins = still.mean() < ALWAYS
+            begins = still.mean() < 1.0 - ALWAYS
             width = (START_RAD if revolute else START_MM) if begins else (ALWAYS_RAD if revolute else ALWAYS_MM)
             found.append((f"start.{run.name}.{a}", width, only(r, thinned(shift, run.thin)), False))
             if begins and run.measured.has("drive"):

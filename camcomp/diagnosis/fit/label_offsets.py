@@ -25,14 +25,14 @@ def with_clocks(twin: Twin, runs: Sequence[Run]) -> list[Run]:
         k for k, run in enumerate(runs) if run.measured.has("tip") and not run.run_path.led and run.run_path.ordered
     ]
     labels = {k: runs[k].clock for k in seen}
-    if len(set(labels.values())) < 2:
-        return list(runs)
-    found = {each: _offset(twin, [runs[k] for k in seen if labels[k] == each]) for each in set(labels.values())}
-    common = found[None] if None in found else float(np.mean(list(found.values())))
+    found = {
+        each: _offset(twin, [runs[k] for k in seen if labels[k] == each]) for each in dict.fromkeys(labels.values())
+    }
+    common = found[None] if None in found else float(np.mean(list(found.values()))) if found else 0.0
     out = list(runs)
     for k in seen:
-        path = replace(runs[k].run_path, clock_s=found[labels[k]] - common)
-        out[k] = replace(runs[k], run_path=path)
+        late = found[labels[k]]
+        out[k] = replace(runs[k], run_path=replace(runs[k].run_path, clock_s=late - common, between_s=abs(late)))
     return out
 
 

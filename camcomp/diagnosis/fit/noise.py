@@ -68,8 +68,8 @@ def inflation(bench: Bench) -> list[Floats]:
             place = run.run_path.place(t)
             slope = np.abs(bench.twin.rotation.T @ place.of(bench.slopes[k].tip_rho))
             m = len(bench.actuators)
-            # where a tip's clock is known to be late, it was read between rows, where nobody saw the speed change
-            unseen = abs(run.run_path.clock_s) * usual * BETWEEN_ROWS
+            # a tip that was read between the rows stands where nobody saw the speed change
+            unseen = run.run_path.between_s * usual * BETWEEN_ROWS
             extra[:, :3] = (TIMING_S**2 + unseen) * np.einsum("nij,nj->ni", slope, change)
             extra[:, 3 : 3 + m] = TIMING_S**2 * change
             if unsteady > 0.0:

@@ -12,7 +12,9 @@ from camcomp.ground import shelf
 from camcomp.ground.errors import ConfigError
 from camcomp.report.plot import brief
 
-_SMALLER = {"mm": (1e3, "µm"), "rad": (1e3, "mrad"), "s": (1e3, "ms")}  # units that small values are told in
+_SMALLER = {  # units that small values are told in
+    "mm": (1e3, "µm"), "rad": (1e3, "mrad"), "s": (1e3, "ms"), "mm/N": (1e3, "µm/N"), "rad/Nmm": (1e9, "µrad/Nm"),
+}  # fmt: skip
 _NOTHING = " not told from "
 _LONG_NUMBER = re.compile(r"\d+\.\d{3,}(?:e[+-]?\d+)?")
 _COVARIATES = {
@@ -65,7 +67,7 @@ def sizes(cause: FoundCause) -> str:
 
 def title(name: str, parameter: Any = None) -> str:
     """The name of a parameter without its unit."""
-    unit = parameter.unit.replace("/", "_per_") if parameter is not None else ""
+    unit = parameter.unit.replace("/", "_per_").removeprefix("1_") if parameter is not None else ""
     return name.removesuffix(f"_{unit}").replace("_", " ") if unit else name.replace("_", " ")
 
 

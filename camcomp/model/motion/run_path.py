@@ -60,6 +60,9 @@ class RunPath:
     feed_mm_per_min: float = np.nan  # of the program, in the middle
     cut_before_min: float = 0.0
     clock_s: float = 0.0  # by which the clock of the tip is known to be late
+    between_s: float = (
+        0.0  # by which the tip seems to have been read beside the instants of the rows, whatever the reason
+    )
     led: bool = False  # the motion is that of the measured tip, which has no clock beside it then
 
     @cached_property

@@ -23,6 +23,7 @@ FEWEST, MOST = 16, 48  # angles at which the front of a tool is looked at
 TURNS = 8  # halvings of the step between them
 ASIDE = 0.02  # of such a step: beside an edge
 SCAN, SLICES = 12, 8  # heights of a tool that is no cylinder: to find where it cuts, and there
+NEAR = 1e-4  # mm to which the lowest and highest cut of such a tool are found
 END_ANGLE = 1e-3  # rad from the sides of the front half; on less, a wall just cut lies against the tool
 BITE = 5  # columns of an arc: entry, exit (rad), height (mm), rise and run of the tool's surface per length of its edge
 DEPTH, ENGAGED, ARCS, WHAT = 5, 6, 7, 8  # of what is told of a place; in front: five integrals over the engagement
@@ -190,10 +191,12 @@ def limit(nodes, place, row, inside, outside, count):
     best = inside
     step = 1.0 if outside > inside else -1.0
     for k in range(count):
-        if step * (outside - best) <= 1e-5 or not cuts_at(nodes, place, row, best + step * 1e-5, k, count):
+        if step * (outside - best) <= NEAR:
+            break
+        if not cuts_at(nodes, place, row, best + 0.1 * step * NEAR, k, count):
             continue
         a, b = best, outside
-        while abs(b - a) > 1e-4:
+        while abs(b - a) > NEAR:
             middle = 0.5 * (a + b)
             if cuts_at(nodes, place, row, middle, k, count):
                 a = middle

@@ -2,7 +2,7 @@
 
 import click
 
-from camcomp.ground.files import write_all
+from camcomp.ground.files import display_name, read_bytes, write_all
 from camcomp.ground.headway import part
 from camcomp.ground.places import STANDARD
 from camcomp.terminal.commands._options import OUTPUT
@@ -19,6 +19,9 @@ from camcomp.terminal.progress import say, working
     type=OUTPUT,
     help="What is left of the stock: a body, or with the suffix .csv heights. Needs workpiece: stock.",
 )
+@click.option(
+    "--report", metavar="OUT.html", type=OUTPUT, help="The walls that are left, as a page. Needs workpiece: stock."
+)
 @click.option("--step-s", type=click.FloatRange(min=1e-5), default=0.02, show_default=True, help="Time between rows.")
 @click.option("--air", is_flag=True, help="The tool does not cut.")
 @click.option("--started-s", type=float, default=0.0, help="Start on the common clock, for effects of warming up.")
@@ -27,6 +30,7 @@ def command(
     configs: tuple[str, ...],
     output: str | None,
     surface: str | None,
+    report: str | None,
     step_s: float,
     air: bool,
     started_s: float,
@@ -34,13 +38,14 @@ def command(
     """Write the log that the modelled machine would produce.
 
     The model is the config with its `effects:`; there is no noise. Columns and frames are those that diagnose reads. With
-    --surface alone, what the loaded tool leaves of the stock is written and no log.
+    --surface or --report alone, what the loaded tool leaves of the stock is written and no log.
     """
     from camcomp.api.machine import load_machine
-    from camcomp.api.simulation import simulate, simulate_cut
+    from camcomp.api.simulation import simulate, simulate_cut, walls_report
+    from camcomp.report.inputs import Input
 
     machine, outputs = load_machine(*configs), {}
-    if output or not surface:
+    if output or not (surface or report):
         with working(f"simulating {program}"):
             with part(0.0, 0.5):
                 log = simulate(program, machine, step_s, cutting=not air, started_s=started_s)
@@ -52,4 +57,10 @@ def command(
         with working(f"cutting {program}"):
             left = simulate_cut(program, machine)
         outputs[surface] = left.to_csv() if surface.endswith(".csv") else left.to_stl()
+    if report:
+        with working(f"drawing the walls of {program}"):
+            inputs = [
+                Input("configuration", display_name(each), read_bytes(each)) for each in configs if each != STANDARD
+            ]
+            outputs[report] = walls_report(program, machine, inputs)
     write_all(outputs, inputs=(program, *configs))
