@@ -105,6 +105,7 @@ def test_the_law_stands_in_the_result(lathe):
         low < each["value"] < high and each["unit"] == "mm" for each in law["terms"] for low, high in [each["ci95"]]
     )
     assert law["on"] == "structure" and set(law["envelope"]) == {"y_mm"}
+    assert lathe.result["where"]["stage"] == law["on"]
     assert law["before_rms_um"] > 40.0 and law["after_rms_um"] < 0.25 * law["before_rms_um"]
     assert "repeats over y_mm" in lathe.said and in_four_digits(law["formula"]) in lathe.said
 
