@@ -131,10 +131,14 @@ def diagnose(
     Raises ConfigError, ProgramError, FileError, PhysicsError.
     """
     from camcomp.diagnosis.law.library import keep, learned
-    from camcomp.diagnosis.studies import study_of
     from camcomp.model.config.load import load_config
 
-    if (study := study_of(experiment, without)) is not None:
+    study = None
+    if all(run.program is None for run in load_experiment(experiment).runs):  # else their import would be for nothing
+        from camcomp.diagnosis.studies import study_of
+
+        study = study_of(experiment, without)
+    if study is not None:
         if library is not None and study.result.law is not None and study.result.law.parts:
             keep(str(library), study.result.law, load_config(load_experiment(experiment).config).robot.name)
         return ExperimentDiagnosis(str(experiment), study.result, None, None, study.residuals)

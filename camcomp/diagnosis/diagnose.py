@@ -47,7 +47,7 @@ from camcomp.diagnosis.search.unknown import firm_prior, residual_tests
 from camcomp.diagnosis.standards import of_runs
 from camcomp.diagnosis.statistics import places
 from camcomp.diagnosis.statistics.cause_sets import Fitted
-from camcomp.diagnosis.statistics.periods import frequencies
+from camcomp.diagnosis.statistics.periods import SpectralLine, frequencies
 from camcomp.diagnosis.statistics.probability import probability_of_chance, stated
 from camcomp.ground.datatypes import Floats
 from camcomp.ground.headway import part as part_of_work
@@ -277,6 +277,7 @@ def _named(problem: Problem, i: int) -> NamedCause:
 def _where(problem: Problem, found: CauseSearch, best: Fitted, law: LawAnswer | None) -> Where:
     gaps = run_gaps(problem)
     at = places.axes(gaps, channel_axes(problem))
+    heard = frequencies(gaps, channel_axes(problem))
     left = gaps  # what is unknown acts where the known causes leave something
     if found.unknown_in and best.members:
         left = run_gaps(problem, problem.causes(best.members, best.theta, best.extra))
@@ -286,8 +287,8 @@ def _where(problem: Problem, found: CauseSearch, best: Fitted, law: LawAnswer | 
         "actuators": places.actuators(gaps, problem.bench.actuators),
         "lines": places.lines(gaps),
         "intervals": places.intervals(left),
-        "drivers": with_stretches(_drivers(problem, found), problem, best),
-        **patterns_of(problem, gaps),
+        "drivers": with_stretches(_drivers(problem, found, heard), problem, best),
+        **patterns_of(problem, gaps, heard),
     })  # fmt: skip
 
 
@@ -316,10 +317,10 @@ def _first_label(found: CauseSearch) -> str:
     return labels[0][0] if labels else ""
 
 
-def _drivers(problem: Problem, found: CauseSearch) -> list[Driver]:
+def _drivers(problem: Problem, found: CauseSearch, heard: Sequence[SpectralLine]) -> list[Driver]:
     """What the gap depends on; with an unknown cause, what the rest depends on."""
     if found.unknown_in:
-        labels = (*_vibrations(problem), *found.left[found.unknown_in].labels)
+        labels = (*_vibrations(heard), *found.left[found.unknown_in].labels)
     else:
         null = problem.refit(())
         at_null = residual_tests(problem, null, firm_prior(problem))
@@ -327,9 +328,8 @@ def _drivers(problem: Problem, found: CauseSearch) -> list[Driver]:
     return [Driver(covariate=name, share=round(share, 4)) for name, share in labels[:6] if share > LEAST_DRIVER]
 
 
-def _vibrations(problem: Problem) -> tuple[tuple[str, float], ...]:
+def _vibrations(heard: Sequence[SpectralLine]) -> tuple[tuple[str, float], ...]:
     """What shakes at one frequency depends on time and on nothing else."""
-    heard = frequencies(run_gaps(problem), channel_axes(problem))
     return tuple((f"time:{line.name}", line.share) for line in heard if line.share > VIBRATION_SHARE)
 
 

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camcomp.diagnosis.arm.poses import ArmBench, Poses
-from camcomp.diagnosis.axis.findings import AxisChannel, AxisFindings
 from camcomp.diagnosis.experiment.open_experiment import columns_of
 from camcomp.diagnosis.fit.bench import Bench, Run, thinned
 from camcomp.diagnosis.result.types import DiagnosisResult
@@ -25,6 +24,7 @@ from camcomp.model.motion.twin import Twin
 from camcomp.model.statics.description import Robot
 
 if TYPE_CHECKING:
+    from camcomp.diagnosis.axis.findings import AxisChannel, AxisFindings
     from camcomp.diagnosis.diagnose import Diagnosis
 
 Columns = dict[str, NDArray[Any]]

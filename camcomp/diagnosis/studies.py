@@ -48,14 +48,12 @@ class LogStudy:
 
 
 def study_of(path: str | Path, without: Sequence[str] = ()) -> LogStudy | None:
-    """The study of an experiment of static poses or of axis logs; None where it is for the general diagnosis.
+    """The study of an experiment without programs, of static poses or of axis logs; None where it is for the general diagnosis.
 
     Raises ConfigError CC420 where the logs say too little, CC407, CC408, CC412, CC413 where they cannot be of this machine
     as they are read.
     """
     experiment = load_experiment(path)
-    if any(run.program is not None for run in experiment.runs):
-        return None
     config = load_config(experiment.config)
     robot, _ = build_robot(config.robot, config.tool.tip)
     columns = log_columns([a.name for a in robot.actuators], [a.revolute for a in robot.actuators])

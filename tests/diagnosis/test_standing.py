@@ -1,8 +1,11 @@
 """A tool that stands in a cut between two of its lines: its control executes the line or not, and nobody logs which."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
+from camcomp.diagnosis.experiment.driven_run import _idle_or_not
 from camcomp.diagnosis.experiment.open_experiment import open_experiment
 from camcomp.diagnosis.fit.bench import Bench
 from camcomp.terminal.cli import run
@@ -64,3 +67,14 @@ def test_its_drives_say_nothing_of_its_force(stood):
     there = bench.observed(0)[first + 1 : first + ROWS - 1, drives]
     assert np.isnan(there).all()
     assert np.isfinite(bench.observed(0)[first + 2 * ROWS :, drives]).mean() > 0.5
+
+
+@pytest.mark.parametrize("line", [0, 1])
+def test_it_stands_where_one_line_ends_and_the_next_begins(line):
+    """A place that two lines share is matched with either."""
+    path = SimpleNamespace(start=np.array([[0, 0, 0], [5, 0, 0]]), end=np.array([[5, 0, 0], [5, 5, 0]]))
+    tip = np.array([[4.0, 0, 0], *[[5.0, 0, 0]] * 6, [5.0, 1, 0]])
+    motion = np.array([0, *[line] * 6, 1])
+    words = SimpleNamespace(cutting=np.ones(8, bool)), SimpleNamespace(motion=motion)
+    found = _idle_or_not(*words, SimpleNamespace(track=SimpleNamespace(path=path)), tip, 0.04 * np.arange(8))
+    np.testing.assert_array_equal(np.flatnonzero(found), [2, 3, 4, 5])

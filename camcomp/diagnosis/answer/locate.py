@@ -11,7 +11,7 @@ from camcomp.diagnosis.fit.gap import main_channels
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.statistics import places
 from camcomp.diagnosis.statistics.noise_model import effective_rows
-from camcomp.diagnosis.statistics.periods import SpectralLine, frequencies, screws
+from camcomp.diagnosis.statistics.periods import SpectralLine, screws
 from camcomp.model.effect import Cause
 
 
@@ -45,13 +45,13 @@ def channel_axes(problem: Problem) -> list[str]:
     return ["x", "y", "z"] if main_channels(problem).start == 0 else list(problem.bench.actuators)
 
 
-def patterns_of(problem: Problem, gaps: list[places.RunGap]) -> dict[str, Any]:
+def patterns_of(problem: Problem, gaps: list[places.RunGap], heard: Sequence[SpectralLine]) -> dict[str, Any]:
     """What the gap does with the direction of travel, the turns of the screws, time, and the place in the workspace."""
     actuators = problem.bench.actuators
     return {
         "travel": places.travel(gaps, actuators),
         "screws": [_line(each, "actuator", "period_mm") for each in screws(gaps, actuators)],
-        "frequencies": [_line(each, "axis", "hertz") for each in frequencies(gaps, channel_axes(problem))],
+        "frequencies": [_line(each, "axis", "hertz") for each in heard],
         "places": places.places(gaps),
     }
 

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import t as student
+from scipy.special import stdtr
 
 from camcomp.ground.datatypes import Floats, Ints
 
@@ -102,7 +102,9 @@ def log10_chance(found: Gain, tried: int = 1) -> float:
     """
     if found.blocks < 2:
         return 0.0
-    return min(float(student.logsf(found.z, found.blocks - 1) + np.log(tried)) / float(np.log(10.0)), 0.0)
+    with np.errstate(divide="ignore"):
+        chance = np.log(stdtr(found.blocks - 1, -found.z))
+    return min(float(chance + np.log(tried)) / float(np.log(10.0)), 0.0)
 
 
 def fit(data: Series, A: Floats) -> tuple[Floats, Floats]:

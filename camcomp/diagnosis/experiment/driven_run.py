@@ -194,9 +194,11 @@ def _close(time: Floats, known: Bools) -> Bools:
 
 
 def _idle_or_not(forces: Forces, aligned: Aligned, program: _Program, tip: Floats, time: Floats) -> Bools:
-    """Rows (n,) that stand still for a while where a cutting line ends: whether it is still executed nobody says."""
+    """Rows (n,) that stand still for a while where a cutting line begins or ends: whether it is executed nobody says."""
     path = program.track.path
-    ends = np.linalg.norm(path.end[aligned.motion] - tip, axis=1) < STILL_MM
+    ends = (
+        np.min([np.linalg.norm(at[aligned.motion] - tip, axis=1) for at in (path.start, path.end)], axis=0) < STILL_MM
+    )
     step = np.linalg.norm(np.diff(tip, axis=0), axis=1)
     still = ends & np.concatenate([[False], step < STILL_MM]) & np.concatenate([step < STILL_MM, [True]])
     out = np.zeros(len(tip), bool)

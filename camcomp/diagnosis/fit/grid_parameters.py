@@ -89,8 +89,8 @@ def quick_columns(bench: Bench, candidate: CandidateCause, shape: Mapping[str, f
                 motion = bench.nominal[k].motion
                 moved, guided = signal_path.driven([cause], bench.actuators, motion)
                 effort = signal_path.drive_forces([cause], bench.actuators, guided)
-                values = np.zeros_like(bench.observed(k))
                 slope = bench.row_slopes(k)
+                values = np.zeros((len(slope), 6 + 2 * len(bench.actuators)))
                 values[:, :3] = bench.turned(k, np.einsum("nij,nj->ni", slope, moved))
                 if effort is not None:
                     m = len(bench.actuators)

@@ -7,7 +7,7 @@ nothing to differ from: then labels scatter about what they have in common, by a
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.stats import norm, t
+from scipy.special import ndtri, stdtrit
 
 from camcomp.ground.datatypes import Floats
 
@@ -29,7 +29,7 @@ def scattering(labels: Sequence[Label]) -> bool:
 
 def scatter(offsets: Floats) -> float:
     """Standard deviation of labels about what they have in common, from their offsets (labels,), as large as few may hide."""
-    few = float(t.isf(SIDE, len(offsets) - 1) / norm.isf(SIDE))
+    few = float(stdtrit(len(offsets) - 1, SIDE) / ndtri(SIDE))
     return float(np.std(offsets, ddof=1)) * few
 
 

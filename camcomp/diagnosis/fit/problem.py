@@ -1,7 +1,7 @@
 """The state of one diagnosis: columns, white rows, and re-fits of sets of causes through the twin."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -49,6 +49,7 @@ class Problem:
     white_residual: list[Floats]
     shapes: dict[int, dict[str, float]]
     candidates: CausePrior
+    _last: tuple[tuple[object, ...], list[Reading]] | None = field(default=None, init=False, repr=False)
 
     @cached_property
     def tip_gram(self) -> Floats:
@@ -162,13 +163,18 @@ class Problem:
     ) -> tuple[Floats, list[Reading]]:
         """Readings of all runs, and the coordinates that they are of: halved as often as no machine stands at what was asked for."""
         for _ in range(HALVED):
-            causes = self.causes(members, theta, shapes)
             try:
-                return theta, [self.bench.read(k, causes) for k in range(len(self.bench.runs))]
+                return theta, self._read(self.causes(members, theta, shapes))
             except PhysicsError:
                 theta = 0.5 * theta
-        causes = self.causes(members, theta, shapes)
-        return theta, [self.bench.read(k, causes) for k in range(len(self.bench.runs))]
+        return theta, self._read(self.causes(members, theta, shapes))
+
+    def _read(self, causes: Sequence[Cause]) -> list[Reading]:
+        """Readings of all runs; the same causes twice, one after the other, are read once."""
+        key = tuple((each.name, each.target, tuple(sorted(each.values.items()))) for each in causes)
+        if self._last is None or self._last[0] != key:
+            self._last = key, [self.bench.read(k, causes) for k in range(len(self.bench.runs))]
+        return self._last[1]
 
     def theta_without(self, f: Fitted, k: int) -> Floats:
         """The members' coordinates fitted without run k, about the fit to all runs."""
@@ -191,12 +197,12 @@ class Problem:
         out = []
         for k, (own, r) in enumerate(zip(white, left, strict=True)):
             W = self.white[k]
-            A = self.base_grams[k].A.copy()
-            cross = W.T @ own
-            cross[index] = own.T @ own
+            A, d = self.base_grams[k].A.copy(), own.shape[1]
+            both = np.column_stack([own, r])
+            products = W.T @ both
+            products[index] = own.T @ both
+            cross, b = products[:, :d], products[:, d].copy()
             A[:, index], A[index, :] = cross, cross.T
-            b = W.T @ r
-            b[index] = own.T @ r
             out.append(Gram(A, b, float(r @ r), len(r)))
         return tuple(out)
 
@@ -238,22 +244,35 @@ class Problem:
                     step = -step
                 changed = theta.copy()
                 changed[at + j] += step / p.scale
-                out.append(self._slope(self.causes(members, changed, shapes), readings, step / p.scale))
+                acts = self._runs_of(i, shapes)
+                out.append(self._slope(self.causes(members, changed, shapes), readings, step / p.scale, acts))
             at += len(candidate.parameters)
         return out
 
-    def _slope(self, causes: Sequence[Cause], readings: Sequence[Reading], step: float) -> list[Floats]:
-        """Change of the channels per unit, per run (n, c), from readings to those with other causes."""
+    def _slope(
+        self, causes: Sequence[Cause], readings: Sequence[Reading], step: float, acts: Sequence[bool] | None = None
+    ) -> list[Floats]:
+        """Change of the channels per unit, per run (n, c), from readings to those with other causes; acts: runs that change."""
         out = []
         for k, (reading, run) in enumerate(zip(readings, self.bench.runs, strict=True)):
+            if acts is not None and not acts[k]:
+                out.append(np.zeros_like(self.residuals[k]))
+                continue
             change = self.bench.channels(k, self.bench.read(k, causes)) - self.bench.channels(k, reading)
             out.append(thinned(change / step, run.thin))
         return out
 
+    def _runs_of(self, i: int, shapes: Mapping[int, Mapping[str, float]]) -> list[bool]:
+        """In which runs a candidate acts: what begins and ends is nothing in the others."""
+        if not self.passing(i):
+            return [True] * len(self.bench.runs)
+        start, end = (shapes[i][p.name] for p in self.columns.candidates[i].shapes)
+        paths = [run.run_path for run in self.bench.runs]
+        return [path.started + path.grid[0] <= end and start <= path.started + path.grid[-1] for path in paths]
+
     def shape_columns(self, members: Members, theta: Floats, shapes: Mapping[int, Mapping[str, float]]) -> list[Floats]:
         """White columns (w, s) per run of the members' shapes, in their own units."""
-        causes = self.causes(members, theta, shapes)
-        readings = [self.bench.read(k, causes) for k in range(len(self.bench.runs))]
+        readings = self._read(self.causes(members, theta, shapes))
         moved = []
         for i, p in self.shapes_of(members):
             step = 1e-4 * shapes[i][p.name]
@@ -321,6 +340,7 @@ def open_problem(bench: Bench, candidates: Sequence[CandidateCause], stated_mm: 
         columns = with_scatter(columns, bench, estimate(total(rough.base_grams), rough.prior, ())[0])
         rough = replace(rough, columns=columns)
     noise = _with_model_error(rough)
+    del rough  # its white columns are as large as all that follows
     problem = _whiten(bench, columns, words, floor, noise, inflate, times, residuals, shapes, outliers)
     return _scanned(problem) if shapes else problem
 

@@ -68,7 +68,7 @@ def answer_law(problem: Problem, f: Fitted, kind: str) -> LawAnswer | None:
         return None
     joint = with_law(problem, bench, best.found, _terms(bench, best.found))
     fit = standing(joint, f.members)
-    if fit.members != (() if best.f is None else best.f.members):
+    if best.f is not None or fit.members:  # about the values that the causes have beside it
         base = _base(problem, fit, bench, kind)(best.found.folds.split, False)
         best = _beside(problem, fit, bench, fitted_beside(best.found, base))
     without = _gaps(problem, f if fit.members == f.members else problem.refit(fit.members))

@@ -70,10 +70,10 @@ class TermBench:
         """Reach of the covariates there."""
         return sizes(self.rows(spot))
 
-    def values(self, spot: Spot, form: Form) -> list[Floats]:
-        """Functions of a form (n, f) per run, mm or rad per unit of their coefficients; 0 where they are none."""
+    def values(self, spot: Spot, *forms: Form) -> list[Floats]:
+        """Functions of forms (n, f), one behind the other, per run: mm or rad per unit of their coefficients; 0 where they are none."""
         rows = self.rows(spot)
-        parsed = [parse(text, dict.fromkeys(rows[0])) for text in form.said]
+        parsed = [parse(text, dict.fromkeys(rows[0])) for form in forms for text in form.said]
         return [np.nan_to_num(np.stack([each(r, r.rows) for each in parsed], axis=1)) for r in rows]
 
     def tip_ways(self, spot: Spot) -> list[Floats]:
@@ -192,8 +192,7 @@ def _grids(bench: TermBench, where: Sequence[Spot]) -> list[TermGrid]:
     forms = at_drive(size, bench.bench.twin.robot.actuators[first.index].revolute) if on_drive else at_tip(size)
     whites: list[list[White]] = [[] for _ in where]
     for some in range(0, len(forms), AT_ONCE):  # rows before thinning are many
-        each = [bench.values(first, form) for form in forms[some : some + AT_ONCE]]
-        values = [np.concatenate(of_run, axis=1) for of_run in zip(*each, strict=True)]
+        values = bench.values(first, *forms[some : some + AT_ONCE])
         for parts, spot in zip(whites, where, strict=True):
             parts.append(bench.white(spot, values))
     begin = np.cumsum([0, *(len(each.texts) for each in forms[:-1])])

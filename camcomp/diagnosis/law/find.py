@@ -256,17 +256,9 @@ class _Search:
         for count in (1, 2, 3):
             for some in combinations(range(len(terms)), count):
                 gain, tried = of(some), [terms[i] for i in some]
-                if gain > value + self._margin(tried, best):
+                if gain > value + margin(tried, best):
                     best, value = tried, gain
         return best
-
-    @staticmethod
-    def _margin(tried: Sequence[Term], best: Sequence[Term]) -> float:
-        """Log density by which a set has to be more probable than another: fewer terms and fewer shapes go before."""
-        shapes = [sum(len(t.form.shape) for t in terms) for terms in (tried, best)]
-        if len(tried) < len(best):
-            return -SAME
-        return SAME if shapes[0] > shapes[1] else 0.5
 
     def _without_idle(self, chosen: list[Term]) -> list[Term]:
         """The terms that do something beside the others."""
@@ -307,6 +299,14 @@ class _Search:
         return FoundLaw(
             tuple(chosen), theta[0], covariance, theta[1:], gain, tuple(alike), self.folds, columns, precision
         )
+
+
+def margin(tried: Sequence[Term], best: Sequence[Term]) -> float:
+    """Log density by which a set has to be more probable than another: fewer terms and fewer shapes go before."""
+    shapes = [sum(len(t.form.shape) for t in terms) for terms in (tried, best)]
+    if len(tried) < len(best):
+        return -SAME
+    return SAME if shapes[0] > shapes[1] else 0.5
 
 
 def _unlikely(term: Term) -> bool:

@@ -76,11 +76,11 @@ def told_chance(probability: float) -> str:
 def law_lines(law: Law) -> list[str]:
     """A law in a few lines: what it says, the formula with the size of every term, where it was seen, what it takes away."""
     seen = ", ".join(f"{name} {brief(low, 4)} to {brief(high, 4)}" for name, (low, high) in law.envelope.items())
+    said = law.says
     gone = f"from {brief(law.before_rms_um)} µm to {brief(law.after_rms_um)} µm"
-    lines = [
-        f"{law.says} On parts of the data that it was not fitted to it takes the gap {gone} (rms).",
-        shortened(law.formula),
-    ]
+    if law.after_rms_um < law.before_rms_um:  # a law of a drive force leaves the gap as it is
+        said += f" On parts of the data that it was not fitted to it takes the gap {gone} (rms)."
+    lines = [said, shortened(law.formula)]
     if law.kind == "formula":
         lines += [term_size(each) for each in law.terms]
     return [*lines, f"seen for {seen}"] if seen else lines

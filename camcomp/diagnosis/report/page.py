@@ -191,7 +191,9 @@ def _next(proposal: NextExperiment) -> list[str]:
     """What to measure, and what that is worth; what its outcomes mean follows as a list."""
     time = f", {brief(proposal.minutes, 2)} minutes with setting up" if proposal.minutes else ""
     gain = f"{brief(proposal.gain)} bits expected{time}."
-    if UNKNOWN in proposal.separates and proposal.poses is None and proposal.moves is None:
+    if proposal.moves is not None:
+        gain = f"It tells whether anything is left, and what that goes with: {gain}"
+    elif UNKNOWN in proposal.separates and proposal.poses is None:
         gain = f"It changes what the unknown effect may depend on, and as little else as can be: {gain}"
     elif separates := listed(proposal.separates):
         gain = f"It separates {separates}: {gain}"

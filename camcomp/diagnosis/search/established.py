@@ -1,7 +1,7 @@
 """Whether what a set of causes names is surely there, and more than every healthy machine has."""
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from camcomp.diagnosis.fit.floor import MINOR
 from camcomp.diagnosis.fit.intervals import joint_covariance
@@ -26,7 +26,7 @@ def weakest(problem: Problem, f: Fitted) -> int | None:
         mine = slice(at, at + len(problem.candidates.columns[i]))
         at, theta = mine.stop, f.theta[mine]
         far = float(np.sqrt(theta @ np.linalg.solve(C[mine, mine], theta)))
-        reach = float(np.sqrt(chi2.isf(2.0 * CHANCE, len(theta))))
+        reach = float(np.sqrt(chdtri(len(theta), 2.0 * CHANCE)))
         surely = size_um(problem, f, (i,)) * (1.0 - reach / max(far, 1e-12))
         if surely < least:
             least, found = surely, i

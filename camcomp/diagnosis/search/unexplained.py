@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import log_ndtr
 
 from camcomp.diagnosis.fit.bench import thinned
 from camcomp.diagnosis.fit.floor import row_scatter
@@ -44,7 +44,7 @@ class Unexplained:
     @property
     def log10_chance(self) -> float:
         """Of as much from noise alone."""
-        return float(norm.logsf(self.z) / np.log(10.0))
+        return float(log_ndtr(-self.z) / np.log(10.0))
 
 
 def unexplained(problem: Problem, f: Fitted) -> dict[str, Unexplained]:

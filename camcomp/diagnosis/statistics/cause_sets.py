@@ -83,16 +83,14 @@ class Scale:
         """How far off the tolerances most likely are, given a set."""
         return TOLERANCES[int(np.argmax(self._by_tolerance(members)))]
 
-    def _by_tolerance(self, members: Members) -> list[float]:
+    def _by_tolerance(self, members: Members) -> Floats:
         sets = [self.candidates.columns[i] for i in members]
         index = [c for each in sets for c in each]
-        return [
-            b.log_evidence
-            + odds
-            + (log_bayes(b, self.prior, sets) if sets else 0.0)
-            - holding_back(b, self.prior, index)
+        none = np.array([
+            b.log_evidence + odds - holding_back(b, self.prior, index)
             for b, odds in zip(self.bases, TOLERANCE_LOG, strict=True)
-        ]
+        ])  # fmt: skip
+        return none + log_bayes(self.bases, self.prior, sets) if sets else none
 
 
 def predictive(grams: Sequence[Gram], prior: Prior, candidates: CausePrior, sets: Sequence[Members]) -> Floats:
@@ -132,7 +130,7 @@ def pairs(scale: Scale, candidates: Sequence[int], most: int) -> list[tuple[floa
         second = np.array([scale.candidates.columns[two[k][1]][0] for k in fast])
         rough[fast] = log_bayes_pairs(at, scale.prior, first, second)
     for k in np.flatnonzero(~np.array(single, bool)):
-        rough[k] = log_bayes(at, scale.prior, [scale.candidates.columns[i] for i in two[k]])
+        rough[k] = log_bayes([at], scale.prior, [scale.candidates.columns[i] for i in two[k]])[0]
     rough += [scale.candidates.prior(each) for each in two]
     best = [two[k] for k in np.argsort(-rough)[:most]]
     return sorted(((scale(each) + scale.candidates.prior(each), each) for each in best), reverse=True)

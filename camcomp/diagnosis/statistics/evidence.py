@@ -109,26 +109,26 @@ def _inverse(scaled: Floats, size: Floats) -> tuple[Floats, float]:
     return size[:, None] * inverse * size, float(log_det)
 
 
-def log_bayes(at: Base, prior: Prior, candidates: Sequence[Sequence[int]]) -> float:
-    """Log Bayes factor of `candidates` (each the columns of one cause) being causes, against no cause."""
-    index = [i for candidate in candidates for i in candidate]
+def log_bayes(at: Sequence[Base], prior: Prior, candidates: Sequence[Sequence[int]]) -> Floats:
+    """Log Bayes factor (b,) of `candidates` (each the columns of one cause) being causes, against no cause, for every base."""
+    index = np.array([i for candidate in candidates for i in candidate])
     group = np.array([g for g, candidate in enumerate(candidates) for _ in candidate])
-    C = at.covariance[np.ix_(index, index)]
-    mean = at.mean[index]
+    C = np.array([each.covariance[index[:, None], index] for each in at])
+    mean, narrow = np.array([each.mean[index] for each in at]), np.array([each.precision[index] for each in at])
     inverse = np.linalg.inv(C)
-    narrow = at.precision[index]
-    h = inverse @ mean
+    h = (inverse @ mean[:, :, None])[:, :, 0]
     sizes, weight = _widths(len(candidates))
     wide = 1.0 / (prior.scale[index] * sizes[:, group]) ** 2  # (w, d)
     # a cause is at least as wide as its tolerance
-    wide = np.minimum(wide, narrow)
-    posterior, spread, fit, log_det = _posteriors(inverse - np.diag(narrow), h, wide)
-    volume = 0.5 * np.log(wide).sum(axis=1) - 0.5 * log_det
-    volume -= 0.5 * np.log(narrow).sum() - 0.5 * np.linalg.slogdet(inverse)[1]
+    wide = np.minimum(wide, narrow[:, None])
+    posterior, spread, fit, log_det = _posteriors(inverse - narrow[:, :, None] * np.eye(len(index)), h, wide)
+    volume = 0.5 * np.log(wide).sum(axis=2) - 0.5 * log_det
+    none = np.log(narrow).sum(axis=1) - np.linalg.slogdet(inverse)[1] + np.sum(mean * h, axis=1)
+    volume -= 0.5 * none[:, None]
     signed = prior.sign[index] > 0
-    positive = (log_ndtr(posterior[:, signed] / spread[:, signed]) + np.log(2.0)).sum(axis=1)
-    value = 0.5 * fit - 0.5 * float(mean @ inverse @ mean) + volume + positive + weight
-    return log_sum(value)
+    positive = (log_ndtr(posterior[:, :, signed] / spread[:, :, signed]) + np.log(2.0)).sum(axis=2)
+    value = 0.5 * fit + volume + positive + weight
+    return np.array([log_sum(each) for each in value])
 
 
 def _widths(count: int) -> tuple[Floats, Floats]:
@@ -144,38 +144,39 @@ def _choices(count: int, widths: int) -> Ints:
 
 @kept
 def _posteriors(likelihood, h, wide):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """Per prior precision wide (w, d): mean and deviation (w, d), h's mean (w,) and log determinant (w,) of the precision.
-
-    The inverse by Gauss and Jordan; the determinant is infinite where the precision is none.
+    """Per base (b) and prior precision wide (b, w, d): mean and deviation (b, w, d), h's mean and log determinant (b, w) of the
+    precision. The inverse by Gauss and Jordan; the determinant is infinite where the precision is none.
     """
-    n, d = wide.shape
-    mean, spread = np.zeros((n, d)), np.ones((n, d))
-    fit, log_det = np.zeros(n), np.zeros(n)
-    for w in range(n):
-        A = likelihood.copy()
-        for i in range(d):
-            A[i, i] += wide[w, i]
-        for k in range(d):
-            pivot = A[k, k]
-            if not pivot > 0.0:
-                log_det[w] = np.inf
-                break
-            log_det[w] += np.log(pivot)
-            A[k, k] = 1.0
-            for j in range(d):
-                A[k, j] /= pivot
+    bases, n, d = wide.shape
+    mean, spread = np.zeros((bases, n, d)), np.ones((bases, n, d))
+    fit, log_det = np.zeros((bases, n)), np.zeros((bases, n))
+    A = np.zeros((d, d))
+    for b in range(bases):
+        for w in range(n):
+            A[:] = likelihood[b]
             for i in range(d):
-                if i != k:
-                    factor = A[i, k]
-                    A[i, k] = 0.0
-                    for j in range(d):
-                        A[i, j] -= factor * A[k, j]
-        if log_det[w] < np.inf:
-            for i in range(d):
-                spread[w, i] = np.sqrt(max(A[i, i], 1e-300))
+                A[i, i] += wide[b, w, i]
+            for k in range(d):
+                pivot = A[k, k]
+                if not pivot > 0.0:
+                    log_det[b, w] = np.inf
+                    break
+                log_det[b, w] += np.log(pivot)
+                A[k, k] = 1.0
                 for j in range(d):
-                    mean[w, i] += A[i, j] * h[j]
-                fit[w] += h[i] * mean[w, i]
+                    A[k, j] /= pivot
+                for i in range(d):
+                    if i != k:
+                        factor = A[i, k]
+                        A[i, k] = 0.0
+                        for j in range(d):
+                            A[i, j] -= factor * A[k, j]
+            if log_det[b, w] < np.inf:
+                for i in range(d):
+                    spread[b, w, i] = np.sqrt(max(A[i, i], 1e-300))
+                    for j in range(d):
+                        mean[b, w, i] += A[i, j] * h[b, j]
+                    fit[b, w] += h[b, i] * mean[b, w, i]
     return mean, spread, fit, log_det
 
 

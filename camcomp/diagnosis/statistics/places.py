@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from camcomp.ground.datatypes import Floats, Ints
 
@@ -65,7 +65,7 @@ def _chance(run: RunGap, rows: Ints) -> float:
     """Chance that noise alone makes these rows as large."""
     normal = run.gap[rows] / run.noise
     count = np.isfinite(normal).sum() / run.thin
-    return float(chi2.sf(np.nansum(normal**2) / run.thin, max(count, 1.0)))
+    return float(chdtrc(max(count, 1.0), np.nansum(normal**2) / run.thin))
 
 
 def discoveries(chances: Sequence[float]) -> list[bool]:
@@ -184,7 +184,7 @@ def places(runs: Sequence[RunGap], most: int = 6) -> list[dict[str, object]]:
             z = r.gap[inside] / r.noise
             normal, count = normal + float(np.nansum(z**2)) / r.thin, count + np.isfinite(z).sum() / r.thin
         if rows:
-            found.append((energy, rows, a, b, float(chi2.sf(normal, max(count, 1.0)))))
+            found.append((energy, rows, a, b, float(chdtrc(max(count, 1.0), normal))))
     real = discoveries([f[-1] for f in found]) if found else []
     kept = sorted((f for f, ok in zip(found, real, strict=True) if ok), key=lambda f: -f[0])[:most]
     return [

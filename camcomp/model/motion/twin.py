@@ -59,6 +59,15 @@ class Solved:
     wrench: Floats  # (q, 6)
     tip: Floats  # (q, 3) machine frame
     drive: Floats  # (q, m)
+    _at: WeakKeyDictionary[Places, tuple[Floats, Floats, Floats]] = field(
+        default_factory=WeakKeyDictionary, init=False, repr=False
+    )
+
+    def at(self, place: Places) -> tuple[Floats, Floats, Floats]:
+        """Force (n, 3), wrench (n, 6) and drives (n, m) between the nodes, worked out once for every `place`."""
+        if place not in self._at:
+            self._at[place] = place.of(self.force), place.of(self.wrench), place.of(self.drive)
+        return self._at[place]
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +102,7 @@ class Twin:
         default_factory=WeakKeyDictionary, init=False, repr=False
     )
 
-    @property
+    @cached_property
     def actuators(self) -> tuple[str, ...]:
         """Names in the order of every actuator array."""
         return tuple(each.name for each in self.robot.actuators)
@@ -205,7 +214,7 @@ class Twin:
         solved = known
         load = signal_path.loaded(causes, rows, run_path.row_force)
         load_tip = signal_path.loaded(causes, at_tip, run_path.forces(place_tip)) if late else load
-        drive, tip = place.of(solved.drive), run_path.tips(solved.tip, place_tip, seen)
+        drive, tip = solved.at(place)[2], run_path.tips(solved.tip, place_tip, seen)
         if slopes is not None:
             at_rows = slopes.at(place)
             d_rho, d_wrench = self._differences(solved, place, gap_row, load)
@@ -325,8 +334,8 @@ class Twin:
     def _differences(self, solved: Solved, place: Places, gap: Floats, load: Load) -> tuple[Floats, Floats]:
         """Carriage (n, m) and wrench at the reference (n, 6) beyond what the nodes were solved with."""
         d_rho = gap - solved.shift[place.piece]
-        d_force = load.force - place.of(solved.force)
-        d_wrench = load.wrench - place.of(solved.wrench)
+        force, wrench, _ = solved.at(place)
+        d_force, d_wrench = load.force - force, load.wrench - wrench
         lever = self.nominal.tool  # platform axes; its tilt under load is of second order here
         d_wrench = d_wrench + np.concatenate([d_force, np.cross(lever, d_force)], axis=1)
         return d_rho, d_wrench

@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
+from camcomp.diagnosis.law.bench_terms import Spot, Term
+from camcomp.diagnosis.law.find import margin
 from camcomp.diagnosis.law.folds import ALTERNATING, Folds, Split, gains, usual_split, withheld
 from camcomp.diagnosis.law.forms import at_drive, at_tip
 from camcomp.diagnosis.law.library import keep, learned
@@ -80,6 +82,13 @@ def test_what_is_withheld_has_no_say():
 def test_creep_under_load_is_a_form():
     (form,) = [f for f in at_tip(sizes(AT_TIP)) if f.family == "settling" and len(f.about) == 2][:1]
     assert form.about == ("cut_min", "force_N") and form.units == ("", "N") and form.said[1].endswith("*force_N")
+
+
+def test_of_sets_that_explain_alike_the_one_with_fewer_shapes_goes_before():
+    forms, spot = at_tip(sizes(AT_TIP)), Spot("structure", 0)
+    wave, power = (Term(spot, next(f for f in forms if f.family == family)) for family in ("wave", "power"))
+    assert margin([wave], [power]) > margin([power], [wave]) > 0.0  # else a parabola is a piece of a long wave
+    assert margin([wave], [power, power]) < 0.0
 
 
 def test_splines_add_up_to_one_and_stay_within_their_limits():
