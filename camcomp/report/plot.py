@@ -116,3 +116,12 @@ def brief(value: float, digits: int = 3) -> str:
 def micrometres(value: float) -> str:
     """A length in um for people: never smaller than a hundredth."""
     return f"below {SMALLEST_UM:g} µm" if 0.0 <= value < SMALLEST_UM else f"{brief(value)} µm"
+
+
+def digits_alike(value: float, low: float, high: float) -> list[str]:
+    """A value and the ends of its interval, with decimals that show two digits of the doubt."""
+    doubt = 0.5 * (high - low)
+    if not doubt > 0.0 or not np.isfinite(doubt) or doubt < 1e-4:
+        return [brief(each) for each in (value, low, high)]
+    places = max(1 - int(np.floor(np.log10(doubt))), 0)
+    return [f"{each:.{places}f}" for each in (value, low, high)]

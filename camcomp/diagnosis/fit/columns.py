@@ -181,6 +181,7 @@ def build(
             size = min(size, HEALTHY * floor_um / max(tip_um(bench, per_run), 1e-9))
         put(-1, name, size, reached * size, per_run, 0, loose)
     blocks = tuple(np.stack([each[r] for each in parts], axis=2) for r in range(len(bench.runs)))
+    bench.columns.clear()  # they stand in the blocks now
     k = len(owner)
     prior = Prior(np.array(tolerance), np.ones(k), np.array(sign), np.array(flexible), np.array(reach))
     return Columns(tuple(candidates), np.array(owner), tuple(names), prior, blocks)

@@ -340,6 +340,7 @@ def open_problem(bench: Bench, candidates: Sequence[CandidateCause], stated_mm: 
         columns = with_scatter(columns, bench, estimate(total(rough.base_grams), rough.prior, ())[0])
         rough = replace(rough, columns=columns)
     noise = _with_model_error(rough)
+    del rough  # its white columns are as large as all that follows
     problem = _whiten(bench, columns, words, floor, noise, inflate, times, residuals, shapes, outliers)
     return _scanned(problem) if shapes else problem
 

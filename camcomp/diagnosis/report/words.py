@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from functools import cache
 from typing import Any
@@ -10,7 +9,7 @@ from typing import Any
 from camcomp.diagnosis.result.types import Driver, Estimate, FoundCause, LawTerm, NamedCause, StretchDriver
 from camcomp.ground import shelf
 from camcomp.ground.errors import ConfigError
-from camcomp.report.plot import brief
+from camcomp.report.plot import digits_alike
 
 _SMALLER = {  # units that small values are told in
     "mm": (1e3, "µm"), "rad": (1e3, "mrad"), "s": (1e3, "ms"), "mm/N": (1e3, "µm/N"), "rad/Nmm": (1e9, "µrad/Nm"),
@@ -100,15 +99,6 @@ def _told(value: float, ci95: tuple[float, float], unit: str, nominal: float | N
     if nominal is not None and low <= nominal <= high:
         return f"{_NOTHING}{nominal:g} ({least} to {most}{behind})"
     return f" {told}{behind} ({least} to {most})"
-
-
-def digits_alike(value: float, low: float, high: float) -> list[str]:
-    """A value and the ends of its interval, with decimals that show two digits of the doubt."""
-    doubt = 0.5 * (high - low)
-    if not doubt > 0.0 or not math.isfinite(doubt) or doubt < 1e-4:
-        return [brief(each) for each in (value, low, high)]
-    places = max(1 - math.floor(math.log10(doubt)), 0)
-    return [f"{each:.{places}f}" for each in (value, low, high)]
 
 
 def depends(driver: Driver) -> str:

@@ -20,7 +20,6 @@ from camcomp.diagnosis.fit.floor import MINOR
 from camcomp.diagnosis.fit.intervals import BLOCKS
 from camcomp.diagnosis.fit.patterns import Ground
 from camcomp.diagnosis.fit.problem import Problem
-from camcomp.diagnosis.search.unknown import about
 from camcomp.diagnosis.statistics.cause_sets import Fitted, Members
 from camcomp.diagnosis.statistics.evidence import Base, Gram, Prior, base, estimate, gram, holding_back, log_bayes
 from camcomp.ground.datatypes import Bools, Floats, Ints
@@ -50,12 +49,12 @@ def credibility(
     """Probability of every member of f, and of something unknown in its place; surely: whether that is there for certain."""
     if not f.members:
         return {}, {}
-    own, residual = about(problem, f)
-    weight = _at_the_tip(problem)
-    W, r = weight[:, None] * np.concatenate(own), weight * np.concatenate(residual)
-    data, index = gram(W, r), problem.member_columns(f.members)
+    weight, index = _at_the_tip(problem), problem.member_columns(f.members)
+    W, r = np.concatenate(problem.white), weight * np.concatenate(f.residual)
+    W[:, index] = np.concatenate(f.white)  # about the fit
+    W *= weight[:, None]
+    data = gram(W, r)
     sets, candidates = _subsets(f.members), problem.candidates
-    families = [replace(each, columns=weight[each.at, None] * each.columns) for each in _families(problem)]
     hypotheses: list[tuple[Floats, float]] = []  # evidence per set, log prior
     best: tuple[float, _Family | None] = (-np.inf, None)
     if not surely:
@@ -63,11 +62,13 @@ def credibility(
             (_evidence(problem, base(data, problem.prior, 1.0), problem.prior, sets), np.log(1.0 - UNKNOWN))
         )
         best = (hypotheses[0][0][0], None)
-    for family in families:
+    values: list[Floats] = []
+    for each in _families(problem):  # one at a time: together they are as large as all else
+        family = replace(each, columns=weight[each.at, None] * each.columns)
         joint, prior = _with(problem, data, W, r, family)
-        value = _evidence(problem, base(joint, prior, 1.0), prior, sets)
-        hypotheses.append((value, np.log(UNKNOWN / len(families))))
-        best = max(best, (float(value[0]), family), key=lambda each: each[0])
+        values.append(_evidence(problem, base(joint, prior, 1.0), prior, sets))
+        best = max(best, (float(values[-1][0]), family), key=lambda each: each[0])
+    hypotheses += [(value, np.log(UNKNOWN / len(values))) for value in values]
     strain = _strain(problem, data, W, r, best[1], index)
     log_prior = np.array([candidates.prior(each) for each in sets])
     present, replaced, at = dict[int, float](), dict[int, float](), 0
@@ -119,7 +120,7 @@ def _evidence(problem: Problem, at: Base, prior: Prior, sets: Sequence[Members])
 def _with(problem: Problem, data: Gram, W: Floats, r: Floats, family: _Family) -> tuple[Gram, Prior]:
     """Gram matrix and prior with the columns of a family behind all others, as large as all that its rows show."""
     D, seen = family.columns, r[family.at]
-    cross = W[family.at].T @ D
+    cross = (W if family.at.all() else W[family.at]).T @ D
     joint = Gram(
         np.block([[data.A, cross], [cross.T, D.T @ D]]), np.concatenate([data.b, D.T @ seen]), data.c, data.rows
     )
@@ -140,11 +141,12 @@ def _strain(problem: Problem, data: Gram, W: Floats, r: Floats, family: _Family 
     prior = problem.prior
     if family is not None:
         data, prior = _with(problem, data, W, r, family)
-        more = np.zeros((len(r), family.columns.shape[1]))
-        more[family.at] = family.columns
-        W = np.concatenate([W, more], axis=1)
     mean, covariance = estimate(data, prior, index)
-    pull = (W @ covariance[:, index]) * (r - W @ mean)[:, None]
+    k, both = W.shape[1], np.column_stack([covariance[:, index], mean])
+    does = W @ both[:k]
+    if family is not None:
+        does[family.at] += family.columns @ both[k:]
+    pull = does[:, :-1] * (r - does[:, -1])[:, None]
     at = [problem.row_places(k) for k in range(len(problem.white))]
     worst = np.ones(len(index))
     for count in BLOCKS:

@@ -53,7 +53,7 @@ def command(
 
 
 def _text(found: "Chronicle") -> list[str]:
-    from camcomp.diagnosis.report.words import digits_alike
+    from camcomp.report.plot import digits_alike
 
     if not found.verdicts:
         return ["nothing is kept here yet"]
