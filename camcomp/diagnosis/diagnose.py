@@ -16,7 +16,7 @@ from camcomp.diagnosis.answer.minor import minor_effects, outlying_rows
 from camcomp.diagnosis.answer.stretch import with_stretches
 from camcomp.diagnosis.fit.bench import Bench, Run
 from camcomp.diagnosis.fit.columns import candidate_causes, working_causes
-from camcomp.diagnosis.fit.gap import gap_of, main_channels, rest_by_actuator
+from camcomp.diagnosis.fit.gap import floor_um, gap_of, main_channels, rest_by_actuator
 from camcomp.diagnosis.fit.intervals import joint_covariance
 from camcomp.diagnosis.fit.lookalikes import without_lookalikes, without_twins
 from camcomp.diagnosis.fit.problem import Problem, open_problem
@@ -98,7 +98,7 @@ def diagnose(
     with part_of_work(0.5, 0.95):
         found = search_causes(problem)
     best = found.fits[found.verdict.best]
-    gap = gap_of(problem)
+    gap = gap_of(problem, best)
     word: Any = "unknown" if found.unknown_in else found.verdict.word
     law = answer_law(problem, best, found.unknown_in) if found.unknown_in else None
     stands = problem
@@ -346,7 +346,7 @@ def _shrinkage(
     else:
         seen = problem.bench
         thetas = [problem.theta_without(best, k) for k in range(len(seen.runs))]
-    floor = gap_of(problem)["noise_floor_um"]
+    floor = round(floor_um(problem), 3)
     return shrinkage_of(problem, best, seen, thetas, _by_energy(problem, best), main_channels(problem), floor)
 
 

@@ -1,12 +1,14 @@
 """The gap that is to be explained: in which channels it is stated, how large it is, and the floor of its noise."""
 
-from collections.abc import Sequence
-
 import numpy as np
 
+from camcomp.diagnosis.fit.bench import CandidateCause, cause_of
+from camcomp.diagnosis.fit.labels import EFFECT_OF, apart, label_name
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.statistics import places
-from camcomp.diagnosis.statistics.cause_sets import Fitted
+from camcomp.diagnosis.statistics.cause_sets import Fitted, total
+from camcomp.diagnosis.statistics.evidence import estimate
+from camcomp.ground import shelf
 from camcomp.ground.datatypes import Floats
 from camcomp.model.effect import Cause
 
@@ -20,10 +22,10 @@ def main_channels(problem: Problem) -> slice:
     return slice(3 + 2 * m, 6 + 2 * m)
 
 
-def gap_sizes(problem: Problem, causes: Sequence[Cause] = ()) -> Floats:
-    """Length (n,), um, of what causes leave of the gap, at all rows of all runs where it is known."""
+def gap_sizes(problem: Problem, f: Fitted) -> Floats:
+    """Length (n,), um, of the gap at all rows of all runs where it is known, without what labels differ by beside the set f."""
     part = main_channels(problem)
-    gaps = [problem.bench.gap(k, causes)[:, part] for k in range(len(problem.residuals))]
+    gaps = [problem.bench.gap(k, of_labels)[:, part] for k, of_labels in enumerate(_label_causes(problem, f))]
     # an axis that nobody measured is no reason to do without the others
     size = np.concatenate(
         [np.where(np.isfinite(g).any(axis=1), np.sqrt(np.nansum(g**2, axis=1)), np.nan) for g in _together(gaps)]
@@ -31,9 +33,27 @@ def gap_sizes(problem: Problem, causes: Sequence[Cause] = ()) -> Floats:
     return np.asarray(size[np.isfinite(size)] * 1e3)
 
 
-def gap_of(problem: Problem) -> dict[str, float]:
-    """Size of the gap over all runs, and of the floor, um."""
-    size = gap_sizes(problem)
+def _label_causes(problem: Problem, f: Fitted) -> list[list[Cause]]:
+    """Per run what its clamping and its clock do by themselves, where they are labelled."""
+    found: list[list[Cause]] = [[] for _ in problem.bench.runs]
+    if not len(problem.columns.of_labels):
+        return found
+    usual = estimate(total(f.grams), problem.prior, problem.member_columns(f.members), f.factor)[0]
+    amplitude = dict(zip(problem.columns.names, usual, strict=True))
+    for label, effect in EFFECT_OF.items():
+        candidate = CandidateCause(effect, None, shelf.load("effects", effect))
+        own = apart([getattr(run, label) for run in problem.bench.runs])
+        for causes, run in zip(found, problem.bench.runs, strict=True):
+            each = getattr(run, label)
+            if each in own:
+                at = {p.name: float(amplitude[label_name(label, each, p.name)]) * p.scale for p in candidate.parameters}
+                causes.append(cause_of(candidate, at))
+    return found
+
+
+def gap_of(problem: Problem, f: Fitted) -> dict[str, float]:
+    """Size of the gap over all runs, and of the floor, um; f: the causes, which labels are seen beside."""
+    size = gap_sizes(problem, f)
     return {
         "rms_um": round(float(np.sqrt(np.mean(size**2))), 3),
         "p95_um": round(float(np.quantile(size, 0.95)), 3),

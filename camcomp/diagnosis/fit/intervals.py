@@ -46,11 +46,11 @@ def joint_covariance(problem: Problem, f: Fitted, *, as_stated: bool = False) ->
     C = size[:, None] * np.linalg.inv(size[:, None] * M * size) * size
     most = np.concatenate([most, np.full(s, np.inf)])
     most[index] = np.inf
-    mean = within(C @ sum(g.T @ r for g, r in zip(G, f.residual, strict=True)), lambda held: C[:, held], most)[0][:k]
+    mean = within(C @ sum(g.T @ r for g, r in zip(G, f.residual, strict=True)), lambda held: C[:, held], most)[0]
     mine = np.array([*index, *range(k, k + s)], int)
     scatter = np.zeros((len(BLOCKS), d + s))
     for run, (g, r) in enumerate(zip(G, f.residual, strict=True)):
-        pull = (g @ C[:, mine]) * (r - g[:, :k] @ mean)[:, None]
+        pull = (g @ C[:, mine]) * (r - g @ mean)[:, None]
         at = problem.row_places(run)
         for b, count in enumerate(BLOCKS):
             block = np.minimum((at * count).astype(int), count - 1)

@@ -262,9 +262,12 @@ def lay_track(path: Path, conditions: Conditions, engaged: Engaged | None = None
     s0 = np.concatenate(([0.0], np.cumsum(length)))[motion] + length[motion] * u0
     middle = 0.5 * (u0 + u1)
     first = path_geometry.tangents(path, motion, u0 + beside0)
-    last = path_geometry.tangents(path, motion, u1 - beside1)
+    arcs = bool((path.kind == ARC).any())  # lines have one direction from end to end
+    last = path_geometry.tangents(path, motion, u1 - beside1) if arcs else first
     feeding = (path.kind[motion] != RAPID) & path.known[motion] & ~path.machine[motion] & (piece_length > 0.0)
-    sine = np.maximum(lateral(first, axis), lateral(path_geometry.tangents(path, motion, middle), axis))
+    sine = lateral(first, axis)
+    if arcs:
+        sine = np.maximum(sine, lateral(path_geometry.tangents(path, motion, middle), axis))
     cutting = feeding & ((sine > PLUNGE_SINE) | conditions.plunges)
     grip = None
     if places is not None:

@@ -39,10 +39,13 @@ class LegBefore:
 
 def legs_of(path: Path, before: LegBefore) -> Legs:
     """The legs of a path."""
-    motion, u0, u1 = _chords(path)
-    start, end = path_geometry.points(path, motion, u0), path_geometry.points(path, motion, u1)
+    arcs = bool((path.kind == ARC).any())
+    motion, u0, u1 = _chords(path) if arcs else (np.arange(len(path)), np.zeros(len(path)), np.ones(len(path)))
+    start, end = path.start, path.end
+    if arcs:
+        start, end = path_geometry.points(path, motion, u0), path_geometry.points(path, motion, u1)
     chord = end - start
-    length = np.linalg.norm(chord, axis=1)
+    length = np.sqrt(np.einsum("ij,ij->i", chord, chord))
     reached = np.concatenate(([before.known], path.known[:-1] & ~path.machine[:-1]))
     seen = path.known & ~path.machine
     kind = np.where(path.kind == RAPID, np.where(seen & reached, RAPID_LEG, UNSEEN_LEG), CUT_LEG)[motion]
@@ -51,8 +54,10 @@ def legs_of(path: Path, before: LegBefore) -> Legs:
     kind = np.where(seen[motion], kind, UNSEEN_LEG)
     on = np.flatnonzero((length > 0.0) | (kind == UNSEEN_LEG))
     motion, kind = motion[on], kind[on]
-    u0, u1, start, end, chord = (each[on] for each in (u0, u1, start, end, chord))
-    first, last = path_geometry.tangents(path, motion, u0), path_geometry.tangents(path, motion, u1)
+    if len(on) < len(length):
+        u0, u1, start, end, chord = (each[on] for each in (u0, u1, start, end, chord))
+    first = path_geometry.tangents(path, motion, u0)
+    last = path_geometry.tangents(path, motion, u1) if arcs else first.copy()
     ends = last.copy()
     joined = np.zeros(len(motion) + 1, np.bool_)
     if len(motion):
@@ -86,9 +91,10 @@ def _chords(path: Path) -> tuple[Ints, Floats, Floats]:
 def _level(direction: Floats, chord: Floats) -> Floats:
     """Unit directions (m, 2) in the plane; that of the chord where there is none."""
     flat = direction[:, :2]
-    size = np.linalg.norm(flat, axis=1, keepdims=True)
-    other = chord[:, :2]
-    flat = np.where(size > 1e-6, flat, other)
-    size = np.linalg.norm(flat, axis=1, keepdims=True)
-    out: Floats = np.divide(flat, size, out=np.tile([1.0, 0.0], (len(flat), 1)), where=size > 0.0)
+    size = np.hypot(flat[:, 0], flat[:, 1])
+    level = size <= 1e-6
+    if level.any():
+        flat = np.where(level[:, None], chord[:, :2], flat)
+        size = np.hypot(flat[:, 0], flat[:, 1])
+    out: Floats = np.divide(flat, size[:, None], out=np.tile([1.0, 0.0], (len(flat), 1)), where=size[:, None] > 0.0)
     return out
