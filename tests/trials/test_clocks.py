@@ -39,6 +39,8 @@ def named(result):
         ((-6.0, 4.0, 9.0, -3.0), "abcd", False, []),
         pytest.param((12.0, 0.0, 0.0, 0.0), ("other", None, None, None), True, [], marks=pytest.mark.campaign),
         ((5.0, 5.0, 5.2, 5.2), "aabb", True, [("time_sync", None)]),
+        # all that an unknown function of velocity would do here is what a late clock does
+        ((5.0, 5.0, 5.2, 5.2), "aabb", False, [("time_sync", None)]),
     ],
 )
 def test_clocks_that_differ_are_nobodys_fault_and_what_they_share_is_a_cause(tmp_path, late_ms, labels, rapids, causes):

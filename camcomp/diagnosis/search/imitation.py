@@ -31,6 +31,10 @@ SAME = 1.0 - 1e-9  # correlation of two places that are one
 DEGREE = 4  # of the polynomials of what depends on several axes at once
 IN_A_RUN = 8  # degree of those of time, for every run anew
 ALL_SETS = 3  # members up to which every subset is looked at; of larger ones each alone, and all but one
+DRAWN = 0.05  # probability of something unknown in a cause's place from which on it is held against what the cause does
+LIKE = (
+    0.1  # of a cause's signal, by which something unknown has to differ to be something else: none is modelled better
+)
 OF_WHAT_MOVES = ("velocity", "reversal", "force", "acceleration", "direction", "temperature")
 
 
@@ -76,11 +80,30 @@ def credibility(
         mine = slice(at, at + len(candidates.columns[i]))
         at = mine.stop
         value = np.array([e / (temperature * strain[mine].max()) + log_prior + odds for e, odds in hypotheses])
-        has = np.array([i in each for each in sets])
-        whole = logsumexp(value)
-        present[i] = float(np.exp(logsumexp(value[:, has]) - whole))
-        replaced[i] = float(np.exp(logsumexp(value[0 if surely else 1 :, ~has]) - whole))
+        has = np.tile([i in each for each in sets], (len(hypotheses), 1))
+        whole, first = logsumexp(value), len(hypotheses) - len(values)
+        likely = first + np.flatnonzero(np.max(np.where(has, -np.inf, value), axis=1)[first:] > whole + np.log(DRAWN))
+        for n, each in enumerate(_families(problem), first):
+            if n in likely:
+                has[n] |= _draws(problem, f, i, W, r, replace(each, columns=weight[each.at, None] * each.columns))
+        unlike = np.exp(value - whole) * ~has
+        present[i] = float(np.sum(np.exp(value - whole) * has))
+        replaced[i] = float(unlike[first:].sum())
     return present, replaced
+
+
+def _draws(problem: Problem, f: Fitted, i: int, W: Floats, r: Floats, family: _Family) -> bool:
+    """Whether the family, beside the other members, draws what member i does: then it is that member by another name.
+
+    Of all that may depend on velocity, a clock that is late makes one; of all that depends on force, a spring that is soft.
+    """
+    own, others = problem.member_columns((i,)), problem.member_columns(tuple(x for x in f.members if x != i))
+    at = problem.member_columns(f.members)
+    signal = W[:, own] @ f.theta[[at.index(c) for c in own]]
+    joint, prior = _with(problem, gram(W, r), W, r, family)
+    drawn = np.zeros(len(r))
+    drawn[family.at] = family.columns @ estimate(joint, prior, others)[0][W.shape[1] :]
+    return float(np.sum((drawn - signal) ** 2)) < LIKE**2 * float(np.sum(signal**2))
 
 
 def _at_the_tip(problem: Problem) -> Floats:
