@@ -159,13 +159,13 @@ def score_(folder, results, jobs, only, listed):
 @click.argument("constants", nargs=-1, metavar="MODULE:NAME...")
 def sensitivity_(out, constants):
     """Halve and double constants below camcomp/diagnosis, e.g. search.cause_search:GATE, and count answers that differ."""
-    experiments = changes.written(out)
-    usual = [changes.answer(each) for each in experiments]
-    for each, said in zip(experiments, usual, strict=True):
-        click.echo(f"{each.parent.name} {said}", err=True)
-    for each in constants:
-        half, double = changes.differing(experiments, usual, *each.split(":"))
-        click.echo(f"{each} {half} {double} of {len(experiments)}")
+    bench = changes.Bench([(each.split(":")[0], each.split(":")[1]) for each in constants])
+    for each in changes.written(out):
+        bench.ask(each)
+        click.echo(f"{each.parent.name} {bench.usual[each]}", err=True)
+        for constant in bench.constants:
+            half, double = bench.changed[constant]
+            click.echo(f"{':'.join(constant)} {half} {double} of {bench.met[constant]}")
 
 
 if __name__ == "__main__":

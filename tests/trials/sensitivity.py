@@ -1,24 +1,29 @@
 """How much the answers of a diagnosis hang on its tuned constants: each halved and doubled on a fixed set of experiments.
 
 The set is small on purpose (three short runs each): what is asked is which constants decide anything at all, and at which
-size of a change, not what the rates are. `python -m tests.trials sensitivity` prints the column of camcomp/data/constants.md.
+size of a change, not what the rates are. A diagnosis goes on in a process of its own, with the constant changed, from
+where it first uses it: what stands before is not worked out again. `python -m tests.trials sensitivity` prints the column of camcomp/data/constants.md.
 """
 
 from __future__ import annotations
 
-import ast
+import contextlib
+import io
+import json
+import os
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections import defaultdict
 from importlib import import_module
 from pathlib import Path
+from types import FrameType
 from typing import Any
 
-import camcomp
-from tests.trials import score
+import numpy as np
+
 from tests.trials.experiment import Plan, make, write
 
-PACKAGE = Path(camcomp.__file__).parent
+FACTORS = (0.5, 2.0)
+WING = "camcomp.diagnosis."
 SHORT = {"runs": 3, "rows": 200, "stated": False, "rapids": True}
 SET = (
     Plan(8101, "null", **SHORT),
@@ -45,50 +50,100 @@ def written(folder: Path) -> list[Path]:
     return out
 
 
-@contextmanager
-def changed(module: str, name: str, factor: float) -> Iterator[None]:
-    """The constant of a module below camcomp/diagnosis, there and wherever it is imported, `factor` times its value."""
-    home = import_module(f"camcomp.diagnosis.{module}")
+def answer(experiment: Path, folder: Path) -> str:
+    """What an answer comes to: verdict and causes; its file stands in the folder."""
+    from camcomp.terminal.cli import run as camcomp
+
+    file = folder / "result.json"
+    file.unlink(missing_ok=True)
+    with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
+        code = camcomp(["diagnose", str(experiment), "--json", str(file)])
+    if not file.exists():
+        return f"exit {code}"
+    result = json.loads(file.read_text())
+    causes = sorted(f"{c['effect']}({c['target']})" for c in result["causes"])
+    return f"{result['verdict']} {' '.join(causes)}"
+
+
+class Bench:
+    """Answers of experiments, and of every constant (module below the wing, name) how many of them it changes when halved, and when doubled."""
+
+    def __init__(self, constants: list[tuple[str, str]]) -> None:
+        self.constants = constants
+        self.homes = {module: import_module(WING + module) for module, _ in constants}
+        self.usual: dict[Path, str] = {}
+        self.met: dict[tuple[str, str], int] = defaultdict(int)
+        self.changed: dict[tuple[str, str], list[int]] = {each: [0, 0] for each in constants}
+
+    def ask(self, experiment: Path) -> None:
+        """Diagnoses an experiment, and on the way all that it would be with each constant halved and doubled."""
+        other: dict[tuple[str, str], list[str]] = {}
+        pending: dict[str, list[tuple[str, str]]] = defaultdict(list)
+        for module, name in self.constants:
+            pending[name].append((module, name))
+        seen = set()
+
+        def on_call(frame: FrameType, event: str, _: Any) -> None:
+            code = frame.f_code
+            if event != "call" or code in seen:
+                return
+            seen.add(code)
+            home = str(frame.f_globals.get("__name__", ""))
+            if not home.startswith("camcomp."):
+                return
+            for name in set(code.co_names) & pending.keys():
+                for module, _ in list(pending[name]):
+                    if frame.f_globals.get(name) is not getattr(self.homes[module], name):
+                        continue  # something else of that name
+                    pending[name].remove((module, name))
+                    other[module, name] = []
+                    for factor in FACTORS:
+                        other[module, name].append(forked(module, name, factor))
+                        if tell:
+                            return  # the copy: it asks for nothing else
+
+        def forked(module: str, name: str, factor: float) -> str:
+            """The answer of a copy of this process that goes on with the changed constant."""
+            reading, writing = os.pipe()
+            child = os.fork()
+            if child:
+                os.close(writing)
+                with os.fdopen(reading) as pipe:
+                    said = pipe.read()
+                os.waitpid(child, 0)
+                return said
+            sys.setprofile(None)
+            os.close(reading)
+            tell.append(writing)
+            _change(module, name, factor)
+            return ""
+
+        tell: list[int] = []
+        sys.setprofile(on_call)
+        said = answer(experiment, experiment.parent)
+        sys.setprofile(None)
+        if tell:
+            os.write(tell[0], said.encode())
+            os._exit(0)
+        self.usual[experiment] = said
+        for each, answers in other.items():
+            self.met[each] += 1
+            for n, one in enumerate(answers):
+                self.changed[each][n] += one != said
+
+
+def _change(module: str, name: str, factor: float) -> None:
+    """Sets a constant below the wing, there and wherever it is imported, to `factor` times its value."""
+    home = import_module(WING + module)
     usual = getattr(home, name)
-    other = _times(usual, factor)
-    places = [home, *(sys.modules[each] for each in _importers(f"camcomp.diagnosis.{module}", name))]
-    for each in places:
-        setattr(each, name, other)
-    try:
-        yield
-    finally:
-        for each in places:
-            setattr(each, name, usual)
+    for each in list(sys.modules.values()):
+        if getattr(each, "__name__", "").startswith("camcomp.") and each.__dict__.get(name) is usual:
+            setattr(each, name, _times(usual, factor))
 
 
 def _times(value: Any, factor: float) -> Any:
     if isinstance(value, tuple):
         return tuple(_times(each, factor) for each in value)
+    if isinstance(value, np.ndarray):
+        return value * factor
     return max(round(value * factor), 1) if isinstance(value, int) else value * factor
-
-
-def _importers(module: str, name: str) -> list[str]:
-    found = []
-    for path in PACKAGE.rglob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.ImportFrom) and node.module == module and name in {a.name for a in node.names}:
-                found.append("camcomp." + ".".join(path.relative_to(PACKAGE).with_suffix("").parts))
-    return [each for each in found if each in sys.modules]
-
-
-def answer(experiment: Path) -> str:
-    """What an answer comes to: verdict and causes."""
-    result = score.ask(experiment)
-    if "failed" in result:
-        return "failed"
-    causes = sorted(f"{c['effect']}({c['target']})" for c in result["causes"])
-    return f"{result['verdict']} {' '.join(causes)}"
-
-
-def differing(experiments: list[Path], usual: list[str], module: str, name: str) -> tuple[int, int]:
-    """How many answers differ with the constant halved and doubled."""
-    counts = []
-    for factor in (0.5, 2.0):
-        with changed(module, name, factor):
-            counts.append(sum(answer(e) != u for e, u in zip(experiments, usual, strict=True)))
-    return counts[0], counts[1]

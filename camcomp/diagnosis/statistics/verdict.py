@@ -9,7 +9,7 @@ from camcomp.diagnosis.statistics.cause_sets import Fitted, Members
 from camcomp.ground.datatypes import Floats
 
 EQUAL_LOG_ODDS = 3.0  # log odds within which two sets are told apart by nobody
-MOST_ODDS = 3.0  # of the leader against a set that the data cannot tell apart from it: the rest is the word of priors
+BARE_ODDS = 3.0  # of the leader against a set that does nearly the same: not worth a mention, and the most that priors alone give
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,9 +39,9 @@ def judge(fits: Sequence[Fitted], probability: Floats, twins: Sequence[tuple[Mem
         if alike and not nested and len(fit.members) <= len(leader.members):
             rivals.append(int(j))
             twin += [int(j)] if same else []
-    # of what no data of this kind can tell apart priors alone make nobody sure
+    # among what the data hardly tell apart a small lead is none, and priors alone make nobody sure
     held = probability.copy()
-    held[twin] = np.maximum(held[twin], held[best] / MOST_ODDS)
+    held[twin] = np.clip(BARE_ODDS * held[twin], held[best] / BARE_ODDS, held[best])
     held[twin] *= probability[twin].sum() / held[twin].sum()
     inclusion: dict[int, float] = {}
     for fit, p in zip(fits, held, strict=True):
