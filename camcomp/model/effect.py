@@ -80,6 +80,7 @@ class Motion:
     stiffness: Floats  # (m,) of the drives, N/mm or N mm/rad; inf = rigid
     ordered: bool = True
     nut: Floats | None = None  # (n, m) encoder and what the screw makes of it, for guides; None: as the encoder
+    cut_before_min: float = 0.0  # of cut_min, what was cut in earlier runs
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,8 +22,9 @@ TIP_MM = 0.003
 ENCODER = {"mm": 5e-4, "rad": 2e-7}
 STEP_S = 0.03
 FORCE = ("cutting_force", None, {"factor": 1.3})
+NEW_TOOLS = ("tool_wear", None, {"growth_per_min": 2.0, "one_tool": 0.0})  # `simulate` begins every program with one
 CASES = {
-    "orthoglide": (FORCE, ("backlash", "y", {"width_mm": 0.02})),
+    "orthoglide": (FORCE, ("backlash", "y", {"width_mm": 0.02}), NEW_TOOLS),
     "delta": (FORCE, ("backlash", "b", {"width_mm": 0.02})),
     "puu": (FORCE, ("backlash", "x", {"width_mm": 0.02})),
     "cartesian": (FORCE, ("backlash", "y", {"width_mm": 0.02})),

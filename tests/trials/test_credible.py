@@ -1,5 +1,7 @@
 """What is named instead of something that no library has."""
 
+import pytest
+
 from tests.trials.experiment import Plan
 from tests.trials.test_diagnosed import answer
 
@@ -12,3 +14,12 @@ def test_three_causes_that_one_unknown_effect_does_as_well_are_not_named(tmp_pat
     result, _ = answer(plan, tmp_path)
     assert result["verdict"] == "unknown"
     assert [each["effect"] for each in result["causes"]] == ["unknown"]
+
+
+@pytest.mark.campaign
+def test_a_lag_that_any_function_of_velocity_draws_but_for_what_is_minor_is_the_lag(tmp_path):
+    """Such a family draws small things beside the lag as well: nothing unknown is claimed for less than is minor at the tip."""
+    causes = (("servo_lag", None), ("gravity", None))
+    result, _ = answer(Plan(1532000, "pair", causes, (3.0, 6.0), machine="router", runs=4, rows=300), tmp_path)
+    assert result["verdict"] == "identified"
+    assert {(each["effect"], each["target"]) for each in result["causes"]} == set(causes)

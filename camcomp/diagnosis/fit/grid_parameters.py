@@ -7,7 +7,7 @@ import numpy as np
 from camcomp.diagnosis.fit.bench import Bench, CandidateCause, cause_of, thinned
 from camcomp.diagnosis.fit.columns import Columns, shape_default
 from camcomp.diagnosis.statistics.cause_sets import total
-from camcomp.diagnosis.statistics.evidence import Gram
+from camcomp.diagnosis.statistics.evidence import PRIOR_WIDTHS, Gram
 from camcomp.ground.datatypes import Floats, Ints
 from camcomp.model import signal_path
 from camcomp.model.effect import Parameter
@@ -53,7 +53,10 @@ def _gains(
     rest: Sequence[Floats],
     whitened: Callable[[int, Floats], Floats],
 ) -> Floats | None:
-    """Chi-square (v,) that the columns of an effect explain with each value of a shape; None where it is not scanned."""
+    """Chi-square (v,) that an effect explains with each value of a shape, its size within its usual one; None where it is not scanned.
+
+    Where rows do not tell a shape (an early stretch of a warm-up is straight, however long that takes), usual sizes do.
+    """
     quick = [quick_columns(bench, candidate, {**shape_default(candidate), p.name: float(value)}) for value in values]
     found = [each for each in quick if each is not None]
     if len(found) < len(values):
@@ -67,7 +70,7 @@ def _gains(
     for v in range(len(values)):
         own = white[:, v * d : v * d + d]
         G = own.T @ own
-        G += (1e-9 * np.trace(G) + 1e-12) * np.eye(d)
+        G += (1.0 / PRIOR_WIDTHS[-1] ** 2) * np.eye(d)
         gains.append(float(h[v * d : v * d + d] @ np.linalg.solve(G, h[v * d : v * d + d])))
     return np.array(gains)
 

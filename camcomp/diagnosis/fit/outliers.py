@@ -43,8 +43,10 @@ def _jumping_off(x: Floats) -> Bools:
     around = x - median_filter(x, min(LONG, len(x)), mode="mirror")
     wide = 1.4826 * float(np.median(np.abs(around)))
     gross = np.abs(around) > GROSS * max(wide, scale, 1e-12)
-    if scale == 0.0 or single.mean() > MANY:
-        single[:] = False
+    if scale == 0.0 or single.mean() > MANY:  # the machine itself moves from row to row: only what is far beyond
+        single = np.abs(beside) > GROSS * max(scale, 1e-12) if scale > 0.0 else np.zeros_like(single)
+        if single.mean() > MANY:
+            single[:] = False
     return np.asarray(single | (gross if gross.mean() < 2.0 * MANY else False))
 
 

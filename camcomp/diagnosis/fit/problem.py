@@ -333,7 +333,9 @@ def open_problem(bench: Bench, candidates: Sequence[CandidateCause], stated_mm: 
     noise = instrument_noise(bench, floor, least_noise(bench, floor), times)
     inflate = less_certain(noise, inflation(bench), tails(bench))
     columns = build(bench, candidates, {}, floor.tip_um, MINOR * floor.tip_um)
-    shapes: dict[int, dict[str, float]] = {i: shape_default(a) for i, a in enumerate(candidates) if a.shapes}
+    shapes: dict[int, dict[str, float]] = {
+        i: shape_default(a) for i, a in enumerate(candidates) if a.shapes or a.switches
+    }
     words = patterns(bench)
     rough = _whiten(bench, columns, [], floor, noise, inflate, times, residuals, shapes, outliers)
     if len(columns.of_labels):
@@ -402,11 +404,12 @@ def _scanned(problem: Problem) -> Problem:
     """The problem with the scanned shapes (pitches, time constants) that explain most of what the others leave: their columns,
     in channels and in white rows, are exchanged in place.
     """
-    own = [c for i in problem.shapes for c in problem.candidates.columns[i]]
+    scanned = [i for i in problem.shapes if problem.columns.candidates[i].shapes]
+    own = [c for i in scanned for c in problem.candidates.columns[i]]
     others = np.setdiff1d(np.arange(len(problem.columns.names)), own)
     rest = beside(problem.base_grams, problem.white, problem.white_residual, problem.columns, others)
     changed: list[tuple[list[int], list[list[Floats]]]] = []
-    for i in problem.shapes:
+    for i in scanned:
         candidate = problem.columns.candidates[i]
         if problem.passing(i):
             always = quick_columns(problem.bench, candidate, never_ending(candidate))

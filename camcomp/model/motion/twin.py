@@ -326,6 +326,7 @@ class Twin:
             home,
             signal_path.springs(self.robot),
             run_path.ordered,
+            cut_before_min=run_path.cut_before_min,
         )
         encoder = signal_path.controlled(servo, self.actuators, motion)
         speed = np.gradient(encoder, t, axis=0) if run_path.ordered and len(t) > 1 else zero

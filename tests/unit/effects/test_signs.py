@@ -1,5 +1,7 @@
 """Signs and sizes of single effects, from their definitions, on motions simple enough to do by hand."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -67,6 +69,17 @@ def test_wear_counts_minutes_of_cutting_and_spares_the_weight():
     load = Load(np.ones((len(m.time), 3)), np.full((len(m.time), 6), 7.0))
     worn = shelf.load("effects", "tool_wear").on_load(load, m, {"growth_per_min": 3.0})
     assert worn.force[-1] == pytest.approx(1.0 + 3.0 * 4.0 / 60.0) and worn.wrench is load.wrench
+
+
+def test_a_new_tool_in_every_run_does_not_wear_by_what_was_cut_before():
+    m = replace(ramp(), cut_before_min=0.5)
+    m = replace(m, cut_min=m.cut_min + 0.5)
+    load, on_load = (
+        Load(np.ones((len(m.time), 3)), np.zeros((len(m.time), 6))),
+        shelf.load("effects", "tool_wear").on_load,
+    )
+    worn, new = (on_load(load, m, {"growth_per_min": 3.0, "one_tool": one}).force[-1, 0] for one in (1.0, 0.0))
+    assert (worn, new) == pytest.approx((1.0 + 3.0 * (0.5 + 4.0 / 60.0), 1.0 + 3.0 * 4.0 / 60.0))
 
 
 def test_the_displaced_workpiece_sees_the_tip_on_the_other_side():
