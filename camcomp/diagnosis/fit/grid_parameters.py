@@ -54,21 +54,16 @@ def _gains(
     whitened: Callable[[int, Floats], Floats],
 ) -> Floats | None:
     """Chi-square (v,) that the columns of an effect explain with each value of a shape; None where it is not scanned."""
-    quick = [quick_columns(bench, candidate, {**shape_default(candidate), p.name: float(value)}) for value in values]
-    found = [each for each in quick if each is not None]
-    if len(found) < len(values):
-        return None
-    d = len(candidate.parameters)
-    white = np.concatenate([
-        whitened(k, np.stack([c[k] for each in found for c in each], axis=2)) for k in range(len(bench.runs))
-    ])  # fmt: skip
-    h = white.T @ np.concatenate(rest)
     gains = []
-    for v in range(len(values)):
-        own = white[:, v * d : v * d + d]
-        G = own.T @ own
-        G += (1e-9 * np.trace(G) + 1e-12) * np.eye(d)
-        gains.append(float(h[v * d : v * d + d] @ np.linalg.solve(G, h[v * d : v * d + d])))
+    for value in values:  # one at a time: together they are as large as all other columns
+        columns = quick_columns(bench, candidate, {**shape_default(candidate), p.name: float(value)})
+        if columns is None:
+            return None
+        white = [whitened(k, np.stack([each[k] for each in columns], axis=2)) for k in range(len(bench.runs))]
+        h = sum(W.T @ r for W, r in zip(white, rest, strict=True))
+        G = sum(W.T @ W for W in white)
+        G = G + (1e-9 * np.trace(G) + 1e-12) * np.eye(len(G))
+        gains.append(float(h @ np.linalg.solve(G, h)))
     return np.array(gains)
 
 
