@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
@@ -34,6 +35,13 @@ AT_DRIVE = {
     "act_rad_per_s2": "its acceleration",
     **_TIME,
 }
+LOADS = {
+    "load_N": "force that the drive exerts on its slide against load and weight, as modelled",
+    "load_Nmm": "torque that the drive of a hinge exerts",
+    "load_<a>_N": "force of another drive, of actuator <a>",
+    "load_<a>_Nmm": "torque of another drive",
+}
+_LOAD = re.compile(r"load(?:_(\w+))?_(?:N|Nmm)")
 REFERENCE_C = 20.0
 
 
@@ -83,10 +91,14 @@ class TipRows(Mapping[str, Floats]):
 
 @dataclass(frozen=True, eq=False)
 class DriveRows(Mapping[str, Floats]):
-    """Covariates of n rows at drive j: its set-points where the control is meant, else its encoder; worked out when asked for."""
+    """Covariates of n rows at drive j: its set-points where the control is meant, else its encoder; worked out when asked for.
+
+    loads: names of loads of drives that are listed, too; any can be asked for.
+    """
 
     motion: Motion
     j: int
+    loads: tuple[str, ...] = ()
     _known: dict[str, Floats] = field(default_factory=dict)
 
     def __getitem__(self, name: str) -> Floats:
@@ -97,22 +109,41 @@ class DriveRows(Mapping[str, Floats]):
     def _of(self, name: str) -> Floats:
         if name in _TIME:
             return _of_time(name, self.motion)
+        if is_load(name):
+            return self._load(load_of(name))
         position = self.motion.encoder[:, self.j]
         order = {"": 0, "_per_s": 1, "_per_s2": 2}[name.removeprefix("act_mm").removeprefix("act_rad")]
         for _ in range(order):
             position = rate(position[:, None], self.motion)[:, 0]
         return position
 
+    def _load(self, actuator: str | None) -> Floats:
+        """What this drive or another one exerts (n,); nothing where no load is known."""
+        if self.motion.held is None:
+            return np.zeros(self.rows)
+        return self.motion.held()[:, self.j if actuator is None else self.motion.names.index(actuator)]
+
     def __iter__(self) -> Iterator[str]:
-        return iter(AT_DRIVE)
+        return iter((*AT_DRIVE, *self.loads))
 
     def __len__(self) -> int:
-        return len(AT_DRIVE)
+        return len(AT_DRIVE) + len(self.loads)
 
     @property
     def rows(self) -> int:
         """How many, n."""
         return len(self.motion.time)
+
+
+def is_load(name: str) -> bool:
+    """Whether a covariate is the load of a drive."""
+    return _LOAD.fullmatch(name) is not None
+
+
+def load_of(name: str) -> str | None:
+    """The actuator that the load of a drive names; None: its own."""
+    found = _LOAD.fullmatch(name)
+    return found[1] if found else None
 
 
 def rate(values: Floats, motion: Motion) -> Floats:
