@@ -87,7 +87,8 @@ def credibility(
             if n in likely:
                 has[n] |= _draws(problem, f, i, W, r, replace(each, columns=weight[each.at, None] * each.columns))
         unlike = np.exp(value - whole) * ~has
-        present[i] = float(np.sum(np.exp(value - whole) * has))
+        # the search, whose evidence is not strained, has found the member: where nothing unknown takes its place, one word against another
+        present[i] = float(np.sum(np.exp(value - whole) * has) + 0.5 * unlike[:first].sum())
         replaced[i] = float(unlike[first:].sum())
     return present, replaced
 
