@@ -67,7 +67,8 @@ class Motion:
 
     `direction` is the sign of travel with its memory: +1, -1, in between while a reversal takes up its presliding
     distance, 0 where no move has been seen yet. `ordered` is false for poses that are not a movement. `held` works out, when it
-    is called, what the drives `names` exert against the load as modelled; None where no load is known.
+    is called, what the drives `names` exert against the load as modelled; None where no load is known. `told` works out where the
+    set-points lead the tip; None where nobody knows.
     """
 
     time: Floats  # (n,) s since the start of the run
@@ -83,6 +84,7 @@ class Motion:
     nut: Floats | None = None  # (n, m) encoder and what the screw makes of it, for guides; None: as the encoder
     names: tuple[str, ...] = ()  # of the actuators
     held: Callable[[], Floats] | None = None  # (n, m) N or N mm
+    told: Callable[[], Floats] | None = None  # (n, 3) mm, program frame
 
 
 @dataclass(frozen=True, eq=False)

@@ -153,7 +153,10 @@ def at_tip(size: Sizes) -> list[Form]:
     if len(axes) > 1:
         for k in range(1, 5):
             angle = "heading_rad" if k == 1 else f"{k}*heading_rad"
-            out.append(Form(f"heading {k}", ("heading_rad",), (f"sin({angle})", f"cos({angle})"), ("", "")))
+            texts = f"sin({angle})", f"cos({angle})"
+            out.append(Form(f"heading {k}", ("heading_rad",), texts, ("", "")))
+            while_moving = tuple(f"moving*{text}" for text in texts)
+            out.append(Form(f"heading {k}", ("heading_rad", "moving"), while_moving, ("", "")))
     for f in [f"f{a}_N" for a in "xyz" if size.wide(f"f{a}_N")]:
         out.append(Form("force", (f,), (f,), ("N",)))
         out.append(Form("force squared", (f,), (f"{f}*abs({f})",), ("N2",)))

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from camcomp.ground.datatypes import Floats
+from camcomp.ground.datatypes import Bools, Floats
 from camcomp.model.effect import Load, Motion
 
 _TIME = {
@@ -18,10 +18,11 @@ _TIME = {
     "cut_min": "minutes that the tool has cut",
 }
 AT_TIP = {
-    **{f"{a}_mm": f"place of the tip along program {a}" for a in "xyz"},
-    **{f"v{a}_mm_per_s": f"velocity of the tip along program {a}" for a in "xyz"},
-    "feed_mm_per_s": "speed of the tip",
-    "heading_rad": "direction of travel in the program's XY plane, from X towards Y",
+    **{f"{a}_mm": f"place of the tip along program {a}, where the set-points lead it" for a in "xyz"},
+    **{f"v{a}_mm_per_s": f"its velocity along program {a}" for a in "xyz"},
+    "feed_mm_per_s": "its speed",
+    "heading_rad": "direction of travel in the program's XY plane, from X towards Y; at standstill the last one",
+    "moving": "1 where the tip travels in the program's XY plane, 0 where it stands or plunges",
     **{f"f{a}_N": f"cutting force on the tool along machine {a}" for a in "xyz"},
     "force_N": "size of the cutting force on the tool",
     **_TIME,
@@ -47,7 +48,11 @@ REFERENCE_C = 20.0
 
 @dataclass(frozen=True, eq=False)
 class TipRows(Mapping[str, Floats]):
-    """Covariates of n rows at the tip: tip (n, 3) mm in the program frame; each is worked out when it is asked for."""
+    """Covariates of n rows at the tip: tip (n, 3) mm in the program frame, for where nobody knows where the set-points lead it; each
+    is worked out when it is asked for.
+
+    What axes and guides do goes with where they were told to be: the load bends the tip away from there, by a millimetre on a robot.
+    """
 
     tip: Floats
     load: Load
@@ -74,19 +79,25 @@ class TipRows(Mapping[str, Floats]):
         if name in _TIME:
             return _of_time(name, self.motion)
         if name[1:] == "_mm":
-            return self.tip[:, "xyz".index(name[0])]
+            return self._place[:, "xyz".index(name[0])]
         if name == "force_N":
             return np.asarray(np.linalg.norm(self.load.force, axis=1))
         if name[0] == "f" and name[2:] == "_N":
             return self.load.force[:, "xyz".index(name[1])]
-        velocity = rate(self.tip, self.motion)
+        velocity = rate(self._place, self.motion)
         if name[0] == "v":
             return velocity[:, "xyz".index(name[1])]
         if name == "feed_mm_per_s":
             return np.asarray(np.linalg.norm(velocity, axis=1))
         if name == "heading_rad":
             return _kept_angle(velocity)
+        if name == "moving":
+            return _moving(velocity).astype(float)
         raise KeyError(name)
+
+    @property
+    def _place(self) -> Floats:
+        return self.tip if self.motion.told is None else self.motion.told()
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,10 +169,15 @@ def rate(values: Floats, motion: Motion) -> Floats:
     return np.asarray(found[np.cumsum(apart) - 1])
 
 
+def _moving(velocity: Floats) -> Bools:
+    """Whether rows (n,) travel in the plane."""
+    speed = np.hypot(velocity[:, 0], velocity[:, 1])
+    return np.asarray(speed > 1e-3 * max(float(speed.max(initial=0.0)), 1e-9))
+
+
 def _kept_angle(velocity: Floats) -> Floats:
     """Heading (n,) rad; at standstill that of the last move, at first that of the first."""
-    speed = np.hypot(velocity[:, 0], velocity[:, 1])
-    moving = speed > 1e-3 * max(float(speed.max(initial=0.0)), 1e-9)
+    moving = _moving(velocity)
     if not moving.any():
         return np.zeros(len(velocity))
     last = np.maximum.accumulate(np.where(moving, np.arange(len(velocity)), -1))

@@ -84,7 +84,7 @@ def respond(
         )
         return np.nan_to_num(where.drive)
 
-    motion = replace(motion, names=job.real_machine.actuators, held=held)
+    motion = replace(motion, names=job.real_machine.actuators, held=held, told=lambda: commanded)
     error, guided = signal_path.driven(job.causes, job.real_machine.actuators, motion)
     effort = signal_path.drive_forces(job.causes, job.real_machine.actuators, guided)
     load = loading()

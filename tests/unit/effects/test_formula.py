@@ -89,6 +89,22 @@ def test_the_response_has_it_and_the_correction_takes_it_out(tmp_path):
     assert respond(job, told, travel)[0] == pytest.approx(target, abs=2e-5)
 
 
+def test_the_place_is_where_the_set_points_lead_the_tip_and_not_where_the_load_bends_it(tmp_path):
+    plain = Job(load_config([str(CONFIG / "orthoglide.yaml")]))
+    job = job_with(tmp_path, "effect: formula, stage: structure, axis: x, formula: 0.1*y_mm", machine="orthoglide")
+    told, at = np.array([[5.0, 10.0, 0.0]]), (np.zeros(1), np.zeros(1), np.ones(1, bool))
+    travel = Travel(np.array([[150.0, 180.0, 60.0]]), *at)
+    loaded, found = respond(plain, told, travel)[0], respond(job, told, travel)[0]
+    assert abs(loaded - told)[0, 1] > 0.05
+    assert found - loaded == pytest.approx(np.array([[1.0, 0.0, 0.0]]), abs=1e-9)
+
+
+def test_where_the_tip_stands_or_plunges_it_does_not_move_in_the_plane(tmp_path):
+    job = job_with(tmp_path, "effect: formula, stage: structure, axis: x, formula: moving")
+    way = np.array([[0, 0, 5], [0, 0, 3], [0, 0, 0], [0, 0, 0], [2, 0, 0], [4, 0, 0], [6, 1, 0]], float)
+    assert shifts(job, way)[2][:, 0].tolist() == [0, 0, 0, 1, 1, 1, 1]
+
+
 # springs of the machine files: a law that goes evenly with a drive's own load is a softer spring
 @pytest.mark.parametrize(
     ("machine", "target", "load", "spring", "at"),
