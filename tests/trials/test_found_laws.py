@@ -54,23 +54,28 @@ def test_what_acts_in_one_run_alone_is_a_while_on_its_drive(tmp_path):
     assert law.after_rms_um < 0.25 * law.before_rms_um
 
 
-def test_a_drive_that_another_drives_load_moves_is_told_so_and_its_spring_not_blamed(tmp_path):
-    plan, runs = Plan(1, rows=80, stated=True), []
+@pytest.mark.parametrize(
+    ("machine", "target", "size", "term", "unit"),
+    [("orthoglide", "x", 1.2, "load_y_N", "mm/N"), ("kuka-kr210", "A3", 7.0, "load_A4_Nmm", "rad/N mm")],
+)
+def test_a_drive_that_another_drives_load_moves_is_told_so_and_its_spring_not_blamed(
+    tmp_path, machine, target, size, term, unit
+):
+    plan, runs = Plan(1, machine=machine, rows=80, stated=True), []
     for i, name in enumerate(("circles-exact", "zigzag-blended", "pocket-10um")):
         runs.append(Run(recording.load(name), True, 300.0 * i))
-    size = 1.2
-    moved = Fault("crosstalk", "x", {"size": size, "place_mm": 0.0})
-    rng, machine = np.random.default_rng(1), MACHINES["orthoglide"]
-    states = [observe(machine, r, Faults((moved,)), Character(), row_times(r, plan, True, rng)) for r in runs]
+    moved = Fault("crosstalk", target, {"size": size, "place_mm": 0.0})
+    rng, truth = np.random.default_rng(1), MACHINES[machine]
+    states = [observe(truth, r, Faults((moved,)), Character(), row_times(r, plan, True, rng)) for r in runs]
     files = open_experiment(write(Made(runs, states, {"runs": [{} for _ in runs]}), plan, tmp_path))
-    causes = [CandidateCause("drive_stiffness", at, shelf.load("effects", "drive_stiffness")) for at in "xyz"]
+    causes = [CandidateCause("drive_stiffness", at, shelf.load("effects", "drive_stiffness")) for at in truth.actuators]
     problem = open_problem(Bench(files.twin, files.runs), causes, 0.003)
-    answer = answer_law(problem, standing(problem, (0,)), "tip")
+    answer = answer_law(problem, standing(problem, (truth.actuators.index(target),)), "tip")
     assert answer.fit.members == ()  # the law tells it better than the spring
-    (term,) = answer.law.terms
-    assert (term.term, term.unit) == ("drive x: load_y_N", "mm/N")
+    (found,) = answer.law.terms
+    assert (found.term, found.unit) == (f"drive {target}: {term}", unit)
     # what the structure exerts on a drive is the opposite of what the drive exerts
-    assert term.value == pytest.approx(-2e-4 * size, rel=0.03)
+    assert found.value == pytest.approx(-2e-4 * size / truth.reach**2, rel=0.03)
     assert answer.law.after_rms_um < 0.2 * answer.law.before_rms_um
 
 
