@@ -197,8 +197,6 @@ def _strain(
 
 def _families(problem: Problem) -> Iterator[_Family]:
     """Of all that something unknown may depend on."""
-    sizes = [[len(part) for part in parts] for parts in problem.white_patterns]
-    kinds = [np.repeat(np.arange(len(parts)), parts) for parts in sizes]
     everywhere = _kinds(problem)
     kinds_of = [words.kind for words in problem.dictionaries]
     names = [name for words in problem.dictionaries for name in words.labels]
