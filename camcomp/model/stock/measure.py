@@ -15,8 +15,8 @@ from typing import Any, NamedTuple
 
 from camcomp.ground.datatypes import Floats
 from camcomp.model.statics.compiled import inner
-from camcomp.model.stock.field import CELL, XMAX, XMIN, YMAX, YMIN, ZMAX, ZMIN, height
-from camcomp.model.stock.sweeps import FLAT, KIND, RADIUS, bottom, radius_at, slope
+from camcomp.model.stock.field import CELL, XMAX, XMIN, YMAX, YMIN, ZMAX, ZMIN, above, height
+from camcomp.model.stock.sweeps import FLAT, KIND, RADIUS, bottom, passes, radius_at, slope
 
 EDGE, FLOOR = 0.002, 0.001  # mm
 FEWEST, MOST = 16, 48  # angles at which the front of a tool is looked at
@@ -123,23 +123,20 @@ def step_beside(nodes, place, radius, z, edge, psi, here):
 
 
 @inner
-def look_round(nodes, place, bites, n, radius, z, tall, rise, run, least):
-    """Arcs at one height of the tool. tall: height of the slice that they stand for, 0: as high as the material is.
-
-    least (rad): angle at both sides at which the surface begins to move towards the material.
-    """
+def look_round(nodes, place, bites, n, radius, z):
+    """Arcs of a cylinder, as high as the material is in each; the number of arcs."""
     count = angles_of(nodes, radius)
-    begin, end = least + END_ANGLE, math.pi - least - END_ANGLE
+    begin, end = END_ANGLE, math.pi - END_ANGLE
     start, top, sum_, members = -1.0, 0.0, 0.0, 0
     before, last = 0.0, begin
     for k in range(count + 2):
         psi = end if k == count + 1 else (begin if k == 0 else begin + (k - 0.5) / count * (end - begin))
         now = stands(nodes, place, radius, z, psi)
         mean = sum_ / members if members > 0 else 0.0  # a slope is divided as often as it takes
-        same = abs(now - mean) <= 2.0 * EDGE + 0.02 * max(now, mean) if tall == 0.0 else (now > 0.0) == (before > 0.0)
+        same = abs(now - mean) <= 2.0 * EDGE + 0.02 * max(now, mean)
         if k == 0:
             if now > 0.0:
-                start, sum_, members = least, now, 1
+                start, sum_, members = 0.0, now, 1
         elif same and (now > 0.0) == (before > 0.0):
             if now > 0.0:
                 sum_ += now
@@ -149,21 +146,97 @@ def look_round(nodes, place, bites, n, radius, z, tall, rise, run, least):
             at = edge_between(nodes, place, radius, z, last, psi, 0.5 * (now + before) if both else 0.0)
             if before > 0.0:
                 step, high = at, 0.0
-                if tall == 0.0 and not both:
+                if not both:
                     step, high = step_beside(nodes, place, radius, z, at, last, before)
-                n = add_bite(place, bites, n, start, step, tall if tall > 0.0 else sum_ / members, rise, run)
-                n = add_bite(place, bites, n, step, at, high, rise, run)
+                n = add_bite(place, bites, n, start, step, sum_ / members, 1.0, 0.0)
+                n = add_bite(place, bites, n, step, at, high, 1.0, 0.0)
                 top = max(top, high)
             start, sum_, members = at, now, 1
-            if now > 0.0 and tall == 0.0 and not both:
+            if now > 0.0 and not both:
                 start, high = step_beside(nodes, place, radius, z, at, psi, now)
-                n = add_bite(place, bites, n, at, start, high, rise, run)
+                n = add_bite(place, bites, n, at, start, high, 1.0, 0.0)
                 top = max(top, high)
         top = max(top, now)
         before, last = now, psi
     if before > 0.0:
-        n = add_bite(place, bites, n, start, math.pi - least, tall if tall > 0.0 else sum_ / members, rise, run)
+        n = add_bite(place, bites, n, start, math.pi, sum_ / members, 1.0, 0.0)
     place.told[DEPTH] = max(place.told[DEPTH], top)
+    return n
+
+
+@inner
+def point_of(place, radius, c, s):
+    """Where the tool's front has a radius at an angle with this cosine and sine."""
+    ex, ey = place.at[3], place.at[4]
+    return place.at[0] + radius * (s * ex - c * ey), place.at[1] + radius * (s * ey + c * ex)
+
+
+@inner
+def taken(nodes, place, x, y, level):
+    """Whether what is not cut away yet, but taken, is as low as a level over a point."""
+    for r in range(place.many[0]):
+        if passes(nodes.sweeps, nodes.tools, place.recent[r], 1, x, y, level):
+            return True
+    return False
+
+
+@inner
+def meets(nodes, place, radius, level, c, s, beside):
+    """Whether material stands higher than a level at an angle of the tool's front. beside: as what was taken may lie there."""
+    x, y = point_of(place, radius, c, s)
+    return above(nodes, x, y, level) and not (beside and taken(nodes, place, x, y, level))
+
+
+@inner
+def clear(nodes, place, radius, level, psi, step, most):
+    """How many angles, from one side of the front in equal steps on, what was taken may lie at: it is attached to that side."""
+    for k in range(most):
+        x, y = point_of(place, radius, math.cos(psi + k * step), math.sin(psi + k * step))
+        if not taken(nodes, place, x, y, level):
+            return k
+    return most
+
+
+@inner
+def look_slice(nodes, place, bites, n, radius, z, tall, rise, run, least):
+    """Arcs of a slice of this height (mm) of the tool, with this rise and run; the number of arcs.
+
+    least (rad): angle at both sides at which the surface begins to move towards the material.
+    """
+    count = angles_of(nodes, radius)
+    level = max(z, nodes.place[ZMIN]) + FLOOR
+    begin = least + END_ANGLE
+    step = (math.pi - 2.0 * begin) / (count + 1)
+    first = clear(nodes, place, radius, level, begin, step, count + 2)
+    final = count + 1 - clear(nodes, place, radius, level, math.pi - begin, -step, count + 2)
+    c, s = math.cos(begin), math.sin(begin)
+    turn_c, turn_s = math.cos(step), math.sin(step)
+    start = least
+    before = meets(nodes, place, radius, level, c, s, first > 0)
+    for k in range(1, count + 2):
+        c0, s0 = c, s
+        c, s = c * turn_c - s * turn_s, s * turn_c + c * turn_s
+        now = meets(nodes, place, radius, level, c, s, k < first or k > final)
+        if now == before:
+            continue
+        c1, s1 = c, s
+        at, part = begin + (k - 1) * step, 0.5 * step
+        for _ in range(TURNS):
+            cm, sm = c0 + c1, s0 + s1
+            size = math.sqrt(cm * cm + sm * sm)
+            cm, sm = cm / size, sm / size
+            if meets(nodes, place, radius, level, cm, sm, k <= first or k > final) == before:
+                c0, s0 = cm, sm
+                at += part
+            else:
+                c1, s1 = cm, sm
+            part *= 0.5
+        at += part
+        if before:
+            n = add_bite(place, bites, n, start, at, tall, rise, run)
+        start, before = at, now
+    if before:
+        n = add_bite(place, bites, n, start, math.pi - least, tall, rise, run)
     return n
 
 
@@ -172,8 +245,11 @@ def cuts_at(nodes, place, row, lift, k, count):
     """Whether a tool that is no cylinder meets material at a height over its tip and at an angle of its front."""
     radius = radius_at(nodes.tools, row, lift)
     least = least_angle(place.at[5], 1.0 / max(slope(nodes.tools, row, radius), 1e-12))
+    if least >= 0.5 * math.pi:
+        return False
     psi = least + (k + 0.5) / count * (math.pi - 2.0 * least)
-    return least < 0.5 * math.pi and stands(nodes, place, max(radius - EDGE, 0.0), place.at[2] + lift, psi) > 0.0
+    level = max(place.at[2] + lift, nodes.place[ZMIN]) + FLOOR
+    return meets(nodes, place, max(radius - EDGE, 0.0), level, math.cos(psi), math.sin(psi), True)
 
 
 @inner
@@ -245,7 +321,7 @@ def look_over(nodes, place, bites, n, row):
         least = least_angle(place.at[5], 1.0 / max(slope(nodes.tools, row, radius), 1e-12))
         radius -= EDGE
         if least < 0.5 * math.pi and radius > 0.0:
-            n = look_round(nodes, place, bites, n, radius, z + middle, b - a, (b - a) / edge, run / edge, least)
+            n = look_slice(nodes, place, bites, n, radius, z + middle, b - a, (b - a) / edge, run / edge, least)
     place.told[DEPTH] = high if place.told[ARCS] > 0.0 else 0.0
     return n
 
@@ -264,7 +340,7 @@ def measure(nodes, place, bites, n):
     if x < bounds[XMIN] - radius or x > bounds[XMAX] + radius or y < bounds[YMIN] - radius or y > bounds[YMAX] + radius:
         return n
     if nodes.tools[row, KIND] == FLAT:
-        n = look_round(nodes, place, bites, n, radius - EDGE, z, 0.0, 1.0, 0.0, 0.0)
+        n = look_round(nodes, place, bites, n, radius - EDGE, z)
     else:
         n = look_over(nodes, place, bites, n, row)
     told[ENGAGED] = united(place)

@@ -11,7 +11,7 @@ from camcomp.ground.datatypes import Floats, Ints, Path
 from camcomp.model.cutting.engaged import Bites, Engaged
 from camcomp.model.stock.at_tip import meet, take_way
 from camcomp.model.stock.facets import facets_on
-from camcomp.model.stock.field import TOUCHED, USED, XMAX, XMIN, ZMAX, ZMIN, room_for
+from camcomp.model.stock.field import SPAN, TOUCHED, USED, XMAX, XMIN, ZMAX, ZMIN, room_for
 from camcomp.model.stock.legs import LegBefore, Legs, legs_of
 from camcomp.model.stock.march import ROOM_FOR_ARCS, ROOM_FOR_PLACES, march, peek, settle
 from camcomp.model.stock.measure import BITE, DEPTH, EDGE, ENGAGED, WHAT, Place
@@ -42,9 +42,10 @@ class StockMemory:
         self.cell = cell_for(stock, tools) if cell_mm is None else cell_mm
         self._number = {number: k for k, number in enumerate(tools)}
         rows = np.array([row for each in tools.values() for row in each.rows()])
+        rise = max(each.rise(SPAN * self.cell) for each in tools.values())
         size = np.ceil((stock.high - stock.low)[:2] / self.cell).astype(int) + 2 * MARGIN
         place = np.concatenate(
-            (stock.low[:2] - (MARGIN - 0.5) * self.cell, [self.cell, stock.form], stock.low, stock.high)
+            (stock.low[:2] - (MARGIN - 0.5) * self.cell, [self.cell, stock.form], stock.low, stock.high, [rise])
         )
         facet, mesh = facets_on(stock, place, size)
         self.nodes = room_for(place, int(size[1]), int(size[0]), rows, 1 << 12, facet, mesh)
