@@ -50,7 +50,7 @@ class StockMemory:
         facet, mesh = facets_on(stock, place, size)
         self.nodes = room_for(place, int(size[1]), int(size[0]), rows, 1 << 12, facet, mesh)
         self._place = Place(
-            np.zeros(6), np.zeros(1, np.int64), np.zeros(MOST_RECENT, np.int64), np.zeros(1, np.int64), np.zeros(WHAT),
+            np.zeros(8), np.zeros(1, np.int64), np.zeros(MOST_RECENT, np.int64), np.zeros(1, np.int64), np.zeros(WHAT),
             np.zeros((ARCS, 2)),
         )  # fmt: skip
         n, r, deep = 4 * ROOM_FOR_PLACES, 2 * ROOM_FOR_ARCS, DEEP + CHAIN_DEEP
@@ -110,7 +110,7 @@ class StockMemory:
         The depth in mm, and the arcs of this one place. Not to be mixed with `follow`.
         """
         n = meet(self.nodes, self._place, self._found, tip, direction, self._tool(tool))
-        start, stop, height, rise, run = self._found.bites[:n].T.copy()
+        start, stop, height, rise, run, _ = self._found.bites[:n].T.copy()
         return float(self._place.told[DEPTH]), Bites(np.zeros(n, np.int64), start, stop, height, rise, run)
 
     def take(self, start: Floats, end: Floats, tool: int, lag_mm: float) -> None:
@@ -213,6 +213,6 @@ def _engaged(parts: list[_Places], legs: Legs) -> Engaged:
     motion, at, told, first, many = motion[keep], at[keep], told[keep], first[keep], many[keep]
     place = np.repeat(np.arange(len(many)), many)
     row = np.repeat(first - (np.cumsum(many) - many), many) + np.arange(int(many.sum()))
-    start, stop, height, rise, run = bites[row].T
+    start, stop, height, rise, run, _ = bites[row].T
     bites_of = Bites(place, start, stop, height, rise, run)
     return Engaged(motion, at, told[:, DEPTH], told[:, ENGAGED], bends[kept], bites_of)

@@ -156,13 +156,11 @@ def passes(sweeps, tools, k, slim, x, y, z):
     if off * off + over * over <= left:
         return True
     low, high = 0.0, length  # where the centre is not above the height
+    if max(up, up - climb * length) < 0.0:
+        return False
     if climb > 0.0:
         high = min(high, up / climb)
     elif climb < 0.0:
         low = max(low, up / climb)
-    elif up < 0.0:
-        return False
-    if low > high:
-        return False
     off = min(max(s, low), high) - s
     return off * off <= left
