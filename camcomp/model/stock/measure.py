@@ -40,6 +40,7 @@ TURNS = 8  # halvings of the step between them
 ASIDE = 0.02  # of such a step: beside an edge
 SCAN, SLICES = 12, 8  # heights of a tool that is no cylinder: to find where it cuts, and there
 NEAR = 1e-4  # mm to which the lowest and highest cut of such a tool are found
+CLOSER = 6  # halvings of the angle beside the one where the highest was found
 END_ANGLE = 1e-3  # rad from the sides of the front half; on less, a wall just cut lies against the tool
 BITE = (
     6  # columns of an arc: entry, exit (rad), height (mm), rise and run of the tool's surface per length of its edge,
@@ -304,24 +305,43 @@ def least_angle(climb, run):
 
 
 @inner
-def limit(nodes, place, row, inside, outside, count):
-    """Height over the tip between one where the tool cuts and one where it does not, to which it cuts at any angle."""
-    best = inside
-    step = 1.0 if outside > inside else -1.0
-    for k in range(count):
-        if step * (outside - best) <= NEAR:
-            break
-        if not cuts_at(nodes, place, row, best + 0.1 * step * NEAR, k, count):
-            continue
-        a, b = best, outside
-        while abs(b - a) > NEAR:
-            middle = 0.5 * (a + b)
-            if cuts_at(nodes, place, row, middle, k, count):
-                a = middle
-            else:
-                b = middle
-        best = a
+def limit(nodes, place, row, inside, outside, k, count):
+    """Height over the tip between one where the tool cuts, at angle k, and one where it does not, to which it cuts at any angle."""
+    best, most = inside, float(k)
+    for turn in range(count):
+        best, most = farther(nodes, place, row, best, outside, most, float(turn), count)
+    if outside < inside:
+        return best
+    apart, end = 0.5, nodes.place[ZMAX] - place.at[2]
+    for _ in range(CLOSER):  # a ridge may end in between
+        middle = most
+        for side in (-1.0, 1.0):
+            at = min(max(middle + side * apart, 0.0), count - 1.0)
+            best, most = farther(nodes, place, row, best, end, most, at, count)
+        apart *= 0.5
     return best
+
+
+@inner
+def farther(nodes, place, row, best, outside, most, at, count):
+    """How far the tool cuts, and at which angle: `best` at `most`, or more at another one."""
+    step = 1.0 if outside > best else -1.0
+    if step * (outside - best) <= NEAR or not cuts_at(nodes, place, row, best + 0.1 * step * NEAR, at, count):
+        return best, most
+    a, b, gap = best, best, 8.0 * NEAR
+    while b != outside:  # steps that grow, and then halves
+        b = best + step * min(gap, step * (outside - best))
+        if not cuts_at(nodes, place, row, b, at, count):
+            break
+        a = b
+        gap *= 2.0
+    while abs(b - a) > NEAR:
+        middle = 0.5 * (a + b)
+        if cuts_at(nodes, place, row, middle, at, count):
+            a = middle
+        else:
+            b = middle
+    return a, at
 
 
 @inner
@@ -330,26 +350,26 @@ def look_over(nodes, place, bites, n, row):
     highest = nodes.place[ZMAX] - place.at[2]
     count = angles_of(nodes, nodes.tools[row, RADIUS])
     low, high, above, below = -1.0, -1.0, highest, 0.0
-    before, last = 0.0, 0
+    before, last, first = 0.0, 0, 0
     for j in range(SCAN):
         lift = highest * ((j + 0.5) / SCAN) ** 2
         found = False
         for turn in range(count):
             k = (last + turn) % count  # where it cuts a little lower it mostly does here
-            if cuts_at(nodes, place, row, lift, k, count):
+            if cuts_at(nodes, place, row, lift, float(k), count):
                 found, last = True, k
                 break
         if found:
             if low < 0.0:
-                low, below = lift, before
+                low, below, first = lift, before, last
             high, above = lift, highest
         elif high == before and high > 0.0:
             above = lift
         before = lift
     if low < 0.0:
         return n
-    high = limit(nodes, place, row, high, above, count)
-    low = limit(nodes, place, row, low, below, count)
+    high = limit(nodes, place, row, high, above, last, count)
+    low = limit(nodes, place, row, low, below, first, count)
     if low < 1e-3:
         low = 0.0
     for j in range(SLICES):  # thinner towards both ends, where the arcs change most
