@@ -13,7 +13,7 @@ from camcomp.compensation.long.met_loads import lay_met
 from camcomp.compensation.long.plain_run import NotInPieces, PlainRun
 from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import LINE, RAPID, Bools, Floats, Ints, Path
-from camcomp.model.cutting.engaged import Places
+from camcomp.model.cutting.engaged import EngagedAt
 from camcomp.model.cutting.grip import needed
 from camcomp.model.cutting.track import JOIN_ANGLE, PLUNGE_SINE, Conditions, base_of, lay_track
 from camcomp.model.job import Job
@@ -178,7 +178,7 @@ def _where_met(run: PlainRun, path: Path, own: slice, c: Conditions, met: Met) -
         at = np.where(w == 1.0, u1[move], u0[move] + w * (u1[move] - u0[move]))
         return np.column_stack(places.sizes(of[move], at, w == 0.0))
 
-    places = Places(motion, u, depth, turn)
+    places = EngagedAt(motion, u, depth, turn)
     return Loads(f0, f1, jump[a : b + 1], length[a:b], at, parts, of - own.start, sizes)
 
 

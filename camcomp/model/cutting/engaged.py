@@ -52,7 +52,7 @@ class Bites:
 
 
 @dataclass(frozen=True, eq=False)
-class Places:
+class EngagedAt:
     """Places (k,) along the motions of a path, in order; between them the engagement is a straight line.
 
     Two places at one fraction of a motion: it jumps there. Motions without places meet nothing.
@@ -93,7 +93,7 @@ class Places:
 
 
 @dataclass(frozen=True, eq=False)
-class Engaged(Places):
+class Engaged(EngagedAt):
     """Places with all that the force depends on."""
 
     bends: Bools  # (k,) the force depends on it; others only tell how deep the tool is

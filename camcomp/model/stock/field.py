@@ -152,9 +152,8 @@ def above(nodes, x, y, z):
     highest = max(max(low[i, j], low[i, j + 1]), max(low[i + 1, j], low[i + 1, j + 1]))
     lowest = min(min(low[i, j], low[i, j + 1]), min(low[i + 1, j], low[i + 1, j + 1]))
     a, b, c, d = own[i, j], own[i, j + 1], own[i + 1, j], own[i + 1, j + 1]
-    if a > 0 and b > 0 and c > 0 and d > 0 and (a != b or a != c or a != d):
-        if highest - lowest <= TIE:
-            return highest > z + TIE
+    if a > 0 and b > 0 and c > 0 and d > 0 and (a != b or a != c or a != d) and highest - lowest <= TIE:
+        return highest > z + TIE
     if lowest - nodes.last[SLACK] > z and place[FORM] == BOX and (
         min(x - place[XMIN], place[XMAX] - x) > 2.0 * cell and min(y - place[YMIN], place[YMAX] - y) > 2.0 * cell
     ):  # fmt: skip
