@@ -4,7 +4,7 @@ What such a module has to have, and what its hooks are given, stands in camcomp/
 camcomp/model/signal_path.py calls the hooks, stage by stage, effects in the order of the config.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -66,7 +66,9 @@ class Motion:
     """How the machine moves through n instants in order: what hooks may depend on. m actuators, mm or rad, s.
 
     `direction` is the sign of travel with its memory: +1, -1, in between while a reversal takes up its presliding
-    distance, 0 where no move has been seen yet. `ordered` is false for poses that are not a movement.
+    distance, 0 where no move has been seen yet. `ordered` is false for poses that are not a movement. `held` works out, when it
+    is called, what the drives `names` exert against the load as modelled; None where no load is known. `told` works out where the
+    set-points lead the tip; None where nobody knows.
     """
 
     time: Floats  # (n,) s since the start of the run
@@ -80,6 +82,9 @@ class Motion:
     stiffness: Floats  # (m,) of the drives, N/mm or N mm/rad; inf = rigid
     ordered: bool = True
     nut: Floats | None = None  # (n, m) encoder and what the screw makes of it, for guides; None: as the encoder
+    names: tuple[str, ...] = ()  # of the actuators
+    held: Callable[[], Floats] | None = None  # (n, m) N or N mm
+    told: Callable[[], Floats] | None = None  # (n, 3) mm, program frame
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,8 +8,6 @@ from camcomp.ground.datatypes import Floats
 from camcomp.ground.machine_code import kept
 
 STILL = 1e-9  # mm or rad, round-off of two solutions of the same point
-_PARTS = 40  # of a period in which a loop is followed: its phase is right to 0.2 %
-_FORGOTTEN = 1000.0  # periods of a pause behind which no loop swings any more
 PRESLIDING_MM = 0.005  # rolling guides take 1 to 20 um to turn their friction round (Armstrong-Helouvry 1994)
 
 
@@ -34,37 +32,48 @@ def first_order(x: Floats, time: Floats, tau: float) -> Floats:
 
 
 @kept
+def _free_swing(w, damping, dt):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """What a loop left alone for dt keeps: of its error by error and by rate, of its rate by error and by rate."""
+    fade, square = damping * w, (damping * damping - 1.0) * w * w
+    if square < 0.0:
+        q = np.sqrt(-square)
+        even, odd = np.exp(-fade * dt) * np.cos(q * dt), np.exp(-fade * dt) * np.sin(q * dt) / q
+    else:
+        q = np.sqrt(square)
+        slow, ratio = np.exp(-(fade - q) * dt), np.exp(-2.0 * q * dt)
+        even = 0.5 * slow * (1.0 + ratio)
+        odd = slow * dt if q == 0.0 else -0.5 * slow * np.expm1(-2.0 * q * dt) / q
+    return even + fade * odd, odd, -w * w * odd, even - fade * odd
+
+
+@kept
 def _second_order(x, t, period, damping):  # type: ignore[no-untyped-def]  # pragma: no cover
     n = x.shape[0]
     y = np.zeros_like(x)
     w = 2.0 * np.pi / period
-    for j in range(x.shape[1]):
-        push = rate = 0.0
-        for i in range(1, n):
-            dt = t[i] - t[i - 1]
-            after = t[i + 1] - t[i] if i + 1 < n else 0.0
+    push = np.zeros(x.shape[1])
+    rate = np.zeros(x.shape[1])
+    for i in range(1, n):
+        dt = t[i] - t[i - 1]
+        if dt <= 0.0:
+            y[i] = y[i - 1]
+            push[:] = 0.0
+            continue
+        after = t[i + 1] - t[i] if i + 1 < n else 0.0
+        ee, er, re, rr = _free_swing(w, damping, dt)
+        for j in range(x.shape[1]):
             bend = 0.0
-            if dt > 0.0 and after > 0.0:
+            if after > 0.0:
                 bend = 2.0 * ((x[i + 1, j] - x[i, j]) / after - (x[i, j] - x[i - 1, j]) / dt) / (dt + after)
-            if dt > _FORGOTTEN * period:
-                y[i, j], rate, push = -bend / (w * w), 0.0, bend
-                continue
-            parts = int(np.ceil(dt * _PARTS / period))
-            h = dt / max(parts, 1)
-            error = y[i - 1, j]
-            force = -push - 2.0 * damping * w * rate - w * w * error
-            for k in range(parts):  # mean acceleration over a part: exact in energy, never unstable
-                now = push + (bend - push) * (k + 1) / parts
-                left = (
-                    -now
-                    - 2.0 * damping * w * (rate + 0.5 * h * force)
-                    - w * w * (error + h * rate + 0.25 * h * h * force)
-                )
-                new = left / (1.0 + damping * w * h + 0.25 * w * w * h * h)
-                error += h * rate + 0.25 * h * h * (force + new)
-                rate += 0.5 * h * (force + new)
-                force = new
-            y[i, j], push = error, bend
+            # where the loop runs straight along with an acceleration that is straight, and what swings about that
+            slope = (bend - push[j]) / dt
+            run = -slope / (w * w)
+            late = 2.0 * damping * slope / w
+            error = y[i - 1, j] + (push[j] - late) / (w * w)
+            drift = rate[j] - run
+            y[i, j] = ee * error + er * drift - (bend - late) / (w * w)
+            rate[j] = re * error + rr * drift + run
+            push[j] = bend
     return y
 
 
@@ -72,7 +81,7 @@ def second_order(x: Floats, time: Floats, period: float, damping: float) -> Floa
     """Position minus set-point x (n, m) of a second-order loop with velocity feed-forward; period s, time (n,) s, not decreasing.
 
     e'' + 2 d w e' + w^2 e = -x'', the set-point's acceleration x'' being straight between two instants. Settled at the start.
-    Source: Newmark 1959, mean acceleration.
+    Exact, whatever the period.
     """
     out: Floats = _second_order(np.ascontiguousarray(x), np.ascontiguousarray(time), period, damping)
     return out

@@ -17,7 +17,7 @@ from camcomp.ground.files import shipped
 from camcomp.ground.rules import RULES
 from camcomp.model.config.load import params_of
 from camcomp.model.config.yaml_tree import Node, plain, read_tree
-from camcomp.model.law.covariates import AT_DRIVE, AT_TIP
+from camcomp.model.law.covariates import AT_DRIVE, AT_TIP, LOADS
 from camcomp.model.law.expression import FUNCTIONS
 from camcomp.terminal.cli import cli
 from camcomp.terminal.key_reference import ROOTS, default_text, rows, sections, title, type_text
@@ -163,7 +163,7 @@ def _formulas() -> list[str]:
     ]
 
 
-_COVARIATES = (("structure, tool, workpiece", AT_TIP), ("control, drive", AT_DRIVE))
+_COVARIATES = (("structure, tool, workpiece", AT_TIP), ("control, drive", AT_DRIVE), ("drive", LOADS))
 
 
 def _first(member: Any) -> str:

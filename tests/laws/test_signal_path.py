@@ -26,6 +26,7 @@ from camcomp.model.config.load import load_config
 from camcomp.model.cutting.track import lay_track
 from camcomp.model.effect import Cause
 from camcomp.model.job import Job
+from camcomp.model.law.spec import FormulaSpec
 from camcomp.model.motion.response import Travel, respond
 from camcomp.model.motion.run_path import path_of_program
 from camcomp.model.motion.timeline import schedule
@@ -82,17 +83,26 @@ def cause(name, target="x", **values):
     return Cause(name, effect, None if effect.TARGET == "machine" else target, usual | values)
 
 
+def law(formula, target=None, **place):
+    """A law at work."""
+    spec = FormulaSpec.model_validate({**place, "formula": formula})
+    return Cause("formula", shelf.load("effects", "formula"), target, spec.effect_values())
+
+
 NAMES = [name for name in shelf.members("effects") if shelf.load("effects", name).PARAMETERS]
 ON_ARMS = [name for name in NAMES if getattr(shelf.load("effects", name), "ARM_ONLY", False)]
 CASES = {name: [cause(name)] for name in NAMES if name not in ON_ARMS} | {
     "viscous friction": [cause("friction", "y", force_N=40.0, viscous_Ns_per_mm=0.5, asymmetry_Ns_per_mm=0.1)],
     "all together": [cause(name) for name in NAMES if name not in ON_ARMS],
+    "place of the tip": [law("0.05*sin(y_mm/2)", stage="structure", axis="x")],
+    "loads of drives": [law("1e-6*load_N*abs(load_N) - 2e-4*load_x_N", "y", stage="drive")],
 }
 ARM_CASES = {name: [cause(name, "A2")] for name in ON_ARMS} | {
     "joint_coupling": [cause("joint_coupling", "A3")],  # A1 stands still
     "joint_hysteresis": [cause("joint_hysteresis", "A5")],  # A2 and A3 turn round between rows
     "joint_offset": [cause("joint_offset", "A2", offset_rad=1e-3)],
     "screw_pitch": [cause("screw_pitch", "A3")],
+    "loads of drives": [law("1e-18*load_Nmm^2 - 1e-12*load_A3_Nmm", "A2", stage="drive")],
 }
 
 

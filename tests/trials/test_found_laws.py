@@ -9,6 +9,7 @@ from camcomp.diagnosis.diagnose import diagnose
 from camcomp.diagnosis.experiment.open_experiment import open_experiment
 from camcomp.diagnosis.fit.bench import Bench, CandidateCause
 from camcomp.diagnosis.fit.problem import open_problem
+from camcomp.diagnosis.law.answer import answer_law
 from camcomp.diagnosis.law.bench_terms import Spot
 from camcomp.diagnosis.law.beside import with_law
 from camcomp.diagnosis.law.forms import at_tip
@@ -19,8 +20,12 @@ from camcomp.ground import shelf
 from camcomp.model.effect import Cause
 from camcomp.model.law.covariates import AT_DRIVE
 from camcomp.model.law.expression import parse
-from tests.trials.faults import Fault
+from tests.recordings import recording
+from tests.trials.experiment import Made, Plan, row_times, write
+from tests.trials.faults import Fault, Faults
 from tests.trials.lawful import Experiment
+from tests.trials.machines import MACHINES
+from tests.trials.plant import Character, Run, observe
 
 
 def opened(folder, *how):
@@ -47,6 +52,31 @@ def test_what_acts_in_one_run_alone_is_a_while_on_its_drive(tmp_path):
     assert acts.sum() > 10 and (acts != said).sum() <= 1  # both ends between the rows that they fall
     assert abs(law.terms[0].value - 0.06 * made.size) < 0.1 * 0.06 * made.size
     assert law.after_rms_um < 0.25 * law.before_rms_um
+
+
+@pytest.mark.parametrize(
+    ("machine", "target", "size", "term", "unit"),
+    [("orthoglide", "x", 1.2, "load_y_N", "mm/N"), ("kuka-kr210", "A3", 7.0, "load_A4_Nmm", "rad/N mm")],
+)
+def test_a_drive_that_another_drives_load_moves_is_told_so_and_its_spring_not_blamed(
+    tmp_path, machine, target, size, term, unit
+):
+    plan, runs = Plan(1, machine=machine, rows=80, stated=True), []
+    for i, name in enumerate(("circles-exact", "zigzag-blended", "pocket-10um")):
+        runs.append(Run(recording.load(name), True, 300.0 * i))
+    moved = Fault("crosstalk", target, {"size": size, "place_mm": 0.0})
+    rng, truth = np.random.default_rng(1), MACHINES[machine]
+    states = [observe(truth, r, Faults((moved,)), Character(), row_times(r, plan, True, rng)) for r in runs]
+    files = open_experiment(write(Made(runs, states, {"runs": [{} for _ in runs]}), plan, tmp_path))
+    causes = [CandidateCause("drive_stiffness", at, shelf.load("effects", "drive_stiffness")) for at in truth.actuators]
+    problem = open_problem(Bench(files.twin, files.runs), causes, 0.003)
+    answer = answer_law(problem, standing(problem, (truth.actuators.index(target),)), "tip")
+    assert answer.fit.members == ()  # the law tells it better than the spring
+    (found,) = answer.law.terms
+    assert (found.term, found.unit) == (f"drive {target}: {term}", unit)
+    # what the structure exerts on a drive is the opposite of what the drive exerts
+    assert found.value == pytest.approx(-2e-4 * size / truth.reach**2, rel=0.03)
+    assert answer.law.after_rms_um < 0.2 * answer.law.before_rms_um
 
 
 def test_a_cause_that_followed_a_law_goes_once_it_is_known_and_another_stays(tmp_path):

@@ -310,6 +310,8 @@ def margin(tried: Sequence[Term], best: Sequence[Term]) -> float:
 
 
 def _unlikely(term: Term) -> bool:
-    """Of a drive that leads one axis of the tip: what follows its own travel, or acts for a while, is its own; else the tip's."""
-    own = term.form.family == "while" or term.form.about[0].startswith(("act", *"xyz"))
+    """Of a drive that leads one axis of the tip: what follows its own travel or a drive's load, or acts for a while, is its own;
+    else the tip's.
+    """
+    own = term.form.family == "while" or term.form.about[0].startswith(("act", "load", *"xyz"))
     return (term.spot.on == "drive") != own

@@ -9,6 +9,7 @@ import numpy as np
 
 from camcomp.diagnosis.law.sizes import Sizes
 from camcomp.ground.datatypes import Floats
+from camcomp.model.law.covariates import is_load, load_of
 
 MOST_WAVES = 240  # periods of one covariate that are tried
 LEAST_SPAN_MM = 2.0
@@ -152,7 +153,10 @@ def at_tip(size: Sizes) -> list[Form]:
     if len(axes) > 1:
         for k in range(1, 5):
             angle = "heading_rad" if k == 1 else f"{k}*heading_rad"
-            out.append(Form(f"heading {k}", ("heading_rad",), (f"sin({angle})", f"cos({angle})"), ("", "")))
+            texts = f"sin({angle})", f"cos({angle})"
+            out.append(Form(f"heading {k}", ("heading_rad",), texts, ("", "")))
+            while_moving = tuple(f"moving*{text}" for text in texts)
+            out.append(Form(f"heading {k}", ("heading_rad", "moving"), while_moving, ("", "")))
     for f in [f"f{a}_N" for a in "xyz" if size.wide(f"f{a}_N")]:
         out.append(Form("force", (f,), (f,), ("N",)))
         out.append(Form("force squared", (f,), (f"{f}*abs({f})",), ("N2",)))
@@ -173,4 +177,17 @@ def at_drive(size: Sizes, revolute: bool) -> list[Form]:
     for text, of in ((speed, f"{unit}/s"), (f"abs({speed})", f"{unit}/s"), (f"{speed}*abs({speed})", f"({unit}/s)2")):
         out.append(Form("rate", (speed,), (text,), (of,)))
     out.append(Form("acceleration", (f"{speed}2",), (f"{speed}2",), (f"{unit}/s2",)))
-    return out + _times(size)
+    return out + _loads(size) + _times(size)
+
+
+def _loads(size: Sizes) -> list[Form]:
+    """What goes with the loads of drives: of its own beyond what a spring gives, which is its stiffness; of others, anything."""
+    out = []
+    for name in [each for each in size.limits if is_load(each) and size.wide(each)]:
+        unit = "N" if name.endswith("N") else "N mm"
+        square, cube = (f"({unit}){k}" if " " in unit else f"{unit}{k}" for k in (2, 3))
+        if load_of(name) is not None:
+            out.append(Form("force", (name,), (name,), (unit,)))
+        out.append(Form("force squared", (name,), (f"{name}*abs({name})",), (square,)))
+        out += [Form("force power", (name,), (f"{name}^{k}",), (per,)) for k, per in ((2, square), (3, cube))]
+    return out

@@ -21,7 +21,7 @@ from camcomp.ground.datatypes import Floats
 from camcomp.ground.errors import ConfigError, Location
 from camcomp.ground.files import display_name, read_bytes, write_all
 from camcomp.model.effect import Load, Motion, Parameter
-from camcomp.model.law.covariates import DriveRows, TipRows
+from camcomp.model.law.covariates import DriveRows, TipRows, load_of
 from camcomp.model.law.expression import FormulaError
 from camcomp.model.law.law import EmpiricalLaw
 from camcomp.model.law.spec import FormulaSpec, MapSpec
@@ -63,6 +63,8 @@ class LearnedLaw:
         if not pieces or any(part.target is not None and part.target not in actuators for part, _ in pieces):
             return None
         laws = [_placed(part, size) for part, size in pieces]
+        if any(load_of(name) not in (None, *actuators) for law in laws for name in law.shape.names):
+            return None
         at = [None if part.target is None else list(actuators).index(part.target) for part, _ in pieces]
         placed = [_Piece(p.name, law, j) for p, law, j in zip(self.parameters, laws, at, strict=True)]
         stages = {"control": _OnControl, "drive": _OnDrive}

@@ -9,8 +9,21 @@ import numpy as np
 from camcomp.diagnosis.fit.bench import Bench
 from camcomp.model.effect import Load
 from camcomp.model.law.covariates import DriveRows, TipRows
+from camcomp.model.statics.description import Robot
 
 Rows = TipRows | DriveRows
+
+
+def load_names(robot: Robot, j: int) -> tuple[str, ...]:
+    """The covariates that are loads of drives, where actuator j is meant: its own first, then those of the others that a formula
+    can name.
+    """
+    units = [(each.name, "Nmm" if each.revolute else "N") for each in robot.actuators]
+    own = f"load_{units[j][1]}"
+    return (
+        own,
+        *(f"load_{name}_{unit}" for k, (name, unit) in enumerate(units) if k != j and f"load_{name}".isidentifier()),
+    )
 
 
 def tip_rows(bench: Bench) -> list[TipRows]:
@@ -21,6 +34,7 @@ def tip_rows(bench: Bench) -> list[TipRows]:
 
 def drive_rows(bench: Bench, j: int, *, setpoints: bool) -> list[DriveRows]:
     """Per run, of actuator j; setpoints: what the control was told instead of where the encoder was."""
+    others = () if setpoints else load_names(bench.twin.robot, j)
     out = []
     for run, reading in zip(bench.runs, bench.nominal, strict=True):
         motion = reading.motion
@@ -29,5 +43,5 @@ def drive_rows(bench: Bench, j: int, *, setpoints: bool) -> list[DriveRows]:
         elif run.by == "setpoint" and run.measured.has("encoder"):
             seen = run.measured.encoder
             motion = replace(motion, encoder=np.where(np.isfinite(seen), seen, motion.encoder))
-        out.append(DriveRows(motion, j))
+        out.append(DriveRows(motion, j, others))
     return out

@@ -12,7 +12,7 @@ WORDS = {
     "line": "rises evenly with", "power": "follows a power of", "wave": "repeats over", "bump": "is a bump at one place of",
     "sense": "turns round with the sense of", "drag": "is dragged behind", "reversal": "fades behind reversals of",
     "rate": "goes with", "acceleration": "goes with", "product": "follows the product of", "force": "goes with",
-    "force squared": "goes with the square of", "force by place": "goes with", "step": "steps at one moment of",
+    "force squared": "goes with the square of", "force power": "follows a power of", "force by place": "goes with", "step": "steps at one moment of",
     "while": "acts for a while of", "settling": "settles with", "constant": "is a constant",
 }  # fmt: skip
 

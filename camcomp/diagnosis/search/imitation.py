@@ -20,6 +20,8 @@ from camcomp.diagnosis.fit.floor import MINOR
 from camcomp.diagnosis.fit.intervals import BLOCKS
 from camcomp.diagnosis.fit.patterns import Ground
 from camcomp.diagnosis.fit.problem import Problem
+from camcomp.diagnosis.search.unknown import about
+from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.diagnosis.statistics.cause_sets import Fitted, Members
 from camcomp.diagnosis.statistics.evidence import Base, Gram, Prior, base, estimate, gram, holding_back, log_bayes
 from camcomp.ground.datatypes import Bools, Floats, Ints
@@ -54,9 +56,7 @@ def credibility(
     if not f.members:
         return {}, {}
     weight, index = _at_the_tip(problem), problem.member_columns(f.members)
-    W, r = np.concatenate(problem.white), weight * np.concatenate(f.residual)
-    W[:, index] = np.concatenate(f.white)  # about the fit
-    W *= weight[:, None]
+    W, r = ByChannel.behind(about(problem, f)[0]).scaled(weight), weight * np.concatenate(f.residual)
     data = gram(W, r)
     sets, candidates = _subsets(f.members), problem.candidates
     hypotheses: list[tuple[Floats, float]] = []  # evidence per set, log prior
@@ -87,12 +87,13 @@ def credibility(
             if n in likely:
                 has[n] |= _draws(problem, f, i, W, r, replace(each, columns=weight[each.at, None] * each.columns))
         unlike = np.exp(value - whole) * ~has
-        present[i] = float(np.sum(np.exp(value - whole) * has))
+        # the search, whose evidence is not strained, has found the member: where nothing unknown takes its place, one word against another
+        present[i] = float(np.sum(np.exp(value - whole) * has) + 0.5 * unlike[:first].sum())
         replaced[i] = float(unlike[first:].sum())
     return present, replaced
 
 
-def _draws(problem: Problem, f: Fitted, i: int, W: Floats, r: Floats, family: _Family) -> bool:
+def _draws(problem: Problem, f: Fitted, i: int, W: ByChannel, r: Floats, family: _Family) -> bool:
     """Whether the family, beside the other members, draws what member i does: then it is that member by another name.
 
     Of all that may depend on velocity, a clock that is late makes one; of all that depends on force, a spring that is soft.
@@ -140,10 +141,10 @@ def _evidence(problem: Problem, at: Base, prior: Prior, sets: Sequence[Members])
     ])  # fmt: skip
 
 
-def _with(problem: Problem, data: Gram, W: Floats, r: Floats, family: _Family) -> tuple[Gram, Prior]:
+def _with(problem: Problem, data: Gram, W: ByChannel, r: Floats, family: _Family) -> tuple[Gram, Prior]:
     """Gram matrix and prior with the columns of a family behind all others, as large as all that its rows show."""
     D, seen = family.columns, r[family.at]
-    cross = (W if family.at.all() else W[family.at]).T @ D
+    cross = (W if family.at.all() else W[np.flatnonzero(family.at)]).T @ D
     joint = Gram(
         np.block([[data.A, cross], [cross.T, D.T @ D]]), np.concatenate([data.b, D.T @ seen]), data.c, data.rows
     )
@@ -159,7 +160,9 @@ def _with(problem: Problem, data: Gram, W: Floats, r: Floats, family: _Family) -
     )
 
 
-def _strain(problem: Problem, data: Gram, W: Floats, r: Floats, family: _Family | None, index: Sequence[int]) -> Floats:
+def _strain(
+    problem: Problem, data: Gram, W: ByChannel, r: Floats, family: _Family | None, index: Sequence[int]
+) -> Floats:
     """How much more than noise what is left varies from block to block of time, along each member's column (d,)."""
     prior = problem.prior
     if family is not None:

@@ -9,6 +9,7 @@ from camcomp.diagnosis.statistics.cause_sets import Fitted, Members
 from camcomp.ground.datatypes import Floats
 
 EQUAL_LOG_ODDS = 3.0  # log odds within which two sets are told apart by nobody
+MOST_ODDS = 3.0  # of the leader against a set that the data cannot tell apart from it: the rest is the word of priors
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,11 +39,12 @@ def judge(fits: Sequence[Fitted], probability: Floats, twins: Sequence[tuple[Mem
         if alike and not nested and len(fit.members) <= len(leader.members):
             rivals.append(int(j))
             twin += [int(j)] if same else []
-    # what no data of this kind can tell apart is as probable as each other: a prior is no reason to believe in one
-    even = probability.copy()
-    even[twin] = probability[twin].mean()
+    # of what no data of this kind can tell apart priors alone make nobody sure
+    held = probability.copy()
+    held[twin] = np.maximum(held[twin], held[best] / MOST_ODDS)
+    held[twin] *= probability[twin].sum() / held[twin].sum()
     inclusion: dict[int, float] = {}
-    for fit, p in zip(fits, even, strict=True):
+    for fit, p in zip(fits, held, strict=True):
         for i in fit.members:
             inclusion[i] = inclusion.get(i, 0.0) + float(p)
     word = "none" if not leader.members else "ambiguous" if rivals else "identified"

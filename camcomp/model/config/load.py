@@ -285,6 +285,9 @@ def _check_targets(config: Config) -> list[CamcompError]:
             message, hint = f"'{hinge}' is a hinge, and '{each.effect}' is of slides", None
         elif each.target is not None and getattr(each.params, "axis", None) is not None:
             message, hint = "a law on the tip has no target", "leave the target out; its axis says where it acts"
+        elif other := next((a for a in getattr(each.params, "loads_of", ()) if a not in actuators), None):
+            at = config.at("effects", i, "effect")
+            message, hint = f"there is no drive '{other}' to have a load", choose(other, actuators)
         elif kind == "machine" and each.target is not None:
             message, hint = f"'{each.effect}' concerns the machine as a whole", "leave the target out"
         else:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from camcomp.ground.datatypes import Floats
+from camcomp.ground.datatypes import Bools, Floats
 from camcomp.model.effect import Load, Motion
 
 _TIME = {
@@ -17,10 +18,11 @@ _TIME = {
     "cut_min": "minutes that the tool has cut",
 }
 AT_TIP = {
-    **{f"{a}_mm": f"place of the tip along program {a}" for a in "xyz"},
-    **{f"v{a}_mm_per_s": f"velocity of the tip along program {a}" for a in "xyz"},
-    "feed_mm_per_s": "speed of the tip",
-    "heading_rad": "direction of travel in the program's XY plane, from X towards Y",
+    **{f"{a}_mm": f"place of the tip along program {a}, where the set-points lead it" for a in "xyz"},
+    **{f"v{a}_mm_per_s": f"its velocity along program {a}" for a in "xyz"},
+    "feed_mm_per_s": "its speed",
+    "heading_rad": "direction of travel in the program's XY plane, from X towards Y; at standstill the last one",
+    "moving": "1 where the tip travels in the program's XY plane, 0 where it stands or plunges",
     **{f"f{a}_N": f"cutting force on the tool along machine {a}" for a in "xyz"},
     "force_N": "size of the cutting force on the tool",
     **_TIME,
@@ -34,12 +36,23 @@ AT_DRIVE = {
     "act_rad_per_s2": "its acceleration",
     **_TIME,
 }
+LOADS = {
+    "load_N": "force that the drive exerts on its slide against load and weight, as modelled",
+    "load_Nmm": "torque that the drive of a hinge exerts",
+    "load_<a>_N": "force of another drive, of actuator <a>",
+    "load_<a>_Nmm": "torque of another drive",
+}
+_LOAD = re.compile(r"load(?:_(\w+))?_(?:N|Nmm)")
 REFERENCE_C = 20.0
 
 
 @dataclass(frozen=True, eq=False)
 class TipRows(Mapping[str, Floats]):
-    """Covariates of n rows at the tip: tip (n, 3) mm in the program frame; each is worked out when it is asked for."""
+    """Covariates of n rows at the tip: tip (n, 3) mm in the program frame, for where nobody knows where the set-points lead it; each
+    is worked out when it is asked for.
+
+    What axes and guides do goes with where they were told to be: the load bends the tip away from there, by a millimetre on a robot.
+    """
 
     tip: Floats
     load: Load
@@ -66,27 +79,37 @@ class TipRows(Mapping[str, Floats]):
         if name in _TIME:
             return _of_time(name, self.motion)
         if name[1:] == "_mm":
-            return self.tip[:, "xyz".index(name[0])]
+            return self._place[:, "xyz".index(name[0])]
         if name == "force_N":
             return np.asarray(np.linalg.norm(self.load.force, axis=1))
         if name[0] == "f" and name[2:] == "_N":
             return self.load.force[:, "xyz".index(name[1])]
-        velocity = rate(self.tip, self.motion)
+        velocity = rate(self._place, self.motion)
         if name[0] == "v":
             return velocity[:, "xyz".index(name[1])]
         if name == "feed_mm_per_s":
             return np.asarray(np.linalg.norm(velocity, axis=1))
         if name == "heading_rad":
             return _kept_angle(velocity)
+        if name == "moving":
+            return _moving(velocity).astype(float)
         raise KeyError(name)
+
+    @property
+    def _place(self) -> Floats:
+        return self.tip if self.motion.told is None else self.motion.told()
 
 
 @dataclass(frozen=True, eq=False)
 class DriveRows(Mapping[str, Floats]):
-    """Covariates of n rows at drive j: its set-points where the control is meant, else its encoder; worked out when asked for."""
+    """Covariates of n rows at drive j: its set-points where the control is meant, else its encoder; worked out when asked for.
+
+    loads: names of loads of drives that are listed, too; any can be asked for.
+    """
 
     motion: Motion
     j: int
+    loads: tuple[str, ...] = ()
     _known: dict[str, Floats] = field(default_factory=dict)
 
     def __getitem__(self, name: str) -> Floats:
@@ -97,22 +120,41 @@ class DriveRows(Mapping[str, Floats]):
     def _of(self, name: str) -> Floats:
         if name in _TIME:
             return _of_time(name, self.motion)
+        if is_load(name):
+            return self._load(load_of(name))
         position = self.motion.encoder[:, self.j]
         order = {"": 0, "_per_s": 1, "_per_s2": 2}[name.removeprefix("act_mm").removeprefix("act_rad")]
         for _ in range(order):
             position = rate(position[:, None], self.motion)[:, 0]
         return position
 
+    def _load(self, actuator: str | None) -> Floats:
+        """What this drive or another one exerts (n,); nothing where no load is known."""
+        if self.motion.held is None:
+            return np.zeros(self.rows)
+        return self.motion.held()[:, self.j if actuator is None else self.motion.names.index(actuator)]
+
     def __iter__(self) -> Iterator[str]:
-        return iter(AT_DRIVE)
+        return iter((*AT_DRIVE, *self.loads))
 
     def __len__(self) -> int:
-        return len(AT_DRIVE)
+        return len(AT_DRIVE) + len(self.loads)
 
     @property
     def rows(self) -> int:
         """How many, n."""
         return len(self.motion.time)
+
+
+def is_load(name: str) -> bool:
+    """Whether a covariate is the load of a drive."""
+    return _LOAD.fullmatch(name) is not None
+
+
+def load_of(name: str) -> str | None:
+    """The actuator that the load of a drive names; None: its own."""
+    found = _LOAD.fullmatch(name)
+    return found[1] if found else None
 
 
 def rate(values: Floats, motion: Motion) -> Floats:
@@ -127,10 +169,15 @@ def rate(values: Floats, motion: Motion) -> Floats:
     return np.asarray(found[np.cumsum(apart) - 1])
 
 
+def _moving(velocity: Floats) -> Bools:
+    """Whether rows (n,) travel in the plane."""
+    speed = np.hypot(velocity[:, 0], velocity[:, 1])
+    return np.asarray(speed > 1e-3 * max(float(speed.max(initial=0.0)), 1e-9))
+
+
 def _kept_angle(velocity: Floats) -> Floats:
     """Heading (n,) rad; at standstill that of the last move, at first that of the first."""
-    speed = np.hypot(velocity[:, 0], velocity[:, 1])
-    moving = speed > 1e-3 * max(float(speed.max(initial=0.0)), 1e-9)
+    moving = _moving(velocity)
     if not moving.any():
         return np.zeros(len(velocity))
     last = np.maximum.accumulate(np.where(moving, np.arange(len(velocity)), -1))

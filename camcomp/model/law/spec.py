@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from functools import cached_property
 from typing import Any, Literal
 
@@ -10,17 +11,20 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
 from camcomp.model.config.base import Limits, Spec
-from camcomp.model.law.covariates import AT_DRIVE, AT_TIP
+from camcomp.model.law.covariates import AT_DRIVE, AT_TIP, LOADS, is_load, load_of
 from camcomp.model.law.expression import Expression, FormulaError, parse
 from camcomp.model.law.law import AT_DRIVES, EmpiricalLaw
 from camcomp.model.law.spline_map import DEGREE, SplineMap
 
 MOST_COEFFICIENTS = 40  # along one covariate
-_EVERY = {**AT_TIP, **AT_DRIVE}
+_EVERY = {**AT_TIP, **AT_DRIVE, **LOADS}
+_WORD = re.compile(r"[A-Za-z_]\w*")
 
 
-def known_names(on: str) -> dict[str, str]:
-    """Covariates that a law on that stage may use, with what they are."""
+def known_names(on: str, text: str = "") -> dict[str, str]:
+    """Covariates that a law on that stage may use, with what they are; those in a text by the actuators that it names."""
+    if on == "drive":
+        return {**AT_DRIVE, **LOADS, **{word: "load of a drive" for word in _WORD.findall(text) if is_load(word)}}
     return AT_DRIVE if on in AT_DRIVES else AT_TIP
 
 
@@ -44,7 +48,7 @@ class _LawSpec(Spec):
         return self
 
     def _known(self, name: str) -> None:
-        if name not in known_names(self.stage):
+        if name not in known_names(self.stage, name):
             raise PydanticCustomError(
                 "CC290", f"'{name}' is not known on {self.stage}; known here: {', '.join(known_names(self.stage))}"
             )
@@ -53,6 +57,11 @@ class _LawSpec(Spec):
     def shape(self) -> Expression | SplineMap:
         """What is evaluated."""
         raise NotImplementedError
+
+    @property
+    def loads_of(self) -> tuple[str, ...]:
+        """Other actuators whose loads it depends on."""
+        return tuple(other for other in map(load_of, (*self.shape.names, *self.envelope)) if other is not None)
 
     @cached_property
     def law(self) -> EmpiricalLaw:
@@ -75,7 +84,7 @@ class FormulaSpec(_LawSpec):
     @classmethod
     def _can_be_read(cls, text: str, info: ValidationInfo) -> str:
         try:
-            parse(text, known_names(info.data["stage"]) if "stage" in info.data else _EVERY)
+            parse(text, known_names(info.data["stage"], text) if "stage" in info.data else _EVERY)
         except FormulaError as error:
             hint = f" ({error.hint})" if error.hint else ""
             raise PydanticCustomError("CC290", "{text}", {"text": f"{error}{hint}", "offset": error.at}) from None
@@ -84,7 +93,7 @@ class FormulaSpec(_LawSpec):
     @property
     def shape(self) -> Expression:
         """The formula."""
-        return parse(self.formula, known_names(self.stage))
+        return parse(self.formula, known_names(self.stage, self.formula))
 
 
 class MapSpec(_LawSpec):

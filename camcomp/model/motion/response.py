@@ -8,6 +8,7 @@ exact solution of the structure. Effects of the sensors change no part and are l
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
+from functools import cache, partial
 
 import numpy as np
 
@@ -73,9 +74,20 @@ def respond(
         return _finite(job, job.frame.to_program(loaded), settled)
     control = solve(job.real_machine, FREE, told, check=False)
     motion = _motion(job, control.rho_nominal, travel)
+    loading = cache(partial(signal_path.loaded, job.causes, motion, travel.force))
+
+    @cache
+    def held() -> Floats:  # where carriages stand where they are told
+        load = loading()
+        where = solve(
+            job.real_machine, FREE, told, force=load.force, wrench=load.wrench, rho=motion.encoder, check=False
+        )
+        return np.nan_to_num(where.drive)
+
+    motion = replace(motion, names=job.real_machine.actuators, held=held, told=lambda: commanded)
     error, guided = signal_path.driven(job.causes, job.real_machine.actuators, motion)
     effort = signal_path.drive_forces(job.causes, job.real_machine.actuators, guided)
-    load = signal_path.loaded(job.causes, motion, travel.force)
+    load = loading()
     carriage = motion.encoder + error
     state = solve(job.real_machine, FREE, told, force=load.force, wrench=load.wrench, rho=carriage)
     drive = state.drive if effort is None else state.drive + effort

@@ -76,6 +76,11 @@ class RunPath:
         return self.place(self.time)
 
     @cached_property
+    def grid_place(self) -> Places:
+        """Where the grid lies between the nodes."""
+        return self.place(self.grid)
+
+    @cached_property
     def tip_place(self) -> Places:
         """Where the rows' tips lie between the nodes."""
         return self.place(self.tip_time) if self.clock_s else self.row_place

@@ -7,9 +7,9 @@ carry on.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any
 from weakref import WeakKeyDictionary
 
@@ -186,6 +186,14 @@ class Twin:
         if robot is not self.robot:
             springs = signal_path.springs(robot)
             grid, rows = replace(grid, stiffness=springs), replace(rows, stiffness=springs)
+        held = self._held(run_path, grid, causes, solved, robot, key)
+        grid = replace(grid, names=self.actuators, held=lambda: run_path.grid_place.of(held()))
+        rows = replace(
+            rows,
+            names=self.actuators,
+            held=lambda: run_path.row_place.of(held()),
+            told=lambda: self._told(run_path, run_path.tip_place, run_path.tip_time),
+        )
         error, guided = signal_path.driven(causes, self.actuators, grid)
         effort = signal_path.drive_forces(causes, self.actuators, guided)
         carriage = grid.encoder + error if error.any() else grid.encoder
@@ -195,7 +203,11 @@ class Twin:
         ahead = None
         if measured is not None:
             ahead = np.where(np.isfinite(measured), measured - encoder, 0.0)
-        at_tip = _at(run_path, grid, seen, None) if late else rows
+        at_tip = rows
+        if late:
+            at_tip = replace(
+                _at(run_path, grid, seen, None), told=lambda: self._told(run_path, run_path.place(seen), seen)
+            )
         moved = carriage is not run_path.grid_rho
         gap = carriage - run_path.grid_rho if moved else None  # carriage minus set-point
         gap_row = _gap_at(run_path, run_path.time, gap, ahead)
@@ -252,6 +264,33 @@ class Twin:
             and np.abs(load.wrench - known.wrench).max(initial=0.0) <= size
         )
         return Load(known.force, known.wrench) if near and known.key == key else load
+
+    def _told(self, run_path: RunPath, place: Places, at: Floats) -> Floats:
+        """Tips (n, 3), program frame, to which the set-points lead at times (n,)."""
+        return self.to_program(run_path.tips(run_path.node_tip, place, at))
+
+    def _held(
+        self,
+        run_path: RunPath,
+        grid: Motion,
+        causes: Sequence[Cause],
+        known: Solved | None,
+        robot: Robot,
+        key: tuple[Any, ...],
+    ) -> Callable[[], Floats]:
+        """What gives the forces (q, m) of the drives at the nodes, for carriages that stand where they are told: what drives make
+        of their loads moves the loads by next to nothing.
+        """
+
+        @cache
+        def at_nodes() -> Floats:
+            if known is not None:
+                return known.drive
+            shift = np.zeros((run_path.pieces, len(self.actuators)))
+            load = self._node_load(run_path, grid, causes, None, key)
+            return self.structure(run_path, self._machine(robot, key), key, shift, load).drive
+
+        return at_nodes
 
     def structure(self, run_path: RunPath, machine: Machine, key: tuple[Any, ...], shift: Floats, load: Load) -> Solved:
         """Loaded equilibrium at the nodes. Raises PhysicsError CC411 when a node cannot be solved."""
@@ -371,6 +410,8 @@ def _at(run_path: RunPath, grid: Motion, at: Floats, rho: Floats | None) -> Moti
         encoder=setpoint,
         speed=_interpolate(run_path, at, grid.speed),
         direction=_interpolate(run_path, at, grid.direction),
+        held=None,
+        told=None,
     )
 
 

@@ -17,10 +17,10 @@ CONFIG = Path(__file__).parents[3] / "config"
 ACTUATORS = ("x", "y", "z")
 
 
-def job_with(tmp_path, *effects):
+def job_with(tmp_path, *effects, machine="cartesian"):
     over = tmp_path / "over.yaml"
     over.write_text("effects:\n" + "".join(f"  - {{{each}}}\n" for each in effects))
-    return Job(load_config([str(CONFIG / "cartesian.yaml"), str(over)]))
+    return Job(load_config([str(CONFIG / f"{machine}.yaml"), str(over)]))
 
 
 def motion(position):
@@ -89,6 +89,42 @@ def test_the_response_has_it_and_the_correction_takes_it_out(tmp_path):
     assert respond(job, told, travel)[0] == pytest.approx(target, abs=2e-5)
 
 
+def test_the_place_is_where_the_set_points_lead_the_tip_and_not_where_the_load_bends_it(tmp_path):
+    plain = Job(load_config([str(CONFIG / "orthoglide.yaml")]))
+    job = job_with(tmp_path, "effect: formula, stage: structure, axis: x, formula: 0.1*y_mm", machine="orthoglide")
+    told, at = np.array([[5.0, 10.0, 0.0]]), (np.zeros(1), np.zeros(1), np.ones(1, bool))
+    travel = Travel(np.array([[150.0, 180.0, 60.0]]), *at)
+    loaded, found = respond(plain, told, travel)[0], respond(job, told, travel)[0]
+    assert abs(loaded - told)[0, 1] > 0.05
+    assert found - loaded == pytest.approx(np.array([[1.0, 0.0, 0.0]]), abs=1e-9)
+
+
+def test_where_the_tip_stands_or_plunges_it_does_not_move_in_the_plane(tmp_path):
+    job = job_with(tmp_path, "effect: formula, stage: structure, axis: x, formula: moving")
+    way = np.array([[0, 0, 5], [0, 0, 3], [0, 0, 0], [0, 0, 0], [2, 0, 0], [4, 0, 0], [6, 1, 0]], float)
+    assert shifts(job, way)[2][:, 0].tolist() == [0, 0, 0, 1, 1, 1, 1]
+
+
+# springs of the machine files: a law that goes evenly with a drive's own load is a softer spring
+@pytest.mark.parametrize(
+    ("machine", "target", "load", "spring", "at"),
+    [
+        ("orthoglide", "y", "load_N", 1.0e4, [10.0, 20.0, 0.0]),
+        ("kuka-kr210", "A2", "load_Nmm", 3.377e9, [30.0, 0.0, 5.0]),
+    ],
+)
+def test_a_drive_that_gives_way_evenly_with_its_load_is_a_softer_one(tmp_path, machine, target, load, spring, at):
+    plain = Job(load_config([str(CONFIG / f"{machine}.yaml")]))
+    law = job_with(
+        tmp_path, f"effect: formula, stage: drive, target: {target}, formula: -{load}/{4 * spring}", machine=machine
+    )
+    soft = job_with(tmp_path, f"effect: drive_stiffness, target: {target}, factor: 0.8", machine=machine)
+    travel = Travel(np.array([[150.0, -180.0, 60.0]]), np.zeros(1), np.zeros(1), np.ones(1, bool))
+    tips = [respond(job, np.array([at]), travel)[0][0] for job in (plain, law, soft)]
+    assert np.linalg.norm(tips[2] - tips[0]) > 1e-3
+    assert tips[1] - tips[0] == pytest.approx(tips[2] - tips[0], abs=0.02 * np.linalg.norm(tips[2] - tips[0]))
+
+
 @pytest.mark.parametrize(
     ("entry", "rule", "column", "words"),
     [
@@ -102,6 +138,8 @@ def test_the_response_has_it_and_the_correction_takes_it_out(tmp_path):
         ("effect: map, stage: drive, over: [act_mm], coefficients_mm: [1, 2, 3, 4]", "CC291", 5, "act_mm"),
         ("effect: map, stage: drive, over: [act_mm], envelope: {act_mm: [0, 1]}, coefficients_mm: [1, 2]", "CC291", 5, "4"),
         ("effect: formula, stage: structure, axis: x, formula: '1', target: x", "CC205", 72, "no target"),
+        ("effect: formula, stage: drive, target: x, formula: load_q_N", "CC205", 14, "no drive 'q'"),
+        ("effect: formula, stage: control, target: x, formula: load_N", "CC290", 59, "'load_N' is not known"),
     ],
 )  # fmt: skip
 def test_mistakes_are_told_with_their_place(tmp_path, entry, rule, column, words):

@@ -42,6 +42,17 @@ def test_it_solves_its_equation(damping):
     assert np.abs(got - WAY)[800:1000].max() < 1e-3, "at constant speed it is not late"
 
 
+@pytest.mark.parametrize("damping", [0.02, 0.7, 1.0, 5.0])
+@pytest.mark.parametrize("period_ms", [500.0, 50.0, 1.0, 1e-3])
+def test_however_short_its_period_is_against_the_rows_it_is_exact(period_ms, damping):
+    w = 2e3 * np.pi / period_ms
+    pushed = np.append(np.diff(np.append(WAY[0], WAY), n=2), 0.0) / STEP_S**2
+    b, a, _ = cont2discrete(([-1.0], [1.0, 2 * damping * w, w * w]), STEP_S, method="foh")
+    true = lfilter(b.ravel(), a, pushed)
+    got = encoder(("servo_overshoot", {"period_ms": period_ms, "damping": damping})) - WAY
+    assert np.abs(got - true).max() < 1e-6 * np.abs(true).max() + 1e-13
+
+
 def test_with_a_lag_it_is_the_plain_loop_of_second_order_and_with_much_damping_the_lag_alone():
     w, damping = 2.0 * np.pi / 0.05, 0.4
     both = (

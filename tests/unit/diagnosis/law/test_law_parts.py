@@ -8,11 +8,12 @@ from camcomp.diagnosis.law.bench_terms import Spot, Term
 from camcomp.diagnosis.law.find import margin
 from camcomp.diagnosis.law.folds import ALTERNATING, Folds, Split, gains, usual_split, withheld
 from camcomp.diagnosis.law.forms import at_drive, at_tip
-from camcomp.diagnosis.law.library import keep, learned
+from camcomp.diagnosis.law.library import LearnedLaw, keep, learned
 from camcomp.diagnosis.law.sizes import Sizes
 from camcomp.diagnosis.law.white import White
 from camcomp.diagnosis.result.types import Law, LawPart, LawTerm
-from camcomp.model.law.covariates import AT_DRIVE, AT_TIP
+from camcomp.diagnosis.statistics.by_channel import ByChannel
+from camcomp.model.law.covariates import AT_DRIVE, AT_TIP, is_load
 from camcomp.model.law.expression import parse
 from camcomp.model.law.spline_map import splines, tensor
 
@@ -60,7 +61,7 @@ def test_what_stands_beside_a_law_gives_way_to_it():
     known, law = rng.normal(size=(400, 1)), rng.normal(size=(400, 1))
     known = known + 2.0 * law  # looks like the law, where nothing else may
     residual = 3.0 * law[:, 0] + 0.1 * rng.normal(size=400)
-    folds = Folds([known], [residual], np.array([1e-4]), [np.linspace(0.0, 1.0, 400)], Split(2, 2), [])
+    folds = Folds([ByChannel.of([known])], [residual], np.array([1e-4]), [np.linspace(0.0, 1.0, 400)], Split(2, 2), [])
     alone = float(known[:, 0] @ residual / (known[:, 0] @ known[:, 0]))
     beside = folds.means([White((np.arange(400),), (law,))], np.array([1e-4]))
     assert alone > 1.0 and beside.shape == (3, 1) and np.abs(beside).max() < 0.02
@@ -71,7 +72,7 @@ def test_what_is_withheld_has_no_say():
     known, law = rng.normal(size=(400, 1)), rng.normal(size=(400, 1))
     residual = 2.0 * known[:, 0] + 3.0 * law[:, 0]
     residual[:200] *= -1.0
-    folds = Folds([known], [residual], np.array([1e-4]), [np.linspace(0.0, 1.0, 400)], Split(2, 2), [])
+    folds = Folds([ByChannel.of([known])], [residual], np.array([1e-4]), [np.linspace(0.0, 1.0, 400)], Split(2, 2), [])
     columns, prior = [White((np.arange(400),), (law,))], np.array([1e-4])
     assert folds.means(columns, prior)[1:, 0] == pytest.approx([2.0, -2.0], abs=1e-3)
     each, covariance = folds.coefficients(columns, prior)
@@ -82,6 +83,19 @@ def test_what_is_withheld_has_no_say():
 def test_creep_under_load_is_a_form():
     (form,) = [f for f in at_tip(sizes(AT_TIP)) if f.family == "settling" and len(f.about) == 2][:1]
     assert form.about == ("cut_min", "force_N") and form.units == ("", "N") and form.said[1].endswith("*force_N")
+
+
+def test_what_goes_evenly_with_a_drives_own_load_is_its_stiffness_and_no_form():
+    size = sizes((*AT_DRIVE, "load_N", "load_y_N"))
+    said = {(each.about, each.said): each.units for each in at_drive(size, False) if is_load(each.about[0])}
+    own, other = (
+        {said_[1][0]: unit for said_, unit in said.items() if said_[0] == (name,)} for name in ("load_N", "load_y_N")
+    )
+    assert own == {"load_N*abs(load_N)": ("N2",), "load_N^2": ("N2",), "load_N^3": ("N3",)}
+    assert other["load_y_N"] == ("N",) and len(other) == 4
+    still = {name: (0.0, 0.0) for name in ("load_N", "load_y_N")}
+    idle = at_drive(Sizes(size.limits | still, size.apart, size.stretches), False)
+    assert not any(is_load(each.about[0]) for each in idle)
 
 
 def test_of_sets_that_explain_alike_the_one_with_fewer_shapes_goes_before():
@@ -124,3 +138,8 @@ def test_a_library_gives_back_terms_that_have_their_own_size(tmp_path):
     assert found.candidate(("x", "z")) is None
     cause = found.candidate(("x", "y"))
     assert cause.name == name and hasattr(cause.effect, "on_drive") and not hasattr(cause.effect, "on_place")
+
+
+def test_a_law_over_a_drives_load_waits_for_a_machine_that_has_the_drive():
+    found = LearnedLaw("found", "lathe", law_of(("load_x_N", 1e-4)))
+    assert found.candidate(("y", "z")) is None and found.candidate(("x", "y")) is not None

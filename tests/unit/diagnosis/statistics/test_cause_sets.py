@@ -48,3 +48,14 @@ def test_a_set_far_less_probable_is_a_rival_only_where_nothing_tells_it_apart():
     fits = [fitted(0), fitted(1)]
     assert judge(fits, np.array([0.99, 0.01]), []).word == "identified"
     assert judge(fits, np.array([0.99, 0.01]), [((1,), (0,))]).rivals == (1,)
+
+
+def test_priors_alone_make_nobody_sure_of_one_of_what_nothing_tells_apart():
+    fits = [fitted(0), fitted(1), fitted(2)]
+    probability = np.array([0.9, 0.02, 0.08])
+    assert judge(fits, probability, []).inclusion[0] == 0.9
+    alike = judge(fits, probability, [((0,), (1,))]).inclusion
+    assert alike[0] == pytest.approx(3.0 * alike[1])
+    assert alike[0] + alike[1] == pytest.approx(0.92)
+    rows_tell = judge(fits, np.array([0.6, 0.35, 0.05]), [((0,), (1,))]).inclusion
+    assert (rows_tell[0], rows_tell[1]) == pytest.approx((0.6, 0.35))
