@@ -15,6 +15,7 @@ from camcomp.ground.datatypes import Floats
 
 INSTANTS, TURNS = 60, 2  # moments between rows that are tried for a beginning and for an end, and how often in turn
 PHASES = 6  # of a turn between the first row and the last, by which swings that are tried differ
+MOST_APART = 500  # such steps to both sides: runs that are days apart do not count turns
 TINY = 1e-12
 
 
@@ -82,7 +83,9 @@ class Shapes:
         size = self.bench.sizes(term.spot)
         low, high = size.limits["common_s"]
         longest = max(b - a for a, b in size.stretches)
-        way = np.arange(-1.0 / longest, 1.0 / longest, 1.0 / (PHASES * (high - low)))
+        step_hz = 1.0 / (PHASES * max(high - low, 1e-9))
+        most = min(int(1.0 / max(longest * step_hz, 1e-9)), MOST_APART)
+        way = step_hz * np.arange(-most, most + 1)
         turns = 1.0 / term.form.shape[0] + way  # per second
         forms = [term.form, *(term.form.at((1.0 / each,)) for each in turns[turns > 0.0])]
         best = [self._pair_gains(step, term.spot, forms[i : i + AT_ONCE]) for i in range(0, len(forms), AT_ONCE)]
@@ -99,7 +102,7 @@ class Shapes:
         h = (step.target(white) - step.of_target(half)).reshape(-1, 2)
         rms = self.bench.rms(spot, values).reshape(-1, 2)
         size = np.repeat(np.mean(rms**2, axis=1)[:, None] / WIDE_MM**2 + TINY, 2, axis=1)
-        return gains(G[None], h[None], size)[0]
+        return np.asarray(gains(G[None], h[None], size)[0])
 
     def _between(self, spot: Spot) -> Floats:
         """Instants on the common clock in the middle between rows that show what happens at a spot."""
