@@ -6,6 +6,7 @@ simulate and compensate use.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -156,6 +157,11 @@ class Bench:
             slopes, thin = self.row_slopes(k), self.runs[k].thin
             self._thin_slopes[k] = thinned(slopes.reshape(len(slopes), -1), thin).reshape(-1, *slopes.shape[1:])
         return self._thin_slopes[k]
+
+    @cached_property
+    def transmission(self) -> float:
+        """Largest motion of the tip per motion of the drives."""
+        return float(max(np.linalg.norm(self.row_slopes(k), 2, axis=(1, 2)).max() for k in range(len(self.runs))))
 
     def channels(self, k: int, reading: Reading) -> Floats:
         """Channels (n, c) of readings of run k; its tip along and across the path where the tip is the motion."""

@@ -15,6 +15,7 @@ from camcomp.diagnosis.fit.bench import Bench, CandidateCause, Run, cause_of, st
 from camcomp.diagnosis.fit.labels import EFFECT_OF, apart, label_name
 from camcomp.diagnosis.fit.measured import channel_names
 from camcomp.diagnosis.fit.patterns import Dictionary, Ground, dictionary
+from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.diagnosis.statistics.evidence import Prior
 from camcomp.ground import shelf
 from camcomp.ground.datatypes import Floats, Ints
@@ -83,13 +84,13 @@ def working_causes(bench: Bench, candidates: Sequence[CandidateCause]) -> list[C
 
 @dataclass(frozen=True, eq=False)
 class Columns:
-    """k columns: candidate (k,) index of the candidate or -1, names (k,), prior, blocks per run (n, c, k)."""
+    """k columns: candidate (k,) index of the candidate or -1, names (k,), prior, blocks per run (c n, k)."""
 
     candidates: tuple[CandidateCause, ...]
     candidate: np.ndarray
     names: tuple[str, ...]
     prior: Prior
-    blocks: tuple[Floats, ...]
+    blocks: tuple[ByChannel, ...]
 
     def of(self, candidate: int) -> list[int]:
         """Columns of an candidate."""
@@ -180,7 +181,11 @@ def build(
         if name.startswith("spring."):  # a soft machine has no more of it than of anything else
             size = min(size, HEALTHY * floor_um / max(tip_um(bench, per_run), 1e-9))
         put(-1, name, size, reached * size, per_run, 0, loose)
-    blocks = tuple(np.stack([each[r] for each in parts], axis=2) for r in range(len(bench.runs)))
+    channels = range(6 + 2 * len(bench.actuators))
+    blocks = tuple(
+        ByChannel.of(np.stack([each[r][:, c] for each in parts], axis=1) for c in channels)
+        for r in range(len(bench.runs))
+    )
     bench.columns.clear()  # they stand in the blocks now
     k = len(owner)
     prior = Prior(np.array(tolerance), np.ones(k), np.array(sign), np.array(flexible), np.array(reach))

@@ -6,6 +6,7 @@ import numpy as np
 
 from camcomp.diagnosis.fit.bench import Bench, CandidateCause, cause_of, thinned
 from camcomp.diagnosis.fit.columns import Columns, shape_default
+from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.diagnosis.statistics.cause_sets import total
 from camcomp.diagnosis.statistics.evidence import Gram
 from camcomp.ground.datatypes import Floats, Ints
@@ -16,7 +17,7 @@ _FINER = 17  # values between the neighbours of the best
 
 
 def beside(
-    grams: Sequence[Gram], white: Sequence[Floats], residual: Sequence[Floats], columns: Columns, others: Ints
+    grams: Sequence[Gram], white: Sequence[ByChannel], residual: Sequence[Floats], columns: Columns, others: Ints
 ) -> list[Floats]:
     """White residual per run with the columns `others` softly fitted and taken out."""
     data = total(grams)
@@ -24,8 +25,9 @@ def beside(
     M = data.A[np.ix_(others, others)] + np.diag(precision)
     size = 1.0 / np.sqrt(np.diag(M))
     L = np.linalg.cholesky(size[:, None] * M * size + 1e-12 * np.eye(len(size)))
-    a = size * np.linalg.solve(L.T, np.linalg.solve(L, size * data.b[others]))
-    return [r - W[:, others] @ a for r, W in zip(residual, white, strict=True)]
+    a = np.zeros(len(data.b))
+    a[others] = size * np.linalg.solve(L.T, np.linalg.solve(L, size * data.b[others]))
+    return [r - W @ a for r, W in zip(residual, white, strict=True)]
 
 
 def best_shape(
@@ -54,21 +56,16 @@ def _gains(
     whitened: Callable[[int, Floats], Floats],
 ) -> Floats | None:
     """Chi-square (v,) that the columns of an effect explain with each value of a shape; None where it is not scanned."""
-    quick = [quick_columns(bench, candidate, {**shape_default(candidate), p.name: float(value)}) for value in values]
-    found = [each for each in quick if each is not None]
-    if len(found) < len(values):
-        return None
-    d = len(candidate.parameters)
-    white = np.concatenate([
-        whitened(k, np.stack([c[k] for each in found for c in each], axis=2)) for k in range(len(bench.runs))
-    ])  # fmt: skip
-    h = white.T @ np.concatenate(rest)
     gains = []
-    for v in range(len(values)):
-        own = white[:, v * d : v * d + d]
-        G = own.T @ own
-        G += (1e-9 * np.trace(G) + 1e-12) * np.eye(d)
-        gains.append(float(h[v * d : v * d + d] @ np.linalg.solve(G, h[v * d : v * d + d])))
+    for value in values:  # one at a time: together they are as large as all other columns
+        columns = quick_columns(bench, candidate, {**shape_default(candidate), p.name: float(value)})
+        if columns is None:
+            return None
+        white = [whitened(k, np.stack([each[k] for each in columns], axis=2)) for k in range(len(bench.runs))]
+        h = sum(W.T @ r for W, r in zip(white, rest, strict=True))
+        G = np.sum([W.T @ W for W in white], axis=0)
+        G += (1e-9 * np.trace(G) + 1e-12) * np.eye(len(G))
+        gains.append(float(h @ np.linalg.solve(G, h)))
     return np.array(gains)
 
 
@@ -89,13 +86,13 @@ def quick_columns(bench: Bench, candidate: CandidateCause, shape: Mapping[str, f
                 motion = bench.nominal[k].motion
                 moved, guided = signal_path.driven([cause], bench.actuators, motion)
                 effort = signal_path.drive_forces([cause], bench.actuators, guided)
-                slope = bench.row_slopes(k)
-                values = np.zeros((len(slope), 6 + 2 * len(bench.actuators)))
-                values[:, :3] = bench.turned(k, np.einsum("nij,nj->ni", slope, moved))
+                tip = np.einsum("nij,nj->ni", bench.row_slopes(k), moved)
+                tip, m = thinned(bench.turned(k, tip), run.thin), len(bench.actuators)
+                values = np.zeros((len(tip), 6 + 2 * m))
+                values[:, :3] = tip
                 if effort is not None:
-                    m = len(bench.actuators)
-                    values[:, 3 + m : 3 + 2 * m] = effort
-                per_run.append(thinned(values, run.thin))
+                    values[:, 3 + m : 3 + 2 * m] = thinned(effort, run.thin)
+                per_run.append(values)
             out.append(per_run)
         return out
     return None

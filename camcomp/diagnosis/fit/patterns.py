@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.ground.datatypes import Floats
 from camcomp.model.effect import Motion
 
@@ -38,12 +39,12 @@ class Ground:
 
 @dataclass(frozen=True, eq=False)
 class Dictionary:
-    """Patterns of one kind of channel. labels (p,): covariate; blocks: per run (n, c, p), c channels from `first` on."""
+    """Patterns of one kind of channel. labels (p,): covariate; blocks: per run (c n, p), c channels from `first` on."""
 
     kind: str
     first: int
     labels: tuple[str, ...]
-    blocks: tuple[Floats, ...]
+    blocks: tuple[ByChannel, ...]
 
 
 def _reversal(motion: Motion, length: float, j: int) -> Floats:
@@ -130,20 +131,25 @@ class _Store:
     def __init__(self, kind: str, first: int, width: int, runs: int) -> None:
         self.kind, self.first, self.width = kind, first, width
         self.labels: list[str] = []
+        self.channels: list[int] = []
         self.columns: list[list[Floats]] = [[] for _ in range(runs)]
 
     def put(self, label: str, channel: int, per_run: Sequence[Floats], size: float) -> None:
         if max(float(np.abs(v).max(initial=0.0)) for v in per_run) < 1e-12:
             return
         self.labels.append(label)
+        self.channels.append(channel)
         for store, values in zip(self.columns, per_run, strict=True):
-            column = np.zeros((len(values), self.width))
-            column[:, channel] = size * values
-            store.append(column)
+            store.append(size * values)
 
     def done(self) -> Dictionary:
-        blocks = tuple(np.stack(c, axis=2) if c else np.zeros((0, self.width, 0)) for c in self.columns)
-        return Dictionary(self.kind, self.first, tuple(self.labels), blocks)
+        return Dictionary(self.kind, self.first, tuple(self.labels), tuple(map(self._block, self.columns)))
+
+    def _block(self, columns: Sequence[Floats]) -> ByChannel:
+        every = np.array(self.channels, int)
+        each = np.stack(columns, axis=1) if columns else np.zeros((0, 0))
+        mine = [np.flatnonzero(every == channel) for channel in range(self.width)]
+        return ByChannel(len(every), tuple((on, each[:, on]) for on in mine))
 
 
 def dictionary(grounds: Sequence[Ground], actuators: Sequence[str]) -> list[Dictionary]:

@@ -15,6 +15,7 @@ from camcomp.diagnosis.fit.label_offsets import with_scatter
 from camcomp.diagnosis.fit.noise import inflation, instrument_noise, less_certain
 from camcomp.diagnosis.fit.outliers import outlying, tails
 from camcomp.diagnosis.fit.patterns import Dictionary
+from camcomp.diagnosis.statistics.by_channel import ByChannel, channel_behind_channel
 from camcomp.diagnosis.statistics.cause_sets import CausePrior, Fitted, Members, Scale, total
 from camcomp.diagnosis.statistics.evidence import Gram, Prior, estimate, gram
 from camcomp.diagnosis.statistics.noise_model import Noise
@@ -44,8 +45,8 @@ class Problem:
     floor: NoiseFloor
     noise: Noise
     outliers: list[Bools]  # per run (n, c), before thinning
-    white: list[Floats]  # per run (w, k)
-    white_patterns: list[list[Floats]]  # per run, per kind (rows of the kind, p)
+    white: list[ByChannel]  # per run (w, k)
+    white_patterns: list[list[ByChannel]]  # per run, per kind (rows of the kind, p)
     white_residual: list[Floats]
     shapes: dict[int, dict[str, float]]
     candidates: CausePrior
@@ -54,8 +55,8 @@ class Problem:
     @cached_property
     def tip_gram(self) -> Floats:
         """Products (k, k) of what the columns do to the tip, mean over the rows of all runs, mm2."""
-        rows = sum(len(block) for block in self.columns.blocks)
-        moved = (moved_tip(self.bench, k, block) for k, block in enumerate(self.columns.blocks))
+        rows = sum(map(len, self.residuals))
+        moved = (moved_tip(self.bench, k, block.dense()) for k, block in enumerate(self.columns.blocks))
         parts = (each.reshape(-1, each.shape[2]) for each in moved)
         return np.asarray(sum(each.T @ each for each in parts) / max(rows, 1))
 
@@ -73,7 +74,7 @@ class Problem:
         """Per run, at nominal."""
         return self.grams(self.white_residual, self.white)
 
-    def grams(self, residual: Sequence[Floats], white: Sequence[Floats]) -> tuple[Gram, ...]:
+    def grams(self, residual: Sequence[Floats], white: Sequence[ByChannel]) -> tuple[Gram, ...]:
         """Per run."""
         return tuple(gram(D, r) for D, r in zip(white, residual, strict=True))
 
@@ -186,7 +187,7 @@ class Problem:
 
     def _stacked(self, k: int, moved: Sequence[Floats | None], index: Sequence[int]) -> Floats:
         """White columns (w, d) of run k: those that were worked out anew, and the nominal ones of the others."""
-        W = self.white[k][:, index].copy()
+        W: Floats = self.white[k][:, index]
         new = [j for j, m in enumerate(moved) if m is not None]
         if new:
             W[:, new] = self.whitened(k, np.stack([m for m in moved if m is not None], axis=2))
@@ -370,8 +371,8 @@ def _whiten(
 ) -> Problem:  # fmt: skip
     white, white_patterns, white_residual = [], [], []
     for k in range(len(bench.runs)):
-        white.append(noise.rows(k, columns.blocks[k], inflate[k], times[k]))
-        white_patterns.append([noise.rows(k, w.blocks[k], inflate[k], times[k], w.first) for w in words])
+        white.append(noise.by_channel(k, columns.blocks[k], inflate[k], times[k]))
+        white_patterns.append([noise.by_channel(k, w.blocks[k], inflate[k], times[k], w.first) for w in words])
         white_residual.append(noise.rows(k, residuals[k][:, :, None], inflate[k], times[k])[:, 0])
     words = [replace(each, blocks=()) for each in words]  # white they are enough
     return Problem(bench, columns, words, inflate, times, residuals, floor, noise, outliers, white, white_patterns,
@@ -399,9 +400,7 @@ def cause_prior(columns: Columns) -> CausePrior:
 
 
 def _scanned(problem: Problem) -> Problem:
-    """The problem with the scanned shapes (pitches, time constants) that explain most of what the others leave: their columns,
-    in channels and in white rows, are exchanged in place.
-    """
+    """The problem with the scanned shapes (pitches, time constants) that explain most of what the others leave."""
     own = [c for i in problem.shapes for c in problem.candidates.columns[i]]
     others = np.setdiff1d(np.arange(len(problem.columns.names)), own)
     rest = beside(problem.base_grams, problem.white, problem.white_residual, problem.columns, others)
@@ -420,8 +419,10 @@ def _scanned(problem: Problem) -> Problem:
         problem.shapes[i] = best
         columns = candidate_columns(problem.bench, candidate, best)
         changed.append((list(problem.candidates.columns[i]), columns))
+    blocks, white = list(problem.columns.blocks), list(problem.white)
     for index, columns in changed:
-        for k, (block, W) in enumerate(zip(problem.columns.blocks, problem.white, strict=True)):
-            block[:, :, index] = np.stack([each[k] for each in columns], axis=2)
-            W[:, index] = problem.whitened(k, block[:, :, index])
-    return replace(problem)  # what was worked out of the columns is worked out anew
+        for k in range(len(blocks)):
+            new = np.stack([each[k] for each in columns], axis=2)
+            blocks[k] = blocks[k].exchanged(index, channel_behind_channel(new))
+            white[k] = white[k].exchanged(index, problem.whitened(k, new))
+    return replace(problem, columns=replace(problem.columns, blocks=tuple(blocks)), white=white)

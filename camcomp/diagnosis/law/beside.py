@@ -12,6 +12,7 @@ from camcomp.diagnosis.law.bench_terms import Spot, TermBench
 from camcomp.diagnosis.law.find import FoundLaw
 from camcomp.diagnosis.law.folds import Folds
 from camcomp.diagnosis.law.smooth import FoundMap
+from camcomp.diagnosis.statistics.by_channel import channel_behind_channel
 from camcomp.diagnosis.statistics.evidence import Prior
 from camcomp.ground.datatypes import Floats
 
@@ -30,7 +31,8 @@ def with_law(
     )
     own = [bench.channels(spot, values) for spot, values in terms]
     blocks = tuple(
-        np.concatenate([block, *(each[k] for each in own)], axis=2) for k, block in enumerate(problem.columns.blocks)
+        block.beside(channel_behind_channel(np.concatenate([each[k] for each in own], axis=2)))
+        for k, block in enumerate(problem.columns.blocks)
     )
     columns = replace(
         problem.columns,
@@ -40,7 +42,8 @@ def with_law(
         blocks=blocks,
     )
     white = [
-        np.concatenate([W, *(x.over(k, 0, len(W)) for x in found.columns)], axis=1) for k, W in enumerate(problem.white)
+        W.beside(np.concatenate([x.over(k, 0, len(W)) for x in found.columns], axis=1))
+        for k, W in enumerate(problem.white)
     ]
     return replace(problem, columns=columns, white=white)
 

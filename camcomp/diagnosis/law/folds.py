@@ -14,6 +14,7 @@ import numpy as np
 from scipy.linalg import solve_triangular
 
 from camcomp.diagnosis.law.white import White
+from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.ground.datatypes import Floats, Ints
 
 FEW_RUNS = 4  # from which on runs are withheld, else stretches of them
@@ -59,7 +60,7 @@ class Folds:
     """
 
     def __init__(
-        self, white: Sequence[Floats], residual: Sequence[Floats], precision: Floats, places: Sequence[Floats],
+        self, white: Sequence[ByChannel], residual: Sequence[Floats], precision: Floats, places: Sequence[Floats],
         split: Split, constants: Sequence[White],
     ) -> None:  # fmt: skip
         """White (w, k), residual (w,) per run; precision (k,) of the prior; places (w,) 0 to 1 of white rows in the time of their

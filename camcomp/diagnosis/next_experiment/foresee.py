@@ -113,7 +113,7 @@ def _on_bench(problem: Problem, candidate: Candidate, job: Job) -> Bench:
     if (run.run_path.grid_rho < low).any() or (run.run_path.grid_rho > high).any():
         raise ValueError("out of the travel of an actuator")
     bench = Bench(problem.bench.twin, [run])
-    if _transmission(bench) > STRETCH * _transmission(problem.bench):
+    if bench.transmission > STRETCH * problem.bench.transmission:
         raise ValueError("too near a singular pose for the model to be trusted")
     return bench
 
@@ -137,7 +137,7 @@ def _lay(question: Question, candidate: Candidate, whole: bool) -> Foreseen:
     known = {name: i for i, name in enumerate(problem.columns.names)}
     mine = np.array([i for i, name in enumerate(columns.names) if name in known], int)
     theirs = np.array([known[columns.names[i]] for i in mine], int)
-    block = columns.blocks[0]
+    block = columns.blocks[0].dense()
     tolerance = np.minimum(columns.prior.tolerance, 1.0)
     signals, reach = [], []
     for (mean, covariance), change in zip(question.beliefs, changes, strict=True):
@@ -156,11 +156,6 @@ def _root(covariance: Floats) -> Floats:
     size = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
     value, vector = np.linalg.eigh(covariance / size[:, None] / size)
     return np.asarray(size[:, None] * vector * np.sqrt(np.maximum(value, 0.0)), float)
-
-
-def _transmission(bench: Bench) -> float:
-    """Largest motion of the tip per motion of the drives."""
-    return float(max(np.linalg.norm(bench.row_slopes(k), 2, axis=(1, 2)).max() for k in range(len(bench.runs))))
 
 
 def _noise(problem: Problem) -> Floats:

@@ -111,7 +111,7 @@ def program_weight(problem: Problem) -> Floats:
     m, bench = len(problem.bench.actuators), problem.bench
     k, rows = len(problem.columns.names), 0
     out = np.zeros((k, k))
-    for r, (run, block) in enumerate(zip(bench.runs, problem.columns.blocks, strict=True)):
+    for r, (run, block) in enumerate(zip(bench.runs, (each.dense() for each in problem.columns.blocks), strict=True)):
         tip = block[:, :3]
         if run.by == "setpoint" and run.measured.has("encoder"):
             ways = bench.thin_slopes(r)

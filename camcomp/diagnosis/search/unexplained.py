@@ -70,7 +70,7 @@ def _left(problem: Problem, f: Fitted, k: int) -> Floats:
     index = problem.member_columns(f.members)
     usual = estimate(total(f.grams), problem.prior, index, 1.0)[0]
     usual[index] = 0.0
-    return np.asarray(left - problem.columns.blocks[k] @ usual)
+    return np.asarray(left - (problem.columns.blocks[k] @ usual).reshape(left.shape[1], -1).T)
 
 
 def _at_tip(problem: Problem, k: int, left: Floats, kind: str) -> Floats:

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from camcomp.diagnosis.fit.problem import Problem
+from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.diagnosis.statistics.cause_sets import Fitted, Members, total
 from camcomp.diagnosis.statistics.evidence import Prior, estimate
 from camcomp.diagnosis.statistics.score_test import (
@@ -31,14 +32,12 @@ def residual_tests(problem: Problem, f: Fitted, prior: Prior) -> dict[str, Resid
     return score_test(_projected(problem, prior, *about(problem, f), f.members), rows)
 
 
-def about(problem: Problem, f: Fitted) -> tuple[list[Floats], list[Floats]]:
+def about(problem: Problem, f: Fitted) -> tuple[list[ByChannel], list[Floats]]:
     """White columns and residual (absolute coordinates) linearised at the fit."""
     if not f.members:
         return problem.white, problem.white_residual
     index = problem.member_columns(f.members)
-    white = [W.copy() for W in problem.white]
-    for W, own in zip(white, f.white, strict=True):
-        W[:, index] = own
+    white = [W.exchanged(index, own) for W, own in zip(problem.white, f.white, strict=True)]
     return white, list(f.residual)
 
 
@@ -54,7 +53,7 @@ def _held(prior: Prior, columns: Ints) -> Prior:
 
 
 def _projected(
-    problem: Problem, prior: Prior, white: list[Floats], residual: list[Floats], members: Members
+    problem: Problem, prior: Prior, white: list[ByChannel], residual: list[Floats], members: Members
 ) -> Projected:
     return project(
         white, problem.white_patterns, residual, [w.labels for w in problem.dictionaries],
@@ -115,9 +114,10 @@ def followed(problem: Problem, f: Fitted, i: int) -> bool:
     causes = problem.causes(f.members, f.theta, f.extra)
     near: list[Bools] = []
     for k in range(len(bench.runs)):
-        signal = (problem.columns.blocks[k][:, :, index] @ theta)[:, :3]
+        gap = bench.difference(k, bench.read(k, causes))
+        signal = (problem.columns.blocks[k][:, index] @ theta).reshape(-1, len(gap))[:3].T
         size = np.linalg.norm(signal, axis=1)
-        rest = np.sum(bench.difference(k, bench.read(k, causes))[:, :3] * signal, axis=1) / np.maximum(size, 1e-12)
+        rest = np.sum(gap[:, :3] * signal, axis=1) / np.maximum(size, 1e-12)
         there = (size > 0.0) & np.isfinite(rest)
         near.append(np.abs(rest[there]) < np.maximum(NEAR * size[there], SURE_SD * problem.floor.axis_mm))
     rows = np.concatenate(near)

@@ -16,11 +16,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from itertools import product
+from typing import Any
 
 import numpy as np
 from scipy.linalg.lapack import dpotrf, dpotri
 from scipy.special import log_ndtr, logsumexp
 
+from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.ground.datatypes import Floats, Ints
 from camcomp.ground.machine_code import kept
 
@@ -54,9 +56,10 @@ def log_sum(values: Sequence[float] | Floats) -> float:
     return most + float(np.log(np.exp(v - most).sum())) if np.isfinite(most) else most
 
 
-def gram(D: Floats, r: Floats) -> Gram:
+def gram(D: Floats | ByChannel, r: Floats) -> Gram:
     """From white columns D (w, k) and residual r (w,)."""
-    return Gram(D.T @ D, D.T @ r, float(r @ r), len(r))
+    turned: Any = D.T  # of an array or a ByChannel
+    return Gram(turned @ D, turned @ r, float(r @ r), len(r))
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.ground.datatypes import Bools, Floats, Ints
 from camcomp.ground.machine_code import kept
 
@@ -47,6 +48,16 @@ class Noise:
             _innovations(x, each.rows, each.scale, each.fresh, self.slow[run, j], self.memory[run, j], white)
             at += len(each.rows)
         return out
+
+    def by_channel(self, run: int, values: ByChannel, inflate: Floats, time: Floats, first: int = 0) -> ByChannel:
+        """The same of values whose channels, n rows each, lie one behind the other."""
+        known, parts = self._known(run, inflate, time), []
+        for j, (on, x) in enumerate(values.parts, first):
+            if j in known:
+                each, white = known[j], np.empty((len(known[j].rows), len(on)))
+                _innovations(x, each.rows, each.scale, each.fresh, self.slow[run, j], self.memory[run, j], white)
+                parts.append((on, white))
+        return ByChannel(values.width, tuple(parts))
 
     def _known(self, run: int, inflate: Floats, time: Floats) -> dict[int, _Channel]:
         """The channels of a run that have rows; those of a problem are asked for again and again."""

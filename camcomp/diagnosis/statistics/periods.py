@@ -47,11 +47,14 @@ def _spectrum(y: Floats, x: Floats, frequencies: Floats, trend: Floats) -> tuple
     found = [np.zeros(0)]
     for part in np.array_split(frequencies, max(len(frequencies) * len(x) // _AT_ONCE, 1)):
         turn = 2.0 * np.pi * x[:, None] * part
-        waves = np.stack([np.sin(turn), np.cos(turn)], axis=2)  # (n, f, 2)
-        waves = waves - np.tensordot(Q, np.tensordot(Q, waves, axes=(0, 0)), axes=(1, 0))
-        M = np.einsum("nfi,nfj->fij", waves, waves)
+        waves = np.sin(turn), np.cos(turn)  # (n, f) each
+        smooth = [Q.T @ each for each in waves]
+        M = np.empty((len(part), 2, 2))
+        for i, j in ((0, 0), (0, 1), (1, 1)):
+            M[:, i, j] = np.einsum("nf,nf->f", waves[i], waves[j]) - np.einsum("kf,kf->f", smooth[i], smooth[j])
+        M[:, 1, 0] = M[:, 0, 1]
         M = M + (1e-9 * np.trace(M, axis1=1, axis2=2)[:, None, None] + 1e-30) * np.eye(2)
-        b = np.einsum("nfi,n->fi", waves, rest)
+        b = np.stack([rest @ each for each in waves], axis=1)
         found.append(np.einsum("fi,fi->f", b, np.linalg.solve(M, b[:, :, None])[:, :, 0]))
     return np.concatenate(found), float(rest @ rest)
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.diagnosis.statistics.evidence import Prior
 from camcomp.ground.datatypes import Floats, Ints
 
@@ -45,8 +46,8 @@ class Projected:
 
 
 def project(
-    white: Sequence[Floats],
-    patterns: Sequence[Sequence[Floats]],
+    white: Sequence[ByChannel],
+    patterns: Sequence[Sequence[ByChannel]],
     residual: Sequence[Floats],
     labels: Sequence[Sequence[str]],
     kinds: Sequence[str],
@@ -64,7 +65,7 @@ def project(
     A, B = np.zeros((k + 1, k + 1)), np.zeros((k + 1, p))
     P = np.zeros((p, p))
     for W, r, parts in zip(white, residual, patterns, strict=True):
-        joint = np.concatenate([W, r[:, None]], axis=1)
+        joint = W.beside(r[:, None])
         A += joint.T @ joint
         row = at = 0
         for part, names in zip(parts, labels, strict=True):

@@ -7,6 +7,7 @@ import pytest
 
 from camcomp.diagnosis.fit.intervals import STATED, joint_covariance
 from camcomp.diagnosis.search.unknown import followed
+from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.diagnosis.statistics.cause_sets import Fitted
 from camcomp.diagnosis.statistics.evidence import Prior
 
@@ -24,7 +25,7 @@ def deviation_of_force(apart, *, log=True, as_stated=False):
         columns=SimpleNamespace(candidates=[SimpleNamespace(parameters=(parameter,))] * 2, names="ab"),
         candidates=SimpleNamespace(columns=((0,), (1,))),
         member_columns=list, shapes_of=lambda members: [], row_places=lambda k: np.linspace(0.0, 1.0, len(r)),
-        white=[D],
+        white=[ByChannel.of([D])],
     )  # fmt: skip
     fit = Fitted((0,), np.array([0.1]), np.eye(1), 0.0, (), white=(D[:, :1],), residual=(r,))
     return 0.3 * np.sqrt(joint_covariance(problem, fit, as_stated=as_stated)[0, 0])
@@ -55,13 +56,13 @@ def test_what_is_moved_at_the_tip_is_known_all_the_same():
 def test_rows_follow_what_acts_while_they_are_read(seen_um, answer):
     shift = 1e-3 * np.median(seen_um)
     n = len(seen_um)
-    block = np.zeros((n + 40, 9, 1))
-    block[20 : 20 + n, 2, 0] = 1.0
+    channels = np.zeros((9, n + 40, 1))
+    channels[2, 20 : 20 + n] = 1.0
     rest = np.zeros((n + 40, 9))
     rest[20 : 20 + n, 2] = 1e-3 * np.array(seen_um) - shift
     problem = SimpleNamespace(
         bench=SimpleNamespace(runs=[None], read=lambda k, causes: None, difference=lambda k, reading: rest),
-        columns=SimpleNamespace(blocks=(block,)), member_columns=list, causes=lambda *a: [],
+        columns=SimpleNamespace(blocks=(ByChannel.of(channels),)), member_columns=list, causes=lambda *a: [],
         floor=SimpleNamespace(axis_mm=0.003),
     )  # fmt: skip
     assert followed(problem, Fitted((0,), np.array([shift]), np.eye(1), 0.0, ()), 0) is answer

@@ -12,6 +12,7 @@ from camcomp.diagnosis.law.library import LearnedLaw, keep, learned
 from camcomp.diagnosis.law.sizes import Sizes
 from camcomp.diagnosis.law.white import White
 from camcomp.diagnosis.result.types import Law, LawPart, LawTerm
+from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.model.law.covariates import AT_DRIVE, AT_TIP, is_load
 from camcomp.model.law.expression import parse
 from camcomp.model.law.spline_map import splines, tensor
@@ -60,7 +61,7 @@ def test_what_stands_beside_a_law_gives_way_to_it():
     known, law = rng.normal(size=(400, 1)), rng.normal(size=(400, 1))
     known = known + 2.0 * law  # looks like the law, where nothing else may
     residual = 3.0 * law[:, 0] + 0.1 * rng.normal(size=400)
-    folds = Folds([known], [residual], np.array([1e-4]), [np.linspace(0.0, 1.0, 400)], Split(2, 2), [])
+    folds = Folds([ByChannel.of([known])], [residual], np.array([1e-4]), [np.linspace(0.0, 1.0, 400)], Split(2, 2), [])
     alone = float(known[:, 0] @ residual / (known[:, 0] @ known[:, 0]))
     beside = folds.means([White((np.arange(400),), (law,))], np.array([1e-4]))
     assert alone > 1.0 and beside.shape == (3, 1) and np.abs(beside).max() < 0.02
@@ -71,7 +72,7 @@ def test_what_is_withheld_has_no_say():
     known, law = rng.normal(size=(400, 1)), rng.normal(size=(400, 1))
     residual = 2.0 * known[:, 0] + 3.0 * law[:, 0]
     residual[:200] *= -1.0
-    folds = Folds([known], [residual], np.array([1e-4]), [np.linspace(0.0, 1.0, 400)], Split(2, 2), [])
+    folds = Folds([ByChannel.of([known])], [residual], np.array([1e-4]), [np.linspace(0.0, 1.0, 400)], Split(2, 2), [])
     columns, prior = [White((np.arange(400),), (law,))], np.array([1e-4])
     assert folds.means(columns, prior)[1:, 0] == pytest.approx([2.0, -2.0], abs=1e-3)
     each, covariance = folds.coefficients(columns, prior)

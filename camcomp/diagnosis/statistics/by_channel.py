@@ -1,0 +1,150 @@
+"""Columns over the rows of many channels, most of which are zero in most channels: what is zero is neither kept nor multiplied."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from camcomp.ground.datatypes import Floats, Ints
+
+
+@dataclass(frozen=True, eq=False)
+class ByChannel:
+    """A matrix (w, k) whose rows lie channel behind channel. width k; parts: per channel the columns (a,) that are not zero
+    there, and their values (rows, a).
+
+    It is multiplied and picked from as an array is; what comes out is an array, where only rows are picked a ByChannel.
+    """
+
+    width: int
+    parts: tuple[tuple[Ints, Floats], ...]
+
+    @classmethod
+    def of(cls, channels: Iterable[Floats]) -> ByChannel:
+        """From the values (rows, k) of every channel."""
+        every = list(channels)
+        return cls(every[0].shape[1], tuple(_not_zero(np.arange(each.shape[1]), each) for each in every))
+
+    @classmethod
+    def behind(cls, runs: Sequence[ByChannel]) -> ByChannel:
+        """The rows of one run behind those of the other."""
+        return cls(runs[0].width, tuple(part for each in runs for part in each.parts))
+
+    @cached_property
+    def _starts(self) -> list[int]:
+        return [int(n) for n in np.cumsum([0, *(len(X) for _, X in self.parts)])]
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows, columns."""
+        return len(self), self.width
+
+    def __len__(self) -> int:
+        return self._starts[-1]
+
+    def __matmul__(self, a: Floats) -> Floats:
+        return np.concatenate([X @ a[on] for on, X in self.parts])
+
+    @property
+    def T(self) -> _Turned:
+        """Rows for columns."""
+        return _Turned(self)
+
+    def __getitem__(self, key: Any) -> Any:
+        """[:, columns]: an array; [rows], a slice or indices in order: a ByChannel."""
+        if isinstance(key, tuple):
+            return self._columns(np.asarray(key[1], int))[key[0]]
+        return self._rows(key)
+
+    def _columns(self, index: Ints) -> Floats:
+        out = np.zeros((len(self), len(index)))
+        for (to, X), at in zip(self.placed(index, np.arange(len(index)), len(index)).parts, self._starts, strict=False):
+            out[at : at + len(X), to] = X
+        return out
+
+    def placed(self, index: Ints, to: Ints, width: int) -> ByChannel:
+        """Columns `index` (d,) alone, in the places `to` (d,) of a matrix of some width."""
+        place = np.full(self.width, -1)
+        place[index] = to
+        some = [(place[on], X) for on, X in self.parts]
+        return ByChannel(width, tuple((at[at >= 0], X[:, at >= 0]) for at, X in some))
+
+    def _rows(self, rows: slice | Ints) -> ByChannel:
+        if isinstance(rows, slice):
+            low, high, _ = rows.indices(len(self))
+            ends = [(max(low - at, 0), max(high - at, 0)) for at in self._starts]
+            parts = [(on, X[a:b]) for (on, X), (a, b) in zip(self.parts, ends, strict=False)]
+        else:
+            cut = np.searchsorted(rows, self._starts)
+            parts = [
+                (on, X[rows[a:b] - at])
+                for (on, X), at, a, b in zip(self.parts, self._starts, cut, cut[1:], strict=False)
+            ]
+        return ByChannel(self.width, tuple(parts))
+
+    def exchanged(self, index: Sequence[int] | Ints, columns: Floats) -> ByChannel:
+        """With other columns (w, d) in the places `index` (d,)."""
+        at, parts = np.asarray(index, int), []
+        for (on, X), start in zip(self.parts, self._starts, strict=False):
+            others = ~np.isin(on, at)
+            new, values = _not_zero(at, columns[start : start + len(X)])
+            if others.all() and not len(new):
+                parts.append((on, X))
+            else:
+                parts.append((np.concatenate([on[others], new]), np.concatenate([X[:, others], values], axis=1)))
+        return ByChannel(self.width, tuple(parts))
+
+    def beside(self, columns: Floats) -> ByChannel:
+        """With more columns (w, d) behind its own."""
+        new = np.arange(self.width, self.width + columns.shape[1])
+        return ByChannel(self.width + len(new), self.parts).exchanged(new, columns)
+
+    def scaled(self, weight: Floats) -> ByChannel:
+        """Every row times its weight (w,)."""
+        each = zip(self.parts, self._starts, strict=False)
+        return ByChannel(self.width, tuple((on, weight[at : at + len(X), None] * X) for (on, X), at in each))
+
+    def dense(self) -> Floats:
+        """Every value (n, c, k) of channels that have n rows each."""
+        out = np.zeros((len(self.parts[0][1]), len(self.parts), self.width))
+        for c, (on, X) in enumerate(self.parts):
+            out[:, c, on] = X
+        return out
+
+
+@dataclass(frozen=True, eq=False)
+class _Turned:
+    whole: ByChannel
+
+    def __matmul__(self, other: Floats | ByChannel) -> Floats:
+        mine = self.whole
+        if other is mine:
+            gram = np.zeros((mine.width, mine.width))
+            for on, X in mine.parts:
+                gram[np.ix_(on, on)] += X.T @ X
+            return gram
+        if isinstance(other, ByChannel):
+            out, at = np.zeros((mine.width, other.width)), 0
+            for on, X in other.parts:
+                out[:, on] += mine[at : at + len(X)].T @ X
+                at += len(X)
+            return out
+        out = np.zeros((mine.width, *other.shape[1:]))
+        for (on, X), at in zip(mine.parts, mine._starts, strict=False):
+            out[on] += X.T @ other[at : at + len(X)]
+        return out
+
+
+def channel_behind_channel(values: Floats) -> Floats:
+    """Values (n, c, k) as rows (c n, k)."""
+    return np.swapaxes(values, 0, 1).reshape(-1, values.shape[2])
+
+
+def _not_zero(index: Ints, columns: Floats) -> tuple[Ints, Floats]:
+    """The columns (n, d) that are not zero, and their numbers of `index` (d,)."""
+    some = np.flatnonzero(columns.any(axis=0))
+    return index[some], np.ascontiguousarray(columns[:, some])

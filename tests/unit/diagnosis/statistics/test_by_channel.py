@@ -1,0 +1,85 @@
+"""A matrix by channels multiplies and is picked from as the array of the same values; what is zero takes no place."""
+
+import numpy as np
+import pytest
+
+from camcomp.diagnosis.statistics.by_channel import ByChannel, channel_behind_channel
+from camcomp.diagnosis.statistics.noise_model import Noise
+
+N, CHANNELS, K = 7, 3, 6
+
+
+@pytest.fixture
+def values():
+    """Rows (n, c, k), two thirds of the channels' columns zero."""
+    rng = np.random.default_rng(1)
+    return rng.standard_normal((N, CHANNELS, K)) * (rng.random((CHANNELS, K)) < 0.4)
+
+
+@pytest.fixture
+def lean(values):
+    return ByChannel.of(values[:, c] for c in range(CHANNELS))
+
+
+@pytest.fixture
+def whole(values):
+    return channel_behind_channel(values)
+
+
+def test_what_is_zero_takes_no_place(lean, values):
+    kept = sum(X.size for _, X in lean.parts)
+    assert kept == np.count_nonzero(values) < values.size / 2
+    assert np.array_equal(lean.dense(), values)
+
+
+def test_it_multiplies_as_an_array(lean, whole):
+    rng = np.random.default_rng(2)
+    a, X = rng.standard_normal((K, 2)), rng.standard_normal((len(whole), 4))
+    other = ByChannel.of([X])
+    assert lean.shape == whole.shape and len(lean) == len(whole)
+    for got, true in (
+        (lean @ a, whole @ a),
+        (lean @ a[:, 0], whole @ a[:, 0]),
+        (lean.T @ X, whole.T @ X),
+        (lean.T @ X[:, 0], whole.T @ X[:, 0]),
+        (lean.T @ lean, whole.T @ whole),
+        (lean.T @ other, whole.T @ X),
+        (other.T @ lean, X.T @ whole),
+    ):
+        assert got == pytest.approx(true, abs=1e-12)
+
+
+def test_rows_and_columns_are_picked_as_from_an_array(lean, whole):
+    every = np.arange(K)
+    for rows in (slice(None), slice(3, 9), slice(N, 2 * N), np.array([0, 6, 7, 8, 20]), np.zeros(0, int)):
+        assert np.array_equal(lean[rows][:, every], whole[rows])
+    assert np.array_equal(lean[:, [4, 1]], whole[:, [4, 1]])
+    assert np.array_equal(lean[2:9, [5]], whole[2:9, [5]])
+    assert lean[:, []].shape == (len(whole), 0)
+
+
+def test_columns_are_exchanged_and_put_beside_rows_weighed_and_runs_joined(lean, whole):
+    rng = np.random.default_rng(3)
+    new, weight, every = rng.standard_normal((len(whole), 2)), rng.random(len(whole)), np.arange(K)
+    new[:N, 1] = 0.0
+    changed = whole.copy()
+    changed[:, [4, 0]] = new
+    assert np.array_equal(lean.exchanged([4, 0], new)[:, every], changed)
+    assert np.array_equal(lean[:, every], whole), "it stays what it was"
+    assert np.array_equal(lean.beside(new)[:, np.arange(K + 2)], np.concatenate([whole, new], axis=1))
+    assert np.array_equal(lean.scaled(weight)[:, every], weight[:, None] * whole)
+    assert np.array_equal(ByChannel.behind([lean, lean])[:, every], np.concatenate([whole, whole]))
+
+
+def test_it_is_made_white_as_an_array_is(lean, values):
+    noise = Noise(*(np.full((1, CHANNELS + 1), x) for x in (0.5, 0.4, 0.9)))
+    time, inflate = 0.02 * np.arange(N), np.ones((N, CHANNELS + 1))
+    inflate[2, 1], inflate[:, 3] = np.nan, np.nan
+    white = noise.by_channel(0, lean, inflate, time, 1)
+    assert np.array_equal(white[:, np.arange(K)], noise.rows(0, values, inflate, time, 1))
+
+
+def test_some_columns_are_put_in_places_of_a_wider_matrix(lean, whole):
+    wide = np.zeros((len(whole), 9))
+    wide[:, [7, 2]] = whole[:, [1, 5]]
+    assert np.array_equal(lean.placed(np.array([1, 5]), np.array([7, 2]), 9)[:, np.arange(9)], wide)
