@@ -57,10 +57,10 @@ def test_what_acts_in_one_run_alone_is_a_while_on_its_drive(tmp_path):
 
 
 def driven(folder, machine, wrong):
-    """A machine and the opened experiment of three runs of it, five minutes apart, with one thing wrong."""
+    """A machine and the opened experiment of three runs of it, minutes apart, with one thing wrong."""
     plan, runs = Plan(1, machine=machine, rows=80, stated=True), []
     for i, name in enumerate(("circles-exact", "zigzag-blended", "pocket-10um")):
-        runs.append(Run(recording.load(name), True, 300.0 * i))
+        runs.append(Run(recording.load(name), True, (0.0, 300.0, 731.0)[i]))
     rng, truth = np.random.default_rng(1), MACHINES[machine]
     states = [observe(truth, r, Faults((wrong,)), Character(), row_times(r, plan, True, rng)) for r in runs]
     return truth, open_experiment(write(Made(runs, states, {"runs": [{} for _ in runs]}), plan, folder))
