@@ -46,7 +46,7 @@ class _Family:
 
     name: str
     at: Bools
-    columns: Floats
+    columns: ByChannel
 
 
 def credibility(
@@ -68,7 +68,7 @@ def credibility(
         best = (hypotheses[0][0][0], None)
     values: list[Floats] = []
     for each in _families(problem):  # one at a time: together they are as large as all else
-        family = replace(each, columns=weight[each.at, None] * each.columns)
+        family = replace(each, columns=each.columns.scaled(weight[each.at]))
         joint, prior = _with(problem, data, W, r, family)
         values.append(_evidence(problem, base(joint, prior, 1.0), prior, sets))
         best = max(best, (float(values[-1][0]), family), key=lambda each: each[0])
@@ -85,7 +85,7 @@ def credibility(
         likely = first + np.flatnonzero(np.max(np.where(has, -np.inf, value), axis=1)[first:] > whole + np.log(DRAWN))
         for n, each in enumerate(_families(problem), first):
             if n in likely:
-                has[n] |= _draws(problem, f, i, W, r, replace(each, columns=weight[each.at, None] * each.columns))
+                has[n] |= _draws(problem, f, i, W, r, replace(each, columns=each.columns.scaled(weight[each.at])))
         unlike = np.exp(value - whole) * ~has
         # the search, whose evidence is not strained, has found the member: where nothing unknown takes its place, one word against another
         present[i] = float(np.sum(np.exp(value - whole) * has) + 0.5 * unlike[:first].sum())
@@ -145,12 +145,11 @@ def _with(problem: Problem, data: Gram, W: ByChannel, r: Floats, family: _Family
     """Gram matrix and prior with the columns of a family behind all others, as large as all that its rows show."""
     D, seen = family.columns, r[family.at]
     cross = (W if family.at.all() else W[np.flatnonzero(family.at)]).T @ D
-    joint = Gram(
-        np.block([[data.A, cross], [cross.T, D.T @ D]]), np.concatenate([data.b, D.T @ seen]), data.c, data.rows
-    )
+    own = D.T @ D
+    joint = Gram(np.block([[data.A, cross], [cross.T, own]]), np.concatenate([data.b, D.T @ seen]), data.c, data.rows)
     energy = max(float(seen @ seen) - len(seen), 1.0)
-    size = np.full(D.shape[1], np.sqrt(energy / float(np.sum(D**2))))
-    prior, more = problem.prior, np.ones(D.shape[1])
+    size = np.full(D.width, np.sqrt(energy / float(np.trace(own))))
+    prior, more = problem.prior, np.ones(D.width)
     return joint, Prior(
         np.concatenate([prior.tolerance, size]),
         np.concatenate([prior.scale, more]),
@@ -199,7 +198,7 @@ def _families(problem: Problem) -> Iterator[_Family]:
         picked = np.flatnonzero(whole == word)
         if len(picked):
             picked = np.concatenate([picked, np.flatnonzero(constant)])
-            yield _Family(word, np.ones(len(everywhere), bool), _patterns(problem, picked, of, everywhere, kinds))
+            yield _Family(word, np.ones(len(everywhere), bool), _patterns(problem, picked, of))
     if "tip" not in kinds_of:
         return
     at = everywhere == kinds_of.index("tip")
@@ -207,19 +206,14 @@ def _families(problem: Problem) -> Iterator[_Family]:
         yield _Family(name, at, _white_tip(problem, values))
 
 
-def _patterns(problem: Problem, picked: Ints, of: Ints, everywhere: Ints, kinds: Sequence[Ints]) -> Floats:
+def _patterns(problem: Problem, picked: Ints, of: Ints) -> ByChannel:
     """White columns (w, p) of some of the patterns of all kinds of channels."""
-    out = np.zeros((len(everywhere), len(picked)))
-    start = 0
-    for k, parts in enumerate(problem.white_patterns):
-        row = start
+    out: list[tuple[Ints, Floats]] = []
+    for parts in problem.white_patterns:
         for kind, part in enumerate(parts):
-            first = int(np.searchsorted(of, kind))
             mine = np.flatnonzero(of[picked] == kind)
-            out[row : row + len(part), mine] = part[:, picked[mine] - first]
-            row += len(part)
-        start += len(kinds[k])
-    return out
+            out += part.placed(picked[mine] - int(np.searchsorted(of, kind)), mine, len(picked)).parts
+    return ByChannel(len(picked), tuple(out))
 
 
 def _of_place(every: Sequence[Ground]) -> Iterator[tuple[str, list[Floats]]]:
@@ -249,10 +243,11 @@ def _of_place(every: Sequence[Ground]) -> Iterator[tuple[str, list[Floats]]]:
     yield "time", [np.kron(np.eye(len(every))[r], leg(np.linspace(-1, 1, len(every[r].tip)), IN_A_RUN)) for r in runs]
 
 
-def _white_tip(problem: Problem, values: Sequence[Floats]) -> Floats:
+def _white_tip(problem: Problem, values: Sequence[Floats]) -> ByChannel:
     """White rows of the tip (rows, 3 p) of functions (n, p) per run, each on each axis, in um."""
     out = []
     for k, one in enumerate(values):
-        columns = 1e-3 * np.einsum("np,ac->nacp", one, np.eye(3)).reshape(len(one), 3, -1)
-        out.append(problem.noise.rows(k, columns, problem.inflate[k], problem.times[k]))
-    return np.concatenate(out)
+        p = one.shape[1]
+        axes = ByChannel(3 * p, tuple((axis * p + np.arange(p), 1e-3 * one) for axis in range(3)))
+        out.append(problem.noise.by_channel(k, axes, problem.inflate[k], problem.times[k]))
+    return ByChannel.behind(out)

@@ -77,3 +77,9 @@ def test_it_is_made_white_as_an_array_is(lean, values):
     inflate[2, 1], inflate[:, 3] = np.nan, np.nan
     white = noise.by_channel(0, lean, inflate, time, 1)
     assert np.array_equal(white[:, np.arange(K)], noise.rows(0, values, inflate, time, 1))
+
+
+def test_some_columns_are_put_in_places_of_a_wider_matrix(lean, whole):
+    wide = np.zeros((len(whole), 9))
+    wide[:, [7, 2]] = whole[:, [1, 5]]
+    assert np.array_equal(lean.placed(np.array([1, 5]), np.array([7, 2]), 9)[:, np.arange(9)], wide)
