@@ -5,11 +5,14 @@ grows with the square root of what stands, and behind the corner the tool needs 
 """
 
 import itertools
+import sys
 
 import numpy as np
 import pytest
 
+from camcomp.compensation.program.compensate import compensate
 from camcomp.compensation.program.loaded_cut import loaded_cut
+from camcomp.ground.datatypes import RAPID
 from camcomp.ground.files import shipped
 from camcomp.model.config.load import load_config
 from camcomp.model.control import program_of
@@ -92,12 +95,16 @@ def walls(free):
     return np.array(out)
 
 
-def by_camcomp(job, laps, step):
+def text_of(laps):
     text = "G21 G90 G17\nS8000 M3\n"
     for lap in laps:
         (x, y), *rest = lap
         text += f"G0 X{x} Y{y} Z5\nG1 Z-{DEPTH} F200\n" + "".join(f"G1 X{x} Y{y} F600\n" for x, y in rest) + "G0 Z5\n"
-    cut = loaded_cut(job, program_of((text + "M30\n").encode(), "p.nc", job.config), step)
+    return text + "M30\n"
+
+
+def by_camcomp(job, laps, step):
+    cut = loaded_cut(job, program_of(text_of(laps).encode(), "p.nc", job.config), step)
     cut.memory.settle()
     return walls(lambda q: heights(cut.memory, q) < -0.5 * DEPTH)
 
@@ -117,3 +124,57 @@ def test_walls_of_a_bending_tool_are_those_of_a_plant_that_keeps_all_its_ways(tm
     assert np.median(off[0.25]) < EDGE
     assert off[0.25].mean() < 0.2 * np.abs(wanted - meant).mean()
     assert off[0.25].mean() < 0.6 * off[1.0].mean()
+
+
+SHORT = [
+    [(-3.0, -1.5), (1.5, -1.5), (1.5, 3.0)], [(-3.0, -1.9), (1.9, -1.9), (2.1, -2.1), (2.1, 3.0)],
+    *2 * [[(-3.0, -2.1), (2.1, -2.1), (2.1, 3.0)]],
+]  # fmt: skip
+
+
+def laps_of(path):
+    """Corners of the ways at depth between rapids."""
+    out, lap = [], []
+    for kind, end in zip(path.kind, path.end, strict=True):
+        if kind == RAPID:
+            out, lap = out + [lap] * (len(lap) > 1), []
+        elif end[2] < -0.9 * DEPTH and not (lap and np.allclose(lap[-1], end[:2], atol=1e-9)):
+            lap.append(end[:2])
+    return out
+
+
+def in_the_corner(free):
+    """How far (n,) mm from the last corner nothing stands, on rays into it."""
+    turn = np.radians(np.arange(-85.0, 0.0, 10.0))
+    rays = np.column_stack((np.cos(turn), np.sin(turn)))
+    low, high = np.full(len(rays), 0.8 * R), np.full(len(rays), 1.5 * R)
+    for _ in range(20):
+        middle = 0.5 * (low + high)
+        gone = free(SHORT[-1][1] + middle[:, None] * rays)
+        low, high = np.where(gone, middle, low), np.where(gone, high, middle)
+    return low
+
+
+@pytest.mark.parametrize(("spring", "corrected", "within"), [(600.0, False, 25e-3), (1000.0, True, 10e-3)])
+def test_a_corner_is_reached_over_a_line_shorter_than_the_way_on_which_the_bend_changes(
+    tmp_path, monkeypatch, spring, corrected, within
+):
+    """The tip goes along it; by the plant the corrected program leaves nothing standing in the corner."""
+    monkeypatch.setattr(sys.modules[__name__], "SPRING", spring)
+    (tmp_path / "soft.yaml").write_text(CONFIG.replace("400.0", str(spring)))
+    job = Job(load_config([shipped("config/cartesian.yaml"), tmp_path / "soft.yaml"]))
+    program = program_of(text_of(SHORT).encode(), "p.nc", job.config)
+    if corrected:
+        result = compensate(program, job, method="newton", tolerance_um=1.0, version="1")
+        program = program_of(result.written.data, "c.nc", job.config)
+    plant = Plant()
+    for lap in laps_of(program.path):
+        plant.drive(lap)
+    cut = loaded_cut(job, program)
+    cut.memory.settle()
+    wanted, found = in_the_corner(plant.free), in_the_corner(lambda q: heights(cut.memory, q) < -0.5 * DEPTH)
+    assert np.abs(found - wanted).mean() < within
+    if corrected:
+        assert wanted.min() > R - within
+    else:
+        assert wanted.min() < R - within  # something to find

@@ -9,12 +9,14 @@ from camcomp.diagnosis.diagnose import diagnose
 from camcomp.diagnosis.experiment.open_experiment import open_experiment
 from camcomp.diagnosis.fit.bench import Bench, CandidateCause
 from camcomp.diagnosis.fit.problem import open_problem
-from camcomp.diagnosis.law.answer import answer_law
-from camcomp.diagnosis.law.bench_terms import Spot
+from camcomp.diagnosis.law.answer import _base, answer_law
+from camcomp.diagnosis.law.bench_terms import Spot, Term
 from camcomp.diagnosis.law.beside import with_law
+from camcomp.diagnosis.law.folds import usual_split
 from camcomp.diagnosis.law.forms import at_tip
 from camcomp.diagnosis.law.law_answer import term_bench
 from camcomp.diagnosis.law.library import LearnedLaw
+from camcomp.diagnosis.law.shapes import Shapes
 from camcomp.diagnosis.search.established import standing
 from camcomp.ground import shelf
 from camcomp.model.effect import Cause
@@ -54,6 +56,16 @@ def test_what_acts_in_one_run_alone_is_a_while_on_its_drive(tmp_path):
     assert law.after_rms_um < 0.25 * law.before_rms_um
 
 
+def driven(folder, machine, wrong):
+    """A machine and the opened experiment of three runs of it, minutes apart, with one thing wrong."""
+    plan, runs = Plan(1, machine=machine, rows=80, stated=True), []
+    for i, name in enumerate(("circles-exact", "zigzag-blended", "pocket-10um")):
+        runs.append(Run(recording.load(name), True, (0.0, 300.0, 731.0)[i]))
+    rng, truth = np.random.default_rng(1), MACHINES[machine]
+    states = [observe(truth, r, Faults((wrong,)), Character(), row_times(r, plan, True, rng)) for r in runs]
+    return truth, open_experiment(write(Made(runs, states, {"runs": [{} for _ in runs]}), plan, folder))
+
+
 @pytest.mark.parametrize(
     ("machine", "target", "size", "term", "unit"),
     [("orthoglide", "x", 1.2, "load_y_N", "mm/N"), ("kuka-kr210", "A3", 7.0, "load_A4_Nmm", "rad/N mm")],
@@ -61,13 +73,7 @@ def test_what_acts_in_one_run_alone_is_a_while_on_its_drive(tmp_path):
 def test_a_drive_that_another_drives_load_moves_is_told_so_and_its_spring_not_blamed(
     tmp_path, machine, target, size, term, unit
 ):
-    plan, runs = Plan(1, machine=machine, rows=80, stated=True), []
-    for i, name in enumerate(("circles-exact", "zigzag-blended", "pocket-10um")):
-        runs.append(Run(recording.load(name), True, 300.0 * i))
-    moved = Fault("crosstalk", target, {"size": size, "place_mm": 0.0})
-    rng, truth = np.random.default_rng(1), MACHINES[machine]
-    states = [observe(truth, r, Faults((moved,)), Character(), row_times(r, plan, True, rng)) for r in runs]
-    files = open_experiment(write(Made(runs, states, {"runs": [{} for _ in runs]}), plan, tmp_path))
+    truth, files = driven(tmp_path, machine, Fault("crosstalk", target, {"size": size, "place_mm": 0.0}))
     causes = [CandidateCause("drive_stiffness", at, shelf.load("effects", "drive_stiffness")) for at in truth.actuators]
     problem = open_problem(Bench(files.twin, files.runs), causes, 0.003)
     answer = answer_law(problem, standing(problem, (truth.actuators.index(target),)), "tip")
@@ -77,6 +83,18 @@ def test_a_drive_that_another_drives_load_moves_is_told_so_and_its_spring_not_bl
     # what the structure exerts on a drive is the opposite of what the drive exerts
     assert found.value == pytest.approx(-2e-4 * size / truth.reach**2, rel=0.03)
     assert answer.law.after_rms_um < 0.2 * answer.law.before_rms_um
+
+
+def test_a_swing_in_time_is_told_by_how_many_turns_it_does_between_runs(tmp_path):
+    swing = {"size": 1.0, "place_mm": 0.0, "period_mm": 20.0, "phase": 0.4, "period_s": 27.1}
+    _, files = driven(tmp_path, "router", Fault("breathing", "x", swing))
+    problem = open_problem(Bench(files.twin, files.runs), [], 0.003)
+    bench, spot = term_bench(problem), Spot("structure", 0)
+    step = _base(problem, None, bench, "tip")(usual_split(len(files.runs)), False)
+    waves = [f for f in at_tip(bench.sizes(spot)) if (f.family, f.about) == ("wave", ("common_s",))]
+    near = min(waves, key=lambda f: abs(1.0 / f.shape[0] - 1.0 / 31.0))  # a run of 15 s hardly knows it from 27.1
+    found = Shapes(bench).followed(step, Term(spot, near))
+    assert found.form.shape[0] == pytest.approx(swing["period_s"], rel=2e-3)
 
 
 def test_a_cause_that_followed_a_law_goes_once_it_is_known_and_another_stays(tmp_path):

@@ -9,9 +9,13 @@ import numpy as np
 
 from camcomp.compensation.long.kernel import lay_loads
 from camcomp.compensation.long.met import Met
+from camcomp.compensation.long.met_loads import lay_met
 from camcomp.compensation.long.plain_run import NotInPieces, PlainRun
+from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import LINE, RAPID, Bools, Floats, Ints, Path
-from camcomp.model.cutting.track import JOIN_ANGLE, PLUNGE_SINE, Conditions, lay_track
+from camcomp.model.cutting.engaged import EngagedAt
+from camcomp.model.cutting.grip import needed
+from camcomp.model.cutting.track import JOIN_ANGLE, PLUNGE_SINE, Conditions, base_of, lay_track
 from camcomp.model.job import Job
 
 
@@ -113,6 +117,8 @@ def _of_model(
         feed=np.where(kind == RAPID, np.nan, feed), speed=speed, turn=turn, tool=tool,
         known=np.ones(n, np.bool_), machine=np.zeros(n, np.bool_),
     )  # fmt: skip
+    if met is not None and not c.plunges:
+        return _where_met(run, path, own, c, met)
     track = lay_track(path, c, None if met is None else met.around(own))
     if met is None and len(track.motion) != n:  # a neighbour crosses the stock's top within NEAR
         raise NotInPieces
@@ -131,6 +137,49 @@ def _of_model(
     parts = run if met is None else run.parts(of, track.points(moves + first, zero), track.points(moves + first, one))
     length = track.length[first:last]
     return Loads(at(moves, zero), at(moves, one), jump, length, at, parts, of, None if met is None else sizes)
+
+
+def _where_met(run: PlainRun, path: Path, own: slice, c: Conditions, met: Met) -> Loads:
+    """The same where the stock is known: in parts between places of the engagement."""
+    met_parts, lengths = met.parts(own), path_geometry.lengths(path)
+    base = np.concatenate([base_of(path, c, each, lengths, extent=False) for each in met_parts])
+    motion, u, depth, turn, bends = (
+        np.concatenate([getattr(each, name) for each in met_parts])
+        for name in ("motion", "u", "depth", "turn", "bends")
+    )
+    rows = needed(motion, u, turn, bends, base)
+    n, parts = len(path), run
+    of, u0, u1 = np.arange(n), np.zeros(n), np.ones(n)
+    start, end = path.start, path.end
+    inner = rows[(u[rows] > 0.0) & (u[rows] < 1.0)]
+    if len(inner):
+        inner = inner[np.append(True, (np.diff(motion[inner]) > 0) | (np.diff(u[inner]) > 0.0))]
+        of, u0 = np.concatenate((of, motion[inner])), np.concatenate((u0, u[inner]))
+        order = np.lexsort((u0, of))
+        of, u0 = of[order], u0[order]
+        u1 = np.append(np.where(of[1:] == of[:-1], u0[1:], 1.0), 1.0)
+        start, end = path_geometry.points(path, of, u0), path_geometry.points(path, of, u1)
+    first, last = np.empty(start.shape), np.empty(start.shape)
+    jump, length = np.zeros(len(of) + 1, np.bool_), np.empty(len(of))
+    axis = np.asarray(c.tool_axis, float)
+    lay_met(
+        path.kind[of], of, u0, u1, start, end, axis, motion[rows], u[rows], turn[rows], base[rows],
+        float(np.cos(JOIN_ANGLE)), PLUNGE_SINE, first, last, jump, length,
+    )  # fmt: skip
+    a, b = np.searchsorted(of, (own.start, own.stop)).tolist()
+    f0, f1, of, u0, u1 = first[a:b], last[a:b], of[a:b], u0[a:b], u1[a:b]
+    if len(inner):
+        parts = run.parts(of - own.start, start[a:b], end[a:b])
+
+    def at(move: Ints, w: Floats) -> Floats:
+        return f0[move] + w[:, None] * (f1[move] - f0[move])
+
+    def sizes(move: Ints, w: Floats) -> Floats:
+        at = np.where(w == 1.0, u1[move], u0[move] + w * (u1[move] - u0[move]))
+        return np.column_stack(places.sizes(of[move], at, w == 0.0))
+
+    places = EngagedAt(motion, u, depth, turn)
+    return Loads(f0, f1, jump[a : b + 1], length[a:b], at, parts, of - own.start, sizes)
 
 
 def joints_at(loads: Loads, kind: np.ndarray, before: Edge | None, after: Edge | None) -> tuple[Bools, Bools]:

@@ -32,10 +32,13 @@ class Met:
 
     def around(self, own: slice) -> Engaged:
         """For a path in which the motions of the run are `own`, with one motion on either side where there is any."""
+        return Engaged.joined(self.parts(own))
+
+    def parts(self, own: slice) -> list[Engaged]:
+        """The same in parts one behind the other."""
         parts = [] if own.start == 0 or self.before is None else [_still(self.before, -1, own.start - 1)]
         parts.append(replace(self.own, motion=self.own.motion + own.start))
-        parts += [] if self.after is None else [_still(self.after, 0, own.stop)]
-        return Engaged.joined(parts)
+        return parts if self.after is None else [*parts, _still(self.after, 0, own.stop)]
 
     def within(self, first: int, last: int) -> Engaged:
         """For a path whose first motion is the one before the run, whose motions first on are the run's, and which ends at

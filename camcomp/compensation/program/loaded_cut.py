@@ -33,6 +33,7 @@ ROUNDS, TRIES = 4, 16
 SHARP = np.radians(30.0)
 FARTHER = 1.5  # times its bend: the way on which a tool comes to be bent otherwise
 BASE_MM, LEAST_REACH_MM = 0.15, 0.1
+REAL = 0.5  # of the way to where it is told to be that a tip goes over short lines when they are the program's own
 LEAST_SHARE = 0.03  # of a step towards the force that was found
 
 
@@ -180,19 +181,26 @@ def _lead(
 
     A force changes as the tool goes on, and it takes about as much way as the tool is bent: behind a sharp corner the tip
     goes straight to where it is bent for the new direction, and so it does over runs shorter than `reach` between two
-    sharp corners, by which corrected lines are joined.
+    sharp corners, by which corrected lines are joined. Where such runs lead elsewhere, the tip first goes there.
     """
     n = len(way.piece)
     tool = track.path.tool[track.motion[way.piece]]
     force, unrest = np.zeros((n, 3)), list[float]()
-    at, begin = free[0] if n else np.zeros(3), 0.0
+    at, begin, skipped = free[0] if n else np.zeros(3), 0.0, False
     bend: list[tuple[float, Floats]] = []  # way and bend at the nodes of this run
     for k in range(n):
         before = force[max(k - 1, 0)]
         if k == 0 or way.run[k] != way.run[k - 1]:
             begin, goes_on = way.s[k], k > 0 and way.feeds[k - 1] and way.feeds[k]
             rest = FARTHER * float(np.linalg.norm(at - way.told[k])) if goes_on else 0.0
-            rest = np.inf if goes_on and way.run_length[k] < reach else rest
+            short = goes_on and way.run_length[k] < reach
+            if skipped and not short and way.loads[k]:
+                there = free[k] + slope[k] @ _at_rest(memory, track, way, k, free[k], slope[k], before, [])[0]
+                if np.linalg.norm(there - at) > REAL * np.linalg.norm(way.told[k] - at):  # not joined where it stood
+                    memory.take(at, there, int(tool[k]), reach)
+                    at, rest = there, 0.0
+            skipped = short
+            rest = np.inf if short else rest
             bend = []
         if way.s[k] - begin < rest or (bend and way.s[k] == bend[-1][0]):
             force[k] = before

@@ -226,7 +226,7 @@ class _Search:
     def _simplest(fine: Sequence[tuple[float, Term]]) -> Term:
         """Of the terms that are as good as the best, one of a plain kind."""
         near = [term for score, term in fine if score > fine[0][0] - SAME]
-        return min(near, key=lambda t: (t.form.family not in _PLAIN, len(t.form.shape), _unlikely(t)))
+        return min(near, key=lambda t: (t.form.family not in _PLAIN, len(t.form.shape), unlikely(t)))
 
     # -- sets ----------------------------------------------------------------------------------------------------------
 
@@ -309,9 +309,9 @@ def margin(tried: Sequence[Term], best: Sequence[Term]) -> float:
     return SAME if shapes[0] > shapes[1] else 0.5
 
 
-def _unlikely(term: Term) -> bool:
-    """Of a drive that leads one axis of the tip: what follows its own travel or a drive's load, or acts for a while, is its own;
-    else the tip's.
+def unlikely(term: Term) -> bool:
+    """Of a drive that leads one axis of the tip: what follows its own travel, or acts for a while, is its own; else the
+    tip's, that too which follows a drive's load where that is the force along an axis.
     """
-    own = term.form.family == "while" or term.form.about[0].startswith(("act", "load", *"xyz"))
+    own = term.form.family == "while" or term.form.about[0].startswith(("act", *"xyz"))
     return (term.spot.on == "drive") != own

@@ -7,13 +7,15 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.optimize import minimize
 
-from camcomp.diagnosis.law.bench_terms import Spot, Term, TermBench
+from camcomp.diagnosis.law.bench_terms import AT_ONCE, Spot, Term, TermBench
 from camcomp.diagnosis.law.folds import WIDE_MM, Folds, gains
 from camcomp.diagnosis.law.forms import Form
 from camcomp.diagnosis.law.white import White
 from camcomp.ground.datatypes import Floats
 
 INSTANTS, TURNS = 60, 2  # moments between rows that are tried for a beginning and for an end, and how often in turn
+PHASES = 6  # of a turn between the first row and the last, by which swings that are tried differ
+MOST_APART = 500  # such steps to both sides: runs that are days apart do not count turns
 TINY = 1e-12
 
 
@@ -39,7 +41,11 @@ class Shapes:
         """The term with the shape that the data want beside what is in the base."""
         if not term.form.shape:
             return term
-        return self._between_rows(step, term) if term.form.passing else self._by_simplex(step, term)
+        if term.form.passing:
+            return self._between_rows(step, term)
+        if (term.form.family, term.form.about) == ("wave", ("common_s",)):
+            term = self._between_runs(step, term)
+        return self._by_simplex(step, term)
 
     def _by_simplex(self, step: Folds, term: Term) -> Term:
         start = np.array(term.form.shape)
@@ -71,6 +77,32 @@ class Shapes:
                 tried = [*(_moved(best, i, float(at)) for at in near), best]
                 best = tried[int(np.argmax(self._gains(step, term.spot, tried)))]
         return Term(term.spot, best)
+
+    def _between_runs(self, step: Folds, term: Term) -> Term:
+        """A swing in time by how many turns it does between runs, too: all that turn alike while runs last are tried."""
+        size = self.bench.sizes(term.spot)
+        low, high = size.limits["common_s"]
+        longest = max(b - a for a, b in size.stretches)
+        step_hz = 1.0 / (PHASES * max(high - low, 1e-9))
+        most = min(int(1.0 / max(longest * step_hz, 1e-9)), MOST_APART)
+        way = step_hz * np.arange(-most, most + 1)
+        turns = 1.0 / term.form.shape[0] + way  # per second
+        forms = [term.form, *(term.form.at((1.0 / each,)) for each in turns[turns > 0.0])]
+        best = [self._pair_gains(step, term.spot, forms[i : i + AT_ONCE]) for i in range(0, len(forms), AT_ONCE)]
+        return Term(term.spot, forms[int(np.argmax(np.concatenate(best)))])
+
+    def _pair_gains(self, step: Folds, spot: Spot, forms: Sequence[Form]) -> Floats:
+        """Log evidence (f,) that forms of two columns add, each alone."""
+        values = self.bench.values(spot, *forms)
+        white = self.bench.white(spot, values)
+        half = step.halved(step.cross(white))
+        pairs = [X.reshape(len(X), -1, 2) for X in (*white.columns, half)]
+        grams = [np.einsum("nfc,nfd->fcd", each, each) for each in pairs]
+        G = np.sum(grams[:-1], axis=0) - grams[-1]
+        h = (step.target(white) - step.of_target(half)).reshape(-1, 2)
+        rms = self.bench.rms(spot, values).reshape(-1, 2)
+        size = np.repeat(np.mean(rms**2, axis=1)[:, None] / WIDE_MM**2 + TINY, 2, axis=1)
+        return np.asarray(gains(G[None], h[None], size)[0])
 
     def _between(self, spot: Spot) -> Floats:
         """Instants on the common clock in the middle between rows that show what happens at a spot."""

@@ -109,9 +109,8 @@ def _draws(problem: Problem, f: Fitted, i: int, W: ByChannel, r: Floats, family:
     if float(apart.sum()) < LIKE**2 * float(np.sum(signal**2)):
         return True
     kinds = _kinds(problem)
-    most = [
-        MINOR if words.kind == "tip" else 1.0 for words in problem.dictionaries
-    ]  # rows of others are weighted by it
+    # rows of other channels are weighted by what is minor
+    most = [MINOR if words.kind == "tip" else 1.0 for words in problem.dictionaries]
     return all(float(apart[kinds == k].mean()) < size**2 for k, size in enumerate(most) if (kinds == k).any())
 
 

@@ -43,10 +43,13 @@ class Grip:
         return Grip(self.base(of, begin), self.base(of, end), self.on[of])
 
 
-def needed(engaged: Engaged, base: Floats) -> Ints:
-    """The places (q,) without which the force would not be the same; a cut begins or ends there, or the force bends."""
-    rows = np.flatnonzero(engaged.bends)
-    return rows[_bent(engaged.motion[rows], engaged.u[rows], engaged.turn[rows] > 0.0, base[rows])]
+def needed(motion: Ints, u: Floats, turn: Floats, bends: Bools, base: Floats) -> Ints:
+    """The places (q,) without which the force (k, 3) would not be the same: a cut begins or ends there, or the force bends.
+
+    motion, u, turn, bends (k,): as in Engaged.
+    """
+    rows = np.flatnonzero(bends)
+    return rows[_bent(motion[rows], u[rows], turn[rows] > 0.0, base[rows])]
 
 
 def _bent(motion: Ints, u: Floats, on: Bools, base: Floats) -> Ints:

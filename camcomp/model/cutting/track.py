@@ -223,8 +223,11 @@ def _components(
     return out
 
 
-def _base(path: Path, c: Conditions, engaged: Engaged, length: Floats) -> Floats:
-    """Fr, Ft, Fz (k, 3) N of the model at the places of the engagement where the tool cuts, and at those next to them."""
+def base_of(path: Path, c: Conditions, engaged: Engaged, length: Floats, *, extent: bool = True) -> Floats:
+    """Fr, Ft, Fz (k, 3) N of the model at the places of the engagement where the tool cuts, and at those next to them.
+
+    extent: whether the model asks how wide the cut is; those of camcomp do with the arcs alone.
+    """
     near = engaged.turn > 0.0
     on, beside = near.copy(), engaged.motion[1:] == engaged.motion[:-1]
     near[1:] |= on[:-1] & beside
@@ -235,7 +238,7 @@ def _base(path: Path, c: Conditions, engaged: Engaged, length: Floats) -> Floats
         where, u, bites = engaged.motion[rows], engaged.u[rows], engaged.bites.of(rows)
         direction = path_geometry.tangents(path, where, u)
         s = np.concatenate(([0.0], np.cumsum(length)))[where] + u * length[where]
-        reach = bites.reach(len(rows))
+        reach = bites.reach(len(rows)) if extent else np.full(len(rows), np.nan)
         base[rows] = _components(path, c, where, direction, engaged.depth[rows], reach, s, u == 1.0, bites)
     return base
 
@@ -252,8 +255,8 @@ def lay_track(path: Path, conditions: Conditions, engaged: Engaged | None = None
         engaged = conditions.engage(path)
     places = None
     if engaged is not None:
-        base = _base(path, conditions, engaged, length)
-        rows = needed(engaged, base)
+        base = base_of(path, conditions, engaged, length)
+        rows = needed(engaged.motion, engaged.u, engaged.turn, engaged.bends, base)
         places, base = engaged.take(rows), base[rows]
     motion, u0, u1, over = _pieces(path, conditions, upright, places)
     beside0, beside1 = upright.beside(path, axis, motion, u0, u1)

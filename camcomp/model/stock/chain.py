@@ -3,7 +3,10 @@
 # mypy: disallow-untyped-defs=False, disallow-incomplete-defs=False
 # numba infers the types of these functions; written by hand they would only be repeated.
 
+import math
+
 from camcomp.model.statics.compiled import inner
+from camcomp.model.stock.foreseen import alike, as_foreseen, mix
 from camcomp.model.stock.measure import BITE, WHAT
 from camcomp.model.stock.places import (
     BENT,
@@ -26,6 +29,7 @@ from camcomp.model.stock.places import (
     leg_length,
     look,
     put_place,
+    stand,
 )
 
 
@@ -37,6 +41,10 @@ def blend(found, a, b, w, out):
         found.stack[out, i] = found.stack[a, i] + w * (found.stack[b, i] - found.stack[a, i])
     if apart(found, a, b) <= BENT * found.way[SCALE]:
         found.stack_rows[out, 0], found.stack_rows[out, 1] = found.stack_rows[a, 0], found.stack_rows[a, 1]
+        return
+    if alike(found, a, b):
+        found.stack_rows[out, 0], found.stack_rows[out, 1] = mix(found, a, b, w), found.stack_rows[a, 1]
+        found.told_of[ROWS] = first + found.stack_rows[a, 1]
         return
     n = first
     for side in range(2):
@@ -68,6 +76,23 @@ def put_straight(found, k, a, b, slot_a, slot_b):
 
 
 @inner
+def foreseen_between(nodes, place, found, legs, k, a, b, slot_a, slot_b, radius, before):
+    """Whether the engagement behind short legs k + a to k + b - 2 is foreseen wherever it would be looked at."""
+    ends = found.chain_way
+    gap = ends[b] - ends[a]
+    parts = max(math.ceil(gap / (0.5 * STEP * radius)), 2)
+    last = a
+    for j in range(a + 1, b):
+        if ends[j] - ends[last] < 0.9 * gap / parts:
+            continue
+        last = j
+        stand(nodes, place, legs, k + j - 1, 1.0, before + j)
+        if not as_foreseen(nodes, place, found, slot_a, slot_b, (ends[j] - ends[a]) / gap, BENT * found.way[SCALE]):
+            return False
+    return True
+
+
+@inner
 def along_chain(nodes, place, found, legs, k, count, radius, before, joined_on):
     """Puts down the places of short legs that go on from each other; slot FIRST tells what is met at their begin."""
     ends, number = found.chain_way, found.chain_number
@@ -86,9 +111,15 @@ def along_chain(nodes, place, found, legs, k, count, radius, before, joined_on):
             between(nodes, place, found, legs, k + a, gap, radius, before + a)
         elif gap > SHORT * radius or apart(found, FIRST, slot) > CALM * scale or begins(found, FIRST, slot):
             m = (a + b) // 2
+            if foreseen_between(nodes, place, found, legs, k, a, b, FIRST, slot, radius, before):
+                put_straight(found, k, a, b, FIRST, slot)
+                copy_slot(found, slot, FIRST)
+                number[0] = b
+                top -= 1
+                continue
             look(nodes, place, found, legs, k + m - 1, 1.0, before + m, slot + 1)
             off = bent(found, FIRST, slot + 1, slot, (ends[m] - ends[a]) / gap)
-            if off > BENT * scale or begins(found, FIRST, slot):
+            if off > BENT * scale or gap > STEP * radius or begins(found, FIRST, slot):
                 top += 1
                 number[top] = m
                 continue
@@ -102,8 +133,8 @@ def along_chain(nodes, place, found, legs, k, count, radius, before, joined_on):
 
 
 @inner
-def chain_from(found, kind, legs, joined, leg, radius, lately):
-    """How many short legs from `leg` on go on from each other; chain_way gets the ways to their ends."""
+def chain_from(found, kind, legs, joined, leg, most_way, lately):
+    """How many short legs from `leg` on go on from each other, for most_way mm; chain_way gets the ways to their ends."""
     ends, count = found.chain_way, 0
     most = min(MOST_CHAIN, MOST_RECENT - found.told_of[RECENT] - 2)
     ends[0] = 0.0
@@ -115,7 +146,7 @@ def chain_from(found, kind, legs, joined, leg, radius, lately):
     ):
         k = leg + count
         length = leg_length(legs, k)
-        if not 0.0 < length < 3.0 * lately or ends[count] + length > STEP * radius:
+        if not 0.0 < length < 3.0 * lately or ends[count] + length > most_way:
             break
         count += 1
         ends[count] = ends[count - 1] + length

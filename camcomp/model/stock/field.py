@@ -15,31 +15,33 @@ import numpy as np
 
 from camcomp.ground.datatypes import Floats
 from camcomp.model.statics.compiled import inner
-from camcomp.model.stock.sweeps import NOWHERE, bottom
+from camcomp.model.stock.sweeps import NOWHERE, bottom, passes
 
 BOX, ROUND, MESH = 0, 1, 2
-GX, GY, CELL, FORM, XMIN, YMIN, ZMIN, XMAX, YMAX, ZMAX = range(10)  # of `place`; a round stock fills its rectangle
+GX, GY, CELL, FORM, XMIN, YMIN, ZMIN, XMAX, YMAX, ZMAX, RISE = range(
+    11
+)  # of `place`; a round stock fills its rectangle
 TIE = 1e-5  # mm: heights are kept with seven digits
 HAIR = 1e-9  # mm
 USED, FREE, TOUCHED, BEGUN = range(4)  # of `counts`
+SPAN = 3.0  # cells: what lies around a cell is that far away
+SLACK = 7  # of `last`: mm by which a sweep may be lower between the nodes of a cell than at all nodes around it
 
 
 class HeightField(NamedTuple):
     """The field. ny, nx nodes; M sweeps; T rows of tools; the mesh of a stock from a file."""
 
-    place: Floats  # (10,) first node, cell, form and bounds of the stock, mm
+    place: Floats  # (11,) first node, cell, form and bounds of the stock, how much a tool rises within SPAN, mm
     own: Any  # (ny, nx) int32, sweep that cut a node lowest, counted from 1; 0: nothing did
-    low: Any  # (ny, nx) float32, height there, mm
+    low: Any  # (ny, nx) float32, height there, mm; the top of a box where nothing did
     near: Any  # (ny, nx) int32, sweep that passes nearest, of those that cut about as low
     over: Any  # (ny, nx) int32, sweep that passes nearest of all
-    sweeps: Floats  # (M, 11)
+    sweeps: Floats  # (M, 12)
     tools: Floats  # (T, 5)
     kept: Any  # (M,) int32, how often a sweep stands in these; below 0: it is still to be cut away
     free: Any  # (M,) int32, stack of places in `sweeps` that can be used again
     counts: Any  # (4,) int64
-    last: (
-        Floats  # (7,) end, tool and direction of the sweep that was cut away last, and from where on it left something
-    )
+    last: Floats  # (8,) end, tool and direction of the sweep that was cut away last, from where on it left something, slack
     facet: Any  # (ny, nx) int32 triangle on top of a node, counted from 1; 0: none
     mesh: Floats  # (F, 3, 3) mm, its triangles
 
@@ -136,12 +138,83 @@ def height(nodes, x, y, below):
     return best
 
 
+@inner
+def above(nodes, x, y, z):
+    """Whether what stands over a point is higher than z: as `height` has it, but mostly without asking any sweep."""
+    place, own, low = nodes.place, nodes.own, nodes.low
+    cell = place[CELL]
+    fx = (x - place[GX]) / cell
+    fy = (y - place[GY]) / cell
+    if not (fx >= 1.0 and fy >= 1.0 and fx < own.shape[1] - 3 and fy < own.shape[0] - 3):
+        return False
+    j = int(fx)
+    i = int(fy)
+    highest = max(max(low[i, j], low[i, j + 1]), max(low[i + 1, j], low[i + 1, j + 1]))
+    lowest = min(min(low[i, j], low[i, j + 1]), min(low[i + 1, j], low[i + 1, j + 1]))
+    a, b, c, d = own[i, j], own[i, j + 1], own[i + 1, j], own[i + 1, j + 1]
+    if a > 0 and b > 0 and c > 0 and d > 0 and (a != b or a != c or a != d) and highest - lowest <= TIE:
+        return highest > z + TIE
+    if lowest - nodes.last[SLACK] > z and place[FORM] == BOX and (
+        min(x - place[XMIN], place[XMAX] - x) > 2.0 * cell and min(y - place[YMIN], place[YMAX] - y) > 2.0 * cell
+    ):  # fmt: skip
+        for p in (i - 1, i + 2):
+            for q in range(j - 1, j + 3):
+                lowest = min(lowest, low[p, q])
+        for p in range(i, i + 2):
+            for q in (j - 1, j + 2):
+                lowest = min(lowest, low[p, q])
+        if lowest - nodes.last[SLACK] > z:
+            return True
+    sweeps, tools = nodes.sweeps, nodes.tools
+    if top_at(nodes, x, y, i, j) <= z:
+        return False
+    if a == b and a == c and a == d:
+        return not (a > 0 and passes(sweeps, tools, a - 1, 0, x, y, z))
+    before = 0
+    for corner in range(4):
+        k = (a, b, c, d)[corner]
+        if k > 0 and k != before and passes(sweeps, tools, k - 1, 0, x, y, z):
+            return False
+        before = k
+    near, over = nodes.near, nodes.over
+    for p in range(i - 1, i + 3):
+        for q in range(j - 1, j + 3):
+            k = own[p, q]
+            if k == 0:
+                continue
+            n, m = near[p, q], over[p, q]
+            if (
+                k != a and k != b and k != c and k != d
+                and (q == j - 1 or own[p, q - 1] != k) and (p == i - 1 or own[p - 1, q] != k)
+                and passes(sweeps, tools, k - 1, 0, x, y, z)
+            ):  # fmt: skip
+                return False
+            if (
+                n != k and (q == j - 1 or near[p, q - 1] != n) and (p == i - 1 or near[p - 1, q] != n)
+                and passes(sweeps, tools, n - 1, 0, x, y, z)
+            ):  # fmt: skip
+                return False
+            if (
+                m != k and m != n and (q == j - 1 or over[p, q - 1] != m) and (p == i - 1 or over[p - 1, q] != m)
+                and passes(sweeps, tools, m - 1, 0, x, y, z)
+            ):  # fmt: skip
+                return False
+    return True
+
+
 def room_for(
     place: Floats, rows: int, columns: int, tools: Floats, sweeps: int, facet: Any, mesh: Floats
 ) -> HeightField:
-    """An uncut field. Pages that no tool has touched take no memory."""
+    """An uncut field. Pages that no tool has touched take no memory, but for the heights of a box."""
+    low = (
+        np.full((rows, columns), place[ZMAX], np.float32)
+        if place[FORM] == BOX
+        else np.zeros((rows, columns), np.float32)
+    )
+    last = np.zeros(8)
+    last[SLACK] = place[RISE]
     return HeightField(
-        place, np.zeros((rows, columns), np.int32), np.zeros((rows, columns), np.float32),
-        np.zeros((rows, columns), np.int32), np.zeros((rows, columns), np.int32), np.empty((sweeps, 11)), tools,
-        np.zeros(sweeps, np.int32), np.zeros(sweeps, np.int32), np.zeros(4, np.int64), np.zeros(7), facet, mesh,
+        place, np.zeros((rows, columns), np.int32), low, np.zeros((rows, columns), np.int32),
+        np.zeros((rows, columns), np.int32), np.empty((sweeps, 12)), tools, np.zeros(sweeps, np.int32),
+        np.zeros(sweeps, np.int32), np.zeros(4, np.int64), last, facet, mesh,
     )  # fmt: skip

@@ -35,9 +35,10 @@ from camcomp.model.stock.places import (
     put_place,
 )
 from camcomp.model.stock.removal import cut_away, drop_one, hits, put_sweep
-from camcomp.model.stock.sweeps import RADIUS
+from camcomp.model.stock.sweeps import FLAT, KIND, RADIUS
 
 LATELY = 1.5  # times the way on which a sweep lies against the front of the tool by less than EDGE
+FARTHER = 1.0  # of the radius, instead of STEP, where what lies between can be foreseen
 ROOM_FOR_PLACES, ROOM_FOR_ARCS = 4096, 65536  # that a leg may take up
 
 
@@ -127,7 +128,8 @@ def march(nodes, place, found, kind, legs, tool, joined, leg):
                 found.stack_u[0] = 0.0
             else:
                 look(nodes, place, found, legs, k, 0.0, before, 0)
-            count = chain_from(found, kind, legs, joined, k, radius, lately)
+            step = STEP if nodes.tools[2 * which, KIND] == FLAT else FARTHER
+            count = chain_from(found, kind, legs, joined, k, step * radius, lately)
             if count > 1:
                 for j in range(count):
                     take(nodes, place, found, legs, k + j, which, found.chain_way[j + 1] - found.chain_way[j], lately)

@@ -11,7 +11,7 @@ from camcomp.ground.datatypes import Floats, Ints, Path
 from camcomp.model.cutting.engaged import Bites, Engaged
 from camcomp.model.stock.at_tip import meet, take_way
 from camcomp.model.stock.facets import facets_on
-from camcomp.model.stock.field import TOUCHED, USED, XMAX, XMIN, ZMAX, ZMIN, room_for
+from camcomp.model.stock.field import SPAN, TOUCHED, USED, XMAX, XMIN, ZMAX, ZMIN, room_for
 from camcomp.model.stock.legs import LegBefore, Legs, legs_of
 from camcomp.model.stock.march import ROOM_FOR_ARCS, ROOM_FOR_PLACES, march, peek, settle
 from camcomp.model.stock.measure import BITE, DEPTH, EDGE, ENGAGED, WHAT, Place
@@ -42,14 +42,15 @@ class StockMemory:
         self.cell = cell_for(stock, tools) if cell_mm is None else cell_mm
         self._number = {number: k for k, number in enumerate(tools)}
         rows = np.array([row for each in tools.values() for row in each.rows()])
+        rise = max(each.rise(SPAN * self.cell) for each in tools.values())
         size = np.ceil((stock.high - stock.low)[:2] / self.cell).astype(int) + 2 * MARGIN
         place = np.concatenate(
-            (stock.low[:2] - (MARGIN - 0.5) * self.cell, [self.cell, stock.form], stock.low, stock.high)
+            (stock.low[:2] - (MARGIN - 0.5) * self.cell, [self.cell, stock.form], stock.low, stock.high, [rise])
         )
         facet, mesh = facets_on(stock, place, size)
         self.nodes = room_for(place, int(size[1]), int(size[0]), rows, 1 << 12, facet, mesh)
         self._place = Place(
-            np.zeros(6), np.zeros(1, np.int64), np.zeros(MOST_RECENT, np.int64), np.zeros(1, np.int64), np.zeros(WHAT),
+            np.zeros(8), np.zeros(1, np.int64), np.zeros(MOST_RECENT, np.int64), np.zeros(1, np.int64), np.zeros(WHAT),
             np.zeros((ARCS, 2)),
         )  # fmt: skip
         n, r, deep = 4 * ROOM_FOR_PLACES, 2 * ROOM_FOR_ARCS, DEEP + CHAIN_DEEP
@@ -109,7 +110,7 @@ class StockMemory:
         The depth in mm, and the arcs of this one place. Not to be mixed with `follow`.
         """
         n = meet(self.nodes, self._place, self._found, tip, direction, self._tool(tool))
-        start, stop, height, rise, run = self._found.bites[:n].T.copy()
+        start, stop, height, rise, run, _ = self._found.bites[:n].T.copy()
         return float(self._place.told[DEPTH]), Bites(np.zeros(n, np.int64), start, stop, height, rise, run)
 
     def take(self, start: Floats, end: Floats, tool: int, lag_mm: float) -> None:
@@ -212,6 +213,6 @@ def _engaged(parts: list[_Places], legs: Legs) -> Engaged:
     motion, at, told, first, many = motion[keep], at[keep], told[keep], first[keep], many[keep]
     place = np.repeat(np.arange(len(many)), many)
     row = np.repeat(first - (np.cumsum(many) - many), many) + np.arange(int(many.sum()))
-    start, stop, height, rise, run = bites[row].T
+    start, stop, height, rise, run, _ = bites[row].T
     bites_of = Bites(place, start, stop, height, rise, run)
     return Engaged(motion, at, told[:, DEPTH], told[:, ENGAGED], bends[kept], bites_of)

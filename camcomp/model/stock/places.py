@@ -12,7 +12,8 @@ from typing import Any, NamedTuple
 
 from camcomp.ground.datatypes import Floats
 from camcomp.model.statics.compiled import inner
-from camcomp.model.stock.measure import DEPTH, WHAT, measure
+from camcomp.model.stock.foreseen import as_foreseen
+from camcomp.model.stock.measure import DEPTH, WHAT, lay_back, measure
 
 RAPID_LEG, CUT_LEG, PLUNGE_LEG, UNSEEN_LEG = 0, 1, 2, 3
 FX, FY, FZ, TX, TY, TZ, AX, AY, BX, BY = range(10)  # of a leg: from, to (mm); directions in the plane at both ends
@@ -58,8 +59,8 @@ def leg_length(legs, k):
 
 
 @inner
-def look(nodes, place, found, legs, k, u, many, slot):
-    """Measures at fraction u of leg k into a slot of the stack."""
+def stand(nodes, place, legs, k, u, many):
+    """Puts the tool at fraction u of leg k, when `many` of the recent sweeps have been taken."""
     at = place.at
     for i in range(3):
         at[i] = legs[k, FX + i] + u * (legs[k, TX + i] - legs[k, FX + i])
@@ -75,6 +76,13 @@ def look(nodes, place, found, legs, k, u, many, slot):
     else:
         at[3], at[4] = legs[k, side], legs[k, side + 1]
     place.many[0] = many
+    lay_back(nodes, place)
+
+
+@inner
+def look(nodes, place, found, legs, k, u, many, slot):
+    """Measures at fraction u of leg k into a slot of the stack."""
+    stand(nodes, place, legs, k, u, many)
     rows = found.told_of[ROWS]
     n = measure(nodes, place, found.bites, rows)
     found.told_of[ROWS] = n
@@ -149,8 +157,11 @@ def between(nodes, place, found, legs, k, length, radius, before):
         edge = gap > JUMP_MM and begins(found, 0, top)
         if room and not jumps and gap > FINE_MM and (differ > CALM * scale or gap > SHORT * radius or edge):
             rows = found.told_of[ROWS]
-            look(nodes, place, found, legs, k, 0.5 * (a + b), before, top + 1)
-            if edge or bent(found, 0, top + 1, top, 0.5) > BENT * scale:
+            stand(nodes, place, legs, k, 0.5 * (a + b), before)
+            so = as_foreseen(nodes, place, found, 0, top, 0.5, BENT * scale)
+            if not so:
+                look(nodes, place, found, legs, k, 0.5 * (a + b), before, top + 1)
+            if edge or not so and bent(found, 0, top + 1, top, 0.5) > BENT * scale:
                 top += 1
                 continue
             found.told_of[ROWS] = rows

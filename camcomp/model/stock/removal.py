@@ -6,7 +6,23 @@
 import math
 
 from camcomp.model.statics.compiled import inner
-from camcomp.model.stock.field import BEGUN, CELL, FREE, GX, GY, HAIR, TIE, TOUCHED, USED, ZMAX, ZMIN, top_at
+from camcomp.model.stock.field import (
+    BEGUN,
+    CELL,
+    FREE,
+    GX,
+    GY,
+    HAIR,
+    RISE,
+    SLACK,
+    SPAN,
+    TIE,
+    TOUCHED,
+    USED,
+    ZMAX,
+    ZMIN,
+    top_at,
+)
 from camcomp.model.stock.sweeps import (
     BALL,
     CLIMB,
@@ -19,39 +35,42 @@ from camcomp.model.stock.sweeps import (
     TOOL,
     UX,
     UY,
+    WAY,
     X0,
     X1,
     Y0,
     Y1,
     Z0,
     Z1,
+    across,
     beside,
     bottom,
+    bottom_at,
 )
 
 SAME_LEVEL = 0.02  # mm, and what a sweep climbs within its tool
+SHORTEST = 0.01  # mm: shorter ones, which plunges are after rounding, slant by nothing
+LEAN = 1e-6  # a direction along a row or across it
 CRASH_DEEP, CRASH_INSIDE = 0.01, 0.02  # mm that a rapid has to be in material before it is called a crash
 
 
 @inner
-def row_span(sweeps, k, radius, y):
-    """From where to where, in x, a sweep of this radius covers a row of the field; nowhere when the first is larger."""
-    low, high = NOWHERE, -NOWHERE
-    for end in range(2):
-        x = sweeps[k, X1] if end else sweeps[k, X0]
-        dy = y - (sweeps[k, Y1] if end else sweeps[k, Y0])
-        if abs(dy) <= radius:
-            half = math.sqrt(radius * radius - dy * dy)
-            low = min(low, x - half)
-            high = max(high, x + half)
-    for side in (-1.0, 1.0):
-        ox, oy = side * radius * sweeps[k, UY], -side * radius * sweeps[k, UX]
-        ya, yb = sweeps[k, Y0] + oy, sweeps[k, Y1] + oy
-        if ya != yb and min(ya, yb) <= y <= max(ya, yb):
-            x = sweeps[k, X0] + ox + (y - ya) / (yb - ya) * (sweeps[k, X1] - sweeps[k, X0])
-            low = min(low, x)
-            high = max(high, x)
-    return low, high
+def strip(low, high, over, by):
+    """Where low <= over * x + by * y <= high: the ends of x on the row y = 0, and how much they move from row to row."""
+    if abs(over) <= LEAN:
+        return -NOWHERE, NOWHERE, 0.0
+    a, b = low / over, high / over
+    return min(a, b) - HAIR, max(a, b) + HAIR, -by / over
+
+
+@inner
+def rows_between(nodes, k, radius, first, last):
+    """The first and the last row of the field that a sweep can reach between two places of its way, mm."""
+    y0, ux, uy = nodes.sweeps[k, Y0], nodes.sweeps[k, UX], nodes.sweeps[k, UY]
+    low = y0 + min(first * uy, last * uy) - radius * abs(ux) - nodes.place[GY] - HAIR
+    high = y0 + max(first * uy, last * uy) + radius * abs(ux) - nodes.place[GY] + HAIR
+    cell = nodes.place[CELL]
+    return max(math.ceil(low / cell), 0), min(math.floor(high / cell), nodes.own.shape[0] - 1)
 
 
 @inner
@@ -75,7 +94,10 @@ def put_sweep(nodes, x0, y0, z0, x1, y1, z1, tool):
     s[k, LENGTH] = length
     s[k, UX] = (x1 - x0) / length if length > 0.0 else 1.0
     s[k, UY] = (y1 - y0) / length if length > 0.0 else 0.0
-    s[k, CLIMB] = (z1 - z0) / length if length > 0.0 else 0.0
+    climb = (z1 - z0) / length if length > 0.0 else 0.0
+    s[k, CLIMB], s[k, WAY] = climb, math.sqrt(1.0 + climb * climb)
+    if length > SHORTEST:
+        nodes.last[SLACK] = max(nodes.last[SLACK], nodes.place[RISE] + SPAN * nodes.place[CELL] * abs(climb))
     nodes.kept[k] = -1
     return k
 
@@ -126,33 +148,27 @@ def cut_away(nodes, k, after):
     begun = -overhang(sweeps, tools, k, -sweeps[k, CLIMB]) if joined else -NOWHERE
     left = overhang(sweeps, tools, k, sweeps[k, CLIMB]) if goes_on else NOWHERE
     before, bx, by = last[6], last[4], last[5]
-    lowest = -NOWHERE
+    first, beyond = -radius, min(length + left, length + radius)
     if begun > -NOWHERE and bx * ux + by * uy > 0.0:
-        lowest = begun - radius * abs(bx * uy - by * ux)  # of what the one before has left, as it was beyond its end
+        first = max(first, begun - radius * abs(bx * uy - by * ux))  # of what the one before has left beyond its end
     nodes.kept[k] = 1  # it must not be freed meanwhile
-    bottom_row = max(math.ceil((min(y0, sweeps[k, Y1]) - radius - gy) / cell), 0)
-    top_row = min(math.floor((max(y0, sweeps[k, Y1]) + radius - gy) / cell), own.shape[0] - 1)
+    bottom_row, top_row = rows_between(nodes, k, radius, first, beyond)
     if min(sweeps[k, Z0], sweeps[k, Z1]) >= place[ZMAX]:
         top_row = -1
+    a, b, lean = strip(first, beyond, ux, uy)
+    c, d, tilt = strip(-radius, radius, uy, -ux)
+    width, off = own.shape[1] - 1, x0 - gx
     for i in range(bottom_row, top_row + 1):
-        dy = gy + i * cell - y0
-        begin, end = row_span(sweeps, k, radius, gy + i * cell)
-        if abs(ux) > 1e-6:
-            a = x0 + (lowest - dy * uy) / ux
-            b = x0 + (length + left - dy * uy) / ux
-            begin, end = max(begin, min(a, b) - HAIR), min(end, max(a, b) + HAIR)
-        elif dy * uy < lowest - 1e-3 or dy * uy > length + left + 1e-3:
-            continue
-        if begin > end:
-            continue
-        for j in range(
-            max(math.ceil((begin - gx) / cell), 0), min(math.floor((end - gx) / cell), own.shape[1] - 1) + 1
-        ):
+        y = gy + i * cell
+        dy = y - y0
+        begin = max(a + lean * dy, c + tilt * dy)
+        end = min(b + lean * dy, d + tilt * dy)
+        for j in range(max(math.ceil((begin + off) / cell), 0), min(math.floor((end + off) / cell), width) + 1):
             x = gx + j * cell
             s = (x - x0) * ux + dy * uy
             if s > length + left or (s < begun and (x - x0) * bx + dy * by <= before):
                 continue
-            cut_node(nodes, k, i, j, x, gy + i * cell)
+            cut_node(nodes, k, i, j, x, y)
     drop_one(nodes, k)
     last[0], last[1], last[2], last[3] = sweeps[k, X1], sweeps[k, Y1], sweeps[k, Z1], tool
     last[4], last[5], last[6] = ux, uy, left
@@ -163,7 +179,8 @@ def cut_away(nodes, k, after):
 def cut_node(nodes, k, i, j, x, y):
     """Takes the material of sweep k out of a node."""
     own, low, near, over, sweeps, tools = nodes.own, nodes.low, nodes.near, nodes.over, nodes.sweeps, nodes.tools
-    z = bottom(sweeps, tools, k, 0, x, y)
+    n, s = across(sweeps, k, x, y)
+    z = bottom_at(sweeps, tools, k, 0, n, s)
     if z >= NOWHERE:
         return
     before = own[i, j]
@@ -175,27 +192,31 @@ def cut_node(nodes, k, i, j, x, y):
         nodes.counts[TOUCHED] += int(stands > nodes.place[ZMIN])
         if before > 0:
             drop_one(nodes, before - 1)
-    if own[i, j] == 0:
+    elif before == 0:
         return
-    aside = beside(sweeps, k, x, y)
+    aside = beside(sweeps, k, n, s)
+    lowest = float(low[i, j])
     level = SAME_LEVEL + 2.0 * tools[2 * int(sweeps[k, TOOL]), RADIUS] * abs(sweeps[k, CLIMB])
-    if z <= float(low[i, j]) + level:
-        other = near[i, j]
-        if (
-            other == 0
-            or z < bottom(sweeps, tools, other - 1, 0, x, y) - level
-            or aside < beside(sweeps, other - 1, x, y) - HAIR
-        ):
-            near[i, j] = k + 1
-            nodes.kept[k] += 1
-            if other > 0:
-                drop_one(nodes, other - 1)
-    other = over[i, j]
-    if other == 0 or aside < beside(sweeps, other - 1, x, y) + (HAIR if z <= float(low[i, j]) else -HAIR):
+    first, second = near[i, j], over[i, j]
+    away = 0.0
+    if first > 0:
+        n, s = across(sweeps, first - 1, x, y)
+        away = beside(sweeps, first - 1, n, s)
+    if z <= lowest + level and (
+        first == 0 or aside < away - HAIR or z < bottom_at(sweeps, tools, first - 1, 0, n, s) - level
+    ):
+        near[i, j] = k + 1
+        nodes.kept[k] += 1
+        if first > 0:
+            drop_one(nodes, first - 1)
+    if second > 0 and second != first:
+        n, s = across(sweeps, second - 1, x, y)
+        away = beside(sweeps, second - 1, n, s)
+    if second == 0 or aside < away + (HAIR if z <= lowest else -HAIR):
         over[i, j] = k + 1
         nodes.kept[k] += 1
-        if other > 0:
-            drop_one(nodes, other - 1)
+        if second > 0:
+            drop_one(nodes, second - 1)
 
 
 @inner
@@ -206,13 +227,18 @@ def hits(nodes, k):
     cell, gx, gy = place[CELL], place[GX], place[GY]
     if min(sweeps[k, Z0], sweeps[k, Z1]) >= place[ZMAX] - CRASH_DEEP or radius <= 0.0:
         return False
-    bottom_row = max(math.ceil((min(sweeps[k, Y0], sweeps[k, Y1]) - radius - gy) / cell), 0)
-    top_row = min(math.floor((max(sweeps[k, Y0], sweeps[k, Y1]) + radius - gy) / cell), own.shape[0] - 1)
+    last = sweeps[k, LENGTH] + radius
+    bottom_row, top_row = rows_between(nodes, k, radius, -radius, last)
+    a, b, lean = strip(-radius, last, sweeps[k, UX], sweeps[k, UY])
+    c, d, tilt = strip(-radius, radius, sweeps[k, UY], -sweeps[k, UX])
+    off = sweeps[k, X0] - gx
     for i in range(bottom_row, top_row + 1):
         y = gy + i * cell
-        begin, end = row_span(sweeps, k, radius, y)
-        first = max(math.ceil((begin - gx) / cell), 0)
-        for j in range(first, min(math.floor((end - gx) / cell), own.shape[1] - 1) + 1):
+        dy = y - sweeps[k, Y0]
+        begin = max(a + lean * dy, c + tilt * dy)
+        end = min(b + lean * dy, d + tilt * dy)
+        first = max(math.ceil((begin + off) / cell), 0)
+        for j in range(first, min(math.floor((end + off) / cell), own.shape[1] - 1) + 1):
             x = gx + j * cell
             stands = float(low[i, j]) if own[i, j] > 0 else top_at(nodes, x, y, i, j)
             if stands > place[ZMIN] and max(bottom(sweeps, tools, k, 0, x, y), place[ZMIN]) < stands - CRASH_DEEP:

@@ -41,6 +41,16 @@ class ToolShape:
         lift = 0.0 if self.kind == "flat" else higher + FLOOR + SLIMMER
         return [[radius, KINDS[self.kind], corner, cone, 0.0], [*slim, lift]]
 
+    def rise(self, aside: float) -> float:
+        """Height of its surface over the tip at a distance from its axis, mm; infinite beside it."""
+        radius, _, corner, cone, _ = self.rows()[0]
+        if aside > radius:
+            return np.inf
+        if self.kind == "drill":
+            return aside / cone
+        inside = max(aside - (radius - corner), 0.0)
+        return float(corner - np.sqrt(corner**2 - inside**2))
+
 
 @dataclass(frozen=True, eq=False)
 class StockShape:

@@ -1,7 +1,7 @@
 """What a tool takes away on a straight way, exactly: the lowest height that its sweep reaches over a point.
 
 A tool is a body of revolution, given by its radius over height. Columns of a sweep: begin and end of the tip, tool,
-length and direction in the plane, climb per mm. Columns of a tool: radius, kind, corner radius, tangent of the tip's
+length and direction in the plane, climb per mm, and way per mm in the plane. Columns of a tool: radius, kind, corner radius, tangent of the tip's
 half angle, lift of the tip. Every tool has a second row, a hair slimmer: what the tool has just taken counts by that.
 """
 
@@ -13,7 +13,7 @@ import math
 from camcomp.model.statics.compiled import inner
 
 FLAT, BALL, BULL, DRILL = 0, 1, 2, 3
-X0, Y0, Z0, X1, Y1, Z1, TOOL, LENGTH, UX, UY, CLIMB = range(11)
+X0, Y0, Z0, X1, Y1, Z1, TOOL, LENGTH, UX, UY, CLIMB, WAY = range(12)
 RADIUS, KIND, CORNER, CONE, LIFT = range(5)
 NOWHERE = 1e30  # mm, the height of what is not there
 LEVEL = 1e-12  # climb per mm
@@ -21,16 +21,18 @@ HALVINGS = 30
 
 
 @inner
-def profile(tools, row, rho):
-    """Height of the tool's surface over its tip at distance rho from its axis, mm."""
+def profile(tools, row, square):
+    """Height of the tool's surface over its tip, mm; square (mm2): of the distance from its axis."""
     kind = tools[row, KIND]
     lift = tools[row, LIFT]
     if kind == FLAT:
         return lift
     if kind == DRILL:
-        return lift + rho / tools[row, CONE]
+        return lift + math.sqrt(square) / tools[row, CONE]
     corner = tools[row, CORNER]
-    inside = rho - (tools[row, RADIUS] - corner)
+    if kind == BALL:
+        return lift + corner - math.sqrt(max(corner * corner - square, 0.0))
+    inside = math.sqrt(square) - (tools[row, RADIUS] - corner)
     if inside <= 0.0:
         return lift
     return lift + corner - math.sqrt(max(corner * corner - inside * inside, 0.0))
@@ -67,16 +69,18 @@ def radius_at(tools, row, height):
 
 
 @inner
-def beside(sweeps, k, x, y):
-    """Distance of a point from the way of a sweep in the plane, mm."""
+def across(sweeps, k, x, y):
+    """Where a point lies in the plane, mm: right of the way of a sweep, and along it from its begin."""
     dx = x - sweeps[k, X0]
     dy = y - sweeps[k, Y0]
-    s = dx * sweeps[k, UX] + dy * sweeps[k, UY]
-    t = min(max(s, 0.0), sweeps[k, LENGTH])
-    n = dx * sweeps[k, UY] - dy * sweeps[k, UX]
-    if sweeps[k, LENGTH] == 0.0:
-        return math.sqrt(dx * dx + dy * dy)
-    return math.sqrt(n * n + (s - t) * (s - t))
+    return dx * sweeps[k, UY] - dy * sweeps[k, UX], dx * sweeps[k, UX] + dy * sweeps[k, UY]
+
+
+@inner
+def beside(sweeps, k, n, s):
+    """Square of the distance, in the plane, of a point `across` the way of a sweep from that way, mm2."""
+    off = s - min(max(s, 0.0), sweeps[k, LENGTH])
+    return n * n + off * off
 
 
 @inner
@@ -89,34 +93,34 @@ def rises(tools, row, climb, aside, along):
 @inner
 def bottom(sweeps, tools, k, slim, x, y):
     """Lowest height of sweep k over a point, mm; NOWHERE where it does not pass. slim: 1 for the slimmer tool."""
+    n, s = across(sweeps, k, x, y)
+    return bottom_at(sweeps, tools, k, slim, n, s)
+
+
+@inner
+def bottom_at(sweeps, tools, k, slim, n, s):
+    """The same over a point `across` its way."""
     row = 2 * int(sweeps[k, TOOL]) + slim
     radius = tools[row, RADIUS]
-    dx = x - sweeps[k, X0]
-    dy = y - sweeps[k, Y0]
-    length = sweeps[k, LENGTH]
-    if length == 0.0:
-        square = dx * dx + dy * dy
-        if square > radius * radius:
-            return NOWHERE
-        return min(sweeps[k, Z0], sweeps[k, Z1]) + profile(tools, row, math.sqrt(square))
-    n = dx * sweeps[k, UY] - dy * sweeps[k, UX]
-    left = radius * radius - n * n
-    if left < 0.0:
+    square = beside(sweeps, k, n, s)
+    if square > radius * radius:
         return NOWHERE
-    s = dx * sweeps[k, UX] + dy * sweeps[k, UY]
-    half = math.sqrt(left)
+    length, climb = sweeps[k, LENGTH], sweeps[k, CLIMB]
+    if abs(climb) < LEVEL:
+        z = sweeps[k, Z0] if length > 0.0 else min(sweeps[k, Z0], sweeps[k, Z1])
+        return z + profile(tools, row, square)
+    half = math.sqrt(max(radius * radius - n * n, 0.0))
+    kind = tools[row, KIND]
     low = max(0.0, s - half)
     high = min(length, s + half)
-    if low > high:
-        return NOWHERE
-    climb = sweeps[k, CLIMB]
-    kind = tools[row, KIND]
     if kind == FLAT:
         return sweeps[k, Z0] + climb * (low if climb >= 0.0 else high) + tools[row, LIFT]
-    if abs(climb) < LEVEL:
-        t = min(max(s, low), high)
-    elif kind == BALL:
-        t = min(max(s - climb * half / math.sqrt(1.0 + climb * climb), low), high)
+    if kind == BALL:
+        way = sweeps[k, WAY]
+        t = s - climb * half / way
+        if 0.0 <= t <= length:
+            return sweeps[k, Z0] + tools[row, LIFT] + climb * s + radius - half * way
+        t = min(max(t, 0.0), length)
     else:  # the height is convex along the way
         a, b = low, high
         if rises(tools, row, climb, n, a - s):
@@ -131,5 +135,32 @@ def bottom(sweeps, tools, k, slim, x, y):
                 else:
                     a = t
         t = 0.5 * (a + b)
-    rho = min(math.sqrt(n * n + (t - s) * (t - s)), radius)
-    return sweeps[k, Z0] + climb * t + profile(tools, row, rho)
+    return sweeps[k, Z0] + climb * t + profile(tools, row, min(n * n + (t - s) * (t - s), radius * radius))
+
+
+@inner
+def passes(sweeps, tools, k, slim, x, y, z):
+    """Whether sweep k reaches as low as a height over a point: `bottom` is not above it."""
+    row = 2 * int(sweeps[k, TOOL]) + slim
+    length, climb = sweeps[k, LENGTH], sweeps[k, CLIMB]
+    if tools[row, KIND] != BALL or length == 0.0:
+        return bottom(sweeps, tools, k, slim, x, y) <= z
+    n, s = across(sweeps, k, x, y)
+    left = tools[row, RADIUS] * tools[row, RADIUS] - n * n
+    if left < 0.0:
+        return False
+    # To the way of the ball's centre, over which the tool is a cylinder.
+    up = z - (sweeps[k, Z0] + tools[row, LIFT] + tools[row, RADIUS])
+    t = min(max((s + climb * up) / (sweeps[k, WAY] * sweeps[k, WAY]), 0.0), length)
+    off, over = t - s, up - climb * t
+    if off * off + over * over <= left:
+        return True
+    low, high = 0.0, length  # where the centre is not above the height
+    if max(up, up - climb * length) < 0.0:
+        return False
+    if climb > 0.0:
+        high = min(high, up / climb)
+    elif climb < 0.0:
+        low = max(low, up / climb)
+    off = min(max(s, low), high) - s
+    return off * off <= left

@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from camcomp.diagnosis.law.bench_terms import Spot, Term
-from camcomp.diagnosis.law.find import margin
+from camcomp.diagnosis.law.find import margin, unlikely
 from camcomp.diagnosis.law.folds import ALTERNATING, Folds, Split, gains, usual_split, withheld
 from camcomp.diagnosis.law.forms import at_drive, at_tip
 from camcomp.diagnosis.law.library import LearnedLaw, keep, learned
@@ -96,6 +96,12 @@ def test_what_goes_evenly_with_a_drives_own_load_is_its_stiffness_and_no_form():
     still = {name: (0.0, 0.0) for name in ("load_N", "load_y_N")}
     idle = at_drive(Sizes(size.limits | still, size.apart, size.stretches), False)
     assert not any(is_load(each.about[0]) for each in idle)
+
+
+def test_of_a_force_at_the_tip_and_the_load_of_a_drive_that_is_the_same_the_tip_goes_before():
+    force = next(f for f in at_tip(sizes(AT_TIP)) if f.about == ("fy_N",))
+    load = next(f for f in at_drive(sizes((*AT_DRIVE, "load_y_N")), False) if f.about == ("load_y_N",))
+    assert unlikely(Term(Spot("drive", 0), load)) and not unlikely(Term(Spot("structure", 0), force))
 
 
 def test_of_sets_that_explain_alike_the_one_with_fewer_shapes_goes_before():
