@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -130,6 +131,14 @@ def diagnose(
 
     Raises ConfigError, ProgramError, FileError, PhysicsError.
     """
+    from threadpoolctl import threadpool_limits
+
+    # numpy is there already in a user's Python: threads of small matrices wait for each other longer than they compute
+    with threadpool_limits(limits=int(os.environ.get("OPENBLAS_NUM_THREADS", "1")), user_api="blas"):
+        return _diagnosed(experiment, without, library)
+
+
+def _diagnosed(experiment: str | Path, without: Sequence[str], library: str | Path | None) -> ExperimentDiagnosis:
     from camcomp.diagnosis.law.library import keep, learned
     from camcomp.model.config.load import load_config
 

@@ -5,6 +5,7 @@ import sys
 
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_info, threadpool_limits
 
 import camcomp
 from camcomp.ground.errors import CheckFailed, ConfigError
@@ -162,3 +163,18 @@ def test_residuals_of_axes_are_those_of_their_logs(tmp_path):
     np.testing.assert_allclose(left["gap_act_x_mm"], encoder - setpoint - np.mean(encoder - setpoint), atol=2e-6)
     assert 1e3 * np.sqrt(np.mean(left["gap_act_x_mm"] ** 2)) == pytest.approx(done.result.gap.rms_um, rel=1e-3)
     assert np.sqrt(np.mean(left["rest_act_x_mm"] ** 2)) < 2e-4
+
+
+def test_diagnose_works_with_one_thread_of_linear_algebra(monkeypatch):
+    """In a Python that has numpy already, which has taken as many threads as there are cores."""
+    seen: list[int] = []
+
+    def opened(experiment):
+        seen.extend(each["num_threads"] for each in threadpool_info() if each["user_api"] == "blas")
+        raise ConfigError("CC201", "seen")
+
+    monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
+    monkeypatch.setattr("camcomp.diagnosis.experiment.open_experiment.open_experiment", opened)
+    with threadpool_limits(limits=2, user_api="blas"), pytest.raises(ConfigError):
+        camcomp.diagnose(EXPERIMENTS["diagnosis/clear"])
+    assert seen and set(seen) == {1}
