@@ -62,6 +62,10 @@ def difference(program: Program, run: Run) -> str:
                 return f"{where}: turns {turns}, plane {sites.plane[k]}"
         if kind != "TRAVERSE" and sites.feed_mode[k] != 95:
             feed = path.feed[k]
+            if (
+                sites.feed_mode[k] == 93
+            ):  # LinuxCNC moves at no less than 0.1 units a minute there; camcomp keeps what is written
+                feed = max(feed, 0.1 * sites.unit[k])
             if abs(feed - other.feed) > 25.4e-4 + 1e-4 * feed:
                 return f"{where}: feed {feed}, rs274 {other.feed}"
     return ""
