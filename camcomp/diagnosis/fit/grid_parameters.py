@@ -1,6 +1,7 @@
 """Shapes that nothing shows while an effect is absent (pitches, time constants): tried one by one against a leftover."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,33 +17,53 @@ from camcomp.model.effect import Parameter
 _FINER = 17  # values between the neighbours of the best
 
 
+@dataclass(frozen=True, eq=False)
+class Beside:
+    """A leftover with other columns softly fitted and taken out, and what they take of further columns.
+
+    A column that is tried against the leftover has to lose the same: a warm-up less its mean is another curve than a warm-up.
+    """
+
+    rest: list[Floats]  # white, per run
+    white: Sequence[ByChannel]
+    others: Ints
+    half: Floats  # (o, o): its square is the inverse of the others' products
+
+    def taken(self, columns: Sequence[Floats]) -> Floats:
+        """Products (d, d) of white columns (w, d) per run that lie in the others."""
+        shared = sum((W.T @ C for W, C in zip(self.white, columns, strict=True)), np.zeros(1))[self.others]
+        in_others = self.half @ shared
+        return np.asarray(in_others.T @ in_others)
+
+
 def beside(
     grams: Sequence[Gram], white: Sequence[ByChannel], residual: Sequence[Floats], columns: Columns, others: Ints
-) -> list[Floats]:
+) -> Beside:
     """White residual per run with the columns `others` softly fitted and taken out."""
     data = total(grams)
     precision = np.where(columns.candidate >= 0, 1.0 / 9.0, columns.prior.precision(1.0))[others]
     M = data.A[np.ix_(others, others)] + np.diag(precision)
     size = 1.0 / np.sqrt(np.diag(M))
     L = np.linalg.cholesky(size[:, None] * M * size + 1e-12 * np.eye(len(size)))
+    half = np.linalg.solve(L, np.diag(size))
     a = np.zeros(len(data.b))
-    a[others] = size * np.linalg.solve(L.T, np.linalg.solve(L, size * data.b[others]))
-    return [r - W @ a for r, W in zip(residual, white, strict=True)]
+    a[others] = half.T @ (half @ data.b[others])
+    return Beside([r - W @ a for r, W in zip(residual, white, strict=True)], white, others, half)
 
 
 def best_shape(
-    bench: Bench, candidate: CandidateCause, rest: Sequence[Floats], whitened: Callable[[int, Floats], Floats]
+    bench: Bench, candidate: CandidateCause, left: Beside, whitened: Callable[[int, Floats], Floats]
 ) -> dict[str, float] | None:
-    """The scanned shape whose columns explain most of `rest` (white, per run); None where the effect is not scanned."""
+    """The scanned shape whose columns explain most of what is left; None where the effect is not scanned."""
     p = candidate.shapes[0]
     values = np.asarray(p.scan)
-    gains = _gains(bench, candidate, p, values, rest, whitened)
+    gains = _gains(bench, candidate, p, values, left, whitened)
     if gains is None:
         return None
     best = int(np.argmax(gains))
     # between its neighbours the gain has one peak, and a large effect off its peak leaves what looks like noise
     near = np.geomspace(values[max(best - 1, 0)], values[min(best + 1, len(values) - 1)], _FINER)
-    finer = _gains(bench, candidate, p, near, rest, whitened)
+    finer = _gains(bench, candidate, p, near, left, whitened)
     value = near[int(np.argmax(finer))] if finer is not None and finer.max() > gains[best] else values[best]
     return {**shape_default(candidate), p.name: float(value)}
 
@@ -52,7 +73,7 @@ def _gains(
     candidate: CandidateCause,
     p: Parameter,
     values: Floats,
-    rest: Sequence[Floats],
+    left: Beside,
     whitened: Callable[[int, Floats], Floats],
 ) -> Floats | None:
     """Chi-square (v,) that an effect explains with each value of a shape, its size within its usual one; None where it is not scanned.
@@ -65,8 +86,8 @@ def _gains(
         if columns is None:
             return None
         white = [whitened(k, np.stack([each[k] for each in columns], axis=2)) for k in range(len(bench.runs))]
-        h = sum(W.T @ r for W, r in zip(white, rest, strict=True))
-        G = np.sum([W.T @ W for W in white], axis=0)
+        h = sum(W.T @ r for W, r in zip(white, left.rest, strict=True))
+        G = np.sum([W.T @ W for W in white], axis=0) - left.taken(white)
         G += (1.0 / PRIOR_WIDTHS[-1] ** 2) * np.eye(len(G))
         gains.append(float(h @ np.linalg.solve(G, h)))
     return np.array(gains)

@@ -3,12 +3,13 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import product
 
 import numpy as np
 
 from camcomp.diagnosis.fit.bench import Bench, CandidateCause, cause_of, step_of, thinned
-from camcomp.diagnosis.fit.columns import Columns, build, candidate_columns, moved_tip, patterns, shape_default
-from camcomp.diagnosis.fit.floor import MINOR, NoiseFloor, least_noise, measure_floor
+from camcomp.diagnosis.fit.columns import Columns, build, candidate_columns, healthy_sizes, moved_tip, patterns, shape_default
+from camcomp.diagnosis.fit.floor import NoiseFloor, least_noise, measure_floor
 from camcomp.diagnosis.fit.grid_parameters import beside, best_shape, quick_columns, reach
 from camcomp.diagnosis.fit.intervals_in_time import LOOK_ELSEWHERE, best_interval, never_ending
 from camcomp.diagnosis.fit.label_offsets import with_scatter
@@ -29,6 +30,8 @@ BENT = 9.0  # chi-square by which the model may miss a straight line before all 
 SETTLED = 0.05  # chi-square that one more pass may cost
 HALVED = 6  # times that a step is halved which no machine can take
 OTHER_LAW_LOG = 3.0  # log evidence by which another law than the nominal one has to be better
+FOLLOWED = 6  # further passes of what shows at its size alone
+LARGER = (1.0, 2.0, 4.0, 8.0)  # than a straight model says: sizes from which what rings is followed
 STRAIGHT = 0.3  # chi-square that the bend of the model may cost before it is followed
 
 
@@ -130,16 +133,19 @@ class Problem:
         white = [W[:, index] for W in self.white]
         left = list(self.white_residual)
         bent = False
-        passes += 1 if shapes else 0
+        passes += (1 if shapes else 0) + (FOLLOWED if self._ringing(members) else 0)
         for step in range(passes):
             theta, readings = self._readings(members, theta, shapes)
-            now = [self.whitened(k, self.bench.difference(k, r)[:, :, None])[:, 0] for k, r in enumerate(readings)]
+            now = self._white_now(readings)
             bend = self._bend(now, index, theta)
             if step == 0 and not shapes and bend < STRAIGHT:
                 grams = self.base_grams
                 theta = self._bounded(members, estimate(total(grams), self.prior, index)[0][index])
                 break
             bent = bent or (step == 0 and bend > BENT)
+            if step == 0 and bend > STRAIGHT and self._ringing(members):
+                theta, readings = self._readings(members, self._scan_shapes(members, theta, shapes), shapes)
+                now = self._white_now(readings)
             moved = self._columns_at(members, theta, shapes, readings, bent)
             white = [self._stacked(k, [m[k] for m in moved], index) for k in range(len(self.bench.runs))]
             left = [r + W @ theta for r, W in zip(now, white, strict=True)]
@@ -295,6 +301,38 @@ class Problem:
         at = (t - t[0]) / max(float(t[-1] - t[0]), 1e-12)
         return self.noise.rows_of(k, at, self.inflate[k])
 
+    def _ringing(self, members: Members) -> list[tuple[int, Parameter]]:
+        """Shapes that show only where the effect is as large as it is; those of drives are scanned before (`grid_parameters`)."""
+        return [
+            (i, p) for i, p in self.shapes_of(members) if stages_of(self.columns.candidates[i].effect) != {"drive"}
+        ]
+
+    def _scan_shapes(self, members: Members, theta: Floats, shapes: dict[int, dict[str, float]]) -> Floats:
+        """Takes such shapes to the scanned values, and theta (d,) to the sizes, from which the least is left.
+
+        How a loop rings shows when it rings: at nominal all its dampings do the same, its size comes out too small, and far
+        from the right values no slope leads to them.
+        """
+        for i, p in self._ringing(members):
+            own = np.isin(self.member_columns(members), self.candidates.columns[i])
+            tried: list[tuple[float, float, float]] = []
+            for value, larger in product(p.scan, LARGER):
+                causes = self.causes(members, np.where(own, larger * theta, theta), {**shapes, i: {**shapes[i], p.name: value}})
+                try:
+                    now = self._white_now(self._read(causes))
+                except PhysicsError:
+                    continue
+                left = [Gram(g.A, W.T @ r, float(r @ r), len(r)) for g, W, r in zip(self.base_grams, self.white, now, strict=True)]
+                tried.append((Scale(total(left), self.prior, self.candidates)(()), value, larger))
+            if tried:
+                _, shapes[i][p.name], larger = max(tried)
+                theta = self._bounded(members, np.where(own, larger * theta, theta))
+        return theta
+
+    def _white_now(self, readings: Sequence[Reading]) -> list[Floats]:
+        """White residuals (w,) of all runs at readings."""
+        return [self.whitened(k, self.bench.difference(k, r)[:, :, None])[:, 0] for k, r in enumerate(readings)]
+
     def _move_shapes(
         self, members: Members, theta: Floats, shapes: dict[int, dict[str, float]], left: Sequence[Floats],
         white: Sequence[Floats], mean: Floats,
@@ -333,7 +371,7 @@ def open_problem(bench: Bench, candidates: Sequence[CandidateCause], stated_mm: 
     residuals = [bench.residual(k) for k in range(len(bench.runs))]
     noise = instrument_noise(bench, floor, least_noise(bench, floor), times)
     inflate = less_certain(noise, inflation(bench), tails(bench))
-    columns = build(bench, candidates, {}, floor.tip_um, MINOR * floor.tip_um)
+    columns = build(bench, candidates, {}, floor.tip_um)
     shapes: dict[int, dict[str, float]] = {
         i: shape_default(a) for i, a in enumerate(candidates) if a.shapes or a.switches
     }
@@ -406,7 +444,7 @@ def _scanned(problem: Problem) -> Problem:
     scanned = [i for i in problem.shapes if problem.columns.candidates[i].shapes]
     own = [c for i in scanned for c in problem.candidates.columns[i]]
     others = np.setdiff1d(np.arange(len(problem.columns.names)), own)
-    rest = beside(problem.base_grams, problem.white, problem.white_residual, problem.columns, others)
+    left = beside(problem.base_grams, problem.white, problem.white_residual, problem.columns, others)
     changed: list[tuple[list[int], list[list[Floats]]]] = []
     for i in scanned:
         candidate = problem.columns.candidates[i]
@@ -414,18 +452,22 @@ def _scanned(problem: Problem) -> Problem:
             always = quick_columns(problem.bench, candidate, never_ending(candidate))
             if always is None:
                 continue
-            best = best_interval(problem.bench, candidate, always, rest, problem.whitened, problem.row_places)
+            best = best_interval(problem.bench, candidate, always, left.rest, problem.whitened, problem.row_places)
         else:
-            best = best_shape(problem.bench, candidate, rest, problem.whitened)
+            best = best_shape(problem.bench, candidate, left, problem.whitened)
         if best is None:
             continue
         problem.shapes[i] = best
         columns = candidate_columns(problem.bench, candidate, best)
         changed.append((list(problem.candidates.columns[i]), columns))
     blocks, white = list(problem.columns.blocks), list(problem.white)
+    prior = replace(problem.prior, tolerance=problem.prior.tolerance.copy(), reach=problem.prior.reach.copy())
     for index, columns in changed:
+        candidate = problem.columns.candidates[problem.columns.candidate[index[0]]]
+        for c, p, per_run in zip(index, candidate.parameters, columns, strict=True):
+            prior.tolerance[c], prior.reach[c] = healthy_sizes(problem.bench, candidate, p, per_run, problem.floor.tip_um)
         for k in range(len(blocks)):
             new = np.stack([each[k] for each in columns], axis=2)
             blocks[k] = blocks[k].exchanged(index, channel_behind_channel(new))
             white[k] = white[k].exchanged(index, problem.whitened(k, new))
-    return replace(problem, columns=replace(problem.columns, blocks=tuple(blocks)), white=white)
+    return replace(problem, columns=replace(problem.columns, blocks=tuple(blocks), prior=prior), white=white)

@@ -135,7 +135,8 @@ class _Turned:
             return out
         out = np.zeros((mine.width, *other.shape[1:]))
         for (on, X), at in zip(mine.parts, mine._starts, strict=False):
-            out[on] += X.T @ other[at : at + len(X)]
+            if (own := other[at : at + len(X)]).any():  # most columns are of a few channels
+                out[on] += X.T @ own
         return out
 
 
