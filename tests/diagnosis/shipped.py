@@ -26,6 +26,9 @@ BEGINS_S = {"left": 0, "right": 900, "ramps": 2400}  # on the common clock
 TIP_MM = 0.003
 ENCODER = {"mm": 5e-4, "rad": 2e-7}
 STEP_S = 0.03
+FINE_S = {"servo_overshoot": 0.015}  # rings within some rows
+
+
 @dataclass(frozen=True)
 class Fault:
     """One entry under `effects:`."""
@@ -48,7 +51,8 @@ def logged(folder: Path, machine: str, fault: Fault | None) -> dict[str, Path]:
         source, logs[name] = folder / f"{name}.nc", folder / f"{name}.csv"
         source.write_text(program)
         arguments = ["simulate", str(source), "--config", str(config), "--config", str(wrong), "-o", str(logs[name])]
-        arguments += ["--step-s", str(STEP_S), "--started-s", str(BEGINS_S[name]), *(["--air"] if name == AIR else [])]
+        step = STEP_S if fault is None else FINE_S.get(fault.effect, STEP_S)
+        arguments += ["--step-s", str(step), "--started-s", str(BEGINS_S[name]), *(["--air"] if name == AIR else [])]
         code, said = runner.invoke(arguments)
         assert code == 0, said
     return logs
@@ -60,7 +64,13 @@ def experiment(folder: Path, machine: str, fault: Fault | None) -> Path:
     for name, log in logged(folder, machine, fault).items():
         blur(log, rng)
         runs.append(
-            {"name": name, "program": f"{name}.nc", "log": log.name, "cutting": name != AIR, "started_s": BEGINS_S[name]}
+            {
+                "name": name,
+                "program": f"{name}.nc",
+                "log": log.name,
+                "cutting": name != AIR,
+                "started_s": BEGINS_S[name],
+            }
         )
     path = folder / "experiment.yaml"
     path.write_text(json.dumps({"config": [str(runner.ROOT / "config" / f"{machine}.yaml")], "runs": runs}))

@@ -1,92 +1,89 @@
-"""The plainest test of the diagnosis, on every shipped machine: `camcomp simulate`, a little noise, `camcomp diagnose`.
+"""The plainest test of the diagnosis, of every effect on every shipped machine: `simulate`, a little noise, `diagnose`.
 
-A smoke test of the plumbing and of the gate, not of physics: the model itself writes the logs here (truth plants stand
-in tests/trials and tests/plants).  Tip: 3 um of white noise per axis; encoders: rounded to 0.5 um, or as much at the reach of an arm.
+Every second pair of effect and machine is tried in CI, all of them by `python -m pytest tests/diagnosis/test_every_machine.py
+-m "campaign or not campaign"`.
 """
 
-import json
-
-import numpy as np
 import pytest
 
+from camcomp.ground import shelf
 from tests.campaign import runner
-
-HEAD = "G21 G90 G17 G94\nS18000 M3\n"
-PROGRAMS = {
-    "left": f"{HEAD}G0 X10 Y0 Z5\nG1 Z0 F300\nG3 X10 Y0 I-10 J0 F1200\nG0 Z5\nM5\nM30\n",
-    "right": f"{HEAD}G0 X10 Y0 Z5\nG1 Z0 F300\nG2 X10 Y0 I-10 J0 F900\nG0 Z5\nM5\nM30\n",
-    "ramps": f"{HEAD}G0 X-12 Y-8 Z9\nG1 X12 Y-4 Z0 F1500\nG1 Y6 Z2\nG1 X-12 Y8 Z-3\nG1 Y-8 Z4\nG0 Z9\nM5\nM30\n",
-}
-AIR = "ramps"
-TIP_MM = 0.003
-ENCODER = {"mm": 5e-4, "rad": 2e-7}
-STEP_S = 0.03
-FORCE = ("cutting_force", None, {"factor": 1.3})
-NEW_TOOLS = ("tool_wear", None, {"growth_per_min": 2.0, "one_tool": 0.0})  # `simulate` begins every program with one
-CASES = {
-    "orthoglide": (FORCE, ("backlash", "y", {"width_mm": 0.02}), NEW_TOOLS),
-    "delta": (FORCE, ("backlash", "b", {"width_mm": 0.02})),
-    "puu": (FORCE, ("backlash", "x", {"width_mm": 0.02})),
-    "cartesian": (FORCE, ("backlash", "y", {"width_mm": 0.02})),
-    "router": (FORCE, ("backlash", "x", {"width_mm": 0.02})),
-    "kuka-kr210": (FORCE, ("joint_offset", "A2", {"offset_rad": 1e-4})),
-}
-# on so short a way the workpiece, another length or scale of a joint do the same
-ALIKE = {("kuka-kr210", "joint_offset")}
+from tests.diagnosis import grid
+from tests.diagnosis.shipped import Fault
 
 
 def trials():
-    """Every machine with nothing wrong, and with each cause alone."""
-    for machine, causes in CASES.items():
-        for cause in (None, *causes):
-            yield pytest.param(machine, cause, id=f"{machine}-{cause[0] if cause else 'null'}")
+    for machine in grid.MACHINES:
+        yield pytest.param(machine, None, id=f"{machine}-nothing")
+        for fault in grid.faults(machine):
+            marks = [] if grid.soon(machine, fault) else [pytest.mark.campaign]
+            if why := grid.OPEN.get((machine, fault.effect, fault.target)):
+                marks.append(pytest.mark.xfail(reason=why, strict=True))
+            yield pytest.param(machine, fault, id=f"{machine}-{fault.effect}-{fault.target}", marks=marks)
 
 
-def simulated(folder, machine, cause):
-    """An experiment of all programs on the shipped machine with that cause; its path."""
-    config, wrong = runner.ROOT / "config" / f"{machine}.yaml", folder / "wrong.yaml"
-    effects = []
-    if cause is not None:
-        effect, target, parameters = cause
-        effects = [{"effect": effect, **({"target": target} if target else {}), **parameters}]
-    wrong.write_text(json.dumps({"effects": effects}))
-    rng, runs = np.random.default_rng(7), []
-    for k, (name, program) in enumerate(PROGRAMS.items()):
-        source, log, begun = folder / f"{name}.nc", folder / f"{name}.csv", 100 * k
-        source.write_text(program)
-        arguments = ["simulate", str(source), "--config", str(config), "--config", str(wrong), "-o", str(log)]
-        arguments += ["--step-s", str(STEP_S), "--started-s", str(begun), *(["--air"] if name == AIR else [])]
-        code, said = runner.invoke(arguments)
-        assert code == 0, said
-        blur(log, rng)
-        runs.append({"name": name, "program": source.name, "log": log.name, "cutting": name != AIR, "started_s": begun})
-    path = folder / "experiment.yaml"
-    path.write_text(json.dumps({"config": [str(config)], "runs": runs}))
-    return path
+@pytest.mark.parametrize(("machine", "fault"), list(trials()))
+def test_what_is_wrong_is_named_and_nothing_else(machine, fault, tmp_path):
+    verdict, bad = grid.answer(tmp_path, machine, fault)
+    assert not bad, (verdict, bad)
 
 
-def blur(log, rng):
-    """Puts noise on the tip and rounds the encoders of a log."""
-    header, table = log.read_text().partition("\n")[0], np.loadtxt(log, delimiter=",", skiprows=1)
-    for i, name in enumerate(header.split(",")):
-        step = ENCODER.get(name.rpartition("_")[2]) if name.startswith("act_") else None
-        if name in ("x_mm", "y_mm", "z_mm"):
-            table[:, i] += rng.normal(0, TIP_MM, len(table))
-        elif step:
-            table[:, i] = np.round(table[:, i] / step) * step
-    np.savetxt(log, table, fmt="%.7f", delimiter=",", header=header, comments="")
+def test_every_effect_has_its_row():
+    """An effect that is new in camcomp/effects needs one, or a word on where it is tried."""
+    assert {effect for effect, *_ in grid.SIZES} | set(grid.ELSEWHERE) == set(shelf.members("effects"))
+    for effect, place in grid.ELSEWHERE.items():
+        assert effect in (runner.ROOT / place).read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize(("machine", "cause"), list(trials()))
-def test_what_is_wrong_is_named_and_nothing_else(machine, cause, tmp_path):
-    result = runner.ask(simulated(tmp_path, machine, cause))
-    named = [(each["effect"], each["target"]) for each in result["causes"]]
-    if cause is None:
-        assert (result["verdict"], named) == ("none", [])
-        return
-    effect, target, parameters = cause
-    word = "ambiguous" if (machine, effect) in ALIKE else "identified"
-    assert (result["verdict"], named) == (word, [(effect, target)])
-    for name, value in parameters.items():
-        low, high = result["causes"][0]["parameters"][name]["ci95"]
-        assert low <= value <= high
+def test_every_shipped_machine_has_its_column():
+    """But the Orthoglide with rolled chains, which is the Orthoglide, and no-force, which is no machine."""
+    shipped = {path.stem for path in (runner.ROOT / "config").glob("*.yaml")} - {"orthoglide-1deg", "no-force"}
+    assert shipped == set(grid.MACHINES)
+
+
+@pytest.mark.parametrize("machine", grid.MACHINES)
+def test_what_is_not_tried_on_a_machine_is_not_there(machine):
+    tried = {fault.effect for fault in grid.faults(machine)}
+    arm, slides = machine in grid.ARMS, machine in grid.SLIDES_IN_A_ROW
+    for effect in {each for each, *_ in grid.SIZES} - tried:
+        module = shelf.load("effects", effect)
+        foreign = (getattr(module, "ARM_ONLY", False) and not arm) or (
+            getattr(module, "SLIDES_ONLY", False) and (arm or (module.TARGET == "named" and not slides))
+        )
+        assert foreign or (effect, machine) in grid.NOT_THERE
+
+
+def test_every_effect_and_every_stage_of_every_machine_is_tried_in_ci():
+    soon = [
+        (machine, fault.effect)
+        for machine in grid.MACHINES
+        for fault in grid.faults(machine)
+        if grid.soon(machine, fault)
+    ]
+    assert {effect for _, effect in soon} == {effect for effect, *_ in grid.SIZES}
+    for machine in grid.MACHINES:
+        stages = {shelf.load("effects", fault.effect).STAGE for fault in grid.faults(machine)}
+        assert {shelf.load("effects", effect).STAGE for each, effect in soon if each == machine} == stages
+
+
+def result(verdict, *causes, alternatives=()):
+    named = [
+        {"effect": e, "target": t, "probability": p, "parameters": {"width_mm": {"ci95": ci}}} for e, t, p, ci in causes
+    ]
+    return {"verdict": verdict, "causes": named, "alternatives": [[{"effect": e, "target": t}] for e, t in alternatives]}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("given", "found"),
+    [
+        (result("identified", ("backlash", "y", 1.0, (0.01, 0.03))), 0),
+        (result("identified", ("backlash", "y", 1.0, (0.03, 0.04))), 1),
+        (result("identified", ("backlash", "x", 1.0, (0.01, 0.03))), 2),
+        (result("identified", ("backlash", "y", 1.0, (0.01, 0.03)), ("friction", "y", 0.6, (0, 1))), 1),
+        (result("ambiguous", ("friction", "y", 0.6, (0, 1)), alternatives=[("backlash", "y"), ("friction", "y")]), 0),
+        (result("ambiguous", ("friction", "y", 0.9, (0, 1)), alternatives=[("backlash", "y"), ("friction", "y")]), 1),
+        (result("none"), 2),
+    ],
+)
+def test_answers_are_judged(given, found):
+    assert len(grid.wrong(given, Fault("backlash", "y", {"width_mm": 0.02}))) == found

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 
 from camcomp.diagnosis.fit.bench import Bench, CandidateCause, Run, cause_of, step_of, thinned
-from camcomp.diagnosis.fit.floor import MINOR
 from camcomp.diagnosis.fit.labels import EFFECT_OF, apart, label_name
 from camcomp.diagnosis.fit.measured import channel_names
 from camcomp.diagnosis.fit.patterns import Dictionary, Ground, dictionary
@@ -39,7 +38,7 @@ CLOCK_RATE = 1e-5
 SPRING_LOG = 0.01  # one link's spring against its stated value
 HEALTHY = 0.08  # of the noise floor at the tip: what of every effect is within tolerance
 MOST_HEALTHY = 0.3  # of an effect's typical size
-REACHED = MINOR / HEALTHY  # tolerances beyond which it is no tolerance: at the tip no longer minor, by chance once in 5600
+# tolerances beyond which it is no tolerance: at the tip no longer minor, by chance once in 5600
 _EDIT = 0.05  # step of the allowances' differences
 FORCE_TURN_RAD = 0.005  # direction of the cutting force in the plane of the work
 
@@ -139,11 +138,12 @@ def build(
     candidates: Sequence[CandidateCause],
     shapes: Mapping[int, Mapping[str, float]],
     floor_um: float,
+    minor_um: float,
 ) -> Columns:
     """All columns at nominal. Candidates that no channel can see have columns of zeros and stay.
 
     Every healthy machine has a little of everything: what moves the tip by HEALTHY of the noise floor is within tolerance,
-    whatever other channels see of it; what moves it by more than MINOR of it is a cause. Nuisances reach as many of their
+    whatever other channels see of it; what moves it by more than minor_um is a cause. Nuisances reach as many of their
     tolerances: a healthy one goes beyond once in 5600.
     """
     owner: list[int] = []
@@ -171,12 +171,12 @@ def build(
             candidate_columns(bench, candidate, shapes.get(i, shape_default(candidate))),
             strict=True,
         ):
-            size, most = healthy_sizes(bench, candidate, p, per_run, floor_um)
+            size, most = healthy_sizes(bench, candidate, p, per_run, floor_um, minor_um)
             put(i, f"{candidate.label}.{p.name}", size, most, per_run, p.sign, True)
     for name, size, per_run, loose in _nuisances(bench):
         if name.startswith("spring."):  # a soft machine has no more of it than of anything else
             size = min(size, HEALTHY * floor_um / max(tip_um(bench, per_run), 1e-9))
-        put(-1, name, size, REACHED * size, per_run, 0, loose)
+        put(-1, name, size, minor_um / (HEALTHY * floor_um) * size, per_run, 0, loose)
     channels = range(6 + 2 * len(bench.actuators))
     blocks = tuple(
         ByChannel.of(np.stack([each[r][:, c] for each in parts], axis=1) for c in channels)
@@ -189,13 +189,13 @@ def build(
 
 
 def healthy_sizes(
-    bench: Bench, candidate: CandidateCause, p: Parameter, per_run: Sequence[Floats], floor_um: float
+    bench: Bench, candidate: CandidateCause, p: Parameter, per_run: Sequence[Floats], floor_um: float, minor_um: float
 ) -> tuple[float, float]:
     """What every healthy machine has of a parameter with columns (n, c) per run, and the most that is no cause, in scales of it."""
     healthy = HEALTHY * floor_um / max(tip_um(bench, per_run), 1e-9)
     if any(each.placed for each in candidate.shapes):  # nothing happens for a while to every healthy machine
         healthy = min(healthy, p.tolerance / p.scale)
-    return min(healthy, MOST_HEALTHY), REACHED * healthy
+    return min(healthy, MOST_HEALTHY), minor_um / (HEALTHY * floor_um) * healthy
 
 
 def tip_um(bench: Bench, per_run: Sequence[Floats]) -> float:

@@ -76,21 +76,57 @@ def _gains(
     left: Beside,
     whitened: Callable[[int, Floats], Floats],
 ) -> Floats | None:
-    """Chi-square (v,) that an effect explains with each value of a shape, its size within its usual one; None where it is not scanned.
+    """Chi-square (v,) that an effect explains with each value of a shape, its size within its usual one; None where it is not scanned."""
+    gains = []
+    for value in values:  # one at a time: together they are as large as all other columns
+        gain = _gain(bench, candidate, {**shape_default(candidate), p.name: float(value)}, left, whitened)
+        if gain is None:
+            return None
+        gains.append(gain)
+    return np.array(gains)
+
+
+def _gain(
+    bench: Bench, candidate: CandidateCause, shape: Mapping[str, float], left: Beside,
+    whitened: Callable[[int, Floats], Floats],
+) -> float | None:  # fmt: skip
+    """Chi-square that an effect of one shape explains.
 
     Where rows do not tell a shape (an early stretch of a warm-up is straight, however long that takes), usual sizes do.
     """
-    gains = []
-    for value in values:  # one at a time: together they are as large as all other columns
-        columns = quick_columns(bench, candidate, {**shape_default(candidate), p.name: float(value)})
-        if columns is None:
-            return None
-        white = [whitened(k, np.stack([each[k] for each in columns], axis=2)) for k in range(len(bench.runs))]
-        h = sum(W.T @ r for W, r in zip(white, left.rest, strict=True))
-        G = np.sum([W.T @ W for W in white], axis=0) - left.taken(white)
-        G += (1.0 / PRIOR_WIDTHS[-1] ** 2) * np.eye(len(G))
-        gains.append(float(h @ np.linalg.solve(G, h)))
-    return np.array(gains)
+    columns = quick_columns(bench, candidate, shape)
+    if columns is None:
+        return None
+    white = [whitened(k, np.stack([each[k] for each in columns], axis=2)) for k in range(len(bench.runs))]
+    h = sum(W.T @ r for W, r in zip(white, left.rest, strict=True))
+    G = np.sum([W.T @ W for W in white], axis=0) - left.taken(white)
+    G += (1.0 / PRIOR_WIDTHS[-1] ** 2) * np.eye(len(G))
+    return float(h @ np.linalg.solve(G, h))
+
+
+def settled_interval(
+    bench: Bench, candidate: CandidateCause, shape: Mapping[str, float], left: Beside,
+    whitened: Callable[[int, Floats], Floats],
+) -> dict[str, float]:  # fmt: skip
+    """The interval near one that was found whose columns explain most when they lose to the others what the leftover has lost.
+
+    What begins where a drive turns is halfway a play: the leftover beside all plays shows less of it there.
+    """
+    paths = [run.run_path for run in bench.runs]
+    best, (start, end) = dict(shape), [each.name for each in candidate.shapes]
+    run = next((p for p in paths if p.started <= 0.5 * (best[start] + best[end]) <= p.started + p.time[-1]), paths[0])
+    row = float(np.median(np.diff(run.time)))
+    most = _gain(bench, candidate, best, left, whitened) or 0.0
+    step = 4
+    while step:
+        near = [{**best, which: best[which] + sign * step * row} for which in (start, end) for sign in (-1, 1)]
+        near = [each for each in near if each[end] - each[start] > 2 * row]
+        gains = [_gain(bench, candidate, each, left, whitened) or 0.0 for each in near]
+        if max(gains, default=0.0) > most:
+            most, best = max(gains), near[int(np.argmax(gains))]
+        else:
+            step //= 2
+    return best
 
 
 def reach(p: Parameter, value: float) -> float:

@@ -3,19 +3,27 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import product
 
 import numpy as np
 
 from camcomp.diagnosis.fit.bench import Bench, CandidateCause, cause_of, step_of, thinned
-from camcomp.diagnosis.fit.columns import Columns, build, candidate_columns, healthy_sizes, moved_tip, patterns, shape_default
-from camcomp.diagnosis.fit.floor import NoiseFloor, least_noise, measure_floor
-from camcomp.diagnosis.fit.grid_parameters import beside, best_shape, quick_columns, reach
+from camcomp.diagnosis.fit.columns import (
+    Columns,
+    build,
+    candidate_columns,
+    healthy_sizes,
+    moved_tip,
+    patterns,
+    shape_default,
+)
+from camcomp.diagnosis.fit.floor import MINOR, NoiseFloor, least_noise, measure_floor
+from camcomp.diagnosis.fit.grid_parameters import beside, best_shape, quick_columns, reach, settled_interval
 from camcomp.diagnosis.fit.intervals_in_time import LOOK_ELSEWHERE, best_interval, never_ending
 from camcomp.diagnosis.fit.label_offsets import with_scatter
 from camcomp.diagnosis.fit.noise import inflation, instrument_noise, less_certain
 from camcomp.diagnosis.fit.outliers import outlying, tails
 from camcomp.diagnosis.fit.patterns import Dictionary
+from camcomp.diagnosis.fit.ringing import FOLLOWED, loudest
 from camcomp.diagnosis.statistics.by_channel import ByChannel, channel_behind_channel
 from camcomp.diagnosis.statistics.cause_sets import CausePrior, Fitted, Members, Scale, total
 from camcomp.diagnosis.statistics.evidence import Gram, Prior, estimate, gram
@@ -30,8 +38,6 @@ BENT = 9.0  # chi-square by which the model may miss a straight line before all 
 SETTLED = 0.05  # chi-square that one more pass may cost
 HALVED = 6  # times that a step is halved which no machine can take
 OTHER_LAW_LOG = 3.0  # log evidence by which another law than the nominal one has to be better
-FOLLOWED = 6  # further passes of what shows at its size alone
-LARGER = (1.0, 2.0, 4.0, 8.0)  # than a straight model says: sizes from which what rings is followed
 STRAIGHT = 0.3  # chi-square that the bend of the model may cost before it is followed
 
 
@@ -53,6 +59,7 @@ class Problem:
     white_residual: list[Floats]
     shapes: dict[int, dict[str, float]]
     candidates: CausePrior
+    _heard: dict[int, tuple[float, float]] = field(default_factory=dict, init=False, repr=False)
     _last: tuple[tuple[object, ...], list[Reading]] | None = field(default=None, init=False, repr=False)
 
     @cached_property
@@ -84,6 +91,10 @@ class Problem:
     def whitened(self, k: int, values: Floats) -> Floats:
         """White rows (w, j) of channels (n, c, j) of run k."""
         return self.noise.rows(k, values, self.inflate[k], self.times[k])
+
+    def _white_at(self, readings: Sequence[Reading]) -> list[Floats]:
+        """White residuals (w,) of all runs at readings."""
+        return [self.whitened(k, self.bench.difference(k, r)[:, :, None])[:, 0] for k, r in enumerate(readings)]
 
     def causes(self, members: Members, theta: Floats, shapes: Mapping[int, Mapping[str, float]]) -> list[Cause]:
         """Causes at coordinates theta (d,)."""
@@ -136,7 +147,7 @@ class Problem:
         passes += (1 if shapes else 0) + (FOLLOWED if self._ringing(members) else 0)
         for step in range(passes):
             theta, readings = self._readings(members, theta, shapes)
-            now = self._white_now(readings)
+            now = self._white_at(readings)
             bend = self._bend(now, index, theta)
             if step == 0 and not shapes and bend < STRAIGHT:
                 grams = self.base_grams
@@ -144,8 +155,8 @@ class Problem:
                 break
             bent = bent or (step == 0 and bend > BENT)
             if step == 0 and bend > STRAIGHT and self._ringing(members):
-                theta, readings = self._readings(members, self._scan_shapes(members, theta, shapes), shapes)
-                now = self._white_now(readings)
+                theta, readings = self._readings(members, self._loudest(members, theta, shapes), shapes)
+                now = self._white_at(readings)
             moved = self._columns_at(members, theta, shapes, readings, bent)
             white = [self._stacked(k, [m[k] for m in moved], index) for k in range(len(self.bench.runs))]
             left = [r + W @ theta for r, W in zip(now, white, strict=True)]
@@ -301,37 +312,31 @@ class Problem:
         at = (t - t[0]) / max(float(t[-1] - t[0]), 1e-12)
         return self.noise.rows_of(k, at, self.inflate[k])
 
-    def _ringing(self, members: Members) -> list[tuple[int, Parameter]]:
-        """Shapes that show only where the effect is as large as it is; those of drives are scanned before (`grid_parameters`)."""
+    def _ringing(self, members: Members) -> list[tuple[int, Parameter, Bools]]:
+        """Shapes that show at the effect's size alone, and which coordinates (d,) are that size."""
+        index = self.member_columns(members)
         return [
-            (i, p) for i, p in self.shapes_of(members) if stages_of(self.columns.candidates[i].effect) != {"drive"}
+            (i, p, np.isin(index, self.candidates.columns[i]))
+            for i, p in self.shapes_of(members)
+            if stages_of(self.columns.candidates[i].effect) != {"drive"}
         ]
 
-    def _scan_shapes(self, members: Members, theta: Floats, shapes: dict[int, dict[str, float]]) -> Floats:
-        """Takes such shapes to the scanned values, and theta (d,) to the sizes, from which the least is left.
+    def _loudest(self, members: Members, theta: Floats, shapes: dict[int, dict[str, float]]) -> Floats:
+        """Where to follow what rings from; sought once per candidate, because that reads the twin some dozen times."""
 
-        How a loop rings shows when it rings: at nominal all its dampings do the same, its size comes out too small, and far
-        from the right values no slope leads to them.
-        """
-        for i, p in self._ringing(members):
-            own = np.isin(self.member_columns(members), self.candidates.columns[i])
-            tried: list[tuple[float, float, float]] = []
-            for value, larger in product(p.scan, LARGER):
-                causes = self.causes(members, np.where(own, larger * theta, theta), {**shapes, i: {**shapes[i], p.name: value}})
-                try:
-                    now = self._white_now(self._read(causes))
-                except PhysicsError:
-                    continue
-                left = [Gram(g.A, W.T @ r, float(r @ r), len(r)) for g, W, r in zip(self.base_grams, self.white, now, strict=True)]
-                tried.append((Scale(total(left), self.prior, self.candidates)(()), value, larger))
-            if tried:
-                _, shapes[i][p.name], larger = max(tried)
-                theta = self._bounded(members, np.where(own, larger * theta, theta))
+        def evidence(at: Floats, there: dict[int, dict[str, float]]) -> float:
+            now = self._white_at(self._read(self.causes(members, at, there)))
+            runs = zip(self.base_grams, self.white, now, strict=True)
+            left = [Gram(g.A, W.T @ r, float(r @ r), len(r)) for g, W, r in runs]
+            return Scale(total(left), self.prior, self.candidates)(())
+
+        asked = self._ringing(members)
+        for i, p, own in asked:
+            if i in self._heard:
+                shapes[i][p.name], theta = self._heard[i][0], np.where(own, self._heard[i][1], theta)
+        theta = loudest([each for each in asked if each[0] not in self._heard], evidence, theta, shapes)
+        self._heard |= {i: (shapes[i][p.name], float(theta[own][0])) for i, p, own in asked}
         return theta
-
-    def _white_now(self, readings: Sequence[Reading]) -> list[Floats]:
-        """White residuals (w,) of all runs at readings."""
-        return [self.whitened(k, self.bench.difference(k, r)[:, :, None])[:, 0] for k, r in enumerate(readings)]
 
     def _move_shapes(
         self, members: Members, theta: Floats, shapes: dict[int, dict[str, float]], left: Sequence[Floats],
@@ -371,7 +376,7 @@ def open_problem(bench: Bench, candidates: Sequence[CandidateCause], stated_mm: 
     residuals = [bench.residual(k) for k in range(len(bench.runs))]
     noise = instrument_noise(bench, floor, least_noise(bench, floor), times)
     inflate = less_certain(noise, inflation(bench), tails(bench))
-    columns = build(bench, candidates, {}, floor.tip_um)
+    columns = build(bench, candidates, {}, floor.tip_um, MINOR * floor.tip_um)
     shapes: dict[int, dict[str, float]] = {
         i: shape_default(a) for i, a in enumerate(candidates) if a.shapes or a.switches
     }
@@ -453,6 +458,8 @@ def _scanned(problem: Problem) -> Problem:
             if always is None:
                 continue
             best = best_interval(problem.bench, candidate, always, left.rest, problem.whitened, problem.row_places)
+            if best is not None:
+                best = settled_interval(problem.bench, candidate, best, left, problem.whitened)
         else:
             best = best_shape(problem.bench, candidate, left, problem.whitened)
         if best is None:
@@ -461,11 +468,14 @@ def _scanned(problem: Problem) -> Problem:
         columns = candidate_columns(problem.bench, candidate, best)
         changed.append((list(problem.candidates.columns[i]), columns))
     blocks, white = list(problem.columns.blocks), list(problem.white)
+    floor_um = problem.floor.tip_um
     prior = replace(problem.prior, tolerance=problem.prior.tolerance.copy(), reach=problem.prior.reach.copy())
     for index, columns in changed:
         candidate = problem.columns.candidates[problem.columns.candidate[index[0]]]
         for c, p, per_run in zip(index, candidate.parameters, columns, strict=True):
-            prior.tolerance[c], prior.reach[c] = healthy_sizes(problem.bench, candidate, p, per_run, problem.floor.tip_um)
+            prior.tolerance[c], prior.reach[c] = healthy_sizes(
+                problem.bench, candidate, p, per_run, floor_um, MINOR * floor_um
+            )
         for k in range(len(blocks)):
             new = np.stack([each[k] for each in columns], axis=2)
             blocks[k] = blocks[k].exchanged(index, channel_behind_channel(new))

@@ -11,6 +11,7 @@ import numpy as np
 
 from camcomp.diagnosis.fit.bench import Bench, Run
 from camcomp.diagnosis.fit.columns import build
+from camcomp.diagnosis.fit.floor import MINOR
 from camcomp.diagnosis.fit.measured import Measured
 from camcomp.diagnosis.fit.noise import inflation
 from camcomp.diagnosis.fit.problem import Problem
@@ -132,7 +133,7 @@ def _lay(question: Question, candidate: Candidate, whole: bool) -> Foreseen:
     some = range(len(every)) if whole else question.members
     shapes = {n: question.shapes[i] for n, i in enumerate(some) if i in question.shapes}
     floor_um = problem.floor.tip_um
-    columns = build(bench, [every[i] for i in some], shapes, floor_um)
+    columns = build(bench, [every[i] for i in some], shapes, floor_um, MINOR * floor_um)
     known = {name: i for i, name in enumerate(problem.columns.names)}
     mine = np.array([i for i, name in enumerate(columns.names) if name in known], int)
     theirs = np.array([known[columns.names[i]] for i in mine], int)
