@@ -34,10 +34,15 @@ ROTARY = (
 PARAMETERS = (*FITTED[:2], *ROTARY)
 
 
-def _share(motion: Motion, p: Mapping[str, float]) -> Floats:
-    """How much of the disturbance is there (n,), 0 to 1: straight up from its begin, and down to its end."""
-    since, left = motion.common - p["from_s"], p["to_s"] - motion.common
-    return np.clip(np.minimum(since, left) / RISE_S, 0.0, 1.0)
+def _added(values: Floats, motion: Motion, p: Mapping[str, float], most: Floats) -> Floats:
+    """Values (n, m) with most (m,) where the disturbance is there: straight up from its begin, and down to its end."""
+    at = np.flatnonzero((motion.common > p["from_s"]) & (motion.common < p["to_s"]))
+    if not len(at):
+        return values
+    since, left = motion.common[at] - p["from_s"], p["to_s"] - motion.common[at]
+    out = values.copy()
+    out[at] += np.clip(np.minimum(since, left) / RISE_S, 0.0, 1.0)[:, None] * most
+    return out
 
 
 def _size(p: Mapping[str, float]) -> tuple[float, float]:
@@ -50,7 +55,7 @@ def on_drive(error: Floats, motion: Motion, which: Floats, p: Mapping[str, float
     shift, force = _size(p)
     if (shift == 0.0 and force == 0.0) or p["to_s"] <= p["from_s"]:
         return error
-    return error + _share(motion, p)[:, None] * which * (shift + force / motion.stiffness)
+    return _added(error, motion, p, which * (shift + force / motion.stiffness))
 
 
 def on_drive_force(effort: Floats, motion: Motion, which: Floats, p: Mapping[str, float]) -> Floats:
@@ -58,4 +63,4 @@ def on_drive_force(effort: Floats, motion: Motion, which: Floats, p: Mapping[str
     force = _size(p)[1]
     if force == 0.0 or p["to_s"] <= p["from_s"]:
         return effort
-    return effort - _share(motion, p)[:, None] * which * force
+    return _added(effort, motion, p, -which * force)

@@ -15,6 +15,7 @@ from camcomp.model import signal_path
 from camcomp.model.effect import Parameter
 
 _FINER = 17  # values between the neighbours of the best
+_AT_ONCE = 4  # values of a shape whose columns are made white together
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,10 +31,10 @@ class Beside:
     half: Floats  # (o, o): its square is the inverse of the others' products
 
     def taken(self, columns: Sequence[Floats]) -> Floats:
-        """Products (d, d) of white columns (w, d) per run that lie in the others."""
-        shared = sum((W.T @ C for W, C in zip(self.white, columns, strict=True)), np.zeros(1))[self.others]
-        in_others = self.half @ shared
-        return np.asarray(in_others.T @ in_others)
+        """What of white columns (w, d) per run lies in the others: (o, d), in coordinates whose products are those of columns."""
+        return np.asarray(
+            self.half @ sum((W.T @ C for W, C in zip(self.white, columns, strict=True)), np.zeros(1))[self.others]
+        )
 
 
 def beside(
@@ -57,51 +58,43 @@ def best_shape(
     """The scanned shape whose columns explain most of what is left; None where the effect is not scanned."""
     p = candidate.shapes[0]
     values = np.asarray(p.scan)
-    gains = _gains(bench, candidate, p, values, left, whitened)
+    gains = _gains(bench, candidate, [{**shape_default(candidate), p.name: float(v)} for v in values], left, whitened)
     if gains is None:
         return None
     best = int(np.argmax(gains))
     # between its neighbours the gain has one peak, and a large effect off its peak leaves what looks like noise
     near = np.geomspace(values[max(best - 1, 0)], values[min(best + 1, len(values) - 1)], _FINER)
-    finer = _gains(bench, candidate, p, near, left, whitened)
+    finer = _gains(bench, candidate, [{**shape_default(candidate), p.name: float(v)} for v in near], left, whitened)
     value = near[int(np.argmax(finer))] if finer is not None and finer.max() > gains[best] else values[best]
     return {**shape_default(candidate), p.name: float(value)}
 
 
 def _gains(
-    bench: Bench,
-    candidate: CandidateCause,
-    p: Parameter,
-    values: Floats,
-    left: Beside,
+    bench: Bench, candidate: CandidateCause, shapes: Sequence[Mapping[str, float]], left: Beside,
     whitened: Callable[[int, Floats], Floats],
-) -> Floats | None:
-    """Chi-square (v,) that an effect explains with each value of a shape, its size within its usual one; None where it is not scanned."""
-    gains = []
-    for value in values:  # one at a time: together they are as large as all other columns
-        gain = _gain(bench, candidate, {**shape_default(candidate), p.name: float(value)}, left, whitened)
-        if gain is None:
-            return None
-        gains.append(gain)
-    return np.array(gains)
-
-
-def _gain(
-    bench: Bench, candidate: CandidateCause, shape: Mapping[str, float], left: Beside,
-    whitened: Callable[[int, Floats], Floats],
-) -> float | None:  # fmt: skip
-    """Chi-square that an effect of one shape explains.
+) -> Floats | None:  # fmt: skip
+    """Chi-square (v,) that an effect explains with each of v shapes, its size within its usual one; None where it is not scanned.
 
     Where rows do not tell a shape (an early stretch of a warm-up is straight, however long that takes), usual sizes do.
     """
-    columns = quick_columns(bench, candidate, shape)
-    if columns is None:
-        return None
-    white = [whitened(k, np.stack([each[k] for each in columns], axis=2)) for k in range(len(bench.runs))]
-    h = sum(W.T @ r for W, r in zip(white, left.rest, strict=True))
-    G = np.sum([W.T @ W for W in white], axis=0) - left.taken(white)
-    G += (1.0 / PRIOR_WIDTHS[-1] ** 2) * np.eye(len(G))
-    return float(h @ np.linalg.solve(G, h))
+    gains = []
+    for i in range(0, len(shapes), _AT_ONCE):  # all together they are as large as all other columns
+        each = [quick_columns(bench, candidate, shape) for shape in shapes[i : i + _AT_ONCE]]
+        columns = [column for of_shape in each if of_shape is not None for column in of_shape]
+        if not columns:
+            return None
+        v, own = len(each), len(candidate.parameters)
+        white = [
+            whitened(k, np.stack([c[k] for c in columns], axis=2)).reshape(len(r), -1) for k, r in enumerate(left.rest)
+        ]
+        lost = left.taken(white).reshape(-1, v, own).transpose(1, 2, 0)
+        h, G = np.zeros((v, own)), np.tile((1.0 / PRIOR_WIDTHS[-1] ** 2) * np.eye(own), (v, 1, 1))
+        G = G - lost @ lost.transpose(0, 2, 1)
+        for W, r in zip(white, left.rest, strict=True):
+            by_shape = np.ascontiguousarray(W.reshape(len(r), v, own).transpose(1, 2, 0))
+            h, G = h + by_shape @ r, G + by_shape @ by_shape.transpose(0, 2, 1)
+        gains.append(np.einsum("vp,vp->v", h, np.linalg.solve(G, h[:, :, None])[:, :, 0]))
+    return np.concatenate(gains)
 
 
 def settled_interval(
@@ -115,15 +108,15 @@ def settled_interval(
     paths = [run.run_path for run in bench.runs]
     best, (start, end) = dict(shape), [each.name for each in candidate.shapes]
     run = next((p for p in paths if p.started <= 0.5 * (best[start] + best[end]) <= p.started + p.time[-1]), paths[0])
-    row = float(np.median(np.diff(run.time)))
-    most = _gain(bench, candidate, best, left, whitened) or 0.0
-    step = 4
+    row, step, most = float(np.median(np.diff(run.time))), 4, -np.inf
     while step:
-        near = [{**best, which: best[which] + sign * step * row} for which in (start, end) for sign in (-1, 1)]
+        near = [best, *({**best, which: best[which] + sign * step * row} for which in (start, end) for sign in (-1, 1))]
         near = [each for each in near if each[end] - each[start] > 2 * row]
-        gains = [_gain(bench, candidate, each, left, whitened) or 0.0 for each in near]
-        if max(gains, default=0.0) > most:
-            most, best = max(gains), near[int(np.argmax(gains))]
+        gains = _gains(bench, candidate, near, left, whitened) if near else None
+        if gains is None:
+            return best
+        if gains.max() > most and gains.argmax() > 0:
+            most, best = float(gains.max()), near[int(gains.argmax())]
         else:
             step //= 2
     return best
