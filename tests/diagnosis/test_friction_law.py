@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tests.campaign import runner
-from tests.diagnosis.test_every_machine import simulated
+from tests.diagnosis import shipped
 
 FORCE_N, SPRING = 600.0, 2.0e4  # 30 um each way, spring of the shipped machine in N/mm
 BLOCKS_MM = (0.0008, 0.0015, 0.003, 0.006)  # ways after which each of four equal blocks slides
@@ -26,7 +26,7 @@ def pulled(encoder):
 
 @pytest.mark.parametrize("logged", ["forces", "no forces"])
 def test_friction_that_the_encoder_s_way_turns_round_is_friction(logged, tmp_path):
-    experiment = simulated(tmp_path, "cartesian", None)
+    experiment = shipped.experiment(tmp_path, "cartesian", None)
     for log in sorted(tmp_path.glob("*.csv")):
         header, table = log.read_text().partition("\n")[0].split(","), np.loadtxt(log, delimiter=",", skiprows=1)
         force = pulled(table[:, header.index("act_y_mm")])
