@@ -24,7 +24,7 @@ GX, GY, CELL, FORM, XMIN, YMIN, ZMIN, XMAX, YMAX, ZMAX, RISE = range(
 TIE = 1e-5  # mm: heights are kept with seven digits
 HAIR = 1e-9  # mm
 USED, FREE, TOUCHED, BEGUN = range(4)  # of `counts`
-SPAN = 3.0  # cells: what lies around a cell is that far away
+SPAN = 0.7072  # cells: a circle as large has a node inside
 SLACK = 7  # of `last`: mm by which a sweep may be lower between the nodes of a cell than at all nodes around it
 
 

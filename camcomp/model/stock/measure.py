@@ -312,7 +312,7 @@ def limit(nodes, place, row, inside, outside, k, count):
         best, most = farther(nodes, place, row, best, outside, most, float(turn), count)
     if outside < inside:
         return best
-    apart, end = 0.5, nodes.place[ZMAX] - place.at[2]
+    apart, end = 0.5, nodes.place[ZMAX] - FLOOR - place.at[2]
     for _ in range(CLOSER):  # a ridge may end in between
         middle = most
         for side in (-1.0, 1.0):
@@ -328,6 +328,8 @@ def farther(nodes, place, row, best, outside, most, at, count):
     step = 1.0 if outside > best else -1.0
     if step * (outside - best) <= NEAR or not cuts_at(nodes, place, row, best + 0.1 * step * NEAR, at, count):
         return best, most
+    if cuts_at(nodes, place, row, outside - 0.5 * step * NEAR, at, count):
+        return outside, at
     a, b, gap = best, best, 8.0 * NEAR
     while b != outside:  # steps that grow, and then halves
         b = best + step * min(gap, step * (outside - best))
@@ -347,7 +349,7 @@ def farther(nodes, place, row, best, outside, most, at, count):
 @inner
 def look_over(nodes, place, bites, n, row):
     """Arcs of a tool that is no cylinder, slice by slice."""
-    highest = nodes.place[ZMAX] - place.at[2]
+    highest = nodes.place[ZMAX] - FLOOR - place.at[2]  # nothing counts as higher
     count = angles_of(nodes, nodes.tools[row, RADIUS])
     low, high, above, below = -1.0, -1.0, highest, 0.0
     before, last, first = 0.0, 0, 0

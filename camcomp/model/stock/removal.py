@@ -96,8 +96,6 @@ def put_sweep(nodes, x0, y0, z0, x1, y1, z1, tool):
     s[k, UY] = (y1 - y0) / length if length > 0.0 else 0.0
     climb = (z1 - z0) / length if length > 0.0 else 0.0
     s[k, CLIMB], s[k, WAY] = climb, math.sqrt(1.0 + climb * climb)
-    if length > SHORTEST:
-        nodes.last[SLACK] = max(nodes.last[SLACK], nodes.place[RISE] + SPAN * nodes.place[CELL] * abs(climb))
     nodes.kept[k] = -1
     return k
 
