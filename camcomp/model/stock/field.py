@@ -24,8 +24,9 @@ GX, GY, CELL, FORM, XMIN, YMIN, ZMIN, XMAX, YMAX, ZMAX, RISE = range(
 TIE = 1e-5  # mm: heights are kept with seven digits
 HAIR = 1e-9  # mm
 USED, FREE, TOUCHED, BEGUN = range(4)  # of `counts`
-SPAN = 0.7072  # cells: a circle as large has a node inside
-SLACK = 7  # of `last`: mm by which a sweep may be lower between the nodes of a cell than at all nodes around it
+# Cells: a circle as large has a node inside. A sweep is low over circles, so where it is, a node near is as low, but for
+# what its tool rises on so much.
+SPAN = 0.7072
 
 
 class HeightField(NamedTuple):
@@ -41,7 +42,7 @@ class HeightField(NamedTuple):
     kept: Any  # (M,) int32, how often a sweep stands in these; below 0: it is still to be cut away
     free: Any  # (M,) int32, stack of places in `sweeps` that can be used again
     counts: Any  # (4,) int64
-    last: Floats  # (8,) end, tool and direction of the sweep that was cut away last, from where on it left something, slack
+    last: Floats  # (7,) end, tool and direction of the sweep that was cut away last, from where on it left something
     facet: Any  # (ny, nx) int32 triangle on top of a node, counted from 1; 0: none
     mesh: Floats  # (F, 3, 3) mm, its triangles
 
@@ -154,7 +155,7 @@ def above(nodes, x, y, z):
     a, b, c, d = own[i, j], own[i, j + 1], own[i + 1, j], own[i + 1, j + 1]
     if a > 0 and b > 0 and c > 0 and d > 0 and (a != b or a != c or a != d) and highest - lowest <= TIE:
         return highest > z + TIE
-    if lowest - nodes.last[SLACK] > z and place[FORM] == BOX and (
+    if lowest - place[RISE] > z and place[FORM] == BOX and (
         min(x - place[XMIN], place[XMAX] - x) > 2.0 * cell and min(y - place[YMIN], place[YMAX] - y) > 2.0 * cell
     ):  # fmt: skip
         for p in (i - 1, i + 2):
@@ -163,7 +164,7 @@ def above(nodes, x, y, z):
         for p in range(i, i + 2):
             for q in (j - 1, j + 2):
                 lowest = min(lowest, low[p, q])
-        if lowest - nodes.last[SLACK] > z:
+        if lowest - place[RISE] > z:
             return True
     sweeps, tools = nodes.sweeps, nodes.tools
     if top_at(nodes, x, y, i, j) <= z:
@@ -211,10 +212,8 @@ def room_for(
         if place[FORM] == BOX
         else np.zeros((rows, columns), np.float32)
     )
-    last = np.zeros(8)
-    last[SLACK] = place[RISE]
     return HeightField(
         place, np.zeros((rows, columns), np.int32), low, np.zeros((rows, columns), np.int32),
         np.zeros((rows, columns), np.int32), np.empty((sweeps, 12)), tools, np.zeros(sweeps, np.int32),
-        np.zeros(sweeps, np.int32), np.zeros(4, np.int64), last, facet, mesh,
+        np.zeros(sweeps, np.int32), np.zeros(4, np.int64), np.zeros(7), facet, mesh,
     )  # fmt: skip

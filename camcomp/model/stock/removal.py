@@ -13,9 +13,6 @@ from camcomp.model.stock.field import (
     GX,
     GY,
     HAIR,
-    RISE,
-    SLACK,
-    SPAN,
     TIE,
     TOUCHED,
     USED,
@@ -49,7 +46,6 @@ from camcomp.model.stock.sweeps import (
 )
 
 SAME_LEVEL = 0.02  # mm, and what a sweep climbs within its tool
-SHORTEST = 0.01  # mm: shorter ones, which plunges are after rounding, slant by nothing
 LEAN = 1e-6  # a direction along a row or across it
 CRASH_DEEP, CRASH_INSIDE = 0.01, 0.02  # mm that a rapid has to be in material before it is called a crash
 
