@@ -42,7 +42,7 @@ class HeightField(NamedTuple):
     kept: Any  # (M,) int32, how often a sweep stands in these; below 0: it is still to be cut away
     free: Any  # (M,) int32, stack of places in `sweeps` that can be used again
     counts: Any  # (4,) int64
-    last: Floats  # (7,) end, tool and direction of the sweep that was cut away last, from where on it left something
+    last: Floats  # (8,) end, tool and direction of the sweep cut away last, from where on it left something, its slant
     facet: Any  # (ny, nx) int32 triangle on top of a node, counted from 1; 0: none
     mesh: Floats  # (F, 3, 3) mm, its triangles
 
@@ -215,5 +215,5 @@ def room_for(
     return HeightField(
         place, np.zeros((rows, columns), np.int32), low, np.zeros((rows, columns), np.int32),
         np.zeros((rows, columns), np.int32), np.empty((sweeps, 12)), tools, np.zeros(sweeps, np.int32),
-        np.zeros(sweeps, np.int32), np.zeros(4, np.int64), np.zeros(7), facet, mesh,
+        np.zeros(sweeps, np.int32), np.zeros(4, np.int64), np.zeros(8), facet, mesh,
     )  # fmt: skip

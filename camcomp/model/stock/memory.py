@@ -12,9 +12,9 @@ from camcomp.model.cutting.engaged import Bites, Engaged
 from camcomp.model.stock.at_tip import meet, take_way
 from camcomp.model.stock.facets import facets_on
 from camcomp.model.stock.field import SPAN, TOUCHED, USED, XMAX, XMIN, ZMAX, ZMIN, room_for
+from camcomp.model.stock.front import BITE, DEPTH, EDGE, ENGAGED, WHAT, Place
 from camcomp.model.stock.legs import LegBefore, Legs, legs_of
 from camcomp.model.stock.march import ROOM_FOR_ARCS, ROOM_FOR_PLACES, march, peek, settle
-from camcomp.model.stock.measure import BITE, DEPTH, EDGE, ENGAGED, WHAT, Place
 from camcomp.model.stock.places import CHAIN_DEEP, CUT_LEG, DEEP, MOST_CHAIN, MOST_RECENT, PLACES, ROWS, Found
 from camcomp.model.stock.shapes import StockShape, ToolShape
 from camcomp.model.stock.thinning import thin
