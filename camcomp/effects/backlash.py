@@ -14,16 +14,22 @@ REMEDY = (
     "up at every reversal"
 )
 SOURCE = "play operator (Krasnoselskii, Pokrovskii: Systems with hysteresis, 1989); reversal value B of ISO 230-2"
-PARAMETERS = (
+FITTED = (
     Parameter(
         "width_mm", "mm", 0.0, 0.0, 0.5, 0.02, 0.0001, "worn ball screws: 2 to 50 um (ISO 230-2 reports)", sign=1
     ),
 )
+ROTARY = (
+    Parameter(
+        "width_rad", "rad", 0.0, 0.0, 0.01, 1e-4, 3e-6, "lost motion of robot gears: 0.5 to 3 arc minutes", sign=1
+    ),
+)
+PARAMETERS = FITTED + ROTARY
 
 
 def on_drive(error: Floats, motion: Motion, which: Floats, p: Mapping[str, float]) -> Floats:
-    """Carriage minus encoder (n, m), mm; the carriage starts in the middle of its play."""
-    width = p["width_mm"]
+    """Carriage minus encoder (n, m), mm, or rad for a hinge; the carriage starts in the middle of its play."""
+    width = p.get("width_mm", 0.0) + p.get("width_rad", 0.0)
     if width == 0.0 or not motion.ordered:
         return error
     aimed = which > 0

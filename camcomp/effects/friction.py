@@ -6,7 +6,7 @@ import numpy as np
 
 from camcomp.ground.datatypes import Floats
 from camcomp.model.effect import Motion, Parameter
-from camcomp.model.hysteresis import PRESLIDING_MM, held_back
+from camcomp.model.hysteresis import PRESLIDING_MM, PRESLIDING_RAD, held_back
 
 STAGE = "drive"
 TARGET = "actuator"
@@ -14,14 +14,22 @@ PLAIN = "friction in the guide"
 REMEDY = "clean and lubricate the guide, check covers and preload; run the machine warm before it is measured"
 SOURCE = "force balance of the carriage; turn-round of the force after Dahl 1968, on the carriage's way; viscous by the speed of the encoder"
 _LENGTH = (1e-4, 1.0, 0.005, 0.0005, "rolling guides: 1 to 100 um")
+_CARRIAGE_WAY = Parameter(
+    "carriage_way", "1", 1.0, 0.0, 1.0, 1.0, 0.0,
+    "way that turns the friction round: 1 the carriage's, behind its spring; 0 the encoder's", either=(1.0, 0.0),
+)  # fmt: skip
 FITTED = (
     Parameter("force_N", "N", 0.0, 0.0, 2000.0, 60.0, 0.2, "guides and seals of feed drives: 5 to 300 N", sign=1),
     Parameter("presliding_mm", "mm", PRESLIDING_MM, *_LENGTH, scan=(0.001, 0.003, 0.008, 0.02, 0.06)),
-    Parameter(
-        "carriage_way", "1", 1.0, 0.0, 1.0, 1.0, 0.0,
-        "way that turns the friction round: 1 the carriage's, behind its spring; 0 the encoder's", either=(1.0, 0.0),
-    ),
-)  # fmt: skip
+    _CARRIAGE_WAY,
+)
+_TORQUE = "robot joints: 1 to 5 % of the rated torque"
+_ANGLE = (1e-7, 1e-2, 1e-5, 1e-6, "bearings and gears: 1 to 100 urad")
+ROTARY = (
+    Parameter("force_Nmm", "Nmm", 0.0, 0.0, 5e6, 5e4, 200.0, _TORQUE, sign=1),
+    Parameter("presliding_rad", "rad", PRESLIDING_RAD, *_ANGLE, scan=(2e-6, 5e-6, 1.5e-5, 5e-5, 1.5e-4)),
+    _CARRIAGE_WAY,
+)
 # Known where drive forces are logged; the other channels hardly see them.
 _MORE = (
     Parameter("viscous_Ns_per_mm", "Ns/mm", 0.0, 0.0, 100.0, 0.2, 0.002, "grease and seals: 0.01 to 1 N s/mm", sign=1),
@@ -29,16 +37,17 @@ _MORE = (
         "asymmetry_Ns_per_mm", "Ns/mm", 0.0, -100.0, 100.0, 0.05, 0.001, "viscous forward minus mean of both ways"
     ),
 )
-PARAMETERS = (FITTED[0], *_MORE, *FITTED[1:])
+PARAMETERS = (FITTED[0], *_MORE, *FITTED[1:], *ROTARY[:2])
 
 
 def _pull(motion: Motion, which: Floats, p: Mapping[str, float]) -> Floats | None:
-    """Force (n, m) of the guides against the travel, N, of the actuators aimed at; None where there is none."""
-    force, viscous = p["force_N"], p.get("viscous_Ns_per_mm", 0.0)
+    """Force (n, m) of the guides against the travel, N or Nmm, of the actuators aimed at; None where there is none."""
+    torque = p.get("force_Nmm", 0.0)
+    force, viscous = p.get("force_N", 0.0) + torque, p.get("viscous_Ns_per_mm", 0.0)
     lopsided = p.get("asymmetry_Ns_per_mm", 0.0)
     if force == 0.0 and viscous == 0.0 and lopsided == 0.0:
         return None
-    length = p.get("presliding_mm", PRESLIDING_MM)
+    length = p.get("presliding_rad", PRESLIDING_RAD) if torque else p.get("presliding_mm", PRESLIDING_MM)
     nut = motion.encoder if motion.nut is None else motion.nut
     turned = motion.direction
     if motion.ordered:

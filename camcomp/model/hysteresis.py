@@ -9,6 +9,7 @@ from camcomp.ground.machine_code import kept
 
 STILL = 1e-9  # mm or rad, round-off of two solutions of the same point
 PRESLIDING_MM = 0.005  # rolling guides take 1 to 20 um to turn their friction round (Armstrong-Helouvry 1994)
+PRESLIDING_RAD = 1e-5
 
 
 @kept

@@ -30,6 +30,7 @@ ORDER = (
 )
 STAGES = tuple(stage for stage, _ in ORDER)
 HOOKS = tuple(hook for _, hooks in ORDER for hook in hooks)
+_AT = dict(ORDER)
 
 
 def stages_of(effect: Any) -> set[str]:
@@ -39,7 +40,7 @@ def stages_of(effect: Any) -> set[str]:
 
 def acting(causes: Sequence[Cause], stage: str) -> list[Cause]:
     """The causes with a hook at a stage."""
-    return [cause for cause in causes if stage in stages_of(cause.effect)]
+    return [cause for cause in causes if any(hasattr(cause.effect, hook) for hook in _AT[stage])]
 
 
 def controlled(causes: Sequence[Cause], actuators: tuple[str, ...], motion: Motion) -> Floats:

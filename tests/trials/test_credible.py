@@ -3,9 +3,11 @@
 import pytest
 
 from tests.trials.experiment import Plan
+from tests.trials.sensors import Sensors
 from tests.trials.test_diagnosed import answer
 
 ROUTER = {"machine": "router", "runs": 3, "rows": 200, "stated": False}
+LONG = {"runs": 4, "rows": 300, "channels": "full", "sensors": Sensors(tip_mm=3e-3)}
 
 
 def test_three_causes_that_one_unknown_effect_does_as_well_are_not_named(tmp_path):
@@ -23,3 +25,20 @@ def test_a_lag_that_any_function_of_velocity_draws_but_for_what_is_minor_is_the_
     result, _ = answer(Plan(1532000, "pair", causes, (3.0, 6.0), machine="router", runs=4, rows=300), tmp_path)
     assert result["verdict"] == "identified"
     assert {(each["effect"], each["target"]) for each in result["causes"]} == set(causes)
+
+
+@pytest.mark.campaign
+def test_springs_of_several_joints_are_one_thing_that_gives_way(tmp_path):
+    """Whatever depends on the force does what they do together, and nothing unknown is needed for that."""
+    result, _ = answer(Plan(1544004, "imperfect", imperfect=True, machine="kuka-kr210", **LONG), tmp_path)
+    assert result["verdict"] != "unknown"
+    assert {("drive_stiffness", "A3"), ("cutting_force", None)} <= {
+        (each["effect"], each["target"]) for each in result["causes"] if each["probability"] > 0.95
+    }
+
+
+@pytest.mark.campaign
+def test_where_a_play_stood_for_four_rows_before_its_first_motion_is_no_disturbance(tmp_path):
+    causes = (("backlash", "b"), ("screw_pitch", "a"))
+    result, _ = answer(Plan(1512009, "pair", causes, (6.0, 3.0), machine="delta", **LONG), tmp_path)
+    assert "disturbance" not in {each["effect"] for each in result["causes"]}

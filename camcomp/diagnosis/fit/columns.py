@@ -26,13 +26,13 @@ from camcomp.model.effect import Cause, Load
 from camcomp.model.statics.description import Link, Parallelogram, Robot
 
 RUN_OFFSET_MM = 0.001  # repeatability of a run
-RUN_OFFSET_N = 0.3
+RUN_OFFSET_N, RUN_OFFSET_NMM = 0.3, 300.0
 STARTED_MM, STARTED_RAD = 0.1, 1e-4  # by which an actuator has to move before its play is taken up
 START_MM, START_RAD = 0.1, 5e-5  # where its carriage may stand until then: play and guides as bad as they come
-START_N = 1000.0  # and how hard its guide may hold it there
+START_N, START_NMM = 1000.0, 1e6  # and how hard its guide may hold it there
 ALWAYS_MM, ALWAYS_RAD = 0.005, 5e-6  # the same where it hardly ever moves: little, or nothing would be known of it
 ALWAYS = 0.2  # of a run: what moves for less of it hardly ever moves
-STARTING_ROWS = 5
+STARTING_ROWS = 2
 CLOCK_JITTER_S = 1e-5
 CLOCK_RATE = 1e-5
 SPRING_LOG = 0.01  # one link's spring against its stated value
@@ -218,14 +218,14 @@ def _nuisances(bench: Bench) -> list[tuple[str, float, list[Floats], bool]]:
     def only(r: int, values: Floats) -> list[Floats]:
         return [values if k == r else zero[k] for k in range(len(zero))]
 
-    m = len(bench.actuators)
+    m, hinges = len(bench.actuators), [a.revolute for a in bench.twin.robot.actuators]
     for r, run in enumerate(bench.runs):
         for c in range(6 + 2 * m):
             if 3 <= c < 3 + m or not np.isfinite(bench.observed(r)[:, c]).any():
                 continue
             one = zero[r].copy()
             one[:, c] = 1.0
-            size = RUN_OFFSET_MM if c < 3 else RUN_OFFSET_N
+            size = RUN_OFFSET_MM if c < 3 else RUN_OFFSET_NMM if c < 3 + 2 * m and hinges[c - 3 - m] else RUN_OFFSET_N
             found.append((f"offset.{run.name}.{channel_names(bench.actuators)[c]}", size, only(r, one), c >= 3))
     found += _starts(bench, only)
     clock = CandidateCause("time_sync", None, shelf.load("effects", "time_sync"))
@@ -269,7 +269,8 @@ def _starts(bench: Bench, only: Callable[[int, Floats], list[Floats]]) -> list[t
             if begins and run.measured.has("drive"):
                 held = np.zeros_like(shift)
                 held[:, 3 + m + j] = still
-                found.append((f"held.{run.name}.{a}", START_N, only(r, thinned(held, run.thin)), False))
+                holding = START_NMM if revolute else START_N
+                found.append((f"held.{run.name}.{a}", holding, only(r, thinned(held, run.thin)), False))
     return found
 
 

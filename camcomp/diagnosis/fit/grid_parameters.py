@@ -14,6 +14,7 @@ from camcomp.model import signal_path
 from camcomp.model.effect import Parameter
 
 _FINER = 17  # values between the neighbours of the best
+_AT_ONCE = 4  # values of a shape whose columns are made white together
 
 
 def beside(
@@ -60,16 +61,20 @@ def _gains(
     Where rows do not tell a shape (an early stretch of a warm-up is straight, however long that takes), usual sizes do.
     """
     gains = []
-    for value in values:  # one at a time: together they are as large as all other columns
-        columns = quick_columns(bench, candidate, {**shape_default(candidate), p.name: float(value)})
-        if columns is None:
+    for i in range(0, len(values), _AT_ONCE):  # all together they are as large as all other columns
+        some = values[i : i + _AT_ONCE]
+        each = [quick_columns(bench, candidate, {**shape_default(candidate), p.name: float(v)}) for v in some]
+        columns = [column for of_value in each if of_value is not None for column in of_value]
+        if not columns:
             return None
-        white = [whitened(k, np.stack([each[k] for each in columns], axis=2)) for k in range(len(bench.runs))]
-        h = sum(W.T @ r for W, r in zip(white, rest, strict=True))
-        G = np.sum([W.T @ W for W in white], axis=0)
-        G += (1.0 / PRIOR_WIDTHS[-1] ** 2) * np.eye(len(G))
-        gains.append(float(h @ np.linalg.solve(G, h)))
-    return np.array(gains)
+        own = len(candidate.parameters)
+        h, G = np.zeros((len(some), own)), np.tile((1.0 / PRIOR_WIDTHS[-1] ** 2) * np.eye(own), (len(some), 1, 1))
+        for k, r in enumerate(rest):
+            white = whitened(k, np.stack([column[k] for column in columns], axis=2)).reshape(len(r), len(some), -1)
+            by_value = np.ascontiguousarray(white.transpose(1, 2, 0))
+            h, G = h + by_value @ r, G + by_value @ by_value.transpose(0, 2, 1)
+        gains.append(np.einsum("vp,vp->v", h, np.linalg.solve(G, h[:, :, None])[:, :, 0]))
+    return np.concatenate(gains)
 
 
 def reach(p: Parameter, value: float) -> float:

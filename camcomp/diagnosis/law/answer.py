@@ -9,12 +9,13 @@ import numpy as np
 
 from camcomp.diagnosis.fit.gap import main_channels
 from camcomp.diagnosis.fit.problem import Problem
-from camcomp.diagnosis.law.bench_terms import Spot, TermBench, spots, term_grids
+from camcomp.diagnosis.law.bench_terms import Spot, TermBench, spots
 from camcomp.diagnosis.law.beside import fitted_beside, with_law
 from camcomp.diagnosis.law.describe import law_result, moved_without, terms_of
 from camcomp.diagnosis.law.find import FoundLaw, find_law
 from camcomp.diagnosis.law.folds import Folds, Split, usual_split
 from camcomp.diagnosis.law.law_answer import LawAnswer, term_bench
+from camcomp.diagnosis.law.screen import term_grids
 from camcomp.diagnosis.law.smooth import FoundMap, find_map, map_values
 from camcomp.diagnosis.search.established import standing
 from camcomp.diagnosis.search.unknown import about, firm_prior

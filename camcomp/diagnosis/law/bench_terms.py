@@ -1,17 +1,16 @@
-"""Terms on the bench: where a form acts, what it does to the channels of every run, that in white rows, and grids of all that is
-tried.
-"""
+"""Terms on the bench: where a form acts, what it does to the channels of every run, and that in white rows."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
 from camcomp.diagnosis.fit.bench import Bench, thinned
-from camcomp.diagnosis.law.forms import Form, at_drive, at_tip
+from camcomp.diagnosis.law.forms import Form
 from camcomp.diagnosis.law.rows import Rows, drive_rows, tip_rows
 from camcomp.diagnosis.law.sizes import Sizes, sizes
 from camcomp.diagnosis.law.white import White
@@ -45,6 +44,18 @@ def spots(actuators: int, kind: str) -> list[Spot]:
     return [Spot("structure", a) for a in range(3)] + [Spot("drive", j) for j in range(actuators)]
 
 
+class _Joined(dict[str, Floats]):
+    """Covariates of all runs, one run behind the other, worked out when asked for."""
+
+    def __init__(self, runs: Sequence[Rows]) -> None:
+        super().__init__()
+        self._runs = runs
+
+    def __missing__(self, name: str) -> Floats:
+        self[name] = np.concatenate([each[name] for each in self._runs])
+        return self[name]
+
+
 class TermBench:
     """Evaluates terms on the runs of a bench; noise, inflate, times: of its rows, as a Problem has them."""
 
@@ -72,9 +83,20 @@ class TermBench:
 
     def values(self, spot: Spot, *forms: Form) -> list[Floats]:
         """Functions of forms (n, f), one behind the other, per run: mm or rad per unit of their coefficients; 0 where they are none."""
-        rows = self.rows(spot)
-        parsed = [parse(text, dict.fromkeys(rows[0])) for form in forms for text in form.said]
-        return [np.nan_to_num(np.stack([each(r, r.rows) for each in parsed], axis=1)) for r in rows]
+        rows, known = self.rows(spot), dict.fromkeys(self.rows(spot)[0])
+        parsed = [parse(text, known) for form in forms for text in form.said]
+        ends = np.cumsum([0, *(r.rows for r in rows)])
+        out = np.empty((int(ends[-1]), len(parsed)))
+        every = _Joined(rows)
+        for i, each in enumerate(parsed):
+            if each.remembers:
+                for r, (a, b) in zip(rows, pairwise(ends), strict=True):
+                    out[a:b, i] = each(r, r.rows)
+            else:
+                out[:, i] = each(every, len(out))
+        if not np.isfinite(out).all():
+            np.nan_to_num(out, copy=False)
+        return [out[a:b] for a, b in pairwise(ends)]
 
     def tip_ways(self, spot: Spot) -> list[Floats]:
         """By how much the tip (n, 3), program frame, moves per unit at the spot, per run."""
@@ -130,6 +152,11 @@ class TermBench:
         way = self.bench.turned(k, self.tip_ways(spot)[k])
         return {c: thinned(way[:, c : c + 1] * values, thin) for c in range(3) if np.abs(way[:, c]).max() > 1e-9}
 
+    def white_rows(self, spot: Spot) -> int:
+        """How many white rows of all runs the spot reaches."""
+        ones = [np.ones((len(way), 1)) for way in self.tip_ways(spot)]
+        return sum(map(len, self.white(spot, ones).rows))
+
     def seen(self, spot: Spot) -> list[Bools]:
         """Rows (n',) per run, thinned, in which some channel that the spot reaches is known."""
         ones = [np.ones((len(way), 1)) for way in self.tip_ways(spot)]
@@ -157,57 +184,10 @@ class TermBench:
                 for c, each in self._reached(spot, k, v).items()
                 if c in self._slices[k]
             ]
+            if len(found) == 1:  # nothing has to be copied then
+                rows.append(found[0][0])
+                columns.append(found[0][1])
+                continue
             rows.append(np.concatenate([r for r, _ in found]) if found else np.zeros(0, int))
             columns.append(np.concatenate([x for _, x in found]) if found else np.zeros((0, v.shape[1])))
         return White(tuple(rows), tuple(columns))
-
-
-@dataclass(frozen=True, eq=False)
-class TermGrid:
-    """All terms of one spot that are tried, white (c columns); first (forms,): column at which each begins; own (c,): energy;
-    products (c - 1,): of a column with the next.
-    """
-
-    spot: Spot
-    forms: tuple[Form, ...]
-    first: Ints
-    white: White
-    own: Floats
-    products: Floats
-
-
-def term_grids(bench: TermBench, kind: str) -> list[TermGrid]:
-    """What is tried where a law may act that shows in a kind of channel."""
-    every = spots(len(bench.bench.actuators), kind)
-    tip = [each for each in every if each.on == "structure"]
-    return [*_grids(bench, tip), *(grid for each in every if each not in tip for grid in _grids(bench, [each]))]
-
-
-def _grids(bench: TermBench, where: Sequence[Spot]) -> list[TermGrid]:
-    """Of spots at which the same covariates stand: their functions are evaluated once."""
-    if not where:
-        return []
-    size, first = bench.sizes(where[0]), where[0]
-    on_drive = first.on in ("control", "drive")
-    forms = at_drive(size, bench.bench.twin.robot.actuators[first.index].revolute) if on_drive else at_tip(size)
-    whites: list[list[White]] = [[] for _ in where]
-    for some in range(0, len(forms), AT_ONCE):  # rows before thinning are many
-        values = bench.values(first, *forms[some : some + AT_ONCE])
-        for parts, spot in zip(whites, where, strict=True):
-            parts.append(bench.white(spot, values))
-    begin = np.cumsum([0, *(len(each.texts) for each in forms[:-1])])
-    return [_grid(spot, forms, begin, parts) for spot, parts in zip(where, whites, strict=True)]
-
-
-def _grid(spot: Spot, forms: Sequence[Form], begin: Ints, parts: list[White]) -> TermGrid:
-    rows, columns = parts[0].rows, []
-    for of_run in zip(*(each.columns for each in parts), strict=True):
-        columns.append(np.concatenate(of_run, axis=1))
-    parts.clear()
-    own = np.asarray(np.sum([np.einsum("rc,rc->c", X, X) for X in columns], axis=0))
-    return TermGrid(spot, tuple(forms), begin, White(rows, tuple(columns)), own, following(columns))
-
-
-def following(columns: Sequence[Floats]) -> Floats:
-    """Products (c - 1,) of columns (n, c) with the next ones, over all runs."""
-    return np.asarray(np.sum([np.einsum("rc,rc->c", X[:, :-1], X[:, 1:]) for X in columns], axis=0))

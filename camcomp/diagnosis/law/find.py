@@ -13,15 +13,14 @@ from itertools import combinations
 
 import numpy as np
 
-from camcomp.diagnosis.law.bench_terms import Spot, Term, TermBench, TermGrid, following
+from camcomp.diagnosis.law.bench_terms import Spot, Term, TermBench
 from camcomp.diagnosis.law.folds import ALTERNATING, Folds, Split, gains, usual_split, withheld
 from camcomp.diagnosis.law.forms import Form
+from camcomp.diagnosis.law.screen import Screen, TermGrid
 from camcomp.diagnosis.law.shapes import Shapes
 from camcomp.diagnosis.law.white import White
-from camcomp.ground.datatypes import Bools, Floats
+from camcomp.ground.datatypes import Floats
 
-FALSE_RATE = 0.02  # of a law where there is none
-DRAWS, BLOCK = 40, 8  # of signs; rows that share one
 MOST_TERMS = 6
 REFINED = 7  # kinds of terms whose shapes are followed at every step
 PER_SHAPE = 3.0  # log density that a number of a shape has to bring: it was looked for among many
@@ -52,16 +51,6 @@ class FoundLaw:
     precision: Floats
 
 
-@dataclass(frozen=True, eq=False)
-class _View:
-    """A grid with the base taken out, all data: half (k, c) of what the base's columns take, G, h (c,), usable (c,)."""
-
-    half: Floats
-    G: Floats
-    h: Floats
-    good: Bools
-
-
 def find_law(
     bench: TermBench, base: Callable[[Split, bool], Folds], grids: Sequence[TermGrid], *, seed: int = 0
 ) -> FoundLaw | None:
@@ -83,10 +72,8 @@ class _Search:
         rng: np.random.Generator,
     ) -> None:
         self.base, self.split, self.folds = base, split, base(split, True)
-        self.bench, self.grids, self.rng = bench, grids, rng
-        # of every grid against the base: the same at all steps
-        self._cross = [self.folds.cross(each.white) for each in grids]
-        self._target = [self.folds.target(each.white) for each in grids]
+        self.bench, self.grids = bench, grids
+        self.screen = Screen(grids, self.folds, rng)
         self.shapes = Shapes(bench)
 
     def run(self) -> FoundLaw | None:
@@ -95,9 +82,7 @@ class _Search:
         score = 0.0
         while len(chosen) < MOST_TERMS:
             step = self._beside(chosen)
-            views = [self._view(step, n) for n in range(len(self.grids))]
-            ranked = self._singles(views)
-            threshold = self._by_chance(step, views)
+            ranked, threshold = self.screen.gains(step)
             if not ranked or ranked[0][0] < threshold:
                 break
             fine = [self._refined(step, term) for _, term in self._leaders(ranked)]
@@ -129,10 +114,7 @@ class _Search:
 
     def _spots_beside(self, term: Term) -> list[Spot]:
         """The other spots at which the same function of the same covariates can act."""
-        same = [
-            b.spot for b in self.grids if (b.spot.on in ("control", "drive")) == (term.spot.on in ("control", "drive"))
-        ]
-        return [s for s in same if s != term.spot and s.on == term.spot.on and s.on == "structure"]
+        return [s for each in self.grids for s in each.spots if term.spot in each.spots and s != term.spot]
 
     # -- one step ------------------------------------------------------------------------------------------------------
 
@@ -148,53 +130,6 @@ class _Search:
 
     def _precision(self, term: Term) -> Floats:
         return self.shapes.columns(term)[1]
-
-    def _view(self, step: Folds, n: int) -> _View:
-        grid = self.grids[n]
-        half = step.halved(np.concatenate([self._cross[n], step.cross(grid.white, first=len(self.folds.more))]))
-        G = grid.own - np.einsum("kc,kc->c", half, half)
-        return _View(half, G, self._target[n] - step.of_target(half), G > 1e-4 * grid.own + 1e-9)
-
-    def _singles(self, views: Sequence[_View]) -> list[tuple[float, Term]]:
-        """(gain in evidence, term) of all grid terms, best first."""
-        out: list[tuple[float, Term]] = []
-        for grid, view in zip(self.grids, views, strict=True):
-            G, h, good = view.G, view.h, view.good
-            count = np.array([len(each.texts) for each in grid.forms])
-            one = np.flatnonzero(count == 1)
-            i = grid.first[one]
-            gain = np.where(good[i], 0.5 * h[i] ** 2 / np.maximum(G[i], 1e-12), 0.0)
-            out += [(float(g), Term(grid.spot, grid.forms[k])) for g, k in zip(gain, one, strict=True)]
-            two = np.flatnonzero(count == 2)
-            if len(two):
-                i = grid.first[two]
-                cross = grid.products[i] - following([view.half])[i]
-                det = G[i] * G[i + 1] - cross**2
-                fit = (h[i] ** 2 * G[i + 1] - 2 * h[i] * h[i + 1] * cross + h[i + 1] ** 2 * G[i]) / np.maximum(
-                    det, 1e-12
-                )
-                usable = good[i] & good[i + 1] & (det > 1e-4 * G[i] * G[i + 1])
-                gain = np.where(usable, 0.5 * fit, 0.0)
-                out += [(float(g), Term(grid.spot, grid.forms[k])) for g, k in zip(gain, two, strict=True)]
-        return sorted(out, key=lambda each: -each[0])
-
-    def _by_chance(self, step: Folds, views: Sequence[_View]) -> float:
-        """Gain that the best of all terms has with signs drawn at random, exceeded in FALSE_RATE of draws."""
-        rest = step.rest()
-        draws = []
-        for r in rest:
-            signs = self.rng.choice([-1.0, 1.0], size=(-(-len(r) // BLOCK), DRAWS))
-            draws.append(r[:, None] * np.repeat(signs, BLOCK, axis=0)[: len(r)])
-        most = np.zeros(DRAWS)
-        half = step.projected(draws)
-        for grid, view in zip(self.grids, views, strict=True):
-            white = grid.white
-            h = sum(X.T @ e[white.reach(k)] for k, (X, e) in enumerate(zip(white.columns, draws, strict=True)))
-            h = h - view.half.T @ half
-            gain = np.where(view.good[:, None], 0.5 * h**2 / np.maximum(view.G, 1e-12)[:, None], 0.0)
-            most = np.maximum(most, gain.max(axis=0, initial=0.0))
-        beta = float(most.std()) * np.sqrt(6.0) / np.pi
-        return float(most.mean() - 0.5772 * beta - beta * np.log(-np.log(1.0 - FALSE_RATE)))
 
     @staticmethod
     def _leaders(ranked: Sequence[tuple[float, Term]]) -> list[tuple[float, Term]]:

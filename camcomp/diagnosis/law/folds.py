@@ -138,13 +138,13 @@ class Folds:
         each = np.asarray(np.linalg.solve(M, data.h[..., None])[..., 0], float)
         return each, np.asarray(np.linalg.inv(M[0]), float)
 
-    def cross(self, x: White, *, first: int = 0) -> Floats:
-        """Products (k, c) of the base's columns, from number `first` of those that stand apart on, with columns of a spot."""
+    def cross(self, x: White, *, first: int | None = None) -> Floats:
+        """Products (k, c) of the base's columns with columns of a spot: of all, or from number `first` of those that stand apart on."""
         return np.asarray(np.sum([self._against(k, x, first) for k in range(len(self.white))], axis=0))
 
-    def _against(self, k: int, x: White, first: int) -> Floats:
+    def _against(self, k: int, x: White, first: int | None) -> Floats:
         X, rows = x.columns[k], x.reach(k)
-        parts = [] if first else [self.white[k][rows].T @ X]
+        parts = [self.white[k][rows].T @ X] if first is None else []
         low, high = x.hull(k)
         for each in self.more[first:]:
             near = each.over(k, low, high)

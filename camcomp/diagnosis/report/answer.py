@@ -7,6 +7,7 @@ from camcomp.diagnosis.report.words import depends, percent, plain, remedy, shor
 from camcomp.diagnosis.result.types import UNKNOWN, DiagnosisResult, FoundCause, GapSize, Law, NamedCause
 from camcomp.report.plot import brief, micrometres
 
+SURE = 0.95  # probability beyond which none is told: diagnose is never surer than that something looks alike
 HALF = 0.5  # of what is left: what goes with less is told only where nothing goes with more
 MOST_CAUSES = 3  # that the terminal tells
 BESIDE_LAW = 1  # where a law is told, too
@@ -70,7 +71,7 @@ def floor_text(gap: GapSize) -> str:
 
 def told_chance(probability: float) -> str:
     """A probability that is worth a word; nothing where there is no doubt."""
-    return "" if probability > 0.995 else f", probability {100 * probability:.0f} %"
+    return "" if probability > SURE else f", probability {100 * probability:.0f} %"
 
 
 def law_lines(law: Law) -> list[str]:

@@ -50,6 +50,7 @@ LARGE_SCALES = 3.0  # size of an effect, in its typical ones, that would show at
 MOST_SCALES = 8.0  # the same that nobody believes of a rival that fits as well
 HOPELESS_LOG = 12.0  # log evidence behind the best at which a set is not fitted any more
 LEAST_PROBABILITY = 0.02  # of a set whose foretelling is looked at
+LOOKALIKE = 0.04  # probability that what a cause explains down to the noise is something that no library has and that looks the same
 INSTEAD = 0.95  # probability of something unknown in place of a cause, where without it nothing unknown would show
 POINTED = 0.85  # share of what is left that one actuator has to have to be that place
 
@@ -132,7 +133,7 @@ def search_causes(problem: Problem) -> CauseSearch:
         probability = probabilities(fits, problem.candidates, temperature)
         word = "identified" if known.members else "none"
         verdict = replace(verdict, word=word, best=0, rivals=())
-    sure = {i: min(p, credible.get(i, 1.0)) for i, p in verdict.inclusion.items()}
+    sure = {i: (1.0 - LOOKALIKE) * min(p, credible.get(i, 1.0)) for i, p in verdict.inclusion.items()}
     verdict = replace(verdict, inclusion=sure)
     prior = problem.prior if kind is None else firm_prior(problem)
     left = residual_tests(problem, known, prior)

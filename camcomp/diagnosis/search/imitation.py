@@ -85,7 +85,8 @@ def credibility(
         likely = first + np.flatnonzero(np.max(np.where(has, -np.inf, value), axis=1)[first:] > whole + np.log(DRAWN))
         for n, each in enumerate(_families(problem), first):
             if n in likely:
-                has[n] |= _draws(problem, f, i, W, r, replace(each, columns=each.columns.scaled(weight[each.at])))
+                family = replace(each, columns=each.columns.scaled(weight[each.at]))
+                has[n] |= any(_draws(problem, f, part, W, r, family) for part in _parts(problem, f.members, i))
         unlike = np.exp(value - whole) * ~has
         # the search, whose evidence is not strained, has found the member: where nothing unknown takes its place, one word against another
         present[i] = float(np.sum(np.exp(value - whole) * has) + 0.5 * unlike[:first].sum())
@@ -93,13 +94,20 @@ def credibility(
     return present, replaced
 
 
-def _draws(problem: Problem, f: Fitted, i: int, W: ByChannel, r: Floats, family: _Family) -> bool:
-    """Whether the family, beside the other members, draws what member i does: then it is that member by another name.
+def _parts(problem: Problem, members: Members, i: int) -> list[Members]:
+    """A member alone, and together with the others of its name: springs of several joints are one thing that gives way."""
+    name = problem.columns.candidates[i].name
+    mates = tuple(j for j in members if problem.columns.candidates[j].name == name)
+    return [(i,), mates] if len(mates) > 1 else [(i,)]
+
+
+def _draws(problem: Problem, f: Fitted, part: Members, W: ByChannel, r: Floats, family: _Family) -> bool:
+    """Whether the family, beside the other members, draws what a part of f does: then it is that part by another name.
 
     Of all that may depend on velocity, a clock that is late makes one; of all that depends on force, a spring that is soft.
-    It may differ by a share of what the member does, or by what is minor at the tip: nothing unknown is claimed for less.
+    It may differ by a share of what the part does, or by what is minor at the tip: nothing unknown is claimed for less.
     """
-    own, others = problem.member_columns((i,)), problem.member_columns(tuple(x for x in f.members if x != i))
+    own, others = problem.member_columns(part), problem.member_columns(tuple(x for x in f.members if x not in part))
     at = problem.member_columns(f.members)
     signal = W[:, own] @ f.theta[[at.index(c) for c in own]]
     joint, prior = _with(problem, gram(W, r), W, r, family)

@@ -258,9 +258,11 @@ def within(mean: Floats, columns: Callable[[Ints], Floats], reach: Floats) -> tu
     are let go again.
     """
     mode, held, side = mean, np.zeros(0, np.int64), np.zeros(0)
-    pull = side
+    pull, end = side, reach * (1.0 + 1e-9)
     for _ in range(PASSES):
-        far = np.setdiff1d(np.flatnonzero(np.abs(mode) > reach * (1.0 + 1e-9)), held)
+        beyond = np.abs(mode) > end
+        beyond[held] = False
+        far = np.flatnonzero(beyond)
         loose = pull * side > 0.0
         if not len(far) and not loose.any():
             break

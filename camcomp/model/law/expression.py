@@ -76,6 +76,7 @@ FUNCTIONS: dict[str, tuple[int, Callable[..., Floats], str]] = {
     "since": (1, since, "way since the last reversal"),
 }
 _LENGTHS = {"way", "drag"}  # their second argument is one number
+_OF_ROWS_IN_ORDER = {*_LENGTHS, "since"}
 
 
 @dataclass(frozen=True)
@@ -105,6 +106,11 @@ class Expression:
     def names(self) -> tuple[str, ...]:
         """The covariates in it, each once, in order."""
         return tuple(dict.fromkeys(str(each.value) for each in self.root.walk() if each.kind == "name"))
+
+    @property
+    def remembers(self) -> bool:
+        """Whether a value hangs on the rows before it, which are those of one run then."""
+        return any(each.kind == "call" and each.value in _OF_ROWS_IN_ORDER for each in self.root.walk())
 
     def __call__(self, rows: Mapping[str, Floats], n: int) -> Floats:
         """Values (n,) where every covariate has its values (n,); NaN or infinite where the formula has none."""
@@ -233,7 +239,7 @@ def _value(node: FormulaNode, rows: Mapping[str, Floats]) -> Floats:
     parts = [_value(each, rows) for each in node.parts]
     if node.kind == "call":
         name = str(node.value)
-        if name in (*_LENGTHS, "since"):  # of rows in order
+        if name in _OF_ROWS_IN_ORDER:
             first = np.atleast_1d(np.asarray(parts[0], float))
             return FUNCTIONS[name][1](first, *(float(each) for each in parts[1:]))
         return np.asarray(FUNCTIONS[name][1](*parts))

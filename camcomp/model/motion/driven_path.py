@@ -134,6 +134,9 @@ def cutting_forces(
     turning = np.maximum(turning, np.where(on[:, None], thicker, 0.0))
     unsteady = _unsteady(before, after, as_told)[:, None] * np.linalg.norm(force, axis=1, keepdims=True) / np.sqrt(3.0)
     turning = np.maximum(turning, unsteady)
+    # an edge that stands cuts nothing, rubs as hard as it rubs, and back along whatever it moved by last
+    standing = (on & _standing(tip, time))[:, None] * np.linalg.norm(force, axis=1, keepdims=True)
+    turning = np.maximum(turning, standing)
     # line numbers that were late or early are right to a row
     slack = CLOCK_S + (float(np.median(np.diff(time))) if aligned.lag else 0.0)
     return Forces(force, np.maximum(_doubt(force, time, on, slack), turning), on, _apart(track, motion))
@@ -207,8 +210,7 @@ def driven_directions(tip: Floats, time: Floats) -> tuple[Floats, Floats]:
     left, right = _beside(at)
     before = _unit(tip - tip[np.clip(left, 0, n - 1)])
     after = _unit(tip[np.clip(right, 0, n - 1)] - tip)
-    slow = np.concatenate([length / np.maximum(np.diff(time), 1e-9) < _STILL_MM_PER_S, [True]])
-    moving = ~(slow & np.concatenate([[True], slow[:-1]]))
+    moving = ~_standing(tip, time)
     last = np.maximum.accumulate(np.where(moving, np.arange(n), -1))
     held = np.where(last[:, None] >= 0, after[np.maximum(last, 0)], 0.0)
     still = ~moving
@@ -218,6 +220,13 @@ def driven_directions(tip: Floats, time: Floats) -> tuple[Floats, Floats]:
     end = moving & (np.linalg.norm(after, axis=1) == 0.0)
     after[end] = before[end]
     return before, after
+
+
+def _standing(tip: Floats, time: Floats) -> Bools:
+    """Whether a row (n,) was neither reached nor left by a movement."""
+    speed = np.linalg.norm(np.diff(tip, axis=0), axis=1) / np.maximum(np.diff(time), 1e-9)
+    slow = speed < _STILL_MM_PER_S
+    return np.asarray(np.append(slow, True) & np.append(True, slow), bool)
 
 
 def _unit(vectors: Floats) -> Floats:

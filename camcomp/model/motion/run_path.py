@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from camcomp.ground import path_geometry
-from camcomp.ground.datatypes import Bools, Floats
+from camcomp.ground.datatypes import Bools, Floats, Ints
 from camcomp.model.cutting.track import Track
 from camcomp.model.hysteresis import direction
 from camcomp.model.motion.node_pieces import Pieces, Places, cut
@@ -69,6 +69,19 @@ class RunPath:
     def tip_time(self) -> Floats:
         """Times (n,) s at which the tips of the rows stood there, as far as that is known."""
         return self.time - self.clock_s if self.clock_s else self.time
+
+    @cached_property
+    def _rows_in_grid(self) -> tuple[Ints, Floats]:
+        return self._between_instants(self.time)
+
+    def in_grid(self, at: Floats) -> tuple[Ints, Floats]:
+        """Times (n,) on the grid: the instant (n,) before each, and its share (n, 1) of the way to the next."""
+        return self._rows_in_grid if at is self.time else self._between_instants(at)
+
+    def _between_instants(self, at: Floats) -> tuple[Ints, Floats]:
+        i = np.clip(np.searchsorted(self.grid, at, side="right") - 1, 0, len(self.grid) - 2)
+        step = self.grid[i + 1] - self.grid[i]
+        return i, np.clip((at - self.grid[i]) / np.where(step > 0, step, 1.0), 0.0, 1.0)[:, None]
 
     @cached_property
     def row_place(self) -> Places:

@@ -35,6 +35,7 @@ _FORWARD_PASSES = 12
 _FORWARD_MM = 1e-7
 _FORWARD_FAR_MM = 3.0  # from which on slopes are worked out anew for Newton's method,
 _FORWARD_NEAR_MM = 0.3  # and for what lies between its points
+_LATELY = 4  # changed machines that are kept
 _SAME_LOAD = 1e-3  # share of the load by which a changed machine's may differ from that it was solved with
 
 
@@ -98,6 +99,9 @@ class Twin:
     causes: tuple[Cause, ...] = ()
     # what was worked out before, for this machine with these causes; a copy of a changed twin starts without
     _machines: dict[tuple[Any, ...], Machine] = field(default_factory=dict, init=False, repr=False)
+    _edited: dict[tuple[int, ...], tuple[tuple[Cause, ...], Robot, tuple[Any, ...]]] = field(
+        default_factory=dict, init=False, repr=False
+    )
     _usual: WeakKeyDictionary[RunPath, tuple[Motion, Motion]] = field(
         default_factory=WeakKeyDictionary, init=False, repr=False
     )
@@ -111,6 +115,12 @@ class Twin:
     def _control(self) -> Machine:
         """The machine as its control knows it."""
         return build_machine(self.nominal, self.nominal)
+
+    @cached_property
+    def _at_reference(self) -> Floats:
+        """Wrench (3, 6) at the platform reference per force at the tip."""
+        lever = self.nominal.tool  # platform axes; its tilt under load is of second order here
+        return np.hstack([np.eye(3), np.cross(lever, np.eye(3))])
 
     def to_machine(self, tip: Floats) -> Floats:
         """Tips (n, 3) program -> machine frame."""
@@ -159,8 +169,15 @@ class Twin:
 
     def edited(self, causes: Sequence[Cause]) -> tuple[Robot, tuple[Any, ...]]:
         """The machine with the effects on it, and a key that tells equal ones."""
-        robot, by = signal_path.edited(causes, self.actuators, self.robot)
-        return robot, tuple((cause.name, cause.target, tuple(sorted(cause.values.items()))) for cause in by)
+        editing = tuple(signal_path.acting(causes, "structure"))
+        asked = tuple(map(id, editing))
+        if asked not in self._edited:
+            if len(self._edited) > _LATELY:
+                self._edited.clear()
+            robot, by = signal_path.edited(editing, self.actuators, self.robot)
+            key = tuple((cause.name, cause.target, tuple(sorted(cause.values.items()))) for cause in by)
+            self._edited[asked] = editing, robot, key  # those causes stay alive, and so no other one is taken for them
+        return self._edited[asked][1:]
 
     # -- the signal path ----------------------------------------------------------------------------------------------
 
@@ -329,7 +346,7 @@ class Twin:
     def _machine(self, robot: Robot, key: tuple[Any, ...]) -> Machine:
         """The packed machine; runs of one experiment ask for the same one after each other."""
         if key not in self._machines:
-            if len(self._machines) > 4:
+            if len(self._machines) > _LATELY:
                 self._machines.clear()
             self._machines[key] = build_machine(robot, self.nominal)
         return self._machines[key]
@@ -376,8 +393,7 @@ class Twin:
         d_rho = gap - solved.shift[place.piece]
         force, wrench, _ = solved.at(place)
         d_force, d_wrench = load.force - force, load.wrench - wrench
-        lever = self.nominal.tool  # platform axes; its tilt under load is of second order here
-        d_wrench = d_wrench + np.concatenate([d_force, np.cross(lever, d_force)], axis=1)
+        d_wrench = d_wrench + d_force @ self._at_reference
         return d_rho, d_wrench
 
 
@@ -428,9 +444,7 @@ def _interpolate(run_path: RunPath, at: Floats, values: Floats) -> Floats:
     """Grid values (g, c) at times (n,); rows of unordered poses are the grid itself."""
     if not run_path.ordered:
         return values
-    i = np.clip(np.searchsorted(run_path.grid, at, side="right") - 1, 0, len(run_path.grid) - 2)
-    step = run_path.grid[i + 1] - run_path.grid[i]
-    u = np.clip((at - run_path.grid[i]) / np.where(step > 0, step, 1.0), 0.0, 1.0)[:, None]
+    i, u = run_path.in_grid(at)
     return (1.0 - u) * values[i] + u * values[i + 1]
 
 

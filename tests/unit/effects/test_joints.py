@@ -1,15 +1,27 @@
 """What joints of arms do behind their encoders, against formulas written down anew."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from camcomp.diagnosis.fit.bench import CandidateCause
 from camcomp.effects import joint_coupling, joint_curve, joint_hysteresis
+from camcomp.ground import shelf
 from camcomp.ground.errors import ConfigError
 from camcomp.model.config.load import load_config
-from camcomp.model.effect import Motion
+from camcomp.model.effect import Motion, nominal
+from camcomp.model.signal_path import stages_of
 
 ANGLE = np.radians(np.arange(-400.0, 400.0, 0.5))
 ARM = "config/ur10.yaml"
+BEHIND_THE_MOTOR = [
+    name
+    for name, effect in shelf.usable("effects", ("none",))
+    if effect.TARGET in ("actuator", "either")
+    and not getattr(effect, "SLIDES_ONLY", False)
+    and stages_of(effect) & {"control", "drive"}
+]
 
 
 def motion(q, *, ordered=True, way=None):
@@ -74,3 +86,31 @@ def test_a_curve_that_is_none_is_refused_where_it_stands(tmp_path, text, rule):
         load_config([ARM, tmp_path / "c.yaml"])
     assert refused.value.at.line == 4
     assert refused.value.rule == rule
+
+
+@pytest.mark.parametrize("effect", BEHIND_THE_MOTOR)
+def test_what_a_hinge_does_is_sought_in_its_own_units(effect):
+    """Sizes that are typical of slides, in mm and N, are out by orders of magnitude in rad and N mm."""
+    fitted = CandidateCause(effect, "A1", shelf.load("effects", effect), hinge=True).parameters
+    assert not [p.name for p in fitted if p.unit.split("/")[0] in ("mm", "N", "Ns")]
+
+
+@pytest.mark.parametrize(
+    "slide, hinge",
+    [
+        (("backlash", {"width_mm": 0.02}), {"width_rad": 0.02}),
+        (("thermal_growth", {"growth_mm_per_K": 0.01}), {"growth_rad_per_K": 0.01}),
+        (("disturbance", {"shift_mm": 0.1, "from_s": 5.0, "to_s": 12.0}), {"shift_rad": 0.1}),
+        (("disturbance", {"force_N": 7.0, "from_s": 5.0, "to_s": 12.0}), {"force_Nmm": 7.0}),
+        (("friction", {"force_N": 7.0, "presliding_mm": 0.1}), {"force_Nmm": 7.0, "presliding_rad": 0.1}),
+    ],
+)
+def test_a_hinge_follows_the_law_of_a_slide(slide, hinge):
+    name, values = slide
+    there = motion(np.concatenate([np.linspace(0.0, 1.0, 20), np.linspace(1.0, 0.0, 20)])[:, None])
+    there = replace(there, stiffness=np.array([1e3]))
+    effect, zero = shelf.load("effects", name), np.zeros((40, 1))
+    instants = {key: value for key, value in values.items() if key.endswith("_s")}
+    asked = [{**nominal(effect), **values}, {**nominal(effect), **instants, **hinge}]
+    both = [effect.on_drive(zero, there, np.ones(1), p) for p in asked]
+    assert np.ptp(both[0]) > 0.0 and np.array_equal(*both)

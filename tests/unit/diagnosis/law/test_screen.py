@@ -1,0 +1,88 @@
+"""All terms at once: in parts as all together, and rows of several runs as each run alone."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from camcomp.diagnosis.law.bench_terms import Spot, TermBench
+from camcomp.diagnosis.law.folds import Folds, Split
+from camcomp.diagnosis.law.forms import Form
+from camcomp.diagnosis.law.screen import Screen, TermGrid
+from camcomp.diagnosis.law.white import White
+from camcomp.diagnosis.statistics.by_channel import ByChannel
+
+TIPS = (Spot("structure", 0), Spot("structure", 1))
+PERIODS = (30.0, 24.0, 17.0, 12.0, 9.0)
+WAVES = tuple(
+    Form("wave", ("x_mm",), ("sin(2*pi*x_mm/{0})", "cos(2*pi*x_mm/{0})"), ("", ""), (each,), ((1.0, 90.0),))
+    for each in PERIODS
+)
+FORMS = (
+    Form("line", ("x_mm",), ("x_mm",), ("mm",)),
+    *WAVES,
+    Form("drag", ("x_mm",), ("drag(x_mm, 4)",), ("mm",)),
+)
+NOWHERE = Form("power", ("x_mm",), ("1/x_mm",), ("",))  # at 0
+
+
+class Rows(dict):
+    rows = 200
+
+
+class Runs(TermBench):
+    """Two runs over x; rows of the first spot come before those of the second."""
+
+    def __init__(self):
+        super().__init__(SimpleNamespace(), None, [], [])
+        t = np.linspace(0.0, 9.0, Rows.rows)
+        self.runs = [Rows(x_mm=20.0 * np.sin(t)), Rows(x_mm=25.0 - 30.0 * np.cos(1.3 * t))]
+        self.runs[0]["x_mm"][0] = 0.0
+
+    def rows(self, spot):
+        return self.runs
+
+    def white(self, spot, values):
+        return White(tuple(np.arange(len(v)) + len(v) * spot.index for v in values), tuple(values))
+
+
+def screen(bench, keep, at_once):
+    rng = np.random.default_rng(3)
+    ends = np.cumsum([0, *(len(each.texts) for each in FORMS)])
+    grid = TermGrid(bench, TIPS, FORMS, ends[:-1], int(ends[-1]), at_once, keep)
+    swing = [np.sin(2 * np.pi * (run["x_mm"] + 2.0) / PERIODS[2]) for run in bench.runs]
+    residual = [rng.normal(size=400) + np.concatenate([np.zeros(200), each]) for each in swing]
+    white = [ByChannel(3, ((np.arange(3), rng.normal(size=(400, 3))),)) for _ in residual]
+    folds = Folds(white, residual, np.ones(3), [np.linspace(0, 1, 400)] * 2, Split(1, 1), ())
+    return Screen([grid], folds, np.random.default_rng(0)), folds, grid
+
+
+def test_in_parts_that_are_not_kept_they_gain_what_they_gain_all_together():
+    bench = Runs()
+    (whole, base, kept), (parts, _, anew) = screen(bench, True, 100), screen(bench, False, 2)
+    more = base.beside([bench.white(TIPS[1], bench.values(TIPS[1], WAVES[2]))], np.ones(2))
+    for step in (base, more):
+        (expected, by_chance), (got, chance) = whole.gains(step), parts.gains(step)
+        assert [term for _, term in got] == [term for _, term in expected]
+        assert [gain for gain, _ in got] == pytest.approx([gain for gain, _ in expected])
+        assert chance == pytest.approx(by_chance)
+    assert len(list(kept.parts())) == 1 and len(list(anew.parts())) == 4
+    assert next(kept.parts())[1][0] is next(kept.parts())[1][0]
+    assert next(anew.parts())[1][0] is not next(anew.parts())[1][0]
+
+
+def test_what_is_there_leads_and_is_far_beyond_chance():
+    all_terms, base, _ = screen(Runs(), False, 3)
+    (first, second, *_), chance = all_terms.gains(base)
+    assert (first[1].spot, first[1].form) == (TIPS[1], WAVES[2])
+    assert first[0] > 5.0 * chance and first[0] > 5.0 * second[0]
+
+
+def test_rows_of_several_runs_have_the_values_of_each_run():
+    bench = Runs()
+    together = bench.values(TIPS[0], *FORMS, NOWHERE)
+    for k, run in enumerate(bench.runs):
+        bench.runs = [run]
+        assert np.array_equal(bench.values(TIPS[0], *FORMS, NOWHERE)[0], together[k])
+        bench.runs = Runs().runs
+    assert together[0][0, -1] == np.finfo(float).max  # finite, where the formula has no value

@@ -1,0 +1,32 @@
+"""What the force on a tool does that a feed hold stops in its cut nobody knows: its edges rub, and no chip says which way."""
+
+import numpy as np
+
+from camcomp.model.config.load import load_config
+from camcomp.model.control import open_program
+from camcomp.model.cutting.track import lay_track
+from camcomp.model.job import Job
+from camcomp.model.motion.alignment import align
+from camcomp.model.motion.driven_path import cutting_forces
+
+RADIUS, ROW_S, HELD = 20.0, 0.02, 25
+CIRCLE = "G21 G90 G17\nG0 X20 Y0 Z0\nG3 X20 Y0 I-20 J0 F1500\nM2\n"
+
+
+def test_its_force_may_be_off_by_all_of_it_and_that_of_its_way_is_known(tmp_path):
+    (tmp_path / "p.nc").write_text(CIRCLE)
+    config = load_config(["config/cartesian.yaml"])
+    path = open_program(str(tmp_path / "p.nc"), config).path
+    angle = np.arange(0.0, 2.0 * np.pi, 25.0 * ROW_S / RADIUS)
+    half = len(angle) // 2
+    angle = np.concatenate([angle[:half], np.full(HELD, angle[half]), angle[half:]])
+    tip = np.column_stack([RADIUS * np.cos(angle), RADIUS * np.sin(angle), 0.0 * angle])
+    found = align(path, tip, np.full(len(tip), 3.0))
+    forces = cutting_forces(
+        lay_track(path, Job(config).conditions), found, tip, ROW_S * np.arange(len(tip)), logged_line=True
+    )
+    size, doubt = (np.linalg.norm(each, axis=1) for each in (forces.force, forces.doubt))
+    held, on_its_way = slice(half + 1, half + HELD - 1), np.r_[5 : half - 5, half + HELD + 5 : len(tip) - 5]
+    assert size[held].min() > 10.0
+    assert (doubt[held] >= size[held]).all()
+    assert doubt[on_its_way].max() < 0.1 * size.max()
