@@ -27,7 +27,7 @@ MACHINES = {
     "orthoglide": "y", "delta": "b", "puu": "y", "cartesian": "y", "router": "y", "hexapod": "leg2", "kuka-kr210": "A2", "ur10": "elbow",
 }  # fmt: skip
 ARMS, SLIDES_IN_A_ROW = ("kuka-kr210", "ur10"), ("cartesian", "router")
-ALONE = ("time_sync", "workpiece_frame")  # of their stage
+ALWAYS = ("cutting_force", "squareness", "time_sync", "workpiece_frame")  # so that no machine misses a stage
 OWN = "its actuator"
 SURE = 0.8  # contract: confident and wrong
 EITHER = ("screw_growth", "servo_lag", "servo_overshoot", "thermal_growth")  # of one actuator, or of all alike
@@ -114,8 +114,8 @@ ELSEWHERE = {
 
 
 def soon(machine: str, fault: Fault) -> bool:
-    """Whether CI tries it: what is alone of its stage, and every second machine that has the effect, from the first or second on in turns."""
-    if fault.effect in ALONE:
+    """Whether CI tries it: some effects everywhere, and every second machine that has the effect, from the first or second on in turns."""
+    if fault.effect in ALWAYS:
         return True
     rows = list(dict.fromkeys((effect, target is None) for effect, target, *_ in SIZES))
     own = (fault.effect, fault.target is None)
