@@ -47,6 +47,9 @@ class Whole(_Library):  # type: ignore[misc]
 
     def _optimize_final_module(self) -> None:
         self.linked = self.name, self._final_module.as_bitcode()
+        for function in self._final_module.functions:  # nobody else calls what it takes in
+            if not function.is_declaration and function.linkage.name.startswith(("weak", "linkonce")):
+                function.linkage = "internal"
         super()._optimize_final_module()
 
 

@@ -438,12 +438,12 @@ RULES: dict[str, Rule] = {
     "CC297": Rule(
         "stock file not usable",
         "A stock from a file is an STL with at least one body, in mm in the program frame; reading it needs the package trimesh.",
-        "pip install 'camcomp[stock]', and check the file",
+        "check the path and export the file anew; the reader comes with pip install 'camcomp[stock]'",
     ),
     "CC298": Rule(
         "stock never touched",
         "No motion of the program takes anything off the stock, so the stock lies elsewhere or the program is another one.",
-        "the stock is given in the program frame of G54: check min_mm and max_mm, and the zero of the program",
+        "the stock is given in mm in the program frame of G54: check its place, the unit of an STL file, and the zero of the program",
     ),
     # --- CC3xx physics -----------------------------------------------------------------------------------------
     "CC301": Rule(

@@ -73,5 +73,4 @@ def test_a_million_lines_through_a_block(tmp_path, name, points, tip):
     tell(f"{LINES} lines of a {name}, {tip} tool, block of 300 x 300 x 60 mm", f"{cut[0]:.0f} s, {cut[2]:.0f} MB")
     tell("  times the time without a stock (wanted: 3 at most)", against(cut, plain))
     assert cut[2] < 1000.0
-    if tip == "flat":
-        assert cut[1] < 3.0 * plain[1]
+    assert cut[1] < 3.0 * plain[1]

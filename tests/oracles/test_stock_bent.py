@@ -17,7 +17,7 @@ from camcomp.ground.files import shipped
 from camcomp.model.config.load import load_config
 from camcomp.model.control import program_of
 from camcomp.model.job import Job
-from camcomp.model.stock.measure import EDGE
+from camcomp.model.stock.front import EDGE
 from camcomp.model.stock.walls import heights
 
 R, TEETH, SPEED, FEED, SPRING = 2.0, 2, 8000.0, 600.0, 400.0

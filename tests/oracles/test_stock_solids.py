@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from camcomp.model.stock.measure import EDGE, FLOOR, SLICES
+from camcomp.model.stock.front import EDGE, FLOOR
 from camcomp.model.stock.memory import NO_TOOL, StockMemory, cell_for
 from camcomp.model.stock.shapes import StockShape, ToolShape
+from camcomp.model.stock.slices import SLICES
 from tests.paths import path_of
 
 manifold3d = pytest.importorskip("manifold3d", reason="the solids are made by manifold3d, part of camcomp[dev]")

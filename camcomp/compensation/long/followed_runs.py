@@ -11,7 +11,7 @@ from camcomp.compensation.long.met import path_of_run
 from camcomp.compensation.long.plain_run import PlainRun
 from camcomp.compensation.long.runs import OddRun, Runs
 from camcomp.gcode.setup import Setup
-from camcomp.ground.datatypes import Path
+from camcomp.ground.datatypes import RAPID, Path
 from camcomp.ground.errors import Location, ProgramError, raise_all
 from camcomp.model.cutting.engaged import Engaged
 from camcomp.model.job import Job
@@ -32,7 +32,7 @@ class FollowedRuns:
 
     @classmethod
     def of(cls, job: Job, source: BinaryIO, name: str, setup: Setup) -> FollowedRuns | None:
-        """None where no stock is known. Reads the program for its bounds where the stock depends on them."""
+        """None where no stock is known. Reads the program for its bounds and tools where the stock depends on them."""
         stock = job.config.workpiece.stock
         if stock is None:
             return None
@@ -41,7 +41,10 @@ class FollowedRuns:
             runs = Runs(source, name, setup, job.config.control.dialect)
             for run in runs:
                 if isinstance(run, PlainRun):
-                    bounds.add(path_of_run(run))
+                    if stock.type == "program":
+                        bounds.add(path_of_run(run))
+                    elif (run.plain.kind != RAPID).any():
+                        bounds.tools.add(run.state.tool)
                 elif isinstance(run, OddRun) and run.motions:
                     bounds.add(runs.program(run.text, run.row0, run.state).path)
             source.seek(0)

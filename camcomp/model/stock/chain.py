@@ -7,7 +7,7 @@ import math
 
 from camcomp.model.statics.compiled import inner
 from camcomp.model.stock.foreseen import alike, as_foreseen, mix
-from camcomp.model.stock.measure import BITE, WHAT
+from camcomp.model.stock.front import BITE, WHAT
 from camcomp.model.stock.places import (
     BENT,
     CALM,

@@ -23,9 +23,11 @@ GX, GY, CELL, FORM, XMIN, YMIN, ZMIN, XMAX, YMAX, ZMAX, RISE = range(
 )  # of `place`; a round stock fills its rectangle
 TIE = 1e-5  # mm: heights are kept with seven digits
 HAIR = 1e-9  # mm
+ONE, TWO, THREE = np.uint64(1), np.uint64(2), np.uint64(3)  # numba looks whether an index with a sign is below 0
 USED, FREE, TOUCHED, BEGUN = range(4)  # of `counts`
-SPAN = 3.0  # cells: what lies around a cell is that far away
-SLACK = 7  # of `last`: mm by which a sweep may be lower between the nodes of a cell than at all nodes around it
+# Cells: a circle as large has a node inside. A sweep is low over circles, so where it is, a node near is as low, but for
+# what its tool rises on so much.
+SPAN = 0.7072
 
 
 class HeightField(NamedTuple):
@@ -41,7 +43,7 @@ class HeightField(NamedTuple):
     kept: Any  # (M,) int32, how often a sweep stands in these; below 0: it is still to be cut away
     free: Any  # (M,) int32, stack of places in `sweeps` that can be used again
     counts: Any  # (4,) int64
-    last: Floats  # (8,) end, tool and direction of the sweep that was cut away last, from where on it left something, slack
+    last: Floats  # (8,) end, tool and direction of the sweep cut away last, from where on it left something, its slant
     facet: Any  # (ny, nx) int32 triangle on top of a node, counted from 1; 0: none
     mesh: Floats  # (F, 3, 3) mm, its triangles
 
@@ -147,26 +149,25 @@ def above(nodes, x, y, z):
     fy = (y - place[GY]) / cell
     if not (fx >= 1.0 and fy >= 1.0 and fx < own.shape[1] - 3 and fy < own.shape[0] - 3):
         return False
-    j = int(fx)
-    i = int(fy)
-    highest = max(max(low[i, j], low[i, j + 1]), max(low[i + 1, j], low[i + 1, j + 1]))
-    lowest = min(min(low[i, j], low[i, j + 1]), min(low[i + 1, j], low[i + 1, j + 1]))
-    a, b, c, d = own[i, j], own[i, j + 1], own[i + 1, j], own[i + 1, j + 1]
+    j, i = np.uint64(int(fx)), np.uint64(int(fy))
+    highest = max(max(low[i, j], low[i, j + ONE]), max(low[i + ONE, j], low[i + ONE, j + ONE]))
+    lowest = min(min(low[i, j], low[i, j + ONE]), min(low[i + ONE, j], low[i + ONE, j + ONE]))
+    a, b, c, d = own[i, j], own[i, j + ONE], own[i + ONE, j], own[i + ONE, j + ONE]
     if a > 0 and b > 0 and c > 0 and d > 0 and (a != b or a != c or a != d) and highest - lowest <= TIE:
         return highest > z + TIE
-    if lowest - nodes.last[SLACK] > z and place[FORM] == BOX and (
+    if lowest - place[RISE] > z and place[FORM] == BOX and (
         min(x - place[XMIN], place[XMAX] - x) > 2.0 * cell and min(y - place[YMIN], place[YMAX] - y) > 2.0 * cell
     ):  # fmt: skip
-        for p in (i - 1, i + 2):
-            for q in range(j - 1, j + 3):
-                lowest = min(lowest, low[p, q])
-        for p in range(i, i + 2):
-            for q in (j - 1, j + 2):
-                lowest = min(lowest, low[p, q])
-        if lowest - nodes.last[SLACK] > z:
+        for row in (i - ONE, i + TWO):
+            for column in (j - ONE, j, j + ONE, j + TWO):
+                lowest = min(lowest, low[row, column])
+        for row in (i, i + ONE):
+            for column in (j - ONE, j + TWO):
+                lowest = min(lowest, low[row, column])
+        if lowest - place[RISE] > z:
             return True
     sweeps, tools = nodes.sweeps, nodes.tools
-    if top_at(nodes, x, y, i, j) <= z:
+    if top_at(nodes, x, y, int(i), int(j)) <= z:
         return False
     if a == b and a == c and a == d:
         return not (a > 0 and passes(sweeps, tools, a - 1, 0, x, y, z))
@@ -177,25 +178,25 @@ def above(nodes, x, y, z):
             return False
         before = k
     near, over = nodes.near, nodes.over
-    for p in range(i - 1, i + 3):
-        for q in range(j - 1, j + 3):
+    for p in range(i - ONE, i + THREE):
+        for q in range(j - ONE, j + THREE):
             k = own[p, q]
             if k == 0:
                 continue
             n, m = near[p, q], over[p, q]
             if (
                 k != a and k != b and k != c and k != d
-                and (q == j - 1 or own[p, q - 1] != k) and (p == i - 1 or own[p - 1, q] != k)
+                and (q == j - ONE or own[p, q - ONE] != k) and (p == i - ONE or own[p - ONE, q] != k)
                 and passes(sweeps, tools, k - 1, 0, x, y, z)
             ):  # fmt: skip
                 return False
             if (
-                n != k and (q == j - 1 or near[p, q - 1] != n) and (p == i - 1 or near[p - 1, q] != n)
+                n != k and (q == j - ONE or near[p, q - ONE] != n) and (p == i - ONE or near[p - ONE, q] != n)
                 and passes(sweeps, tools, n - 1, 0, x, y, z)
             ):  # fmt: skip
                 return False
             if (
-                m != k and m != n and (q == j - 1 or over[p, q - 1] != m) and (p == i - 1 or over[p - 1, q] != m)
+                m != k and m != n and (q == j - ONE or over[p, q - ONE] != m) and (p == i - ONE or over[p - ONE, q] != m)
                 and passes(sweeps, tools, m - 1, 0, x, y, z)
             ):  # fmt: skip
                 return False
@@ -211,10 +212,8 @@ def room_for(
         if place[FORM] == BOX
         else np.zeros((rows, columns), np.float32)
     )
-    last = np.zeros(8)
-    last[SLACK] = place[RISE]
     return HeightField(
         place, np.zeros((rows, columns), np.int32), low, np.zeros((rows, columns), np.int32),
         np.zeros((rows, columns), np.int32), np.empty((sweeps, 12)), tools, np.zeros(sweeps, np.int32),
-        np.zeros(sweeps, np.int32), np.zeros(4, np.int64), last, facet, mesh,
+        np.zeros(sweeps, np.int32), np.zeros(4, np.int64), np.zeros(8), facet, mesh,
     )  # fmt: skip

@@ -41,5 +41,7 @@ def refuse_crashes(path: Path, crashes: Ints, program: Program | None) -> None:
 def refuse_untouched(config: Config, memory: StockMemory) -> None:
     """Raises ConfigError CC298 when nothing has been cut of the stock."""
     if not memory.touched:
-        message = "the program never touches the stock"
+        low, high = memory.bounds
+        lies = ", ".join(f"{axis} {a:.6g} to {b:.6g}" for axis, a, b in zip("XYZ", low, high, strict=True))
+        message = f"the program never touches the stock ({lies} mm)"
         raise ConfigError("CC298", message, at=config.at("workpiece", "stock"))

@@ -12,7 +12,7 @@ import math
 
 from camcomp.model.statics.compiled import inner
 from camcomp.model.stock.field import ZMIN
-from camcomp.model.stock.measure import AT, BITE, EDGE, END_ANGLE, FLOOR, least_angle, meets
+from camcomp.model.stock.front import AT, BITE, EDGE, END_ANGLE, FLOOR, least_angle, meets
 from camcomp.model.stock.sweeps import FLAT, KIND, radius_at, slope
 
 OFF, FINEST = 5e-3, 1e-3  # rad by which an edge may be elsewhere at most, and what is worth looking for

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
+from typing import BinaryIO
 
 import numpy as np
 
@@ -73,13 +75,25 @@ def _mesh(config: Config, stl: StlStock) -> StockShape:
         message = "a stock from a file needs trimesh: pip install 'camcomp[stock]'"
         raise ConfigError("CC297", message, at=at) from None
     try:
-        mesh = trimesh.load_mesh(stl.file, file_type="stl")
-        triangles = np.asarray(mesh.triangles, float)
+        with open(stl.file, "rb") as file:
+            _whole(file)
+            triangles = np.asarray(trimesh.load_mesh(file, file_type="stl").triangles, float)
+    except OSError as error:
+        raise ConfigError("CC297", f"the stock cannot be read: {error.strerror}", at=at) from None
     except Exception as error:  # noqa: BLE001 - whatever a file makes the reader do
         raise ConfigError("CC297", f"the stock cannot be read: {error}", at=at) from None
     if not len(triangles) or not np.isfinite(triangles).all() or not (np.ptp(triangles, axis=(0, 1)) > 0.0).all():
         raise ConfigError("CC297", "the STL file holds no body", at=at)
     return StockShape(triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1)), MESH, triangles)
+
+
+def _whole(file: BinaryIO) -> None:
+    """Raises ValueError for a binary STL file that ends before its triangles do."""
+    head = file.read(84)
+    size, wanted = file.seek(0, os.SEEK_END), 84 + 50 * int.from_bytes(head[80:], "little")
+    file.seek(0)
+    if not head.lstrip().startswith(b"solid") and len(head) == 84 and size < wanted:
+        raise ValueError(f"the file ends after {size} of {wanted} bytes")
 
 
 def _around(config: Config, stock: ProgramStock, bounds: Bounds, radius: float) -> StockShape:

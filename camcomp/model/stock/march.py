@@ -8,7 +8,7 @@ import math
 from camcomp.model.statics.compiled import entry, inner
 from camcomp.model.stock.chain import along_chain, chain_from
 from camcomp.model.stock.field import FREE, USED
-from camcomp.model.stock.measure import EDGE, WHAT
+from camcomp.model.stock.front import EDGE, WHAT
 from camcomp.model.stock.places import (
     FIRST,
     FX,

@@ -12,9 +12,9 @@ from camcomp.model.cutting.engaged import Bites, Engaged
 from camcomp.model.stock.at_tip import meet, take_way
 from camcomp.model.stock.facets import facets_on
 from camcomp.model.stock.field import SPAN, TOUCHED, USED, XMAX, XMIN, ZMAX, ZMIN, room_for
+from camcomp.model.stock.front import BITE, DEPTH, EDGE, ENGAGED, WHAT, Place
 from camcomp.model.stock.legs import LegBefore, Legs, legs_of
 from camcomp.model.stock.march import ROOM_FOR_ARCS, ROOM_FOR_PLACES, march, peek, settle
-from camcomp.model.stock.measure import BITE, DEPTH, EDGE, ENGAGED, WHAT, Place
 from camcomp.model.stock.places import CHAIN_DEEP, CUT_LEG, DEEP, MOST_CHAIN, MOST_RECENT, PLACES, ROWS, Found
 from camcomp.model.stock.shapes import StockShape, ToolShape
 from camcomp.model.stock.thinning import thin
@@ -200,19 +200,19 @@ def _engaged(parts: list[_Places], legs: Legs) -> Engaged:
     motion = legs.motion[leg]
     at = np.where(u == 1.0, legs.u1[leg], legs.u0[leg] + u * (legs.u1[leg] - legs.u0[leg]))
     # Two legs of an arc share the place between them.
-    same = np.zeros(len(leg), np.bool_)
-    same[1:] = (motion[1:] == motion[:-1]) & (at[1:] == at[:-1]) & (np.abs(told[1:] - told[:-1])[:, :DEPTH].max(axis=1, initial=0.0) == 0.0)  # fmt: skip
-    keep = np.zeros(len(leg), np.bool_)
-    rest = np.flatnonzero(~same)
-    kept = np.zeros(len(rest), np.bool_)
-    stack = np.zeros((2 * len(rest) + 2, 2), np.int64)
-    thin(motion[rest], at[rest], told[rest], DEPTH, kept, stack)
-    bends = kept.copy()
-    thin(motion[rest], at[rest], told[rest], DEPTH + 2, kept, stack)
-    keep[rest] = kept
-    motion, at, told, first, many = motion[keep], at[keep], told[keep], first[keep], many[keep]
+    twice = np.flatnonzero((motion[1:] == motion[:-1]) & (at[1:] == at[:-1])) + 1
+    twice = twice[(told[twice, :DEPTH] == told[twice - 1, :DEPTH]).all(axis=1)]
+    if len(twice):
+        motion, at, told, first, many = (np.delete(each, twice, axis=0) for each in (motion, at, told, first, many))
+    keep = np.zeros(len(motion), np.bool_)
+    stack = np.zeros((2 * len(motion) + 2, 2), np.int64)
+    thin(motion, at, told, DEPTH, keep, stack)
+    bends = keep.copy()
+    thin(motion, at, told, DEPTH + 2, keep, stack)
+    if not keep.all():
+        motion, at, told, first, many, bends = (each[keep] for each in (motion, at, told, first, many, bends))
     place = np.repeat(np.arange(len(many)), many)
     row = np.repeat(first - (np.cumsum(many) - many), many) + np.arange(int(many.sum()))
     start, stop, height, rise, run, _ = bites[row].T
     bites_of = Bites(place, start, stop, height, rise, run)
-    return Engaged(motion, at, told[:, DEPTH], told[:, ENGAGED], bends[kept], bites_of)
+    return Engaged(motion, at, told[:, DEPTH], told[:, ENGAGED], bends, bites_of)

@@ -13,7 +13,8 @@ from typing import Any, NamedTuple
 from camcomp.ground.datatypes import Floats
 from camcomp.model.statics.compiled import inner
 from camcomp.model.stock.foreseen import as_foreseen
-from camcomp.model.stock.measure import DEPTH, WHAT, lay_back, measure
+from camcomp.model.stock.front import DEPTH, WHAT, lay_back
+from camcomp.model.stock.measure import measure
 
 RAPID_LEG, CUT_LEG, PLUNGE_LEG, UNSEEN_LEG = 0, 1, 2, 3
 FX, FY, FZ, TX, TY, TZ, AX, AY, BX, BY = range(10)  # of a leg: from, to (mm); directions in the plane at both ends

@@ -13,9 +13,6 @@ from camcomp.model.stock.field import (
     GX,
     GY,
     HAIR,
-    RISE,
-    SLACK,
-    SPAN,
     TIE,
     TOUCHED,
     USED,
@@ -49,7 +46,6 @@ from camcomp.model.stock.sweeps import (
 )
 
 SAME_LEVEL = 0.02  # mm, and what a sweep climbs within its tool
-SHORTEST = 0.01  # mm: shorter ones, which plunges are after rounding, slant by nothing
 LEAN = 1e-6  # a direction along a row or across it
 CRASH_DEEP, CRASH_INSIDE = 0.01, 0.02  # mm that a rapid has to be in material before it is called a crash
 
@@ -96,8 +92,6 @@ def put_sweep(nodes, x0, y0, z0, x1, y1, z1, tool):
     s[k, UY] = (y1 - y0) / length if length > 0.0 else 0.0
     climb = (z1 - z0) / length if length > 0.0 else 0.0
     s[k, CLIMB], s[k, WAY] = climb, math.sqrt(1.0 + climb * climb)
-    if length > SHORTEST:
-        nodes.last[SLACK] = max(nodes.last[SLACK], nodes.place[RISE] + SPAN * nodes.place[CELL] * abs(climb))
     nodes.kept[k] = -1
     return k
 
@@ -149,8 +143,10 @@ def cut_away(nodes, k, after):
     left = overhang(sweeps, tools, k, sweeps[k, CLIMB]) if goes_on else NOWHERE
     before, bx, by = last[6], last[4], last[5]
     first, beyond = -radius, min(length + left, length + radius)
-    if begun > -NOWHERE and bx * ux + by * uy > 0.0:
-        first = max(first, begun - radius * abs(bx * uy - by * ux))  # of what the one before has left beyond its end
+    ball, slant = tools[2 * int(tool), KIND] == BALL, sweeps[k, CLIMB] / sweeps[k, WAY]
+    if begun > -NOWHERE and bx * ux + by * uy > 0.0:  # of what the one before has left beyond its end
+        back = min(begun, radius * last[7]) if ball else begun
+        first = max(first, back - radius * abs(bx * uy - by * ux))
     nodes.kept[k] = 1  # it must not be freed meanwhile
     bottom_row, top_row = rows_between(nodes, k, radius, first, beyond)
     if min(sweeps[k, Z0], sweeps[k, Z1]) >= place[ZMAX]:
@@ -166,20 +162,33 @@ def cut_away(nodes, k, after):
         for j in range(max(math.ceil((begin + off) / cell), 0), min(math.floor((end + off) / cell), width) + 1):
             x = gx + j * cell
             s = (x - x0) * ux + dy * uy
-            if s > length + left or (s < begun and (x - x0) * bx + dy * by <= before):
+            behind = (x - x0) * bx + dy * by
+            if s > length + left or (s < begun and behind <= before and not ball):
                 continue
-            cut_node(nodes, k, i, j, x, y)
+            n = (x - x0) * uy - dy * ux
+            if ball:  # it leaves to others exactly what is theirs
+                square = radius * radius - n * n
+                if square < 0.0:
+                    continue
+                t = s - slant * math.sqrt(square)
+                if t > length and left < NOWHERE:
+                    continue
+                if t < 0.0 and joined:
+                    aside = (x - x0) * by - dy * bx
+                    square = radius * radius - aside * aside
+                    if before == NOWHERE or square >= 0.0 and behind <= last[7] * math.sqrt(square):
+                        continue
+            cut_node(nodes, k, i, j, x, y, n, s)
     drop_one(nodes, k)
     last[0], last[1], last[2], last[3] = sweeps[k, X1], sweeps[k, Y1], sweeps[k, Z1], tool
-    last[4], last[5], last[6] = ux, uy, left
+    last[4], last[5], last[6], last[7] = ux, uy, left, slant
     nodes.counts[BEGUN] = 1
 
 
 @inner
-def cut_node(nodes, k, i, j, x, y):
-    """Takes the material of sweep k out of a node."""
+def cut_node(nodes, k, i, j, x, y, n, s):
+    """Takes the material of sweep k out of a node, which lies at n and s `across` its way."""
     own, low, near, over, sweeps, tools = nodes.own, nodes.low, nodes.near, nodes.over, nodes.sweeps, nodes.tools
-    n, s = across(sweeps, k, x, y)
     z = bottom_at(sweeps, tools, k, 0, n, s)
     if z >= NOWHERE:
         return

@@ -8,7 +8,7 @@ import numpy as np
 
 from camcomp.ground.datatypes import Floats
 from camcomp.model.stock.field import BOX
-from camcomp.model.stock.measure import EDGE, FLOOR
+from camcomp.model.stock.front import EDGE, FLOOR
 from camcomp.model.stock.sweeps import BALL, BULL, DRILL, FLAT
 
 KINDS = {"flat": FLAT, "ball": BALL, "bull": BULL, "drill": DRILL}

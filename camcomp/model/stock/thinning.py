@@ -4,7 +4,7 @@
 # numba infers the types of these functions; written by hand they would only be repeated.
 
 from camcomp.model.statics.compiled import entry, inner
-from camcomp.model.stock.measure import DEPTH, WHAT
+from camcomp.model.stock.front import DEPTH, WHAT
 from camcomp.model.stock.places import BENT
 
 

@@ -52,6 +52,16 @@ def test_a_wall_is_cut_on_its_side(width, side):
     np.testing.assert_allclose(arcs_at(engaged, 0, 0.5)[1][:, :2], [wanted], atol=DEGREES)
 
 
+def test_a_thin_rib_is_met_by_a_face_mill():
+    """The front is looked at two cells apart, however large the tool is."""
+    radius, low, high = 30.0, 9.3, 10.1
+    rib = StockShape(np.array([-50.0, low, -20.0]), np.array([50.0, high, 0.0]))
+    engaged = follow(path_of(("line", (20, 0, -2)), start=(-20, 0, -2)), stock=rib, radius=radius)
+    _, arcs, depth = arcs_at(engaged, 0, 0.5)
+    np.testing.assert_allclose(arcs[:, :2], [[np.arccos(high / radius), np.arccos(low / radius)]], atol=DEGREES)
+    assert depth == pytest.approx(2.0, abs=MICROMETRES)
+
+
 def front_left(path, motion, u, count=20001):
     """Share of the front half, rad, that no earlier move of a level path with a flat tool has been over; by sampling."""
     start, way = path.start[motion], path.end[motion] - path.start[motion]

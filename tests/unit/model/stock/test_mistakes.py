@@ -43,6 +43,28 @@ def test_a_stock_that_cannot_be_used_is_refused_at_its_place(run, rule, sections
     assert found.value.rule == rule and found.value.at.line > 0
 
 
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (None, "No such file"),
+        (b"", "no body"),
+        (bytes(80) + (12).to_bytes(4, "little") + bytes(100), "the file ends after 184 of 684 bytes"),
+    ],
+)
+def test_what_is_wrong_with_a_file_is_said(run, tmp_path, content, said):
+    pytest.importorskip("trimesh", reason="it reads the file")
+    if content is not None:
+        (tmp_path / "block.stl").write_bytes(content)
+    with pytest.raises(ConfigError, match=said) as found:
+        run(PASS, "workpiece: {stock: {type: stl, file: block.stl}}\n", TOOL)
+    assert found.value.rule == "CC297"
+
+
+def test_a_stock_that_is_missed_is_told_with_its_place(run):
+    with pytest.raises(ConfigError, match="X 50 to 90, Y 50 to 90, Z -9 to 0 mm"):
+        run(PASS, BOX.replace("[-30, -30, -9], max_mm: [30, 30, 0]", "[50, 50, -9], max_mm: [90, 90, 0]"), TOOL)
+
+
 def test_a_rapid_through_material_is_an_error_at_its_line(run):
     with pytest.raises(ProgramError) as found:
         run(PASS + "G0 Z-2\nG0 X20 Y20\n", BOX, TOOL)

@@ -7,9 +7,10 @@ grid; the tool stands on the ridge. Cells are halved three times.
 import numpy as np
 import pytest
 
-from camcomp.model.stock.measure import EDGE, FLOOR, SLICES
+from camcomp.model.stock.front import EDGE, FLOOR
 from camcomp.model.stock.memory import NO_TOOL, StockMemory
 from camcomp.model.stock.shapes import StockShape, ToolShape
+from camcomp.model.stock.slices import SLICES
 from tests.paths import path_of
 
 R, Z, LONG, CHORDS, WIDE = 2.0, -2.5, 3.0, 500, 5  # slices from below whose arcs are wider than any cell
