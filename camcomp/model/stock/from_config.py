@@ -19,6 +19,7 @@ from camcomp.model.stock.memory import NO_TOOL, StockMemory
 from camcomp.model.stock.shapes import POINT_DEG, StockShape, ToolShape
 
 UPRIGHT = 1e-6  # of the sine between tool and program Z
+_MERGED_DIGITS = 3  # corners of a file's triangles are one within a micrometre
 
 
 def memory_of(config: Config, tool_axis: Floats, bounds: Bounds) -> StockMemory:
@@ -77,13 +78,20 @@ def _mesh(config: Config, stl: StlStock) -> StockShape:
     try:
         with open(stl.file, "rb") as file:
             _whole(file)
-            triangles = np.asarray(trimesh.load_mesh(file, file_type="stl").triangles, float)
+            body = trimesh.load_mesh(file, file_type="stl")
+        triangles = np.asarray(body.triangles, float)
+        body.merge_vertices(digits_vertex=_MERGED_DIGITS)
+        edges, triangles_of = np.unique(np.sort(body.edges, axis=1), axis=0, return_counts=True)
     except OSError as error:
         raise ConfigError("CC297", f"the stock cannot be read: {error.strerror}", at=at) from None
     except Exception as error:  # noqa: BLE001 - whatever a file makes the reader do
         raise ConfigError("CC297", f"the stock cannot be read: {error}", at=at) from None
     if not len(triangles) or not np.isfinite(triangles).all() or not (np.ptp(triangles, axis=(0, 1)) > 0.0).all():
         raise ConfigError("CC297", "the STL file holds no body", at=at)
+    if (open_edges := edges[triangles_of % 2 > 0]).size:
+        x, y, z = body.vertices[open_edges[0, 0]]
+        message = f"the STL file is no closed body: {len(open_edges)} edges have a triangle on one side only, as at {x:g} {y:g} {z:g}"
+        raise ConfigError("CC297", message, at=at)
     return StockShape(triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1)), MESH, triangles)
 
 

@@ -60,6 +60,23 @@ def test_what_is_wrong_with_a_file_is_said(run, tmp_path, content, said):
     assert found.value.rule == "CC297"
 
 
+@pytest.mark.parametrize(("missing", "said"), [(0, None), (2, "4 edges have a triangle on one side only, as at -30 ")])
+def test_a_body_with_a_hole_is_refused(run, tmp_path, missing, said):
+    """What stands under a hole nobody knows."""
+    trimesh = pytest.importorskip("trimesh", reason="it reads the file")
+    box = trimesh.creation.box(bounds=[[-30, -30, -9], [30, 30, 0]])
+    up = np.argsort(-box.face_normals[:, 2], kind="stable")
+    box.update_faces(np.sort(up[missing:]))
+    box.export(tmp_path / "block.stl")
+    sections = "workpiece: {stock: {type: stl, file: block.stl}}\n", TOOL
+    if said is None:
+        run(PASS, *sections)
+        return
+    with pytest.raises(ConfigError, match=said) as found:
+        run(PASS, *sections)
+    assert found.value.rule == "CC297"
+
+
 def test_a_stock_that_is_missed_is_told_with_its_place(run):
     with pytest.raises(ConfigError, match="X 50 to 90, Y 50 to 90, Z -9 to 0 mm"):
         run(PASS, BOX.replace("[-30, -30, -9], max_mm: [30, 30, 0]", "[50, 50, -9], max_mm: [90, 90, 0]"), TOOL)
