@@ -42,3 +42,19 @@ def test_where_a_play_stood_for_four_rows_before_its_first_motion_is_no_disturba
     causes = (("backlash", "b"), ("screw_pitch", "a"))
     result, _ = answer(Plan(1512009, "pair", causes, (6.0, 3.0), machine="delta", **LONG), tmp_path)
     assert "disturbance" not in {each["effect"] for each in result["causes"]}
+
+
+@pytest.mark.campaign
+def test_what_a_law_of_friction_says_wrongly_is_no_play_beside_it(tmp_path):
+    """The guide of the plant turns its friction round in another way: 3 um of 52."""
+    result, _ = answer(Plan(1631017, "single", (("friction", "y"),), (10.0,), machine="router", **LONG), tmp_path)
+    assert (result["verdict"], [each["effect"] for each in result["causes"]]) == ("identified", ["friction"])
+
+
+@pytest.mark.campaign
+def test_a_lag_stands_beside_a_friction_whose_law_is_a_little_wrong(tmp_path):
+    """What depends on velocity draws the lag, and what the law of friction leaves as well."""
+    causes = (("servo_lag", None), ("friction", "x"))
+    result, _ = answer(Plan(1632000, "pair", causes, (3.0, 9.0), machine="router", **LONG), tmp_path)
+    assert result["verdict"] == "identified"
+    assert {(each["effect"], each["target"]) for each in result["causes"]} == set(causes)

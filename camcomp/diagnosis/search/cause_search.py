@@ -224,8 +224,19 @@ def visible(problem: Problem, i: int) -> bool:
 
 
 def _matters(problem: Problem, f: Fitted) -> bool:
-    """Whether every member moves the tip by more than what is minor."""
-    return all(size_um(problem, f, (i,)) > MINOR * problem.floor.tip_um for i in f.members)
+    """Whether every member moves the tip by more than what is minor, and by more than what may be wrong of another one.
+
+    A small one at the actuator of a large one is what that one's law says wrongly: none is modelled better than GATE_SHARE.
+    """
+    sizes = {i: size_um(problem, f, (i,)) for i in f.members}
+    target = {i: problem.columns.candidates[i].target for i in f.members}
+    beside = {
+        i: max(
+            (sizes[j] for j in f.members if j != i and target[i] is not None and target[j] == target[i]), default=0.0
+        )
+        for i in f.members
+    }
+    return all(size > max(MINOR * problem.floor.tip_um, GATE_SHARE * beside[i]) for i, size in sizes.items())
 
 
 def _cancels(problem: Problem, f: Fitted) -> bool:

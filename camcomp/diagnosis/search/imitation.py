@@ -37,6 +37,7 @@ DRAWN = 0.05  # probability of something unknown in a cause's place from which o
 LIKE = (
     0.1  # of a cause's signal, by which something unknown has to differ to be something else: none is modelled better
 )
+MOST_UNLIKE = 0.5  # the same where other causes do far more, which are modelled no better either
 OF_WHAT_MOVES = ("velocity", "reversal", "force", "acceleration", "direction", "temperature")
 
 
@@ -105,16 +106,20 @@ def _draws(problem: Problem, f: Fitted, part: Members, W: ByChannel, r: Floats, 
     """Whether the family, beside the other members, draws what a part of f does: then it is that part by another name.
 
     Of all that may depend on velocity, a clock that is late makes one; of all that depends on force, a spring that is soft.
-    It may differ by a share of what the part does, or by what is minor at the tip: nothing unknown is claimed for less.
+    It may differ by a share of what f does, as far as it still draws most of the part, or by what is minor at the tip:
+    nothing unknown is claimed for less.
     """
     own, others = problem.member_columns(part), problem.member_columns(tuple(x for x in f.members if x not in part))
     at = problem.member_columns(f.members)
-    signal = W[:, own] @ f.theta[[at.index(c) for c in own]]
+    signal, whole = W[:, own] @ f.theta[[at.index(c) for c in own]], W[:, at] @ f.theta
     joint, prior = _with(problem, gram(W, r), W, r, family)
     drawn = np.zeros(len(r))
     drawn[family.at] = family.columns @ estimate(joint, prior, others)[0][W.shape[1] :]
     apart = (drawn - signal) ** 2
-    if float(apart.sum()) < LIKE**2 * float(np.sum(signal**2)):
+    own_energy = float(np.sum(signal**2))
+    if float(apart.sum()) < max(
+        LIKE**2 * own_energy, min(LIKE**2 * float(np.sum(whole**2)), MOST_UNLIKE**2 * own_energy)
+    ):
         return True
     kinds = _kinds(problem)
     # rows of other channels are weighted by what is minor
