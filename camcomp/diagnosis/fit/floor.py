@@ -19,6 +19,9 @@ MINOR = 0.3  # of the noise floor at the tip: what moves it by less is no cause,
 LEAST_SHARE = 0.05  # of the floor: what moves the tip by less is the resolution of a channel and no finding
 CLIPPED = 6.0  # robust deviations beyond which a difference of rows says nothing about the noise
 LEAST_ROWS = 20
+STRETCH, LEAST_STRETCHES = 16, 8  # differences of rows that make a stretch, and stretches that tell a quiet one
+LOWER_QUARTILE = 0.82  # of the scatter of such stretches of white noise, in units of the noise (4000 draws: 0.816)
+UNSTEADY = 1.5  # times the quiet stretches: of 4000 draws of 160 rows of white noise none had it
 RAPID_TIMES = 2.0  # of the program's feed: rows that are faster are no measure of the instrument
 REGULAR = 1.6  # usual steps of time: a longer one is a gap
 
@@ -46,7 +49,8 @@ def measure_floor(bench: Bench, stated_mm: float | None = None) -> NoiseFloor:
     times = [thinned(run.run_path.time[:, None], run.thin)[:, 0] for run in bench.runs]
     fast = np.full(gaps[0].shape[1], np.nan)
     for c in range(len(fast)):
-        sizes = [row_scatter(g[:, c], t) for g, t in zip(gaps, times, strict=True)]
+        scatter = steady_scatter if c < 3 else row_scatter
+        sizes = [scatter(g[:, c], t) for g, t in zip(gaps, times, strict=True)]
         known = np.array([s for s in sizes if np.isfinite(s)])
         if len(known):  # one sensor: a run whose corners scatter has not the sensor's noise
             fast[c] = float(np.median(known))
@@ -79,20 +83,38 @@ def row_scatter(values: Floats, time: Floats) -> float:
 
     What is smooth does not enter; single rows far off hardly do, heavy tails do.
     """
+    bend = _bends(values, time)
+    return float("nan") if bend is None else float(np.sqrt(np.mean(bend**2)))
+
+
+def steady_scatter(values: Floats, time: Floats) -> float:
+    """The same of an instrument that sees swings faster than its rows: what it scatters by in its quiet stretches.
+
+    An instrument is as noisy in one stretch as in the next. Where the scatter of stretches differs by more than chance makes
+    it, something swings in some of them; then their lower quartile counts, less what chance takes off it.
+    """
+    bend, whole = _bends(values, time), row_scatter(values, time)
+    if bend is None or len(bend) < LEAST_STRETCHES * STRETCH:
+        return whole
+    stretches = bend[: len(bend) // STRETCH * STRETCH].reshape(-1, STRETCH)
+    quiet = float(np.quantile(np.sqrt(np.mean(stretches**2, axis=1)), 0.25)) / LOWER_QUARTILE
+    return quiet if quiet < whole / UNSTEADY else whole
+
+
+def _bends(values: Floats, time: Floats) -> Floats | None:
+    """Second differences in units of the noise, those far off cut; None where rows are too few."""
     known = np.flatnonzero(np.isfinite(values))
     if len(known) < LEAST_ROWS:
-        return float("nan")
+        return None
     x, t = values[known], time[known]
     step = np.diff(t)
     usual = float(np.median(step))
     near = step < REGULAR * usual
     bend = (x[2:] - 2.0 * x[1:-1] + x[:-2])[near[1:] & near[:-1]] / np.sqrt(6.0)
     if len(bend) < LEAST_ROWS // 2:
-        return float("nan")
+        return None
     middle = 1.4826 * float(np.median(np.abs(bend)))
-    if middle == 0.0:
-        return float(np.sqrt(np.mean(bend**2)))
-    return float(np.sqrt(np.mean(np.clip(bend, -CLIPPED * middle, CLIPPED * middle) ** 2)))
+    return bend if middle == 0.0 else np.clip(bend, -CLIPPED * middle, CLIPPED * middle)
 
 
 def least_noise(bench: Bench, floor: NoiseFloor) -> Floats:

@@ -25,6 +25,7 @@ from camcomp.ground.datatypes import Floats
 BLOCK = 8  # rows that are averaged
 FEW_RUNS = 3  # from which on causes are fitted to the other runs
 KINDS = ("tip", "encoder", "drive", "dyno")
+NOISIEST = 2.0  # of the floor: what the tip scatters by in one run and is its instrument's
 TINY = 1e-12  # mm2, below which no noise is
 
 
@@ -112,6 +113,8 @@ def unexplained_of(problem: Problem, kind: str, at_tip: Sequence[Floats]) -> Une
         noise = np.where(np.isfinite(noise), noise, 0.0)
         if kind == "encoder":  # no encoder is worse than the tip's instrument: what shakes from row to row is motion
             noise = np.minimum(noise, problem.floor.axis_mm)
+        elif kind == "tip":  # nor is that instrument in one run so much worse than in all
+            noise = np.minimum(noise, NOISIEST * problem.floor.axis_mm)
         for a in range(0, len(values), BLOCK):
             rows = values[a : a + BLOCK]
             count = np.isfinite(rows).sum(axis=0)
