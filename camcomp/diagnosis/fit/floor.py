@@ -114,7 +114,7 @@ def _bends(values: Floats, time: Floats) -> Floats | None:
     if len(bend) < LEAST_ROWS // 2:
         return None
     middle = 1.4826 * float(np.median(np.abs(bend)))
-    return bend if middle == 0.0 else np.clip(bend, -CLIPPED * middle, CLIPPED * middle)
+    return np.asarray(bend if middle == 0.0 else np.clip(bend, -CLIPPED * middle, CLIPPED * middle))
 
 
 def least_noise(bench: Bench, floor: NoiseFloor) -> Floats:
