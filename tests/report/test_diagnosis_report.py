@@ -156,7 +156,8 @@ def test_runs_that_are_drawn_shrink_as_the_result_says(diagnosed):
     drawn = [np.sqrt(np.mean(np.square(np.array(each["marker"]["color"], float)))) for each in maps]
     shrink = found["shrinkage"]
     assert drawn == pytest.approx([shrink["before_rms_um"], shrink["after_rms_um"]], rel=0.02)
-    assert f"{100 * (1 - shrink['after_rms_um'] / shrink['before_rms_um']):.1f} % of the gap goes" in words(html)
+    assert shrink["ratio"] == pytest.approx(1 - shrink["after_rms_um"] / shrink["before_rms_um"], abs=1e-4)
+    assert f"{100 * shrink['ratio']:.1f} % of the gap goes" in words(html)
 
 
 def test_a_diagnosis_names_all_its_files(diagnosed):
