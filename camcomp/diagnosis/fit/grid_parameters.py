@@ -13,6 +13,7 @@ from camcomp.diagnosis.statistics.evidence import PRIOR_WIDTHS, Gram
 from camcomp.ground.datatypes import Floats, Ints
 from camcomp.model import signal_path
 from camcomp.model.effect import Parameter
+from camcomp.model.motion.loaded_structure import applied
 
 _FINER = 17  # values between the neighbours of the best
 _AT_ONCE = 4  # values of a shape whose columns are made white together
@@ -139,7 +140,7 @@ def quick_columns(bench: Bench, candidate: CandidateCause, shape: Mapping[str, f
                 motion = bench.nominal[k].motion
                 moved, guided = signal_path.driven([cause], bench.actuators, motion)
                 effort = signal_path.drive_forces([cause], bench.actuators, guided)
-                tip = np.einsum("nij,nj->ni", bench.row_slopes(k), moved)
+                tip = applied(bench.row_slopes(k), moved)
                 tip, m = thinned(bench.turned(k, tip), run.thin), len(bench.actuators)
                 values = np.zeros((len(tip), 6 + 2 * m))
                 values[:, :3] = tip

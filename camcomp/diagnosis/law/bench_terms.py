@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property, partial
 from itertools import pairwise
 
 import numpy as np
@@ -144,9 +144,13 @@ class TermBench:
             out.append(found)
         return out
 
-    def _reached(self, spot: Spot, k: int, values: Floats) -> dict[int, Floats]:
-        """Functions (n, f) of run k in the channels that the spot reaches, thinned: (n', f) each."""
+    def _reached(
+        self, spot: Spot, k: int, values: Floats, alone: Callable[[], Floats] | None = None
+    ) -> dict[int, Floats]:
+        """Functions (n, f) of run k in the channels that the spot reaches, thinned: (n', f) each; alone: they themselves, thinned."""
         thin = self.bench.runs[k].thin
+        if spot.on == "structure" and self.bench.runs[k].turn is None:
+            return {spot.index: thinned(values, thin) if alone is None else alone()}
         if spot.on == "control" and self._seen_by_encoders(k):
             return {3 + spot.index: thinned(values, thin)}
         way = self.bench.turned(k, self.tip_ways(spot)[k])
@@ -177,11 +181,20 @@ class TermBench:
 
     def white(self, spot: Spot, values: Sequence[Floats]) -> White:
         """Functions (n, f) per run as white columns of the channels that the spot reaches."""
+        return self.whites([spot], values)[0]
+
+    def whites(self, spots: Sequence[Spot], values: Sequence[Floats]) -> list[White]:
+        """The same at several spots: what is the same for all of them is worked out once."""
+        runs = zip(values, self.bench.runs, strict=True)
+        alone = [cache(partial(thinned, v, run.thin)) for v, run in runs]
+        return [self._white(spot, values, alone) for spot in spots]
+
+    def _white(self, spot: Spot, values: Sequence[Floats], alone: Sequence[Callable[[], Floats]]) -> White:
         rows, columns = [], []
         for k, v in enumerate(values):
             found = [
                 (self._slices[k][c], self.noise.rows(k, each[:, None, :], self.inflate[k], self.times[k], c))
-                for c, each in self._reached(spot, k, v).items()
+                for c, each in self._reached(spot, k, v, alone[k]).items()
                 if c in self._slices[k]
             ]
             if len(found) == 1:  # nothing has to be copied then

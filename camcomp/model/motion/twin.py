@@ -20,6 +20,7 @@ from camcomp.ground.errors import PhysicsError
 from camcomp.model import signal_path
 from camcomp.model.effect import Cause, Load, Motion
 from camcomp.model.job import Job
+from camcomp.model.motion.loaded_structure import Slopes, Solved
 from camcomp.model.motion.node_pieces import Places
 from camcomp.model.motion.run_path import RunPath, travel_direction
 from camcomp.model.statics.description import Robot
@@ -28,7 +29,6 @@ from camcomp.model.statics.solve import FREE, STATUS, solve
 
 _RHO_STEP = 1e-3  # mm or 1e-3 mrad of drive, to first order linear within 1e-6
 _FORCE_STEP = 1.0  # N
-_SLOPES = ("tip_rho", "tip_wrench", "drive_rho", "drive_wrench")
 _MOMENT_STEP = 100.0  # N mm
 _KNOT_MM = 0.25  # or mrad / 4: 0.1 um of a circle of 300 mm
 _FORWARD_PASSES = 12
@@ -48,44 +48,6 @@ class Reading:
     drive: Floats
     dyno: Floats
     motion: Motion
-
-
-@dataclass(frozen=True, eq=False)
-class Solved:
-    """The structure at a run path's nodes, for the drive positions and loads it was solved with."""
-
-    key: tuple[Any, ...]
-    shift: Floats  # (pieces, m) carriage minus set-point, piece by piece
-    force: Floats  # (q, 3)
-    wrench: Floats  # (q, 6)
-    tip: Floats  # (q, 3) machine frame
-    drive: Floats  # (q, m)
-    _at: WeakKeyDictionary[Places, tuple[Floats, Floats, Floats]] = field(
-        default_factory=WeakKeyDictionary, init=False, repr=False
-    )
-
-    def at(self, place: Places) -> tuple[Floats, Floats, Floats]:
-        """Force (n, 3), wrench (n, 6) and drives (n, m) between the nodes, worked out once for every `place`."""
-        if place not in self._at:
-            self._at[place] = place.of(self.force), place.of(self.wrench), place.of(self.drive)
-        return self._at[place]
-
-
-@dataclass(frozen=True, eq=False)
-class Slopes:
-    """First derivatives at the nodes: of tip and drive force by carriage (q, ., m) and by wrench at the reference (q, ., 6)."""
-
-    tip_rho: Floats
-    tip_wrench: Floats
-    drive_rho: Floats
-    drive_wrench: Floats
-    _at: WeakKeyDictionary[Places, Slopes] = field(default_factory=WeakKeyDictionary, init=False, repr=False)
-
-    def at(self, place: Places) -> Slopes:
-        """The same between the nodes, worked out once for every `place`."""
-        if place not in self._at:
-            self._at[place] = Slopes(*(place.of(getattr(self, each)) for each in _SLOPES))
-        return self._at[place]
 
 
 @dataclass(frozen=True, eq=False)
@@ -238,20 +200,16 @@ class Twin:
         else:
             shift = known.shift
         load = self._node_load(run_path, grid, causes, known, key)
-        if known is None or known.key != key or load.force is not known.force:
+        if known is None or known.key != key or load is not known.load:
             known = self.structure(run_path, self._machine(robot, key), key, shift, load)
         solved = known
         load = signal_path.loaded(causes, rows, run_path.row_force)
         load_tip = signal_path.loaded(causes, at_tip, run_path.forces(place_tip)) if late else load
-        drive, tip = solved.at(place)[2], run_path.tips(solved.tip, place_tip, seen)
+        drive, tip = solved.drives(place), solved.tips(run_path, place_tip, seen)
         if slopes is not None:
-            at_rows = slopes.at(place)
-            d_rho, d_wrench = self._differences(solved, place, gap_row, load)
-            drive = drive + _apply(at_rows.drive_rho, d_rho) + _apply(at_rows.drive_wrench, d_wrench)
-            if late:
-                at_rows = slopes.at(place_tip)
-                d_rho, d_wrench = self._differences(solved, place_tip, gap_tip, load_tip)
-            tip = tip + _apply(at_rows.tip_rho, d_rho) + _apply(at_rows.tip_wrench, d_wrench)
+            usual = not signal_path.acting(causes, "process")
+            drive = slopes.drives(place).behind(drive, place, solved, gap_row, load, usual=usual)
+            tip = slopes.tips(place_tip).behind(tip, place_tip, solved, gap_tip, load_tip, usual=usual)
         if effort is not None:
             drive = drive + _interpolate(run_path, run_path.time, effort)
         # tool, workpiece, sensor
@@ -269,7 +227,7 @@ class Twin:
         """
         loading = bool(signal_path.acting(causes[len(self.causes) :], "process"))
         if known is not None and (not loading or key == self.edited(self.causes)[1]):
-            return Load(known.force, known.wrench)
+            return known.load
         load = signal_path.loaded(
             causes, _at(run_path, grid, run_path.node_time, run_path.node_rho), run_path.node_force
         )
@@ -277,10 +235,10 @@ class Twin:
             return load
         size = _SAME_LOAD * max(float(np.abs(load.force).max(initial=0.0)), float(np.abs(load.wrench).max(initial=0.0)))
         near = (
-            np.abs(load.force - known.force).max(initial=0.0) <= size
-            and np.abs(load.wrench - known.wrench).max(initial=0.0) <= size
+            np.abs(load.force - known.load.force).max(initial=0.0) <= size
+            and np.abs(load.wrench - known.load.wrench).max(initial=0.0) <= size
         )
-        return Load(known.force, known.wrench) if near and known.key == key else load
+        return known.load if near and known.key == key else load
 
     def _told(self, run_path: RunPath, place: Places, at: Floats) -> Floats:
         """Tips (n, 3), program frame, to which the set-points lead at times (n,)."""
@@ -318,7 +276,7 @@ class Twin:
             bad = int(np.argmax(state.status != 0))
             where = np.round(self.to_program(run_path.node_tip[bad]), 3).tolist()
             raise PhysicsError("CC411", f"run '{run_path.name}', tip {where}: {STATUS[int(state.status[bad])]}")
-        return Solved(key, shift, load.force, load.wrench, state.tip, state.drive)
+        return Solved(key, shift, load, state.tip, state.drive)
 
     def slopes(self, run_path: RunPath, causes: Sequence[Cause], solved: Solved) -> Slopes:
         """Derivatives of the structure at the nodes, by differences of its own solution."""
@@ -329,17 +287,17 @@ class Twin:
         tips, drives = [], []
         for j in range(m):
             shift = solved.shift + _RHO_STEP * np.eye(m)[j]
-            moved = self.structure(run_path, machine, key, shift, Load(solved.force, solved.wrench))
+            moved = self.structure(run_path, machine, key, shift, solved.load)
             tips.append((moved.tip - solved.tip) / _RHO_STEP)
             drives.append((moved.drive - solved.drive) / _RHO_STEP)
         for j in range(6):
             step = _FORCE_STEP if j < 3 else _MOMENT_STEP
-            load = Load(solved.force, solved.wrench + step * np.eye(6)[j])
+            load = Load(solved.load.force, solved.load.wrench + step * np.eye(6)[j])
             moved = self.structure(run_path, machine, key, solved.shift, load)
             tips.append((moved.tip - solved.tip) / step)
             drives.append((moved.drive - solved.drive) / step)
         tip, drive = np.stack(tips, axis=2), np.stack(drives, axis=2)
-        return Slopes(tip[:, :, :m], tip[:, :, m:], drive[:, :, :m], drive[:, :, m:])
+        return Slopes(tip[:, :, :m], tip[:, :, m:], drive[:, :, :m], drive[:, :, m:], self._at_reference)
 
     # -- pieces of the path -------------------------------------------------------------------------------------------
 
@@ -387,14 +345,6 @@ class Twin:
         encoder = signal_path.controlled(servo, self.actuators, motion)
         speed = np.gradient(encoder, t, axis=0) if run_path.ordered and len(t) > 1 else zero
         return replace(motion, encoder=encoder, speed=speed, direction=travel_direction(run_path, encoder))
-
-    def _differences(self, solved: Solved, place: Places, gap: Floats, load: Load) -> tuple[Floats, Floats]:
-        """Carriage (n, m) and wrench at the reference (n, 6) beyond what the nodes were solved with."""
-        d_rho = gap - solved.shift[place.piece]
-        force, wrench, _ = solved.at(place)
-        d_force, d_wrench = load.force - force, load.wrench - wrench
-        d_wrench = d_wrench + d_force @ self._at_reference
-        return d_rho, d_wrench
 
 
 def _knots(rho: Floats) -> tuple[Ints, Ints]:
@@ -453,9 +403,3 @@ def _piece_means(run_path: RunPath, gap: Floats) -> Floats:
     count = np.bincount(run_path.grid_piece, minlength=run_path.pieces)
     total = np.column_stack([np.bincount(run_path.grid_piece, each, run_path.pieces) for each in gap.T])
     return total / np.maximum(count, 1)[:, None]
-
-
-def _apply(slope: Floats, change: Floats) -> Floats:
-    """Slopes (n, 3, k) times changes (n, k)."""
-    out: Floats = np.einsum("nik,nk->ni", slope, change)
-    return out

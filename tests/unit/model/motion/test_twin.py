@@ -1,7 +1,9 @@
 """What a twin has worked out before belongs to that machine: the next one on the same run path works out its own."""
 
 from dataclasses import replace
+from gc import collect
 from pathlib import Path
+from weakref import ref
 
 import numpy as np
 import pytest
@@ -12,9 +14,10 @@ from camcomp.model.config.load import load_config
 from camcomp.model.cutting.track import lay_track
 from camcomp.model.effect import Cause
 from camcomp.model.job import Job
+from camcomp.model.motion.loaded_structure import Slopes
 from camcomp.model.motion.run_path import path_of_program
 from camcomp.model.motion.timeline import schedule
-from camcomp.model.motion.twin import Slopes, Twin, twin_of
+from camcomp.model.motion.twin import Twin, twin_of
 from camcomp.model.statics.description import Actuator
 
 CONFIG = Path(__file__).parents[4] / "config" / "orthoglide.yaml"
@@ -93,7 +96,32 @@ def test_slopes_are_not_taken_for_others_that_are_gone(job):
     still = twin.sense(run_path, solved=solved, slopes=known)[0].tip
     away = twin.sense(run_path, solved=solved, slopes=known, measured=moved)[0].tip - still
     for k in range(2, 12):
-        slopes = Slopes(k * known.tip_rho, known.tip_wrench, known.drive_rho, known.drive_wrench)
+        slopes = Slopes(k * known.tip_rho, known.tip_wrench, known.drive_rho, known.drive_wrench, known.at_reference)
         tip = twin.sense(run_path, solved=solved, slopes=slopes, measured=moved)[0].tip
         del slopes
         assert tip - still == pytest.approx(k * away, abs=1e-9)
+
+
+def test_what_the_usual_load_adds_is_not_told_of_another_load(job):
+    twin, run_path = twin_of(job), a_run(job)
+    force = shelf.load("effects", "cutting_force")
+    heavy = [Cause("cutting_force", force, None, {"factor": 2.0})]
+    _, solved = twin.sense(run_path)
+    slopes = twin.slopes(run_path, (), solved)
+    first = twin.sense(run_path, heavy, solved=solved, slopes=slopes)[0].tip
+    usual = twin.sense(run_path, solved=solved, slopes=slopes)[0].tip
+    again = twin.sense(run_path, heavy, solved=solved, slopes=slopes)[0].tip
+    assert np.array_equal(again, first) and np.abs(again - usual).max() > 1e-3
+
+
+def test_places_of_one_reading_are_not_kept(job):
+    """A clock that is late reads between other instants every time: a diagnosis does so by the thousand."""
+    twin, run_path = twin_of(job), a_run(job)
+    clock = shelf.load("effects", "time_sync")
+    _, solved = twin.sense(run_path)
+    slopes = twin.slopes(run_path, (), solved)
+    made = []
+    kept = replace(run_path, place=lambda at: made.append(ref(place := run_path.place(at))) or place)
+    twin.sense(kept, [Cause("time_sync", clock, None, {"offset_s": 0.002})], solved=solved, slopes=slopes)
+    collect()
+    assert made and made[-1]() is None

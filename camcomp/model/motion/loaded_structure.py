@@ -1,0 +1,116 @@
+"""The loaded structure along one run: solved at the nodes of its path, and followed from there by first derivatives.
+
+What many readings of a run ask for again (values between the nodes, what the usual load adds) is worked out once.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from camcomp.ground.datatypes import Floats
+from camcomp.model.effect import Load
+from camcomp.model.motion.node_pieces import Places
+from camcomp.model.motion.run_path import RunPath
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """The structure at a run path's nodes, for the drive positions and loads it was solved with."""
+
+    key: tuple[Any, ...]
+    shift: Floats  # (pieces, m) carriage minus set-point, piece by piece
+    load: Load  # (q)
+    tip: Floats  # (q, 3) machine frame
+    drive: Floats  # (q, m)
+    _tips: WeakKeyDictionary[Places, Floats] = field(default_factory=WeakKeyDictionary, init=False, repr=False)
+    _drives: WeakKeyDictionary[Places, Floats] = field(default_factory=WeakKeyDictionary, init=False, repr=False)
+
+    def tips(self, run_path: RunPath, place: Places, at: Floats) -> Floats:
+        """Tips (n, 3), machine frame, at times (n,) that lie at `place` between the nodes, worked out once for every `place`."""
+        if place not in self._tips:
+            self._tips[place] = run_path.tips(self.tip, place, at)
+        return self._tips[place]
+
+    def drives(self, place: Places) -> Floats:
+        """Drives (n, m) between the nodes, worked out once for every `place`."""
+        if place not in self._drives:
+            self._drives[place] = place.of(self.drive)
+        return self._drives[place]
+
+
+@dataclass(frozen=True, eq=False)
+class Following:
+    """How a quantity (n, 3 or m) at a place between the nodes follows the carriages and the load.
+
+    by_rho (n, ., m), by_wrench (n, ., 6): first derivatives; at_reference (3, 6): wrench there per force at the tip. The place
+    itself is not kept: those of one reading only could never go.
+    """
+
+    by_rho: Floats
+    by_wrench: Floats
+    at_reference: Floats
+    _by_usual_load: WeakKeyDictionary[Load, Floats] = field(default_factory=WeakKeyDictionary, init=False, repr=False)
+
+    def behind(self, values: Floats, place: Places, solved: Solved, gap: Floats, load: Load, *, usual: bool) -> Floats:
+        """Values that stand in a structure, with what carriages (n, m) beside set-points and a load (n) change beyond it.
+
+        usual: it is the load of the run path itself, under which what it changes is worked out once.
+        """
+        by_load = self._by_usual_load.get(solved.load) if usual else None
+        if by_load is None:
+            force, wrench = load.force - place.of(solved.load.force), load.wrench - place.of(solved.load.wrench)
+            by_load = applied(self.by_wrench, wrench + force @ self.at_reference)
+        if usual:
+            self._by_usual_load[solved.load] = by_load
+        return np.asarray(values + applied(self.by_rho, gap - solved.shift[place.piece]) + by_load)
+
+
+@dataclass(frozen=True, eq=False)
+class Slopes:
+    """First derivatives at the nodes: of tip and drive force by carriage (q, ., m) and by wrench at the reference (q, ., 6)."""
+
+    tip_rho: Floats
+    tip_wrench: Floats
+    drive_rho: Floats
+    drive_wrench: Floats
+    at_reference: Floats  # wrench (3, 6) there per force at the tip
+    _at: WeakKeyDictionary[Places, Slopes] = field(default_factory=WeakKeyDictionary, init=False, repr=False)
+    _tips: WeakKeyDictionary[Places, Following] = field(default_factory=WeakKeyDictionary, init=False, repr=False)
+    _drives: WeakKeyDictionary[Places, Following] = field(default_factory=WeakKeyDictionary, init=False, repr=False)
+
+    def at(self, place: Places) -> Slopes:
+        """The same between the nodes, worked out once for every `place`."""
+        if place not in self._at:
+            nodes = (self.tip_rho, self.tip_wrench, self.drive_rho, self.drive_wrench)
+            tip_rho, tip_wrench, drive_rho, drive_wrench = (rows_together(place.of(each)) for each in nodes)
+            self._at[place] = Slopes(tip_rho, tip_wrench, drive_rho, drive_wrench, self.at_reference)
+        return self._at[place]
+
+    def tips(self, place: Places) -> Following:
+        """How the tips follow there."""
+        if place not in self._tips:
+            there = self.at(place)
+            self._tips[place] = Following(there.tip_rho, there.tip_wrench, self.at_reference)
+        return self._tips[place]
+
+    def drives(self, place: Places) -> Following:
+        """How the drives follow there."""
+        if place not in self._drives:
+            there = self.at(place)
+            self._drives[place] = Following(there.drive_rho, there.drive_wrench, self.at_reference)
+        return self._drives[place]
+
+
+def applied(slope: Floats, change: Floats) -> Floats:
+    """Slopes (n, 3, k) times changes (n, k); row behind row lies together, for a sum over k is too short to be fast."""
+    rows_last = np.ascontiguousarray(change.T)
+    return np.ascontiguousarray(np.einsum("ikn,kn->in", slope.transpose(1, 2, 0), rows_last).T)
+
+
+def rows_together(slope: Floats) -> Floats:
+    """Slopes (n, 3, k) as applied is fast with them: the same array, in memory row behind row of each of its elements."""
+    return np.ascontiguousarray(slope.transpose(1, 2, 0)).transpose(2, 0, 1)
