@@ -58,3 +58,24 @@ def test_a_lag_stands_beside_a_friction_whose_law_is_a_little_wrong(tmp_path):
     result, _ = answer(Plan(1632000, "pair", causes, (3.0, 9.0), machine="router", **LONG), tmp_path)
     assert result["verdict"] == "identified"
     assert {(each["effect"], each["target"]) for each in result["causes"]} == set(causes)
+
+
+def test_a_drive_that_hardens_is_no_soft_drive(tmp_path):
+    """A straight spring does most of it; what depends on this drive's own force in any way does all of it."""
+    result, _ = answer(Plan(901006, "unknown", (("hardening", "y"),), (4.0,), **ROUTER), tmp_path)
+    assert (result["verdict"], [each["effect"] for each in result["causes"]]) == ("unknown", ["unknown"])
+
+
+@pytest.mark.campaign
+def test_a_guide_that_is_not_straight_is_no_wrong_zero_with_a_squareness(tmp_path):
+    """Tolerances of zeros stretch to cover it: what takes the place of causes is told even so."""
+    result, _ = answer(
+        Plan(1643002, "unknown", (("straightness", "y"),), (3.0,), machine="kuka-kr210", **LONG), tmp_path
+    )
+    assert (result["verdict"], [each["effect"] for each in result["causes"]]) == ("unknown", ["unknown"])
+
+
+@pytest.mark.campaign
+def test_a_bump_of_a_guide_is_no_wave_with_a_pitch(tmp_path):
+    result, _ = answer(Plan(1523001, "unknown", (("guide_bump", "z"),), (10.0,), machine="puu", **LONG), tmp_path)
+    assert (result["verdict"], [each["effect"] for each in result["causes"]]) == ("unknown", ["unknown"])

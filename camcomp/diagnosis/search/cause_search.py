@@ -13,7 +13,7 @@ from camcomp.diagnosis.search.established import weakest
 from camcomp.diagnosis.search.imitation import credibility
 from camcomp.diagnosis.search.indistinguishable import Likeness, likeness, stand_ins
 from camcomp.diagnosis.search.tempering import TEMPERATURE, misfit, tempering
-from camcomp.diagnosis.search.unexplained import Unexplained, size_um, unexplained, worst
+from camcomp.diagnosis.search.unexplained import SURE_Z, Unexplained, size_um, unexplained, worst
 from camcomp.diagnosis.search.unknown import firm_prior, foretelling, residual_tests, signal_rms
 from camcomp.diagnosis.statistics.cause_sets import (
     Fitted,
@@ -43,7 +43,6 @@ SAME_EVIDENCE = 2.0  # log evidence by which two sets may differ and still be th
 GATE = 0.4  # of the noise floor: what unseen runs show beyond it makes an effect that the library lacks
 GATE_SHARE = 0.1  # of what the causes explain: none is modelled better than that
 GATE_LOCAL = 1.5  # of the floor: the same for what acts for a while only
-SURE_Z = 5.0  # standard deviations of chance
 LEAST_BESIDE = 0.4  # size in units of an unknown effect below which nothing is named beside it
 PART_OF_UNKNOWN = 2.0  # size in units of an unknown effect below which a cause at its place is taken for a part of it
 LARGE_SCALES = 3.0  # size of an effect, in its typical ones, that would show at least if it can be seen at all
@@ -125,10 +124,10 @@ def search_causes(problem: Problem) -> CauseSearch:
     best = fits[verdict.best]
     beyond = unexplained(problem, best)
     kind = unknown_kind(problem, best, beyond)
-    known, credible = _credible(problem, best, beyond, fit)
+    known, credible, instead = _credible(problem, best, beyond, fit)
     if known.members != best.members:
         beyond = unexplained(problem, known)
-        kind = unknown_kind(problem, known, beyond) or (worst(beyond).kind if kind else None)
+        kind = unknown_kind(problem, known, beyond) or (worst(beyond).kind if kind or instead else None)
         fits = (known, *(f for f in fits if f.members != known.members))
         probability = probabilities(fits, problem.candidates, temperature)
         word = "identified" if known.members else "none"
@@ -143,11 +142,13 @@ def search_causes(problem: Problem) -> CauseSearch:
 
 def _credible(
     problem: Problem, f: Fitted, beyond: Mapping[str, Unexplained], fit: Callable[[Members], Fitted]
-) -> tuple[Fitted, dict[int, float]]:
-    """What is left of a set when members that something unknown does as well have gone, one by one, and how sure they are.
+) -> tuple[Fitted, dict[int, float], bool]:
+    """What is left of a set when members that something unknown does as well have gone, one by one; how sure they are;
+    whether something unknown took the place of one, even where what every machine has would stretch to cover it.
 
     Where something unknown shows, those that do not foretell unseen runs beside it go first.
     """
+    instead = False
     while True:
         unknown = unknown_kind(problem, f, beyond) is not None
         kept = beside_unknown(problem, f, beyond) if unknown else f.members
@@ -156,7 +157,8 @@ def _credible(
             credible, replaced = credibility(problem, f, surely=unknown, temperature=TEMPERATURE)
             most = max(replaced, key=lambda i: replaced[i], default=None)
             if most is None or replaced[most] < (EVEN if unknown else INSTEAD):
-                return f, credible
+                return f, credible, instead
+            instead = instead or size_um(problem, f, (most,)) > _least(problem, f)
             kept = tuple(i for i in f.members if i != most)
         f = fit(kept)
         beyond = unexplained(problem, f)
@@ -184,14 +186,17 @@ def beside_unknown(problem: Problem, f: Fitted, beyond: Mapping[str, Unexplained
 
 def unknown_kind(problem: Problem, f: Fitted, beyond: Mapping[str, Unexplained]) -> str | None:
     """The kind of channel in which unseen runs show more than the floor, None where none does."""
-    floor = problem.floor.tip_um
-    explained = size_um(problem, f)
-    least = max(GATE * floor, GATE_SHARE * explained)
-    for_a_while = max(GATE_LOCAL * floor, 2.0 * GATE_SHARE * explained)
+    least = _least(problem, f)
+    for_a_while = max(GATE_LOCAL * problem.floor.tip_um, 2.0 * GATE_SHARE * size_um(problem, f))
     # where the tip is measured it says itself what moves it; only of the control it knows nothing
     counts = [beyond[kind] for kind in (("tip", "encoder") if "tip" in beyond else beyond) if kind in beyond]
     found = [each for each in counts if each.z > SURE_Z and (each.excess_um > least or each.local_um > for_a_while)]
     return max(found, key=lambda each: each.excess_um).kind if found else None
+
+
+def _least(problem: Problem, f: Fitted) -> float:
+    """Size (um at the tip) from which on something beside what a set explains is worth a name."""
+    return max(GATE * problem.floor.tip_um, GATE_SHARE * size_um(problem, f))
 
 
 def _with_stand_ins(
