@@ -51,6 +51,15 @@ def test_a_third_that_another_channel_shows_makes_no_two_others_real(answers):
     assert answers(every)
 
 
+def test_a_third_in_the_other_channel_shows_none_of_two_that_cancel_in_both(answers):
+    every = {
+        FORCE: {"tip": 40.0, "drive": 20.0},
+        SPRING: {"tip": -39.5, "drive": -19.5},
+        FRICTION: {"tip": 0.0, "drive": 30.0},
+    }
+    assert answers(every)
+
+
 def test_small_members_are_those_that_are_minor_and_those_of_a_large_ones_actuator(monkeypatch):
     sizes = {0: 1.0, 1: 4.0, 2: 60.0, 3: 4.0}
     monkeypatch.setattr(sound, "size_um", lambda problem, f, members: sizes[members[0]])
