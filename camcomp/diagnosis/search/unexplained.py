@@ -102,6 +102,8 @@ def _at_tip(problem: Problem, k: int, left: Floats, kind: str) -> Floats:
 def unexplained_of(problem: Problem, kind: str, at_tip: Sequence[Floats]) -> Unexplained:
     """Of one kind of channel, from left-overs (n, 3) mm of every run at the tip."""
     slow = problem.floor.slow_mm if kind == "tip" else 0.0
+    # no encoder is worse than the tip's instrument, nor is that one in one run so much worse than in all
+    noisiest = {"encoder": problem.floor.axis_mm, "tip": NOISIEST * problem.floor.axis_mm}
     excess: list[Floats] = []
     chance: list[Floats] = []
     weight: list[Floats] = []
@@ -113,10 +115,8 @@ def unexplained_of(problem: Problem, kind: str, at_tip: Sequence[Floats]) -> Une
         values = np.where(inflate < 3.0, values, np.nan)
         noise = np.array([row_scatter(x, t) for x in values.T])
         noise = np.where(np.isfinite(noise), noise, 0.0)
-        if kind == "encoder":  # no encoder is worse than the tip's instrument: what shakes from row to row is motion
-            noise = np.minimum(noise, problem.floor.axis_mm)
-        elif kind == "tip":  # nor is that instrument in one run so much worse than in all
-            noise = np.minimum(noise, NOISIEST * problem.floor.axis_mm)
+        if kind in noisiest:  # what shakes more from row to row is motion
+            noise = np.minimum(noise, noisiest[kind])
         for a in range(0, len(values), BLOCK):
             rows = values[a : a + BLOCK]
             count = np.isfinite(rows).sum(axis=0)
@@ -124,8 +124,8 @@ def unexplained_of(problem: Problem, kind: str, at_tip: Sequence[Floats]) -> Une
             if not enough.any():
                 continue
             middle = np.nansum(rows, axis=0) / np.maximum(count, 1)
-            if kind in ("tip", "encoder"):
-                swing.append(_swing(rows - middle, inflate[a : a + BLOCK], NOISIEST * problem.floor.axis_mm))
+            if kind in noisiest:
+                swing.append(_swing(rows - middle, inflate[a : a + BLOCK], noisiest[kind]))
             usual = noise**2 / np.maximum(count, 1) + slow**2
             # rows of which less is known than their noise says (a force that turns between rows) err together
             more = np.where(np.isfinite(rows), inflate[a : a + BLOCK] ** 2 - 1.0, 0.0).sum(axis=0)
