@@ -58,3 +58,53 @@ def test_a_lag_stands_beside_a_friction_whose_law_is_a_little_wrong(tmp_path):
     result, _ = answer(Plan(1632000, "pair", causes, (3.0, 9.0), machine="router", **LONG), tmp_path)
     assert result["verdict"] == "identified"
     assert {(each["effect"], each["target"]) for each in result["causes"]} == set(causes)
+
+
+@pytest.mark.campaign
+def test_a_drive_that_hardens_is_no_soft_drive(tmp_path):
+    """A straight spring does most of it; what depends on this drive's own force in any way does all of it."""
+    result, _ = answer(Plan(1623006, "unknown", (("hardening", "y"),), (3.0,), machine="puu", **LONG), tmp_path)
+    assert (result["verdict"], [each["effect"] for each in result["causes"]]) == ("unknown", ["unknown"])
+
+
+@pytest.mark.campaign
+def test_a_guide_that_is_not_straight_is_no_wrong_zero_with_a_squareness(tmp_path):
+    """Tolerances of zeros stretch to cover it: what takes the place of causes is told even so."""
+    result, _ = answer(
+        Plan(1643002, "unknown", (("straightness", "y"),), (3.0,), machine="kuka-kr210", **LONG), tmp_path
+    )
+    assert (result["verdict"], [each["effect"] for each in result["causes"]]) == ("unknown", ["unknown"])
+
+
+@pytest.mark.campaign
+def test_a_bump_of_a_guide_is_no_wave_with_a_pitch(tmp_path):
+    result, _ = answer(Plan(1523001, "unknown", (("guide_bump", "z"),), (10.0,), machine="puu", **LONG), tmp_path)
+    assert (result["verdict"], [each["effect"] for each in result["causes"]]) == ("unknown", ["unknown"])
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("seed", [1544009, 1644002])
+def test_springs_of_two_joints_that_give_way_alike_are_alternatives(tmp_path, seed):
+    """Found greedily, a frame and an offset stand for springs, and with them one joint for another."""
+    result, _ = answer(Plan(seed, "imperfect", imperfect=True, machine="kuka-kr210", **LONG), tmp_path)
+    true = {("cutting_force", None), *(("drive_stiffness", f"A{n}") for n in (1, 2, 3))}
+    sure = {(each["effect"], each["target"]) for each in result["causes"] if each["probability"] > 0.8}
+    assert result["verdict"] == "ambiguous"
+    assert sure < true
+    assert true in [{(each["effect"], each["target"]) for each in every} for every in result["alternatives"]]
+
+
+@pytest.mark.campaign
+def test_a_smaller_force_and_softer_links_are_both_there_though_the_tip_hardly_shows_them(tmp_path):
+    result, _ = answer(Plan(1604006, "imperfect", imperfect=True, machine="orthoglide", **LONG), tmp_path)
+    assert {(each["effect"], each["target"]) for each in result["causes"]} == {
+        ("cutting_force", None), ("link_stiffness", None)
+    }  # fmt: skip
+    assert result["shrinkage"]["ci95"][0] > 0.0
+
+
+@pytest.mark.campaign
+def test_a_squareness_that_shows_where_the_tool_plunges_is_no_slip_of_the_clamping(tmp_path):
+    causes = (("squareness", "yz"), ("servo_lag", "A5"))
+    result, _ = answer(Plan(1642009, "pair", causes, (3.0, 9.0), machine="kuka-kr210", **LONG), tmp_path)
+    assert {(each["effect"], each["target"]) for each in result["causes"]} == set(causes)

@@ -17,6 +17,7 @@ from camcomp.ground.datatypes import Floats
 from camcomp.model import signal_path
 
 ALIKE = 0.3  # share of its own size that a candidate has to keep beside another one and the workpiece's frame
+LEVEL = 0.1  # share of its own size that has to lie within runs: as much as a row's noise where it is ten times that
 _FRAME = "workpiece_frame"
 
 
@@ -73,7 +74,7 @@ def _a_shift_per_run(bench: Bench, candidate: CandidateCause) -> bool:
         tips = [run[:, :3][np.isfinite(run[:, :3]).all(axis=1)] for run in column]
         whole = sum(float(np.sum(each**2)) for each in tips)
         within = sum(float(np.sum((each - each.mean(axis=0)) ** 2)) for each in tips if len(each))
-        if whole > 0.0 and within > ALIKE**2 * whole:
+        if whole > 0.0 and within > LEVEL**2 * whole:
             return False
     return True
 

@@ -2,23 +2,23 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from itertools import combinations
 
 import numpy as np
 
-from camcomp.diagnosis.fit.floor import MINOR
 from camcomp.diagnosis.fit.gap import rest_by_actuator
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.search.established import weakest
 from camcomp.diagnosis.search.imitation import credibility
 from camcomp.diagnosis.search.indistinguishable import Likeness, likeness, stand_ins
+from camcomp.diagnosis.search.sound import GATE_SHARE, Sound, cancels, small_members
 from camcomp.diagnosis.search.tempering import TEMPERATURE, misfit, tempering
-from camcomp.diagnosis.search.unexplained import Unexplained, size_um, unexplained, worst
-from camcomp.diagnosis.search.unknown import firm_prior, foretelling, residual_tests, signal_rms
+from camcomp.diagnosis.search.unexplained import SURE_Z, Unexplained, size_um, unexplained, worst
+from camcomp.diagnosis.search.unknown import firm_prior, foretelling, residual_tests
 from camcomp.diagnosis.statistics.cause_sets import (
     Fitted,
     Members,
     Scale,
+    exchanges,
     extensions,
     pairs,
     predictive,
@@ -33,17 +33,14 @@ from camcomp.ground import headway
 from camcomp.ground.datatypes import Floats
 
 SINGLES, PAIRS, TRIPLES, MORE = 6, 6, 3, 3  # sets that are tried of each size; beyond three one is added at a time
-CANCELLING = 8.0  # size of a member, in units of the whole set, above which the set lives on differences of its members
-OPPOSED = 4.0  # the same of two members against both together
+EXCHANGES, EXCHANGED = 4, 4  # rounds in which a member of the best set is exchanged or left out, and sets tried in each
 BEYOND_DOUBT = (
     20.0  # log evidence of a member, all tolerances strained as far as they like, above which no run vetoes it
 )
 HARM_LOG = 2.0  # log density by which a cause has to harm the prediction of other runs before it goes
 SAME_EVIDENCE = 2.0  # log evidence by which two sets may differ and still be the same answer, whatever their priors
 GATE = 0.4  # of the noise floor: what unseen runs show beyond it makes an effect that the library lacks
-GATE_SHARE = 0.1  # of what the causes explain: none is modelled better than that
 GATE_LOCAL = 1.5  # of the floor: the same for what acts for a while only
-SURE_Z = 5.0  # standard deviations of chance
 LEAST_BESIDE = 0.4  # size in units of an unknown effect below which nothing is named beside it
 PART_OF_UNKNOWN = 2.0  # size in units of an unknown effect below which a cause at its place is taken for a part of it
 LARGE_SCALES = 3.0  # size of an effect, in its typical ones, that would show at least if it can be seen at all
@@ -113,8 +110,20 @@ def search_causes(problem: Problem) -> CauseSearch:
         fit(extensions(scale, best.members, every)[0][1], best)
         if max(done.values(), key=value) is best:
             break
-    fits = tuple(sorted(done.values(), key=value, reverse=True))
-    fits = tuple(f for f in fits if _matters(problem, f) and not _cancels(problem, f))
+    sound = Sound(problem)
+    for _ in range(EXCHANGES):  # what was taken first may stand for what was found last, and one actuator for another
+        for f in sorted(done.values(), key=value, reverse=True):
+            if sound(f):
+                best = f
+                break
+            fit(tuple(i for i in f.members if i not in small_members(problem, f)), f)
+        best = max((f for f in done.values() if sound(f)), key=value)
+        scale = Scale(total(best.grams), problem.prior, problem.candidates)
+        near = [(v, m, best) for v, m in exchanges(scale, best.members, every, EXCHANGED) if m not in done]
+        _fit_best(near, fit, EXCHANGED, value(best))
+        if not any(sound(f) and value(f) > value(best) for f in done.values()):
+            break
+    fits = tuple(f for f in sorted(done.values(), key=value, reverse=True) if sound(f))
     temperature = tempering(problem, fits[0])
     probability = probabilities(fits, problem.candidates, temperature)
     fits, probability = _prune(problem, fits, probability)
@@ -125,10 +134,10 @@ def search_causes(problem: Problem) -> CauseSearch:
     best = fits[verdict.best]
     beyond = unexplained(problem, best)
     kind = unknown_kind(problem, best, beyond)
-    known, credible = _credible(problem, best, beyond, fit)
+    known, credible, instead = _credible(problem, best, beyond, fit)
     if known.members != best.members:
         beyond = unexplained(problem, known)
-        kind = unknown_kind(problem, known, beyond) or (worst(beyond).kind if kind else None)
+        kind = unknown_kind(problem, known, beyond) or (worst(beyond).kind if kind or instead else None)
         fits = (known, *(f for f in fits if f.members != known.members))
         probability = probabilities(fits, problem.candidates, temperature)
         word = "identified" if known.members else "none"
@@ -143,11 +152,13 @@ def search_causes(problem: Problem) -> CauseSearch:
 
 def _credible(
     problem: Problem, f: Fitted, beyond: Mapping[str, Unexplained], fit: Callable[[Members], Fitted]
-) -> tuple[Fitted, dict[int, float]]:
-    """What is left of a set when members that something unknown does as well have gone, one by one, and how sure they are.
+) -> tuple[Fitted, dict[int, float], bool]:
+    """What is left of a set when members that something unknown does as well have gone, one by one; how sure they are;
+    whether something unknown took the place of one, even where what every machine has would stretch to cover it.
 
     Where something unknown shows, those that do not foretell unseen runs beside it go first.
     """
+    instead = False
     while True:
         unknown = unknown_kind(problem, f, beyond) is not None
         kept = beside_unknown(problem, f, beyond) if unknown else f.members
@@ -156,7 +167,8 @@ def _credible(
             credible, replaced = credibility(problem, f, surely=unknown, temperature=TEMPERATURE)
             most = max(replaced, key=lambda i: replaced[i], default=None)
             if most is None or replaced[most] < (EVEN if unknown else INSTEAD):
-                return f, credible
+                return f, credible, instead
+            instead = instead or size_um(problem, f, (most,)) > _least(problem, f)
             kept = tuple(i for i in f.members if i != most)
         f = fit(kept)
         beyond = unexplained(problem, f)
@@ -184,14 +196,17 @@ def beside_unknown(problem: Problem, f: Fitted, beyond: Mapping[str, Unexplained
 
 def unknown_kind(problem: Problem, f: Fitted, beyond: Mapping[str, Unexplained]) -> str | None:
     """The kind of channel in which unseen runs show more than the floor, None where none does."""
-    floor = problem.floor.tip_um
-    explained = size_um(problem, f)
-    least = max(GATE * floor, GATE_SHARE * explained)
-    for_a_while = max(GATE_LOCAL * floor, 2.0 * GATE_SHARE * explained)
+    least = _least(problem, f)
+    for_a_while = max(GATE_LOCAL * problem.floor.tip_um, 2.0 * GATE_SHARE * size_um(problem, f))
     # where the tip is measured it says itself what moves it; only of the control it knows nothing
     counts = [beyond[kind] for kind in (("tip", "encoder") if "tip" in beyond else beyond) if kind in beyond]
     found = [each for each in counts if each.z > SURE_Z and (each.excess_um > least or each.local_um > for_a_while)]
     return max(found, key=lambda each: each.excess_um).kind if found else None
+
+
+def _least(problem: Problem, f: Fitted) -> float:
+    """Size (um at the tip) from which on something beside what a set explains is worth a name."""
+    return max(GATE * problem.floor.tip_um, GATE_SHARE * size_um(problem, f))
 
 
 def _with_stand_ins(
@@ -207,7 +222,7 @@ def _with_stand_ins(
     same = _same(problem, fits, probability)
     for members in stand_ins(design, best.members, best.theta):
         other = fit(members)
-        if not _possible(problem, other) or _cancels(problem, other):
+        if not _possible(problem, other) or cancels(problem, other):
             continue
         same.append((best.members, members))
         if all(f.members != members for f in fits):
@@ -221,32 +236,6 @@ def visible(problem: Problem, i: int) -> bool:
     """Whether an effect of three scales would show at all in the channels present."""
     energy = sum(float((W[:, list(problem.candidates.columns[i])] ** 2).sum()) for W in problem.white)
     return energy * LARGE_SCALES**2 > 1.0
-
-
-def _matters(problem: Problem, f: Fitted) -> bool:
-    """Whether every member moves the tip by more than what is minor, and by more than what may be wrong of another one.
-
-    A small one at the actuator of a large one is what that one's law says wrongly: none is modelled better than GATE_SHARE.
-    """
-    sizes = {i: size_um(problem, f, (i,)) for i in f.members}
-    target = {i: problem.columns.candidates[i].target for i in f.members}
-    beside = {
-        i: max(
-            (sizes[j] for j in f.members if j != i and target[i] is not None and target[j] == target[i]), default=0.0
-        )
-        for i in f.members
-    }
-    return all(size > max(MINOR * problem.floor.tip_um, GATE_SHARE * beside[i]) for i, size in sizes.items())
-
-
-def _cancels(problem: Problem, f: Fitted) -> bool:
-    """Whether members undo each other nearly: by chance that hardly happens, but a fit of what is unknown seeks it."""
-    whole = signal_rms(problem, f)
-    each = [signal_rms(problem, f, (i,)) for i in f.members]
-    if any(one[kind] > max(1.0, CANCELLING * whole[kind]) for one in each for kind in whole):
-        return True
-    alone = {i: size_um(problem, f, (i,)) for i in f.members}
-    return any(min(alone[i], alone[j]) > OPPOSED * size_um(problem, f, (i, j)) for i, j in combinations(f.members, 2))
 
 
 def _same_name(problem: Problem, members: Members, every: list[int]) -> list[Members]:

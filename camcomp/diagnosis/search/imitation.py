@@ -8,46 +8,29 @@ of time to the next. Sources: model averaging (Hoeting et al., Statistical Scien
 the sandwich's information (Varin, Reid, Firth, Statistica Sinica 21, 2011).
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations, product
+from itertools import combinations, islice
 
 import numpy as np
 from scipy.special import logsumexp
 
-from camcomp.diagnosis.fit.columns import grounds
 from camcomp.diagnosis.fit.floor import MINOR
 from camcomp.diagnosis.fit.intervals import BLOCKS
-from camcomp.diagnosis.fit.patterns import Ground
 from camcomp.diagnosis.fit.problem import Problem
+from camcomp.diagnosis.search.families import Family, alone, families, kinds
 from camcomp.diagnosis.search.unknown import about
 from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.diagnosis.statistics.cause_sets import Fitted, Members
 from camcomp.diagnosis.statistics.evidence import Base, Gram, Prior, base, estimate, gram, holding_back, log_bayes
-from camcomp.ground.datatypes import Bools, Floats, Ints
+from camcomp.ground.datatypes import Floats, Ints
 
+EITHER = 0.5  # one word against another
 UNKNOWN = 0.1  # prior probability of something that the library does not have
-WAVES = 24  # half waves along a travel: a bump of a twentieth of it is still followed
-MOVES_MM, MOVES_DRIVE = 1e-3, 1e-6  # of an axis, of a drive (mm or rad), on which something can depend
-SAME = 1.0 - 1e-9  # correlation of two places that are one
-DEGREE = 4  # of the polynomials of what depends on several axes at once
-IN_A_RUN = 8  # degree of those of time, for every run anew
 ALL_SETS = 3  # members up to which every subset is looked at; of larger ones each alone, and all but one
 DRAWN = 0.05  # probability of something unknown in a cause's place from which on it is held against what the cause does
-LIKE = (
-    0.1  # of a cause's signal, by which something unknown has to differ to be something else: none is modelled better
-)
+LIKE = 0.1  # of a cause's signal, by which something unknown has to differ to be something else: no cause is modelled better
 MOST_UNLIKE = 0.5  # the same where other causes do far more, which are modelled no better either
-OF_WHAT_MOVES = ("velocity", "reversal", "force", "acceleration", "direction", "temperature")
-
-
-@dataclass(frozen=True, eq=False)
-class _Family:
-    """Functions of one thing: name, which of all white rows (w,) they touch, their white columns there (rows, p)."""
-
-    name: str
-    at: Bools
-    columns: ByChannel
 
 
 def credibility(
@@ -61,18 +44,21 @@ def credibility(
     data = gram(W, r)
     sets, candidates = _subsets(f.members), problem.candidates
     hypotheses: list[tuple[Floats, float]] = []  # evidence per set, log prior
-    best: tuple[float, _Family | None] = (-np.inf, None)
+    best: tuple[float, Family | None] = (-np.inf, None)
     if not surely:
         hypotheses.append(
             (_evidence(problem, base(data, problem.prior, 1.0), problem.prior, sets), np.log(1.0 - UNKNOWN))
         )
         best = (hypotheses[0][0][0], None)
     values: list[Floats] = []
-    for each in _families(problem):  # one at a time: together they are as large as all else
+    for each in families(problem):  # one at a time: together they are as large as all else
         family = replace(each, columns=each.columns.scaled(weight[each.at]))
-        joint, prior = _with(problem, data, W, r, family)
-        values.append(_evidence(problem, base(joint, prior, 1.0), prior, sets))
-        best = max(best, (float(values[-1][0]), family), key=lambda each: each[0])
+        beside = _beside(data, W, r, family)
+        for part in family.parts:
+            joint, prior = _joined(problem, data, beside, part)
+            values.append(_evidence(problem, base(joint, prior, 1.0), prior, sets))
+            if values[-1][0] > best[0]:
+                best = float(values[-1][0]), family.alone(part)
     hypotheses += [(value, np.log(UNKNOWN / len(values))) for value in values]
     strain = _strain(problem, data, W, r, best[1], index)
     log_prior = np.array([candidates.prior(each) for each in sets])
@@ -81,17 +67,22 @@ def credibility(
         mine = slice(at, at + len(candidates.columns[i]))
         at = mine.stop
         value = np.array([e / (temperature * strain[mine].max()) + log_prior + odds for e, odds in hypotheses])
-        has = np.tile([i in each for each in sets], (len(hypotheses), 1))
+        has = np.tile([float(i in each) for each in sets], (len(hypotheses), 1))
         whole, first = logsumexp(value), len(hypotheses) - len(values)
-        likely = first + np.flatnonzero(np.max(np.where(has, -np.inf, value), axis=1)[first:] > whole + np.log(DRAWN))
-        for n, each in enumerate(_families(problem), first):
+        without = np.max(np.where(has > 0.0, -np.inf, value), axis=1)[first:]
+        likely = np.flatnonzero(without > whole + np.log(DRAWN))
+        for n, each in enumerate(islice(alone(problem), int(likely.max(initial=-1)) + 1)):
             if n in likely:
                 family = replace(each, columns=each.columns.scaled(weight[each.at]))
-                has[n] |= any(_draws(problem, f, part, W, r, family) for part in _parts(problem, f.members, i))
-        unlike = np.exp(value - whole) * ~has
+                drawn = max(_draws(problem, f, part, W, r, family) for part in _parts(problem, f.members, i))
+                has[first + n] = np.maximum(has[first + n], drawn)
+        unlike = np.exp(value - whole) * (1.0 - has)
+        missed = float(unlike[first:].sum())
+        # what rows do not need where nothing unknown is, nothing unknown replaces
+        needless = float(np.exp(logsumexp(value[0][has[0] == 0.0]) - logsumexp(value[0]))) if first else 0.0
         # the search, whose evidence is not strained, has found the member: where nothing unknown takes its place, one word against another
-        present[i] = float(np.sum(np.exp(value - whole) * has) + 0.5 * unlike[:first].sum())
-        replaced[i] = float(unlike[first:].sum())
+        present[i] = float(np.sum(np.exp(value - whole) * has) + EITHER * (unlike[:first].sum() + needless * missed))
+        replaced[i] = (1.0 - needless) * missed
     return present, replaced
 
 
@@ -102,12 +93,12 @@ def _parts(problem: Problem, members: Members, i: int) -> list[Members]:
     return [(i,), mates] if len(mates) > 1 else [(i,)]
 
 
-def _draws(problem: Problem, f: Fitted, part: Members, W: ByChannel, r: Floats, family: _Family) -> bool:
-    """Whether the family, beside the other members, draws what a part of f does: then it is that part by another name.
+def _draws(problem: Problem, f: Fitted, part: Members, W: ByChannel, r: Floats, family: Family) -> float:
+    """How far the family, beside the other members, draws what a part of f does, 0 to 1: then it is that part by another name.
 
     Of all that may depend on velocity, a clock that is late makes one; of all that depends on force, a spring that is soft.
-    It may differ by a share of what f does, as far as it still draws most of the part, or by what is minor at the tip:
-    nothing unknown is claimed for less.
+    It may differ by a share of what f does, as far as it still draws most of the part. Where it differs by more, but by what is
+    minor at the tip, it is one word against another: nothing unknown is claimed for so little, and no law is shown either.
     """
     own, others = problem.member_columns(part), problem.member_columns(tuple(x for x in f.members if x not in part))
     at = problem.member_columns(f.members)
@@ -120,16 +111,12 @@ def _draws(problem: Problem, f: Fitted, part: Members, W: ByChannel, r: Floats, 
     if float(apart.sum()) < max(
         LIKE**2 * own_energy, min(LIKE**2 * float(np.sum(whole**2)), MOST_UNLIKE**2 * own_energy)
     ):
-        return True
-    kinds = _kinds(problem)
+        return 1.0
+    kind = kinds(problem)
     # rows of other channels are weighted by what is minor
     most = [MINOR if words.kind == "tip" else 1.0 for words in problem.dictionaries]
-    return all(float(apart[kinds == k].mean()) < size**2 for k, size in enumerate(most) if (kinds == k).any())
-
-
-def _kinds(problem: Problem) -> Ints:
-    """Index of the kind of channel of every white row (w,)."""
-    return np.concatenate([np.repeat(np.arange(len(p)), [len(part) for part in p]) for p in problem.white_patterns])
+    minor = all(float(apart[kind == k].mean()) < size**2 for k, size in enumerate(most) if (kind == k).any())
+    return EITHER if minor else 0.0
 
 
 def _at_the_tip(problem: Problem) -> Floats:
@@ -166,15 +153,30 @@ def _evidence(problem: Problem, at: Base, prior: Prior, sets: Sequence[Members])
     ])  # fmt: skip
 
 
-def _with(problem: Problem, data: Gram, W: ByChannel, r: Floats, family: _Family) -> tuple[Gram, Prior]:
-    """Gram matrix and prior with the columns of a family behind all others, as large as all that its rows show."""
+@dataclass(frozen=True, eq=False)
+class _Beside:
+    """A family beside all other columns: cross (k, p) and own (p, p) products, b (p,), energy of what its rows show beyond noise."""
+
+    cross: Floats
+    own: Floats
+    b: Floats
+    energy: float
+
+
+def _beside(data: Gram, W: ByChannel, r: Floats, family: Family) -> _Beside:
     D, seen = family.columns, r[family.at]
     cross = (W if family.at.all() else W[np.flatnonzero(family.at)]).T @ D
-    own = D.T @ D
-    joint = Gram(np.block([[data.A, cross], [cross.T, own]]), np.concatenate([data.b, D.T @ seen]), data.c, data.rows)
-    energy = max(float(seen @ seen) - len(seen), 1.0)
-    size = np.full(D.width, np.sqrt(energy / float(np.trace(own))))
-    prior, more = problem.prior, np.ones(D.width)
+    return _Beside(cross, D.T @ D, D.T @ seen, max(float(seen @ seen) - len(seen), 1.0))
+
+
+def _joined(problem: Problem, data: Gram, beside: _Beside, part: Ints) -> tuple[Gram, Prior]:
+    """Gram matrix and prior with some columns of a family behind all others, as large as all that its rows show."""
+    cross, own = beside.cross[:, part], beside.own[np.ix_(part, part)]
+    joint = Gram(
+        np.block([[data.A, cross], [cross.T, own]]), np.concatenate([data.b, beside.b[part]]), data.c, data.rows
+    )
+    size = np.full(len(part), np.sqrt(beside.energy / float(np.trace(own))))
+    prior, more = problem.prior, np.ones(len(part))
     return joint, Prior(
         np.concatenate([prior.tolerance, size]),
         np.concatenate([prior.scale, more]),
@@ -184,8 +186,13 @@ def _with(problem: Problem, data: Gram, W: ByChannel, r: Floats, family: _Family
     )
 
 
+def _with(problem: Problem, data: Gram, W: ByChannel, r: Floats, family: Family) -> tuple[Gram, Prior]:
+    """The same with all columns of a family."""
+    return _joined(problem, data, _beside(data, W, r, family), np.arange(family.columns.width))
+
+
 def _strain(
-    problem: Problem, data: Gram, W: ByChannel, r: Floats, family: _Family | None, index: Sequence[int]
+    problem: Problem, data: Gram, W: ByChannel, r: Floats, family: Family | None, index: Sequence[int]
 ) -> Floats:
     """How much more than noise what is left varies from block to block of time, along each member's column (d,)."""
     prior = problem.prior
@@ -205,72 +212,3 @@ def _strain(
         np.add.at(sums, block, pull)
         worst = np.maximum(worst, np.sum(sums**2, axis=0) / np.diag(covariance)[index])
     return worst
-
-
-def _families(problem: Problem) -> Iterator[_Family]:
-    """Of all that something unknown may depend on."""
-    everywhere = _kinds(problem)
-    kinds_of = [words.kind for words in problem.dictionaries]
-    names = [name for words in problem.dictionaries for name in words.labels]
-    whole = np.array([name.split(":")[0] for name in names])
-    # the first of an axis' functions of time is one throughout: an unknown effect has some mean
-    constant = [words.kind == "tip" and name.startswith("time:") and name not in words.labels[:n]
-                for words in problem.dictionaries for n, name in enumerate(words.labels)]  # fmt: skip
-    of = np.repeat(np.arange(len(problem.dictionaries)), [len(words.labels) for words in problem.dictionaries])
-    for word in OF_WHAT_MOVES:
-        picked = np.flatnonzero(whole == word)
-        if len(picked):
-            picked = np.concatenate([picked, np.flatnonzero(constant)])
-            yield _Family(word, np.ones(len(everywhere), bool), _patterns(problem, picked, of))
-    if "tip" not in kinds_of:
-        return
-    at = everywhere == kinds_of.index("tip")
-    for name, values in _of_place(grounds(problem.bench)):
-        yield _Family(name, at, _white_tip(problem, values))
-
-
-def _patterns(problem: Problem, picked: Ints, of: Ints) -> ByChannel:
-    """White columns (w, p) of some of the patterns of all kinds of channels."""
-    out: list[tuple[Ints, Floats]] = []
-    for parts in problem.white_patterns:
-        for kind, part in enumerate(parts):
-            mine = np.flatnonzero(of[picked] == kind)
-            out += part.placed(picked[mine] - int(np.searchsorted(of, kind)), mine, len(picked)).parts
-    return ByChannel(len(picked), tuple(out))
-
-
-def _of_place(every: Sequence[Ground]) -> Iterator[tuple[str, list[Floats]]]:
-    """Names, and functions (n, p) per run, of places, of positions, of several axes at once, and of time in each run."""
-    tips, drives = [g.tip for g in every], [g.motion.encoder for g in every]
-    places = [np.concatenate([tip, drive], axis=1) for tip, drive in zip(tips, drives, strict=True)]
-    low = np.min([p.min(axis=0) for p in places], axis=0)
-    span = np.max([p.max(axis=0) for p in places], axis=0) - low
-    u = [(p - low) / np.maximum(span, 1e-9) for p in places]
-    least, seen = np.repeat([MOVES_MM, MOVES_DRIVE], [3, len(span) - 3]), np.concatenate(u)
-    moving = np.flatnonzero(span > least)
-    k = np.arange(WAVES + 1)
-    for n, a in enumerate(moving):
-        if any(abs(np.corrcoef(seen[:, a], seen[:, b])[0, 1]) > SAME for b in moving[:n]):
-            continue  # of a machine of slides: the axis is the drive's
-        yield f"position {a}", [np.cos(np.pi * k * x[:, a, None]) / np.maximum(k, 1) for x in u]
-    axes = [a for a in moving if a < 3]
-    powers = [d for d in product(range(DEGREE + 1), repeat=len(axes)) if sum(d) <= DEGREE]
-    leg = np.polynomial.legendre.legvander
-    if axes:
-        high = [leg(2.0 * x[:, axes] - 1.0, DEGREE) for x in u]  # (n, axes, degrees)
-        yield (
-            "place",
-            [np.stack([np.prod([h[:, n, e] for n, e in enumerate(d)], axis=0) for d in powers], 1) for h in high],
-        )
-    runs = range(len(every))
-    yield "time", [np.kron(np.eye(len(every))[r], leg(np.linspace(-1, 1, len(every[r].tip)), IN_A_RUN)) for r in runs]
-
-
-def _white_tip(problem: Problem, values: Sequence[Floats]) -> ByChannel:
-    """White rows of the tip (rows, 3 p) of functions (n, p) per run, each on each axis, in um."""
-    out = []
-    for k, one in enumerate(values):
-        p = one.shape[1]
-        axes = ByChannel(3 * p, tuple((axis * p + np.arange(p), 1e-3 * one) for axis in range(3)))
-        out.append(problem.noise.by_channel(k, axes, problem.inflate[k], problem.times[k]))
-    return ByChannel.behind(out)

@@ -26,6 +26,7 @@ BLOCK = 8  # rows that are averaged
 FEW_RUNS = 3  # from which on causes are fitted to the other runs
 KINDS = ("tip", "encoder", "drive", "dyno")
 NOISIEST = 2.0  # of the floor: what the tip scatters by in one run and is its instrument's
+SURE_Z = 5.0  # standard deviations of chance
 TINY = 1e-12  # mm2, below which no noise is
 
 
@@ -101,9 +102,12 @@ def _at_tip(problem: Problem, k: int, left: Floats, kind: str) -> Floats:
 def unexplained_of(problem: Problem, kind: str, at_tip: Sequence[Floats]) -> Unexplained:
     """Of one kind of channel, from left-overs (n, 3) mm of every run at the tip."""
     slow = problem.floor.slow_mm if kind == "tip" else 0.0
+    # no encoder is worse than the tip's instrument, nor is that one in one run so much worse than in all
+    noisiest = {"encoder": problem.floor.axis_mm, "tip": NOISIEST * problem.floor.axis_mm}
     excess: list[Floats] = []
     chance: list[Floats] = []
     weight: list[Floats] = []
+    swing: list[tuple[Floats, Floats]] = []
     place: list[tuple[int, float, float]] = []
     for k, values in enumerate(at_tip):
         t = problem.times[k]
@@ -111,10 +115,8 @@ def unexplained_of(problem: Problem, kind: str, at_tip: Sequence[Floats]) -> Une
         values = np.where(inflate < 3.0, values, np.nan)
         noise = np.array([row_scatter(x, t) for x in values.T])
         noise = np.where(np.isfinite(noise), noise, 0.0)
-        if kind == "encoder":  # no encoder is worse than the tip's instrument: what shakes from row to row is motion
-            noise = np.minimum(noise, problem.floor.axis_mm)
-        elif kind == "tip":  # nor is that instrument in one run so much worse than in all
-            noise = np.minimum(noise, NOISIEST * problem.floor.axis_mm)
+        if kind in noisiest:  # what shakes more from row to row is motion
+            noise = np.minimum(noise, noisiest[kind])
         for a in range(0, len(values), BLOCK):
             rows = values[a : a + BLOCK]
             count = np.isfinite(rows).sum(axis=0)
@@ -122,6 +124,8 @@ def unexplained_of(problem: Problem, kind: str, at_tip: Sequence[Floats]) -> Une
             if not enough.any():
                 continue
             middle = np.nansum(rows, axis=0) / np.maximum(count, 1)
+            if kind in noisiest:
+                swing.append(_swing(rows - middle, inflate[a : a + BLOCK], noisiest[kind]))
             usual = noise**2 / np.maximum(count, 1) + slow**2
             # rows of which less is known than their noise says (a force that turns between rows) err together
             more = np.where(np.isfinite(rows), inflate[a : a + BLOCK] ** 2 - 1.0, 0.0).sum(axis=0)
@@ -137,14 +141,33 @@ def unexplained_of(problem: Problem, kind: str, at_tip: Sequence[Floats]) -> Une
     mean = float((np.sum(w * e, axis=0) / whole).sum())
     doubt = float(np.sqrt(2.0 * np.sum(np.sum((w * v) ** 2, axis=0) / whole**2))) + TINY
     local, at = _stretch((w * e).sum(axis=1), place)
-    return Unexplained(
-        kind,
-        1e3 * float(np.sqrt(max(mean, 0.0))),
-        mean / doubt,
-        1e3 * float(np.sqrt(max(local, 0.0))),
-        at,
-        np.sum(w * e, axis=0),
-    )
+    z, energy = mean / doubt, np.sum(w * e, axis=0)
+    fast, its_z = _fast(swing)
+    if its_z > SURE_Z and fast.sum() > 0.0:
+        mean, z, energy = max(mean, 0.0) + float(fast.sum()), max(z, its_z), np.maximum(energy, 0.0) + len(e) * fast
+    return Unexplained(kind, 1e3 * float(np.sqrt(max(mean, 0.0))), z, 1e3 * float(np.sqrt(max(local, 0.0))), at, energy)
+
+
+def _swing(rows: Floats, inflate: Floats, noisiest: float) -> tuple[Floats, Floats]:
+    """By how much (3,) mm2 the rows of a block swing about their middle beyond the noisiest instrument, and its variance by chance."""
+    there = np.isfinite(rows)
+    free = np.maximum(there.sum(axis=0) - 1, 1)
+    allowed = noisiest**2 * np.where(there, inflate**2, 0.0).sum(axis=0) / np.maximum(there.sum(axis=0), 1)
+    beyond = np.nansum(rows**2, axis=0) / free - allowed
+    enough = there.sum(axis=0) >= BLOCK // 2
+    return np.where(enough, beyond, 0.0), np.where(enough, 2.0 * allowed**2 / free, 0.0)
+
+
+def _fast(swing: Sequence[tuple[Floats, Floats]]) -> tuple[Floats, float]:
+    """What swings faster than the blocks: its mean square (3,) mm2, and standard deviations of its chance.
+
+    Averaging hides a loop that rings; the instrument of the tip does not ring.
+    """
+    if not swing:
+        return np.zeros(3), 0.0
+    mean = np.mean([each for each, _ in swing], axis=0)
+    doubt = float(np.sqrt(np.sum([each for _, each in swing]))) / len(swing) + TINY
+    return np.maximum(mean, 0.0), float(mean.sum()) / doubt
 
 
 LOCAL_BLOCKS = 5  # of a stretch in which something acts for a while

@@ -108,6 +108,13 @@ class ByChannel:
         each = zip(self.parts, self._starts, strict=False)
         return ByChannel(self.width, tuple((on, weight[at : at + len(X), None] * X) for (on, X), at in each))
 
+    def energy(self) -> Floats:
+        """Sum (k,) of the squares of every column."""
+        out = np.zeros(self.width)
+        for on, X in self.parts:
+            out[on] += np.sum(X**2, axis=0)
+        return out
+
     def dense(self) -> Floats:
         """Every value (n, c, k) of channels that have n rows each."""
         out = np.zeros((len(self.parts[0][1]), len(self.parts), self.width))

@@ -136,6 +136,22 @@ def pairs(scale: Scale, candidates: Sequence[int], most: int) -> list[tuple[floa
     return sorted(((scale(each) + scale.candidates.prior(each), each) for each in best), reverse=True)
 
 
+def exchanges(scale: Scale, members: Members, candidates: Sequence[int], most: int) -> list[tuple[float, Members]]:
+    """The best sets with one member exchanged or left out, best first: screened at the stated tolerances, then scored."""
+    at = scale.bases[TOLERANCES.index(1.0)]
+    near = {tuple(x for x in members if x != i) for i in members}
+    for rest in list(near):
+        free = [j for j in candidates if j not in members and not any(scale.candidates.exclusive(j, x) for x in rest)]
+        near |= {tuple(sorted((*rest, j))) for j in free}
+
+    def rough(each: Members) -> float:
+        columns = [scale.candidates.columns[i] for i in each]
+        return scale.candidates.prior(each) + (float(log_bayes([at], scale.prior, columns)[0]) if each else 0.0)
+
+    best = sorted(near, key=lambda each: (-rough(each), each))[:most]
+    return sorted(((scale(each) + scale.candidates.prior(each), each) for each in best), reverse=True)
+
+
 def probabilities(fits: Sequence[Fitted], candidates: CausePrior, temperature: float = 1.0) -> Floats:
     """Posterior probability of every set among those fitted."""
     value = np.array([f.log_evidence / temperature + candidates.prior(f.members) for f in fits])

@@ -5,7 +5,7 @@ from math import comb
 import numpy as np
 import pytest
 
-from camcomp.diagnosis.statistics.cause_sets import SIZES, CausePrior, Fitted, Scale
+from camcomp.diagnosis.statistics.cause_sets import SIZES, CausePrior, Fitted, Scale, exchanges
 from camcomp.diagnosis.statistics.evidence import Prior, gram
 from camcomp.diagnosis.statistics.verdict import judge
 
@@ -32,6 +32,21 @@ def test_tolerances_are_not_doubled_to_hide_a_cause():
     prior = Prior(np.full(4, 0.2), np.ones(4), np.zeros(4), np.ones(4), np.full(4, np.inf))
     data = gram(D, D @ np.array([0.5, -0.5, 0.5, -0.5]) + 0.1 * rng.standard_normal(400))
     assert Scale(data, prior, candidates(4)).factor(()) < 2.0
+
+
+def test_one_member_exchanged_or_left_out_leads_from_a_set_that_was_put_together_greedily():
+    """Column 2 follows 0 and 1 together: it comes first and stays, although with them nobody wants it."""
+    rng = np.random.default_rng(5)
+    D = rng.standard_normal((400, 5))
+    D[:, 2] = (D[:, 0] + D[:, 1]) / np.sqrt(2.0) + 0.1 * D[:, 2]
+    prior = Prior(np.full(5, 1e-3), np.ones(5), np.zeros(5), np.ones(5), np.full(5, np.inf))
+    scale = Scale(gram(D, 0.7 * (D[:, 0] + D[:, 1]) + rng.standard_normal(400)), prior, candidates(5))
+    assert exchanges(scale, (0, 2), range(5), 3)[0][1] == (0, 1)
+    assert exchanges(scale, (0, 1, 3), range(5), 3)[0][1] == (0, 1)
+    first, second = exchanges(scale, (0, 2), range(5), 3)[:2]
+    assert first[0] == pytest.approx(scale((0, 1)) + candidates(5).prior((0, 1)))
+    assert first[0] > second[0]
+    assert exchanges(scale, (), range(5), 3) == []
 
 
 def test_a_rival_is_another_set_that_is_neither_larger_nor_the_same_with_one_more_or_less():

@@ -1,0 +1,69 @@
+"""Which sets of causes are answers at all: those whose members all matter, and do not undo one another."""
+
+from collections.abc import Mapping
+from itertools import combinations
+
+from camcomp.diagnosis.fit.floor import MINOR
+from camcomp.diagnosis.fit.problem import Problem
+from camcomp.diagnosis.search.unexplained import size_um
+from camcomp.diagnosis.search.unknown import signal_rms
+from camcomp.diagnosis.statistics.cause_sets import Fitted, Members
+
+CANCELLING = 8.0  # size of a member, in units of the whole set, above which the set lives on differences of its members
+OPPOSED = 4.0  # the same of two members against both together
+GATE_SHARE = 0.1  # of what the causes explain: none is modelled better than that
+
+
+class Sound:
+    """Whether a set is an answer: every member matters, and none undoes another. Asked once of each."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem, self.known = problem, dict[Members, bool]()
+
+    def __call__(self, f: Fitted) -> bool:
+        """Of one set."""
+        if f.members not in self.known:
+            self.known[f.members] = not small_members(self.problem, f) and not cancels(self.problem, f)
+        return self.known[f.members]
+
+
+def small_members(problem: Problem, f: Fitted) -> Members:
+    """The members that move the tip by no more than what is minor, or by no more than what may be wrong of another one.
+
+    A small one at the actuator of a large one is what that one's law says wrongly: none is modelled better than GATE_SHARE.
+    """
+    sizes = {i: size_um(problem, f, (i,)) for i in f.members}
+    target = {i: problem.columns.candidates[i].target for i in f.members}
+    beside = {
+        i: max(
+            (sizes[j] for j in f.members if j != i and target[i] is not None and target[j] == target[i]), default=0.0
+        )
+        for i in f.members
+    }
+    return tuple(i for i in f.members if sizes[i] <= max(MINOR * problem.floor.tip_um, GATE_SHARE * beside[i]))
+
+
+def cancels(problem: Problem, f: Fitted) -> bool:
+    """Whether members undo each other nearly: by chance that hardly happens, but a fit of what is unknown seeks it.
+
+    Where another kind of channel shows one of them by itself the fit has had no choice.
+    """
+    whole = signal_rms(problem, f)
+    each = {i: signal_rms(problem, f, (i,)) for i in f.members}
+    for kind in whole:
+        undone = [i for i in f.members if each[i][kind] > max(1.0, CANCELLING * whole[kind])]
+        loose = [i for i in undone if not _shown_beside(each[i], whole, kind)]
+        if len(loose) > 1 or loose == undone != []:
+            return True
+    alone = {i: size_um(problem, f, (i,)) for i in f.members}
+    for i, j in combinations(f.members, 2):
+        if min(alone[i], alone[j]) > OPPOSED * size_um(problem, f, (i, j)):
+            both = signal_rms(problem, f, (i, j))
+            if not any(_shown_beside(each[x], both, "tip") for x in (i, j)):
+                return True
+    return False
+
+
+def _shown_beside(own: Mapping[str, float], whole: Mapping[str, float], kind: str) -> bool:
+    """Whether another kind of channel shows a member, and the whole set with it; all in units of the noise."""
+    return any(own[k] > 1.0 and CANCELLING * whole[k] > own[k] for k in own if k != kind)
