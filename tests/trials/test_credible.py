@@ -108,3 +108,11 @@ def test_a_squareness_that_shows_where_the_tool_plunges_is_no_slip_of_the_clampi
     causes = (("squareness", "yz"), ("servo_lag", "A5"))
     result, _ = answer(Plan(1642009, "pair", causes, (3.0, 9.0), machine="kuka-kr210", **LONG), tmp_path)
     assert {(each["effect"], each["target"]) for each in result["causes"]} == set(causes)
+
+
+@pytest.mark.campaign
+def test_a_ringing_drive_is_no_loop_that_rings_half_as_much(tmp_path):
+    """Over eight rows it averages to nothing; row by row 37 of its 58 um are left."""
+    plan = Plan(1543009, "unknown", (("servo_resonance", "A2"),), (10.0,), machine="kuka-kr210", **LONG)
+    result, _ = answer(plan, tmp_path)
+    assert (result["verdict"], [each["effect"] for each in result["causes"]]) == ("unknown", ["unknown"])

@@ -143,7 +143,7 @@ def unexplained_of(problem: Problem, kind: str, at_tip: Sequence[Floats]) -> Une
     local, at = _stretch((w * e).sum(axis=1), place)
     z, energy = mean / doubt, np.sum(w * e, axis=0)
     fast, its_z = _fast(swing)
-    if its_z > SURE_Z and fast.sum() > 0.0:
+    if its_z > SURE_Z:
         mean, z, energy = max(mean, 0.0) + float(fast.sum()), max(z, its_z), np.maximum(energy, 0.0) + len(e) * fast
     return Unexplained(kind, 1e3 * float(np.sqrt(max(mean, 0.0))), z, 1e3 * float(np.sqrt(max(local, 0.0))), at, energy)
 
