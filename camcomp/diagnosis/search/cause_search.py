@@ -34,6 +34,7 @@ from camcomp.ground.datatypes import Floats
 
 SINGLES, PAIRS, TRIPLES, MORE = 6, 6, 3, 3  # sets that are tried of each size; beyond three one is added at a time
 EXCHANGES, EXCHANGED = 4, 4  # rounds in which a member of the best set is exchanged or left out, and sets tried in each
+EXCHANGEABLE = 5  # members up to which that is done: what takes more is no cause of the library
 BEYOND_DOUBT = (
     20.0  # log evidence of a member, all tolerances strained as far as they like, above which no run vetoes it
 )
@@ -107,7 +108,7 @@ def search_causes(problem: Problem) -> CauseSearch:
         if len(best.members) < 3:
             break
         scale = Scale(total(best.grams), problem.prior, problem.candidates)
-        fit(extensions(scale, best.members, every)[0][1], best)
+        fit(extensions(scale, best.members, every, EXCHANGED)[0][1], best)
         if max(done.values(), key=value) is best:
             break
     sound = Sound(problem)
@@ -118,6 +119,8 @@ def search_causes(problem: Problem) -> CauseSearch:
                 break
             fit(tuple(i for i in f.members if i not in small_members(problem, f)), f)
         best = max((f for f in done.values() if sound(f)), key=value)
+        if len(best.members) > EXCHANGEABLE:
+            break
         scale = Scale(total(best.grams), problem.prior, problem.candidates)
         near = [(v, m, best) for v, m in exchanges(scale, best.members, every, EXCHANGED) if m not in done]
         _fit_best(near, fit, EXCHANGED, value(best))

@@ -107,15 +107,16 @@ def predictive(grams: Sequence[Gram], prior: Prior, candidates: CausePrior, sets
     return out
 
 
-def extensions(scale: Scale, members: Members, candidates: Sequence[int]) -> list[tuple[float, Members]]:
-    """The set with one more candidate each: (log evidence + log prior, set), best first."""
-    found = []
-    for i in candidates:
-        if i in members or any(scale.candidates.exclusive(i, j) for j in members):
-            continue
-        more = tuple(sorted((*members, i)))
-        found.append((scale(more) + scale.candidates.prior(more), more))
-    return sorted(found, reverse=True)
+def extensions(
+    scale: Scale, members: Members, candidates: Sequence[int], most: int | None = None
+) -> list[tuple[float, Members]]:
+    """The set with one more candidate each: (log evidence + log prior, set), best first; most: only so many, screened before."""
+    more = [
+        tuple(sorted((*members, i)))
+        for i in candidates
+        if i not in members and not any(scale.candidates.exclusive(i, j) for j in members)
+    ]
+    return _scored(scale, more if most is None else _screened(scale, more, most))
 
 
 def pairs(scale: Scale, candidates: Sequence[int], most: int) -> list[tuple[float, Members]]:
@@ -133,23 +134,32 @@ def pairs(scale: Scale, candidates: Sequence[int], most: int) -> list[tuple[floa
         rough[k] = log_bayes([at], scale.prior, [scale.candidates.columns[i] for i in two[k]])[0]
     rough += [scale.candidates.prior(each) for each in two]
     best = [two[k] for k in np.argsort(-rough)[:most]]
-    return sorted(((scale(each) + scale.candidates.prior(each), each) for each in best), reverse=True)
+    return _scored(scale, best)
 
 
 def exchanges(scale: Scale, members: Members, candidates: Sequence[int], most: int) -> list[tuple[float, Members]]:
-    """The best sets with one member exchanged or left out, best first: screened at the stated tolerances, then scored."""
-    at = scale.bases[TOLERANCES.index(1.0)]
+    """The best sets with one member exchanged or left out, best first: screened, then scored."""
     near = {tuple(x for x in members if x != i) for i in members}
     for rest in list(near):
         free = [j for j in candidates if j not in members and not any(scale.candidates.exclusive(j, x) for x in rest)]
         near |= {tuple(sorted((*rest, j))) for j in free}
+    return _scored(scale, _screened(scale, sorted(near), most))
+
+
+def _screened(scale: Scale, sets: Sequence[Members], most: int) -> list[Members]:
+    """The best of sets at the stated tolerances, all members of one width: each one's own takes four times as long per member."""
+    at = scale.bases[TOLERANCES.index(1.0)]
 
     def rough(each: Members) -> float:
-        columns = [scale.candidates.columns[i] for i in each]
-        return scale.candidates.prior(each) + (float(log_bayes([at], scale.prior, columns)[0]) if each else 0.0)
+        columns = [c for i in each for c in scale.candidates.columns[i]]
+        return scale.candidates.prior(each) + (float(log_bayes([at], scale.prior, [columns])[0]) if each else 0.0)
 
-    best = sorted(near, key=lambda each: (-rough(each), each))[:most]
-    return sorted(((scale(each) + scale.candidates.prior(each), each) for each in best), reverse=True)
+    return sorted(sets, key=rough, reverse=True)[:most]
+
+
+def _scored(scale: Scale, sets: Sequence[Members]) -> list[tuple[float, Members]]:
+    """Log evidence + log prior of sets, best first."""
+    return sorted(((scale(each) + scale.candidates.prior(each), each) for each in sets), reverse=True)
 
 
 def probabilities(fits: Sequence[Fitted], candidates: CausePrior, temperature: float = 1.0) -> Floats:
