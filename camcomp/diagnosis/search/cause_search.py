@@ -172,9 +172,23 @@ def _credible(
             if most is None or replaced[most] < (EVEN if unknown else INSTEAD):
                 return f, credible, instead
             instead = instead or size_um(problem, f, (most,)) > _least(problem, f)
-            kept = tuple(i for i in f.members if i != most)
+            kept = _needed(problem, fit, tuple(i for i in f.members if i != most))
         f = fit(kept)
         beyond = unexplained(problem, f)
+
+
+def _needed(problem: Problem, fit: Callable[[Members], Fitted], members: Members) -> Members:
+    """The members that earn their place: one that only filled up what another did too much has none without it."""
+
+    def value(each: Members) -> float:
+        return fit(each).log_evidence + problem.candidates.prior(each)
+
+    while members:
+        less = max((tuple(x for x in members if x != i) for i in members), key=value)
+        if value(less) <= value(members):
+            break
+        members = less
+    return members
 
 
 def beside_unknown(problem: Problem, f: Fitted, beyond: Mapping[str, Unexplained]) -> Members:

@@ -76,14 +76,19 @@ def families(problem: Problem) -> Iterator[Family]:
         p = values[0].shape[1]
         axes = [np.arange(p) + axis * p for axis in range(3)]
         bows = [each[:SLOW] for each in axes] if name.startswith("position") else []
-        yield Family(name, at, _white_tip(problem, values), (np.arange(3 * p), *axes, *bows))
+        columns = _white_tip(problem, values)
+        yield Family(name, at, columns, _doing(columns, (np.arange(3 * p), *axes, *bows)))
     for j, name in enumerate(problem.bench.actuators):
         functions = _of_drive(every, j)
         ends = np.cumsum([0, *(each.shape[1] for each in functions[0].values())])
         columns = _white_way(problem, j, functions)
-        does = columns.energy() > NOTHING  # a drive at rest, or one that turns the tool about itself, does nothing
-        parts = tuple(part[does[part]] for part in np.split(np.arange(ends[-1]), ends[1:-1]))
-        yield Family(f"drive {name}", at, columns, tuple(part for part in parts if len(part)))
+        yield Family(f"drive {name}", at, columns, _doing(columns, np.split(np.arange(ends[-1]), ends[1:-1])))
+
+
+def _doing(columns: ByChannel, parts: Sequence[Ints]) -> tuple[Ints, ...]:
+    """The parts without columns that do nothing: of a drive at rest, or that turns the tool about itself, of an axis that nobody measured."""
+    does = columns.energy() > NOTHING
+    return tuple(part[does[part]] for part in parts if does[part].any())
 
 
 def _patterns(problem: Problem, picked: Ints, of: Ints) -> ByChannel:
