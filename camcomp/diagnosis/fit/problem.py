@@ -441,7 +441,12 @@ def cause_prior(columns: Columns) -> CausePrior:
         a, b = columns.candidates[i], columns.candidates[j]
         return a.name == b.name and (a.target is None or b.target is None)
 
-    return CausePrior(tuple(tuple(columns.of(i)) for i in range(len(columns.candidates))), np.array(weight), exclusive)
+    kinds = [
+        tuple(i for i, a in enumerate(columns.candidates) if a.name == name and a.target is not None) for name in names
+    ]
+    return CausePrior(
+        tuple(tuple(columns.of(i)) for i in range(len(columns.candidates))), np.array(weight), exclusive, tuple(kinds)
+    )
 
 
 def _scanned(problem: Problem) -> Problem:

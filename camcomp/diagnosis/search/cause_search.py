@@ -1,6 +1,6 @@
 """The search for causes on one problem: which sets are tried, in which order, and how they are ranked."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,9 +18,11 @@ from camcomp.diagnosis.statistics.cause_sets import (
     Fitted,
     Members,
     Scale,
+    both_exchanged,
     exchanges,
     extensions,
     pairs,
+    parted,
     predictive,
     probabilities,
     total,
@@ -28,12 +30,15 @@ from camcomp.diagnosis.statistics.cause_sets import (
 from camcomp.diagnosis.statistics.evidence import estimate
 from camcomp.diagnosis.statistics.probability import EVEN
 from camcomp.diagnosis.statistics.score_test import ResidualTest
-from camcomp.diagnosis.statistics.verdict import Verdict, judge
+from camcomp.diagnosis.statistics.verdict import EQUAL_LOG_ODDS, Verdict, judge
 from camcomp.ground import headway
 from camcomp.ground.datatypes import Floats
 
 SINGLES, PAIRS, TRIPLES, MORE = 6, 6, 3, 3  # sets that are tried of each size; beyond three one is added at a time
-EXCHANGES, EXCHANGED = 4, 4  # rounds in which a member of the best set is exchanged or left out, and sets tried in each
+EXCHANGES, EXCHANGED = (
+    6,
+    4,
+)  # rounds in which a member of the best sets is exchanged or left out, and sets tried in each
 EXCHANGEABLE = 5  # members up to which that is done: what takes more is no cause of the library
 BEYOND_DOUBT = (
     20.0  # log evidence of a member, all tolerances strained as far as they like, above which no run vetoes it
@@ -111,29 +116,40 @@ def search_causes(problem: Problem) -> CauseSearch:
         fit(extensions(scale, best.members, every, EXCHANGED)[0][1], best)
         if max(done.values(), key=value) is best:
             break
-    sound = Sound(problem)
+    sound, looked = Sound(problem), set[Members]()
     for _ in range(EXCHANGES):  # what was taken first may stand for what was found last, and one actuator for another
         for f in sorted(done.values(), key=value, reverse=True):
             if sound(f):
-                best = f
                 break
             fit(tuple(i for i in f.members if i not in small_members(problem, f)), f)
-        best = max((f for f in done.values() if sound(f)), key=value)
-        if len(best.members) > EXCHANGEABLE:
+        right = [f for f in done.values() if sound(f)]
+        best = max(right, key=value)
+        # what may stand for a member of one set may do so in those that are as good
+        tied = [f for f in right if f.members not in looked and value(f) > value(best) - EQUAL_LOG_ODDS]
+        if not tied or len(best.members) > EXCHANGEABLE:
             break
-        scale = Scale(total(best.grams), problem.prior, problem.candidates)
-        near = [(v, m, best) for v, m in exchanges(scale, best.members, every, EXCHANGED) if m not in done]
-        _fit_best(near, fit, EXCHANGED, value(best))
-        if not any(sound(f) and value(f) > value(best) for f in done.values()):
-            break
+        near = max(tied, key=value)
+        looked.add(near.members)
+        scale = Scale(total(near.grams), problem.prior, problem.candidates)
+        others = [(v, m, near) for v, m in exchanges(scale, near.members, every, EXCHANGED) if m not in done]
+        _fit_best(others, fit, EXCHANGED, value(best))
+        if near.members and len(near.members) < EXCHANGEABLE:
+            two = parted(scale, near.members, every, EXCHANGED)
+            _fit_best(
+                [(v, m, near) for v, m in two if v > value(best) - EQUAL_LOG_ODDS and m not in done],
+                fit,
+                EXCHANGED,
+                value(best),
+            )
     fits = tuple(f for f in sorted(done.values(), key=value, reverse=True) if sound(f))
     temperature = tempering(problem, fits[0])
     probability = probabilities(fits, problem.candidates, temperature)
-    fits, probability = _prune(problem, fits, probability)
-    fits, probability = _established(problem, fits, fit, temperature, probability)
+    fits, probability, harmful = _prune(problem, fits, temperature, probability)
+    fits, probability, weak = _established(problem, fits, fit, temperature, probability)
     design = likeness(problem)
     fits, probability, same = _with_stand_ins(problem, design, fits, probability, fit, temperature)
     verdict = judge(fits, probability, same)
+    verdict = _held_against(problem, fits, probability, verdict, [*harmful, *weak], temperature)
     best = fits[verdict.best]
     beyond = unexplained(problem, best)
     kind = unknown_kind(problem, best, beyond)
@@ -234,18 +250,24 @@ def _with_stand_ins(
     fit: Callable[[Members], Fitted],
     temperature: float,
 ) -> tuple[tuple[Fitted, ...], Floats, list[tuple[Members, Members]]]:
-    """The fits with those sets added that do the same as the leader by their structure, and all pairs that are alike."""
+    """The fits with those sets added that do the same as the leader by their structure, and all pairs that are alike.
+
+    Where two members have others that do the same, all that these make together is added: one of them would else look more
+    sure than the other, by the number of sets in which it was tried.
+    """
     best = fits[int(np.argmax(probability))]
-    same = _same(problem, fits, probability)
-    for members in stand_ins(design, best.members, best.theta):
-        other = fit(members)
-        if not _possible(problem, other) or cancels(problem, other):
-            continue
-        same.append((best.members, members))
-        if all(f.members != members for f in fits):
-            fits = (*fits, other)
-    if len(fits) > len(probability):
+    found = {f.members: f for f in fits}
+    by_structure = [fit(members) for members in stand_ins(design, best.members, best.theta)]
+    by_structure = [f for f in by_structure if _possible(problem, f) and not cancels(problem, f)]
+    found |= {f.members: f for f in by_structure}
+    near = [members for _, members in _same(problem, tuple(found.values()), best)]
+    for members in both_exchanged(problem.candidates, best.members, near):
+        if members not in found and not cancels(problem, other := fit(members)):
+            found[members] = other
+    if len(found) > len(fits):
+        fits = tuple(found.values())
         probability = probabilities(fits, problem.candidates, temperature)
+    same = _same(problem, fits, best) + [(best.members, f.members) for f in by_structure]
     return fits, probability, same
 
 
@@ -270,11 +292,16 @@ def _fit_best(found, fit, count: int, best: float) -> None:  # type: ignore[no-u
         fit(members, near)
 
 
-def _prune(problem: Problem, fits: tuple[Fitted, ...], probability: Floats) -> tuple[tuple[Fitted, ...], Floats]:
-    """Scores the leaders on runs not used for fitting; a set that predicts worse than the same set less a member goes."""
+def _prune(
+    problem: Problem, fits: tuple[Fitted, ...], temperature: float, probability: Floats
+) -> tuple[tuple[Fitted, ...], Floats, list[Fitted]]:
+    """Scores the leaders on runs not used for fitting; a set that predicts worse than the same set less a member goes.
+
+    Behind the others those gone that are far more likely than what they are without it: something is there that it explains.
+    """
+    keep, harmful = list(range(len(fits))), list[Fitted]()
     if len(problem.bench.runs) < 2:
-        return fits, probability
-    keep = list(range(len(fits)))
+        return fits, probability, harmful
     for j in list(np.argsort(-probability)[:4]):
         f = fits[j]
         if not f.members or probability[j] < LEAST_PROBABILITY:
@@ -286,8 +313,10 @@ def _prune(problem: Problem, fits: tuple[Fitted, ...], probability: Floats) -> t
         scores = predictive(f.grams, problem.prior, problem.candidates, [f.members, *smaller])
         if scores[0] < scores[1:].max() - HARM_LOG:
             keep.remove(j)
+            if _stands_for_more(problem, f, smaller[int(np.argmax(scores[1:]))], temperature):
+                harmful.append(f)
     kept = tuple(fits[j] for j in keep)
-    return kept, probability[keep] / probability[keep].sum()
+    return kept, probability[keep] / probability[keep].sum(), harmful
 
 
 def _established(
@@ -296,22 +325,61 @@ def _established(
     fit: Callable[[Members], Fitted],
     temperature: float,
     probability: Floats,
-) -> tuple[tuple[Fitted, ...], Floats]:
-    """The fits without leaders that have a member which may as well be minor; what they are without it takes their place."""
-    while (weak := weakest(problem, fits[best := int(np.argmax(probability))])) is not None:
-        less = fit(tuple(i for i in fits[best].members if i != weak))
-        fits = tuple(f for j, f in enumerate(fits) if j != best and f.members != less.members)
-        fits = (*fits, less)
+) -> tuple[tuple[Fitted, ...], Floats, list[Fitted]]:
+    """The fits without those that have a member which may as well be minor; what they are without it takes their place.
+
+    Not the leader alone: rivals that keep what the leader has lost would be no rivals of what it is now. Behind them those
+    that are far more likely than what takes their place: something is there that a weak member explains.
+    """
+    firm, weak = set[Members](), list[Fitted]()
+    while True:
+        likely = [int(j) for j in np.argsort(-probability) if probability[j] >= LEAST_PROBABILITY]
+        at = next((j for j in likely if fits[j].members not in firm), None)
+        if at is None:
+            return fits, probability, weak
+        least = weakest(problem, f := fits[at])
+        if least is None:
+            firm.add(f.members)
+            continue
+        less = fit(tuple(i for i in f.members if i != least))
+        if _stands_for_more(problem, f, less.members, temperature):
+            weak.append(f)
+        fits = (*(g for j, g in enumerate(fits) if j != at and g.members != less.members), less)
         probability = probabilities(fits, problem.candidates, temperature)
-    return fits, probability
 
 
-def _same(problem: Problem, fits: tuple[Fitted, ...], probability: Floats) -> list[tuple[Members, Members]]:
-    """Pairs of the leader and a set of its size that fits as well, whatever the priors say of them.
+def _stands_for_more(problem: Problem, f: Fitted, less: Members, temperature: float) -> bool:
+    """Whether a set is far more likely than the same without a member: something is there that this one explains."""
+    scale = Scale(total(f.grams), problem.prior, problem.candidates)
+    odds = (scale(f.members) - scale(less)) / temperature
+    return odds + problem.candidates.prior(f.members) - problem.candidates.prior(less) > EQUAL_LOG_ODDS
+
+
+def _held_against(
+    problem: Problem, fits: tuple[Fitted, ...], probability: Floats, verdict: Verdict, others: Sequence[Fitted],
+    temperature: float,
+) -> Verdict:  # fmt: skip
+    """The verdict beside sets that are no answer and yet explain as well: what these lack is less sure.
+
+    None of them counts for more than the best answer: it is one word against another.
+    """
+    best = fits[verdict.best]
+    beside = {f.members: f for f in others if all(f.members != g.members for g in fits)}.values()
+    odds = [float(np.divide(*probabilities((f, best), problem.candidates, temperature))) for f in beside]
+    counts = probability[verdict.best] * np.minimum(odds, 1.0)
+    whole = 1.0 + float(counts.sum())
+    inclusion = {i: p / whole for i, p in verdict.inclusion.items()}
+    for f, p in zip(beside, counts, strict=True):
+        for i in f.members:
+            inclusion[i] = inclusion.get(i, 0.0) + float(p) / whole
+    return replace(verdict, inclusion=inclusion)
+
+
+def _same(problem: Problem, fits: tuple[Fitted, ...], best: Fitted) -> list[tuple[Members, Members]]:
+    """Pairs of the best set and a set of its size that fits as well, whatever the priors say of them.
 
     Priors of sizes, and of how far off the tolerances are all together: the rows and the stated tolerances have to tell.
     """
-    best = fits[int(np.argmax(probability))]
     found = []
     for f in fits:
         if f is best or len(f.members) != len(best.members) or not best.members:

@@ -58,14 +58,18 @@ class Likeness:
             out[these] = LARGE * np.sqrt(np.maximum(_share(left, own, direction), 0.0))
         return out
 
-    def told(self, i: int) -> bool:
-        """Whether nuisances leave something of the candidate: where they hide it, nothing else is its rival."""
+    def told(self, i: int, free: Sequence[int] = (), direction: Floats | None = None) -> bool:
+        """Whether nuisances, and free candidates, leave something of the candidate: where they hide it, nothing else is its rival."""
         if not self.shows(i):
             return False
-        mine = list(self.problem.candidates.columns[i])
-        left = np.linalg.inv(self.covariance[np.ix_(mine, mine)]) - np.diag(self.precision[mine])
+        columns = self.problem.candidates.columns
+        mine, index = list(columns[i]), [*columns[i], *(c for each in free for c in columns[each])]
+        d, wide = len(mine), self.problem.prior.scale[index[len(mine) :]]
+        known = np.linalg.inv(self.covariance[np.ix_(index, index)]) - np.diag(self.precision[index])
+        known[d:, d:] += np.diag(1.0 / (10.0 * wide) ** 2)
+        left = known[:d, :d] - known[:d, d:] @ np.linalg.solve(known[d:, d:], known[d:, :d])
         own = self.grams[self._kinds[i][0]][np.ix_(mine, mine)]
-        return bool(LARGE * np.sqrt(max(float(_share(np.asarray(left[None]), own, None)[0]), 0.0)) >= HIDDEN)
+        return bool(LARGE * np.sqrt(max(float(_share(np.asarray(left[None]), own, direction)[0]), 0.0)) >= HIDDEN)
 
     @cached_property
     def _kinds(self) -> list[tuple[int, float]]:
@@ -133,8 +137,8 @@ def stand_ins(design: Likeness, members: Members, theta: Floats) -> list[Members
         direction = theta[at : at + d]
         at += d
         others = tuple(m for m in members if m != i)
-        if not told[i]:
-            continue
+        if not design.told(i, others, direction):
+            continue  # another member does what it does: beside that one nothing is its rival
         free = [
             j
             for j in range(len(candidates.columns))

@@ -6,6 +6,7 @@ The search knows grams, priors and numbers of candidates; what an candidate is, 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
+from math import comb, factorial
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from camcomp.diagnosis.statistics.evidence import (
     Gram,
     Prior,
     base,
+    freed,
     holding_back,
     log_bayes,
     log_bayes_pairs,
@@ -24,6 +26,8 @@ from camcomp.diagnosis.statistics.evidence import (
 from camcomp.ground.datatypes import Floats
 
 Members = tuple[int, ...]
+PATTERN = 3  # targets of one effect from which on they may have one origin: springs of several joints are one thing that gives way
+SHARED = 0.5  # probability that they have
 SIZES = (0.45, 0.33, 0.13, 0.055, 0.022, 0.009, 0.004)  # prior probability of 0, 1, 2 ... causes
 
 
@@ -49,14 +53,33 @@ class CausePrior:
     columns: tuple[tuple[int, ...], ...]
     weight: Floats
     exclusive: Callable[[int, int], bool]  # whether two candidates make no sense together
+    kinds: tuple[tuple[int, ...], ...] = ()  # candidates that are one effect at several targets, alike in weight
 
     def prior(self, members: Members) -> float:
-        """Log prior probability of a set."""
-        d = len(members)
-        if d == 0:
-            return float(np.log(SIZES[0]))
-        orders = float(np.log(np.arange(1, d + 1)).sum())
-        return float(np.log(SIZES[d]) + orders + sum(self.weight[i] for i in members))
+        """Log prior probability of a set.
+
+        Its members come one by one, each by itself; or one effect at several targets is one cause, by whatever all of these
+        have in common.
+        """
+        alone = _in_any_order([float(self.weight[i]) for i in members])
+        if len(members) < PATTERN:
+            return alone
+        groups = [(tuple(i for i in members if i in kind), len(kind)) for kind in self.kinds]
+        groups = [(mine, of) for mine, of in groups if len(mine) >= PATTERN]
+        if not groups:
+            return alone
+        weights = [float(self.weight[i]) for i in set(members).difference(*(mine for mine, _ in groups))]
+        for mine, of in groups:
+            more = 0.5 ** np.arange(of - PATTERN + 1)  # halving with every further target, and any so many of them
+            these = more[len(mine) - PATTERN] / more.sum() / comb(of, len(mine))
+            weights.append(float(self.weight[mine[0]]) + float(np.log(of * these)))
+        return log_sum([alone, len(groups) * float(np.log(SHARED)) + _in_any_order(weights)])
+
+
+def _in_any_order(weights: Sequence[float]) -> float:
+    """Log prior probability of causes of these log weights, drawn one after the other."""
+    d = len(weights)
+    return float(np.log(SIZES[d] * factorial(d))) + sum(weights)
 
 
 def total(grams: Sequence[Gram]) -> Gram:
@@ -121,29 +144,71 @@ def extensions(
 
 def pairs(scale: Scale, candidates: Sequence[int], most: int) -> list[tuple[float, Members]]:
     """The best sets of two, best first: screened at the stated tolerances, then scored."""
-    two = [each for each in combinations(sorted(candidates), 2) if not scale.candidates.exclusive(*each)]
-    single = [len(scale.candidates.columns[a]) == len(scale.candidates.columns[b]) == 1 for a, b in two]
     at = scale.bases[TOLERANCES.index(1.0)]
+    two = [each for each in combinations(sorted(candidates), 2) if not scale.candidates.exclusive(*each)]
+    rough = _of_two(scale, at, two) + [scale.candidates.prior(each) for each in two]
+    return _scored(scale, [two[k] for k in np.argsort(-rough)[:most]])
+
+
+def _of_two(scale: Scale, at: Base, two: Sequence[Members]) -> Floats:
+    """Log Bayes factor (p,) of pairs at one base."""
+    columns = scale.candidates.columns
+    single = np.array([len(columns[a]) == len(columns[b]) == 1 for a, b in two], bool)
     rough = np.empty(len(two))
     fast = np.flatnonzero(single)
     if len(fast):
-        first = np.array([scale.candidates.columns[two[k][0]][0] for k in fast])
-        second = np.array([scale.candidates.columns[two[k][1]][0] for k in fast])
+        first = np.array([columns[two[k][0]][0] for k in fast])
+        second = np.array([columns[two[k][1]][0] for k in fast])
         rough[fast] = log_bayes_pairs(at, scale.prior, first, second)
-    for k in np.flatnonzero(~np.array(single, bool)):
-        rough[k] = log_bayes([at], scale.prior, [scale.candidates.columns[i] for i in two[k]])[0]
-    rough += [scale.candidates.prior(each) for each in two]
-    best = [two[k] for k in np.argsort(-rough)[:most]]
-    return _scored(scale, best)
+    for k in np.flatnonzero(~single):
+        rough[k] = log_bayes([at], scale.prior, [columns[i] for i in two[k]])[0]
+    return rough
 
 
 def exchanges(scale: Scale, members: Members, candidates: Sequence[int], most: int) -> list[tuple[float, Members]]:
     """The best sets with one member exchanged or left out, best first: screened, then scored."""
     near = {tuple(x for x in members if x != i) for i in members}
     for rest in list(near):
-        free = [j for j in candidates if j not in members and not any(scale.candidates.exclusive(j, x) for x in rest)]
-        near |= {tuple(sorted((*rest, j))) for j in free}
+        near |= {tuple(sorted((*rest, j))) for j in _beside(scale, rest, members, candidates)}
     return _scored(scale, _screened(scale, sorted(near), most))
+
+
+def parted(scale: Scale, members: Members, candidates: Sequence[int], most: int) -> list[tuple[float, Members]]:
+    """The best sets with two others in one member's place, best first: what came first may have stood for both.
+
+    Screened at the stated tolerances beside the others, which are free; then scored.
+    """
+    at = scale.bases[TOLERANCES.index(1.0)]
+    found: dict[Members, float] = {}
+    for i in members:
+        rest = tuple(x for x in members if x != i)
+        own = [c for x in rest for c in scale.candidates.columns[x]]
+        free = _beside(scale, rest, members, candidates)
+        two = [each for each in combinations(sorted(free), 2) if not scale.candidates.exclusive(*each)]
+        if not two:
+            continue
+        rough = _of_two(scale, freed(at, scale.prior, own) if own else at, two)
+        rough += float(log_bayes([at], scale.prior, [own])[0]) if own else 0.0
+        sets = [tuple(sorted((*rest, *each))) for each in two]
+        rough += [scale.candidates.prior(each) for each in sets]
+        found |= {sets[k]: float(rough[k]) for k in np.argsort(-rough)[:most]}
+    return _scored(scale, sorted(found, key=lambda each: found[each], reverse=True)[:most])
+
+
+def both_exchanged(candidates: CausePrior, members: Members, near: Sequence[Members]) -> list[Members]:
+    """Sets with two members exchanged at once, each as a set that is near exchanges it alone."""
+    one = [(set(members) - set(each), set(each) - set(members)) for each in near if len(each) == len(members)]
+    out = set()
+    for (gone, come), (also_gone, also_come) in combinations([each for each in one if len(each[0]) == 1], 2):
+        new = (set(members) - gone - also_gone) | come | also_come
+        if len(new) == len(members) and not any(candidates.exclusive(i, j) for i, j in combinations(new, 2)):
+            out.add(tuple(sorted(new)))
+    return sorted(out)
+
+
+def _beside(scale: Scale, rest: Members, without: Members, candidates: Sequence[int]) -> list[int]:
+    """The candidates that make sense beside a set."""
+    return [j for j in candidates if j not in without and not any(scale.candidates.exclusive(j, x) for x in rest)]
 
 
 def _screened(scale: Scale, sets: Sequence[Members], most: int) -> list[Members]:

@@ -228,12 +228,25 @@ def estimate(data: Gram, prior: Prior, members: Sequence[int], factor: float = 1
     return within(covariance @ data.b, lambda held: covariance[:, held], _reach(prior, members))[0], covariance
 
 
+def freed(at: Base, prior: Prior, members: Sequence[int]) -> Base:
+    """The same with the columns `members` free within 10 scales; its log evidence stays that without them."""
+    index = list(members)
+    own, gain = _widened(at, prior, index)
+    precision = at.precision.copy()
+    precision[index] = _free(prior, index)
+    return Base(at.mean - own @ (gain @ at.mean[index]), at.covariance - own @ gain @ own.T, precision, at.log_evidence)
+
+
+def _widened(at: Base, prior: Prior, index: list[int]) -> tuple[Floats, Floats]:
+    """Covariance (k, d) of all columns with some, and the gain (d, d) by which freeing those changes mean and covariance."""
+    own = at.covariance[:, index]
+    return own, np.linalg.inv(np.diag(1.0 / (_free(prior, index) - at.precision[index])) + own[index])
+
+
 def holding_back(at: Base, prior: Prior, members: Sequence[int]) -> float:
     """Log evidence >= 0 that it costs a set with the columns `members` to keep all others within reach."""
     index = list(members)
-    own = at.covariance[:, index]
-    # those columns' prior widens
-    gain = np.linalg.inv(np.diag(1.0 / (_free(prior, index) - at.precision[index])) + own[index])
+    own, gain = _widened(at, prior, index)
     mean = at.mean - own @ (gain @ at.mean[index])
     return within(mean, lambda held: at.covariance[:, held] - own @ (gain @ own[held].T), _reach(prior, index))[1]
 
