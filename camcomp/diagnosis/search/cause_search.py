@@ -1,13 +1,13 @@
 """The search for causes on one problem: which sets are tried, in which order, and how they are ranked."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from camcomp.diagnosis.fit.gap import rest_by_actuator
 from camcomp.diagnosis.fit.problem import Problem
-from camcomp.diagnosis.search.established import weakest
+from camcomp.diagnosis.search.established import LEAST_PROBABILITY, established, held_against, stands_for_more
 from camcomp.diagnosis.search.imitation import credibility
 from camcomp.diagnosis.search.indistinguishable import Likeness, likeness, stand_ins
 from camcomp.diagnosis.search.sound import GATE_SHARE, Sound, cancels, small_members
@@ -52,7 +52,6 @@ PART_OF_UNKNOWN = 2.0  # size in units of an unknown effect below which a cause 
 LARGE_SCALES = 3.0  # size of an effect, in its typical ones, that would show at least if it can be seen at all
 MOST_SCALES = 8.0  # the same that nobody believes of a rival that fits as well
 HOPELESS_LOG = 12.0  # log evidence behind the best at which a set is not fitted any more
-LEAST_PROBABILITY = 0.02  # of a set whose foretelling is looked at
 LOOKALIKE = 0.01  # probability that what a cause explains down to the noise is something that no library has and that looks the same
 INSTEAD = 0.95  # probability of something unknown in place of a cause, where without it nothing unknown would show
 POINTED = 0.85  # share of what is left that one actuator has to have to be that place
@@ -145,11 +144,11 @@ def search_causes(problem: Problem) -> CauseSearch:
     temperature = tempering(problem, fits[0])
     probability = probabilities(fits, problem.candidates, temperature)
     fits, probability, harmful = _prune(problem, fits, temperature, probability)
-    fits, probability, weak = _established(problem, fits, fit, temperature, probability)
+    fits, probability, weak = established(problem, fits, fit, temperature, probability)
     design = likeness(problem)
     fits, probability, same = _with_stand_ins(problem, design, fits, probability, fit, temperature)
     verdict = judge(fits, probability, same)
-    verdict = _held_against(problem, fits, probability, verdict, [*harmful, *weak], temperature)
+    verdict = held_against(problem, fits, probability, verdict, [*harmful, *weak], temperature)
     best = fits[verdict.best]
     beyond = unexplained(problem, best)
     kind = unknown_kind(problem, best, beyond)
@@ -313,66 +312,10 @@ def _prune(
         scores = predictive(f.grams, problem.prior, problem.candidates, [f.members, *smaller])
         if scores[0] < scores[1:].max() - HARM_LOG:
             keep.remove(j)
-            if _stands_for_more(problem, f, smaller[int(np.argmax(scores[1:]))], temperature):
+            if stands_for_more(problem, f, smaller[int(np.argmax(scores[1:]))], temperature):
                 harmful.append(f)
     kept = tuple(fits[j] for j in keep)
     return kept, probability[keep] / probability[keep].sum(), harmful
-
-
-def _established(
-    problem: Problem,
-    fits: tuple[Fitted, ...],
-    fit: Callable[[Members], Fitted],
-    temperature: float,
-    probability: Floats,
-) -> tuple[tuple[Fitted, ...], Floats, list[Fitted]]:
-    """The fits without those that have a member which may as well be minor; what they are without it takes their place.
-
-    Not the leader alone: rivals that keep what the leader has lost would be no rivals of what it is now. Behind them those
-    that are far more likely than what takes their place: something is there that a weak member explains.
-    """
-    firm, weak = set[Members](), list[Fitted]()
-    while True:
-        likely = [int(j) for j in np.argsort(-probability) if probability[j] >= LEAST_PROBABILITY]
-        at = next((j for j in likely if fits[j].members not in firm), None)
-        if at is None:
-            return fits, probability, weak
-        least = weakest(problem, f := fits[at])
-        if least is None:
-            firm.add(f.members)
-            continue
-        less = fit(tuple(i for i in f.members if i != least))
-        if _stands_for_more(problem, f, less.members, temperature):
-            weak.append(f)
-        fits = (*(g for j, g in enumerate(fits) if j != at and g.members != less.members), less)
-        probability = probabilities(fits, problem.candidates, temperature)
-
-
-def _stands_for_more(problem: Problem, f: Fitted, less: Members, temperature: float) -> bool:
-    """Whether a set is far more likely than the same without a member: something is there that this one explains."""
-    scale = Scale(total(f.grams), problem.prior, problem.candidates)
-    odds = (scale(f.members) - scale(less)) / temperature
-    return odds + problem.candidates.prior(f.members) - problem.candidates.prior(less) > EQUAL_LOG_ODDS
-
-
-def _held_against(
-    problem: Problem, fits: tuple[Fitted, ...], probability: Floats, verdict: Verdict, others: Sequence[Fitted],
-    temperature: float,
-) -> Verdict:  # fmt: skip
-    """The verdict beside sets that are no answer and yet explain as well: what these lack is less sure.
-
-    None of them counts for more than the best answer: it is one word against another.
-    """
-    best = fits[verdict.best]
-    beside = {f.members: f for f in others if all(f.members != g.members for g in fits)}.values()
-    odds = [float(np.divide(*probabilities((f, best), problem.candidates, temperature))) for f in beside]
-    counts = probability[verdict.best] * np.minimum(odds, 1.0)
-    whole = 1.0 + float(counts.sum())
-    inclusion = {i: p / whole for i, p in verdict.inclusion.items()}
-    for f, p in zip(beside, counts, strict=True):
-        for i in f.members:
-            inclusion[i] = inclusion.get(i, 0.0) + float(p) / whole
-    return replace(verdict, inclusion=inclusion)
 
 
 def _same(problem: Problem, fits: tuple[Fitted, ...], best: Fitted) -> list[tuple[Members, Members]]:

@@ -1,4 +1,7 @@
-"""Whether what a set of causes names is surely there, and more than every healthy machine has."""
+"""Whether what a set of causes names is surely there, and more than every healthy machine has; what speaks against it."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 from scipy.special import chdtri
@@ -8,8 +11,11 @@ from camcomp.diagnosis.fit.intervals import joint_covariance
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.search.tempering import tempering
 from camcomp.diagnosis.search.unexplained import size_um
-from camcomp.diagnosis.statistics.cause_sets import Fitted, Members, Scale, predictive, total
+from camcomp.diagnosis.statistics.cause_sets import Fitted, Members, Scale, predictive, probabilities, total
+from camcomp.diagnosis.statistics.verdict import EQUAL_LOG_ODDS, Verdict
+from camcomp.ground.datatypes import Floats
 
+LEAST_PROBABILITY = 0.02  # of a set that is looked at more closely
 CHANCE = 0.16  # of a member that looks as large as it does although it is minor: one standard deviation
 
 
@@ -31,6 +37,62 @@ def weakest(problem: Problem, f: Fitted) -> int | None:
         if surely < least:
             least, found = surely, i
     return found
+
+
+def established(
+    problem: Problem,
+    fits: tuple[Fitted, ...],
+    fit: Callable[[Members], Fitted],
+    temperature: float,
+    probability: Floats,
+) -> tuple[tuple[Fitted, ...], Floats, list[Fitted]]:
+    """The fits without those that have a member which may as well be minor; what they are without it takes their place.
+
+    Not the leader alone: rivals that keep what the leader has lost would be no rivals of what it is now. Behind them those
+    that are far more likely than what takes their place: something is there that a weak member explains.
+    """
+    firm, weak = set[Members](), list[Fitted]()
+    while True:
+        likely = [int(j) for j in np.argsort(-probability) if probability[j] >= LEAST_PROBABILITY]
+        at = next((j for j in likely if fits[j].members not in firm), None)
+        if at is None:
+            return fits, probability, weak
+        least = weakest(problem, f := fits[at])
+        if least is None:
+            firm.add(f.members)
+            continue
+        less = fit(tuple(i for i in f.members if i != least))
+        if stands_for_more(problem, f, less.members, temperature):
+            weak.append(f)
+        fits = (*(g for j, g in enumerate(fits) if j != at and g.members != less.members), less)
+        probability = probabilities(fits, problem.candidates, temperature)
+
+
+def stands_for_more(problem: Problem, f: Fitted, less: Members, temperature: float) -> bool:
+    """Whether a set is far more likely than the same without a member: something is there that this one explains."""
+    scale = Scale(total(f.grams), problem.prior, problem.candidates)
+    odds = (scale(f.members) - scale(less)) / temperature
+    return odds + problem.candidates.prior(f.members) - problem.candidates.prior(less) > EQUAL_LOG_ODDS
+
+
+def held_against(
+    problem: Problem, fits: tuple[Fitted, ...], probability: Floats, verdict: Verdict, others: Sequence[Fitted],
+    temperature: float,
+) -> Verdict:  # fmt: skip
+    """The verdict beside sets that are no answer and yet explain as well: what these lack is less sure.
+
+    None of them counts for more than the best answer: it is one word against another.
+    """
+    best = fits[verdict.best]
+    beside = {f.members: f for f in others if all(f.members != g.members for g in fits)}.values()
+    shares = [probabilities((f, best), problem.candidates, temperature) for f in beside]
+    counts = np.array([min(mine / max(its, 1e-300), 1.0) for mine, its in shares]) * probability[verdict.best]
+    whole = 1.0 + float(counts.sum())
+    inclusion = {i: p / whole for i, p in verdict.inclusion.items()}
+    for f, p in zip(beside, counts, strict=True):
+        for i in f.members:
+            inclusion[i] = inclusion.get(i, 0.0) + float(p) / whole
+    return replace(verdict, inclusion=inclusion)
 
 
 def standing(problem: Problem, members: Members) -> Fitted:

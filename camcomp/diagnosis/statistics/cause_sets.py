@@ -56,24 +56,31 @@ class CausePrior:
     kinds: tuple[tuple[int, ...], ...] = ()  # candidates that are one effect at several targets, alike in weight
 
     def prior(self, members: Members) -> float:
-        """Log prior probability of a set.
+        """Log prior probability of a set."""
+        return log_sum([odds for odds, _ in self.ways(members)])
 
-        Its members come one by one, each by itself; or one effect at several targets is one cause, by whatever all of these
-        have in common.
+    def ways(self, members: Members) -> list[tuple[float, list[Members]]]:
+        """How a set may have come about: the log prior probability of each way, and members that are of one size in it.
+
+        One by one, each of a size of its own; or one effect at several targets is one cause, by whatever all of these have
+        in common.
         """
-        alone = _in_any_order([float(self.weight[i]) for i in members])
+        one_by_one: list[Members] = [(i,) for i in members]
+        ways = [(_in_any_order([float(self.weight[i]) for i in members]), one_by_one)]
         if len(members) < PATTERN:
-            return alone
+            return ways
         groups = [(tuple(i for i in members if i in kind), len(kind)) for kind in self.kinds]
         groups = [(mine, of) for mine, of in groups if len(mine) >= PATTERN]
         if not groups:
-            return alone
-        weights = [float(self.weight[i]) for i in set(members).difference(*(mine for mine, _ in groups))]
+            return ways
+        rest = [i for i in members if not any(i in mine for mine, _ in groups)]
+        weights = [float(self.weight[i]) for i in rest]
         for mine, of in groups:
             more = 0.5 ** np.arange(of - PATTERN + 1)  # halving with every further target, and any so many of them
             these = more[len(mine) - PATTERN] / more.sum() / comb(of, len(mine))
             weights.append(float(self.weight[mine[0]]) + float(np.log(of * these)))
-        return log_sum([alone, len(groups) * float(np.log(SHARED)) + _in_any_order(weights)])
+        shared = len(groups) * float(np.log(SHARED)) + _in_any_order(weights)
+        return [*ways, (shared, [*(mine for mine, _ in groups), *((i,) for i in rest)])]
 
 
 def _in_any_order(weights: Sequence[float]) -> float:
@@ -107,13 +114,20 @@ class Scale:
         return TOLERANCES[int(np.argmax(self._by_tolerance(members)))]
 
     def _by_tolerance(self, members: Members) -> Floats:
-        sets = [self.candidates.columns[i] for i in members]
-        index = [c for each in sets for c in each]
+        columns = self.candidates.columns
+        index = [c for i in members for c in columns[i]]
         none = np.array([
             b.log_evidence + odds - holding_back(b, self.prior, index)
             for b, odds in zip(self.bases, TOLERANCE_LOG, strict=True)
         ])  # fmt: skip
-        return none + log_bayes(self.bases, self.prior, sets) if sets else none
+        if not members:
+            return none
+        ways = self.candidates.ways(members)
+        each = [
+            odds + log_bayes(self.bases, self.prior, [[c for i in group for c in columns[i]] for group in groups])
+            for odds, groups in ways
+        ]
+        return np.asarray(none + np.logaddexp.reduce(each) - log_sum([odds for odds, _ in ways]))
 
 
 def predictive(grams: Sequence[Gram], prior: Prior, candidates: CausePrior, sets: Sequence[Members]) -> Floats:
@@ -155,12 +169,12 @@ def _of_two(scale: Scale, at: Base, two: Sequence[Members]) -> Floats:
     columns = scale.candidates.columns
     single = np.array([len(columns[a]) == len(columns[b]) == 1 for a, b in two], bool)
     rough = np.empty(len(two))
-    fast = np.flatnonzero(single)
-    if len(fast):
-        first = np.array([columns[two[k][0]][0] for k in fast])
-        second = np.array([columns[two[k][1]][0] for k in fast])
-        rough[fast] = log_bayes_pairs(at, scale.prior, first, second)
-    for k in np.flatnonzero(~single):
+    if single.any():
+        first, second = np.array(
+            [(columns[a][0], columns[b][0]) for (a, b), one in zip(two, single, strict=True) if one]
+        ).T
+        rough[single] = log_bayes_pairs(at, scale.prior, first, second)
+    for k in map(int, np.flatnonzero(~single)):
         rough[k] = log_bayes([at], scale.prior, [columns[i] for i in two[k]])[0]
     return rough
 

@@ -240,7 +240,8 @@ def freed(at: Base, prior: Prior, members: Sequence[int]) -> Base:
 def _widened(at: Base, prior: Prior, index: list[int]) -> tuple[Floats, Floats]:
     """Covariance (k, d) of all columns with some, and the gain (d, d) by which freeing those changes mean and covariance."""
     own = at.covariance[:, index]
-    return own, np.linalg.inv(np.diag(1.0 / (_free(prior, index) - at.precision[index])) + own[index])
+    gain = np.linalg.inv(np.diag(1.0 / (_free(prior, index) - at.precision[index])) + own[index])
+    return own, np.asarray(gain, float)
 
 
 def holding_back(at: Base, prior: Prior, members: Sequence[int]) -> float:

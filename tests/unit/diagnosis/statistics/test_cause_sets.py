@@ -5,7 +5,15 @@ from math import comb
 import numpy as np
 import pytest
 
-from camcomp.diagnosis.statistics.cause_sets import SIZES, CausePrior, Fitted, Scale, exchanges
+from camcomp.diagnosis.statistics.cause_sets import (
+    SIZES,
+    CausePrior,
+    Fitted,
+    Scale,
+    both_exchanged,
+    exchanges,
+    parted,
+)
 from camcomp.diagnosis.statistics.evidence import Prior, gram
 from camcomp.diagnosis.statistics.verdict import judge
 
@@ -47,6 +55,54 @@ def test_one_member_exchanged_or_left_out_leads_from_a_set_that_was_put_together
     assert first[0] == pytest.approx(scale((0, 1)) + candidates(5).prior((0, 1)))
     assert first[0] > second[0]
     assert exchanges(scale, (), range(5), 3) == []
+
+
+def test_a_member_that_stood_for_two_is_parted_beside_the_others():
+    """Column 2 does what 0 and 1 leave of each other: either of them alone in its place does far worse."""
+    rng = np.random.default_rng(6)
+    D = rng.standard_normal((400, 6))
+    D[:, 1] = 0.3 * D[:, 1] - D[:, 0]
+    both = D[:, 0] + D[:, 1]
+    D[:, 2] = both / 0.3 + 0.6 * D[:, 2]
+    prior = Prior(np.full(6, 1e-3), np.ones(6), np.zeros(6), np.ones(6), np.full(6, np.inf))
+    scale = Scale(gram(D, 4.0 * both + 0.7 * D[:, 4] + rng.standard_normal(400)), prior, candidates(6))
+    now = scale((2, 4)) + candidates(6).prior((2, 4))
+    assert exchanges(scale, (2, 4), range(6), 3)[0][0] < now
+    value, best = parted(scale, (2, 4), range(6), 3)[0]
+    assert best == (0, 1, 4)
+    assert value == pytest.approx(scale(best) + candidates(6).prior(best))
+    assert value > now
+    assert parted(scale, (2,), range(6), 1)[0][1] == (0, 1)
+    assert parted(scale, (), range(6), 3) == []
+
+
+def test_two_members_are_exchanged_at_once_as_each_is_alone():
+    near = [(0, 1, 5), (0, 2, 6), (1, 2, 5), (0, 1, 2, 3), (3, 4, 5)]
+    assert both_exchanged(candidates(7), (0, 1, 2), near) == [(0, 5, 6), (2, 5, 6)]
+    alone = CausePrior(candidates(7).columns, candidates(7).weight, lambda i, j: {i, j} == {0, 5})
+    assert both_exchanged(alone, (0, 1, 2), near) == [(2, 5, 6)]
+
+
+def test_one_effect_at_three_targets_is_likelier_than_three_effects_and_at_two_it_is_not():
+    kinds = CausePrior(
+        *(getattr(candidates(12), name) for name in ("columns", "weight", "exclusive")), ((0, 1, 2, 3, 4, 5),)
+    )
+    assert kinds.prior((0, 1)) == candidates(12).prior((0, 1))
+    assert kinds.prior((0, 1, 6)) == candidates(12).prior((0, 1, 6))
+    assert kinds.prior((0, 1, 2)) > kinds.prior((6, 7, 8)) + 1.0
+    assert kinds.prior((0, 1, 2)) > kinds.prior((0, 1, 2, 3))
+
+
+def test_what_has_one_origin_is_of_one_size():
+    """Rows that two columns explain alike: one at the size of its mates, or its twin at eight times that."""
+    rng = np.random.default_rng(7)
+    D = rng.standard_normal((400, 8))
+    D[:, 3] = D[:, 2] / 8.0
+    prior = Prior(np.full(8, 1e-3), np.ones(8), np.zeros(8), np.ones(8), np.full(8, np.inf))
+    data = gram(D, D[:, :3] @ np.full(3, 0.3) + rng.standard_normal(400))
+    kinds = CausePrior(*(getattr(candidates(8), name) for name in ("columns", "weight", "exclusive")), ((0, 1, 2, 3),))
+    apart, together = (Scale(data, prior, each) for each in (candidates(8), kinds))
+    assert together((0, 1, 2)) - together((0, 1, 3)) > apart((0, 1, 2)) - apart((0, 1, 3)) + 1.0
 
 
 def test_a_rival_is_another_set_that_is_neither_larger_nor_the_same_with_one_more_or_less():

@@ -1,5 +1,7 @@
 """Evidence in closed form against the integral itself, and what it has to prefer."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.integrate import quad
@@ -12,6 +14,7 @@ from camcomp.diagnosis.statistics.evidence import (
     Prior,
     base,
     estimate,
+    freed,
     gram,
     holding_back,
     log_bayes,
@@ -120,3 +123,14 @@ def test_what_needs_no_tolerance_beyond_its_reach_wins():
         return scale((0, 1)) + candidates.prior((0, 1)) - scale((0,)) - candidates.prior((0,))
 
     assert lead(prior(2, tolerance=0.1)) < 0.0 < lead(prior(2, tolerance=0.1, reach=0.2))
+
+
+def test_freed_columns_are_those_of_a_wide_prior():
+    rng = np.random.default_rng(8)
+    D = rng.standard_normal((60, 4))
+    data = gram(D, D @ np.array([0.5, -0.2, 0.1, 0.4]) + rng.standard_normal(60))
+    stated = Prior(np.array([0.1, 0.2, 0.3, 0.1]), np.full(4, 2.0), np.zeros(4), np.zeros(4), np.full(4, np.inf))
+    wide = replace(stated, tolerance=np.array([0.1, 20.0, 0.3, 20.0]))
+    got, wanted = freed(base(data, stated, 1.0), stated, [1, 3]), base(data, wide, 1.0)
+    for name in ("mean", "covariance", "precision"):
+        assert getattr(got, name) == pytest.approx(getattr(wanted, name), abs=1e-9)
