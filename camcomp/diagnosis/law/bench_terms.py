@@ -8,14 +8,13 @@ from functools import cached_property
 
 import numpy as np
 
-from camcomp.diagnosis.fit.bench import Bench, thinned
+from camcomp.diagnosis.fit.bench import Bench, means, thinned
 from camcomp.diagnosis.law.forms import Form
 from camcomp.diagnosis.law.rows import Rows, drive_rows, tip_rows
 from camcomp.diagnosis.law.sizes import Sizes, sizes
 from camcomp.diagnosis.law.white import White
 from camcomp.diagnosis.statistics.noise_model import Noise
 from camcomp.ground.datatypes import Bools, Floats, Ints
-from camcomp.ground.machine_code import kept
 from camcomp.model.law.expression import parse
 
 AT_ONCE = 100  # forms that are evaluated together
@@ -206,28 +205,6 @@ class TermBench:
             rows.append(np.concatenate([r for r, _ in found]) if found else np.zeros(0, int))
             columns.append(np.concatenate([x for _, x in found]) if found else np.zeros((0, v.shape[1])))
         return White(tuple(rows), tuple(columns))
-
-
-def means(values: Floats, ways: Floats, factor: int) -> Floats:
-    """Means (c, n // factor, f) of functions (n, f) times ways (c, n) over `factor` rows each."""
-    columns = np.ascontiguousarray(values.T)
-    out = np.empty((len(ways), len(columns), len(values) // factor))
-    _means(columns, ways, factor, out)
-    return out.transpose(0, 2, 1)
-
-
-@kept
-def _means(columns, ways, factor, out):  # type: ignore[no-untyped-def]  # pragma: no cover
-    channels, functions, n = out.shape
-    for j in range(functions):
-        for c in range(channels):
-            column, way, to, at = columns[j], ways[c], out[c, j], 0
-            for t in range(n):
-                total = 0.0
-                for i in range(factor):
-                    total += column[at + i] * way[at + i]
-                to[t] = total / factor
-                at += factor
 
 
 def _in_cache(lengths: Sequence[int]) -> list[list[int]]:
