@@ -17,11 +17,12 @@ PARAMETERS = (
 
 
 def on_servo(position: Floats, motion: Motion, which: Floats, p: Mapping[str, float]) -> Floats:
-    """Encoder positions (n, m); the lag starts settled."""
+    """Encoder positions (n, m); the lag starts settled, at the speed at which a recording begins."""
     tau = p["time_constant_ms"] * 1e-3
     if tau == 0.0 or not motion.ordered:
         return position
     aimed = which > 0
     out = position.copy()
-    out[:, aimed] = first_order(position[:, aimed], motion.time, tau)
+    seams = None if motion.seams is None else motion.seams.of(aimed)
+    out[:, aimed] = first_order(position[:, aimed], motion.time, tau, seams)
     return out

@@ -12,6 +12,7 @@ import numpy as np
 
 from camcomp.ground.datatypes import Floats
 from camcomp.ground.errors import Location
+from camcomp.model.hysteresis import Seams
 
 Target = Literal["actuator", "machine", "either", "named"]
 
@@ -86,6 +87,7 @@ class Motion:
     held: Callable[[], Floats] | None = None  # (n, m) N or N mm
     told: Callable[[], Floats] | None = None  # (n, 3) mm, program frame
     cut_before_min: float = 0.0  # of cut_min, what was cut in earlier runs
+    seams: Seams | None = None  # where a recording begins or goes on in motion; None: it starts at rest
 
 
 @dataclass(frozen=True, eq=False)

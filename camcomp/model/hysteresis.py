@@ -1,10 +1,11 @@
 """What remembers: lag, play and the direction of travel, as sweeps over ordered instants."""
 
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
-from camcomp.ground.datatypes import Floats
+from camcomp.ground.datatypes import Bools, Floats, Ints
 from camcomp.ground.machine_code import kept
 
 STILL = 1e-9  # mm or rad, round-off of two solutions of the same point
@@ -12,11 +13,37 @@ PRESLIDING_MM = 0.005  # rolling guides take 1 to 20 um to turn their friction r
 PRESLIDING_RAD = 1e-5
 
 
+@dataclass(frozen=True, eq=False)
+class Seams:
+    """Where a recording begins, or goes on after rows that nobody logged, in motion: k instants.
+
+    at (k,): their indices, rising; unseen (k,) s before them, inf at the beginning; speed (k, m) with which it goes on, per s.
+    """
+
+    at: Ints
+    unseen: Floats
+    speed: Floats
+
+    def of(self, actuators: Bools) -> "Seams":
+        """Of some of the actuators."""
+        return replace(self, speed=self.speed[:, actuators])
+
+
 @kept
-def _first_order(x, t, tau):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _first_order(x, t, tau, at, unseen, speed):  # type: ignore[no-untyped-def]  # pragma: no cover
     y = np.empty_like(x)
     y[0] = x[0]
-    for i in range(1, x.shape[0]):
+    seam = 0
+    for i in range(x.shape[0]):
+        if seam < len(at) and at[seam] == i:
+            kept_share = np.exp(-unseen[seam] / tau)
+            for j in range(x.shape[1]):
+                before = y[i - 1, j] - x[i - 1, j] if i > 0 else 0.0
+                y[i, j] = x[i, j] + kept_share * before - (1.0 - kept_share) * tau * speed[seam, j]
+            seam += 1
+            continue
+        if i == 0:
+            continue
         dt = t[i] - t[i - 1]
         decay = np.exp(-dt / tau)
         hold = tau * (1.0 - decay) / dt if dt > 0.0 else 1.0
@@ -26,9 +53,20 @@ def _first_order(x, t, tau):  # type: ignore[no-untyped-def]  # pragma: no cover
     return y
 
 
-def first_order(x: Floats, time: Floats, tau: float) -> Floats:
-    """First-order lag of x (n, m) with time constant tau s, settled at the start; time (n,) s, not decreasing."""
-    out: Floats = _first_order(np.ascontiguousarray(x), np.ascontiguousarray(time), tau)
+def first_order(x: Floats, time: Floats, tau: float, seams: Seams | None = None) -> Floats:
+    """First-order lag of x (n, m) with time constant tau s; time (n,) s, not decreasing.
+
+    At rest and settled at the start; at seams settled at the speed with which the recording goes on.
+    """
+    if seams is None:
+        seams = Seams(np.zeros(0, np.int64), np.zeros(0), np.zeros((0, x.shape[1])))
+    out: Floats = _first_order(
+        *(np.ascontiguousarray(each) for each in (x, time)),
+        tau,
+        seams.at,
+        seams.unseen,
+        np.ascontiguousarray(seams.speed),
+    )
     return out
 
 

@@ -116,3 +116,19 @@ def test_a_ringing_drive_is_no_loop_that_rings_half_as_much(tmp_path):
     plan = Plan(1543009, "unknown", (("servo_resonance", "A2"),), (10.0,), machine="kuka-kr210", **LONG)
     result, _ = answer(plan, tmp_path)
     assert (result["verdict"], [each["effect"] for each in result["causes"]]) == ("unknown", ["unknown"])
+
+
+@pytest.mark.campaign
+def test_a_lag_is_known_though_the_rows_begin_and_go_on_in_a_plunge(tmp_path):
+    """Rapids are not logged; the drive was in motion when they ended."""
+    result, _ = answer(Plan(1731011, "single", (("servo_lag", "z"),), (10.0,), machine="router", **LONG), tmp_path)
+    assert (result["verdict"], [each["target"] for each in result["causes"]]) == ("identified", ["z"])
+
+
+@pytest.mark.campaign
+def test_a_late_drive_is_no_riddle_where_rapids_have_few_rows(tmp_path):
+    """A row every 49 ms, a drive that is 9 ms late: where it stands while a rapid speeds up nobody knows."""
+    causes = (("screw_cyclic", "z"), ("servo_lag", "z"))
+    result, _ = answer(Plan(1732005, "pair", causes, (3.0, 9.0), machine="router", **LONG), tmp_path)
+    assert result["verdict"] == "identified"
+    assert {(each["effect"], each["target"]) for each in result["causes"]} == set(causes)

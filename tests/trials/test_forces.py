@@ -50,8 +50,9 @@ def test_what_swings_faster_than_blocks_of_rows_is_left_as_well(swing_um):
     left = np.random.default_rng(4).normal(0.0, 3e-3, (600, 3))
     left[:, 1] += 1e-3 * swing_um * np.sin(2.0 * np.pi * 9.0 / 16.0 * np.arange(600))
     problem = SimpleNamespace(
-        times=[np.arange(600) * 0.05], inflate=[np.ones((600, 9))], floor=SimpleNamespace(slow_mm=1e-4, axis_mm=3e-3)
-    )
+        times=[np.arange(600) * 0.05], inflate=[np.ones((600, 9))], floor=SimpleNamespace(slow_mm=1e-4, axis_mm=3e-3),
+        bench=SimpleNamespace(actuators=("x", "y", "z")),
+    )  # fmt: skip
     for kind in ("tip", "encoder"):
         found = unexplained_of(problem, kind, [left])
         if swing_um:

@@ -52,7 +52,7 @@ def inflation(bench: Bench) -> list[Floats]:
     In units of the channel's own noise, which is not known yet: here the extra standard deviation in mm or N.
     """
     out = []
-    unsteady = jitter(bench)
+    unsteady, late = jitter(bench), _late(bench)
     for k, run in enumerate(bench.runs):
         observed = bench.observed(k)
         extra = np.zeros_like(observed)
@@ -68,16 +68,34 @@ def inflation(bench: Bench) -> list[Floats]:
             place = run.run_path.place(t)
             slope = np.abs(bench.twin.rotation.T @ place.of(bench.slopes[k].tip_rho))
             m = len(bench.actuators)
-            # a tip that was read between the rows stands where nobody saw the speed change
+            # a tip that was read between the rows, and a drive that is late, stand where nobody saw the speed change
             unseen = run.run_path.between_s * usual * BETWEEN_ROWS
-            extra[:, :3] = (TIMING_S**2 + unseen) * np.einsum("nij,nj->ni", slope, change)
-            extra[:, 3 : 3 + m] = TIMING_S**2 * change
+            of_drives = (TIMING_S**2 + late * usual * BETWEEN_ROWS) * change
+            extra[:, :3] = np.einsum("nij,nj->ni", slope, of_drives + unseen * change)
+            extra[:, 3 : 3 + m] = of_drives
             if unsteady > 0.0:
                 extra[:, :3] = np.hypot(extra[:, :3], unsteady * np.abs(_speed(bench, k)))
         extra = np.hypot(extra, _doubt(bench, k))
         extra = np.where(np.isfinite(observed), extra, np.nan)
         out.append(thinned(extra, run.thin))
     return out
+
+
+def _late(bench: Bench) -> Floats:
+    """By how much (m,) s the drives are behind their set-points, from the encoders where they are fast; 0 where nobody knows."""
+    m = len(bench.actuators)
+    behind: list[list[Floats]] = [[] for _ in range(m)]
+    for k, run in enumerate(bench.runs):
+        path = run.run_path
+        if not path.ordered or len(path.time) < 3:
+            continue
+        gap = (bench.observed(k) - bench.channels(k, bench.nominal[k]))[:, 3 : 3 + m]
+        speed = np.gradient(path.grid_rho, path.grid, axis=0)
+        for j in range(m):
+            v = np.interp(path.time, path.grid, speed[:, j])
+            fast = np.isfinite(gap[:, j]) & (np.abs(v) > float(np.mean(np.abs(v))))
+            behind[j].append(-gap[fast, j] / v[fast])
+    return np.array([max(float(np.median(np.concatenate([*each, [0.0]]))), 0.0) for each in behind])
 
 
 def _doubt(bench: Bench, k: int) -> Floats:

@@ -48,7 +48,7 @@ LARGE_SCALES = 3.0  # size of an effect, in its typical ones, that would show at
 MOST_SCALES = 8.0  # the same that nobody believes of a rival that fits as well
 HOPELESS_LOG = 12.0  # log evidence behind the best at which a set is not fitted any more
 LEAST_PROBABILITY = 0.02  # of a set whose foretelling is looked at
-LOOKALIKE = 0.04  # probability that what a cause explains down to the noise is something that no library has and that looks the same
+LOOKALIKE = 0.01  # probability that what a cause explains down to the noise is something that no library has and that looks the same
 INSTEAD = 0.95  # probability of something unknown in place of a cause, where without it nothing unknown would show
 POINTED = 0.85  # share of what is left that one actuator has to have to be that place
 

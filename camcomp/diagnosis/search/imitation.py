@@ -80,8 +80,10 @@ def credibility(
         missed = float(unlike[first:].sum())
         # what rows do not need where nothing unknown is, nothing unknown replaces
         needless = float(np.exp(logsumexp(value[0][has[0] == 0.0]) - logsumexp(value[0]))) if first else 0.0
-        # the search, whose evidence is not strained, has found the member: where nothing unknown takes its place, one word against another
-        present[i] = float(np.sum(np.exp(value - whole) * has) + EITHER * (unlike[:first].sum() + needless * missed))
+        # the search, whose evidence is not strained, has found the member: that rows need it is its word, that nothing unknown
+        # was meant is the prior's
+        found = (1.0 - UNKNOWN) * (unlike[:first].sum() + needless * missed)
+        present[i] = float(np.sum(np.exp(value - whole) * has) + found)
         replaced[i] = (1.0 - needless) * missed
     return present, replaced
 

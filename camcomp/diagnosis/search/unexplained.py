@@ -111,7 +111,7 @@ def unexplained_of(problem: Problem, kind: str, at_tip: Sequence[Floats]) -> Une
     place: list[tuple[int, float, float]] = []
     for k, values in enumerate(at_tip):
         t = problem.times[k]
-        inflate = problem.inflate[k][:, :3] if kind == "tip" else np.ones_like(values)
+        inflate = _inflation(problem, k, kind, values)
         values = np.where(inflate < 3.0, values, np.nan)
         noise = np.array([row_scatter(x, t) for x in values.T])
         noise = np.where(np.isfinite(noise), noise, 0.0)
@@ -146,6 +146,16 @@ def unexplained_of(problem: Problem, kind: str, at_tip: Sequence[Floats]) -> Une
     if its_z > SURE_Z:
         mean, z, energy = max(mean, 0.0) + float(fast.sum()), max(z, its_z), np.maximum(energy, 0.0) + len(e) * fast
     return Unexplained(kind, 1e3 * float(np.sqrt(max(mean, 0.0))), z, 1e3 * float(np.sqrt(max(local, 0.0))), at, energy)
+
+
+def _inflation(problem: Problem, k: int, kind: str, values: Floats) -> Floats:
+    """How much less certain than their noise the values (n, 3) of one kind in run k are, >= 1."""
+    if kind == "tip":
+        return problem.inflate[k][:, :3]
+    m = len(problem.bench.actuators)
+    if kind == "encoder":  # each moves the tip along its own way: the worst of them counts
+        return np.repeat(np.nanmax(problem.inflate[k][:, 3 : 3 + m], axis=1, initial=1.0)[:, None], 3, axis=1)
+    return np.ones_like(values)
 
 
 def _swing(rows: Floats, inflate: Floats, noisiest: float) -> tuple[Floats, Floats]:

@@ -18,6 +18,7 @@ from scipy.interpolate import Akima1DInterpolator, PchipInterpolator
 from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import Bools, Floats, Ints
 from camcomp.model.cutting.track import Track
+from camcomp.model.hysteresis import Seams
 from camcomp.model.motion.alignment import Aligned
 from camcomp.model.motion.node_pieces import NODES, SPLIT, Places, basis_at
 from camcomp.model.motion.run_path import MOST_STEPS, STEP_S, Driven, RunPath
@@ -99,8 +100,25 @@ def driven_path(
     return RunPath(
         name, time, started, True, node_tip, node_force, node_rho, node_time, grid, grid_rho,
         forces.cut_at(time, grid), pieces.of(grid), len(pieces.begin), pieces.at, rho, temperature,
-        driven=Driven(row_tip, row_force, np.abs(vectors(forces.doubt)), lead_tip),
+        driven=Driven(row_tip, row_force, np.abs(vectors(forces.doubt)), lead_tip, _seams(time, grid, lead)),
     )  # fmt: skip
+
+
+def _seams(time: Floats, grid: Floats, lead: Callable[[Floats], Floats]) -> Seams:
+    """Where rows (n,) s begin, and go on after some that are missing: the instants on either side of such a row."""
+    rows = np.repeat(np.flatnonzero(np.append(True, _missing(time))), 2)
+    before = np.searchsorted(grid, time[rows], side="right") - 1
+    at = before + np.arange(len(rows)) % 2
+    alone = np.append(np.diff(at) > 0, True) & (at < len(grid))  # of several in one step of the grid the last
+    unseen = np.where(rows > 0, time[rows] - time[rows - 1], np.inf)
+    speed = (lead(time[rows] + STEP_S) - lead(time[rows])) / STEP_S
+    return Seams(at[alone], unseen[alone], speed[alone])
+
+
+def _missing(time: Floats) -> Bools:
+    """Whether rows are missing (n - 1,) between each and the next."""
+    step = np.diff(time)
+    return np.asarray(step > _MISSING * float(np.median(step)) if len(step) else np.zeros(0, bool))
 
 
 def cutting_forces(
@@ -292,9 +310,8 @@ def _smooth(time: Floats, values: Floats) -> Callable[[Floats], Floats]:
     if len(time) < 3:
         return lambda at: np.column_stack([np.interp(at, time, v) for v in values.T])
     step, way = np.diff(time), np.abs(np.diff(values, axis=0))
-    missing = step > _MISSING * float(np.median(step))
     rest = np.pad(way <= _RESTS * way.max(axis=0), ((2, 2), (0, 0)))
-    held = missing[:, None] | (rest[3:-1] & rest[4:]) | (rest[1:-3] & rest[:-4])
+    held = _missing(time)[:, None] | (rest[3:-1] & rest[4:]) | (rest[1:-3] & rest[:-4])
     lead = Akima1DInterpolator(time, values, axis=0)
     with np.errstate(over="ignore"):  # beside slopes of round-off, whose harmonic mean is nothing
         over = PchipInterpolator(time, values, axis=0)

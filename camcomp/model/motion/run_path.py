@@ -9,7 +9,7 @@ import numpy as np
 from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import Bools, Floats, Ints
 from camcomp.model.cutting.track import Track
-from camcomp.model.hysteresis import direction
+from camcomp.model.hysteresis import Seams, direction
 from camcomp.model.motion.node_pieces import Pieces, Places, cut
 from camcomp.model.motion.timeline import Timeline
 
@@ -24,13 +24,14 @@ class Driven:
     """What is known at the rows of a run that was really driven, machine frame.
 
     tip (n, 3) mm: nominal, where the set-points of the row lead; force (n, 3) N; doubt (n, 3) N: half of what the force
-    may be off by; lead: times (k,) -> nominal tips (k, 3).
+    may be off by; lead: times (k,) -> nominal tips (k, 3); seams: instants of the grid where the recording begins or goes on.
     """
 
     tip: Floats
     force: Floats
     doubt: Floats
     lead: Callable[[Floats], Floats]
+    seams: Seams
 
 
 @dataclass(frozen=True, eq=False)

@@ -341,6 +341,7 @@ class Twin:
             signal_path.springs(self.robot),
             run_path.ordered,
             cut_before_min=run_path.cut_before_min,
+            seams=None if run_path.driven is None else run_path.driven.seams,
         )
         encoder = signal_path.controlled(servo, self.actuators, motion)
         speed = np.gradient(encoder, t, axis=0) if run_path.ordered and len(t) > 1 else zero
@@ -379,6 +380,7 @@ def _at(run_path: RunPath, grid: Motion, at: Floats, rho: Floats | None) -> Moti
         direction=_interpolate(run_path, at, grid.direction),
         held=None,
         told=None,
+        seams=None,
     )
 
 
