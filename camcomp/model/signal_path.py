@@ -52,14 +52,15 @@ def controlled(causes: Sequence[Cause], actuators: tuple[str, ...], motion: Moti
 
 
 def driven(causes: Sequence[Cause], actuators: tuple[str, ...], motion: Motion) -> tuple[Floats, Motion]:
-    """Carriage minus encoder (n, m), and the motion as the guides see it, with the nut where play and screw leave it.
+    """Carriage minus encoder (n, m), and the motion as the guides see it, if there are any: with the nut where play and screw
+    leave it.
 
     Effects with a force of their own come last: guides hold back the carriage, behind the screw and its play.
     """
     error = np.zeros_like(motion.encoder)
     drives = list(_hooks(causes, "on_drive"))
     for guide in (False, True):
-        if guide:
+        if guide and any(cause.hook("on_drive_force") is not None for cause in causes):
             motion = replace(motion, nut=motion.encoder + error)
         for hook, cause in drives:
             if (cause.hook("on_drive_force") is not None) == guide:

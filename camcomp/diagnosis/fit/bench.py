@@ -13,6 +13,7 @@ import numpy as np
 
 from camcomp.diagnosis.fit.measured import Measured, stack
 from camcomp.ground.datatypes import Bools, Floats, Path
+from camcomp.ground.machine_code import kept
 from camcomp.model.effect import Cause, Parameter
 from camcomp.model.motion.loaded_structure import Slopes, Solved, rows_together
 from camcomp.model.motion.run_path import RunPath
@@ -230,6 +231,28 @@ def thinned(values: Floats, factor: int) -> Floats:
     for i in range(1, factor):
         out += blocks[:, i]
     return out / factor
+
+
+def means(values: Floats, ways: Floats, factor: int) -> Floats:
+    """Means (c, n // factor, f) of functions (n, f) times ways (c, n) over `factor` rows each."""
+    columns = np.ascontiguousarray(values.T)
+    out = np.empty((len(ways), len(columns), len(values) // factor))
+    _means(columns, ways, factor, out)
+    return out.transpose(0, 2, 1)
+
+
+@kept
+def _means(columns, ways, factor, out):  # type: ignore[no-untyped-def]  # pragma: no cover
+    channels, functions, n = out.shape
+    for j in range(functions):
+        for c in range(channels):
+            column, way, to, at = columns[j], ways[c], out[c, j], 0
+            for t in range(n):
+                total = 0.0
+                for i in range(factor):
+                    total += column[at + i] * way[at + i]
+                to[t] = total / factor
+                at += factor
 
 
 def cause_of(candidate: CandidateCause, coordinates: Mapping[str, float]) -> Cause:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from camcomp.diagnosis.fit.bench import Bench, CandidateCause, cause_of, thinned
+from camcomp.diagnosis.fit.bench import Bench, CandidateCause, cause_of, means
 from camcomp.diagnosis.fit.columns import Columns, shape_default
 from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.diagnosis.statistics.cause_sets import total
@@ -13,10 +13,10 @@ from camcomp.diagnosis.statistics.evidence import PRIOR_WIDTHS, Gram
 from camcomp.ground.datatypes import Floats, Ints
 from camcomp.model import signal_path
 from camcomp.model.effect import Parameter
-from camcomp.model.motion.loaded_structure import applied
 
 _FINER = 17  # values between the neighbours of the best
-_AT_ONCE = 4  # values of a shape whose columns are made white together
+_AT_ONCE = 8  # values of a shape whose columns are made white together
+White = Callable[[int, ByChannel], ByChannel]  # what makes columns of a run white
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +31,7 @@ class Beside:
     others: Ints
     half: Floats  # (o, o): its square is the inverse of the others' products
 
-    def taken(self, columns: Sequence[Floats]) -> Floats:
+    def taken(self, columns: Sequence[ByChannel]) -> Floats:
         """What of white columns (w, d) per run lies in the others: (o, d), in coordinates whose products are those of columns."""
         return np.asarray(
             self.half @ sum((W.T @ C for W, C in zip(self.white, columns, strict=True)), np.zeros(1))[self.others]
@@ -53,9 +53,7 @@ def beside(
     return Beside([r - W @ a for r, W in zip(residual, white, strict=True)], white, others, half)
 
 
-def best_shape(
-    bench: Bench, candidate: CandidateCause, left: Beside, whitened: Callable[[int, Floats], Floats]
-) -> dict[str, float] | None:
+def best_shape(bench: Bench, candidate: CandidateCause, left: Beside, whitened: White) -> dict[str, float] | None:
     """The scanned shape whose columns explain most of what is left; None where the effect is not scanned."""
     p = candidate.shapes[0]
     values = np.asarray(p.scan)
@@ -72,7 +70,7 @@ def best_shape(
 
 def _gains(
     bench: Bench, candidate: CandidateCause, shapes: Sequence[Mapping[str, float]], left: Beside,
-    whitened: Callable[[int, Floats], Floats],
+    whitened: White,
 ) -> Floats | None:  # fmt: skip
     """Chi-square (v,) that an effect explains with each of v shapes, its size within its usual one; None where it is not scanned.
 
@@ -80,27 +78,23 @@ def _gains(
     """
     gains = []
     for i in range(0, len(shapes), _AT_ONCE):  # all together they are as large as all other columns
-        each = [quick_columns(bench, candidate, shape) for shape in shapes[i : i + _AT_ONCE]]
-        columns = [column for of_shape in each if of_shape is not None for column in of_shape]
-        if not columns:
+        some, own = shapes[i : i + _AT_ONCE], len(candidate.parameters)
+        columns = quick_columns(bench, candidate, some)
+        if columns is None:
             return None
-        v, own = len(each), len(candidate.parameters)
-        white = [
-            whitened(k, np.stack([c[k] for c in columns], axis=2)).reshape(len(r), -1) for k, r in enumerate(left.rest)
-        ]
-        lost = left.taken(white).reshape(-1, v, own).transpose(1, 2, 0)
-        h, G = np.zeros((v, own)), np.tile((1.0 / PRIOR_WIDTHS[-1] ** 2) * np.eye(own), (v, 1, 1))
-        G = G - lost @ lost.transpose(0, 2, 1)
-        for W, r in zip(white, left.rest, strict=True):
-            by_shape = np.ascontiguousarray(W.reshape(len(r), v, own).transpose(1, 2, 0))
-            h, G = h + by_shape @ r, G + by_shape @ by_shape.transpose(0, 2, 1)
+        white = [whitened(k, each) for k, each in enumerate(columns)]
+        lost = left.taken(white)
+        products = sum((W.T @ W for W in white), -lost.T @ lost).reshape(len(some), own, len(some), own)
+        each = np.arange(len(some))
+        G = products[each, :, each] + (1.0 / PRIOR_WIDTHS[-1] ** 2) * np.eye(own)
+        h = sum((W.T @ r for W, r in zip(white, left.rest, strict=True)), np.zeros(1)).reshape(-1, own)
         gains.append(np.einsum("vp,vp->v", h, np.linalg.solve(G, h[:, :, None])[:, :, 0]))
     return np.concatenate(gains)
 
 
 def settled_interval(
     bench: Bench, candidate: CandidateCause, shape: Mapping[str, float], left: Beside,
-    whitened: Callable[[int, Floats], Floats],
+    whitened: White,
 ) -> dict[str, float]:  # fmt: skip
     """The interval near one that was found whose columns explain most when they lose to the others what the leftover has lost.
 
@@ -129,24 +123,36 @@ def reach(p: Parameter, value: float) -> float:
     return float(np.clip(0.5 * np.sort(gaps[gaps > 1e-9])[:2].max(initial=0.0), 0.005, 0.4))
 
 
-def quick_columns(bench: Bench, candidate: CandidateCause, shape: Mapping[str, float]) -> list[list[Floats]] | None:
-    """Columns of an effect of the drive alone, straight from its hooks; None for any other effect."""
-    if signal_path.stages_of(candidate.effect) == {"drive"}:
-        out = []
-        for p in candidate.parameters:
-            cause = cause_of(candidate, {**shape, p.name: p.scale})
-            per_run = []
-            for k, run in enumerate(bench.runs):
-                motion = bench.nominal[k].motion
-                moved, guided = signal_path.driven([cause], bench.actuators, motion)
-                effort = signal_path.drive_forces([cause], bench.actuators, guided)
-                tip = applied(bench.row_slopes(k), moved)
-                tip, m = thinned(bench.turned(k, tip), run.thin), len(bench.actuators)
-                values = np.zeros((len(tip), 6 + 2 * m))
-                values[:, :3] = tip
-                if effort is not None:
-                    values[:, 3 + m : 3 + 2 * m] = thinned(effort, run.thin)
-                per_run.append(values)
-            out.append(per_run)
-        return out
-    return None
+def quick_columns(
+    bench: Bench, candidate: CandidateCause, shapes: Sequence[Mapping[str, float]]
+) -> list[ByChannel] | None:
+    """Columns of an effect of the drive alone, straight from its hooks; None for any other effect.
+
+    Per run over its channels of n' rows each, thinned: those of every shape behind those of the one before.
+    """
+    if signal_path.stages_of(candidate.effect) != {"drive"}:
+        return None
+    causes = [cause_of(candidate, {**shape, p.name: p.scale}) for shape in shapes for p in candidate.parameters]
+    m, every = len(bench.actuators), np.arange(len(causes))
+    aimed, out = np.flatnonzero(causes[0].which(bench.actuators)), []
+    for k, run in enumerate(bench.runs):
+        motion = bench.nominal[k].motion
+        n = len(motion.time)
+        moved, effort = np.zeros((2, len(aimed), len(causes), n))
+        for i, cause in enumerate(causes):
+            error, guided = signal_path.driven([cause], bench.actuators, motion)
+            moved[:, i] = error[:, aimed].T
+            force = signal_path.drive_forces([cause], bench.actuators, guided)
+            if force is not None:
+                effort[:, i] = force[:, aimed].T
+        parts = [(every[:0], np.zeros((n // run.thin, 0)))] * (6 + 2 * m)
+        ways = [np.ascontiguousarray(bench.turned(k, bench.row_slopes(k)[:, :, j]).T) for j in aimed]
+        tip = np.zeros((3, n // run.thin, len(causes)))
+        for each, way in zip(moved, ways, strict=True):
+            tip += means(each.T, way, run.thin)
+        parts[:3] = [(every, channel) for channel in tip]
+        if force is not None:
+            for j, each in zip(aimed, effort, strict=True):
+                parts[3 + m + j] = every, means(each.T, np.ones((1, n)), run.thin)[0]
+        out.append(ByChannel(len(causes), tuple(parts)))
+    return out

@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from camcomp.diagnosis.fit.bench import Bench, CandidateCause
+from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.ground.datatypes import Floats
 
 LEAST_GAIN = 60.0  # chi-square of one interval; the best of 1e5 by chance is 20
@@ -26,17 +27,17 @@ def never_ending(candidate: CandidateCause) -> dict[str, float]:
 
 
 def best_interval(
-    bench: Bench, candidate: CandidateCause, always: Sequence[Sequence[Floats]], rest: Sequence[Floats],
-    whitened: Callable[[int, Floats], Floats], places: Callable[[int], Floats],
+    bench: Bench, candidate: CandidateCause, always: Sequence[ByChannel], rest: Sequence[Floats],
+    places: Callable[[int], Floats],
 ) -> dict[str, float] | None:  # fmt: skip
     """The two instants, by the names of the candidate's shapes, between which it explains most of `rest` (white, per run).
 
-    always: columns (n, c), per parameter and run, of the candidate as if it never ended. places: where in the time of a run its white rows lie, 0 to 1. None where no interval stands out.
+    always: white columns (w, p) per run of the candidate as if it never ended. places: where in the time of a run its white rows lie, 0 to 1. None where no interval stands out.
     """
     start, end = (each.name for each in candidate.shapes)
     found: list[tuple[float, float, float]] = []
     for k, run in enumerate(bench.runs):
-        columns = whitened(k, np.stack([each[k] for each in always], axis=2))
+        columns = always[k][:, np.arange(always[k].width)]
         order = np.argsort(places(k), kind="stable")
         at = run.run_path.started + run.run_path.time[0] + places(k)[order] * np.ptp(run.run_path.time)
         instants, rows = np.unique(at, return_inverse=True)

@@ -52,14 +52,14 @@ def without_twins(bench: Bench, candidates: Sequence[CandidateCause]) -> list[Ca
     for each in candidates:
         columns = None
         if len(each.parameters) > 1 and any(p.placed for p in each.shapes):
-            columns = quick_columns(bench, each, never_ending(each))
+            columns = quick_columns(bench, each, [never_ending(each)])
         if columns is not None:
             seen = [np.isfinite(bench.residual(k)) for k in range(len(bench.runs))]
-            flat = [np.concatenate([c[s] for c, s in zip(per, seen, strict=True)]) for per in columns]
+            flat = np.concatenate([c.dense()[s] for c, s in zip(columns, seen, strict=True)]).T
             twins = [
                 p.name
                 for i, p in enumerate(each.parameters)
-                if i and np.abs(flat[i]).max(initial=0.0) > 0.0 and _alike(flat[i][:, None], np.stack(flat[:i], axis=1))
+                if i and np.abs(flat[i]).max(initial=0.0) > 0.0 and _alike(flat[i][:, None], flat[:i].T)
             ]
             each = replace(each, without=tuple(twins))
         out.append(each)

@@ -92,6 +92,10 @@ class Problem:
         """White rows (w, j) of channels (n, c, j) of run k."""
         return self.noise.rows(k, values, self.inflate[k], self.times[k])
 
+    def white_columns(self, k: int, columns: ByChannel) -> ByChannel:
+        """The same of columns over the channels of run k, n rows each."""
+        return self.noise.by_channel(k, columns, self.inflate[k], self.times[k])
+
     def _white_at(self, readings: Sequence[Reading]) -> list[Floats]:
         """White residuals (w,) of all runs at readings."""
         return [self.whitened(k, self.bench.difference(k, r)[:, :, None])[:, 0] for k, r in enumerate(readings)]
@@ -459,20 +463,21 @@ def _scanned(problem: Problem) -> Problem:
     for i in scanned:
         candidate = problem.columns.candidates[i]
         if problem.passing(i):
-            always = quick_columns(problem.bench, candidate, never_ending(candidate))
+            always = quick_columns(problem.bench, candidate, [never_ending(candidate)])
             if always is None:
                 continue
-            best = best_interval(problem.bench, candidate, always, left.rest, problem.whitened, problem.row_places)
+            white = [problem.white_columns(k, each) for k, each in enumerate(always)]
+            best = best_interval(problem.bench, candidate, white, left.rest, problem.row_places)
             if best is not None:
-                best = settled_interval(problem.bench, candidate, best, left, problem.whitened)
+                best = settled_interval(problem.bench, candidate, best, left, problem.white_columns)
         else:
-            best = best_shape(problem.bench, candidate, left, problem.whitened)
+            best = best_shape(problem.bench, candidate, left, problem.white_columns)
         if best is None:
             continue
         problem.shapes[i] = best
         columns = candidate_columns(problem.bench, candidate, best)
         changed.append((list(problem.candidates.columns[i]), columns))
-    blocks, white = list(problem.columns.blocks), list(problem.white)
+    blocks, whole = list(problem.columns.blocks), list(problem.white)
     floor_um = problem.floor.tip_um
     prior = replace(problem.prior, tolerance=problem.prior.tolerance.copy(), reach=problem.prior.reach.copy())
     for index, columns in changed:
@@ -484,5 +489,5 @@ def _scanned(problem: Problem) -> Problem:
         for k in range(len(blocks)):
             new = np.stack([each[k] for each in columns], axis=2)
             blocks[k] = blocks[k].exchanged(index, channel_behind_channel(new))
-            white[k] = white[k].exchanged(index, problem.whitened(k, new))
-    return replace(problem, columns=replace(problem.columns, blocks=tuple(blocks), prior=prior), white=white)
+            whole[k] = whole[k].exchanged(index, problem.whitened(k, new))
+    return replace(problem, columns=replace(problem.columns, blocks=tuple(blocks), prior=prior), white=whole)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache, cached_property, partial
-from itertools import pairwise
+from functools import cached_property
 
 import numpy as np
 
-from camcomp.diagnosis.fit.bench import Bench, thinned
+from camcomp.diagnosis.fit.bench import Bench, means, thinned
 from camcomp.diagnosis.law.forms import Form
 from camcomp.diagnosis.law.rows import Rows, drive_rows, tip_rows
 from camcomp.diagnosis.law.sizes import Sizes, sizes
@@ -19,6 +18,7 @@ from camcomp.ground.datatypes import Bools, Floats, Ints
 from camcomp.model.law.expression import parse
 
 AT_ONCE = 100  # forms that are evaluated together
+ROWS_AT_ONCE = 16_000  # rows of several runs for which a function is worked out in one go
 
 
 @dataclass(frozen=True)
@@ -64,6 +64,7 @@ class TermBench:
         self._rows: dict[tuple[str, int], list[Rows]] = {}
         self._ways: dict[Spot, list[Floats]] = {}
         self._squares: dict[Spot, list[Floats]] = {}
+        self._reaches: dict[tuple[Spot, int], tuple[list[int], Floats]] = {}
 
     def rows(self, spot: Spot) -> Sequence[Rows]:
         """Covariates per run where the spot is."""
@@ -85,18 +86,21 @@ class TermBench:
         """Functions of forms (n, f), one behind the other, per run: mm or rad per unit of their coefficients; 0 where they are none."""
         rows, known = self.rows(spot), dict.fromkeys(self.rows(spot)[0])
         parsed = [parse(text, known) for form in forms for text in form.said]
-        ends = np.cumsum([0, *(r.rows for r in rows)])
-        out = np.empty((int(ends[-1]), len(parsed)))
-        every = _Joined(rows)
-        for i, each in enumerate(parsed):
-            if each.remembers:
-                for r, (a, b) in zip(rows, pairwise(ends), strict=True):
-                    out[a:b, i] = each(r, r.rows)
-            else:
-                out[:, i] = each(every, len(out))
-        if not np.isfinite(out).all():
-            np.nan_to_num(out, copy=False)
-        return [out[a:b] for a, b in pairwise(ends)]
+        out = [np.empty((len(parsed), r.rows)) for r in rows]  # rows of a function lie together, as they are worked out
+        for some in _in_cache([r.rows for r in rows]):
+            every = _Joined([rows[k] for k in some])
+            ends = np.cumsum([rows[k].rows for k in some])
+            for i, each in enumerate(parsed):
+                if each.remembers:
+                    for k in some:
+                        out[k][i] = each(rows[k], rows[k].rows)
+                else:
+                    for k, values in zip(some, np.split(each(every, int(ends[-1])), ends[:-1]), strict=True):
+                        out[k][i] = values
+        for own in out:
+            if not np.isfinite(own).all():
+                np.nan_to_num(own, copy=False)
+        return [own.T for own in out]
 
     def tip_ways(self, spot: Spot) -> list[Floats]:
         """By how much the tip (n, 3), program frame, moves per unit at the spot, per run."""
@@ -144,17 +148,24 @@ class TermBench:
             out.append(found)
         return out
 
-    def _reached(
-        self, spot: Spot, k: int, values: Floats, alone: Callable[[], Floats] | None = None
-    ) -> dict[int, Floats]:
-        """Functions (n, f) of run k in the channels that the spot reaches, thinned: (n', f) each; alone: they themselves, thinned."""
-        thin = self.bench.runs[k].thin
-        if spot.on == "structure" and self.bench.runs[k].turn is None:
-            return {spot.index: thinned(values, thin) if alone is None else alone()}
-        if spot.on == "control" and self._seen_by_encoders(k):
-            return {3 + spot.index: thinned(values, thin)}
-        way = self.bench.turned(k, self.tip_ways(spot)[k])
-        return {c: thinned(way[:, c : c + 1] * values, thin) for c in range(3) if np.abs(way[:, c]).max() > 1e-9}
+    def _reach(self, spot: Spot, k: int) -> tuple[list[int], Floats]:
+        """The channels that a spot reaches in run k, and by how much (c, n) each moves per unit at the spot."""
+        if (spot, k) not in self._reaches:
+            n = len(self.bench.runs[k].run_path.time)
+            if spot.on == "structure" and self.bench.runs[k].turn is None:
+                self._reaches[spot, k] = [spot.index], np.ones((1, n))
+            elif spot.on == "control" and self._seen_by_encoders(k):
+                self._reaches[spot, k] = [3 + spot.index], np.ones((1, n))
+            else:
+                ways = np.ascontiguousarray(self.bench.turned(k, self.tip_ways(spot)[k]).T)
+                moved = np.flatnonzero(np.abs(ways).max(axis=1) > 1e-9)
+                self._reaches[spot, k] = moved.tolist(), ways[moved]
+        return self._reaches[spot, k]
+
+    def _reached(self, spot: Spot, k: int, values: Floats) -> dict[int, Floats]:
+        """Functions (n, f) of run k in the channels that the spot reaches, thinned: (n', f) each."""
+        channels, ways = self._reach(spot, k)
+        return dict(zip(channels, means(values, ways, self.bench.runs[k].thin), strict=True))
 
     def white_rows(self, spot: Spot) -> int:
         """How many white rows of all runs the spot reaches."""
@@ -163,10 +174,9 @@ class TermBench:
 
     def seen(self, spot: Spot) -> list[Bools]:
         """Rows (n',) per run, thinned, in which some channel that the spot reaches is known."""
-        ones = [np.ones((len(way), 1)) for way in self.tip_ways(spot)]
         return [
-            np.asarray(np.isfinite(inflate[:, list(self._reached(spot, k, one))]).any(axis=1))
-            for k, (inflate, one) in enumerate(zip(self.inflate, ones, strict=True))
+            np.asarray(np.isfinite(inflate[:, self._reach(spot, k)[0]]).any(axis=1))
+            for k, inflate in enumerate(self.inflate)
         ]
 
     def channels(self, spot: Spot, values: Sequence[Floats]) -> list[Floats]:
@@ -181,20 +191,11 @@ class TermBench:
 
     def white(self, spot: Spot, values: Sequence[Floats]) -> White:
         """Functions (n, f) per run as white columns of the channels that the spot reaches."""
-        return self.whites([spot], values)[0]
-
-    def whites(self, spots: Sequence[Spot], values: Sequence[Floats]) -> list[White]:
-        """The same at several spots: what is the same for all of them is worked out once."""
-        runs = zip(values, self.bench.runs, strict=True)
-        alone = [cache(partial(thinned, v, run.thin)) for v, run in runs]
-        return [self._white(spot, values, alone) for spot in spots]
-
-    def _white(self, spot: Spot, values: Sequence[Floats], alone: Sequence[Callable[[], Floats]]) -> White:
         rows, columns = [], []
         for k, v in enumerate(values):
             found = [
                 (self._slices[k][c], self.noise.rows(k, each[:, None, :], self.inflate[k], self.times[k], c))
-                for c, each in self._reached(spot, k, v, alone[k]).items()
+                for c, each in self._reached(spot, k, v).items()
                 if c in self._slices[k]
             ]
             if len(found) == 1:  # nothing has to be copied then
@@ -204,3 +205,14 @@ class TermBench:
             rows.append(np.concatenate([r for r, _ in found]) if found else np.zeros(0, int))
             columns.append(np.concatenate([x for _, x in found]) if found else np.zeros((0, v.shape[1])))
         return White(tuple(rows), tuple(columns))
+
+
+def _in_cache(lengths: Sequence[int]) -> list[list[int]]:
+    """Numbers of runs of some lengths, those next to each other together as long as the processor keeps their rows at hand."""
+    out: list[list[int]] = []
+    for k, n in enumerate(lengths):
+        if out and n + sum(lengths[i] for i in out[-1]) <= ROWS_AT_ONCE:
+            out[-1].append(k)
+        else:
+            out.append([k])
+    return out

@@ -46,7 +46,7 @@ class TermGrid:
         for i in range(0, len(self.forms), self.at_once):
             some = self.forms[i : i + self.at_once]
             values = self.bench.values(self.spots[0], *some)
-            part = slice(ends[i], ends[i + len(some)]), self.bench.whites(self.spots, values)
+            part = slice(ends[i], ends[i + len(some)]), [self.bench.white(spot, values) for spot in self.spots]
             if self.keep:
                 kept.append(part)
             yield part

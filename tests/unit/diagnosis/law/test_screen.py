@@ -42,9 +42,8 @@ class Runs(TermBench):
     def rows(self, spot):
         return self.runs
 
-    def whites(self, spots, values):
-        rows = [np.arange(len(v)) for v in values]
-        return [White(tuple(r + len(r) * spot.index for r in rows), tuple(values)) for spot in spots]
+    def white(self, spot, values):
+        return White(tuple(np.arange(len(v)) + len(v) * spot.index for v in values), tuple(values))
 
 
 def screen(bench, keep, at_once):

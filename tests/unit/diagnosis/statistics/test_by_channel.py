@@ -35,7 +35,8 @@ def test_what_is_zero_takes_no_place(lean, values):
 def test_it_multiplies_as_an_array(lean, whole):
     rng = np.random.default_rng(2)
     a, X = rng.standard_normal((K, 2)), rng.standard_normal((len(whole), 4))
-    other = ByChannel.of([X])
+    X[N : 2 * N] = 0.0
+    other, alike = ByChannel.of([X]), ByChannel.of(X.reshape(CHANNELS, N, 4))
     assert lean.shape == whole.shape and len(lean) == len(whole)
     for got, true in (
         (lean @ a, whole @ a),
@@ -45,6 +46,8 @@ def test_it_multiplies_as_an_array(lean, whole):
         (lean.T @ lean, whole.T @ whole),
         (lean.T @ other, whole.T @ X),
         (other.T @ lean, X.T @ whole),
+        (lean.T @ alike, whole.T @ X),
+        (alike.T @ lean, X.T @ whole),
     ):
         assert got == pytest.approx(true, abs=1e-12)
 
