@@ -116,6 +116,17 @@ def search_causes(problem: Problem) -> CauseSearch:
         if max(done.values(), key=value) is best:
             break
     sound, looked = Sound(problem), set[Members]()
+
+    def look_beside(near: Fitted) -> None:
+        looked.add(near.members)
+        scale = Scale(total(near.grams), problem.prior, problem.candidates)
+        others = [(v, m, near) for v, m in exchanges(scale, near.members, every, EXCHANGED) if m not in done]
+        _fit_best(others, fit, EXCHANGED, value(near))
+        if near.members and len(near.members) < EXCHANGEABLE:
+            two = parted(scale, near.members, every, EXCHANGED)
+            good = [(v, m, near) for v, m in two if v > value(near) - EQUAL_LOG_ODDS and m not in done]
+            _fit_best(good, fit, EXCHANGED, value(near))
+
     for _ in range(EXCHANGES):  # what was taken first may stand for what was found last, and one actuator for another
         for f in sorted(done.values(), key=value, reverse=True):
             if sound(f):
@@ -127,24 +138,17 @@ def search_causes(problem: Problem) -> CauseSearch:
         tied = [f for f in right if f.members not in looked and value(f) > value(best) - EQUAL_LOG_ODDS]
         if not tied or len(best.members) > EXCHANGEABLE:
             break
-        near = max(tied, key=value)
-        looked.add(near.members)
-        scale = Scale(total(near.grams), problem.prior, problem.candidates)
-        others = [(v, m, near) for v, m in exchanges(scale, near.members, every, EXCHANGED) if m not in done]
-        _fit_best(others, fit, EXCHANGED, value(best))
-        if near.members and len(near.members) < EXCHANGEABLE:
-            two = parted(scale, near.members, every, EXCHANGED)
-            _fit_best(
-                [(v, m, near) for v, m in two if v > value(best) - EQUAL_LOG_ODDS and m not in done],
-                fit,
-                EXCHANGED,
-                value(best),
-            )
-    fits = tuple(f for f in sorted(done.values(), key=value, reverse=True) if sound(f))
-    temperature = tempering(problem, fits[0])
-    probability = probabilities(fits, problem.candidates, temperature)
-    fits, probability, harmful = _prune(problem, fits, temperature, probability)
-    fits, probability, weak = established(problem, fits, fit, temperature, probability)
+        look_beside(max(tied, key=value))
+    for _ in range(EXCHANGES):
+        fits = tuple(f for f in sorted(done.values(), key=value, reverse=True) if sound(f))
+        temperature = tempering(problem, fits[0])
+        probability = probabilities(fits, problem.candidates, temperature)
+        fits, probability, harmful = _prune(problem, fits, temperature, probability)
+        fits, probability, weak = established(problem, fits, fit, temperature, probability)
+        best = fits[int(np.argmax(probability))]
+        if not best.members or best.members in looked or len(best.members) > EXCHANGEABLE:
+            break
+        look_beside(best)  # what is left of a set without its weak members has rivals of its own
     design = likeness(problem)
     fits, probability, same = _with_stand_ins(problem, design, fits, probability, fit, temperature)
     verdict = judge(fits, probability, same)
