@@ -89,6 +89,11 @@ class Run:
     program: Path | None = None  # what the control was given
     turn: Floats | None = None  # (n, 3, 3) program axes to along and across the path, where the tip is the motion
 
+    @cached_property
+    def encoders(self) -> Floats | None:
+        """Logged encoders (n, m), None where there are none."""
+        return self.measured.encoder if self.measured.has("encoder") else None
+
 
 @dataclass(eq=False)
 class Bench:
@@ -109,11 +114,11 @@ class Bench:
 
     def __post_init__(self) -> None:
         for run in self.runs:
-            reading, solved = self.twin.sense(run.run_path, measured=self._encoders(run))
+            reading, solved = self.twin.sense(run.run_path, measured=run.encoders)
             slopes = self.twin.slopes(run.run_path, (), solved)
             self.solved.append(solved)
             self.slopes.append(slopes)
-            reading, _ = self.twin.sense(run.run_path, solved=solved, slopes=slopes, measured=self._encoders(run))
+            reading, _ = self.twin.sense(run.run_path, solved=solved, slopes=slopes, measured=run.encoders)
             self.nominal.append(reading)
 
     def without(self, outlying: Sequence[Bools]) -> None:
@@ -125,13 +130,9 @@ class Bench:
         """Names in order."""
         return self.twin.actuators
 
-    def _encoders(self, run: Run) -> Floats | None:
-        return run.measured.encoder if run.measured.has("encoder") else None
-
     def read(self, k: int, causes: Sequence[Cause]) -> Reading:
         """Readings of run k with causes on top of the config."""
-        run = self.runs[k]
-        return self._sense(k, causes, self._encoders(run))
+        return self._sense(k, causes, self.runs[k].encoders)
 
     def _sense(self, k: int, causes: Sequence[Cause], encoders: Floats | None) -> Reading:
         """Readings of run k; the structure of a machine that was asked for lately is not solved again."""
@@ -203,6 +204,17 @@ class Bench:
         """Measured minus a reading (n, c) of run k, thinned."""
         return thinned(self.observed(k) - self.channels(k, reading), self.runs[k].thin)
 
+    def change(self, k: int, after: Reading, before: Reading) -> Floats:
+        """Change (n', c) of the channels of run k from one reading to another, thinned; the same arrays do not change."""
+        n, thin = len(after.tip) // self.runs[k].thin, self.runs[k].thin
+        pairs = (
+            (self.turned(k, after.tip), self.turned(k, before.tip)),
+            (after.encoder, before.encoder),
+            (after.drive, before.drive),
+            (after.dyno, before.dyno),
+        )
+        return stack(*(np.zeros((n, a.shape[1])) if a is b else thinned(a - b, thin) for a, b in pairs))
+
     def gap(self, k: int, causes: Sequence[Cause] = ()) -> Floats:
         """Measured minus model (n, c) in run k, thinned, with the model's own encoders: the gap as a user sees it.
 
@@ -210,7 +222,7 @@ class Bench:
         """
         run = self.runs[k]
         gap = self.observed(k) - self.channels(
-            k, self._sense(k, causes, None if run.by == "setpoint" else self._encoders(run))
+            k, self._sense(k, causes, None if run.by == "setpoint" else run.encoders)
         )
         if run.turn is not None:
             known = np.asarray(np.isfinite(gap[:, 1:3]).all(axis=1))

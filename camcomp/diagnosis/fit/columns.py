@@ -119,9 +119,9 @@ def candidate_columns(bench: Bench, candidate: CandidateCause, shape: Mapping[st
     for p in candidate.parameters:
         after = cause_of(candidate, {**shape, p.name: step_of(p)})
         per_run = []
-        for k, run in enumerate(bench.runs):
-            change = bench.channels(k, bench.read(k, [after])) - bench.channels(k, bench.nominal[k])
-            per_run.append(thinned(change * (p.scale / step_of(p)), run.thin))
+        for k in range(len(bench.runs)):
+            change = bench.change(k, bench.read(k, [after]), bench.nominal[k])
+            per_run.append(change * (p.scale / step_of(p)))
         out.append(per_run)
     if not candidate.shapes:
         bench.columns[key] = out
@@ -343,9 +343,8 @@ class _Turn:
 def _difference(bench: Bench, name: str, effect: object, step: float) -> list[Floats]:
     cause = Cause(name, effect, None, {})  # the name tells one changed machine from another
     out = []
-    for k, run in enumerate(bench.runs):
-        change = bench.channels(k, bench.read(k, [cause])) - bench.channels(k, bench.nominal[k])
-        out.append(thinned(change / step, run.thin))
+    for k in range(len(bench.runs)):
+        out.append(bench.change(k, bench.read(k, [cause]), bench.nominal[k]) / step)
     return out
 
 

@@ -276,12 +276,11 @@ class Problem:
     ) -> list[Floats]:
         """Change of the channels per unit, per run (n, c), from readings to those with other causes; acts: runs that change."""
         out = []
-        for k, (reading, run) in enumerate(zip(readings, self.bench.runs, strict=True)):
+        for k, reading in enumerate(readings):
             if acts is not None and not acts[k]:
                 out.append(np.zeros_like(self.residuals[k]))
                 continue
-            change = self.bench.channels(k, self.bench.read(k, causes)) - self.bench.channels(k, reading)
-            out.append(thinned(change / step, run.thin))
+            out.append(self.bench.change(k, self.bench.read(k, causes), reading) / step)
         return out
 
     def _runs_of(self, i: int, shapes: Mapping[int, Mapping[str, float]]) -> list[bool]:

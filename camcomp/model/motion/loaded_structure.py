@@ -12,6 +12,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from camcomp.ground.datatypes import Floats
+from camcomp.ground.machine_code import kept
 from camcomp.model.effect import Load
 from camcomp.model.motion.node_pieces import Places
 from camcomp.model.motion.run_path import RunPath
@@ -66,7 +67,10 @@ class Following:
             by_load = applied(self.by_wrench, wrench + force @ self.at_reference)
         if usual:
             self._by_usual_load[solved.load] = by_load
-        return np.asarray(values + applied(self.by_rho, gap - solved.shift[place.piece]) + by_load)
+        out = np.empty(values.shape)
+        slope, given = self.by_rho.transpose(1, 2, 0), (values, gap, solved.shift, by_load)
+        _behind(np.ascontiguousarray(slope), place.piece, *map(np.ascontiguousarray, given), out)
+        return out
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,6 +107,16 @@ class Slopes:
             there = self.at(place)
             self._drives[place] = Following(there.drive_rho, there.drive_wrench, self.at_reference)
         return self._drives[place]
+
+
+@kept
+def _behind(slope, piece, values, gap, shift, by_load, out):  # type: ignore[no-untyped-def]  # pragma: no cover
+    for t in range(out.shape[0]):
+        for i in range(out.shape[1]):
+            change = 0.0
+            for k in range(gap.shape[1]):
+                change += slope[i, k, t] * (gap[t, k] - shift[piece[t], k])
+            out[t, i] = values[t, i] + change + by_load[t, i]
 
 
 def applied(slope: Floats, change: Floats) -> Floats:

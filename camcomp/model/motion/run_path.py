@@ -8,6 +8,7 @@ import numpy as np
 
 from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import Bools, Floats, Ints
+from camcomp.ground.machine_code import kept
 from camcomp.model.cutting.track import Track
 from camcomp.model.hysteresis import Seams, direction
 from camcomp.model.motion.node_pieces import Pieces, Places, cut
@@ -79,6 +80,15 @@ class RunPath:
         """Times (n,) on the grid: the instant (n,) before each, and its share (n, 1) of the way to the next."""
         return self._rows_in_grid if at is self.time else self._between_instants(at)
 
+    def between(self, values: Floats, at: Floats) -> Floats:
+        """Grid values (g, c) at times (n,); rows of unordered poses are the grid itself."""
+        if not self.ordered:
+            return values
+        i, u = self.in_grid(at)
+        out = np.empty((len(i), values.shape[1]))
+        _between(np.ascontiguousarray(values), i, u, out)
+        return out
+
     def _between_instants(self, at: Floats) -> tuple[Ints, Floats]:
         i = np.clip(np.searchsorted(self.grid, at, side="right") - 1, 0, len(self.grid) - 2)
         step = self.grid[i + 1] - self.grid[i]
@@ -144,6 +154,14 @@ class RunPath:
         """Minutes of cutting in this run."""
         dt = np.diff(self.grid, prepend=self.grid[:1])
         return float((dt * self.grid_cut).sum() / 60.0)
+
+
+@kept
+def _between(values, before, share, out):  # type: ignore[no-untyped-def]  # pragma: no cover
+    for t in range(len(before)):
+        i, u = before[t], share[t, 0]
+        for j in range(out.shape[1]):
+            out[t, j] = (1.0 - u) * values[i, j] + u * values[i + 1, j]
 
 
 def path_of_program(

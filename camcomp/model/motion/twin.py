@@ -211,7 +211,7 @@ class Twin:
             drive = slopes.drives(place).behind(drive, place, solved, gap_row, load, usual=usual)
             tip = slopes.tips(place_tip).behind(tip, place_tip, solved, gap_tip, load_tip, usual=usual)
         if effort is not None:
-            drive = drive + _interpolate(run_path, run_path.time, effort)
+            drive = drive + run_path.between(effort, run_path.time)
         # tool, workpiece, sensor
         tip = signal_path.led(causes, tip, at_tip, self.nominal, self.origin)
         tip = self.to_program(signal_path.posed(causes, tip, load_tip, at_tip))
@@ -365,19 +365,19 @@ def twin_of(job: Job) -> Twin:
 
 def _at(run_path: RunPath, grid: Motion, at: Floats, rho: Floats | None) -> Motion:
     """The grid's motion at other times (n,); rho: set-points there when they are known exactly."""
-    setpoint = _interpolate(run_path, at, run_path.grid_rho) if rho is None else rho
+    setpoint = run_path.between(run_path.grid_rho, at) if rho is None else rho
     if grid.encoder is not run_path.grid_rho:
-        setpoint = setpoint + _interpolate(run_path, at, grid.encoder - run_path.grid_rho)
-    temperature = None if grid.temperature is None else _interpolate(run_path, at, grid.temperature[:, None])[:, 0]
+        setpoint = setpoint + run_path.between(grid.encoder - run_path.grid_rho, at)
+    temperature = None if grid.temperature is None else run_path.between(grid.temperature[:, None], at)[:, 0]
     return replace(
         grid,
         time=at,
         common=run_path.started + at,
-        cut_min=_interpolate(run_path, at, grid.cut_min[:, None])[:, 0],
+        cut_min=run_path.between(grid.cut_min[:, None], at)[:, 0],
         temperature=temperature,
         encoder=setpoint,
-        speed=_interpolate(run_path, at, grid.speed),
-        direction=_interpolate(run_path, at, grid.direction),
+        speed=run_path.between(grid.speed, at),
+        direction=run_path.between(grid.direction, at),
         held=None,
         told=None,
         seams=None,
@@ -388,16 +388,8 @@ def _gap_at(run_path: RunPath, at: Floats, gap: Floats | None, ahead: Floats | N
     """Carriage minus set-point (n, m) at times (n,): the model's own, and what the logged encoders add."""
     if gap is None:
         return np.zeros_like(run_path.row_rho) if ahead is None else ahead
-    own = _interpolate(run_path, at, gap)
+    own = run_path.between(gap, at)
     return own if ahead is None else own + ahead
-
-
-def _interpolate(run_path: RunPath, at: Floats, values: Floats) -> Floats:
-    """Grid values (g, c) at times (n,); rows of unordered poses are the grid itself."""
-    if not run_path.ordered:
-        return values
-    i, u = run_path.in_grid(at)
-    return (1.0 - u) * values[i] + u * values[i + 1]
 
 
 def _piece_means(run_path: RunPath, gap: Floats) -> Floats:
