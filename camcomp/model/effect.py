@@ -6,15 +6,13 @@ camcomp/model/signal_path.py calls the hooks, stage by stage, effects in the ord
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from camcomp.ground.datatypes import Floats
 from camcomp.ground.errors import Location
-
-if TYPE_CHECKING:
-    from camcomp.model.hysteresis import Seams
+from camcomp.model.seams import Seams
 
 Target = Literal["actuator", "machine", "either", "named"]
 
@@ -89,7 +87,7 @@ class Motion:
     held: Callable[[], Floats] | None = None  # (n, m) N or N mm
     told: Callable[[], Floats] | None = None  # (n, 3) mm, program frame
     cut_before_min: float = 0.0  # of cut_min, what was cut in earlier runs
-    seams: "Seams | None" = None  # where a recording begins or goes on in motion; None: it starts at rest
+    seams: Seams | None = None  # where a recording begins or goes on in motion; None: it starts at rest
 
 
 @dataclass(frozen=True, eq=False)

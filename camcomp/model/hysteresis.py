@@ -1,32 +1,16 @@
 """What remembers: lag, play and the direction of travel, as sweeps over ordered instants."""
 
-from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
-from camcomp.ground.datatypes import Bools, Floats, Ints
+from camcomp.ground.datatypes import Floats
 from camcomp.ground.machine_code import kept
+from camcomp.model.seams import Seams
 
 STILL = 1e-9  # mm or rad, round-off of two solutions of the same point
 PRESLIDING_MM = 0.005  # rolling guides take 1 to 20 um to turn their friction round (Armstrong-Helouvry 1994)
 PRESLIDING_RAD = 1e-5
-
-
-@dataclass(frozen=True, eq=False)
-class Seams:
-    """Where a recording begins, or goes on after rows that nobody logged, in motion: k instants.
-
-    at (k,): their indices, rising; unseen (k,) s before them, inf at the beginning; speed (k, m) with which it goes on, per s.
-    """
-
-    at: Ints
-    unseen: Floats
-    speed: Floats
-
-    def of(self, actuators: Bools) -> "Seams":
-        """Of some of the actuators."""
-        return replace(self, speed=self.speed[:, actuators])
 
 
 @kept

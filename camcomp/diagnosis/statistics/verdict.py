@@ -9,6 +9,7 @@ from camcomp.diagnosis.statistics.cause_sets import Fitted, Members
 from camcomp.ground.datatypes import Floats
 
 EQUAL_LOG_ODDS = 3.0  # log odds within which two sets are told apart by nobody
+BARE_ODDS = 3.0  # of the leader against a set that does nearly the same: not worth a mention
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,9 +39,10 @@ def judge(fits: Sequence[Fitted], probability: Floats, twins: Sequence[tuple[Mem
         if alike and not nested and len(fit.members) <= len(leader.members):
             rivals.append(int(j))
             twin += [int(j)] if same else []
-    # what the data cannot tell apart, priors alone put no further behind than what nobody would
+    # among what the data hardly tell apart a small lead is none, and priors alone put nothing further behind than nobody would
     held = probability.copy()
-    held[twin] = np.maximum(held[twin], held[best] * np.exp(-EQUAL_LOG_ODDS))
+    near = BARE_ODDS * held[twin] > held[best]
+    held[twin] = np.where(near, held[best], np.maximum(held[twin], held[best] * np.exp(-EQUAL_LOG_ODDS)))
     held[twin] *= probability[twin].sum() / held[twin].sum()
     inclusion: dict[int, float] = {}
     for fit, p in zip(fits, held, strict=True):

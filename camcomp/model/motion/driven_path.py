@@ -18,10 +18,10 @@ from scipy.interpolate import Akima1DInterpolator, PchipInterpolator
 from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import Bools, Floats, Ints
 from camcomp.model.cutting.track import Track
-from camcomp.model.hysteresis import Seams
 from camcomp.model.motion.alignment import Aligned
 from camcomp.model.motion.node_pieces import NODES, SPLIT, Places, basis_at
 from camcomp.model.motion.run_path import MOST_STEPS, STEP_S, Driven, RunPath
+from camcomp.model.seams import Seams
 
 CLOCK_S = 0.010  # by which the clock of a tip measurement may be off that of the control
 _JUMP_SHARE = 0.1  # of the largest force: what the force changes from row to row is more than the turn of an arc

@@ -10,9 +10,10 @@ from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import Bools, Floats, Ints
 from camcomp.ground.machine_code import kept
 from camcomp.model.cutting.track import Track
-from camcomp.model.hysteresis import Seams, direction
+from camcomp.model.hysteresis import direction
 from camcomp.model.motion.node_pieces import Pieces, Places, cut
 from camcomp.model.motion.timeline import Timeline
+from camcomp.model.seams import Seams
 
 STEP_S = 0.001  # grid of what has memory: 0.2 um of interpolation at 1500 mm/s2
 MOST_STEPS = 40000

@@ -121,12 +121,14 @@ def test_a_set_far_less_probable_is_a_rival_only_where_nothing_tells_it_apart():
     assert judge(fits, np.array([0.99, 0.01]), [((1,), (0,))]).rivals == (1,)
 
 
-def test_priors_make_nobody_sure_among_what_nothing_tells_apart():
+def test_a_small_lead_among_what_nothing_tells_apart_is_none_and_priors_make_nobody_sure():
     fits = [fitted(0), fitted(1), fitted(2)]
     told = np.array([0.9, 0.02, 0.08])
     assert judge(fits, told, []).inclusion[0] == 0.9
     by_priors = judge(fits, told, [((0,), (1,))]).inclusion
     assert by_priors[0] == pytest.approx(np.exp(3.0) * by_priors[1])
     assert by_priors[0] + by_priors[1] == pytest.approx(0.92)
-    by_rows = judge(fits, np.array([0.6, 0.35, 0.05]), [((0,), (1,))]).inclusion
-    assert (by_rows[0], by_rows[1]) == pytest.approx((0.6, 0.35))
+    small = judge(fits, np.array([0.6, 0.35, 0.05]), [((0,), (1,))]).inclusion
+    assert (small[0], small[1]) == pytest.approx((0.475, 0.475))
+    clear = judge(fits, np.array([0.8, 0.16, 0.04]), [((0,), (1,))]).inclusion
+    assert (clear[0], clear[1]) == pytest.approx((0.8, 0.16))
