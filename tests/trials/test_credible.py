@@ -142,3 +142,18 @@ def test_a_late_drive_is_no_riddle_where_rapids_have_few_rows(tmp_path):
     result, _ = answer(Plan(1732005, "pair", causes, (3.0, 9.0), machine="router", **LONG), tmp_path)
     assert result["verdict"] == "identified"
     assert {(each["effect"], each["target"]) for each in result["causes"]} == set(causes)
+
+
+@pytest.mark.campaign
+def test_a_drive_that_rings_shows_at_its_encoder_where_it_changes_its_speed(tmp_path):
+    plan = Plan(1823009, "unknown", (("servo_resonance", "y"),), (10.0,), machine="puu", **LONG)
+    result, _ = answer(plan, tmp_path)
+    assert (result["verdict"], [each["effect"] for each in result["causes"]]) == ("unknown", ["unknown"])
+
+
+@pytest.mark.campaign
+def test_what_only_tolerances_smaller_than_stated_ask_for_is_not_believed(tmp_path):
+    """Where small errors do not show, small tolerances fit better, and one small error that does show becomes a cause."""
+    causes = (("servo_lag", None), ("drive_stiffness", "A1"))
+    result, _ = answer(Plan(1742000, "pair", causes, (3.0, 9.0), machine="kuka-kr210", **LONG), tmp_path)
+    assert {(each["effect"], each["target"]) for each in result["causes"] if each["probability"] > 0.5} == set(causes)

@@ -51,7 +51,7 @@ def test_what_swings_faster_than_blocks_of_rows_is_left_as_well(swing_um):
     left[:, 1] += 1e-3 * swing_um * np.sin(2.0 * np.pi * 9.0 / 16.0 * np.arange(600))
     problem = SimpleNamespace(
         times=[np.arange(600) * 0.05], inflate=[np.ones((600, 9))], floor=SimpleNamespace(slow_mm=1e-4, axis_mm=3e-3),
-        bench=SimpleNamespace(actuators=("x", "y", "z")),
+        late_drives=[np.ones((600, 3))],
     )  # fmt: skip
     for kind in ("tip", "encoder"):
         found = unexplained_of(problem, kind, [left])

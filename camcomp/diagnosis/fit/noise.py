@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from camcomp.diagnosis.fit.bench import Bench, thinned
+from camcomp.diagnosis.fit.bench import Bench, Run, thinned
 from camcomp.diagnosis.fit.floor import NoiseFloor, row_scatter
 from camcomp.diagnosis.statistics.noise_model import Noise
 from camcomp.ground.datatypes import Floats
@@ -52,25 +52,19 @@ def inflation(bench: Bench) -> list[Floats]:
     In units of the channel's own noise, which is not known yet: here the extra standard deviation in mm or N.
     """
     out = []
-    unsteady, late = jitter(bench), _late(bench)
+    unsteady, unseen_speeds = jitter(bench), _unseen_speeds(bench)
     for k, run in enumerate(bench.runs):
         observed = bench.observed(k)
         extra = np.zeros_like(observed)
         t = run.run_path.time
         if run.run_path.ordered and len(t) > 4:
-            usual = float(np.median(np.diff(t)))
-            window = max(1.5 * usual, 0.02)
-            grid = run.run_path.grid
-            push = np.gradient(np.gradient(run.run_path.grid_rho, grid, axis=0), grid, axis=0)
-            steps = np.linspace(-window, 0.5 * usual, 21)
-            around = [np.column_stack([np.interp(t + d, grid, v) for v in push.T]) for d in steps]
-            change = np.ptp(np.stack(around), axis=0)  # (n, m)
+            change = _changes(run)
             place = run.run_path.place(t)
             slope = np.abs(bench.twin.rotation.T @ place.of(bench.slopes[k].tip_rho))
             m = len(bench.actuators)
-            # a tip that was read between the rows, and a drive that is late, stand where nobody saw the speed change
-            unseen = run.run_path.between_s * usual * BETWEEN_ROWS
-            of_drives = (TIMING_S**2 + late * usual * BETWEEN_ROWS) * change
+            of_drives = TIMING_S**2 * change + unseen_speeds[k]
+            # a tip that was read between the rows stands where nobody saw the speed change
+            unseen = run.run_path.between_s * float(np.median(np.diff(t))) * BETWEEN_ROWS
             extra[:, :3] = np.einsum("nij,nj->ni", slope, of_drives + unseen * change)
             extra[:, 3 : 3 + m] = of_drives
             if unsteady > 0.0:
@@ -79,6 +73,35 @@ def inflation(bench: Bench) -> list[Floats]:
         extra = np.where(np.isfinite(observed), extra, np.nan)
         out.append(thinned(extra, run.thin))
     return out
+
+
+def less_certain_drives(bench: Bench, noise: Noise) -> list[Floats]:
+    """Per run (n, m) >= 1: where nobody saw a drive that is late change its speed, its encoder says less of where it stands."""
+    m = len(bench.actuators)
+    unseen = [thinned(each, run.thin) for each, run in zip(_unseen_speeds(bench), bench.runs, strict=True)]
+    return [np.sqrt(1.0 + (e / s[3 : 3 + m]) ** 2) for e, s in zip(unseen, noise.sigma, strict=True)]
+
+
+def _unseen_speeds(bench: Bench) -> list[Floats]:
+    """Per run (n, m) mm or rad: a late drive stands behind by its speed, which between rows may have been another one."""
+    late = _late(bench)
+    out = []
+    for run in bench.runs:
+        t = run.run_path.time
+        known = run.run_path.ordered and len(t) > 4 and late.any()
+        usual = float(np.median(np.diff(t))) if known else 0.0
+        out.append(late * usual * BETWEEN_ROWS * _changes(run) if known else np.zeros((len(t), len(late))))
+    return out
+
+
+def _changes(run: Run) -> Floats:
+    """By how much (n, m) the drives' acceleration changes around each row."""
+    t, grid = run.run_path.time, run.run_path.grid
+    usual = float(np.median(np.diff(t)))
+    push = np.gradient(np.gradient(run.run_path.grid_rho, grid, axis=0), grid, axis=0)
+    steps = np.linspace(-max(1.5 * usual, 0.02), 0.5 * usual, 21)
+    around = [np.column_stack([np.interp(t + d, grid, v) for v in push.T]) for d in steps]
+    return np.asarray(np.ptp(np.stack(around), axis=0))
 
 
 def _late(bench: Bench) -> Floats:

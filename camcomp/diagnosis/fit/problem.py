@@ -20,7 +20,7 @@ from camcomp.diagnosis.fit.floor import MINOR, NoiseFloor, least_noise, measure_
 from camcomp.diagnosis.fit.grid_parameters import beside, best_shape, quick_columns, reach, settled_interval
 from camcomp.diagnosis.fit.intervals_in_time import LOOK_ELSEWHERE, best_interval, never_ending
 from camcomp.diagnosis.fit.label_offsets import with_scatter
-from camcomp.diagnosis.fit.noise import inflation, instrument_noise, less_certain
+from camcomp.diagnosis.fit.noise import inflation, instrument_noise, less_certain, less_certain_drives
 from camcomp.diagnosis.fit.outliers import outlying, tails
 from camcomp.diagnosis.fit.patterns import Dictionary
 from camcomp.diagnosis.fit.ringing import FOLLOWED, loudest
@@ -73,6 +73,11 @@ class Problem:
     def size_um(self, index: Sequence[int], theta: Floats) -> float:
         """How far (rms over the rows) some columns with coordinates theta (d,) move the tip."""
         return 1e3 * float(np.sqrt(np.maximum(theta @ self.tip_gram[np.ix_(index, index)] @ theta, 0.0)))
+
+    @cached_property
+    def late_drives(self) -> list[Floats]:
+        """Per run (n, m) >= 1: how much less than its noise says an encoder tells where a late drive changed its speed unseen."""
+        return less_certain_drives(self.bench, self.noise)
 
     @property
     def prior(self) -> Prior:

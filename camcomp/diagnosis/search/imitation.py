@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from itertools import combinations, islice
 
 import numpy as np
-from scipy.special import logsumexp
+from scipy.special import expit, logsumexp
 
 from camcomp.diagnosis.fit.floor import MINOR
 from camcomp.diagnosis.fit.intervals import BLOCKS
@@ -21,7 +21,7 @@ from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.search.families import Family, alone, families, kinds
 from camcomp.diagnosis.search.unknown import about
 from camcomp.diagnosis.statistics.by_channel import ByChannel
-from camcomp.diagnosis.statistics.cause_sets import Fitted, Members
+from camcomp.diagnosis.statistics.cause_sets import Fitted, Members, total
 from camcomp.diagnosis.statistics.evidence import Base, Gram, Prior, base, estimate, gram, holding_back, log_bayes
 from camcomp.ground.datatypes import Floats, Ints
 
@@ -63,6 +63,7 @@ def credibility(
     strain = _strain(problem, data, W, r, best[1], index)
     log_prior = np.array([candidates.prior(each) for each in sets])
     present, replaced, at = dict[int, float](), dict[int, float](), 0
+    stated = _at_stated_tolerances(problem, f, temperature)
     for i in f.members:
         mine = slice(at, at + len(candidates.columns[i]))
         at = mine.stop
@@ -83,9 +84,18 @@ def credibility(
         # the search, whose evidence is not strained, has found the member: that rows need it is its word, that nothing unknown
         # was meant is the prior's
         found = (1.0 - UNKNOWN) * (unlike[:first].sum() + needless * missed)
-        present[i] = float(np.sum(np.exp(value - whole) * has) + found)
+        present[i] = min(float(np.sum(np.exp(value - whole) * has) + found), stated[i])
         replaced[i] = (1.0 - needless) * missed
     return present, replaced
+
+
+def _at_stated_tolerances(problem: Problem, f: Fitted, temperature: float) -> dict[int, float]:
+    """Probability of every member of f beside the others where the tolerances are as stated, and not smaller because small errors do not show."""
+    within, prior = base(total(f.grams), problem.prior, 1.0), problem.candidates.prior
+    less = [tuple(x for x in f.members if x != i) for i in f.members]
+    whole, *others = _evidence(problem, within, problem.prior, [f.members, *less])
+    odds = [whole - e + prior(f.members) - prior(each) for e, each in zip(others, less, strict=True)]
+    return {i: float(expit(x / temperature)) for i, x in zip(f.members, odds, strict=True)}
 
 
 def _parts(problem: Problem, members: Members, i: int) -> list[Members]:

@@ -152,9 +152,8 @@ def _inflation(problem: Problem, k: int, kind: str, values: Floats) -> Floats:
     """How much less certain than their noise the values (n, 3) of one kind in run k are, >= 1."""
     if kind == "tip":
         return problem.inflate[k][:, :3]
-    m = len(problem.bench.actuators)
     if kind == "encoder":  # each moves the tip along its own way: the worst of them counts
-        return np.repeat(np.nanmax(problem.inflate[k][:, 3 : 3 + m], axis=1, initial=1.0)[:, None], 3, axis=1)
+        return np.repeat(problem.late_drives[k].max(axis=1)[:, None], 3, axis=1)
     return np.ones_like(values)
 
 
