@@ -139,11 +139,11 @@ def settled():
     """Waits until the joints stand still and have taken up the offsets; their positions."""
     before = None
     for _ in range(200):
+        # first the offsets: one that comes between the two readings is not in the joints yet
+        taken = all(abs(pin(f"axis.{each}.eoffset-request") - pin(f"axis.{each}.eoffset")) < 1e-6 for each in "xyz")
         now = [pin(f"joint.{k}.motor-pos-cmd") for k in range(3)]
         still = before is not None and max(abs(a - b) for a, b in zip(before, now, strict=True)) < 1e-6
-        if still and all(
-            abs(pin(f"axis.{each}.eoffset-request") - pin(f"axis.{each}.eoffset")) < 1e-6 for each in "xyz"
-        ):
+        if taken and still:
             return now
         before = now
         time.sleep(0.1)
