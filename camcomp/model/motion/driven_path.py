@@ -108,11 +108,12 @@ def _seams(time: Floats, grid: Floats, lead: Callable[[Floats], Floats]) -> Seam
     """Where rows (n,) s begin, and go on after some that are missing: the instants on either side of such a row."""
     rows = np.repeat(np.flatnonzero(np.append(True, _missing(time))), 2)
     before = np.searchsorted(grid, time[rows], side="right") - 1
-    at = before + np.arange(len(rows)) % 2
-    alone = np.append(np.diff(at) > 0, True) & (at < len(grid))  # of several in one step of the grid the last
+    instants = np.minimum(before + np.arange(len(rows)) % 2, len(grid) - 1)
+    at, last = np.unique(instants[::-1], return_index=True)  # of several in one step of the grid the last
+    rows = rows[::-1][last]
     unseen = np.where(rows > 0, time[rows] - time[rows - 1], np.inf)
     speed = (lead(time[rows] + STEP_S) - lead(time[rows])) / STEP_S
-    return Seams(at[alone], unseen[alone], speed[alone])
+    return Seams(at, unseen, speed)
 
 
 def _missing(time: Floats) -> Bools:

@@ -51,3 +51,11 @@ def test_one_that_is_recorded_from_rest_on_is_not_late_at_first(course):
     told_there, is_there = np.interp(rows, t, x), np.interp(rows, t, there)
     off = 1e3 * np.abs(modelled(rows, told_there, seams=True) - is_there)
     assert off.max() < 1.5 and off[:2].max() < 0.1
+
+
+def test_rows_lost_closer_together_than_the_grid_is_fine_are_seams_that_rise():
+    """A long log of many rows has a grid that is coarser than they are."""
+    rows = np.delete(np.arange(0.0, 1.0, 0.001), [501, 503, 505, 507, 700])
+    grid = np.linspace(rows[0], rows[-1], 68)
+    at = _seams(rows, grid, _smooth(rows, told(rows)[:, None])).at
+    assert len(at) > 4 and np.all(np.diff(at) > 0)
