@@ -106,7 +106,7 @@ def driven_path(
 
 def _seams(time: Floats, grid: Floats, lead: Callable[[Floats], Floats]) -> Seams:
     """Where rows (n,) s begin, and go on after some that are missing: the instants on either side of such a row."""
-    rows = np.repeat(np.flatnonzero(np.append(True, _missing(time))), 2)
+    rows = np.repeat(np.flatnonzero(np.append(True, missing_rows(time))), 2)
     before = np.searchsorted(grid, time[rows], side="right") - 1
     instants = np.minimum(before + np.arange(len(rows)) % 2, len(grid) - 1)
     at, last = np.unique(instants[::-1], return_index=True)  # of several in one step of the grid the last
@@ -116,7 +116,7 @@ def _seams(time: Floats, grid: Floats, lead: Callable[[Floats], Floats]) -> Seam
     return Seams(at, unseen, speed)
 
 
-def _missing(time: Floats) -> Bools:
+def missing_rows(time: Floats) -> Bools:
     """Whether rows are missing (n - 1,) between each and the next."""
     step = np.diff(time)
     return np.asarray(step > _MISSING * float(np.median(step)) if len(step) else np.zeros(0, bool))
@@ -312,7 +312,7 @@ def _smooth(time: Floats, values: Floats) -> Callable[[Floats], Floats]:
         return lambda at: np.column_stack([np.interp(at, time, v) for v in values.T])
     step, way = np.diff(time), np.abs(np.diff(values, axis=0))
     rest = np.pad(way <= _RESTS * way.max(axis=0), ((2, 2), (0, 0)))
-    held = _missing(time)[:, None] | (rest[3:-1] & rest[4:]) | (rest[1:-3] & rest[:-4])
+    held = missing_rows(time)[:, None] | (rest[3:-1] & rest[4:]) | (rest[1:-3] & rest[:-4])
     lead = Akima1DInterpolator(time, values, axis=0)
     with np.errstate(over="ignore"):  # beside slopes of round-off, whose harmonic mean is nothing
         over = PchipInterpolator(time, values, axis=0)
