@@ -228,7 +228,7 @@ def _nuisances(bench: Bench) -> list[tuple[str, float, list[Floats], bool]]:
             one[:, c] = 1.0
             size = RUN_OFFSET_MM if c < 3 else RUN_OFFSET_NMM if c < 3 + 2 * m and hinges[c - 3 - m] else RUN_OFFSET_N
             found.append((f"offset.{run.name}.{channel_names(bench.actuators)[c]}", size, only(r, one), c >= 3))
-    found += start_columns(bench, only)
+    found += start_columns(bench, lambda r, values: only(r, thinned(values, bench.runs[r].thin)))
     clock = CandidateCause("time_sync", None, shelf.load("effects", "time_sync"))
     frame = CandidateCause("workpiece_frame", None, shelf.load("effects", "workpiece_frame"))
     if any(run.measured.has("tip") for run in bench.runs):

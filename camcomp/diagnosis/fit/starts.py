@@ -4,13 +4,18 @@ Nor does anybody where a log goes on after motions that are not in it. Where tha
 nuisance of its own; where one row later all is known again, that row says nothing of it.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from camcomp.diagnosis.fit.bench import Bench, thinned
 from camcomp.ground.datatypes import Bools, Floats
-from camcomp.model.motion.driven_path import missing_rows
+from camcomp.model.seams import missing_rows
+
+if TYPE_CHECKING:
+    from camcomp.diagnosis.fit.bench import Bench
 
 STARTED_MM, STARTED_RAD = 0.1, 1e-4  # by which an actuator has to move before its play is taken up
 START_MM, START_RAD = 0.1, 5e-5  # where its carriage may stand until then: play and guides as bad as they come
@@ -24,7 +29,7 @@ def start_columns(
     bench: Bench, only: Callable[[int, Floats], list[Floats]]
 ) -> list[tuple[str, float, list[Floats], bool]]:
     """One column per run and actuator for the rows before it has moved, where there are enough of them, and one for the force
-    with which its guide holds it: name, size, column per run (as `only` makes it of one run's), whether the size may be off.
+    with which its guide holds it: name, size, column per run (as `only` makes it of all rows of one run), whether the size may be off.
     """
     found, m = [], len(bench.actuators)
     for r, run in enumerate(bench.runs):
@@ -39,12 +44,12 @@ def start_columns(
             shift[:, :3] = bench.turned(r, bench.row_slopes(r)[:, :, j] * still[:, None])
             begins = still.mean() < 1.0 - ALWAYS
             width = (START_RAD if revolute else START_MM) if begins else (ALWAYS_RAD if revolute else ALWAYS_MM)
-            found.append((f"start.{run.name}.{a}", width, only(r, thinned(shift, run.thin)), False))
+            found.append((f"start.{run.name}.{a}", width, only(r, shift), False))
             if begins and run.measured.has("drive"):
                 held = np.zeros_like(shift)
                 held[:, 3 + m + j] = still
                 holding = START_NMM if revolute else START_N
-                found.append((f"held.{run.name}.{a}", holding, only(r, thinned(held, run.thin)), False))
+                found.append((f"held.{run.name}.{a}", holding, only(r, held), False))
     return found
 
 

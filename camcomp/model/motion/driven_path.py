@@ -21,7 +21,7 @@ from camcomp.model.cutting.track import Track
 from camcomp.model.motion.alignment import Aligned
 from camcomp.model.motion.node_pieces import NODES, SPLIT, Places, basis_at
 from camcomp.model.motion.run_path import MOST_STEPS, STEP_S, Driven, RunPath
-from camcomp.model.seams import Seams
+from camcomp.model.seams import Seams, missing_rows
 
 CLOCK_S = 0.010  # by which the clock of a tip measurement may be off that of the control
 _JUMP_SHARE = 0.1  # of the largest force: what the force changes from row to row is more than the turn of an arc
@@ -36,7 +36,6 @@ BESIDE_MM = 0.6  # from the path: no blended corner leaves it further, and what 
 _SURE_N = 20.0  # what the force may be off by for the nodes between rows to be led by it
 _SAME_FEED = 0.03  # by which a driven feed may differ from the programmed one and still be it
 LEAST_FEED = 1e-3  # mm/min, of what stands still
-_MISSING = 1.5  # usual steps between rows from which on rows are missing between them
 _RESTS = 1e-3  # of the longest way between two rows: less, twice in a row, is rest
 _CHORD_MM = 0.02  # over which a direction is taken: digits and noise of set-points are small beside it
 
@@ -114,12 +113,6 @@ def _seams(time: Floats, grid: Floats, lead: Callable[[Floats], Floats]) -> Seam
     unseen = np.where(rows > 0, time[rows] - time[rows - 1], np.inf)
     speed = (lead(time[rows] + STEP_S) - lead(time[rows])) / STEP_S
     return Seams(at, unseen, speed)
-
-
-def missing_rows(time: Floats) -> Bools:
-    """Whether rows are missing (n - 1,) between each and the next."""
-    step = np.diff(time)
-    return np.asarray(step > _MISSING * float(np.median(step)) if len(step) else np.zeros(0, bool))
 
 
 def cutting_forces(
