@@ -324,15 +324,11 @@ def grounds(bench: Bench) -> list[Ground]:
         velocity = (
             np.gradient(tip, run.run_path.time, axis=0) if run.run_path.ordered and len(tip) > 2 else np.zeros_like(tip)
         )
-        motion = reading.motion
-        motion = replace(
-            motion,
-            **{n: getattr(motion, n)[keep] for n in ("time", "common", "cut_min", "encoder", "speed", "direction")},
-            temperature=None if motion.temperature is None else motion.temperature[keep],
-        )
         present = {n: run.measured.has(n) for n in ("tip", "encoder", "drive", "dyno")}
         present["encoder"] &= run.by == "setpoint"  # else it is the motion itself
-        out.append(Ground(motion, reading.drive[keep], reading.dyno[keep], tip[keep], velocity[keep], present))
+        out.append(
+            Ground(reading.motion.at(keep), reading.drive[keep], reading.dyno[keep], tip[keep], velocity[keep], present)
+        )
     return out
 
 
