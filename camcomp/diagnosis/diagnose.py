@@ -19,7 +19,8 @@ from camcomp.diagnosis.fit.columns import candidate_causes, working_causes
 from camcomp.diagnosis.fit.gap import floor_um, gap_of, main_channels, rest_by_actuator
 from camcomp.diagnosis.fit.intervals import joint_covariance
 from camcomp.diagnosis.fit.lookalikes import without_lookalikes, without_twins
-from camcomp.diagnosis.fit.problem import Problem, open_problem
+from camcomp.diagnosis.fit.open_problem import open_problem
+from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.law.answer import answer_law
 from camcomp.diagnosis.law.law_answer import LawAnswer
 from camcomp.diagnosis.law.library import LearnedLaw

@@ -24,7 +24,7 @@ from camcomp.diagnosis.experiment.open_experiment import open_experiment
 from camcomp.diagnosis.fit.bench import Bench
 from camcomp.diagnosis.fit.columns import candidate_causes, working_causes
 from camcomp.diagnosis.fit.lookalikes import without_lookalikes
-from camcomp.diagnosis.fit.problem import open_problem
+from camcomp.diagnosis.fit.open_problem import open_problem
 from camcomp.diagnosis.next_experiment.design import MotionDesign
 from camcomp.diagnosis.next_experiment.designed import Desk, propose
 from camcomp.diagnosis.next_experiment.foresee import Question

@@ -8,7 +8,7 @@ import pytest
 from camcomp.diagnosis.diagnose import diagnose
 from camcomp.diagnosis.experiment.open_experiment import open_experiment
 from camcomp.diagnosis.fit.bench import Bench, CandidateCause
-from camcomp.diagnosis.fit.problem import open_problem
+from camcomp.diagnosis.fit.open_problem import open_problem
 from camcomp.diagnosis.law.answer import _base, answer_law
 from camcomp.diagnosis.law.bench_terms import Spot, Term
 from camcomp.diagnosis.law.beside import with_law

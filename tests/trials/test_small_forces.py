@@ -5,7 +5,7 @@ import pytest
 
 from camcomp.diagnosis.experiment.open_experiment import open_experiment
 from camcomp.diagnosis.fit.bench import Bench, CandidateCause
-from camcomp.diagnosis.fit.problem import open_problem
+from camcomp.diagnosis.fit.open_problem import open_problem
 from camcomp.ground import shelf
 from tests.recordings import recording
 from tests.trials.experiment import Made, Plan, row_times, write
@@ -46,7 +46,9 @@ def test_a_small_force_moves_a_soft_drive_as_much_farther_as_it_is_softer(proble
     (friction,) = problem.candidates.columns[2]
     assert f.pushed == (friction,)
     nominal = problem.columns.blocks[0].dense()[:, :, friction]
-    assert np.linalg.norm(f.farther[0][:, 1, 0]) == pytest.approx(np.linalg.norm(nominal[:, 1]) / FACTOR, rel=0.02)
+    assert np.linalg.norm(problem.farther(f)[0][:, 1, 0]) == pytest.approx(
+        np.linalg.norm(nominal[:, 1]) / FACTOR, rel=0.02
+    )
 
 
 def test_friction_within_tolerance_on_a_soft_drive_is_no_play(problem):

@@ -31,9 +31,7 @@ def joint_covariance(problem: Problem, f: Fitted, *, as_stated: bool = False) ->
     shapes = problem.shape_columns(f.members, f.theta, f.extra) if s else [np.zeros((len(W), 0)) for W in f.white]
     # a shape that the data do not tell is known to about a third
     reach = np.array([0.3 * f.extra[i][p.name] for i, p in names])
-    G = []
-    for W, own, D in zip(problem.white, f.white, shapes, strict=True):
-        G.append(W.beside(D * reach).exchanged([*index, *f.pushed], own))
+    G = [W.beside(D * reach) for W, D in zip(problem.white_at(f), shapes, strict=True)]
     usual, most = problem.prior.precision(f.factor), problem.prior.reach.copy()
     if not as_stated:
         usual, most = _stated(problem, usual, most)

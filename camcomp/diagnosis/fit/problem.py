@@ -1,32 +1,20 @@
 """The state of one diagnosis: columns, white rows, and re-fits of sets of causes through the twin."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 
-from camcomp.diagnosis.fit.bench import Bench, CandidateCause, cause_of, step_of, thinned
-from camcomp.diagnosis.fit.cause_prior import cause_prior
-from camcomp.diagnosis.fit.columns import (
-    Columns,
-    build,
-    candidate_columns,
-    healthy_sizes,
-    moved_tip,
-    patterns,
-    shape_default,
-)
-from camcomp.diagnosis.fit.floor import MINOR, NoiseFloor, least_noise, measure_floor
-from camcomp.diagnosis.fit.grid_parameters import beside, best_shape, quick_columns, reach, settled_interval
-from camcomp.diagnosis.fit.intervals_in_time import best_interval, never_ending
-from camcomp.diagnosis.fit.label_offsets import with_scatter
-from camcomp.diagnosis.fit.noise import inflation, instrument_noise, less_certain, less_certain_drives
-from camcomp.diagnosis.fit.outliers import outlying, tails
+from camcomp.diagnosis.fit.bench import Bench, cause_of, step_of
+from camcomp.diagnosis.fit.columns import Columns, moved_tip, shape_default
+from camcomp.diagnosis.fit.floor import NoiseFloor
+from camcomp.diagnosis.fit.grid_parameters import reach
+from camcomp.diagnosis.fit.noise import less_certain_drives
 from camcomp.diagnosis.fit.patterns import Dictionary
 from camcomp.diagnosis.fit.ringing import FOLLOWED, loudest
 from camcomp.diagnosis.fit.small_forces import pushed_farther, small_forces
-from camcomp.diagnosis.statistics.by_channel import ByChannel, channel_behind_channel
+from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.diagnosis.statistics.cause_sets import CausePrior, Fitted, Members, Scale, total
 from camcomp.diagnosis.statistics.evidence import Gram, Prior, estimate, gram
 from camcomp.diagnosis.statistics.noise_model import Noise
@@ -63,6 +51,7 @@ class Problem:
     candidates: CausePrior
     _heard: dict[int, tuple[float, float]] = field(default_factory=dict, init=False, repr=False)
     _last: tuple[tuple[object, ...], list[Reading]] | None = field(default=None, init=False, repr=False)
+    _farther: tuple[Fitted, tuple[Floats, ...]] | None = field(default=None, init=False, repr=False)
 
     @cached_property
     def tip_gram(self) -> Floats:
@@ -182,21 +171,18 @@ class Problem:
             if step > 0 and size < SETTLED:
                 break
         beside = small_forces(self.columns.candidates, members) if bent else ()
-        farther: tuple[Floats, ...] = ()
+        pushed, pushed_at = tuple(self.member_columns(beside)), theta
         if beside:
-            causes = self.causes(members, theta, shapes)
-            forces = [(self.columns.candidates[i], self.shapes.get(i, {})) for i in beside]
-            farther = pushed_farther(self.bench, causes, self._read(causes), forces)
-            white = [
+            farther = self._pushed(beside, self.causes(members, theta, shapes))
+            both = [
                 np.column_stack([own, self.whitened(k, far)])
                 for k, (own, far) in enumerate(zip(white, farther, strict=True))
             ]
-            grams = self._grams_at([*index, *self.member_columns(beside)], white, left)
+            grams = self._grams_at([*index, *pushed], both, left)
         scale = Scale(total(grams), self.prior, self.candidates)
         factor = scale.factor(members)
         mean, full = estimate(total(grams), self.prior, index, factor)
         theta, covariance = self._bounded(members, mean[index]), full[np.ix_(index, index)]
-        pushed = tuple(self.member_columns(beside))
         return Fitted(
             members,
             theta,
@@ -208,8 +194,30 @@ class Problem:
             tuple(white),
             tuple(left),
             pushed,
-            farther,
+            pushed_at,
         )
+
+    def _pushed(self, beside: Members, causes: Sequence[Cause]) -> tuple[Floats, ...]:
+        """Per run (n, c, p): what small forces do to the channels of the machine that the causes make."""
+        forces = [(self.columns.candidates[i], self.shapes.get(i, {})) for i in beside]
+        return pushed_farther(self.bench, causes, self._read(causes), forces)
+
+    def farther(self, f: Fitted) -> tuple[Floats, ...]:
+        """The same of a fit's columns `pushed`, of the fit asked for last: those of all fits are as large as all else."""
+        if self._farther is None or self._farther[0] is not f:
+            assert f.pushed_at is not None
+            causes = self.causes(f.members, f.pushed_at, f.extra)
+            beside = small_forces(self.columns.candidates, f.members)
+            self._farther = f, self._pushed(beside, causes)
+        return self._farther[1]
+
+    def white_at(self, f: Fitted) -> list[ByChannel]:
+        """White columns (w, k) per run as they are at a fit."""
+        index = self.member_columns(f.members)
+        white = [W.exchanged(index, own) for W, own in zip(self.white, f.white, strict=True)]
+        if f.pushed:
+            white = [W.exchanged(f.pushed, self.whitened(k, self.farther(f)[k])) for k, W in enumerate(white)]
+        return white
 
     def _readings(
         self, members: Members, theta: Floats, shapes: Mapping[int, Mapping[str, float]]
@@ -396,103 +404,3 @@ class Problem:
             for (i, p), s in zip(names, step[len(index) :], strict=True):
                 shapes[i][p.name] = float(np.clip(shapes[i][p.name] + s, p.low, p.high))
         return moves
-
-
-def open_problem(bench: Bench, candidates: Sequence[CandidateCause], stated_mm: float | None = None) -> Problem:
-    """Columns, noise and white rows for a bench and the candidates that may be causes.
-
-    stated_mm: whole deviation of the tip's instrument per axis, where the user states it.
-    """
-    outliers = outlying(bench)
-    bench.without(outliers)
-    floor = measure_floor(bench, stated_mm)
-    times = [thinned(run.run_path.time[:, None], run.thin)[:, 0] for run in bench.runs]
-    residuals = [bench.residual(k) for k in range(len(bench.runs))]
-    noise = instrument_noise(bench, floor, least_noise(bench, floor), times)
-    inflate = less_certain(noise, inflation(bench), tails(bench))
-    columns = build(bench, candidates, {}, floor.tip_um, MINOR * floor.tip_um)
-    shapes: dict[int, dict[str, float]] = {
-        i: shape_default(a) for i, a in enumerate(candidates) if a.shapes or a.switches
-    }
-    words = patterns(bench)
-    rough = _whiten(bench, columns, [], floor, noise, inflate, times, residuals, shapes, outliers)
-    if len(columns.of_labels):
-        columns = with_scatter(columns, bench, estimate(total(rough.base_grams), rough.prior, ())[0])
-        rough = replace(rough, columns=columns)
-    noise = _with_model_error(rough)
-    del rough  # its white columns are as large as all that follows
-    problem = _whiten(bench, columns, words, floor, noise, inflate, times, residuals, shapes, outliers)
-    return _scanned(problem) if shapes else problem
-
-
-def _with_model_error(problem: Problem) -> Noise:
-    """The noise with what even all effects together leave of encoders, drive forces and dynamometer: the model's own error.
-
-    It makes these channels count less, so that what a model of forces says wrongly is not held against a cause that the
-    tip shows. The tip keeps the noise of its instrument, and the floor is never touched.
-    """
-    free = [c for own in problem.candidates.columns for c in own]
-    mean, _ = estimate(total(problem.base_grams), problem.prior, free)
-    sigma = problem.noise.sigma.copy()
-    for k, (W, r) in enumerate(zip(problem.white, problem.white_residual, strict=True)):
-        left, at = (r - W @ mean) ** 2, 0
-        for c in range(sigma.shape[1]):
-            rows = int(np.isfinite(problem.inflate[k][:, c]).sum()) if np.isfinite(sigma[k, c]) else 0
-            if c >= 3 and rows:
-                sigma[k, c] *= max(1.0, float(np.sqrt(np.mean(left[at : at + rows]))))
-            at += rows
-    return replace(problem.noise, sigma=sigma)
-
-
-def _whiten(
-    bench: Bench, columns: Columns, words: list[Dictionary], floor: NoiseFloor, noise: Noise, inflate: list[Floats],
-    times: list[Floats], residuals: list[Floats], shapes: dict[int, dict[str, float]], outliers: list[Bools],
-) -> Problem:  # fmt: skip
-    white, white_patterns, white_residual = [], [], []
-    for k in range(len(bench.runs)):
-        white.append(noise.by_channel(k, columns.blocks[k], inflate[k], times[k]))
-        white_patterns.append([noise.by_channel(k, w.blocks[k], inflate[k], times[k], w.first) for w in words])
-        white_residual.append(noise.rows(k, residuals[k][:, :, None], inflate[k], times[k])[:, 0])
-    words = [replace(each, blocks=()) for each in words]  # white they are enough
-    return Problem(bench, columns, words, inflate, times, residuals, floor, noise, outliers, white, white_patterns,
-                   white_residual, shapes, cause_prior(columns))  # fmt: skip
-
-
-def _scanned(problem: Problem) -> Problem:
-    """The problem with the scanned shapes (pitches, time constants) that explain most of what the others leave."""
-    scanned = [i for i in problem.shapes if problem.columns.candidates[i].shapes]
-    own = [c for i in scanned for c in problem.candidates.columns[i]]
-    others = np.setdiff1d(np.arange(len(problem.columns.names)), own)
-    left = beside(problem.base_grams, problem.white, problem.white_residual, problem.columns, others)
-    changed: list[tuple[list[int], list[list[Floats]]]] = []
-    for i in scanned:
-        candidate = problem.columns.candidates[i]
-        if problem.passing(i):
-            always = quick_columns(problem.bench, candidate, [never_ending(candidate)])
-            if always is None:
-                continue
-            white = [problem.white_columns(k, each) for k, each in enumerate(always)]
-            best = best_interval(problem.bench, candidate, white, left.rest, problem.row_places)
-            if best is not None:
-                best = settled_interval(problem.bench, candidate, best, left, problem.white_columns)
-        else:
-            best = best_shape(problem.bench, candidate, left, problem.white_columns)
-        if best is None:
-            continue
-        problem.shapes[i] = best
-        columns = candidate_columns(problem.bench, candidate, best)
-        changed.append((list(problem.candidates.columns[i]), columns))
-    blocks, whole = list(problem.columns.blocks), list(problem.white)
-    floor_um = problem.floor.tip_um
-    prior = replace(problem.prior, tolerance=problem.prior.tolerance.copy(), reach=problem.prior.reach.copy())
-    for index, columns in changed:
-        candidate = problem.columns.candidates[problem.columns.candidate[index[0]]]
-        for c, p, per_run in zip(index, candidate.parameters, columns, strict=True):
-            prior.tolerance[c], prior.reach[c] = healthy_sizes(
-                problem.bench, candidate, p, per_run, floor_um, MINOR * floor_um
-            )
-        for k in range(len(blocks)):
-            new = np.stack([each[k] for each in columns], axis=2)
-            blocks[k] = blocks[k].exchanged(index, channel_behind_channel(new))
-            whole[k] = whole[k].exchanged(index, problem.whitened(k, new))
-    return replace(problem, columns=replace(problem.columns, blocks=tuple(blocks), prior=prior), white=whole)

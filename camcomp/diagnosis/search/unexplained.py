@@ -74,7 +74,7 @@ def _left(problem: Problem, f: Fitted, k: int) -> Floats:
     usual[index] = 0.0
     if f.pushed:
         pushed = list(f.pushed)
-        left = left - f.farther[k] @ usual[pushed]
+        left = left - problem.farther(f)[k] @ usual[pushed]
         usual[pushed] = 0.0
     return np.asarray(left - (problem.columns.blocks[k] @ usual).reshape(left.shape[1], -1).T)
 

@@ -1,0 +1,123 @@
+"""How a problem begins: which rows count, the noise, white columns, and where scanned shapes stand before any set is tried."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from camcomp.diagnosis.fit.bench import Bench, CandidateCause, thinned
+from camcomp.diagnosis.fit.cause_prior import cause_prior
+from camcomp.diagnosis.fit.columns import Columns, build, candidate_columns, healthy_sizes, patterns, shape_default
+from camcomp.diagnosis.fit.floor import MINOR, NoiseFloor, least_noise, measure_floor
+from camcomp.diagnosis.fit.grid_parameters import beside, best_shape, quick_columns, settled_interval
+from camcomp.diagnosis.fit.intervals_in_time import best_interval, never_ending
+from camcomp.diagnosis.fit.label_offsets import with_scatter
+from camcomp.diagnosis.fit.noise import inflation, instrument_noise, less_certain
+from camcomp.diagnosis.fit.outliers import outlying, tails
+from camcomp.diagnosis.fit.patterns import Dictionary
+from camcomp.diagnosis.fit.problem import Problem
+from camcomp.diagnosis.statistics.by_channel import channel_behind_channel
+from camcomp.diagnosis.statistics.cause_sets import total
+from camcomp.diagnosis.statistics.evidence import estimate
+from camcomp.diagnosis.statistics.noise_model import Noise
+from camcomp.ground.datatypes import Bools, Floats
+
+
+def open_problem(bench: Bench, candidates: Sequence[CandidateCause], stated_mm: float | None = None) -> Problem:
+    """Columns, noise and white rows for a bench and the candidates that may be causes.
+
+    stated_mm: whole deviation of the tip's instrument per axis, where the user states it.
+    """
+    outliers = outlying(bench)
+    bench.without(outliers)
+    floor = measure_floor(bench, stated_mm)
+    times = [thinned(run.run_path.time[:, None], run.thin)[:, 0] for run in bench.runs]
+    residuals = [bench.residual(k) for k in range(len(bench.runs))]
+    noise = instrument_noise(bench, floor, least_noise(bench, floor), times)
+    inflate = less_certain(noise, inflation(bench), tails(bench))
+    columns = build(bench, candidates, {}, floor.tip_um, MINOR * floor.tip_um)
+    shapes: dict[int, dict[str, float]] = {
+        i: shape_default(a) for i, a in enumerate(candidates) if a.shapes or a.switches
+    }
+    words = patterns(bench)
+    rough = _whiten(bench, columns, [], floor, noise, inflate, times, residuals, shapes, outliers)
+    if len(columns.of_labels):
+        columns = with_scatter(columns, bench, estimate(total(rough.base_grams), rough.prior, ())[0])
+        rough = replace(rough, columns=columns)
+    noise = _with_model_error(rough)
+    del rough  # its white columns are as large as all that follows
+    problem = _whiten(bench, columns, words, floor, noise, inflate, times, residuals, shapes, outliers)
+    return _scanned(problem) if shapes else problem
+
+
+def _with_model_error(problem: Problem) -> Noise:
+    """The noise with what even all effects together leave of encoders, drive forces and dynamometer: the model's own error.
+
+    It makes these channels count less, so that what a model of forces says wrongly is not held against a cause that the
+    tip shows. The tip keeps the noise of its instrument, and the floor is never touched.
+    """
+    free = [c for own in problem.candidates.columns for c in own]
+    mean, _ = estimate(total(problem.base_grams), problem.prior, free)
+    sigma = problem.noise.sigma.copy()
+    for k, (W, r) in enumerate(zip(problem.white, problem.white_residual, strict=True)):
+        left, at = (r - W @ mean) ** 2, 0
+        for c in range(sigma.shape[1]):
+            rows = int(np.isfinite(problem.inflate[k][:, c]).sum()) if np.isfinite(sigma[k, c]) else 0
+            if c >= 3 and rows:
+                sigma[k, c] *= max(1.0, float(np.sqrt(np.mean(left[at : at + rows]))))
+            at += rows
+    return replace(problem.noise, sigma=sigma)
+
+
+def _whiten(
+    bench: Bench, columns: Columns, words: list[Dictionary], floor: NoiseFloor, noise: Noise, inflate: list[Floats],
+    times: list[Floats], residuals: list[Floats], shapes: dict[int, dict[str, float]], outliers: list[Bools],
+) -> Problem:  # fmt: skip
+    white, white_patterns, white_residual = [], [], []
+    for k in range(len(bench.runs)):
+        white.append(noise.by_channel(k, columns.blocks[k], inflate[k], times[k]))
+        white_patterns.append([noise.by_channel(k, w.blocks[k], inflate[k], times[k], w.first) for w in words])
+        white_residual.append(noise.rows(k, residuals[k][:, :, None], inflate[k], times[k])[:, 0])
+    words = [replace(each, blocks=()) for each in words]  # white they are enough
+    return Problem(bench, columns, words, inflate, times, residuals, floor, noise, outliers, white, white_patterns,
+                   white_residual, shapes, cause_prior(columns))  # fmt: skip
+
+
+def _scanned(problem: Problem) -> Problem:
+    """The problem with the scanned shapes (pitches, time constants) that explain most of what the others leave."""
+    scanned = [i for i in problem.shapes if problem.columns.candidates[i].shapes]
+    own = [c for i in scanned for c in problem.candidates.columns[i]]
+    others = np.setdiff1d(np.arange(len(problem.columns.names)), own)
+    left = beside(problem.base_grams, problem.white, problem.white_residual, problem.columns, others)
+    changed: list[tuple[list[int], list[list[Floats]]]] = []
+    for i in scanned:
+        candidate = problem.columns.candidates[i]
+        if problem.passing(i):
+            always = quick_columns(problem.bench, candidate, [never_ending(candidate)])
+            if always is None:
+                continue
+            white = [problem.white_columns(k, each) for k, each in enumerate(always)]
+            best = best_interval(problem.bench, candidate, white, left.rest, problem.row_places)
+            if best is not None:
+                best = settled_interval(problem.bench, candidate, best, left, problem.white_columns)
+        else:
+            best = best_shape(problem.bench, candidate, left, problem.white_columns)
+        if best is None:
+            continue
+        problem.shapes[i] = best
+        columns = candidate_columns(problem.bench, candidate, best)
+        changed.append((list(problem.candidates.columns[i]), columns))
+    blocks, whole = list(problem.columns.blocks), list(problem.white)
+    floor_um = problem.floor.tip_um
+    prior = replace(problem.prior, tolerance=problem.prior.tolerance.copy(), reach=problem.prior.reach.copy())
+    for index, columns in changed:
+        candidate = problem.columns.candidates[problem.columns.candidate[index[0]]]
+        for c, p, per_run in zip(index, candidate.parameters, columns, strict=True):
+            prior.tolerance[c], prior.reach[c] = healthy_sizes(
+                problem.bench, candidate, p, per_run, floor_um, MINOR * floor_um
+            )
+        for k in range(len(blocks)):
+            new = np.stack([each[k] for each in columns], axis=2)
+            blocks[k] = blocks[k].exchanged(index, channel_behind_channel(new))
+            whole[k] = whole[k].exchanged(index, problem.whitened(k, new))
+    return replace(problem, columns=replace(problem.columns, blocks=tuple(blocks), prior=prior), white=whole)
