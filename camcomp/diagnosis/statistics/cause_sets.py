@@ -44,6 +44,12 @@ class Fitted:
     factor: float = 1.0  # the tolerances, as far off as the data have them
     white: tuple[Floats, ...] = ()  # per run (w, d), the members' columns at the fit
     residual: tuple[Floats, ...] = ()  # per run (w,), in absolute coordinates
+    minor: Members = ()  # what the evidence has beside the members, and nobody names
+
+    @property
+    def all_members(self) -> Members:
+        """The members and what is minor beside them: what the evidence is of."""
+        return tuple(sorted((*self.members, *self.minor)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +64,10 @@ class CausePrior:
     def prior(self, members: Members) -> float:
         """Log prior probability of a set."""
         return log_sum([odds for odds, _ in self.ways(members)])
+
+    def value(self, f: Fitted, temperature: float = 1.0) -> float:
+        """Log evidence of a set and what is minor beside it, tempered, + their log prior."""
+        return f.log_evidence / temperature + self.prior(f.all_members)
 
     def ways(self, members: Members) -> list[tuple[float, list[Members]]]:
         """How a set may have come about: the log prior probability of each way, and members that are of one size in it.
@@ -243,6 +253,6 @@ def _scored(scale: Scale, sets: Sequence[Members]) -> list[tuple[float, Members]
 
 def probabilities(fits: Sequence[Fitted], candidates: CausePrior, temperature: float = 1.0) -> Floats:
     """Posterior probability of every set among those fitted."""
-    value = np.array([f.log_evidence / temperature + candidates.prior(f.members) for f in fits])
+    value = np.array([candidates.value(f, temperature) for f in fits])
     out: Floats = np.exp(value - log_sum(value))
     return out
