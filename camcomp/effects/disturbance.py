@@ -9,6 +9,7 @@ from camcomp.model.effect import Motion, Parameter
 
 STAGE = "drive"
 TARGET = "actuator"
+MOMENTARY = True
 PLAIN = "disturbance of a drive for a while"
 REMEDY = "look at what touched the axis at that time: covers, chips, hoses, the drive's own log"
 SOURCE = (

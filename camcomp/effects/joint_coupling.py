@@ -9,6 +9,7 @@ from camcomp.model.effect import Motion, Parameter
 
 STAGE = "drive"
 TARGET = "actuator"
+MOMENTARY = True
 PLAIN = "a wrist joint dragged along by the one in front"
 REMEDY = "set the coupling factor of the wrist in the control, or master the wrist anew"
 ARM_ONLY = True

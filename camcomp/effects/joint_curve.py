@@ -13,6 +13,7 @@ from camcomp.model.effect import Motion, Parameter
 
 STAGE = "drive"
 TARGET = "actuator"
+MOMENTARY = True
 PLAIN = "a joint that turns unevenly"
 REMEDY = "take the curve out in the program where it was seen, measure poses at the angles it was not, and look at the gear where it is large"
 ARM_ONLY = True

@@ -7,6 +7,7 @@ from camcomp.model.effect import Motion, Parameter
 
 STAGE = "drive"
 TARGET = "actuator"
+MOMENTARY = True
 PLAIN = "a wrong zero of the axis"
 REMEDY = "run the reference again and correct the home offset in the control"
 SOURCE = "definition: carriage minus encoder; offset_mm for slides, offset_rad for hinges"

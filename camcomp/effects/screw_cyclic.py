@@ -10,6 +10,7 @@ from camcomp.model.effect import Motion, Parameter
 STAGE = "drive"
 TARGET = "actuator"
 SLIDES_ONLY = True
+MOMENTARY = True
 PLAIN = "a screw that runs out"
 REMEDY = (
     "check the alignment of the screw and its coupling; a compensation table of the control or camcomp removes "

@@ -12,6 +12,7 @@ from camcomp.model.effect import Motion, Parameter
 STAGE = "drive"
 TARGET = "either"
 SLIDES_ONLY = True
+MOMENTARY = True
 PLAIN = "a screw that grows as it warms up"
 REMEDY = (
     "fit a linear scale or cool the screw; or warm the machine up before it works, log its temperature, and keep the "

@@ -7,6 +7,7 @@ from camcomp.model.effect import Motion, Parameter
 
 STAGE = "drive"
 TARGET = "actuator"
+MOMENTARY = True
 PLAIN = "a pitch error of the screw"
 REMEDY = "put the pitch into the control's compensation table, or keep it in the machine file"
 SOURCE = "definition: carriage minus encoder = ppm 1e-6 (encoder - home); classes of ISO 3408-3"

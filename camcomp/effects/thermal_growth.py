@@ -8,6 +8,7 @@ from camcomp.model.effect import Motion, Parameter
 
 STAGE = "drive"
 TARGET = "either"
+MOMENTARY = True
 PLAIN = "growth with temperature"
 REMEDY = "warm the machine up before it works, log its temperature, and keep the coefficient in the machine file"
 SOURCE = "linear expansion; first-order warm-up where no temperature is logged"

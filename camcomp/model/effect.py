@@ -5,12 +5,12 @@ camcomp/model/signal_path.py calls the hooks, stage by stage, effects in the ord
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from typing import Any, Literal
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal, Self
 
 import numpy as np
 
-from camcomp.ground.datatypes import Floats
+from camcomp.ground.datatypes import Floats, Ints
 from camcomp.ground.errors import Location
 from camcomp.model.seams import Seams
 
@@ -88,6 +88,23 @@ class Motion:
     told: Callable[[], Floats] | None = None  # (n, 3) mm, program frame
     cut_before_min: float = 0.0  # of cut_min, what was cut in earlier runs
     seams: Seams | None = None  # where a recording begins or goes on in motion; None: it starts at rest
+
+    def at(self, instants: Ints | slice) -> Self:
+        """The same at some of the instants: no movement any more, nor what is worked out for all of them."""
+        return replace(
+            self,
+            time=self.time[instants],
+            common=self.common[instants],
+            cut_min=self.cut_min[instants],
+            temperature=None if self.temperature is None else self.temperature[instants],
+            encoder=self.encoder[instants],
+            speed=self.speed[instants],
+            direction=self.direction[instants],
+            nut=None if self.nut is None else self.nut[instants],
+            held=None,
+            told=None,
+            seams=None,
+        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,7 +2,11 @@
 
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from camcomp.ground.datatypes import Bools, Floats, Ints
+
+_MISSING = 1.5  # usual steps between rows from which on rows are missing between them
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,3 +23,9 @@ class Seams:
     def of(self, actuators: Bools) -> "Seams":
         """Of some of the actuators."""
         return replace(self, speed=self.speed[:, actuators])
+
+
+def missing_rows(time: Floats) -> Bools:
+    """Whether rows at times (n,) s are missing between each and the next (n - 1,)."""
+    step = np.diff(time)
+    return np.asarray(step > _MISSING * float(np.median(step)) if len(step) else np.zeros(0, bool))

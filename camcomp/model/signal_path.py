@@ -43,6 +43,11 @@ def acting(causes: Sequence[Cause], stage: str) -> list[Cause]:
     return [cause for cause in causes if any(hasattr(cause.effect, hook) for hook in _AT[stage])]
 
 
+def momentary(causes: Sequence[Cause]) -> bool:
+    """Whether drives have no memory: what they do at an instant depends on that instant alone."""
+    return all(getattr(cause.effect, "MOMENTARY", False) for cause in acting(causes, "drive"))
+
+
 def controlled(causes: Sequence[Cause], actuators: tuple[str, ...], motion: Motion) -> Floats:
     """Encoders (n, m) of a motion whose encoders are still the set-points."""
     encoder = motion.encoder

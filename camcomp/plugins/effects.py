@@ -34,6 +34,7 @@ if TYPE_CHECKING:  # the solver is not needed to say what an effect is
     from camcomp.model.motion.twin import Reading
 
 _ALSO = ("public",)
+_SOME = slice(1, None, 3)  # instants of a trial
 _YAML_KEYS = {"effect", "target", "source"}  # stand beside the parameters
 
 
@@ -44,7 +45,8 @@ class EffectPlugin(Protocol):
     PLAIN (what it is, in the words of a workshop: "play in the drive"), REMEDY (what to do about it, without a capital),
     FITTED (tuple of Parameter: the ones a diagnosis fits, where others are easier to fit) with the function `public`
     (their values -> those of PARAMETERS), TARGETS (tuple of names, where TARGET is "named"), ROTARY (those that a hinge
-    has), ARM_ONLY (for serial arms), SLIDES_ONLY (for slides), WARMS (compensate asks for the temperature), Params (Spec:
+    has), ARM_ONLY (for serial arms), SLIDES_ONLY (for slides), MOMENTARY (True: on_drive and on_drive_force answer for every
+    instant alone, whatever came before), WARMS (compensate asks for the temperature), Params (Spec:
     keys in YAML beside PARAMETERS, never fitted); where TARGET is "named", OF_TARGET (target -> those of its keys that make
     sense there) and SOUGHT (target -> the parameters that a diagnosis fits there).
     """
@@ -239,7 +241,12 @@ def _try_hook(who: str, effect: ModuleType, hook: str, given: Mapping[str, tuple
     call: Callable[..., Any] = getattr(effect, hook)
     if not same(call(*given[hook], nominal(effect)), given[hook][0]):
         raise refusal(who, f"{hook} changes something at the nominal values of all parameters")
-    call(*given[hook], _away(who, effect))
+    answer = call(*given[hook], _away(who, effect))
+    if getattr(effect, "MOMENTARY", False) and hook in ("on_drive", "on_drive_force"):
+        values, motion, which = given[hook]
+        some = call(values[_SOME], motion.at(_SOME), which, _away(who, effect))
+        if not np.allclose(some, answer[_SOME], rtol=1e-9, atol=0.0, equal_nan=True):
+            raise refusal(who, f"MOMENTARY is True, but what {hook} answers depends on the instants before")
 
 
 def _more_keys(effect: Any) -> set[str]:

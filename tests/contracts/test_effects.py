@@ -133,3 +133,16 @@ def test_an_effect_of_one_actuator_leaves_the_others_alone(name, hook):
 def test_a_common_target_acts_on_every_actuator():
     cause = Cause("servo_lag", shelf.load("effects", "servo_lag"), None, {})
     assert cause.which(ACTUATORS).tolist() == [1.0, 1.0, 1.0] and cause.aimed(ACTUATORS) == ACTUATORS
+
+
+@pytest.mark.parametrize(
+    "name", [n for n in shelf.members("effects") if hasattr(shelf.load("effects", n), "MOMENTARY")]
+)
+def test_what_says_that_it_acts_at_every_instant_alone_does(name):
+    effect = shelf.load("effects", name)
+    for hook in {"on_drive", "on_drive_force"} & set(hooks(effect)):
+        before, m, which = inputs(hook)
+        some = np.arange(3, len(m.time), 7)
+        got = getattr(effect, hook)(before[some], m.at(some), which, away(effect))
+        whole = getattr(effect, hook)(before, m, which, away(effect))
+        np.testing.assert_allclose(got, whole[some], rtol=1e-13)

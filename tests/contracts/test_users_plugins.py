@@ -195,6 +195,11 @@ def changed(source, old, new):
     return source.replace(old, new)
 
 
+MEMORY = """MOMENTARY = True
+
+
+def on_drive(error, motion, which, p):
+    return error + p["lean"] * which * np.cumsum(motion.speed, axis=0)"""
 BROKEN = {
     "effects": [
         ('STAGE = "tool"', "", "STAGE is missing"),
@@ -226,6 +231,7 @@ BROKEN = {
         ("[1.0, 0.0, 0.0])\n", "[1.0, 0.0, 0.0])[:2]\n", "ValueError"),
         ("    return tip if", "    if p['lean']:\n        return tip[:, :2]\n    return tip if", "an array (41, 2), not an array (41, 3)"),
         ("PARAMETERS =", "PARAMETERS = ()\nOTHERS =", "PARAMETERS is empty"),
+        ("def on_pose", f"{MEMORY}\n\n\ndef on_pose", "MOMENTARY is True, but what on_drive answers"),
         ("SOURCE =", "Params = dict\nSOURCE =", "not a class made from camcomp.plugins.Spec"),
         ("SOURCE =", "from camcomp.plugins import Spec\nclass Params(Spec):\n    lean: list[float] = []\n\nSOURCE =", "'lean'"),
     ],

@@ -23,3 +23,20 @@ def test_friction_and_play_leave_nothing_unknown_where_an_axis_waits(tmp_path):
     assert {(each.effect, each.target) for each in result.causes[:2]} == {("friction", "y"), ("backlash", "x")}
     assert all(each.probability > 0.95 for each in result.causes[:2])
     assert result.verdict != "unknown"
+
+
+def test_play_of_an_axis_that_moves_when_the_log_begins_is_one_of_what_may_have_shifted_it(tmp_path):
+    """Every log begins on the way down, the play taken up by rapids that are not in it: all that shows is a constant height."""
+    rng = np.random.default_rng(PLAN.seed)
+    ways = character(rng, False)
+    runs = schedule(PLAN, rng)
+    machine = Bench(PLAN, runs, ways)
+    faults = machine.sized((), "backlash", "z", 0.03, 1)
+    times = [row_times(run, PLAN, False, rng) for run in runs]
+    seen = machine.see((faults,), times)
+    assert all(abs(s.commanded[1, 2] - s.commanded[0, 2]) > 0.1 for s in seen)
+    found = open_experiment(write(Made(runs, seen, {"runs": [{} for _ in runs]}), PLAN, tmp_path))
+    result = diagnose(found.job, found.twin, found.runs, stated_mm=PLAN.sensors.tip_mm).result
+    sets = [{(each.effect, each.target) for each in some} for some in result.alternatives]
+    assert {("backlash", "z")} in sets
+    assert result.verdict == "ambiguous"

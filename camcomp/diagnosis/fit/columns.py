@@ -15,6 +15,7 @@ from camcomp.diagnosis.fit.bench import Bench, CandidateCause, Run, cause_of, st
 from camcomp.diagnosis.fit.labels import EFFECT_OF, apart, label_name
 from camcomp.diagnosis.fit.measured import channel_names
 from camcomp.diagnosis.fit.patterns import Dictionary, Ground, dictionary
+from camcomp.diagnosis.fit.starts import start_columns
 from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.diagnosis.statistics.evidence import Prior
 from camcomp.ground import shelf
@@ -27,12 +28,6 @@ from camcomp.model.statics.description import Link, Parallelogram, Robot
 
 RUN_OFFSET_MM = 0.001  # repeatability of a run
 RUN_OFFSET_N, RUN_OFFSET_NMM = 0.3, 300.0
-STARTED_MM, STARTED_RAD = 0.1, 1e-4  # by which an actuator has to move before its play is taken up
-START_MM, START_RAD = 0.1, 5e-5  # where its carriage may stand until then: play and guides as bad as they come
-START_N, START_NMM = 1000.0, 1e6  # and how hard its guide may hold it there
-ALWAYS_MM, ALWAYS_RAD = 0.005, 5e-6  # the same where it hardly ever moves: little, or nothing would be known of it
-ALWAYS = 0.2  # of a run: what moves for less of it hardly ever moves
-STARTING_ROWS = 2
 CLOCK_JITTER_S = 1e-5
 CLOCK_RATE = 1e-5
 SPRING_LOG = 0.01  # one link's spring against its stated value
@@ -233,7 +228,7 @@ def _nuisances(bench: Bench) -> list[tuple[str, float, list[Floats], bool]]:
             one[:, c] = 1.0
             size = RUN_OFFSET_MM if c < 3 else RUN_OFFSET_NMM if c < 3 + 2 * m and hinges[c - 3 - m] else RUN_OFFSET_N
             found.append((f"offset.{run.name}.{channel_names(bench.actuators)[c]}", size, only(r, one), c >= 3))
-    found += _starts(bench, only)
+    found += start_columns(bench, lambda r, values: only(r, thinned(values, bench.runs[r].thin)))
     clock = CandidateCause("time_sync", None, shelf.load("effects", "time_sync"))
     frame = CandidateCause("workpiece_frame", None, shelf.load("effects", "workpiece_frame"))
     if any(run.measured.has("tip") for run in bench.runs):
@@ -248,35 +243,6 @@ def _nuisances(bench: Bench) -> list[tuple[str, float, list[Floats], bool]]:
         frames = candidate_columns(bench, frame, {})
         _by_label(found, bench, "clamping", [(p.name, f) for p, f in zip(frame.parameters, frames, strict=True)])
     found += _allowances(bench)
-    return found
-
-
-def _starts(bench: Bench, only: Callable[[int, Floats], list[Floats]]) -> list[tuple[str, float, list[Floats], bool]]:
-    """Where play and guides stood when a run began, nobody knows: until an actuator has moved, its carriage may be anywhere.
-
-    One column per run and actuator for the rows before that, where there are enough of them, and one for the force with
-    which its guide holds it.
-    """
-    found, m = [], len(bench.actuators)
-    for r, run in enumerate(bench.runs):
-        if not run.run_path.ordered:
-            continue
-        moved = np.abs(run.run_path.row_rho - run.run_path.row_rho[0])
-        for j, a in enumerate(bench.actuators):
-            revolute = bench.twin.robot.actuators[j].revolute
-            still = np.maximum.accumulate(moved[:, j]) < (STARTED_RAD if revolute else STARTED_MM)
-            if still.sum() < STARTING_ROWS:
-                continue
-            shift = np.zeros_like(bench.observed(r))
-            shift[:, :3] = bench.turned(r, bench.row_slopes(r)[:, :, j] * still[:, None])
-            begins = still.mean() < 1.0 - ALWAYS
-            width = (START_RAD if revolute else START_MM) if begins else (ALWAYS_RAD if revolute else ALWAYS_MM)
-            found.append((f"start.{run.name}.{a}", width, only(r, thinned(shift, run.thin)), False))
-            if begins and run.measured.has("drive"):
-                held = np.zeros_like(shift)
-                held[:, 3 + m + j] = still
-                holding = START_NMM if revolute else START_N
-                found.append((f"held.{run.name}.{a}", holding, only(r, thinned(held, run.thin)), False))
     return found
 
 
@@ -358,15 +324,11 @@ def grounds(bench: Bench) -> list[Ground]:
         velocity = (
             np.gradient(tip, run.run_path.time, axis=0) if run.run_path.ordered and len(tip) > 2 else np.zeros_like(tip)
         )
-        motion = reading.motion
-        motion = replace(
-            motion,
-            **{n: getattr(motion, n)[keep] for n in ("time", "common", "cut_min", "encoder", "speed", "direction")},
-            temperature=None if motion.temperature is None else motion.temperature[keep],
-        )
         present = {n: run.measured.has(n) for n in ("tip", "encoder", "drive", "dyno")}
         present["encoder"] &= run.by == "setpoint"  # else it is the motion itself
-        out.append(Ground(motion, reading.drive[keep], reading.dyno[keep], tip[keep], velocity[keep], present))
+        out.append(
+            Ground(reading.motion.at(keep), reading.drive[keep], reading.dyno[keep], tip[keep], velocity[keep], present)
+        )
     return out
 
 

@@ -33,7 +33,7 @@ def joint_covariance(problem: Problem, f: Fitted, *, as_stated: bool = False) ->
     reach = np.array([0.3 * f.extra[i][p.name] for i, p in names])
     G = []
     for W, own, D in zip(problem.white, f.white, shapes, strict=True):
-        G.append(W.beside(D * reach).exchanged(index, own))
+        G.append(W.beside(D * reach).exchanged([*index, *f.pushed], own))
     usual, most = problem.prior.precision(f.factor), problem.prior.reach.copy()
     if not as_stated:
         usual, most = _stated(problem, usual, most)

@@ -6,6 +6,7 @@ import numpy as np
 
 from camcomp.diagnosis.fit.bench import Bench, Run, thinned
 from camcomp.diagnosis.fit.floor import NoiseFloor, row_scatter
+from camcomp.diagnosis.fit.starts import unknown_starts
 from camcomp.diagnosis.statistics.noise_model import Noise
 from camcomp.ground.datatypes import Floats
 
@@ -47,7 +48,7 @@ def less_certain(noise: Noise, extra: Sequence[Floats], heavy: Sequence[Floats])
 
 
 def inflation(bench: Bench) -> list[Floats]:
-    """Per run (n, c) >= 1: rows just after a step of the acceleration count less; NaN where no value.
+    """Per run (n, c) >= 1: rows just after a step of the acceleration, or of which nobody knows what came before, count less; NaN where no value.
 
     In units of the channel's own noise, which is not known yet: here the extra standard deviation in mm or N.
     """
@@ -69,7 +70,7 @@ def inflation(bench: Bench) -> list[Floats]:
             extra[:, 3 : 3 + m] = of_drives
             if unsteady > 0.0:
                 extra[:, :3] = np.hypot(extra[:, :3], unsteady * np.abs(_speed(bench, k)))
-        extra = np.hypot(extra, _doubt(bench, k))
+        extra = np.hypot(np.hypot(extra, _doubt(bench, k)), unknown_starts(bench, k))
         extra = np.where(np.isfinite(observed), extra, np.nan)
         out.append(thinned(extra, run.thin))
     return out

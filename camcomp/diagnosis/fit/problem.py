@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from camcomp.diagnosis.fit.bench import Bench, CandidateCause, cause_of, step_of, thinned
+from camcomp.diagnosis.fit.cause_prior import cause_prior
 from camcomp.diagnosis.fit.columns import (
     Columns,
     build,
@@ -18,12 +19,13 @@ from camcomp.diagnosis.fit.columns import (
 )
 from camcomp.diagnosis.fit.floor import MINOR, NoiseFloor, least_noise, measure_floor
 from camcomp.diagnosis.fit.grid_parameters import beside, best_shape, quick_columns, reach, settled_interval
-from camcomp.diagnosis.fit.intervals_in_time import LOOK_ELSEWHERE, best_interval, never_ending
+from camcomp.diagnosis.fit.intervals_in_time import best_interval, never_ending
 from camcomp.diagnosis.fit.label_offsets import with_scatter
 from camcomp.diagnosis.fit.noise import inflation, instrument_noise, less_certain, less_certain_drives
 from camcomp.diagnosis.fit.outliers import outlying, tails
 from camcomp.diagnosis.fit.patterns import Dictionary
 from camcomp.diagnosis.fit.ringing import FOLLOWED, loudest
+from camcomp.diagnosis.fit.small_forces import pushed_farther, small_forces
 from camcomp.diagnosis.statistics.by_channel import ByChannel, channel_behind_channel
 from camcomp.diagnosis.statistics.cause_sets import CausePrior, Fitted, Members, Scale, total
 from camcomp.diagnosis.statistics.evidence import Gram, Prior, estimate, gram
@@ -179,11 +181,35 @@ class Problem:
                 size = self._move_shapes(members, theta, shapes, left, white, mean)
             if step > 0 and size < SETTLED:
                 break
+        beside = small_forces(self.columns.candidates, members) if bent else ()
+        farther: tuple[Floats, ...] = ()
+        if beside:
+            causes = self.causes(members, theta, shapes)
+            forces = [(self.columns.candidates[i], self.shapes.get(i, {})) for i in beside]
+            farther = pushed_farther(self.bench, causes, self._read(causes), forces)
+            white = [
+                np.column_stack([own, self.whitened(k, far)])
+                for k, (own, far) in enumerate(zip(white, farther, strict=True))
+            ]
+            grams = self._grams_at([*index, *self.member_columns(beside)], white, left)
         scale = Scale(total(grams), self.prior, self.candidates)
         factor = scale.factor(members)
         mean, full = estimate(total(grams), self.prior, index, factor)
         theta, covariance = self._bounded(members, mean[index]), full[np.ix_(index, index)]
-        return Fitted(members, theta, covariance, scale(members), grams, shapes, factor, tuple(white), tuple(left))
+        pushed = tuple(self.member_columns(beside))
+        return Fitted(
+            members,
+            theta,
+            covariance,
+            scale(members),
+            grams,
+            shapes,
+            factor,
+            tuple(white),
+            tuple(left),
+            pushed,
+            farther,
+        )
 
     def _readings(
         self, members: Members, theta: Floats, shapes: Mapping[int, Mapping[str, float]]
@@ -430,31 +456,6 @@ def _whiten(
     words = [replace(each, blocks=()) for each in words]  # white they are enough
     return Problem(bench, columns, words, inflate, times, residuals, floor, noise, outliers, white, white_patterns,
                    white_residual, shapes, cause_prior(columns))  # fmt: skip
-
-
-def cause_prior(columns: Columns) -> CausePrior:
-    """Prior weights: every effect alike; within an effect one value for all weighs half, or all targets alike."""
-    names = sorted({a.name for a in columns.candidates})
-    weight = []
-    for a in columns.candidates:
-        same = [b for b in columns.candidates if b.name == a.name]
-        common = any(b.target is None for b in same)
-        share = (
-            1.0 / len(same) if not common or len(same) == 1 else (0.5 if a.target is None else 0.5 / (len(same) - 1))
-        )
-        sought = LOOK_ELSEWHERE if any(p.placed for p in a.shapes) else 0.0
-        weight.append(np.log(share / len(names)) - sought)
-
-    def exclusive(i: int, j: int) -> bool:
-        a, b = columns.candidates[i], columns.candidates[j]
-        return a.name == b.name and (a.target is None or b.target is None)
-
-    kinds = [
-        tuple(i for i, a in enumerate(columns.candidates) if a.name == name and a.target is not None) for name in names
-    ]
-    return CausePrior(
-        tuple(tuple(columns.of(i)) for i in range(len(columns.candidates))), np.array(weight), exclusive, tuple(kinds)
-    )
 
 
 def _scanned(problem: Problem) -> Problem:

@@ -72,6 +72,10 @@ def _left(problem: Problem, f: Fitted, k: int) -> Floats:
     index = problem.member_columns(f.members)
     usual = estimate(total(f.grams), problem.prior, index, 1.0)[0]
     usual[index] = 0.0
+    if f.pushed:
+        pushed = list(f.pushed)
+        left = left - f.farther[k] @ usual[pushed]
+        usual[pushed] = 0.0
     return np.asarray(left - (problem.columns.blocks[k] @ usual).reshape(left.shape[1], -1).T)
 
 

@@ -36,7 +36,7 @@ def about(problem: Problem, f: Fitted) -> tuple[list[ByChannel], list[Floats]]:
     """White columns and residual (absolute coordinates) linearised at the fit."""
     if not f.members:
         return problem.white, problem.white_residual
-    index = problem.member_columns(f.members)
+    index = [*problem.member_columns(f.members), *f.pushed]
     white = [W.exchanged(index, own) for W, own in zip(problem.white, f.white, strict=True)]
     return white, list(f.residual)
 

@@ -42,8 +42,12 @@ class Fitted:
     grams: tuple[Gram, ...]  # per run, about the fit, in absolute coordinates
     extra: Mapping[int, Mapping[str, float]] = field(default_factory=dict)  # scanned shapes by candidate
     factor: float = 1.0  # the tolerances, as far off as the data have them
-    white: tuple[Floats, ...] = ()  # per run (w, d), the members' columns at the fit
+    white: tuple[
+        Floats, ...
+    ] = ()  # per run (w, d + p), the columns at the fit of the members and of what pushes beside them
     residual: tuple[Floats, ...] = ()  # per run (w,), in absolute coordinates
+    pushed: tuple[int, ...] = ()  # columns (p,) of small forces that springs changed by the members feel otherwise
+    farther: tuple[Floats, ...] = ()  # per run (n, c, p), what they do to the channels there
     minor: Members = ()  # what the evidence has beside the members, and nobody names
 
     @property

@@ -21,7 +21,7 @@ from camcomp.model.cutting.track import Track
 from camcomp.model.motion.alignment import Aligned
 from camcomp.model.motion.node_pieces import NODES, SPLIT, Places, basis_at
 from camcomp.model.motion.run_path import MOST_STEPS, STEP_S, Driven, RunPath
-from camcomp.model.seams import Seams
+from camcomp.model.seams import Seams, missing_rows
 
 CLOCK_S = 0.010  # by which the clock of a tip measurement may be off that of the control
 _JUMP_SHARE = 0.1  # of the largest force: what the force changes from row to row is more than the turn of an arc
@@ -36,7 +36,6 @@ BESIDE_MM = 0.6  # from the path: no blended corner leaves it further, and what 
 _SURE_N = 20.0  # what the force may be off by for the nodes between rows to be led by it
 _SAME_FEED = 0.03  # by which a driven feed may differ from the programmed one and still be it
 LEAST_FEED = 1e-3  # mm/min, of what stands still
-_MISSING = 1.5  # usual steps between rows from which on rows are missing between them
 _RESTS = 1e-3  # of the longest way between two rows: less, twice in a row, is rest
 _CHORD_MM = 0.02  # over which a direction is taken: digits and noise of set-points are small beside it
 
@@ -106,7 +105,7 @@ def driven_path(
 
 def _seams(time: Floats, grid: Floats, lead: Callable[[Floats], Floats]) -> Seams:
     """Where rows (n,) s begin, and go on after some that are missing: the instants on either side of such a row."""
-    rows = np.repeat(np.flatnonzero(np.append(True, _missing(time))), 2)
+    rows = np.repeat(np.flatnonzero(np.append(True, missing_rows(time))), 2)
     before = np.searchsorted(grid, time[rows], side="right") - 1
     instants = np.minimum(before + np.arange(len(rows)) % 2, len(grid) - 1)
     at, last = np.unique(instants[::-1], return_index=True)  # of several in one step of the grid the last
@@ -114,12 +113,6 @@ def _seams(time: Floats, grid: Floats, lead: Callable[[Floats], Floats]) -> Seam
     unseen = np.where(rows > 0, time[rows] - time[rows - 1], np.inf)
     speed = (lead(time[rows] + STEP_S) - lead(time[rows])) / STEP_S
     return Seams(at, unseen, speed)
-
-
-def _missing(time: Floats) -> Bools:
-    """Whether rows are missing (n - 1,) between each and the next."""
-    step = np.diff(time)
-    return np.asarray(step > _MISSING * float(np.median(step)) if len(step) else np.zeros(0, bool))
 
 
 def cutting_forces(
@@ -312,7 +305,7 @@ def _smooth(time: Floats, values: Floats) -> Callable[[Floats], Floats]:
         return lambda at: np.column_stack([np.interp(at, time, v) for v in values.T])
     step, way = np.diff(time), np.abs(np.diff(values, axis=0))
     rest = np.pad(way <= _RESTS * way.max(axis=0), ((2, 2), (0, 0)))
-    held = _missing(time)[:, None] | (rest[3:-1] & rest[4:]) | (rest[1:-3] & rest[:-4])
+    held = missing_rows(time)[:, None] | (rest[3:-1] & rest[4:]) | (rest[1:-3] & rest[:-4])
     lead = Akima1DInterpolator(time, values, axis=0)
     with np.errstate(over="ignore"):  # beside slopes of round-off, whose harmonic mean is nothing
         over = PchipInterpolator(time, values, axis=0)

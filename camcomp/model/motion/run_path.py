@@ -1,7 +1,7 @@
 """One run as the twin sees it: where the set-points are in time, and where in the program every row of a log stands."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -19,6 +19,7 @@ STEP_S = 0.001  # grid of what has memory: 0.2 um of interpolation at 1500 mm/s2
 MOST_STEPS = 40000
 _IN_DOUBT = 0.05  # of the largest force
 _HARDLY_OTHERS = 0.8  # of the rows that cut are in doubt
+_FEW = 0.5  # of the grid, below which instants are worth picking
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,6 +95,20 @@ class RunPath:
         i = np.clip(np.searchsorted(self.grid, at, side="right") - 1, 0, len(self.grid) - 2)
         step = self.grid[i + 1] - self.grid[i]
         return i, np.clip((at - self.grid[i]) / np.where(step > 0, step, 1.0), 0.0, 1.0)[:, None]
+
+    @cached_property
+    def near_rows(self) -> Ints:
+        """Instants of the grid between which rows and their tips lie."""
+        before = np.concatenate([self.in_grid(self.time)[0], self.in_grid(self.tip_time)[0]])
+        return np.unique(np.concatenate([before, before + 1]))
+
+    @cached_property
+    def around_rows(self) -> "RunPath":
+        """The same run on these instants of the grid alone, itself where they are most of it."""
+        if not self.ordered or len(self.near_rows) > _FEW * len(self.grid):
+            return self
+        grid = {each: getattr(self, each)[self.near_rows] for each in ("grid", "grid_rho", "grid_cut", "grid_piece")}
+        return replace(self, **grid)
 
     @cached_property
     def row_place(self) -> Places:

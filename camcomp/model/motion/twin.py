@@ -25,7 +25,7 @@ from camcomp.model.motion.node_pieces import Places
 from camcomp.model.motion.run_path import RunPath, travel_direction
 from camcomp.model.statics.description import Robot
 from camcomp.model.statics.machine import Machine, build_machine
-from camcomp.model.statics.solve import FREE, STATUS, solve
+from camcomp.model.statics.solve import FREE, INVERSE, STATUS, solve
 
 _RHO_STEP = 1e-3  # mm or 1e-3 mrad of drive, to first order linear within 1e-6
 _FORCE_STEP = 1.0  # N
@@ -64,7 +64,7 @@ class Twin:
     _edited: dict[tuple[int, ...], tuple[tuple[Cause, ...], Robot, tuple[Any, ...]]] = field(
         default_factory=dict, init=False, repr=False
     )
-    _usual: WeakKeyDictionary[RunPath, tuple[Motion, Motion]] = field(
+    _usual: WeakKeyDictionary[RunPath, tuple[Motion, Motion, Motion]] = field(
         default_factory=WeakKeyDictionary, init=False, repr=False
     )
 
@@ -94,7 +94,7 @@ class Twin:
 
     def inverse(self, tip: Floats) -> Floats:
         """Set-points (n, m) that the control computes for machine tips (n, 3). Raises PhysicsError CC301."""
-        state = solve(self._control, FREE, tip, check=False)
+        state = solve(self._control, INVERSE, tip)
         if (state.status == 3).any():
             bad = int(np.argmax(state.status == 3))
             raise PhysicsError("CC410", f"tip {np.round(tip[bad], 3).tolist()} (machine frame) is {STATUS[3]}")
@@ -161,23 +161,25 @@ class Twin:
         causes = (*self.causes, *causes)
         # control, drive
         robot, key = self.edited(causes)
-        grid, rows = self._motions(run_path, causes)
+        grid, near, rows = self._motions(run_path, causes)
         if robot is not self.robot:
             springs = signal_path.springs(robot)
-            grid, rows = replace(grid, stiffness=springs), replace(rows, stiffness=springs)
+            grid, near, rows = (replace(each, stiffness=springs) for each in (grid, near, rows))
+        seen = run_path.time if run_path.led else signal_path.clock(causes, run_path.tip_time)
+        late = seen is not run_path.time
+        stated = not late or seen is run_path.tip_time
         held = self._held(run_path, grid, causes, solved, robot, key)
-        grid = replace(grid, names=self.actuators, held=lambda: run_path.grid_place.of(held()))
         rows = replace(
             rows,
-            names=self.actuators,
             held=lambda: run_path.row_place.of(held()),
             told=lambda: self._told(run_path, run_path.tip_place, run_path.tip_time),
         )
-        error, guided = signal_path.driven(causes, self.actuators, grid)
+        alone = slopes is not None and stated and signal_path.momentary(causes)
+        path, drives = (run_path.around_rows, near) if alone else (run_path, grid)
+        drives = replace(drives, held=lambda: path.grid_place.of(held()))
+        error, guided = signal_path.driven(causes, self.actuators, drives)
         effort = signal_path.drive_forces(causes, self.actuators, guided)
-        carriage = grid.encoder + error if error.any() else grid.encoder
-        seen = run_path.time if run_path.led else signal_path.clock(causes, run_path.tip_time)
-        late = seen is not run_path.time
+        carriage = drives.encoder + error if error.any() else drives.encoder
         encoder = rows.encoder
         ahead = None
         if measured is not None:
@@ -187,12 +189,12 @@ class Twin:
             at_tip = replace(
                 _at(run_path, grid, seen, None), told=lambda: self._told(run_path, run_path.place(seen), seen)
             )
-        moved = carriage is not run_path.grid_rho
-        gap = carriage - run_path.grid_rho if moved else None  # carriage minus set-point
-        gap_row = _gap_at(run_path, run_path.time, gap, ahead)
-        gap_tip = _gap_at(run_path, seen, gap, ahead) if late else gap_row
+        moved = carriage is not path.grid_rho
+        gap = carriage - path.grid_rho if moved else None  # carriage minus set-point
+        gap_row = _gap_at(path, run_path.time, gap, ahead)
+        gap_tip = _gap_at(path, seen, gap, ahead) if late else gap_row
         place = run_path.row_place
-        place_tip = place if not late else run_path.tip_place if seen is run_path.tip_time else run_path.place(seen)
+        place_tip = place if not late else run_path.tip_place if stated else run_path.place(seen)
         # structure
         known = solved if slopes is not None else None
         if known is None:
@@ -211,7 +213,7 @@ class Twin:
             drive = slopes.drives(place).behind(drive, place, solved, gap_row, load, usual=usual)
             tip = slopes.tips(place_tip).behind(tip, place_tip, solved, gap_tip, load_tip, usual=usual)
         if effort is not None:
-            drive = drive + run_path.between(effort, run_path.time)
+            drive = drive + path.between(effort, run_path.time)
         # tool, workpiece, sensor
         tip = signal_path.led(causes, tip, at_tip, self.nominal, self.origin)
         tip = self.to_program(signal_path.posed(causes, tip, load_tip, at_tip))
@@ -309,13 +311,13 @@ class Twin:
             self._machines[key] = build_machine(robot, self.nominal)
         return self._machines[key]
 
-    def _motions(self, run_path: RunPath, causes: Sequence[Cause]) -> tuple[Motion, Motion]:
-        """Motion on the fine grid and at the rows; the same for all causes that leave the control alone."""
+    def _motions(self, run_path: RunPath, causes: Sequence[Cause]) -> tuple[Motion, Motion, Motion]:
+        """Motion on the fine grid, on that around the rows, and at the rows; the same for all causes that leave the control alone."""
         servo = signal_path.acting(causes, "control")
         if not servo and run_path in self._usual:
             return self._usual[run_path]
         grid = self._grid_motion(run_path, servo)
-        motions = grid, _at(run_path, grid, run_path.time, run_path.row_rho)
+        motions = grid, _around_rows(run_path, grid), _at(run_path, grid, run_path.time, run_path.row_rho)
         if not servo:
             self._usual[run_path] = motions
         return motions
@@ -340,6 +342,7 @@ class Twin:
             home,
             signal_path.springs(self.robot),
             run_path.ordered,
+            names=self.actuators,
             cut_before_min=run_path.cut_before_min,
             seams=None if run_path.driven is None else run_path.driven.seams,
         )
@@ -382,6 +385,15 @@ def _at(run_path: RunPath, grid: Motion, at: Floats, rho: Floats | None) -> Moti
         told=None,
         seams=None,
     )
+
+
+def _around_rows(run_path: RunPath, grid: Motion) -> Motion:
+    """The grid's motion at the instants around the rows."""
+    path = run_path.around_rows
+    if path is run_path:
+        return grid
+    near = grid.at(run_path.near_rows)
+    return replace(near, encoder=path.grid_rho) if grid.encoder is run_path.grid_rho else near
 
 
 def _gap_at(run_path: RunPath, at: Floats, gap: Floats | None, ahead: Floats | None) -> Floats:

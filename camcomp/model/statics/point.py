@@ -8,6 +8,7 @@ the machine; while steps are short the factored matrices serve several passes. T
     TARGET   tip given, force given       -> tilt, commanded tip      F = f(t0 | t0F), seed eqs. (2)-(3)
     CLAMP    rho given, pose given        -> wrench (6,)              f(t | t0) with the full pose held
     POSE     pose given, force given      -> commanded pose           TARGET without tilt; needs six actuators
+    INVERSE  tip given                    -> rho                      nothing gives way: the control's own kinematics
 """
 
 # mypy: disallow-untyped-defs=False, disallow-incomplete-defs=False
@@ -38,7 +39,7 @@ from camcomp.model.statics.rigid import (
 )
 from camcomp.model.statics.vectors import add_to, cross, dot, log_product, move, part, plus, turned
 
-FREE, HOLD, TARGET, CLAMP, POSE = 0, 1, 2, 3, 4
+FREE, HOLD, TARGET, CLAMP, POSE, INVERSE = 0, 1, 2, 3, 4, 5
 STEP_DONE = 1e-6  # mm: after a Newton step this short the next one is below 1e-12
 ERROR_DONE = 3e-11  # mm: estimated error left by the passes that reuse a factored matrix
 SHORT_STEP = 0.1  # mm: below it a factored matrix serves the next pass

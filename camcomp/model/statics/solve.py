@@ -22,7 +22,7 @@ from camcomp.model.statics.rotation import rotation_vectors
 
 Array = NDArray[np.float64]
 PIECE = 256
-FREE, HOLD, TARGET, CLAMP, POSE = point.FREE, point.HOLD, point.TARGET, point.CLAMP, point.POSE
+FREE, HOLD, TARGET, CLAMP, POSE, INVERSE = point.FREE, point.HOLD, point.TARGET, point.CLAMP, point.POSE, point.INVERSE
 STATUS = {
     rigid.OK: "solved",
     rigid.MAX_ITERATIONS: "no convergence",
@@ -41,7 +41,7 @@ class State:
     rho_nominal (n, m) inverse kinematics of the point asked for; drive (n, m) force of each drive on its carriage;
     force (n, 3) at the tip; status, passes (n,) int; x (n, c, nz), F (n, c, 6): internal states and wrenches of the
     chains, empty unless asked for; commanded_rotation (n, 3, 3); wrench (n, 6): sum of the chains' wrenches, the whole
-    load at the platform reference (the answer of CLAMP, and of HOLD with six actuators).
+    load at the platform reference (the answer of CLAMP, and of HOLD with six actuators). INVERSE answers rho_nominal alone.
     """
 
     tip: Array

@@ -7,7 +7,7 @@ import math
 
 from camcomp.model.statics.compiled import entry, inner
 from camcomp.model.statics.layout import A_CHAIN, A_VAR, SPRINGS
-from camcomp.model.statics.point import HOLD, POSE, TARGET, drive_forces, solve_point
+from camcomp.model.statics.point import HOLD, INVERSE, POSE, TARGET, drive_forces, solve_point
 from camcomp.model.statics.rigid import OK, OUT_OF_REACH, kinematics
 from camcomp.model.statics.vectors import (
     add_to,
@@ -117,6 +117,12 @@ def solve_one(
     memory.warm[0] = 0
     if code != OK:
         return code, 0
+    if mode == INVERSE:
+        for i in range(12):
+            memory.goal[i] = goal[i]
+        copy_rows(y, memory.y)
+        memory.warm[0] = 1
+        return code, 0
     passes = 0
     f = W.load[0]
     w = W.load[1]
@@ -190,7 +196,7 @@ def solve_many(
             turn[i], aim[i], near[i], tip_aim[i], force[i], wrench[i], rho[i], rho_nominal[i], commanded[i], pose[i],
             memory, W,
         )  # fmt: skip
-        if status[i] != OK:
+        if status[i] != OK or mode == INVERSE:
             continue
         z = memory.z
         lever = turned(pose[i], part(tool, 0))

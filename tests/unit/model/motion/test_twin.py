@@ -62,6 +62,18 @@ def read(twin, run_path, causes=()):
     return np.concatenate([reading.tip, reading.encoder, reading.drive], axis=1)
 
 
+MOMENTARY = {
+    "disturbance": {"shift_mm": 0.05, "force_N": 30.0, "from_s": 0.3, "to_s": 0.9},
+    "screw_cyclic": {"amplitude_mm": 0.02, "pitch_mm": 4.0, "phase_rad": 0.4},
+    "screw_growth": {"expansion_ppm_per_K": 200.0},
+    "thermal_growth": {"growth_mm_per_K": 0.01},
+}
+
+
+def typical(name):
+    return cause(name, **MOMENTARY[name])
+
+
 SECOND = {
     "softer drives": (softer, cause("friction", force_N=60.0)),
     "another home": (elsewhere, cause("screw_pitch", error_ppm=300.0)),
@@ -86,6 +98,23 @@ def test_a_copy_of_a_used_twin_with_another_machine_has_not_the_first_ones(job):
     soft = replace(first, robot=softer(first.robot))
     assert np.array_equal(read(soft, run_path), read(changed(first, softer(first.robot)), a_run(job)))
     assert np.abs(read(soft, run_path) - before).max() > 1e-3
+
+
+@pytest.mark.parametrize("clock_s", [0.0, 0.0034])
+@pytest.mark.parametrize("name", MOMENTARY)
+def test_instants_about_the_rows_are_enough_where_drives_have_no_memory(job, name, clock_s, monkeypatch):
+    one, run_path = [typical(name)], replace(a_run(job), clock_s=clock_s)
+    assert len(run_path.around_rows.grid) < 0.25 * len(run_path.grid)
+    few = read(twin_of(job), run_path, one)
+    monkeypatch.setattr("camcomp.model.signal_path.momentary", lambda causes: False)
+    np.testing.assert_allclose(few, read(twin_of(job), run_path, one), rtol=1e-13)
+
+
+def test_drives_with_a_memory_see_the_whole_run(job):
+    """Where play turned round between two rows decides what it does long after."""
+    one, run_path = [cause("screw_pitch", error_ppm=300.0), cause("backlash", width_mm=20.0)], a_run(job)
+    rows_apart = replace(run_path, time=run_path.time[::9], row_rho=run_path.row_rho[::9])
+    assert np.array_equal(read(twin_of(job), run_path, one)[::9], read(twin_of(job), rows_apart, one))
 
 
 def test_slopes_are_not_taken_for_others_that_are_gone(job):

@@ -10,7 +10,8 @@ from camcomp.model.job import Job
 from camcomp.model.statics.arm import arm_of, end_pose
 from camcomp.model.statics.closedform import closed_form
 from camcomp.model.statics.description import Transform
-from camcomp.model.statics.solve import FREE, solve
+from camcomp.model.statics.rigid import OUT_OF_REACH
+from camcomp.model.statics.solve import FREE, INVERSE, solve
 from tests.plants import kuka, serial
 
 
@@ -47,6 +48,20 @@ def test_the_branch_is_that_of_the_start_pose_and_the_plant_is_there(machine):
     vars(numeric)["closed_form"] = None  # it walks from the start pose
     walked = solve(numeric, FREE, tip, check=False).rho_nominal
     np.testing.assert_allclose(q, walked, atol=1e-9)
+
+
+@pytest.mark.parametrize("config", ["orthoglide-1deg", "delta", "ur10"])
+def test_the_inverse_alone_is_that_of_the_loaded_machine(config):
+    machine = Job(load_config([f"config/{config}.yaml"])).real_machine
+    at = machine.nominal.held_rotation @ machine.nominal.tool + machine.start_pose[9:]
+    tip = at + np.random.default_rng(5).uniform(-30.0, 30.0, (300, 3))
+    tip[7] += 1e5
+    loaded, alone = (solve(machine, mode, tip, check=False) for mode in (FREE, INVERSE))
+    assert np.array_equal(alone.rho_nominal, loaded.rho_nominal, equal_nan=True)
+    assert (
+        np.array_equal(alone.status == OUT_OF_REACH, loaded.status == OUT_OF_REACH) and alone.status[7] == OUT_OF_REACH
+    )
+    assert np.isfinite(np.delete(alone.rho_nominal, 7, axis=0)).all() and np.isnan(alone.tip).all()
 
 
 def test_what_is_out_of_reach_has_no_joint_angles(machine):

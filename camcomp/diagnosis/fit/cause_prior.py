@@ -1,0 +1,32 @@
+"""What is believed of causes before a log is looked at."""
+
+import numpy as np
+
+from camcomp.diagnosis.fit.columns import Columns
+from camcomp.diagnosis.fit.intervals_in_time import LOOK_ELSEWHERE
+from camcomp.diagnosis.statistics.cause_sets import CausePrior
+
+
+def cause_prior(columns: Columns) -> CausePrior:
+    """Prior weights: every effect alike; within an effect one value for all weighs half, or all targets alike."""
+    names = sorted({a.name for a in columns.candidates})
+    weight = []
+    for a in columns.candidates:
+        same = [b for b in columns.candidates if b.name == a.name]
+        common = any(b.target is None for b in same)
+        share = (
+            1.0 / len(same) if not common or len(same) == 1 else (0.5 if a.target is None else 0.5 / (len(same) - 1))
+        )
+        sought = LOOK_ELSEWHERE if any(p.placed for p in a.shapes) else 0.0
+        weight.append(np.log(share / len(names)) - sought)
+
+    def exclusive(i: int, j: int) -> bool:
+        a, b = columns.candidates[i], columns.candidates[j]
+        return a.name == b.name and (a.target is None or b.target is None)
+
+    kinds = [
+        tuple(i for i, a in enumerate(columns.candidates) if a.name == name and a.target is not None) for name in names
+    ]
+    return CausePrior(
+        tuple(tuple(columns.of(i)) for i in range(len(columns.candidates))), np.array(weight), exclusive, tuple(kinds)
+    )

@@ -1,0 +1,82 @@
+"""Where play and guides stood when a run began, nobody knows: until an actuator has moved, its carriage may be anywhere.
+
+Nor does anybody where a log goes on after motions that are not in it. Where that lasts for some rows of a run it is a
+nuisance of its own; where one row later all is known again, that row says nothing of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from camcomp.ground.datatypes import Bools, Floats
+from camcomp.model.seams import missing_rows
+
+if TYPE_CHECKING:
+    from camcomp.diagnosis.fit.bench import Bench
+
+STARTED_MM, STARTED_RAD = 0.1, 1e-4  # by which an actuator has to move before its play is taken up
+START_MM, START_RAD = 0.1, 5e-5  # where its carriage may stand until then: play and guides as bad as they come
+START_N, START_NMM = 1000.0, 1e6  # and how hard its guide may hold it there
+ALWAYS_MM, ALWAYS_RAD = 0.005, 5e-6  # the same where it hardly ever moves: little, or nothing would be known of it
+ALWAYS = 0.2  # of a run: what moves for less of it hardly ever moves
+STARTING_ROWS = 2
+
+
+def start_columns(
+    bench: Bench, only: Callable[[int, Floats], list[Floats]]
+) -> list[tuple[str, float, list[Floats], bool]]:
+    """One column per run and actuator for the rows before it has moved, where there are enough of them, and one for the force
+    with which its guide holds it: name, size, column per run (as `only` makes it of all rows of one run), whether the size may be off.
+    """
+    found, m = [], len(bench.actuators)
+    for r, run in enumerate(bench.runs):
+        if not run.run_path.ordered:
+            continue
+        for j, a in enumerate(bench.actuators):
+            revolute = bench.twin.robot.actuators[j].revolute
+            still = _still(run.run_path.row_rho[:, j], revolute)
+            if still.sum() < STARTING_ROWS:
+                continue
+            shift = np.zeros_like(bench.observed(r))
+            shift[:, :3] = bench.turned(r, bench.row_slopes(r)[:, :, j] * still[:, None])
+            begins = still.mean() < 1.0 - ALWAYS
+            width = (START_RAD if revolute else START_MM) if begins else (ALWAYS_RAD if revolute else ALWAYS_MM)
+            found.append((f"start.{run.name}.{a}", width, only(r, shift), False))
+            if begins and run.measured.has("drive"):
+                held = np.zeros_like(shift)
+                held[:, 3 + m + j] = still
+                holding = START_NMM if revolute else START_N
+                found.append((f"held.{run.name}.{a}", holding, only(r, held), False))
+    return found
+
+
+def unknown_starts(bench: Bench, k: int) -> Floats:
+    """What single rows of run k may be off by (n, c), standard deviations, because nobody saw how its actuators came there.
+
+    Of the first row, and of that behind missing ones from which it turned back, where the next has the actuator moved on.
+    """
+    out, path = np.zeros_like(bench.observed(k)), bench.runs[k].run_path
+    if not path.ordered or len(path.time) < 3:
+        return out
+    m = len(bench.actuators)
+    behind = np.flatnonzero(missing_rows(path.time)) + 1
+    behind = behind[behind < len(path.time) - 1]
+    for j in range(m):
+        revolute = bench.twin.robot.actuators[j].revolute
+        rho = path.row_rho[:, j]
+        turned = behind[(rho[behind] - rho[behind - 1]) * (rho[behind + 1] - rho[behind]) <= 0.0]
+        rows = [i for i in (0, *turned) if _still(rho[i:], revolute).sum() < STARTING_ROWS]
+        unknown = np.zeros(len(path.time))
+        unknown[rows] = START_RAD if revolute else START_MM
+        out[:, :3] = np.hypot(out[:, :3], bench.turned(k, bench.row_slopes(k)[:, :, j] * unknown[:, None]))
+        out[rows, 3 + m + j] = START_NMM if revolute else START_N
+    return out
+
+
+def _still(rho: Floats, revolute: bool) -> Bools:
+    """Whether an actuator at rho (n,) has not yet moved (n,) since the first of these rows."""
+    moved: Bools = np.maximum.accumulate(np.abs(rho - rho[0])) < (STARTED_RAD if revolute else STARTED_MM)
+    return moved
