@@ -9,10 +9,17 @@ from scipy.special import chdtri
 from camcomp.diagnosis.fit.floor import MINOR
 from camcomp.diagnosis.fit.intervals import joint_covariance
 from camcomp.diagnosis.fit.problem import Problem
-from camcomp.diagnosis.search.sound import with_minor
 from camcomp.diagnosis.search.tempering import tempering
 from camcomp.diagnosis.search.unexplained import size_um
-from camcomp.diagnosis.statistics.cause_sets import Fitted, Members, Scale, predictive, probabilities, total
+from camcomp.diagnosis.statistics.cause_sets import (
+    Fitted,
+    Members,
+    Scale,
+    predictive,
+    probabilities,
+    total,
+    with_minor,
+)
 from camcomp.diagnosis.statistics.verdict import EQUAL_LOG_ODDS, Verdict
 from camcomp.ground.datatypes import Floats
 

@@ -1,14 +1,13 @@
 """Which sets of causes are answers at all: those whose members all matter, and do not undo one another."""
 
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import replace
 from itertools import combinations
 
 from camcomp.diagnosis.fit.floor import MINOR
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.search.unexplained import size_um
 from camcomp.diagnosis.search.unknown import signal_rms
-from camcomp.diagnosis.statistics.cause_sets import Fitted, Members
+from camcomp.diagnosis.statistics.cause_sets import Fitted, Members, with_minor
 from camcomp.diagnosis.statistics.verdict import EQUAL_LOG_ODDS
 
 CANCELLING = 8.0  # size of a member, in units of the whole set, above which the set lives on differences of its members
@@ -76,12 +75,6 @@ class Sound:
                 if set(self.minor(f)) <= set(minor) and not self.cancels(f):
                     either = found[members], with_minor(found[members], f)
                     found[members] = max(either, key=lambda f: candidates.value(f, temperature))
-
-
-def with_minor(less: Fitted, f: Fitted) -> Fitted:
-    """A set with the evidence of a larger one, whose other members are minor."""
-    minor = tuple(i for i in f.all_members if i not in less.members)
-    return replace(less, log_evidence=f.log_evidence, minor=minor)
 
 
 def small_members(problem: Problem, f: Fitted) -> Members:

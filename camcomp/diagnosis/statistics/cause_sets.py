@@ -4,7 +4,7 @@ The search knows grams, priors and numbers of candidates; what an candidate is, 
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 from math import comb, factorial
 
@@ -54,6 +54,12 @@ class Fitted:
     def all_members(self) -> Members:
         """The members and what is minor beside them: what the evidence is of."""
         return tuple(sorted((*self.members, *self.minor)))
+
+
+def with_minor(less: Fitted, f: Fitted) -> Fitted:
+    """A set with the evidence of a larger one, whose other members are minor."""
+    minor = tuple(i for i in f.all_members if i not in less.members)
+    return replace(less, log_evidence=f.log_evidence, minor=minor)
 
 
 @dataclass(frozen=True, eq=False)

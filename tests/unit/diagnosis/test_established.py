@@ -7,8 +7,7 @@ import pytest
 
 from camcomp.diagnosis.search import established as module
 from camcomp.diagnosis.search.established import held_against
-from camcomp.diagnosis.search.sound import with_minor
-from camcomp.diagnosis.statistics.cause_sets import CausePrior, Fitted, probabilities
+from camcomp.diagnosis.statistics.cause_sets import CausePrior, Fitted, probabilities, with_minor
 from camcomp.diagnosis.statistics.verdict import judge
 
 PROBLEM = SimpleNamespace(
