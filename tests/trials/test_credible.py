@@ -157,3 +157,13 @@ def test_what_only_tolerances_smaller_than_stated_ask_for_is_not_believed(tmp_pa
     causes = (("servo_lag", None), ("drive_stiffness", "A1"))
     result, _ = answer(Plan(1742000, "pair", causes, (3.0, 9.0), machine="kuka-kr210", **LONG), tmp_path)
     assert {(each["effect"], each["target"]) for each in result["causes"] if each["probability"] > 0.5} == set(causes)
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("seed", [1844008, 1844009, 2044008])
+def test_a_spring_too_small_to_be_named_speaks_for_the_springs_beside_it(tmp_path, seed):
+    """A5 moves the tip by less than is minor; a soft tool with a stiff A5, or a longer link, took its place and that of others."""
+    result, _ = answer(Plan(seed, "imperfect", imperfect=True, machine="kuka-kr210", **LONG), tmp_path)
+    found = {(each["effect"], each["target"]): each["probability"] for each in result["causes"]}
+    assert min(found["cutting_force", None], found["drive_stiffness", "A2"], found["drive_stiffness", "A3"]) > 0.5
+    assert {effect for effect, _ in found} == {"cutting_force", "drive_stiffness"}

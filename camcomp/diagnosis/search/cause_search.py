@@ -10,7 +10,7 @@ from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.search.established import LEAST_PROBABILITY, established, held_against, stands_for_more
 from camcomp.diagnosis.search.imitation import credibility
 from camcomp.diagnosis.search.indistinguishable import Likeness, likeness, stand_ins
-from camcomp.diagnosis.search.sound import GATE_SHARE, Sound, cancels, small_members
+from camcomp.diagnosis.search.sound import GATE_SHARE, Sound, cancels
 from camcomp.diagnosis.search.tempering import TEMPERATURE, misfit, tempering
 from camcomp.diagnosis.search.unexplained import SURE_Z, Unexplained, size_um, unexplained, worst
 from camcomp.diagnosis.search.unknown import firm_prior, foretelling, residual_tests
@@ -86,9 +86,7 @@ def search_causes(problem: Problem) -> CauseSearch:
             headway.done(len(done) / (SINGLES + PAIRS + TRIPLES))
         return done[members]
 
-    def value(f: Fitted) -> float:
-        return f.log_evidence + problem.candidates.prior(f.members)
-
+    value = problem.candidates.value
     singles = extensions(at_null, (), every)
     for _, members in singles[:SINGLES]:
         fit(members)
@@ -128,31 +126,27 @@ def search_causes(problem: Problem) -> CauseSearch:
             _fit_best(good, fit, EXCHANGED, value(near))
 
     for _ in range(EXCHANGES):  # what was taken first may stand for what was found last, and one actuator for another
-        for f in sorted(done.values(), key=value, reverse=True):
-            if sound(f):
-                break
-            fit(tuple(i for i in f.members if i not in small_members(problem, f)), f)
-        right = [f for f in done.values() if sound(f)]
-        best = max(right, key=value)
+        best = sound.answers(done, fit)[0]
         # what may stand for a member of one set may do so in those that are as good
-        tied = [f for f in right if f.members not in looked and value(f) > value(best) - EQUAL_LOG_ODDS]
+        tied = [f for f in done.values() if f.members not in looked and value(f) > value(best) - EQUAL_LOG_ODDS]
+        tied = [f for f in tied if not sound.cancels(f)]
         if not tied or len(best.members) > EXCHANGEABLE:
             break
         look_beside(max(tied, key=value))
     for _ in range(EXCHANGES):
-        fits = tuple(f for f in sorted(done.values(), key=value, reverse=True) if sound(f))
-        temperature = tempering(problem, fits[0])
+        temperature = tempering(problem, sound.answers(done, fit)[0])
+        fits = tuple(sound.answers(done, fit, temperature))
         probability = probabilities(fits, problem.candidates, temperature)
         fits, probability, harmful = _prune(problem, fits, temperature, probability)
-        fits, probability, weak = established(problem, fits, fit, temperature, probability)
+        fits, probability = established(problem, fits, fit, temperature, probability)
         best = fits[int(np.argmax(probability))]
         if not best.members or best.members in looked or len(best.members) > EXCHANGEABLE:
             break
         look_beside(best)  # what is left of a set without its weak members has rivals of its own
     design = likeness(problem)
-    fits, probability, same = _with_stand_ins(problem, design, fits, probability, fit, temperature)
+    fits, probability, same = _with_stand_ins(problem, design, fits, probability, sound, fit, temperature)
     verdict = judge(fits, probability, same)
-    verdict = held_against(problem, fits, probability, verdict, [*harmful, *weak], temperature)
+    verdict = held_against(problem, fits, probability, verdict, harmful, temperature)
     best = fits[verdict.best]
     beyond = unexplained(problem, best)
     kind = unknown_kind(problem, best, beyond)
@@ -250,6 +244,7 @@ def _with_stand_ins(
     design: Likeness,
     fits: tuple[Fitted, ...],
     probability: Floats,
+    sound: Sound,
     fit: Callable[[Members], Fitted],
     temperature: float,
 ) -> tuple[tuple[Fitted, ...], Floats, list[tuple[Members, Members]]]:
@@ -262,12 +257,14 @@ def _with_stand_ins(
     found = {f.members: f for f in fits}
     by_structure = [fit(members) for members in stand_ins(design, best.members, best.theta)]
     by_structure = [f for f in by_structure if _possible(problem, f) and not cancels(problem, f)]
-    found |= {f.members: f for f in by_structure}
+    found = {f.members: f for f in by_structure} | found
     near = [members for _, members in _same(problem, tuple(found.values()), best)]
     for members in both_exchanged(problem.candidates, best.members, near):
         if members not in found and not cancels(problem, other := fit(members)):
             found[members] = other
-    if len(found) > len(fits):
+    sound.share_minor(found, {best.members, *near, *(f.members for f in by_structure)}, fit, temperature)
+    best = found[best.members]
+    if found != {f.members: f for f in fits}:
         fits = tuple(found.values())
         probability = probabilities(fits, problem.candidates, temperature)
     same = _same(problem, fits, best) + [(best.members, f.members) for f in by_structure]

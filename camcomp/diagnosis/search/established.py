@@ -11,7 +11,15 @@ from camcomp.diagnosis.fit.intervals import joint_covariance
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.search.tempering import tempering
 from camcomp.diagnosis.search.unexplained import size_um
-from camcomp.diagnosis.statistics.cause_sets import Fitted, Members, Scale, predictive, probabilities, total
+from camcomp.diagnosis.statistics.cause_sets import (
+    Fitted,
+    Members,
+    Scale,
+    predictive,
+    probabilities,
+    total,
+    with_minor,
+)
 from camcomp.diagnosis.statistics.verdict import EQUAL_LOG_ODDS, Verdict
 from camcomp.ground.datatypes import Floats
 
@@ -45,26 +53,26 @@ def established(
     fit: Callable[[Members], Fitted],
     temperature: float,
     probability: Floats,
-) -> tuple[tuple[Fitted, ...], Floats, list[Fitted]]:
+) -> tuple[tuple[Fitted, ...], Floats]:
     """The fits without those that have a member which may as well be minor; what they are without it takes their place.
 
-    Not the leader alone: rivals that keep what the leader has lost would be no rivals of what it is now. Behind them those
-    that are far more likely than what takes their place: something is there that a weak member explains.
+    As likely as they were: that member is there, and nobody names it. Not of the leader alone: rivals that keep what the leader
+    has lost would be no rivals of what it is now.
     """
-    firm, weak = set[Members](), list[Fitted]()
+    firm = set[Members]()
     while True:
         likely = [int(j) for j in np.argsort(-probability) if probability[j] >= LEAST_PROBABILITY]
         at = next((j for j in likely if fits[j].members not in firm), None)
         if at is None:
-            return fits, probability, weak
+            return fits, probability
         least = weakest(problem, f := fits[at])
         if least is None:
             firm.add(f.members)
             continue
-        less = fit(tuple(i for i in f.members if i != least))
-        if stands_for_more(problem, f, less.members, temperature):
-            weak.append(f)
-        fits = (*(g for j, g in enumerate(fits) if j != at and g.members != less.members), less)
+        without = tuple(i for i in f.members if i != least)
+        same = [g for g in fits if g.members == without] or [fit(without)]
+        less = max(*same, with_minor(same[0], f), key=lambda g: problem.candidates.value(g, temperature))
+        fits = (*(g for j, g in enumerate(fits) if j != at and g.members != without), less)
         probability = probabilities(fits, problem.candidates, temperature)
 
 

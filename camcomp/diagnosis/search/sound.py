@@ -1,13 +1,14 @@
 """Which sets of causes are answers at all: those whose members all matter, and do not undo one another."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Collection, Mapping
 from itertools import combinations
 
 from camcomp.diagnosis.fit.floor import MINOR
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.search.unexplained import size_um
 from camcomp.diagnosis.search.unknown import signal_rms
-from camcomp.diagnosis.statistics.cause_sets import Fitted, Members
+from camcomp.diagnosis.statistics.cause_sets import Fitted, Members, with_minor
+from camcomp.diagnosis.statistics.verdict import EQUAL_LOG_ODDS
 
 CANCELLING = 8.0  # size of a member, in units of the whole set, above which the set lives on differences of its members
 OPPOSED = 4.0  # the same of two members against both together
@@ -18,13 +19,62 @@ class Sound:
     """Whether a set is an answer: every member matters, and none undoes another. Asked once of each."""
 
     def __init__(self, problem: Problem) -> None:
-        self.problem, self.known = problem, dict[Members, bool]()
+        self.problem = problem
+        self._minor, self._cancels = dict[Members, Members](), dict[Members, bool]()
 
     def __call__(self, f: Fitted) -> bool:
         """Of one set."""
-        if f.members not in self.known:
-            self.known[f.members] = not small_members(self.problem, f) and not cancels(self.problem, f)
-        return self.known[f.members]
+        return not self.minor(f) and not self.cancels(f)
+
+    def minor(self, f: Fitted) -> Members:
+        """The members that do not matter."""
+        if f.members not in self._minor:
+            self._minor[f.members] = small_members(self.problem, f)
+        return self._minor[f.members]
+
+    def cancels(self, f: Fitted) -> bool:
+        """Whether members undo each other."""
+        if f.members not in self._cancels:
+            self._cancels[f.members] = cancels(self.problem, f)
+        return self._cancels[f.members]
+
+    def answers(
+        self, done: Mapping[Members, Fitted], fit: Callable[[Members], Fitted], temperature: float = 1.0
+    ) -> list[Fitted]:
+        """The answers among sets that were fitted, each as likely as the likeliest way to it.
+
+        Of a set with minor members that is as likely as the best answer the others are one: what is minor is there, and nobody
+        names it. Else what is larger and undone by another one would take its place.
+        """
+
+        def value(f: Fitted) -> float:
+            return self.problem.candidates.value(f, temperature)
+
+        found = {f.members: f for f in done.values() if self(f)}
+        least = max(map(value, found.values())) - EQUAL_LOG_ODDS
+        for f in [f for f in done.values() if value(f) > least and self.minor(f)]:
+            less = f
+            while small := self.minor(less):
+                less = fit(tuple(i for i in less.members if i not in small))
+            if not self.cancels(f) and self(less):
+                found[less.members] = max(found.get(less.members, less), with_minor(less, f), key=value)
+        return sorted(found.values(), key=value, reverse=True)
+
+    def share_minor(
+        self, found: dict[Members, Fitted], alike: Collection[Members], fit: Callable[[Members], Fitted],
+        temperature: float,
+    ) -> None:  # fmt: skip
+        """What is minor beside one of the sets that do the same may be beside the others: puts those of them that are likelier with it."""
+        candidates = self.problem.candidates
+        for minor in {found[members].minor for members in alike} - {()}:
+            for members in alike:
+                both = tuple(sorted({*members, *minor}))
+                if both == members or any(candidates.exclusive(i, j) for i, j in combinations(both, 2)):
+                    continue
+                f = fit(both)
+                if set(self.minor(f)) <= set(minor) and not self.cancels(f):
+                    either = found[members], with_minor(found[members], f)
+                    found[members] = max(either, key=lambda f: candidates.value(f, temperature))
 
 
 def small_members(problem: Problem, f: Fitted) -> Members:

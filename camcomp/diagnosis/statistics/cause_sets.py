@@ -4,7 +4,7 @@ The search knows grams, priors and numbers of candidates; what an candidate is, 
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 from math import comb, factorial
 
@@ -46,6 +46,18 @@ class Fitted:
     residual: tuple[Floats, ...] = ()  # per run (w,), in absolute coordinates
     pushed: tuple[int, ...] = ()  # columns (p,) of small forces that springs changed by the members feel otherwise
     pushed_at: Floats | None = None  # (d,) coordinates of those springs
+    minor: Members = ()  # what the evidence has beside the members, and nobody names
+
+    @property
+    def all_members(self) -> Members:
+        """The members and what is minor beside them: what the evidence is of."""
+        return tuple(sorted((*self.members, *self.minor)))
+
+
+def with_minor(less: Fitted, f: Fitted) -> Fitted:
+    """A set with the evidence of a larger one, whose other members are minor."""
+    minor = tuple(i for i in f.all_members if i not in less.members)
+    return replace(less, log_evidence=f.log_evidence, minor=minor)
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +72,10 @@ class CausePrior:
     def prior(self, members: Members) -> float:
         """Log prior probability of a set."""
         return log_sum([odds for odds, _ in self.ways(members)])
+
+    def value(self, f: Fitted, temperature: float = 1.0) -> float:
+        """Log evidence of a set and what is minor beside it, tempered, + their log prior."""
+        return f.log_evidence / temperature + self.prior(f.all_members)
 
     def ways(self, members: Members) -> list[tuple[float, list[Members]]]:
         """How a set may have come about: the log prior probability of each way, and members that are of one size in it.
@@ -245,6 +261,6 @@ def _scored(scale: Scale, sets: Sequence[Members]) -> list[tuple[float, Members]
 
 def probabilities(fits: Sequence[Fitted], candidates: CausePrior, temperature: float = 1.0) -> Floats:
     """Posterior probability of every set among those fitted."""
-    value = np.array([f.log_evidence / temperature + candidates.prior(f.members) for f in fits])
+    value = np.array([candidates.value(f, temperature) for f in fits])
     out: Floats = np.exp(value - log_sum(value))
     return out

@@ -1,12 +1,13 @@
-"""What is no answer, because a member of it may be minor, speaks against those that name something else."""
+"""A set with a member that may be minor is the answer without it; one that harms unseen runs speaks against the others."""
 
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from camcomp.diagnosis.search import established as module
 from camcomp.diagnosis.search.established import held_against
-from camcomp.diagnosis.statistics.cause_sets import CausePrior, Fitted
+from camcomp.diagnosis.statistics.cause_sets import CausePrior, Fitted, probabilities, with_minor
 from camcomp.diagnosis.statistics.verdict import judge
 
 PROBLEM = SimpleNamespace(
@@ -33,3 +34,23 @@ def test_a_set_that_is_an_answer_is_not_held_against_the_others_once_more():
     fits = (fitted(0.0, 0), fitted(0.0, 1))
     said = judge(fits, np.array([0.6, 0.4]), [])
     assert held_against(PROBLEM, fits, np.array([0.6, 0.4]), said, [fits[1]], 1.5).inclusion == said.inclusion
+
+
+def test_what_may_as_well_be_minor_is_not_named_and_the_others_are_as_likely_as_with_it(monkeypatch):
+    """Without it (0, 1) explains less than (0, 3), which stands for it; with it more."""
+    monkeypatch.setattr(module, "weakest", lambda problem, f: 2 if 2 in f.members else None)
+    fits = (fitted(20.0, 0, 1, 2), fitted(16.0, 0, 3, 4))
+    after, probability = module.established(
+        PROBLEM, fits, lambda members: fitted(0.0, *members), 1.5, probabilities(fits, PROBLEM.candidates, 1.5)
+    )
+    assert {(f.members, f.minor) for f in after} == {((0, 1), (2,)), ((0, 3, 4), ())}
+    assert probability == pytest.approx(probabilities(fits, PROBLEM.candidates, 1.5)[::-1])
+
+
+def test_what_takes_the_place_of_a_set_keeps_what_makes_it_likeliest(monkeypatch):
+    """It may be among the sets already, with something else that is minor."""
+    monkeypatch.setattr(module, "weakest", lambda problem, f: 2 if 2 in f.members else None)
+    less = with_minor(fitted(0.0, 0), fitted(30.0, 0, 4))
+    fits = (fitted(20.0, 0, 2), less)
+    after, _ = module.established(PROBLEM, fits, fitted, 1.5, np.array([0.5, 0.5]))
+    assert after == (less,)

@@ -1,10 +1,15 @@
-"""Causes that undo one another at the tip are believed where another channel shows one of them by itself."""
+"""Causes that undo one another at the tip are believed where another channel shows one of them by itself.
+
+What is minor is named nowhere; the others are as likely as they are together with it.
+"""
 
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from camcomp.diagnosis.search import sound
+from camcomp.diagnosis.statistics.cause_sets import CausePrior, Fitted, probabilities, with_minor
 
 FORCE, SPRING, FRICTION = 0, 1, 2
 
@@ -66,3 +71,45 @@ def test_small_members_are_those_that_are_minor_and_those_of_a_large_ones_actuat
     causes = [SimpleNamespace(target=target) for target in (None, "x", "x", "y")]
     problem = SimpleNamespace(columns=SimpleNamespace(candidates=causes), floor=SimpleNamespace(tip_um=5.0))
     assert sound.small_members(problem, SimpleNamespace(members=(0, 1, 2, 3))) == (0, 1)
+
+
+FREE = CausePrior(tuple((i,) for i in range(6)), np.log(np.full(6, 1 / 6)), lambda i, j: {i, j} == {1, 5})
+
+
+def fitted(evidence, *members):
+    return Fitted(members, np.zeros(len(members)), np.eye(len(members)), evidence, ())
+
+
+@pytest.fixture
+def weighed(monkeypatch):
+    """A search in which 2 is minor wherever it is, and sets that were not fitted explain nothing."""
+    monkeypatch.setattr(sound, "small_members", lambda problem, f: tuple(i for i in f.members if i == 2))
+    monkeypatch.setattr(sound, "cancels", lambda problem, f: False)
+    return sound.Sound(SimpleNamespace(candidates=FREE)), lambda members: fitted(-90.0, *members)
+
+
+def test_what_is_minor_is_there_and_nobody_names_it(weighed):
+    """Without it (0, 1) explains less than (0, 3, 4), two that undo one another in its place; with it more."""
+    search, fit = weighed
+    done = {f.members: f for f in (fitted(0.0, 0, 1), fitted(14.0, 0, 1, 2), fitted(10.0, 0, 3, 4))}
+    first, second = search.answers(done, fit)
+    assert (first.members, first.minor, first.all_members) == ((0, 1), (2,), (0, 1, 2))
+    assert second.members == (0, 3, 4)
+    assert probabilities((first, second), FREE)[0] == pytest.approx(1 / (1 + np.exp(-4.0)))
+
+
+def test_what_is_minor_makes_no_answer_likelier_once_evidence_is_tempered(weighed):
+    search, fit = weighed
+    done = {f.members: f for f in (fitted(0.0, 0, 1), fitted(2.0, 0, 1, 2))}
+    assert FREE.value(done[0, 1, 2]) > FREE.value(done[0, 1])
+    assert [f.minor for f in search.answers(done, fit)] == [(2,)]
+    assert [f.minor for f in search.answers(done, fit, 1.5)] == [()]
+
+
+def test_a_set_that_does_the_same_has_what_is_minor_beside_it_too(weighed):
+    search, _ = weighed
+    fits = {(0, 2, 4): fitted(12.0, 0, 2, 4), (0, 2, 3): fitted(1.0, 0, 2, 3)}
+    found = {f.members: f for f in (fitted(0.0, 0, 1), fitted(0.0, 0, 3), fitted(0.0, 0, 4))}
+    found[0, 1] = with_minor(found[0, 1], fitted(14.0, 0, 1, 2))
+    search.share_minor(found, list(found), lambda members: fits.get(members, fitted(14.0, *members)), 1.5)
+    assert {members: f.minor for members, f in found.items()} == {(0, 1): (2,), (0, 3): (), (0, 4): (2,)}
