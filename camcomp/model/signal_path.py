@@ -38,6 +38,11 @@ def stages_of(effect: Any) -> set[str]:
     return {stage for stage, hooks in ORDER if any(hasattr(effect, hook) for hook in hooks)}
 
 
+def pushes(effect: Any) -> bool:
+    """Whether an effect is a force: at the tool, or beyond the load of the structure at a drive."""
+    return hasattr(effect, "on_load") or hasattr(effect, "on_drive_force")
+
+
 def acting(causes: Sequence[Cause], stage: str) -> list[Cause]:
     """The causes with a hook at a stage."""
     return [cause for cause in causes if any(hasattr(cause.effect, hook) for hook in _AT[stage])]

@@ -12,19 +12,18 @@ from camcomp.diagnosis.fit.bench import Bench, CandidateCause, cause_of, step_of
 from camcomp.ground.datatypes import Floats
 from camcomp.model.effect import Cause
 from camcomp.model.motion.twin import Reading
-
-PUSHES = ("on_load", "on_drive_force")  # hooks of effects that are forces
+from camcomp.model.signal_path import pushes, stages_of
 
 
 def small_forces(candidates: Sequence[CandidateCause], members: Sequence[int]) -> tuple[int, ...]:
     """Candidates beside the members that push on springs which these change."""
-    changed = [candidates[i] for i in members if hasattr(candidates[i].effect, "on_robot")]
+    changed = [candidates[i] for i in members if "structure" in stages_of(candidates[i].effect)]
     soft = {each.target for each in changed if each.parameters[0].log}
     return tuple(
         i
         for i, each in enumerate(candidates)
         if i not in members
-        and any(hasattr(each.effect, hook) for hook in PUSHES)
+        and pushes(each.effect)
         and not any(p.placed for p in each.shapes)
         and (None in soft or (soft and each.target in {*soft, None}))
     )
