@@ -8,7 +8,7 @@ import numpy as np
 
 from camcomp.diagnosis.fit.bench import Bench, cause_of, step_of
 from camcomp.diagnosis.fit.columns import Columns, moved_tip, shape_default
-from camcomp.diagnosis.fit.floor import NoiseFloor
+from camcomp.diagnosis.fit.floor import MINOR, NoiseFloor
 from camcomp.diagnosis.fit.grid_parameters import reach
 from camcomp.diagnosis.fit.noise import less_certain_drives
 from camcomp.diagnosis.fit.patterns import Dictionary
@@ -116,6 +116,10 @@ class Problem:
         if best.grams is self.base_grams:
             return best  # so small that no law of its turning can be seen
         for i in members:
+            own = self.member_columns((i,))
+            size = self.size_um(own, best.theta[np.isin(self.member_columns(members), own)])
+            if size <= MINOR * self.floor.tip_um:
+                continue  # it will not be named, whatever its law
             for p in self.columns.candidates[i].switches:
                 for value in p.either:
                     if value == best.extra.get(i, {}).get(p.name, p.nominal):
@@ -170,10 +174,11 @@ class Problem:
                 size = self._move_shapes(members, theta, shapes, left, white, mean)
             if step > 0 and size < SETTLED:
                 break
-        beside = small_forces(self.columns.candidates, members) if bent else ()
+        causes = self.causes(members, theta, shapes)
+        beside = small_forces(self.columns.candidates, members, causes) if bent else ()
         pushed, pushed_at = tuple(self.member_columns(beside)), theta
         if beside:
-            farther = self._pushed(beside, self.causes(members, theta, shapes))
+            farther = self._pushed(beside, causes)
             both = [
                 np.column_stack([own, self.whitened(k, far)])
                 for k, (own, far) in enumerate(zip(white, farther, strict=True))
@@ -207,7 +212,7 @@ class Problem:
         if self._farther is None or self._farther[0] is not f:
             assert f.pushed_at is not None
             causes = self.causes(f.members, f.pushed_at, f.extra)
-            beside = small_forces(self.columns.candidates, f.members)
+            beside = small_forces(self.columns.candidates, f.members, causes)
             self._farther = f, self._pushed(beside, causes)
         return self._farther[1]
 

@@ -1,4 +1,4 @@
-"""Small forces on a machine that its causes have made soft or stiff: there they push it farther, or less far, than at nominal.
+"""Small forces on a machine that its causes have made soft: there they push it farther than at nominal.
 
 Where a screw is six times as soft as stated, friction that every healthy guide has bends it six times as far: a column at
 nominal has no room for that, and play would be named for it.
@@ -14,11 +14,19 @@ from camcomp.model.effect import Cause
 from camcomp.model.motion.twin import Reading
 from camcomp.model.signal_path import pushes, stages_of
 
+SOFT = 0.5  # of a stated spring: on one that is not softer, what small forces do more is as small as they are
 
-def small_forces(candidates: Sequence[CandidateCause], members: Sequence[int]) -> tuple[int, ...]:
-    """Candidates beside the members that push on springs which these change."""
-    changed = [candidates[i] for i in members if "structure" in stages_of(candidates[i].effect)]
-    soft = {each.target for each in changed if each.parameters[0].log}
+
+def small_forces(
+    candidates: Sequence[CandidateCause], members: Sequence[int], causes: Sequence[Cause]
+) -> tuple[int, ...]:
+    """Candidates beside the members, which are as the causes say, that push on springs which these make SOFT."""
+    changed = [(cause, candidates[i].parameters[0]) for i, cause in zip(members, causes, strict=True)]
+    soft = {
+        cause.target
+        for cause, p in changed
+        if p.log and "structure" in stages_of(cause.effect) and cause.values[p.name] < SOFT * p.nominal
+    }
     return tuple(
         i
         for i, each in enumerate(candidates)

@@ -126,11 +126,11 @@ def search_causes(problem: Problem) -> CauseSearch:
             _fit_best(good, fit, EXCHANGED, value(near))
 
     for _ in range(EXCHANGES):  # what was taken first may stand for what was found last, and one actuator for another
-        best = sound.answers(done, fit)[0]
+        answers = sound.answers(done, fit)
         # what may stand for a member of one set may do so in those that are as good
-        tied = [f for f in done.values() if f.members not in looked and value(f) > value(best) - EQUAL_LOG_ODDS]
-        tied = [f for f in tied if not sound.cancels(f)]
-        if not tied or len(best.members) > EXCHANGEABLE:
+        good = [done[f.all_members] for f in answers if value(f) > value(answers[0]) - EQUAL_LOG_ODDS]
+        tied = [f for f in good if f.members not in looked]
+        if not tied or len(good[0].members) > EXCHANGEABLE:
             break
         look_beside(max(tied, key=value))
     for _ in range(EXCHANGES):
