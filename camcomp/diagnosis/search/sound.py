@@ -5,8 +5,8 @@ from itertools import combinations
 
 from camcomp.diagnosis.fit.floor import MINOR
 from camcomp.diagnosis.fit.problem import Problem
-from camcomp.diagnosis.search.unexplained import size_um
-from camcomp.diagnosis.search.unknown import signal_rms
+from camcomp.diagnosis.search.unexplained import SURE_Z, size_um
+from camcomp.diagnosis.search.unknown import rows_by_kind, signal_rms
 from camcomp.diagnosis.statistics.cause_sets import Fitted, Members, with_minor
 from camcomp.diagnosis.statistics.verdict import EQUAL_LOG_ODDS
 
@@ -100,20 +100,21 @@ def cancels(problem: Problem, f: Fitted) -> bool:
     """
     whole = signal_rms(problem, f)
     each = {i: signal_rms(problem, f, (i,)) for i in f.members}
+    rows = rows_by_kind(problem)
     for kind in whole:
         undone = [i for i in f.members if each[i][kind] > max(1.0, CANCELLING * whole[kind])]
-        loose = [i for i in undone if not _shown_beside(each[i], whole, kind)]
+        loose = [i for i in undone if not _shown_beside(each[i], whole, kind, rows)]
         if len(loose) > 1 or loose == undone != []:
             return True
     alone = {i: size_um(problem, f, (i,)) for i in f.members}
     for i, j in combinations(f.members, 2):
         if min(alone[i], alone[j]) > OPPOSED * size_um(problem, f, (i, j)):
             both = signal_rms(problem, f, (i, j))
-            if not any(_shown_beside(each[x], both, "tip") for x in (i, j)):
+            if not any(_shown_beside(each[x], both, "tip", rows) for x in (i, j)):
                 return True
     return False
 
 
-def _shown_beside(own: Mapping[str, float], whole: Mapping[str, float], kind: str) -> bool:
-    """Whether another kind of channel shows a member, and the whole set with it; all in units of the noise."""
-    return any(own[k] > 1.0 and CANCELLING * whole[k] > own[k] for k in own if k != kind)
+def _shown_beside(own: Mapping[str, float], whole: Mapping[str, float], kind: str, rows: Mapping[str, int]) -> bool:
+    """Whether another kind of channel surely shows a member, all its rows together, and the whole set with it; in units of the noise."""
+    return any(own[k] * rows[k] ** 0.5 > SURE_Z and CANCELLING * whole[k] > own[k] for k in own if k != kind)

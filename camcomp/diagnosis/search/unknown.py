@@ -75,6 +75,12 @@ def signal_rms(problem: Problem, f: Fitted, members: Members | None = None) -> d
     return out
 
 
+def rows_by_kind(problem: Problem) -> dict[str, int]:
+    """White rows of all runs, per kind of channel."""
+    counts = zip(*([len(part) for part in parts] for parts in problem.white_patterns), strict=True)
+    return {words.kind: sum(each) for words, each in zip(problem.dictionaries, counts, strict=True)}
+
+
 def foretelling(problem: Problem, f: Fitted) -> Members:
     """The members that foretell, fitted to the other runs, what a run shows: they stand or fall one by one.
 

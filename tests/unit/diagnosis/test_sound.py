@@ -12,6 +12,7 @@ from camcomp.diagnosis.search import sound
 from camcomp.diagnosis.statistics.cause_sets import CausePrior, Fitted, probabilities, with_minor
 
 FORCE, SPRING, FRICTION = 0, 1, 2
+ROWS = 3600
 
 
 @pytest.fixture
@@ -24,6 +25,7 @@ def answers(monkeypatch):
             return {kind: abs(sum(each[kind] for each in chosen)) for kind in ("tip", "drive")}
 
         monkeypatch.setattr(sound, "signal_rms", together)
+        monkeypatch.setattr(sound, "rows_by_kind", lambda problem: {"tip": ROWS, "drive": ROWS})
         monkeypatch.setattr(sound, "size_um", lambda problem, f, members: 5.0 * together(problem, f, members)["tip"])
         return sound.cancels(None, SimpleNamespace(members=tuple(does)))
 
@@ -40,6 +42,12 @@ def test_two_that_only_the_tip_shows_cancel(answers, size):
 def test_a_force_that_the_drives_feel_and_softer_links_that_give_way_less(answers, size):
     both = {FORCE: {"tip": size, "drive": 1.3}, SPRING: {"tip": -size + 0.5, "drive": 0.0}}
     assert not answers(both)
+
+
+@pytest.mark.parametrize(("drive", "cancels"), [(0.28, False), (0.07, True)])
+def test_a_force_that_all_rows_of_the_drives_together_show_is_no_choice_of_the_fit(answers, drive, cancels):
+    both = {FORCE: {"tip": 2.76, "drive": drive}, SPRING: {"tip": -2.44, "drive": 0.0}}
+    assert answers(both) is cancels
 
 
 def test_what_cancels_in_the_other_channel_too_is_not_shown_by_it(answers):

@@ -25,7 +25,7 @@ def deviation_of_force(apart, *, log=True, as_stated=False):
         columns=SimpleNamespace(candidates=[SimpleNamespace(parameters=(parameter,))] * 2, names="ab"),
         candidates=SimpleNamespace(columns=((0,), (1,))),
         member_columns=list, shapes_of=lambda members: [], row_places=lambda k: np.linspace(0.0, 1.0, len(r)),
-        white=[ByChannel.of([D])],
+        white_at=lambda f: [ByChannel.of([D])],
     )  # fmt: skip
     fit = Fitted((0,), np.array([0.1]), np.eye(1), 0.0, (), white=(D[:, :1],), residual=(r,))
     return 0.3 * np.sqrt(joint_covariance(problem, fit, as_stated=as_stated)[0, 0])

@@ -115,6 +115,14 @@ def test_a_rival_is_another_set_that_is_neither_larger_nor_the_same_with_one_mor
     assert pair.rivals == (2,)
 
 
+def test_sets_of_another_kind_break_no_tie():
+    """That one of two twins is in more of the far less probable sets says nothing of which of them is there."""
+    fits = [fitted(0, 1), fitted(0, 2), fitted(1, 3)]
+    inclusion = judge(fits, np.array([0.60, 0.35, 0.05]), [((0, 1), (0, 2))]).inclusion
+    assert inclusion[1] == pytest.approx(0.5)
+    assert inclusion[0] == pytest.approx(0.95)
+
+
 def test_a_set_far_less_probable_is_a_rival_only_where_nothing_tells_it_apart():
     fits = [fitted(0), fitted(1)]
     assert judge(fits, np.array([0.99, 0.01]), []).word == "identified"
