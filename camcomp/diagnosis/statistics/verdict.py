@@ -10,6 +10,9 @@ from camcomp.ground.datatypes import Floats
 
 EQUAL_LOG_ODDS = 3.0  # log odds within which two sets are told apart by nobody
 BARE_ODDS = 3.0  # of the leader against a set that does nearly the same: not worth a mention
+UNSURE_ODDS = (
+    4.0  # of the leader against all such sets together at most: what is ambiguous is not sure, which begins at 0.8
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +46,8 @@ def judge(fits: Sequence[Fitted], probability: Floats, twins: Sequence[tuple[Mem
     held = probability.copy()
     near = BARE_ODDS * held[twin] > held[best]
     held[twin] = np.where(near, held[best], np.maximum(held[twin], held[best] * np.exp(-EQUAL_LOG_ODDS)))
+    if 0.0 < UNSURE_ODDS * (others := held[twin[1:]].sum()) < held[best]:  # what is ambiguous is not sure
+        held[twin[1:]] *= held[best] / (UNSURE_ODDS * others)
     held[twin] *= probability[twin].sum() / held[twin].sum()
     inclusion: dict[int, float] = {}
     for fit, p in zip(fits, held, strict=True):

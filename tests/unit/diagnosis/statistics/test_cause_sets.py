@@ -134,9 +134,17 @@ def test_a_small_lead_among_what_nothing_tells_apart_is_none_and_priors_make_nob
     told = np.array([0.9, 0.02, 0.08])
     assert judge(fits, told, []).inclusion[0] == 0.9
     by_priors = judge(fits, told, [((0,), (1,))]).inclusion
-    assert by_priors[0] == pytest.approx(np.exp(3.0) * by_priors[1])
-    assert by_priors[0] + by_priors[1] == pytest.approx(0.92)
+    assert (by_priors[0], by_priors[1]) == pytest.approx((0.8 * 0.92, 0.2 * 0.92))
     small = judge(fits, np.array([0.6, 0.35, 0.05]), [((0,), (1,))]).inclusion
     assert (small[0], small[1]) == pytest.approx((0.475, 0.475))
     clear = judge(fits, np.array([0.8, 0.16, 0.04]), [((0,), (1,))]).inclusion
-    assert (clear[0], clear[1]) == pytest.approx((0.8, 0.16))
+    assert (clear[0], clear[1]) == pytest.approx((0.8 * 0.96, 0.2 * 0.96))
+
+
+def test_what_is_ambiguous_is_not_sure_however_many_share_what_speaks_against_it():
+    fits, twins = [fitted(0), fitted(1), fitted(2)], [((0,), (1,)), ((0,), (2,))]
+    said = judge(fits, np.array([0.95, 0.04, 0.01]), twins).inclusion
+    assert said[0] == pytest.approx(0.8)
+    assert said[1] + said[2] == pytest.approx(0.2)
+    told = judge(fits, np.array([0.7, 0.2, 0.1]), twins).inclusion
+    assert (told[0], told[1], told[2]) == pytest.approx((0.7, 0.2, 0.1))
