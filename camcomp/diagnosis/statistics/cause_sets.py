@@ -75,7 +75,8 @@ class CausePrior:
 
     def value(self, f: Fitted, temperature: float = 1.0) -> float:
         """Log evidence of a set and what is minor beside it, tempered, + their log prior."""
-        return f.log_evidence / temperature + self.prior(f.all_members)
+        # what is minor makes nothing likelier before the data: three of a kind are one thing, two and a minor one are not
+        return f.log_evidence / temperature + min(self.prior(f.all_members), self.prior(f.members))
 
     def ways(self, members: Members) -> list[tuple[float, list[Members]]]:
         """How a set may have come about: the log prior probability of each way, and members that are of one size in it.

@@ -1,5 +1,6 @@
 """From sets of causes and their evidence to one answer: priors of sets, tolerances, rivals."""
 
+from dataclasses import replace
 from math import comb
 
 import numpy as np
@@ -148,3 +149,10 @@ def test_what_is_ambiguous_is_not_sure_however_many_share_what_speaks_against_it
     assert said[1] + said[2] == pytest.approx(0.2)
     told = judge(fits, np.array([0.7, 0.2, 0.1]), twins).inclusion
     assert (told[0], told[1], told[2]) == pytest.approx((0.7, 0.2, 0.1))
+
+
+def test_a_minor_one_makes_no_set_likelier_before_the_data():
+    """All targets of an effect are one thing that happens; two of them and a minor third, which nobody names, are two."""
+    kinds = CausePrior(*(getattr(candidates(8), name) for name in ("columns", "weight", "exclusive")), ((0, 1, 2),))
+    assert kinds.prior((0, 1, 2)) > kinds.prior((0, 1))
+    assert kinds.value(replace(fitted(0, 1), minor=(2,))) == kinds.prior((0, 1))
