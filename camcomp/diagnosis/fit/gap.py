@@ -91,11 +91,26 @@ def rest_by_actuator(problem: Problem, f: Fitted, kind: str) -> dict[str, float]
         rest = problem.bench.difference(k, problem.bench.read(k, causes))
         rest = np.where(np.isfinite(rest), rest, 0.0)
         if kind == "tip":
-            slope = problem.bench.thin_slopes(k)
-            rest = np.einsum("nij,nj->ni", np.linalg.pinv(slope), rest[:, :3])
+            rest = _of_carriages(problem, k, rest[:, :3])
         elif kind in ("encoder", "drive"):
             rest = rest[:, 3:][:, :m] if kind == "encoder" else rest[:, 3 + m :][:, :m]
         else:
             return {}
         energy += np.sum(rest**2, axis=0)
     return places.shares(dict(zip(names, energy.tolist(), strict=True)))
+
+
+def tip_by_actuator(problem: Problem, f: Fitted, i: int) -> dict[str, float]:
+    """Energy of what one member of a set does to the tip, read as motion of the carriages, by actuator, as shares."""
+    names, at, index = problem.bench.actuators, problem.member_columns(f.members), problem.member_columns((i,))
+    theta = f.theta[[at.index(c) for c in index]]
+    energy = np.zeros(len(names))
+    for k, residual in enumerate(problem.residuals):
+        moved = (problem.columns.blocks[k][:, index] @ theta).reshape(-1, len(residual))[:3].T
+        energy += np.sum(_of_carriages(problem, k, moved) ** 2, axis=0)
+    return places.shares(dict(zip(names, energy.tolist(), strict=True)))
+
+
+def _of_carriages(problem: Problem, k: int, tip: Floats) -> Floats:
+    """Motion of the carriages (n, m) that makes one of the tip (n, 3) in run k."""
+    return np.asarray(np.einsum("nij,nj->ni", np.linalg.pinv(problem.bench.thin_slopes(k)), tip))

@@ -5,15 +5,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from camcomp.diagnosis.fit.gap import rest_by_actuator
 from camcomp.diagnosis.fit.problem import Problem
+from camcomp.diagnosis.search.beside import beside_unknown, doubted
 from camcomp.diagnosis.search.established import LEAST_PROBABILITY, established, held_against, stands_for_more
 from camcomp.diagnosis.search.imitation import credibility
 from camcomp.diagnosis.search.indistinguishable import Likeness, likeness, stand_ins
 from camcomp.diagnosis.search.sound import GATE_SHARE, Sound, cancels
 from camcomp.diagnosis.search.tempering import TEMPERATURE, misfit, tempering
 from camcomp.diagnosis.search.unexplained import SURE_Z, Unexplained, size_um, unexplained, worst
-from camcomp.diagnosis.search.unknown import firm_prior, foretelling, residual_tests
+from camcomp.diagnosis.search.unknown import firm_prior, residual_tests
 from camcomp.diagnosis.statistics.cause_sets import (
     Fitted,
     Members,
@@ -47,14 +47,11 @@ HARM_LOG = 2.0  # log density by which a cause has to harm the prediction of oth
 SAME_EVIDENCE = 2.0  # log evidence by which two sets may differ and still be the same answer, whatever their priors
 GATE = 0.4  # of the noise floor: what unseen runs show beyond it makes an effect that the library lacks
 GATE_LOCAL = 1.5  # of the floor: the same for what acts for a while only
-LEAST_BESIDE = 0.4  # size in units of an unknown effect below which nothing is named beside it
-PART_OF_UNKNOWN = 2.0  # size in units of an unknown effect below which a cause at its place is taken for a part of it
 LARGE_SCALES = 3.0  # size of an effect, in its typical ones, that would show at least if it can be seen at all
 MOST_SCALES = 8.0  # the same that nobody believes of a rival that fits as well
 HOPELESS_LOG = 12.0  # log evidence behind the best at which a set is not fitted any more
 LOOKALIKE = 0.01  # probability that what a cause explains down to the noise is something that no library has and that looks the same
 INSTEAD = 0.95  # probability of something unknown in place of a cause, where without it nothing unknown would show
-POINTED = 0.85  # share of what is left that one actuator has to have to be that place
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,7 +180,8 @@ def _credible(
             credible, replaced = credibility(problem, f, surely=unknown, temperature=TEMPERATURE)
             most = max(replaced, key=lambda i: replaced[i], default=None)
             if most is None or replaced[most] < (EVEN if unknown else INSTEAD):
-                return f, credible, instead
+                doubt = doubted(problem, f, beyond) if unknown else {}
+                return f, {i: min(p, doubt.get(i, 1.0)) for i, p in credible.items()}, instead
             instead = instead or size_um(problem, f, (most,)) > _least(problem, f)
             kept = _needed(problem, fit, tuple(i for i in f.members if i != most))
         f = fit(kept)
@@ -202,26 +200,6 @@ def _needed(problem: Problem, fit: Callable[[Members], Fitted], members: Members
             break
         members = less
     return members
-
-
-def beside_unknown(problem: Problem, f: Fitted, beyond: Mapping[str, Unexplained]) -> Members:
-    """The members that stand beside an unknown effect, one by one.
-
-    They foretell what unseen runs show. What is smaller than the unknown one and aimed at the actuator that the rest
-    points at is most likely a part of it.
-    """
-    members = foretelling(problem, f)
-    left = worst(beyond)
-    shares = rest_by_actuator(problem, f, left.kind)
-    where = max(shares, key=lambda a: shares[a]) if shares else None
-    if where is not None and shares[where] < POINTED:
-        where = None
-    sizes = {i: size_um(problem, f, (i,)) / max(left.excess_um, 1e-9) for i in members}
-
-    def there(i: int) -> bool:
-        return where is not None and problem.columns.candidates[i].target in (where, None)
-
-    return tuple(i for i in members if sizes[i] > (PART_OF_UNKNOWN if there(i) else LEAST_BESIDE))
 
 
 def unknown_kind(problem: Problem, f: Fitted, beyond: Mapping[str, Unexplained]) -> str | None:

@@ -116,13 +116,15 @@ def _draws(problem: Problem, f: Fitted, part: Members, W: ByChannel, r: Floats, 
     at = problem.member_columns(f.members)
     signal, whole = W[:, own] @ f.theta[[at.index(c) for c in own]], W[:, at] @ f.theta
     joint, prior = _with(problem, gram(W, r), W, r, family)
+    # what is wrong with others is of their own kind: it is no excuse where the family could not draw them
+    D, seen = family.columns, whole[family.at]
+    b = D.T @ seen
+    whole_energy = float(b @ np.linalg.lstsq(D.T @ D, b, rcond=1e-9)[0])
     drawn = np.zeros(len(r))
     drawn[family.at] = family.columns @ estimate(joint, prior, others)[0][W.shape[1] :]
     apart = (drawn - signal) ** 2
     own_energy = float(np.sum(signal**2))
-    if float(apart.sum()) < max(
-        LIKE**2 * own_energy, min(LIKE**2 * float(np.sum(whole**2)), MOST_UNLIKE**2 * own_energy)
-    ):
+    if float(apart.sum()) < max(LIKE**2 * own_energy, min(LIKE**2 * whole_energy, MOST_UNLIKE**2 * own_energy)):
         return 1.0
     kind = kinds(problem)
     # rows of other channels are weighted by what is minor

@@ -1,6 +1,6 @@
 """What a set of causes leaves: how much, what it depends on, and whether it is an effect that the library does not have."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -19,6 +19,7 @@ from camcomp.ground.datatypes import Bools, Floats, Ints
 
 SEEN_SHARE = 0.1  # of the energy of the run that shows a cause best, from which on a run says something about it
 CONFIRMED = 0.8  # share of its own signal that a cause beside an unknown one has to take away from unseen runs
+OWN = 0.5  # of its signal that no other member could take over, from which on a member is measured by that part alone
 NEAR = 0.5  # of what acts for a while: a row that it leaves nearer to nothing than this follows it
 SURE_SD = 3.0  # of the floor: what noise leaves of a row
 
@@ -92,7 +93,7 @@ def foretelling(problem: Problem, f: Fitted) -> Members:
         return members
     while members:
         now = _unforetold(problem, f, members)
-        own = [_own(problem, f, i) for i in members]
+        own = [_own(problem, f, members, i) for i in members]
         gains = [
             (CONFIRMED if followed(problem, f, i) else 0.0)
             if problem.passing(i)
@@ -139,15 +140,29 @@ def _gain(before: Mapping[str, Floats], after: Mapping[str, Floats], own: Mappin
     return min(float(change[seen].sum() / whole[seen].sum()), 1.0 + float(np.min(change[seen] / whole[seen])))
 
 
-def _own(problem: Problem, f: Fitted, i: int) -> dict[str, Floats]:
-    """Energy per row (runs,) of a member's own signal, per kind of channel."""
+def _own(problem: Problem, f: Fitted, members: Members, i: int) -> dict[str, Floats]:
+    """Energy per row (runs,) of what a member does and the others would not take over, per kind of channel.
+
+    Where they would take over more than OWN of it, the others may be what is there, and all that it does counts.
+    """
     index, at = problem.member_columns((i,)), problem.member_columns(f.members)
-    theta = np.array([f.theta[at.index(c)] for c in index])
+    others = problem.member_columns(tuple(each for each in members if each != i))
+    theta = f.theta[[at.index(c) for c in index]]
+    A = total(f.grams).A
+    instead = np.linalg.solve(A[np.ix_(others, others)] + np.eye(len(others)), A[np.ix_(others, index)] @ theta)
+    white = about(problem, f)[0]
+    whole = _energies(problem, [W[:, index] @ theta for W in white])
+    own = _energies(problem, [W[:, index] @ theta - W[:, others] @ instead for W in white])
+    return own if sum(map(np.sum, own.values())) > OWN * sum(map(np.sum, whole.values())) else whole
+
+
+def _energies(problem: Problem, rows: Sequence[Floats]) -> dict[str, Floats]:
+    """Mean square (runs,) of white rows (w,) of every run, per kind of channel."""
     out: dict[str, list[float]] = {words.kind: [] for words in problem.dictionaries}
-    for W, parts in zip(about(problem, f)[0], problem.white_patterns, strict=True):
-        signal, first = W[:, index] @ theta, 0
+    for values, parts in zip(rows, problem.white_patterns, strict=True):
+        first = 0
         for kind, part in zip(out, parts, strict=True):
-            out[kind].append(float(np.mean(signal[first : first + len(part)] ** 2)) if len(part) else 0.0)
+            out[kind].append(float(np.mean(values[first : first + len(part)] ** 2)) if len(part) else 0.0)
             first += len(part)
     return {kind: np.array(each) for kind, each in out.items()}
 
