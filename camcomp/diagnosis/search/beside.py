@@ -30,11 +30,15 @@ def beside_unknown(problem: Problem, f: Fitted, beyond: Mapping[str, Unexplained
     """The members that stand beside an unknown effect, one by one.
 
     They foretell what unseen runs show. What is smaller than the unknown one and aimed at the actuator that the rest
-    points at is most likely a part of it.
+    points at is most likely a part of it; so is what is smaller where neither points anywhere.
     """
     members = foretelling(problem, f)
     each = _beside(problem, f, beyond, members)
-    return tuple(i for i in members if each[i].size > (PART_OF_UNKNOWN if each[i].there else LEAST_BESIDE))
+
+    def least(of: _Beside) -> float:
+        return PART_OF_UNKNOWN if of.there else 1.0 if of.nowhere else LEAST_BESIDE
+
+    return tuple(i for i in members if each[i].size > least(each[i]))
 
 
 def doubted(problem: Problem, f: Fitted, beyond: Mapping[str, Unexplained]) -> dict[int, float]:

@@ -147,7 +147,7 @@ def search_causes(problem: Problem) -> CauseSearch:
     best = fits[verdict.best]
     beyond = unexplained(problem, best)
     kind = unknown_kind(problem, best, beyond)
-    known, credible, instead = _credible(problem, best, beyond, fit)
+    known, credible, instead = _credible(problem, best, beyond, fit, every)
     if known.members != best.members:
         beyond = unexplained(problem, known)
         kind = unknown_kind(problem, known, beyond) or (worst(beyond).kind if kind or instead else None)
@@ -155,7 +155,9 @@ def search_causes(problem: Problem) -> CauseSearch:
         probability = probabilities(fits, problem.candidates, temperature)
         word = "identified" if known.members else "none"
         verdict = replace(verdict, word=word, best=0, rivals=())
-    sure = {i: (1.0 - LOOKALIKE) * min(p, credible.get(i, 1.0)) for i, p in verdict.inclusion.items()}
+    # of what was overlooked because something unknown is there the sets without that say nothing
+    inclusion = verdict.inclusion | {i: 1.0 for i in known.members if i not in best.members}
+    sure = {i: (1.0 - LOOKALIKE) * min(p, credible.get(i, 1.0)) for i, p in inclusion.items()}
     verdict = replace(verdict, inclusion=sure)
     prior = problem.prior if kind is None else firm_prior(problem)
     left = residual_tests(problem, known, prior)
@@ -164,7 +166,11 @@ def search_causes(problem: Problem) -> CauseSearch:
 
 
 def _credible(
-    problem: Problem, f: Fitted, beyond: Mapping[str, Unexplained], fit: Callable[[Members], Fitted]
+    problem: Problem,
+    f: Fitted,
+    beyond: Mapping[str, Unexplained],
+    fit: Callable[[Members], Fitted],
+    every: list[int],
 ) -> tuple[Fitted, dict[int, float], bool]:
     """What is left of a set when members that something unknown does as well have gone, one by one; how sure they are;
     whether something unknown took the place of one, even where what every machine has would stretch to cover it.
@@ -180,12 +186,36 @@ def _credible(
             credible, replaced = credibility(problem, f, surely=unknown, temperature=TEMPERATURE)
             most = max(replaced, key=lambda i: replaced[i], default=None)
             if most is None or replaced[most] < (EVEN if unknown else INSTEAD):
+                if unknown and (more := _overlooked(problem, f, fit, every)) is not None:
+                    f, beyond = more, unexplained(problem, more)
+                    continue
                 doubt = doubted(problem, f, beyond) if unknown else {}
                 return f, {i: min(p, doubt.get(i, 1.0)) for i, p in credible.items()}, instead
             instead = instead or size_um(problem, f, (most,)) > _least(problem, f)
             kept = _needed(problem, fit, tuple(i for i in f.members if i != most))
         f = fit(kept)
         beyond = unexplained(problem, f)
+
+
+def _overlooked(problem: Problem, f: Fitted, fit: Callable[[Members], Fitted], every: list[int]) -> Fitted | None:
+    """The set with one cause more, where that stands beside the unknown effect by every measure; None where none does.
+
+    A set that was found as if nothing unknown were there may hold none of the true causes.
+    """
+    value, found = (
+        problem.candidates.value,
+        extensions(Scale(total(f.grams), problem.prior, problem.candidates), f.members, every),
+    )
+    best = max((fit(members) for _, members in found[:EXCHANGED]), key=value)
+    beyond = unexplained(problem, best)
+    if (
+        value(best) < value(f) + BEYOND_DOUBT
+        or unknown_kind(problem, best, beyond) is None
+        or beside_unknown(problem, best, beyond) != best.members
+    ):
+        return None
+    credible, replaced = credibility(problem, best, surely=True, temperature=TEMPERATURE)
+    return best if min(credible.values()) > INSTEAD and max(replaced.values()) < EVEN else None
 
 
 def _needed(problem: Problem, fit: Callable[[Members], Fitted], members: Members) -> Members:
