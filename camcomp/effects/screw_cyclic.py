@@ -28,7 +28,7 @@ PARAMETERS = (
 FITTED = (
     Parameter("sine_mm", "mm", 0.0, -0.3, 0.3, 0.004, 0.00005, "as the amplitude"),
     Parameter("cosine_mm", "mm", 0.0, -0.3, 0.3, 0.004, 0.00005, "as the amplitude"),
-    Parameter("pitch_mm", "mm", 5.0, 0.5, 100.0, 1.0, 0.0, "as above", scan=_PITCHES),
+    Parameter("pitch_mm", "mm", 5.0, 0.5, 100.0, 1.0, 0.0, "as above", scan=_PITCHES, turns=1.5),  # one wave is a bow
 )
 
 

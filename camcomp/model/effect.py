@@ -24,7 +24,8 @@ class Parameter:
     `scale` is the size that is typical where the effect is present, `tolerance` the size that every healthy machine
     has and no model states; both in `unit`, or as differences of the natural logarithm where `log` (factors). `sign` +1: never below
     nominal. `scan`: a shape (a pitch, a time constant) that nothing shows while the effect is absent; the values to
-    try first. `placed`: such a shape is an instant on the common clock, found where something begins or ends. `either`: a
+    try first. `turns`: such a shape is a period of the drive's way, and what was driven has to hold it that often to tell it from
+    any other curve. `placed`: such a shape is an instant on the common clock, found where something begins or ends. `either`: a
     shape that is one of a few values (which of two laws holds); the fit takes the one that explains more.
     """
 
@@ -40,6 +41,7 @@ class Parameter:
     log: bool = False
     scan: tuple[float, ...] = ()
     placed: bool = False
+    turns: float = 0.0
     either: tuple[float, ...] = ()
 
     @property

@@ -57,6 +57,7 @@ def best_shape(bench: Bench, candidate: CandidateCause, left: Beside, whitened: 
     """The scanned shape whose columns explain most of what is left; None where the effect is not scanned."""
     p = candidate.shapes[0]
     values = np.asarray(p.scan)
+    values = np.sort(values[values <= max(longest(bench, candidate, p), values.min())])
     gains = _gains(bench, candidate, [{**shape_default(candidate), p.name: float(v)} for v in values], left, whitened)
     if gains is None:
         return None
@@ -66,6 +67,15 @@ def best_shape(bench: Bench, candidate: CandidateCause, left: Beside, whitened: 
     finer = _gains(bench, candidate, [{**shape_default(candidate), p.name: float(v)} for v in near], left, whitened)
     value = near[int(np.argmax(finer))] if finer is not None and finer.max() > gains[best] else values[best]
     return {**shape_default(candidate), p.name: float(value)}
+
+
+def longest(bench: Bench, candidate: CandidateCause, p: Parameter) -> float:
+    """Upper bound of a shape, in its unit: of a period, what was driven holds often enough to show that it comes back."""
+    if p.turns == 0.0:
+        return p.high
+    which = cause_of(candidate, {}).which(bench.actuators)
+    way = np.concatenate([reading.motion.encoder for reading in bench.nominal])[:, which > 0]
+    return min(p.high, float(np.ptp(way, axis=0).max(initial=0.0)) / p.turns)
 
 
 def _gains(

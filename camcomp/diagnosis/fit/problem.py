@@ -9,7 +9,7 @@ import numpy as np
 from camcomp.diagnosis.fit.bench import Bench, cause_of, step_of
 from camcomp.diagnosis.fit.columns import Columns, moved_tip, shape_default
 from camcomp.diagnosis.fit.floor import MINOR, NoiseFloor
-from camcomp.diagnosis.fit.grid_parameters import reach
+from camcomp.diagnosis.fit.grid_parameters import longest, reach
 from camcomp.diagnosis.fit.noise import less_certain_drives
 from camcomp.diagnosis.fit.patterns import Dictionary
 from camcomp.diagnosis.fit.ringing import FOLLOWED, loudest
@@ -407,5 +407,6 @@ class Problem:
         moves = float(np.sum((A @ step) ** 2))
         if moves > SETTLED:
             for (i, p), s in zip(names, step[len(index) :], strict=True):
-                shapes[i][p.name] = float(np.clip(shapes[i][p.name] + s, p.low, p.high))
+                high = longest(self.bench, self.columns.candidates[i], p)
+                shapes[i][p.name] = float(np.clip(shapes[i][p.name] + s, p.low, max(high, p.low)))
         return moves

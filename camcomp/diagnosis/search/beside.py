@@ -17,28 +17,29 @@ POINTED = 0.85  # share of what is left that one actuator has to have to be that
 
 @dataclass(frozen=True)
 class _Beside:
-    """size: of a cause in units of the unknown effect; there: whether that shows at the cause's actuator, and as it does;
-    nowhere: whether neither is of one actuator, but both show alike.
+    """size: of a cause in units of what is left in the kind of channel that shows the cause best, of_all: of what is left in
+    any; there: whether that points at the cause's actuator; anywhere: whether the cause is of no actuator.
     """
 
     size: float
+    of_all: float
     there: bool
-    nowhere: bool
+    anywhere: bool
 
 
 def beside_unknown(problem: Problem, f: Fitted, beyond: Mapping[str, Unexplained]) -> Members:
     """The members that stand beside an unknown effect, one by one.
 
     They foretell what unseen runs show. What is smaller than the unknown one and aimed at the actuator that the rest
-    points at is most likely a part of it; so is what is smaller where neither points anywhere.
+    points at is most likely a part of it; so is what is smaller and of no actuator.
     """
     members = foretelling(problem, f)
     each = _beside(problem, f, beyond, members)
 
-    def least(of: _Beside) -> float:
-        return PART_OF_UNKNOWN if of.there else 1.0 if of.nowhere else LEAST_BESIDE
+    def stands(of: _Beside) -> bool:
+        return of.of_all > LEAST_BESIDE and of.size > (PART_OF_UNKNOWN if of.there else 1.0 if of.anywhere else 0.0)
 
-    return tuple(i for i in members if each[i].size > least(each[i]))
+    return tuple(i for i in members if stands(each[i]))
 
 
 def doubted(problem: Problem, f: Fitted, beyond: Mapping[str, Unexplained]) -> dict[int, float]:
@@ -51,26 +52,29 @@ def doubted(problem: Problem, f: Fitted, beyond: Mapping[str, Unexplained]) -> d
     out = {}
     for i, each in _beside(problem, f, beyond, f.members).items():
         chance = 1.0 / len(problem.bench.actuators) if each.there else 1.0
-        imitated = 1.0 / (1.0 + each.size**2) if each.there or each.nowhere else 0.0
+        imitated = 1.0 / (1.0 + each.size**2) if each.there or each.anywhere else 0.0
         out[i] = chance / (chance + imitated)
     return out
 
 
 def _beside(problem: Problem, f: Fitted, beyond: Mapping[str, Unexplained], members: Members) -> dict[int, _Beside]:
-    left = worst(beyond)
-    shares = rest_by_actuator(problem, f, left.kind)
-    where = max(shares, key=lambda a: shares[a]) if shares else None
-    if where is not None and shares[where] < POINTED:
-        where = None
+    whole, places, out = worst(beyond).excess_um, dict[str, str | None](), dict[int, _Beside]()
+    for i in members:
+        shown = signal_rms(problem, f, (i,))
+        kind = max(shown, key=lambda each: shown[each])
+        left = beyond[kind].excess_um if kind in beyond else 0.0
+        if kind not in places:
+            places[kind] = _pointed(problem, f, kind)
+        where, target = places[kind], problem.columns.candidates[i].target
+        there = where is not None and target == where
+        if where is not None and target is None:
+            there = tip_by_actuator(problem, f, i).get(where, 0.0) > EVEN
+        size = size_um(problem, f, (i,))
+        out[i] = _Beside(size / max(left, 1e-9), size / max(whole, 1e-9), there, target is None and not there)
+    return out
 
-    def one(i: int) -> _Beside:
-        size, shown = size_um(problem, f, (i,)) / max(left.excess_um, 1e-9), signal_rms(problem, f, (i,))
-        if max(shown, key=lambda kind: shown[kind]) != left.kind:
-            return _Beside(size, False, False)  # the forces of a drive show nothing of what only the tip shows
-        target = problem.columns.candidates[i].target
-        if where is None:
-            return _Beside(size, False, target is None)
-        aimed = target is None and tip_by_actuator(problem, f, i).get(where, 0.0) > EVEN
-        return _Beside(size, target == where or aimed, False)
 
-    return {i: one(i) for i in members}
+def _pointed(problem: Problem, f: Fitted, kind: str) -> str | None:
+    """The actuator that has most of what is left in a kind of channel, None where none has."""
+    shares = rest_by_actuator(problem, f, kind)
+    return next((name for name, share in shares.items() if share >= POINTED), None)
