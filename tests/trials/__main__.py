@@ -18,7 +18,7 @@ from tests.trials.machines import MACHINES
 from tests.trials.sensors import CHANNELS, Sensors
 from tests.trials.strange import ON_ACTUATORS, STRANGE
 
-KINDS = ("null", "single", "pair", "unknown", "imperfect")
+KINDS = ("null", "single", "pair", "unknown", "beside", "imperfect")
 # what data may be like: changes of the sensors, and of the plan
 MESS: dict[str, tuple[dict, dict]] = {
     "tails": ({"tails": True}, {}),
@@ -56,11 +56,13 @@ def plan(kind: str, index: int, seed: int, base: Plan, ratios: tuple[float, ...]
         others = [each for each in names if each[0] != first[0]]
         causes = [first, others[int(rng.integers(len(others)))]]
         chosen = [3.0, float(rng.choice([3.0, 6.0, 9.0]))]
-    elif kind == "unknown":
+    elif kind in ("unknown", "beside"):
         sizes = ratios or (3.0, 10.0)
         odd = sorted(STRANGE)[(index * 5) % len(STRANGE)]
         causes = [(odd, str(rng.choice(machine.actuators if odd in ON_ACTUATORS else list("xyz"))))]
         chosen = [sizes[index % len(sizes)]]
+        if kind == "beside":
+            causes, chosen = [names[(index * 13) % len(names)], *causes], [9.0, 5.0]
     else:
         causes, chosen = [], []
     return replace(

@@ -209,6 +209,8 @@ def render(rows: list[Row]) -> str:
     rate("imperfect model: all from 2.7 x noise on named", [r for r in complete if r["kind"] == "imperfect"], _all_due)
     rate("unknown named unknown (0.90)", foreign, "unknown")
     rate("the same where the library leaves >= 1 x noise", [r for r in foreign if r["left"] >= 1], "unknown")
+    beside = [r for r in foreign if r["true"]]
+    rate("a cause beside something unknown: named", beside, "all")
     rate("complete library: false unknown (0.03)", complete, "unknown")
     rate("a false cause at p > 0.5 (0.02)", good, "false_cause")
     rate("sure (p > 0.8) and wrong (0.01)", good, "sure_and_wrong")
@@ -237,7 +239,7 @@ def right(row: Row) -> bool:
     if "failed" in row or row["false_cause"] or row["unknown"] != bool(row["foreign"]):
         return False
     if row["foreign"]:
-        return True
+        return not row["true"] or bool(row["all"])
     if not row["true"]:
         return bool(row["none"])
     if row["kind"] in ("pair", "imperfect"):

@@ -18,11 +18,13 @@ POINTED = 0.85  # share of what is left that one actuator has to have to be that
 @dataclass(frozen=True)
 class _Beside:
     """size: of a cause in units of what is left in the kind of channel that shows the cause best, of_all: of what is left in
-    any; there: whether that points at the cause's actuator; anywhere: whether the cause is of no actuator.
+    any; share: of that at the cause's actuator, 1 where the cause is of none; there: whether that points at the cause's actuator;
+    anywhere: whether the cause is of no actuator.
     """
 
     size: float
     of_all: float
+    share: float
     there: bool
     anywhere: bool
 
@@ -45,36 +47,31 @@ def beside_unknown(problem: Problem, f: Fitted, beyond: Mapping[str, Unexplained
 def doubted(problem: Problem, f: Fitted, beyond: Mapping[str, Unexplained]) -> dict[int, float]:
     """Most that the probability of each member can be beside what is left.
 
-    Either the unknown effect is at the member's actuator by chance, one of m, or the member imitates it: up to which share
-    of its energy an unknown effect can be imitated nobody knows, so that every share is as likely. Of what shows at another
-    place, or in another kind of channel, it is no imitation.
+    Either the unknown effect is at the member's actuator by chance, one of m, or the member imitates it, as far as it is there:
+    up to which share of its energy an unknown effect can be imitated nobody knows, so that every share is as likely. Of what
+    shows at another place, or in another kind of channel, it is no imitation.
     """
     out = {}
     for i, each in _beside(problem, f, beyond, f.members).items():
-        chance = 1.0 / len(problem.bench.actuators) if each.there else 1.0
-        imitated = 1.0 / (1.0 + each.size**2) if each.there or each.anywhere else 0.0
-        out[i] = chance / (chance + imitated)
+        chance = 1.0 if each.anywhere else 1.0 / len(problem.bench.actuators)
+        out[i] = chance / (chance + each.share / (1.0 + each.size**2))
     return out
 
 
 def _beside(problem: Problem, f: Fitted, beyond: Mapping[str, Unexplained], members: Members) -> dict[int, _Beside]:
-    whole, places, out = worst(beyond).excess_um, dict[str, str | None](), dict[int, _Beside]()
+    whole, kinds, out = worst(beyond).excess_um, dict[str, dict[str, float]](), dict[int, _Beside]()
     for i in members:
         shown = signal_rms(problem, f, (i,))
         kind = max(shown, key=lambda each: shown[each])
         left = beyond[kind].excess_um if kind in beyond else 0.0
-        if kind not in places:
-            places[kind] = _pointed(problem, f, kind)
-        where, target = places[kind], problem.columns.candidates[i].target
+        if kind not in kinds:
+            kinds[kind] = rest_by_actuator(problem, f, kind)
+        shares, target = kinds[kind], problem.columns.candidates[i].target
+        where = next((name for name, share in shares.items() if share >= POINTED), None)
         there = where is not None and target == where
         if where is not None and target is None:
             there = tip_by_actuator(problem, f, i).get(where, 0.0) > EVEN
         size = size_um(problem, f, (i,))
-        out[i] = _Beside(size / max(left, 1e-9), size / max(whole, 1e-9), there, target is None and not there)
+        share = 1.0 if target is None else shares.get(target, 0.0)
+        out[i] = _Beside(size / max(left, 1e-9), size / max(whole, 1e-9), share, there, target is None and not there)
     return out
-
-
-def _pointed(problem: Problem, f: Fitted, kind: str) -> str | None:
-    """The actuator that has most of what is left in a kind of channel, None where none has."""
-    shares = rest_by_actuator(problem, f, kind)
-    return next((name for name, share in shares.items() if share >= POINTED), None)
