@@ -91,15 +91,6 @@ NOT_THERE = {
                      "tool_deflection", "tool_wear")
     },
 }  # fmt: skip
-# Wrong today, and why.
-OPEN = {
-    (
-        "delta",
-        "servo_overshoot",
-        None,
-    ): "settles where period and damping are 76 ms and 0.34 instead of 83 ms and 0.2: its "
-    "three drives ring alike, and the search starts from too coarse a grid of both"
-}
 # Never asked about where a program is driven, because so short a way shows them as offsets and lengths: where they are found.
 ELSEWHERE = {
     "joint_coupling": "tests/unit/diagnosis/test_joint_curves.py",

@@ -17,8 +17,6 @@ def trials():
         yield pytest.param(machine, None, id=f"{machine}-nothing")
         for fault in grid.faults(machine):
             marks = [] if grid.soon(machine, fault) else [pytest.mark.campaign]
-            if why := grid.OPEN.get((machine, fault.effect, fault.target)):
-                marks.append(pytest.mark.xfail(reason=why, strict=True))
             yield pytest.param(machine, fault, id=f"{machine}-{fault.effect}-{fault.target}", marks=marks)
 
 

@@ -23,6 +23,9 @@ START_N, START_NMM = 1000.0, 1e6  # and how hard its guide may hold it there
 ALWAYS_MM, ALWAYS_RAD = 0.005, 5e-6  # the same where it hardly ever moves: little, or nothing would be known of it
 ALWAYS = 0.2  # of a run: what moves for less of it hardly ever moves
 STARTING_ROWS = 2
+SWING_S = 0.03  # times the speed with which a log begins: how far a loop may then stand from where it is told
+SWINGS_S = 0.06  # in which that dies away: loops of 5 to 60 Hz as they are tuned
+BEGUN_ANEW = 3.0  # usual steps between rows from which on nobody knows how a loop came to the next one
 
 
 def start_columns(
@@ -56,12 +59,14 @@ def start_columns(
 def unknown_starts(bench: Bench, k: int) -> Floats:
     """What single rows of run k may be off by (n, c), standard deviations, because nobody saw how its actuators came there.
 
-    Of the first row, and of that behind missing ones from which it turned back, where the next has the actuator moved on.
+    Of the first row, and of that behind missing ones from which it turned back, where the next has the actuator moved on; of
+    encoders until a loop has settled that nobody saw speed up.
     """
     out, path = np.zeros_like(bench.observed(k)), bench.runs[k].run_path
     if not path.ordered or len(path.time) < 3:
         return out
     m = len(bench.actuators)
+    out[:, 3 : 3 + m] = _swing(path.time, path.row_rho)
     behind = np.flatnonzero(missing_rows(path.time)) + 1
     behind = behind[behind < len(path.time) - 1]
     for j in range(m):
@@ -73,6 +78,17 @@ def unknown_starts(bench: Bench, k: int) -> Floats:
         unknown[rows] = START_RAD if revolute else START_MM
         out[:, :3] = np.hypot(out[:, :3], bench.turned(k, bench.row_slopes(k)[:, :, j] * unknown[:, None]))
         out[rows, 3 + m + j] = START_NMM if revolute else START_N
+    return out
+
+
+def _swing(time: Floats, rho: Floats) -> Floats:
+    """How far (n, m) loops at rho (n, m) may swing that came in motion to the first row, or to one behind many missing ones."""
+    out, step = np.zeros_like(rho), np.diff(time)
+    for i in (0, *np.flatnonzero(step > BEGUN_ANEW * float(np.median(step))) + 1):
+        if i + 1 < len(time) and step[i] > 0.0:
+            speed = np.abs(rho[i + 1] - rho[i]) / step[i]
+            since = time[i:] - time[i]
+            out[i:] = np.hypot(out[i:], SWING_S * speed * np.exp(-since / SWINGS_S)[:, None])
     return out
 
 

@@ -206,11 +206,9 @@ def _overlooked(problem: Problem, f: Fitted, fit: Callable[[Members], Fitted], e
 
     A set that was found as if nothing unknown were there may hold none of the true causes.
     """
-    value, found = (
-        problem.candidates.value,
-        extensions(Scale(total(f.grams), problem.prior, problem.candidates), f.members, every),
-    )
-    best = max((fit(members) for _, members in found[:EXCHANGED]), key=value)
+    value = problem.candidates.value
+    scale = Scale(total(f.grams), problem.prior, problem.candidates)
+    best = max((fit(members) for _, members in extensions(scale, f.members, every)[:EXCHANGED]), key=value)
     beyond = unexplained(problem, best)
     if (
         value(best) < value(f) + BEYOND_DOUBT
