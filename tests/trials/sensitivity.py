@@ -11,6 +11,7 @@ import contextlib
 import io
 import json
 import os
+import shutil
 import sys
 from collections import defaultdict
 from importlib import import_module
@@ -39,15 +40,51 @@ SET = (
 )
 
 
+ROOT = Path(__file__).resolve().parents[2]
+
+
 def written(folder: Path) -> list[Path]:
-    """The experiments of the fixed set below a folder."""
-    out = []
+    """The experiments of the fixed set below a folder: an axis by itself, an arm in static poses, milled paths."""
+    out = [_axis(folder / "s-axis"), _poses(folder / "s-poses")]
     for plan in SET:
         there = folder / f"s-{plan.seed}"
         out.append(there / "experiment.yaml")
         if not out[-1].exists():
             write(make(plan), plan, there)
     return out
+
+
+def _axis(folder: Path) -> Path:
+    """Two runs of an axis that is late, rubs, and feels a ball screw's pitch in its drive, which no effect has."""
+    folder.mkdir(parents=True, exist_ok=True)
+    t = np.arange(0.0, 16.0, 0.01)
+    for k, w in enumerate((1.0, 1.3)):
+        rng = np.random.default_rng(k)
+        x = 100.0 * np.sin(0.9 * w * t) + 40.0 * np.sin(2.3 * w * t + 0.4)
+        speed = np.gradient(x, t)
+        force = 0.08 * np.gradient(speed, t) + 30.0 * np.tanh(speed / 0.5) + 0.1 * speed + 2.0 * np.sin(0.4 * np.pi * x)
+        force += rng.normal(0.0, 0.5, len(t))
+        table = np.column_stack([t, x + 0.005 * speed + rng.normal(0.0, 5e-4, len(t)), x, force])
+        header = "t_s,cmd_x_mm,act_x_mm,act_x_N"
+        np.savetxt(folder / f"{k}.csv", table, fmt="%.6f", delimiter=",", header=header, comments="")
+    runs = [{"name": f"run-{k}", "log": f"{k}.csv", "cutting": False} for k in range(2)]
+    return _stated(folder, "cartesian", runs)
+
+
+def _poses(folder: Path) -> Path:
+    """The shipped measurement of an arm."""
+    folder.mkdir(parents=True, exist_ok=True)
+    runs = []
+    for name in "AB":
+        shutil.copy(ROOT / "samples" / "ur10" / f"series_{name}.csv", folder)
+        runs.append({"name": name, "log": f"series_{name}.csv", "cutting": False, "clamping": name})
+    return _stated(folder, "ur10", runs)
+
+
+def _stated(folder: Path, machine: str, runs: list[dict[str, Any]]) -> Path:
+    path = folder / "experiment.yaml"
+    path.write_text(json.dumps({"config": [str(ROOT / "config" / f"{machine}.yaml")], "runs": runs}))
+    return path
 
 
 def answer(experiment: Path, folder: Path) -> str:
