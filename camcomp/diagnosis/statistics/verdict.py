@@ -53,8 +53,9 @@ def judge(fits: Sequence[Fitted], probability: Floats, twins: Sequence[tuple[Mem
     for fit, p in zip(fits, held, strict=True):
         for i in fit.members:
             inclusion[i] = inclusion.get(i, 0.0) + float(p)
-    for i in leader.members:  # sets of another kind break no tie
-        having = sum(float(held[j]) for j in twin if i in fits[j].members)
-        inclusion[i] = min(inclusion[i], having / float(held[twin].sum()))
+    tied = [fits[j].members for j, level in zip(twin, near, strict=True) if level]
+    for i in leader.members:  # sets of another kind break no tie, nor do twins further behind
+        having = sum(float(held[j]) for j in twin if i in fits[j].members) / float(held[twin].sum())
+        inclusion[i] = min(inclusion[i], having, sum(i in members for members in tied) / len(tied))
     word = "none" if not leader.members else "ambiguous" if rivals else "identified"
     return Verdict(word, best, tuple(rivals), inclusion)

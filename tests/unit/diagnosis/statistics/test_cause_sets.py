@@ -124,6 +124,15 @@ def test_sets_of_another_kind_break_no_tie():
     assert inclusion[0] == pytest.approx(0.95)
 
 
+def test_a_twin_far_behind_breaks_no_tie():
+    """It shares a member with one of the two before it, by chance."""
+    fits = [fitted(0, 1), fitted(0, 2), fitted(1, 3)]
+    twins = [((0, 1), (0, 2)), ((0, 1), (1, 3))]
+    inclusion = judge(fits, np.array([0.57, 0.42, 0.01]), twins).inclusion
+    assert inclusion[1] == pytest.approx(0.5)
+    assert 0.94 < inclusion[0] < 1.0
+
+
 def test_a_set_far_less_probable_is_a_rival_only_where_nothing_tells_it_apart():
     fits = [fitted(0), fitted(1)]
     assert judge(fits, np.array([0.99, 0.01]), []).word == "identified"
