@@ -42,3 +42,12 @@ def test_a_loop_that_rings_twice_as_much_as_what_is_left_of_its_drive_is_not_sur
     result, _ = answer(plan, tmp_path)
     assert result["verdict"] == "unknown"
     assert max([each["probability"] for each in result["causes"] if each["effect"] != "unknown"], default=0.0) <= 0.8
+
+
+@pytest.mark.campaign
+def test_what_begins_at_two_drives_at_once_is_no_disturbance_of_either(tmp_path):
+    """A clamping that slips moves the workpiece along both."""
+    plan = Plan(2303005, "unknown", (("clamp_slip", "x"),), (10.0,), **LONG)
+    result, _ = answer(plan, tmp_path)
+    assert result["verdict"] == "unknown"
+    assert [each["effect"] for each in result["causes"]] == ["unknown"]

@@ -3,6 +3,8 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+import numpy as np
+
 from camcomp.diagnosis.fit.gap import rest_by_actuator, tip_by_actuator
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.search.unexplained import Unexplained, size_um, worst
@@ -13,6 +15,7 @@ from camcomp.diagnosis.statistics.probability import EVEN
 LEAST_BESIDE = 0.4  # size in units of an unknown effect below which nothing is named beside it
 PART_OF_UNKNOWN = 2.0  # size in units of an unknown effect below which a cause at its place is taken for a part of it
 POINTED = 0.85  # share of what is left that one actuator has to have to be that place
+AT_ONCE = 2.0  # rows within which what began at several actuators began at none of them
 
 
 @dataclass(frozen=True)
@@ -33,15 +36,27 @@ def beside_unknown(problem: Problem, f: Fitted, beyond: Mapping[str, Unexplained
     """The members that stand beside an unknown effect, one by one.
 
     They foretell what unseen runs show. What is smaller than the unknown one and aimed at the actuator that the rest
-    points at is most likely a part of it; so is what is smaller and of no actuator.
+    points at is most likely a part of it; so is what is smaller and of no actuator. What began at several actuators at once is
+    one event, of a place that all of them move.
     """
     members = foretelling(problem, f)
+    events = _shared_events(problem, f, members)
+    members = tuple(i for i in members if i not in events)
     each = _beside(problem, f, beyond, members)
 
     def stands(of: _Beside) -> bool:
         return of.of_all > LEAST_BESIDE and of.size > (PART_OF_UNKNOWN if of.there else 1.0 if of.anywhere else 0.0)
 
     return tuple(i for i in members if stands(each[i]))
+
+
+def _shared_events(problem: Problem, f: Fitted, members: Members) -> set[int]:
+    """The members that act for a while and began when another one of another actuator did."""
+    began = {i: f.extra[i][problem.columns.candidates[i].shapes[0].name] for i in members if problem.passing(i)}
+    if len(began) < 2:
+        return set()
+    rows = max(float(np.median(np.diff(run.run_path.time))) for run in problem.bench.runs)
+    return {i for i in began for j in began if i != j and abs(began[i] - began[j]) <= AT_ONCE * rows}
 
 
 def doubted(problem: Problem, f: Fitted, beyond: Mapping[str, Unexplained]) -> dict[int, float]:
