@@ -80,25 +80,19 @@ class Sound:
 def small_members(problem: Problem, f: Fitted) -> Members:
     """The members that move the tip by no more than what is minor, or by no more than what may be wrong of another one.
 
-    A small one at the actuator of a large one is what that one's law says wrongly: none is modelled better than GATE_SHARE. Two
-    below the floor that undo each other down to what the others may be wrong by are two names for that.
+    A small one at the actuator of a large one is what that one's law says wrongly, and so is one below the floor that is of no
+    actuator: none is modelled better than GATE_SHARE.
     """
     sizes = {i: size_um(problem, f, (i,)) for i in f.members}
     target = {i: problem.columns.candidates[i].target for i in f.members}
-    beside = {
-        i: max(
-            (sizes[j] for j in f.members if j != i and target[i] is not None and target[j] == target[i]), default=0.0
-        )
-        for i in f.members
-    }
     floor = problem.floor.tip_um
-    small = {i for i in f.members if sizes[i] <= max(MINOR * floor, GATE_SHARE * beside[i])}
-    for i, j in combinations(f.members, 2):
-        least = max(MINOR * floor, GATE_SHARE * size_um(problem, f, tuple(x for x in f.members if x not in (i, j))))
-        both = size_um(problem, f, (i, j))
-        if both <= least and both < min(sizes[i], sizes[j]) and max(sizes[i], sizes[j]) < floor:
-            small |= {i, j}
-    return tuple(sorted(small))
+
+    def beside(i: int) -> float:
+        anywhere = target[i] is None and sizes[i] < floor
+        others = (sizes[j] for j in f.members if j != i and (anywhere or target[j] == target[i] is not None))
+        return max(others, default=0.0)
+
+    return tuple(i for i in f.members if sizes[i] <= max(MINOR * floor, GATE_SHARE * beside(i)))
 
 
 def cancels(problem: Problem, f: Fitted) -> bool:

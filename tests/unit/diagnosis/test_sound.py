@@ -81,15 +81,16 @@ def test_small_members_are_those_that_are_minor_and_those_of_a_large_ones_actuat
     assert sound.small_members(problem, SimpleNamespace(members=(0, 1, 2, 3))) == (0, 1)
 
 
-@pytest.mark.parametrize(("first", "second", "both"), [(4.0, -2.5, (0, 1)), (4.0, 2.5, ()), (40.0, -38.5, ())])
-def test_two_below_the_floor_that_undo_each_other_down_to_what_the_others_may_be_wrong_by_are_small(
-    monkeypatch, first, second, both
-):
-    sizes = {0: first, 1: second, 2: 60.0}
-    monkeypatch.setattr(sound, "size_um", lambda problem, f, members: abs(sum(sizes[i] for i in members)))
-    causes = [SimpleNamespace(target=target) for target in (None, None, "x")]
+@pytest.mark.parametrize(
+    ("size", "target", "small"),
+    [(4.0, None, True), (4.0, "y", False), (5.2, None, False)],  # below the floor, another actuator's, above the floor
+)
+def test_one_of_no_actuator_below_the_floor_is_what_a_large_ones_law_says_wrongly(monkeypatch, size, target, small):
+    sizes = {0: size, 1: 60.0}
+    monkeypatch.setattr(sound, "size_um", lambda problem, f, members: sum(sizes[i] for i in members))
+    causes = [SimpleNamespace(target=target), SimpleNamespace(target="x")]
     problem = SimpleNamespace(columns=SimpleNamespace(candidates=causes), floor=SimpleNamespace(tip_um=5.0))
-    assert sound.small_members(problem, SimpleNamespace(members=(0, 1, 2))) == both
+    assert (sound.small_members(problem, SimpleNamespace(members=(0, 1))) == (0,)) is small
 
 
 FREE = CausePrior(tuple((i,) for i in range(6)), np.log(np.full(6, 1 / 6)), lambda i, j: {i, j} == {1, 5})
