@@ -85,8 +85,11 @@ def _swing(time: Floats, rho: Floats) -> Floats:
     """How far (n, m) loops at rho (n, m) may swing that came in motion to the first row, or to one behind many missing ones."""
     out, step = np.zeros_like(rho), np.diff(time)
     for i in (0, *np.flatnonzero(step > BEGUN_ANEW * float(np.median(step))) + 1):
-        if i + 1 < len(time) and step[i] > 0.0:
-            speed = np.abs(rho[i + 1] - rho[i]) / step[i]
+        if i + 2 < len(time) and step[i] > 0.0 and step[i + 1] > 0.0:
+            first, second = (rho[i + 1] - rho[i]) / step[i], (rho[i + 2] - rho[i + 1]) / step[i + 1]
+            speed = np.abs(
+                first - 0.5 * (second - first)
+            )  # at the row itself: none where the rows show how it speeds up
             since = time[i:] - time[i]
             out[i:] = np.hypot(out[i:], SWING_S * speed * np.exp(-since / SWINGS_S)[:, None])
     return out

@@ -50,3 +50,8 @@ def test_rows_behind_many_missing_ones_begin_anew_and_behind_one_do_not(swung):
     for lost, anew in ((1, False), (4, True)):
         kept = np.delete(np.arange(len(rows)), np.arange(40, 40 + lost))
         assert (_swing(rows[kept], told[kept])[40, 0] > 0.1) == anew
+
+
+def test_where_rows_show_how_it_speeds_up_from_rest_nothing_is_unknown():
+    rows = np.arange(0.0, 0.2, 0.01)
+    assert _swing(rows, 500.0 * rows[:, None] ** 2).max() < 1e-9
