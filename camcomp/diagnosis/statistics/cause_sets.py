@@ -69,30 +69,29 @@ class CausePrior:
     exclusive: Callable[[int, int], bool]  # whether two candidates make no sense together
     kinds: tuple[tuple[int, ...], ...] = ()  # candidates that are one effect at several targets, alike in weight
 
-    def prior(self, members: Members) -> float:
-        """Log prior probability of a set."""
-        return log_sum([odds for odds, _ in self.ways(members)])
+    def prior(self, members: Members, minor: Members = ()) -> float:
+        """Log prior probability of a set, and of what is minor beside it."""
+        return log_sum([odds for odds, _ in self.ways(members, minor)])
 
     def value(self, f: Fitted, temperature: float = 1.0) -> float:
         """Log evidence of a set and what is minor beside it, tempered, + their log prior."""
-        # what is minor makes nothing likelier before the data: three of a kind are one thing, two and a minor one are not
-        return f.log_evidence / temperature + min(self.prior(f.all_members), self.prior(f.members))
+        return f.log_evidence / temperature + self.prior(f.members, f.minor)
 
-    def ways(self, members: Members) -> list[tuple[float, list[Members]]]:
+    def ways(self, members: Members, minor: Members = ()) -> list[tuple[float, list[Members]]]:
         """How a set may have come about: the log prior probability of each way, and members that are of one size in it.
 
         One by one, each of a size of its own; or one effect at several targets is one cause, by whatever all of these have
-        in common.
+        in common. What is minor has nothing in common with them: three of a kind are one thing, two and a minor one are not.
         """
-        one_by_one: list[Members] = [(i,) for i in members]
-        ways = [(_in_any_order([float(self.weight[i]) for i in members]), one_by_one)]
+        one_by_one: list[Members] = [(i,) for i in (*members, *minor)]
+        ways = [(_in_any_order([float(self.weight[i]) for (i,) in one_by_one]), one_by_one)]
         if len(members) < PATTERN:
             return ways
         groups = [(tuple(i for i in members if i in kind), len(kind)) for kind in self.kinds]
         groups = [(mine, of) for mine, of in groups if len(mine) >= PATTERN]
         if not groups:
             return ways
-        rest = [i for i in members if not any(i in mine for mine, _ in groups)]
+        rest = [i for i in (*members, *minor) if not any(i in mine for mine, _ in groups)]
         weights = [float(self.weight[i]) for i in rest]
         for mine, of in groups:
             more = 0.5 ** np.arange(of - PATTERN + 1)  # halving with every further target, and any so many of them

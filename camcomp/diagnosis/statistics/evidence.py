@@ -8,8 +8,10 @@ cause by definition, and a set that would need it without naming it pays for hol
 of the normal distributions that are cut off there; the mode by active sets, Nocedal and Wright, Numerical
 Optimization, 16.5).
 
-Source: group selection with amplitude mixtures; the widths 0.1 to 3 and the half-normal signs follow the priors that
-the effects state. Positive parameters enter by the posterior probability of their sign.
+Source: group selection with amplitude mixtures; the half-normal signs follow the priors that the effects state, and the
+widths together are nearly flat in the logarithm of a size, from a hundredth of the typical one to three: a calibrated
+machine has of everything what its calibration could just not see, and of two causes that do the same the one whose typical
+size is larger is no less likely for it. Positive parameters enter by the posterior probability of their sign.
 """
 
 from collections.abc import Callable, Sequence
@@ -26,8 +28,8 @@ from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.ground.datatypes import Floats, Ints
 from camcomp.ground.machine_code import kept
 
-PRIOR_WIDTHS = np.array([0.1, 0.3, 1.0, 3.0])
-_WEIGHTS = np.log([0.15, 0.3, 0.35, 0.2])
+PRIOR_WIDTHS = np.array([0.02, 0.1, 0.5, 2.5])
+_WEIGHTS = np.log([0.2, 0.25, 0.3, 0.25])
 TOLERANCES = (0.2, 0.5, 1.0, 2.0)  # by how much the tolerances may be off, all together
 PASSES = 30  # of the search for columns at the end of their reach
 TOLERANCE_LOG = (0.0, 0.0, 0.0, -6.0)  # and the log odds of it: an effect is not to hide in them

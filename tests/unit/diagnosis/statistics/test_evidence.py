@@ -42,10 +42,19 @@ def test_bayes_factor_of_one_cause_is_the_integral_it_stands_for():
     def integral(density):
         return quad(lambda x: np.exp(b * x - 0.5 * a * x * x) * density(x), -3, 3, points=[b / a, 0.0], limit=400)[0]
 
-    weights = [0.15, 0.3, 0.35, 0.2]
+    weights = [0.2, 0.25, 0.3, 0.25]
     wide = sum(w * integral(lambda x, s=s: norm.pdf(x, 0, s)) for w, s in zip(weights, PRIOR_WIDTHS, strict=True))
     narrow = integral(lambda x: norm.pdf(x, 0, 0.01))
     assert log_bayes([base(g, p, 1.0)], p, [[0]])[0] == pytest.approx(np.log(wide / narrow), abs=1e-5)
+
+
+def test_of_two_that_do_the_same_the_one_of_larger_typical_size_is_no_less_likely():
+    """One column for two effects, of which one is typically five times as large: what is seen is 0.5 or 0.1 of it, or less."""
+    for size in (0.5, 0.25, 0.1):
+        g = data([size], n=10_000, k=1)
+        small, large = prior(1, tolerance=1e-3), replace(prior(1, tolerance=1e-3), scale=np.array([5.0]))
+        odds = [log_bayes([base(g, p, 1.0)], p, [[0]])[0] for p in (small, large)]
+        assert abs(odds[0] - odds[1]) < 0.4
 
 
 def test_a_cause_of_the_wrong_sign_is_held_against_it():
