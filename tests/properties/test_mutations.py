@@ -12,6 +12,7 @@ import pytest
 from camcomp.ground.files import shipped
 from camcomp.terminal.cli import run
 from tests.mutations import mutated_markup, mutated_table, mutated_text
+from tests.pace import soon
 from tests.unit.model.config.test_urdf import urdf
 
 CONTRACT = (0, 1, 2, 3, 4, 5)
@@ -32,7 +33,7 @@ def end_of(data, *words, longest=LONGEST_S):
         warnings.simplefilter("always")
         code = run([str(word) for word in words])
     took = time.process_time() - begun
-    assert code in CONTRACT and not warned and took < longest, (
+    assert code in CONTRACT and not warned and soon(took, longest), (
         code,
         took,
         warned and warned[0].message,

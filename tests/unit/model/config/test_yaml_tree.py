@@ -3,6 +3,7 @@ import time
 import pytest
 
 from camcomp.model.config.yaml_tree import find, leaves, merge, plain, read_tree
+from tests.pace import soon
 
 
 def values(text):
@@ -135,7 +136,7 @@ def test_budgets_end_what_no_machine_file_needs(text):
     begun = time.process_time()
     tree, errors = read_tree(text.encode(), "file.yaml")
     assert tree is None and [each.rule for each in errors] == ["CC217"] and errors[0].at.line >= 1
-    assert time.process_time() - begun < 2.0
+    assert soon(time.process_time() - begun, 2.0)
 
 
 @pytest.mark.parametrize("number", ["1e308", "-1e19", "9" * 300, "0x" + "f" * 99])
