@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from camcomp.api.diagnosis import diagnose
+from camcomp.diagnosis.experiment.open_experiment import open_experiment
+from camcomp.diagnosis.fit.bench import Bench
 from camcomp.terminal.cli import run as camcomp
 from tests.campaign import runner
 from tests.diagnosis.conftest import plan_of
@@ -54,8 +56,8 @@ def missing(folder, moves):
         f"config: [{runner.CONFIG}]\nruns:\n  - {{name: a, program: p.nc, log: l.csv, cutting: true, started_s: 0}}\n"
     )
     (folder / "experiment.yaml").write_text(text)
-    diagnosis = diagnose(folder / "experiment.yaml").behind
-    return float(np.isnan(diagnosis.problem.bench.observed(0)[:, 0]).mean())
+    opened = open_experiment(folder / "experiment.yaml")
+    return float(np.isnan(Bench(opened.twin, opened.runs).observed(0)[:, 0]).mean())
 
 
 def test_rows_beside_corners_do_not_count_unless_there_are_hardly_others(tmp_path):

@@ -78,3 +78,25 @@ def test_it_stands_where_one_line_ends_and_the_next_begins(line):
     words = SimpleNamespace(cutting=np.ones(8, bool)), SimpleNamespace(motion=motion)
     found = _idle_or_not(*words, SimpleNamespace(track=SimpleNamespace(path=path)), tip, 0.04 * np.arange(8))
     np.testing.assert_array_equal(np.flatnonzero(found), [2, 3, 4, 5])
+
+
+@pytest.mark.parametrize("by", ["cmd", "tip"])
+@pytest.mark.parametrize("where", ["before", "behind"])
+def test_where_a_machine_waits_for_long_says_nothing_of_its_program(tmp_path, by, where):
+    """At home before the program, and where its last rapid has led: off the lines that cut, in three quarters of the rows."""
+    (tmp_path / "p.nc").write_text(PROGRAM.replace("G1 Z2 F1000", "G0 Z30"))
+    config = ROOT / "config/cartesian.yaml"
+    assert run(["simulate", str(tmp_path / "p.nc"), "--config", str(config), "-o", str(tmp_path / "raw.csv")]) == 0
+    head, *rows = [line.split(",") for line in (tmp_path / "raw.csv").read_text().splitlines()]
+    names = [name for name in head if name in ("x_mm", "y_mm", "z_mm") or name.startswith(by)]
+    rows = [[row[head.index(name)] for name in names] for row in rows]
+    place = {"before": ("40", "30", "20"), "behind": ("10", "0", "30")}[where] * (len(names) // 3)
+    waits = 3 * len(rows) * [place]
+    rows = waits + rows if where == "before" else rows + waits
+    text = [",".join(["t_s", *names]), *(",".join([f"{0.02 * i:.2f}", *row]) for i, row in enumerate(rows))]
+    (tmp_path / "log.csv").write_text("\n".join(text) + "\n")
+    (tmp_path / "e.yaml").write_text(
+        f"config: [{config}]\nruns: [{{name: a, program: p.nc, log: log.csv, cutting: true}}]\n"
+    )
+    (opened,) = open_experiment(tmp_path / "e.yaml").runs
+    assert len(opened.run_path.time) == len(rows)

@@ -17,6 +17,7 @@ from camcomp.diagnosis.experiment.log_checks import (
     check_on_program,
     check_places,
     check_told,
+    places,
 )
 from camcomp.diagnosis.fit.measured import Measured
 from camcomp.ground import path_geometry, shelf
@@ -24,7 +25,7 @@ from camcomp.ground.datatypes import RAPID, Bools, Floats, Path
 from camcomp.ground.errors import ConfigError, Location
 from camcomp.model.cutting.track import JOIN_ANGLE, Conditions, Track, lay_track
 from camcomp.model.effect import Cause
-from camcomp.model.motion.alignment import Aligned, align, way_from_lines
+from camcomp.model.motion.alignment import LOST_MM, Aligned, align, way_from_lines
 from camcomp.model.motion.driven_path import BESIDE_MM, Forces, cutting_forces, driven_path
 from camcomp.model.motion.run_path import RunPath
 from camcomp.model.motion.twin import Twin
@@ -118,11 +119,12 @@ def drive(
 def _open(path: Path, conditions: Conditions, twin: Twin) -> _Program:
     track = lay_track(path, conditions)
     length = path_geometry.lengths(path)
-    feeds = np.flatnonzero((path.kind != RAPID) & (length > 0.0) & ~path.machine)
-    if not len(feeds):
-        feeds = np.flatnonzero(length > 0.0)
-    count = np.maximum(np.ceil(length[feeds] / SAMPLE_MM), 1.0).astype(np.int64)
-    motion = np.repeat(feeds, count + 1)
+    from_known = np.concatenate([[False], path.known[:-1]])
+    moves = np.flatnonzero(((path.kind != RAPID) | from_known) & (length > 0.0) & ~path.machine)
+    if not len(moves):
+        moves = np.flatnonzero(length > 0.0)
+    count = np.maximum(np.ceil(length[moves] / SAMPLE_MM), 1.0).astype(np.int64)
+    motion = np.repeat(moves, count + 1)
     u = np.concatenate([np.linspace(0.0, 1.0, c + 1) for c in count]) if len(count) else np.zeros(0)
     tips = path_geometry.points(path, motion, u)
     return _Program(track, tips, twin.inverse(twin.to_machine(tips)))
@@ -152,8 +154,8 @@ def _aligned(
         lines = sorted({int(each) for each in line[known]})[:5]
         message = f"run '{name}': the rows are on lines that the program does not move on, e.g. {lines}"
         raise ConfigError("CC406", message, at=Location(log, 1, 1))
-    found = align(path, tip, line)
-    check_followed(log, name, found.distance, _agreement(path, found, tip), aside_mm)
+    found = align(path, tip, line, max(aside_mm, LOST_MM))
+    check_followed(log, name, found.distance[places(tip)], _agreement(path, found, tip), aside_mm)
     check_lines(log, name, way_from_lines(path, found))
     return found
 

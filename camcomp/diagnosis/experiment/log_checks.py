@@ -8,11 +8,12 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from camcomp.diagnosis.fit.measured import Measured
-from camcomp.ground.datatypes import Floats
+from camcomp.ground.datatypes import Floats, Ints
 from camcomp.ground.errors import ConfigError, Location
 
 FAR_MM = 5.0  # no machine of the kind is wrong by so much; a log of another program or unit is
 FAR_RAD = 0.1
+PLACE = 0.01  # of what is far: the size of a place
 ASIDE_MM = 1.0  # no control leaves its path by so much for half of the time
 LEAST_AGREEMENT = 0.7  # of the moving rows go the way of the program
 LEAST_ROWS = 10  # of a run that executes a program; fewer say nothing about their own noise
@@ -142,12 +143,20 @@ def check_told(
     name: str, run: str, what: str, told: Floats, program: Floats, actuators: Sequence[str], rotary: bool = False
 ) -> None:
     """Like `check_places` for the motion itself: told (n, m) against the actuators program (s, m) along the program."""
-    _check(name, run, f"{what}s look", told, _to_nearest(program), FAR_RAD if rotary else FAR_MM, actuators, rotary)
+    far = FAR_RAD if rotary else FAR_MM
+    found = told[places(told, PLACE * far)]
+    _check(name, run, f"{what}s look", found, _to_nearest(program), far, actuators, rotary)
 
 
 def check_on_program(name: str, run: str, tip: Floats, program: Floats) -> None:
     """Like `check_places` where the tip is the motion: tip (n, 3) against points program (s, 3) along the program."""
-    _check(name, run, "tip looks", tip, _to_nearest(program), FAR_MM, AXES, False)
+    _check(name, run, "tip looks", tip[places(tip)], _to_nearest(program), FAR_MM, AXES, False)
+
+
+def places(points: Floats, apart: float = PLACE * FAR_MM) -> Ints:
+    """One row of every place of points (n, k), apart from one another: how long a machine stands says nothing of its program."""
+    rows: Ints = np.unique(np.round(points / apart), axis=0, return_index=True)[1]
+    return rows
 
 
 def _to_nearest(program: Floats) -> Callable[[Floats], float]:

@@ -20,7 +20,7 @@ _CHORD_RAD = 0.05  # of an arc
 _LINE_MM2 = 0.01  # squared distance that a wrong line number weighs as much as, and by how many times it adds to it
 _LINE_TIMES = 4.0
 _SLACK_MM = 0.5  # by which a row may be further along than the way between two rows says
-_LOST_MM = 2.0  # from the path: a row that is further off says nothing about where the machine was
+LOST_MM = 2.0  # from the path: a row that is further off says nothing about where the machine was
 _JUMP_MM2 = 10.0  # what a place weighs that the row before does not lead to: rows are missing, or the log begins again
 _BACK_MM2 = 10.0  # and every mm back along the path
 _PLACES = 16  # that are followed at a time
@@ -42,15 +42,18 @@ class Aligned:
     line: Floats
 
 
-def align(path: Path, tip: Floats, line: Floats) -> Aligned:
-    """Rows of tips (n, 3) mm, program frame, in the order of time; line (n,): as logged, NaN where it is not known."""
+def align(path: Path, tip: Floats, line: Floats, lost_mm: float = LOST_MM) -> Aligned:
+    """Rows of tips (n, 3) mm, program frame, in the order of time; line (n,): as logged, NaN where it is not known.
+
+    lost_mm: from the path, beyond which a row is a beam break; more where the tip bends by as much.
+    """
     motion, u0, u1 = _chords(path)
     begin, end = path_geometry.points(path, motion, u0), path_geometry.points(path, motion, u1)
     length = np.linalg.norm(end - begin, axis=1)
     at = np.concatenate([[0.0], np.cumsum(length)])
     hint = np.where(np.isfinite(line) & (line > 0), line, -1.0).astype(np.int64)
     hint[~np.isin(hint, path.line)] = -1  # comments, dwells, the end of the program
-    way = _onward(_follow(begin, end - begin, length, at, path.line[motion], *_boxes(begin, end), tip, hint))
+    way = _onward(_follow(begin, end - begin, length, at, path.line[motion], *_boxes(begin, end), tip, hint, lost_mm))
     chord = np.clip(np.searchsorted(at, way, side="right") - 1, 0, len(motion) - 1)
     share = u0[chord] + (way - at[chord]) / length[chord] * (u1[chord] - u0[chord])
     found = motion[chord]
@@ -101,7 +104,7 @@ def _put(place, weight, found, at, weighs):  # type: ignore[no-untyped-def]  # p
 
 
 @njit(cache=True)
-def _places(begin, way, length, at, line, low, high, tip, hint):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _places(begin, way, length, at, line, low, high, tip, hint, lost):  # type: ignore[no-untyped-def]  # pragma: no cover
     """Where along the path it comes nearest to a tip (3,) and leaves again, mm, and what these places weigh."""
     place, weight = np.empty(_PLACES), np.empty(_PLACES)
     found, previous = 0, -2
@@ -111,7 +114,7 @@ def _places(begin, way, length, at, line, low, high, tip, hint):  # type: ignore
         gap = 0.0
         for j in range(3):
             gap += max(low[box, j] - tip[j], tip[j] - high[box, j], 0.0) ** 2
-        if gap > _LOST_MM**2:
+        if gap > lost**2:
             continue
         for c in range(box * _BOX, min(box * _BOX + _BOX, len(length))):
             x = 0.0
@@ -121,7 +124,7 @@ def _places(begin, way, length, at, line, low, high, tip, hint):  # type: ignore
             gap = 0.0
             for j in range(3):
                 gap += (begin[c, j] + x / length[c] * way[c, j] - tip[j]) ** 2
-            if gap > _LOST_MM**2:
+            if gap > lost**2:
                 continue
             # the line that is said to be executed has a nearest place of its own
             on = c == previous + 1 and (hint < 0 or (line[c] == hint) == (line[previous] == hint))
@@ -137,18 +140,18 @@ def _places(begin, way, length, at, line, low, high, tip, hint):  # type: ignore
 
 
 @njit(cache=True)
-def _follow(begin, way, length, at, line, low, high, tip, hint):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _follow(begin, way, length, at, line, low, high, tip, hint, lost):  # type: ignore[no-untyped-def]  # pragma: no cover
     """Way along the path (n,) mm: of all sequences of places near the rows the one that fits best and leads from row to row.
 
     Dynamic programming over the nearest places of every row, at most _PLACES of them, each with the row it was last seen at:
-    a row may be no place at all (a beam break), for which it counts as _LOST_MM off.
+    a row may be no place at all (a beam break), for which it counts as `lost` mm off.
     """
     n = tip.shape[0]
     where, cost = np.zeros((n, _PLACES)), np.full((n, _PLACES), np.inf)
     before, seen = np.full((n, _PLACES), -1), np.full((n, _PLACES), -1)
     held = 0  # places of the row before
     for i in range(n):
-        near, off = _places(begin, way, length, at, line, low, high, tip[i], hint[i])
+        near, off = _places(begin, way, length, at, line, low, high, tip[i], hint[i], lost)
         count = len(near) + held
         s, c = np.empty(count), np.empty(count)
         b, last = np.full(count, -1), np.full(count, i)
@@ -174,7 +177,7 @@ def _follow(begin, way, length, at, line, low, high, tip, hint):  # type: ignore
             c[k] += off[k]
         for j in range(held):
             k = len(near) + j
-            s[k], c[k], b[k], last[k] = where[i - 1, j], cost[i - 1, j] + _LOST_MM**2, j, seen[i - 1, j]
+            s[k], c[k], b[k], last[k] = where[i - 1, j], cost[i - 1, j] + lost**2, j, seen[i - 1, j]
         held = min(count, _PLACES)
         best = np.argsort(c, kind="mergesort")[:held]
         for j in range(held):

@@ -73,3 +73,15 @@ def test_a_log_of_the_last_lap_alone_goes_its_way(tmp_path):
     last = line == 5
     found = align(path, tip[last], np.full(last.sum(), np.nan))
     assert set(path.line[found.motion[2:-2]]) == {5}
+
+
+@pytest.mark.parametrize(("lost_mm", "followed"), [(2.0, False), (5.0, True)])
+def test_rows_of_a_tip_that_bends_far_are_followed_where_that_may_be(tmp_path, lost_mm, followed):
+    """Two and a half millimetres from the path: beam breaks, or a soft machine in a heavy cut."""
+    (tmp_path / "p.nc").write_text(BACK_AND_FORTH)
+    path = open_program(str(tmp_path / "p.nc"), load_config(["config/cartesian.yaml"])).path
+    tip, line = straight((3.0, -4.0, 25.0))
+    cutting = np.flatnonzero((line > 3) & (np.abs(tip[:, 0]) < 15.0))
+    found = align(path, tip + [0.0, 2.5, 0.0], np.full(len(tip), np.nan), lost_mm)
+    assert (path.line[found.motion[cutting]] == line[cutting]).all() == followed
+    assert (np.abs(found.distance[cutting] - 2.5) < 0.01).all() == followed
