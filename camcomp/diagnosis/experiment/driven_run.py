@@ -10,7 +10,6 @@ from scipy.spatial import KDTree
 
 from camcomp.diagnosis.experiment.log_checks import (
     ASIDE_MM,
-    FAR_MM,
     check_followed,
     check_forces,
     check_lines,
@@ -20,6 +19,7 @@ from camcomp.diagnosis.experiment.log_checks import (
     places,
 )
 from camcomp.diagnosis.fit.measured import Measured
+from camcomp.diagnosis.fit.outliers import FAR_MM
 from camcomp.ground import path_geometry, shelf
 from camcomp.ground.datatypes import RAPID, Bools, Floats, Path
 from camcomp.ground.errors import ConfigError, Location

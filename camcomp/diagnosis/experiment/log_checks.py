@@ -8,11 +8,11 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from camcomp.diagnosis.fit.measured import Measured
+from camcomp.diagnosis.fit.outliers import FAR_MM
 from camcomp.ground.datatypes import Floats, Ints
 from camcomp.ground.errors import ConfigError, Location
 
-FAR_MM = 5.0  # no machine of the kind is wrong by so much; a log of another program or unit is
-FAR_RAD = 0.1
+FAR_RAD = 0.1  # the same as FAR_MM of a hinge: a log of another program or unit is wrong by so much
 PLACE = 0.01  # of what is far: the size of a place
 ASIDE_MM = 1.0  # no control leaves its path by so much for half of the time
 LEAST_AGREEMENT = 0.7  # of the moving rows go the way of the program

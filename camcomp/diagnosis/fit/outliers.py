@@ -15,6 +15,8 @@ OFF = 8.0  # robust deviations from the rows beside it by which a single row is 
 SHORT, LONG = 7, 61  # rows of the running medians
 GROSS = 160.0  # robust deviations from the rows around it by which several rows in a row are off
 MANY = 0.02  # of the rows: more are no outliers
+FAR_MM = 5.0  # no machine is wrong by so much from one row to the next
+MANY_FAR = 0.25  # of the rows that are as far off: more are no outliers
 HEAVY = 3.5  # robust deviations beyond which a reading counts less
 LEAST_ROWS = 20
 
@@ -29,6 +31,8 @@ def outlying(bench: Bench) -> list[Bools]:
             known = np.flatnonzero(np.isfinite(x))
             if len(known) >= LEAST_ROWS and run.run_path.ordered:
                 bad[known, c] = _jumping_off(x[known])
+        if run.run_path.ordered:
+            bad[:, :3] |= _sprung_off(gap[:, :3])[:, None]
         m = len(bench.actuators)
         for part in (slice(0, 3), slice(3 + 2 * m, 6 + 2 * m)):  # one instrument, one telegram
             bad[:, part] = np.any(bad[:, part], axis=1, keepdims=True)
@@ -48,6 +52,23 @@ def _jumping_off(x: Floats) -> Bools:
         if single.mean() > MANY:
             single[:] = False
     return np.asarray(single | (gross if gross.mean() < 2.0 * MANY else False))
+
+
+def _sprung_off(gap: Floats) -> Bools:
+    """Rows (n,) of a tip's gap (n, 3) mm between two springs that no machine makes: a beam was broken, for how long ever.
+
+    What goes there and back little by little is none: a workpiece may lie far askew.
+    """
+    known = np.flatnonzero(np.isfinite(gap).all(axis=1))
+    x, out = gap[known], np.zeros(len(gap), bool)
+    if len(known) < LEAST_ROWS:
+        return out
+    far = np.linalg.norm(x - np.median(x, axis=0), axis=1) > FAR_MM
+    springs = np.concatenate([[True], np.linalg.norm(np.diff(x, axis=0), axis=1) > FAR_MM, [True]])
+    edges = np.flatnonzero(np.diff(far, prepend=False, append=False))
+    for first, end in zip(edges[::2], edges[1::2], strict=True):
+        out[known[first:end]] = springs[first] and springs[end]
+    return out if out.sum() < MANY_FAR * len(known) else np.zeros(len(gap), bool)
 
 
 def tails(bench: Bench) -> list[Floats]:
