@@ -144,24 +144,23 @@ def check_told(
 ) -> None:
     """Like `check_places` for the motion itself: told (n, m) against the actuators program (s, m) along the program."""
     far = FAR_RAD if rotary else FAR_MM
-    found = told[places(told, PLACE * far)]
-    _check(name, run, f"{what}s look", found, _to_nearest(program), far, actuators, rotary)
+    _check(name, run, f"{what}s look", told, _to_nearest(program, far), far, actuators, rotary)
 
 
 def check_on_program(name: str, run: str, tip: Floats, program: Floats) -> None:
     """Like `check_places` where the tip is the motion: tip (n, 3) against points program (s, 3) along the program."""
-    _check(name, run, "tip looks", tip[places(tip)], _to_nearest(program), FAR_MM, AXES, False)
+    _check(name, run, "tip looks", tip, _to_nearest(program, FAR_MM), FAR_MM, AXES, False)
 
 
-def places(points: Floats, apart: float = PLACE * FAR_MM) -> Ints:
-    """One row of every place of points (n, k), apart from one another: how long a machine stands says nothing of its program."""
-    rows: Ints = np.unique(np.round(points / apart), axis=0, return_index=True)[1]
+def places(points: Floats, far: float = FAR_MM) -> Ints:
+    """One row of every place of points (n, k): how long a machine stands says nothing of its program."""
+    rows: Ints = np.unique(np.round(points / (PLACE * far)), axis=0, return_index=True)[1]
     return rows
 
 
-def _to_nearest(program: Floats) -> Callable[[Floats], float]:
+def _to_nearest(program: Floats, far: float) -> Callable[[Floats], float]:
     tree = KDTree(program)
-    return lambda found: float(np.median(tree.query(found)[0]))
+    return lambda found: float(np.median(tree.query(found[places(found, far)])[0]))
 
 
 def _check(
