@@ -57,14 +57,14 @@ def _jumping_off(x: Floats) -> Bools:
 def _sprung_off(gap: Floats) -> Bools:
     """Rows (n,) of a tip's gap (n, 3) mm between two springs that no machine makes: a beam was broken, for how long ever.
 
-    What goes there and back little by little is none: a workpiece may lie far askew.
+    What goes there and back little by little is none: a workpiece may lie far askew. What never comes back is none: steps are lost.
     """
     known = np.flatnonzero(np.isfinite(gap).all(axis=1))
     x, out = gap[known], np.zeros(len(gap), bool)
     if len(known) < LEAST_ROWS:
         return out
     far = np.linalg.norm(x - np.median(x, axis=0), axis=1) > FAR_MM
-    springs = np.concatenate([[True], np.linalg.norm(np.diff(x, axis=0), axis=1) > FAR_MM, [True]])
+    springs = np.concatenate([[False], np.linalg.norm(np.diff(x, axis=0), axis=1) > FAR_MM, [False]])
     edges = np.flatnonzero(np.diff(far, prepend=False, append=False))
     for first, end in zip(edges[::2], edges[1::2], strict=True):
         out[known[first:end]] = springs[first] and springs[end]

@@ -20,7 +20,7 @@ def test_beam_breaks_are_found_however_many_rows_they_take_of_a_short_log():
     """Two bursts of seven rows in three hundred are 5 % of them, and a break that lasts is longer than any running median."""
     rng = np.random.default_rng(7)
     gap = rng.normal(0, 0.003, (300, 3)) + [0.0, 0.0, 8.0]  # with a tool whose length nobody has told
-    broken = np.r_[45:52, 84:91, 250:300]
+    broken = np.r_[45:52, 84:91, 230:280]
     gap[broken] += 30.0 * np.array([0.6, -0.8, 0.0])
     gap[10] = np.nan
     np.testing.assert_array_equal(np.flatnonzero(_sprung_off(gap)), broken)
@@ -31,4 +31,10 @@ def test_a_workpiece_that_lies_askew_is_no_beam_break():
     gap = np.column_stack([7.0 * np.sin(angle), 7.0 * np.cos(angle), np.zeros(300)])
     assert not _sprung_off(gap).any()
     gap[:, :2] *= np.exp(-(((np.arange(300) - 150) / 15.0) ** 2))[:, None]  # far for a while
+    assert not _sprung_off(gap).any()
+
+
+def test_a_machine_that_has_lost_steps_and_stays_off_is_no_beam_break():
+    gap = np.random.default_rng(8).normal(0, 0.003, (300, 3))
+    gap[250:, 0] += 8.0
     assert not _sprung_off(gap).any()
