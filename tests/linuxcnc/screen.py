@@ -156,31 +156,35 @@ def push(force):
         subprocess.run(["halcmd", "setp", f"camcomp.f{axis}", str(value)], check=True)
 
 
+def stepped(code):
+    """What HAL says at rest behind lines of G-code. Raises LateError."""
+    mdi(*code.splitlines())
+    row = {
+        "code": code,
+        "joints": settled(),
+        "tip": [pin(f"axis.{each}.pos-cmd") for each in "xyz"],
+        "offset": [pin(f"axis.{each}.eoffset") for each in "xyz"],
+        "drive": [pin(f"camcomp.drive-{k}") for k in range(3)],
+        "solved": pin("camcomp.solved"),
+    }
+    if is_on("camcomp.error"):
+        raise LateError
+    return row
+
+
 def steps(task):
-    """G-code, each line with the force at its end."""
+    """G-code, each step with the force at its end."""
     switch_on()
     home()
     rows = []
     for code, force in task["steps"]:
         push(force)
-        patiently(lambda: mdi(code))  # noqa: B023
-        joints = settled()
-        rows.append(
-            {
-                "code": code,
-                "joints": joints,
-                "tip": [pin(f"axis.{each}.pos-cmd") for each in "xyz"],
-                "offset": [pin(f"axis.{each}.eoffset") for each in "xyz"],
-                "drive": [pin(f"camcomp.drive-{k}") for k in range(3)],
-                "solved": pin("camcomp.solved"),
-                "error": text_of("camcomp.error"),
-            }
-        )
-    return {"rows": rows, "refused": [refused(code, force) for code, force in task["refused"]]}
+        rows.append(patiently(lambda: stepped(code)))  # noqa: B023
+    return {"rows": rows, "refused": [any(refused(*each) for _ in range(TRIES)) for each in task["refused"]]}
 
 
 def refused(code, force):
-    """Whether the component, and not only the clock, refuses what some G-code leads to; undone afterwards."""
+    """Whether the component, and not the clock before it, refuses what some G-code leads to; undone afterwards."""
     push(force)
     mode(linuxcnc.MODE_MDI)
     COMMAND.mdi(code)
