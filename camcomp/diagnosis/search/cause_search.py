@@ -15,6 +15,7 @@ from camcomp.diagnosis.search.tempering import TEMPERATURE, misfit, tempering
 from camcomp.diagnosis.search.unexplained import SURE_Z, Unexplained, size_um, unexplained, worst
 from camcomp.diagnosis.search.unknown import firm_prior, residual_tests
 from camcomp.diagnosis.statistics.cause_sets import (
+    SIZES,
     Fitted,
     Members,
     Scale,
@@ -30,15 +31,16 @@ from camcomp.diagnosis.statistics.cause_sets import (
 from camcomp.diagnosis.statistics.evidence import estimate
 from camcomp.diagnosis.statistics.probability import EVEN
 from camcomp.diagnosis.statistics.score_test import ResidualTest
+from camcomp.diagnosis.statistics.stepwise import stepwise
 from camcomp.diagnosis.statistics.verdict import EQUAL_LOG_ODDS, UNSURE_ODDS, Verdict, judge
 from camcomp.ground import headway
 from camcomp.ground.datatypes import Floats
 
-SINGLES, PAIRS, TRIPLES, MORE = 6, 6, 3, 3  # sets that are tried of each size; beyond three one is added at a time
-EXCHANGES, EXCHANGED = (
-    6,
-    4,
-)  # rounds in which a member of the best sets is exchanged or left out, and sets tried in each
+# sets that are tried of each size, and of those that begin with an effect at all of its targets
+SINGLES, PAIRS, TRIPLES, KINDS = 6, 6, 3, 3
+MORE = 3  # rounds in which one member is added to a set of three or more
+EXCHANGES = 6  # rounds in which a member of the best sets is exchanged or left out
+EXCHANGED = 4  # sets tried in each
 EXCHANGEABLE = 5  # members up to which that is done: what takes more is no cause of the library
 BEYOND_DOUBT = (
     20.0  # log evidence of a member, all tolerances strained as far as they like, above which no run vetoes it
@@ -110,6 +112,9 @@ def search_causes(problem: Problem) -> CauseSearch:
         fit(extensions(scale, best.members, every, EXCHANGED)[0][1], best)
         if max(done.values(), key=value) is best:
             break
+    best = max(done.values(), key=value)
+    linear = at_null(best.members) + problem.candidates.prior(best.members)
+    _fit_best(_from_kinds(at_null, problem, every), fit, KINDS, linear)
     sound, looked = Sound(problem), set[Members]()
 
     def look_beside(near: Fitted) -> None:
@@ -291,6 +296,13 @@ def _same_name(problem: Problem, members: Members, every: list[int]) -> list[Mem
     """The leader's effect at its other targets: right effect, wrong actuator, is the mistake to exclude first."""
     names = {problem.columns.candidates[i].name for i in members}
     return [(i,) for i in every if problem.columns.candidates[i].name in names]
+
+
+def _from_kinds(scale: Scale, problem: Problem, every: list[int]) -> list[tuple[float, Members, None]]:
+    """Sets that stepwise selection leaves of an effect at all of its targets, one for every effect that has several."""
+    kinds = [tuple(i for i in kind if i in every) for kind in problem.candidates.kinds]
+    left = {stepwise(scale, kind, every, EXCHANGEABLE) for kind in kinds if 1 < len(kind) < len(SIZES)}
+    return [(scale(each) + problem.candidates.prior(each), each, None) for each in sorted(left)]
 
 
 def _fit_best(found, fit, count: int, best: float) -> None:  # type: ignore[no-untyped-def]

@@ -80,19 +80,26 @@ class Sound:
 def small_members(problem: Problem, f: Fitted) -> Members:
     """The members that move the tip by no more than what is minor, or by no more than what may be wrong of another one.
 
-    A small one at the actuator of a large one is what that one's law says wrongly, and so is one below the floor that is of no
-    actuator: none is modelled better than GATE_SHARE.
+    A small one at the actuator of a large one is what that one's law says wrongly, and so is one below the floor where either
+    is of no actuator: none is modelled better than GATE_SHARE. Of two at one actuator what they do together counts as well.
     """
-    sizes = {i: size_um(problem, f, (i,)) for i in f.members}
     target = {i: problem.columns.candidates[i].target for i in f.members}
+    alone: list[Members] = [(i,) for i in f.members]
+    two = [(i, j) for i, j in combinations(f.members, 2) if target[i] == target[j] is not None]
+    sizes = {those: size_um(problem, f, those) for those in [*alone, *two]}
     floor = problem.floor.tip_um
 
-    def beside(i: int) -> float:
-        anywhere = target[i] is None and sizes[i] < floor
-        others = (sizes[j] for j in f.members if j != i and (anywhere or target[j] == target[i] is not None))
-        return max(others, default=0.0)
+    def small(those: Members) -> bool:
+        at = target[those[0]]
 
-    return tuple(i for i in f.members if sizes[i] <= max(MINOR * floor, GATE_SHARE * beside(i)))
+        def says_wrongly(j: int) -> bool:
+            return target[j] == at is not None or (sizes[those] < floor and None in (at, target[j]))
+
+        beside = [sizes[j,] for j in f.members if j not in those and says_wrongly(j)]
+        return sizes[those] <= max(MINOR * floor, GATE_SHARE * max(beside, default=0.0))
+
+    found = {i for those in sizes if small(those) for i in those}
+    return tuple(i for i in f.members if i in found)
 
 
 def cancels(problem: Problem, f: Fitted) -> bool:

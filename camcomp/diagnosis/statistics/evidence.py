@@ -185,6 +185,21 @@ def _posteriors(likelihood, h, wide):  # type: ignore[no-untyped-def]  # pragma:
     return mean, spread, fit, log_det
 
 
+def log_bayes_singles(at: Base, prior: Prior, index: Ints) -> Floats:
+    """log_bayes (p,) of causes of one column each, `index` (p,); all at once."""
+    precision, narrow = 1.0 / at.covariance[index, index], at.precision[index]
+    h = at.mean[index] * precision
+    sizes, weight = _widths(1)
+    wide = np.minimum(1.0 / (prior.scale[index] * sizes) ** 2, narrow)  # (w, p)
+    M = (precision - narrow) + wide
+    good = M > 0
+    M = np.where(good, M, 1.0)
+    value = 0.5 * (h**2 / M - h * at.mean[index]) + 0.5 * np.log(wide / narrow * precision / M) + weight[:, None]
+    value += np.where(prior.sign[index] > 0, log_ndtr(h / np.sqrt(M)) + np.log(2.0), 0.0)
+    out: Floats = logsumexp(np.where(good, value, -np.inf), axis=0)
+    return out
+
+
 def log_bayes_pairs(at: Base, prior: Prior, first: Ints, second: Ints) -> Floats:
     """log_bayes (p,) of pairs of one-column causes, columns `first` and `second` (p,); all at once."""
     i = np.stack([first, second], axis=1)  # (p, 2)
