@@ -82,15 +82,33 @@ def test_small_members_are_those_that_are_minor_and_those_of_a_large_ones_actuat
 
 
 @pytest.mark.parametrize(
-    ("size", "target", "small"),
-    [(4.0, None, True), (4.0, "y", False), (5.2, None, False)],  # below the floor, another actuator's, above the floor
+    ("size", "target", "beside", "small"),
+    [
+        (4.0, None, "x", True),
+        (4.0, "y", None, True),
+        (4.0, "y", "x", False),  # another actuator's
+        (5.2, None, "x", False),  # above the floor
+        (5.2, "y", None, False),
+    ],
 )
-def test_one_of_no_actuator_below_the_floor_is_what_a_large_ones_law_says_wrongly(monkeypatch, size, target, small):
+def test_one_of_no_actuator_below_the_floor_is_what_a_large_ones_law_says_wrongly(
+    monkeypatch, size, target, beside, small
+):
     sizes = {0: size, 1: 60.0}
     monkeypatch.setattr(sound, "size_um", lambda problem, f, members: sum(sizes[i] for i in members))
-    causes = [SimpleNamespace(target=target), SimpleNamespace(target="x")]
+    causes = [SimpleNamespace(target=target), SimpleNamespace(target=beside)]
     problem = SimpleNamespace(columns=SimpleNamespace(candidates=causes), floor=SimpleNamespace(tip_um=5.0))
     assert (sound.small_members(problem, SimpleNamespace(members=(0, 1))) == (0,)) is small
+
+
+@pytest.mark.parametrize(("targets", "small"), [(("x", "x"), (1, 2)), (("x", "y"), ()), ((None, None), ())])
+def test_two_at_one_actuator_that_undo_each_other_are_as_small_as_they_are_together(monkeypatch, targets, small):
+    """A force of 127 um, and at one actuator 9.2 um of growth of which another growth undoes 5.4."""
+    sizes = {0: 127.0, 1: 9.2, 2: -5.4}
+    monkeypatch.setattr(sound, "size_um", lambda problem, f, members: abs(sum(sizes[i] for i in members)))
+    causes = [SimpleNamespace(target=target) for target in (None, *targets)]
+    problem = SimpleNamespace(columns=SimpleNamespace(candidates=causes), floor=SimpleNamespace(tip_um=5.2))
+    assert sound.small_members(problem, SimpleNamespace(members=(0, 1, 2))) == small
 
 
 FREE = CausePrior(tuple((i,) for i in range(6)), np.log(np.full(6, 1 / 6)), lambda i, j: {i, j} == {1, 5})

@@ -19,6 +19,7 @@ from camcomp.diagnosis.statistics.evidence import (
     holding_back,
     log_bayes,
     log_bayes_pairs,
+    log_bayes_singles,
 )
 
 RNG = np.random.default_rng(7)
@@ -61,6 +62,13 @@ def test_a_cause_of_the_wrong_sign_is_held_against_it():
     g = data([-0.5], k=1)
     free, signed = prior(1), prior(1, [1.0])
     assert log_bayes([base(g, signed, 1.0)], signed, [[0]])[0] < log_bayes([base(g, free, 1.0)], free, [[0]])[0] - 10
+
+
+def test_single_causes_at_once_equal_those_one_by_one():
+    g, p = data([0.3, 0.0, -0.2, 0.05]), prior(4, [0.0, 1.0, 1.0, 1.0])
+    at, index = freed(base(g, p, 1.0), p, [3]), np.array([2, 0, 1])
+    one_by_one = [log_bayes([at], p, [[i]])[0] for i in index]
+    assert log_bayes_singles(at, p, index) == pytest.approx(one_by_one, abs=1e-8)
 
 
 def test_pairs_at_once_equal_pairs_one_by_one():
