@@ -16,7 +16,6 @@ def test_springs_and_force_of_an_arm_are_not_taken_for_a_weight(tmp_path):
     base = Plan(0, machine="kuka-kr210", channels="no-forces", sensors=Sensors(tip_mm=3e-3), rows=300, runs=4)
     wanted = plan("imperfect", 448, 3300149, messy(base, ("early-lines",)), ())
     made = make(wanted)
-    assert wanted.causes or made.record["causes"]
     write(made, wanted, tmp_path)
     run(["diagnose", str(tmp_path / "experiment.yaml"), "--json", str(tmp_path / "found.json")])
     causes = json.loads((tmp_path / "found.json").read_text())["causes"]

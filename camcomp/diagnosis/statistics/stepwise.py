@@ -20,8 +20,9 @@ def stepwise(scale: Scale, start: Members, candidates: Sequence[int], most: int)
     A step takes the candidate whose coming or going gains most while the other members are free.
     """
     at, prior, known = scale.bases[TOLERANCES.index(1.0)], scale.prior, scale.candidates
-    members = tuple(sorted(start))
-    while True:
+    members, seen = tuple(sorted(start)), set[Members]()
+    while members not in seen:  # steps are judged beside different others, and might go round
+        seen.add(members)
         rest = [tuple(x for x in members if x != i) for i in members]
         losses = [_gains(at, prior, known, less, [i])[0] for less, i in zip(rest, members, strict=True)]
         least = int(np.argmin(losses)) if losses else -1
@@ -31,8 +32,7 @@ def stepwise(scale: Scale, start: Members, candidates: Sequence[int], most: int)
             members = rest[least]
         elif gains.max() > 0.0:
             members = tuple(sorted((*members, free[int(gains.argmax())])))
-        else:
-            return members
+    return members
 
 
 def _gains(at: Base, prior: Prior, known: CausePrior, members: Members, more: Sequence[int]) -> Floats:

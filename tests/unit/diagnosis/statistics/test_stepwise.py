@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from camcomp.diagnosis.statistics import stepwise as module
 from camcomp.diagnosis.statistics.cause_sets import CausePrior, Scale, exchanges, extensions, parted
 from camcomp.diagnosis.statistics.evidence import Prior, gram
 from camcomp.diagnosis.statistics.stepwise import stepwise
@@ -50,3 +51,11 @@ def test_a_cause_of_two_columns_is_taken_where_it_is_one_and_beside_none_that_it
 def test_no_more_members_are_left_than_are_asked_for(scale):
     assert stepwise(scale, SPRINGS, SPRINGS, 1) in {(0,), (1,)}
     assert stepwise(scale, (), ALL, 0) == ()
+
+
+def test_a_selection_that_goes_round_ends(scale, monkeypatch):
+    """A candidate gains by coming and, once it is there, by going."""
+    monkeypatch.setattr(
+        module, "_gains", lambda at, prior, known, rest, more: np.full(len(more), 1.0 if len(more) > 1 else -1.0)
+    )
+    assert stepwise(scale, (), ALL, 1) == ()
