@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tests.plants.legs import Legs
-from tests.plants.rotations import Walk, rate, turn, vector
+from tests.plants.rotations import Walk, cross, rate, turn, vector
 
 
 class Settled(NamedTuple):
@@ -49,9 +49,9 @@ def inverse(legs: Legs, tip: np.ndarray) -> np.ndarray:
 
 def direct(legs: Legs, rho: np.ndarray) -> np.ndarray:
     """Platform references (n, 3) of the perfect machine for actuator coordinates (n, 3), by Newton on the spheres."""
-    p = np.zeros_like(rho)
+    p, centres = np.zeros_like(rho), legs.centres(rho)
     for _ in range(60):
-        d = p[:, None, :] - legs.centres(rho)
+        d = p[:, None, :] - centres
         error = (d**2).sum(2) - legs.nominal_length**2
         step = np.linalg.solve(2 * d, error[:, :, None])[:, :, 0]
         p = p - step
@@ -173,7 +173,7 @@ def settle(
         jz = np.concatenate([-(g @ walk.m), -(unrate @ g @ walk.w)], 1)
         jp = np.zeros((3 * n, 6, 6))
         jp[:, :3, :3] = a_t
-        jp[:, :3, 3:] = np.cross(lever[:, None, :], np.swapaxes(a_t, 1, 2)).swapaxes(1, 2)
+        jp[:, :3, 3:] = cross(lever[:, None, :], np.swapaxes(a_t, 1, 2)).swapaxes(1, 2)
         jp[:, 3:, 3:] = unrate @ a_t
         springs = _parallelogram(bars, legs.width, z[:, 1]) if legs.kind == "parallelogram" else bars
         kz = np.zeros((3 * n, k, k))
@@ -184,7 +184,7 @@ def settle(
         tip_arm = r @ arm
         gp[:, :3] -= force
         gp[:, 2] += weight
-        gp[:, 3:] -= np.cross(tip_arm, force)
+        gp[:, 3:] -= cross(tip_arm, force)
         if moment is not None:
             gp[:, 3:] -= moment
         fj = foot @ jz

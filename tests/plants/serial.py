@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import minimize
 
-from tests.plants.rotations import Walk, turn, vector
+from tests.plants.rotations import Walk, cross, turn, vector
 
 
 @dataclass(frozen=True)
@@ -110,11 +110,11 @@ def settle(arm: list[Element], q: np.ndarray, force: np.ndarray, limit: int = 20
         step += 1
         walk, weights = _walk(arm, q, z)
         pull = np.einsum("nik,ni->nk", walk.m, force)
-        pull += np.einsum("nik,ni->nk", walk.w, np.cross(walk.t, force))
+        pull += np.einsum("nik,ni->nk", walk.w, cross(walk.t, force))
         for newton, centre, before in weights:
             w = np.array([0.0, 0.0, -newton])
             pull[:, :before] += np.einsum("nik,i->nk", walk.m[:, :, :before], w)
-            pull[:, :before] += np.einsum("nik,ni->nk", walk.w[:, :, :before], np.cross(centre, w))
+            pull[:, :before] += np.einsum("nik,ni->nk", walk.w[:, :, :before], cross(centre, w))
         new = np.linalg.solve(stiffness, pull.T).T * free
         move, z = np.abs(new - z).max(), new
         if move < 1e-14 * max(1.0, np.abs(z).max()) + 1e-13:

@@ -203,8 +203,13 @@ def tip_um(bench: Bench, per_run: Sequence[Floats]) -> float:
 
 
 def moved_tip(bench: Bench, k: int, changes: Floats) -> Floats:
-    """How far changes (n, c, j) of the channels of run k move the tip (n, 3, j), mm, whatever channel shows them."""
+    """How far changes (n, c, j) of the channels of run k move the tip (n, 3, j), mm, whatever channel shows them.
+
+    Where the tip is the motion what lies along the path is when it was driven, and no error.
+    """
     moved = changes[:, :3]
+    if bench.runs[k].turn is not None:
+        moved = moved * np.array([0.0, 1.0, 1.0])[:, None]
     if bench.runs[k].by == "setpoint" and bench.runs[k].measured.has("encoder"):
         ways = bench.thin_slopes(k)
         moved = moved + ways @ changes[:, 3 : 3 + ways.shape[2]]
