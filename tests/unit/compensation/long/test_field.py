@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from camcomp.compensation.long import field as field_module
-from camcomp.compensation.long.field import ALLOWED, Field
+from camcomp.compensation.long.field import ALLOWED, LEVELS, Field
 from camcomp.compensation.long.kernel import look_up
 from camcomp.ground.files import shipped
 from camcomp.model.config.load import load_config
@@ -113,3 +113,10 @@ def test_a_cube_with_points_out_of_reach_is_divided(orthoglide):
     exact = correct(job.machine, near, np.zeros((1, 3)))
     assert tile[0] < 0 or np.abs(near + correction - exact.commanded).max() < 5e-5
     assert (known.tiles.values == -1).any()
+
+
+def test_far_out_of_reach_one_point_of_a_cube_is_tried_and_no_more(orthoglide):
+    """The solver gives up a hundred times later than it finds: a line with a digit too many took half a minute."""
+    known = Field(orthoglide, np.array([[0.0, 0.0, -100.0]]))
+    ask(known, np.array([[900.0, 0.0, 0.0]]), np.zeros((1, 3)))
+    assert known.solved == LEVELS, "the cube and every half of it that holds the point"
