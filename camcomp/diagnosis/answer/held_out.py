@@ -37,12 +37,11 @@ def shrinkage_of(
         return [_square(gap) for gap in _without(gaps, free)]
 
     per_step = [squares(count) for count in range(len(best.members) + 1)]
-    times = [thinned(run.run_path.time[:, None], run.thin)[:, 0] for run in seen.runs]
-    whole = shrinkage(per_step[0], per_step[-1], times)
+    whole = shrinkage(per_step[0], per_step[-1])
     steps = []
     for count, j in enumerate(order, start=1):
         candidate = problem.columns.candidates[best.members[j]]
-        rms = shrinkage(per_step[0], per_step[count], times).after
+        rms = shrinkage(per_step[0], per_step[count]).after
         steps.append({"effect": candidate.name, "target": candidate.target, "after_rms_um": round(rms, 3)})
     ceiling = _ceiling(problem, best, seen, part, free)
     return {

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
-from scipy.stats import t as student
 
 from camcomp.diagnosis.arm.curves import covered, curved_joints, curves_taken, seen_angles, without_waves
 from camcomp.diagnosis.arm.discrepancy import (
@@ -31,6 +30,7 @@ from camcomp.diagnosis.arm.forward_selection import (
 )
 from camcomp.diagnosis.arm.poses import CURVE, ArmBench, Poses
 from camcomp.diagnosis.result.types import ShrinkageStep, UnseenShrinkage
+from camcomp.diagnosis.statistics.one_more import log_ratio, of_one_more, scatter
 from camcomp.ground.datatypes import Floats
 
 # Sets of one campaign that leave up to this many times as much: effects that differ by 6 % of the rms within a campaign
@@ -275,18 +275,11 @@ def _interval(before: Sequence[Floats], after: Sequence[Floats], features: Seque
     Logarithms of the ratio are taken as normal. They vary from campaign to campaign as they do between these, and as means
     over REGIONS_OF_ONE regions of postures do. Student's t, the spread pooled over both.
     """
-    per_campaign, square, freedom = [], 0.0, 0
+    each = np.array([log_ratio(float(b.mean()), float(a.mean())) for b, a in zip(before, after, strict=True)])
+    square, freedom = scatter(each)
     for b, a, f in zip(before, after, features, strict=True):
-        per_campaign.append(_log_ratio(b, a))
         group = regions(f, min(REGIONS, max(len(b) // 8, 2)))
-        own = np.array([_log_ratio(b[group == g], a[group == g]) for g in np.unique(group)])
-        square += float(((own - own.mean()) ** 2).sum()) / REGIONS_OF_ONE
-        freedom += len(own) - 1
-    each = np.array(per_campaign)
-    square, freedom = square + float(((each - each.mean()) ** 2).sum()), max(freedom + len(each) - 1, 1)
-    half = float(student.ppf(0.975, freedom) * np.sqrt(square / freedom * (1.0 + 1.0 / len(each))))
-    return 1.0 - float(np.exp(each.mean() + half)), 1.0 - float(np.exp(each.mean() - half))
-
-
-def _log_ratio(before: Floats, after: Floats) -> float:
-    return 0.5 * float(np.log(max(after.mean(), 1e-300) / max(before.mean(), 1e-300)))
+        own = [log_ratio(float(b[group == g].mean()), float(a[group == g].mean())) for g in np.unique(group)]
+        inside, regions_seen = scatter(np.array(own))
+        square, freedom = square + inside / REGIONS_OF_ONE, freedom + regions_seen
+    return of_one_more(float(each.mean()), square, freedom, 1.0 + 1.0 / len(each))

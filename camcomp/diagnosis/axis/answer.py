@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.stats import t as student
 
 from camcomp.diagnosis.axis.findings import AxisChannel, AxisFindings
 from camcomp.diagnosis.result.types import (
@@ -19,6 +18,7 @@ from camcomp.diagnosis.result.types import (
     UnseenShrinkage,
     Where,
 )
+from camcomp.diagnosis.statistics.one_more import log_ratio, of_one_more, scatter
 from camcomp.diagnosis.statistics.probability import EVEN, probability_of_chance, stated
 from camcomp.model.motion.log_columns import log_columns
 
@@ -117,21 +117,14 @@ def _interval(judged: Sequence[Sequence[AxisChannel]], runs: Sequence[tuple[floa
     over STRETCHES_OF_ONE of its stretches do. Student's t.
     """
     if len(runs) > 1:
-        each = np.array([_log_ratio(*r) for r in runs])
+        each = np.array([log_ratio(*r) for r in runs])
         more = 1.0 + 1.0 / len(each)
     else:
         first, last = (np.concatenate([getattr(c, part) for c in judged[0]]) for part in ("first", "last"))
-        each = np.array([_log_ratio(float(a), float(b)) for a, b in zip(first, last, strict=True)])
+        each = np.array([log_ratio(float(a), float(b)) for a, b in zip(first, last, strict=True)])
         more = 1.0 / STRETCHES_OF_ONE + 1.0 / len(each)
-    spread = float(each.std(ddof=1)) if len(each) > 1 else 0.0
-    half = float(student.ppf(0.975, max(len(each) - 1, 1))) * spread * float(np.sqrt(more))
-    middle = float(np.mean([_log_ratio(*r) for r in runs]))
-    return 1.0 - float(np.exp(middle + half)), 1.0 - float(np.exp(middle - half))
+    return of_one_more(float(np.mean([log_ratio(*r) for r in runs])), *scatter(each), more)
 
 
 def _mean_square(channels: Sequence[AxisChannel], part: str) -> float:
     return float(np.mean(np.concatenate([getattr(c, part) for c in channels])))
-
-
-def _log_ratio(before: float, after: float) -> float:
-    return 0.5 * float(np.log(max(after, 1e-300) / max(before, 1e-300)))
