@@ -16,7 +16,6 @@ UNSTEADY_S = 0.002  # more jitter than any log has
 MIDDLE = 0.4549  # median of a squared standard normal number
 PLAIN = 0.3  # share of the noise at rest by which jitter has to add to it at speed
 REMEMBERED_S = 1.0  # for which slow noise lasts
-FORCE_SHARE = 0.01  # of the cutting force: what every component of it may be off by from row to row
 
 
 def instrument_noise(bench: Bench, floor: NoiseFloor, least: Floats, times: Sequence[Floats]) -> Noise:
@@ -124,35 +123,27 @@ def _late(bench: Bench) -> Floats:
 
 
 def _doubt(bench: Bench, k: int) -> Floats:
-    """What the channels (n, c) may be off by where the force is not known, standard deviations.
-
-    The tip's besides by what no model of a cutting force has from row to row; that of the other channels is found from the
-    rows once all columns stand.
-    """
+    """What the channels (n, c) may be off by where the force is not known, standard deviations."""
     run = bench.runs[k]
     out = np.zeros_like(bench.observed(k))
-    force = np.zeros_like(run.run_path.row_force) if run.run_path.driven is None else run.run_path.driven.doubt
-    at_tip = np.hypot(force, FORCE_SHARE * np.linalg.norm(run.run_path.row_force, axis=1)[:, None])
-    if not at_tip.any():
+    if run.run_path.driven is None or not run.run_path.driven.doubt.any():
         return out
+    force = run.run_path.driven.doubt
     m = len(bench.actuators)
     slopes = bench.slopes[k].at(run.run_path.row_place)
+    lever = bench.twin.nominal.tool
     # each axis of the force may be off by itself
     for axis in range(3):
-        tip = np.einsum("nij,nj->ni", slopes.tip_wrench, _wrench(bench, axis, at_tip)) @ bench.twin.rotation
+        push = np.zeros((len(force), 3))
+        push[:, axis] = force[:, axis]
+        wrench = np.concatenate([push, np.cross(lever, push)], axis=1)
+        tip = np.einsum("nij,nj->ni", slopes.tip_wrench, wrench) @ bench.twin.rotation
         out[:, :3] = np.hypot(out[:, :3], bench.turned(k, tip))
         out[:, 3 + m : 3 + 2 * m] = np.hypot(
-            out[:, 3 + m : 3 + 2 * m], np.einsum("nij,nj->ni", slopes.drive_wrench, _wrench(bench, axis, force))
+            out[:, 3 + m : 3 + 2 * m], np.einsum("nij,nj->ni", slopes.drive_wrench, wrench)
         )
     out[:, 3 + 2 * m :] = force
     return np.abs(out)
-
-
-def _wrench(bench: Bench, axis: int, force: Floats) -> Floats:
-    """Of one component of forces (n, 3) at the tip, (n, 6)."""
-    push = np.zeros_like(force)
-    push[:, axis] = force[:, axis]
-    return np.concatenate([push, np.cross(bench.twin.nominal.tool, push)], axis=1)
 
 
 def jitter(bench: Bench) -> float:
