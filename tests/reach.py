@@ -1,8 +1,8 @@
 """A pytest plugin (`-p tests.reach`): how much of camcomp the tests ran, and which modules none of them reached.
 
-Every run of statements inside a function is given a mark as its module is imported: a list's item that is set, an eighth
-of what a set's `add` costs, where a tracer doubles the time of the tests. What tests start as processes of their own is not looked into, and functions that
-numba compiles run unseen: neither counts.
+Every run of statements inside a function is given a mark as its module is imported: an item of a list that is set, which
+is the least that Python can do; a tracer doubles the time of the tests. What tests start as processes of their own is not
+looked into, and functions that numba compiles run unseen: neither counts.
 """
 
 import ast

@@ -67,9 +67,7 @@ class Made:
     runs: list[Run]
     states: list[State]
     record: dict
-    left: dict[int, Callable[[], float]] = field(
-        default_factory=dict
-    )  # mm of a strange cause, by its place in the record
+    left: dict[int, Callable[[], float]] = field(default_factory=dict)  # mm, by place in the record: see truth_json
 
 
 def character(rng: np.random.Generator, ripple: bool) -> Character:

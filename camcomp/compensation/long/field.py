@@ -201,7 +201,7 @@ class Field:
         """
         self.solved += 1
         if solve(self.machine, TARGET, (self.corner + centre)[None], force=self.force_mid[None]).status.any():
-            return None  # to find nothing takes the solver far longer than to find something: one point instead of all
+            return None  # one point before all: the solver tries long before it gives up
         known = np.zeros((0, 0))
         unloaded = np.zeros((0, 0))
         m = len(self.machine.actuators)

@@ -8,9 +8,7 @@ import numpy as np
 from camcomp.diagnosis.statistics.one_more import log_ratio, of_one_more, scatter
 from camcomp.ground.datatypes import Floats
 
-USUAL_SPREAD = (
-    0.3  # by which runs differ in the logarithm of the ratio: some cut, some are short, some hardly move an axis
-)
+USUAL_SPREAD = 0.3  # by which runs differ in the logarithm of the ratio: some cut, some hardly move an axis
 USUAL_RUNS = 2  # that this is worth beside those at hand
 
 

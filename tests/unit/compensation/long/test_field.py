@@ -116,7 +116,7 @@ def test_a_cube_with_points_out_of_reach_is_divided(orthoglide):
 
 
 def test_far_out_of_reach_one_point_of_a_cube_is_tried_and_no_more(orthoglide):
-    """The solver gives up a hundred times later than it finds: a line with a digit too many took half a minute."""
+    """The solver tries long before it gives up: a line with a digit too many took half a minute."""
     known = Field(orthoglide, np.array([[0.0, 0.0, -100.0]]))
     ask(known, np.array([[900.0, 0.0, 0.0]]), np.zeros((1, 3)))
     assert known.solved == LEVELS, "the cube and every half of it that holds the point"
