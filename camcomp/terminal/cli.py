@@ -12,6 +12,7 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib import import_module
+from threading import Timer
 from types import FrameType
 from typing import Any
 
@@ -28,6 +29,7 @@ from camcomp.terminal.standard_streams import stand_in_for_closed
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 SHORT_OF_MEMORY = "there is not enough memory"
+SOON_S = 0.02  # longer than any object takes to be finalised
 ENOUGH = 1 << 26  # bytes; every verb that computes needs more
 
 # One line per verb, so that `camcomp --help` imports none of them; a test keeps the table and the commands equal.
@@ -90,7 +92,19 @@ def _terminate(number: int, _frame: FrameType | None) -> None:
     raise Terminated(number)
 
 
+def _send_again(dropped: "sys.UnraisableHookArgs") -> None:
+    """A signal that came while an object was finalised, where Python drops what is raised, comes again a moment later."""
+    error = dropped.exc_value
+    if not isinstance(error, KeyboardInterrupt | Terminated):
+        return sys.__unraisablehook__(dropped)
+    number = error.number if isinstance(error, Terminated) else signal.SIGINT
+    again = Timer(SOON_S, os.kill, (os.getpid(), number))
+    again.daemon = True
+    again.start()
+
+
 def _end_on_signals() -> None:
+    sys.unraisablehook = _send_again
     for name in ("SIGTERM", "SIGHUP"):
         number = getattr(signal, name, None)
         if number is not None and signal.getsignal(number) is signal.SIG_DFL:  # nohup ignores one
