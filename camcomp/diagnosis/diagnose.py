@@ -13,6 +13,7 @@ import numpy as np
 from camcomp.diagnosis.answer.held_out import shrinkage_of
 from camcomp.diagnosis.answer.locate import channel_axes, patterns_of, run_gaps
 from camcomp.diagnosis.answer.minor import minor_effects, outlying_rows
+from camcomp.diagnosis.answer.nested import causes_without
 from camcomp.diagnosis.answer.stretch import with_stretches
 from camcomp.diagnosis.fit.bench import Bench, Run
 from camcomp.diagnosis.fit.columns import candidate_causes, working_causes
@@ -105,7 +106,7 @@ def diagnose(
     stands = problem
     if law is not None:  # causes have the values that they have beside it; those that had only followed it are gone
         stands, best = law.problem, law.fit
-    shrinkage = _shrinkage(twin, runs, holdout, stands, best)
+    shrinkage = _shrinkage(twin, runs, holdout, stands, best, found if law is None else None)
     unseen = len(used) < len(runs) or (len(used) > 1 and not holdout)
     proposal = _next(problem, found, word, job)
     result = DiagnosisResult(
@@ -338,17 +339,21 @@ def _vibrations(heard: Sequence[SpectralLine]) -> tuple[tuple[str, float], ...]:
 
 
 def _shrinkage(
-    twin: Twin, runs: Sequence[Run], holdout: Sequence[str], problem: Problem, best: Fitted
+    twin: Twin, runs: Sequence[Run], holdout: Sequence[str], problem: Problem, best: Fitted, found: CauseSearch | None
 ) -> dict[str, Any]:
-    """Named runs are judged with the fit of the others; without names every run is held out once."""
+    """Named runs are judged with the answer of the others; without names every run is held out once, from the choice among the
+    sets that were found, too, where the problem is still theirs.
+    """
     if holdout:
         seen = Bench(twin, [run for run in runs if run.name in holdout])
-        thetas = [best.theta] * len(seen.runs)
+        causes = problem.causes(best.members, best.theta, best.extra)
+        chosen = [dict(zip(best.members, causes, strict=True))] * len(seen.runs)
     else:
         seen = problem.bench
-        thetas = [problem.theta_without(best, k) for k in range(len(seen.runs))]
+        rivals = () if found is None else found.fits
+        chosen = causes_without(problem, best, rivals, np.zeros(0) if found is None else found.probability)
     floor = round(floor_um(problem), 3)
-    return shrinkage_of(problem, best, seen, thetas, _by_energy(problem, best), main_channels(problem), floor)
+    return shrinkage_of(problem, best, seen, chosen, _by_energy(problem, best), main_channels(problem), floor)
 
 
 def _by_energy(problem: Problem, f: Fitted) -> list[int]:

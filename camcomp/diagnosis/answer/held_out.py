@@ -1,6 +1,6 @@
 """How far the gap shrinks on runs that were not used for the fit, how far it could, and what was re-fitted to say so."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from camcomp.diagnosis.statistics.cause_sets import Fitted
 from camcomp.diagnosis.statistics.shrinkage import shrinkage
 from camcomp.ground import shelf
 from camcomp.ground.datatypes import Floats
+from camcomp.model.effect import Cause
 
 _STEP = 0.02  # of an interval's half width, for differences of the gap
 
@@ -21,26 +22,27 @@ def shrinkage_of(
     problem: Problem,
     best: Fitted,
     seen: Bench,
-    thetas: Sequence[Floats],
+    chosen: Sequence[Mapping[int, Cause]],
     order: Sequence[int],
     part: slice,
     floor_um: float,
 ) -> dict[str, Any]:
-    """The `shrinkage` of the result. seen: the held-out runs; thetas: per run, fitted without it; order: of the members;
-    part: the channels of the gap.
+    """The `shrinkage` of the result. seen: the held-out runs; chosen: per run the causes by candidate, chosen and fitted without
+    it; order: of the members; part: the channels of the gap.
     """
-    causes = [problem.causes(best.members, theta, best.extra) for theta in thetas]
     free, named = _nuisances(seen, problem.bench.runs, part)
+    members = [best.members[j] for j in order]
 
     def squares(count: int) -> list[Floats]:
-        gaps = [seen.gap(k, [causes[k][j] for j in order[:count]])[:, part] for k in range(len(seen.runs))]
-        return [_square(gap) for gap in _without(gaps, free)]
+        """With so many members of the answer, as far as they were chosen; with all of them, all that was."""
+        these = [[c for i, c in each.items() if count == len(members) or i in members[:count]] for each in chosen]
+        return [_square(gap) for gap in _without([seen.gap(k, each)[:, part] for k, each in enumerate(these)], free)]
 
-    per_step = [squares(count) for count in range(len(best.members) + 1)]
+    per_step = [squares(count) for count in range(len(members) + 1)]
     whole = shrinkage(per_step[0], per_step[-1])
     steps = []
-    for count, j in enumerate(order, start=1):
-        candidate = problem.columns.candidates[best.members[j]]
+    for count, i in enumerate(members, start=1):
+        candidate = problem.columns.candidates[i]
         rms = shrinkage(per_step[0], per_step[count]).after
         steps.append({"effect": candidate.name, "target": candidate.target, "after_rms_um": round(rms, 3)})
     ceiling = _ceiling(problem, best, seen, part, free)

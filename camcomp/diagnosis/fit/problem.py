@@ -242,13 +242,14 @@ class Problem:
             self._last = key, [self.bench.read(k, causes) for k in range(len(self.bench.runs))]
         return self._last[1]
 
-    def theta_without(self, f: Fitted, k: int) -> Floats:
-        """The members' coordinates fitted without run k, about the fit to all runs."""
-        if len(f.grams) == 1 or not f.members:
-            return f.theta
-        index = self.member_columns(f.members)
+    def theta_without(self, f: Fitted, k: int, members: Members | None = None) -> Floats:
+        """The coordinates of the members, or of some of them by themselves, fitted without run k, about the fit to all runs."""
+        members = f.members if members is None else members
+        if len(f.grams) == 1 or not members:
+            return f.theta[: len(self.member_columns(members))]
+        index = self.member_columns(members)
         others = total(f.grams) - f.grams[k]
-        return self._bounded(f.members, estimate(others, self.prior, index, f.factor)[0][index])
+        return self._bounded(members, estimate(others, self.prior, index, f.factor)[0][index])
 
     def _stacked(self, k: int, moved: Sequence[Floats | None], index: Sequence[int]) -> Floats:
         """White columns (w, d) of run k: those that were worked out anew, and the nominal ones of the others."""

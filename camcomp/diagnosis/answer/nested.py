@@ -1,0 +1,59 @@
+"""What would have been named without a run: that is what the run is judged with, for what is chosen on a run has seen it."""
+
+from collections.abc import Sequence
+from itertools import combinations
+
+import numpy as np
+
+from camcomp.diagnosis.fit.problem import Problem
+from camcomp.diagnosis.search.tempering import tempering
+from camcomp.diagnosis.statistics.cause_sets import Fitted, Members, Scale, total
+from camcomp.ground.datatypes import Floats
+from camcomp.model.effect import Cause
+
+RIVALS = 4  # sets beside the answer that another choice of runs might have led to: the contract lists as many
+ALL_PARTS = (
+    3  # members up to which every part of the answer is looked at; of larger ones all but one, each alone, and none
+)
+
+
+def causes_without(
+    problem: Problem, best: Fitted, fits: Sequence[Fitted], probability: Floats
+) -> list[dict[int, Cause]]:
+    """Causes by candidate that are chosen and fitted without a run, for every run.
+
+    best: the answer; fits, probability: the sets that rivalled it. Looked at are the answer, what is left of it without some of
+    its members, and the likeliest sets that are no larger; Stone, Journal of the Royal Statistical Society B 36 (1974) 111.
+    """
+    runs = range(len(problem.bench.runs))
+    if len(runs) == 1 or not best.members:
+        return [_by_candidate(problem, best, best.members, best.theta)] * len(runs)
+    rivals = [fits[j] for j in np.argsort(-probability) if _is_rival(fits[j].members, best.members)][:RIVALS]
+    tried = [(best, part) for part in _parts(best.members)] + [(f, f.members) for f in rivals]
+    temperature = tempering(problem, best)
+
+    def value(k: int, f: Fitted, members: Members) -> float:
+        minor = f.minor if members == f.members else ()
+        scale = Scale(total(f.grams) - f.grams[k], problem.prior, problem.candidates)
+        return scale((*members, *minor)) / temperature + problem.candidates.prior(members, minor)
+
+    out = []
+    for k in runs:
+        f, members = max(tried, key=lambda each: value(k, *each))
+        out.append(_by_candidate(problem, f, members, problem.theta_without(f, k, members)))
+    return out
+
+
+def _is_rival(members: Members, best: Members) -> bool:
+    """Whether a set is another answer: neither a part of the best one, which is tried anyway, nor that with something more."""
+    return not (set(members) <= set(best) or set(members) > set(best) or len(members) > len(best))
+
+
+def _parts(members: Members) -> list[Members]:
+    n = len(members)
+    sizes = range(n, -1, -1) if n <= ALL_PARTS else (n, n - 1, 1, 0)
+    return [each for size in sizes for each in combinations(members, size)]
+
+
+def _by_candidate(problem: Problem, f: Fitted, members: Members, theta: Floats) -> dict[int, Cause]:
+    return dict(zip(members, problem.causes(members, theta, f.extra), strict=True))
