@@ -12,6 +12,7 @@ import numpy as np
 from tests.trials import laws as law
 from tests.trials import score as judging
 from tests.trials import sensitivity as changes
+from tests.trials import unseen as left_out
 from tests.trials.experiment import Plan, make, truth_json, write
 from tests.trials.faults import every
 from tests.trials.machines import MACHINES
@@ -19,6 +20,7 @@ from tests.trials.sensors import CHANNELS, Sensors
 from tests.trials.strange import ON_ACTUATORS, STRANGE
 
 KINDS = ("null", "single", "pair", "unknown", "beside", "imperfect")
+IN_TURNS = ("null", "single", "single", "pair", "unknown", "imperfect")  # kinds of a mixture
 # what data may be like: changes of the sensors, and of the plan
 MESS: dict[str, tuple[dict, dict]] = {
     "tails": ({"tails": True}, {}),
@@ -70,6 +72,15 @@ def plan(kind: str, index: int, seed: int, base: Plan, ratios: tuple[float, ...]
     )
 
 
+def mixed(i: int, seed: int, clean: bool) -> tuple[str, Plan]:
+    """Kind and plan of the i-th of a mixture: machines, kinds, what is poor about the data and channels go round at their own pace."""
+    kind = IN_TURNS[i // len(MACHINES) % len(IN_TURNS)]
+    channels = "full" if clean else list(CHANNELS)[(i + i // (len(MACHINES) * len(IN_TURNS))) % len(CHANNELS)]
+    machine = list(MACHINES)[i % len(MACHINES)]
+    base = Plan(0, machine=machine, channels=channels, sensors=Sensors(tip_mm=3e-3), rows=300, runs=4)
+    return kind, plan(kind, i, seed, base if clean else messy(base, (list(MESS)[i % len(MESS)],)), (3.0, 10.0))
+
+
 @click.group()
 def main():
     """Make experiments and score the answers."""
@@ -102,6 +113,25 @@ def make_(out, kind, machine, count, seed, noise_um, channels, ratios, rapids, s
             click.echo(f"{name} is there")
             continue
         wanted = plan(kind, i, seed + i, base, ratios)
+        made = make(wanted)
+        write(made, wanted, out / name)
+        answer.write_text(truth_json(made))
+        click.echo(f"{name} {kind} {[(c['effect'], c['target'], round(c['ratio'], 2)) for c in made.record['causes']]}")
+
+
+@main.command("mixed")
+@click.option("--out", type=click.Path(path_type=Path), required=True)
+@click.option("--count", default=10)
+@click.option("--seed", default=1, help="Of the first experiment; the next ones count on.")
+@click.option("--clean", is_flag=True, help="All channels and nothing poor about the data.")
+def mixed_(out, count, seed, clean):
+    """Write experiments of all kinds on all machines in turns, with poor channels and messy data; see make."""
+    (out / "truth").mkdir(parents=True, exist_ok=True)
+    for i in range(count):
+        name, answer = f"e-{seed + i:05d}", out / "truth" / f"e-{seed + i:05d}.json"
+        if answer.exists():
+            continue
+        kind, wanted = mixed(i, seed + i, clean)
         made = make(wanted)
         write(made, wanted, out / name)
         answer.write_text(truth_json(made))
@@ -154,6 +184,23 @@ def score_(folder, results, jobs, only, listed):
         click.echo(judging.listing(rows) + "\n")
     click.echo(judging.render(rows))
     click.echo("\nright answers\n" + judging.by_machine(rows))
+
+
+@main.command("unseen")
+@click.argument("folder", type=click.Path(path_type=Path, exists=True))
+@click.option("--only", multiple=True, help="Names of experiments.")
+def unseen_(folder, only):
+    """Leave every run of the experiments below FOLDER out once: does the interval of the shrinkage hold what it shows?"""
+    results = folder / "unseen.jsonl"
+    rows = [json.loads(line) for line in results.read_text().splitlines()] if results.exists() else []
+    there = {row["name"] for row in rows}
+    for each in sorted(folder.glob("e-*")):
+        if each.name not in there and (not only or each.name in only):
+            more = left_out.runs_left_out(each)
+            rows += more
+            with results.open("a") as file:
+                file.writelines(json.dumps(row) + "\n" for row in more)
+    click.echo(left_out.render(rows))
 
 
 @main.command("sensitivity")
