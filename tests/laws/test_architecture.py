@@ -4,6 +4,7 @@ Shelves hold plug-ins, which nobody imports by name; camcomp/ground/shelf.py fin
 """
 
 import ast
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -66,6 +67,7 @@ def module_of(name):
     return ".".join(parts)
 
 
+@cache
 def graph(package):
     files = [path for path in package.rglob("*.py") if path.name != "__init__.py"]
     return {".".join(path.relative_to(package).with_suffix("").parts): set(imports(path)) for path in files}
