@@ -96,7 +96,8 @@ def _send_again(dropped: "sys.UnraisableHookArgs") -> None:
     """A signal that came while an object was finalised, where Python drops what is raised, comes again a moment later."""
     error = dropped.exc_value
     if not isinstance(error, KeyboardInterrupt | Terminated):
-        return sys.__unraisablehook__(dropped)
+        sys.__unraisablehook__(dropped)
+        return
     number = error.number if isinstance(error, Terminated) else signal.SIGINT
     again = Timer(SOON_S, os.kill, (os.getpid(), number))
     again.daemon = True

@@ -32,6 +32,10 @@ from camcomp.model.motion.twin import Twin
 
 SAMPLE_MM = 2.0  # of the program, where places are compared
 GAP_ROWS = 3.0  # usual steps between rows over which a motion is not led
+GUESSED_MM, GUESSED_RAD = (
+    1e-3,
+    1e-6,
+)  # by which an empty cell's actuator may stand beside the line between its neighbours
 STILL_S = 0.1  # from which on standing at the end of a line may be idleness
 STILL_MM = 0.005
 SOON_S = 1e-4  # in which a tip moves in one direction
@@ -42,13 +46,14 @@ _UPRIGHT = 0.9  # cosine beyond which a path goes along z, and its sides are fou
 @dataclass(frozen=True, eq=False)
 class DrivenRun:
     """run_path; by: the channel that is the motion ("setpoint", "encoder", "tip"); unsure (n,): rows whose tip says
-    nothing, because nobody knows where the machine was told to be; turn (n, 3, 3): program axes to along and across the
-    path, where the tip is the motion.
+    nothing, because nobody knows where the machine was told to be; guessed (n, m): actuators of which nobody does; turn
+    (n, 3, 3): program axes to along and across the path, where the tip is the motion.
     """
 
     run_path: RunPath
     by: str
     unsure: Bools
+    guessed: Bools
     turn: Floats | None
     lag: int
 
@@ -81,12 +86,16 @@ def drive(
         assert program is not None
         return _led_by_tip(log, name, measured, program, twin, started, vectors, temperature, acceleration)
     told = getattr(measured, by)
-    known = np.isfinite(told).all(axis=1)
-    if known.sum() < 2:
+    known = np.isfinite(told)
+    if known.sum(axis=0).min() < 2:
         raise ConfigError(
-            "CC404", f"run '{name}': hardly a row holds the {by}s of all actuators", at=Location(log, 1, 1)
+            "CC404", f"run '{name}': hardly a row holds the {by} of every actuator", at=Location(log, 1, 1)
         )
-    rho = np.column_stack([np.interp(measured.time, measured.time[known], v[known]) for v in told.T])
+    rho = np.column_stack([_over_time(measured.time, v) for v in told.T])
+    guessed = np.column_stack([
+        _guessed(measured.time, v, GUESSED_RAD if a.revolute else GUESSED_MM)
+        for v, a in zip(told.T, twin.robot.actuators, strict=True)
+    ])  # fmt: skip
     rotary = all(a.revolute for a in twin.robot.actuators)
     if program is not None:
         check_told(log, name, by, rho, program.rho, twin.actuators, rotary)
@@ -94,7 +103,7 @@ def drive(
     tip = twin.to_program(twin.forward(rho, twin.to_machine(near)))
     check_places(log, name, measured, rho, tip, twin.actuators, rotary)
     aligned = None if program is None else _aligned(log, name, program, tip, measured)
-    unsure = ~_close(measured.time, known)
+    unsure = np.asarray(guessed.any(axis=1))
     if program is None or aligned is None:
         forces = Forces.none(len(tip))
     else:
@@ -113,7 +122,7 @@ def drive(
     if program is not None:
         run_path = replace(run_path, feed_mm_per_min=program.feed)
     check_forces(log, name, measured, run_path.row_force)
-    return DrivenRun(run_path, by, unsure, None, 0 if aligned is None else aligned.lag)
+    return DrivenRun(run_path, by, unsure, guessed, None, 0 if aligned is None else aligned.lag)
 
 
 def _open(path: Path, conditions: Conditions, twin: Twin) -> _Program:
@@ -140,7 +149,7 @@ def _near(log: str, name: str, measured: Measured, rho: Floats, program: _Progra
     if not known.any():
         message = f"run '{name}' has neither a program nor measured tips: its place is not known"
         raise ConfigError("CC402", message, at=Location(log, 1, 1))
-    return np.column_stack([np.interp(measured.time, measured.time[known], v[known]) for v in measured.tip.T])
+    return np.column_stack([_over_time(measured.time, np.where(known, v, np.nan)) for v in measured.tip.T])
 
 
 def _aligned(
@@ -165,10 +174,9 @@ def _behind(measured: Measured, rho: Floats, tip: Floats, program: _Program, twi
 
     None where no encoders are logged, or where they lie beside the path because of more than a delay.
     """
-    known = np.isfinite(measured.encoder).all(axis=1)
-    if known.sum() < 2:
+    if np.isfinite(measured.encoder).sum(axis=0).min() < 2:
         return None
-    late = np.column_stack([np.interp(measured.time, measured.time[known], v[known]) for v in measured.encoder.T])
+    late = np.column_stack([_over_time(measured.time, v) for v in measured.encoder.T])
     driven = twin.to_program(twin.forward(late, twin.to_machine(tip)))
     found = align(program.track.path, driven, measured.line)
     return found if float(np.median(found.distance)) < ASIDE_MM else None
@@ -183,15 +191,28 @@ def _agreement(path: Path, found: Aligned, tip: Floats) -> float:
     return float(np.mean(np.diff(at)[moving] > -0.5 * step[moving])) if moving.any() else 1.0
 
 
-def _close(time: Floats, known: Bools) -> Bools:
-    """Rows (n,) between known ones that are near in time."""
+def _over_time(time: Floats, values: Floats) -> Floats:
+    """Values (n,) with empty cells filled from their neighbours in time."""
+    known = np.isfinite(values)
+    return np.interp(time, time[known], values[known])
+
+
+def _guessed(time: Floats, values: Floats, most: float) -> Bools:
+    """Empty cells (n,) of which their neighbours say too little: where those are far in time, or where the actuator changes its
+    speed there by so much that it may stand further than `most` from between them.
+    """
+    known = np.isfinite(values)
+    out = ~known
     if known.all() or len(time) < 3:
-        return known
-    usual = float(np.median(np.diff(time)))
-    at = time[known]
-    after = np.clip(np.searchsorted(at, time), 0, len(at) - 1)
-    before = np.maximum(after - 1, 0)
-    out: Bools = known | ((at[after] - at[before]) < GAP_ROWS * usual) & (time >= at[0]) & (time <= at[-1])
+        return out
+    at, usual = time[known], float(np.median(np.diff(time)))
+    speed = np.diff(values[known]) / np.diff(at)
+    k = np.clip(np.searchsorted(at, time[out]), 1, len(at) - 1)
+    here, before, after = k - 1, np.maximum(k - 2, 0), np.minimum(k, len(speed) - 1)
+    turns = np.maximum(np.abs(speed[here] - speed[before]), np.abs(speed[after] - speed[here]))
+    aside = turns * np.minimum(time[out] - at[k - 1], at[k] - time[out])
+    near = (at[k] - at[k - 1] < GAP_ROWS * usual) & (time[out] >= at[0]) & (time[out] <= at[-1])
+    out[out] = ~near | (aside > most)
     return out
 
 
@@ -219,7 +240,7 @@ def _led_by_tip(
     path = program.track.path
     known = np.isfinite(measured.tip).all(axis=1)
     check_on_program(log, name, measured.tip[known], program.tips)
-    whole = np.column_stack([np.interp(measured.time, measured.time[known], v[known]) for v in measured.tip.T])
+    whole = np.column_stack([_over_time(measured.time, np.where(known, v, np.nan)) for v in measured.tip.T])
     bend = np.zeros_like(whole)
     for beside in (np.inf, BESIDE_MM):  # what bends may be beside its program: first nobody knows by how much
         aligned = _aligned(log, name, program, whole - bend, measured, ASIDE_MM if beside < np.inf else FAR_MM)
@@ -237,7 +258,8 @@ def _led_by_tip(
     later = Cause("time_sync", shelf.load("effects", "time_sync"), None, {"offset_s": -SOON_S})
     velocity = (twin.sense(run_path, [later])[0].tip - loaded) / SOON_S
     run_path = replace(run_path, feed_mm_per_min=program.feed, led=True)
-    return DrivenRun(run_path, "tip", unsure, _across(path, aligned, velocity), aligned.lag)
+    guessed = np.zeros((len(tip), len(twin.actuators)), bool)
+    return DrivenRun(run_path, "tip", unsure, guessed, _across(path, aligned, velocity), aligned.lag)
 
 
 def _from_anywhere(path: Path, aligned: Aligned) -> Bools:

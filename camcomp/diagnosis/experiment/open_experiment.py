@@ -76,6 +76,8 @@ def open_run(spec: RunSpec, job: Job, twin: Twin, notes: list[str]) -> Run:
     )  # fmt: skip
     if run.lag:
         notes.append(f"{log}: line numbers are {abs(run.lag)} rows {'late' if run.lag > 0 else 'early'}")
+    if run.by == "setpoint":  # against what was not told no encoder says anything
+        measured = replace(measured, encoder=np.where(run.guessed, np.nan, measured.encoder))
     thin = int(np.ceil(len(measured.time) / MOST_ROWS))
     return Run(
         spec.name,
