@@ -72,13 +72,14 @@ def plan(kind: str, index: int, seed: int, base: Plan, ratios: tuple[float, ...]
     )
 
 
-def mixed(i: int, seed: int, clean: bool) -> tuple[str, Plan]:
-    """Kind and plan of the i-th of a mixture: machines, kinds, what is poor about the data and channels go round at their own pace."""
-    kind = IN_TURNS[i // len(MACHINES) % len(IN_TURNS)]
-    channels = "full" if clean else list(CHANNELS)[(i + i // (len(MACHINES) * len(IN_TURNS))) % len(CHANNELS)]
-    machine = list(MACHINES)[i % len(MACHINES)]
+def mixed(seed: int, clean: bool) -> tuple[str, Plan]:
+    """Kind and plan of one of a mixture: machines, kinds, what is poor about the data and channels go round at their own pace."""
+    kind = IN_TURNS[seed // len(MACHINES) % len(IN_TURNS)]
+    channels = "full" if clean else list(CHANNELS)[(seed + seed // (len(MACHINES) * len(IN_TURNS))) % len(CHANNELS)]
+    machine = list(MACHINES)[seed % len(MACHINES)]
     base = Plan(0, machine=machine, channels=channels, sensors=Sensors(tip_mm=3e-3), rows=300, runs=4)
-    return kind, plan(kind, i, seed, base if clean else messy(base, (list(MESS)[i % len(MESS)],)), (3.0, 10.0))
+    base = base if clean else messy(base, (list(MESS)[seed % len(MESS)],))
+    return kind, plan(kind, seed, seed, base, (3.0, 10.0))
 
 
 @click.group()
@@ -131,7 +132,7 @@ def mixed_(out, count, seed, clean):
         name, answer = f"e-{seed + i:05d}", out / "truth" / f"e-{seed + i:05d}.json"
         if answer.exists():
             continue
-        kind, wanted = mixed(i, seed + i, clean)
+        kind, wanted = mixed(seed + i, clean)
         made = make(wanted)
         write(made, wanted, out / name)
         answer.write_text(truth_json(made))

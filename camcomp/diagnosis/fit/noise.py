@@ -21,19 +21,22 @@ REMEMBERED_S = 1.0  # for which slow noise lasts
 def instrument_noise(bench: Bench, floor: NoiseFloor, least: Floats, times: Sequence[Floats]) -> Noise:
     """Noise per run and channel from the scatter of its rows; it is never what a fitted model leaves.
 
-    Slow noise of the tip is what the floor states; that of the other instruments counts as large as their fast noise.
+    Slow noise of the tip is what the floor states; that of the other instruments counts as large as their fast noise in the
+    run in which they have least: in the cut a dynamometer shakes with the teeth.
     """
     runs, c = len(bench.runs), len(floor.fast)
     sigma = np.full((runs, c), np.nan)
+    scatter = [np.array([row_scatter(x, t) for x in bench.residual(k).T]) for k, t in enumerate(times)]
+    quietest = np.min(np.where(np.isfinite(scatter), scatter, np.inf), axis=0)
     slow, memory = np.zeros((runs, c)), np.zeros((runs, c))
     for k in range(runs):
         gap = bench.residual(k)
         known = np.isfinite(gap).any(axis=0)
-        own = np.array([row_scatter(x, times[k]) for x in gap.T])
+        own = scatter[k]
         fast = np.where(np.isfinite(own), own, floor.fast)
         usual = np.where(np.isfinite(floor.fast), floor.fast, 0.0)
         fast = np.maximum(np.clip(np.where(np.isfinite(fast), fast, 0.0), 0.5 * usual, 2.0 * usual), least)
-        lasting = np.where(np.arange(c) < 3, floor.slow_mm, fast)
+        lasting = np.where(np.arange(c) < 3, floor.slow_mm, np.clip(quietest, least, fast))
         whole = np.hypot(fast, lasting)
         step = float(np.median(np.diff(times[k]))) if len(times[k]) > 1 else 1.0
         sigma[k] = np.where(known, whole, np.nan)

@@ -9,12 +9,14 @@ from camcomp.diagnosis.fit.gap import rest_by_actuator, tip_by_actuator
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.search.unexplained import Unexplained, size_um, worst
 from camcomp.diagnosis.search.unknown import foretelling, signal_rms
-from camcomp.diagnosis.statistics.cause_sets import Fitted, Members
+from camcomp.diagnosis.statistics.cause_sets import SIZES, Fitted, Members
 from camcomp.diagnosis.statistics.probability import EVEN
 
 LEAST_BESIDE = 0.4  # size in units of an unknown effect below which nothing is named beside it
 PART_OF_UNKNOWN = 2.0  # size in units of an unknown effect below which a cause at its place is taken for a part of it
 POINTED = 0.85  # share of what is left that one actuator has to have to be that place
+ONE_MORE = SIZES[2] / SIZES[1]  # prior odds of one cause more than the unknown effect
+STAGES = 7  # control, drive, structure, process, tool, workpiece, sensor: contract, section 6
 AT_ONCE = 2.0  # rows within which what began at several actuators began at none of them
 
 
@@ -59,17 +61,21 @@ def _shared_events(problem: Problem, f: Fitted, members: Members) -> set[int]:
     return {i for i in began for j in began if i != j and abs(began[i] - began[j]) <= AT_ONCE * rows}
 
 
-def doubted(problem: Problem, f: Fitted, beyond: Mapping[str, Unexplained]) -> dict[int, float]:
+def doubted(
+    problem: Problem, f: Fitted, beyond: Mapping[str, Unexplained], drawn: Mapping[int, float]
+) -> dict[int, float]:
     """Most that the probability of each member can be beside what is left.
 
-    Either the unknown effect is at the member's actuator by chance, one of m, or the member imitates it, as far as it is there:
-    up to which share of its energy an unknown effect can be imitated nobody knows, so that every share is as likely. Of what
-    shows at another place, or in another kind of channel, it is no imitation.
+    Either there is a cause more than the unknown effect, which by chance is where that one is: at the same actuator, one of m, or
+    in the same stage. Or the member imitates it, as far as it is there or goes by what it goes by (drawn: how far that
+    draws the member): up to which share of its energy an unknown effect can be imitated nobody knows, so that every share is
+    as likely. Of what shows at another place, in another kind of channel or by another law, it is no imitation.
     """
     out = {}
     for i, each in _beside(problem, f, beyond, f.members).items():
-        chance = 1.0 if each.anywhere else 1.0 / len(problem.bench.actuators)
-        out[i] = chance / (chance + each.share / (1.0 + each.size**2))
+        chance = ONE_MORE / (STAGES if each.anywhere else len(problem.bench.actuators))
+        alike = drawn[i] if each.anywhere else each.share
+        out[i] = chance / (chance + alike / (1.0 + each.size**2))
     return out
 
 

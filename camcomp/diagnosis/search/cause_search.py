@@ -190,16 +190,16 @@ def _credible(
     while True:
         unknown = unknown_kind(problem, f, beyond) is not None
         kept = beside_unknown(problem, f, beyond) if unknown else f.members
-        credible: dict[int, float] = {}
         if kept == f.members:
-            credible, replaced = credibility(problem, f, surely=unknown, temperature=TEMPERATURE)
+            credible = credibility(problem, f, surely=unknown, temperature=TEMPERATURE)
+            replaced = credible.replaced
             most = max(replaced, key=lambda i: replaced[i], default=None)
             if most is None or replaced[most] < (EVEN if unknown else INSTEAD):
                 if unknown and (more := _overlooked(problem, f, fit, every)) is not None:
                     f, beyond = more, unexplained(problem, more)
                     continue
-                doubt = doubted(problem, f, beyond) if unknown else {}
-                return f, {i: min(p, doubt.get(i, 1.0)) for i, p in credible.items()}, instead
+                doubt = doubted(problem, f, beyond, credible.drawn) if unknown else {}
+                return f, {i: min(p, doubt.get(i, 1.0)) for i, p in credible.present.items()}, instead
             instead = instead or size_um(problem, f, (most,)) > _least(problem, f)
             kept = _needed(problem, fit, tuple(i for i in f.members if i != most))
         f = fit(kept)
@@ -221,8 +221,9 @@ def _overlooked(problem: Problem, f: Fitted, fit: Callable[[Members], Fitted], e
         or beside_unknown(problem, best, beyond) != best.members
     ):
         return None
-    credible, replaced = credibility(problem, best, surely=True, temperature=TEMPERATURE)
-    return best if min(credible.values()) > INSTEAD and max(replaced.values()) < EVEN else None
+    credible = credibility(problem, best, surely=True, temperature=TEMPERATURE)
+    sure = min(credible.present.values()) > INSTEAD and max(credible.replaced.values()) < EVEN
+    return best if sure else None
 
 
 def _needed(problem: Problem, fit: Callable[[Members], Fitted], members: Members) -> Members:

@@ -8,7 +8,7 @@ of time to the next. Sources: model averaging (Hoeting et al., Statistical Scien
 the sandwich's information (Varin, Reid, Firth, Statistica Sinica 21, 2011).
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, islice
 
@@ -33,12 +33,21 @@ LIKE = 0.1  # of a cause's signal, by which something unknown has to differ to b
 MOST_UNLIKE = 0.5  # the same where other causes do far more, which are modelled no better either
 
 
-def credibility(
-    problem: Problem, f: Fitted, *, surely: bool, temperature: float
-) -> tuple[dict[int, float], dict[int, float]]:
-    """Probability of every member of f, and of something unknown in its place; surely: whether that is there for certain."""
+@dataclass(frozen=True, eq=False)
+class Credibility:
+    """Of every member of a set. present: its probability; replaced: that of something unknown in its place; drawn: share of
+    the energy of what it does that the likeliest family beside the set could draw, 0 where no family is likelier than none.
+    """
+
+    present: Mapping[int, float]
+    replaced: Mapping[int, float]
+    drawn: Mapping[int, float]
+
+
+def credibility(problem: Problem, f: Fitted, *, surely: bool, temperature: float) -> Credibility:
+    """How sure the members of f are; surely: whether something unknown is there for certain."""
     if not f.members:
-        return {}, {}
+        return Credibility({}, {}, {})
     weight, index = _at_the_tip(problem), problem.member_columns(f.members)
     W, r = ByChannel.behind(about(problem, f)[0]).scaled(weight), weight * np.concatenate(f.residual)
     data = gram(W, r)
@@ -86,7 +95,22 @@ def credibility(
         found = (1.0 - UNKNOWN) * (unlike[:first].sum() + needless * missed)
         present[i] = min(float(np.sum(np.exp(value - whole) * has) + found), stated[i])
         replaced[i] = (1.0 - needless) * missed
-    return present, replaced
+    return Credibility(present, replaced, _drawn(problem, f, W, best[1]))
+
+
+def _drawn(problem: Problem, f: Fitted, W: ByChannel, family: Family | None) -> dict[int, float]:
+    """Share of the energy of what every member does that functions of a family could draw."""
+    if family is None:
+        return dict.fromkeys(f.members, 0.0)
+    D, at, out = family.columns, problem.member_columns(f.members), dict[int, float]()
+    own = D.T @ D
+    for i in f.members:
+        index = problem.member_columns((i,))
+        signal = W[:, index] @ f.theta[[at.index(c) for c in index]]
+        b = D.T @ signal[family.at]
+        most = max(float(signal @ signal), 1e-300)
+        out[i] = min(float(b @ np.linalg.lstsq(own, b, rcond=1e-9)[0]) / most, 1.0)
+    return out
 
 
 def _at_stated_tolerances(problem: Problem, f: Fitted, temperature: float) -> dict[int, float]:

@@ -32,7 +32,7 @@ def deviation_of_force(apart, *, log=True, as_stated=False):
 
 
 def test_a_force_is_known_no_better_than_the_spring_that_it_bends():
-    assert deviation_of_force(1e-3) == pytest.approx(STATED, rel=0.15)
+    assert deviation_of_force(1e-4) == pytest.approx(STATED, rel=0.15)
 
 
 def test_rows_that_tell_force_and_spring_apart_say_it_better():
@@ -40,8 +40,8 @@ def test_rows_that_tell_force_and_spring_apart_say_it_better():
 
 
 def test_what_is_moved_at_the_tip_is_known_all_the_same():
-    assert deviation_of_force(1e-3, as_stated=True) < 0.1 * STATED
-    assert deviation_of_force(1e-3, log=False) < 0.1 * STATED
+    assert deviation_of_force(1e-4, as_stated=True) < 0.1 * STATED
+    assert deviation_of_force(1e-4, log=False) < 0.1 * STATED
 
 
 @pytest.mark.parametrize(
