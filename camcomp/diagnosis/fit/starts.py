@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from camcomp.diagnosis.fit.bench import Bench
 
 STARTED_MM, STARTED_RAD = 0.1, 1e-4  # by which an actuator has to move before its play is taken up
+STOOD_MM, STOOD_RAD = 1e-3, 1e-6  # by which it may have moved and have taken up nothing
+UNDER_WAY = 8  # rows from the one to the other, in which nothing is known of it
 START_MM, START_RAD = 0.1, 5e-5  # where its carriage may stand until then: play and guides as bad as they come
 START_N, START_NMM = 1000.0, 1e6  # and how hard its guide may hold it there
 ALWAYS_MM, ALWAYS_RAD = 0.005, 5e-6  # the same where it hardly ever moves: little, or nothing would be known of it
@@ -40,7 +42,7 @@ def start_columns(
             continue
         for j, a in enumerate(bench.actuators):
             revolute = bench.twin.robot.actuators[j].revolute
-            still = _still(run.run_path.row_rho[:, j], revolute)
+            still = _standing(run.run_path.row_rho[:, j], revolute)[0]
             if still.sum() < STARTING_ROWS:
                 continue
             shift = np.zeros_like(bench.observed(r))
@@ -59,8 +61,8 @@ def start_columns(
 def unknown_starts(bench: Bench, k: int) -> Floats:
     """What single rows of run k may be off by (n, c), standard deviations, because nobody saw how its actuators came there.
 
-    Of the first row, and of that behind missing ones from which it turned back, where the next has the actuator moved on; of
-    encoders until a loop has settled that nobody saw speed up.
+    Of the first row, and of that behind missing ones from which it turned back, where the next has the actuator moved on, and
+    of those until its play is taken up; of encoders until a loop has settled that nobody saw speed up.
     """
     out, path = np.zeros_like(bench.observed(k)), bench.runs[k].run_path
     if not path.ordered or len(path.time) < 3:
@@ -73,7 +75,12 @@ def unknown_starts(bench: Bench, k: int) -> Floats:
         revolute = bench.twin.robot.actuators[j].revolute
         rho = path.row_rho[:, j]
         turned = behind[(rho[behind] - rho[behind - 1]) * (rho[behind + 1] - rho[behind]) <= 0.0]
-        rows = [i for i in (0, *turned) if _still(rho[i:], revolute).sum() < STARTING_ROWS]
+        rows: list[int] = []
+        for i in (0, *turned):
+            standing, under_way = _standing(rho[i:], revolute)
+            short = standing.sum() < STARTING_ROWS
+            rows += [i] if short else []
+            rows += (i + np.flatnonzero(under_way)).tolist() if short or i == 0 else []
         unknown = np.zeros(len(path.time))
         unknown[rows] = START_RAD if revolute else START_MM
         out[:, :3] = np.hypot(out[:, :3], bench.turned(k, bench.row_slopes(k)[:, :, j] * unknown[:, None]))
@@ -95,7 +102,15 @@ def _swing(time: Floats, rho: Floats) -> Floats:
     return out
 
 
-def _still(rho: Floats, revolute: bool) -> Bools:
-    """Whether an actuator at rho (n,) has not yet moved (n,) since the first of these rows."""
-    moved: Bools = np.maximum.accumulate(np.abs(rho - rho[0])) < (STARTED_RAD if revolute else STARTED_MM)
-    return moved
+def _standing(rho: Floats, revolute: bool) -> tuple[Bools, Bools]:
+    """Rows (n,) in which an actuator at rho (n,) has its play not yet taken up: those that are alike, and those on its way.
+
+    On its way its carriage begins to follow somewhere, which no row beside it tells. Where that takes many rows they are alike:
+    the way from one to the next is little.
+    """
+    moved = np.maximum.accumulate(np.abs(rho - rho[0]))
+    still = moved < (STARTED_RAD if revolute else STARTED_MM)
+    under_way = still & (moved > (STOOD_RAD if revolute else STOOD_MM))
+    if under_way.sum() > UNDER_WAY:
+        under_way = np.zeros(len(rho), bool)
+    return np.asarray(still & ~under_way), under_way

@@ -20,7 +20,7 @@ from camcomp.ground.datatypes import Bools, Floats, Ints
 from camcomp.model.cutting.track import Track
 from camcomp.model.motion.alignment import Aligned
 from camcomp.model.motion.node_pieces import NODES, SPLIT, Places, basis_at
-from camcomp.model.motion.run_path import MOST_STEPS, STEP_S, Driven, RunPath
+from camcomp.model.motion.run_path import MOST_STEPS, STEP_S, Driven, RunPath, moving
 from camcomp.model.seams import Seams, missing_rows
 
 CLOCK_S = 0.010  # by which the clock of a tip measurement may be off that of the control
@@ -98,7 +98,7 @@ def driven_path(
     node_force = _of_stretches(time, row_force, sure, jump, node_time, pieces)
     return RunPath(
         name, time, started, True, node_tip, node_force, node_rho, node_time, grid, grid_rho,
-        forces.cut_at(time, grid), pieces.of(grid), len(pieces.begin), pieces.at, rho, temperature,
+        forces.cut_at(time, grid) * moving(grid, grid_tip), pieces.of(grid), len(pieces.begin), pieces.at, rho, temperature,
         driven=Driven(row_tip, row_force, np.abs(vectors(forces.doubt)), lead_tip, _seams(time, grid, lead)),
     )  # fmt: skip
 

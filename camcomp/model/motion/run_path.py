@@ -18,6 +18,9 @@ from camcomp.model.seams import Seams
 STEP_S = 0.001  # grid of what has memory: 0.2 um of interpolation at 1500 mm/s2
 MOST_STEPS = 40000
 _IN_DOUBT = 0.05  # of the largest force
+MOVES_S = 0.05  # to both sides of an instant, in which a tip that moves is told from its noise
+STANDS_MM_PER_S = 0.05  # speed below which it stands
+CREEPS = 0.05  # of the usual speed, below which it stood while rows are missing
 _HARDLY_OTHERS = 0.8  # of the rows that cut are in doubt
 _FEW = 0.5  # of the grid, below which instants are worth picking
 
@@ -54,7 +57,7 @@ class RunPath:
     node_time: Floats  # (q,) s
     grid: Floats  # (g,) s
     grid_rho: Floats  # (g, m) set-points
-    grid_cut: Floats  # (g,) 1 where the model cuts
+    grid_cut: Floats  # (g,) 1 where the model cuts and the tool moves
     grid_piece: np.ndarray  # (g,) piece
     pieces: int
     place: Callable[[Floats], Places]  # times (n,) -> where they lie between the nodes
@@ -219,12 +222,26 @@ def path_of_program(
     where = place(grid)
     grid_rho = where.of(rho)
     row_rho = place(time).of(rho)
-    grid_cut = (np.abs(where.of(load)).sum(axis=1) > 1e-9).astype(float)
+    grid_cut = (np.abs(where.of(load)).sum(axis=1) > 1e-9) * moving(grid, where.of(tip))
     grid_cut[(grid < 0.0) | (grid > timeline.end)] = 0.0
     return RunPath(
         name, time, started, True, tip, load, rho, _node_times(timeline, pieces.motion[piece], share), grid, grid_rho, grid_cut,
         where.piece, len(pieces.motion), place, row_rho, temperature, feed_mm_per_min=60.0 * float(np.median(timeline.feed)),
     )  # fmt: skip
+
+
+def moving(time: Floats, tip: Floats) -> Floats:
+    """1 where a tip (n, 3) mm moves at times (n,) s, else 0: a tool that dwells or waits in its cut is not worn by it.
+
+    Between rows that are missing while it stood it seems to creep.
+    """
+    if len(time) < 2:
+        return np.zeros(len(time))
+    around = [np.clip(time + d, time[0], time[-1]) for d in (-MOVES_S, MOVES_S)]
+    before, after = (np.column_stack([np.interp(at, time, v) for v in tip.T]) for at in around)
+    speed = np.linalg.norm(after - before, axis=1) / (around[1] - around[0])
+    usual = float(np.median(speed[speed > STANDS_MM_PER_S])) if (speed > STANDS_MM_PER_S).any() else 0.0
+    return np.asarray(speed > max(STANDS_MM_PER_S, CREEPS * usual), float)
 
 
 def _node_times(timeline: Timeline, k: np.ndarray, share: Floats) -> Floats:
