@@ -1,0 +1,1 @@
+"""Truth made by others: generators that were written from the contract alone."""

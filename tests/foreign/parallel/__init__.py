@@ -1,0 +1,1 @@
+"""Parallel machines (Orthoglide, linear delta, 3-PUU): experiments whose causes are known."""

@@ -1,0 +1,43 @@
+"""What camcomp says of experiments by generators that were written from the contract alone: what they have shown, and a mixture."""
+
+import json
+
+import pytest
+
+from tests.foreign.parallel.__main__ import write as parallel
+from tests.foreign.serial.make import make as serial
+from tests.trials.score import ask, judge, library
+
+
+def judged(folder, generator, seed):
+    if generator == "serial":
+        serial(seed, folder, None)
+    else:
+        parallel(seed, folder, None)
+    truth = json.loads((folder / "truth" / f"e-{seed}.json").read_text())
+    result = ask(folder / f"e-{seed}" / "experiment.yaml")
+    return result, judge(result, truth, library())
+
+
+def test_a_log_with_empty_set_points_of_a_machine_with_nothing_wrong(tmp_path):
+    """At a corner the row without the set-point of x had its set-point of z, 0.38 mm beside what lies between its neighbours."""
+    result, _ = judged(tmp_path, "serial", 5008)
+    assert (result["verdict"], result["causes"]) == ("none", [])
+
+
+@pytest.mark.campaign
+def test_play_of_an_axis_that_plunges_when_the_log_begins(tmp_path):
+    result, row = judged(tmp_path, "serial", 7010)
+    assert [(each["effect"], each["target"]) for each in result["causes"]] == [("backlash", "z")]
+    assert row["held"] == [True]
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize(
+    ("generator", "seed"),
+    [("serial", 5013), ("serial", 5025), ("parallel", 6003)],
+    ids=["rings", "slips under force", "chirps"],
+)
+def test_what_imitates_something_unknown_is_not_named_for_certain(tmp_path, generator, seed):
+    result, row = judged(tmp_path, generator, seed)
+    assert result["verdict"] == "unknown" and not row["false_cause"]
