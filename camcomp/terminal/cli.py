@@ -9,6 +9,7 @@ import os
 import signal
 import sys
 import warnings
+from _thread import interrupt_main
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib import import_module
@@ -99,7 +100,7 @@ def _send_again(dropped: "sys.UnraisableHookArgs") -> None:
         sys.__unraisablehook__(dropped)
         return
     number = error.number if isinstance(error, Terminated) else signal.SIGINT
-    again = Timer(SOON_S, os.kill, (os.getpid(), number))
+    again = Timer(SOON_S, interrupt_main, (number,))
     again.daemon = True
     again.start()
 

@@ -33,9 +33,8 @@ def causes_without(
     temperature = tempering(problem, best)
 
     def value(k: int, f: Fitted, members: Members) -> float:
-        minor = f.minor if members == f.members else ()
         scale = Scale(total(f.grams) - f.grams[k], problem.prior, problem.candidates)
-        return scale((*members, *minor)) / temperature + problem.candidates.prior(members, minor)
+        return scale((*members, *f.minor)) / temperature + problem.candidates.prior(members, f.minor)
 
     out = []
     for k in runs:
@@ -45,8 +44,8 @@ def causes_without(
 
 
 def _is_rival(members: Members, best: Members) -> bool:
-    """Whether a set is another answer: neither a part of the best one, which is tried anyway, nor that with something more."""
-    return not (set(members) <= set(best) or set(members) > set(best) or len(members) > len(best))
+    """Whether a set is another answer: neither a part of the best one, which is tried anyway, nor a larger one."""
+    return not (set(members) <= set(best) or len(members) > len(best))
 
 
 def _parts(members: Members) -> list[Members]:

@@ -21,13 +21,14 @@ REMEMBERED_S = 1.0  # for which slow noise lasts
 def instrument_noise(bench: Bench, floor: NoiseFloor, least: Floats, times: Sequence[Floats]) -> Noise:
     """Noise per run and channel from the scatter of its rows; it is never what a fitted model leaves.
 
-    Slow noise of the tip is what the floor states; that of the other instruments counts as large as their fast noise in the
-    run in which they have least: in the cut a dynamometer shakes with the teeth.
+    Slow noise of the tip is what the floor states; that of the other instruments counts as large as their fast noise, of a
+    dynamometer in the run in which it has least: in the cut the teeth shake it.
     """
     runs, c = len(bench.runs), len(floor.fast)
     sigma = np.full((runs, c), np.nan)
     scatter = [np.array([row_scatter(x, t) for x in bench.residual(k).T]) for k, t in enumerate(times)]
-    quietest = np.min(np.where(np.isfinite(scatter), scatter, np.inf), axis=0)
+    quietest = np.min(np.where(np.nan_to_num(scatter) > 0.0, scatter, np.inf), axis=0)
+    quietest[: c - 3] = np.inf
     slow, memory = np.zeros((runs, c)), np.zeros((runs, c))
     for k in range(runs):
         gap = bench.residual(k)

@@ -245,9 +245,9 @@ class Problem:
     def theta_without(self, f: Fitted, k: int, members: Members | None = None) -> Floats:
         """The coordinates of the members, or of some of them by themselves, fitted without run k, about the fit to all runs."""
         members = f.members if members is None else members
+        index, at = self.member_columns(members), self.member_columns(f.members)
         if len(f.grams) == 1 or not members:
-            return f.theta[: len(self.member_columns(members))]
-        index = self.member_columns(members)
+            return np.asarray(f.theta[np.array([at.index(c) for c in index], int)])
         others = total(f.grams) - f.grams[k]
         return self._bounded(members, estimate(others, self.prior, index, f.factor)[0][index])
 

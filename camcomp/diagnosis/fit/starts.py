@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from camcomp.diagnosis.fit.bench import Bench
 
 STARTED_MM, STARTED_RAD = 0.1, 1e-4  # by which an actuator has to move before its play is taken up
-STOOD_MM, STOOD_RAD = 1e-3, 1e-6  # by which it may have moved and have taken up nothing
+STOOD_MM, STOOD_RAD = 5e-3, 5e-6  # by which it may have moved and stands: a digit of its encoder
 UNDER_WAY = 8  # rows from the one to the other, in which nothing is known of it
 START_MM, START_RAD = 0.1, 5e-5  # where its carriage may stand until then: play and guides as bad as they come
 START_N, START_NMM = 1000.0, 1e6  # and how hard its guide may hold it there

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from camcomp.diagnosis.answer.nested import causes_without
 from camcomp.diagnosis.experiment.open_experiment import OpenExperiment
 from camcomp.diagnosis.fit.bench import Bench, Run, thinned
 from camcomp.diagnosis.fit.gap import main_channels
@@ -19,10 +20,9 @@ from camcomp.diagnosis.report.law_view import law_view
 from camcomp.diagnosis.report.page import diagnosis_html
 from camcomp.diagnosis.report.run_view import RivalSignals, RunView
 from camcomp.diagnosis.result.types import DiagnosisResult, NamedCause
-from camcomp.diagnosis.statistics.cause_sets import Fitted
-from camcomp.ground.datatypes import Floats
 from camcomp.ground.files import read_bytes
 from camcomp.model.config.load import load_config, load_experiment
+from camcomp.model.effect import Cause
 from camcomp.model.motion.twin import Twin
 from camcomp.report.inputs import Input
 from camcomp.report.page import Listing
@@ -74,18 +74,21 @@ def report_of(
 def views_of(done: Diagnosis, twin: Twin, runs: Sequence[Run], holdout: Sequence[str]) -> list[RunView]:
     """Runs of the fit in their order, then those named in `holdout`.
 
-    Without names every run is judged with causes fitted without it.
+    Without names every run is judged with causes chosen and fitted without it.
     """
-    problem = done.problem
+    problem, count = done.problem, len(done.problem.bench.runs)
     best = done.search.fits[done.search.verdict.best]
-    out = []
-    for k in range(len(problem.bench.runs)):
-        theta = best.theta if holdout else problem.theta_without(best, k)
-        out.append(_view(problem, problem.bench, k, best, theta, held_out=not holdout and len(problem.bench.runs) > 1))
+    answer = problem.causes(best.members, best.theta, best.extra)
+    chosen = [answer] * count
+    if not holdout:
+        without = causes_without(problem, best, done.search.fits, done.search.probability)
+        chosen = [list(each.values()) for each in without]
+    each_one = not holdout and count > 1
+    out = [_view(problem, problem.bench, k, causes, held_out=each_one) for k, causes in enumerate(chosen)]
     unseen = [run for run in runs if run.name in holdout and run.name not in {each.name for each in problem.bench.runs}]
     if unseen:
         bench = Bench(twin, unseen)
-        out += [_view(problem, bench, k, best, best.theta, held_out=True) for k in range(len(unseen))]
+        out += [_view(problem, bench, k, answer, held_out=True) for k in range(len(unseen))]
     return out
 
 
@@ -107,9 +110,8 @@ def rivals_of(done: Diagnosis) -> list[RivalSignals]:
     return out
 
 
-def _view(problem: Problem, bench: Bench, k: int, fit: Fitted, theta: Floats, *, held_out: bool) -> RunView:
+def _view(problem: Problem, bench: Bench, k: int, causes: Sequence[Cause], *, held_out: bool) -> RunView:
     part, run = main_channels(problem), bench.runs[k]
-    causes = problem.causes(fit.members, theta, fit.extra)
     before = bench.gap(k)
     after = bench.gap(k, causes) if causes else before
     path = run.run_path

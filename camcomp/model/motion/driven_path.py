@@ -34,6 +34,7 @@ _AGREE = np.cos(
 _STILL_MM_PER_S = 0.05
 BESIDE_MM = 0.6  # from the path: no blended corner leaves it further, and what does so is no cut of it
 _SURE_N = 20.0  # what the force may be off by for the nodes between rows to be led by it
+_CREEPS = 0.05  # of the speed with which the run cuts: between rows that are so far apart in time and so near in place it stood
 _SAME_FEED = 0.03  # by which a driven feed may differ from the programmed one and still be it
 LEAST_FEED = 1e-3  # mm/min, of what stands still
 _RESTS = 1e-3  # of the longest way between two rows: less, twice in a row, is rest
@@ -43,7 +44,7 @@ _CHORD_MM = 0.02  # over which a direction is taken: digits and noise of set-poi
 @dataclass(frozen=True, eq=False)
 class Forces:
     """Cutting force at n rows. force, doubt (n, 3) N, program frame: doubt is half of what it may be off by. apart (n - 1,):
-    between a row and the next something was driven that does not cut, and was not logged.
+    between a row and the next the machine did something that does not cut, or waited, and that was not logged.
     """
 
     force: Floats
@@ -151,7 +152,9 @@ def cutting_forces(
     turning = np.maximum(turning, standing)
     # line numbers that were late or early are right to a row
     slack = CLOCK_S + (float(np.median(np.diff(time))) if aligned.lag else 0.0)
-    return Forces(force, np.maximum(_doubt(force, time, on, slack), turning), on, _apart(track, motion))
+    return Forces(
+        force, np.maximum(_doubt(force, time, on, slack), turning), on, _apart(track, motion) | _waited(tip, time, on)
+    )
 
 
 def _unsteady(before: Floats, after: Floats, as_told: Bools) -> Floats:
@@ -174,6 +177,13 @@ def _apart(track: Track, motion: Ints) -> Bools:
     cuts[track.motion[track.cutting]] = True
     idle = np.concatenate([[0], np.cumsum(~cuts & (path_geometry.lengths(track.path) > 0.0))])
     return np.asarray(idle[motion[1:]] > idle[np.minimum(motion[:-1] + 1, len(idle) - 1)], bool)
+
+
+def _waited(tip: Floats, time: Floats, on: Bools) -> Bools:
+    """Whether a tool that cuts at rows (n,) `on` stood for most of the time between a row and the next, where rows are missing."""
+    speed = np.linalg.norm(np.diff(tip, axis=0), axis=1) / np.maximum(np.diff(time), 1e-9)
+    cutting = speed[on[1:] & on[:-1]]
+    return np.asarray(missing_rows(time) & (speed < _CREEPS * float(np.median(cutting) if len(cutting) else 0.0)))
 
 
 def path_tangents(track: Track, piece: Ints, w: Floats) -> Floats:

@@ -20,7 +20,6 @@ MOST_STEPS = 40000
 _IN_DOUBT = 0.05  # of the largest force
 MOVES_S = 0.05  # to both sides of an instant, in which a tip that moves is told from its noise
 STANDS_MM_PER_S = 0.05  # speed below which it stands
-CREEPS = 0.05  # of the usual speed, below which it stood while rows are missing
 _HARDLY_OTHERS = 0.8  # of the rows that cut are in doubt
 _FEW = 0.5  # of the grid, below which instants are worth picking
 
@@ -231,17 +230,13 @@ def path_of_program(
 
 
 def moving(time: Floats, tip: Floats) -> Floats:
-    """1 where a tip (n, 3) mm moves at times (n,) s, else 0: a tool that dwells or waits in its cut is not worn by it.
-
-    Between rows that are missing while it stood it seems to creep.
-    """
+    """1 where a tip (n, 3) mm moves at times (n,) s, else 0: a tool that dwells or waits in its cut is not worn by it."""
     if len(time) < 2:
         return np.zeros(len(time))
     around = [np.clip(time + d, time[0], time[-1]) for d in (-MOVES_S, MOVES_S)]
     before, after = (np.column_stack([np.interp(at, time, v) for v in tip.T]) for at in around)
     speed = np.linalg.norm(after - before, axis=1) / (around[1] - around[0])
-    usual = float(np.median(speed[speed > STANDS_MM_PER_S])) if (speed > STANDS_MM_PER_S).any() else 0.0
-    return np.asarray(speed > max(STANDS_MM_PER_S, CREEPS * usual), float)
+    return np.asarray(speed > STANDS_MM_PER_S, float)
 
 
 def _node_times(timeline: Timeline, k: np.ndarray, share: Floats) -> Floats:

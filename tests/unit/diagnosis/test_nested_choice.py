@@ -1,5 +1,6 @@
 """A run is judged with what the others would have named: what it alone has decided is no answer to it."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -24,13 +25,17 @@ class Told(SimpleNamespace):
         return list(zip(members, theta, strict=True))
 
 
-def experiment(sizes, weights):
-    """Three runs; what column 0 and column 1 do differs in the last one only, column 2 does something of its own."""
+def experiment(sizes, weights, *, only_last=False):
+    """Three runs; what column 0 and column 1 do differs in the last one only, column 2 does something of its own.
+
+    only_last: neither of the two does anything in the others.
+    """
     rng = np.random.default_rng(8)
     runs = []
     for last in (False, False, True):
         D = rng.standard_normal((200, 3))
         D[:, 1] = 0.3 * D[:, 0] + D[:, 1] if last else D[:, 0] + 0.02 * D[:, 1]
+        D[:, :2] *= last or not only_last
         runs.append(gram(D, D @ sizes + rng.standard_normal(200)))
     prior = Prior(np.full(3, 1e-3), np.ones(3), np.zeros(3), np.ones(3), np.full(3, np.inf))
     problem = Told(
@@ -65,6 +70,15 @@ def test_what_shows_in_one_run_alone_is_not_named_by_the_others():
     one = SimpleNamespace(**vars(problem) | {"bench": SimpleNamespace(runs=[None])})
     one.causes = problem.causes
     assert [tuple(each) for each in causes_without(one, both, [both], np.ones(1))] == [(0, 2)]
+
+
+def test_what_is_minor_beside_the_answer_is_beside_its_parts_too():
+    """Column 2 shows in all runs and is named by nobody: it is no reason to keep what the others do not ask for."""
+    problem, fit = experiment(np.array([0.0, 1.0, 0.4]), np.array([0.4, 0.3, 0.3]), only_last=True)
+    for minor in ((), (2,)):
+        f = replace(fit((1,)), minor=minor)
+        chosen = causes_without(problem, f, [f, fit(())], np.array([0.9, 0.1]))
+        assert tuple(chosen[2]) == ()
 
 
 def test_a_set_with_more_in_it_is_no_rival():

@@ -13,7 +13,7 @@ from camcomp.diagnosis.fit.starts import UNDER_WAY, _standing
         ((0.0, 0.13, 0.2, 0.3), (0,), ()),
         ((0.0, 0.0, 0.0, 0.05, 0.09, 0.2), (0, 1, 2), (3, 4)),  # stands, then goes
         ((0.0, 0.05, 0.0, 0.05, 0.2), (0,), (1, 2, 3)),  # what once has moved has taken up something
-        ((0.0, 0.0005, 0.0, 0.0005), (0, 1, 2, 3), ()),
+        ((0.0, 0.0025, 0.0, 0.0025), (0, 1, 2, 3), ()),  # a digit of an encoder
         (tuple(0.002 * k for k in range(60)), tuple(range(50)), ()),  # so slow that rows are alike
     ],
 )

@@ -3,27 +3,37 @@
 import numpy as np
 import pytest
 
+from camcomp.model.motion.driven_path import _waited
 from camcomp.model.motion.run_path import moving
 
 
-def way(waits_s, missing=False):
-    """30 mm/s along x for a second, a wait, and another second; rows every 10 ms, none while it stands where they are missing."""
-    n = 100
-    x = np.concatenate([0.3 * np.arange(n), np.full(round(waits_s / 0.01), 0.3 * n), 0.3 * (n + np.arange(n))])
-    t = 0.01 * np.arange(len(x))
-    if missing:
-        kept = np.flatnonzero(np.concatenate([[True], np.diff(x) > 0.0]))
-        grid = np.linspace(0.0, t[-1], 4 * len(t))
-        return grid, np.column_stack([np.interp(grid, t[kept], x[kept]), np.zeros((len(grid), 2))])
-    return t, np.column_stack([x, np.zeros((len(x), 2))])
+def way(waits_s, feed=30.0):
+    """Along x for a second, a wait, and another second; a row every 10 ms."""
+    n, step = 100, 0.01 * feed
+    x = np.concatenate([step * np.arange(n), np.full(round(waits_s / 0.01), step * n), step * (n + np.arange(n))])
+    return 0.01 * np.arange(len(x)), np.column_stack([x, np.zeros((len(x), 2))])
 
 
-@pytest.mark.parametrize("missing", [False, True])
 @pytest.mark.parametrize("waits_s", [0.0, 1.5])
-def test_seconds_in_which_it_stands_do_not_count(waits_s, missing):
-    t, tip = way(waits_s, missing)
-    cut_s = float((moving(t, tip)[1:] * np.diff(t)).sum())
-    assert cut_s == pytest.approx(2.0, abs=0.12)
+def test_seconds_in_which_it_stands_do_not_count(waits_s):
+    t, tip = way(waits_s)
+    assert (moving(t, tip)[1:] * np.diff(t)).sum() == pytest.approx(2.0, abs=0.12)
+
+
+@pytest.mark.parametrize("feed", [30.0, 1.0])
+def test_nor_do_they_where_their_rows_are_missing(feed):
+    t, tip = way(1.5, feed)
+    on = np.ones(len(t), bool)
+    kept = np.flatnonzero(np.concatenate([[True], np.diff(tip[:, 0]) > 0.0]))
+    for rows, waits in ((np.arange(len(t)), 0), (kept, 1), (kept[::2], 1), (np.delete(kept, slice(20, 40)), 1)):
+        assert _waited(tip[rows], t[rows], on[rows]).sum() == waits
+
+
+def test_a_slow_cut_is_one_beside_fast_moves_in_the_air():
+    t = 0.01 * np.arange(2000)
+    x = np.where(t < 12.0, 100.0 * t, 1200.0 + 4.0 * (t - 12.0))
+    assert moving(t, np.column_stack([x, 0.0 * x, 0.0 * x])).all()
+    assert not _waited(np.column_stack([x, 0.0 * x, 0.0 * x]), t, t >= 12.0).any()
 
 
 def test_noise_of_an_encoder_is_no_motion_and_a_slow_feed_is_one():
