@@ -1,9 +1,20 @@
-"""What keeps to a clock runs alone: the other processes of a test run wait for it, and it for them."""
+"""What keeps to a clock runs alone: the other processes of a test run wait for it, and it for them.
+
+Commands that tests start are ended by signals as in a shell, also where the test run was started by nohup or in the background.
+"""
 
 import fcntl
+import signal
 from contextlib import ExitStack, contextmanager
 
 import pytest
+
+
+def pytest_configure():
+    """What is ignored here would be ignored by every command that a test starts; what is handled is not."""
+    for number in (signal.SIGINT, signal.SIGHUP):
+        if signal.getsignal(number) == signal.SIG_IGN:
+            signal.signal(number, lambda *_: None)
 
 
 @contextmanager
