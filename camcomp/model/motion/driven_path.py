@@ -8,11 +8,12 @@ corner, at which instant a cut begins) the rows say so.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d, minimum_filter1d
 from scipy.interpolate import Akima1DInterpolator, PchipInterpolator
 
 from camcomp.ground import path_geometry
@@ -34,6 +35,15 @@ _AGREE = np.cos(
 _STILL_MM_PER_S = 0.05
 BESIDE_MM = 0.6  # from the path: no blended corner leaves it further, and what does so is no cut of it
 _SURE_N = 20.0  # what the force may be off by for the nodes between rows to be led by it
+_DEGREES = (
+    (0, 1),
+    (1, 2),
+    (3, 7),
+)  # of a load along a piece, and rows for it; the cubic misses 60 deg of an arc by 4e-4 of it
+_CORNER = 0.1  # of the largest force, beside most of a piece: beyond it first derivatives are not enough
+_EVEN = 1e-3  # of the largest force: what most rows may be off by where a lower degree will do
+_REWEIGHTED = 12
+_REST_S = 0.1  # within which a tip that stands goes no further than _CHORD_MM
 _CREEPS = 0.05  # of the speed with which the run cuts: between rows that are so far apart in time and so near in place it stood
 _SAME_FEED = 0.03  # by which a driven feed may differ from the programmed one and still be it
 LEAST_FEED = 1e-3  # mm/min, of what stands still
@@ -90,13 +100,14 @@ def driven_path(
     lead, lead_tip = _smooth(time, rho), _smooth(time, row_tip)
     grid_rho, grid_tip = lead(grid), lead_tip(grid)
     jump = _jumps(row_force, forces.cutting)
+    sure = np.linalg.norm(forces.doubt, axis=1) <= _SURE_N
     pieces = _Pieces.along(time, grid, grid_tip, jump)
+    pieces = pieces.around(time, _beside_most(time, row_force, sure, jump, pieces))
     node_time = pieces.node_times()
     # the tip is led between rows, and the drives where it asks them to be: an arm keeps its tool upright there
     node_tip = lead_tip(node_time)
     node_rho = inverse(node_tip)
-    sure = np.linalg.norm(forces.doubt, axis=1) <= _SURE_N
-    node_force = _of_stretches(time, row_force, sure, jump, node_time, pieces)
+    node_force = _node_loads(time, row_force, sure, jump, node_time, pieces)
     return RunPath(
         name, time, started, True, node_tip, node_force, node_rho, node_time, grid, grid_rho,
         forces.cut_at(time, grid) * moving(grid, grid_tip), pieces.of(grid), len(pieces.begin), pieces.at, rho, temperature,
@@ -131,6 +142,7 @@ def cutting_forces(
         on &= aligned.distance < beside_mm
     if not on.any() or track.conditions.model is None:
         return Forces.none(len(tip))
+    tip = _held_at_rest(tip, time)
     before, after = driven_directions(tip, time)
     programmed = path_tangents(track, piece, w)
     middle = before + after
@@ -242,6 +254,26 @@ def driven_directions(tip: Floats, time: Floats) -> tuple[Floats, Floats]:
     end = moving & (np.linalg.norm(after, axis=1) == 0.0)
     after[end] = before[end]
     return before, after
+
+
+def _held_at_rest(tip: Floats, time: Floats) -> Floats:
+    """Tips (n, 3) with those of a rest in its middle: what measured ones, and digits, tremble by is no way and has no direction."""
+    rows = (
+        2 * max(int(round(0.5 * _REST_S / max(float(np.median(np.diff(time))), 1e-9))), 2) + 1 if len(time) > 1 else 1
+    )
+    if len(time) < rows:
+        return tip
+    spread = (maximum_filter1d(tip, rows, axis=0) - minimum_filter1d(tip, rows, axis=0)).max(axis=1)
+    near = maximum_filter1d((spread < _CHORD_MM).astype(int), rows)
+    edge = np.flatnonzero(np.diff(near, prepend=0, append=0))
+    out = tip.copy()
+    for a, b in zip(edge[::2], edge[1::2], strict=True):
+        if (
+            b - a >= rows
+            and np.linalg.norm(tip[b - rows : b].mean(axis=0) - tip[a : a + rows].mean(axis=0)) < _CHORD_MM
+        ):
+            out[a:b] = np.median(tip[a:b], axis=0)
+    return out
 
 
 def _standing(tip: Floats, time: Floats) -> Bools:
@@ -365,11 +397,20 @@ class _Pieces:
         start = np.array(begin)
         return cls(start, np.append(start[1:], time[-1]), grid, way, np.array(stretch))
 
+    def around(self, time: Floats, rows: Bools) -> _Pieces:
+        """The same with pieces of their own for rows (n,) that follow each other."""
+        changes = np.flatnonzero(rows[1:] != rows[:-1])
+        right = np.clip(np.searchsorted(time, self.begin), 1, len(time) - 1)
+        new_stretch = np.diff(self.stretch, prepend=-1) > 0
+        kept = self.begin[new_stretch | ~(rows[right - 1] & rows[right])]
+        begin = np.unique(np.concatenate([kept, 0.5 * (time[changes] + time[changes + 1])]))
+        return replace(self, begin=begin, end=np.append(begin[1:], time[-1]), stretch=self.stretch[self.of(begin)])
+
     def of(self, at: Floats) -> Ints:
         """Piece (n,) at times (n,)."""
         return np.clip(np.searchsorted(self.begin, at, side="right") - 1, 0, len(self.begin) - 1)
 
-    def _local(self, piece: Ints, at: Floats) -> Floats:
+    def local(self, piece: Ints, at: Floats) -> Floats:
         """Fraction (n,) of the piece that is done: of its way, or of its time where it stands still."""
         first, last = np.interp(self.begin, self.grid, self.way), np.interp(self.end, self.grid, self.way)
         way = (last - first)[piece]
@@ -379,7 +420,7 @@ class _Pieces:
 
     def at(self, at: Floats) -> Places:
         piece = self.of(at)
-        return Places(piece, piece[:, None] * NODES + np.arange(NODES), basis_at(self._local(piece, at)))
+        return Places(piece, piece[:, None] * NODES + np.arange(NODES), basis_at(self.local(piece, at)))
 
     def node_times(self) -> Floats:
         out = []
@@ -390,6 +431,49 @@ class _Pieces:
             done = (way - way[0]) / (way[-1] - way[0]) if way[-1] - way[0] > 1e-3 else (t - a) / max(b - a, 1e-9)
             out.append(np.interp(SPLIT, done, t))
         return np.concatenate(out)
+
+
+def _node_loads(time: Floats, force: Floats, sure: Bools, jump: Ints, at: Floats, pieces: _Pieces) -> Floats:
+    """Loads (q, 3) N under which the structure is solved at node times (q,): smooth along a piece, as most of its sure rows have them.
+
+    What a row's force (n, 3) is beside, first derivatives add. A polynomial that went through all of them would swing between
+    nodes wherever a piece begins or ends in a corner, and the structure with it.
+    """
+    out = _of_stretches(time, force, sure, jump, at, pieces)
+    piece, most = pieces.of(time), float(np.linalg.norm(force, axis=1).max(initial=0.0))
+    local = pieces.local(piece, time)
+    order = np.argsort(piece[sure], kind="stable")
+    rows = np.flatnonzero(sure)[order]
+    for mine in np.split(rows, np.flatnonzero(np.diff(piece[rows])) + 1):
+        if not len(mine):
+            continue
+        for degree in (d for d, fewest in _DEGREES if len(mine) >= fewest):
+            smooth, off = _mostly(local[mine], force[mine], degree)
+            if off <= _EVEN * most:
+                break
+        if np.linalg.norm(smooth, axis=1).max() <= most:
+            out[piece[mine[0]] * NODES + np.arange(NODES)] = smooth
+    return out
+
+
+def _beside_most(time: Floats, force: Floats, sure: Bools, jump: Ints, pieces: _Pieces) -> Bools:
+    """Sure rows (n,) whose force is far beside that of most of their piece, as in a corner that a control blends."""
+    loads = _node_loads(time, force, sure, jump, pieces.node_times(), pieces)
+    off = np.linalg.norm(force - pieces.at(time).of(loads), axis=1)
+    return np.asarray(sure & (off > _CORNER * float(np.linalg.norm(force, axis=1).max(initial=0.0))))
+
+
+def _mostly(at: Floats, values: Floats, degree: int) -> tuple[Floats, float]:
+    """The polynomial at the nodes (NODES, 3) that is nearest to most values (n, 3) at places (n,) from 0 to 1, and the median of
+    what it misses: least absolute deviations (iteratively reweighted, Schlossmacher 1973).
+    """
+    ways, at_nodes = np.vander(2.0 * at - 1.0, degree + 1), np.vander(2.0 * SPLIT - 1.0, degree + 1)
+    weight = np.ones(len(at))
+    for _ in range(_REWEIGHTED):
+        found = np.linalg.lstsq(weight[:, None] * ways, weight[:, None] * values, rcond=None)[0]
+        off = np.linalg.norm(values - ways @ found, axis=1)
+        weight = 1.0 / np.sqrt(np.maximum(off, 1e-3 * float(off.max(initial=0.0)) + 1e-9))
+    return at_nodes @ found, float(np.median(off))
 
 
 def _of_stretches(time: Floats, values: Floats, sure: Bools, jump: Ints, at: Floats, pieces: _Pieces) -> Floats:

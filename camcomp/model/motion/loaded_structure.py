@@ -19,6 +19,16 @@ from camcomp.model.motion.run_path import RunPath
 
 
 @dataclass(frozen=True, eq=False)
+class Softer:
+    """By how much more (mm/N, N/N) a changed machine gives way to a force at the tip than the one whose slopes carry on from its
+    nodes, piece by piece: tip (pieces, 3, 3), drive (pieces, m, 3).
+    """
+
+    tip: Floats
+    drive: Floats
+
+
+@dataclass(frozen=True, eq=False)
 class Solved:
     """The structure at a run path's nodes, for the drive positions and loads it was solved with."""
 
@@ -27,6 +37,7 @@ class Solved:
     load: Load  # (q)
     tip: Floats  # (q, 3) machine frame
     drive: Floats  # (q, m)
+    softer: Softer | None = None  # where the nodes' loads are not those between them
     _tips: WeakKeyDictionary[Places, Floats] = field(default_factory=WeakKeyDictionary, init=False, repr=False)
     _drives: WeakKeyDictionary[Places, Floats] = field(default_factory=WeakKeyDictionary, init=False, repr=False)
 
@@ -54,19 +65,35 @@ class Following:
     by_rho: Floats
     by_wrench: Floats
     at_reference: Floats
-    _by_usual_load: WeakKeyDictionary[Load, Floats] = field(default_factory=WeakKeyDictionary, init=False, repr=False)
+    _by_usual_load: WeakKeyDictionary[Load, tuple[Floats, Floats]] = field(
+        default_factory=WeakKeyDictionary, init=False, repr=False
+    )
 
-    def behind(self, values: Floats, place: Places, solved: Solved, gap: Floats, load: Load, *, usual: bool) -> Floats:
+    def behind(
+        self,
+        values: Floats,
+        place: Places,
+        solved: Solved,
+        gap: Floats,
+        load: Load,
+        *,
+        usual: bool,
+        softer: Floats | None = None,
+    ) -> Floats:
         """Values that stand in a structure, with what carriages (n, m) beside set-points and a load (n) change beyond it.
 
-        usual: it is the load of the run path itself, under which what it changes is worked out once.
+        usual: it is the load of the run path itself, under which what it changes is worked out once. softer (pieces, ., 3): of
+        a structure that gives way to forces otherwise than the slopes say.
         """
-        by_load = self._by_usual_load.get(solved.load) if usual else None
-        if by_load is None:
+        known = self._by_usual_load.get(solved.load) if usual else None
+        if known is None:
             force, wrench = load.force - place.of(solved.load.force), load.wrench - place.of(solved.load.wrench)
-            by_load = applied(self.by_wrench, wrench + force @ self.at_reference)
+            known = force, applied(self.by_wrench, wrench + force @ self.at_reference)
         if usual:
-            self._by_usual_load[solved.load] = by_load
+            self._by_usual_load[solved.load] = known
+        force, by_load = known
+        if softer is not None:
+            by_load = by_load + np.einsum("nij,nj->ni", softer[place.piece], force)
         out = np.empty(values.shape)
         slope, given = self.by_rho.transpose(1, 2, 0), (values, gap, solved.shift, by_load)
         _behind(np.ascontiguousarray(slope), place.piece, *map(np.ascontiguousarray, given), out)
@@ -82,6 +109,7 @@ class Slopes:
     drive_rho: Floats
     drive_wrench: Floats
     at_reference: Floats  # wrench (3, 6) there per force at the tip
+    key: tuple[Any, ...] = ()  # the machine that they are of
     _at: WeakKeyDictionary[Places, Slopes] = field(default_factory=WeakKeyDictionary, init=False, repr=False)
     _tips: WeakKeyDictionary[Places, Following] = field(default_factory=WeakKeyDictionary, init=False, repr=False)
     _drives: WeakKeyDictionary[Places, Following] = field(default_factory=WeakKeyDictionary, init=False, repr=False)
@@ -91,7 +119,7 @@ class Slopes:
         if place not in self._at:
             nodes = (self.tip_rho, self.tip_wrench, self.drive_rho, self.drive_wrench)
             tip_rho, tip_wrench, drive_rho, drive_wrench = (rows_together(place.of(each)) for each in nodes)
-            self._at[place] = Slopes(tip_rho, tip_wrench, drive_rho, drive_wrench, self.at_reference)
+            self._at[place] = Slopes(tip_rho, tip_wrench, drive_rho, drive_wrench, self.at_reference, self.key)
         return self._at[place]
 
     def tips(self, place: Places) -> Following:

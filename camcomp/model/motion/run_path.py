@@ -21,6 +21,7 @@ _IN_DOUBT = 0.05  # of the largest force
 MOVES_S = 0.05  # to both sides of an instant, in which a tip that moves is told from its noise
 STANDS_MM_PER_S = 0.05  # speed below which it stands
 _HARDLY_OTHERS = 0.8  # of the rows that cut are in doubt
+_UNEVEN = 1e-3  # of the largest force
 _FEW = 0.5  # of the grid, below which instants are worth picking
 
 
@@ -131,6 +132,21 @@ class RunPath:
     def row_force(self) -> Floats:
         """Cutting force (n, 3) N at the rows, machine frame, as modelled."""
         return self.row_place.of(self.node_force) if self.driven is None else self.driven.force
+
+    @cached_property
+    def node_piece(self) -> Ints:
+        """Piece (q,) of every node."""
+        return np.arange(len(self.node_tip)) // max(len(self.node_tip) // max(self.pieces, 1), 1)
+
+    @cached_property
+    def uneven(self) -> tuple[Ints, float]:
+        """A node in the middle of every piece along which the force at the rows is not what its nodes lead to, and by how much, N."""
+        if self.driven is None:
+            return np.zeros(0, np.int64), 0.0
+        off = np.abs(self.row_force - self.row_place.of(self.node_force)).max(axis=1)
+        pieces = np.unique(self.row_place.piece[off > _UNEVEN * float(np.abs(self.row_force).max(initial=0.0))])
+        middle = len(self.node_tip) // max(self.pieces, 1) // 2
+        return np.searchsorted(self.node_piece, pieces) + middle, float(off.max(initial=0.0))
 
     def forces(self, place: Places) -> Floats:
         """Cutting force (n, 3) N, machine frame, at a `place` that lies little beside that of the rows."""

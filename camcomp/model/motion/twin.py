@@ -20,7 +20,7 @@ from camcomp.ground.errors import PhysicsError
 from camcomp.model import signal_path
 from camcomp.model.effect import Cause, Load, Motion
 from camcomp.model.job import Job
-from camcomp.model.motion.loaded_structure import Slopes, Solved
+from camcomp.model.motion.loaded_structure import Slopes, Softer, Solved
 from camcomp.model.motion.node_pieces import Places
 from camcomp.model.motion.run_path import RunPath, travel_direction
 from camcomp.model.statics.description import Robot
@@ -35,6 +35,7 @@ _FORWARD_PASSES = 12
 _FORWARD_MM = 1e-7
 _FORWARD_FAR_MM = 3.0  # from which on slopes are worked out anew for Newton's method,
 _FORWARD_NEAR_MM = 0.3  # and for what lies between its points
+_UNSEEN_MM = 1e-5  # what uneven forces move a changed machine's tip by
 _LATELY = 4  # changed machines that are kept
 _SAME_LOAD = 1e-3  # share of the load by which a changed machine's may differ from that it was solved with
 
@@ -203,15 +204,23 @@ class Twin:
             shift = known.shift
         load = self._node_load(run_path, grid, causes, known, key)
         if known is None or known.key != key or load is not known.load:
-            known = self.structure(run_path, self._machine(robot, key), key, shift, load)
+            machine = self._machine(robot, key)
+            known = self.structure(run_path, machine, key, shift, load)
+            if slopes is not None and key != slopes.key:
+                known = replace(known, softer=self._softer(run_path, machine, known, slopes))
         solved = known
         load = signal_path.loaded(causes, rows, run_path.row_force)
         load_tip = signal_path.loaded(causes, at_tip, run_path.forces(place_tip)) if late else load
         drive, tip = solved.drives(place), solved.tips(run_path, place_tip, seen)
         if slopes is not None:
             usual = not signal_path.acting(causes, "process")
-            drive = slopes.drives(place).behind(drive, place, solved, gap_row, load, usual=usual)
-            tip = slopes.tips(place_tip).behind(tip, place_tip, solved, gap_tip, load_tip, usual=usual)
+            soft = solved.softer
+            drive = slopes.drives(place).behind(
+                drive, place, solved, gap_row, load, usual=usual, softer=None if soft is None else soft.drive
+            )
+            tip = slopes.tips(place_tip).behind(
+                tip, place_tip, solved, gap_tip, load_tip, usual=usual, softer=None if soft is None else soft.tip
+            )
         if effort is not None:
             drive = drive + path.between(effort, run_path.time)
         # tool, workpiece, sensor
@@ -271,14 +280,62 @@ class Twin:
 
     def structure(self, run_path: RunPath, machine: Machine, key: tuple[Any, ...], shift: Floats, load: Load) -> Solved:
         """Loaded equilibrium at the nodes. Raises PhysicsError CC411 when a node cannot be solved."""
-        node_piece = np.arange(len(run_path.node_tip)) // max(len(run_path.node_tip) // max(run_path.pieces, 1), 1)
-        rho = run_path.node_rho + shift[node_piece]
-        state = solve(machine, FREE, run_path.node_tip, force=load.force, wrench=load.wrench, rho=rho, check=False)
+        return Solved(key, shift, load, *self._loaded(run_path, machine, slice(None), shift, load.force, load.wrench))
+
+    def _loaded(
+        self,
+        run_path: RunPath,
+        machine: Machine,
+        nodes: slice | Ints,
+        shift: Floats,
+        force: Floats,
+        wrench: Floats,
+    ) -> tuple[Floats, Floats]:
+        """Tips (k, 3) and drives (k, m) at some nodes under a load (k). Raises PhysicsError CC411."""
+        near, of = run_path.node_tip[nodes], run_path.node_piece[nodes]
+        rho = run_path.node_rho[nodes] + shift[of]
+        state = solve(machine, FREE, near, force=force, wrench=wrench, rho=rho, check=False)
         if (state.status != 0).any():
             bad = int(np.argmax(state.status != 0))
-            where = np.round(self.to_program(run_path.node_tip[bad]), 3).tolist()
+            where = np.round(self.to_program(near[bad]), 3).tolist()
             raise PhysicsError("CC411", f"run '{run_path.name}', tip {where}: {STATUS[int(state.status[bad])]}")
-        return Solved(key, shift, load, state.tip, state.drive)
+        return state.tip, state.drive
+
+    def _softer(self, run_path: RunPath, machine: Machine, solved: Solved, slopes: Slopes) -> Softer | None:
+        """What the machine gives way by more than the slopes say, at one node of every piece in which the force is uneven.
+
+        None where one such node says that it is next to nothing: most changes of a machine leave its springs alone.
+        """
+        nodes, most = run_path.uneven
+        if not len(nodes):
+            return None
+        first = self._more(run_path, machine, solved, slopes, nodes[:1])[0]
+        if np.abs(first).max() * most < _UNSEEN_MM:
+            return None
+        tip, drive = (np.zeros((run_path.pieces, k, 3)) for k in (3, len(self.actuators)))
+        pieces = run_path.node_piece[nodes]
+        tip[pieces], drive[pieces] = self._more(run_path, machine, solved, slopes, nodes)
+        return Softer(tip, drive)
+
+    def _more(
+        self, run_path: RunPath, machine: Machine, solved: Solved, slopes: Slopes, nodes: Ints
+    ) -> tuple[Floats, Floats]:
+        """Slopes of tip (k, 3, 3) and drives (k, m, 3) by force at some nodes, less those of the unchanged machine."""
+        force, wrench = solved.load.force[nodes], solved.load.wrench[nodes]
+        pushed = [
+            self._loaded(run_path, machine, nodes, solved.shift, force, wrench + _FORCE_STEP * each)
+            for each in self._at_reference
+        ]
+        tip, drive = (
+            (np.stack(moved, axis=2) - still[nodes][:, :, None]) / _FORCE_STEP - usual[nodes] @ self._at_reference.T
+            for moved, still, usual in zip(
+                zip(*pushed, strict=True),
+                (solved.tip, solved.drive),
+                (slopes.tip_wrench, slopes.drive_wrench),
+                strict=True,
+            )
+        )
+        return tip, drive
 
     def slopes(self, run_path: RunPath, causes: Sequence[Cause], solved: Solved) -> Slopes:
         """Derivatives of the structure at the nodes, by differences of its own solution."""
@@ -299,7 +356,7 @@ class Twin:
             tips.append((moved.tip - solved.tip) / step)
             drives.append((moved.drive - solved.drive) / step)
         tip, drive = np.stack(tips, axis=2), np.stack(drives, axis=2)
-        return Slopes(tip[:, :, :m], tip[:, :, m:], drive[:, :, :m], drive[:, :, m:], self._at_reference)
+        return Slopes(tip[:, :, :m], tip[:, :, m:], drive[:, :, :m], drive[:, :, m:], self._at_reference, key)
 
     # -- pieces of the path -------------------------------------------------------------------------------------------
 
