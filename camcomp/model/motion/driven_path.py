@@ -13,8 +13,8 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import maximum_filter1d, minimum_filter1d
 from scipy.interpolate import Akima1DInterpolator, PchipInterpolator
+from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import Bools, Floats, Ints
@@ -258,9 +258,7 @@ def driven_directions(tip: Floats, time: Floats) -> tuple[Floats, Floats]:
 
 def _held_at_rest(tip: Floats, time: Floats) -> Floats:
     """Tips (n, 3) with those of a rest in its middle: what measured ones, and digits, tremble by is no way and has no direction."""
-    rows = (
-        2 * max(int(round(0.5 * _REST_S / max(float(np.median(np.diff(time))), 1e-9))), 2) + 1 if len(time) > 1 else 1
-    )
+    rows = 2 * max(round(0.5 * _REST_S / max(float(np.median(np.diff(time))), 1e-9)), 2) + 1 if len(time) > 1 else 1
     if len(time) < rows:
         return tip
     spread = (maximum_filter1d(tip, rows, axis=0) - minimum_filter1d(tip, rows, axis=0)).max(axis=1)
