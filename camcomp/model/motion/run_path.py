@@ -139,14 +139,13 @@ class RunPath:
         return np.arange(len(self.node_tip)) // max(len(self.node_tip) // max(self.pieces, 1), 1)
 
     @cached_property
-    def uneven(self) -> tuple[Ints, float]:
-        """A node in the middle of every piece along which the force at the rows is not what its nodes lead to, and by how much, N."""
+    def uneven(self) -> Ints:
+        """A node in the middle of every piece along which the force at the rows is not what its nodes lead to."""
         if self.driven is None:
-            return np.zeros(0, np.int64), 0.0
+            return np.zeros(0, np.int64)
         off = np.abs(self.row_force - self.row_place.of(self.node_force)).max(axis=1)
         pieces = np.unique(self.row_place.piece[off > _UNEVEN * float(np.abs(self.row_force).max(initial=0.0))])
-        middle = len(self.node_tip) // max(self.pieces, 1) // 2
-        return np.searchsorted(self.node_piece, pieces) + middle, float(off.max(initial=0.0))
+        return np.asarray(np.searchsorted(self.node_piece, pieces) + len(self.node_tip) // max(self.pieces, 1) // 2)
 
     def forces(self, place: Places) -> Floats:
         """Cutting force (n, 3) N, machine frame, at a `place` that lies little beside that of the rows."""

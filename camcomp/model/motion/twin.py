@@ -35,7 +35,6 @@ _FORWARD_PASSES = 12
 _FORWARD_MM = 1e-7
 _FORWARD_FAR_MM = 3.0  # from which on slopes are worked out anew for Newton's method,
 _FORWARD_NEAR_MM = 0.3  # and for what lies between its points
-_UNSEEN_MM = 1e-5  # what uneven forces move a changed machine's tip by
 _LATELY = 4  # changed machines that are kept
 _SAME_LOAD = 1e-3  # share of the load by which a changed machine's may differ from that it was solved with
 
@@ -204,10 +203,7 @@ class Twin:
             shift = known.shift
         load = self._node_load(run_path, grid, causes, known, key)
         if known is None or known.key != key or load is not known.load:
-            machine = self._machine(robot, key)
-            known = self.structure(run_path, machine, key, shift, load)
-            if slopes is not None and key != slopes.key:
-                known = replace(known, softer=self._softer(run_path, machine, known, slopes))
+            known = self.structure(run_path, self._machine(robot, key), key, shift, load, slopes)
         solved = known
         load = signal_path.loaded(causes, rows, run_path.row_force)
         load_tip = signal_path.loaded(causes, at_tip, run_path.forces(place_tip)) if late else load
@@ -278,9 +274,42 @@ class Twin:
 
         return at_nodes
 
-    def structure(self, run_path: RunPath, machine: Machine, key: tuple[Any, ...], shift: Floats, load: Load) -> Solved:
-        """Loaded equilibrium at the nodes. Raises PhysicsError CC411 when a node cannot be solved."""
-        return Solved(key, shift, load, *self._loaded(run_path, machine, slice(None), shift, load.force, load.wrench))
+    def structure(
+        self,
+        run_path: RunPath,
+        machine: Machine,
+        key: tuple[Any, ...],
+        shift: Floats,
+        load: Load,
+        slopes: Slopes | None = None,
+    ) -> Solved:
+        """Loaded equilibrium at the nodes. Raises PhysicsError CC411 when a node cannot be solved.
+
+        slopes: those with which values between the nodes follow it. Where they are of another machine, a node of every piece with
+        uneven forces is solved under a force more in every direction as well: all in one call, which costs more than its points.
+        """
+        q, uneven = len(run_path.node_tip), run_path.uneven
+        if slopes is None or slopes.key == key or not len(uneven):
+            tip, drive = self._loaded(run_path, machine, slice(None), shift, load.force, load.wrench)
+            return Solved(key, shift, load, tip, drive)
+        nodes = np.concatenate([np.arange(q), np.tile(uneven, 3)])
+        wrench = load.wrench[nodes]
+        wrench[q:] += _FORCE_STEP * np.repeat(self._at_reference, len(uneven), axis=0)
+        tip, drive = self._loaded(run_path, machine, nodes, shift, load.force[nodes], wrench)
+        softer = Softer(*(
+            self._more(run_path, each, usual)
+            for each, usual in ((tip, slopes.tip_wrench), (drive, slopes.drive_wrench))
+        ))  # fmt: skip
+        return Solved(key, shift, load, tip[:q], drive[:q], softer)
+
+    def _more(self, run_path: RunPath, values: Floats, usual: Floats) -> Floats:
+        """Slopes (pieces, ., 3) by force less usual ones (q, ., 6) by wrench, from values at the nodes and at the pushed ones."""
+        q, uneven = len(run_path.node_tip), run_path.uneven
+        pushed = values[q:].reshape(3, len(uneven), -1).transpose(1, 2, 0)
+        own = (pushed - values[uneven][:, :, None]) / _FORCE_STEP
+        out = np.zeros((run_path.pieces, values.shape[1], 3))
+        out[run_path.node_piece[uneven]] = own - usual[uneven] @ self._at_reference.T
+        return out
 
     def _loaded(
         self,
@@ -300,42 +329,6 @@ class Twin:
             where = np.round(self.to_program(near[bad]), 3).tolist()
             raise PhysicsError("CC411", f"run '{run_path.name}', tip {where}: {STATUS[int(state.status[bad])]}")
         return state.tip, state.drive
-
-    def _softer(self, run_path: RunPath, machine: Machine, solved: Solved, slopes: Slopes) -> Softer | None:
-        """What the machine gives way by more than the slopes say, at one node of every piece in which the force is uneven.
-
-        None where one such node says that it is next to nothing: most changes of a machine leave its springs alone.
-        """
-        nodes, most = run_path.uneven
-        if not len(nodes):
-            return None
-        first = self._more(run_path, machine, solved, slopes, nodes[:1])[0]
-        if np.abs(first).max() * most < _UNSEEN_MM:
-            return None
-        tip, drive = (np.zeros((run_path.pieces, k, 3)) for k in (3, len(self.actuators)))
-        pieces = run_path.node_piece[nodes]
-        tip[pieces], drive[pieces] = self._more(run_path, machine, solved, slopes, nodes)
-        return Softer(tip, drive)
-
-    def _more(
-        self, run_path: RunPath, machine: Machine, solved: Solved, slopes: Slopes, nodes: Ints
-    ) -> tuple[Floats, Floats]:
-        """Slopes of tip (k, 3, 3) and drives (k, m, 3) by force at some nodes, less those of the unchanged machine."""
-        force, wrench = solved.load.force[nodes], solved.load.wrench[nodes]
-        pushed = [
-            self._loaded(run_path, machine, nodes, solved.shift, force, wrench + _FORCE_STEP * each)
-            for each in self._at_reference
-        ]
-        tip, drive = (
-            (np.stack(moved, axis=2) - still[nodes][:, :, None]) / _FORCE_STEP - usual[nodes] @ self._at_reference.T
-            for moved, still, usual in zip(
-                zip(*pushed, strict=True),
-                (solved.tip, solved.drive),
-                (slopes.tip_wrench, slopes.drive_wrench),
-                strict=True,
-            )
-        )
-        return tip, drive
 
     def slopes(self, run_path: RunPath, causes: Sequence[Cause], solved: Solved) -> Slopes:
         """Derivatives of the structure at the nodes, by differences of its own solution."""

@@ -22,6 +22,9 @@ EXACT = (
 )
 
 
+_BRANCHES = tuple(product((1.0, -1.0), repeat=3))  # side, elbow, flip
+
+
 @dataclass(frozen=True)
 class ClosedForm:
     """Axes (6, 3) and points on them (6, 3) mm with all joints at zero; the wrist's centre; the platform's pose there."""
@@ -36,22 +39,23 @@ class ClosedForm:
 
     def near(self, rotation: Array, position: Array) -> Array | None:
         """Joint coordinates (6,) rad that bring the platform to a pose, in the branch of the start pose; None out of reach."""
-        q = self.all(rotation, position)[self.branch]
+        q = self._in_branch(self.branch, *self._wrist_at(rotation, position))
         return None if q is None else q + 2.0 * np.pi * np.round((self.start - q) / (2.0 * np.pi))
 
     def all(self, rotation: Array, position: Array) -> list[Array | None]:
         """The eight branches, each (6,) rad or None where the arm does not reach."""
+        at = self._wrist_at(rotation, position)
+        return [self._in_branch(branch, *at) for branch in range(len(_BRANCHES))]
+
+    def _wrist_at(self, rotation: Array, position: Array) -> tuple[Array, Array]:
+        """Turn (3, 3) of the platform from its start pose, and centre (3,) of the wrist."""
         turn = rotation @ self.rotation.T
-        centre = position + turn @ (self.wrist - self.position)
-        out: list[Array | None] = []
-        for side, elbow in product((1.0, -1.0), repeat=2):
-            arm = self._arm(centre, side, elbow)
-            out += (
-                [None, None]
-                if arm is None
-                else [np.concatenate((arm, self._wrist(turn, arm, flip))) for flip in (1.0, -1.0)]
-            )
-        return out
+        return turn, position + turn @ (self.wrist - self.position)
+
+    def _in_branch(self, branch: int, turn: Array, centre: Array) -> Array | None:
+        side, elbow, flip = _BRANCHES[branch]
+        arm = self._arm(centre, side, elbow)
+        return None if arm is None else np.concatenate((arm, self._wrist(turn, arm, flip)))
 
     def _arm(self, centre: Array, side: float, elbow: float) -> Array | None:
         z, u = self.axes[0], self.axes[1]
