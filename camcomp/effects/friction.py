@@ -19,7 +19,7 @@ _CARRIAGE_WAY = Parameter(
     "way that turns the friction round: 1 the carriage's, behind its spring; 0 the encoder's", either=(1.0, 0.0),
 )  # fmt: skip
 FITTED = (
-    Parameter("force_N", "N", 0.0, 0.0, 2000.0, 60.0, 0.2, "guides and seals of feed drives: 5 to 300 N", sign=1),
+    Parameter("force_N", "N", 0.0, 0.0, 20000.0, 60.0, 0.2, "guides and seals of feed drives: 5 to 300 N", sign=1),
     Parameter("presliding_mm", "mm", PRESLIDING_MM, *_LENGTH, scan=(0.001, 0.003, 0.008, 0.02, 0.06)),
     _CARRIAGE_WAY,
 )

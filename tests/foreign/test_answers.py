@@ -25,6 +25,30 @@ def test_a_log_with_empty_set_points_of_a_machine_with_nothing_wrong(tmp_path):
     assert (result["verdict"], result["causes"]) == ("none", [])
 
 
+def test_a_bending_tool_that_one_run_of_three_shows(tmp_path):
+    """The others are in the air: they say nothing of it, and were held against it."""
+    result, row = judged(tmp_path, "serial", 11032)
+    assert result["verdict"] == "identified" and row["held"] == [True]
+    assert [each["effect"] for each in result["causes"]] == ["tool_deflection"]
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize(
+    ("generator", "seed", "named"),
+    [
+        ("serial", 7011, {"link_stiffness", "screw_cyclic"}),
+        ("serial", 7032, {"link_stiffness", "cutting_force"}),
+        ("serial", 7019, {"friction", "time_sync"}),
+        ("parallel", 9510, set()),
+    ],
+)
+def test_rows_follow_their_own_force(tmp_path, generator, seed, named):
+    """In corners that are rounded off, and while the tool rests in its cut; in the last one two causes undo each other."""
+    result, row = judged(tmp_path, generator, seed)
+    assert {each["effect"] for each in result["causes"]} == named
+    assert result["verdict"] == ("identified" if named else "none") and not row["false_cause"]
+
+
 @pytest.mark.campaign
 def test_play_of_an_axis_that_plunges_when_the_log_begins(tmp_path):
     result, row = judged(tmp_path, "serial", 7010)

@@ -23,6 +23,7 @@ from camcomp.diagnosis.statistics.evidence import estimate
 from camcomp.ground.datatypes import Floats
 
 BLOCK = 8  # rows that are averaged
+NOTHING_SAID = 0.5  # of a cause's size: runs that know it to no better say nothing of it
 FEW_RUNS = 3  # from which on causes are fitted to the other runs
 KINDS = ("tip", "encoder", "drive", "dyno")
 NOISIEST = 2.0  # of the floor: what the tip scatters by in one run and is its instrument's
@@ -61,13 +62,19 @@ def unexplained(problem: Problem, f: Fitted) -> dict[str, Unexplained]:
 
 
 def _left(problem: Problem, f: Fitted, k: int) -> Floats:
-    """Channels (n, c) of run k that the causes, fitted to the other runs, and the usual small errors leave."""
+    """Channels (n, c) of run k that the causes, fitted to the other runs, and the usual small errors leave.
+
+    Where the other runs say nothing of a cause (they are all in the air, and it bends the tool), what they do not foretell of it
+    is no sign of anything else.
+    """
     bench = problem.bench
-    several = len(bench.runs) >= FEW_RUNS
     passing = np.repeat(
         [problem.passing(i) for i in f.members], [len(problem.candidates.columns[i]) for i in f.members]
     ).astype(bool)
-    theta = np.where(passing, f.theta, problem.theta_without(f, k)) if several else f.theta
+    theta = f.theta
+    if len(bench.runs) >= FEW_RUNS:
+        without, doubt = problem.told_without(f, k)
+        theta = np.where(passing | (doubt > NOTHING_SAID * np.abs(f.theta)), f.theta, without)
     left = bench.difference(k, bench.read(k, problem.causes(f.members, theta, f.extra)))
     index = problem.member_columns(f.members)
     usual = estimate(total(f.grams), problem.prior, index, 1.0)[0]
