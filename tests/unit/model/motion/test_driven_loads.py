@@ -11,8 +11,8 @@ from camcomp.model.config.load import load_config
 from camcomp.model.effect import Cause, Load
 from camcomp.model.job import Job
 from camcomp.model.motion.driven_path import Forces, driven_path
-from camcomp.model.motion.driven_pieces import DrivenPieces, node_loads
-from camcomp.model.motion.node_pieces import direct
+from camcomp.model.motion.driven_pieces import DrivenPieces, beside_most, node_loads
+from camcomp.model.motion.node_pieces import NODES, direct
 from camcomp.model.motion.twin import twin_of
 
 CONFIG = Path(__file__).parents[4] / "config"
@@ -91,17 +91,21 @@ def test_rows_follow_their_own_force(machine, change):
     assert np.abs(reading.drive - drive).max() < 2e-4 * FORCE_N
 
 
-def test_loads_along_an_arc_turn_with_it_whatever_its_last_rows_do():
+@pytest.mark.parametrize("corner_N", [0.0, 100.0])
+def test_loads_along_an_arc_turn_with_it_whatever_its_last_rows_do(corner_N):
     time = np.arange(0.0, 1.0, 0.01)
-    turn = 0.9 * time  # less than 60 degrees: one piece
-    tip = 20.0 * np.column_stack([np.cos(turn), np.sin(turn), 0.0 * turn])
-    force = FORCE_N * np.column_stack([np.cos(turn), np.sin(turn), 0.0 * turn])
-    corner = force.copy()
-    corner[-6:, 1] -= np.linspace(10.0, 60.0, 6)
-    none = np.zeros(0, np.int64)
-    pieces = DrivenPieces.along(time, time, tip, none)
-    at = pieces.node_times()
-    found = node_loads(time, corner, np.ones(len(time), bool), none, at, pieces)
-    expected = FORCE_N * np.column_stack([np.cos(0.9 * at), np.sin(0.9 * at), 0.0 * at])
+    turn = 0.6 * time  # less than 60 degrees: one piece
+    along = np.column_stack([np.cos(turn), np.sin(turn), 0.0 * turn])
+    force = FORCE_N * along
+    force[-6:, 1] -= np.linspace(0.5, 1.0, 6) * corner_N
+    none, sure = np.zeros(0, np.int64), np.ones(len(time), bool)
+    pieces = DrivenPieces.along(time, time, 10.0 * along, none)
     assert len(pieces.begin) == 1
-    assert np.abs(found - expected).max() < 1e-3 * FORCE_N
+    pieces = pieces.around(time, beside_most(time, force, sure, none, pieces))
+    assert len(pieces.begin) == 1 + (corner_N > 0.0)
+    loads = node_loads(time, force, sure, none, pieces.node_times(), pieces)
+    off = np.linalg.norm(pieces.at(time).of(loads) - force, axis=1)
+    assert off[:-6].max() < 2e-4 * FORCE_N
+    assert (
+        np.linalg.norm(loads, axis=1)[:NODES].max() > FORCE_N
+    )  # a cubic that follows an arc is a little larger in places
