@@ -20,7 +20,7 @@ from camcomp.diagnosis.fit.floor import row_scatter
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.statistics.cause_sets import Fitted, total
 from camcomp.diagnosis.statistics.evidence import estimate
-from camcomp.ground.datatypes import Floats
+from camcomp.ground.datatypes import Bools, Floats
 
 BLOCK = 8  # rows that are averaged
 NOTHING_SAID = 0.5  # of a cause's size: runs that know it to no better say nothing of it
@@ -68,13 +68,12 @@ def _left(problem: Problem, f: Fitted, k: int) -> Floats:
     is no sign of anything else.
     """
     bench = problem.bench
-    passing = np.repeat(
-        [problem.passing(i) for i in f.members], [len(problem.candidates.columns[i]) for i in f.members]
-    ).astype(bool)
     theta = f.theta
     if len(bench.runs) >= FEW_RUNS:
         without, doubt = problem.told_without(f, k)
-        theta = np.where(passing | (doubt > NOTHING_SAID * np.abs(f.theta)), f.theta, without)
+        widths = [len(problem.candidates.columns[i]) for i in f.members]
+        passing = np.repeat([problem.passing(i) for i in f.members], widths).astype(bool)
+        theta = np.where(passing | untold(theta, doubt, widths), theta, without)
     left = bench.difference(k, bench.read(k, problem.causes(f.members, theta, f.extra)))
     index = problem.member_columns(f.members)
     usual = estimate(total(f.grams), problem.prior, index, 1.0)[0]
@@ -84,6 +83,16 @@ def _left(problem: Problem, f: Fitted, k: int) -> Floats:
         left = left - problem.farther(f)[k] @ usual[pushed]
         usual[pushed] = 0.0
     return np.asarray(left - (problem.columns.blocks[k] @ usual).reshape(left.shape[1], -1).T)
+
+
+def untold(theta: Floats, doubt: Floats, widths: Sequence[int]) -> Bools:
+    """Of which coordinates (d,) runs say nothing that know them to a standard deviation (d,): those of a cause go together.
+
+    widths: how many are a cause's. One that is small beside its cause's others is no reason to ask the run itself.
+    """
+    faint, ends = doubt > NOTHING_SAID * np.abs(theta), np.cumsum(widths)
+    each = [bool(faint[end - width : end].all()) for end, width in zip(ends, widths, strict=True)]
+    return np.repeat(each, widths).astype(bool)
 
 
 def _at_tip(problem: Problem, k: int, left: Floats, kind: str) -> Floats:

@@ -8,7 +8,7 @@ from camcomp.model.control import open_program
 from camcomp.model.cutting.track import lay_track
 from camcomp.model.job import Job
 from camcomp.model.motion.alignment import align
-from camcomp.model.motion.driven_path import cutting_forces
+from camcomp.model.motion.driven_path import _held_at_rest, cutting_forces
 
 RADIUS, ROW_S, HELD = 20.0, 0.02, 25
 CIRCLE = "G21 G90 G17\nG0 X20 Y0 Z0\nG3 X20 Y0 I-20 J0 F1500\nM2\n"
@@ -35,3 +35,11 @@ def test_its_force_may_be_off_by_all_of_it_and_that_of_its_way_is_known(tmp_path
     assert doubt[on_its_way].max() < 0.1 * size.max()
     turns = np.diff(np.unwrap(np.arctan2(forces.force[:, 1], forces.force[:, 0]))[3:-3])
     assert np.abs(turns).max() < 0.1 and np.abs(turns[half : half + HELD - 10]).max() < 0.01
+
+
+@pytest.mark.parametrize("mm_per_s", [0.05, 0.15, 2.0])
+def test_what_creeps_is_on_its_way(mm_per_s):
+    """Within a tenth of a second it goes no further than a tip trembles at rest."""
+    time = ROW_S * np.arange(500)
+    tip = np.random.default_rng(6).normal(0.0, 0.002, (500, 3)) + mm_per_s * time[:, None] * [0.6, 0.0, -0.8]
+    assert np.array_equal(_held_at_rest(tip, time), tip)
