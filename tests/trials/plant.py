@@ -185,7 +185,9 @@ class Motion:
     def force(self, t: np.ndarray, share: float) -> np.ndarray:
         """Force on the tool (n, 3) N at times t; share: of the ripple that is seen."""
         k = np.clip(np.floor(t / drives.STEP_S + 1e-6).astype(int), 0, len(self.cuts) - 1)
-        along = self.along[k]
+        # a force that is held for a millisecond is half of one late, and turns that much too late
+        along = self.at(self.along, t)
+        along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-12)
         right = np.cross(along, [0.0, 0.0, 1.0])
         right /= np.maximum(np.linalg.norm(right, axis=1), 1e-12)[:, None]
         fr, ft, fz = self.triple[k].T[:, :, None]

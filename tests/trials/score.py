@@ -22,6 +22,8 @@ NAMED = 0.3  # of the noise: a cause of at least this size may be named
 DUE = 2.7  # from which on it has to be: what was made as 3
 SURE = 0.8
 KNOWN_AS = {"disturbed_drive": "disturbance", **later.KNOWN_AS}  # strange faults that the tool has learnt to name
+# what control does wrong shows nowhere where no set-points are logged: encoders are the motion then
+WITHOUT_SETPOINTS, OF_CONTROL = ("no-setpoints", "no cmd", "no_cmd"), ("servo_lag", "servo_overshoot")
 Row = dict[str, Any]
 
 
@@ -62,12 +64,21 @@ def held(cause: Row, truth: dict[str, float]) -> list[bool]:
     return out
 
 
+def _by_its_name(cause: Row, known: set[str]) -> Row:
+    """A true cause as the library calls it; strange: whether the library has none such, though it may have the name for another thing."""
+    name = KNOWN_AS.get(cause["effect"], cause["effect"])
+    own = cause.get("strange", False) and cause["effect"] not in KNOWN_AS
+    return {**cause, "effect": name, "strange": own or name not in known}
+
+
 def judge(result: Row, truth: Row, known: set[str]) -> Row:
     """What was right; keys that do not apply are missing."""
-    real = [{**c, "effect": KNOWN_AS.get(c["effect"], c["effect"])} for c in truth["causes"] if c["ratio"] >= NAMED]
-    true = {(c["effect"], c["target"]) for c in real if c["effect"] in known}
-    due = {(c["effect"], c["target"]) for c in real if c["effect"] in known and c["ratio"] >= DUE}
-    foreign = [c for c in real if c["effect"] not in known]
+    hidden = OF_CONTROL if truth["channels"] in WITHOUT_SETPOINTS else ()
+    real = [_by_its_name(c, known) for c in truth["causes"] if c["ratio"] >= NAMED]
+    real = [c for c in real if c["effect"] not in hidden]
+    true = {(c["effect"], c["target"]) for c in real if not c["strange"]}
+    due = {(c["effect"], c["target"]) for c in real if not c["strange"] and c["ratio"] >= DUE}
+    foreign = [c for c in real if c["strange"]]
     out: Row = {"ratio": min((c["ratio"] for c in real), default=0.0), "true": sorted(map(str, true))}
     out |= {
         "foreign": [c["effect"] for c in foreign],

@@ -59,6 +59,22 @@ def test_answers_are_judged(made):
     assert judge({**right, "verdict": "unknown"}, truth, set())["foreign"] == ["backlash"]
 
 
+def test_what_the_library_has_only_the_name_of_is_foreign(made):
+    truth = json.loads(truth_json(made))
+    truth["causes"][0] |= {"strange": True}
+    nothing = {"verdict": "none", "causes": [], "alternatives": [], "gap": {"rms_um": 5.0, "noise_floor_um": 5.2}}
+    missed = judge(nothing, truth, {"backlash"})
+    assert missed["foreign"] == ["backlash"] and missed["true"] == []
+
+
+def test_a_lag_is_due_where_set_points_are_logged(made):
+    truth = json.loads(truth_json(made))
+    truth["causes"][0] |= {"effect": "servo_lag"}
+    nothing = {"verdict": "none", "causes": [], "alternatives": [], "gap": {"rms_um": 5.0, "noise_floor_um": 5.2}}
+    assert judge(nothing, truth, {"servo_lag"})["due"]
+    assert not judge(nothing, {**truth, "channels": "no-setpoints"}, {"servo_lag"})["due"]
+
+
 def test_wilson_by_the_textbook():
     assert wilson(8, 10) == (pytest.approx(0.4902, abs=1e-4), pytest.approx(0.9433, abs=1e-4))
 

@@ -175,3 +175,15 @@ def test_strange_faults_have_actuators_of_any_name(effect):
     t = rows("circles-exact")
     plain, changed = (observe(machine, run, each, WAYS, t) for each in (NOTHING, odd))
     assert np.abs(changed.tip - plain.tip).max() > 1e-3
+
+
+def test_the_force_turns_as_evenly_as_the_way():
+    """On a circle the force at times between the milliseconds stands as the way stands there: none is held."""
+    record = recording.load("circles-exact")
+    motion = Motion(ORTHOGLIDE, Run(record, True, 0.0), NOTHING, WAYS)
+    middle = record.t[:-1][motion.cuts[:-1] & motion.cuts[1:]] + 0.5 * drives.STEP_S
+    middle = middle[len(middle) // 4 : len(middle) // 4 + 200]
+    early, half, late = (motion.force(middle + step, 0.0) for step in (-0.25e-3, 0.0, 0.25e-3))
+    turned = np.linalg.norm(late - early, axis=1)
+    assert turned.min() > 0.0
+    assert np.abs(0.5 * (early + late) - half).max() < 1e-3 * np.linalg.norm(half, axis=1).max()
