@@ -1,0 +1,1 @@
+"""Blind experiments of static poses of arms, written from the contract alone."""
