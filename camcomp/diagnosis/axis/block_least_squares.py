@@ -12,10 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import stdtr
 
-from camcomp.ground.datatypes import Floats, Ints
+from camcomp.ground.datatypes import Bools, Floats, Ints
 
 MARGIN_S = 0.2
 MOST_BLOCKS = 25
+SEEN_SHARE = 0.1  # of the energy of the block that shows a term best, from which on a block says something about it
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,8 +89,16 @@ class Gain:
     blocks: int
 
 
-def gain(before: Floats, after: Floats) -> Gain:
-    """From mean squares of the same blocks (blocks,)."""
+def telling(data: Series, column: Floats) -> Bools:
+    """Blocks (blocks,) in which a column (n,) is more than little: an axis that stands there says nothing of its speed."""
+    energy = np.array([float(np.mean(column[data.block == b] ** 2)) for b in range(len(data.others))])
+    return np.asarray(energy > SEEN_SHARE * energy.max(initial=0.0))
+
+
+def gain(before: Floats, after: Floats, where: Bools | None = None) -> Gain:
+    """From mean squares of the same blocks (blocks,), or of those that say something."""
+    if where is not None:
+        before, after = before[where], after[where]
     each = 0.5 * (np.log(np.maximum(before, 1e-300)) - np.log(np.maximum(after, 1e-300)))
     spread = float(each.std(ddof=1)) / np.sqrt(len(each)) if len(each) > 1 else 0.0
     return Gain(float(each.mean()), float(each.mean() / spread) if spread > 0 else 0.0, len(each))

@@ -9,10 +9,15 @@ import numpy as np
 
 from camcomp.diagnosis.axis.block_least_squares import Series
 from camcomp.diagnosis.axis.gate import AxisGate
-from camcomp.diagnosis.axis.noise_floor import LEAST_SPIKE_MM, spikes
+from camcomp.diagnosis.axis.noise_floor import FAST_S, LEAST_SPIKE_MM, spikes
 from camcomp.diagnosis.axis.terms import WIDE, AxisTravel, Ripple
 from camcomp.diagnosis.result.types import FoundCause, Law
-from camcomp.ground.datatypes import Floats
+from camcomp.diagnosis.statistics.probability import EVEN
+from camcomp.ground.datatypes import Bools, Floats
+
+MOST_LOST = 4.0  # steps between two rows: a cubic leads over one lost row, not over what a drive does meanwhile
+FIRST_MOVE_MM = 0.2  # after which friction has its sense
+BESIDE_GAP = 10  # rows of which a gap leaves speed and acceleration uncertain
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,13 +40,45 @@ class AxisRun:
         row = np.arange(1, len(self.time) + 1) if self.row is None else self.row
         off = np.zeros(len(self.time), bool)
         kept = {}
-        for name, least in (("setpoint", LEAST_SPIKE_MM), ("encoder", LEAST_SPIKE_MM), ("force", 0.0)):
+        if len(row) < 2:
+            return self, row[:0]
+        jump = LEAST_SPIKE_MM if float(np.median(np.diff(self.time))) > FAST_S else 0.0
+        for name, least in (("setpoint", jump), ("encoder", jump), ("force", 0.0)):
             y = getattr(self, name)
             bad = spikes(y, least)
+            if name == "encoder":  # while the axis moves it is the following error that shows them
+                bad |= spikes(kept["setpoint"] - y, least)
             good = np.isfinite(y) & ~bad
             kept[name] = np.where(bad, np.interp(self.time, self.time[good], y[good]), y) if bad.any() else y
             off |= bad
         return replace(self, **kept), row[off]
+
+    def away_from_gaps(self) -> AxisRun:
+        """The run without the rows beside several lost ones: nobody saw how fast it was there. All where gaps are the rule."""
+        step = np.diff(self.time)
+        gaps = np.flatnonzero(step > MOST_LOST * np.median(step)) if len(step) else step
+        near = np.zeros(len(self.time), bool)
+        for gap in gaps:
+            near[max(gap + 1 - BESIDE_GAP, 0) : gap + 1 + BESIDE_GAP] = True
+        if not near.any() or near.mean() > EVEN:
+            return self
+        return self._of(~near)
+
+    def from_first_move(self) -> AxisRun:
+        """The run without its rest before it moves for the first time: which way friction held it there nobody knows."""
+        away = np.abs(self.encoder - self.encoder[:1])
+        if (
+            self.revolute
+            or not np.isfinite(self.force).any()
+            or not np.nanmax(away, initial=0.0) > 10.0 * FIRST_MOVE_MM
+        ):
+            return self
+        return self._of(np.arange(len(away)) >= int(np.argmax(away > FIRST_MOVE_MM)))
+
+    def _of(self, rows: Bools) -> AxisRun:
+        parts = (self.time, self.setpoint, self.encoder, self.force)
+        row = np.arange(1, len(rows) + 1) if self.row is None else self.row
+        return AxisRun(self.name, *(part[rows] for part in parts), row[rows], self.revolute)
 
 
 @dataclass(frozen=True)
@@ -79,6 +116,7 @@ class AxisFindings:
     name: str
     stated: AxisDeviation
     wide: int = WIDE[0]
+    carries: bool = True  # whether encoders are the motion, so that their noise goes with it
     causes: list[FoundCause] = field(default_factory=list)
     following: AxisChannel | None = None
     force: AxisChannel | None = None

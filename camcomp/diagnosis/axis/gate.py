@@ -16,7 +16,11 @@ from camcomp.ground.datatypes import Floats
 
 MINOR = 0.3  # of the floor: what is smaller is no unknown, however sure it is
 ABOVE = 1.25  # of the floor's square: rows do not tell it to better than an eighth
+LOCAL = 2.0  # of the floor's square, that a stretch has to show: as much again as the floor
 LEVEL = 1.5  # of the floor's square that a leftover has to stay below to be the floor
+BLOCK = 8  # rows
+MEDIAN = 0.9065  # of the variance of eight rows of white noise over its mean (chi-square of seven)
+STRETCHES = 25  # of all runs, in which the size of a leftover is looked at
 STRETCH_S = 0.5  # in which a leftover is looked for
 FALSE = 0.01  # of the stretches that are named
 LEAST_STRETCHES = 8  # of which one can stand out
@@ -45,24 +49,44 @@ class AxisGate:
     intervals: tuple[Interval, ...]
 
 
-def judge(squares: Floats, inside: float, left: Sequence[Floats], times: Sequence[Floats], floor: float) -> AxisGate:
-    """Leftovers against a floor. squares (blocks,): their means on rows that were not fitted; left, times (n,) per run.
+def judge(inside: Sequence[Floats], left: Sequence[Floats], times: Sequence[Floats], floor: float) -> AxisGate:
+    """Leftovers (n,) mm or N per run against a floor. left, times: of rows that were not fitted.
 
-    inside: mean square where everything is fitted. What goes away then is what the rows leave open, and no unknown.
+    inside: where everything is fitted. What goes away then is what the rows leave open, and no unknown.
     """
     found, chance = intervals(left, times, floor)
     floor = max(floor, 1e-12)
-    size = squares / floor**2
-    spread = float(size.std(ddof=1)) / np.sqrt(len(size)) if len(size) > 1 else float(size.mean())
-    spread, freedom = max(spread, 1e-12), max(len(size) - 1, 1)
+    parts = max(STRETCHES // len(left), 2)
+    size = np.array([energy(part, floor) for run in left for part in np.array_split(run, parts)]) / floor**2
+    fitted = float(np.mean([energy(part, floor) for run in inside for part in np.array_split(run, parts)])) / floor**2
+    spread = float(size.std(ddof=1)) / np.sqrt(len(size))
+    spread, freedom = max(spread, 1e-12), len(size) - 1
     sure = float(student.ppf(0.99, freedom)) * spread
-    if size.mean() - sure > ABOVE and inside > ABOVE * floor**2:
+    if size.mean() - sure > ABOVE and fitted > ABOVE:
         by_size = float(student.logsf((size.mean() - ABOVE) / spread, freedom) / np.log(10.0))
         return AxisGate("above", min(chance, by_size), found)
     if found:
         return AxisGate("above", chance, found)
     high = size.mean() + float(student.ppf(0.95, freedom)) * spread
-    return AxisGate("at" if high < LEVEL else "open", 0.0, ())
+    return AxisGate("at" if high < LEVEL or fitted < 1.0 else "open", 0.0, ())
+
+
+def energy(left: Floats, floor: float) -> float:
+    """Mean square of rows (n,) that follow each other, without what tails make of it.
+
+    Rows that stand out by themselves, and noise with heavy tails, are the instrument's: within blocks of BLOCK rows no more
+    than the floor counts, or what half of the blocks show. What goes on for longer counts whole.
+    """
+    n = len(left) // BLOCK * BLOCK
+    if not n:
+        return float(np.mean(left**2)) if len(left) else 0.0
+    blocks = left[:n].reshape(-1, BLOCK)
+    slow, fast = blocks.mean(axis=1), blocks.var(axis=1)
+    usual = float(np.median(fast)) / MEDIAN
+    noise = min(float(fast.mean()), max(usual, floor**2 * (1.0 - 1.0 / BLOCK)))
+    # of the means, too, what tails do to them
+    beyond = max(float(fast.mean()) - noise, 0.0) / (BLOCK - 1)
+    return max(float(np.mean(slow**2)) - beyond, 0.0) + noise
 
 
 def intervals(left: Sequence[Floats], times: Sequence[Floats], floor: float) -> tuple[tuple[Interval, ...], float]:
@@ -79,16 +103,16 @@ def intervals(left: Sequence[Floats], times: Sequence[Floats], floor: float) -> 
     if len(stretches) < LEAST_STRETCHES:
         return (), 0.0
     whole = sum(float((r**2).sum()) for r in left)
-    energy = np.array([float((left[k][rows] ** 2).mean()) for k, rows in stretches])
-    log = np.log(np.maximum(energy, 1e-300))
+    size = np.array([energy(left[k][rows], floor) for k, rows in stretches])
+    log = np.log(np.maximum(size, 1e-300))
     middle = float(np.median(log))
     spread = 1.4826 * float(np.median(np.abs(log - middle)))
     rows_each = np.array([len(rows) for _, rows in stretches])
     pure = chi2.isf(FALSE / len(stretches), rows_each) / rows_each  # what even white noise reaches
     chances = norm.logsf((log - middle) / max(spread, 1e-12)) / np.log(10.0) + np.log10(len(stretches))
-    out = (chances < np.log10(FALSE)) & (energy > ABOVE * floor**2) & (energy > pure * np.exp(middle))
+    out = (chances < np.log10(FALSE)) & (size > LOCAL * floor**2) & (size > pure * np.exp(middle))
     joined: list[Interval] = []
-    for (k, rows), e, on in zip(stretches, energy, out, strict=True):
+    for (k, rows), e, on in zip(stretches, size, out, strict=True):
         if not on:
             continue
         t0, t1, share = float(times[k][rows[0]]), float(times[k][rows[-1]]), float(e * len(rows)) / max(whole, 1e-300)

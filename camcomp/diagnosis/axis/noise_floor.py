@@ -12,7 +12,8 @@ from camcomp.ground.datatypes import Floats
 STAYING = 0.1  # of the rows that do not move, from which on steps are a resolution
 REPEATABILITY_MM = 1e-3  # by which runs differ, and positions drift, unless stated otherwise
 SPIKE = 12.0  # deviations from the neighbours' median
-LEAST_SPIKE_MM = 0.1  # no machine jumps so far and back from one row to the next
+FAST_S = 0.005  # between rows: within two of them no drive goes out and comes back, however little
+LEAST_SPIKE_MM = 0.1  # the same between rows that are further apart: none goes so far
 MOST_SPIKES = 0.03  # of the rows; more are no mistakes
 BESIDE = 3  # rows on either side, so that two that follow each other do not hide each other
 
@@ -35,7 +36,8 @@ def rows_floor(channels: Sequence[Floats]) -> float:
 def spikes(y: Floats, least: float) -> np.ndarray:
     """Mask (n,) of rows that stand out of what is before and behind them alike, by SPIKE deviations, `least` and any step.
 
-    None where they are many.
+    A row's deviation is that of its neighbours, and at least its resolution: what stands flickers by that. None where they are
+    many.
     """
     rows = np.flatnonzero(np.isfinite(y))
     out = np.zeros(len(y), bool)
@@ -48,5 +50,6 @@ def spikes(y: Floats, least: float) -> np.ndarray:
     over = np.maximum(known - np.maximum(before, behind), np.minimum(before, behind) - known)
     off = known - 0.5 * (before + behind)
     step = 3.0 * float(np.quantile(np.abs(np.diff(known)), 0.95))
-    out[rows] = over > max(SPIKE * float(median_abs_deviation(off, scale="normal")), least, step)
+    scatter = max(float(median_abs_deviation(off, scale="normal")), rows_floor([known]))
+    out[rows] = over > max(SPIKE * scatter, least, step)
     return out if out.mean() <= MOST_SPIKES else np.zeros(len(y), bool)

@@ -8,6 +8,7 @@ import numpy as np
 
 from camcomp.diagnosis.axis.block_least_squares import solve
 from camcomp.diagnosis.axis.findings import AxisRun
+from camcomp.diagnosis.axis.noise_floor import rows_floor
 from camcomp.diagnosis.axis.study import ROWS
 from camcomp.diagnosis.axis.terms import WIDE, travel
 from camcomp.ground.datatypes import Floats
@@ -19,6 +20,7 @@ LARGE, BETTER = (
     0.5,
     0.2,
 )  # of the travel: a gap that is no lag; of the gap: what another encoder leaves that is the right one
+TRAVELS = 100.0  # deviations of a row that an axis which moves goes at least
 NEAR = 0.1  # of a factor between set-points and encoder
 _FACTORS = {1e3: "m", 1e-3: "um", 25.4: "inches", 180.0 / np.pi: "degrees where radians are due"}
 
@@ -27,11 +29,16 @@ def check_axes(log: str, runs: Mapping[str, AxisRun]) -> None:
     """Raise ConfigError CC407 (units) or CC408 (columns exchanged or reversed) for one log's axes by name."""
     for name, run in runs.items():
         both = np.isfinite(run.setpoint) & np.isfinite(run.encoder)
-        if both.sum() < ROWS or np.ptp(run.encoder[both]) == 0.0:
+        if both.sum() < ROWS or not _moves(run.setpoint[both], run.encoder[both]):
             continue
         _check_factor(log, name, run.setpoint[both], run.encoder[both])
         _check_order(log, name, runs)
         _check_size(log, name, run)
+
+
+def _moves(setpoint: Floats, encoder: Floats) -> bool:
+    """Whether set-points or encoder go so far that noise is small beside it: what stands says nothing of units and columns."""
+    return bool(max(np.ptp(setpoint), np.ptp(encoder)) > TRAVELS * rows_floor([encoder]) > 0.0)
 
 
 def _refused(rule: str, log: str, text: str) -> ConfigError:
@@ -53,19 +60,18 @@ def _check_factor(log: str, name: str, setpoint: Floats, encoder: Floats) -> Non
 
 def _check_order(log: str, name: str, runs: Mapping[str, AxisRun]) -> None:
     run = runs[name]
+    known = np.isfinite(run.setpoint)
 
     def off(other: AxisRun) -> float:
-        gap = (
-            run.setpoint - other.encoder[: len(run.setpoint)]
-            if len(other.encoder) == len(run.setpoint)
-            else run.setpoint
-        )
-        gap = gap[np.isfinite(gap)]
-        return float(np.std(gap)) if len(gap) else np.inf
+        there = np.isfinite(other.encoder)  # rows that one axis has lost another one has
+        gap = run.setpoint[known] - np.interp(run.time[known], other.time[there], other.encoder[there])
+        return float(np.std(gap))
 
     own = off(run)
+    if own <= LARGE * float(np.std(run.setpoint[known])):
+        return
     for other, each in runs.items():
-        if other != name and own > LARGE * float(np.nanstd(run.encoder)) and off(each) < BETTER * own:
+        if other != name and np.isfinite(each.encoder).sum() >= ROWS and off(each) < BETTER * own:
             raise _refused("CC408", log, f"the set-points of {name} fit the encoder of {other}: columns are exchanged")
 
 

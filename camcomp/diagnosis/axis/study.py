@@ -23,6 +23,7 @@ from camcomp.diagnosis.axis.block_least_squares import (
     log10_chance,
     series,
     solve,
+    telling,
     withheld,
 )
 from camcomp.diagnosis.axis.findings import AxisChannel, AxisDeviation, AxisFindings, AxisRun
@@ -59,6 +60,9 @@ LEAST_Z = 4.0  # mean gain over its standard error
 LEAST_RIPPLE = 0.02  # share of the leftover's energy
 ROWS = 50  # below which a run says nothing
 NO_TIPS = "ISO 230-2: the tip was not measured"
+LATEST_S = 0.1  # of a loop
+ENCODER_BETTER = 0.8  # of what set-points leave of a channel: what encoders have to leave to be the motion
+SETPOINT_WIDE = (2, 5, 10)  # samples on either side of a local cubic through set-points
 WHOLE_RUNS = 4  # from which on runs are withheld as wholes
 
 
@@ -92,7 +96,7 @@ def studied(
     for name, runs in headway.steps(axes.items(), len(axes) * (1 + again)):
         clean = [r.without_spikes() for r in runs]
         outliers |= {(r.name, int(row)) for r, rows in clean for row in rows}
-        cleaned[name] = [r for r, _ in clean]
+        cleaned[name] = [r.away_from_gaps().from_first_move() for r, _ in clean]
         found.append(_axis(name, cleaned[name], set(holdout), set(without), stated or AxisDeviation()))
     found = [a for a in found if a.channels]
     if not found:
@@ -145,11 +149,13 @@ def _axis(name: str, runs: list[AxisRun], holdout: set[str], without: set[str], 
     test = [k for k, r in enumerate(usable) if r.name in holdout]
     gaps = [r.setpoint - r.encoder for r in usable]
     found.wide = _width(usable, train)
-    moves = [travel(r.time, r.encoder, found.wide) for r in usable]
+    late = None
     if train and all(np.isfinite(gaps[k]).all() for k in train):
-        _following(found, usable, moves, gaps, train, test, without)
+        late = _lateness(usable, gaps, train)
+        _following(found, usable, _motion(found, usable, gaps, train, late), gaps, train, test, without)
     if train and all(np.isfinite(usable[k].force).all() for k in train):
-        _force(found, usable, moves, train, test, without)
+        forces = [r.force for r in usable]
+        _force(found, usable, _motion(found, usable, forces, train, late), train, test, without)
     _name_rest(found)
     if found.strange:
         asked = [usable[k] for k in found.following.runs] if found.following else []
@@ -163,13 +169,50 @@ def _width(runs: list[AxisRun], train: list[int]) -> int:
     rows = [r for k, r in enumerate(runs) if k in train and np.isfinite(r.force).all()]
     if not rows:
         return WIDE[0]
-    data = series([r.time for r in rows], [r.force for r in rows])
-    least: list[float] = []
-    for wide in (w for w in WIDE if 2 * w + 1 < min(len(r.time) for r in rows) / 4):
-        at = [travel(r.time, r.encoder, wide) for r in rows]
-        A = [np.stack([np.ones_like(m.time), 1e-3 * m.acceleration, m.speed, np.sign(m.speed)], axis=1) for m in at]
-        least.append(float(np.median(np.abs(leftover(data, np.concatenate(A))))))
+    wide = [w for w in WIDE if 2 * w + 1 < min(len(r.time) for r in rows) / 4]
+    forces = [r.force for r in rows]
+    least = [_misfit(rows, forces, [travel(r.time, r.encoder, w) for r in rows]) for w in wide]
     return WIDE[int(np.argmin([0.95 * least[0], *least[1:]]))] if least else WIDE[0]
+
+
+def _lateness(runs: list[AxisRun], gaps: list[Floats], train: list[int]) -> float:
+    """How late (s) the axis follows its set-points, on average."""
+    moves = [travel(runs[k].time, runs[k].setpoint) for k in train]
+    A = np.concatenate([_usual(m) for m in moves])
+    return float(np.clip(solve(A, np.concatenate([gaps[k] for k in train]))[2], 0.0, LATEST_S))
+
+
+def _motion(
+    found: AxisFindings, runs: list[AxisRun], values: list[Floats], train: list[int], late: float | None
+) -> list[AxisTravel]:
+    """What moved while a channel had its values (n,): set-points, as late as they are followed, where that explains them as well.
+
+    The noise of an encoder is in its following error, too, and would explain a part of itself.
+    """
+    encoders = [travel(r.time, r.encoder, found.wide) for r in runs]
+    if late is None:
+        return encoders
+    mine = [runs[k] for k in train]
+    told = [values[k] for k in train]
+
+    def misfit(moves: list[AxisTravel]) -> float:
+        return _misfit(mine, told, [moves[k] for k in train])
+
+    every = [[travel(r.time, r.setpoint, wide, late) for r in runs] for wide in SETPOINT_WIDE]
+    setpoints = min(every, key=misfit)
+    found.carries = misfit(encoders) < ENCODER_BETTER * misfit(setpoints)
+    return encoders if found.carries else setpoints
+
+
+def _usual(m: AxisTravel) -> Floats:
+    """What every axis has (n, 4): a constant, inertia, and something with the speed and its sense."""
+    return np.stack([np.ones_like(m.time), 1e-3 * m.acceleration, m.speed, np.sign(m.speed)], axis=1)
+
+
+def _misfit(runs: list[AxisRun], values: list[Floats], moves: list[AxisTravel]) -> float:
+    """Median of what is left (of all rows) of a channel when what every axis has is fitted to a motion."""
+    data = series([r.time for r in runs], values)
+    return float(np.median(np.abs(leftover(data, np.concatenate([_usual(m) for m in moves])))))
 
 
 def _judged(
@@ -206,14 +249,21 @@ def _following(
     channel.encoder_noise = [rows_floor([r.encoder]) for r in runs]
     columns = [one, push]
     if "servo_lag" not in without:
+        moving = telling(data, table(train, speed)[:, 0])
         lag = withheld(data, table(train, one, push, speed, turn))
         blind = withheld(data, table(train, one, push, turn))
-        g = gain(blind, lag)
-        if g.z > LEAST_Z and g.log_ratio > LEAST_SHARE:
+        g = gain(blind, lag, moving)
+        if _holds(g):
             columns, last = [one, push, speed, turn], lag
+        else:  # at one speed a lag and a reversal are nearly the same: what needs less is it
+            lag = withheld(data, table(train, one, push, speed))
+            g = gain(last, lag, moving)
+            if _holds(g) and np.mean(lag) <= np.mean(blind):
+                columns, last = [one, push, speed], lag
+        if last is lag:
             lopsided = withheld(data, table(train, *columns, both))
-            more = gain(lag, lopsided)
-            if more.z > LEAST_Z and more.log_ratio > LEAST_SHARE:  # friction that differs between the ways
+            more = gain(lag, lopsided, moving)
+            if len(columns) > 3 and _holds(more):  # friction that differs between the ways
                 columns, last = [*columns, both], lopsided
             c, C = fit(data, table(train, *columns))
             spread = 1.96 * float(np.sqrt(C[2, 2]))
@@ -226,11 +276,12 @@ def _following(
                     parameters={"time_constant_ms": _value(1e3 * c[2], 1e3 * spread)},
                 )
             )
-            found.details["following"] = {
-                "reversal_um": _value(1e3 * c[3], 1.96e3 * float(np.sqrt(C[3, 3]))),
-                "presliding_mm": length.distance,
-                "acceleration_us2": _value(1e6 * c[1], 1.96e6 * float(np.sqrt(C[1, 1]))),
-            }
+            found.details["following"] = {"acceleration_us2": _value(1e6 * c[1], 1.96e6 * float(np.sqrt(C[1, 1])))}
+            if len(c) > 3:
+                found.details["following"] |= {
+                    "reversal_um": _value(1e3 * c[3], 1.96e3 * float(np.sqrt(C[3, 3]))),
+                    "presliding_mm": length.distance,
+                }
     _close(found, channel, "servo_lag", last, data, table, columns, test, gaps, moves)
     found.following = channel
 
@@ -265,8 +316,7 @@ def _close(
         )
         left, times = [values[k] - table([k], *columns) @ c for k in test], [moves[k].time for k in test]
         channel.names = [channel.all_names[k] for k in test]
-    inside = float(np.mean(np.concatenate(channel.left) ** 2))
-    channel.gate = judge(channel.last, inside, left, times, channel.floor)
+    channel.gate = judge(channel.left, left, times, channel.floor)
     found.unknown_chance = min(found.unknown_chance, channel.gate.chance)
     if any(each.effect == effect for each in found.causes):
         channel.steps.append((effect, float(np.sqrt(np.mean(channel.last)))))
@@ -274,10 +324,13 @@ def _close(
 
 def _carried(found: AxisFindings, channel: AxisChannel, moves: list[AxisTravel], c: Floats, effect: str) -> float:
     """What the noise of the encoder, resolution included, does to a channel by way of speed and acceleration."""
+    if not found.carries:
+        return 0.0
     noise = [channel.encoder_noise[k] for k in channel.runs]
     gains = [noise_gains(float(np.median(np.diff(moves[k].time))), found.wide) for k in channel.runs]
     push = c[1] * (1e-3 if effect == "friction" else 1.0) if len(c) > 1 else 0.0
-    speed = (c[3] if effect == "friction" else c[2]) if len(c) > 3 else 0.0
+    at = 3 if effect == "friction" else 2
+    speed = c[at] if len(c) > at else 0.0
     return float(
         np.sqrt(np.mean([(n * np.hypot(push * g[1], speed * g[0])) ** 2 for n, g in zip(noise, gains, strict=True)]))
     )
@@ -325,12 +378,13 @@ def _force(
     last = before
     if "friction" not in without:
         after = withheld(data, table(train, one, push, turn, speed))
-        g = gain(before, after)
-        if g.z > LEAST_Z and g.log_ratio > LEAST_SHARE:
+        moving = telling(data, table(train, turn)[:, 0])
+        g = gain(before, after, moving)
+        if _holds(g):
             columns, last = [one, push, turn, speed], after
             lopsided = withheld(data, table(train, *columns, both))
-            more = gain(last, lopsided)
-            if more.z > LEAST_Z and more.log_ratio > LEAST_SHARE:
+            more = gain(last, lopsided, moving)
+            if _holds(more):
                 columns, last = [*columns, both], lopsided
             found.causes.append(_friction(found, data, table(train, *columns), length, _probability(g), before, last))
             found.details["force"]["asymmetry_z"] = round(more.z, 2)
@@ -399,6 +453,11 @@ def _around(length: float) -> tuple[float, float]:
     """Neighbours of a value of the scan: what it is known to."""
     i = PRESLIDING_GRID_MM.index(length)
     return PRESLIDING_GRID_MM[max(i - 1, 0)], PRESLIDING_GRID_MM[min(i + 1, len(PRESLIDING_GRID_MM) - 1)]
+
+
+def _holds(g: Gain) -> bool:
+    """Whether a term helps withheld blocks, surely and by more than little."""
+    return g.z > LEAST_Z and g.log_ratio > LEAST_SHARE
 
 
 def _probability(g: Gain) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.interpolate import Akima1DInterpolator
 from scipy.signal import savgol_coeffs, savgol_filter
 
 from camcomp.ground.datatypes import Floats
@@ -47,11 +48,18 @@ class AxisTravel:
         return direction(self.position[:, None], how.distance)[:, 0]
 
 
-def travel(time: Floats, encoder: Floats, wide: int = WIDE[0]) -> AxisTravel:
-    """Local cubics over 2 wide + 1 samples (Savitzky, Golay 1964) of evenly sampled encoders (n,)."""
+def travel(time: Floats, position: Floats, wide: int = WIDE[0], late: float = 0.0) -> AxisTravel:
+    """Local cubics over 2 wide + 1 samples (Savitzky, Golay 1964) of positions (n,) at times (n,) s, late s later.
+
+    Rows that are lost and clocks that tremble are led over: the cubics want even steps.
+    """
     dt = float(np.median(np.diff(time)))
-    value, speed, push = (savgol_filter(encoder, 2 * wide + 1, 3, deriv=k, delta=dt, mode="interp") for k in range(3))
-    return AxisTravel(time, value, speed, push)
+    even = time[0] + dt * np.arange(max(round(float(time[-1] - time[0]) / dt) + 1, 2 * wide + 1))
+    values = Akima1DInterpolator(time, position)(np.minimum(even, time[-1]))
+    parts = [savgol_filter(values, 2 * wide + 1, 3, deriv=k, delta=dt, mode="interp") for k in range(3)]
+    if np.ptp(values) == 0.0:  # at rest, to the last digit
+        parts = [values, np.zeros_like(values), np.zeros_like(values)]
+    return AxisTravel(time, *(np.interp(time - late, even, part) for part in parts))
 
 
 def noise_gains(dt: float, wide: int) -> tuple[float, float]:
@@ -97,6 +105,8 @@ def ripple(at: list[AxisTravel], left: list[Floats], shortest: float = 0.5, long
     v = np.concatenate([t.speed for t in at])
     way = np.concatenate([np.concatenate([[0.0], np.abs(np.diff(t.position))]) for t in at])
     moving = np.abs(v) > 1.0
+    if not moving.any():
+        return None
     x, y, v, way = x[moving], y[moving] - y[moving].mean(), v[moving], way[moving]
     span = float(np.ptp(x)) if len(x) else 0.0
     if span < 4.0 * shortest:
