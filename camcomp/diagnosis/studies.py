@@ -122,4 +122,4 @@ def _axis(run: RunSpec, log: Measured, k: int, revolute: bool) -> AxisRun:
     rows = np.flatnonzero(known)
     rows = rows[np.unique(log.time[rows], return_index=True)[1]]
     encoder, setpoint, force = (each[rows] for each in channels)
-    return AxisRun(run.name, log.time[rows], setpoint, encoder, force, rows + 1, revolute)
+    return AxisRun(run.name, log.time[rows], setpoint, encoder, force, rows + 1, revolute, run.started_s)

@@ -16,7 +16,7 @@ from camcomp.ground.datatypes import Bools, Floats, Ints
 
 MARGIN_S = 0.2
 MOST_BLOCKS = 25
-SEEN_SHARE = 0.1  # of the energy of the block that shows a term best, from which on a block says something about it
+FEWEST = 3  # blocks, of which a standard error can be taken
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,10 +89,13 @@ class Gain:
     blocks: int
 
 
-def telling(data: Series, column: Floats) -> Bools:
-    """Blocks (blocks,) in which a column (n,) is more than little: an axis that stands there says nothing of its speed."""
-    energy = np.array([float(np.mean(column[data.block == b] ** 2)) for b in range(len(data.others))])
-    return np.asarray(energy > SEEN_SHARE * energy.max(initial=0.0))
+def telling(data: Series, A: Floats, at: int, least: float) -> Bools:
+    """Blocks (blocks,) in which one of the columns A (n, k) does more (rms) than `least`: an axis that stands there says nothing of
+    its speed. All where it does nowhere, or in one block only.
+    """
+    part = solve(A, data.y)[at] * A[:, at]
+    found = np.array([float(np.mean(part[data.block == b] ** 2)) > least**2 for b in range(len(data.others))])
+    return found if found.sum() >= FEWEST else np.ones(len(found), bool)
 
 
 def gain(before: Floats, after: Floats, where: Bools | None = None) -> Gain:

@@ -24,7 +24,7 @@ BESIDE_GAP = 10  # rows of which a gap leaves speed and acceleration uncertain
 class AxisRun:
     """Log of one axis in one run: time (n,) s; setpoint, encoder mm; force N, each (n,), NaN where nothing was logged.
 
-    row (n,): of the log, from 1. revolute: rad and N mm in the place of mm and N.
+    row (n,): of the log, from 1. revolute: rad and N mm in the place of mm and N. started: s, on the clock common to all runs.
     """
 
     name: str
@@ -34,12 +34,13 @@ class AxisRun:
     force: Floats
     row: np.ndarray | None = None
     revolute: bool = False
+    started: float = 0.0
 
     def without_spikes(self) -> tuple[AxisRun, np.ndarray]:
         """The run with neighbours in the place of rows that are no measurement, and these rows' numbers."""
         row = np.arange(1, len(self.time) + 1) if self.row is None else self.row
         off = np.zeros(len(self.time), bool)
-        kept = {}
+        kept: dict[str, Floats] = {}
         if len(row) < 2:
             return self, row[:0]
         jump = LEAST_SPIKE_MM if float(np.median(np.diff(self.time))) > FAST_S else 0.0
@@ -51,7 +52,8 @@ class AxisRun:
             good = np.isfinite(y) & ~bad
             kept[name] = np.where(bad, np.interp(self.time, self.time[good], y[good]), y) if bad.any() else y
             off |= bad
-        return replace(self, **kept), row[off]
+        clean = replace(self, setpoint=kept["setpoint"], encoder=kept["encoder"], force=kept["force"])
+        return clean, row[off]
 
     def away_from_gaps(self) -> AxisRun:
         """The run without the rows beside several lost ones: nobody saw how fast it was there. All where gaps are the rule."""
@@ -62,7 +64,7 @@ class AxisRun:
             near[max(gap + 1 - BESIDE_GAP, 0) : gap + 1 + BESIDE_GAP] = True
         if not near.any() or near.mean() > EVEN:
             return self
-        return self._of(~near)
+        return self.of(~near)
 
     def from_first_move(self) -> AxisRun:
         """The run without its rest before it moves for the first time: which way friction held it there nobody knows."""
@@ -73,12 +75,13 @@ class AxisRun:
             or not np.nanmax(away, initial=0.0) > 10.0 * FIRST_MOVE_MM
         ):
             return self
-        return self._of(np.arange(len(away)) >= int(np.argmax(away > FIRST_MOVE_MM)))
+        return self.of(np.arange(len(away)) >= int(np.argmax(away > FIRST_MOVE_MM)))
 
-    def _of(self, rows: Bools) -> AxisRun:
-        parts = (self.time, self.setpoint, self.encoder, self.force)
+    def of(self, rows: Bools) -> AxisRun:
+        """Some of the rows (n,)."""
         row = np.arange(1, len(rows) + 1) if self.row is None else self.row
-        return AxisRun(self.name, *(part[rows] for part in parts), row[rows], self.revolute)
+        time, setpoint, encoder, force = (x[rows] for x in (self.time, self.setpoint, self.encoder, self.force))
+        return replace(self, time=time, setpoint=setpoint, encoder=encoder, force=force, row=row[rows])
 
 
 @dataclass(frozen=True)

@@ -8,10 +8,12 @@ that it was not fitted on, and what is left there is held against the floor: sta
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from scipy.stats import t as student
 
 from camcomp.diagnosis.axis import answer
 from camcomp.diagnosis.axis.block_least_squares import (
@@ -31,6 +33,8 @@ from camcomp.diagnosis.axis.gate import MINOR, dependences, judge
 from camcomp.diagnosis.axis.law import LEAST_SHARE, axis_law
 from camcomp.diagnosis.axis.next_moves import next_moves
 from camcomp.diagnosis.axis.noise_floor import REPEATABILITY_MM, rows_floor
+from camcomp.diagnosis.axis.push import QUARTERS, Window, find_window
+from camcomp.diagnosis.axis.swing import Swing, find_swing
 from camcomp.diagnosis.axis.terms import (
     PRESLIDING_GRID_MM,
     TURNINGS,
@@ -63,6 +67,9 @@ NO_TIPS = "ISO 230-2: the tip was not measured"
 LATEST_S = 0.1  # of a loop
 ENCODER_BETTER = 0.8  # of what set-points leave of a channel: what encoders have to leave to be the motion
 SETPOINT_WIDE = (2, 5, 10)  # samples on either side of a local cubic through set-points
+MOST_PUSHES = 2  # of an axis: what comes more often is no mishap
+ALIKE = 0.02  # of a time constant: by which those of axes may differ and be one
+EQUAL = 1.05  # of what a loop with inertia leaves: what one that swings over may leave to be the simpler answer
 WHOLE_RUNS = 4  # from which on runs are withheld as wholes
 
 
@@ -103,6 +110,7 @@ def studied(
         raise ValueError(
             "no axis has a run with set-points and encoders, or encoders and drive forces, in 50 rows or more"
         )
+    _share_lag(found)
     main = [a.channels[0] for a in found]
     whole = sum(len(a.channels) for a in found)  # every channel weighs alike
     causes = [c.model_copy(update={"share": round(c.share / whole, 4)}) for a in found for c in a.causes]
@@ -129,6 +137,32 @@ def studied(
         standards=StandardValues(absent=(NO_TIPS,)),
     )
     return result, found
+
+
+def _share_lag(found: Sequence[AxisFindings]) -> None:
+    """One lag where one common value serves for all axes that move (contract, section 5)."""
+    moving = [
+        a for a in found if a.following is not None and any(float(np.ptp(m.position)) > 0 for m in a.following.moves)
+    ]
+    lags = [(a, c) for a in moving for c in a.causes if c.effect == "servo_lag"]
+    if len(lags) < 2 or len(lags) < len(moving):
+        return
+    each = [c.parameters["time_constant_ms"] for _, c in lags]
+    value, half = np.array([e.value for e in each]), np.array([0.5 * (e.ci95[1] - e.ci95[0]) for e in each])
+    weight = 1.0 / np.maximum(half, 1e-12) ** 2
+    common = float(weight @ value / weight.sum())
+    if np.any(np.abs(value - common) > np.maximum(half, ALIKE * abs(common))):
+        return
+    together = FoundCause(
+        effect="servo_lag",
+        target=None,
+        probability=min(c.probability for _, c in lags),
+        share=float(sum(c.share for _, c in lags)),
+        parameters={"time_constant_ms": _value(common, max(float(weight.sum() ** -0.5), float(np.std(value))))},
+    )
+    for a, c in lags:
+        a.causes.remove(c)
+    lags[0][0].causes.append(together)
 
 
 def _verdict(found: Sequence[AxisFindings]) -> Any:
@@ -233,57 +267,189 @@ def _following(
     found: AxisFindings, runs: list[AxisRun], moves: list[AxisTravel], gaps: list[Floats], train: list[int], test: list[int],
     without: set[str],
 ) -> None:  # fmt: skip
-    data = series([runs[k].time for k in train], [gaps[k] for k in train])
-
-    def table(ks: Sequence[int], *columns: Any) -> Floats:
-        return np.concatenate([np.stack([c(moves[k]) for c in columns], axis=1) for k in ks])
-
-    one, push = (lambda m: np.ones_like(m.time)), (lambda m: m.acceleration)
-    speed, both = (lambda m: m.speed), (lambda m: np.abs(m.speed))
-    length = _presliding(data, lambda d: table(train, speed, push, one, lambda m: m.reversal(d)))
-    turn = lambda m: m.reversal(length)
-    before, last = withheld(data, table(train, one)), withheld(data, table(train, one, push))
     floor = found.stated.encoder_mm or float(np.hypot(_scatter([runs[k] for k in train]), REPEATABILITY_MM))
+    swung = None if "servo_overshoot" in without else _swung(runs, moves, gaps, train, floor, without)
+    if swung is not None:
+        runs, moves, gaps = swung.runs, swung.moves, swung.gaps
+    data, table = _series(moves, gaps, train), _table(moves)
+    columns: list[Column] = [_one, _push] if swung is None else [_one, swung.error]
+    before, last = withheld(data, table(train, _one)), withheld(data, table(train, *columns))
     channel = AxisChannel(data, train, before, last, floor=floor, stated=found.stated.encoder_mm is not None)
     channel.all_names = [r.name for r in runs]
     channel.encoder_noise = [rows_floor([r.encoder]) for r in runs]
-    columns = [one, push]
-    if "servo_lag" not in without:
-        moving = telling(data, table(train, speed)[:, 0])
-        lag = withheld(data, table(train, one, push, speed, turn))
-        blind = withheld(data, table(train, one, push, turn))
-        g = gain(blind, lag, moving)
-        if _holds(g):
-            columns, last = [one, push, speed, turn], lag
-        else:  # at one speed a lag and a reversal are nearly the same: what needs less is it
-            lag = withheld(data, table(train, one, push, speed))
-            g = gain(last, lag, moving)
-            if _holds(g) and np.mean(lag) <= np.mean(blind):
-                columns, last = [one, push, speed], lag
-        if last is lag:
-            lopsided = withheld(data, table(train, *columns, both))
-            more = gain(lag, lopsided, moving)
-            if len(columns) > 3 and _holds(more):  # friction that differs between the ways
-                columns, last = [*columns, both], lopsided
-            c, C = fit(data, table(train, *columns))
-            spread = 1.96 * float(np.sqrt(C[2, 2]))
-            found.causes.append(
-                FoundCause(
-                    effect="servo_lag",
-                    target=found.name,
-                    probability=_probability(g),
-                    share=round(1.0 - float(np.mean(lag) / np.mean(before)), 4),
-                    parameters={"time_constant_ms": _value(1e3 * c[2], 1e3 * spread)},
-                )
+    named = []
+    if swung is not None:
+        found.causes.append(_overshoot(found.name, swung, before, last))
+        named.append("servo_overshoot")
+    lag = None if "servo_lag" in without else _lag(data, table, train, columns, floor)
+    if lag is not None:
+        columns, last = [*columns, *lag.columns], lag.last
+        c, C = fit(data, table(train, *columns))
+        spread = 1.96e3 * np.sqrt(np.diag(C))
+        value = dict(zip(columns, (_value(1e3 * each, s) for each, s in zip(c, spread, strict=True)), strict=True))
+        found.causes.append(
+            FoundCause(
+                effect="servo_lag",
+                target=found.name,
+                probability=_probability(lag.gain),
+                share=round(1.0 - float(np.mean(last) / np.mean(before)), 4),
+                parameters={"time_constant_ms": value[_speed]},
             )
-            found.details["following"] = {"acceleration_us2": _value(1e6 * c[1], 1.96e6 * float(np.sqrt(C[1, 1])))}
-            if len(c) > 3:
-                found.details["following"] |= {
-                    "reversal_um": _value(1e3 * c[3], 1.96e3 * float(np.sqrt(C[3, 3]))),
-                    "presliding_mm": length.distance,
-                }
-    _close(found, channel, "servo_lag", last, data, table, columns, test, gaps, moves)
+        )
+        named.append("servo_lag")
+        i = columns.index(_push) if _push in columns else None
+        found.details["following"] = {} if i is None else {"acceleration_us2": _value(1e6 * c[i], 1e3 * spread[i])}
+        if lag.turn in columns:
+            found.details["following"] |= {"reversal_um": value[lag.turn], "presliding_mm": lag.length.distance}
+    _close(found, channel, named, last, data, table, columns, test, gaps, moves)
     found.following = channel
+
+
+Column = Callable[[AxisTravel], Floats]
+
+
+def _one(m: AxisTravel) -> Floats:
+    return np.ones_like(m.time)
+
+
+def _push(m: AxisTravel) -> Floats:
+    return m.acceleration
+
+
+def _inertia(m: AxisTravel) -> Floats:
+    return 1e-3 * m.acceleration
+
+
+def _speed(m: AxisTravel) -> Floats:
+    return m.speed
+
+
+def _either_way(m: AxisTravel) -> Floats:
+    return np.abs(m.speed)
+
+
+def _series(moves: list[AxisTravel], values: list[Floats], train: list[int]) -> Series:
+    return series([moves[k].time for k in train], [values[k] for k in train])
+
+
+def _table(moves: list[AxisTravel]) -> Callable[..., Floats]:
+    """Columns (n, k) of some runs."""
+
+    def table(ks: Sequence[int], *columns: Column) -> Floats:
+        return np.concatenate([np.stack([c(moves[k]) for c in columns], axis=1) for k in ks])
+
+    return table
+
+
+@dataclass(frozen=True, eq=False)
+class _Lag:
+    """A lag beside other columns: its own columns, what they leave of withheld blocks, and what that gains."""
+
+    columns: list[Column]
+    last: Floats
+    gain: Gain
+    turn: Column
+    length: Turning
+
+
+def _lag(
+    data: Series, table: Callable[..., Floats], train: list[int], base: Sequence[Column], floor: float
+) -> _Lag | None:
+    """Whether an axis is late, beside friction that turns round; None where it is not."""
+    length = _presliding(data, lambda d: table(train, _speed, *reversed(base), lambda m: m.reversal(d)))
+
+    def turn(m: AxisTravel) -> Floats:
+        return m.reversal(length)
+
+    moving = telling(data, table(train, _speed, *base), 0, MINOR * floor)
+    blind = withheld(data, table(train, *base, turn))
+    last = withheld(data, table(train, *base, _speed, turn))
+    g = gain(blind, last, moving)
+    if _holds(g):
+        lopsided = withheld(data, table(train, *base, _speed, turn, _either_way))
+        if _holds(gain(last, lopsided, moving)):  # friction that differs between the ways
+            return _Lag([_speed, turn, _either_way], lopsided, g, turn, length)
+        return _Lag([_speed, turn], last, g, turn, length)
+    # at one speed a lag and a reversal are nearly the same: what needs less is it
+    last = withheld(data, table(train, *base, _speed))
+    g = gain(withheld(data, table(train, *base)), last, moving)
+    return _Lag([_speed], last, g, turn, length) if _holds(g) and np.mean(last) <= np.mean(blind) else None
+
+
+@dataclass(frozen=True, eq=False)
+class _Swung:
+    """A loop that swings over, and the rows that tell of it: runs without how their loops were before the log began."""
+
+    swing: Swing
+    spread: tuple[float, float]
+    gain: Gain
+    runs: list[AxisRun]
+    moves: list[AxisTravel]
+    gaps: list[Floats]
+    errors: list[Floats]
+
+    def error(self, m: AxisTravel) -> Floats:
+        """What the loop makes of the set-points of a run."""
+        return next(error for each, error in zip(self.moves, self.errors, strict=True) if each is m)
+
+
+def _swung(
+    runs: list[AxisRun], moves: list[AxisTravel], gaps: list[Floats], train: list[int], floor: float, without: set[str]
+) -> _Swung | None:
+    """A loop that swings over, where it explains more than inertia in the loop does; None where it does not.
+
+    Where the axis is late as well its inertia is what its loop has anyway.
+    """
+    if not all(np.isfinite(r.setpoint).all() for r in runs) or max(float(np.ptp(r.setpoint)) for r in runs) == 0.0:
+        return None
+    if float(np.std(np.concatenate([gaps[k] for k in train]))) < MINOR * floor:
+        return None
+    swing, spread = find_swing([runs[k] for k in train], [gaps[k] for k in train], [moves[k] for k in train])
+    rows = [swing.settled(r) for r in runs]
+    if min(int(on.sum()) for on in rows) < ROWS:
+        return None
+    errors = [swing.error(r)[on] for r, on in zip(runs, rows, strict=True)]
+    found = _Swung(
+        swing,
+        spread,
+        Gain(0.0, 0.0, 0),
+        [r.of(on) for r, on in zip(runs, rows, strict=True)],
+        [m.of(on) for m, on in zip(moves, rows, strict=True)],
+        [g[on] for g, on in zip(gaps, rows, strict=True)],
+        errors,
+    )
+    data, table = _series(found.moves, found.gaps, train), _table(found.moves)
+    plain = withheld(data, table(train, _one, _push))
+    late = None if "servo_lag" in without else _lag(data, table, train, [_one, _push], floor)
+    with_it = withheld(data, table(train, _one, found.error))
+    beside = None if "servo_lag" in without else _lag(data, table, train, [_one, found.error], floor)
+    last = with_it if beside is None else beside.last
+    less = withheld(data, table(train, _one, *(beside.columns if beside else ())))
+    shown = telling(data, table(train, found.error, _one), 0, MINOR * floor)
+    g = gain(less, last, shown)
+    large = float(np.std(np.concatenate([errors[k] for k in train]))) > MINOR * floor
+    if not large or not _holds(g):
+        return None
+    other = plain if late is None else late.last
+    if late is not None and beside is not None:
+        better = _holds(gain(other, last, shown))
+    else:
+        better = float(np.mean(last)) < EQUAL * float(np.mean(other))
+    return replace(found, gain=g) if better else None
+
+
+def _overshoot(name: str, swung: _Swung, before: Floats, last: Floats) -> FoundCause:
+    period, damping = swung.swing.period, swung.swing.damping
+    return FoundCause(
+        effect="servo_overshoot",
+        target=name,
+        probability=_probability(swung.gain),
+        share=round(1.0 - float(np.mean(last) / np.mean(before)), 4),
+        parameters={
+            "period_ms": _value(1e3 * period, 1.96e3 * swung.spread[0]),
+            "damping": _value(damping, 1.96 * swung.spread[1]),
+        },
+    )
 
 
 def _scatter(runs: Sequence[AxisRun]) -> float:
@@ -293,7 +459,7 @@ def _scatter(runs: Sequence[AxisRun]) -> float:
 
 
 def _close(
-    found: AxisFindings, channel: AxisChannel, effect: str, last: Floats, data: Series, table: Any, columns: list[Any],
+    found: AxisFindings, channel: AxisChannel, effects: Sequence[str], last: Floats, data: Series, table: Any, columns: list[Any],
     test: list[int], values: list[Floats], moves: list[AxisTravel],
 ) -> None:  # fmt: skip
     """Leftovers of the channel; where runs are held out, what is left there takes the place of withheld blocks."""
@@ -301,7 +467,9 @@ def _close(
     c = solve(A, data.y)
     channel.columns, channel.moves = A, [moves[k] for k in channel.runs]
     if not channel.stated:
-        channel.floor = float(np.hypot(channel.floor, _carried(found, channel, moves, c, effect)))
+        channel.floor = float(
+            np.hypot(channel.floor, _carried(found, channel, moves, dict(zip(columns, c, strict=True))))
+        )
     channel.left = [np.array(values[k] - table([k], *columns) @ c, dtype=np.float64) for k in channel.runs]
     channel.last = last
     ends = np.cumsum([len(moves[k].time) for k in channel.runs])[:-1]
@@ -318,22 +486,18 @@ def _close(
         channel.names = [channel.all_names[k] for k in test]
     channel.gate = judge(channel.left, left, times, channel.floor)
     found.unknown_chance = min(found.unknown_chance, channel.gate.chance)
-    if any(each.effect == effect for each in found.causes):
-        channel.steps.append((effect, float(np.sqrt(np.mean(channel.last)))))
+    channel.steps += [(effect, float(np.sqrt(np.mean(channel.last)))) for effect in effects]
 
 
-def _carried(found: AxisFindings, channel: AxisChannel, moves: list[AxisTravel], c: Floats, effect: str) -> float:
+def _carried(found: AxisFindings, channel: AxisChannel, moves: list[AxisTravel], c: Mapping[Column, float]) -> float:
     """What the noise of the encoder, resolution included, does to a channel by way of speed and acceleration."""
     if not found.carries:
         return 0.0
     noise = [channel.encoder_noise[k] for k in channel.runs]
     gains = [noise_gains(float(np.median(np.diff(moves[k].time))), found.wide) for k in channel.runs]
-    push = c[1] * (1e-3 if effect == "friction" else 1.0) if len(c) > 1 else 0.0
-    at = 3 if effect == "friction" else 2
-    speed = c[at] if len(c) > at else 0.0
-    return float(
-        np.sqrt(np.mean([(n * np.hypot(push * g[1], speed * g[0])) ** 2 for n, g in zip(noise, gains, strict=True)]))
-    )
+    push = c.get(_push, 0.0) + 1e-3 * c.get(_inertia, 0.0)
+    each = [n * np.hypot(push * g[1], c.get(_speed, 0.0) * g[0]) for n, g in zip(noise, gains, strict=True)]
+    return float(np.sqrt(np.mean(np.square(each))))
 
 
 def _name_rest(found: AxisFindings) -> None:
@@ -359,37 +523,37 @@ def _force(
     without: set[str],
 ) -> None:
     forces = [r.force for r in runs]
-    data = series([runs[k].time for k in train], [forces[k] for k in train])
+    data, table = _series(moves, forces, train), _table(moves)
+    length = _presliding(data, lambda d: table(train, _one, _inertia, _speed, _either_way, lambda m: m.reversal(d)))
 
-    def table(ks: Sequence[int], *columns: Any) -> Floats:
-        return np.concatenate([np.stack([c(moves[k]) for c in columns], axis=1) for k in ks])
+    def turn(m: AxisTravel) -> Floats:
+        return m.reversal(length)
 
-    one, push = (lambda m: np.ones_like(m.time)), (lambda m: 1e-3 * m.acceleration)
-    speed, both = (lambda m: m.speed), (lambda m: np.abs(m.speed))
-    length = _presliding(data, lambda d: table(train, one, push, speed, both, lambda m: m.reversal(d)))
-    turn = lambda m: m.reversal(length)
-    columns = [one, push]
+    columns: list[Column] = [_one, _inertia]
     before = withheld(data, table(train, *columns))
     floor = found.stated.force_N or rows_floor([forces[k] for k in train])
-    first = withheld(data, table(train, one))
+    first = withheld(data, table(train, _one))
     channel = AxisChannel(data, train, first, before, floor=floor, stated=found.stated.force_N is not None)
     channel.all_names = [r.name for r in runs]
     channel.encoder_noise = [rows_floor([r.encoder]) for r in runs]
-    last = before
+    last, named = before, []
     if "friction" not in without:
-        after = withheld(data, table(train, one, push, turn, speed))
-        moving = telling(data, table(train, turn)[:, 0])
+        after = withheld(data, table(train, _one, _inertia, turn, _speed))
+        moving = telling(data, table(train, turn, *columns), 0, MINOR * floor)
         g = gain(before, after, moving)
         if _holds(g):
-            columns, last = [one, push, turn, speed], after
-            lopsided = withheld(data, table(train, *columns, both))
+            columns, last = [_one, _inertia, turn, _speed], after
+            lopsided = withheld(data, table(train, *columns, _either_way))
             more = gain(last, lopsided, moving)
             if _holds(more):
-                columns, last = [*columns, both], lopsided
+                columns, last = [*columns, _either_way], lopsided
             found.causes.append(_friction(found, data, table(train, *columns), length, _probability(g), before, last))
             found.details["force"]["asymmetry_z"] = round(more.z, 2)
+            named.append("friction")
     _refused(found, data, table, train, columns, last, length, floor)
-    _close(found, channel, "friction", last, data, table, columns, test, forces, moves)
+    _close(found, channel, named, last, data, table, columns, test, forces, moves)
+    if "disturbance" not in without and channel.gate is not None and channel.gate.word == "above":
+        channel = _pushed(found, runs, channel, named, columns, test, forces, moves) or channel
     found.force = channel
     line = ripple([moves[k] for k in train], channel.left)
     if line is not None and line.share > LEAST_RIPPLE and line.amplitude**2 / 2.0 > (MINOR * floor) ** 2:
@@ -397,6 +561,67 @@ def _force(
         waves = [lambda m, w=wave: w(2.0 * np.pi * m.position / line.period) for wave in (np.sin, np.cos)]
         g = gain(last, withheld(data, table(train, *columns, *waves)))
         found.unknown_chance = min(found.unknown_chance, log10_chance(g, line.tried))
+
+
+def _pushed(
+    found: AxisFindings, runs: list[AxisRun], channel: AxisChannel, named: Sequence[str], columns: list[Column], test: list[int],
+    forces: list[Floats], moves: list[AxisTravel],
+) -> AxisChannel | None:  # fmt: skip
+    """The channel without pushes that last for a while, where nothing is left above the floor then; these are causes.
+
+    Other stretches tell nothing of them: the rows that they last for have to follow them.
+    """
+    chance, now, without, pushes = found.unknown_chance, channel, list(forces), list[Window]()
+    table = _table(moves)
+    for _ in range(MOST_PUSHES):
+        window = find_window(now.left, [m.time for m in now.moves], now.floor)
+        if window is None:
+            return None
+        pushes.append(window)
+        k = channel.runs[window.run]
+        without[k] = without[k].copy()
+        without[k][window.first : window.last] -= window.shift
+        data = _series(moves, without, channel.runs)
+        now = replace(channel, steps=[], left=[], gate=None)
+        found.unknown_chance = 0.0
+        effects = [*named, "disturbance"]
+        _close(
+            found,
+            now,
+            effects,
+            withheld(data, table(channel.runs, *columns)),
+            data,
+            table,
+            columns,
+            test,
+            without,
+            moves,
+        )
+        if now.gate is not None and now.gate.word != "above":
+            found.causes += [_push_cause(found.name, runs[channel.runs[each.run]], each, now) for each in pushes]
+            return now
+    found.unknown_chance = chance
+    return None
+
+
+def _push_cause(name: str, run: AxisRun, window: Window, now: AxisChannel) -> FoundCause:
+    rows = now.left[window.run][window.first : window.last]
+    parts = [float(np.mean(part)) for part in np.array_split(rows, QUARTERS)]
+    spread = float(student.ppf(0.975, QUARTERS - 1)) * float(np.std(parts, ddof=1)) / np.sqrt(QUARTERS)
+    step = 2.0 * float(np.median(np.diff(run.time)))
+    begin, end = (run.started + float(run.time[min(i, len(run.time) - 1)]) for i in (window.first, window.last))
+    square = window.shift**2 * (window.last - window.first) / sum(map(len, now.left))
+    return FoundCause(
+        effect="disturbance",
+        target=name,
+        probability=stated(probability_of_chance(window.chance)),
+        share=round(min(square / max(float(np.mean(now.first)), 1e-300), 1.0), 4),
+        parameters={
+            "force_N": _value(-window.shift, spread),
+            "from_s": _value(begin, step),
+            "to_s": _value(end, step),
+        },
+    )
 
 
 def _friction(

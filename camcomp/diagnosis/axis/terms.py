@@ -8,10 +8,10 @@ import numpy as np
 from scipy.interpolate import Akima1DInterpolator
 from scipy.signal import savgol_coeffs, savgol_filter
 
-from camcomp.ground.datatypes import Floats
+from camcomp.ground.datatypes import Bools, Floats
 from camcomp.model.hysteresis import direction
 
-PRESLIDING_GRID_MM = (1e-4, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1)  # the first is a step
+PRESLIDING_GRID_MM = (1e-4, 0.001, 0.002, 0.003, 0.005, 0.01, 0.02, 0.05, 0.1)  # the first is a step
 TURNING_GRID_MM_PER_S = (0.1, 0.2, 0.35, 0.5, 0.7, 1.0, 1.5, 2.5, 5.0, 10.0)
 STANDS_OUT = 1.6  # times the next line of a spectrum
 STRIBECK_MM_PER_S = 10.0
@@ -41,6 +41,10 @@ class AxisTravel:
     speed: Floats
     acceleration: Floats
 
+    def of(self, rows: Bools) -> AxisTravel:
+        """Some of the rows (n,)."""
+        return AxisTravel(self.time[rows], self.position[rows], self.speed[rows], self.acceleration[rows])
+
     def reversal(self, how: Turning) -> Floats:
         """Direction of travel (n,), -1 to 1."""
         if how.speed is not None:
@@ -48,10 +52,11 @@ class AxisTravel:
         return direction(self.position[:, None], how.distance)[:, 0]
 
 
-def travel(time: Floats, position: Floats, wide: int = WIDE[0], late: float = 0.0) -> AxisTravel:
-    """Local cubics over 2 wide + 1 samples (Savitzky, Golay 1964) of positions (n,) at times (n,) s, late s later.
+def travel(time: Floats, position: Floats, wide: int = WIDE[0], late: float | None = None) -> AxisTravel:
+    """Local cubics over 2 wide + 1 samples (Savitzky, Golay 1964) of positions (n,) at times (n,) s.
 
-    Rows that are lost and clocks that tremble are led over: the cubics want even steps.
+    late: s, of an axis that follows positions which are free of noise: these themselves then, for cubics turn round before
+    and after a stop. Rows that are lost and clocks that tremble are led over: cubics want even steps.
     """
     dt = float(np.median(np.diff(time)))
     even = time[0] + dt * np.arange(max(round(float(time[-1] - time[0]) / dt) + 1, 2 * wide + 1))
@@ -59,7 +64,9 @@ def travel(time: Floats, position: Floats, wide: int = WIDE[0], late: float = 0.
     parts = [savgol_filter(values, 2 * wide + 1, 3, deriv=k, delta=dt, mode="interp") for k in range(3)]
     if np.ptp(values) == 0.0:  # at rest, to the last digit
         parts = [values, np.zeros_like(values), np.zeros_like(values)]
-    return AxisTravel(time, *(np.interp(time - late, even, part) for part in parts))
+    if late is not None:
+        parts[0] = values
+    return AxisTravel(time, *(np.interp(time - (late or 0.0), even, part) for part in parts))
 
 
 def noise_gains(dt: float, wide: int) -> tuple[float, float]:

@@ -1,0 +1,81 @@
+"""Whether something pushed an axis for a while: a window of one run in which its drive force is shifted."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import norm
+
+from camcomp.ground.datatypes import Floats
+
+CELL_S = 0.02  # in which a window begins and ends, before it is placed to a row
+SHORTEST_S, LONGEST = 0.1, 0.6  # of a window; of its run: what lasts longer is how the run is
+LEVEL = 0.5  # of the shift: every quarter of a window has to show it to within that
+QUARTERS = 4
+LEAST_SIZE = 1.0  # of the floor, that a push has to be
+FARTHEST = 3  # cells by which an end is moved to its row
+
+
+@dataclass(frozen=True)
+class Window:
+    """Rows first to last (exclusive) of a run, counted from 0; shift N; log10 of the chance that noise looks like this."""
+
+    run: int
+    first: int
+    last: int
+    shift: float
+    chance: float
+
+
+def find_window(left: Sequence[Floats], times: Sequence[Floats], floor: float) -> Window | None:
+    """The window of leftovers (n,) N per run that stands out most, where it is a push: as large throughout as it is on average."""
+    best: Window | None = None
+    tried = 0
+    for k, (rest, time) in enumerate(zip(left, times, strict=True)):
+        step = float(np.median(np.diff(time)))
+        cell = max(round(CELL_S / step), 1, len(rest) // 400)
+        edges = np.arange(0, len(rest) - cell + 1, cell)
+        sums = np.concatenate([[0.0], np.cumsum(rest)])[edges]
+        i, j = np.triu_indices(len(edges), max(round(SHORTEST_S / (cell * step)), 2))
+        n = edges[j] - edges[i]
+        some = n < LONGEST * len(rest)
+        i, j, n = i[some], j[some], n[some]
+        if not len(n):
+            continue
+        # against the rest of the run: a shift of all of it is none
+        whole = float(rest.sum())
+        inside = sums[j] - sums[i]
+        apart = inside / n - (whole - inside) / (len(rest) - n)
+        score = apart**2 * n * (len(rest) - n) / len(rest)
+        at = int(np.argmax(score))
+        tried += len(n)
+        first, last = _placed(rest, int(edges[i[at]]), int(edges[j[at]]), FARTHEST * cell)
+        chance = float(norm.logsf(np.sqrt(score[at]) / floor) / np.log(10.0))
+        if best is None or chance < best.chance:
+            best = Window(k, first, last, float(apart[at]), chance)
+    if best is None or abs(best.shift) < LEAST_SIZE * floor:
+        return None
+    rest = left[best.run]
+    outside = float(np.mean(np.concatenate([rest[: best.first], rest[best.last :]])))
+    parts = [float(np.mean(p)) - outside for p in np.array_split(rest[best.first : best.last], QUARTERS)]
+    even = all(abs(p - best.shift) < LEVEL * abs(best.shift) for p in parts)
+    return (
+        Window(best.run, best.first, best.last, best.shift, min(best.chance + np.log10(tried), 0.0)) if even else None
+    )
+
+
+def _placed(rest: Floats, first: int, last: int, reach: int) -> tuple[int, int]:
+    """Both ends moved by up to `reach` rows to where the step is."""
+
+    def step_at(near: int) -> int:
+        low, high = max(near - reach, 1), min(near + reach, len(rest) - 1)
+        a, b = max(low - reach, 0), min(high + reach, len(rest))
+        cuts = np.arange(low, high + 1)
+        sums = np.concatenate([[0.0], np.cumsum(rest[a:b])])
+        n, m = cuts - a, b - cuts
+        before, behind = sums[cuts - a] / n, (sums[-1] - sums[cuts - a]) / np.maximum(m, 1)
+        return int(cuts[np.argmax((before - behind) ** 2 * n * m)])
+
+    return (step_at(first) if first > 0 else 0), step_at(last)
