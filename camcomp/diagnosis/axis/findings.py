@@ -14,10 +14,10 @@ from camcomp.diagnosis.axis.terms import WIDE, AxisTravel, Ripple
 from camcomp.diagnosis.result.types import FoundCause, Law
 from camcomp.diagnosis.statistics.probability import EVEN
 from camcomp.ground.datatypes import Bools, Floats
+from camcomp.model.seams import missing_rows
 
-MOST_LOST = 4.0  # steps between two rows: a cubic leads over one lost row, not over what a drive does meanwhile
 FIRST_MOVE_MM = 0.2  # after which friction has its sense
-BESIDE_GAP = 10  # rows of which a gap leaves speed and acceleration uncertain
+BESIDE_GAP = 5  # rows of which a gap leaves speed and acceleration uncertain
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,9 +56,8 @@ class AxisRun:
         return clean, row[off]
 
     def away_from_gaps(self) -> AxisRun:
-        """The run without the rows beside several lost ones: nobody saw how fast it was there. All where gaps are the rule."""
-        step = np.diff(self.time)
-        gaps = np.flatnonzero(step > MOST_LOST * np.median(step)) if len(step) else step
+        """The run without the rows beside lost ones: nobody saw how fast it was there. All where gaps are the rule."""
+        gaps = np.flatnonzero(missing_rows(self.time))
         near = np.zeros(len(self.time), bool)
         for gap in gaps:
             near[max(gap + 1 - BESIDE_GAP, 0) : gap + 1 + BESIDE_GAP] = True
@@ -66,16 +65,12 @@ class AxisRun:
             return self
         return self.of(~near)
 
-    def from_first_move(self) -> AxisRun:
-        """The run without its rest before it moves for the first time: which way friction held it there nobody knows."""
+    def moved(self) -> Bools:
+        """Rows (n,) from the first move on: which way friction held the axis before nobody knows. All where it stays."""
         away = np.abs(self.encoder - self.encoder[:1])
-        if (
-            self.revolute
-            or not np.isfinite(self.force).any()
-            or not np.nanmax(away, initial=0.0) > 10.0 * FIRST_MOVE_MM
-        ):
-            return self
-        return self.of(np.arange(len(away)) >= int(np.argmax(away > FIRST_MOVE_MM)))
+        if self.revolute or not away.max(initial=0.0) > 10.0 * FIRST_MOVE_MM:
+            return np.ones(len(away), bool)
+        return np.arange(len(away)) >= int(np.argmax(away > FIRST_MOVE_MM))
 
     def of(self, rows: Bools) -> AxisRun:
         """Some of the rows (n,)."""
@@ -107,9 +102,17 @@ class AxisChannel:
     floor: float = 0.0
     stated: bool = False
     all_names: list[str] = field(default_factory=list)
-    encoder_noise: list[float] = field(default_factory=list)  # mm, of every run
     names: list[str] = field(default_factory=list)  # of the runs that the gate has seen
     gate: AxisGate | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Carried:
+    """Noise (mm per run) of what is taken for the motion, and how cubics and a loop's lateness (s, of set-points) hand it on."""
+
+    noise: list[float]
+    wide: int
+    late: float | None = None
 
 
 @dataclass(eq=False)
@@ -119,7 +122,7 @@ class AxisFindings:
     name: str
     stated: AxisDeviation
     wide: int = WIDE[0]
-    carries: bool = True  # whether encoders are the motion, so that their noise goes with it
+    carried: Carried = field(default_factory=lambda: Carried([], WIDE[0]))
     causes: list[FoundCause] = field(default_factory=list)
     following: AxisChannel | None = None
     force: AxisChannel | None = None

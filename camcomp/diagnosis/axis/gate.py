@@ -49,11 +49,15 @@ class AxisGate:
     intervals: tuple[Interval, ...]
 
 
-def judge(inside: Sequence[Floats], left: Sequence[Floats], times: Sequence[Floats], floor: float) -> AxisGate:
-    """Leftovers (n,) mm or N per run against a floor. left, times: of rows that were not fitted.
+def judge(
+    inside: Sequence[Floats], left: Sequence[Floats], times: Sequence[Floats], floor: float, offset: float = 0.0
+) -> AxisGate:
+    """Leftovers (n,) mm or N per run against a floor. left, times: of rows that were not fitted; offset: constant by which a run
+    may differ from the others, which is repeatability.
 
     inside: where everything is fitted. What goes away then is what the rows leave open, and no unknown.
     """
+    inside, left = ([each - np.clip(each.mean(), -offset, offset) for each in part] for part in (inside, left))
     found, chance = intervals(left, times, floor)
     floor = max(floor, 1e-12)
     parts = max(STRETCHES // len(left), 2)

@@ -38,7 +38,12 @@ def check_axes(log: str, runs: Mapping[str, AxisRun]) -> None:
 
 def _moves(setpoint: Floats, encoder: Floats) -> bool:
     """Whether set-points or encoder go so far that noise is small beside it: what stands says nothing of units and columns."""
-    return bool(max(np.ptp(setpoint), np.ptp(encoder)) > TRAVELS * rows_floor([encoder]) > 0.0)
+    return bool(max(_spread(setpoint), _spread(encoder)) > TRAVELS * rows_floor([encoder]) > 0.0)
+
+
+def _spread(values: Floats) -> float:
+    """How far values (n,) spread, without the few that are no measurement."""
+    return float(np.ptp(np.quantile(values, [0.02, 0.98])))
 
 
 def _refused(rule: str, log: str, text: str) -> ConfigError:
@@ -65,10 +70,10 @@ def _check_order(log: str, name: str, runs: Mapping[str, AxisRun]) -> None:
     def off(other: AxisRun) -> float:
         there = np.isfinite(other.encoder)  # rows that one axis has lost another one has
         gap = run.setpoint[known] - np.interp(run.time[known], other.time[there], other.encoder[there])
-        return float(np.std(gap))
+        return _spread(gap)
 
     own = off(run)
-    if own <= LARGE * float(np.std(run.setpoint[known])):
+    if own <= LARGE * _spread(run.setpoint[known]):
         return
     for other, each in runs.items():
         if other != name and np.isfinite(each.encoder).sum() >= ROWS and off(each) < BETTER * own:

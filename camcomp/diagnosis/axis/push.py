@@ -55,7 +55,7 @@ def find_window(left: Sequence[Floats], times: Sequence[Floats], floor: float) -
         chance = float(norm.logsf(np.sqrt(score[at]) / floor) / np.log(10.0))
         if best is None or chance < best.chance:
             best = Window(k, first, last, float(apart[at]), chance)
-    if best is None or abs(best.shift) < LEAST_SIZE * floor:
+    if best is None or abs(best.shift) < LEAST_SIZE * floor or best.last - best.first < QUARTERS:
         return None
     rest = left[best.run]
     outside = float(np.mean(np.concatenate([rest[: best.first], rest[best.last :]])))

@@ -28,7 +28,7 @@ from camcomp.diagnosis.axis.block_least_squares import (
     telling,
     withheld,
 )
-from camcomp.diagnosis.axis.findings import AxisChannel, AxisDeviation, AxisFindings, AxisRun
+from camcomp.diagnosis.axis.findings import AxisChannel, AxisDeviation, AxisFindings, AxisRun, Carried
 from camcomp.diagnosis.axis.gate import MINOR, dependences, judge
 from camcomp.diagnosis.axis.law import LEAST_SHARE, axis_law
 from camcomp.diagnosis.axis.next_moves import next_moves
@@ -37,6 +37,7 @@ from camcomp.diagnosis.axis.push import QUARTERS, Window, find_window
 from camcomp.diagnosis.axis.swing import Swing, find_swing
 from camcomp.diagnosis.axis.terms import (
     PRESLIDING_GRID_MM,
+    SETTLED,
     TURNINGS,
     WIDE,
     AxisTravel,
@@ -66,7 +67,8 @@ ROWS = 50  # below which a run says nothing
 NO_TIPS = "ISO 230-2: the tip was not measured"
 LATEST_S = 0.1  # of a loop
 ENCODER_BETTER = 0.8  # of what set-points leave of a channel: what encoders have to leave to be the motion
-SETPOINT_WIDE = (2, 5, 10)  # samples on either side of a local cubic through set-points
+SETPOINT_WIDE = (2, *WIDE)  # samples on either side of a local cubic through set-points
+PASSES = 2  # of the fit of a push and of all else
 MOST_PUSHES = 2  # of an axis: what comes more often is no mishap
 ALIKE = 0.02  # of a time constant: by which those of axes may differ and be one
 EQUAL = 1.05  # of what a loop with inertia leaves: what one that swings over may leave to be the simpler answer
@@ -103,7 +105,7 @@ def studied(
     for name, runs in headway.steps(axes.items(), len(axes) * (1 + again)):
         clean = [r.without_spikes() for r in runs]
         outliers |= {(r.name, int(row)) for r, rows in clean for row in rows}
-        cleaned[name] = [r.away_from_gaps().from_first_move() for r, _ in clean]
+        cleaned[name] = [r.away_from_gaps() for r, _ in clean]
         found.append(_axis(name, cleaned[name], set(holdout), set(without), stated or AxisDeviation()))
     found = [a for a in found if a.channels]
     if not found:
@@ -186,14 +188,15 @@ def _axis(name: str, runs: list[AxisRun], holdout: set[str], without: set[str], 
     late = None
     if train and all(np.isfinite(gaps[k]).all() for k in train):
         late = _lateness(usable, gaps, train)
-        _following(found, usable, _motion(found, usable, gaps, train, late), gaps, train, test, without)
+        _following(found, *_motion(found, usable, gaps, train, late), train, test, without)
     if train and all(np.isfinite(usable[k].force).all() for k in train):
-        forces = [r.force for r in usable]
-        _force(found, usable, _motion(found, usable, forces, train, late), train, test, without)
+        runs, moves, _ = _motion(found, usable, [r.force for r in usable], train, late)
+        found = _force(found, runs, moves, train, test, without)
     _name_rest(found)
     if found.strange:
-        asked = [usable[k] for k in found.following.runs] if found.following else []
-        told = [travel(r.time, r.setpoint, found.wide) for r in asked]
+        follows = found.following
+        asked = [(usable[k], m) for k, m in zip(follows.runs, follows.moves, strict=True)] if follows else []
+        told = [travel(r.time, r.setpoint, found.wide).of(np.isin(r.time, m.time)) for r, m in asked]
         found.law = axis_law(name, found.force, found.following, told)
     return found
 
@@ -218,24 +221,33 @@ def _lateness(runs: list[AxisRun], gaps: list[Floats], train: list[int]) -> floa
 
 def _motion(
     found: AxisFindings, runs: list[AxisRun], values: list[Floats], train: list[int], late: float | None
-) -> list[AxisTravel]:
+) -> tuple[list[AxisRun], list[AxisTravel], list[Floats]]:
     """What moved while a channel had its values (n,): set-points, as late as they are followed, where that explains them as well.
 
-    The noise of an encoder is in its following error, too, and would explain a part of itself.
+    The noise of an encoder is in its following error, too, and would explain a part of itself. With the runs and their values,
+    from where on it no longer matters how the axis moved before its log began.
     """
     encoders = [travel(r.time, r.encoder, found.wide) for r in runs]
     if late is None:
-        return encoders
+        found.carried = Carried([rows_floor([r.encoder]) for r in runs], found.wide)
+        return runs, encoders, values
     mine = [runs[k] for k in train]
     told = [values[k] for k in train]
 
     def misfit(moves: list[AxisTravel]) -> float:
         return _misfit(mine, told, [moves[k] for k in train])
 
-    every = [[travel(r.time, r.setpoint, wide, late) for r in runs] for wide in SETPOINT_WIDE]
-    setpoints = min(every, key=misfit)
-    found.carries = misfit(encoders) < ENCODER_BETTER * misfit(setpoints)
-    return encoders if found.carries else setpoints
+    ways = {wide: [travel(r.time, r.setpoint, wide, late) for r in runs] for wide in SETPOINT_WIDE}
+    wide = min(ways, key=lambda each: misfit(ways[each]))
+    setpoints = ways[wide]
+    if misfit(encoders) < ENCODER_BETTER * misfit(setpoints):
+        found.carried = Carried([rows_floor([r.encoder]) for r in runs], found.wide)
+        return runs, encoders, values
+    found.carried = Carried([rows_floor([r.setpoint]) for r in runs], wide, late)
+    rows = [r.time >= r.time[0] + SETTLED * late for r in runs]
+    every = zip(runs, setpoints, values, rows, strict=True)
+    kept = [(r.of(on), m.of(on), v[on]) if on.sum() >= ROWS else (r, m, v) for r, m, v, on in every]
+    return [r for r, _, _ in kept], [m for _, m, _ in kept], [v for _, _, v in kept]
 
 
 def _usual(m: AxisTravel) -> Floats:
@@ -244,9 +256,14 @@ def _usual(m: AxisTravel) -> Floats:
 
 
 def _misfit(runs: list[AxisRun], values: list[Floats], moves: list[AxisTravel]) -> float:
-    """Median of what is left (of all rows) of a channel when what every axis has is fitted to a motion."""
+    """Median of what is left (of all rows) of a channel when what every axis has is fitted to a motion.
+
+    About their middle: a push for a while shifts all that it is not there for.
+    """
     data = series([r.time for r in runs], values)
-    return float(np.median(np.abs(leftover(data, np.concatenate([_usual(m) for m in moves])))))
+    left = leftover(data, np.concatenate([_usual(m) for m in moves]))
+    left = left - np.median(left)
+    return float(np.median(np.abs(left)))
 
 
 def _judged(
@@ -268,7 +285,11 @@ def _following(
     without: set[str],
 ) -> None:  # fmt: skip
     floor = found.stated.encoder_mm or float(np.hypot(_scatter([runs[k] for k in train]), REPEATABILITY_MM))
-    swung = None if "servo_overshoot" in without else _swung(runs, moves, gaps, train, floor, without)
+    swung = (
+        None
+        if "servo_overshoot" in without
+        else _swung(runs, moves, gaps, train, floor, without, found.carried.late or 0.0)
+    )
     if swung is not None:
         runs, moves, gaps = swung.runs, swung.moves, swung.gaps
     data, table = _series(moves, gaps, train), _table(moves)
@@ -276,7 +297,6 @@ def _following(
     before, last = withheld(data, table(train, _one)), withheld(data, table(train, *columns))
     channel = AxisChannel(data, train, before, last, floor=floor, stated=found.stated.encoder_mm is not None)
     channel.all_names = [r.name for r in runs]
-    channel.encoder_noise = [rows_floor([r.encoder]) for r in runs]
     named = []
     if swung is not None:
         found.causes.append(_overshoot(found.name, swung, before, last))
@@ -394,7 +414,13 @@ class _Swung:
 
 
 def _swung(
-    runs: list[AxisRun], moves: list[AxisTravel], gaps: list[Floats], train: list[int], floor: float, without: set[str]
+    runs: list[AxisRun],
+    moves: list[AxisTravel],
+    gaps: list[Floats],
+    train: list[int],
+    floor: float,
+    without: set[str],
+    late: float,
 ) -> _Swung | None:
     """A loop that swings over, where it explains more than inertia in the loop does; None where it does not.
 
@@ -404,7 +430,7 @@ def _swung(
         return None
     if float(np.std(np.concatenate([gaps[k] for k in train]))) < MINOR * floor:
         return None
-    swing, spread = find_swing([runs[k] for k in train], [gaps[k] for k in train], [moves[k] for k in train])
+    swing, spread = find_swing([runs[k] for k in train], [gaps[k] for k in train], [moves[k] for k in train], late)
     rows = [swing.settled(r) for r in runs]
     if min(int(on.sum()) for on in rows) < ROWS:
         return None
@@ -420,7 +446,7 @@ def _swung(
     )
     data, table = _series(found.moves, found.gaps, train), _table(found.moves)
     plain = withheld(data, table(train, _one, _push))
-    late = None if "servo_lag" in without else _lag(data, table, train, [_one, _push], floor)
+    lag = None if "servo_lag" in without else _lag(data, table, train, [_one, _push], floor)
     with_it = withheld(data, table(train, _one, found.error))
     beside = None if "servo_lag" in without else _lag(data, table, train, [_one, found.error], floor)
     last = with_it if beside is None else beside.last
@@ -430,8 +456,8 @@ def _swung(
     large = float(np.std(np.concatenate([errors[k] for k in train]))) > MINOR * floor
     if not large or not _holds(g):
         return None
-    other = plain if late is None else late.last
-    if late is not None and beside is not None:
+    other = plain if lag is None else lag.last
+    if lag is not None and beside is not None:
         better = _holds(gain(other, last, shown))
     else:
         better = float(np.mean(last)) < EQUAL * float(np.mean(other))
@@ -484,17 +510,17 @@ def _close(
         )
         left, times = [values[k] - table([k], *columns) @ c for k in test], [moves[k].time for k in test]
         channel.names = [channel.all_names[k] for k in test]
-    channel.gate = judge(channel.left, left, times, channel.floor)
+    channel.gate = judge(
+        channel.left, left, times, channel.floor, 0.0 if _inertia in columns else 2.0 * REPEATABILITY_MM
+    )
     found.unknown_chance = min(found.unknown_chance, channel.gate.chance)
     channel.steps += [(effect, float(np.sqrt(np.mean(channel.last)))) for effect in effects]
 
 
 def _carried(found: AxisFindings, channel: AxisChannel, moves: list[AxisTravel], c: Mapping[Column, float]) -> float:
-    """What the noise of the encoder, resolution included, does to a channel by way of speed and acceleration."""
-    if not found.carries:
-        return 0.0
-    noise = [channel.encoder_noise[k] for k in channel.runs]
-    gains = [noise_gains(float(np.median(np.diff(moves[k].time))), found.wide) for k in channel.runs]
+    """What the noise of what is taken for the motion, resolution included, does to a channel by way of speed and acceleration."""
+    noise, wide, late = [found.carried.noise[k] for k in channel.runs], found.carried.wide, found.carried.late
+    gains = [noise_gains(float(np.median(np.diff(moves[k].time))), wide, late) for k in channel.runs]
     push = c.get(_push, 0.0) + 1e-3 * c.get(_inertia, 0.0)
     each = [n * np.hypot(push * g[1], c.get(_speed, 0.0) * g[0]) for n, g in zip(noise, gains, strict=True)]
     return float(np.sqrt(np.mean(np.square(each))))
@@ -521,8 +547,70 @@ def _force(
     train: list[int],
     test: list[int],
     without: set[str],
-) -> None:
-    forces = [r.force for r in runs]
+) -> AxisFindings:
+    """What was found on the axis, with its drive force; what pushed it for a while goes first where nothing is left then.
+
+    Other stretches tell nothing of a push: the rows that it lasts for have to follow it, and nothing may be left beside it.
+    """
+    rows = [r.moved() for r in runs]
+    runs = [r.of(on) for r, on in zip(runs, rows, strict=True)]
+    moves = [m.of(on) for m, on in zip(moves, rows, strict=True)]
+    forces, pushes = [r.force for r in runs], list[Window]()
+    plain, raw = _forced(found, runs, moves, forces, train, test, without), _series(moves, forces, train)
+    now = plain
+    for _ in range(0 if "disturbance" in without else MOST_PUSHES + 1):
+        channel = now.force
+        assert channel is not None
+        if channel.gate is not None and channel.gate.word == "at" and not now.ripple:
+            for each in pushes:
+                now.causes.append(_push_cause(found.name, runs[train[each.run]], each, channel, raw))
+                channel.steps.append(("disturbance", float(np.sqrt(np.mean(channel.last)))))
+            channel.data, channel.first = raw, withheld(raw, _table(moves)(train, _one))
+            return now
+        window = find_window(channel.left, [m.time for m in channel.moves], channel.floor)
+        if window is None or len(pushes) == MOST_PUSHES:
+            break
+        pushes.append(window)
+        for _ in range(PASSES):  # what friction looks like is known when the push is gone
+            pushes = _sizes(pushes, raw, now.force)
+            shifted = [_without(pushes, i, forces[k]) for i, k in enumerate(train)]
+            now = _forced(found, runs, moves, _put(forces, train, shifted), train, test, without)
+    return plain
+
+
+def _sizes(pushes: Sequence[Window], raw: Series, channel: AxisChannel | None) -> list[Window]:
+    """Pushes with their sizes fitted together with all else that a channel has."""
+    assert channel is not None
+    ends = np.cumsum([0, *(len(m.time) for m in channel.moves)])
+    during = np.zeros((len(raw.y), len(pushes)))
+    for j, each in enumerate(pushes):
+        during[ends[each.run] + each.first : ends[each.run] + each.last, j] = 1.0
+    c = solve(np.concatenate([during, channel.columns], axis=1), raw.y)
+    return [replace(each, shift=float(c[j])) for j, each in enumerate(pushes)]
+
+
+def _without(pushes: Sequence[Window], run: int, force: Floats) -> Floats:
+    """Forces (n,) of a run without the pushes in it."""
+    out = force.copy()
+    for each in pushes:
+        if each.run == run:
+            out[each.first : each.last] -= each.shift
+    return out
+
+
+def _put(forces: Sequence[Floats], train: Sequence[int], values: Sequence[Floats]) -> list[Floats]:
+    out = list(forces)
+    for k, value in zip(train, values, strict=True):
+        out[k] = value
+    return out
+
+
+def _forced(
+    found: AxisFindings, runs: list[AxisRun], moves: list[AxisTravel], forces: list[Floats], train: list[int], test: list[int],
+    without: set[str],
+) -> AxisFindings:  # fmt: skip
+    """The same for given forces (n,) per run."""
+    found = replace(found, causes=[*found.causes], unknown_in=[*found.unknown_in], details={**found.details})
     data, table = _series(moves, forces, train), _table(moves)
     length = _presliding(data, lambda d: table(train, _one, _inertia, _speed, _either_way, lambda m: m.reversal(d)))
 
@@ -531,11 +619,10 @@ def _force(
 
     columns: list[Column] = [_one, _inertia]
     before = withheld(data, table(train, *columns))
-    floor = found.stated.force_N or rows_floor([forces[k] for k in train])
+    floor = found.stated.force_N or rows_floor([runs[k].force for k in train])
     first = withheld(data, table(train, _one))
     channel = AxisChannel(data, train, first, before, floor=floor, stated=found.stated.force_N is not None)
     channel.all_names = [r.name for r in runs]
-    channel.encoder_noise = [rows_floor([r.encoder]) for r in runs]
     last, named = before, []
     if "friction" not in without:
         after = withheld(data, table(train, _one, _inertia, turn, _speed))
@@ -552,8 +639,6 @@ def _force(
             named.append("friction")
     _refused(found, data, table, train, columns, last, length, floor)
     _close(found, channel, named, last, data, table, columns, test, forces, moves)
-    if "disturbance" not in without and channel.gate is not None and channel.gate.word == "above":
-        channel = _pushed(found, runs, channel, named, columns, test, forces, moves) or channel
     found.force = channel
     line = ripple([moves[k] for k in train], channel.left)
     if line is not None and line.share > LEAST_RIPPLE and line.amplitude**2 / 2.0 > (MINOR * floor) ** 2:
@@ -561,61 +646,21 @@ def _force(
         waves = [lambda m, w=wave: w(2.0 * np.pi * m.position / line.period) for wave in (np.sin, np.cos)]
         g = gain(last, withheld(data, table(train, *columns, *waves)))
         found.unknown_chance = min(found.unknown_chance, log10_chance(g, line.tried))
+    return found
 
 
-def _pushed(
-    found: AxisFindings, runs: list[AxisRun], channel: AxisChannel, named: Sequence[str], columns: list[Column], test: list[int],
-    forces: list[Floats], moves: list[AxisTravel],
-) -> AxisChannel | None:  # fmt: skip
-    """The channel without pushes that last for a while, where nothing is left above the floor then; these are causes.
-
-    Other stretches tell nothing of them: the rows that they last for have to follow them.
-    """
-    chance, now, without, pushes = found.unknown_chance, channel, list(forces), list[Window]()
-    table = _table(moves)
-    for _ in range(MOST_PUSHES):
-        window = find_window(now.left, [m.time for m in now.moves], now.floor)
-        if window is None:
-            return None
-        pushes.append(window)
-        k = channel.runs[window.run]
-        without[k] = without[k].copy()
-        without[k][window.first : window.last] -= window.shift
-        data = _series(moves, without, channel.runs)
-        now = replace(channel, steps=[], left=[], gate=None)
-        found.unknown_chance = 0.0
-        effects = [*named, "disturbance"]
-        _close(
-            found,
-            now,
-            effects,
-            withheld(data, table(channel.runs, *columns)),
-            data,
-            table,
-            columns,
-            test,
-            without,
-            moves,
-        )
-        if now.gate is not None and now.gate.word != "above":
-            found.causes += [_push_cause(found.name, runs[channel.runs[each.run]], each, now) for each in pushes]
-            return now
-    found.unknown_chance = chance
-    return None
-
-
-def _push_cause(name: str, run: AxisRun, window: Window, now: AxisChannel) -> FoundCause:
+def _push_cause(name: str, run: AxisRun, window: Window, now: AxisChannel, raw: Series) -> FoundCause:
     rows = now.left[window.run][window.first : window.last]
     parts = [float(np.mean(part)) for part in np.array_split(rows, QUARTERS)]
     spread = float(student.ppf(0.975, QUARTERS - 1)) * float(np.std(parts, ddof=1)) / np.sqrt(QUARTERS)
     step = 2.0 * float(np.median(np.diff(run.time)))
     begin, end = (run.started + float(run.time[min(i, len(run.time) - 1)]) for i in (window.first, window.last))
-    square = window.shift**2 * (window.last - window.first) / sum(map(len, now.left))
+    square = window.shift**2 * (window.last - window.first) / len(raw.y)
     return FoundCause(
         effect="disturbance",
         target=name,
         probability=stated(probability_of_chance(window.chance)),
-        share=round(min(square / max(float(np.mean(now.first)), 1e-300), 1.0), 4),
+        share=round(min(square / float(np.var(raw.y)), 1.0), 4),
         parameters={
             "force_N": _value(-window.shift, spread),
             "from_s": _value(begin, step),

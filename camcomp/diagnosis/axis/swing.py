@@ -12,7 +12,7 @@ from camcomp.diagnosis.axis.block_least_squares import fit, series, solve
 from camcomp.diagnosis.axis.findings import AxisRun
 from camcomp.diagnosis.axis.terms import AxisTravel
 from camcomp.ground.datatypes import Bools, Floats
-from camcomp.model.hysteresis import second_order
+from camcomp.model.hysteresis import first_order, second_order
 
 PERIODS_S = tuple(np.geomspace(0.004, 0.25, 16))
 DAMPINGS = (0.1, 0.25, 0.5, 0.8, 1.5)
@@ -26,14 +26,16 @@ STEP = 1e-3  # of a logarithm, for slopes
 
 @dataclass(frozen=True)
 class Swing:
-    """A loop with velocity feed-forward: natural period s, damping; e'' + 2 d w e' + w^2 e = the set-point's acceleration."""
+    """A loop with velocity feed-forward: natural period s, damping, late: time constant s of a lag in series with it; e'' + 2 d w e' + w^2 e = the set-point's acceleration."""
 
     period: float
     damping: float
+    late: float = 0.0
 
     def error(self, run: AxisRun) -> Floats:
-        """Set-point minus encoder (n,) mm of a run."""
-        return -second_order(run.setpoint[:, None], run.time, self.period, self.damping)[:, 0]
+        """Set-point minus encoder (n,) mm of a run, without what a lag behind the loop adds."""
+        swings = second_order(run.setpoint[:, None], run.time, self.period, self.damping)
+        return -(first_order(swings, run.time, self.late) if self.late > 0.0 else swings)[:, 0]
 
     def settled(self, run: AxisRun) -> Bools:
         """Rows (n,) that no longer show what the axis did before its log began."""
@@ -43,13 +45,13 @@ class Swing:
 
 
 def find_swing(
-    runs: Sequence[AxisRun], gaps: Sequence[Floats], moves: Sequence[AxisTravel]
+    runs: Sequence[AxisRun], gaps: Sequence[Floats], moves: Sequence[AxisTravel], late: float = 0.0
 ) -> tuple[Swing, tuple[float, float]]:
     """The loop that explains following errors (n,) mm best beside a constant and a lag, and deviations of its period and damping.
 
     Source of the deviations: robust against what is alike within a stretch, as in `block_least_squares.fit`.
     """
-    grid = [Swing(period, damping) for period in PERIODS_S for damping in DAMPINGS]
+    grid = [Swing(period, damping, late) for period in PERIODS_S for damping in DAMPINGS]
     every = [np.ones(len(run.time), bool) for run in runs]
     start = min(grid, key=lambda each: float(np.sum(_rest(each, runs, gaps, moves, every) ** 2)))
     rows = [start.settled(run) for run in runs]
@@ -57,7 +59,7 @@ def find_swing(
         rows = every
 
     def rest(at: Floats) -> Floats:
-        return _rest(Swing(*np.exp(at)), runs, gaps, moves, rows)
+        return _rest(Swing(float(np.exp(at[0])), float(np.exp(at[1])), late), runs, gaps, moves, rows)
 
     low, high = np.log([LEAST_S, LEAST_DAMPING]), np.log([MOST_S, MOST_DAMPING])
     begin = np.log([start.period, start.damping])
@@ -68,10 +70,10 @@ def find_swing(
     spread = np.sqrt(np.diag(fit(data, slopes)[1]))
     period, damping = (float(x) for x in np.exp(best))
     # of a row: when set-points and encoders were taken
-    late = CLOCK * max(float(np.median(np.diff(run.time))) for run in runs) * 2.0 * np.pi / period
-    return Swing(period, damping), (
-        period * float(np.hypot(spread[0], late)),
-        float(np.hypot(damping * spread[1], late)),
+    apart = CLOCK * max(float(np.median(np.diff(run.time))) for run in runs) * 2.0 * np.pi / period
+    return Swing(period, damping, late), (
+        period * float(np.hypot(spread[0], apart)),
+        float(np.hypot(damping * spread[1], apart)),
     )
 
 

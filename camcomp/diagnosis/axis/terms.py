@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.interpolate import Akima1DInterpolator
-from scipy.signal import savgol_coeffs, savgol_filter
+from scipy.signal import savgol_filter
 
 from camcomp.ground.datatypes import Bools, Floats
-from camcomp.model.hysteresis import direction
+from camcomp.model.hysteresis import direction, first_order
+from camcomp.model.seams import Seams
 
 PRESLIDING_GRID_MM = (1e-4, 0.001, 0.002, 0.003, 0.005, 0.01, 0.02, 0.05, 0.1)  # the first is a step
 TURNING_GRID_MM_PER_S = (0.1, 0.2, 0.35, 0.5, 0.7, 1.0, 1.5, 2.5, 5.0, 10.0)
 STANDS_OUT = 1.6  # times the next line of a spectrum
 STRIBECK_MM_PER_S = 10.0
+SETTLED = 5.0  # time constants after which a late axis shows no more how it moved before
 WIDE = (5, 10, 20, 40)  # samples on either side of a local cubic
 
 
@@ -40,39 +42,50 @@ class AxisTravel:
     position: Floats
     speed: Floats
     acceleration: Floats
+    before: Floats = field(
+        default_factory=lambda: np.zeros(0)
+    )  # positions ahead of the first row: friction remembers them
 
     def of(self, rows: Bools) -> AxisTravel:
         """Some of the rows (n,)."""
-        return AxisTravel(self.time[rows], self.position[rows], self.speed[rows], self.acceleration[rows])
+        before = np.concatenate([self.before, self.position[: int(np.argmax(rows))]])
+        return AxisTravel(self.time[rows], self.position[rows], self.speed[rows], self.acceleration[rows], before)
 
     def reversal(self, how: Turning) -> Floats:
         """Direction of travel (n,), -1 to 1."""
         if how.speed is not None:
             return np.asarray(np.tanh(self.speed / how.speed), float)
-        return direction(self.position[:, None], how.distance)[:, 0]
+        way = np.concatenate([self.before, self.position])
+        return direction(way[:, None], how.distance)[len(self.before) :, 0]
 
 
 def travel(time: Floats, position: Floats, wide: int = WIDE[0], late: float | None = None) -> AxisTravel:
     """Local cubics over 2 wide + 1 samples (Savitzky, Golay 1964) of positions (n,) at times (n,) s.
 
-    late: s, of an axis that follows positions which are free of noise: these themselves then, for cubics turn round before
-    and after a stop. Rows that are lost and clocks that tremble are led over: cubics want even steps.
+    late: time constant s with which the axis follows positions that are free of noise: no cubics for the position then, for
+    they turn round before and after a stop. Rows that are lost and clocks that tremble are led over: cubics want even steps.
     """
     dt = float(np.median(np.diff(time)))
     even = time[0] + dt * np.arange(max(round(float(time[-1] - time[0]) / dt) + 1, 2 * wide + 1))
     values = Akima1DInterpolator(time, position)(np.minimum(even, time[-1]))
+    if late:
+        begins = Seams(np.zeros(1, np.int64), np.full(1, np.inf), np.full((1, 1), (values[1] - values[0]) / dt))
+        values = first_order(values[:, None], even, late, begins)[:, 0]
     parts = [savgol_filter(values, 2 * wide + 1, 3, deriv=k, delta=dt, mode="interp") for k in range(3)]
     if np.ptp(values) == 0.0:  # at rest, to the last digit
         parts = [values, np.zeros_like(values), np.zeros_like(values)]
     if late is not None:
         parts[0] = values
-    return AxisTravel(time, *(np.interp(time - (late or 0.0), even, part) for part in parts))
+    return AxisTravel(time, *(np.interp(time, even, part) for part in parts))
 
 
-def noise_gains(dt: float, wide: int) -> tuple[float, float]:
-    """Deviation of speed (1/s) and acceleration (1/s2) of such a cubic per deviation of one encoder value."""
-    first, second = (savgol_coeffs(2 * wide + 1, 3, deriv=k, delta=dt) for k in (1, 2))
-    return float(np.linalg.norm(first)), float(np.linalg.norm(second))
+def noise_gains(dt: float, wide: int, late: float | None = None) -> tuple[float, float]:
+    """Deviation of speed (1/s) and acceleration (1/s2) of such a cubic per deviation of one position, as in `travel`."""
+    n = 2 * wide + 1 + (0 if not late else int(np.ceil(SETTLED * late / dt)))
+    impulse = np.zeros(3 * n)
+    impulse[n] = 1.0
+    answer = travel(dt * np.arange(3.0 * n), impulse, wide, late)
+    return float(np.linalg.norm(answer.speed)), float(np.linalg.norm(answer.acceleration))
 
 
 def strangers(at: AxisTravel, how: Turning) -> dict[str, tuple[str, Floats]]:

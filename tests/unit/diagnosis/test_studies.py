@@ -317,12 +317,25 @@ def test_rows_far_out_count_like_those_at_the_edge():
     assert np.mean(block.loose > 1.0) < 0.06
 
 
-@pytest.mark.parametrize(("channel", "size"), [("force", 3.0), ("setpoint", 0.01)])
-def test_a_disturbance_of_an_axis_is_located_in_time(channel, size):
+def test_a_push_of_an_axis_is_named_with_its_time():
     log = axis_log()
-    values = getattr(log, channel).copy()
-    values[4000:4600] += size
-    result = axis_study({"x": [replace(log, **{channel: values})]})
+    force = log.force.copy()
+    force[4000:4600] += 3.0
+    result = axis_study({"x": [replace(log, force=force, started=100.0)]})
+    assert result.verdict == "identified"
+    (push,) = (c for c in result.causes if c.effect == "disturbance")
+    low, high = push.parameters["force_N"].ci95
+    assert low < -3.0 < high and high - low < 1.0
+    assert push.parameters["from_s"].value == pytest.approx(100.0 + log.time[4000], abs=0.02)
+    assert push.parameters["to_s"].value == pytest.approx(100.0 + log.time[4600], abs=0.02)
+    assert {c.effect for c in result.causes} == {"servo_lag", "friction", "disturbance"}
+
+
+def test_a_shift_of_set_points_is_located_in_time():
+    log = axis_log()
+    setpoint = log.setpoint.copy()
+    setpoint[4000:4600] += 0.01
+    result = axis_study({"x": [replace(log, setpoint=setpoint)]})
     assert result.verdict == "unknown"
     first = result.where.intervals[0]
     assert first.t0_s < 4.0 and first.t1_s > 4.6 and first.t1_s - first.t0_s < 1.6
