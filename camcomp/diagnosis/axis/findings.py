@@ -16,7 +16,9 @@ from camcomp.diagnosis.statistics.probability import EVEN
 from camcomp.ground.datatypes import Bools, Floats
 from camcomp.model.seams import missing_rows
 
+ROWS = 50  # below which a run says nothing
 FIRST_MOVE_MM = 0.2  # after which friction has its sense
+FAR = 10.0  # times as far goes an axis that moves
 BESIDE_GAP = 5  # rows of which a gap leaves speed and acceleration uncertain
 
 
@@ -68,7 +70,7 @@ class AxisRun:
     def moved(self) -> Bools:
         """Rows (n,) from the first move on: which way friction held the axis before nobody knows. All where it stays."""
         away = np.abs(self.encoder - self.encoder[:1])
-        if self.revolute or not away.max(initial=0.0) > 10.0 * FIRST_MOVE_MM:
+        if self.revolute or not away.max(initial=0.0) > FAR * FIRST_MOVE_MM:
             return np.ones(len(away), bool)
         return np.arange(len(away)) >= int(np.argmax(away > FIRST_MOVE_MM))
 

@@ -7,9 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from camcomp.diagnosis.axis.block_least_squares import solve
-from camcomp.diagnosis.axis.findings import AxisRun
+from camcomp.diagnosis.axis.findings import ROWS, AxisRun
 from camcomp.diagnosis.axis.noise_floor import rows_floor
-from camcomp.diagnosis.axis.study import ROWS
 from camcomp.diagnosis.axis.terms import WIDE, travel
 from camcomp.ground.datatypes import Floats
 from camcomp.ground.errors import ConfigError, Location
@@ -20,6 +19,7 @@ LARGE, BETTER = (
     0.5,
     0.2,
 )  # of the travel: a gap that is no lag; of the gap: what another encoder leaves that is the right one
+MIDDLE = (0.02, 0.98)  # quantiles between which values are looked at
 TRAVELS = 100.0  # deviations of a row that an axis which moves goes at least
 NEAR = 0.1  # of a factor between set-points and encoder
 _FACTORS = {1e3: "m", 1e-3: "um", 25.4: "inches", 180.0 / np.pi: "degrees where radians are due"}
@@ -43,7 +43,7 @@ def _moves(setpoint: Floats, encoder: Floats) -> bool:
 
 def _spread(values: Floats) -> float:
     """How far values (n,) spread, without the few that are no measurement."""
-    return float(np.ptp(np.quantile(values, [0.02, 0.98])))
+    return float(np.ptp(np.quantile(values, MIDDLE)))
 
 
 def _refused(rule: str, log: str, text: str) -> ConfigError:

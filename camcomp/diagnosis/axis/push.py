@@ -8,13 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import norm
 
-from camcomp.ground.datatypes import Floats
+from camcomp.diagnosis.axis.terms import AxisTravel
+from camcomp.ground.datatypes import Floats, Ints
 
 CELL_S = 0.02  # in which a window begins and ends, before it is placed to a row
-SHORTEST_S, LONGEST = 0.1, 0.6  # of a window; of its run: what lasts longer is how the run is
+SHORTEST_S, LONGEST = 0.2, 0.6  # of a window; of its run: what lasts longer is how the run is
 LEVEL = 0.5  # of the shift: every quarter of a window has to show it to within that
 QUARTERS = 4
-LEAST_SIZE = 1.0  # of the floor, that a push has to be
+LEAST_SIZE = 2.0  # of the floor, that a push has to be: a force's zero wanders by less
+PLACES = 40  # of the travel, each way of its own
+BEEN = 0.5  # of a window's rows, at places where the axis was at other times as well
 FARTHEST = 3  # cells by which an end is moved to its row
 
 
@@ -55,7 +58,11 @@ def find_window(left: Sequence[Floats], times: Sequence[Floats], floor: float) -
         chance = float(norm.logsf(np.sqrt(score[at]) / floor) / np.log(10.0))
         if best is None or chance < best.chance:
             best = Window(k, first, last, float(apart[at]), chance)
-    if best is None or abs(best.shift) < LEAST_SIZE * floor or best.last - best.first < QUARTERS:
+    if (
+        best is None
+        or abs(best.shift) < LEAST_SIZE * floor
+        or times[best.run][best.last - 1] - times[best.run][best.first] < SHORTEST_S
+    ):
         return None
     rest = left[best.run]
     outside = float(np.mean(np.concatenate([rest[: best.first], rest[best.last :]])))
@@ -64,6 +71,21 @@ def find_window(left: Sequence[Floats], times: Sequence[Floats], floor: float) -
     return (
         Window(best.run, best.first, best.last, best.shift, min(best.chance + np.log10(tried), 0.0)) if even else None
     )
+
+
+def seen_elsewhere(window: Window, moves: Sequence[AxisTravel]) -> bool:
+    """Whether the axis was where the window was at other times as well, the same way: else it may be the place that pushes."""
+    every = np.concatenate([m.position for m in moves])
+    low, span = float(every.min()), max(float(np.ptp(every)), 1e-9)
+
+    def places(m: AxisTravel) -> Ints:
+        place = np.minimum((PLACES * (m.position - low) / span).astype(int), PLACES - 1)
+        return np.asarray(3 * place + np.sign(np.round(m.speed, 6)).astype(int) + 1)
+
+    at = [places(m) for m in moves]
+    mine = at[window.run][window.first : window.last]
+    others = [np.delete(p, slice(window.first, window.last)) if k == window.run else p for k, p in enumerate(at)]
+    return float(np.isin(mine, np.concatenate(others)).mean()) > BEEN
 
 
 def _placed(rest: Floats, first: int, last: int, reach: int) -> tuple[int, int]:

@@ -28,12 +28,12 @@ from camcomp.diagnosis.axis.block_least_squares import (
     telling,
     withheld,
 )
-from camcomp.diagnosis.axis.findings import AxisChannel, AxisDeviation, AxisFindings, AxisRun, Carried
+from camcomp.diagnosis.axis.findings import ROWS, AxisChannel, AxisDeviation, AxisFindings, AxisRun, Carried
 from camcomp.diagnosis.axis.gate import MINOR, dependences, judge
 from camcomp.diagnosis.axis.law import LEAST_SHARE, axis_law
 from camcomp.diagnosis.axis.next_moves import next_moves
 from camcomp.diagnosis.axis.noise_floor import REPEATABILITY_MM, rows_floor
-from camcomp.diagnosis.axis.push import QUARTERS, Window, find_window
+from camcomp.diagnosis.axis.push import QUARTERS, Window, find_window, seen_elsewhere
 from camcomp.diagnosis.axis.swing import Swing, find_swing
 from camcomp.diagnosis.axis.terms import (
     PRESLIDING_GRID_MM,
@@ -63,7 +63,6 @@ from camcomp.ground.datatypes import Floats
 
 LEAST_Z = 4.0  # mean gain over its standard error
 LEAST_RIPPLE = 0.02  # share of the leftover's energy
-ROWS = 50  # below which a run says nothing
 NO_TIPS = "ISO 230-2: the tip was not measured"
 LATEST_S = 0.1  # of a loop
 ENCODER_BETTER = 0.8  # of what set-points leave of a channel: what encoders have to leave to be the motion
@@ -568,7 +567,7 @@ def _force(
             channel.data, channel.first = raw, withheld(raw, _table(moves)(train, _one))
             return now
         window = find_window(channel.left, [m.time for m in channel.moves], channel.floor)
-        if window is None or len(pushes) == MOST_PUSHES:
+        if window is None or len(pushes) == MOST_PUSHES or not seen_elsewhere(window, channel.moves):
             break
         pushes.append(window)
         for _ in range(PASSES):  # what friction looks like is known when the push is gone

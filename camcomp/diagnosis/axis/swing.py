@@ -9,7 +9,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from camcomp.diagnosis.axis.block_least_squares import fit, series, solve
-from camcomp.diagnosis.axis.findings import AxisRun
+from camcomp.diagnosis.axis.findings import ROWS, AxisRun
 from camcomp.diagnosis.axis.terms import AxisTravel
 from camcomp.ground.datatypes import Bools, Floats
 from camcomp.model.hysteresis import first_order, second_order
@@ -18,7 +18,6 @@ PERIODS_S = tuple(np.geomspace(0.004, 0.25, 16))
 DAMPINGS = (0.1, 0.25, 0.5, 0.8, 1.5)
 LEAST_S, MOST_S = 0.001, 0.6
 LEAST_DAMPING, MOST_DAMPING = 0.02, 5.0
-ROWS = 50  # of a run that has settled, at least
 CLOCK = 0.02  # of the time between rows, that set-points and encoders may be apart
 SETTLES = 4.0  # time constants after which nothing is left of how a loop was when its log began
 STEP = 1e-3  # of a logarithm, for slopes
