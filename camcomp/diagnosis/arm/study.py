@@ -78,7 +78,7 @@ def study(
     with part(0.3, 0.7):
         curved = found if CURVE in without else with_curves(bench, found)
     judges = court(bench, found, held)
-    curve_judges = judges if curved is found else court_of_curves(judges, bench, curved, held)
+    curve_judges = court_of_curves(judges, bench, curved, held)
     seen_names = sorted({str(r.run[0]) for r in runs if not holdout or str(r.run[0]) in holdout})
     shrunk = shrinkage(curve_judges, curved, seen_names, bench)
     floor_mm = None if floor is None else 1e-3 * floor.um

@@ -73,7 +73,9 @@ def court(bench: ArmBench, found: ArmFit, held: ArmBench | None) -> Court:
 
 
 def court_of_curves(judges: Court, bench: ArmBench, found: ArmFit, held: ArmBench | None) -> Court:
-    """The court of a fit without waves of joints for the same fit with them."""
+    """The court of a fit without waves of joints for the same fit, which may have them."""
+    if CURVE not in found.groups:  # beside other causes they were worth nothing
+        return judges
     if held is None:
         return court(bench, found, None)
     own, waves = len(found.linear), [found.columns[j] for j in found.groups[CURVE]]
