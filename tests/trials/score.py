@@ -196,6 +196,12 @@ def wilson(hits: int, total: int, z: float = 1.96) -> tuple[float, float]:
     return float((middle - half) / (1 + z * z / n)), float((middle + half) / (1 + z * z / n))
 
 
+def calibration_error(pairs: np.ndarray) -> float:
+    """Of probabilities and whether they came true (n, 2): their mean distance in ten bins."""
+    bins = np.clip((pairs[:, 0] * 10).astype(int), 0, 9)
+    return sum(abs(pairs[bins == b, 0].sum() - pairs[bins == b, 1].sum()) for b in range(10)) / len(pairs)
+
+
 def render(rows: list[Row]) -> str:
     """Rates as a table."""
     lines = []
@@ -229,9 +235,11 @@ def render(rows: list[Row]) -> str:
     rate("95 % intervals that hold (0.90 to 0.98)", held_, "hit")
     pairs = np.array([pair for row in good for pair in row["calibration"] if pair[0]], float).reshape(-1, 2)
     if len(pairs):
-        bins = np.clip((pairs[:, 0] * 10).astype(int), 0, 9)
-        off = [abs(pairs[bins == b, 0].sum() - pairs[bins == b, 1].sum()) for b in range(10)]
-        lines.append(f"{'expected calibration error (0.05)':<52} {sum(off) / len(pairs):.3f} of {len(pairs)}")
+        missed = calibration_error(pairs)
+        drawn = np.random.default_rng(0).random((200, len(pairs))) < pairs[:, 0]
+        chance = np.mean([calibration_error(np.column_stack([pairs[:, 0], each])) for each in drawn])
+        name = "expected calibration error (0.05)"
+        lines.append(f"{name:<52} {missed:.3f} of {len(pairs)}, {chance:.3f} if they were right")
     for name, key in (("gap", "gap_um"), ("floor", "floor_um"), ("seconds", "seconds")):
         values = [row[key] for row in good if row.get(key) is not None]
         if values:

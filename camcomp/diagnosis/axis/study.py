@@ -69,6 +69,7 @@ ENCODER_BETTER = 0.8  # of what set-points leave of a channel: what encoders hav
 SETPOINT_WIDE = (2, *WIDE)  # samples on either side of a local cubic through set-points
 PASSES = 2  # of the fit of a push and of all else
 MOST_PUSHES = 2  # of an axis: what comes more often is no mishap
+KNOWN = 0.01  # of a loop's constants: no law of a loop is better than that
 ALIKE = 0.02  # of a time constant: by which those of axes may differ and be one
 EQUAL = 1.05  # of what a loop with inertia leaves: what one that swings over may leave to be the simpler answer
 WHOLE_RUNS = 4  # from which on runs are withheld as wholes
@@ -159,7 +160,11 @@ def _share_lag(found: Sequence[AxisFindings]) -> None:
         target=None,
         probability=min(c.probability for _, c in lags),
         share=float(sum(c.share for _, c in lags)),
-        parameters={"time_constant_ms": _value(common, max(float(weight.sum() ** -0.5), float(np.std(value))))},
+        parameters={
+            "time_constant_ms": _value(
+                common, max(KNOWN * abs(common), float(weight.sum() ** -0.5), float(np.std(value)))
+            )
+        },
     )
     for a, c in lags:
         a.causes.remove(c)
@@ -305,6 +310,7 @@ def _following(
         columns, last = [*columns, *lag.columns], lag.last
         c, C = fit(data, table(train, *columns))
         spread = 1.96e3 * np.sqrt(np.diag(C))
+        spread[columns.index(_speed)] += 1e3 * KNOWN * abs(float(c[columns.index(_speed)]))
         value = dict(zip(columns, (_value(1e3 * each, s) for each, s in zip(c, spread, strict=True)), strict=True))
         found.causes.append(
             FoundCause(
@@ -471,8 +477,8 @@ def _overshoot(name: str, swung: _Swung, before: Floats, last: Floats) -> FoundC
         probability=_probability(swung.gain),
         share=round(1.0 - float(np.mean(last) / np.mean(before)), 4),
         parameters={
-            "period_ms": _value(1e3 * period, 1.96e3 * swung.spread[0]),
-            "damping": _value(damping, 1.96 * swung.spread[1]),
+            "period_ms": _value(1e3 * period, 1e3 * (1.96 * swung.spread[0] + KNOWN * period)),
+            "damping": _value(damping, 1.96 * swung.spread[1] + KNOWN * damping),
         },
     )
 
@@ -633,7 +639,12 @@ def _forced(
             more = gain(last, lopsided, moving)
             if _holds(more):
                 columns, last = [*columns, _either_way], lopsided
-            found.causes.append(_friction(found, data, table(train, *columns), length, _probability(g), before, last))
+            others = [
+                [m if m is not turn else (lambda m, d=d: m.reversal(Turning(d))) for m in columns]
+                for d in _around(length.distance)
+            ]
+            tables = [table(train, *each) for each in ([*others, columns] if length.speed is None else [columns])]
+            found.causes.append(_friction(found, data, tables, length, _probability(g), before, last))
             found.details["force"]["asymmetry_z"] = round(more.z, 2)
             named.append("friction")
     _refused(found, data, table, train, columns, last, length, floor)
@@ -669,10 +680,18 @@ def _push_cause(name: str, run: AxisRun, window: Window, now: AxisChannel, raw: 
 
 
 def _friction(
-    found: AxisFindings, data: Series, A: Floats, length: Turning, probability: float, before: Floats, last: Floats
+    found: AxisFindings,
+    data: Series,
+    tables: Sequence[Floats],
+    length: Turning,
+    probability: float,
+    before: Floats,
+    last: Floats,
 ) -> FoundCause:
-    c, C = fit(data, A)
-    spread = 1.96 * np.sqrt(np.diag(C))
+    """Tables (n, k): the columns, last, and before them those with the ways of turning round next to the best one."""
+    c, C = fit(data, tables[-1])
+    beside = [np.abs(solve(A, data.y) - c) for A in tables]
+    spread = np.maximum(1.96 * np.sqrt(np.diag(C)), np.max(beside, axis=0))
     parameters = {
         "force_N": _value(c[2], spread[2]),
         "viscous_Ns_per_mm": _value(c[3], spread[3]),

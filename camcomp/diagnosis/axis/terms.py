@@ -140,6 +140,8 @@ def ripple(at: list[AxisTravel], left: list[Floats], shortest: float = 0.5, long
             return None
         lowest = bins[on].min()
         weight = np.bincount(bins[on] - lowest, way[on])
+        if not weight.any():
+            return None
         mean = np.bincount(bins[on] - lowest, way[on] * y[on]) / np.maximum(weight, 1e-300)
         used = weight > 0
         place = (np.flatnonzero(used) + lowest) * (shortest / 12.0)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import json
 import shutil
 from pathlib import Path
@@ -10,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import yaml
 
+from tests.foreign.command import write_all
 from tests.foreign.parallel import sensors
 from tests.foreign.parallel.machine import read
 from tests.foreign.parallel.scenario import CHANNELS, KINDS, MESSES, Impossible, Scenario, fill, runs, times
@@ -79,18 +79,5 @@ def write(seed: int, out: Path, machine_name: str | None) -> str:
     return f"e-{seed} {s.machine.name} {s.kind} {s.channels} {s.mess} noise {noise * 1e3:.1f} um; {named}"
 
 
-def main() -> None:
-    """Writes what is not there yet."""
-    parser = argparse.ArgumentParser(description="Experiments on parallel machines whose causes are known.")
-    parser.add_argument("--out", type=Path, required=True)
-    parser.add_argument("--count", type=int, required=True)
-    parser.add_argument("--seed", type=int, required=True)
-    parser.add_argument("--machine", choices=MACHINES)
-    options = parser.parse_args()
-    for seed in range(options.seed, options.seed + options.count):
-        if not (options.out / "truth" / f"e-{seed}.json").exists():
-            print(write(seed, options.out, options.machine), flush=True)
-
-
 if __name__ == "__main__":
-    main()
+    write_all("tests.foreign.parallel", write, "--machine", MACHINES)

@@ -1,0 +1,23 @@
+"""The command line that all generators have: which experiments to write, and where."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+
+def write_all(
+    module: str, make: Callable[[int, Path, str | None], object], option: str, choices: Sequence[str]
+) -> None:
+    """Writes the experiments that are not there yet, by make(seed, out, choice); the truth of each comes last."""
+    parser = argparse.ArgumentParser(prog=f"python -m {module}")
+    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--count", type=int, required=True)
+    parser.add_argument("--seed", type=int, required=True)
+    parser.add_argument(option, choices=choices, dest="only")
+    given = parser.parse_args()
+    for seed in range(given.seed, given.seed + given.count):
+        if not (given.out / "truth" / f"e-{seed}.json").exists():
+            said = make(seed, given.out, given.only)
+            print(said or f"e-{seed}", flush=True)
