@@ -72,7 +72,7 @@ def judge(
     if found:
         return AxisGate("above", chance, found)
     high = size.mean() + float(student.ppf(0.95, freedom)) * spread
-    return AxisGate("at" if high < LEVEL or fitted < 1.0 else "open", 0.0, ())
+    return AxisGate("at" if high < LEVEL else "open", 0.0, ())
 
 
 def energy(left: Floats, floor: float) -> float:

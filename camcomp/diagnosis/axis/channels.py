@@ -1,0 +1,147 @@
+"""What a channel of an axis is made of: columns over its motion, how terms prove themselves, and what is left against the floor."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from camcomp.diagnosis.axis.block_least_squares import (
+    Gain,
+    Series,
+    leftover,
+    log10_chance,
+    series,
+    solve,
+    withheld,
+)
+from camcomp.diagnosis.axis.findings import AxisChannel, AxisFindings
+from camcomp.diagnosis.axis.gate import judge
+from camcomp.diagnosis.axis.law import LEAST_SHARE
+from camcomp.diagnosis.axis.noise_floor import REPEATABILITY_MM
+from camcomp.diagnosis.axis.terms import (
+    PRESLIDING_GRID_MM,
+    TURNINGS,
+    AxisTravel,
+    Turning,
+    noise_gains,
+)
+from camcomp.diagnosis.result.types import (
+    Estimate,
+)
+from camcomp.diagnosis.statistics.probability import probability_of_chance, stated
+from camcomp.ground.datatypes import Floats
+
+LEAST_Z = 4.0  # mean gain over its standard error
+
+
+Column = Callable[[AxisTravel], Floats]
+
+
+def constant(m: AxisTravel) -> Floats:
+    """Ones (n,): what a channel has by itself."""
+    return np.ones_like(m.time)
+
+
+def acceleration(m: AxisTravel) -> Floats:
+    """mm/s2 (n,): inertia in a loop."""
+    return m.acceleration
+
+
+def inertia(m: AxisTravel) -> Floats:
+    """m/s2 (n,): N per kg of what is moved."""
+    return 1e-3 * m.acceleration
+
+
+def speed(m: AxisTravel) -> Floats:
+    """mm/s (n,): a lag, or viscous friction."""
+    return m.speed
+
+
+def either_way(m: AxisTravel) -> Floats:
+    """mm/s (n,) without its sign: friction that differs between the ways."""
+    return np.abs(m.speed)
+
+
+def series_of(moves: list[AxisTravel], values: list[Floats], train: list[int]) -> Series:
+    """Values (n,) of some runs in blocks of time."""
+    return series([moves[k].time for k in train], [values[k] for k in train])
+
+
+def table_of(moves: list[AxisTravel]) -> Callable[..., Floats]:
+    """Columns (n, k) of some runs."""
+
+    def table(ks: Sequence[int], *columns: Column) -> Floats:
+        return np.concatenate([np.stack([c(moves[k]) for c in columns], axis=1) for k in ks])
+
+    return table
+
+
+def turning(data: Series, table: Any) -> Turning:
+    """How friction turns round, by withheld blocks; what is shorter than sampled comes out as a step."""
+    return min(TURNINGS, key=lambda how: float(np.mean(np.log(np.maximum(withheld(data, table(how)), 1e-300)))))
+
+
+def around(length: float) -> tuple[float, float]:
+    """Neighbours of a value of the scan: what it is known to."""
+    i = PRESLIDING_GRID_MM.index(length)
+    return PRESLIDING_GRID_MM[max(i - 1, 0)], PRESLIDING_GRID_MM[min(i + 1, len(PRESLIDING_GRID_MM) - 1)]
+
+
+def holds(g: Gain) -> bool:
+    """Whether a term helps withheld blocks, surely and by more than little."""
+    return g.z > LEAST_Z and g.log_ratio > LEAST_SHARE
+
+
+def probability_of(g: Gain) -> float:
+    """That a term is at work, by the chance that withheld blocks gain as much from one that is not."""
+    return stated(probability_of_chance(log10_chance(g)))
+
+
+def value_of(value: float, spread: float) -> Estimate:
+    """A value with its interval of plus and minus spread."""
+    low, high = (float(f"{value + sign * spread:.6g}") for sign in (-1.0, 1.0))
+    return Estimate(value=float(f"{value:.6g}"), ci95=(low, high))
+
+
+def close(
+    found: AxisFindings, channel: AxisChannel, effects: Sequence[str], last: Floats, data: Series, table: Any, columns: list[Any],
+    test: list[int], values: list[Floats], moves: list[AxisTravel],
+) -> None:  # fmt: skip
+    """Leftovers of the channel; where runs are held out, what is left there takes the place of withheld blocks."""
+    A = table(channel.runs, *columns)
+    c = solve(A, data.y)
+    channel.columns, channel.moves = A, [moves[k] for k in channel.runs]
+    if not channel.stated:
+        channel.floor = float(
+            np.hypot(channel.floor, _carried(found, channel, moves, dict(zip(columns, c, strict=True))))
+        )
+    channel.left = [np.array(values[k] - table([k], *columns) @ c, dtype=np.float64) for k in channel.runs]
+    channel.last = last
+    ends = np.cumsum([len(moves[k].time) for k in channel.runs])[:-1]
+    left, times = np.split(leftover(data, A), ends), [moves[k].time for k in channel.runs]
+    channel.names = [channel.all_names[k] for k in channel.runs]
+    if test:
+        base = solve(table(channel.runs, *columns[:1]), data.y)
+        seen = series([moves[k].time for k in test], [values[k] for k in test])
+        squares = [(seen.y - table(test, *cols) @ w) ** 2 for cols, w in ((columns[:1], base), (columns, c))]
+        channel.first, channel.last = (
+            np.array([s[seen.block == b].mean() for b in range(len(seen.others))]) for s in squares
+        )
+        left, times = [values[k] - table([k], *columns) @ c for k in test], [moves[k].time for k in test]
+        channel.names = [channel.all_names[k] for k in test]
+    channel.gate = judge(
+        channel.left, left, times, channel.floor, 0.0 if inertia in columns else 2.0 * REPEATABILITY_MM
+    )
+    found.unknown_chance = min(found.unknown_chance, channel.gate.chance)
+    channel.steps += [(effect, float(np.sqrt(np.mean(channel.last)))) for effect in effects]
+
+
+def _carried(found: AxisFindings, channel: AxisChannel, moves: list[AxisTravel], c: Mapping[Column, float]) -> float:
+    """What the noise of what is taken for the motion, resolution included, does to a channel by way of speed and acceleration."""
+    noise, wide, late = [found.carried.noise[k] for k in channel.runs], found.carried.wide, found.carried.late
+    gains = [noise_gains(float(np.median(np.diff(moves[k].time))), wide, late) for k in channel.runs]
+    push = c.get(acceleration, 0.0) + 1e-3 * c.get(inertia, 0.0)
+    each = [n * np.hypot(push * g[1], c.get(speed, 0.0) * g[0]) for n, g in zip(noise, gains, strict=True)]
+    return float(np.sqrt(np.mean(np.square(each))))

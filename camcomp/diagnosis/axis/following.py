@@ -1,0 +1,247 @@
+"""Why an axis follows its set-points late: lag, loops that swing over, and friction that turns round."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from camcomp.diagnosis.axis.block_least_squares import (
+    Gain,
+    Series,
+    fit,
+    gain,
+    telling,
+    withheld,
+)
+from camcomp.diagnosis.axis.channels import (
+    Column,
+    acceleration,
+    close,
+    constant,
+    either_way,
+    holds,
+    probability_of,
+    series_of,
+    speed,
+    table_of,
+    turning,
+    value_of,
+)
+from camcomp.diagnosis.axis.findings import ROWS, AxisChannel, AxisFindings, AxisRun
+from camcomp.diagnosis.axis.gate import MINOR
+from camcomp.diagnosis.axis.noise_floor import REPEATABILITY_MM, rows_floor
+from camcomp.diagnosis.axis.swing import Swing, find_swing
+from camcomp.diagnosis.axis.terms import (
+    AxisTravel,
+    Turning,
+)
+from camcomp.diagnosis.result.types import (
+    FoundCause,
+)
+from camcomp.ground.datatypes import Floats
+
+KNOWN = 0.01  # of a loop's constants: no law of a loop is better than that
+ALIKE = 0.02  # of a time constant: by which those of axes may differ and be one
+EQUAL = 1.05  # of what a loop with inertia leaves: what one that swings over may leave to be the simpler answer
+
+
+def follow(
+    found: AxisFindings, runs: list[AxisRun], moves: list[AxisTravel], gaps: list[Floats], train: list[int], test: list[int],
+    without: set[str],
+) -> None:  # fmt: skip
+    """Adds the channel of the following error and its causes to what was found on the axis; test: runs that are judged only."""
+    floor = found.stated.encoder_mm or float(np.hypot(_scatter([runs[k] for k in train]), REPEATABILITY_MM))
+    swung = (
+        None
+        if "servo_overshoot" in without
+        else _swung(runs, moves, gaps, train, floor, without, found.carried.late or 0.0)
+    )
+    if swung is not None:
+        runs, moves, gaps = swung.runs, swung.moves, swung.gaps
+    data, table = series_of(moves, gaps, train), table_of(moves)
+    columns: list[Column] = [constant, acceleration] if swung is None else [constant, swung.error]
+    before, last = withheld(data, table(train, constant)), withheld(data, table(train, *columns))
+    channel = AxisChannel(data, train, before, last, floor=floor, stated=found.stated.encoder_mm is not None)
+    channel.all_names = [r.name for r in runs]
+    named = []
+    if swung is not None:
+        found.causes.append(_overshoot(found.name, swung, before, last))
+        named.append("servo_overshoot")
+    lag = None if "servo_lag" in without else _lag(data, table, train, columns, floor)
+    if lag is not None:
+        columns, last = [*columns, *lag.columns], lag.last
+        c, C = fit(data, table(train, *columns))
+        spread = 1.96e3 * np.sqrt(np.diag(C))
+        spread[columns.index(speed)] += 1e3 * KNOWN * abs(float(c[columns.index(speed)]))
+        value = dict(zip(columns, (value_of(1e3 * each, s) for each, s in zip(c, spread, strict=True)), strict=True))
+        found.causes.append(
+            FoundCause(
+                effect="servo_lag",
+                target=found.name,
+                probability=probability_of(lag.gain),
+                share=round(1.0 - float(np.mean(last) / np.mean(before)), 4),
+                parameters={"time_constant_ms": value[speed]},
+            )
+        )
+        named.append("servo_lag")
+        i = columns.index(acceleration) if acceleration in columns else None
+        found.details["following"] = {} if i is None else {"acceleration_us2": value_of(1e6 * c[i], 1e3 * spread[i])}
+        if lag.turn in columns:
+            found.details["following"] |= {"reversal_um": value[lag.turn], "presliding_mm": lag.length.distance}
+    close(found, channel, named, last, data, table, columns, test, gaps, moves)
+    found.following = channel
+
+
+@dataclass(frozen=True, eq=False)
+class _Lag:
+    """A lag beside other columns: its own columns, what they leave of withheld blocks, and what that gains."""
+
+    columns: list[Column]
+    last: Floats
+    gain: Gain
+    turn: Column
+    length: Turning
+
+
+def _lag(
+    data: Series, table: Callable[..., Floats], train: list[int], base: Sequence[Column], floor: float
+) -> _Lag | None:
+    """Whether an axis is late, beside friction that turns round; None where it is not."""
+    length = turning(data, lambda d: table(train, speed, *reversed(base), lambda m: m.reversal(d)))
+
+    def turn(m: AxisTravel) -> Floats:
+        return m.reversal(length)
+
+    moving = telling(data, table(train, speed, *base), 0, MINOR * floor)
+    blind = withheld(data, table(train, *base, turn))
+    last = withheld(data, table(train, *base, speed, turn))
+    g = gain(blind, last, moving)
+    if holds(g):
+        lopsided = withheld(data, table(train, *base, speed, turn, either_way))
+        if holds(gain(last, lopsided, moving)):  # friction that differs between the ways
+            return _Lag([speed, turn, either_way], lopsided, g, turn, length)
+        return _Lag([speed, turn], last, g, turn, length)
+    # at one speed a lag and a reversal are nearly the same: what needs less is it
+    last = withheld(data, table(train, *base, speed))
+    g = gain(withheld(data, table(train, *base)), last, moving)
+    return _Lag([speed], last, g, turn, length) if holds(g) and np.mean(last) <= np.mean(blind) else None
+
+
+@dataclass(frozen=True, eq=False)
+class _Swung:
+    """A loop that swings over, and the rows that tell of it: runs without how their loops were before the log began."""
+
+    swing: Swing
+    spread: tuple[float, float]
+    gain: Gain
+    runs: list[AxisRun]
+    moves: list[AxisTravel]
+    gaps: list[Floats]
+    errors: list[Floats]
+
+    def error(self, m: AxisTravel) -> Floats:
+        """What the loop makes of the set-points of a run."""
+        return next(error for each, error in zip(self.moves, self.errors, strict=True) if each is m)
+
+
+def _swung(
+    runs: list[AxisRun],
+    moves: list[AxisTravel],
+    gaps: list[Floats],
+    train: list[int],
+    floor: float,
+    without: set[str],
+    late: float,
+) -> _Swung | None:
+    """A loop that swings over, where it explains more than inertia in the loop does; None where it does not.
+
+    Where the axis is late as well its inertia is what its loop has anyway.
+    """
+    if not all(np.isfinite(r.setpoint).all() for r in runs) or max(float(np.ptp(r.setpoint)) for r in runs) == 0.0:
+        return None
+    if float(np.std(np.concatenate([gaps[k] for k in train]))) < MINOR * floor:
+        return None
+    swing, spread = find_swing([runs[k] for k in train], [gaps[k] for k in train], [moves[k] for k in train], late)
+    rows = [swing.settled(r) for r in runs]
+    if min(int(on.sum()) for on in rows) < ROWS:
+        return None
+    errors = [swing.error(r)[on] for r, on in zip(runs, rows, strict=True)]
+    found = _Swung(
+        swing,
+        spread,
+        Gain(0.0, 0.0, 0),
+        [r.of(on) for r, on in zip(runs, rows, strict=True)],
+        [m.of(on) for m, on in zip(moves, rows, strict=True)],
+        [g[on] for g, on in zip(gaps, rows, strict=True)],
+        errors,
+    )
+    data, table = series_of(found.moves, found.gaps, train), table_of(found.moves)
+    plain = withheld(data, table(train, constant, acceleration))
+    lag = None if "servo_lag" in without else _lag(data, table, train, [constant, acceleration], floor)
+    with_it = withheld(data, table(train, constant, found.error))
+    beside = None if "servo_lag" in without else _lag(data, table, train, [constant, found.error], floor)
+    last = with_it if beside is None else beside.last
+    less = withheld(data, table(train, constant, *(beside.columns if beside else ())))
+    shown = telling(data, table(train, found.error, constant), 0, MINOR * floor)
+    g = gain(less, last, shown)
+    large = float(np.std(np.concatenate([errors[k] for k in train]))) > MINOR * floor
+    if not large or not holds(g):
+        return None
+    other = plain if lag is None else lag.last
+    if lag is not None and beside is not None:
+        better = holds(gain(other, last, shown))
+    else:
+        better = float(np.mean(last)) < EQUAL * float(np.mean(other))
+    return replace(found, gain=g) if better else None
+
+
+def _overshoot(name: str, swung: _Swung, before: Floats, last: Floats) -> FoundCause:
+    period, damping = swung.swing.period, swung.swing.damping
+    return FoundCause(
+        effect="servo_overshoot",
+        target=name,
+        probability=probability_of(swung.gain),
+        share=round(1.0 - float(np.mean(last) / np.mean(before)), 4),
+        parameters={
+            "period_ms": value_of(1e3 * period, 1e3 * (1.96 * swung.spread[0] + KNOWN * period)),
+            "damping": value_of(damping, 1.96 * swung.spread[1] + KNOWN * damping),
+        },
+    )
+
+
+def _scatter(runs: Sequence[AxisRun]) -> float:
+    """Deviation of one row of the following error; a resolution may show in the encoder or the set-points alone."""
+    apart = np.hypot(rows_floor([r.encoder for r in runs]), rows_floor([r.setpoint for r in runs]))
+    return max(rows_floor([r.setpoint - r.encoder for r in runs]), float(apart))
+
+
+def share_lag(found: Sequence[AxisFindings]) -> None:
+    """One lag where one common value serves for all axes that move (contract, section 5)."""
+    moving = [
+        a for a in found if a.following is not None and any(float(np.ptp(m.position)) > 0 for m in a.following.moves)
+    ]
+    lags = [(a, c) for a in moving for c in a.causes if c.effect == "servo_lag"]
+    if len(lags) < 2 or len(lags) < len(moving):
+        return
+    each = [c.parameters["time_constant_ms"] for _, c in lags]
+    value, half = np.array([e.value for e in each]), np.array([0.5 * (e.ci95[1] - e.ci95[0]) for e in each])
+    weight = 1.0 / np.maximum(half, 1e-12) ** 2
+    common = float(weight @ value / weight.sum())
+    if np.any(np.abs(value - common) > np.maximum(half, ALIKE * abs(common))):
+        return
+    together = FoundCause(
+        effect="servo_lag",
+        target=None,
+        probability=min(c.probability for _, c in lags),
+        share=float(sum(c.share for _, c in lags)),
+        parameters={
+            "time_constant_ms": value_of(
+                common, max(KNOWN * abs(common), float(weight.sum() ** -0.5), float(np.std(value)))
+            )
+        },
+    )
+    for a, c in lags:
+        a.causes.remove(c)
+    lags[0][0].causes.append(together)
