@@ -87,13 +87,12 @@ def of_axes(found: Sequence[AxisFindings], revolute: Mapping[str, bool]) -> Colu
 
 
 def _lay(cells: dict[tuple[str, float], dict[str, float]], channel: AxisChannel, name: str, sign: float) -> None:
-    """Adds the gap and the rest of one channel to the rows of its runs."""
-    ends = np.cumsum([len(each.time) for each in channel.moves])[:-1]
-    gaps = np.split(channel.data.y - channel.data.y.mean(), ends)
-    for k, move, gap, rest in zip(channel.runs, channel.moves, gaps, channel.left, strict=True):
-        for time, first, last in zip(move.time.tolist(), gap.tolist(), rest.tolist(), strict=True):
-            row = cells.setdefault((channel.all_names[k], time), {})
-            row[f"gap_{name}"], row[f"rest_{name}"] = sign * first, sign * last
+    """Adds the gap of every row of one channel's runs, and the rest of those that were fitted."""
+    middle = float(np.mean(np.concatenate([values for _, values in channel.whole])))
+    for k, (times, values), move, rest in zip(channel.runs, channel.whole, channel.moves, channel.left, strict=True):
+        for column, at, each in ((f"gap_{name}", times, values - middle), (f"rest_{name}", move.time, rest)):
+            for time, value in zip(at.tolist(), each.tolist(), strict=True):
+                cells.setdefault((channel.all_names[k], time), {})[column] = sign * value
 
 
 def _values(parameters: Mapping[str, Any]) -> dict[str, Any]:

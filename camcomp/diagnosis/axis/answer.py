@@ -43,7 +43,8 @@ def unknown(axis: AxisFindings, whole: int) -> UnknownCause:
 
 def gap(channels: Sequence[AxisChannel]) -> GapSize:
     """Size of the following errors in um; where only forces were logged, of these in mN."""
-    size = 1e3 * np.abs(np.concatenate([c.data.y - (np.mean(c.data.y) if c.data.y.size else 0.0) for c in channels]))
+    rows = [np.concatenate([values for _, values in c.whole]) for c in channels]
+    size = 1e3 * np.abs(np.concatenate([each - np.mean(each) for each in rows]))
     return GapSize(
         rms_um=round(float(np.sqrt(np.mean(size**2))), 3),
         p95_um=round(float(np.quantile(size, 0.95)), 3),

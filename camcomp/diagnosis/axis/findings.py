@@ -104,6 +104,9 @@ class AxisChannel:
     floor: float = 0.0
     stated: bool = False
     all_names: list[str] = field(default_factory=list)
+    whole: list[tuple[Floats, Floats]] = field(
+        default_factory=list
+    )  # time s, value of every row of every run, fitted or not
     names: list[str] = field(default_factory=list)  # of the runs that the gate has seen
     gate: AxisGate | None = None
 

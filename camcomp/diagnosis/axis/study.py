@@ -129,6 +129,9 @@ def _axis(name: str, runs: list[AxisRun], holdout: set[str], without: set[str], 
     if train and all(np.isfinite(usable[k].force).all() for k in train):
         runs, moves, _ = motion_of(found, usable, [r.force for r in usable], train, late)
         found = force_of(found, runs, moves, train, test, without)
+    for channel, values in ((found.following, gaps), (found.force, [r.force for r in usable])):
+        if channel is not None:
+            channel.whole = [(usable[k].time, values[k]) for k in channel.runs]
     _name_rest(found)
     if found.strange:
         follows = found.following
