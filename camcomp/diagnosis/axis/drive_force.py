@@ -74,7 +74,7 @@ def force_of(
     moves = [m.of(on) for m, on in zip(moves, rows, strict=True)]
     forces, pushes = [r.force for r in runs], list[Window]()
     plain, raw = _forced(found, runs, moves, forces, train, test, without), series_of(moves, forces, train)
-    now = plain
+    now, first = plain, withheld(raw, table_of(moves)(train, constant))
     for _ in range(0 if "disturbance" in without else MOST_PUSHES + 1):
         channel = now.force
         assert channel is not None
@@ -82,7 +82,9 @@ def force_of(
             for each in pushes:
                 now.causes.append(_push_cause(found.name, runs[train[each.run]], each, channel, raw))
                 channel.steps.append(("disturbance", float(np.sqrt(np.mean(channel.last)))))
-            channel.data, channel.first = raw, withheld(raw, table_of(moves)(train, constant))
+            channel.data = raw
+            if pushes and not test:  # what was there before holds the pushes, too
+                channel.first = first
             return now
         window = find_window(channel.left, [m.time for m in channel.moves], channel.floor)
         if window is None or len(pushes) == MOST_PUSHES or not seen_elsewhere(window, channel.moves):

@@ -53,11 +53,8 @@ def follow(
 ) -> None:  # fmt: skip
     """Adds the channel of the following error and its causes to what was found on the axis; test: runs that are judged only."""
     floor = found.stated.encoder_mm or float(np.hypot(_scatter([runs[k] for k in train]), REPEATABILITY_MM))
-    swung = (
-        None
-        if "servo_overshoot" in without
-        else _swung(runs, moves, gaps, train, floor, without, found.carried.late or 0.0)
-    )
+    late = found.carried.late or 0.0
+    swung = None if "servo_overshoot" in without else _swung(runs, moves, gaps, train, floor, without, late)
     if swung is not None:
         runs, moves, gaps = swung.runs, swung.moves, swung.gaps
     data, table = series_of(moves, gaps, train), table_of(moves)

@@ -25,7 +25,10 @@ STEP = 1e-3  # of a logarithm, for slopes
 
 @dataclass(frozen=True)
 class Swing:
-    """A loop with velocity feed-forward: natural period s, damping, late: time constant s of a lag in series with it; e'' + 2 d w e' + w^2 e = the set-point's acceleration."""
+    """A loop with velocity feed-forward: natural period s, damping, and late: time constant s of a lag in series with it.
+
+    e'' + 2 d w e' + w^2 e = the set-point's acceleration, w = 2 pi / period (as the effect `servo_overshoot` has it).
+    """
 
     period: float
     damping: float

@@ -331,6 +331,19 @@ def test_a_push_of_an_axis_is_named_with_its_time():
     assert {c.effect for c in result.causes} == {"servo_lag", "friction", "disturbance"}
 
 
+def test_forces_of_a_withheld_run_are_judged_by_themselves():
+    """What was there before is that of the withheld run, which is shorter and pushes less, not that of the others."""
+    whole, other = axis_log(), axis_log(seed=1)
+    nothing = np.full(len(whole.time), np.nan)
+    seen = replace(whole, name="a", setpoint=nothing)
+    held = replace(other, name="b", setpoint=nothing).of((other.time > 2.5) & (other.time < 5.5))
+    result = axis_study({"x": [seen, held]}, holdout=["b"])
+    size = 1e3 * np.sqrt(np.mean((held.force - seen.force.mean()) ** 2))
+    assert result.verdict == "identified"
+    assert result.shrinkage.before_rms_um == pytest.approx(size, rel=0.05)
+    assert abs(1e3 * seen.force.std() / size - 1.0) > 0.1
+
+
 def test_a_shift_of_set_points_is_located_in_time():
     log = axis_log()
     setpoint = log.setpoint.copy()
