@@ -54,6 +54,7 @@ from camcomp.ground.datatypes import Floats
 
 LEAST_RIPPLE = 0.02  # share of the leftover's energy
 PASSES = 2  # of the fit of a push and of all else
+LEFT = 0.2  # of what was beyond the floor: more than that beside pushes, and they are a part of something else
 MOST_PUSHES = 2  # of an axis: what comes more often is no mishap
 
 
@@ -65,36 +66,47 @@ def force_of(
     test: list[int],
     without: set[str],
 ) -> AxisFindings:
-    """What was found on the axis, with its drive force; what pushed it for a while goes first where nothing is left then.
+    """What was found on the axis, with its drive force; what pushed it for a while goes first.
 
-    Other stretches tell nothing of a push: the rows that it lasts for have to follow it, and nothing may be left beside it.
+    Other stretches tell nothing of a push: the rows that it lasts for have to follow it, and little of what was left may be
+    left beside it.
     """
     rows = [r.moved() for r in runs]
     runs = [r.of(on) for r, on in zip(runs, rows, strict=True)]
     moves = [m.of(on) for m, on in zip(moves, rows, strict=True)]
-    forces, pushes = [r.force for r in runs], list[Window]()
-    plain, raw = _forced(found, runs, moves, forces, train, test, without), series_of(moves, forces, train)
-    now, first = plain, withheld(raw, table_of(moves)(train, constant))
-    for _ in range(0 if "disturbance" in without else MOST_PUSHES + 1):
+    forces, raw = [r.force for r in runs], series_of(moves, [r.force for r in runs], train)
+    plain = now = kept = _forced(found, runs, moves, forces, train, test, without)
+    pushes, named = list[Window](), list[Window]()
+    for _ in range(0 if "disturbance" in without else MOST_PUSHES):
         channel = now.force
         assert channel is not None
         if channel.gate is not None and channel.gate.word == "at" and not now.ripple:
-            for each in pushes:
-                now.causes.append(_push_cause(found.name, runs[train[each.run]], each, channel, raw))
-                channel.steps.append(("disturbance", float(np.sqrt(np.mean(channel.last)))))
-            channel.data = raw
-            if pushes and not test:  # what was there before holds the pushes, too
-                channel.first = first
-            return now
-        window = find_window(channel.left, [m.time for m in channel.moves], channel.floor)
-        if window is None or len(pushes) == MOST_PUSHES or not seen_elsewhere(window, channel.moves):
             break
-        pushes.append(window)
+        window = find_window(channel.left, [m.time for m in channel.moves], channel.floor)
+        if window is None or not seen_elsewhere(window, channel.moves):
+            break
+        pushes = [*pushes, window]
         for _ in range(PASSES):  # what friction looks like is known when the push is gone
             pushes = _sizes(pushes, raw, now.force)
             shifted = [_without(pushes, i, forces[k]) for i, k in enumerate(train)]
             now = _forced(found, runs, moves, _put(forces, train, shifted), train, test, without)
-    return plain
+        if _beyond(now) < LEFT * _beyond(plain):
+            kept, named = now, pushes
+    channel = kept.force
+    if named and channel is not None:
+        for each in named:
+            kept.causes.append(_push_cause(found.name, runs[train[each.run]], each, channel, raw))
+            channel.steps.append(("disturbance", float(np.sqrt(np.mean(channel.last)))))
+        channel.data = raw
+        if not test:  # what was there before holds the pushes, too
+            channel.first = withheld(raw, table_of(moves)(train, constant))
+    return kept
+
+
+def _beyond(found: AxisFindings) -> float:
+    """Mean square of what is left of the drive force beyond its floor."""
+    channel = found.force
+    return 0.0 if channel is None else max(float(np.mean(channel.last)) - channel.floor**2, 0.0)
 
 
 def _forced(
