@@ -332,7 +332,7 @@ def test_a_push_of_an_axis_is_named_with_its_time():
 
 
 def test_forces_of_a_withheld_run_are_judged_by_themselves():
-    """What was there before is that of the withheld run, which is shorter and pushes less, not that of the others."""
+    """What was there before is that of the withheld run, which pushes harder, not that of the others."""
     whole, other = axis_log(), axis_log(seed=1)
     nothing = np.full(len(whole.time), np.nan)
     seen = replace(whole, name="a", setpoint=nothing)
