@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from camcomp.diagnosis.arm.discrepancy import without_nuisance
-from camcomp.diagnosis.arm.fit import investigate
+from camcomp.diagnosis.arm.fit import investigate, prepared
 from camcomp.diagnosis.arm.poses import ArmBench, Poses
 from camcomp.diagnosis.arm.study import merged
 from camcomp.model.config.load import load_config
@@ -118,7 +118,8 @@ def campaigns():
 def test_plain_least_squares_of_everything_overfits_where_camcomp_does_not():
     robot, runs = campaigns()
     bench = ArmBench(robot, (), runs)
-    found = investigate(ArmBench(robot, (), merged(runs[:1])))
+    alone = ArmBench(robot, (), merged(runs[:1]))
+    found = investigate(alone, prepared(alone))
     mine = rms(bench.gap(1, found.causes()))
     linear = bench.blocks(found.columns)
     plain = {}

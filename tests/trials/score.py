@@ -25,6 +25,7 @@ KNOWN_AS = {"disturbed_drive": "disturbance", **later.KNOWN_AS}  # strange fault
 # what control does wrong shows nowhere where no set-points are logged: encoders are the motion then
 WITHOUT_SETPOINTS, OF_CONTROL = ("no-setpoints", "no cmd", "no_cmd"), ("servo_lag", "servo_overshoot")
 Row = dict[str, Any]
+Pair = tuple[str, str | None]
 
 
 def ask(experiment: Path) -> Row:
@@ -88,7 +89,7 @@ def judge(result: Row, truth: Row, known: set[str]) -> Row:
         return out | {"failed": result["failed"]}
     causes = [c for c in result["causes"] if c["effect"] != "unknown"]
     found = [(c["effect"], c["target"]) for c in causes]
-    sets = [{(m["effect"], m["target"]) for m in one} for one in result["alternatives"]]
+    sets = [_pairs(one) for one in result["alternatives"]]
     out |= {
         "verdict": result["verdict"],
         "found": [[*pair, c.get("probability")] for pair, c in zip(found, causes, strict=True)],
@@ -106,9 +107,14 @@ def judge(result: Row, truth: Row, known: set[str]) -> Row:
         out["all"] = due <= set(found) or any(due <= one for one in sets)
     out["due"] = sorted(map(str, due))
     sure = [(pair, c.get("probability") or 0.0) for pair, c in zip(found, causes, strict=True)]
-    out["false_cause"] = any(pair not in true and p > 0.5 for pair, p in sure)
-    out["sure_and_wrong"] = any(pair not in true and p > SURE for pair, p in sure)
-    out["calibration"] = [[p, pair in true] for pair, p in sure]
+    fair = true | may_be_named(truth)
+    out["false_cause"] = any(pair not in fair and p > 0.5 for pair, p in sure)
+    out["sure_and_wrong"] = any(pair not in fair and p > SURE for pair, p in sure)
+    out["calibration"] = [[p, pair in fair] for pair, p in sure]
+    if "allowed_verdicts" in truth:
+        whole = [_pairs(one) for one in truth["allowed_sets"]]
+        found_one = not whole or out["unknown"] or any(one <= named for one in whole for named in (set(found), *sets))
+        out["honest"] = result["verdict"] in truth["allowed_verdicts"] and found_one and not out["sure_and_wrong"]
     out["held"] = [
         hit
         for cause, pair in zip(causes, found, strict=True)
@@ -117,6 +123,18 @@ def judge(result: Row, truth: Row, known: set[str]) -> Row:
         for hit in held(cause, c["parameters"])
     ]
     return out
+
+
+def may_be_named(truth: Row) -> set[Pair]:
+    """What does the same as the true causes within the noise, where a truth says so."""
+    out = {(effect, target) for effect, target in truth.get("may_be_named", [])}
+    for one in (truth.get("allowed_beside", []), *truth.get("allowed_sets", [])):
+        out |= _pairs(one)
+    return out
+
+
+def _pairs(members: list[Row]) -> set[Pair]:
+    return {(m["effect"], m["target"]) for m in members}
 
 
 def trial(task: tuple[str, str, set[str]]) -> Row:
@@ -229,6 +247,9 @@ def render(rows: list[Row]) -> str:
     beside = [r for r in foreign if r["true"]]
     rate("a cause beside something unknown: named", beside, "all")
     rate("complete library: false unknown (0.03)", complete, "unknown")
+    told = [r for r in good if "honest" in r]
+    if told:
+        rate("an answer that its truth allows", told, "honest")
     rate("a false cause at p > 0.5 (0.02)", good, "false_cause")
     rate("sure (p > 0.8) and wrong (0.01)", good, "sure_and_wrong")
     held_ = [{"hit": hit} for row in good for hit in row["held"]]

@@ -86,32 +86,50 @@ def causes(told: Told, gaps: Sequence[Floats]) -> tuple[tuple[FoundCause, ...], 
     minor: list[MinorEffect] = []
     for step in found.taken.steps:
         share = (np.mean(before.squares) - np.mean(step.squares)) / whole
+        effect = found.effect(step.group)
         sure = min(odds(step.density - before.density), weights.get(step.group, 1.0))
         targets = list(dict.fromkeys(_targets(found, step.group)))
         own = [_target(found, step, target, full) for target in targets]
         energy = sum(e for e, _, _ in own)
         for (e, probability, parameters), target in zip(own, targets, strict=True):
+            if found.few is not None:
+                sure, probability = weights[step.group], found.few.places[effect, target]
+                probability = min(probability, _beside_unknown(told, e))
             size = 1e3 * float(np.sqrt(e / sum(len(b.r) for b in found.evidence.blocks)))
             if told.floor is not None and size < MINOR * told.floor.um:
                 if size >= FAINT * told.floor.um:
-                    minor.append(MinorEffect(effect=step.group, target=target, size_um=_round(size)))
+                    minor.append(MinorEffect(effect=effect, target=target, size_um=_round(size)))
             elif probability >= LEAST_TARGET:
                 cause = FoundCause(
-                    effect=step.group,
+                    effect=effect,
                     target=target,
                     probability=stated(min(sure, probability)),
                     share=round(float(share * e / energy), 4),
                     parameters=parameters,
                 )
-                out.append(cause if step.group != CURVE else _curve(told, cause))
+                out.append(cause if effect != CURVE else _curve(told, cause))
         before = step
-    order = [s.group for s in found.taken.steps]
+    order = [found.effect(s.group) for s in found.taken.steps]
     out.sort(key=lambda c: (-c.probability, order.index(c.effect), -c.share))
     if told.verdict == "unknown" or (told.verdict == "ambiguous" and not out):
         left = round(_size(found.rest) ** 2 / _size(gaps) ** 2, 4)
         chance = probability_of_chance(told.gate.chance) if told.verdict == "unknown" else EVEN
         out.append(UnknownCause(target=None, probability=stated(chance), share=left))
     return tuple(out), (*minor, *_slight(told))
+
+
+def _beside_unknown(told: Told, energy: float) -> float:
+    """Probability that a cause beside something unknown is no imitation of it. energy: of its squares over all poses, mm2.
+
+    The best of all effects takes the larger part of most of what none of them is; a cause that takes less than what is
+    left is none of that size, and one that takes more is as likely an imitation as not.
+    """
+    if told.gate.word != "above":
+        return 1.0
+    noise = 0.0 if told.floor is None else 3.0 * told.floor.sd**2
+    left = max(float(np.mean((np.concatenate(told.found.rest) ** 2).sum(axis=1))) - noise, 0.0)
+    own = energy / sum(len(r) for r in told.found.rest)
+    return min(own / max(own + left, 1e-300), EVEN)
 
 
 def _curve(told: Told, cause: FoundCause) -> CurveCause:
@@ -153,7 +171,10 @@ def _weights(told: Told) -> dict[str, float]:
     out = {}
     for group in told.found.groups:
         holds = np.array([group in s.groups for s in sets])
-        out[group] = float(p[holds].sum()) if told.judges.whole else (int(holds.sum()) + 1) / (len(sets) + 2)
+        if not told.judges.whole:
+            out[group] = (int(holds.sum()) + 1) / (len(sets) + 2)
+        else:
+            out[group] = 1.0 if told.found.few is not None else float(p[holds].sum())
     return out
 
 
@@ -195,7 +216,7 @@ def _members(found: ArmFit, rival: Rival) -> tuple[NamedCause, ...]:
             less[[j for j in found.groups[group] if found.columns[j].target == target]] = 0.0
             chances[target] = odds(full - found.evidence.value(less))
         some = [t for t, p in chances.items() if p >= LEAST_TARGET] or [max(chances, key=lambda t: chances[t])]
-        out += [NamedCause(effect=group, target=target) for target in some]
+        out += [NamedCause(effect=found.effect(group), target=target) for target in some]
     return tuple(out)
 
 
@@ -218,6 +239,8 @@ def _target(found: ArmFit, step: Step, target: str | None, full: float) -> tuple
         low, high = (_digits(p.value((found.amount[j] + s * spread) * p.scale)) for s in (-1.0, 1.0))
         value = p.value(found.amount[j] * p.scale)
         parameters[p.name] = Estimate(value=_digits(value), ci95=(low, high))
+        for name, shape, first, last in found.columns[j].shape:
+            parameters[name] = Estimate(value=_digits(shape), ci95=(_digits(first), _digits(last)))
     return energy, odds(full - found.evidence.value(widths)), parameters
 
 
@@ -233,7 +256,7 @@ def where(told: Told, gaps: Sequence[Floats]) -> Where:
     for step in found.taken.steps:
         for target in dict.fromkeys(_targets(found, step.group)):
             size, _, _ = _target(found, step, target, 0.0)
-            stage = next(c.module.STAGE for c in found.columns if c.effect == step.group)
+            stage = found.columns[found.groups[step.group][0]].module.STAGE
             stages[stage] = stages.get(stage, 0.0) + size
             if target is not None:
                 actuators[target] += size
@@ -336,7 +359,7 @@ def next_experiment(told: Told) -> NextExperiment | None:
     if not told.judges.whole:
         return _second_campaign(told, q, place)
     new = 100.0 * unseen_share(told.bench, found, q)
-    effects = [*dict.fromkeys(s.group for s in found.taken.steps), UNKNOWN]
+    effects = [*dict.fromkeys(found.effect(s.group) for s in found.taken.steps), UNKNOWN]
     action = f"measure {len(q)} more poses with a clamping of their own"
     if new:
         action += f", {new:.0f} % of them with a joint at angles that no pose had"
@@ -361,7 +384,7 @@ def next_experiment(told: Told) -> NextExperiment | None:
 
 def _second_campaign(told: Told, q: Floats, place: Floats) -> NextExperiment:
     """Other postures, where there is one campaign only: within it, effects stand in for each other."""
-    effects = list(dict.fromkeys(g for s in told.sets for g in s.groups))
+    effects = list(dict.fromkeys(told.found.effect(g) for s in told.sets for g in s.groups))
     sets = ["; ".join(s.groups) for s in told.sets]
     return NextExperiment(
         action="measure a second campaign in other postures, with a clamping of its own",
@@ -377,7 +400,7 @@ def _second_campaign(told: Told, q: Floats, place: Floats) -> NextExperiment:
 
 def _again(told: Told) -> NextExperiment:
     """Repeats: every other quantile of the poses there are, in an order that does not stay in one place."""
-    effects = [*dict.fromkeys(s.group for s in told.found.taken.steps), UNKNOWN]
+    effects = [*dict.fromkeys(told.found.effect(s.group) for s in told.found.taken.steps), UNKNOWN]
     campaign = told.bench.campaigns[0]
     some = np.unique(np.linspace(0, len(campaign.q) - 1, REPEATS).astype(int))
     some = some[np.random.default_rng(POSES_SEED).permutation(len(some))]

@@ -50,11 +50,7 @@ def with_curves(bench: ArmBench, found: ArmFit) -> ArmFit:
     taken = curves_taken(Evidence.of(parts(linear), discrepancy), groups, found.taken)
     if CURVE not in {s.group for s in taken.steps}:
         return found
-    return replace(
-        fitted(bench, columns, groups, linear, discrepancy, taken, passes=1),
-        outliers=found.outliers,
-        rough=found.discrepancy,
-    )
+    return replace(fitted(bench, columns, groups, linear, discrepancy, taken, passes=1), rough=found.discrepancy)
 
 
 def curves_taken(evidence: Evidence, groups: Mapping[str, Sequence[int]], before: Taken) -> Taken:
@@ -113,7 +109,7 @@ class CurveOfJoint:
 
 def curve_of(bench: ArmBench, found: ArmFit, target: str) -> CurveOfJoint:
     """The curve of a joint with what is known of it."""
-    own = [j for j in found.groups[CURVE] if found.columns[j].target == target]
+    own = [j for j in _curved(found) if found.columns[j].target == target]
     joint = list(bench.actuators).index(target)
     columns = [found.columns[j] for j in own]
     amount, covariance = found.amount[own], found.covariance[np.ix_(own, own)]
@@ -168,12 +164,15 @@ def _drawn(cause: Cause, angle: Floats) -> Floats:
     return signal_path.driven([cause], (str(cause.target),), motion)[0][:, 0]
 
 
+def _curved(found: ArmFit) -> list[int]:
+    """Columns of the waves that were taken."""
+    return [int(j) for j in np.flatnonzero(found.taken.widths) if found.columns[int(j)].effect == CURVE]
+
+
 def curved_joints(bench: ArmBench, found: ArmFit) -> list[int]:
     """Numbers of the joints whose curve matters: LEAST_PART of what all curves move the tips by, or more."""
-    if CURVE not in {s.group for s in found.taken.steps}:
-        return []
     energy = np.zeros(len(bench.actuators))
-    for j in found.groups[CURVE]:
+    for j in _curved(found):
         a = bench.actuators.index(str(found.columns[j].target))
         energy[a] += sum(float((b.X[:, :, j] ** 2).sum()) for b in found.linear) * found.amount[j] ** 2
     return [int(a) for a in np.flatnonzero(energy > LEAST_PART * max(float(energy.sum()), 1e-300))]

@@ -27,11 +27,15 @@ FREE = 1e-6  # precision of nuisances, mm and rad: 1 m
 
 @dataclass(frozen=True)
 class Discrepancy:
-    """Size mm and length (distance of features) of the process, and noise mm beside it, per coordinate."""
+    """Size mm and length (distance of features) of the process, and noise mm beside it, per coordinate.
+
+    timed: whether the process goes with the order in time instead of the posture.
+    """
 
     size: float
     length: float
     noise: float
+    timed: bool = False
 
     def covariance(self, features: Floats, loose: Floats | None = None) -> Floats:
         """Covariance (n, n) of one coordinate at features (n, f); loose (n,): factors on the noise."""
@@ -40,6 +44,15 @@ class Discrepancy:
         K = self.size**2 * np.exp(-0.5 * distance / self.length**2)
         K[np.diag_indices(len(K))] += self.noise**2 * (1.0 if loose is None else loose**2)
         return np.asarray(K, float)
+
+    def whitened(self, D: Floats, b: ResidualBlock) -> tuple[Floats, float]:
+        """Columns D (n, 3, q) of a block's rows as (3 n, q), in which it is white and of size one; half the log determinant before."""
+        if self.size > 0.0:
+            L = cholesky(self.covariance(b.about(self.timed), b.loose), lower=True)
+            white = solve_triangular(L, D.reshape(len(D), -1), lower=True).reshape(-1, D.shape[2])
+            return np.asarray(white, float), 3.0 * float(np.log(np.diag(L)).sum())
+        size = np.full(len(D), self.noise) * (1.0 if b.loose is None else b.loose)
+        return (D / size[:, None, None]).reshape(-1, D.shape[2]), 3.0 * float(np.log(size).sum())
 
 
 def fit_discrepancy(features: Sequence[Floats], rest: Sequence[Floats]) -> Discrepancy:
@@ -77,7 +90,7 @@ class ResidualBlock:
     """Rows that are withheld together. features (n, f); X (n, 3, k) in units of scales; N (n, 3, 9); r (n, 3) mm.
 
     frame: number of the campaign, to which the nuisances belong; alone: whether the block is all of its campaign; loose
-    (n,): factors on the noise of rows that lie far out.
+    (n,): factors on the noise of rows that lie far out; order (n,): in time, 0 to 1.
     """
 
     features: Floats
@@ -87,6 +100,11 @@ class ResidualBlock:
     frame: int
     alone: bool
     loose: Floats | None = None
+    order: Floats | None = None
+
+    def about(self, timed: bool) -> Floats:
+        """What a discrepancy of the rows goes by: their features (n, f), or the order in time (n, 1), 0 to 1."""
+        return self.order[:, None] if timed and self.order is not None else self.features
 
     def loosened(self, left: Floats) -> ResidualBlock:
         """With the noise that leftovers (n, 3) mm suggest, so that no row far out counts for more than one at the edge.
@@ -131,12 +149,7 @@ class Evidence:
         grams, moments = np.zeros((len(blocks), q, q)), np.zeros((len(blocks), q))
         for i, b in enumerate(blocks):
             D = np.concatenate([design(b, k, q), b.r[:, :, None]], axis=2)
-            if discrepancy.size > 0.0:
-                L = cholesky(discrepancy.covariance(b.features, b.loose), lower=True)
-                white = solve_triangular(L, D.reshape(len(b.r), -1), lower=True).reshape(-1, q + 1)
-            else:
-                size = np.full(len(b.r), discrepancy.noise) * (1.0 if b.loose is None else b.loose)
-                white = (D / size[:, None, None]).reshape(-1, q + 1)
+            white, _ = discrepancy.whitened(D, b)
             G = white.T @ white
             grams[i], moments[i] = G[:q, :q], G[:q, q]
         return Evidence(tuple(blocks), grams, moments, k, each_withheld(len(blocks)) if folds is None else folds)

@@ -15,6 +15,7 @@ from camcomp.diagnosis.arm.discrepancy import (
     regions,
     without_nuisance,
 )
+from camcomp.diagnosis.arm.few_causes import Few
 from camcomp.diagnosis.arm.forward_selection import Taken, take
 from camcomp.diagnosis.arm.noise_floor import far_off
 from camcomp.diagnosis.arm.poses import ArmBench, Column, Poses, combined, visible
@@ -40,8 +41,16 @@ class ArmFit:
     linear: tuple[ResidualBlock, ...]
     rest: tuple[Floats, ...]  # (n, 3) mm per campaign, machine frame
     chosen: Taken  # before anything held out had a say
-    outliers: tuple[tuple[str, int], ...] = ()  # run and row of poses that were left out
     rough: Discrepancy | None = None  # beside the groups alone, where waves of joints were taken as well
+    few: Few | None = None  # where groups are single places
+
+    def effect(self, group: str) -> str:
+        """The effect of a group."""
+        return self.columns[self.groups[group][0]].effect
+
+    def target(self, group: str) -> str | None:
+        """The target of a group at a single place; None of an effect at all joints."""
+        return None if self.few is None else self.columns[self.groups[group][0]].target
 
     def signed(self, evidence: Evidence, widths: Floats, blocks: Sequence[int]) -> Floats:
         """Widths (k,) without those of positive amounts that want to be negative on some blocks: they are none."""
@@ -56,29 +65,42 @@ class ArmFit:
         return combined(self.columns, on)
 
 
-def investigate(bench: ArmBench, without: Sequence[str] = ()) -> ArmFit:
-    """Groups that predict withheld blocks, fitted through the model itself. Poses far off are taken from the bench."""
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """Columns that move some tip, campaigns linearised about the nominal arm, and runs and rows of poses far off."""
+
+    columns: tuple[Column, ...]
+    linear: tuple[ResidualBlock, ...]
+    outliers: tuple[tuple[str, int], ...]
+
+
+def prepared(bench: ArmBench, without: Sequence[str] = ()) -> Prepared:
+    """What every fit begins with. Poses far off beside the richest model are taken from the bench."""
     columns = bench.columns(without)
-    with headway.part(0.0, 0.1):
-        linear = bench.blocks(columns)
+    linear = bench.blocks(columns)
     seen = visible(linear, columns)
     columns = [columns[j] for j in seen]
     linear = [replace(b, X=b.X[:, :, seen]) for b in linear]
-    groups: dict[str, list[int]] = {}
-    for j, column in enumerate(columns):
-        groups.setdefault(column.effect, []).append(j)
     outliers: list[tuple[str, int]] = []
     campaigns = list(bench.campaigns)
     for k, left in enumerate(_beside_everything(linear)):
-        far = far_off(np.linalg.norm(left, axis=1))
+        far = far_off(np.linalg.norm(left, axis=1), campaigns[k].time)
         outliers += named_rows(campaigns[k], far)
         campaigns[k], linear[k] = campaigns[k].take(~far), taken_rows(linear[k], ~far).loosened(left[~far])
     bench.campaigns = campaigns
-    discrepancy = fit_of_leftovers(linear)
-    with headway.part(0.1, 0.6):
-        taken = take(Evidence.of(parts(linear), discrepancy), groups)
+    return Prepared(tuple(columns), tuple(linear), tuple(outliers))
+
+
+def investigate(bench: ArmBench, start: Prepared) -> ArmFit:
+    """Groups of effects at all joints that predict withheld blocks, fitted through the model itself."""
+    groups: dict[str, list[int]] = {}
+    for j, column in enumerate(start.columns):
+        groups.setdefault(column.effect, []).append(j)
+    discrepancy = fit_of_leftovers(start.linear)
+    with headway.part(0.0, 0.6):
+        taken = take(Evidence.of(parts(start.linear), discrepancy), groups)
     with headway.part(0.6, 1.0):
-        return replace(fitted(bench, columns, groups, linear, discrepancy, taken), outliers=tuple(outliers))
+        return fitted(bench, start.columns, groups, start.linear, discrepancy, taken)
 
 
 def fitted(
@@ -152,8 +174,8 @@ def parts(blocks: Sequence[ResidualBlock]) -> list[ResidualBlock]:
 
 def taken_rows(b: ResidualBlock, mask: np.ndarray) -> ResidualBlock:
     """The rows of a mask."""
-    loose = None if b.loose is None else b.loose[mask]
-    return replace(b, features=b.features[mask], X=b.X[mask], N=b.N[mask], r=b.r[mask], loose=loose)
+    loose, order = (None if own is None else own[mask] for own in (b.loose, b.order))
+    return replace(b, features=b.features[mask], X=b.X[mask], N=b.N[mask], r=b.r[mask], loose=loose, order=order)
 
 
 def named_rows(poses: Poses, mask: np.ndarray) -> list[tuple[str, int]]:

@@ -14,8 +14,8 @@ from scipy.spatial import KDTree
 from scipy.stats import binom, chi2, norm
 
 from camcomp.diagnosis.arm.dependence import Dependence, dependences
-from camcomp.diagnosis.arm.discrepancy import Evidence, design, regions
-from camcomp.diagnosis.arm.noise_floor import TipFloor
+from camcomp.diagnosis.arm.discrepancy import CHI2_3_MEDIAN, Evidence, design, regions
+from camcomp.diagnosis.arm.noise_floor import FAR, IN_A_ROW, TipFloor
 from camcomp.ground.datatypes import Floats
 
 MINOR = 0.3  # of the floor: what moves the tip less is no cause and no unknown
@@ -41,7 +41,7 @@ class Gate:
     """The test of a leftover. word: `above` the floor, `at` it, or `open`, where the data decide neither.
 
     chance: log10 of the chance of the strongest sign in noise alone; drivers: what the leftover depends on; floor:
-    whether there is one.
+    whether there is one; structured: whether the leftover follows something, so that it is no noise of whatever size.
     """
 
     word: Literal["above", "at", "open"]
@@ -49,6 +49,7 @@ class Gate:
     drivers: tuple[Dependence, ...]
     left: LeftOver
     floor: bool
+    structured: bool = False
 
 
 def unseen(evidence: Evidence, widths: Floats, sd: float) -> LeftOver:
@@ -91,14 +92,14 @@ def judge(
     largest = sorted(_discovered(whole), key=lambda e: -e.share)
     drivers = tuple({each.covariate: each for each in reversed(largest) if each.covariate}.values())[::-1]
     if floor is None:
-        return Gate("above" if structured else "open", min(chance, 0.0), drivers, left, floor is not None)
+        return Gate("above" if structured else "open", min(chance, 0.0), drivers, left, False, structured)
     mean, spread = level(left, features, floor)
     many = regions_above(left, features)
-    if structured or mean - norm.ppf(SURE) * spread > ABOVE or many < np.log10(FALSE):
+    if structured or mean - norm.ppf(SURE) * spread > ABOVE or many < np.log10(FALSE) or lasting(left, times):
         if mean - norm.ppf(SURE) * spread > ABOVE:
             chance = min(chance, float(norm.logsf((mean - ABOVE) / spread) / np.log(10.0)))
-        chance = min(chance, many)
-        return Gate("above", min(chance, 0.0), drivers, left, floor is not None)
+        chance = min(chance, many, float(np.log10(CHANCE)) if lasting(left, times) else 0.0)
+        return Gate("above", min(chance, 0.0), drivers, left, True, structured)
     return Gate("at" if mean + norm.ppf(LIKELY) * spread < LEVEL else "open", 0.0, drivers, left, True)
 
 
@@ -125,6 +126,15 @@ def regions_above(left: LeftOver, features: Sequence[Floats]) -> float:
     """
     total, n = _by_region(left, features)
     return float(binom.logsf((total > ABOVE * n).sum() - 1, len(n), 0.5) / np.log(10.0))
+
+
+def lasting(left: LeftOver, times: Sequence[Floats]) -> bool:
+    """Whether poses one after the other are all so far off as no noise is: too few for a mean, and no mistakes."""
+    for square, time in zip(left.squares, times, strict=True):
+        far = square[np.argsort(time, kind="stable")] > FAR**2 * CHI2_3_MEDIAN
+        if len(far) >= IN_A_ROW and np.lib.stride_tricks.sliding_window_view(far, IN_A_ROW).all(axis=1).any():
+            return True
+    return False
 
 
 def _by_region(left: LeftOver, features: Sequence[Floats]) -> tuple[Floats, Floats]:

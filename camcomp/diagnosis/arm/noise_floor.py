@@ -11,6 +11,7 @@ from typing import Literal
 
 import numpy as np
 from scipy.spatial import KDTree
+from scipy.stats import chi2
 
 from camcomp.diagnosis.arm.poses import Poses
 from camcomp.ground.datatypes import Floats
@@ -18,7 +19,10 @@ from camcomp.model.statics.description import Robot
 
 SAME_POSE = 1e-3  # rad or m between two visits of one pose; the model turns the rest of the way into mm
 LEAST_VISITS = 10  # beyond the first ones; fewer know a deviation to no better than a fifth
+SWAYS = 8  # slow waves in time: how an instrument wanders over a campaign
+ENOUGH = 4.0  # visits per wave from which on they are told from noise
 FAR = 8.0  # medians: no noise reaches so far, beams that were cut do
+IN_A_ROW = 3  # poses far off: something lasts
 MOST_FAR = 0.03  # of the poses; where more are far off, something acts there
 
 
@@ -47,19 +51,35 @@ class StatedDeviation:
 def tip_floor(
     robot: Robot, campaigns: Sequence[Poses], gaps: Sequence[Floats], stated: StatedDeviation
 ) -> TipFloor | None:
-    """The floor of campaigns with gaps (n, 3) mm to their nominal model; None where nothing tells it.
+    """The floor of campaigns with gaps (n, 3) mm to a model; None where nothing tells it.
 
-    The larger of what is stated and of what repeats show: drift and frame of an instrument do not show in repeats, and a
-    statement that repeats belie is none.
+    The larger of what is stated and of what repeats show beside slow waves in time: the frame of an instrument does not show
+    in repeats, and a statement that repeats belie is none.
     """
     known = [each for each in (_stated(robot, campaigns, stated), _repeated(robot, campaigns, gaps)) if each]
     return max(known, key=lambda each: each.sd, default=None)
 
 
-def far_off(size: Floats) -> np.ndarray:
-    """Which distances (n,) are no noise: a mask (n,), empty where too many are so far off to be single mistakes."""
+def least_floor(
+    robot: Robot, campaigns: Sequence[Poses], gaps: Sequence[Floats], stated: StatedDeviation
+) -> TipFloor | None:
+    """What the floor may be at least, to begin with: what is stated, else what the quieter half of repeats shows."""
+    return _stated(robot, campaigns, stated) or _repeated(robot, campaigns, gaps, quiet=True)
+
+
+def far_off(size: Floats, time: Floats) -> np.ndarray:
+    """Which distances (n,) at times (n,) are no noise: a mask (n,), empty where too many are so far off to be single mistakes.
+
+    IN_A_ROW of them one after the other are no mistakes either.
+    """
     far = size > FAR * max(float(np.median(size)), 1e-6)
-    return far if far.mean() <= MOST_FAR else np.zeros(len(size), bool)
+    if far.mean() > MOST_FAR:
+        return np.zeros(len(size), bool)
+    order = np.argsort(time, kind="stable")
+    for run in np.split(order, np.flatnonzero(np.diff(far[order].astype(int))) + 1):
+        if len(run) >= IN_A_ROW:
+            far[run] = False
+    return far
 
 
 def _stated(robot: Robot, campaigns: Sequence[Poses], stated: StatedDeviation) -> TipFloor | None:
@@ -74,28 +94,53 @@ def _stated(robot: Robot, campaigns: Sequence[Poses], stated: StatedDeviation) -
     return TipFloor(float(np.sqrt(whole.mean())), np.inf, "stated") if np.isfinite(whole).all() else None
 
 
-def _repeated(robot: Robot, campaigns: Sequence[Poses], gaps: Sequence[Floats]) -> TipFloor | None:
-    """From poses visited again, else from tips read again while the arm stood."""
-    anew: list[tuple[float, int]] = []
-    still: list[tuple[float, int]] = []
+def _repeated(robot: Robot, campaigns: Sequence[Poses], gaps: Sequence[Floats], quiet: bool = False) -> TipFloor | None:
+    """From poses visited again, else from tips read again while the arm stood. quiet: from their median."""
+    anew: list[tuple[float, float]] = []
+    still: list[tuple[float, float]] = []
     for each, gap in zip(campaigns, gaps, strict=True):
         order = np.empty(len(each.q), int)
         order[np.argsort(each.time, kind="stable")] = np.arange(len(each.q))
-        for visits in visits_of(robot, each):
-            square = float(((gap[visits] - gap[visits].mean(axis=0)) ** 2).sum())
-            stood = np.ptp(order[visits]) == len(visits) - 1
-            (still if stood else anew).append((square, len(visits) - 1))
-    return _scatter(anew, "repeats") or _scatter(still, "rest")
+        visits = _near(visits_of(robot, each), gap)
+        again = [rows for rows in visits if np.ptp(order[rows]) > len(rows) - 1]
+        anew += _beside_sways(again, gap, order)
+        stood = [rows for rows in visits if np.ptp(order[rows]) == len(rows) - 1]
+        still += [(_square(gap[rows]), len(rows) - 1.0) for rows in stood]
+    return _scatter(anew, "repeats", quiet) or _scatter(still, "rest", quiet)
 
 
-def _scatter(groups: Sequence[tuple[float, int]], source: Literal["repeats", "rest"]) -> TipFloor | None:
+def _near(visits: Sequence[np.ndarray], gap: Floats) -> list[np.ndarray]:
+    """Visits whose gaps (n, 3) differ by no more than noise may, as far as the median of all tells."""
+    size = np.array([np.sqrt(_square(gap[rows]) / (len(rows) - 1)) for rows in visits])
+    return [rows for rows, own in zip(visits, size, strict=True) if own <= FAR * max(float(np.median(size)), 1e-6)]
+
+
+def _square(values: Floats) -> float:
+    return float(((values - values.mean(axis=0)) ** 2).sum())
+
+
+def _beside_sways(visits: Sequence[np.ndarray], gap: Floats, order: np.ndarray) -> list[tuple[float, float]]:
+    """Squares of what gaps (n, 3) of visits of one pose differ by, beside slow waves of all rows in time, and their freedom."""
+    more = sum(len(rows) - 1 for rows in visits)
+    if more < ENOUGH * SWAYS:
+        return [(_square(gap[rows]), len(rows) - 1.0) for rows in visits]
+    waves = np.cos(np.pi * np.arange(1, SWAYS + 1) * ((order + 0.5) / len(order))[:, None])
+    left = np.concatenate([gap[rows] - gap[rows].mean(axis=0) for rows in visits])
+    basis = np.concatenate([waves[rows] - waves[rows].mean(axis=0) for rows in visits])
+    left = left - basis @ np.linalg.lstsq(basis, left, rcond=1e-9)[0]
+    parts = np.split(left, np.cumsum([len(rows) for rows in visits])[:-1])
+    share = 1.0 - SWAYS / more  # of the freedom is left
+    return [(float((each**2).sum()), share * (len(each) - 1)) for each in parts]
+
+
+def _scatter(groups: Sequence[tuple[float, float]], source: Literal["repeats", "rest"], quiet: bool) -> TipFloor | None:
     if sum(more for _, more in groups) < LEAST_VISITS:
         return None
     square, more = np.array(groups).T
-    size = np.sqrt(square / more)
-    near = size <= FAR * max(float(np.median(size)), 1e-6)
-    freedom = 3.0 * float(more[near].sum())
-    sd = float(np.sqrt(square[near].sum() / freedom))
+    freedom = 3.0 * float(more.sum())
+    sd = float(np.sqrt(square.sum() / freedom))
+    if quiet:
+        sd = min(sd, float(np.sqrt(np.median(square / chi2.median(3.0 * more)))))
     return TipFloor(sd, freedom, source) if sd > 0.0 else None
 
 

@@ -66,6 +66,13 @@ class Poses:
         return np.arange(1, len(self.q) + 1) if self.row is None else self.row
 
     @property
+    def order(self) -> Floats:
+        """Order (n,) of the poses in time, 0 to 1."""
+        out = np.empty(len(self.q))
+        out[np.argsort(self.time, kind="stable")] = (np.arange(len(out)) + 0.5) / len(out)
+        return out
+
+    @property
     def features(self) -> Floats:
         """What makes two postures alike: sines and cosines (n, 2 m) of hinges. Slides count by their share of 1 m."""
         return np.concatenate([np.sin(self.q), np.cos(self.q)], axis=1)
@@ -73,17 +80,22 @@ class Poses:
 
 @dataclass(frozen=True)
 class Column:
-    """One parameter of an effect at a target, fitted in units of its scale."""
+    """One parameter of an effect at a target, fitted in units of its scale.
+
+    shape: what shapes it, where something does: name, value, and between which values it lies.
+    """
 
     effect: str
     target: str | None
     module: Any
     parameter: Parameter
+    shape: tuple[tuple[str, float, float, float], ...] = ()
 
     def cause(self, amount: float) -> Cause:
         """The cause with this parameter at an amplitude."""
         p = self.parameter
-        return Cause(self.effect, self.module, self.target, {p.name: p.value(amount * p.scale)})
+        values = {**{name: value for name, value, _, _ in self.shape}, p.name: p.value(amount * p.scale)}
+        return Cause(self.effect, self.module, self.target, values)
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,6 +155,30 @@ class ArmBench:
         """The waves of every hinge."""
         return self._of_effects([(CURVE, shelf.load("effects", CURVE))])
 
+    def shaped(self, without: Sequence[str] = ()) -> list[Column]:
+        """Parameters of drives' effects that need a shape nobody knows (a time of warming up), one column for each value to try."""
+        found: list[Column] = []
+        for name, module in shelf.usable("effects", (*_UNSEEN, CURVE, *without)):
+            if "drive" not in signal_path.stages_of(module) or module.TARGET == "named":
+                continue
+            targets: list[str | None] = [None] if module.TARGET in ("machine", "either") else []
+            targets += [] if module.TARGET == "machine" else list(self.actuators)
+            for target in targets:
+                turns = self.drive(self.actuators[0] if target is None else target).revolute
+                own = _for(module, turns)
+                found += [
+                    Column(name, target, module, p, shape)
+                    for shape in _shapes(own, self._warm)
+                    for p in own
+                    if not p.shape
+                ]
+        return found
+
+    @property
+    def _warm(self) -> bool:
+        """Whether temperatures of all campaigns are known, so that no time of warming up is."""
+        return all(each.temperature is not None for each in self.campaigns)
+
     def _of_effects(self, effects: Iterable[tuple[str, Any]]) -> list[Column]:
         springs = any(a.stiffness is not None for a in self.robot.actuators)
         links = any(isinstance(e, Link) for e in self.arm.chain.elements)
@@ -185,7 +221,7 @@ class ArmBench:
                 X[:, :, j] = (self.tips(k, moved, frame) - here) / step
             N = nuisance_columns(here, stood.hung.rotation, here.mean(axis=0))
             left = measured - here + X @ np.array([amounts.get(j, 0.0) for j in range(len(columns))])
-            out.append(ResidualBlock(campaign.features, X, N, left, k, True))
+            out.append(ResidualBlock(campaign.features, X, N, left, k, True, order=campaign.order))
         return out
 
     def joint_motion(self, poses: Poses, causes: Sequence[Cause], at: Registration) -> Floats:
@@ -278,14 +314,29 @@ def visible(blocks: Sequence[ResidualBlock], columns: Sequence[Column]) -> list[
 
 
 def _parameters(module: Any, turns: bool) -> tuple[Parameter, ...]:
-    """The parameters that make sense for a hinge (turns) or a slide, without scanned shapes."""
+    """The parameters that make sense for a hinge (turns) or a slide; none where a shape has to be scanned."""
+    own = _for(module, turns)
+    return () if any(p.scan for p in own) else own
+
+
+def _for(module: Any, turns: bool) -> tuple[Parameter, ...]:
     rotary, own = getattr(module, "ROTARY", None), getattr(module, "FITTED", module.PARAMETERS)
     own = (own if rotary is None else rotary) if turns else tuple(p for p in own if p not in (rotary or ()))
     if turns and "drive" in signal_path.stages_of(module) and not hasattr(module, "ROTARY"):
         own = tuple(p for p in own if p.unit == "ppm")  # lengths of a slide mean nothing to a hinge
-    if any(p.scan for p in own):
-        return ()
     return tuple(own)
+
+
+def _shapes(parameters: Sequence[Parameter], warm: bool) -> list[tuple[tuple[str, float, float, float], ...]]:
+    """Shapes to try of an effect: times of warming up, a single one where temperatures are logged; none of what is placed."""
+    scanned = [p for p in parameters if p.scan]
+    if len(scanned) != 1 or scanned[0].placed or scanned[0].turns:
+        return []
+    one = scanned[0]
+    if warm:  # then it says nothing
+        return [((one.name, one.nominal, one.low, one.high),)]
+    ends = (one.low, *one.scan, one.high)
+    return [((one.name, ends[k], ends[k - 1], ends[k + 1]),) for k in range(1, len(ends) - 1)]
 
 
 def _complete(cause: Cause) -> dict[str, float]:

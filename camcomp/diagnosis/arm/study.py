@@ -9,29 +9,21 @@ something is left is a matter of the floor: measured by repeats, or stated, and 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from camcomp.diagnosis.arm import answer
-from camcomp.diagnosis.arm.curves import with_curves
-from camcomp.diagnosis.arm.discrepancy import Discrepancy
-from camcomp.diagnosis.arm.fit import ArmFit, fitted, investigate, named_rows
-from camcomp.diagnosis.arm.gate import Gate, judge, unseen
-from camcomp.diagnosis.arm.noise_floor import StatedDeviation, TipFloor, far_off, tip_floor
+from camcomp.diagnosis.arm.cases import CLOSE, solved
+from camcomp.diagnosis.arm.few_fit import suspects
+from camcomp.diagnosis.arm.fit import ArmFit, named_rows, prepared
+from camcomp.diagnosis.arm.gate import Gate
+from camcomp.diagnosis.arm.noise_floor import StatedDeviation, far_off, least_floor, tip_floor
 from camcomp.diagnosis.arm.pose_values import of_poses
-from camcomp.diagnosis.arm.poses import CURVE, ArmBench, Poses
+from camcomp.diagnosis.arm.poses import ArmBench, Poses
 from camcomp.diagnosis.arm.unseen import (
     Court,
     Rival,
-    adopted,
-    beside_curves,
-    borne_out,
-    court,
-    court_of_curves,
-    holding,
-    rivals,
     shrinkage,
 )
 from camcomp.diagnosis.result.types import UNKNOWN, DiagnosisResult, Floor, Outlier
@@ -65,44 +57,34 @@ def study(
         raise ValueError("every run is held out")
     own, more = merged(fitted_runs), merged([r for r in runs if str(r.run[0]) in holdout])
     every, gaps, outliers = _cleaned(robot, tuple(causes), [*own, *more])
-    floor = tip_floor(robot, every, gaps, StatedDeviation() if stated is None else stated)
     values = of_poses(robot, every, gaps)
-    every = [drawn(each) for each in every]
+    deviation = StatedDeviation() if stated is None else stated
+    floor = least_floor(robot, every, gaps, deviation)
+    whole, every = every, [drawn(each) for each in every]
     bench = ArmBench(robot, tuple(causes), every[: len(own)])
-    with part(0.0, 0.3):
-        found = investigate(bench, without)
-    outliers += found.outliers
     held = ArmBench(robot, tuple(causes), every[len(own) :]) if more else None
-    if held is not None:
-        outliers += _without_outliers(held, found)
-    with part(0.3, 0.7):
-        curved = found if CURVE in without else with_curves(bench, found)
-    judges = court(bench, found, held)
-    curve_judges = court_of_curves(judges, bench, curved, held)
-    seen_names = sorted({str(r.run[0]) for r in runs if not holdout or str(r.run[0]) in holdout})
-    shrunk = shrinkage(curve_judges, curved, seen_names, bench)
-    floor_mm = None if floor is None else 1e-3 * floor.um
-    sets = rivals(judges, found, floor_mm)
-    kept = holding(judges, found) if held is not None else found.taken
-    if judges.whole and kept is found.taken and (best := max(sets, key=lambda s: s.density)) is not sets[0]:
-        kept = adopted(found, best)
-    if [s.group for s in kept.steps] != [s.group for s in found.taken.steps]:
-        chosen = found.chosen if held is not None else kept
-        found = replace(
-            fitted(bench, found.columns, found.groups, found.linear, found.discrepancy, kept), chosen=chosen
-        )
-        judges = court(bench, found, held)
-        sets = rivals(judges, found, floor_mm)
-        if curved.rough is not None:
-            curved = replace(with_curves(bench, found), chosen=curved.chosen)
-            curve_judges = court_of_curves(judges, bench, curved, held)
-    if curved.rough is not None:
-        if held is None or borne_out(curve_judges, curved):
-            found, judges, sets = curved, curve_judges, beside_curves(sets, curved)
+    with part(0.0, 0.05):
+        start = prepared(bench, without)
+    outliers += start.outliers
+    wanted = suspects(bench, start, without)
+    with part(0.05, 0.4):
+        case = solved(bench, held, start, wanted, floor, without)
+    if floor is not None:
+        acting = case.found.causes()
+        beside = [_gap(robot, tuple(causes), each, acting) for each in whole]
+        both = [tip_floor(robot, whole, gap, deviation) for gap in (gaps, beside)]
+        shown = min((one for one in both if one), key=lambda one: one.sd, default=None)
+        if shown is not None and shown.sd > CLOSE * floor.sd:
+            with part(0.4, 0.75):
+                again = solved(bench, held, start, wanted, shown, without)
+            hidden = case.gate.word == "above" and case.gate.structured and again.gate.word != "above"
+            case, floor = (case, floor) if hidden else (again, shown)
         else:
-            found = replace(found, chosen=curved.chosen)
-    headway.done(0.75)
-    gate = _gate(bench, held, found, judges, floor)
+            floor = shown
+    outliers += case.outliers
+    found, judges, sets, gate = case.found, case.judges, case.sets, case.gate
+    seen_names = sorted({str(r.run[0]) for r in runs if not holdout or str(r.run[0]) in holdout})
+    shrunk = shrinkage(case.seen_by, case.chosen, seen_names, bench)
     word = verdict(found, judges, gate, sets)
     first = [bench.gap(k, ()) for k in range(len(bench.campaigns))]
     told = answer.Told(bench, found, gate, floor, sets, word, judges)
@@ -174,6 +156,13 @@ def drawn(poses: Poses) -> Poses:
     return poses.take(np.sort(np.random.default_rng(CAMPAIGN_SEED).choice(n, MOST_POSES, replace=False)))
 
 
+def _gap(robot: Robot, causes: tuple[Cause, ...], poses: Poses, found: Sequence[Cause]) -> Floats:
+    """Measured minus modelled tips (n, 3) of a campaign with what was found, its frame from some poses where they are many."""
+    bench = ArmBench(robot, causes, [drawn(poses)])
+    frame = bench.registration(0, found)
+    return frame.to_machine(poses.tip) - bench.standing(poses, found).tips(frame)
+
+
 def _cleaned(
     robot: Robot, causes: tuple[Cause, ...], campaigns: Sequence[Poses]
 ) -> tuple[list[Poses], list[Floats], list[tuple[str, int]]]:
@@ -181,10 +170,8 @@ def _cleaned(
     out, gaps, outliers = [], [], []
     for each in campaigns:
         for _ in range(3):
-            bench = ArmBench(robot, causes, [drawn(each)])
-            frame = bench.registration(0, ())
-            gap = frame.to_machine(each.tip) - bench.standing(each, ()).tips(frame)
-            far = far_off(np.linalg.norm(gap, axis=1))
+            gap = _gap(robot, causes, each, ())
+            far = far_off(np.linalg.norm(gap, axis=1), each.time)
             outliers += named_rows(each, far)
             each, gap = each.take(~far), gap[~far]
             if not far.any():
@@ -192,24 +179,3 @@ def _cleaned(
         out.append(each)
         gaps.append(gap)
     return out, gaps, outliers
-
-
-def _without_outliers(held: ArmBench, found: ArmFit) -> list[tuple[str, int]]:
-    """Takes poses far off, with the causes in, from campaigns that are held out; their runs and rows."""
-    campaigns, outliers = list(held.campaigns), []
-    for k, each in enumerate(campaigns):
-        far = far_off(np.linalg.norm(held.gap(k, found.causes()), axis=1))
-        outliers += named_rows(each, far)
-        campaigns[k] = each.take(~far)
-    held.campaigns = campaigns
-    return outliers
-
-
-def _gate(bench: ArmBench, held: ArmBench | None, found: ArmFit, judges: Court, floor: TipFloor | None) -> Gate:
-    """What is left on unseen poses against the floor, or where there is none, against what depends on nothing."""
-    sd = floor.sd if floor else max(float(np.sqrt(np.mean(np.concatenate(found.rest) ** 2))), 1e-9)
-    evidence = judges.evidence(Discrepancy(0.0, 1.0, sd))
-    widths = np.where(found.amount != 0.0, found.taken.widths, 0.0)
-    left = unseen(evidence, widths, sd)
-    patterns = answer.patterns(held or bench, judges.poses)
-    return judge(left, floor, [p.features for p in judges.poses], [p.time for p in judges.poses], patterns)

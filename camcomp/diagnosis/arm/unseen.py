@@ -18,6 +18,7 @@ from camcomp.diagnosis.arm.discrepancy import (
     regions,
     without_nuisance,
 )
+from camcomp.diagnosis.arm.few_causes import sways
 from camcomp.diagnosis.arm.fit import ArmFit, masks, parts, relinearised
 from camcomp.diagnosis.arm.forward_selection import (
     LEAST_GAIN,
@@ -28,6 +29,7 @@ from camcomp.diagnosis.arm.forward_selection import (
     rms,
     take,
 )
+from camcomp.diagnosis.arm.noise_floor import SWAYS
 from camcomp.diagnosis.arm.poses import CURVE, ArmBench, Poses
 from camcomp.diagnosis.result.types import ShrinkageStep, UnseenShrinkage
 from camcomp.diagnosis.statistics.one_more import log_ratio, of_one_more, scatter
@@ -86,6 +88,21 @@ def court_of_curves(judges: Court, bench: ArmBench, found: ArmFit, held: ArmBenc
     return replace(judges, blocks=(*found.linear, *more))
 
 
+def beside_sways(court: Court, sd: float) -> Court:
+    """With slow waves in time behind the columns of every fold's block, as columns of its own."""
+    own = [fold.block for fold in court.folds]
+    more = 3 * SWAYS * len(own)
+    blocks = []
+    for i, b in enumerate(court.blocks):
+        X = np.concatenate([b.X, np.zeros((*b.r.shape, more))], axis=2)
+        if i in own:
+            k = own.index(i)
+            at = b.X.shape[2] + 3 * SWAYS * k
+            X[:, :, at : at + 3 * SWAYS] = sways(court.poses[k].time, sd)
+        blocks.append(replace(b, X=X))
+    return replace(court, blocks=tuple(blocks))
+
+
 @dataclass(frozen=True)
 class Rival:
     """A set of groups with the widths (k,) of its columns, log predictive density and rms mm on the folds."""
@@ -116,9 +133,8 @@ def holding(court: Court, found: ArmFit) -> Taken:
 def only(found: ArmFit, names: Sequence[str]) -> Taken:
     """Some of the groups taken."""
     steps = tuple(s for s in found.taken.steps if s.group in names)
-    widths = np.zeros(len(found.columns))
-    for step in steps:
-        widths[found.groups[step.group]] = step.width
+    kept = [j for step in steps for j in found.groups[step.group]]
+    widths = np.where(np.isin(np.arange(len(found.columns)), kept), found.taken.widths, 0.0)
     return replace(found.taken, steps=steps, widths=widths)
 
 
@@ -178,6 +194,19 @@ def _rival(evidence: Evidence, names: tuple[str, ...], widths: Floats) -> Rival:
     return Rival(names, tuple(widths), density, rms(squares))
 
 
+def alike(court: Court, found: ArmFit) -> list[Rival]:
+    """The sets that few causes leave, the most probable first."""
+    assert found.few is not None
+    evidence = court.evidence(found.discrepancy)
+    out = []
+    for names in found.few.sets:
+        widths = np.zeros(len(found.columns))
+        for name in names:
+            widths[found.groups[name]] = 1.0
+        out.append(_rival(evidence, names, widths))
+    return out[:MOST_SETS]
+
+
 def beside_curves(sets: Sequence[Rival], found: ArmFit) -> list[Rival]:
     """Sets that were compared without waves of joints, with those of the fit beside each of them."""
     step = next((s for s in found.taken.steps if s.group == CURVE), None)
@@ -230,7 +259,7 @@ def shrinkage(court: Court, found: ArmFit, names: Sequence[str], bench: ArmBench
         ratio=round(ratio, 4),
         ci95=(round(min(low, ratio), 4), round(max(high, ratio), 4)),
         steps=tuple(
-            ShrinkageStep(effect=g, target=None, after_rms_um=round(1e3 * s, 3))
+            ShrinkageStep(effect=found.effect(g), target=found.target(g), after_rms_um=round(1e3 * s, 3))
             for g, s in zip(order, size[1:], strict=True)
         ),
         refitted=("frame of the instrument", "place of its target"),
@@ -263,7 +292,10 @@ def _without(court: Court, fold: Fold, found: ArmFit) -> Taken:
     if len(fitted) == len(found.linear):
         return found.chosen
     frames = {b.frame: k for k, b in enumerate(fitted)}
-    own = parts([replace(b, frame=frames[b.frame]) for b in fitted])
+    alone = [replace(b, frame=frames[b.frame]) for b in fitted]
+    if found.few is not None:
+        return found.few.again(alone, fold.others)
+    own = parts(alone)
     if found.rough is None:
         return take(Evidence.of(own, found.discrepancy), found.groups)
     groups = {name: columns for name, columns in found.groups.items() if name != CURVE}

@@ -61,7 +61,6 @@ class Off:
     coupling: np.ndarray
     hysteresis: np.ndarray
     growth: np.ndarray  # rad per K
-    expansion: np.ndarray  # share per K
     stiffness: np.ndarray  # factor
     compliance: np.ndarray  # rad per N mm
     length: np.ndarray  # mm
@@ -74,7 +73,7 @@ class Off:
     @staticmethod
     def nothing(joints: int = 6) -> Off:
         """An arm as its table says."""
-        out = Off(*[np.zeros(joints) for _ in range(9)], np.zeros((joints, 5)), np.zeros((joints, 2 * HARMONICS)))
+        out = Off(*[np.zeros(joints) for _ in range(8)], np.zeros((joints, 5)), np.zeros((joints, 2 * HARMONICS)))
         out.stiffness += 1
         return out
 

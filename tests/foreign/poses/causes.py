@@ -82,7 +82,6 @@ def library(plant: Plant, rng: np.random.Generator) -> list[Item]:
         add("joint_curve", name, lambda x: {"amplitude_rad": x}, 1e-4, 0.004, curve, False)
         items[-1].shape = {"shares": pair.tolist(), "phase_rad": float(phase)}  # of the first and the second harmonic
         add("thermal_growth", name, lambda x: {"growth_rad_per_K": x}, 1e-5, 3e-4, into("growth", j))
-        add("screw_growth", name, lambda x: {"expansion_ppm_per_K": x}, 10.0, 900, into("expansion", j, 1e-6))
         if j >= 4:
             add("joint_coupling", name, lambda x: {"factor": x}, 1e-3, 0.02, into("coupling", j))
         if (arm.a[j] != 0) != (arm.d[j] != 0):
@@ -205,10 +204,9 @@ class Local:
             out = [share * plant.side[:, j, None] / 2]
         elif effect == "joint_curve":
             out = [share * f((k + 1) * q)[:, None] for k in range(waves) for f in (np.sin, np.cos)]
-        elif effect in ("thermal_growth", "screw_growth"):
-            way = (q - plant.arm.home[j])[:, None] if effect == "screw_growth" else 1.0
-            out = [share * way * (plant.temp - 20)[:, None]]
-            out += [share * way * (1 - np.exp(-seconds / s))[:, None] for s in (900, 3600, 14400)]
+        elif effect == "thermal_growth":
+            out = [share * (plant.temp - 20)[:, None]]
+            out += [share * (1 - np.exp(-seconds / s))[:, None] for s in (900, 3600, 14400)]
         elif effect == "link_length":
             out = [self.stand.along[j]]
         elif effect == "link_geometry":
@@ -225,7 +223,7 @@ class Local:
         """All effects with a target that rows of poses can show."""
         springs = np.isfinite(self.plant.arm.stiffness).all()
         effects = ["joint_offset", "screw_pitch", "joint_hysteresis", "backlash", "joint_curve", "thermal_growth"]
-        effects += ["screw_growth", "link_length", "link_geometry", "gravity_compliance"]
+        effects += ["link_length", "link_geometry", "gravity_compliance"]
         effects += ["friction", "drive_stiffness"] if springs else []
         keys: list[Key] = [(effect, name) for effect in effects for name in self.plant.arm.names]
         keys += [("joint_coupling", name) for name in self.plant.arm.names[3:]]
@@ -264,7 +262,6 @@ ODDS = (
     "range_scale",
     "foreign_load",
     "link_swing",
-    "angle_bump",
     "axis_wobble",
     "cable",
     "azimuth_error",
@@ -323,10 +320,6 @@ def strange(plant: Plant, local: Local, name: str, rng: np.random.Generator) -> 
         turns = float(rng.uniform(1.5, 4))
         bend[:, j, int(rng.integers(2))] = 0.1 * np.sin(2 * np.pi * turns * rate**1.4 + phase)
         return Odd(name, names[j], {"swings": turns, "phase": phase}, geometry=bend)
-    if name == "angle_bump":
-        centre, width = float(rng.choice(q[:, j])), np.radians(float(rng.uniform(7, 12)))
-        say = {"centre_rad": centre, "width_rad": width}
-        return Odd(name, names[j], say, shift=joint(np.exp(-(((q[:, j] - centre) / (width / 2)) ** 2))))
     if name == "axis_wobble":
         wobble = np.zeros((n, 6, 5))
         times = int(rng.choice([1, 2, 3]))
@@ -382,7 +375,7 @@ def loose(local: Local, keys: list[Key], key: Key, change: np.ndarray, sigma_mm:
     change (n, 3): what the cause does. Free is what has a deviation of a third of its value, or of what is usual.
     """
     groups = [local.group(*k) for k in [key, *[k for k in keys if k != key]]]
-    part = {"thermal_growth": slice(1), "screw_growth": slice(1), "joint_curve": slice(4)}
+    part = {"thermal_growth": slice(1), "joint_curve": slice(4)}
     groups[0] = groups[0][:, part.get(key[0], slice(None))]
     values, *_ = np.linalg.lstsq(groups[0], change.ravel(), rcond=1e-9)
     usual = np.array([0.5, 0.5, 0.5, 5e-4, 5e-4]) if key[0] == "link_geometry" else np.linalg.norm(values)

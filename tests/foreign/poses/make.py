@@ -167,8 +167,10 @@ def measured(plant: Plant, local: Local, tips: np.ndarray, s: dict, rng) -> tupl
     sigma = np.full(n, s["white_mm"])
     if s["noise"] == "range":
         far = np.linalg.norm(plant.seen(local.base), axis=1)
-        sigma = sigma * np.sqrt((1 + (far / far.mean()) ** 4) / 2)
-        sigma *= s["white_mm"] / np.sqrt((sigma**2).mean())
+        for k in range(len(plant.runs)):  # what is stated of an instrument holds for every run
+            rows = plant.run == k
+            sigma[rows] *= np.sqrt((1 + (far[rows] / far[rows].mean()) ** 4) / 2)
+            sigma[rows] *= s["white_mm"] / np.sqrt((sigma[rows] ** 2).mean())
     white = rng.standard_t(3, (n, 3)) / np.sqrt(3) if s["noise"] == "tails" else rng.normal(size=(n, 3))
     out = plant.seen(tips) + sigma[:, None] * white
     if s["noise"] == "drift":
@@ -240,9 +242,7 @@ def attempt_one(seed: int, rng: np.random.Generator, out: Path, only: str | None
     whole = float(np.sqrt(s["white_mm"] ** 2 + s["drift_mm"] ** 2 + shaky**2))
     noise_um = 1e3 * np.sqrt(3) * whole
 
-    items = [
-        i for i in library(plant, rng) if i.effect not in ("thermal_growth", "screw_growth") or np.ptp(plant.temp) > 2
-    ]
+    items = [i for i in library(plant, rng) if i.effect != "thermal_growth" or np.ptp(plant.temp) > 2]
     pool = items + ([disturbed(plant, rng)] if rng.random() < 0.3 else [])
     causes = draw_causes(kind, local, pool, noise_um, rng)
     odd, truth = None, [each[2] for each in causes]
@@ -287,7 +287,7 @@ def attempt_one(seed: int, rng: np.random.Generator, out: Path, only: str | None
     seen, sigma = measured(plant, local, tips, s, rng)
     encoder = np.round((plant.q + rng.normal(0, repeat, plant.q.shape)) / s["encoder_rad"]) * s["encoder_rad"]
     with_temperature = bool(rng.random() < 0.5)
-    if {"thermal_growth", "screw_growth"} & {k[0] for k in keys} and (plant.warmth[2] > 0 or rng.random() < 0.5):
+    if "thermal_growth" in {k[0] for k in keys} and (plant.warmth[2] > 0 or rng.random() < 0.5):
         with_temperature = True  # without it a curve of warming up has to do
     gaps, numbered = rng.random() < 0.25, rng.random() < 0.15
     folder = out / f"e-{seed}"

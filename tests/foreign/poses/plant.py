@@ -72,7 +72,7 @@ class Plant:
     def carriages(self, off: Off) -> np.ndarray:
         """Joints (n, a) behind their gears, without springs."""
         q, warm = self.q, (self.temp - 20)[:, None]
-        out = q + off.offset + (off.pitch + off.expansion * warm) * (q - self.arm.home) + off.growth * warm
+        out = q + off.offset + off.pitch * (q - self.arm.home) + off.growth * warm
         out[:, 1:] += off.coupling[1:] * q[:, :-1]
         if off.hysteresis.any():
             out += np.concatenate([play(run.q, off.hysteresis) for run in self.runs])
