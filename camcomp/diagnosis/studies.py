@@ -27,6 +27,7 @@ from camcomp.diagnosis.fit.measured import Measured
 from camcomp.diagnosis.residuals import Columns, of_axes, of_poses
 from camcomp.diagnosis.result.types import DiagnosisResult
 from camcomp.ground import shelf
+from camcomp.ground.datatypes import Floats
 from camcomp.ground.errors import ConfigError, Location
 from camcomp.ground.files import display_name
 from camcomp.model.config.load import load_config, load_experiment
@@ -98,14 +99,25 @@ def _causes(config: Config) -> list[Cause]:
 def _poses(run: RunSpec, log: Measured) -> Poses:
     """Rows with every joint and the whole tip."""
     known = np.flatnonzero(np.isfinite(np.concatenate((log.encoder, log.tip), axis=1)).all(axis=1))
-    heat = log.temperature if len(known) and np.isfinite(log.temperature[known]).all() else None
+    heat = _filled(log.time, log.temperature)
     label = "common" if run.clamping is None else str(run.clamping)
     n = len(log.time)
-    sd = log.tip_sd if np.isfinite(log.tip_sd).any() else None
+    columns = [_filled(log.time, own) for own in log.tip_sd.T]
+    stated = [own for own in columns if own is not None]
+    sd = np.stack(stated, axis=1) if len(stated) == len(columns) else log.tip_sd if stated else None
     every = Poses(
         label, log.encoder, log.tip, run.started_s + log.time, heat, np.full(n, run.name), sd, np.arange(1, n + 1)
     ).take(known)
     return replace(every, approach=approached(every.q, every.time))
+
+
+def _filled(time: Floats, values: Floats) -> Floats | None:
+    """A channel (n,) that is logged, its empty cells between those in front of and behind them; None where it is not."""
+    known = np.isfinite(values)
+    if known.mean() <= MOSTLY:
+        return None
+    order = np.flatnonzero(known)[np.argsort(time[known], kind="stable")]
+    return np.where(known, values, np.interp(time, time[order], values[order]))
 
 
 def _axis(run: RunSpec, log: Measured, k: int, revolute: bool) -> AxisRun:

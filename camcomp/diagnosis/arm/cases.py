@@ -36,7 +36,9 @@ from camcomp.ground.headway import part
 
 MOST, MOST_BESIDE = 6, 3  # causes that are looked for, and beside something unknown
 MANY, MANY_WITHOUT_FLOOR = 4, 2  # causes at once that something unknown is weighed against
-MOSTLY = 0.5  # of what few causes leave of unseen poses: an arm that is off everywhere is explained better than so
+MOSTLY = (
+    0.7  # of the rms that few causes leave of unseen poses: an arm that is off everywhere is explained better than so
+)
 TURNS = 2  # of finding causes beside a discrepancy, and this beside the causes
 CLOSE = 1.1  # as large: floors that differ by less need no second look
 
@@ -71,6 +73,12 @@ def solved(
             case = few_causes(bench, held, own, floor, Discrepancy(0.0, 1.0, noise), MOST)
     with part(0.5, 1.0):
         return beyond_few(bench, held, start, own, floor, noise, without, case) if _open(case) else case
+
+
+def at_floor(bench: ArmBench, held: ArmBench | None, case: ArmCase, floor: TipFloor) -> ArmCase:
+    """A case judged by another floor: of an arm that is off everywhere, because that fit does not go by the floor."""
+    held, _ = _without_outliers(held, case.found)
+    return replace(case, gate=_gate(bench, held, case.found, case.judges, floor))
 
 
 def _left_inside(found: ArmFit) -> float:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from camcomp.diagnosis.arm import answer
-from camcomp.diagnosis.arm.cases import CLOSE, solved
+from camcomp.diagnosis.arm.cases import CLOSE, at_floor, solved
 from camcomp.diagnosis.arm.few_fit import suspects
 from camcomp.diagnosis.arm.fit import ArmFit, named_rows, prepared
 from camcomp.diagnosis.arm.gate import Gate
@@ -76,7 +76,12 @@ def study(
         shown = min((one for one in both if one), key=lambda one: one.sd, default=None)
         if shown is not None and shown.sd > CLOSE * floor.sd:
             with part(0.4, 0.75):
-                again = solved(bench, held, start, wanted, shown, without)
+                everywhere = case.found.few is None
+                again = (
+                    at_floor(bench, held, case, shown)
+                    if everywhere
+                    else solved(bench, held, start, wanted, shown, without)
+                )
             hidden = case.gate.word == "above" and case.gate.structured and again.gate.word != "above"
             case, floor = (case, floor) if hidden else (again, shown)
         else:
