@@ -10,6 +10,7 @@ import numpy as np
 from camcomp.diagnosis.axis.block_least_squares import (
     Gain,
     Series,
+    gain,
     leftover,
     log10_chance,
     series,
@@ -34,6 +35,8 @@ from camcomp.diagnosis.statistics.probability import probability_of_chance, stat
 from camcomp.ground.datatypes import Floats
 
 LEAST_Z = 4.0  # mean gain over its standard error
+ALIKE_Z = 2.0  # the same, below which two ways of turning round are alike
+KNOWN = 0.01  # of the constants of a loop, and of friction: no law of them is better than that
 
 
 Column = Callable[[AxisTravel], Floats]
@@ -83,10 +86,19 @@ def turning(data: Series, table: Any) -> Turning:
     return min(TURNINGS, key=lambda how: float(np.mean(np.log(np.maximum(withheld(data, table(how)), 1e-300)))))
 
 
-def around(length: float) -> tuple[float, float]:
-    """Neighbours of a value of the scan: what it is known to."""
-    i = PRESLIDING_GRID_MM.index(length)
-    return PRESLIDING_GRID_MM[max(i - 1, 0)], PRESLIDING_GRID_MM[min(i + 1, len(PRESLIDING_GRID_MM) - 1)]
+def around(data: Series, table: Any, length: float) -> list[float]:
+    """Distances of the scan with which friction may turn round as well: those no worse on withheld blocks, and their neighbours.
+
+    Two shorter ones: bristles do over a fraction of their length what an exponential does over the whole of its own, and
+    the law of the drive is nobody's.
+    """
+    best = withheld(data, table(Turning(length)))
+    alike = [
+        i for i, d in enumerate(PRESLIDING_GRID_MM)
+        if d == length or gain(withheld(data, table(Turning(d))), best).z < ALIKE_Z
+    ]  # fmt: skip
+    low, high = max(min(alike) - 2, 0), min(max(alike) + 1, len(PRESLIDING_GRID_MM) - 1)
+    return list(PRESLIDING_GRID_MM[low : high + 1])
 
 
 def holds(g: Gain) -> bool:

@@ -19,6 +19,7 @@ from camcomp.diagnosis.axis.block_least_squares import (
     withheld,
 )
 from camcomp.diagnosis.axis.channels import (
+    KNOWN,
     LEAST_Z,
     Column,
     around,
@@ -138,12 +139,14 @@ def _forced(
             more = gain(last, lopsided, moving)
             if holds(more):
                 columns, last = [*columns, either_way], lopsided
-            others = [
-                [m if m is not turn else (lambda m, d=d: m.reversal(Turning(d))) for m in columns]
-                for d in around(length.distance)
-            ]
-            tables = [table(train, *each) for each in ([*others, columns] if length.speed is None else [columns])]
-            found.causes.append(_friction(found, data, tables, length, probability_of(g), before, last))
+            own = [*columns]
+
+            def turned(how: Turning) -> Floats:
+                return table(train, *(m if m is not turn else (lambda m: m.reversal(how)) for m in own))
+
+            lengths = around(data, turned, length.distance) if length.speed is None else [length.distance]
+            tables = [*(turned(Turning(d)) for d in lengths if length.speed is None), table(train, *columns)]
+            found.causes.append(_friction(found, data, tables, length, lengths, probability_of(g), before, last))
             found.details["force"]["asymmetry_z"] = round(more.z, 2)
             named.append("friction")
     _refused(found, data, table, train, columns, last, length, floor)
@@ -210,18 +213,22 @@ def _friction(
     data: Series,
     tables: Sequence[Floats],
     length: Turning,
+    lengths: Sequence[float],
     probability: float,
     before: Floats,
     last: Floats,
 ) -> FoundCause:
-    """Tables (n, k): the columns, last, and before them those with the ways of turning round next to the best one."""
+    """Tables (n, k): the columns, last, and before them those with the ways, over `lengths`, of turning round as well."""
     c, C = fit(data, tables[-1])
     beside = [np.abs(solve(A, data.y) - c) for A in tables]
     spread = np.maximum(1.96 * np.sqrt(np.diag(C)), np.max(beside, axis=0))
+    fast = max(float(np.sqrt(np.mean(tables[-1][:, 3] ** 2))), 1e-12)
+    law = KNOWN * (abs(float(c[2])) + fast * abs(float(c[3])))  # N
+    spread[2:] += law / np.array([1.0, *(fast for _ in c[3:])])
     parameters = {
         "force_N": value_of(c[2], spread[2]),
         "viscous_Ns_per_mm": value_of(c[3], spread[3]),
-        "presliding_mm": Estimate(value=length.distance, ci95=around(length.distance)),
+        "presliding_mm": Estimate(value=length.distance, ci95=(min(lengths), max(lengths))),
     }
     if len(c) > 4:
         parameters["asymmetry_Ns_per_mm"] = value_of(c[4], spread[4])

@@ -16,6 +16,7 @@ from camcomp.diagnosis.axis.block_least_squares import (
     withheld,
 )
 from camcomp.diagnosis.axis.channels import (
+    KNOWN,
     Column,
     acceleration,
     close,
@@ -42,7 +43,6 @@ from camcomp.diagnosis.result.types import (
 )
 from camcomp.ground.datatypes import Floats
 
-KNOWN = 0.01  # of a loop's constants: no law of a loop is better than that
 ALIKE = 0.02  # of a time constant: by which those of axes may differ and be one
 EQUAL = 1.05  # of what a loop with inertia leaves: what one that swings over may leave to be the simpler answer
 
