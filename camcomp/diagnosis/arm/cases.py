@@ -37,7 +37,7 @@ from camcomp.ground.headway import part
 MOST, MOST_BESIDE = 6, 3  # causes that are looked for, and beside something unknown
 MANY, MANY_WITHOUT_FLOOR = 4, 2  # causes at once that something unknown is weighed against
 MOSTLY = (
-    0.7  # of the rms that few causes leave of unseen poses: an arm that is off everywhere is explained better than so
+    0.65  # of what few causes leave of unseen poses (rms): an arm that is off everywhere is explained better than so
 )
 TURNS = 2  # of finding causes beside a discrepancy, and this beside the causes
 CLOSE = 1.1  # as large: floors that differ by less need no second look
