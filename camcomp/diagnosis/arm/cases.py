@@ -36,9 +36,7 @@ from camcomp.ground.headway import part
 
 MOST, MOST_BESIDE = 6, 3  # causes that are looked for, and beside something unknown
 MANY, MANY_WITHOUT_FLOOR = 4, 2  # causes at once that something unknown is weighed against
-MOSTLY = (
-    0.65  # of what few causes leave of unseen poses (rms): an arm that is off everywhere is explained better than so
-)
+MOSTLY = 0.65  # of what few causes leave of unseen poses (rms): an arm that is off everywhere is told better
 TURNS = 2  # of finding causes beside a discrepancy, and this beside the causes
 CLOSE = 1.1  # as large: floors that differ by less need no second look
 

@@ -1,9 +1,10 @@
 """Why an arm's measured poses differ from its model: causes that hold for campaigns they were not fitted on.
 
-Inside one campaign many effects explain the same poses; with other poses most of them make it worse. So groups of
-effects are judged by campaigns that are withheld, or by regions of postures where there is only one campaign (which then
-can be no more than ambiguous), and what no group predicts is stated as unknown, with what it depends on. Whether
-something is left is a matter of the floor: measured by repeats, or stated, and never what a fit leaves.
+A few causes at single joints are asked for first. Where they are not all, an arm may be off everywhere: inside one campaign
+many effects explain the same poses, with other poses most of them make it worse. So groups of effects are judged by campaigns
+that are withheld, or by regions of postures where there is only one campaign (which then can be no more than ambiguous), and
+what none predicts is stated as unknown, with what it depends on. Whether something is left is a matter of the floor: measured
+by repeats, or stated, and never what a fit leaves.
 """
 
 from __future__ import annotations
@@ -14,11 +15,11 @@ from typing import Any
 import numpy as np
 
 from camcomp.diagnosis.arm import answer
-from camcomp.diagnosis.arm.cases import CLOSE, at_floor, solved
-from camcomp.diagnosis.arm.few_fit import suspects
-from camcomp.diagnosis.arm.fit import ArmFit, named_rows, prepared
+from camcomp.diagnosis.arm.cases import CLOSE, ArmCase, at_floor, solved
+from camcomp.diagnosis.arm.few_fit import Suspects, suspects
+from camcomp.diagnosis.arm.fit import ArmFit, Prepared, named_rows, prepared
 from camcomp.diagnosis.arm.gate import Gate
-from camcomp.diagnosis.arm.noise_floor import StatedDeviation, far_off, least_floor, tip_floor
+from camcomp.diagnosis.arm.noise_floor import StatedDeviation, TipFloor, far_off, least_floor, tip_floor
 from camcomp.diagnosis.arm.pose_values import of_poses
 from camcomp.diagnosis.arm.poses import ArmBench, Poses
 from camcomp.diagnosis.arm.unseen import (
@@ -73,19 +74,9 @@ def study(
         acting = case.found.causes()
         beside = [_gap(robot, tuple(causes), each, acting) for each in whole]
         both = [tip_floor(robot, whole, gap, deviation) for gap in (gaps, beside)]
-        shown = min((one for one in both if one), key=lambda one: one.sd, default=None)
-        if shown is not None and shown.sd > CLOSE * floor.sd:
-            with part(0.4, 0.75):
-                everywhere = case.found.few is None
-                again = (
-                    at_floor(bench, held, case, shown)
-                    if everywhere
-                    else solved(bench, held, start, wanted, shown, without)
-                )
-            hidden = case.gate.word == "above" and case.gate.structured and again.gate.word != "above"
-            case, floor = (case, floor) if hidden else (again, shown)
-        else:
-            floor = shown
+        shown = min((one for one in both if one), key=lambda one: one.sd, default=floor)
+        with part(0.4, 0.75):
+            case, floor = _settled(bench, held, start, wanted, without, case, floor, shown)
     outliers += case.outliers
     found, judges, sets, gate = case.found, case.judges, case.sets, case.gate
     seen_names = sorted({str(r.run[0]) for r in runs if not holdout or str(r.run[0]) in holdout})
@@ -114,6 +105,24 @@ def study(
         outliers=tuple(Outlier(run=run, row=row) for run, row in sorted(set(outliers))),
         standards=values,
     )
+
+
+def _settled(
+    bench: ArmBench, held: ArmBench | None, start: Prepared, wanted: Suspects, without: Sequence[str], case: ArmCase,
+    floor: TipFloor, shown: TipFloor,
+) -> tuple[ArmCase, TipFloor]:  # fmt: skip
+    """A case found at the least floor there may be, and that floor; or what is found at the one that repeats show beside it.
+
+    What follows something at the lower one, and would be hidden by the higher one, is no noise: it is in the repeats as well.
+    """
+    if shown.sd <= CLOSE * floor.sd:
+        return case, shown
+    if case.found.few is None:
+        again = at_floor(bench, held, case, shown)
+    else:
+        again = solved(bench, held, start, wanted, shown, without)
+    hidden = case.gate.word == "above" and case.gate.structured and again.gate.word != "above"
+    return (case, floor) if hidden else (again, shown)
 
 
 def verdict(found: ArmFit, judges: Court, gate: Gate, sets: Sequence[Rival]) -> Any:
