@@ -35,6 +35,7 @@ from camcomp.diagnosis.statistics.probability import probability_of_chance, stat
 from camcomp.ground.datatypes import Floats
 
 LEAST_Z = 4.0  # mean gain over its standard error
+WITHIN = 0.5  # rows: force and motion of one row are not known to be of one instant to better than that
 ALIKE_Z = 2.0  # the same, below which two ways of turning round are alike
 KNOWN = 0.01  # of the constants of a loop, and of friction: no law of them is better than that
 
@@ -143,9 +144,18 @@ def close(
         )
         left, times = [values[k] - table([k], *columns) @ c for k in test], [moves[k].time for k in test]
         channel.names = [channel.all_names[k] for k in test]
-    channel.gate = judge(
-        channel.left, left, times, channel.floor, 0.0 if inertia in columns else 2.0 * REPEATABILITY_MM
-    )
+    inside, offset = channel.left, 2.0 * REPEATABILITY_MM
+    if inertia in columns:
+        offset = 0.0
+
+        def beside_law(rows: Sequence[Floats], ks: Sequence[int]) -> list[Floats]:
+            """Leftovers without what inertia and friction are not known to, row by row: their size, and when within a row."""
+            own = [table([k], *columns[1:]) @ c[1:] for k in ks]
+            laws = [np.hypot(KNOWN * each, WITHIN * np.gradient(each)) for each in own]
+            return [each * channel.floor / np.hypot(channel.floor, law) for each, law in zip(rows, laws, strict=True)]
+
+        inside, left = beside_law(inside, channel.runs), beside_law(left, test or channel.runs)
+    channel.gate = judge(inside, left, times, channel.floor, offset)
     found.unknown_chance = min(found.unknown_chance, channel.gate.chance)
     channel.steps += [(effect, float(np.sqrt(np.mean(channel.last)))) for effect in effects]
 
