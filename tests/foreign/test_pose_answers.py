@@ -12,6 +12,7 @@ def judged(folder, seed):
     make(seed, folder, None)
     truth = json.loads((folder / "truth" / f"e-{seed}.json").read_text())
     result = ask(folder / f"e-{seed}" / "experiment.yaml")
+    assert all(0.0 <= cause["share"] <= 1.0 for cause in result["causes"])
     return result, judge(result, truth, library())
 
 

@@ -75,7 +75,8 @@ def gap(gaps: Sequence[Floats], floor: TipFloor | None) -> GapSize:
 def causes(told: Told, gaps: Sequence[Floats]) -> tuple[tuple[FoundCause, ...], tuple[MinorEffect, ...]]:
     """Effects with the actuators that matter, the unknown one last, and those too small to be causes.
 
-    Shares follow the order in which the groups were taken. A set that has rivals is as probable as it is among them.
+    Shares are of unseen poses and follow the order in which the groups were taken; those of few causes are of the squares of
+    all poses. A set that has rivals is as probable as it is among them.
     """
     found = told.found
     before = found.taken.none
@@ -85,12 +86,14 @@ def causes(told: Told, gaps: Sequence[Floats]) -> tuple[tuple[FoundCause, ...], 
     out: list[FoundCause] = []
     minor: list[MinorEffect] = []
     for step in found.taken.steps:
-        share = (np.mean(before.squares) - np.mean(step.squares)) / whole
+        share = float(np.mean(before.squares) - np.mean(step.squares)) / whole
         effect = found.effect(step.group)
         sure = min(odds(step.density - before.density), weights.get(step.group, 1.0))
         targets = list(dict.fromkeys(_targets(found, step.group)))
         own = [_target(found, step, target, full) for target in targets]
         energy = sum(e for e, _, _ in own)
+        if found.few is not None:  # some act on one campaign only, and on no other that is withheld
+            share = min(energy / sum(float((gap**2).sum()) for gap in gaps), 1.0)
         for (e, probability, parameters), target in zip(own, targets, strict=True):
             if found.few is not None:
                 sure, probability = weights[step.group], found.few.places[effect, target]
