@@ -328,13 +328,13 @@ def _for(module: Any, turns: bool) -> tuple[Parameter, ...]:
 
 
 def _shapes(parameters: Sequence[Parameter], warm: bool) -> list[tuple[tuple[str, float, float, float], ...]]:
-    """Shapes to try of an effect: times of warming up, a single one where temperatures are logged; none of what is placed."""
+    """Shapes to try of an effect: times of warming up, or nothing where temperatures are logged; no shape of what is placed."""
     scanned = [p for p in parameters if p.scan]
     if len(scanned) != 1 or scanned[0].placed or scanned[0].turns:
         return []
     one = scanned[0]
-    if warm:  # then it says nothing
-        return [((one.name, one.nominal, one.low, one.high),)]
+    if warm:
+        return [()]
     ends = (one.low, *one.scan, one.high)
     return [((one.name, ends[k], ends[k - 1], ends[k + 1]),) for k in range(1, len(ends) - 1)]
 

@@ -13,7 +13,10 @@ from camcomp.diagnosis.arm.few_causes import SMALL, WIDTHS, search, sways, weigh
 from camcomp.diagnosis.arm.gate import LeftOver, lasting
 from camcomp.diagnosis.arm.noise_floor import far_off
 from camcomp.diagnosis.arm.placed_effects import PlacedEffect
+from camcomp.diagnosis.arm.poses import _shapes
 from camcomp.diagnosis.arm.spells import _window
+from camcomp.diagnosis.studies import _poses
+from camcomp.effects import disturbance, thermal_growth
 from camcomp.model.effect import Parameter
 
 ROWS, SD = 14, 0.03
@@ -118,6 +121,15 @@ def test_the_spell_that_explains_most_is_that_of_all_windows_fitted_beside_the_f
     assert not shift or np.abs(np.subtract(best, (7, 15))).max() <= 1  # noise moves an edge by a row
 
 
+def test_a_time_of_warming_up_is_tried_only_where_no_temperature_is_logged():
+    own = thermal_growth.ROTARY
+    tried = [shape[0] for shape in _shapes(own, warm=False)]
+    assert [value for _, value, _, _ in tried] == list(own[1].scan)
+    assert all(low < value < high for _, value, low, high in tried)
+    assert _shapes(own, warm=True) == [()]
+    assert _shapes(disturbance.ROTARY, warm=False) == []  # when it was is looked for in the leftovers
+
+
 def test_poses_far_off_are_mistakes_unless_they_come_one_after_the_other():
     size, time = np.full(200, 0.03), np.random.default_rng(1).permutation(200).astype(float)
     at = np.argsort(time)
@@ -131,8 +143,6 @@ def test_poses_far_off_are_mistakes_unless_they_come_one_after_the_other():
 
 
 def test_empty_cells_of_deviations_and_temperatures_are_filled():
-    from camcomp.diagnosis.studies import _poses
-
     n = 6
     nan = np.where(np.arange(n) == 2, np.nan, 1.0)
     log = SimpleNamespace(
