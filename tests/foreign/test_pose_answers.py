@@ -27,11 +27,12 @@ FEW = {
     21024: "a coupling of the wrist just above what has to be named",
     23001: "a shift that repeats see as well, and that made the floor three times as large",
     23007: "a joint that stops short, which repeats see",
+    23027: "a joint that warms up, with the temperature logged",
     23029: "a link and a joint that warms up",
 }
 
 
-@pytest.mark.parametrize("seed", some(FEW, in_ci=(21004, 21009, 23001)))
+@pytest.mark.parametrize("seed", some(FEW, in_ci=(21004, 21009, 23001, 23027)))
 def test_a_few_things_that_are_wrong_with_an_arm(tmp_path, seed):
     _, row = judged(tmp_path, seed)
     assert row["honest"] and row["all"] and not row["false_cause"], FEW[seed]

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from camcomp.diagnosis.arm.discrepancy import ResidualBlock
-from camcomp.diagnosis.arm.poses import CURVE, ArmBench, Column, Poses, wave_motion
+from camcomp.diagnosis.arm.poses import CURVE, ArmBench, Column, Poses, complete, wave_motion
 from camcomp.ground.datatypes import Floats
 from camcomp.model import signal_path
 from camcomp.model.effect import Motion
@@ -83,5 +83,6 @@ def drive_motion(bench: ArmBench, poses: Poses, joints: Floats, column: Column) 
     still = np.zeros(len(poses.q))
     stiff = signal_path.springs(bench.robot)
     motion = Motion(poses.time, poses.time, still, poses.temperature, poses.q, zero, way, home, stiff, False)
-    error, _ = signal_path.driven([column.cause(1.0)], bench.actuators, motion)
+    cause = column.cause(1.0)
+    error, _ = signal_path.driven([replace(cause, values=complete(cause))], bench.actuators, motion)
     return np.asarray(np.einsum("nim,nm->ni", joints, error), float)

@@ -134,7 +134,7 @@ class ArmBench:
 
     def standing(self, campaign: Poses, causes: Sequence[Cause]) -> LoadedArm:
         """A campaign with causes on top of those of the config."""
-        causes = [replace(cause, values=_complete(cause)) for cause in (*self.causes, *causes)]
+        causes = [replace(cause, values=complete(cause)) for cause in (*self.causes, *causes)]
         robot, _ = signal_path.edited(causes, self.actuators, self.robot)
         motion = _standing(robot, campaign)
         motion = replace(motion, encoder=signal_path.controlled(causes, self.actuators, motion))
@@ -339,7 +339,7 @@ def _shapes(parameters: Sequence[Parameter], warm: bool) -> list[tuple[tuple[str
     return [((one.name, ends[k], ends[k - 1], ends[k + 1]),) for k in range(1, len(ends) - 1)]
 
 
-def _complete(cause: Cause) -> dict[str, float]:
+def complete(cause: Cause) -> dict[str, float]:
     """All parameters of a cause, nominal where none is given."""
     return {**{p.name: p.nominal for p in cause.effect.PARAMETERS}, **cause.values}
 
