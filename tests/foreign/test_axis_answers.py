@@ -35,14 +35,25 @@ WRONG = {
     31021: "one lag of all axes",
     31028: "friction, whose sense cubics turned round before every stop",
     31031: "a lag at one speed, which a reversal explains nearly as well",
+    34011: "a loop that swings over: forces belong to what it makes of the set-points",
+    34012: "friction that differs between the ways, on an axis that goes down and up once",
+    36047: "a loop that swings over between rows of 10 ms",
+    37016: "a push that chose how smooth the motion is taken to be",
+    37018: "a push of the run that is held out",
+    37027: "a loop that swings over in two runs of four; in the others its axis stands",
+    37041: "what a loop makes of a push",
+    37043: "a push that begins and ends at once, where the axis was that time only",
+    37051: "friction that turns round behind a spring",
+    37057: "one short move in a log of one run",
     37026: "friction of a hundred times the noise, whose shape is known to a hundredth",
     37052: "the same on two axes, where reversals fall between two rows",
 }
 
 
-@pytest.mark.parametrize(
-    "seed", [pytest.param(k, marks=() if k in (31018, 31031, 37026) else pytest.mark.campaign) for k in WRONG]
-)
+IN_CI = (31018, 31031, 36047, 37016, 37018, 37026, 37041, 37051)
+
+
+@pytest.mark.parametrize("seed", [pytest.param(k, marks=() if k in IN_CI else pytest.mark.campaign) for k in WRONG])
 def test_an_axis_with_something_wrong(tmp_path, seed):
     result, row = judged(tmp_path, seed)
     assert result["verdict"] == "identified" and row["all"] and not row["false_cause"], WRONG[seed]
@@ -52,4 +63,17 @@ def test_an_axis_with_something_wrong(tmp_path, seed):
 def test_a_cable_at_the_end_of_the_travel_is_no_push(tmp_path):
     """The axis was there once: it may be the place as well as the time."""
     result, row = judged(tmp_path, 33044)
+    assert result["verdict"] == "unknown" and not row["false_cause"]
+
+
+def test_a_lag_that_differs_between_the_ways_is_unknown_beside_the_lag(tmp_path):
+    """Nothing rubs there: a loop has no way that it likes better."""
+    result, row = judged(tmp_path, 34009)
+    assert result["verdict"] == "unknown" and row["all"] and not row["false_cause"]
+
+
+@pytest.mark.campaign
+def test_what_takes_the_smaller_part_of_something_unknown_is_not_sure(tmp_path):
+    """Friction that fades, of which a loop that swings over takes a third."""
+    result, row = judged(tmp_path, 37024)
     assert result["verdict"] == "unknown" and not row["false_cause"]

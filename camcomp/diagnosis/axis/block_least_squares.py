@@ -16,38 +16,38 @@ from camcomp.ground.datatypes import Bools, Floats, Ints
 
 MARGIN_S = 0.2
 MOST_BLOCKS = 25
+WHOLE_RUNS = 4  # from which on runs are left out as wholes
 FEWEST = 3  # blocks, of which a standard error can be taken
 
 
 @dataclass(frozen=True, eq=False)
 class Series:
-    """Rows of one channel over all runs: y (n,), block number (n,), and for every block the rows to fit on (n,) bool; whole:
-    blocks are whole runs.
-    """
+    """Rows of one channel over all runs: y (n,), block number (n,), and for every block the rows to fit on (n,) bool."""
 
     y: Floats
     block: Ints
     others: tuple[np.ndarray, ...]
-    whole: bool
 
 
 def series(times: Sequence[Floats], values: Sequence[Floats]) -> Series:
-    """Blocks of whole runs where there are four runs or more, otherwise of equal stretches of every run's time."""
+    """Blocks of equal stretches of every run's time; where there are four runs or more, their whole run is left out for them.
+
+    Stretches, for an axis may stand in most of the runs.
+    """
     y = np.concatenate(list(values))
     run = np.concatenate([np.full(len(t), k) for k, t in enumerate(times)])
     time = np.concatenate(list(times))
-    if len(times) >= 4:
-        block = run
-    else:
-        each = max(MOST_BLOCKS // len(times), 2)
-        parts = [np.minimum((t - t[0]) / max(t[-1] - t[0], 1e-12) * each, each - 1).astype(int) for t in times]
-        block = np.concatenate([p + k * each for k, p in enumerate(parts)])
+    each = max(MOST_BLOCKS // len(times), 2)
+    parts = [np.minimum((t - t[0]) / max(t[-1] - t[0], 1e-12) * each, each - 1).astype(int) for t in times]
+    block = np.concatenate([p + k * each for k, p in enumerate(parts)])
+    whole = len(times) >= WHOLE_RUNS
     others = []
     for b in np.unique(block):
         mine = block == b
-        near = (run == run[mine][0]) & (time > time[mine].min() - MARGIN_S) & (time < time[mine].max() + MARGIN_S)
-        others.append(~near if len(times) < 4 else ~mine)
-    return Series(y, np.unique(block, return_inverse=True)[1], tuple(others), len(times) >= 4)
+        same = run == run[mine][0]
+        near = (time > time[mine].min() - MARGIN_S) & (time < time[mine].max() + MARGIN_S)
+        others.append(~same if whole else ~(same & near))
+    return Series(y, np.unique(block, return_inverse=True)[1], tuple(others))
 
 
 def solve(A: Floats, y: Floats) -> Floats:

@@ -107,6 +107,11 @@ def holds(g: Gain) -> bool:
     return g.z > LEAST_Z and g.log_ratio > LEAST_SHARE
 
 
+def helps(g: Gain) -> bool:
+    """The same for what an effect that is at work may have as well: a little surely will do."""
+    return g.z > ALIKE_Z and g.log_ratio > LEAST_SHARE
+
+
 def probability_of(g: Gain) -> float:
     """That a term is at work, by the chance that withheld blocks gain as much from one that is not."""
     return stated(probability_of_chance(log10_chance(g)))
@@ -120,9 +125,12 @@ def value_of(value: float, spread: float) -> Estimate:
 
 def close(
     found: AxisFindings, channel: AxisChannel, effects: Sequence[str], last: Floats, data: Series, table: Any, columns: list[Any],
-    test: list[int], values: list[Floats], moves: list[AxisTravel],
+    test: list[int], values: list[Floats], moves: list[AxisTravel], unsure: Mapping[int, Floats] | None = None,
 ) -> None:  # fmt: skip
-    """Leftovers of the channel; where runs are held out, what is left there takes the place of withheld blocks."""
+    """Leftovers of the channel; where runs are held out, what is left there takes the place of withheld blocks.
+
+    unsure: what rows (n,) of runs are not known to, by the run's number, beside what the laws of inertia and friction are not.
+    """
     A = table(channel.runs, *columns)
     c = solve(A, data.y)
     channel.columns, channel.moves = A, [moves[k] for k in channel.runs]
@@ -143,6 +151,7 @@ def close(
             np.array([s[seen.block == b].mean() for b in range(len(seen.others))]) for s in squares
         )
         left, times = [values[k] - table([k], *columns) @ c for k in test], [moves[k].time for k in test]
+        channel.held = dict(zip(test, left, strict=True))
         channel.names = [channel.all_names[k] for k in test]
     inside, offset = channel.left, 2.0 * REPEATABILITY_MM
     if inertia in columns:
@@ -151,7 +160,10 @@ def close(
         def beside_law(rows: Sequence[Floats], ks: Sequence[int]) -> list[Floats]:
             """Leftovers without what inertia and friction are not known to, row by row: their size, and when within a row."""
             own = [table([k], *columns[1:]) @ c[1:] for k in ks]
-            laws = [np.hypot(KNOWN * each, WITHIN * np.gradient(each)) for each in own]
+            more = [(unsure or {}).get(k, np.zeros(1)) for k in ks]
+            laws = [
+                np.hypot(each, np.hypot(KNOWN * o, WITHIN * np.gradient(o))) for o, each in zip(own, more, strict=True)
+            ]
             return [each * channel.floor / np.hypot(channel.floor, law) for each, law in zip(rows, laws, strict=True)]
 
         inside, left = beside_law(inside, channel.runs), beside_law(left, test or channel.runs)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -26,6 +26,7 @@ from camcomp.diagnosis.axis.channels import (
     close,
     constant,
     either_way,
+    helps,
     holds,
     inertia,
     probability_of,
@@ -39,8 +40,9 @@ from camcomp.diagnosis.axis.findings import AxisChannel, AxisFindings, AxisRun
 from camcomp.diagnosis.axis.gate import MINOR
 from camcomp.diagnosis.axis.law import LEAST_SHARE
 from camcomp.diagnosis.axis.noise_floor import rows_floor
-from camcomp.diagnosis.axis.push import QUARTERS, Window, find_window, seen_elsewhere
+from camcomp.diagnosis.axis.push import QUARTERS, Window, edges, find_window, placed_again, seen_elsewhere, sharp
 from camcomp.diagnosis.axis.terms import (
+    PRESLIDING_GRID_MM,
     AxisTravel,
     Turning,
     ripple,
@@ -51,7 +53,7 @@ from camcomp.diagnosis.result.types import (
     FoundCause,
 )
 from camcomp.diagnosis.statistics.probability import probability_of_chance, stated
-from camcomp.ground.datatypes import Floats
+from camcomp.ground.datatypes import Bools, Floats
 
 LEAST_RIPPLE = 0.02  # share of the leftover's energy
 PASSES = 2  # of the fit of a push and of all else
@@ -83,20 +85,26 @@ def force_of(
         assert channel is not None
         if channel.gate is not None and channel.gate.word == "at" and not now.ripple:
             break
-        window = find_window(channel.left, [m.time for m in channel.moves], channel.floor)
-        if window is None or not seen_elsewhere(window, channel.moves):
+        window = _next_push(_left_of(channel), moves, channel.floor)
+        if window is None:
             break
-        pushes = [*pushes, window]
-        for _ in range(PASSES):  # what friction looks like is known when the push is gone
-            pushes = _sizes(pushes, raw, now.force)
-            shifted = [_without(pushes, i, forces[k]) for i, k in enumerate(train)]
-            now = _forced(found, runs, moves, _put(forces, train, shifted), train, test, without)
+        gone, pushes = pushes, [*pushes, window]
+        for _ in range(PASSES):  # what friction looks like, and where the push ends, is known when the push is gone
+            pushes = _sizes(_placed(pushes, gone, channel, moves), gone, raw, channel)
+            shifted = [_without(pushes, k, force) for k, force in enumerate(forces)]
+            now, gone = _forced(found, runs, moves, shifted, train, test, without, _edges(pushes, moves)), pushes
+            channel = now.force
+            assert channel is not None
         if _beyond(now) < LEFT * _beyond(plain):
             kept, named = now, pushes
     channel = kept.force
     if named and channel is not None:
         for each in named:
-            kept.causes.append(_push_cause(found.name, runs[train[each.run]], each, channel, raw))
+            time = runs[each.run].time
+            kept.pushed.append(
+                (runs[each.run].name, float(time[each.first]), float(time[min(each.last, len(time) - 1)]))
+            )
+            kept.causes.append(_push_cause(found.name, runs[each.run], each, channel, raw))
             channel.steps.append(("disturbance", float(np.sqrt(np.mean(channel.last)))))
         channel.data = raw
         if not test:  # what was there before holds the pushes, too
@@ -104,17 +112,50 @@ def force_of(
     return kept
 
 
+def _left_of(channel: AxisChannel) -> dict[int, Floats]:
+    """What is left of every run, fitted or held out, by its number: a push is of its own run and foretells nothing."""
+    return dict(zip(channel.runs, channel.left, strict=True)) | channel.held
+
+
+def _next_push(left: Mapping[int, Floats], moves: Sequence[AxisTravel], floor: float) -> Window | None:
+    """The push that stands out most of what is left of runs, by their number; None where none does, or a place may be it."""
+    runs = list(left)
+    own = [moves[k] for k in runs]
+    window = find_window(list(left.values()), [m.time for m in own], floor)
+    if window is None:
+        return None
+    rest, time = left[runs[window.run]], own[window.run].time
+    if not sharp(window, rest, time) and not seen_elsewhere(window, own):
+        return None
+    return replace(window, run=runs[window.run])
+
+
+def _placed(
+    pushes: Sequence[Window], gone: Sequence[Window], channel: AxisChannel, moves: Sequence[AxisTravel]
+) -> list[Window]:
+    """Pushes with their ends where leftovers beside the other ones have them; gone: those that were taken out before."""
+    left, out = _left_of(channel), []
+    for i, each in enumerate(pushes):
+        if i < len(gone):
+            rest = left[each.run] + _force_of(gone[i], len(left[each.run]))
+            each = placed_again(each, rest, moves[each.run].time, channel.floor)
+        out.append(each)
+    return out
+
+
 def _beyond(found: AxisFindings) -> float:
     """Mean square of what is left of the drive force beyond its floor."""
     channel = found.force
-    return 0.0 if channel is None else max(float(np.mean(channel.last)) - channel.floor**2, 0.0)
+    if channel is None:
+        return 0.0
+    return max(float(np.mean(np.concatenate(list(_left_of(channel).values())) ** 2)) - channel.floor**2, 0.0)
 
 
 def _forced(
     found: AxisFindings, runs: list[AxisRun], moves: list[AxisTravel], forces: list[Floats], train: list[int], test: list[int],
-    without: set[str],
+    without: set[str], unsure: Mapping[int, Floats] | None = None,
 ) -> AxisFindings:  # fmt: skip
-    """The same for given forces (n,) per run."""
+    """The same for given forces (n,) per run; unsure: as in `close`."""
     found = replace(found, causes=[*found.causes], unknown_in=[*found.unknown_in], details={**found.details})
     data, table = series_of(moves, forces, train), table_of(moves)
     length = turning(data, lambda d: table(train, constant, inertia, speed, either_way, lambda m: m.reversal(d)))
@@ -137,8 +178,11 @@ def _forced(
             columns, last = [constant, inertia, turn, speed], after
             lopsided = withheld(data, table(train, *columns, either_way))
             more = gain(last, lopsided, moving)
-            if holds(more):
+            if helps(more):
                 columns, last = [*columns, either_way], lopsided
+            shape = None if length.speed is not None else _shape(data, table, train, columns, last, length, moving)
+            if shape is not None:
+                columns, last = [*columns, shape.column], shape.last
             own = [*columns]
 
             def turned(how: Turning) -> Floats:
@@ -146,11 +190,11 @@ def _forced(
 
             lengths = around(data, turned, length.distance) if length.speed is None else [length.distance]
             tables = [*(turned(Turning(d)) for d in lengths if length.speed is None), table(train, *columns)]
-            found.causes.append(_friction(found, data, tables, length, lengths, probability_of(g), before, last))
+            found.causes.append(_friction(found, data, tables, length, shape, lengths, probability_of(g), before, last))
             found.details["force"]["asymmetry_z"] = round(more.z, 2)
             named.append("friction")
     _refused(found, data, table, train, columns, last, length, floor)
-    close(found, channel, named, last, data, table, columns, test, forces, moves)
+    close(found, channel, named, last, data, table, columns, test, forces, moves, unsure)
     found.force = channel
     line = ripple([moves[k] for k in train], channel.left)
     if line is not None and line.share > LEAST_RIPPLE and line.amplitude**2 / 2.0 > (MINOR * floor) ** 2:
@@ -161,35 +205,49 @@ def _forced(
     return found
 
 
-def _sizes(pushes: Sequence[Window], raw: Series, channel: AxisChannel | None) -> list[Window]:
-    """Pushes with their sizes fitted together with all else that a channel has."""
-    assert channel is not None
-    ends = np.cumsum([0, *(len(m.time) for m in channel.moves)])
+def _sizes(pushes: Sequence[Window], gone: Sequence[Window], raw: Series, channel: AxisChannel) -> list[Window]:
+    """Pushes with their sizes fitted together with all else that a channel has; in a run that is held out beside it."""
+    begins = dict(zip(channel.runs, np.cumsum([0, *(len(m.time) for m in channel.moves)]), strict=False))
     during = np.zeros((len(raw.y), len(pushes)))
     for j, each in enumerate(pushes):
-        during[ends[each.run] + each.first : ends[each.run] + each.last, j] = 1.0
+        if each.run in begins:
+            during[begins[each.run] + each.first : begins[each.run] + each.last, j] = 1.0
     c = solve(np.concatenate([during, channel.columns], axis=1), raw.y)
-    return [replace(each, shift=float(c[j])) for j, each in enumerate(pushes)]
+    out = []
+    for each, shift in zip(pushes, c, strict=False):
+        if each.run not in begins:
+            rest = channel.held[each.run] + sum(
+                _force_of(w, len(channel.held[each.run])) for w in gone if w.run == each.run
+            )
+            shift = np.mean(rest[each.first : each.last])
+        out.append(replace(each, shift=float(shift)))
+    return out
+
+
+def _force_of(push: Window, rows: int) -> Floats:
+    """What a push adds to the forces (n,) of its run."""
+    out = np.zeros(rows)
+    out[push.first : push.last] = push.shift
+    return out
+
+
+def _edges(pushes: Sequence[Window], moves: Sequence[AxisTravel]) -> dict[int, Floats]:
+    out: dict[int, Floats] = {}
+    for each in pushes:
+        own = edges(each, moves[each.run].time)
+        out[each.run] = np.hypot(out.get(each.run, 0.0), own)
+    return out
 
 
 def _without(pushes: Sequence[Window], run: int, force: Floats) -> Floats:
     """Forces (n,) of a run without the pushes in it."""
-    out = force.copy()
-    for each in pushes:
-        if each.run == run:
-            out[each.first : each.last] -= each.shift
-    return out
-
-
-def _put(forces: Sequence[Floats], train: Sequence[int], values: Sequence[Floats]) -> list[Floats]:
-    out = list(forces)
-    for k, value in zip(train, values, strict=True):
-        out[k] = value
-    return out
+    return np.asarray(
+        force - sum((_force_of(each, len(force)) for each in pushes if each.run == run), np.zeros(len(force)))
+    )
 
 
 def _push_cause(name: str, run: AxisRun, window: Window, now: AxisChannel, raw: Series) -> FoundCause:
-    rows = now.left[window.run][window.first : window.last]
+    rows = _left_of(now)[window.run][window.first : window.last]
     parts = [float(np.mean(part)) for part in np.array_split(rows, QUARTERS)]
     spread = float(student.ppf(0.975, QUARTERS - 1)) * float(np.std(parts, ddof=1)) / np.sqrt(QUARTERS)
     step = 2.0 * float(np.median(np.diff(run.time)))
@@ -208,27 +266,66 @@ def _push_cause(name: str, run: AxisRun, window: Window, now: AxisChannel, raw: 
     )
 
 
+@dataclass(frozen=True, eq=False)
+class _Shape:
+    """How friction turns round over a second distance, mm, as well: a column, and what withheld blocks leave with it."""
+
+    distance: float
+    column: Column
+    last: Floats
+
+
+def _shape(
+    data: Series, table: Any, train: list[int], columns: list[Column], last: Floats, length: Turning, moving: Bools
+) -> _Shape | None:
+    """The second distance that helps withheld blocks most; None where one is enough.
+
+    A guide has bristles of many lengths, and an encoder may sit behind a spring (the elements of a generalized Maxwell slip
+    model: Al-Bender, Lampaert, Swevers, IEEE Trans. Autom. Control 50 (2005) 1883).
+    """
+
+    def with_it(distance: float) -> _Shape:
+        def column(m: AxisTravel) -> Floats:
+            return m.reversal(Turning(distance)) - m.reversal(length)
+
+        return _Shape(distance, column, withheld(data, table(train, *columns, column)))
+
+    every = [with_it(d) for d in PRESLIDING_GRID_MM if d != length.distance]
+    best = min(every, key=lambda each: float(np.mean(np.log(np.maximum(each.last, 1e-300)))))
+    more = gain(last, best.last, moving)
+    return best if helps(more) else None
+
+
 def _friction(
     found: AxisFindings,
     data: Series,
     tables: Sequence[Floats],
     length: Turning,
+    shape: _Shape | None,
     lengths: Sequence[float],
     probability: float,
     before: Floats,
     last: Floats,
 ) -> FoundCause:
-    """Tables (n, k): the columns, last, and before them those with the ways, over `lengths`, of turning round as well."""
+    """Tables (n, k): the columns, last, and before them those with the ways, over `lengths`, of turning round as well.
+
+    shape: the last of the columns, where there is one.
+    """
     c, C = fit(data, tables[-1])
     beside = [np.abs(solve(A, data.y) - c) for A in tables]
     spread = np.maximum(1.96 * np.sqrt(np.diag(C)), np.max(beside, axis=0))
     fast = max(float(np.sqrt(np.mean(tables[-1][:, 3] ** 2))), 1e-12)
     law = KNOWN * (abs(float(c[2])) + fast * abs(float(c[3])))  # N
     spread[2:] += law / np.array([1.0, *(fast for _ in c[3:])])
+    turns = length.distance
+    if shape is not None:  # the same way lost at a reversal
+        turns = max(turns + float(c[-1] / c[2]) * (shape.distance - turns), PRESLIDING_GRID_MM[0])
+        c = c[:-1]
+    reach = [*lengths, turns]
     parameters = {
         "force_N": value_of(c[2], spread[2]),
         "viscous_Ns_per_mm": value_of(c[3], spread[3]),
-        "presliding_mm": Estimate(value=length.distance, ci95=(min(lengths), max(lengths))),
+        "presliding_mm": Estimate(value=float(f"{turns:.4g}"), ci95=(min(reach), max(reach))),
     }
     if len(c) > 4:
         parameters["asymmetry_Ns_per_mm"] = value_of(c[4], spread[4])

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
-from camcomp.diagnosis.axis.block_least_squares import Series
+from camcomp.diagnosis.axis.block_least_squares import Gain, Series
 from camcomp.diagnosis.axis.gate import AxisGate
 from camcomp.diagnosis.axis.noise_floor import FAST_S, LEAST_SPIKE_MM, spikes
 from camcomp.diagnosis.axis.terms import WIDE, AxisTravel, Ripple
@@ -19,6 +20,7 @@ from camcomp.model.seams import missing_rows
 ROWS = 50  # below which a run says nothing
 FIRST_MOVE_MM = 0.2  # after which friction has its sense
 FAR = 10.0  # times as far goes an axis that moves
+ANSWER_S = (0.02, 0.3)  # ahead of a push, and behind it until a loop has answered
 BESIDE_GAP = 5  # rows of which a gap leaves speed and acceleration uncertain
 
 
@@ -27,6 +29,8 @@ class AxisRun:
     """Log of one axis in one run: time (n,) s; setpoint, encoder mm; force N, each (n,), NaN where nothing was logged.
 
     row (n,): of the log, from 1. revolute: rad and N mm in the place of mm and N. started: s, on the clock common to all runs.
+    seen (n,): rows of which somebody saw how fast the axis was; all, where it is not given. course: times and set-points of the
+    whole log, (m,) each, of which these may be some rows.
     """
 
     name: str
@@ -37,6 +41,14 @@ class AxisRun:
     row: np.ndarray | None = None
     revolute: bool = False
     started: float = 0.0
+    seen: Bools = field(default_factory=lambda: np.zeros(0, bool))
+    course: tuple[Floats, Floats] = field(default_factory=lambda: (np.zeros(0), np.zeros(0)))
+
+    def __post_init__(self) -> None:
+        if not len(self.seen):
+            object.__setattr__(self, "seen", np.ones(len(self.time), bool))
+        if not len(self.course[0]):
+            object.__setattr__(self, "course", (self.time, self.setpoint))
 
     def without_spikes(self) -> tuple[AxisRun, np.ndarray]:
         """The run with neighbours in the place of rows that are no measurement, and these rows' numbers."""
@@ -54,18 +66,27 @@ class AxisRun:
             good = np.isfinite(y) & ~bad
             kept[name] = np.where(bad, np.interp(self.time, self.time[good], y[good]), y) if bad.any() else y
             off |= bad
-        clean = replace(self, setpoint=kept["setpoint"], encoder=kept["encoder"], force=kept["force"])
+        course = self.time, kept["setpoint"]
+        clean = replace(self, setpoint=kept["setpoint"], encoder=kept["encoder"], force=kept["force"], course=course)
         return clean, row[off]
 
     def away_from_gaps(self) -> AxisRun:
-        """The run without the rows beside lost ones: nobody saw how fast it was there. All where gaps are the rule."""
+        """The run with rows beside lost ones unseen: nobody knows how fast it was there. All are seen where gaps are the rule."""
         gaps = np.flatnonzero(missing_rows(self.time))
         near = np.zeros(len(self.time), bool)
         for gap in gaps:
             near[max(gap + 1 - BESIDE_GAP, 0) : gap + 1 + BESIDE_GAP] = True
         if not near.any() or near.mean() > EVEN:
             return self
-        return self.of(~near)
+        return replace(self, seen=~near)
+
+    def unpushed(self, pushed: Sequence[tuple[str, float, float]]) -> AxisRun:
+        """The run with rows unseen in which something pushed the axis, or its loop still answered to that."""
+        away = np.ones(len(self.time), bool)
+        for name, begin, end in pushed:
+            if name == self.name:
+                away &= (self.time < begin - ANSWER_S[0]) | (self.time > end + ANSWER_S[1])
+        return replace(self, seen=self.seen & away) if (self.seen & away).sum() >= ROWS else self
 
     def moved(self) -> Bools:
         """Rows (n,) from the first move on: which way friction held the axis before nobody knows. All where it stays."""
@@ -78,7 +99,8 @@ class AxisRun:
         """Some of the rows (n,)."""
         row = np.arange(1, len(rows) + 1) if self.row is None else self.row
         time, setpoint, encoder, force = (x[rows] for x in (self.time, self.setpoint, self.encoder, self.force))
-        return replace(self, time=time, setpoint=setpoint, encoder=encoder, force=force, row=row[rows])
+        seen = self.seen[rows]
+        return replace(self, time=time, setpoint=setpoint, encoder=encoder, force=force, row=row[rows], seen=seen)
 
 
 @dataclass(frozen=True)
@@ -101,6 +123,7 @@ class AxisChannel:
     moves: list[AxisTravel] = field(default_factory=list)
     steps: list[tuple[str, float]] = field(default_factory=list)  # effect, rms after
     left: list[Floats] = field(default_factory=list)  # per run
+    held: dict[int, Floats] = field(default_factory=dict)  # the same of runs that were never fitted, by their number
     floor: float = 0.0
     stated: bool = False
     all_names: list[str] = field(default_factory=list)
@@ -131,6 +154,9 @@ class AxisFindings:
     causes: list[FoundCause] = field(default_factory=list)
     following: AxisChannel | None = None
     force: AxisChannel | None = None
+    led: Callable[[AxisRun], Floats] | None = None  # what a loop that swings over makes of set-points, mm
+    pushed: list[tuple[str, float, float]] = field(default_factory=list)  # for a while: run, and from and to when, s
+    one_way: Gain | None = None  # of a lag that differs between the ways by more than loops are known to
     ripple: Ripple | None = None
     unknown_in: list[tuple[str, float]] = field(default_factory=list)  # covariate kind, share
     unknown_chance: float = 0.0  # log10, the least of all that is unknown

@@ -12,6 +12,7 @@ from camcomp.diagnosis.axis.block_least_squares import (
     Series,
     fit,
     gain,
+    solve,
     telling,
     withheld,
 )
@@ -41,6 +42,7 @@ from camcomp.diagnosis.axis.terms import (
 from camcomp.diagnosis.result.types import (
     FoundCause,
 )
+from camcomp.diagnosis.statistics.probability import EVEN
 from camcomp.ground.datatypes import Floats
 
 ALIKE = 0.02  # of a time constant: by which those of axes may differ and be one
@@ -64,6 +66,7 @@ def follow(
     channel.all_names = [r.name for r in runs]
     named = []
     if swung is not None:
+        found.led = swung.swing.led
         found.causes.append(_overshoot(found.name, swung, before, last))
         named.append("servo_overshoot")
     lag = None if "servo_lag" in without else _lag(data, table, train, columns, floor)
@@ -83,12 +86,23 @@ def follow(
             )
         )
         named.append("servo_lag")
+        if either_way in columns and abs(float(c[columns.index(either_way)])) > KNOWN * abs(
+            float(c[columns.index(speed)])
+        ):
+            found.one_way = lag.lopsided
         i = columns.index(acceleration) if acceleration in columns else None
         found.details["following"] = {} if i is None else {"acceleration_us2": value_of(1e6 * c[i], 1e3 * spread[i])}
         if lag.turn in columns:
             found.details["following"] |= {"reversal_um": value[lag.turn], "presliding_mm": lag.length.distance}
     close(found, channel, named, last, data, table, columns, test, gaps, moves)
     found.following = channel
+    taken, beyond = float(np.mean(before) - np.mean(last)), float(np.mean(last)) - floor**2
+    if channel.gate is not None and channel.gate.word == "above" and taken < beyond:
+        # anything takes a part of something unknown; what takes the smaller one may be no more than that
+        found.causes = [
+            c.model_copy(update={"probability": min(c.probability, EVEN)}) if c.effect in named else c
+            for c in found.causes
+        ]
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,6 +114,7 @@ class _Lag:
     gain: Gain
     turn: Column
     length: Turning
+    lopsided: Gain | None = None  # of a lag that differs between the ways
 
 
 def _lag(
@@ -111,14 +126,18 @@ def _lag(
     def turn(m: AxisTravel) -> Floats:
         return m.reversal(length)
 
-    moving = telling(data, table(train, speed, *base), 0, MINOR * floor)
+    A = table(train, speed, *base)
+    if float(np.sqrt(np.mean((solve(A, data.y)[0] * A[:, 0]) ** 2))) < MINOR * floor:
+        return None
+    moving = telling(data, A, 0, MINOR * floor)
     blind = withheld(data, table(train, *base, turn))
     last = withheld(data, table(train, *base, speed, turn))
     g = gain(blind, last, moving)
     if holds(g):
         lopsided = withheld(data, table(train, *base, speed, turn, either_way))
-        if holds(gain(last, lopsided, moving)):  # friction that differs between the ways
-            return _Lag([speed, turn, either_way], lopsided, g, turn, length)
+        more = gain(last, lopsided, moving)
+        if holds(more):
+            return _Lag([speed, turn, either_way], lopsided, g, turn, length, more)
         return _Lag([speed, turn], last, g, turn, length)
     # at one speed a lag and a reversal are nearly the same: what needs less is it
     last = withheld(data, table(train, *base, speed))

@@ -58,7 +58,8 @@ def judge(
     inside: where everything is fitted. What goes away then is what the rows leave open, and no unknown.
     """
     inside, left = ([each - np.clip(each.mean(), -offset, offset) for each in part] for part in (inside, left))
-    found, chance = intervals(left, times, floor)
+    own = inside if [len(each) for each in inside] == [len(each) for each in left] else None
+    found, chance = intervals(left, times, floor, own)
     floor = max(floor, 1e-12)
     parts = max(STRETCHES // len(left), 2)
     size = np.array([energy(part, floor) for run in left for part in np.array_split(run, parts)]) / floor**2
@@ -93,10 +94,13 @@ def energy(left: Floats, floor: float) -> float:
     return max(float(np.mean(slow**2)) - beyond, 0.0) + noise
 
 
-def intervals(left: Sequence[Floats], times: Sequence[Floats], floor: float) -> tuple[tuple[Interval, ...], float]:
+def intervals(
+    left: Sequence[Floats], times: Sequence[Floats], floor: float, inside: Sequence[Floats] | None = None
+) -> tuple[tuple[Interval, ...], float]:
     """Stretches in which the mean square is above the floor, and out of what other stretches show (1 % over all of them).
 
-    With log10 of the chance of the most conspicuous one.
+    inside: the same rows where everything is fitted, in which a stretch has to be above the floor as well: the only one in
+    which an axis speeds up has nothing to be judged by. With log10 of the chance of the most conspicuous stretch.
     """
     stretches = [
         (k, rows)
@@ -115,6 +119,8 @@ def intervals(left: Sequence[Floats], times: Sequence[Floats], floor: float) -> 
     pure = chi2.isf(FALSE / len(stretches), rows_each) / rows_each  # what even white noise reaches
     chances = norm.logsf((log - middle) / max(spread, 1e-12)) / np.log(10.0) + np.log10(len(stretches))
     out = (chances < np.log10(FALSE)) & (size > LOCAL * floor**2) & (size > pure * np.exp(middle))
+    if inside is not None:
+        out &= np.array([energy(inside[k][rows], floor) for k, rows in stretches]) > LOCAL * floor**2
     joined: list[Interval] = []
     for (k, rows), e, on in zip(stretches, size, out, strict=True):
         if not on:

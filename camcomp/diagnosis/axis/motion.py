@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
-from camcomp.diagnosis.axis.block_least_squares import (
-    leftover,
-    series,
-    solve,
-)
+from camcomp.diagnosis.axis.block_least_squares import solve
 from camcomp.diagnosis.axis.findings import ROWS, AxisFindings, AxisRun, Carried
 from camcomp.diagnosis.axis.noise_floor import rows_floor
 from camcomp.diagnosis.axis.terms import (
@@ -17,11 +15,16 @@ from camcomp.diagnosis.axis.terms import (
     AxisTravel,
     travel,
 )
-from camcomp.ground.datatypes import Floats
+from camcomp.ground.datatypes import Bools, Floats
 
 LATEST_S = 0.1  # of a loop
 ENCODER_BETTER = 0.8  # of what set-points leave of a channel: what encoders have to leave to be the motion
 SETPOINT_WIDE = (2, *WIDE)  # samples on either side of a local cubic through set-points
+ALIKE = (
+    1.01  # of what the best width leaves: the narrowest that leaves no more is it, for wide cubics round corners off
+)
+APART_S = 0.1  # between the rows that are compared: a push for a while shows at its begin and its end only
+REWEIGHTED = 5  # times, for a fit by least absolute deviations
 
 
 def encoder_width(runs: list[AxisRun], train: list[int]) -> int:
@@ -38,39 +41,51 @@ def encoder_width(runs: list[AxisRun], train: list[int]) -> int:
 def lateness(runs: list[AxisRun], gaps: list[Floats], train: list[int]) -> float:
     """How late (s) the axis follows its set-points, on average."""
     moves = [travel(runs[k].time, runs[k].setpoint) for k in train]
-    A = np.concatenate([_usual(m) for m in moves])
-    return float(np.clip(solve(A, np.concatenate([gaps[k] for k in train]))[2], 0.0, LATEST_S))
+    A = np.concatenate([_usual(m)[runs[k].seen] for k, m in zip(train, moves, strict=True)])
+    return float(np.clip(solve(A, np.concatenate([gaps[k][runs[k].seen] for k in train]))[2], 0.0, LATEST_S))
 
 
 def motion_of(
-    found: AxisFindings, runs: list[AxisRun], values: list[Floats], train: list[int], late: float | None
+    found: AxisFindings,
+    runs: list[AxisRun],
+    values: list[Floats],
+    train: list[int],
+    late: float | None,
+    led: Callable[[AxisRun], Floats] | None = None,
 ) -> tuple[list[AxisRun], list[AxisTravel], list[Floats]]:
     """What moved while a channel had its values (n,): set-points, as late as they are followed, where that explains them as well.
 
-    The noise of an encoder is in its following error, too, and would explain a part of itself. With the runs and their values,
-    from where on it no longer matters how the axis moved before its log began.
+    led: what the loop makes of the set-points of a run. The noise of an encoder is in its following error, too, and would explain a part of itself. With the runs and their values,
+    where somebody saw how fast the axis was, and where it no longer matters how it moved before its log began.
     """
     encoders = [travel(r.time, r.encoder, found.wide) for r in runs]
+
+    def kept(moves: list[AxisTravel], rows: list[Bools]) -> tuple[list[AxisRun], list[AxisTravel], list[Floats]]:
+        every = zip(runs, moves, values, rows, strict=True)
+        some = [(r, m, v, r.seen & on if (r.seen & on).sum() >= ROWS else r.seen) for r, m, v, on in every]
+        return [r.of(on) for r, _, _, on in some], [m.of(on) for _, m, _, on in some], [v[on] for _, _, v, on in some]
+
     if late is None:
         found.carried = Carried([rows_floor([r.encoder]) for r in runs], found.wide)
-        return runs, encoders, values
+        return kept(encoders, [r.seen for r in runs])
     mine = [runs[k] for k in train]
     told = [values[k] for k in train]
 
     def misfit(moves: list[AxisTravel]) -> float:
         return _misfit(mine, told, [moves[k] for k in train])
 
-    ways = {wide: [travel(r.time, r.setpoint, wide, late) for r in runs] for wide in SETPOINT_WIDE}
-    wide = min(ways, key=lambda each: misfit(ways[each]))
+    asked = [r.setpoint if led is None else led(r) for r in runs]
+    ways = {
+        wide: [travel(r.time, way, wide, late) for r, way in zip(runs, asked, strict=True)] for wide in SETPOINT_WIDE
+    }
+    left = {each: misfit(moves) for each, moves in ways.items()}
+    wide = next(each for each in ways if left[each] <= ALIKE * min(left.values()))
     setpoints = ways[wide]
     if misfit(encoders) < ENCODER_BETTER * misfit(setpoints):
         found.carried = Carried([rows_floor([r.encoder]) for r in runs], found.wide)
-        return runs, encoders, values
+        return kept(encoders, [r.seen for r in runs])
     found.carried = Carried([rows_floor([r.setpoint]) for r in runs], wide, late)
-    rows = [r.time >= r.time[0] + SETTLED * late for r in runs]
-    every = zip(runs, setpoints, values, rows, strict=True)
-    kept = [(r.of(on), m.of(on), v[on]) if on.sum() >= ROWS else (r, m, v) for r, m, v, on in every]
-    return [r for r, _, _ in kept], [m for _, m, _ in kept], [v for _, _, v in kept]
+    return kept(setpoints, [r.time >= r.time[0] + SETTLED * late for r in runs])
 
 
 def _usual(m: AxisTravel) -> Floats:
@@ -79,11 +94,24 @@ def _usual(m: AxisTravel) -> Floats:
 
 
 def _misfit(runs: list[AxisRun], values: list[Floats], moves: list[AxisTravel]) -> float:
-    """Median of what is left (of all rows) of a channel when what every axis has is fitted to a motion.
+    """Mean absolute value of what is left of a channel's changes when those of what every axis has are fitted to them.
 
-    About their middle: a push for a while shifts all that it is not there for.
+    Changes and absolute values: a push for a while must not weigh more than how the corners of a motion are met.
     """
-    data = series([r.time for r in runs], values)
-    left = leftover(data, np.concatenate([_usual(m) for m in moves]))
-    left = left - np.median(left)
-    return float(np.median(np.abs(left)))
+    changes = [
+        _changes(r.time[r.seen], np.column_stack([_usual(m)[:, 1:], y])[r.seen])
+        for r, m, y in zip(runs, moves, values, strict=True)
+    ]
+    rows = np.concatenate(changes)
+    A, y = rows[:, :-1], rows[:, -1]
+    left = y - A @ solve(A, y)
+    for _ in range(REWEIGHTED):
+        light = np.sqrt(1.0 / np.maximum(np.abs(left), 0.1 * float(np.median(np.abs(left))) + 1e-300))
+        left = y - A @ solve(A * light[:, None], y * light)
+    return float(np.mean(np.abs(left)))
+
+
+def _changes(time: Floats, rows: Floats) -> Floats:
+    """Rows (n, k) less those APART_S before them."""
+    apart = min(max(round(APART_S / float(np.median(np.diff(time)))), 1), len(rows) - 1)
+    return np.asarray(rows[apart:] - rows[:-apart])

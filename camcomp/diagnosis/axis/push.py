@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import norm
@@ -19,6 +19,10 @@ LEAST_SIZE = 2.0  # of the floor, that a push has to be: a force's zero wanders 
 PLACES = 40  # of the travel, each way of its own
 BEEN = 0.5  # of a window's rows, at places where the axis was at other times as well
 FARTHEST = 3  # cells by which an end is moved to its row
+SHARP_S, SHARP = (
+    0.02,
+    0.6,
+)  # beyond an end, at least two rows; of the shift that has to be gone there: no place ends like that
 
 
 @dataclass(frozen=True)
@@ -86,6 +90,35 @@ def seen_elsewhere(window: Window, moves: Sequence[AxisTravel]) -> bool:
     mine = at[window.run][window.first : window.last]
     others = [np.delete(p, slice(window.first, window.last)) if k == window.run else p for k, p in enumerate(at)]
     return float(np.isin(mine, np.concatenate(others)).mean()) > BEEN
+
+
+def placed_again(window: Window, rest: Floats, time: Floats, floor: float) -> Window:
+    """The window where leftovers (n,) N of its own run have it, what else moves the axis being fitted beside it by now."""
+    found = find_window([rest], [time], floor)
+    if found is None or min(found.last, window.last) <= max(found.first, window.first):
+        return window
+    return replace(found, run=window.run, chance=min(found.chance, window.chance))
+
+
+def edges(window: Window, time: Floats) -> Floats:
+    """N (n,) that rows of its run are not known to for it: at its ends, which no log shows sharper than SHARP_S."""
+    ends = time[[window.first, min(window.last, len(time) - 1)]]
+    near = np.min(np.abs(time[:, None] - ends), axis=1) < SHARP_S
+    return np.where(near, abs(window.shift), 0.0)
+
+
+def sharp(window: Window, rest: Floats, time: Floats) -> bool:
+    """Whether leftovers (n,) N of the window's run jump at both of its ends, neither of them an end of the run."""
+    reach = max(round(SHARP_S / float(np.median(np.diff(time)))), 2)
+    if window.first < reach or window.last + reach > len(rest):
+        return False
+    ends = [(window.first, -1), (window.last, 1)]
+    jumps = [np.mean(_beside(rest, at, -side, reach)) - np.mean(_beside(rest, at, side, reach)) for at, side in ends]
+    return all(float(jump) / window.shift > SHARP for jump in jumps)
+
+
+def _beside(rest: Floats, at: int, side: int, reach: int) -> Floats:
+    return rest[at : at + reach] if side > 0 else rest[at - reach : at]
 
 
 def _placed(rest: Floats, first: int, last: int, reach: int) -> tuple[int, int]:

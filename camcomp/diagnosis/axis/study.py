@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from camcomp.diagnosis.axis import answer
+from camcomp.diagnosis.axis.block_least_squares import WHOLE_RUNS, log10_chance
 from camcomp.diagnosis.axis.drive_force import force_of
 from camcomp.diagnosis.axis.findings import ROWS, AxisChannel, AxisDeviation, AxisFindings, AxisRun
 from camcomp.diagnosis.axis.following import follow, share_lag
@@ -35,7 +36,6 @@ from camcomp.diagnosis.result.types import (
 from camcomp.ground import headway
 
 NO_TIPS = "ISO 230-2: the tip was not measured"
-WHOLE_RUNS = 4  # from which on runs are withheld as wholes
 
 
 def study(
@@ -122,13 +122,22 @@ def _axis(name: str, runs: list[AxisRun], holdout: set[str], without: set[str], 
     test = [k for k, r in enumerate(usable) if r.name in holdout]
     gaps = [r.setpoint - r.encoder for r in usable]
     found.wide = encoder_width(usable, train)
-    late = None
-    if train and all(np.isfinite(gaps[k]).all() for k in train):
-        late = lateness(usable, gaps, train)
-        follow(found, *motion_of(found, usable, gaps, train, late), train, test, without)
-    if train and all(np.isfinite(usable[k].force).all() for k in train):
-        runs, moves, _ = motion_of(found, usable, [r.force for r in usable], train, late)
-        found = force_of(found, runs, moves, train, test, without)
+    followed = bool(train) and all(np.isfinite(gaps[k]).all() for k in train)
+    forced = bool(train) and all(np.isfinite(usable[k].force).all() for k in train)
+    late = lateness(usable, gaps, train) if followed else None
+    pushed = list[tuple[str, float, float]]()
+    for again in (False, True):  # what pushed an axis shows in what its loop makes of it
+        found = AxisFindings(name, stated=stated, wide=found.wide)
+        if followed:
+            follow(
+                found, *motion_of(found, [r.unpushed(pushed) for r in usable], gaps, train, late), train, test, without
+            )
+        if forced:
+            runs, moves, _ = motion_of(found, usable, [r.force for r in usable], train, late, found.led)
+            found = force_of(found, runs, moves, train, test, without)
+        if again or not (followed and found.pushed):
+            break
+        pushed = found.pushed
     for channel, values in ((found.following, gaps), (found.force, [r.force for r in usable])):
         if channel is not None:
             channel.whole = [(usable[k].time, values[k]) for k in channel.runs]
@@ -153,7 +162,12 @@ def _judged(
 
 
 def _name_rest(found: AxisFindings) -> None:
-    """What leftovers above the floor depend on, where nothing else says so."""
+    """What leftovers above the floor depend on, where nothing else says so; a lag that differs between the ways without friction
+    that does.
+    """
+    if found.one_way and not any("asymmetry_Ns_per_mm" in c.parameters for c in found.causes):
+        found.unknown_in.append((f"velocity:{found.name}", 1.0 - float(np.exp(-2.0 * found.one_way.log_ratio))))
+        found.unknown_chance = min(found.unknown_chance, log10_chance(found.one_way))
     if found.unknown_in or found.ripple:
         return
     for channel in found.channels:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 from scipy.optimize import least_squares
 
 from camcomp.diagnosis.axis.block_least_squares import fit, series, solve
@@ -18,6 +19,7 @@ PERIODS_S = tuple(np.geomspace(0.004, 0.25, 16))
 DAMPINGS = (0.1, 0.25, 0.5, 0.8, 1.5)
 LEAST_S, MOST_S = 0.001, 0.6
 LEAST_DAMPING, MOST_DAMPING = 0.02, 5.0
+FINE = 40  # steps of a period, at least: between rows that are further apart the set-points go on smoothly
 CLOCK = 0.02  # of the time between rows, that set-points and encoders may be apart
 SETTLES = 4.0  # time constants after which nothing is left of how a loop was when its log began
 STEP = 1e-3  # of a logarithm, for slopes
@@ -36,8 +38,22 @@ class Swing:
 
     def error(self, run: AxisRun) -> Floats:
         """Set-point minus encoder (n,) mm of a run, without what a lag behind the loop adds."""
-        swings = second_order(run.setpoint[:, None], run.time, self.period, self.damping)
-        return -(first_order(swings, run.time, self.late) if self.late > 0.0 else swings)[:, 0]
+        return -self._swings(run, self.late)
+
+    def led(self, run: AxisRun) -> Floats:
+        """What the loop makes of the set-points (n,) mm of a run; what a lag makes of that is left out."""
+        return np.asarray(run.setpoint + self._swings(run, 0.0))
+
+    def _swings(self, run: AxisRun, late: float) -> Floats:
+        """Loop minus set-points (n,) mm at the rows of a run, behind a lag of `late` s."""
+        seen, asked = run.course
+        per = max(int(np.ceil(FINE * float(np.median(np.diff(seen))) / self.period)), 1)
+        rows = np.arange(len(seen))
+        time = np.interp(np.arange((len(rows) - 1) * per + 1) / per, rows, seen)
+        way = asked if per == 1 else CubicSpline(seen, asked)(time)
+        swings = second_order(way[:, None], time, self.period, self.damping)
+        swings = first_order(swings, time, late) if late > 0.0 else swings
+        return np.asarray(swings[::per, 0][np.searchsorted(seen, run.time)])
 
     def settled(self, run: AxisRun) -> Bools:
         """Rows (n,) that no longer show what the axis did before its log began."""

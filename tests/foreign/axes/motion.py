@@ -23,8 +23,8 @@ def boxed(values: Array, seconds: float) -> Array:
 
 
 def smooth(values: Array, seconds: float) -> Array:
-    """Running mean about each value."""
-    n = max(1, round(seconds / STEP_S))
+    """Running mean about each value, over an odd number of them: over an even one it would come half a value late."""
+    n = max(1, round(seconds / STEP_S)) // 2 * 2 + 1
     return boxed(values, seconds)[(n + 1) // 2 :][: len(values)]
 
 
