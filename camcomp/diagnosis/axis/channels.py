@@ -141,8 +141,6 @@ def close(
     channel.left = [np.array(values[k] - table([k], *columns) @ c, dtype=np.float64) for k in channel.runs]
     channel.last = last
     ends = np.cumsum([len(moves[k].time) for k in channel.runs])[:-1]
-    left, times = np.split(leftover(data, A), ends), [moves[k].time for k in channel.runs]
-    channel.names = [channel.all_names[k] for k in channel.runs]
     if test:
         base = solve(table(channel.runs, *columns[:1]), data.y)
         seen = series([moves[k].time for k in test], [values[k] for k in test])
@@ -150,26 +148,36 @@ def close(
         channel.first, channel.last = (
             np.array([s[seen.block == b].mean() for b in range(len(seen.others))]) for s in squares
         )
-        left, times = [values[k] - table([k], *columns) @ c for k in test], [moves[k].time for k in test]
-        channel.held = dict(zip(test, left, strict=True))
-        channel.names = [channel.all_names[k] for k in test]
-    inside, offset = channel.left, 2.0 * REPEATABILITY_MM
+        channel.held = {k: values[k] - table([k], *columns) @ c for k in test}
+    # runs that are held out show what the others foretell; what those cannot explain of themselves is there as well
+    every, held = [*channel.runs, *test], list(channel.held.values())
+    inside, left = [*channel.left, *held], [*np.split(leftover(data, A), ends), *held]
+    channel.names = [channel.all_names[k] for k in every]
     if inertia in columns:
-        offset = 0.0
-
-        def beside_law(rows: Sequence[Floats], ks: Sequence[int]) -> list[Floats]:
-            """Leftovers without what inertia and friction are not known to, row by row: their size, and when within a row."""
-            own = [table([k], *columns[1:]) @ c[1:] for k in ks]
-            more = [(unsure or {}).get(k, np.zeros(1)) for k in ks]
-            laws = [
-                np.hypot(each, np.hypot(KNOWN * o, WITHIN * np.gradient(o))) for o, each in zip(own, more, strict=True)
-            ]
-            return [each * channel.floor / np.hypot(channel.floor, law) for each, law in zip(rows, laws, strict=True)]
-
-        inside, left = beside_law(inside, channel.runs), beside_law(left, test or channel.runs)
-    channel.gate = judge(inside, left, times, channel.floor, offset)
+        inside, left = (
+            _beside_law(rows, every, channel.floor, table, columns, c, unsure or {}) for rows in (inside, left)
+        )
+    offset = 0.0 if inertia in columns else 2.0 * REPEATABILITY_MM
+    channel.gate = judge(inside, left, [moves[k].time for k in every], channel.floor, offset)
     found.unknown_chance = min(found.unknown_chance, channel.gate.chance)
     channel.steps += [(effect, float(np.sqrt(np.mean(channel.last)))) for effect in effects]
+
+
+def not_known(own: Floats) -> Floats:
+    """What a force (n,) N by inertia and friction is not known to, row by row: its size, and when within a row."""
+    return np.asarray(np.hypot(KNOWN * own, WITHIN * np.gradient(own)))
+
+
+def _beside_law(
+    rows: Sequence[Floats], runs: Sequence[int], floor: float, table: Any, columns: list[Any], c: Floats,
+    unsure: Mapping[int, Floats],
+) -> list[Floats]:  # fmt: skip
+    """Leftovers (n,) by run without what their law is not known to."""
+    out = []
+    for left, k in zip(rows, runs, strict=True):
+        law = np.hypot(unsure.get(k, np.zeros(1)), not_known(table([k], *columns[1:]) @ c[1:]))
+        out.append(left * floor / np.hypot(floor, law))
+    return out
 
 
 def _carried(found: AxisFindings, channel: AxisChannel, moves: list[AxisTravel], c: Mapping[Column, float]) -> float:

@@ -20,7 +20,6 @@ from camcomp.diagnosis.axis.block_least_squares import (
 )
 from camcomp.diagnosis.axis.channels import (
     KNOWN,
-    LEAST_Z,
     Column,
     around,
     close,
@@ -29,6 +28,7 @@ from camcomp.diagnosis.axis.channels import (
     helps,
     holds,
     inertia,
+    not_known,
     probability_of,
     series_of,
     speed,
@@ -38,9 +38,8 @@ from camcomp.diagnosis.axis.channels import (
 )
 from camcomp.diagnosis.axis.findings import AxisChannel, AxisFindings, AxisRun
 from camcomp.diagnosis.axis.gate import MINOR
-from camcomp.diagnosis.axis.law import LEAST_SHARE
 from camcomp.diagnosis.axis.noise_floor import rows_floor
-from camcomp.diagnosis.axis.push import QUARTERS, Window, edges, find_window, placed_again, seen_elsewhere, sharp
+from camcomp.diagnosis.axis.push import QUARTERS, Window, edges, find_window, seen_elsewhere, sharp
 from camcomp.diagnosis.axis.terms import (
     PRESLIDING_GRID_MM,
     AxisTravel,
@@ -85,14 +84,15 @@ def force_of(
         assert channel is not None
         if channel.gate is not None and channel.gate.word == "at" and not now.ripple:
             break
-        window = _next_push(_left_of(channel), moves, channel.floor)
+        window = _next_push(channel, pushes, forces, moves)
         if window is None:
             break
-        gone, pushes = pushes, [*pushes, window]
-        for _ in range(PASSES):  # what friction looks like, and where the push ends, is known when the push is gone
-            pushes = _sizes(_placed(pushes, gone, channel, moves), gone, raw, channel)
+        pushes = [*pushes, window]
+        for again in range(PASSES):  # what friction looks like, and where the push ends, is known when the push is gone
+            if again:
+                pushes = [_placed(each, i, pushes, channel, forces, moves) for i, each in enumerate(pushes)]
             shifted = [_without(pushes, k, force) for k, force in enumerate(forces)]
-            now, gone = _forced(found, runs, moves, shifted, train, test, without, _edges(pushes, moves)), pushes
+            now = _forced(found, runs, moves, shifted, train, test, without, _edges(pushes, moves))
             channel = now.force
             assert channel is not None
         if _beyond(now) < LEFT * _beyond(plain):
@@ -117,30 +117,36 @@ def _left_of(channel: AxisChannel) -> dict[int, Floats]:
     return dict(zip(channel.runs, channel.left, strict=True)) | channel.held
 
 
-def _next_push(left: Mapping[int, Floats], moves: Sequence[AxisTravel], floor: float) -> Window | None:
-    """The push that stands out most of what is left of runs, by their number; None where none does, or a place may be it."""
-    runs = list(left)
-    own = [moves[k] for k in runs]
-    window = find_window(list(left.values()), [m.time for m in own], floor)
-    if window is None:
+def _window(
+    channel: AxisChannel, pushes: Sequence[Window], forces: Sequence[Floats], moves: Sequence[AxisTravel]
+) -> tuple[Window, Floats] | None:
+    """The push that explains most of what all else, and other pushes, leave, as `find_window` has it."""
+    values = {k: _without(pushes, k, forces[k]) for k in _left_of(channel)}
+    ends = np.cumsum([len(m.time) for m in channel.moves])[:-1]
+    beside = dict(zip(channel.runs, np.split(channel.beside, ends), strict=True))
+    return find_window(values, beside, {k: moves[k].time for k in values}, channel.floor)
+
+
+def _next_push(
+    channel: AxisChannel, pushes: Sequence[Window], forces: Sequence[Floats], moves: Sequence[AxisTravel]
+) -> Window | None:
+    """One more push; None where nothing stands out, or a place may be it."""
+    found = _window(channel, pushes, forces, moves)
+    if found is None:
         return None
-    rest, time = left[runs[window.run]], own[window.run].time
-    if not sharp(window, rest, time) and not seen_elsewhere(window, own):
-        return None
-    return replace(window, run=runs[window.run])
+    window, rest = found
+    return window if sharp(window, rest, moves[window.run].time) or seen_elsewhere(window, moves) else None
 
 
 def _placed(
-    pushes: Sequence[Window], gone: Sequence[Window], channel: AxisChannel, moves: Sequence[AxisTravel]
-) -> list[Window]:
-    """Pushes with their ends where leftovers beside the other ones have them; gone: those that were taken out before."""
-    left, out = _left_of(channel), []
-    for i, each in enumerate(pushes):
-        if i < len(gone):
-            rest = left[each.run] + _force_of(gone[i], len(left[each.run]))
-            each = placed_again(each, rest, moves[each.run].time, channel.floor)
-        out.append(each)
-    return out
+    push: Window, number: int, pushes: Sequence[Window], channel: AxisChannel, forces: Sequence[Floats],
+    moves: Sequence[AxisTravel],
+) -> Window:  # fmt: skip
+    """A push where the others and all else, as it is known by now, have it."""
+    found = _window(channel, [*pushes[:number], *pushes[number + 1 :]], forces, moves)
+    if found is None or found[0].run != push.run or min(found[0].last, push.last) <= max(found[0].first, push.first):
+        return push
+    return found[0]
 
 
 def _beyond(found: AxisFindings) -> float:
@@ -164,11 +170,12 @@ def _forced(
         return m.reversal(length)
 
     columns: list[Column] = [constant, inertia]
+    beside = table(train, constant, inertia, turn, speed, either_way)
     before = withheld(data, table(train, *columns))
     floor = found.stated.force_N or rows_floor([runs[k].force for k in train])
     first = withheld(data, table(train, constant))
     channel = AxisChannel(data, train, first, before, floor=floor, stated=found.stated.force_N is not None)
-    channel.all_names = [r.name for r in runs]
+    channel.all_names, channel.beside = [r.name for r in runs], beside
     last, named = before, []
     if "friction" not in without:
         after = withheld(data, table(train, constant, inertia, turn, speed))
@@ -193,7 +200,7 @@ def _forced(
             found.causes.append(_friction(found, data, tables, length, shape, lengths, probability_of(g), before, last))
             found.details["force"]["asymmetry_z"] = round(more.z, 2)
             named.append("friction")
-    _refused(found, data, table, train, columns, last, length, floor)
+    _refused(found, data, table, train, columns, last, moves, length, floor)
     close(found, channel, named, last, data, table, columns, test, forces, moves, unsure)
     found.force = channel
     line = ripple([moves[k] for k in train], channel.left)
@@ -203,25 +210,6 @@ def _forced(
         g = gain(last, withheld(data, table(train, *columns, *waves)))
         found.unknown_chance = min(found.unknown_chance, log10_chance(g, line.tried))
     return found
-
-
-def _sizes(pushes: Sequence[Window], gone: Sequence[Window], raw: Series, channel: AxisChannel) -> list[Window]:
-    """Pushes with their sizes fitted together with all else that a channel has; in a run that is held out beside it."""
-    begins = dict(zip(channel.runs, np.cumsum([0, *(len(m.time) for m in channel.moves)]), strict=False))
-    during = np.zeros((len(raw.y), len(pushes)))
-    for j, each in enumerate(pushes):
-        if each.run in begins:
-            during[begins[each.run] + each.first : begins[each.run] + each.last, j] = 1.0
-    c = solve(np.concatenate([during, channel.columns], axis=1), raw.y)
-    out = []
-    for each, shift in zip(pushes, c, strict=False):
-        if each.run not in begins:
-            rest = channel.held[each.run] + sum(
-                _force_of(w, len(channel.held[each.run])) for w in gone if w.run == each.run
-            )
-            shift = np.mean(rest[each.first : each.last])
-        out.append(replace(each, shift=float(shift)))
-    return out
 
 
 def _force_of(push: Window, rows: int) -> Floats:
@@ -343,17 +331,30 @@ def _friction(
 
 def _refused(
     found: AxisFindings, data: Series, table: Any, train: list[int], columns: list[Any], last: Floats,
-    length: Turning, floor: float,
+    moves: list[AxisTravel], length: Turning, floor: float,
 ) -> None:  # fmt: skip
-    """Terms that nobody states, tried on withheld blocks; those that hold are part of the unknown."""
+    """Terms that nobody states, tried on withheld blocks; those that hold are part of the unknown.
+
+    They have to hold where rows count for less that inertia and friction are not known for to the floor, too.
+    """
+    A = table(train, *columns)
+    own = A[:, 1:] @ solve(A, data.y)[1:]
+    ends = np.cumsum([len(moves[k].time) for k in train])[:-1]
+    weight = floor / np.hypot(floor, np.concatenate([not_known(each) for each in np.split(own, ends)]))
+    sure = replace(data, y=weight * data.y)
+    known = withheld(sure, weight[:, None] * A)
     tried = {}
     terms = strangers(AxisTravel(*(np.zeros(2) for _ in range(4))), Turning(1.0))
     for name, (kind, _) in terms.items():
         column = lambda m, name=name: strangers(m, length)[name][1]
-        g = gain(last, withheld(data, table(train, *columns, column)))
+        B = table(train, *columns, column)
+        g = gain(last, withheld(data, B))
         tried[name] = {"z": round(g.z, 2), "gain": round(g.log_ratio, 4)}
-        share = 1.0 - float(np.exp(-2.0 * g.log_ratio))
-        if g.z > LEAST_Z and g.log_ratio > LEAST_SHARE and share * np.mean(last) > (MINOR * floor) ** 2:
+        if not holds(g):
+            continue
+        weighed = gain(known, withheld(sure, weight[:, None] * B))
+        share = 1.0 - float(np.exp(-2.0 * weighed.log_ratio))
+        if holds(weighed) and share * np.mean(known) > (MINOR * floor) ** 2:
             found.unknown_chance = min(found.unknown_chance, log10_chance(g, len(terms)))
-            found.unknown_in.append((f"{kind}:{found.name}", share))
+            found.unknown_in.append((f"{kind}:{found.name}", 1.0 - float(np.exp(-2.0 * g.log_ratio))))
     found.details.setdefault("force", {})["tried"] = tried

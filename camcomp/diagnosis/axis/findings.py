@@ -10,7 +10,7 @@ import numpy as np
 
 from camcomp.diagnosis.axis.block_least_squares import Gain, Series
 from camcomp.diagnosis.axis.gate import AxisGate
-from camcomp.diagnosis.axis.noise_floor import FAST_S, LEAST_SPIKE_MM, spikes
+from camcomp.diagnosis.axis.noise_floor import FAST_S, LEAST_SPIKE_MM, rows_floor, spikes
 from camcomp.diagnosis.axis.terms import WIDE, AxisTravel, Ripple
 from camcomp.diagnosis.result.types import FoundCause, Law
 from camcomp.diagnosis.statistics.probability import EVEN
@@ -70,6 +70,22 @@ class AxisRun:
         clean = replace(self, setpoint=kept["setpoint"], encoder=kept["encoder"], force=kept["force"], course=course)
         return clean, row[off]
 
+    def on_ticks(self) -> AxisRun:
+        """The run with its rows evenly apart, where its positions say that they were taken so and its clock was read late or early."""
+        if len(self.time) < ROWS:
+            return self
+        tick = np.concatenate([[0.0], np.cumsum(np.round(np.diff(self.time) / np.median(np.diff(self.time))))])
+        slope, start = np.polyfit(tick, self.time, 1)
+        off = self.time - (start + slope * tick)
+        if np.abs(off).max() >= EVEN * slope or np.any(np.diff(tick) < 1.0):
+            return self
+        way = self.setpoint if np.isfinite(self.setpoint).all() and np.ptp(self.setpoint) > 0.0 else self.encoder
+        read = way - np.gradient(way, self.time) * off  # where it was at the tick, if the clock is right
+        if rows_floor([way]) > EVEN * rows_floor([read]):
+            return self
+        time = self.time - off
+        return replace(self, time=time, course=(time, self.setpoint))
+
     def away_from_gaps(self) -> AxisRun:
         """The run with rows beside lost ones unseen: nobody knows how fast it was there. All are seen where gaps are the rule."""
         gaps = np.flatnonzero(missing_rows(self.time))
@@ -120,6 +136,7 @@ class AxisChannel:
     first: Floats  # mean squares of withheld blocks without causes
     last: Floats
     columns: Floats = field(default_factory=lambda: np.zeros((0, 0)))  # (n, k) of what was fitted
+    beside: Floats = field(default_factory=lambda: np.zeros((0, 0)))  # (n, k) of all that may be there beside a push
     moves: list[AxisTravel] = field(default_factory=list)
     steps: list[tuple[str, float]] = field(default_factory=list)  # effect, rms after
     left: list[Floats] = field(default_factory=list)  # per run

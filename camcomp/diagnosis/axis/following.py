@@ -52,13 +52,34 @@ EQUAL = 1.05  # of what a loop with inertia leaves: what one that swings over ma
 def follow(
     found: AxisFindings, runs: list[AxisRun], moves: list[AxisTravel], gaps: list[Floats], train: list[int], test: list[int],
     without: set[str],
-) -> None:  # fmt: skip
-    """Adds the channel of the following error and its causes to what was found on the axis; test: runs that are judged only."""
+) -> AxisFindings:  # fmt: skip
+    """What was found on the axis, with the channel of the following error and its causes; test: runs that are judged only.
+
+    Inertia in the loop is what every axis has. A loop that swings over takes its place where it explains more, or where
+    something is left beside inertia and nothing beside it.
+    """
     floor = found.stated.encoder_mm or float(np.hypot(_scatter([runs[k] for k in train]), REPEATABILITY_MM))
-    late = found.carried.late or 0.0
-    swung = None if "servo_overshoot" in without else _swung(runs, moves, gaps, train, floor, without, late)
-    if swung is not None:
-        runs, moves, gaps = swung.runs, swung.moves, swung.gaps
+    swung = None if "servo_overshoot" in without else _swung(
+        runs, moves, gaps, train, floor, without, found.carried.late or 0.0
+    )  # fmt: skip
+    plain = _followed(found, runs, moves, gaps, train, test, without, floor)
+    if swung is None or not (swung.better or _above(plain)):
+        return plain
+    swings = _followed(found, swung.runs, swung.moves, swung.gaps, train, test, without, floor, swung)
+    return swings if swung.better or not _above(swings) else plain
+
+
+def _above(found: AxisFindings) -> bool:
+    channel = found.following
+    return channel is not None and channel.gate is not None and channel.gate.word == "above"
+
+
+def _followed(
+    found: AxisFindings, runs: list[AxisRun], moves: list[AxisTravel], gaps: list[Floats], train: list[int], test: list[int],
+    without: set[str], floor: float, swung: _Swung | None = None,
+) -> AxisFindings:  # fmt: skip
+    """The same, with a loop that swings over or without one."""
+    found = replace(found, causes=[*found.causes], details={**found.details})
     data, table = series_of(moves, gaps, train), table_of(moves)
     columns: list[Column] = [constant, acceleration] if swung is None else [constant, swung.error]
     before, last = withheld(data, table(train, constant)), withheld(data, table(train, *columns))
@@ -103,6 +124,7 @@ def follow(
             c.model_copy(update={"probability": min(c.probability, EVEN)}) if c.effect in named else c
             for c in found.causes
         ]
+    return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,14 +142,15 @@ class _Lag:
 def _lag(
     data: Series, table: Callable[..., Floats], train: list[int], base: Sequence[Column], floor: float
 ) -> _Lag | None:
-    """Whether an axis is late, beside friction that turns round; None where it is not."""
+    """Whether an axis is late, beside friction that turns round; None where it is not, or early: no loop is."""
     length = turning(data, lambda d: table(train, speed, *reversed(base), lambda m: m.reversal(d)))
 
     def turn(m: AxisTravel) -> Floats:
         return m.reversal(length)
 
     A = table(train, speed, *base)
-    if float(np.sqrt(np.mean((solve(A, data.y)[0] * A[:, 0]) ** 2))) < MINOR * floor:
+    late = solve(A, data.y)[0]
+    if late <= 0.0 or float(np.sqrt(np.mean((late * A[:, 0]) ** 2))) < MINOR * floor:
         return None
     moving = telling(data, A, 0, MINOR * floor)
     blind = withheld(data, table(train, *base, turn))
@@ -156,6 +179,7 @@ class _Swung:
     moves: list[AxisTravel]
     gaps: list[Floats]
     errors: list[Floats]
+    better: bool = False  # than inertia in the loop
 
     def error(self, m: AxisTravel) -> Floats:
         """What the loop makes of the set-points of a run."""
@@ -171,7 +195,7 @@ def _swung(
     without: set[str],
     late: float,
 ) -> _Swung | None:
-    """A loop that swings over, where it explains more than inertia in the loop does; None where it does not.
+    """A loop that swings over, where it explains more than none does, and whether more than inertia in the loop.
 
     Where the axis is late as well its inertia is what its loop has anyway.
     """
@@ -181,7 +205,7 @@ def _swung(
         return None
     swing, spread = find_swing([runs[k] for k in train], [gaps[k] for k in train], [moves[k] for k in train], late)
     rows = [swing.settled(r) for r in runs]
-    if min(int(on.sum()) for on in rows) < ROWS:
+    if swing.at_bounds or min(int(on.sum()) for on in rows) < ROWS:
         return None
     errors = [swing.error(r)[on] for r, on in zip(runs, rows, strict=True)]
     found = _Swung(
@@ -210,7 +234,7 @@ def _swung(
         better = holds(gain(other, last, shown))
     else:
         better = float(np.mean(last)) < EQUAL * float(np.mean(other))
-    return replace(found, gain=g) if better else None
+    return replace(found, gain=g, better=better)
 
 
 def _overshoot(name: str, swung: _Swung, before: Floats, last: Floats) -> FoundCause:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import block_diag
 from scipy.stats import norm
 
 from camcomp.diagnosis.axis.terms import AxisTravel
@@ -13,6 +14,7 @@ from camcomp.ground.datatypes import Floats, Ints
 
 CELL_S = 0.02  # in which a window begins and ends, before it is placed to a row
 SHORTEST_S, LONGEST = 0.2, 0.6  # of a window; of its run: what lasts longer is how the run is
+LEAST_OWN = 0.1  # of a window's rows, that what is fitted beside it has to leave of it
 LEVEL = 0.5  # of the shift: every quarter of a window has to show it to within that
 QUARTERS = 4
 LEAST_SIZE = 2.0  # of the floor, that a push has to be: a force's zero wanders by less
@@ -36,45 +38,78 @@ class Window:
     chance: float
 
 
-def find_window(left: Sequence[Floats], times: Sequence[Floats], floor: float) -> Window | None:
-    """The window of leftovers (n,) N per run that stands out most, where it is a push: as large throughout as it is on average."""
-    best: Window | None = None
+def find_window(
+    values: Mapping[int, Floats], beside: Mapping[int, Floats], times: Mapping[int, Floats], floor: float
+) -> tuple[Window, Floats] | None:
+    """The window of forces (n,) N that explains most, where it is a push: as large throughout as it is on average; by run.
+
+    beside: columns (n, k) that are fitted to the same runs, so that friction and inertia have no part in how long a push lasts;
+    runs without them are held out. With what all else leaves of the window's run (n,), the push still in it.
+    """
+    rests, bases = _projected(values, beside)
+    best: tuple[float, int, int, int] | None = None
     tried = 0
-    for k, (rest, time) in enumerate(zip(left, times, strict=True)):
-        step = float(np.median(np.diff(time)))
+    for k, rest in rests.items():
+        step = float(np.median(np.diff(times[k])))
         cell = max(round(CELL_S / step), 1, len(rest) // 400)
         edges = np.arange(0, len(rest) - cell + 1, cell)
-        sums = np.concatenate([[0.0], np.cumsum(rest)])[edges]
         i, j = np.triu_indices(len(edges), max(round(SHORTEST_S / (cell * step)), 2))
         n = edges[j] - edges[i]
         some = n < LONGEST * len(rest)
         i, j, n = i[some], j[some], n[some]
         if not len(n):
             continue
-        # against the rest of the run: a shift of all of it is none
-        whole = float(rest.sum())
-        inside = sums[j] - sums[i]
-        apart = inside / n - (whole - inside) / (len(rest) - n)
-        score = apart**2 * n * (len(rest) - n) / len(rest)
+        sums = np.concatenate(
+            [np.zeros((1, bases[k].shape[1] + 1)), np.cumsum(np.column_stack([bases[k], rest]), axis=0)]
+        )
+        inside = sums[edges[j]] - sums[edges[i]]
+        own = n - np.sum(inside[:, :-1] ** 2, axis=1)  # of the window, beside the columns
+        score = np.where(own > LEAST_OWN * n, inside[:, -1] ** 2 / np.maximum(own, 1e-300), 0.0)
         at = int(np.argmax(score))
         tried += len(n)
-        first, last = _placed(rest, int(edges[i[at]]), int(edges[j[at]]), FARTHEST * cell)
-        chance = float(norm.logsf(np.sqrt(score[at]) / floor) / np.log(10.0))
-        if best is None or chance < best.chance:
-            best = Window(k, first, last, float(apart[at]), chance)
-    if (
-        best is None
-        or abs(best.shift) < LEAST_SIZE * floor
-        or times[best.run][best.last - 1] - times[best.run][best.first] < SHORTEST_S
-    ):
+        if best is None or score[at] > best[0]:
+            best = float(score[at]), k, int(edges[i[at]]), int(edges[j[at]])
+    if best is None:
         return None
-    rest = left[best.run]
-    outside = float(np.mean(np.concatenate([rest[: best.first], rest[best.last :]])))
-    parts = [float(np.mean(p)) - outside for p in np.array_split(rest[best.first : best.last], QUARTERS)]
-    even = all(abs(p - best.shift) < LEVEL * abs(best.shift) for p in parts)
-    return (
-        Window(best.run, best.first, best.last, best.shift, min(best.chance + np.log10(tried), 0.0)) if even else None
-    )
+    score_of, k, first, last = best
+    shift, rest = _alone(rests[k], bases[k], first, last)
+    step = float(np.median(np.diff(times[k])))
+    first, last = _placed(rest, first, last, FARTHEST * max(round(CELL_S / step), 1, len(rest) // 400))
+    shift, rest = _alone(rests[k], bases[k], first, last)
+    if abs(shift) < LEAST_SIZE * floor or times[k][last - 1] - times[k][first] < SHORTEST_S:
+        return None
+    outside = float(np.mean(np.concatenate([rest[:first], rest[last:]])))
+    parts = [float(np.mean(p)) - outside for p in np.array_split(rest[first:last], QUARTERS)]
+    if not all(abs(p - shift) < LEVEL * abs(shift) for p in parts):
+        return None
+    chance = float(norm.logsf(np.sqrt(score_of) / floor) / np.log(10.0))
+    return Window(k, first, last, shift, min(chance + float(np.log10(tried)), 0.0)), rest
+
+
+def _projected(
+    values: Mapping[int, Floats], beside: Mapping[int, Floats]
+) -> tuple[dict[int, Floats], dict[int, Floats]]:
+    """What columns and a constant per run leave of the values (n,), and an orthonormal basis (n, k) of these, by run."""
+    fitted = [k for k in values if k in beside]
+    ends = np.cumsum([len(values[k]) for k in fitted])[:-1]
+    ones = [np.ones((len(values[k]), 1)) for k in fitted]
+    A = np.concatenate([np.concatenate([beside[k] for k in fitted]), block_diag(*ones)], axis=1)
+    U, size, _ = np.linalg.svd(A / (np.sqrt(np.mean(A**2, axis=0)) + 1e-300), full_matrices=False)
+    Q = U[:, size > 1e-9 * size[0]]
+    y = np.concatenate([values[k] for k in fitted])
+    rests = dict(zip(fitted, np.split(y - Q @ (Q.T @ y), ends), strict=True))
+    bases = dict(zip(fitted, np.split(Q, ends), strict=True))
+    for k in values:
+        if k not in beside:
+            rests[k], bases[k] = values[k] - np.mean(values[k]), np.full((len(values[k]), 1), len(values[k]) ** -0.5)
+    return rests, bases
+
+
+def _alone(rest: Floats, base: Floats, first: int, last: int) -> tuple[float, Floats]:
+    """Size of a window, fitted together with a basis (n, k), and what the basis then leaves of its run (n,)."""
+    inside = base[first:last].sum(axis=0)
+    shift = float(rest[first:last].sum() / max(last - first - float(inside @ inside), 1e-300))
+    return shift, np.asarray(rest + shift * (base @ inside))
 
 
 def seen_elsewhere(window: Window, moves: Sequence[AxisTravel]) -> bool:
@@ -90,14 +125,6 @@ def seen_elsewhere(window: Window, moves: Sequence[AxisTravel]) -> bool:
     mine = at[window.run][window.first : window.last]
     others = [np.delete(p, slice(window.first, window.last)) if k == window.run else p for k, p in enumerate(at)]
     return float(np.isin(mine, np.concatenate(others)).mean()) > BEEN
-
-
-def placed_again(window: Window, rest: Floats, time: Floats, floor: float) -> Window:
-    """The window where leftovers (n,) N of its own run have it, what else moves the axis being fitted beside it by now."""
-    found = find_window([rest], [time], floor)
-    if found is None or min(found.last, window.last) <= max(found.first, window.first):
-        return window
-    return replace(found, run=window.run, chance=min(found.chance, window.chance))
 
 
 def edges(window: Window, time: Floats) -> Floats:

@@ -68,7 +68,7 @@ def studied(
     for name, runs in headway.steps(axes.items(), len(axes) * (1 + again)):
         clean = [r.without_spikes() for r in runs]
         outliers |= {(r.name, int(row)) for r, rows in clean for row in rows}
-        cleaned[name] = [r.away_from_gaps() for r, _ in clean]
+        cleaned[name] = [r.on_ticks().away_from_gaps() for r, _ in clean]
         found.append(_axis(name, cleaned[name], set(holdout), set(without), stated or AxisDeviation()))
     found = [a for a in found if a.channels]
     if not found:
@@ -129,7 +129,7 @@ def _axis(name: str, runs: list[AxisRun], holdout: set[str], without: set[str], 
     for again in (False, True):  # what pushed an axis shows in what its loop makes of it
         found = AxisFindings(name, stated=stated, wide=found.wide)
         if followed:
-            follow(
+            found = follow(
                 found, *motion_of(found, [r.unpushed(pushed) for r in usable], gaps, train, late), train, test, without
             )
         if forced:

@@ -55,6 +55,17 @@ class Swing:
         swings = first_order(swings, time, late) if late > 0.0 else swings
         return np.asarray(swings[::per, 0][np.searchsorted(seen, run.time)])
 
+    @property
+    def at_bounds(self) -> bool:
+        """Whether it would be further out if it were allowed to be: no loop, but what looks a little like one."""
+        ends = [
+            (self.period, LEAST_S),
+            (self.period, MOST_S),
+            (self.damping, LEAST_DAMPING),
+            (self.damping, MOST_DAMPING),
+        ]
+        return any(abs(np.log(value / end)) < STEP for value, end in ends)
+
     def settled(self, run: AxisRun) -> Bools:
         """Rows (n,) that no longer show what the axis did before its log began."""
         w, d = 2.0 * np.pi / self.period, self.damping
