@@ -63,6 +63,7 @@ LEAST_RIVAL = 0.02  # probability of a set that an experiment is to exclude
 UNTESTED = 0.1  # of the leader's probability: what a set that explains alike counts as at least
 LEAST_DRIVER = 0.02  # share of what is left, below which nothing is a driver
 MOST_ALTERNATIVES = 4  # sets that are listed (contract, section 6)
+UNLOGGED_RISE = (0.3, 3.0)  # times the 10 K that are taken where no temperature is logged: by how much drives warm up
 ROWS_OF_AN_INSTANT = 2.0  # to both sides, between which something may have begun or ended
 RIVALS = 8  # sets that one experiment is asked to tell from the answer
 
@@ -245,6 +246,9 @@ def _parameters(problem: Problem, f: Fitted, covariance: Floats, j: int, cause: 
             half = ROWS_OF_AN_INSTANT * max(float(np.median(np.diff(t))) for t in problem.times if len(t) > 1)
         ends = [here[name] - half, here[name] + half]
         low, high = np.exp(ends) if kinds[name].log else ends
+        if kinds[name].unit.endswith("/K") and not _heat_logged(problem):
+            every = [end * k for end in (low, high) for k in UNLOGGED_RISE]
+            low, high = min(every), max(every)
         if name != "phase_rad":
             low, high = max(low, kinds[name].low), min(high, kinds[name].high)
         out[name] = Estimate(value=_round(value), ci95=(_round(low), _round(high)))
@@ -254,9 +258,12 @@ def _parameters(problem: Problem, f: Fitted, covariance: Floats, j: int, cause: 
 def _idle_shapes(problem: Problem, cause: Cause) -> set[str]:
     """Shapes that say nothing here: a warm-up time where temperatures are logged, a law that is the usual one."""
     usual = {p.name for p in cause.effect.PARAMETERS if p.either and cause.values.get(p.name) == p.nominal}
-    logged = all(run.run_path.temperature is not None for run in problem.bench.runs)
     warming = {p.name for p in cause.effect.PARAMETERS if p.scan and p.unit == "s" and not p.placed}
-    return usual | (warming if logged else set())
+    return usual | (warming if _heat_logged(problem) else set())
+
+
+def _heat_logged(problem: Problem) -> bool:
+    return all(run.run_path.temperature is not None for run in problem.bench.runs)
 
 
 def _round(value: float) -> float:

@@ -65,3 +65,18 @@ def test_play_of_an_axis_that_plunges_when_the_log_begins(tmp_path):
 def test_what_imitates_something_unknown_is_not_named_for_certain(tmp_path, generator, seed):
     result, row = judged(tmp_path, generator, seed)
     assert result["verdict"] == "unknown" and not row["false_cause"]
+
+
+@pytest.mark.parametrize(
+    ("generator", "seed"),
+    [
+        ("serial", 17000),
+        pytest.param("parallel", 41079, marks=pytest.mark.campaign),
+        pytest.param("parallel", 41023, marks=pytest.mark.campaign),
+    ],
+    ids=["far from where it was scanned", "warm-ups have several time constants", "a factor is of the whole force"],
+)
+def test_intervals_hold_what_they_are_of(tmp_path, generator, seed):
+    """A shape that is steps away from the best of the scan stopped on its way, with the interval of where it stood."""
+    _, row = judged(tmp_path, generator, seed)
+    assert row["all"] and row["held"] and all(row["held"])

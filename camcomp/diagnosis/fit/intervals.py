@@ -57,8 +57,13 @@ def joint_covariance(problem: Problem, f: Fitted, *, as_stated: bool = False) ->
     wider = np.sqrt(np.maximum(scatter.max(axis=0) / own, 1.0))
     unit = np.concatenate([np.ones(d), reach])
     out = C[np.ix_(mine, mine)] * np.outer(wider * unit, wider * unit)
-    healthy = np.concatenate([problem.prior.tolerance[index], np.zeros(s)])
-    formula = np.concatenate([FORMULA * f.theta, np.zeros(s)])
+    healthy = np.concatenate(
+        [problem.prior.tolerance[index], [p.tolerance * (f.extra[i][p.name] if p.log else 1.0) for i, p in names]]
+    )
+    parameters = [p for i in f.members for p in problem.columns.candidates[i].parameters]
+    # of a factor it is the whole of what it multiplies that the formula is off by
+    whole = [1.0 / p.scale if p.log and not as_stated else t for p, t in zip(parameters, f.theta, strict=True)]
+    formula = np.concatenate([FORMULA * np.asarray(whole, float), np.zeros(s)])
     return np.asarray(out + np.diag(healthy**2 + formula**2), float)
 
 

@@ -26,6 +26,7 @@ from camcomp.model.signal_path import stages_of
 
 BENT = 9.0  # chi-square by which the model may miss a straight line before all columns are worked out anew
 SETTLED = 0.05  # chi-square that one more pass may cost
+FARTHER = 10  # further passes for shapes that are on their way from where they were scanned
 HALVED = 6  # times that a step is halved which no machine can take
 OTHER_LAW_LOG = 3.0  # log evidence by which another law than the nominal one has to be better
 STRAIGHT = 0.3  # chi-square that the bend of the model may cost before it is followed
@@ -149,7 +150,10 @@ class Problem:
         left = list(self.white_residual)
         bent = False
         passes += (1 if shapes else 0) + (FOLLOWED if self._ringing(members) else 0)
-        for step in range(passes):
+        far, most = False, passes + FARTHER
+        for step in range(most):
+            if step >= passes and not far:
+                break
             theta, readings = self._readings(members, theta, shapes)
             now = self._white_at(readings)
             bend = self._bend(now, index, theta)
@@ -170,8 +174,10 @@ class Problem:
             change = after - theta
             theta = after
             size = float(change @ np.linalg.solve(full[np.ix_(index, index)] + 1e-18 * np.eye(len(index)), change))
-            if self.shapes_of(members) and step < passes - 1:
-                size = self._move_shapes(members, theta, shapes, left, white, mean)
+            if self.shapes_of(members) and (step < passes - 1 or (far and step < most - 1)):
+                size, far = self._move_shapes(members, theta, shapes, left, white, mean)
+            else:
+                far = False
             if step > 0 and size < SETTLED:
                 break
         causes = self.causes(members, theta, shapes)
@@ -394,10 +400,10 @@ class Problem:
     def _move_shapes(
         self, members: Members, theta: Floats, shapes: dict[int, dict[str, float]], left: Sequence[Floats],
         white: Sequence[Floats], mean: Floats,
-    ) -> float:  # fmt: skip
+    ) -> tuple[float, bool]:  # fmt: skip
         """One Gauss-Newton step of the scanned shapes at their best amplitudes, within reach of the scan.
 
-        By how much chi-square it moves the model; shapes that the data do not ask to move stay.
+        By how much chi-square it moves the model, and whether it would go further; shapes that the data do not ask to move stay.
         """
         names, index = self.shapes_of(members), self.member_columns(members)
         others = mean.copy()
@@ -409,10 +415,11 @@ class Problem:
         size = np.linalg.norm(A, axis=0) + 1e-12
         step = np.linalg.lstsq(A / size, rest, rcond=1e-8)[0] / size
         most = np.array([reach(p, shapes[i][p.name]) * shapes[i][p.name] for i, p in names])
-        step *= min(1.0, float(np.min(most / np.maximum(np.abs(step[len(index) :]), 1e-300))))
+        whole = float(np.min(most / np.maximum(np.abs(step[len(index) :]), 1e-300)))
+        step *= min(1.0, whole)
         moves = float(np.sum((A @ step) ** 2))
         if moves > SETTLED:
             for (i, p), s in zip(names, step[len(index) :], strict=True):
                 high = longest(self.bench, self.columns.candidates[i], p)
                 shapes[i][p.name] = float(np.clip(shapes[i][p.name] + s, p.low, max(high, p.low)))
-        return moves
+        return moves, whole < 1.0 and moves > BENT
