@@ -44,6 +44,8 @@ WRONG = {
     37043: "a push that begins and ends at once, where the axis was that time only",
     37051: "friction that turns round behind a spring",
     37057: "one short move in a log of one run",
+    35036: "a loop that swings over and looks late on average",
+    35041: "a clock that trembles, of an axis that rests most of the time",
     38007: "a loop that swings over, of which its steady sine shows the inertia only",
     38022: "a push in the middle of friction",
     38026: "a clock that trembles",

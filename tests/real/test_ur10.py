@@ -86,6 +86,7 @@ def test_without_the_true_effects_they_are_not_made_up_from_offsets(tmp_path):
 
 
 @WHOLE
+@pytest.mark.campaign  # the sample is the same arm
 @pytest.mark.parametrize(
     ("held", "most_um", "covered_um"),
     [("measurements_joint_configurations", 333, 260), ("measurements_grid", 235, 170)],

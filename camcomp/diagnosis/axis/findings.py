@@ -10,7 +10,7 @@ import numpy as np
 
 from camcomp.diagnosis.axis.block_least_squares import Gain, Series
 from camcomp.diagnosis.axis.gate import AxisGate
-from camcomp.diagnosis.axis.noise_floor import FAST_S, LEAST_SPIKE_MM, rows_floor, spikes
+from camcomp.diagnosis.axis.noise_floor import FAST_S, LEAST_SPIKE_MM, spikes
 from camcomp.diagnosis.axis.terms import WIDE, AxisTravel, Ripple
 from camcomp.diagnosis.result.types import FoundCause, Law
 from camcomp.diagnosis.statistics.probability import EVEN
@@ -19,6 +19,7 @@ from camcomp.model.seams import missing_rows
 
 ROWS = 50  # below which a run says nothing
 FIRST_MOVE_MM = 0.2  # after which friction has its sense
+MOVING = 0.1  # of the fastest row's way
 FAR = 10.0  # times as far goes an axis that moves
 ANSWER_S = (0.02, 0.3)  # ahead of a push, and behind it until a loop has answered
 BESIDE_GAP = 5  # rows of which a gap leaves speed and acceleration uncertain
@@ -81,7 +82,10 @@ class AxisRun:
             return self
         way = self.setpoint if np.isfinite(self.setpoint).all() and np.ptp(self.setpoint) > 0.0 else self.encoder
         read = way - np.gradient(way, self.time) * off  # where it was at the tick, if the clock is right
-        if rows_floor([way]) > EVEN * rows_floor([read]):
+        fast = np.abs(np.diff(way))
+        moving = (fast > MOVING * fast.max())[2:-1]  # at rest no clock shows
+        rough = [float(np.median(np.abs(np.diff(each, 4)[moving]))) if moving.any() else 0.0 for each in (way, read)]
+        if rough[0] >= EVEN * rough[1]:
             return self
         time = self.time - off
         return replace(self, time=time, course=(time, self.setpoint))

@@ -203,7 +203,9 @@ def _swung(
         return None
     if float(np.std(np.concatenate([gaps[k] for k in train]))) < MINOR * floor:
         return None
-    swing, spread = find_swing([runs[k] for k in train], [gaps[k] for k in train], [moves[k] for k in train], late)
+    own = [runs[k] for k in train], [gaps[k] for k in train], [moves[k] for k in train]
+    # what looks late on average may be the loop that swings over
+    swing, spread, _ = min((find_swing(*own, each) for each in {0.0, late}), key=lambda found: found[2])
     rows = [swing.settled(r) for r in runs]
     if swing.at_bounds or min(int(on.sum()) for on in rows) < ROWS:
         return None

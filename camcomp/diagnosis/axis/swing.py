@@ -75,8 +75,9 @@ class Swing:
 
 def find_swing(
     runs: Sequence[AxisRun], gaps: Sequence[Floats], moves: Sequence[AxisTravel], late: float = 0.0
-) -> tuple[Swing, tuple[float, float]]:
-    """The loop that explains following errors (n,) mm best beside a constant and a lag, and deviations of its period and damping.
+) -> tuple[Swing, tuple[float, float], float]:
+    """The loop that explains following errors (n,) mm best beside a constant and a lag, deviations of its period and damping,
+    and the mean square mm2 that is left.
 
     Source of the deviations: robust against what is alike within a stretch, as in `block_least_squares.fit`.
     """
@@ -100,10 +101,8 @@ def find_swing(
     period, damping = (float(x) for x in np.exp(best))
     # of a row: when set-points and encoders were taken
     apart = CLOCK * max(float(np.median(np.diff(run.time))) for run in runs) * 2.0 * np.pi / period
-    return Swing(period, damping, late), (
-        period * float(np.hypot(spread[0], apart)),
-        float(np.hypot(damping * spread[1], apart)),
-    )
+    deviations = period * float(np.hypot(spread[0], apart)), float(np.hypot(damping * spread[1], apart))
+    return Swing(period, damping, late), deviations, float(np.mean(rest(best) ** 2))
 
 
 def _rest(

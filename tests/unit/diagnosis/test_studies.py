@@ -174,12 +174,13 @@ def test_order_and_doubled_rows_change_nothing(robot, faulty):
     assert arm_study(robot, (), slower, holdout=["B"], stated=STATED).to_json() == first.to_json()
 
 
-def test_less_data_gives_no_more_certainty(robot, faulty):
+@pytest.mark.parametrize("trials", [3, pytest.param(12, marks=pytest.mark.campaign)])
+def test_less_data_gives_no_more_certainty(robot, faulty, trials):
     """Poses and campaigns left out of experiments that are unknown or ambiguous: none becomes another single cause."""
     rng = np.random.default_rng(5)
     unlisted = [weary(r, 3e-4, k + 1) for k, r in enumerate(faulty)]
     wrong = 0
-    for trial in range(9):
+    for trial in range(trials):
         runs, stated = ((unlisted, STATED), (faulty, StatedDeviation()), (faulty[:1], STATED))[trial % 3]
         some = [r.take(np.sort(rng.choice(250, int(rng.integers(30, 150)), replace=False))) for r in runs]
         some = some[: 1 + int(rng.integers(len(some)))]
