@@ -42,14 +42,18 @@ class AxisRun:
     row: np.ndarray | None = None
     revolute: bool = False
     started: float = 0.0
-    seen: Bools = field(default_factory=lambda: np.zeros(0, bool))
-    course: tuple[Floats, Floats] = field(default_factory=lambda: (np.zeros(0), np.zeros(0)))
+    seen: Bools | None = None
+    course: tuple[Floats, Floats] | None = None
 
-    def __post_init__(self) -> None:
-        if not len(self.seen):
-            object.__setattr__(self, "seen", np.ones(len(self.time), bool))
-        if not len(self.course[0]):
-            object.__setattr__(self, "course", (self.time, self.setpoint))
+    @property
+    def clear(self) -> Bools:
+        """Rows (n,) of which somebody saw how fast the axis was."""
+        return np.ones(len(self.time), bool) if self.seen is None else self.seen
+
+    @property
+    def asked(self) -> tuple[Floats, Floats]:
+        """Times and set-points (m,) of the whole log."""
+        return self.course or (self.time, self.setpoint)
 
     def without_spikes(self) -> tuple[AxisRun, np.ndarray]:
         """The run with neighbours in the place of rows that are no measurement, and these rows' numbers."""
@@ -67,8 +71,7 @@ class AxisRun:
             good = np.isfinite(y) & ~bad
             kept[name] = np.where(bad, np.interp(self.time, self.time[good], y[good]), y) if bad.any() else y
             off |= bad
-        course = self.time, kept["setpoint"]
-        clean = replace(self, setpoint=kept["setpoint"], encoder=kept["encoder"], force=kept["force"], course=course)
+        clean = replace(self, setpoint=kept["setpoint"], encoder=kept["encoder"], force=kept["force"])
         return clean, row[off]
 
     def on_ticks(self) -> AxisRun:
@@ -88,7 +91,7 @@ class AxisRun:
         if rough[0] >= EVEN * rough[1]:
             return self
         time = self.time - off
-        return replace(self, time=time, course=(time, self.setpoint))
+        return replace(self, time=time)
 
     def away_from_gaps(self) -> AxisRun:
         """The run with rows beside lost ones unseen: nobody knows how fast it was there. All are seen where gaps are the rule."""
@@ -106,7 +109,7 @@ class AxisRun:
         for name, begin, end in pushed:
             if name == self.name:
                 away &= (self.time < begin - ANSWER_S[0]) | (self.time > end + ANSWER_S[1])
-        return replace(self, seen=self.seen & away) if (self.seen & away).sum() >= ROWS else self
+        return replace(self, seen=self.clear & away) if (self.clear & away).sum() >= ROWS else self
 
     def moved(self) -> Bools:
         """Rows (n,) from the first move on: which way friction held the axis before nobody knows. All where it stays."""
@@ -119,8 +122,17 @@ class AxisRun:
         """Some of the rows (n,)."""
         row = np.arange(1, len(rows) + 1) if self.row is None else self.row
         time, setpoint, encoder, force = (x[rows] for x in (self.time, self.setpoint, self.encoder, self.force))
-        seen = self.seen[rows]
-        return replace(self, time=time, setpoint=setpoint, encoder=encoder, force=force, row=row[rows], seen=seen)
+        seen = self.clear[rows]
+        return replace(
+            self,
+            time=time,
+            setpoint=setpoint,
+            encoder=encoder,
+            force=force,
+            row=row[rows],
+            seen=seen,
+            course=self.asked,
+        )
 
 
 @dataclass(frozen=True)

@@ -41,8 +41,8 @@ def encoder_width(runs: list[AxisRun], train: list[int]) -> int:
 def lateness(runs: list[AxisRun], gaps: list[Floats], train: list[int]) -> float:
     """How late (s) the axis follows its set-points, on average."""
     moves = [travel(runs[k].time, runs[k].setpoint) for k in train]
-    A = np.concatenate([_usual(m)[runs[k].seen] for k, m in zip(train, moves, strict=True)])
-    return float(np.clip(solve(A, np.concatenate([gaps[k][runs[k].seen] for k in train]))[2], 0.0, LATEST_S))
+    A = np.concatenate([_usual(m)[runs[k].clear] for k, m in zip(train, moves, strict=True)])
+    return float(np.clip(solve(A, np.concatenate([gaps[k][runs[k].clear] for k in train]))[2], 0.0, LATEST_S))
 
 
 def motion_of(
@@ -62,12 +62,12 @@ def motion_of(
 
     def kept(moves: list[AxisTravel], rows: list[Bools]) -> tuple[list[AxisRun], list[AxisTravel], list[Floats]]:
         every = zip(runs, moves, values, rows, strict=True)
-        some = [(r, m, v, r.seen & on if (r.seen & on).sum() >= ROWS else r.seen) for r, m, v, on in every]
+        some = [(r, m, v, r.clear & on if (r.clear & on).sum() >= ROWS else r.clear) for r, m, v, on in every]
         return [r.of(on) for r, _, _, on in some], [m.of(on) for _, m, _, on in some], [v[on] for _, _, v, on in some]
 
     if late is None:
         found.carried = Carried([rows_floor([r.encoder]) for r in runs], found.wide)
-        return kept(encoders, [r.seen for r in runs])
+        return kept(encoders, [r.clear for r in runs])
     mine = [runs[k] for k in train]
     told = [values[k] for k in train]
 
@@ -83,7 +83,7 @@ def motion_of(
     setpoints = ways[wide]
     if misfit(encoders) < ENCODER_BETTER * misfit(setpoints):
         found.carried = Carried([rows_floor([r.encoder]) for r in runs], found.wide)
-        return kept(encoders, [r.seen for r in runs])
+        return kept(encoders, [r.clear for r in runs])
     found.carried = Carried([rows_floor([r.setpoint]) for r in runs], wide, late)
     return kept(setpoints, [r.time >= r.time[0] + SETTLED * late for r in runs])
 
@@ -99,7 +99,7 @@ def _misfit(runs: list[AxisRun], values: list[Floats], moves: list[AxisTravel]) 
     Changes and absolute values: a push for a while must not weigh more than how the corners of a motion are met.
     """
     changes = [
-        _changes(r.time[r.seen], np.column_stack([_usual(m)[:, 1:], y])[r.seen])
+        _changes(r.time[r.clear], np.column_stack([_usual(m)[:, 1:], y])[r.clear])
         for r, m, y in zip(runs, moves, values, strict=True)
     ]
     rows = np.concatenate(changes)

@@ -46,7 +46,7 @@ class Swing:
 
     def _swings(self, run: AxisRun, late: float) -> Floats:
         """Loop minus set-points (n,) mm at the rows of a run, behind a lag of `late` s."""
-        seen, asked = run.course
+        seen, asked = run.asked
         per = max(int(np.ceil(FINE * float(np.median(np.diff(seen))) / self.period)), 1)
         rows = np.arange(len(seen))
         time = np.interp(np.arange((len(rows) - 1) * per + 1) / per, rows, seen)
