@@ -50,7 +50,7 @@ from camcomp.diagnosis.standards import of_runs
 from camcomp.diagnosis.statistics import places
 from camcomp.diagnosis.statistics.cause_sets import Fitted
 from camcomp.diagnosis.statistics.periods import SpectralLine, frequencies
-from camcomp.diagnosis.statistics.probability import probability_of_chance, stated
+from camcomp.diagnosis.statistics.probability import EVEN, probability_of_chance, stated
 from camcomp.ground.datatypes import Floats
 from camcomp.ground.headway import part as part_of_work
 from camcomp.model.effect import Cause
@@ -188,13 +188,18 @@ def _causes(problem: Problem, found: CauseSearch, best: Fitted, law: LawAnswer |
     out: list[FoundCause] = []
     causes = problem.causes(best.members, best.theta, best.extra)
     covariance = joint_covariance(problem, best) if best.members else np.zeros((0, 0))
+    # beside what depends on a place a wave may be the part of it that waves
+    placed = bool(found.unknown_in) and _first_label(found).startswith("position")
     for j, i in enumerate(best.members):
         candidate = problem.columns.candidates[i]
+        likely = found.verdict.inclusion.get(i, 0.0)
+        if placed and any(p.turns for p in candidate.shapes):
+            likely = min(likely, EVEN)
         out.append(
             FoundCause(
                 effect=candidate.name,
                 target=candidate.target,
-                probability=round(min(found.verdict.inclusion.get(i, 0.0), 1.0), 4),
+                probability=round(min(likely, 1.0), 4),
                 share=round(energy[j] / whole, 4) if whole > 0 else 0.0,
                 parameters=_parameters(problem, best, covariance, j, causes[j]),
             )

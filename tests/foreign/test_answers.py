@@ -59,8 +59,8 @@ def test_play_of_an_axis_that_plunges_when_the_log_begins(tmp_path):
 @pytest.mark.campaign
 @pytest.mark.parametrize(
     ("generator", "seed"),
-    [("serial", 5013), ("serial", 5025), ("parallel", 6003)],
-    ids=["rings", "slips under force", "chirps"],
+    [("serial", 5013), ("serial", 5025), ("parallel", 6003), ("parallel", 43140)],
+    ids=["rings", "slips under force", "chirps", "waves"],
 )
 def test_what_imitates_something_unknown_is_not_named_for_certain(tmp_path, generator, seed):
     result, row = judged(tmp_path, generator, seed)

@@ -77,7 +77,8 @@ def test_a_lag_that_differs_between_the_ways_is_unknown_beside_the_lag(tmp_path)
 
 
 @pytest.mark.campaign
-def test_what_takes_the_smaller_part_of_something_unknown_is_not_sure(tmp_path):
-    """Friction that fades, of which a loop that swings over takes a third."""
-    result, row = judged(tmp_path, 37024)
+@pytest.mark.parametrize("seed", [37024, 39034])
+def test_what_takes_a_part_of_something_unknown_is_not_sure(tmp_path, seed):
+    """Friction that fades, of which a loop that swings over takes a third; an end stop that two pushes are made of."""
+    result, row = judged(tmp_path, seed)
     assert result["verdict"] == "unknown" and not row["false_cause"]

@@ -61,6 +61,13 @@ def test_the_verdict_is_a_sentence(verdict, told):
     assert told in verdict_text(result(verdict))
 
 
+def test_what_may_be_a_part_of_something_unknown_is_not_called_identified():
+    unknown = result("unknown")
+    causes = tuple(c.model_copy(update={"probability": min(c.probability, 0.5)}) for c in unknown.causes)
+    told = verdict_text(unknown.model_copy(update={"causes": causes}))
+    assert "explains. gravity may be a part of it. It moves y and depends on the reversals of x." in told
+
+
 def test_causes_with_intervals_next_experiment_and_notes():
     text = words(html_of("ambiguous", notes=["run b has no temperature"]))
     assert "backlash x 97.0 % 90 % width 21.3 µm (19.2 to 23.4)" in text

@@ -51,7 +51,7 @@ from camcomp.diagnosis.result.types import (
     Estimate,
     FoundCause,
 )
-from camcomp.diagnosis.statistics.probability import probability_of_chance, stated
+from camcomp.diagnosis.statistics.probability import EVEN, probability_of_chance, stated
 from camcomp.ground.datatypes import Bools, Floats
 
 LEAST_RIPPLE = 0.02  # share of the leftover's energy
@@ -104,7 +104,10 @@ def force_of(
             kept.pushed.append(
                 (runs[each.run].name, float(time[each.first]), float(time[min(each.last, len(time) - 1)]))
             )
-            kept.causes.append(_push_cause(found.name, runs[each.run], each, channel, raw))
+            cause = _push_cause(found.name, runs[each.run], each, channel, raw)
+            if channel.gate is not None and channel.gate.word == "above":  # it may be a part of what is left
+                cause = cause.model_copy(update={"probability": min(cause.probability, EVEN)})
+            kept.causes.append(cause)
             channel.steps.append(("disturbance", float(np.sqrt(np.mean(channel.last)))))
         channel.data = raw
         if not test:  # what was there before holds the pushes, too

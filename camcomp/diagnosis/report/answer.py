@@ -5,6 +5,7 @@ from __future__ import annotations
 from camcomp.diagnosis.law.words import listed
 from camcomp.diagnosis.report.words import depends, percent, plain, remedy, shortened, sizes, term_size
 from camcomp.diagnosis.result.types import UNKNOWN, DiagnosisResult, FoundCause, GapSize, Law, NamedCause
+from camcomp.diagnosis.statistics.probability import EVEN
 from camcomp.report.plot import brief, micrometres
 
 SURE = 0.95  # probability beyond which none is told: diagnose is never surer than that something looks alike
@@ -42,10 +43,14 @@ def verdict_text(result: DiagnosisResult) -> str:
     if result.verdict == "ambiguous":
         sets = [listed([cause_name(each) for each in one]) or "nothing but noise" for one in result.alternatives]
         return f"These runs cannot tell apart: {'; or '.join(sets)}. {told}"
+    known = [cause_name(each) for each in result.known if each.probability > EVEN]
+    maybe = [cause_name(each) for each in result.known if each.probability <= EVEN]
     if len(known) > MOST_CAUSES:
-        known = [*(cause_name(each) for each in by_share(result)[:MOST_CAUSES]), f"{len(known) - MOST_CAUSES} more"]
+        strongest = [each for each in by_share(result) if each.probability > EVEN][:MOST_CAUSES]
+        known = [*(cause_name(each) for each in strongest), f"{len(known) - MOST_CAUSES} more"]
     subject = "The rest" if known else "It"
     rest = f" {listed(known)} {'are' if len(known) > 1 else 'is'} identified." if known else ""
+    rest += f" {listed(maybe[:MOST_CAUSES])} may be a part of it." if maybe else ""
     drivers = [depends(each) for each in result.where.drivers if each.share >= HALF][:2] or [
         depends(each) for each in result.where.drivers[:1]
     ]
