@@ -8,7 +8,7 @@ from camcomp.model.effect import Motion, Parameter
 REFERENCE_C = 20.0
 WARM_UP_K = 10.0  # rise that an unlogged warm-up ends at; only its product with the growth shows
 WARM_UP = Parameter(
-    "warm_up_s", "s", 3600.0, 60.0, 1e5, 1.0, 0.35,
+    "warm_up_s", "s", 3600.0, 60.0, 1e5, 2.0, 0.35,
     "feed drives warm up in 10 minutes to 3 hours, with several time constants: one is known to a factor of two", log=True,
     scan=(300.0, 900.0, 1800.0, 3600.0, 7200.0, 14400.0),
 )  # fmt: skip

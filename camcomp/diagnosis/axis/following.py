@@ -201,7 +201,9 @@ def _swung(
     """
     if not all(np.isfinite(r.setpoint).all() for r in runs) or max(float(np.ptp(r.setpoint)) for r in runs) == 0.0:
         return None
-    if float(np.std(np.concatenate([gaps[k] for k in train]))) < MINOR * floor:
+    size = float(np.std(np.concatenate([gaps[k] for k in train])))
+    # what set-points scatter by themselves is in their following errors, and any loop would explain it
+    if size < MINOR * floor or rows_floor([runs[k].setpoint for k in train]) > MINOR * size:
         return None
     own = [runs[k] for k in train], [gaps[k] for k in train], [moves[k] for k in train]
     # what looks late on average may be the loop that swings over

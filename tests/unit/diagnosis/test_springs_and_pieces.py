@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from camcomp.diagnosis.fit.intervals import STATED, joint_covariance
+from camcomp.diagnosis.fit.intervals import FORMULA, STATED, joint_covariance
 from camcomp.diagnosis.search.unknown import followed
 from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.diagnosis.statistics.cause_sets import Fitted
@@ -36,7 +36,8 @@ def test_a_force_is_known_no_better_than_the_spring_that_it_bends():
 
 
 def test_rows_that_tell_force_and_spring_apart_say_it_better():
-    assert deviation_of_force(0.3) < 0.1 * STATED
+    """To what the formula of a whole force is off by."""
+    assert FORMULA <= deviation_of_force(0.3) < 1.01 * FORMULA < 0.11 * STATED
 
 
 def test_what_is_moved_at_the_tip_is_known_all_the_same():
