@@ -127,7 +127,7 @@ def close(
     found: AxisFindings, channel: AxisChannel, effects: Sequence[str], last: Floats, data: Series, table: Any, columns: list[Any],
     test: list[int], values: list[Floats], moves: list[AxisTravel], unsure: Mapping[int, Floats] | None = None,
 ) -> None:  # fmt: skip
-    """Leftovers of the channel; where runs are held out, what is left there takes the place of withheld blocks.
+    """Leftovers of the channel and their gate; where runs are held out, sizes are of what is left there, not of withheld blocks.
 
     unsure: what rows (n,) of runs are not known to, by the run's number, beside what the laws of inertia and friction are not.
     """

@@ -207,7 +207,7 @@ def _swung(
         return None
     own = [runs[k] for k in train], [gaps[k] for k in train], [moves[k] for k in train]
     # what looks late on average may be the loop that swings over
-    swing, spread, _ = min((find_swing(*own, each) for each in {0.0, late}), key=lambda found: found[2])
+    swing, spread, _ = min((find_swing(*own, each) for each in dict.fromkeys((0.0, late))), key=lambda found: found[2])
     rows = [swing.settled(r) for r in runs]
     if swing.at_bounds or min(int(on.sum()) for on in rows) < ROWS:
         return None

@@ -55,8 +55,9 @@ def motion_of(
 ) -> tuple[list[AxisRun], list[AxisTravel], list[Floats]]:
     """What moved while a channel had its values (n,): set-points, as late as they are followed, where that explains them as well.
 
-    led: what the loop makes of the set-points of a run. The noise of an encoder is in its following error, too, and would explain a part of itself. With the runs and their values,
-    where somebody saw how fast the axis was, and where it no longer matters how it moved before its log began.
+    led: what the loop makes of the set-points of a run. The noise of an encoder is in its following error, too, and would explain
+    a part of itself. With the runs and their values, where somebody saw how fast the axis was, and where it no longer matters
+    how it moved before its log began.
     """
     encoders = [travel(r.time, r.encoder, found.wide) for r in runs]
 
