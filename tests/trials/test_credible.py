@@ -2,6 +2,7 @@
 
 import pytest
 
+from tests.trials.__main__ import mixed
 from tests.trials.experiment import Plan
 from tests.trials.sensors import Sensors
 from tests.trials.test_diagnosed import answer
@@ -167,3 +168,11 @@ def test_a_spring_too_small_to_be_named_speaks_for_the_springs_beside_it(tmp_pat
     found = {(each["effect"], each["target"]): each["probability"] for each in result["causes"]}
     assert min(found["cutting_force", None], found["drive_stiffness", "A2"], found["drive_stiffness", "A3"]) > 0.5
     assert {effect for effect, _ in found} == {"cutting_force", "drive_stiffness"}
+
+
+@pytest.mark.campaign
+def test_a_force_and_links_that_undo_each_other_are_named_where_a_little_is_left_beside_them(tmp_path):
+    """Per cents of a millimetre: 45 and 36 um, 14 together, and what is left was as large as a cause of 14 um is known to."""
+    result, _ = answer(mixed(5100086, False)[1], tmp_path)
+    assert result["verdict"] == "identified"
+    assert {each["effect"] for each in result["causes"]} == {"cutting_force", "link_stiffness"}

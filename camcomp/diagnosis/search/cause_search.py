@@ -147,7 +147,7 @@ def search_causes(problem: Problem) -> CauseSearch:
         look_beside(best)  # what is left of a set without its weak members has rivals of its own
     design = likeness(problem)
     fits, probability, same = _with_stand_ins(problem, design, fits, probability, sound, fit, temperature)
-    verdict = judge(fits, probability, same)
+    verdict = judge(fits, probability, same, problem.candidates)
     verdict = held_against(problem, fits, probability, verdict, harmful, temperature)
     best = fits[verdict.best]
     beyond = unexplained(problem, best)
@@ -243,7 +243,7 @@ def _needed(problem: Problem, fit: Callable[[Members], Fitted], members: Members
 def unknown_kind(problem: Problem, f: Fitted, beyond: Mapping[str, Unexplained]) -> str | None:
     """The kind of channel in which unseen runs show more than the floor, None where none does."""
     least = _least(problem, f)
-    for_a_while = max(GATE_LOCAL * problem.floor.tip_um, 2.0 * GATE_SHARE * size_um(problem, f))
+    for_a_while = max(GATE_LOCAL * problem.floor.tip_um, 2.0 * GATE_SHARE * _largest(problem, f))
     # where the tip is measured it says itself what moves it; only of the control it knows nothing
     counts = [beyond[kind] for kind in (("tip", "encoder") if "tip" in beyond else beyond) if kind in beyond]
     found = [each for each in counts if each.z > SURE_Z and (each.excess_um > least or each.local_um > for_a_while)]
@@ -252,7 +252,12 @@ def unknown_kind(problem: Problem, f: Fitted, beyond: Mapping[str, Unexplained])
 
 def _least(problem: Problem, f: Fitted) -> float:
     """Size (um at the tip) from which on something beside what a set explains is worth a name."""
-    return max(GATE * problem.floor.tip_um, GATE_SHARE * size_um(problem, f))
+    return max(GATE * problem.floor.tip_um, GATE_SHARE * _largest(problem, f))
+
+
+def _largest(problem: Problem, f: Fitted) -> float:
+    """How far (um) a set moves the tip, or its largest member: what undoes another's work is modelled no better for it."""
+    return max((size_um(problem, f, some) for some in (f.members, *((i,) for i in f.members))), default=0.0)
 
 
 def _with_stand_ins(

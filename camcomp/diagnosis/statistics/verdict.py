@@ -5,7 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from camcomp.diagnosis.statistics.cause_sets import Fitted, Members
+from camcomp.diagnosis.statistics.cause_sets import CausePrior, Fitted, Members
+from camcomp.diagnosis.statistics.probability import EVEN
 from camcomp.ground.datatypes import Floats
 
 EQUAL_LOG_ODDS = 3.0  # log odds within which two sets are told apart by nobody
@@ -27,8 +28,12 @@ class Verdict:
     inclusion: dict[int, float]
 
 
-def judge(fits: Sequence[Fitted], probability: Floats, twins: Sequence[tuple[Members, Members]]) -> Verdict:
-    """Fits with their probabilities; twins: pairs of sets that the data cannot tell apart whatever their prior."""
+def judge(
+    fits: Sequence[Fitted], probability: Floats, twins: Sequence[tuple[Members, Members]], candidates: CausePrior
+) -> Verdict:
+    """Fits with their probabilities, and what these were before the data; twins: pairs of sets that the data cannot tell
+    apart whatever their prior.
+    """
     order = np.argsort(-probability)
     best = int(order[0])
     leader = fits[best]
@@ -57,5 +62,9 @@ def judge(fits: Sequence[Fitted], probability: Floats, twins: Sequence[tuple[Mem
     for i in leader.members:  # sets of another kind break no tie, nor do twins further behind
         having = sum(float(held[j]) for j in twin if i in fits[j].members) / float(held[twin].sum())
         inclusion[i] = min(inclusion[i], having, sum(i in members for members in tied) / len(tied))
+    seen = np.log(np.maximum(probability, 1e-300)) - [candidates.prior(f.members, f.minor) for f in fits]
+    for j in twin:  # and what leads by its prior alone is no more likely than not
+        if seen[best] - seen[j] < np.log(BARE_ODDS):
+            inclusion |= {i: min(inclusion[i], EVEN) for i in leader.members if i not in fits[j].members}
     word = "none" if not leader.members else "ambiguous" if rivals else "identified"
     return Verdict(word, best, tuple(rivals), inclusion)

@@ -24,7 +24,7 @@ def test_what_it_lacks_is_less_sure_by_as_much_as_it_is_likely_but_never_by_more
     evidence, share
 ):
     best = fitted(0.0, 0, 1)
-    said = judge((best,), np.ones(1), [])
+    said = judge((best,), np.ones(1), [], PROBLEM.candidates)
     after = held_against(PROBLEM, (best,), np.ones(1), said, [fitted(evidence, 0, 2, 3)], 1.5)
     assert (after.inclusion[0], after.inclusion[1]) == pytest.approx((1.0, share))
     assert (after.word, after.best, after.rivals) == (said.word, said.best, said.rivals)
@@ -32,7 +32,7 @@ def test_what_it_lacks_is_less_sure_by_as_much_as_it_is_likely_but_never_by_more
 
 def test_a_set_that_is_an_answer_is_not_held_against_the_others_once_more():
     fits = (fitted(0.0, 0), fitted(0.0, 1))
-    said = judge(fits, np.array([0.6, 0.4]), [])
+    said = judge(fits, np.array([0.6, 0.4]), [], PROBLEM.candidates)
     assert held_against(PROBLEM, fits, np.array([0.6, 0.4]), said, [fits[1]], 1.5).inclusion == said.inclusion
 
 

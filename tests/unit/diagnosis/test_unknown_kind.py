@@ -1,0 +1,24 @@
+"""From which size on something beside a set of causes is an effect that the library lacks."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from camcomp.diagnosis.search.cause_search import unknown_kind
+from camcomp.diagnosis.search.unexplained import Unexplained
+from camcomp.diagnosis.statistics.cause_sets import Fitted
+
+PROBLEM = SimpleNamespace(
+    floor=SimpleNamespace(tip_um=5.0),
+    member_columns=list,
+    size_um=lambda index, theta: abs(float(np.sum(theta))),
+)
+
+
+@pytest.mark.parametrize(("first", "second", "shown"), [(45.0, -36.0, None), (9.0, 0.0, "tip"), (45.0, 0.0, None)])
+def test_causes_that_undo_each_other_are_modelled_no_better_for_it(first, second, shown):
+    """3 um beside a force of 45 um and links that take 36 of them away again."""
+    f = Fitted((0, 1), np.array([first, second]), np.eye(2), 0.0, ())
+    beyond = {"tip": Unexplained("tip", 3.0, 8.0, 4.0, (0, 0.0, 1.0), np.ones(3))}
+    assert unknown_kind(PROBLEM, f, beyond) == shown
