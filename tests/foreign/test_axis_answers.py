@@ -50,11 +50,12 @@ WRONG = {
     38022: "a push in the middle of friction",
     38026: "a clock that trembles",
     37026: "friction of a hundred times the noise, whose shape is known to a hundredth",
+    39028: "friction that turns round otherwise where the axis creeps back a little than where it turns",
     37052: "the same on two axes, where reversals fall between two rows",
 }
 
 
-IN_CI = (31018, 31031, 37016, 37018, 37026, 37041, 37051)
+IN_CI = (31018, 31031, 37016, 37018, 37026, 37041, 37051, 39028)
 
 
 @pytest.mark.parametrize("seed", [pytest.param(k, marks=() if k in IN_CI else pytest.mark.campaign) for k in WRONG])
@@ -82,3 +83,30 @@ def test_what_takes_a_part_of_something_unknown_is_not_sure(tmp_path, seed):
     """Friction that fades, of which a loop that swings over takes a third; an end stop that two pushes are made of."""
     result, row = judged(tmp_path, seed)
     assert result["verdict"] == "unknown" and not row["false_cause"]
+
+
+RESTS = {
+    39004: ("time:y", "friction that fades while a run goes on"),
+    39029: ("position:y", "a loop whose gain depends on the place"),
+    39039: ("acceleration:y", "forces of another axis on this one's"),
+    39059: ("reversal:x", "play inside the loop"),
+}
+
+
+@pytest.mark.parametrize("seed", [pytest.param(k, marks=() if k == 39039 else pytest.mark.campaign) for k in RESTS])
+def test_what_the_rest_depends_on_is_named(tmp_path, seed):
+    result, row = judged(tmp_path, seed)
+    covariate, fault = RESTS[seed]
+    drivers = result["where"]["drivers"]
+    assert result["verdict"] == "unknown" and not row["false_cause"], fault
+    assert drivers and drivers[0]["covariate"] == covariate, fault
+    if covariate == "acceleration:y":
+        assert "when z moves alone, it goes with how y moves" in result["next_experiment"]["outcomes"][0]
+
+
+def test_a_drag_that_grows_with_speed_is_neither_friction_that_pushes_nor_surely_a_lag(tmp_path):
+    """Friction of -55 N and a viscous part fitted its forces; what its loop makes of it is a lag in the main."""
+    result, row = judged(tmp_path, 39014)
+    assert result["verdict"] == "unknown" and not row["false_cause"]
+    assert "friction" not in [cause["effect"] for cause in result["causes"]]
+    assert "velocity:z" in [each["covariate"] for each in result["where"]["drivers"]]

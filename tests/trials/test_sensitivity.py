@@ -4,7 +4,11 @@ from tests.trials import sensitivity
 
 
 def test_a_constant_that_decides_is_told_from_one_that_does_not_and_from_one_that_is_not_met(tmp_path, monkeypatch):
-    gate, listed, milled = ("axis.channels", "LEAST_Z"), ("axis.plausible", "NEAR"), ("search.cause_search", "GATE")
+    gate, listed, milled = (
+        ("axis.block_least_squares", "LEAST_Z"),
+        ("axis.plausible", "NEAR"),
+        ("search.cause_search", "GATE"),
+    )
     monkeypatch.setattr(sensitivity, "SET", ())
     monkeypatch.setattr(sensitivity, "FACTORS", (1.0, 1e6))
     (axis, _) = sensitivity.written(tmp_path)

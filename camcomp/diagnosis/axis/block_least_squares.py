@@ -17,16 +17,25 @@ from camcomp.ground.datatypes import Bools, Floats, Ints
 MARGIN_S = 0.2
 MOST_BLOCKS = 25
 WHOLE_RUNS = 4  # from which on runs are left out as wholes
+LEAST_Z = 4.0  # mean gain over its standard error
 FEWEST = 3  # blocks, of which a standard error can be taken
 
 
 @dataclass(frozen=True, eq=False)
 class Series:
-    """Rows of one channel over all runs: y (n,), block number (n,), and for every block the rows to fit on (n,) bool."""
+    """Rows of one channel over all runs: y (n,), block number (n,), and for every block the rows to fit on (n,) bool.
+
+    weight (n,): how much a row counts, 1 where it is known to its noise; all alike where it is not given.
+    """
 
     y: Floats
     block: Ints
     others: tuple[np.ndarray, ...]
+    weight: Floats | None = None
+
+    def weighed(self, values: Floats) -> Floats:
+        """Values (n,) or (n, k) by how much their rows count."""
+        return values if self.weight is None else np.asarray((values.T * self.weight).T)
 
 
 def series(times: Sequence[Floats], values: Sequence[Floats]) -> Series:
@@ -58,9 +67,18 @@ def solve(A: Floats, y: Floats) -> Floats:
     return out
 
 
+def solved(data: Series, A: Floats) -> Floats:
+    """Coefficients (k,) of columns A (n, k)."""
+    return solve(data.weighed(A), data.weighed(data.y))
+
+
 def withheld(data: Series, A: Floats) -> Floats:
-    """Mean squares (blocks,) of what columns A (n, k) leave of every block when fitted on the others."""
-    left = leftover(data, A)
+    """Mean squares (blocks,) of what columns A (n, k) leave of every block when fitted on the others, as rows count."""
+    return by_block(data, data.weighed(leftover(data, A)))
+
+
+def by_block(data: Series, left: Floats) -> Floats:
+    """Mean squares (blocks,) of values (n,)."""
     return np.array([np.mean(left[data.block == b] ** 2) for b in range(len(data.others))])
 
 
@@ -71,10 +89,11 @@ def leftover(data: Series, A: Floats) -> Floats:
         return out
     size = np.sqrt(np.mean(A**2, axis=0)) + 1e-300
     B = A / size
-    whole, moment = B.T @ B, B.T @ data.y
+    C, y = data.weighed(B), data.weighed(data.y)
+    whole, moment = C.T @ C, C.T @ y
     for b, rest in enumerate(data.others):
-        own = B[~rest]  # the block and its margins
-        c = np.linalg.lstsq(whole - own.T @ own, moment - own.T @ data.y[~rest], rcond=1e-12)[0]
+        own = C[~rest]  # the block and its margins
+        c = np.linalg.lstsq(whole - own.T @ own, moment - own.T @ y[~rest], rcond=1e-12)[0]
         mine = data.block == b
         out[mine] -= B[mine] @ c
     return out
@@ -124,8 +143,8 @@ def fit(data: Series, A: Floats) -> tuple[Floats, Floats]:
 
     Source: Liang, Zeger, Biometrika 73 (1986) 13, with the usual correction for the number of blocks.
     """
-    c = solve(A, data.y)
-    left = data.y - A @ c
+    c = solved(data, A)
+    A, left = data.weighed(A), data.weighed(data.y - A @ c)
     size = np.sqrt(np.mean(A**2, axis=0)) + 1e-300
     B = A / size
     inverse = np.linalg.pinv(B.T @ B, rcond=1e-13)

@@ -8,13 +8,14 @@ from typing import Any
 import numpy as np
 
 from camcomp.diagnosis.axis.block_least_squares import (
+    LEAST_Z,
     Gain,
     Series,
-    gain,
+    by_block,
     leftover,
     log10_chance,
     series,
-    solve,
+    solved,
     withheld,
 )
 from camcomp.diagnosis.axis.findings import AxisChannel, AxisFindings
@@ -22,7 +23,6 @@ from camcomp.diagnosis.axis.gate import judge
 from camcomp.diagnosis.axis.law import LEAST_SHARE
 from camcomp.diagnosis.axis.noise_floor import REPEATABILITY_MM
 from camcomp.diagnosis.axis.terms import (
-    PRESLIDING_GRID_MM,
     TURNINGS,
     AxisTravel,
     Turning,
@@ -34,7 +34,7 @@ from camcomp.diagnosis.result.types import (
 from camcomp.diagnosis.statistics.probability import probability_of_chance, stated
 from camcomp.ground.datatypes import Floats
 
-LEAST_Z = 4.0  # mean gain over its standard error
+LEFT = 0.2  # of what was beyond the floor: more than that beside causes, and they may be a part of something else
 WITHIN = 0.5  # rows: force and motion of one row are not known to be of one instant to better than that
 ALIKE_Z = 2.0  # the same, below which two ways of turning round are alike
 KNOWN = 0.01  # of the constants of a loop, and of friction: no law of them is better than that
@@ -87,21 +87,6 @@ def turning(data: Series, table: Any) -> Turning:
     return min(TURNINGS, key=lambda how: float(np.mean(np.log(np.maximum(withheld(data, table(how)), 1e-300)))))
 
 
-def around(data: Series, table: Any, length: float) -> list[float]:
-    """Distances of the scan with which friction may turn round as well: those no worse on withheld blocks, and their neighbours.
-
-    Two shorter ones: bristles do over a fraction of their length what an exponential does over the whole of its own, and
-    the law of the drive is nobody's.
-    """
-    best = withheld(data, table(Turning(length)))
-    alike = [
-        i for i, d in enumerate(PRESLIDING_GRID_MM)
-        if d == length or gain(withheld(data, table(Turning(d))), best).z < ALIKE_Z
-    ]  # fmt: skip
-    low, high = max(min(alike) - 2, 0), min(max(alike) + 1, len(PRESLIDING_GRID_MM) - 1)
-    return list(PRESLIDING_GRID_MM[low : high + 1])
-
-
 def holds(g: Gain) -> bool:
     """Whether a term helps withheld blocks, surely and by more than little."""
     return g.z > LEAST_Z and g.log_ratio > LEAST_SHARE
@@ -124,7 +109,7 @@ def value_of(value: float, spread: float) -> Estimate:
 
 
 def close(
-    found: AxisFindings, channel: AxisChannel, effects: Sequence[str], last: Floats, data: Series, table: Any, columns: list[Any],
+    found: AxisFindings, channel: AxisChannel, effects: Sequence[str], data: Series, table: Any, columns: list[Any],
     test: list[int], values: list[Floats], moves: list[AxisTravel], unsure: Mapping[int, Floats] | None = None,
 ) -> None:  # fmt: skip
     """Leftovers of the channel and their gate; where runs are held out, sizes are of what is left there, not of withheld blocks.
@@ -132,17 +117,17 @@ def close(
     unsure: what rows (n,) of runs are not known to, by the run's number, beside what the laws of inertia and friction are not.
     """
     A = table(channel.runs, *columns)
-    c = solve(A, data.y)
+    c = solved(data, A)
     channel.columns, channel.moves = A, [moves[k] for k in channel.runs]
     if not channel.stated:
         channel.floor = float(
             np.hypot(channel.floor, _carried(found, channel, moves, dict(zip(columns, c, strict=True))))
         )
     channel.left = [np.array(values[k] - table([k], *columns) @ c, dtype=np.float64) for k in channel.runs]
-    channel.last = last
+    channel.last = by_block(data, leftover(data, A))
     ends = np.cumsum([len(moves[k].time) for k in channel.runs])[:-1]
     if test:
-        base = solve(table(channel.runs, *columns[:1]), data.y)
+        base = solved(data, table(channel.runs, *columns[:1]))
         seen = series([moves[k].time for k in test], [values[k] for k in test])
         squares = [(seen.y - table(test, *cols) @ w) ** 2 for cols, w in ((columns[:1], base), (columns, c))]
         channel.first, channel.last = (
@@ -165,7 +150,13 @@ def close(
 
 def not_known(own: Floats) -> Floats:
     """What a force (n,) N by inertia and friction is not known to, row by row: its size, and when within a row."""
-    return np.asarray(np.hypot(KNOWN * own, WITHIN * np.gradient(own)))
+    return np.asarray(np.hypot(KNOWN * own, within_a_row(own)))
+
+
+def within_a_row(own: Floats) -> Floats:
+    """What values (n,) are not known to, row by row, where the instant of a row is not; at a peak of one row, too."""
+    steps = np.abs(np.diff(own))
+    return np.asarray(WITHIN * np.maximum(np.append(steps, 0.0), np.insert(steps, 0, 0.0)))
 
 
 def _beside_law(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,17 +11,15 @@ from scipy.stats import t as student
 
 from camcomp.diagnosis.axis.block_least_squares import (
     Series,
-    fit,
     gain,
     log10_chance,
-    solve,
+    solved,
     telling,
     withheld,
 )
 from camcomp.diagnosis.axis.channels import (
-    KNOWN,
+    LEFT,
     Column,
-    around,
     close,
     constant,
     either_way,
@@ -35,28 +33,34 @@ from camcomp.diagnosis.axis.channels import (
     table_of,
     turning,
     value_of,
+    within_a_row,
 )
 from camcomp.diagnosis.axis.findings import AxisChannel, AxisFindings, AxisRun
+from camcomp.diagnosis.axis.friction import (
+    around,
+    as_good,
+    brakes,
+    friction_of,
+    not_known_beside,
+    second_distance,
+)
 from camcomp.diagnosis.axis.gate import MINOR
 from camcomp.diagnosis.axis.noise_floor import rows_floor
 from camcomp.diagnosis.axis.push import QUARTERS, Window, edges, find_window, seen_elsewhere, sharp
 from camcomp.diagnosis.axis.terms import (
-    PRESLIDING_GRID_MM,
     AxisTravel,
     Turning,
     ripple,
     strangers,
 )
 from camcomp.diagnosis.result.types import (
-    Estimate,
     FoundCause,
 )
 from camcomp.diagnosis.statistics.probability import EVEN, probability_of_chance, stated
-from camcomp.ground.datatypes import Bools, Floats
+from camcomp.ground.datatypes import Floats
 
 LEAST_RIPPLE = 0.02  # share of the leftover's energy
 PASSES = 2  # of the fit of a push and of all else
-LEFT = 0.2  # of what was beyond the floor: more than that beside pushes, and they are a part of something else
 MOST_PUSHES = 2  # of an axis: what comes more often is no mishap
 
 
@@ -167,6 +171,8 @@ def _forced(
     """The same for given forces (n,) per run; unsure: as in `close`."""
     found = replace(found, causes=[*found.causes], unknown_in=[*found.unknown_in], details={**found.details})
     data, table = series_of(moves, forces, train), table_of(moves)
+    first = withheld(data, table(train, constant))
+    floor = found.stated.force_N or rows_floor([runs[k].force for k in train])
     length = turning(data, lambda d: table(train, constant, inertia, speed, either_way, lambda m: m.reversal(d)))
 
     def turn(m: AxisTravel) -> Floats:
@@ -175,8 +181,6 @@ def _forced(
     columns: list[Column] = [constant, inertia]
     beside = table(train, constant, inertia, turn, speed, either_way)
     before = withheld(data, table(train, *columns))
-    floor = found.stated.force_N or rows_floor([runs[k].force for k in train])
-    first = withheld(data, table(train, constant))
     channel = AxisChannel(data, train, first, before, floor=floor, stated=found.stated.force_N is not None)
     channel.all_names, channel.beside = [r.name for r in runs], beside
     last, named = before, []
@@ -184,27 +188,34 @@ def _forced(
         after = withheld(data, table(train, constant, inertia, turn, speed))
         moving = telling(data, table(train, turn, *columns), 0, MINOR * floor)
         g = gain(before, after, moving)
-        if holds(g):
+        if holds(g) and brakes(data, table(train, turn, speed, *columns)):
             columns, last = [constant, inertia, turn, speed], after
             lopsided = withheld(data, table(train, *columns, either_way))
             more = gain(last, lopsided, moving)
             if helps(more):
                 columns, last = [*columns, either_way], lopsided
-            shape = None if length.speed is not None else _shape(data, table, train, columns, last, length, moving)
+            shape = (
+                None if length.speed is not None else second_distance(data, table, train, columns, last, length, moving)
+            )
             if shape is not None:
                 columns, last = [*columns, shape.column], shape.last
             own = [*columns]
 
-            def turned(how: Turning) -> Floats:
-                return table(train, *(m if m is not turn else (lambda m: m.reversal(how)) for m in own))
+            def turned(how: Turning, ks: Sequence[int] = train) -> Floats:
+                return table(ks, *(m if m is not turn else (lambda m: m.reversal(how)) for m in own))
 
-            lengths = around(data, turned, length.distance) if length.speed is None else [length.distance]
-            tables = [*(turned(Turning(d)) for d in lengths if length.speed is None), table(train, *columns)]
-            found.causes.append(_friction(found, data, tables, length, shape, lengths, probability_of(g), before, last))
+            alike = as_good(data, turned, length.distance) if length.speed is None else []
+            unsure = not_known_beside(data, turned, train, [*train, *test], length, alike, unsure or {})
+            lengths = around(alike) if alike else [length.distance]
+            tables = [*(turned(Turning(d)) for d in lengths if alike), table(train, *columns)]
+            found.causes.append(
+                friction_of(found, data, tables, length, shape, lengths, probability_of(g), before, last)
+            )
             found.details["force"]["asymmetry_z"] = round(more.z, 2)
             named.append("friction")
     _refused(found, data, table, train, columns, last, moves, length, floor)
-    close(found, channel, named, last, data, table, columns, test, forces, moves, unsure)
+    known = _weighed(data, table(train, *columns), [len(moves[k].time) for k in train], floor)
+    close(found, channel, named, known, table, columns, test, forces, moves, unsure)
     found.force = channel
     line = ripple([moves[k] for k in train], channel.left)
     if line is not None and line.share > LEAST_RIPPLE and line.amplitude**2 / 2.0 > (MINOR * floor) ** 2:
@@ -257,79 +268,14 @@ def _push_cause(name: str, run: AxisRun, window: Window, now: AxisChannel, raw: 
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _Shape:
-    """How friction turns round over a second distance, mm, as well: a column, and what withheld blocks leave with it."""
+def _weighed(data: Series, A: Floats, rows: Sequence[int], floor: float) -> Series:
+    """The series with rows that count for less where the second of the columns A (n, k), inertia, is not known to the floor.
 
-    distance: float
-    column: Column
-    last: Floats
-
-
-def _shape(
-    data: Series, table: Any, train: list[int], columns: list[Column], last: Floats, length: Turning, moving: Bools
-) -> _Shape | None:
-    """The second distance that helps withheld blocks most; None where one is enough.
-
-    A guide has bristles of many lengths, and an encoder may sit behind a spring (the elements of a generalized Maxwell slip
-    model: Al-Bender, Lampaert, Swevers, IEEE Trans. Autom. Control 50 (2005) 1883).
+    Where an axis speeds up within a few rows its force is one of any time within a row: the mass is known from elsewhere.
+    rows: of every run.
     """
-
-    def with_it(distance: float) -> _Shape:
-        def column(m: AxisTravel) -> Floats:
-            return m.reversal(Turning(distance)) - m.reversal(length)
-
-        return _Shape(distance, column, withheld(data, table(train, *columns, column)))
-
-    every = [with_it(d) for d in PRESLIDING_GRID_MM if d != length.distance]
-    best = min(every, key=lambda each: float(np.mean(np.log(np.maximum(each.last, 1e-300)))))
-    more = gain(last, best.last, moving)
-    return best if helps(more) else None
-
-
-def _friction(
-    found: AxisFindings,
-    data: Series,
-    tables: Sequence[Floats],
-    length: Turning,
-    shape: _Shape | None,
-    lengths: Sequence[float],
-    probability: float,
-    before: Floats,
-    last: Floats,
-) -> FoundCause:
-    """Tables (n, k): the columns, last, and before them those with the ways, over `lengths`, of turning round as well.
-
-    shape: the last of the columns, where there is one.
-    """
-    c, C = fit(data, tables[-1])
-    beside = [np.abs(solve(A, data.y) - c) for A in tables]
-    spread = np.maximum(1.96 * np.sqrt(np.diag(C)), np.max(beside, axis=0))
-    fast = max(float(np.sqrt(np.mean(tables[-1][:, 3] ** 2))), 1e-12)
-    law = KNOWN * (abs(float(c[2])) + fast * abs(float(c[3])))  # N
-    spread[2:] += law / np.array([1.0, *(fast for _ in c[3:])])
-    turns = length.distance
-    if shape is not None:  # the same way lost at a reversal
-        turns = max(turns + float(c[-1] / c[2]) * (shape.distance - turns), PRESLIDING_GRID_MM[0])
-        c = c[:-1]
-    reach = [*lengths, turns]
-    parameters = {
-        "force_N": value_of(c[2], spread[2]),
-        "viscous_Ns_per_mm": value_of(c[3], spread[3]),
-        "presliding_mm": Estimate(value=float(f"{turns:.4g}"), ci95=(min(reach), max(reach))),
-    }
-    if len(c) > 4:
-        parameters["asymmetry_Ns_per_mm"] = value_of(c[4], spread[4])
-    found.details["force"] = {"mass_kg": value_of(c[1], spread[1]), "constant_N": value_of(c[0], spread[0])}
-    if length.speed is not None:
-        found.details["force"]["turning_mm_per_s"] = length.speed
-    return FoundCause(
-        effect="friction",
-        target=found.name,
-        probability=probability,
-        share=round(1.0 - float(np.mean(last) / np.mean(before)), 4),
-        parameters=parameters,
-    )
+    own = np.split(A[:, 1] * solved(data, A)[1], np.cumsum(rows)[:-1])
+    return replace(data, weight=floor / np.hypot(floor, np.concatenate([within_a_row(each) for each in own])))
 
 
 def _refused(
@@ -341,11 +287,12 @@ def _refused(
     They have to hold where rows count for less that inertia and friction are not known for to the floor, too.
     """
     A = table(train, *columns)
-    own = A[:, 1:] @ solve(A, data.y)[1:]
+    own = A[:, 1:] @ solved(data, A)[1:]
     ends = np.cumsum([len(moves[k].time) for k in train])[:-1]
-    weight = floor / np.hypot(floor, np.concatenate([not_known(each) for each in np.split(own, ends)]))
-    sure = replace(data, y=weight * data.y)
-    known = withheld(sure, weight[:, None] * A)
+    sure = replace(
+        data, weight=floor / np.hypot(floor, np.concatenate([not_known(each) for each in np.split(own, ends)]))
+    )
+    known = withheld(sure, A)
     tried = {}
     terms = strangers(AxisTravel(*(np.zeros(2) for _ in range(4))), Turning(1.0))
     for name, (kind, _) in terms.items():
@@ -355,7 +302,7 @@ def _refused(
         tried[name] = {"z": round(g.z, 2), "gain": round(g.log_ratio, 4)}
         if not holds(g):
             continue
-        weighed = gain(known, withheld(sure, weight[:, None] * B))
+        weighed = gain(known, withheld(sure, B))
         share = 1.0 - float(np.exp(-2.0 * weighed.log_ratio))
         if holds(weighed) and share * np.mean(known) > (MINOR * floor) ** 2:
             found.unknown_chance = min(found.unknown_chance, log10_chance(g, len(terms)))

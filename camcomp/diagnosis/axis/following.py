@@ -18,6 +18,7 @@ from camcomp.diagnosis.axis.block_least_squares import (
 )
 from camcomp.diagnosis.axis.channels import (
     KNOWN,
+    LEFT,
     Column,
     acceleration,
     close,
@@ -115,11 +116,11 @@ def _followed(
         found.details["following"] = {} if i is None else {"acceleration_us2": value_of(1e6 * c[i], 1e3 * spread[i])}
         if lag.turn in columns:
             found.details["following"] |= {"reversal_um": value[lag.turn], "presliding_mm": lag.length.distance}
-    close(found, channel, named, last, data, table, columns, test, gaps, moves)
+    close(found, channel, named, data, table, columns, test, gaps, moves)
     found.following = channel
     taken, beyond = float(np.mean(before) - np.mean(last)), float(np.mean(last)) - floor**2
-    if channel.gate is not None and channel.gate.word == "above" and taken < beyond:
-        # anything takes a part of something unknown; what takes the smaller one may be no more than that
+    if channel.gate is not None and channel.gate.word == "above" and beyond > LEFT * (taken + beyond):
+        # anything takes a part of something unknown; what leaves much of it may be no more than that
         found.causes = [
             c.model_copy(update={"probability": min(c.probability, EVEN)}) if c.effect in named else c
             for c in found.causes

@@ -1,4 +1,4 @@
-"""What is left of a channel of an axis against its floor: in size, in stretches of time, over position and speed."""
+"""What is left of a channel of an axis against its floor: in size, and in stretches of time."""
 
 from __future__ import annotations
 
@@ -10,8 +10,6 @@ import numpy as np
 from scipy.stats import chi2, norm
 from scipy.stats import t as student
 
-from camcomp.diagnosis.axis.block_least_squares import Series, gain, log10_chance, withheld
-from camcomp.diagnosis.axis.terms import AxisTravel
 from camcomp.ground.datatypes import Floats
 
 MINOR = 0.3  # of the floor: what is smaller is no unknown, however sure it is
@@ -26,8 +24,6 @@ FALSE = 0.01  # of the stretches that are named
 LEAST_STRETCHES = 8  # of which one can stand out
 JOINED = 0.1  # of a stretch between two that are one
 LEAST_ROWS = 20  # of a stretch
-BINS = 16
-LEAST_Z = 4.0  # mean gain over its standard error
 
 
 @dataclass(frozen=True)
@@ -137,22 +133,3 @@ def intervals(
 def _count(time: Floats) -> int:
     length = float(time[-1] - time[0])
     return int(min(length / STRETCH_S, len(time) / LEAST_ROWS))
-
-
-def dependences(data: Series, A: Floats, moves: Sequence[AxisTravel]) -> list[tuple[str, float, float]]:
-    """Covariate, share of what columns A (n, k) leave that it predicts, log10 of its chance: steps over position, speed, ..."""
-    rest = withheld(data, A)
-    covariates = {
-        "position": np.concatenate([m.position for m in moves]),
-        "velocity": np.concatenate([m.speed for m in moves]),
-        "acceleration": np.concatenate([m.acceleration for m in moves]),
-    }
-    out = []
-    for name, x in covariates.items():
-        edges = np.unique(np.quantile(x, np.linspace(0.0, 1.0, BINS + 1)[1:-1]))
-        steps = (np.searchsorted(edges, x)[:, None] == np.arange(1, len(edges) + 1)).astype(float)
-        found = gain(rest, withheld(data, np.concatenate([A, steps], axis=1)))
-        if found.z > LEAST_Z and found.log_ratio > 0.0:
-            share = 1.0 - float(np.exp(-2.0 * found.log_ratio))
-            out.append((name, share, log10_chance(found, len(covariates))))
-    return out

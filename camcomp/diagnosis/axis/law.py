@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import minimize
 
-from camcomp.diagnosis.axis.block_least_squares import Gain, Series, fit, gain, log10_chance, solve, withheld
+from camcomp.diagnosis.axis.block_least_squares import LEAST_Z, Gain, Series, fit, gain, log10_chance, solve, withheld
 from camcomp.diagnosis.axis.findings import AxisChannel
-from camcomp.diagnosis.axis.gate import LEAST_Z, MINOR
+from camcomp.diagnosis.axis.gate import MINOR
 from camcomp.diagnosis.axis.terms import AxisTravel, ripple
 from camcomp.diagnosis.law.forms import Form, at_drive
 from camcomp.diagnosis.law.sizes import sizes

@@ -47,7 +47,8 @@ def next_moves(
     """Strokes of the axis that has most left; None where machine and model agree, or no axis moved."""
     if verdict not in (UNKNOWN, "ambiguous"):
         return None
-    for axis in sorted(found, key=_left, reverse=True):
+    asked = [a for a in found if a.strange] or found  # something unknown is asked of the axes that show it
+    for axis in sorted(asked, key=_left, reverse=True):
         logs = [run for run in runs[axis.name] if np.isfinite(run.encoder).sum() > 2 * axis.wide + 1]
         designed = _designed(axis, logs, verdict)
         if designed is not None:
@@ -126,12 +127,19 @@ def _designed(axis: AxisFindings, logs: Sequence[AxisRun], verdict: str) -> tupl
 def _weights(axis: AxisFindings, verdict: str) -> dict[str, float]:
     """Hypotheses with their weights: covariates by the share of the leftover that goes with them."""
     out = dict.fromkeys(_MEANS, LEAST_WEIGHT)
-    found = [(kind.partition(":")[0], share) for kind, share in axis.unknown_in]
+    found = [(kind, share) for kind, of, share in _depends_on(axis) if of == axis.name]
     if axis.ripple is not None:
         found.append(("position", axis.ripple.share))
     for kind, share in found:
+        kind = "velocity" if kind == "reversal" else kind  # strokes of any speed turn round
         out[kind] = max(out[kind], share)
     return out if verdict == UNKNOWN else out | {_NOTHING: sum(out.values())}
+
+
+def _depends_on(axis: AxisFindings) -> list[tuple[str, str, float]]:
+    """Kind of covariate, of which axis, and the share of the leftover that goes with it."""
+    parted = [(name.partition(":"), share) for name, share in axis.unknown_in]
+    return [(kind, of, share) for (kind, _, of), share in parted]
 
 
 def _blocks(low: float, high: float, fastest: float, hardest: float) -> Iterator[StrokeBlock]:
@@ -226,4 +234,8 @@ def _outcomes(axis: AxisFindings, verdict: str) -> tuple[str, ...]:
             "If they leave more, something acts on it that no effect of the library explains.",
         )
     weight = _weights(axis, verdict)
-    return tuple(_MEANS[kind].format(axis.name) for kind in sorted(weight, key=lambda each: -weight[each]))
+    others = dict.fromkeys(of for _, of, _ in _depends_on(axis) if of != axis.name)
+    return (
+        *(f"If nothing is left of {axis.name} when it moves alone, it goes with how {of} moves." for of in others),
+        *(_MEANS[kind].format(axis.name) for kind in sorted(weight, key=lambda each: -weight[each])),
+    )

@@ -16,15 +16,13 @@ import numpy as np
 from camcomp.diagnosis.axis import answer
 from camcomp.diagnosis.axis.block_least_squares import WHOLE_RUNS, log10_chance
 from camcomp.diagnosis.axis.drive_force import force_of
+from camcomp.diagnosis.axis.drivers import dependences
 from camcomp.diagnosis.axis.findings import ROWS, AxisChannel, AxisDeviation, AxisFindings, AxisRun
 from camcomp.diagnosis.axis.following import follow, share_lag
-from camcomp.diagnosis.axis.gate import dependences
 from camcomp.diagnosis.axis.law import axis_law
 from camcomp.diagnosis.axis.motion import encoder_width, lateness, motion_of
 from camcomp.diagnosis.axis.next_moves import next_moves
-from camcomp.diagnosis.axis.terms import (
-    travel,
-)
+from camcomp.diagnosis.axis.terms import AxisTravel, travel
 from camcomp.diagnosis.result.standards import StandardValues
 from camcomp.diagnosis.result.types import (
     UNKNOWN,
@@ -65,11 +63,13 @@ def studied(
     names = sorted({r.name for runs in axes.values() for r in runs})
     held = [n for n in names if n in holdout] if holdout else names if len(names) >= WHOLE_RUNS else []
     again = 0 if len(held) == 1 and holdout else len(held)  # fits that leave out one run each
-    for name, runs in headway.steps(axes.items(), len(axes) * (1 + again)):
+    for name, runs in axes.items():
         clean = [r.without_spikes() for r in runs]
         outliers |= {(r.name, int(row)) for r, rows in clean for row in rows}
         cleaned[name] = [r.on_ticks().away_from_gaps() for r, _ in clean]
-        found.append(_axis(name, cleaned[name], set(holdout), set(without), stated or AxisDeviation()))
+    for name, own in headway.steps(cleaned.items(), len(axes) * (1 + again)):
+        others = {other: each for other, each in cleaned.items() if other != name}
+        found.append(_axis(name, own, set(holdout), set(without), stated or AxisDeviation(), others))
     found = [a for a in found if a.channels]
     if not found:
         raise ValueError(
@@ -113,7 +113,10 @@ def _verdict(found: Sequence[AxisFindings]) -> Any:
     return "identified" if any(a.causes for a in found) else "none"
 
 
-def _axis(name: str, runs: list[AxisRun], holdout: set[str], without: set[str], stated: AxisDeviation) -> AxisFindings:
+def _axis(
+    name: str, runs: list[AxisRun], holdout: set[str], without: set[str], stated: AxisDeviation,
+    others: Mapping[str, Sequence[AxisRun]] | None = None,
+) -> AxisFindings:  # fmt: skip
     found = AxisFindings(name, stated=stated)
     usable = [r for r in runs if np.isfinite(r.encoder).sum() >= ROWS]
     if not usable:
@@ -141,7 +144,7 @@ def _axis(name: str, runs: list[AxisRun], holdout: set[str], without: set[str], 
     for channel, values in ((found.following, gaps), (found.force, [r.force for r in usable])):
         if channel is not None:
             channel.whole = [(usable[k].time, values[k]) for k in channel.runs]
-    _name_rest(found)
+    _name_rest(found, usable, others or {})
     if found.strange:
         follows = found.following
         asked = [(usable[k], m) for k, m in zip(follows.runs, follows.moves, strict=True)] if follows else []
@@ -161,7 +164,7 @@ def _judged(
     return [[a.channels[0] for a in found if a.channels] for found in every]
 
 
-def _name_rest(found: AxisFindings) -> None:
+def _name_rest(found: AxisFindings, runs: Sequence[AxisRun], others: Mapping[str, Sequence[AxisRun]]) -> None:
     """What leftovers above the floor depend on, where nothing else says so; a lag that differs between the ways without friction
     that does.
     """
@@ -172,6 +175,22 @@ def _name_rest(found: AxisFindings) -> None:
         return
     for channel in found.channels:
         if channel.gate is not None and channel.gate.word == "above":
-            for kind, share, chance in dependences(channel.data, channel.columns, channel.moves):
-                found.unknown_in.append((f"{kind}:{found.name}", share))
+            names = [runs[k].name for k in channel.runs]
+            beside = {other: _moves(theirs, names, found.wide) for other, theirs in others.items()}
+            beside = {other: moves for other, moves in beside.items() if len(moves) == len(names)}
+            for kind, share, chance in dependences(channel.data, channel.columns, channel.moves, beside, channel.floor):
+                found.unknown_in.append((kind if ":" in kind else f"{kind}:{found.name}", share))
                 found.unknown_chance = min(found.unknown_chance, chance)
+            if not found.unknown_in and channel.gate.intervals:
+                found.unknown_in.append((f"time:{found.name}", sum(each.share for each in channel.gate.intervals)))
+
+
+def _moves(runs: Sequence[AxisRun], names: Sequence[str], wide: int) -> list[AxisTravel]:
+    """How an axis moved in the runs of those names that have it."""
+    named = {r.name: r for r in runs if len(r.time) >= ROWS}
+    ways = [
+        (named[n], named[n].setpoint if np.isfinite(named[n].setpoint).all() else named[n].encoder)
+        for n in names
+        if n in named
+    ]
+    return [travel(r.time, way, wide) for r, way in ways if np.isfinite(way).all()]
