@@ -50,6 +50,7 @@ WRONG = {
     38022: "a push in the middle of friction",
     38026: "a clock that trembles",
     37026: "friction of a hundred times the noise, whose shape is known to a hundredth",
+    45026: "friction of an axis that moves in one of four runs, of which the others foretell nothing",
     39028: "friction that turns round otherwise where the axis creeps back a little than where it turns",
     37052: "the same on two axes, where reversals fall between two rows",
 }

@@ -9,14 +9,15 @@ from typing import Any
 import numpy as np
 
 from camcomp.diagnosis.arm.curves import curve_of
-from camcomp.diagnosis.arm.dependence import turns
+from camcomp.diagnosis.arm.dependence import Dependence
 from camcomp.diagnosis.arm.discrepancy import regions, without_nuisance
+from camcomp.diagnosis.arm.drivers import drivers
 from camcomp.diagnosis.arm.fit import ArmFit
 from camcomp.diagnosis.arm.forward_selection import LEAST_GAIN, Step, odds, rms
 from camcomp.diagnosis.arm.gate import MINOR, Gate, standing_out, windows
 from camcomp.diagnosis.arm.next_poses import POSES_SEED, proposed, unseen_share
 from camcomp.diagnosis.arm.noise_floor import TipFloor
-from camcomp.diagnosis.arm.poses import CURVE, ArmBench, Poses
+from camcomp.diagnosis.arm.poses import CURVE, ArmBench
 from camcomp.diagnosis.arm.unseen import Court, Rival
 from camcomp.diagnosis.result.types import (
     UNKNOWN,
@@ -38,7 +39,6 @@ from camcomp.diagnosis.result.types import (
 from camcomp.diagnosis.statistics.probability import EVEN, probability_of_chance, stated
 from camcomp.ground.datatypes import Floats
 
-STEADY_K = 0.1  # by which a temperature has to change to drive anything
 FAINT = 0.01  # of the floor: what moves the tip less is not worth a line
 LEAST_TARGET = 0.5  # probability above which an actuator is named
 PLACES = 8  # parts of the workspace
@@ -267,16 +267,23 @@ def where(told: Told, gaps: Sequence[Floats]) -> Where:
     most: Any = max(stages, key=lambda s: stages[s]) if stages else "structure"
     whole = max(float(energy.sum()), 1e-300)
     unknown = told.verdict == "unknown"
+    intervals = _intervals(told) if unknown else ()
     return Where(
         stage=most,
         axes={axis: round(float(e) / whole, 4) for axis, e in zip("xyz", energy, strict=True)},
         actuators={name: round(size / total, 4) for name, size in actuators.items()},
-        drivers=tuple(Driver(covariate=d.covariate, share=round(d.share, 4)) for d in told.gate.drivers[:6])
-        if unknown
-        else (),
-        intervals=_intervals(told) if unknown else (),
+        drivers=_drivers(told, intervals) if unknown else (),
+        intervals=intervals,
         places=_places(told) if unknown else (),
     )
+
+
+def _drivers(told: Told, intervals: Sequence[IntervalShare]) -> tuple[Driver, ...]:
+    """What the leftover depends on, the most first: the time of stretches in which it is larger, where nothing else shows."""
+    found = drivers(told.bench, told.judges.poses, told.gate)
+    if not found and intervals:
+        found = [Dependence("time", sum(each.share for each in intervals), 0.0)]
+    return tuple(Driver(covariate=d.covariate, share=round(d.share, 4)) for d in found[:6])
 
 
 def _intervals(told: Told) -> tuple[IntervalShare, ...]:
@@ -313,36 +320,6 @@ def _places(told: Told) -> tuple[PlaceShare, ...]:
         share = round(float(square[own].sum()) / whole, 4)
         out.append(PlaceShare(x_mm=x, y_mm=y, z_mm=z, share=share, rms_um=_round(size)))
     return tuple(sorted(out, key=lambda each: -each.share))
-
-
-def patterns(bench: ArmBench, campaigns: Sequence[Poses]) -> dict[str, list[Floats]]:
-    """What a leftover of poses may depend on: covariate -> per campaign motions (n, 3, p) of the tip."""
-    out: dict[str, list[Floats]] = {}
-    for campaign in campaigns:
-        hung = bench.standing(campaign, ()).hung
-        moves = bench.joint_motion(campaign, (), bench.start[0])
-        for a, drive in enumerate(bench.robot.actuators):
-            own = moves[:, :, a]
-            if drive.revolute:
-                out.setdefault(f"position:{drive.name}", []).append(turns(own, campaign.q[:, a]))
-                torque = hung.drive[:, a] / max(float(np.abs(hung.drive[:, a]).max()), 1e-9)
-                pair = np.stack([torque, torque * np.abs(torque)], axis=1)
-                out.setdefault(f"force:{drive.name}", []).append(3e-4 * own[:, :, None] * pair[:, None, :])
-            else:
-                span = np.ptp(campaign.q[:, a]) or 1.0
-                out.setdefault(f"position:{drive.name}", []).append(
-                    turns(own * 1e3, 2 * np.pi * campaign.q[:, a] / span)
-                )
-        slow = (campaign.time - campaign.time.mean()) / max(float(np.ptp(campaign.time)), 1e-9)
-        wide = np.stack([slow, slow**2], axis=1)
-        every = np.concatenate([np.eye(3)[None] * 0.3 * f[:, None, None] for f in wide.T], axis=2)
-        out.setdefault("time", []).append(every)
-    if all(c.temperature is not None and np.ptp(c.temperature) > STEADY_K for c in campaigns):
-        out["temperature"] = [
-            np.eye(3)[None] * 0.1 * (c.temperature - c.temperature.mean())[:, None, None]  # type: ignore[union-attr]
-            for c in campaigns
-        ]
-    return out
 
 
 # -- what to measure next -----------------------------------------------------------------------------------------------

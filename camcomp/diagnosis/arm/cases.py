@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from camcomp.diagnosis.arm import answer
 from camcomp.diagnosis.arm.curves import with_curves
 from camcomp.diagnosis.arm.discrepancy import CLEAR, Discrepancy, fit_discrepancy, without_nuisance
+from camcomp.diagnosis.arm.drivers import patterns
 from camcomp.diagnosis.arm.few_fit import Suspects, of_few, with_spells
 from camcomp.diagnosis.arm.fit import ArmFit, Prepared, fit_of_leftovers, fitted, investigate, named_rows
 from camcomp.diagnosis.arm.forward_selection import LEAST_SHARE, rms
@@ -223,5 +223,5 @@ def _gate(bench: ArmBench, held: ArmBench | None, found: ArmFit, judges: Court, 
         widths[: len(found.amount)] = np.where(found.amount != 0.0, found.taken.widths, found.few.small)
     evidence = judges.evidence(Discrepancy(0.0, 1.0, sd))
     left = unseen(evidence, widths, sd)
-    patterns = answer.patterns(held or bench, judges.poses)
-    return judge(left, floor, [p.features for p in judges.poses], [p.time for p in judges.poses], patterns)
+    may_be = patterns(held or bench, judges.poses)
+    return judge(left, floor, [p.features for p in judges.poses], [p.time for p in judges.poses], may_be)

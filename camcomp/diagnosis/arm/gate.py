@@ -89,7 +89,7 @@ def judge(
     else:
         structured = any(s > MINOR**2 * 3.0 * floor.sd**2 for s in size)
     chance = min((each.log10_chance for each in sure), default=0.0) + np.log10(tried)
-    largest = sorted(_discovered(whole), key=lambda e: -e.share)
+    largest = sorted(discovered(whole), key=lambda e: -e.share)
     drivers = tuple({each.covariate: each for each in reversed(largest) if each.covariate}.values())[::-1]
     if floor is None:
         return Gate("above" if structured else "open", min(chance, 0.0), drivers, left, False, structured)
@@ -103,7 +103,7 @@ def judge(
     return Gate("at" if mean + norm.ppf(LIKELY) * spread < LEVEL else "open", 0.0, drivers, left, True)
 
 
-def _discovered(tried: Sequence[Dependence]) -> list[Dependence]:
+def discovered(tried: Sequence[Dependence]) -> list[Dependence]:
     """Those of which one in a hundred is false. Source: Benjamini, Hochberg, J. R. Statist. Soc. B 57 (1995) 289."""
     order = sorted(tried, key=lambda each: each.log10_chance)
     found = [i for i, each in enumerate(order, 1) if each.log10_chance <= np.log10(FALSE * i / len(order))]

@@ -38,10 +38,11 @@ class Series:
         return values if self.weight is None else np.asarray((values.T * self.weight).T)
 
 
-def series(times: Sequence[Floats], values: Sequence[Floats]) -> Series:
+def series(times: Sequence[Floats], values: Sequence[Floats], telling: int | None = None) -> Series:
     """Blocks of equal stretches of every run's time; where there are four runs or more, their whole run is left out for them.
 
-    Stretches, for an axis may stand in most of the runs.
+    Stretches, for an axis may stand in most of the runs. telling: how many of the runs it moves in, all where not given; the
+    others foretell nothing of one that is left out.
     """
     y = np.concatenate(list(values))
     run = np.concatenate([np.full(len(t), k) for k, t in enumerate(times)])
@@ -49,7 +50,7 @@ def series(times: Sequence[Floats], values: Sequence[Floats]) -> Series:
     each = max(MOST_BLOCKS // len(times), 2)
     parts = [np.minimum((t - t[0]) / max(t[-1] - t[0], 1e-12) * each, each - 1).astype(int) for t in times]
     block = np.concatenate([p + k * each for k, p in enumerate(parts)])
-    whole = len(times) >= WHOLE_RUNS
+    whole = (len(times) if telling is None else telling) >= WHOLE_RUNS
     others = []
     for b in np.unique(block):
         mine = block == b
@@ -83,7 +84,11 @@ def by_block(data: Series, left: Floats) -> Floats:
 
 
 def leftover(data: Series, A: Floats) -> Floats:
-    """What columns A (n, k) leave of every row (n,) when fitted on the other blocks."""
+    """What columns A (n, k) leave of every row (n,) when fitted on the other blocks.
+
+    No column does more (rms) than all there is: what the other blocks leave open, as they do of two columns that only differ in
+    one block, is as little as it may be.
+    """
     out = data.y.copy()
     if not A.shape[1]:
         return out
@@ -91,6 +96,9 @@ def leftover(data: Series, A: Floats) -> Floats:
     B = A / size
     C, y = data.weighed(B), data.weighed(data.y)
     whole, moment = C.T @ C, C.T @ y
+    own = np.linalg.lstsq(whole, moment, rcond=1e-12)[0]
+    noise, energy = float(np.sum((y - C @ own) ** 2)), max(float(y @ y), 1e-300)
+    whole = whole + noise / energy * np.eye(len(whole))
     for b, rest in enumerate(data.others):
         own = C[~rest]  # the block and its margins
         c = np.linalg.lstsq(whole - own.T @ own, moment - own.T @ y[~rest], rcond=1e-12)[0]
@@ -145,7 +153,7 @@ def fit(data: Series, A: Floats) -> tuple[Floats, Floats]:
     """
     c = solved(data, A)
     A, left = data.weighed(A), data.weighed(data.y - A @ c)
-    size = np.sqrt(np.mean(A**2, axis=0)) + 1e-300
+    size = np.sqrt(np.mean(A**2, axis=0)) + 1e-150
     B = A / size
     inverse = np.linalg.pinv(B.T @ B, rcond=1e-13)
     meat = np.zeros_like(inverse)

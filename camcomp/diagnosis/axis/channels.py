@@ -34,6 +34,7 @@ from camcomp.diagnosis.result.types import (
 from camcomp.diagnosis.statistics.probability import probability_of_chance, stated
 from camcomp.ground.datatypes import Floats
 
+STANDS = 0.01  # of its longest way in a run: in one in which it goes less an axis stands
 LEFT = 0.2  # of what was beyond the floor: more than that beside causes, and they may be a part of something else
 WITHIN = 0.5  # rows: force and motion of one row are not known to be of one instant to better than that
 ALIKE_Z = 2.0  # the same, below which two ways of turning round are alike
@@ -70,7 +71,9 @@ def either_way(m: AxisTravel) -> Floats:
 
 def series_of(moves: list[AxisTravel], values: list[Floats], train: list[int]) -> Series:
     """Values (n,) of some runs in blocks of time."""
-    return series([moves[k].time for k in train], [values[k] for k in train])
+    way = np.array([np.ptp(moves[k].position) for k in train])
+    moved = int((way > STANDS * way.max(initial=0.0)).sum())
+    return series([moves[k].time for k in train], [values[k] for k in train], moved)
 
 
 def table_of(moves: list[AxisTravel]) -> Callable[..., Floats]:

@@ -284,8 +284,12 @@ def _refused(
 ) -> None:  # fmt: skip
     """Terms that nobody states, tried on withheld blocks; those that hold are part of the unknown.
 
-    They have to hold where rows count for less that inertia and friction are not known for to the floor, too.
+    They have to hold where rows count for less that inertia and friction are not known for to the floor, too, and beside all that
+    friction may have, whether or not it has shown.
     """
+    if speed in columns and either_way not in columns:
+        columns = [*columns, either_way]
+        last = withheld(data, table(train, *columns))
     A = table(train, *columns)
     own = A[:, 1:] @ solved(data, A)[1:]
     ends = np.cumsum([len(moves[k].time) for k in train])[:-1]
