@@ -16,6 +16,7 @@ def beside(folder, seed, machine, known, unknown):
     return {(each["effect"], each["target"]) for each in result["causes"] if each["effect"] != "unknown"}
 
 
+@pytest.mark.campaign
 def test_the_friction_that_a_drive_feels_is_no_part_of_the_bump_that_only_the_tip_shows(tmp_path):
     """Both are the axis y's own, and the bump is half as large as what friction does to the tip."""
     known = ("friction", "y")

@@ -1,6 +1,7 @@
 """Where play and friction stood when a run began nobody knows, however long an axis waits for its first motion."""
 
 import numpy as np
+import pytest
 
 from camcomp.diagnosis.diagnose import diagnose
 from camcomp.diagnosis.experiment.open_experiment import open_experiment
@@ -9,6 +10,7 @@ from tests.trials.experiment import Bench, Made, Plan, character, row_times, sch
 PLAN = Plan(21, machine="router", channels="full", rows=160, runs=4, stated=True, rapids=False, paths=("circles-blended", "dwell-exact", "rectangle-exact"))  # fmt: skip
 
 
+@pytest.mark.campaign
 def test_friction_and_play_leave_nothing_unknown_where_an_axis_waits(tmp_path):
     rng = np.random.default_rng(PLAN.seed)
     ways = character(rng, False)

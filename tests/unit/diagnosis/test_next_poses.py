@@ -65,6 +65,7 @@ def test_a_list_of_poses_is_written_as_csv_and_as_joints():
     assert told == {"joint_names": ["rail", "elbow"], "points": [{"positions": [0.12, -0.5]}]}
 
 
+@pytest.mark.campaign  # test_ur10.py asks about the sample in CI
 def test_the_sample_asks_for_poses_that_its_arm_reaches(tmp_path):
     done = camcomp(
         "diagnose", "samples/ur10/experiment.yaml", "--json", tmp_path / "o.json", "--next-program", tmp_path / "p.csv"
