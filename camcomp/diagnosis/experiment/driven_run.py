@@ -120,7 +120,7 @@ def drive(
         inverse=twin.inverse, temperature=temperature,
     )  # fmt: skip
     if program is not None:
-        run_path = replace(run_path, feed_mm_per_min=program.feed)
+        run_path = replace(run_path, feed_mm_per_min=program.feed, cut_ahead_min=_cut_ahead(program, aligned))
     check_forces(log, name, measured, run_path.row_force)
     return DrivenRun(run_path, by, unsure, guessed, None, 0 if aligned is None else aligned.lag)
 
@@ -167,6 +167,13 @@ def _aligned(
     check_followed(log, name, found.distance[places(tip)], _agreement(path, found, tip), aside_mm)
     check_lines(log, name, way_from_lines(path, found))
     return found
+
+
+def _cut_ahead(program: _Program, aligned: Aligned | None) -> float:
+    """Minutes that the program had cut when its log began: the tool is no sharper for what nobody logged."""
+    if aligned is None or program.track.conditions.model is None:
+        return 0.0
+    return program.track.minutes_cut(int(aligned.motion[0]), float(aligned.share[0]))
 
 
 def _behind(measured: Measured, rho: Floats, tip: Floats, program: _Program, twin: Twin) -> Aligned | None:
@@ -257,7 +264,7 @@ def _led_by_tip(
     unsure |= _from_anywhere(path, aligned) | _at_corners(path, aligned, measured.time, acceleration)
     later = Cause("time_sync", shelf.load("effects", "time_sync"), None, {"offset_s": -SOON_S})
     velocity = (twin.sense(run_path, [later])[0].tip - loaded) / SOON_S
-    run_path = replace(run_path, feed_mm_per_min=program.feed, led=True)
+    run_path = replace(run_path, feed_mm_per_min=program.feed, led=True, cut_ahead_min=_cut_ahead(program, aligned))
     guessed = np.zeros((len(tip), len(twin.actuators)), bool)
     return DrivenRun(run_path, "tip", unsure, guessed, _across(path, aligned, velocity), aligned.lag)
 

@@ -56,7 +56,7 @@ def open_experiment(path: str | FilePath) -> OpenExperiment:
     worn = 0.0
     for k in order:
         runs[k] = replace(runs[k], run_path=replace(runs[k].run_path, cut_before_min=worn))
-        worn += runs[k].run_path.cut_min
+        worn += runs[k].run_path.cut_ahead_min + runs[k].run_path.cut_min
     return OpenExperiment(experiment, job, twin, tuple(with_clocks(twin, runs)), tuple(notes))
 
 

@@ -100,6 +100,13 @@ class Track:
         """Programmed tip (k, 3) mm at fraction w (k,) of piece (k,)."""
         return path_geometry.points(self.path, self.motion[piece], self.u(piece, w))
 
+    def minutes_cut(self, motion: int, share: float) -> float:
+        """Minutes of cutting as programmed, without acceleration, from the start of the path to a share (0 to 1) of a motion."""
+        within = np.clip((share - self.u0) / np.maximum(self.u1 - self.u0, 1e-12), 0.0, 1.0)
+        done = np.where(self.motion < motion, 1.0, np.where(self.motion == motion, within, 0.0))
+        feed = self.path.feed[self.motion[self.cutting]]
+        return float(np.sum((done * self.length)[self.cutting] / feed))
+
     def cut(self, piece: Ints, w: Floats) -> Track:
         """The same track with pieces cut at fractions w (k,), inside, of pieces (k,): the load of a piece fades linearly."""
         n = len(self.motion)

@@ -65,7 +65,8 @@ class RunPath:
     temperature: Floats | None  # (n,) deg C at the rows
     driven: Driven | None = None
     feed_mm_per_min: float = np.nan  # of the program, in the middle
-    cut_before_min: float = 0.0
+    cut_before_min: float = 0.0  # in earlier runs
+    cut_ahead_min: float = 0.0  # by the program in this run, before its log begins
     clock_s: float = 0.0  # by which the clock of the tip is known to be late
     between_s: float = (
         0.0  # by which the tip seems to have been read beside the instants of the rows, whatever the reason

@@ -379,7 +379,7 @@ class Twin:
         if temperature is not None and len(t) != len(temperature):
             temperature = np.interp(t, run_path.time, temperature)
         dt = np.diff(t, prepend=t[:1])
-        worn = run_path.cut_before_min + np.cumsum(dt * run_path.grid_cut) / 60.0
+        worn = run_path.cut_before_min + run_path.cut_ahead_min + np.cumsum(dt * run_path.grid_cut) / 60.0
         zero = np.zeros_like(run_path.grid_rho)
         motion = Motion(
             t,
