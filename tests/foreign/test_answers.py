@@ -32,6 +32,12 @@ def test_a_bending_tool_that_one_run_of_three_shows(tmp_path):
     assert [each["effect"] for each in result["causes"]] == ["tool_deflection"]
 
 
+def test_a_lag_of_all_axes_is_no_clock_where_forces_are_logged_and_encoders_are_not(tmp_path):
+    """Forces and what bends under them come as late as the axes; of set-points' forces a clock made the tip's late, by itself."""
+    result, row = judged(tmp_path, "serial", 44084)
+    assert result["verdict"] == "identified" and row["all"] and not row["false_cause"]
+
+
 @pytest.mark.campaign
 @pytest.mark.parametrize(
     ("generator", "seed", "named"),

@@ -105,9 +105,10 @@ def drive(
     aligned = None if program is None else _aligned(log, name, program, tip, measured)
     unsure = np.asarray(guessed.any(axis=1))
     if program is None or aligned is None:
-        forces = Forces.none(len(tip))
+        forces, told = Forces.none(len(tip)), False
     else:
         cut = _behind(measured, rho, tip, program, twin) if by == "setpoint" else None
+        told = by == "setpoint" and cut is None
         forces = cutting_forces(
             program.track, cut or aligned, tip, measured.time, bool(np.isfinite(measured.line).any())
         )
@@ -120,7 +121,9 @@ def drive(
         inverse=twin.inverse, temperature=temperature,
     )  # fmt: skip
     if program is not None:
-        run_path = replace(run_path, feed_mm_per_min=program.feed, cut_ahead_min=_cut_ahead(program, aligned))
+        run_path = replace(
+            run_path, feed_mm_per_min=program.feed, cut_ahead_min=_cut_ahead(program, aligned), told=told
+        )
     check_forces(log, name, measured, run_path.row_force)
     return DrivenRun(run_path, by, unsure, guessed, None, 0 if aligned is None else aligned.lag)
 

@@ -71,6 +71,7 @@ class RunPath:
     between_s: float = (
         0.0  # by which the tip seems to have been read beside the instants of the rows, whatever the reason
     )
+    told: bool = False  # forces are where set-points lead: what a loop makes of these makes the forces late, too
     led: bool = False  # the motion is that of the measured tip, which has no clock beside it then
 
     @cached_property

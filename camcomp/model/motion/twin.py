@@ -36,6 +36,8 @@ _FORWARD_MM = 1e-7
 _FORWARD_FAR_MM = 3.0  # from which on slopes are worked out anew for Newton's method,
 _FORWARD_NEAR_MM = 0.3  # and for what lies between its points
 _LATELY = 4  # changed machines that are kept
+_CREEPING = 1e-4  # of the square of the fastest speed: what moves as slowly is late by nobody knows how much
+_LATEST_S = 0.1  # of a position loop
 _SAME_LOAD = 1e-3  # share of the load by which a changed machine's may differ from that it was solved with
 
 
@@ -205,7 +207,10 @@ class Twin:
         if known is None or known.key != key or load is not known.load:
             known = self.structure(run_path, self._machine(robot, key), key, shift, load, slopes)
         solved = known
-        load = signal_path.loaded(causes, rows, run_path.row_force)
+        force = run_path.row_force
+        if run_path.told and signal_path.acting(causes, "control"):
+            force = run_path.forces(run_path.place(run_path.time - _lateness(run_path, grid)))
+        load = signal_path.loaded(causes, rows, force)
         load_tip = signal_path.loaded(causes, at_tip, run_path.forces(place_tip)) if late else load
         drive, tip = solved.drives(place), solved.tips(run_path, place_tip, seen)
         if slopes is not None:
@@ -444,6 +449,15 @@ def _around_rows(run_path: RunPath, grid: Motion) -> Motion:
         return grid
     near = grid.at(run_path.near_rows)
     return replace(near, encoder=path.grid_rho) if grid.encoder is run_path.grid_rho else near
+
+
+def _lateness(run_path: RunPath, grid: Motion) -> Floats:
+    """By how much (n,) s the encoders of a run are behind their set-points at the rows, along the way that these go."""
+    speed = np.gradient(run_path.grid_rho, run_path.grid, axis=0)
+    fast = np.maximum((speed**2).sum(axis=1), 1e-12)
+    late = ((run_path.grid_rho - grid.encoder) * speed).sum(axis=1) / fast
+    late = np.where(fast > _CREEPING * fast.max(), np.clip(late, 0.0, _LATEST_S), 0.0)
+    return run_path.between(late[:, None], run_path.time)[:, 0]
 
 
 def _gap_at(run_path: RunPath, at: Floats, gap: Floats | None, ahead: Floats | None) -> Floats:
