@@ -12,7 +12,17 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import minimize
 
-from camcomp.diagnosis.axis.block_least_squares import LEAST_Z, Gain, Series, fit, gain, log10_chance, solve, withheld
+from camcomp.diagnosis.axis.block_least_squares import (
+    LEAST_Z,
+    Gain,
+    Series,
+    fit,
+    gain,
+    leftover,
+    log10_chance,
+    solve,
+    withheld,
+)
 from camcomp.diagnosis.axis.findings import AxisChannel
 from camcomp.diagnosis.axis.gate import MINOR
 from camcomp.diagnosis.axis.terms import AxisTravel, ripple
@@ -48,8 +58,13 @@ class _Rows:
         return np.nan_to_num(np.stack(found, axis=1)) if found else np.zeros((n, 0))
 
     def withheld(self, forms: Sequence[Form]) -> Floats:
-        """Mean squares (blocks,) that base and forms leave where they were not fitted."""
+        """Mean squares (blocks,) that base and forms leave where they were not fitted, as rows count."""
         return withheld(self.data, np.concatenate([self.base, self.columns(forms)], axis=1))
+
+    def rms(self, forms: Sequence[Form]) -> float:
+        """Of the same, all rows alike."""
+        left = leftover(self.data, np.concatenate([self.base, self.columns(forms)], axis=1))
+        return float(np.sqrt(np.mean(left**2)))
 
 
 def axis_law(
@@ -198,7 +213,7 @@ def _told(name: str, seen: Sequence[tuple[bool, _Rows]], forms: Sequence[Form], 
         ]  # fmt: skip
         formula = law_sum(list(zip([float(v) for v in value], texts, strict=True)))
         formulas.append(f"{where} = {formula}")
-        before, after = (float(np.sqrt(np.mean(each))) for each in (rows.withheld([]), rows.withheld(forms)))
+        before, after = rows.rms([]), rows.rms(forms)
         changes.append((before, after))
         own_envelope = {
             key: (_round(float(rows.known[key].min())), _round(float(rows.known[key].max())))
