@@ -102,7 +102,7 @@ def test_what_the_rest_depends_on_is_named(tmp_path, seed):
     assert result["verdict"] == "unknown" and not row["false_cause"], fault
     assert drivers and drivers[0]["covariate"] == covariate, fault
     if covariate == "acceleration:y":
-        assert "when z moves alone, it goes with how y moves" in result["next_experiment"]["outcomes"][0]
+        assert "of z when it moves alone, it goes with how y moves" in result["next_experiment"]["outcomes"][0]
 
 
 def test_a_drag_that_grows_with_speed_is_neither_friction_that_pushes_nor_surely_a_lag(tmp_path):
