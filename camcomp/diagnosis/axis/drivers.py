@@ -73,8 +73,8 @@ def _covariates(
 
 
 def _stepped(x: Floats, where: Bools) -> Floats:
-    """Steps (n, BINS - 1) over a covariate (n,), between equally many of some rows."""
-    edges = np.unique(np.quantile(x[where], np.linspace(0.0, 1.0, BINS + 1)[1:-1]))
+    """Steps (n, BINS - 1) over a covariate (n,), between equally many of some rows; of all where these are none."""
+    edges = np.unique(np.quantile(x[where] if where.any() else x, np.linspace(0.0, 1.0, BINS + 1)[1:-1]))
     return (np.searchsorted(edges, x)[:, None] >= np.arange(1, len(edges) + 1)).astype(float)
 
 
