@@ -13,7 +13,7 @@ from camcomp.diagnosis.axis.terms import AxisTravel, Turning
 from camcomp.ground.datatypes import Bools, Floats
 
 BINS = 16  # of a covariate
-STEPS = 4  # of time, in each of which something may be more or less than before
+STEPS = 4  # powers of time since a run began
 SLOW = 0.01  # of the fastest row: rows of an axis that stands are of one place
 SINCE_MM = (0.005, 0.02, 0.1, 0.5, 2.0)  # ways from a reversal on
 

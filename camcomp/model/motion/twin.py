@@ -207,14 +207,17 @@ class Twin:
         if known is None or known.key != key or load is not known.load:
             known = self.structure(run_path, self._machine(robot, key), key, shift, load, slopes)
         solved = known
-        force = run_path.row_force
-        if run_path.told and signal_path.acting(causes, "control"):
-            force = run_path.forces(run_path.place(run_path.time - _lateness(run_path, grid)))
+        force, cut = run_path.row_force, place_tip
+        late_force = run_path.told and bool(signal_path.acting(causes, "control"))
+        if late_force:
+            behind = _lateness(run_path, grid)
+            force = run_path.forces(run_path.place(run_path.time - behind))
+            cut = run_path.place(seen - behind)
         load = signal_path.loaded(causes, rows, force)
-        load_tip = signal_path.loaded(causes, at_tip, run_path.forces(place_tip)) if late else load
+        load_tip = signal_path.loaded(causes, at_tip, run_path.forces(cut)) if late else load
         drive, tip = solved.drives(place), solved.tips(run_path, place_tip, seen)
         if slopes is not None:
-            usual = not signal_path.acting(causes, "process")
+            usual = not (late_force or signal_path.acting(causes, "process"))
             soft = solved.softer
             drive = slopes.drives(place).behind(
                 drive, place, solved, gap_row, load, usual=usual, softer=None if soft is None else soft.drive
