@@ -15,7 +15,7 @@ from camcomp.diagnosis.answer.locate import channel_axes, patterns_of, run_gaps
 from camcomp.diagnosis.answer.minor import minor_effects, outlying_rows
 from camcomp.diagnosis.answer.nested import causes_without
 from camcomp.diagnosis.answer.stretch import with_stretches
-from camcomp.diagnosis.fit.bench import Bench, Run
+from camcomp.diagnosis.fit.bench import Bench, CandidateCause, Run
 from camcomp.diagnosis.fit.columns import candidate_causes, working_causes
 from camcomp.diagnosis.fit.gap import floor_um, gap_of, main_channels, rest_by_actuator
 from camcomp.diagnosis.fit.intervals import joint_covariance
@@ -188,12 +188,11 @@ def _causes(problem: Problem, found: CauseSearch, best: Fitted, law: LawAnswer |
     out: list[FoundCause] = []
     causes = problem.causes(best.members, best.theta, best.extra)
     covariance = joint_covariance(problem, best) if best.members else np.zeros((0, 0))
-    # beside what depends on a place a wave may be the part of it that waves
-    placed = bool(found.unknown_in) and _first_label(found).startswith("position")
+    depends = _first_label(found)
     for j, i in enumerate(best.members):
         candidate = problem.columns.candidates[i]
         likely = found.verdict.inclusion.get(i, 0.0)
-        if placed and any(p.turns for p in candidate.shapes):
+        if _part_of_unknown(candidate, depends):
             likely = min(likely, EVEN)
         out.append(
             FoundCause(
@@ -217,6 +216,18 @@ def _causes(problem: Problem, found: CauseSearch, best: Fitted, law: LawAnswer |
             )
         )
     return tuple(out)
+
+
+def _part_of_unknown(candidate: CandidateCause, depends: str) -> bool:
+    """Whether a cause may be a part of something unknown that depends on one thing above all (a label, empty where nothing unknown is).
+
+    A wave may be the part that waves of what depends on a place, a lag the part that grows with speed of what depends on the
+    same drive's speed.
+    """
+    of, _, target = depends.partition(":")
+    if of == "position":
+        return any(p.turns for p in candidate.shapes)
+    return of == "velocity" and candidate.effect.STAGE == "control" and candidate.target in (None, target)
 
 
 def _parameters(problem: Problem, f: Fitted, covariance: Floats, j: int, cause: Cause) -> dict[str, Estimate]:

@@ -49,6 +49,7 @@ HARM_LOG = 2.0  # log density by which a cause has to harm the prediction of oth
 SAME_EVIDENCE = 2.0  # log evidence by which two sets may differ and still be the same answer, whatever their priors
 GATE = 0.4  # of the noise floor: what unseen runs show beyond it makes an effect that the library lacks
 GATE_LOCAL = 1.5  # of the floor: the same for what acts for a while only
+LEFT_OPEN = 0.25  # of what causes explain together: no set explains what leaves more, however large its members are
 LARGE_SCALES = 3.0  # size of an effect, in its typical ones, that would show at least if it can be seen at all
 MOST_SCALES = 8.0  # the same that nobody believes of a rival that fits as well
 HOPELESS_LOG = 12.0  # log evidence behind the best at which a set is not fitted any more
@@ -243,7 +244,7 @@ def _needed(problem: Problem, fit: Callable[[Members], Fitted], members: Members
 def unknown_kind(problem: Problem, f: Fitted, beyond: Mapping[str, Unexplained]) -> str | None:
     """The kind of channel in which unseen runs show more than the floor, None where none does."""
     least = _least(problem, f)
-    for_a_while = max(GATE_LOCAL * problem.floor.tip_um, 2.0 * GATE_SHARE * _largest(problem, f))
+    for_a_while = max(GATE_LOCAL * problem.floor.tip_um, 2.0 * _modelled(problem, f))
     # where the tip is measured it says itself what moves it; only of the control it knows nothing
     counts = [beyond[kind] for kind in (("tip", "encoder") if "tip" in beyond else beyond) if kind in beyond]
     found = [each for each in counts if each.z > SURE_Z and (each.excess_um > least or each.local_um > for_a_while)]
@@ -252,12 +253,16 @@ def unknown_kind(problem: Problem, f: Fitted, beyond: Mapping[str, Unexplained])
 
 def _least(problem: Problem, f: Fitted) -> float:
     """Size (um at the tip) from which on something beside what a set explains is worth a name."""
-    return max(GATE * problem.floor.tip_um, GATE_SHARE * _largest(problem, f))
+    return max(GATE * problem.floor.tip_um, _modelled(problem, f))
 
 
-def _largest(problem: Problem, f: Fitted) -> float:
-    """How far (um) a set moves the tip, or its largest member: what undoes another's work is modelled no better for it."""
-    return max((size_um(problem, f, some) for some in (f.members, *((i,) for i in f.members))), default=0.0)
+def _modelled(problem: Problem, f: Fitted) -> float:
+    """How far (um at the tip) what a set leaves may be an error of its own members.
+
+    That of the largest: what undoes another's work is modelled no better for it. But what is left of that work sets a limit.
+    """
+    together, alone = size_um(problem, f), [size_um(problem, f, (i,)) for i in f.members]
+    return min(GATE_SHARE * max(together, *alone, 0.0), LEFT_OPEN * together)
 
 
 def _with_stand_ins(

@@ -16,9 +16,11 @@ PROBLEM = SimpleNamespace(
 )
 
 
-@pytest.mark.parametrize(("first", "second", "shown"), [(45.0, -36.0, None), (9.0, 0.0, "tip"), (45.0, 0.0, None)])
+@pytest.mark.parametrize(
+    ("first", "second", "shown"), [(45.0, -32.0, None), (13.0, 0.0, "tip"), (45.0, 0.0, None), (200.0, -190.0, "tip")]
+)
 def test_causes_that_undo_each_other_are_modelled_no_better_for_it(first, second, shown):
-    """3 um beside a force of 45 um and links that take 36 of them away again."""
+    """3 um beside a force of 45 um and links that take 32 of them away again; but not beside two that leave 10 of 200."""
     f = Fitted((0, 1), np.array([first, second]), np.eye(2), 0.0, ())
     beyond = {"tip": Unexplained("tip", 3.0, 8.0, 4.0, (0, 0.0, 1.0), np.ones(3))}
     assert unknown_kind(PROBLEM, f, beyond) == shown
