@@ -21,6 +21,8 @@ from typing import Any
 
 import numpy as np
 
+from tests.foreign.axes.make import make as logs_of_axes
+from tests.foreign.poses.make import make as static_poses
 from tests.trials.experiment import Plan, make, write
 
 FACTORS = (0.5, 2.0)
@@ -38,19 +40,25 @@ SET = (
     Plan(8109, "unknown", (("guide_bump", "x"),), (10.0,), **SHORT),
     Plan(8110, "unknown", (("disturbed_drive", "y"),), (3.0,), **SHORT),
 )
-
+# one of each kind by the generators that know nothing of camcomp
+AXES, POSES = (31000, 31001, 31002, 31003, 31004), (21000, 21001, 21002, 21003, 21005)
 
 ROOT = Path(__file__).resolve().parents[2]
 
 
 def written(folder: Path) -> list[Path]:
-    """The experiments of the fixed set below a folder: an axis by itself, an arm in static poses, milled paths."""
+    """The experiments of the fixed set below a folder: an axis by itself, an arm in static poses, milled paths, more of the first two."""
     out = [_axis(folder / "s-axis"), _poses(folder / "s-poses")]
     for plan in SET:
         there = folder / f"s-{plan.seed}"
         out.append(there / "experiment.yaml")
         if not out[-1].exists():
             write(make(plan), plan, there)
+    for one, seeds in ((logs_of_axes, AXES), (static_poses, POSES)):
+        for seed in seeds:
+            out.append(folder / f"e-{seed}" / "experiment.yaml")
+            if not out[-1].exists():
+                one(seed, folder, None)
     return out
 
 

@@ -9,7 +9,8 @@ def test_a_constant_that_decides_is_told_from_one_that_does_not_and_from_one_tha
         ("axis.plausible", "NEAR"),
         ("search.cause_search", "GATE"),
     )
-    monkeypatch.setattr(sensitivity, "SET", ())
+    for name in ("SET", "AXES", "POSES"):
+        monkeypatch.setattr(sensitivity, name, ())
     monkeypatch.setattr(sensitivity, "FACTORS", (1.0, 1e6))
     (axis, _) = sensitivity.written(tmp_path)
     bench = sensitivity.Bench([gate, listed, milled])

@@ -10,7 +10,19 @@ import numpy as np
 import yaml
 
 from tests.foreign.poses.arm import Arm, Off, load_arm, turn_vector
-from tests.foreign.poses.causes import ODDS, Item, Local, alike, disturbed, library, loose, remains, rms, strange
+from tests.foreign.poses.causes import (
+    ODDS,
+    Item,
+    Local,
+    alike,
+    by_another_name,
+    disturbed,
+    library,
+    loose,
+    remains,
+    rms,
+    strange,
+)
 from tests.foreign.poses.plant import WAYS, AgainError, Odd, Plant, Run, poses, visited
 
 MACHINES = ("ur10", "kuka-kr210")
@@ -282,6 +294,9 @@ def attempt_one(seed: int, rng: np.random.Generator, out: Path, only: str | None
     for item, amount in due:
         change = change + local.of(item, amount)
     sets = alike(local, [item.key for item, _ in due], change, whole) if due else []
+    # small ones need not be named, but may be, by any name that does the same
+    names = {key for item, amount, listed in causes if listed["ratio"] < 2.7 and item.effect != "disturbance"
+             for key in by_another_name(local, local.of(item, amount))}  # fmt: skip
 
     tips = plant.tips(off, odd)
     seen, sigma = measured(plant, local, tips, s, rng)
@@ -335,6 +350,7 @@ def attempt_one(seed: int, rng: np.random.Generator, out: Path, only: str | None
         "floor": floor,
         "allowed_verdicts": honest(kind, floor != "not identifiable", frame is not None, len(sets)),
         "allowed_beside": [{"effect": e, "target": None} for e in ("workpiece_frame", "tool_length") if frame],
+        "may_be_named": sorted(names, key=str),
         "allowed_sets": [[{"effect": e, "target": t} for e, t in one] for one in sets],
         "frame": frame,
         "sensors": s
