@@ -36,7 +36,7 @@ from camcomp.diagnosis.result.types import (
     UnknownCause,
     Where,
 )
-from camcomp.diagnosis.statistics.probability import EVEN, probability_of_chance, stated
+from camcomp.diagnosis.statistics.probability import EVEN, UNSURE, probability_of_chance, stated
 from camcomp.ground.datatypes import Floats
 
 FAINT = 0.01  # of the floor: what moves the tip less is not worth a line
@@ -99,6 +99,9 @@ def causes(told: Told, gaps: Sequence[Floats]) -> tuple[tuple[FoundCause, ...], 
                 sure, probability = weights[step.group], found.few.places[effect, target]
                 probability = min(probability, _beside_unknown(told, e))
             size = 1e3 * float(np.sqrt(e / sum(len(b.r) for b in found.evidence.blocks)))
+            if found.few is not None and (told.floor is None or size < told.floor.um):
+                # without a floor nothing says whether all is explained; what is below it others may be wrong by
+                probability = min(probability, UNSURE)
             if told.floor is not None and size < MINOR * told.floor.um:
                 if size >= FAINT * told.floor.um:
                     minor.append(MinorEffect(effect=effect, target=target, size_um=_round(size)))

@@ -29,10 +29,10 @@ from camcomp.diagnosis.statistics.cause_sets import (
     total,
 )
 from camcomp.diagnosis.statistics.evidence import estimate
-from camcomp.diagnosis.statistics.probability import EVEN
+from camcomp.diagnosis.statistics.probability import EVEN, UNSURE
 from camcomp.diagnosis.statistics.score_test import ResidualTest
 from camcomp.diagnosis.statistics.stepwise import stepwise
-from camcomp.diagnosis.statistics.verdict import EQUAL_LOG_ODDS, UNSURE_ODDS, Verdict, judge
+from camcomp.diagnosis.statistics.verdict import EQUAL_LOG_ODDS, Verdict, judge
 from camcomp.ground import headway
 from camcomp.ground.datatypes import Floats
 
@@ -165,9 +165,7 @@ def search_causes(problem: Problem) -> CauseSearch:
     inclusion = verdict.inclusion | {i: 1.0 for i in known.members if i not in best.members}
     sure = {i: (1.0 - LOOKALIKE) * min(p, credible.get(i, 1.0)) for i, p in inclusion.items()}
     small = [i for i in known.members if size_um(problem, known, (i,)) < problem.floor.tip_um]
-    sure |= {
-        i: min(sure[i], UNSURE_ODDS / (1.0 + UNSURE_ODDS)) for i in small
-    }  # what the model itself is wrong by may be as large
+    sure |= {i: min(sure[i], UNSURE) for i in small}  # what the model itself is wrong by may be as large
     verdict = replace(verdict, inclusion=sure)
     prior = problem.prior if kind is None else firm_prior(problem)
     left = residual_tests(problem, known, prior)

@@ -3,6 +3,7 @@
 from math import exp, log
 
 EVEN = 0.5  # of an effect, before the data are looked at
+UNSURE = 0.8  # of what may be something else at most: beyond it a probability is taken for sure
 PLACES = 4
 
 

@@ -6,14 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from camcomp.diagnosis.statistics.cause_sets import CausePrior, Fitted, Members
-from camcomp.diagnosis.statistics.probability import EVEN
+from camcomp.diagnosis.statistics.probability import EVEN, UNSURE
 from camcomp.ground.datatypes import Floats
 
 EQUAL_LOG_ODDS = 3.0  # log odds within which two sets are told apart by nobody
 BARE_ODDS = 3.0  # of the leader against a set that does nearly the same: not worth a mention
-UNSURE_ODDS = (
-    4.0  # of the leader against all such sets together at most: what is ambiguous is not sure, which begins at 0.8
-)
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,8 +48,9 @@ def judge(
     held = probability.copy()
     near = BARE_ODDS * held[twin] > held[best]
     held[twin] = np.where(near, held[best], np.maximum(held[twin], held[best] * np.exp(-EQUAL_LOG_ODDS)))
-    if 0.0 < UNSURE_ODDS * (others := held[twin[1:]].sum()) < held[best]:  # what is ambiguous is not sure
-        held[twin[1:]] *= held[best] / (UNSURE_ODDS * others)
+    least = (1.0 - UNSURE) / UNSURE * held[best]
+    if 0.0 < (others := held[twin[1:]].sum()) < least:  # what is ambiguous is not sure
+        held[twin[1:]] *= least / others
     held[twin] *= probability[twin].sum() / held[twin].sum()
     inclusion: dict[int, float] = {}
     for fit, p in zip(fits, held, strict=True):
