@@ -38,6 +38,14 @@ def test_a_lag_of_all_axes_is_no_clock_where_forces_are_logged_and_encoders_are_
     assert result["verdict"] == "identified" and row["all"] and not row["false_cause"]
 
 
+@pytest.mark.parametrize("seed", [47052, pytest.param(47000, marks=pytest.mark.campaign), pytest.param(44087, marks=pytest.mark.campaign)],
+                         ids=["friction", "a shift where noise seems to have a memory", "a shift and a workpiece"])  # fmt: skip
+def test_what_is_minor_and_when_it_happened_are_known(tmp_path, seed):
+    """A spring some per cent off, far below the noise, was something unknown; of shifts the begin was found only."""
+    result, row = judged(tmp_path, "serial", seed)
+    assert result["verdict"] == "identified" and row["all"] and not row["false_cause"]
+
+
 @pytest.mark.campaign
 @pytest.mark.parametrize(
     ("generator", "seed", "named"),
@@ -65,8 +73,8 @@ def test_play_of_an_axis_that_plunges_when_the_log_begins(tmp_path):
 @pytest.mark.campaign
 @pytest.mark.parametrize(
     ("generator", "seed"),
-    [("serial", 5013), ("serial", 5025), ("parallel", 6003), ("parallel", 43140)],
-    ids=["rings", "slips under force", "chirps", "waves"],
+    [("serial", 5013), ("serial", 5025), ("parallel", 6003), ("parallel", 43140), ("serial", 44067), ("serial", 44119)],
+    ids=["rings", "slips under force", "chirps", "waves", "lags with the square of the speed", "goes with the grain"],
 )
 def test_what_imitates_something_unknown_is_not_named_for_certain(tmp_path, generator, seed):
     result, row = judged(tmp_path, generator, seed)

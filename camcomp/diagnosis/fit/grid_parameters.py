@@ -103,15 +103,16 @@ def _gains(
 
 
 def settled_interval(
-    bench: Bench, candidate: CandidateCause, shape: Mapping[str, float], left: Beside,
+    bench: Bench, candidate: CandidateCause, shapes: Sequence[Mapping[str, float]], left: Beside,
     whitened: White,
 ) -> dict[str, float]:  # fmt: skip
-    """The interval near one that was found whose columns explain most when they lose to the others what the leftover has lost.
+    """The interval near the best of those that were found whose columns explain most when they lose to the others what the leftover has lost.
 
     What begins where a drive turns is halfway a play: the leftover beside all plays shows less of it there.
     """
     paths = [run.run_path for run in bench.runs]
-    best, (start, end) = dict(shape), [each.name for each in candidate.shapes]
+    every = _gains(bench, candidate, shapes, left, whitened)
+    best, (start, end) = dict(shapes[0 if every is None else int(every.argmax())]), [p.name for p in candidate.shapes]
     run = next((p for p in paths if p.started <= 0.5 * (best[start] + best[end]) <= p.started + p.time[-1]), paths[0])
     row, step, most = float(np.median(np.diff(run.time))), 4, -np.inf
     while step:

@@ -5,6 +5,7 @@ not far beyond what chance makes of so many are none.
 """
 
 from collections.abc import Callable, Sequence
+from itertools import combinations
 
 import numpy as np
 
@@ -19,6 +20,7 @@ LOOK_ELSEWHERE = (
 LONGEST = 0.5  # of a run: what acts for longer is no disturbance
 LEAST_ROWS = 5
 _BLOCKS = 60
+_JUMPS = 5  # of a leftover, between which an interval is tried
 
 
 def never_ending(candidate: CandidateCause) -> dict[str, float]:
@@ -26,16 +28,18 @@ def never_ending(candidate: CandidateCause) -> dict[str, float]:
     return dict(zip((p.name for p in candidate.shapes), (-1e9, 1e9), strict=True))
 
 
-def best_interval(
+def likely_intervals(
     bench: Bench, candidate: CandidateCause, always: Sequence[ByChannel], rest: Sequence[Floats],
     places: Callable[[int], Floats],
-) -> dict[str, float] | None:  # fmt: skip
-    """The two instants, by the names of the candidate's shapes, between which it explains most of `rest` (white, per run).
+) -> list[dict[str, float]]:  # fmt: skip
+    """Pairs of instants, by the names of the candidate's shapes, between which it explains much of `rest` (white, per run).
 
-    always: white columns (w, p) per run of the candidate as if it never ended. places: where in the time of a run its white rows lie, 0 to 1. None where no interval stands out.
+    always: white columns (w, p) per run of the candidate as if it never ended. places: where in the time of a run its white
+    rows lie, 0 to 1. Empty where no interval stands out. The first is the best as far as those columns tell; where noise has a
+    long memory they tell little, and of a shift its begin and end are left: the others lie between the largest jumps.
     """
     start, end = (each.name for each in candidate.shapes)
-    found: list[tuple[float, float, float]] = []
+    best: tuple[float, list[tuple[float, float]]] = (LEAST_GAIN, [])
     for k, run in enumerate(bench.runs):
         columns = always[k][:, np.arange(always[k].width)]
         order = np.argsort(places(k), kind="stable")
@@ -50,14 +54,31 @@ def best_interval(
             for b in range(d):
                 size[1:, a, b] = np.cumsum(np.bincount(rows, (columns[:, a] * columns[:, b])[order]))
         gain, i, j = _best(hits, size, len(instants))
-        # half way to the rows outside, and early enough for the rows inside to see all of it
-        before, behind = (
-            0.5 * (instants[b] - instants[a]) for a, b in ((max(i - 1, 0), i), (j - 1, min(j, len(instants) - 1)))
-        )
-        rise = getattr(candidate.effect, "RISE_S", 0.0)
-        found.append((gain, float(instants[i] - max(before, rise)), float(instants[j - 1] + max(behind, rise))))
-    gain, begin, over = max(found, default=(0.0, 0.0, 0.0))
-    return {start: begin, end: over} if gain > LEAST_GAIN else None
+        if gain > best[0]:
+            rise = getattr(candidate.effect, "RISE_S", 0.0)
+            jumps = _jumps(np.bincount(rows, (rest[k] ** 2)[order]))
+            pairs = [(i, j), *(pair for pair in combinations(sorted({i, j, *jumps}), 2) if pair != (i, j))]
+            fair = [(i, j) for i, j in pairs if LEAST_ROWS <= j - i <= LONGEST * len(instants)]
+            best = gain, [_between(instants, i, j, rise) for i, j in fair]
+    return [{start: begin, end: over} for begin, over in best[1]]
+
+
+def _between(instants: Floats, i: int, j: int, rise: float) -> tuple[float, float]:
+    """Half way to the rows outside i to j - 1, and early enough for the rows inside to see all of it."""
+    before, behind = (
+        0.5 * (instants[b] - instants[a]) for a, b in ((max(i - 1, 0), i), (j - 1, min(j, len(instants) - 1)))
+    )
+    return float(instants[i] - max(before, rise)), float(instants[j - 1] + max(behind, rise))
+
+
+def _jumps(energy: Floats) -> list[int]:
+    """The instants (of n) at which a leftover jumps most, none beside a larger one."""
+    left, out = energy.copy(), list[int]()
+    for _ in range(min(_JUMPS, len(left) // LEAST_ROWS)):
+        at = int(np.argmax(left))
+        out.append(at)
+        left[max(at - LEAST_ROWS, 0) : at + LEAST_ROWS + 1] = 0.0
+    return out
 
 
 def _best(hits: Floats, size: Floats, n: int) -> tuple[float, int, int]:

@@ -10,7 +10,7 @@ from camcomp.diagnosis.fit.cause_prior import cause_prior
 from camcomp.diagnosis.fit.columns import Columns, build, candidate_columns, healthy_sizes, patterns, shape_default
 from camcomp.diagnosis.fit.floor import MINOR, NoiseFloor, least_noise, measure_floor
 from camcomp.diagnosis.fit.grid_parameters import beside, best_shape, quick_columns, settled_interval
-from camcomp.diagnosis.fit.intervals_in_time import best_interval, never_ending
+from camcomp.diagnosis.fit.intervals_in_time import likely_intervals, never_ending
 from camcomp.diagnosis.fit.label_offsets import with_scatter
 from camcomp.diagnosis.fit.noise import inflation, instrument_noise, less_certain
 from camcomp.diagnosis.fit.outliers import outlying, tails
@@ -97,9 +97,8 @@ def _scanned(problem: Problem) -> Problem:
             if always is None:
                 continue
             white = [problem.white_columns(k, each) for k, each in enumerate(always)]
-            best = best_interval(problem.bench, candidate, white, left.rest, problem.row_places)
-            if best is not None:
-                best = settled_interval(problem.bench, candidate, best, left, problem.white_columns)
+            near = likely_intervals(problem.bench, candidate, white, left.rest, problem.row_places)
+            best = settled_interval(problem.bench, candidate, near, left, problem.white_columns) if near else None
         else:
             best = best_shape(problem.bench, candidate, left, problem.white_columns)
         if best is None:

@@ -151,7 +151,8 @@ def search_causes(problem: Problem) -> CauseSearch:
     verdict = judge(fits, probability, same, problem.candidates)
     verdict = held_against(problem, fits, probability, verdict, harmful, temperature)
     best = fits[verdict.best]
-    beyond = unexplained(problem, best)
+    # what is minor beside the causes explains what it does, too
+    beyond = unexplained(problem, fit(best.all_members))
     kind = unknown_kind(problem, best, beyond)
     known, credible, instead = _credible(problem, best, beyond, fit, every)
     if known.members != best.members:
