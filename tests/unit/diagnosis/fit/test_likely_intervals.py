@@ -14,15 +14,24 @@ CANDIDATE = SimpleNamespace(
 )
 
 
-@pytest.mark.parametrize("memory", [0.0, 0.5, 0.95])
-def test_begin_and_end_are_among_what_is_likely_whatever_memory_the_noise_has(memory):
-    """A shift of forty units, fifty times the noise, as a filter shows it that takes each row less what the row before foretells."""
+def filtered(values, memory, gain):
+    """What rows show beyond what the rows before foretell."""
+    expected, out = 0.0, []
+    for value in values:
+        out.append(value - expected)
+        expected = memory * (expected + gain * out[-1])
+    return np.array(out)
+
+
+@pytest.mark.parametrize(("memory", "gain"), [(0.0, 0.0), (0.5, 1.0), (0.99, 0.3), (0.999, 0.1)])
+def test_begin_and_end_are_among_what_is_likely_whatever_memory_the_noise_has(memory, gain):
+    """Of a shift of forty units, sixty times the noise."""
     at = np.arange(ROWS)
     shift = np.where((at >= BEGAN) & (at < OVER), 40.0, 0.0) + np.random.default_rng(3).normal(0.0, 0.7, ROWS)
-    rest = shift - memory * np.concatenate([[0.0], shift[:-1]])
-    always = ByChannel(1, ((np.arange(1), np.full((ROWS, 1), 1.0 - memory)),))
+    always = ByChannel(1, ((np.arange(1), filtered(np.ones(ROWS), memory, gain)[:, None]),))
     path = SimpleNamespace(started=5.0, time=STEP_S * at)
     bench = SimpleNamespace(runs=[SimpleNamespace(run_path=path)])
+    rest = filtered(shift, memory, gain)
     found = likely_intervals(bench, CANDIDATE, [always], [rest], lambda k: np.linspace(0.0, 1.0, ROWS))
     off = [max(abs(each["from_s"] - 5.0 - STEP_S * BEGAN), abs(each["to_s"] - 5.0 - STEP_S * OVER)) for each in found]
     assert min(off) < 1.5 * STEP_S
