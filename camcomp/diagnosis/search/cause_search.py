@@ -32,7 +32,7 @@ from camcomp.diagnosis.statistics.evidence import estimate
 from camcomp.diagnosis.statistics.probability import EVEN, UNSURE
 from camcomp.diagnosis.statistics.score_test import ResidualTest
 from camcomp.diagnosis.statistics.stepwise import stepwise
-from camcomp.diagnosis.statistics.verdict import BARE_ODDS, EQUAL_LOG_ODDS, Verdict, judge
+from camcomp.diagnosis.statistics.verdict import EQUAL_LOG_ODDS, Verdict, judge, worth_a_mention
 from camcomp.ground import headway
 from camcomp.ground.datatypes import Floats
 
@@ -167,9 +167,7 @@ def search_causes(problem: Problem) -> CauseSearch:
     sure = {i: (1.0 - LOOKALIKE) * min(p, credible.get(i, 1.0)) for i, p in inclusion.items()}
     small = [i for i in known.members if size_um(problem, known, (i,)) < problem.floor.tip_um]
     sure |= {i: min(sure[i], UNSURE) for i in small}  # what the model itself is wrong by may be as large
-    # a lead that is not worth a mention is none: the model's own errors make as much
-    sure = {i: EVEN if EVEN < p < BARE_ODDS / (1.0 + BARE_ODDS) else p for i, p in sure.items()}
-    verdict = replace(verdict, inclusion=sure)
+    verdict = replace(verdict, inclusion={i: worth_a_mention(p) for i, p in sure.items()})
     prior = problem.prior if kind is None else firm_prior(problem)
     left = residual_tests(problem, known, prior)
     shown = kind if kind is None or kind in left else next(iter(left))

@@ -25,6 +25,11 @@ class Verdict:
     inclusion: dict[int, float]
 
 
+def worth_a_mention(probability: float) -> float:
+    """The probability of a cause, or even where its lead is not worth a mention: errors of the model make as much."""
+    return EVEN if EVEN < probability < BARE_ODDS / (1.0 + BARE_ODDS) else probability
+
+
 def judge(
     fits: Sequence[Fitted], probability: Floats, twins: Sequence[tuple[Members, Members]], candidates: CausePrior
 ) -> Verdict:
