@@ -32,7 +32,7 @@ from camcomp.diagnosis.statistics.evidence import estimate
 from camcomp.diagnosis.statistics.probability import EVEN, UNSURE
 from camcomp.diagnosis.statistics.score_test import ResidualTest
 from camcomp.diagnosis.statistics.stepwise import stepwise
-from camcomp.diagnosis.statistics.verdict import EQUAL_LOG_ODDS, Verdict, judge, worth_a_mention
+from camcomp.diagnosis.statistics.verdict import EQUAL_LOG_ODDS, Verdict, judge, open_where_even, worth_a_mention
 from camcomp.ground import headway
 from camcomp.ground.datatypes import Floats
 
@@ -168,6 +168,7 @@ def search_causes(problem: Problem) -> CauseSearch:
     small = [i for i in known.members if size_um(problem, known, (i,)) < problem.floor.tip_um]
     sure |= {i: min(sure[i], UNSURE) for i in small}  # what the model itself is wrong by may be as large
     verdict = replace(verdict, inclusion={i: worth_a_mention(p) for i, p in sure.items()})
+    verdict = verdict if kind else open_where_even(verdict, fits, probability)
     prior = problem.prior if kind is None else firm_prior(problem)
     left = residual_tests(problem, known, prior)
     shown = kind if kind is None or kind in left else next(iter(left))

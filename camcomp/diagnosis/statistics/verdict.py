@@ -1,7 +1,7 @@
 """From ranked sets of causes to a verdict: none, identified, ambiguous or unknown."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -71,3 +71,17 @@ def judge(
             inclusion |= {i: min(inclusion[i], EVEN) for i in leader.members if i not in fits[j].members}
     word = "none" if not leader.members else "ambiguous" if rivals else "identified"
     return Verdict(word, best, tuple(rivals), inclusion)
+
+
+def open_where_even(verdict: Verdict, fits: Sequence[Fitted], probability: Floats) -> Verdict:
+    """The verdict, but `ambiguous` where a member of what it identifies is no more likely than not: sets without it are its rivals."""
+    doubtful = {i for i in fits[verdict.best].members if verdict.inclusion[i] <= EVEN}
+    least = float(probability[verdict.best]) * np.exp(-EQUAL_LOG_ODDS)
+    rivals = tuple(
+        int(j)
+        for j in np.argsort(-probability)
+        if j != verdict.best and probability[j] > least and fits[j].members and doubtful - set(fits[j].members)
+    )
+    if verdict.word != "identified" or not rivals:
+        return verdict
+    return replace(verdict, word="ambiguous", rivals=rivals)

@@ -1,8 +1,10 @@
 """What a verdict says of a probability."""
 
+import numpy as np
 import pytest
 
-from camcomp.diagnosis.statistics.verdict import worth_a_mention
+from camcomp.diagnosis.statistics.cause_sets import Fitted
+from camcomp.diagnosis.statistics.verdict import Verdict, open_where_even, worth_a_mention
 
 
 @pytest.mark.parametrize(
@@ -10,3 +12,15 @@ from camcomp.diagnosis.statistics.verdict import worth_a_mention
 )
 def test_a_lead_of_less_than_three_to_one_is_none(found, said):
     assert worth_a_mention(found) == said
+
+
+@pytest.mark.parametrize(
+    ("sure", "said"), [({0: 0.5, 1: 0.9}, ("ambiguous", (1, 3))), ({0: 0.9, 1: 0.9}, ("identified", ()))]
+)
+def test_what_is_no_more_likely_than_not_is_not_identified(sure, said):
+    """Of two causes one is doubtful: larger sets without it, and that of the other one alone, are as good; others are too unlikely."""
+    sets = [(0, 1), (1,), (0, 1, 2), (1, 2, 3), (3,), ()]
+    fits = [Fitted(members, np.zeros(len(members)), np.eye(len(members)), 0.0, ()) for members in sets]
+    probability = np.array([0.4, 0.25, 0.15, 0.1, 0.01, 0.09])
+    verdict = open_where_even(Verdict("identified", 0, (), sure), fits, probability)
+    assert (verdict.word, verdict.rivals) == said
