@@ -56,7 +56,7 @@ def likely_intervals(
         gain, i, j = _best(hits, size, len(instants))
         if gain > best[0]:
             rise = getattr(candidate.effect, "RISE_S", 0.0)
-            jumps = _jumps(np.bincount(rows, (rest[k] ** 2)[order]))
+            jumps = _jumps(np.asarray(np.bincount(rows, (rest[k] ** 2)[order]), np.float64))
             pairs = [(i, j), *(pair for pair in combinations(sorted({i, j, *jumps}), 2) if pair != (i, j))]
             fair = [(i, j) for i, j in pairs if LEAST_ROWS <= j - i <= LONGEST * len(instants)]
             best = gain, [_between(instants, i, j, rise) for i, j in fair]
