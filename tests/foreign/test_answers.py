@@ -38,7 +38,21 @@ def test_a_lag_of_all_axes_is_no_clock_where_forces_are_logged_and_encoders_are_
     assert result["verdict"] == "identified" and row["all"] and not row["false_cause"]
 
 
-@pytest.mark.parametrize("seed", [47052, pytest.param(47000, marks=pytest.mark.campaign), pytest.param(44087, marks=pytest.mark.campaign)],
+@pytest.mark.campaign
+def test_two_joints_that_do_the_same_have_the_same_minor_causes_beside_them(tmp_path):
+    """A shift of A4 was told as one of A1, sure, by friction elsewhere that was minor beside that set alone."""
+    result, row = judged(tmp_path, "serial", 49122)
+    assert result["verdict"] == "ambiguous" and row["first_or_class"]
+
+
+@pytest.mark.campaign
+def test_a_log_that_begins_near_the_end_of_its_program_has_missed_nothing(tmp_path):
+    result, row = judged(tmp_path, "serial", 49071)
+    assert result["verdict"] == "identified" and row["all"] and all(row["held"])
+
+
+@pytest.mark.parametrize(
+    "seed", [47052, pytest.param(47000, marks=pytest.mark.campaign), pytest.param(44087, marks=pytest.mark.campaign)],
                          ids=["friction", "a shift where noise seems to have a memory", "a shift and a workpiece"])  # fmt: skip
 def test_what_is_minor_and_when_it_happened_are_known(tmp_path, seed):
     """A spring some per cent off, far below the noise, was something unknown; of shifts the begin was found only."""

@@ -173,10 +173,16 @@ def _aligned(
 
 
 def _cut_ahead(program: _Program, aligned: Aligned | None) -> float:
-    """Minutes that the program had cut when its log began: the tool is no sharper for what nobody logged."""
-    if aligned is None or program.track.conditions.model is None:
+    """Minutes that the program had cut when its log began: the tool is no sharper for what nobody logged.
+
+    By the first row on a cut: on its way there the tool may be nearest to where the program ends.
+    """
+    track = program.track
+    if aligned is None or track.conditions.model is None:
         return 0.0
-    return program.track.minutes_cut(int(aligned.motion[0]), float(aligned.share[0]))
+    cuts = np.isin(aligned.motion, track.motion[track.cutting]) & (aligned.distance < ASIDE_MM)
+    first = int(np.argmax(cuts))
+    return track.minutes_cut(int(aligned.motion[first]), float(aligned.share[first]))
 
 
 def _behind(measured: Measured, rho: Floats, tip: Floats, program: _Program, twin: Twin) -> Aligned | None:

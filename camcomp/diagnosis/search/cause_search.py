@@ -1,6 +1,6 @@
 """The search for causes on one problem: which sets are tried, in which order, and how they are ranked."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -284,6 +284,11 @@ def _with_stand_ins(
     by_structure = [fit(members) for members in stand_ins(design, best.members, best.theta)]
     by_structure = [f for f in by_structure if _possible(problem, f) and not cancels(problem, f)]
     found = {f.members: f for f in by_structure} | found
+    # what is minor beside the leader may be beside its effects at other targets, too: else it would choose between them
+    if best.minor:
+        rivals = _same_effects(problem, tuple(found.values()), fit(best.members))
+        sound.share_minor(found, {best.members, *rivals}, fit, temperature)
+        best = found[best.members]
     near = [members for _, members in _same(problem, tuple(found.values()), best)]
     for members in both_exchanged(problem.candidates, best.members, near):
         if members not in found and not cancels(problem, other := fit(members)):
@@ -295,6 +300,18 @@ def _with_stand_ins(
         probability = probabilities(fits, problem.candidates, temperature)
     same = _same(problem, fits, best) + [(best.members, f.members) for f in by_structure]
     return fits, probability, same
+
+
+def _same_effects(problem: Problem, fits: Sequence[Fitted], best: Fitted) -> list[Members]:
+    """The sets of the same effects as the best one at other targets that come near it, the likeliest first."""
+    value = problem.candidates.value
+
+    def names(f: Fitted) -> list[str]:
+        return sorted(problem.columns.candidates[i].name for i in f.members)
+
+    alike = [f for f in fits if f.members != best.members and names(f) == names(best)]
+    near = [f for f in alike if value(f) > value(best) - HOPELESS_LOG]
+    return [f.members for f in sorted(near, key=value, reverse=True)[:EXCHANGED]]
 
 
 def visible(problem: Problem, i: int) -> bool:
