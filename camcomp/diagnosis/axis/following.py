@@ -46,6 +46,7 @@ from camcomp.diagnosis.result.types import (
 from camcomp.diagnosis.statistics.probability import EVEN
 from camcomp.ground.datatypes import Floats
 
+CRITICAL = 1.0  # damping of a loop from which on it does not swing over
 ALIKE = 0.02  # of a time constant: by which those of axes may differ and be one
 EQUAL = 1.05  # of what a loop with inertia leaves: what one that swings over may leave to be the simpler answer
 
@@ -119,10 +120,13 @@ def _followed(
     close(found, channel, named, data, table, columns, test, gaps, moves)
     found.following = channel
     taken, beyond = float(np.mean(before) - np.mean(last)), float(np.mean(last)) - floor**2
-    if channel.gate is not None and channel.gate.word == "above" and beyond > LEFT * (taken + beyond):
-        # anything takes a part of something unknown; what leaves much of it may be no more than that
+    if _above(found):
+        # anything takes a part of something unknown; what leaves much of it may be no more than that, nor does a loop
+        # that creeps to where it is told swing over
+        much, creeps = beyond > LEFT * (taken + beyond), swung is not None and swung.swing.damping > CRITICAL
+        doubtful = [effect for effect in named if much or (creeps and effect == "servo_overshoot")]
         found.causes = [
-            c.model_copy(update={"probability": min(c.probability, EVEN)}) if c.effect in named else c
+            c.model_copy(update={"probability": min(c.probability, EVEN)}) if c.effect in doubtful else c
             for c in found.causes
         ]
     return found

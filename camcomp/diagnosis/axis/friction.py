@@ -17,10 +17,14 @@ from camcomp.ground.datatypes import Bools, Floats
 
 
 def brakes(data: Series, A: Floats) -> bool:
-    """Whether the first of the columns A (n, k), friction that turns round, may be against the motion: other friction is none."""
+    """Whether the first two of the columns A (n, k), friction that turns round and drag with the speed, may be against the motion
+    where it is slow and where it is fast: other friction is none.
+    """
     c, C = fit(data, A)
-    most = float(c[0]) + 1.96 * float(np.sqrt(C[0, 0]))
-    return most > 0.0
+    fast = float(np.abs(A[:, 1]).max())
+    ways = np.array([[1.0, 0.0], [1.0, fast]])
+    most = ways @ c[:2] + 1.96 * np.sqrt(np.einsum("ij,jk,ik->i", ways, C[:2, :2], ways))
+    return bool(np.all(most > 0.0))
 
 
 @dataclass(frozen=True, eq=False)
