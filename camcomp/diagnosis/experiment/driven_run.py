@@ -180,9 +180,9 @@ def _cut_ahead(program: _Program, aligned: Aligned | None) -> float:
     track = program.track
     if aligned is None or track.conditions.model is None:
         return 0.0
-    cuts = np.isin(aligned.motion, track.motion[track.cutting]) & (aligned.distance < ASIDE_MM)
-    first = int(np.argmax(cuts))
-    return track.minutes_cut(int(aligned.motion[first]), float(aligned.share[first]))
+    near = aligned.distance < max(ASIDE_MM, float(np.median(aligned.distance)))  # a tool may bend by more
+    cuts = np.flatnonzero(np.isin(aligned.motion, track.motion[track.cutting]) & near)
+    return track.minutes_cut(int(aligned.motion[cuts[0]]), float(aligned.share[cuts[0]])) if len(cuts) else 0.0
 
 
 def _behind(measured: Measured, rho: Floats, tip: Floats, program: _Program, twin: Twin) -> Aligned | None:
