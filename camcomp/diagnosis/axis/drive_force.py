@@ -46,7 +46,7 @@ from camcomp.diagnosis.axis.friction import (
 )
 from camcomp.diagnosis.axis.gate import MINOR
 from camcomp.diagnosis.axis.noise_floor import rows_floor
-from camcomp.diagnosis.axis.push import QUARTERS, Window, edges, find_window, seen_elsewhere, sharp
+from camcomp.diagnosis.axis.push import QUARTERS, Window, away_from_ends, edges, find_window, seen_elsewhere, sharp
 from camcomp.diagnosis.axis.terms import (
     AxisTravel,
     Turning,
@@ -205,8 +205,8 @@ def _forced(
                 return table(ks, *(m if m is not turn else (lambda m: m.reversal(how)) for m in own))
 
             alike = as_good(data, turned, length.distance) if length.speed is None else []
-            unsure = not_known_beside(data, turned, train, [*train, *test], length, alike, unsure or {})
             lengths = around(alike) if alike else [length.distance]
+            unsure = not_known_beside(data, turned, train, [*train, *test], length, lengths, unsure or {})
             tables = [*(turned(Turning(d)) for d in lengths if alike), table(train, *columns)]
             found.causes.append(
                 friction_of(found, data, tables, length, shape, lengths, probability_of(g), before, last)
@@ -249,11 +249,11 @@ def _without(pushes: Sequence[Window], run: int, force: Floats) -> Floats:
 
 
 def _push_cause(name: str, run: AxisRun, window: Window, now: AxisChannel, raw: Series) -> FoundCause:
-    rows = _left_of(now)[window.run][window.first : window.last]
+    left = _left_of(now)[window.run]
+    rows = left[away_from_ends(window.first, window.last, run.time)[0]]
     parts = [float(np.mean(part)) for part in np.array_split(rows, QUARTERS)]
     spread = float(student.ppf(0.975, QUARTERS - 1)) * float(np.std(parts, ddof=1)) / np.sqrt(QUARTERS)
-    step = 2.0 * float(np.median(np.diff(run.time)))
-    begin, end = (run.started + float(run.time[min(i, len(run.time) - 1)]) for i in (window.first, window.last))
+    begin, end = (_instant(run, row) for row in (window.first, window.last))
     square = window.shift**2 * (window.last - window.first) / len(raw.y)
     return FoundCause(
         effect="disturbance",
@@ -262,10 +262,18 @@ def _push_cause(name: str, run: AxisRun, window: Window, now: AxisChannel, raw: 
         share=round(min(square / float(np.var(raw.y)), 1.0), 4),
         parameters={
             "force_N": value_of(-window.shift, spread),
-            "from_s": value_of(begin, step),
-            "to_s": value_of(end, step),
+            "from_s": value_of(*begin),
+            "to_s": value_of(*end),
         },
     )
+
+
+def _instant(run: AxisRun, row: int) -> tuple[float, float]:
+    """When something changed, s, that `row` is the first to show, and to what that is known: rows before it may be lost."""
+    row = min(row, len(run.time) - 1)
+    since = float(run.time[row] - run.time[max(row - 1, 0)])
+    step = float(np.median(np.diff(run.time)))
+    return run.started + float(run.time[row]) - 0.5 * max(since - step, 0.0), 0.5 * max(since - step, 0.0) + 2.0 * step
 
 
 def _weighed(data: Series, A: Floats, rows: Sequence[int], floor: float) -> Series:

@@ -95,7 +95,8 @@ def _followed(
     lag = None if "servo_lag" in without else _lag(data, table, train, columns, floor)
     if lag is not None:
         columns, last = [*columns, *lag.columns], lag.last
-        c, C = fit(data, table(train, *columns))
+        A = table(train, *columns)
+        c, C = fit(data, A)
         spread = 1.96e3 * np.sqrt(np.diag(C))
         spread[columns.index(speed)] += 1e3 * KNOWN * abs(float(c[columns.index(speed)]))
         value = dict(zip(columns, (value_of(1e3 * each, s) for each, s in zip(c, spread, strict=True)), strict=True))
@@ -109,10 +110,12 @@ def _followed(
             )
         )
         named.append("servo_lag")
-        if either_way in columns and abs(float(c[columns.index(either_way)])) > KNOWN * abs(
-            float(c[columns.index(speed)])
-        ):
-            found.one_way = lag.lopsided
+        if either_way in columns:
+            one_way, late = (
+                float(np.sqrt(np.mean((c * A)[:, columns.index(each)] ** 2))) for each in (either_way, speed)
+            )
+            if one_way > max(KNOWN * late, MINOR * floor):
+                found.one_way = lag.lopsided
         i = columns.index(acceleration) if acceleration in columns else None
         found.details["following"] = {} if i is None else {"acceleration_us2": value_of(1e6 * c[i], 1e3 * spread[i])}
         if lag.turn in columns:

@@ -15,6 +15,7 @@ from camcomp.ground.datatypes import Floats
 MINOR = 0.3  # of the floor: what is smaller is no unknown, however sure it is
 ABOVE = 1.25  # of the floor's square: rows do not tell it to better than an eighth
 LOCAL = 2.0  # of the floor's square, that a stretch has to show: as much again as the floor
+GOING_ON = 0.5  # of the floor's square, that rows behind each other have to share in a stretch: half of what LOCAL asks for beyond it
 LEVEL = 1.5  # of the floor's square that a leftover has to stay below to be the floor
 BLOCK = 8  # rows
 MEDIAN = 0.9065  # of the variance of eight rows of white noise over its mean (chi-square of seven)
@@ -115,6 +116,7 @@ def intervals(
     pure = chi2.isf(FALSE / len(stretches), rows_each) / rows_each  # what even white noise reaches
     chances = norm.logsf((log - middle) / max(spread, 1e-12)) / np.log(10.0) + np.log10(len(stretches))
     out = (chances < np.log10(FALSE)) & (size > LOCAL * floor**2) & (size > pure * np.exp(middle))
+    out &= np.array([_going_on(left[k][rows]) for k, rows in stretches]) > GOING_ON * floor**2
     if inside is not None:
         out &= np.array([energy(inside[k][rows], floor) for k, rows in stretches]) > LOCAL * floor**2
     joined: list[Interval] = []
@@ -128,6 +130,11 @@ def intervals(
         else:
             joined.append(Interval(k, t0, t1, share))
     return tuple(joined), float(chances[out].min(initial=0.0))
+
+
+def _going_on(left: Floats) -> float:
+    """Mean product of rows (n,) and those behind them: of what goes on its mean square, of noise nothing, however large it is."""
+    return float(np.mean(left[1:] * left[:-1]))
 
 
 def _count(time: Floats) -> int:

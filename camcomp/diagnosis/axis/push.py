@@ -10,7 +10,7 @@ from scipy.linalg import block_diag
 from scipy.stats import norm
 
 from camcomp.diagnosis.axis.terms import AxisTravel
-from camcomp.ground.datatypes import Floats, Ints
+from camcomp.ground.datatypes import Bools, Floats, Ints
 
 CELL_S = 0.02  # in which a window begins and ends, before it is placed to a row
 SHORTEST_S, LONGEST = 0.2, 0.6  # of a window; of its run: what lasts longer is how the run is
@@ -78,8 +78,10 @@ def find_window(
     shift, rest = _alone(rests[k], bases[k], first, last)
     if abs(shift) < LEAST_SIZE * floor or times[k][last - 1] - times[k][first] < SHORTEST_S:
         return None
-    outside = float(np.mean(np.concatenate([rest[:first], rest[last:]])))
-    parts = [float(np.mean(p)) - outside for p in np.array_split(rest[first:last], QUARTERS)]
+    # it takes a while to come and to go: rows at its ends are not as high as it is
+    inside, outside = (rest[rows] for rows in away_from_ends(first, last, times[k]))
+    parts = [float(np.mean(p) - np.mean(outside)) for p in np.array_split(inside, QUARTERS)]
+    shift = float(np.mean(inside) - np.mean(outside))
     if not all(abs(p - shift) < LEVEL * abs(shift) for p in parts):
         return None
     chance = float(norm.logsf(np.sqrt(score_of) / floor) / np.log(10.0))
@@ -129,9 +131,21 @@ def seen_elsewhere(window: Window, moves: Sequence[AxisTravel]) -> bool:
 
 def edges(window: Window, time: Floats) -> Floats:
     """N (n,) that rows of its run are not known to for it: at its ends, which no log shows sharper than SHARP_S."""
-    ends = time[[window.first, min(window.last, len(time) - 1)]]
-    near = np.min(np.abs(time[:, None] - ends), axis=1) < SHARP_S
-    return np.where(near, abs(window.shift), 0.0)
+    return np.where(_at_ends(window.first, window.last, time), abs(window.shift), 0.0)
+
+
+def away_from_ends(first: int, last: int, time: Floats) -> tuple[Bools, Bools]:
+    """Rows (n,) inside a window and outside of it that are further than SHARP_S from both of its ends; all, where none are."""
+    far = ~_at_ends(first, last, time)
+    inside = np.zeros(len(time), bool)
+    inside[first:last] = True
+    inside, outside = (on & far if np.any(on & far) else on for on in (inside, ~inside))
+    return inside, outside
+
+
+def _at_ends(first: int, last: int, time: Floats) -> Bools:
+    ends = time[[first, min(last, len(time) - 1)]]
+    return np.asarray(np.min(np.abs(time[:, None] - ends), axis=1) < SHARP_S)
 
 
 def sharp(window: Window, rest: Floats, time: Floats) -> bool:
