@@ -9,10 +9,11 @@ from camcomp.diagnosis.statistics.cause_sets import CausePrior
 
 def cause_prior(columns: Columns) -> CausePrior:
     """Prior weights: every effect alike; within an effect one value for all weighs half, or all targets alike."""
-    names = sorted({a.name for a in columns.candidates})
+    candidates = columns.candidates  # what follows outlives these columns, which are large
+    names = sorted({a.name for a in candidates})
     weight = []
-    for a in columns.candidates:
-        same = [b for b in columns.candidates if b.name == a.name]
+    for a in candidates:
+        same = [b for b in candidates if b.name == a.name]
         common = any(b.target is None for b in same)
         share = (
             1.0 / len(same) if not common or len(same) == 1 else (0.5 if a.target is None else 0.5 / (len(same) - 1))
@@ -21,12 +22,10 @@ def cause_prior(columns: Columns) -> CausePrior:
         weight.append(np.log(share / len(names)) - sought)
 
     def exclusive(i: int, j: int) -> bool:
-        a, b = columns.candidates[i], columns.candidates[j]
+        a, b = candidates[i], candidates[j]
         return a.name == b.name and (a.target is None or b.target is None)
 
-    kinds = [
-        tuple(i for i, a in enumerate(columns.candidates) if a.name == name and a.target is not None) for name in names
-    ]
+    kinds = [tuple(i for i, a in enumerate(candidates) if a.name == name and a.target is not None) for name in names]
     return CausePrior(
-        tuple(tuple(columns.of(i)) for i in range(len(columns.candidates))), np.array(weight), exclusive, tuple(kinds)
+        tuple(tuple(columns.of(i)) for i in range(len(candidates))), np.array(weight), exclusive, tuple(kinds)
     )

@@ -202,8 +202,9 @@ def tip_um(bench: Bench, per_run: Sequence[Floats]) -> float:
     return 1e3 * float(np.sqrt(whole / max(sum(map(len, per_run)), 1)))
 
 
-def moved_tip(bench: Bench, k: int, changes: Floats) -> Floats:
-    """How far changes (n, c, j) of the channels of run k move the tip (n, 3, j), mm, whatever channel shows them.
+def moved_tip(bench: Bench, k: int, changes: Floats, rows: slice = slice(None)) -> Floats:
+    """How far changes (n, c, j) of the channels of run k, or of some of its rows, move the tip (n, 3, j), mm, whatever channel
+    shows them.
 
     Where the tip is the motion what lies along the path is when it was driven, and no error.
     """
@@ -211,7 +212,7 @@ def moved_tip(bench: Bench, k: int, changes: Floats) -> Floats:
     if bench.runs[k].turn is not None:
         moved = moved * np.array([0.0, 1.0, 1.0])[:, None]
     if bench.runs[k].by == "setpoint" and bench.runs[k].measured.has("encoder"):
-        ways = bench.thin_slopes(k)
+        ways = bench.thin_slopes(k)[rows]
         moved = moved + ways @ changes[:, 3 : 3 + ways.shape[2]]
     return moved
 

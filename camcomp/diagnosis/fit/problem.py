@@ -29,6 +29,7 @@ SETTLED = 0.05  # chi-square that one more pass may cost
 FARTHER = 10  # further passes for shapes that are on their way from where they were scanned
 HALVED = 6  # times that a step is halved which no machine can take
 OTHER_LAW_LOG = 3.0  # log evidence by which another law than the nominal one has to be better
+ROWS_AT_ONCE = 256  # in a sum over rows: all of a long run at once are much memory
 STRAIGHT = 0.3  # chi-square that the bend of the model may cost before it is followed
 
 
@@ -57,10 +58,13 @@ class Problem:
     @cached_property
     def tip_gram(self) -> Floats:
         """Products (k, k) of what the columns do to the tip, mean over the rows of all runs, mm2."""
-        rows = sum(map(len, self.residuals))
-        moved = (moved_tip(self.bench, k, block.dense()) for k, block in enumerate(self.columns.blocks))
-        parts = (each.reshape(-1, each.shape[2]) for each in moved)
-        return np.asarray(sum(each.T @ each for each in parts) / max(rows, 1))
+        out = np.zeros((len(self.columns.names),) * 2)
+        for k, (block, own) in enumerate(zip(self.columns.blocks, self.residuals, strict=True)):
+            for first in range(0, len(own), ROWS_AT_ONCE):
+                rows = slice(first, first + ROWS_AT_ONCE)
+                moved = moved_tip(self.bench, k, block.dense(rows), rows).reshape(-1, len(out))
+                out += moved.T @ moved
+        return out / max(sum(map(len, self.residuals)), 1)
 
     def size_um(self, index: Sequence[int], theta: Floats) -> float:
         """How far (rms over the rows) some columns with coordinates theta (d,) move the tip."""

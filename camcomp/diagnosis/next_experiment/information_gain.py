@@ -108,24 +108,11 @@ def program_weight(problem: Problem) -> Floats:
 
     What encoders see moves the tip too; where the workpiece lies and what the clock says is no error of the machine.
     """
-    m, bench = len(problem.bench.actuators), problem.bench
-    k, rows = len(problem.columns.names), 0
-    out = np.zeros((k, k))
-    for r, (run, block) in enumerate(zip(bench.runs, (each.dense() for each in problem.columns.blocks), strict=True)):
-        tip = block[:, :3]
-        if run.by == "setpoint" and run.measured.has("encoder"):
-            ways = bench.thin_slopes(r)
-            tip = tip + np.einsum("nij,njk->nik", ways, block[:, 3 : 3 + m])
-        if run.turn is not None:  # how far along the path nobody knows, and no surface shows
-            tip = tip * np.array([0.0, 1.0, 1.0])[:, None]
-        flat = np.nan_to_num(tip).reshape(-1, k)
-        out += flat.T @ flat
-        rows += len(tip)
     machine = problem.columns.candidate >= 0
     for i, each in enumerate(problem.columns.candidates):
         if each.effect.STAGE in ("workpiece", "sensor"):
             machine[problem.columns.of(i)] = False
-    return np.asarray(out * np.outer(machine, machine) / max(rows, 1), float)
+    return np.asarray(problem.tip_gram * np.outer(machine, machine))
 
 
 def _by_other_means(problem: Problem, truth: Fitted, other: Fitted, candidate: Candidate) -> float:

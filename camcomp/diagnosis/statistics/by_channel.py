@@ -115,10 +115,11 @@ class ByChannel:
             out[on] += np.sum(X**2, axis=0)
         return out
 
-    def dense(self) -> Floats:
-        """Every value (n, c, k) of channels that have n rows each."""
-        out = np.zeros((len(self.parts[0][1]), len(self.parts), self.width))
-        for c, (on, X) in enumerate(self.parts):
+    def dense(self, rows: slice = slice(None)) -> Floats:
+        """Every value (n, c, k) of channels that have n rows each, or of some of these rows."""
+        parts = [(on, X[rows]) for on, X in self.parts]
+        out = np.zeros((len(parts[0][1]), len(parts), self.width))
+        for c, (on, X) in enumerate(parts):
             out[:, c, on] = X
         return out
 
