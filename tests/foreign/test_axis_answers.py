@@ -52,6 +52,9 @@ WRONG = {
     37026: "friction of a hundred times the noise, whose shape is known to a hundredth",
     45026: "friction of an axis that moves in one of four runs, of which the others foretell nothing",
     39028: "friction that turns round otherwise where the axis creeps back a little than where it turns",
+    50012: "friction of an axis that stops after it crept back a thousandth of a millimetre",
+    50017: "a lag that differs between the ways by a quarter of the floor",
+    50026: "a stretch of an axis that stands in which noise has heavier tails",
     37052: "the same on two axes, where reversals fall between two rows",
 }
 

@@ -79,9 +79,9 @@ def find_window(
     if abs(shift) < LEAST_SIZE * floor or times[k][last - 1] - times[k][first] < SHORTEST_S:
         return None
     # it takes a while to come and to go: rows at its ends are not as high as it is
-    inside, outside = (rest[rows] for rows in away_from_ends(first, last, times[k]))
-    parts = [float(np.mean(p) - np.mean(outside)) for p in np.array_split(inside, QUARTERS)]
-    shift = float(np.mean(inside) - np.mean(outside))
+    inside, outside = away_from_ends(first, last, times[k])
+    shift = _step(rests[k], inside, outside) / _step(_seen(bases[k], first, last), inside, outside)
+    parts = [float(np.mean(p) - np.mean(rest[outside])) for p in np.array_split(rest[inside], QUARTERS)]
     if not all(abs(p - shift) < LEVEL * abs(shift) for p in parts):
         return None
     chance = float(norm.logsf(np.sqrt(score_of) / floor) / np.log(10.0))
@@ -105,6 +105,17 @@ def _projected(
         if k not in beside:
             rests[k], bases[k] = values[k] - np.mean(values[k]), np.full((len(values[k]), 1), len(values[k]) ** -0.5)
     return rests, bases
+
+
+def _step(values: Floats, inside: Bools, outside: Bools) -> float:
+    return float(np.mean(values[inside]) - np.mean(values[outside]))
+
+
+def _seen(base: Floats, first: int, last: int) -> Floats:
+    """What a basis (n, k) leaves of a push of 1 in a window (n,)."""
+    push = np.zeros(len(base))
+    push[first:last] = 1.0
+    return np.asarray(push - base @ base[first:last].sum(axis=0))
 
 
 def _alone(rest: Floats, base: Floats, first: int, last: int) -> tuple[float, Floats]:
