@@ -75,9 +75,10 @@ def test_a_cable_at_the_end_of_the_travel_is_no_push(tmp_path):
     assert result["verdict"] == "unknown" and not row["false_cause"]
 
 
-def test_a_lag_that_differs_between_the_ways_is_unknown_beside_the_lag(tmp_path):
-    """Nothing rubs there: a loop has no way that it likes better."""
-    result, row = judged(tmp_path, 34009)
+@pytest.mark.parametrize("seed", [34009, pytest.param(52049, marks=pytest.mark.campaign)])
+def test_a_lag_that_differs_between_the_ways_is_unknown_beside_the_lag(tmp_path, seed):
+    """Nothing rubs there: a loop has no way that it likes better. By less than a hundredth of the lag, but twice the floor, too."""
+    result, row = judged(tmp_path, seed)
     assert result["verdict"] == "unknown" and row["all"] and not row["false_cause"]
 
 

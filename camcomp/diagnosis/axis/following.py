@@ -114,7 +114,7 @@ def _followed(
             one_way, late = (
                 float(np.sqrt(np.mean((c * A)[:, columns.index(each)] ** 2))) for each in (either_way, speed)
             )
-            if one_way > max(KNOWN * late, MINOR * floor):
+            if one_way > min(max(KNOWN * late, MINOR * floor), floor):
                 found.one_way = lag.lopsided
         i = columns.index(acceleration) if acceleration in columns else None
         found.details["following"] = {} if i is None else {"acceleration_us2": value_of(1e6 * c[i], 1e3 * spread[i])}

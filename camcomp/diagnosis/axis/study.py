@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from camcomp.diagnosis.axis import answer
-from camcomp.diagnosis.axis.block_least_squares import WHOLE_RUNS, log10_chance
+from camcomp.diagnosis.axis.block_least_squares import WHOLE_RUNS, log10_chance, solve
 from camcomp.diagnosis.axis.drive_force import force_of
 from camcomp.diagnosis.axis.drivers import dependences
 from camcomp.diagnosis.axis.findings import ROWS, AxisChannel, AxisDeviation, AxisFindings, AxisRun
@@ -34,6 +34,7 @@ from camcomp.diagnosis.result.types import (
 from camcomp.ground import headway
 
 NO_TIPS = "ISO 230-2: the tip was not measured"
+OF_TIME = 0.5  # of what stands out in time, that a ripple has to leave where it is more than the ripple
 
 
 def study(
@@ -171,10 +172,15 @@ def _name_rest(found: AxisFindings, runs: Sequence[AxisRun], others: Mapping[str
     if found.one_way and not any("asymmetry_Ns_per_mm" in c.parameters for c in found.causes):
         found.unknown_in.append((f"velocity:{found.name}", 1.0 - float(np.exp(-2.0 * found.one_way.log_ratio))))
         found.unknown_chance = min(found.unknown_chance, log10_chance(found.one_way))
-    if found.unknown_in or found.ripple:
+    if found.unknown_in:
         return
     for channel in found.channels:
         if channel.gate is not None and channel.gate.word == "above":
+            stretches = sum(each.share for each in channel.gate.intervals)
+            if found.ripple:  # it may be a small part of what comes and goes
+                if _of_time(channel, found.ripple.period):
+                    found.unknown_in.append((f"time:{found.name}", stretches))
+                continue
             names = [runs[k].name for k in channel.runs]
             beside = {other: _moves(theirs, names, found.wide) for other, theirs in others.items()}
             beside = {other: moves for other, moves in beside.items() if len(moves) == len(names)}
@@ -182,7 +188,21 @@ def _name_rest(found: AxisFindings, runs: Sequence[AxisRun], others: Mapping[str
                 found.unknown_in.append((kind if ":" in kind else f"{kind}:{found.name}", share))
                 found.unknown_chance = min(found.unknown_chance, chance)
             if not found.unknown_in and channel.gate.intervals:
-                found.unknown_in.append((f"time:{found.name}", sum(each.share for each in channel.gate.intervals)))
+                found.unknown_in.append((f"time:{found.name}", stretches))
+
+
+def _of_time(channel: AxisChannel, period: float) -> bool:
+    """Whether waves of a period mm over the position leave most of what stands out in time."""
+    x = np.concatenate([m.position for m in channel.moves])
+    A = np.stack([wave(2.0 * np.pi * x / period) for wave in (np.ones_like, np.sin, np.cos)], axis=1)
+    left = np.concatenate(channel.left)
+    rest = left - A @ solve(A, left)
+    run = np.repeat(np.arange(len(channel.moves)), [len(m.time) for m in channel.moves])
+    time = np.concatenate([m.time for m in channel.moves])
+    on = np.zeros(len(left), bool)
+    for each in channel.gate.intervals if channel.gate is not None else ():
+        on |= (run == each.run) & (time >= each.t0) & (time <= each.t1)
+    return bool(np.sum(rest[on] ** 2) > OF_TIME * np.sum(left[on] ** 2)) if on.any() else False
 
 
 def _moves(runs: Sequence[AxisRun], names: Sequence[str], wide: int) -> list[AxisTravel]:

@@ -73,3 +73,20 @@ def test_a_lag_that_differs_between_the_ways_by_less_than_the_floor_is_a_lag():
     assert late(0.085).verdict == "identified"
     much = late(0.6)
     assert much.verdict == "unknown" and much.where.drivers[0].covariate == "velocity:x"
+
+
+@pytest.mark.parametrize(("pulses", "first"), [(5, "time:x"), (0, "position:x")])
+def test_what_comes_and_goes_beside_a_ripple_is_of_time(pulses, first):
+    rng = np.random.default_rng(6)
+    time = 1e-3 * np.arange(24000)
+    way = 100.0 * np.sin(0.9 * time) + 40.0 * np.sin(2.3 * time + 0.4)
+    speed = np.gradient(way, time)
+    force = 0.08 * np.gradient(speed, time) + 30.0 * np.tanh(speed / 0.5) + NOISE * rng.standard_normal(len(time))
+    force += 4.0 * np.sin(2.0 * np.pi * way / 5.0)
+    for begin in rng.permutation(np.arange(1000, 23000, 1500))[:pulses]:
+        force[begin : begin + 200] += 20.0 * rng.choice([-1.0, 1.0])
+    log = AxisRun("r", time, way, way + 5e-4 * rng.standard_normal(len(time)), force)
+    result = study({"x": [log]})
+    covariates = [each.covariate for each in result.where.drivers]
+    assert result.verdict == "unknown" and covariates[0] == first and "position:x" in covariates
+    assert len(result.where.intervals) >= pulses
