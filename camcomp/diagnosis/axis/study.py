@@ -34,7 +34,6 @@ from camcomp.diagnosis.result.types import (
 from camcomp.ground import headway
 
 NO_TIPS = "ISO 230-2: the tip was not measured"
-OF_TIME = 0.5  # of what stands out in time, that a ripple has to leave where it is more than the ripple
 
 
 def study(
@@ -202,7 +201,7 @@ def _of_time(channel: AxisChannel, period: float) -> bool:
     on = np.zeros(len(left), bool)
     for each in channel.gate.intervals if channel.gate is not None else ():
         on |= (run == each.run) & (time >= each.t0) & (time <= each.t1)
-    return bool(np.sum(rest[on] ** 2) > OF_TIME * np.sum(left[on] ** 2)) if on.any() else False
+    return bool(np.sum(rest[on] ** 2) > 0.5 * np.sum(left[on] ** 2)) if on.any() else False
 
 
 def _moves(runs: Sequence[AxisRun], names: Sequence[str], wide: int) -> list[AxisTravel]:
