@@ -178,7 +178,8 @@ def _weights(told: Told) -> dict[str, float]:
     for group in told.found.groups:
         holds = np.array([group in s.groups for s in sets])
         if not told.judges.whole:
-            out[group] = (int(holds.sum()) + 1) / (len(sets) + 2)
+            some = (int(holds.sum()) + 1) / (len(sets) + 2)
+            out[group] = some if told.gate.word == "at" else min(some, EVEN)  # what is left may be all that it is
         else:
             out[group] = 1.0 if told.found.few is not None else float(p[holds].sum())
     return out

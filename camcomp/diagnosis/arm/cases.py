@@ -224,4 +224,6 @@ def _gate(bench: ArmBench, held: ArmBench | None, found: ArmFit, judges: Court, 
     evidence = judges.evidence(Discrepancy(0.0, 1.0, sd))
     left = unseen(evidence, widths, sd)
     may_be = patterns(held or bench, judges.poses)
-    return judge(left, floor, [p.features for p in judges.poses], [p.time for p in judges.poses], may_be)
+    judged = [evidence.blocks[fold.block] for fold in evidence.folds]
+    frames = [(b.frame, b.N) for b in judged]
+    return judge(left, floor, [p.features for p in judges.poses], [p.time for p in judges.poses], may_be, frames)

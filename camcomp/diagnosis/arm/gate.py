@@ -12,6 +12,7 @@ from typing import Literal
 import numpy as np
 from scipy.spatial import KDTree
 from scipy.stats import binom, chi2, norm
+from scipy.stats import f as f_ratio
 
 from camcomp.diagnosis.arm.dependence import Dependence, dependences
 from camcomp.diagnosis.arm.discrepancy import CHI2_3_MEDIAN, Evidence, design, regions
@@ -26,6 +27,7 @@ CHANCE = 1e-3  # of a structure in noise alone, over all that is tried
 FALSE = 0.01  # of what is named as a driver
 STEPS = 16  # stretches of time, regions of postures
 SHORTEST = 12  # poses in a stretch
+INSTANTS = 48  # of a campaign, at which something may have changed for good
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,13 +76,15 @@ def unseen(evidence: Evidence, widths: Floats, sd: float) -> LeftOver:
 
 def judge(
     left: LeftOver, floor: TipFloor | None, features: Sequence[Floats], times: Sequence[Floats],
-    patterns: Mapping[str, Sequence[Floats]],
+    patterns: Mapping[str, Sequence[Floats]], frames: Sequence[tuple[int, Floats]] = (),
 ) -> Gate:  # fmt: skip
-    """The leftover against the floor; features (n, f), times (n,), patterns per block of the leftover."""
+    """The leftover against the floor; features (n, f), times (n,), patterns per block of the leftover; frames: of every block the
+    number of its campaign, and its nuisances (n, 3, 9).
+    """
     found = dependences(patterns, left.rest, features)
-    tried = len(found) + 2
+    whole = [*found, neighbours(left.rest, features), stretches(left.rest, times), change(left.rest, times, frames)]
+    tried = len(whole)
     limit = np.log10(CHANCE / tried)
-    whole = [*found, neighbours(left.rest, features), stretches(left.rest, times)]
     sure = [each for each in whole if each.log10_chance < limit]
     energy = float(np.mean(np.concatenate([(r**2).sum(axis=1) for r in left.rest])))
     size = [each.share * energy for each in sure]
@@ -184,6 +188,40 @@ def stretches(rest: Sequence[Floats], times: Sequence[Floats]) -> Dependence:
     expected = freedom / 3.0 * whole / sum(len(r) for r in rest)  # what noise alone does
     share = max(energy - expected, 0.0) / max(whole, 1e-300)
     return Dependence("time", share, float(chi2.logsf(white, freedom) / np.log(10.0)))
+
+
+def change(rest: Sequence[Floats], times: Sequence[Floats], frames: Sequence[tuple[int, Floats]]) -> Dependence:
+    """Whether the frame of an instrument, or the place of its target, is another one from some instant of a campaign on.
+
+    Postures that are visited in turns hide it: what it does to them points everywhere.
+    """
+    whole = sum(float((r**2).sum()) for r in rest)
+    best = Dependence("", 0.0, 0.0)
+    for number in {number for number, _ in frames}:
+        own = [i for i, (each, _) in enumerate(frames) if each == number]
+        order = np.argsort(np.concatenate([times[i] for i in own]), kind="stable")
+        r, N = (np.concatenate(part)[order] for part in ([rest[i] for i in own], [frames[i][1] for i in own]))
+        instants = np.unique(np.linspace(0, len(r), INSTANTS + 2).astype(int)[1:-1])
+        instants = instants[(instants >= SHORTEST) & (instants <= len(r) - SHORTEST)]
+        freedom = 3 * len(r) - 2 * N.shape[2]
+        if not len(instants) or freedom <= 0 or not whole > 0.0:
+            continue
+        Q, _ = np.linalg.qr(N.reshape(-1, N.shape[2]))
+        left = r.ravel() - Q @ (Q.T @ r.ravel())
+        before = float(left @ left)
+        for at in instants:
+            D = np.where(np.arange(len(r))[:, None, None] < at, 0.0, N).reshape(-1, N.shape[2])
+            D = D - Q @ (Q.T @ D)
+            taken = float(np.sum((np.linalg.qr(D)[0].T @ left) ** 2))
+            after = max(before - taken, 1e-300)
+            ratio = (taken / N.shape[2]) / (after / freedom)
+            chance = float(f_ratio.logsf(ratio, N.shape[2], freedom) + np.log(len(instants) * len(frames))) / np.log(
+                10.0
+            )
+            if chance < best.log10_chance:
+                share = max(taken - N.shape[2] * after / freedom, 0.0) / whole
+                best = Dependence("time", min(share, 1.0), chance)
+    return best
 
 
 def windows(time: Floats) -> list[np.ndarray]:

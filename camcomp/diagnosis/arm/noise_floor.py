@@ -73,7 +73,7 @@ def far_off(size: Floats, time: Floats) -> np.ndarray:
     IN_A_ROW of them one after the other are no mistakes either.
     """
     far = size > FAR * max(float(np.median(size)), 1e-6)
-    if far.mean() > MOST_FAR:
+    if far.sum() > max(MOST_FAR * len(far), 1.0):  # one of a few poses may be a mistake as well
         return np.zeros(len(size), bool)
     order = np.argsort(time, kind="stable")
     for run in np.split(order, np.flatnonzero(np.diff(far[order].astype(int))) + 1):
