@@ -111,7 +111,8 @@ def intervals(
     size = np.array([energy(left[k][rows], floor) for k, rows in stretches])
     log = np.log(np.maximum(size, 1e-300))
     middle = float(np.median(log))
-    spread = 1.4826 * float(np.median(middle - log[log <= middle]))  # of those that are below: any number may stand out
+    # of those below the middle where it is less: any number may stand out
+    spread = 1.4826 * min(float(np.median(np.abs(log - middle))), float(np.median(middle - log[log <= middle])))
     rows_each = np.array([len(rows) for _, rows in stretches])
     pure = chi2.isf(FALSE / len(stretches), rows_each) / rows_each  # what even white noise reaches
     chances = norm.logsf((log - middle) / max(spread, 1e-12)) / np.log(10.0) + np.log10(len(stretches))
