@@ -38,6 +38,10 @@ GUESSED_MM, GUESSED_RAD = (
 )  # by which an empty cell's actuator may stand beside the line between its neighbours
 STILL_S = 0.1  # from which on standing at the end of a line may be idleness
 STILL_MM = 0.005
+MOST_PASSES = 8  # of finding where a tool that bends is
+SETTLED_MM = (
+    1e-3  # rms by which it may bend otherwise in one more of them: where it is then is known to a fraction of that
+)
 SOON_S = 1e-4  # in which a tip moves in one direction
 STANDING_MM_PER_S = 0.05
 _UPRIGHT = 0.9  # cosine beyond which a path goes along z, and its sides are found from x
@@ -257,8 +261,9 @@ def _led_by_tip(
     known = np.isfinite(measured.tip).all(axis=1)
     check_on_program(log, name, measured.tip[known], program.tips)
     whole = np.column_stack([_over_time(measured.time, np.where(known, v, np.nan)) for v in measured.tip.T])
-    bend = np.zeros_like(whole)
-    for beside in (np.inf, BESIDE_MM):  # what bends may be beside its program: first nobody knows by how much
+    bend, changed = np.zeros_like(whole), np.inf
+    # what bends may be beside its program: first nobody knows by how much, and where it is on arcs follows from how it bends
+    for beside in (np.inf, *[BESIDE_MM] * MOST_PASSES):
         aligned = _aligned(log, name, program, whole - bend, measured, ASIDE_MM if beside < np.inf else FAR_MM)
         tip = path_geometry.points(path, aligned.motion, aligned.share)
         logged = bool(np.isfinite(measured.line).any())
@@ -268,7 +273,10 @@ def _led_by_tip(
             to_machine=twin.to_machine, vectors=vectors, inverse=twin.inverse, temperature=temperature,
         )  # fmt: skip
         loaded = twin.sense(run_path)[0].tip
+        last, changed = changed, float(np.sqrt(np.mean(np.sum((loaded - tip - bend) ** 2, axis=1))))
         bend = loaded - tip
+        if beside < np.inf and (changed < SETTLED_MM or changed > last):
+            break
     unsure = ~known | (aligned.distance > ASIDE_MM) | _idle_or_not(forces, aligned, program, tip, measured.time)
     unsure |= _from_anywhere(path, aligned) | _at_corners(path, aligned, measured.time, acceleration)
     later = Cause("time_sync", shelf.load("effects", "time_sync"), None, {"offset_s": -SOON_S})
