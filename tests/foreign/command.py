@@ -6,6 +6,8 @@ import argparse
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from tests.recordings import recording
+
 
 def write_all(
     module: str, make: Callable[[int, Path, str | None], object], option: str, choices: Sequence[str]
@@ -16,7 +18,13 @@ def write_all(
     parser.add_argument("--count", type=int, required=True)
     parser.add_argument("--seed", type=int, required=True)
     parser.add_argument(option, choices=choices, dest="only")
+    parser.add_argument("--recordings", choices=recording.SHELVES, default="first")
     given = parser.parse_args()
+    with recording.taken_from(given.recordings):
+        _write(make, given)
+
+
+def _write(make: Callable[[int, Path, str | None], object], given: argparse.Namespace) -> None:
     for seed in range(given.seed, given.seed + given.count):
         if not (given.out / "truth" / f"e-{seed}.json").exists():
             said = make(seed, given.out, given.only)

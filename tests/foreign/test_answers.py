@@ -6,6 +6,7 @@ import pytest
 
 from tests.foreign.parallel.__main__ import write as parallel
 from tests.foreign.serial.make import make as serial
+from tests.recordings import recording
 from tests.trials.score import ask, judge, library
 
 
@@ -108,3 +109,10 @@ def test_intervals_hold_what_they_are_of(tmp_path, generator, seed):
     """A shape that is steps away from the best of the scan stopped on its way, with the interval of where it stood."""
     _, row = judged(tmp_path, generator, seed)
     assert row["all"] and row["held"] and all(row["held"])
+
+
+def test_play_where_a_tool_bends_by_a_third_of_the_arcs_that_it_goes_round(tmp_path):
+    """Only the tip is logged: where on an arc of 5 mm it is follows from how its 1.5 mm of bending point, and those from where it is."""
+    with recording.taken_from("second"):
+        result, row = judged(tmp_path, "parallel", 57045)
+    assert result["verdict"] == "identified" and row["all"] and all(row["held"])

@@ -141,15 +141,22 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("names", nargs="*", help="stems of programs; default: all")
     parser.add_argument("--raw", type=Path, help="keep halsampler's own files in this folder")
+    parser.add_argument("--shelf", choices=recording.SHELVES, default="first")
     chosen = parser.parse_args()
-    events = json.loads((HERE / "events.json").read_text())
-    names = chosen.names or sorted(path.stem for path in (HERE / "programs").glob("*.nc"))
+    with recording.taken_from(chosen.shelf):
+        return record(chosen.names, chosen.raw)
+
+
+def record(names: list[str], raw: Path | None) -> int:
+    """Records programs of the shelf, all where none is named; raw: where halsampler's own files are kept. Exit status."""
+    events = json.loads((recording.folder() / "events.json").read_text())
+    names = names or sorted(path.stem for path in (recording.folder() / "programs").glob("*.nc"))
     with tempfile.TemporaryDirectory() as place:
         folder, jobs = Path(place), []
         write_machine(folder)
         for name in names:
             program = folder / f"{name}.nc"
-            program.write_text((HERE / "programs" / f"{name}.nc").read_text())
+            program.write_text((recording.folder() / "programs" / f"{name}.nc").read_text())
             jobs.append(
                 {"program": str(program), "samples": str(folder / f"{name}.samples"), "events": events.get(name, [])}
             )
@@ -159,9 +166,9 @@ def main() -> int:
             if not path.exists():
                 print(f"{path.stem}: nothing was recorded\n{said[-2000:]}", file=sys.stderr)
                 return 1
-            if chosen.raw:
-                chosen.raw.mkdir(parents=True, exist_ok=True)
-                (chosen.raw / path.name).write_bytes(path.read_bytes())
+            if raw:
+                raw.mkdir(parents=True, exist_ok=True)
+                (raw / path.name).write_bytes(path.read_bytes())
             values = shorten(samples(path))
             recording.save(path.stem, values)
             print(f"{path.stem}: {len(values) * recording.STEP_S:.2f} s")

@@ -5,6 +5,9 @@ The files hold whole multiples of 10 nm as second differences, which are small: 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -12,6 +15,10 @@ from pathlib import Path
 import numpy as np
 
 HERE = Path(__file__).parent
+SHELVES = {
+    "first": HERE,
+    "second": HERE / "second",
+}  # of recordings: the second one was seen by nothing before the 56000s
 STEP_S = 1e-3
 QUANTUM_MM = 1e-5
 
@@ -31,9 +38,27 @@ class Recording:
     kind: np.ndarray
 
 
+_shelf: ContextVar[str] = ContextVar("shelf", default="first")
+
+
+@contextmanager
+def taken_from(shelf: str) -> Iterator[None]:
+    """Recordings of another shelf meanwhile."""
+    before = _shelf.set(shelf)
+    try:
+        yield
+    finally:
+        _shelf.reset(before)
+
+
+def folder() -> Path:
+    """Where the recordings and their programs are."""
+    return SHELVES[_shelf.get()]
+
+
 def names() -> list[str]:
-    """Every recording there is."""
-    return sorted(path.stem for path in (HERE / "data").glob("*.npz"))
+    """Every recording of the shelf."""
+    return sorted(path.stem for path in (folder() / "data").glob("*.npz"))
 
 
 def save(name: str, values: np.ndarray) -> None:
@@ -41,9 +66,9 @@ def save(name: str, values: np.ndarray) -> None:
     whole = np.round(values[:, :3] / QUANTUM_MM).astype(np.int64)
     twice = np.diff(whole, n=2, axis=0)
     assert np.abs(twice).max() < 2**15
-    (HERE / "data").mkdir(exist_ok=True)
+    (folder() / "data").mkdir(exist_ok=True)
     np.savez_compressed(
-        HERE / "data" / f"{name}.npz",
+        folder() / "data" / f"{name}.npz",
         start=whole[:2],
         bend=twice.astype(np.int16).T,
         line=values[:, 3].astype(np.int16),
@@ -51,12 +76,16 @@ def save(name: str, values: np.ndarray) -> None:
     )
 
 
-@cache
 def load(name: str) -> Recording:
     """A recording by its name."""
-    with np.load(HERE / "data" / f"{name}.npz") as file:
+    return _load(folder(), name)
+
+
+@cache
+def _load(folder: Path, name: str) -> Recording:
+    with np.load(folder / "data" / f"{name}.npz") as file:
         start, bend, line, kind = (file[key] for key in ("start", "bend", "line", "kind"))
     speed = np.cumsum(np.concatenate([start[1:] - start[:1], bend.T.astype(np.int64)]), 0)
     tip = np.concatenate([start[:1], start[:1] + np.cumsum(speed, 0)]) * QUANTUM_MM
-    program = (HERE / "programs" / f"{name}.nc").read_text()
+    program = (folder / "programs" / f"{name}.nc").read_text()
     return Recording(name, program, np.arange(len(tip)) * STEP_S, tip, line.astype(int), kind.astype(int))
