@@ -260,7 +260,8 @@ class Plant:
         feed = velocity[held(good, run.cuts)] * [1, 1, 0]  # across the tool, as the nominal machine has it on ramps
         feed = feed / np.linalg.norm(feed, axis=1, keepdims=True)
         right = np.column_stack([feed[:, 1], -feed[:, 0], np.zeros(len(feed))])  # e_t x e_z
-        share = (size / run.feed)[run.cuts, None]  # chips are as thick as the tool is fast, in an override, too
+        # chips are as thick as the tool is fast across its axis: on ramps, and in an override, too
+        share = (flat / run.feed)[run.cuts, None]
         at = (run.rub[run.cuts] + (run.triple - run.rub)[run.cuts] * share) * off.cutting_force
         moving = run.cuts & (size > STILL_MM_S)
         minutes = (run.cut_before_s + drives.STEP_S * np.cumsum(moving)) / 60
