@@ -13,7 +13,7 @@ from _thread import interrupt_main
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib import import_module
-from threading import Timer
+from threading import Timer, main_thread
 from types import FrameType
 from typing import Any
 
@@ -100,9 +100,17 @@ def _send_again(dropped: "sys.UnraisableHookArgs") -> None:
         sys.__unraisablehook__(dropped)
         return
     number = error.number if isinstance(error, Terminated) else signal.SIGINT
-    again = Timer(SOON_S, interrupt_main, (number,))
+    again = Timer(SOON_S, _interrupt, (number,))
     again.daemon = True
     again.start()
+
+
+def _interrupt(number: signal.Signals) -> None:
+    """A signal to the main thread, which wakes it where it waits as well, where the system can do that."""
+    if hasattr(signal, "pthread_kill"):
+        signal.pthread_kill(main_thread().ident or 0, number)
+    else:
+        interrupt_main(number)
 
 
 def _end_on_signals() -> None:
