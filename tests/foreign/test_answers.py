@@ -52,9 +52,12 @@ def test_a_log_that_begins_near_the_end_of_its_program_has_missed_nothing(tmp_pa
     assert result["verdict"] == "identified" and row["all"] and all(row["held"])
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize(
-    "seed", [47052, pytest.param(47000, marks=pytest.mark.campaign), pytest.param(44087, marks=pytest.mark.campaign)],
-                         ids=["friction", "a shift where noise seems to have a memory", "a shift and a workpiece"])  # fmt: skip
+    "seed",
+    [47052, 47000, 44087],
+    ids=["friction", "a shift where noise seems to have a memory", "a shift and a workpiece"],
+)
 def test_what_is_minor_and_when_it_happened_are_known(tmp_path, seed):
     """A spring some per cent off, far below the noise, was something unknown; of shifts the begin was found only."""
     result, row = judged(tmp_path, "serial", seed)
@@ -96,12 +99,13 @@ def test_what_imitates_something_unknown_is_not_named_for_certain(tmp_path, gene
     assert result["verdict"] == "unknown" and not row["false_cause"]
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize(
     ("generator", "seed"),
     [
         ("serial", 17000),
-        pytest.param("parallel", 41079, marks=pytest.mark.campaign),
-        pytest.param("parallel", 41023, marks=pytest.mark.campaign),
+        ("parallel", 41079),
+        ("parallel", 41023),
     ],
     ids=["far from where it was scanned", "warm-ups have several time constants", "a factor is of the whole force"],
 )
