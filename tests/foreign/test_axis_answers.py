@@ -111,6 +111,7 @@ def test_what_the_rest_depends_on_is_named(tmp_path, seed):
         assert "of z when it moves alone, it goes with how y moves" in result["next_experiment"]["outcomes"][0]
 
 
+@pytest.mark.campaign
 def test_a_drag_that_grows_with_speed_is_neither_friction_that_pushes_nor_surely_a_lag(tmp_path):
     """Friction of -55 N and a viscous part fitted its forces; what its loop makes of it is a lag in the main."""
     result, row = judged(tmp_path, 39014)

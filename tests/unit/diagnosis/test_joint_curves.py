@@ -108,6 +108,7 @@ def test_one_campaign_does_not_identify_a_curve(robot, runs):
     assert max(c.probability for c in result.causes) <= 0.8
 
 
+@pytest.mark.campaign  # as 23007 of the foreign poses
 def test_a_joint_that_stops_short_is_found_from_the_way_in_which_it_came(robot):
     def short(q):
         way = np.sign(np.diff(q[:, 2], prepend=q[0, 2]))

@@ -98,6 +98,7 @@ def test_one_campaign_identifies_nothing(robot, faulty):
         assert "second campaign" in result.next_experiment.action
 
 
+@pytest.mark.campaign  # the sample of the UR10 has repeats, too
 def test_the_floor_is_what_repeats_show(robot, faulty):
     again = [replace(r, tip=r.tip + 0.0, time=r.time + 500.0) for r in faulty]
     rng = np.random.default_rng(9)
