@@ -47,6 +47,14 @@ def test_a_beam_that_broke_at_one_of_28_poses_is_listed(tmp_path):
     assert result["outliers"] == [{"run": "campaign-1", "row": 26}]
 
 
+@pytest.mark.campaign
+def test_of_one_campaign_nothing_is_more_than_even_beside_what_is_left(tmp_path):
+    """A joint that wobbles about another axis: geometries of three joints were two to one."""
+    result, row = judged(tmp_path, 53002)
+    assert result["verdict"] == "unknown" and not row["false_cause"]
+    assert all(cause["probability"] <= 0.5 for cause in result["causes"] if cause["effect"] != "unknown")
+
+
 @pytest.mark.parametrize("seed", some((21008, 21038, 23010), in_ci=(21008,)))
 def test_an_arm_with_nothing_but_small_errors(tmp_path, seed):
     result, _ = judged(tmp_path, seed)
