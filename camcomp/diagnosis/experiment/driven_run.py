@@ -39,9 +39,7 @@ GUESSED_MM, GUESSED_RAD = (
 STILL_S = 0.1  # from which on standing at the end of a line may be idleness
 STILL_MM = 0.005
 MOST_PASSES = 8  # of finding where a tool that bends is
-SETTLED_MM = (
-    1e-3  # rms by which it may bend otherwise in one more of them: where it is then is known to a fraction of that
-)
+SETTLED_MM = 1e-3  # rms by which it may bend otherwise in one more of them
 SOON_S = 1e-4  # in which a tip moves in one direction
 STANDING_MM_PER_S = 0.05
 _UPRIGHT = 0.9  # cosine beyond which a path goes along z, and its sides are found from x
