@@ -18,7 +18,8 @@ HERE = Path(__file__).parent
 SHELVES = {
     "first": HERE,
     "second": HERE / "second",
-}  # of recordings: the second one was seen by nothing before the 56000s
+    "third": HERE / "third",
+}  # of recordings: nothing saw the second one before the 56000s, and the third one before the 60000s
 STEP_S = 1e-3
 QUANTUM_MM = 1e-5
 
