@@ -7,7 +7,7 @@ integrated out, over priors of a few widths, so that a cause has to be worth its
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import comb, log
@@ -30,7 +30,6 @@ WIDTHS = (2.0, 6.0, 20.0, 60.0, 200.0)  # of the floor: what causes may move the
 KEPT = 12  # sets of each size that are enlarged
 SLACK = 6.0  # log evidence by which all sets of one size may lie behind, and be enlarged still
 LONG = 20  # columns: one cause with more of them is enough for a set
-TOGETHER = 2000  # sets that are weighed at once
 NEVER = 1e30  # precision of a small error that is none
 LEAST = 1e-6  # of the floor: a column that moves the tip less is none
 Members = tuple[int, ...]
@@ -80,7 +79,7 @@ class Weighed:
 
     def widths(self, members: Members) -> Floats:
         """Amplitudes (d,) in scales at which every member moves the tip by one floor."""
-        return np.concatenate([self._unit[i] for i in members])
+        return np.concatenate([np.zeros(0), *(self._unit[i] for i in members)])
 
     def indices(self, members: Members) -> list[int]:
         """Columns of members, one after the other."""
@@ -91,13 +90,13 @@ class Weighed:
         ways = sum(log(self.candidates[i].ways) for i in members)
         return log(SIZES[len(members)]) - log(comb(self._places, len(members))) - ways
 
-    def values(self, sets: Sequence[Members]) -> Floats:
-        """Log evidence (s,) of sets, their priors included, against nothing."""
-        out = np.array([self.prior(members) for members in sets])
-        count = np.array([sum(len(self.candidates[i].columns) for i in members) for members in sets])
-        for d in np.unique(count[count > 0]):
+    def beside(self, members: Members, more: Sequence[int]) -> Floats:
+        """Log evidence (s,) of a set with one candidate more each, their priors included, against nothing."""
+        out = np.array([self.prior((*members, i)) for i in more])
+        count = np.array([len(self.candidates[i].columns) for i in more])
+        for d in np.unique(count):
             own = np.flatnonzero(count == d)
-            value, _, _ = self._posterior([sets[i] for i in own.tolist()])
+            value = self._posterior(members, [more[i] for i in own.tolist()])[0]
             most = value.max(axis=1)
             sure = np.where(np.isfinite(most), most, 0.0)
             with np.errstate(divide="ignore"):
@@ -106,31 +105,48 @@ class Weighed:
 
     def best(self, members: Members) -> tuple[Floats, Floats, float]:
         """Amplitudes (d,), covariance (d, d) and the width at which they are most probable."""
-        value, mean, precision = self._posterior([members])
+        value, mean = self._posterior(members[:-1], members[-1:])
         k = int(np.argmax(value[0]))
-        unit = self.widths(members)
-        (l, V), w = precision, WIDTHS[k]
-        cov = (V[0] / (l[0] + 1.0 / w**2)) @ V[0].T
-        return mean[0, k], unit[:, None] * cov * unit, w
+        on, unit = self.indices(members), self.widths(members)
+        M = unit[:, None] * self.gram[np.ix_(on, on)] * unit + np.eye(len(on)) / WIDTHS[k] ** 2
+        return mean[0, k], unit[:, None] * np.linalg.inv(M) * unit, WIDTHS[k]
 
-    def _posterior(self, sets: Sequence[Members]) -> tuple[Floats, Floats, tuple[Floats, Floats]]:
-        """Of sets with d columns each, log evidence (s, widths), amplitudes (s, widths, d), and eigenvalues and vectors of their grams."""
-        on = np.array([self.indices(members) for members in sets])
-        unit = np.array([self.widths(members) for members in sets])
-        G = unit[:, :, None] * self.gram[on[:, :, None], on[:, None, :]] * unit[:, None, :]
-        l, V = np.linalg.eigh(G)
-        l = np.maximum(l, 0.0)
-        m = np.einsum("sde,sd->se", V, unit * self.moment[on])
+    def _posterior(self, members: Members, more: Sequence[int]) -> tuple[Floats, Floats]:
+        """Of a set with one of s candidates more each, of e columns all: log evidence (s, widths), amplitudes (s, widths, d).
+
+        The set's own columns are eliminated once for all of them.
+        """
+        old, new = np.array(self.indices(members), int), np.array([self.candidates[i].columns for i in more])
+        a, b = self.widths(members), np.array([self._unit[i] for i in more])
         square = np.array(WIDTHS) ** 2
-        M = l[:, None, :] + 1.0 / square[:, None]  # (s, widths, d)
-        value = 0.5 * (m[:, None, :] ** 2 / M).sum(axis=2) - 0.5 * np.log(M * square[:, None]).sum(axis=2)
-        mean = unit[:, None, :] * np.einsum("sde,swe->swd", V, m[:, None, :] / M)
-        sd = unit[:, None, :] * np.sqrt(np.einsum("sde,swe->swd", V**2, 1.0 / M))
+        A = a[:, None] * self.gram[np.ix_(old, old)] * a + np.eye(len(a)) / square[:, None, None]  # (widths, o, o)
+        B = a[:, None] * self.gram[old[:, None], new[:, None, :]] * b[:, None, :]  # (s, o, e)
+        C = b[:, :, None] * self.gram[new[:, :, None], new[:, None, :]] * b[:, None, :]
+        P = np.linalg.inv(A)
+        alone = P @ (a * self.moment[old])  # (widths, o)
+        taken = np.einsum("wop,spe->swoe", P, B, optimize=True)
+        S = (
+            C[:, None]
+            + np.eye(b.shape[1]) / square[:, None, None]
+            - np.einsum("soe,swof->swef", B, taken, optimize=True)
+        )
+        Q = np.linalg.inv(S)
+        left = (b * self.moment[new])[:, None] - np.einsum("soe,wo->swe", B, alone, optimize=True)
+        gained = (Q @ left[..., None])[..., 0]
+        value = 0.5 * ((alone @ (a * self.moment[old]))[None] + (left * gained).sum(axis=2))
+        value -= 0.5 * (np.linalg.slogdet(A)[1] + np.linalg.slogdet(S)[1] + (len(a) + b.shape[1]) * np.log(square))
+        mean = np.concatenate([alone[None] - (taken @ gained[..., None])[..., 0], gained], axis=2)
+        variance = np.concatenate([
+            np.diagonal(P, axis1=1, axis2=2)[None] + ((taken @ Q) * taken).sum(axis=3), np.diagonal(Q, axis1=2, axis2=3)
+        ], axis=2)  # fmt: skip
+        on = np.concatenate([np.broadcast_to(old, (len(new), len(old))), new], axis=1)[:, None, :]
+        unit = np.concatenate([np.broadcast_to(a, (len(b), len(a))), b], axis=1)[:, None, :]
+        mean, sd = unit * mean, unit * np.sqrt(np.maximum(variance, 0.0))
         low, high, sign = self._bounds
-        signed = sign[on][:, None, :] > 0.0
+        signed = sign[on] > 0.0
         value += np.where(signed, log_ndtr(np.where(signed, mean / sd, 0.0)) + log(2.0), 0.0).sum(axis=2)
-        outside = (mean < low[on][:, None, :] - 3.0 * sd) | (mean > high[on][:, None, :] + 3.0 * sd)
-        return np.where(outside.any(axis=2), -np.inf, value), mean, (l, V)
+        outside = (mean < low[on] - 3.0 * sd) | (mean > high[on] + 3.0 * sd)
+        return np.where(outside.any(axis=2), -np.inf, value), mean
 
 
 @dataclass(frozen=True, eq=False)
@@ -228,35 +244,32 @@ def search(w: Weighed, most: int, among: Collection[Place] | None = None) -> Few
     long = [len(c.columns) > LONG for c in w.candidates]
     visited: dict[Members, float] = {(): w.prior(())}
 
-    def weigh(some: Iterable[Members]) -> None:
-        new = [members for members in dict.fromkeys(some) if members not in visited]
-        for k in range(0, len(new), TOGETHER):
-            part = new[k : k + TOGETHER]
-            visited.update(zip(part, w.values(part).tolist(), strict=True))
-
-    def grown(members: Members) -> list[Members]:
+    def grow(members: Members) -> list[Members]:
+        """The sets with one candidate more, weighed."""
         if len(members) == most:
             return []
         there = {w.candidates[i].place for i in members}
         full = any(long[i] for i in members)
-        return [
-            tuple(sorted((*members, i)))
-            for i in usable
-            if w.candidates[i].place not in there and not (full and long[i])
-        ]
+        more = [i for i in usable if w.candidates[i].place not in there and not (full and long[i])]
+        grown = {tuple(sorted((*members, i))): i for i in more}
+        new = {each: i for each, i in grown.items() if each not in visited}
+        if new:
+            visited.update(zip(new, w.beside(members, list(new.values())).tolist(), strict=True))
+        return list(grown)
 
     front: list[Members] = [()]
     for size in range(1, most + 1):
-        found = {each for members in front for each in grown(members)}
-        weigh(found)
+        found = {each for members in front for each in grow(members)}
         front = sorted(found, key=lambda m: (-visited[m], m))[: KEPT if size > 1 else 2 * KEPT]
         if not front or (size > 1 and visited[front[0]] < max(visited.values()) - SLACK):
             break
     best = None
     while best != (best := max(visited, key=lambda m: (visited[m], m))):
-        less = [(*best[:k], *best[k + 1 :]) for k in range(len(best))]
-        weigh(less)
-        weigh(each for members in less for each in grown(members))
+        for k in range(len(best)):
+            less = (*best[:k], *best[k + 1 :])
+            if less not in visited:
+                visited[less] = float(w.beside(less[:-1], less[-1:])[0])
+            grow(less)
     return told(w, visited)
 
 
