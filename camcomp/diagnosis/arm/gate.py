@@ -15,7 +15,7 @@ from scipy.stats import binom, chi2, norm
 from scipy.stats import f as f_ratio
 
 from camcomp.diagnosis.arm.dependence import Dependence, dependences
-from camcomp.diagnosis.arm.discrepancy import CHI2_3_MEDIAN, Evidence, design, regions
+from camcomp.diagnosis.arm.discrepancy import CHI2_3_EDGE, CHI2_3_MEDIAN, Evidence, design, regions
 from camcomp.diagnosis.arm.noise_floor import FAR, IN_A_ROW, TipFloor
 from camcomp.ground.datatypes import Floats
 
@@ -193,19 +193,24 @@ def stretches(rest: Sequence[Floats], times: Sequence[Floats]) -> Dependence:
 def change(rest: Sequence[Floats], times: Sequence[Floats], frames: Sequence[tuple[int, Floats]]) -> Dependence:
     """Whether the frame of an instrument, or the place of its target, is another one from some instant of a campaign on.
 
-    Postures that are visited in turns hide it: what it does to them points everywhere.
+    Postures that are visited in turns hide it: what it does to them points everywhere. Noise may be louder at times, and have
+    tails: Huber's psi of rows that are as loud in every stretch of time.
     """
     whole = sum(float((r**2).sum()) for r in rest)
     best = Dependence("", 0.0, 0.0)
     for number in {number for number, _ in frames}:
         own = [i for i, (each, _) in enumerate(frames) if each == number]
-        order = np.argsort(np.concatenate([times[i] for i in own]), kind="stable")
-        r, N = (np.concatenate(part)[order] for part in ([rest[i] for i in own], [frames[i][1] for i in own]))
+        when = np.concatenate([times[i] for i in own])
+        order = np.argsort(when, kind="stable")
+        r, N = (np.concatenate(part) for part in ([rest[i] for i in own], [frames[i][1] for i in own]))
         instants = np.unique(np.linspace(0, len(r), INSTANTS + 2).astype(int)[1:-1])
         instants = instants[(instants >= SHORTEST) & (instants <= len(r) - SHORTEST)]
         freedom = 3 * len(r) - 2 * N.shape[2]
         if not len(instants) or freedom <= 0 or not whole > 0.0:
             continue
+        energy, weight = float((r**2).sum()), _even_weights(r, when)[:, None]
+        r, N = (r * weight)[order], (N * weight[:, :, None])[order]
+        r /= np.maximum(np.linalg.norm(r, axis=1, keepdims=True) / np.sqrt(CHI2_3_EDGE), 1.0)
         Q, _ = np.linalg.qr(N.reshape(-1, N.shape[2]))
         left = r.ravel() - Q @ (Q.T @ r.ravel())
         before = float(left @ left)
@@ -219,9 +224,18 @@ def change(rest: Sequence[Floats], times: Sequence[Floats], frames: Sequence[tup
                 10.0
             )
             if chance < best.log10_chance:
-                share = max(taken - N.shape[2] * after / freedom, 0.0) / whole
-                best = Dependence("time", min(share, 1.0), chance)
+                share = max(taken - N.shape[2] * after / freedom, 0.0) / float((r**2).sum())
+                best = Dependence("time", min(share, 1.0) * energy / whole, chance)
     return best
+
+
+def _even_weights(rest: Floats, time: Floats) -> Floats:
+    """Weights (n,) of rows of leftovers (n, 3) that make noise as loud in every stretch of time; far rows have no say in it."""
+    out = np.ones(len(rest))
+    for own in windows(time) or [np.arange(len(rest))]:
+        square = float(np.median((rest[own] ** 2).sum(axis=1))) / CHI2_3_MEDIAN
+        out[own] = 1.0 / np.sqrt(max(square, 1e-300))
+    return out
 
 
 def windows(time: Floats) -> list[np.ndarray]:

@@ -48,3 +48,16 @@ def test_one_of_few_poses_may_be_a_mistake(rows, mistakes, found):
     size = np.full(rows, 0.03)
     size[3 : 3 + 4 * mistakes : 4] = 5.0
     assert far_off(size, np.arange(float(rows))).sum() == found
+
+
+@pytest.mark.parametrize("noise", ["tails", "louder"])
+@pytest.mark.parametrize("seed", range(6))
+def test_noise_of_another_kind_is_no_change_either(noise, seed):
+    """Student's t of two degrees, and noise that becomes three times as loud."""
+    _, frame = rounds(0.0, seed)
+    rng = np.random.default_rng(100 + seed)
+    tails = SD * rng.standard_t(2, (ROWS, 3))
+    louder = SD * rng.standard_normal((ROWS, 3)) * np.where(np.arange(ROWS) > 100, 3.0, 1.0)[:, None]
+    left = {"tails": tails, "louder": louder}[noise]
+    left = left - frame @ np.linalg.lstsq(frame.reshape(-1, 9), left.ravel(), rcond=None)[0]
+    assert change([left], TIMES, [(0, frame)]).log10_chance > -2.5
