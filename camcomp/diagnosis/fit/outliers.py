@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.ndimage import median_filter
+from scipy.stats import norm
 
 from camcomp.diagnosis.fit.bench import Bench, thinned
 from camcomp.ground.datatypes import Bools, Floats
@@ -46,11 +47,13 @@ def _jumping_off(x: Floats) -> Bools:
     single = np.abs(beside) > OFF * max(scale, 1e-12)
     around = x - median_filter(x, min(LONG, len(x)), mode="mirror")
     wide = 1.4826 * float(np.median(np.abs(around)))
-    gross = np.abs(around) > GROSS * max(wide, scale, 1e-12)
-    if scale == 0.0 or single.mean() > MANY:  # the machine itself moves from row to row: only what is far beyond
-        single = np.abs(beside) > GROSS * max(scale, 1e-12) if scale > 0.0 else np.zeros_like(single)
-        if single.mean() > MANY:
-            single[:] = False
+    # what mostly stands still is told in steps
+    least = GROSS * max(wide, scale) or OFF * float(np.min(np.abs(around), where=around != 0.0, initial=np.inf))
+    gross = np.abs(around) > least
+    # a curve is its own median, and a machine may move from row to row: only what is far beyond what most rows do
+    if scale == 0.0 or single.mean() > MANY:
+        most = float(np.quantile(np.abs(beside), 1.0 - MANY))
+        single = np.abs(beside) > OFF / norm.isf(0.5 * MANY) * most if most > 0.0 else np.zeros_like(single)
     return np.asarray(single | (gross if gross.mean() < 2.0 * MANY else False))
 
 

@@ -1,6 +1,7 @@
 """Rows that no machine has made are told from the rows beside them."""
 
 import numpy as np
+import pytest
 
 from camcomp.diagnosis.fit.outliers import _jumping_off, _sprung_off
 
@@ -38,3 +39,18 @@ def test_a_machine_that_has_lost_steps_and_stays_off_is_no_beam_break():
     gap = np.random.default_rng(8).normal(0, 0.003, (300, 3))
     gap[250:, 0] += 8.0
     assert not _sprung_off(gap).any()
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.001])
+def test_a_row_off_a_smooth_curve_is_found_though_most_rows_are_the_median_of_those_beside_them(noise):
+    """What rises from row to row is its own running median: of such deviations the median is nothing."""
+    rng = np.random.default_rng(9)
+    x = 0.06 * np.cos(np.pi * np.arange(270) / 30.0) + noise * rng.standard_normal(270)
+    assert not _jumping_off(x).any()
+    x[93] -= 0.28
+    assert list(np.flatnonzero(_jumping_off(x))) == [93]
+
+
+def test_steps_of_an_encoder_that_stands_are_no_outliers():
+    x = np.round(0.4 * np.sin(np.arange(400) / 60.0) + 0.1 * np.random.default_rng(10).standard_normal(400))
+    assert not _jumping_off(x).any()
