@@ -18,6 +18,7 @@ from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.diagnosis.statistics.cause_sets import CausePrior, Fitted, Members, Scale, total
 from camcomp.diagnosis.statistics.evidence import Gram, Prior, estimate, gram
 from camcomp.diagnosis.statistics.noise_model import Noise
+from camcomp.diagnosis.statistics.shape_evidence import SoughtShape
 from camcomp.ground.datatypes import Bools, Floats
 from camcomp.ground.errors import PhysicsError
 from camcomp.model.effect import Cause, Parameter
@@ -152,7 +153,7 @@ class Problem:
         theta = self._bounded(members, theta)
         white = [W[:, index] for W in self.white]
         left = list(self.white_residual)
-        bent = False
+        bent, sought = False, dict[int, list[SoughtShape]]()
         passes += (1 if shapes else 0) + (FOLLOWED if self._ringing(members) else 0)
         far, most = False, passes + FARTHER
         for step in range(most):
@@ -179,7 +180,7 @@ class Problem:
             theta = after
             size = float(change @ np.linalg.solve(full[np.ix_(index, index)] + 1e-18 * np.eye(len(index)), change))
             if self.shapes_of(members) and (step < passes - 1 or (far and step < most - 1)):
-                size, far = self._move_shapes(members, theta, shapes, left, white, mean)
+                size, far, sought = self._move_shapes(members, theta, shapes, left, white, mean)
             else:
                 far = False
             if step > 0 and size < SETTLED:
@@ -202,7 +203,7 @@ class Problem:
             members,
             theta,
             covariance,
-            scale(members),
+            scale(members, sought),
             grams,
             shapes,
             factor,
@@ -404,10 +405,11 @@ class Problem:
     def _move_shapes(
         self, members: Members, theta: Floats, shapes: dict[int, dict[str, float]], left: Sequence[Floats],
         white: Sequence[Floats], mean: Floats,
-    ) -> tuple[float, bool]:  # fmt: skip
+    ) -> tuple[float, bool, dict[int, list[SoughtShape]]]:  # fmt: skip
         """One Gauss-Newton step of the scanned shapes at their best amplitudes, within reach of the scan.
 
-        By how much chi-square it moves the model, and whether it would go further; shapes that the data do not ask to move stay.
+        By how much chi-square it moves the model, whether it would go further, and how well the shapes are known beside the
+        members' sizes; shapes that the data do not ask to move stay.
         """
         names, index = self.shapes_of(members), self.member_columns(members)
         others = mean.copy()
@@ -418,6 +420,8 @@ class Problem:
         rest = rest - A[:, : len(index)] @ theta
         size = np.linalg.norm(A, axis=0) + 1e-12
         step = np.linalg.lstsq(A / size, rest, rcond=1e-8)[0] / size
+        # what rows do not tell at all is known to next to nothing
+        known = size**2 / np.diag(np.linalg.inv((A / size).T @ (A / size) + 1e-10 * np.eye(len(size))))
         most = np.array([reach(p, shapes[i][p.name]) * shapes[i][p.name] for i, p in names])
         whole = float(np.min(most / np.maximum(np.abs(step[len(index) :]), 1e-300)))
         step *= min(1.0, whole)
@@ -426,4 +430,8 @@ class Problem:
             for (i, p), s in zip(names, step[len(index) :], strict=True):
                 high = longest(self.bench, self.columns.candidates[i], p)
                 shapes[i][p.name] = float(np.clip(shapes[i][p.name] + s, p.low, max(high, p.low)))
-        return moves, whole < 1.0 and moves > BENT
+        sought = dict[int, list[SoughtShape]]()
+        for (i, p), of in zip(names, known[len(index) :], strict=True):
+            value, span = shapes[i][p.name], float(np.log(max(p.scan) / min(p.scan)))
+            sought.setdefault(i, []).append(SoughtShape(float(np.log(value)), value**2 * float(of), span))
+        return moves, whole < 1.0 and moves > BENT, sought

@@ -23,6 +23,7 @@ from camcomp.diagnosis.statistics.evidence import (
     log_bayes_pairs,
     log_sum,
 )
+from camcomp.diagnosis.statistics.shape_evidence import SoughtShape, shape_log_evidence
 from camcomp.ground.datatypes import Floats
 
 Members = tuple[int, ...]
@@ -122,16 +123,16 @@ class Scale:
         self.prior, self.candidates = prior, candidates
         self.bases: list[Base] = [base(data, prior, f) for f in TOLERANCES]
 
-    def __call__(self, members: Members) -> float:
-        """Log evidence of a set."""
-        values = self._by_tolerance(members)
+    def __call__(self, members: Members, sought: Mapping[int, Sequence[SoughtShape]] | None = None) -> float:
+        """Log evidence of a set; sought: shapes by candidate at whose best values the columns are."""
+        values = self._by_tolerance(members, sought or {})
         return log_sum(values) - float(np.log(len(values)))
 
     def factor(self, members: Members) -> float:
         """How far off the tolerances most likely are, given a set."""
-        return TOLERANCES[int(np.argmax(self._by_tolerance(members)))]
+        return TOLERANCES[int(np.argmax(self._by_tolerance(members, {})))]
 
-    def _by_tolerance(self, members: Members) -> Floats:
+    def _by_tolerance(self, members: Members, sought: Mapping[int, Sequence[SoughtShape]]) -> Floats:
         columns = self.candidates.columns
         index = [c for i in members for c in columns[i]]
         none = np.array([
@@ -142,7 +143,9 @@ class Scale:
             return none
         ways = self.candidates.ways(members)
         each = [
-            odds + log_bayes(self.bases, self.prior, [[c for i in group for c in columns[i]] for group in groups])
+            odds
+            + shape_log_evidence(groups, sought)
+            + log_bayes(self.bases, self.prior, [[c for i in group for c in columns[i]] for group in groups])
             for odds, groups in ways
         ]
         return np.asarray(none + np.logaddexp.reduce(each) - log_sum([odds for odds, _ in ways]))
