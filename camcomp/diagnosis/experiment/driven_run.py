@@ -160,7 +160,10 @@ def _near(log: str, name: str, measured: Measured, rho: Floats, program: _Progra
 def _aligned(
     log: str, name: str, program: _Program, tip: Floats, measured: Measured, aside_mm: float = ASIDE_MM
 ) -> Aligned:
-    """Where on its program the tip (n, 3) was; most of it within aside_mm of the path. Raises ConfigError CC406."""
+    """Where on its program the tip (n, 3) was; most of it within aside_mm of the path. Raises ConfigError CC406.
+
+    What may be further aside than a control leaves its path bends by it, and may lie nearer to another pass than to its own.
+    """
     path = program.track.path
     line = measured.line
     known = np.isfinite(line) & (line > 0)
@@ -170,7 +173,8 @@ def _aligned(
         raise ConfigError("CC406", message, at=Location(log, 1, 1))
     found = align(path, tip, line, max(aside_mm, LOST_MM))
     check_followed(log, name, found.distance[places(tip)], _agreement(path, found, tip), aside_mm)
-    check_lines(log, name, way_from_lines(path, found))
+    if aside_mm <= ASIDE_MM:
+        check_lines(log, name, way_from_lines(path, found))
     return found
 
 
