@@ -12,7 +12,7 @@ from camcomp.model.config.load import load_config
 from camcomp.model.job import Job
 from tests.linuxcnc import simulator
 
-pytestmark = [simulator.needs_linuxcnc, pytest.mark.alone]
+pytestmark = simulator.needs_linuxcnc
 CONFIG = shipped("config/cartesian.yaml")
 STEPS = [  # all three coordinates, arcs by radius and from their start: behind a recovery axes stand where offsets led
     ("G21 G90 G0 X0 Y0 Z0", (0.0, 0.0, 0.0)),
