@@ -16,9 +16,11 @@ class Cycles(Motions):
 
     actions: list[tuple[str, list[float]]]  # (G0 or G1, end point) or (a statement, [])
 
-    def forget_cycle(self) -> None:
-        """The words of a cycle hold while that cycle stays in force."""
+    def forget_cycle(self, series: bool = True) -> None:
+        """The words of a cycle hold while that cycle stays in force, the height at which a series began while its cycles do."""
         self._held: dict[str, float] = {}
+        if series:
+            self._began: float | None = None
 
     def cycle(self, block: Block, code: int) -> None:
         """Drill, tap or bore, once or several times."""
@@ -35,11 +37,13 @@ class Cycles(Motions):
         start = list(state.position)
         if self._held.setdefault("plane", state.plane) != state.plane:
             self.refuse("CC132", f"the plane changes while {name} is in force")
-        # A series of one cycle refers to the height at which it began.
-        self._held.setdefault("start", start[depth] - state.offset[depth])
-        self._hold(block, name, self._held["start"], depth)
-        initial = self._held["start"] + state.offset[depth]
-        bottom, level = self._held["Z"] + state.offset[depth], self._held["R"] + state.offset[depth]
+        # a series of cycles of whatever kind refers to the height at which it began
+        if self._began is None:
+            self._began = start[depth] - state.offset[depth]
+        self._hold(block, name, depth)
+        initial = self._began + state.offset[depth]
+        level = self._held["R"] + (initial if state.relative else state.offset[depth])
+        bottom = self._held["Z"] + (level if state.relative else state.offset[depth])
         if level < bottom:
             self.refuse("CC132", f"the retract plane of {name} lies below its bottom")
         repeats = self._repeats(block)
@@ -48,27 +52,29 @@ class Cycles(Motions):
         first = True
         for _ in range(repeats):
             place = self._place(block, depth)
-            if first and start[depth] < level:
-                self._go(block, 0, self._at(state.position, depth, level), feed)
-            self._go(block, 0, self._at(place, depth, state.position[depth]), feed, always=repeats == 1 and first)
             clear = max(initial, level) if state.retract_to_start else level
+            if first and initial < level:
+                self._go(block, 0, self._at(state.position, depth, level), feed)
+            here = state.position[depth]
+            across = here if first and here > level else clear  # from below it comes aslant
+            self._go(block, 0, self._at(place, depth, across), feed, always=repeats == 1 and first)
             self._go(block, 0, self._at(place, depth, level), feed)
             self._body(block, code, place, (bottom, level, clear), feed)
             first = False
         self.record.cycle(self.actions, tapping=code in _TAPS)
 
-    def _hold(self, block: Block, name: str, here: float, depth: int) -> None:
-        state, held = self.state, self._held
-        unit = state.unit
+    def _hold(self, block: Block, name: str, depth: int) -> None:
+        """Keeps the words of a cycle as they stand, lengths in mm: in G91 they count from where its series began and from R."""
+        held, unit = self._held, self.state.unit
         r = block.number("R")
         if r is not None:
-            held["R"] = r * unit + (here if state.relative else 0.0)
+            held["R"] = r * unit
         elif "R" not in held:
             self.refuse("CC132", f"{name} has no retract plane R")
         letter = "XYZ"[depth]
         z = block.words[letter].value * unit if letter in block.words else None
         if z is not None:
-            held["Z"] = z + (held["R"] if state.relative else 0.0)
+            held["Z"] = z
         elif "Z" not in held:
             self.refuse("CC132", f"{name} has no depth {letter}")
         for letter in "PQIJK":

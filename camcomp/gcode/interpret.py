@@ -99,7 +99,7 @@ class Interpreter(Settings, Cycles):
         explicit = block.code(1)
         if explicit is not None:
             if explicit not in CYCLES or explicit != state.motion:
-                self.forget_cycle()
+                self.forget_cycle(series=explicit not in CYCLES)
             if explicit == 800:
                 state.motion = state.outside_cycles if self.dialect.cycles_apart else None
             else:

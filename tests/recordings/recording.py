@@ -19,7 +19,7 @@ SHELVES = {
     "first": HERE,
     "second": HERE / "second",
     "third": HERE / "third",
-    "fourth": HERE / "fourth",
+    "words": HERE / "words",
 }  # of recordings: nothing saw the second one before the 56000s, and the third one before the 60000s
 STEP_S = 1e-3
 QUANTUM_MM = 1e-5
