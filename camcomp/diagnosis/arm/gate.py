@@ -193,8 +193,8 @@ def stretches(rest: Sequence[Floats], times: Sequence[Floats]) -> Dependence:
 def change(rest: Sequence[Floats], times: Sequence[Floats], frames: Sequence[tuple[int, Floats]]) -> Dependence:
     """Whether the frame of an instrument, or the place of its target, is another one from some instant of a campaign on.
 
-    Postures that are visited in turns hide it: what it does to them points everywhere. Noise may be louder at times, and have
-    tails: Huber's psi of rows that are as loud in every stretch of time.
+    Postures that are visited in turns hide it: what it does to them points everywhere. Rows far out weigh less (Huber's psi): noise
+    has tails, and is louder at times.
     """
     whole = sum(float((r**2).sum()) for r in rest)
     best = Dependence("", 0.0, 0.0)
@@ -208,9 +208,9 @@ def change(rest: Sequence[Floats], times: Sequence[Floats], frames: Sequence[tup
         freedom = 3 * len(r) - 2 * N.shape[2]
         if not len(instants) or freedom <= 0 or not whole > 0.0:
             continue
-        energy, weight = float((r**2).sum()), _even_weights(r, when)[:, None]
-        r, N = (r * weight)[order], (N * weight[:, :, None])[order]
-        r /= np.maximum(np.linalg.norm(r, axis=1, keepdims=True) / np.sqrt(CHI2_3_EDGE), 1.0)
+        energy, square = float((r**2).sum()), (r**2).sum(axis=1)
+        edge = max(float(np.median(square)) / CHI2_3_MEDIAN * CHI2_3_EDGE, 1e-300)
+        r, N = (r / np.maximum(np.sqrt(square / edge), 1.0)[:, None])[order], N[order]
         Q, _ = np.linalg.qr(N.reshape(-1, N.shape[2]))
         left = r.ravel() - Q @ (Q.T @ r.ravel())
         before = float(left @ left)
@@ -227,15 +227,6 @@ def change(rest: Sequence[Floats], times: Sequence[Floats], frames: Sequence[tup
                 share = max(taken - N.shape[2] * after / freedom, 0.0) / float((r**2).sum())
                 best = Dependence("time", min(share, 1.0) * energy / whole, chance)
     return best
-
-
-def _even_weights(rest: Floats, time: Floats) -> Floats:
-    """Weights (n,) of rows of leftovers (n, 3) that make noise as loud in every stretch of time; far rows have no say in it."""
-    out = np.ones(len(rest))
-    for own in windows(time) or [np.arange(len(rest))]:
-        square = float(np.median((rest[own] ** 2).sum(axis=1))) / CHI2_3_MEDIAN
-        out[own] = 1.0 / np.sqrt(max(square, 1e-300))
-    return out
 
 
 def windows(time: Floats) -> list[np.ndarray]:
