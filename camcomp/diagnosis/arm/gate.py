@@ -11,7 +11,7 @@ from typing import Literal
 
 import numpy as np
 from scipy.spatial import KDTree
-from scipy.stats import binom, chi2, norm
+from scipy.stats import chi2, norm, wilcoxon
 from scipy.stats import f as f_ratio
 
 from camcomp.diagnosis.arm.dependence import Dependence, dependences
@@ -124,12 +124,13 @@ def level(left: LeftOver, features: Sequence[Floats], floor: TipFloor) -> tuple[
 
 
 def regions_above(left: LeftOver, features: Sequence[Floats]) -> float:
-    """log10 of the chance that so many regions of postures have a mean square above ABOVE, where half of them would.
+    """log10 of the chance that regions of postures have mean squares as far above ABOVE as these, where as many lie below.
 
-    A sign test, for leftovers of which a few regions have nearly all: means and their spread then say little.
+    Signed ranks, for leftovers of which a few regions have nearly all: means and their spread then say little. Source:
+    Wilcoxon, Biometrics Bulletin 1 (1945) 80.
     """
     total, n = _by_region(left, features)
-    return float(binom.logsf((total > ABOVE * n).sum() - 1, len(n), 0.5) / np.log(10.0))
+    return float(np.log10(wilcoxon(total / n - ABOVE, alternative="greater").pvalue))
 
 
 def lasting(left: LeftOver, times: Sequence[Floats]) -> bool:

@@ -10,7 +10,7 @@ from scipy.special import logsumexp
 
 from camcomp.diagnosis.arm.discrepancy import FREE, Discrepancy, ResidualBlock
 from camcomp.diagnosis.arm.few_causes import SMALL, WIDTHS, search, sways, weighed
-from camcomp.diagnosis.arm.gate import LeftOver, lasting
+from camcomp.diagnosis.arm.gate import FALSE, LeftOver, lasting, regions_above
 from camcomp.diagnosis.arm.noise_floor import far_off
 from camcomp.diagnosis.arm.placed_effects import PlacedEffect
 from camcomp.diagnosis.arm.poses import _shapes
@@ -153,3 +153,24 @@ def test_empty_cells_of_deviations_and_temperatures_are_filled():
     poses = _poses(SimpleNamespace(clamping=None, started_s=0.0, name="a"), log)
     np.testing.assert_allclose(poses.temperature, 20.0 + np.arange(6.0))
     np.testing.assert_allclose(poses.sd, 0.02)
+
+
+def regions_of(means, rng):
+    """A leftover in regions of postures with so many times the floor's square, five poses each."""
+    features = np.repeat(np.column_stack([np.cos(np.arange(len(means))), np.sin(np.arange(len(means)))]), 5, axis=0)
+    squares = 3.0 * np.repeat(means, 5) * rng.uniform(0.8, 1.2, 5 * len(means))
+    return LeftOver((np.zeros((len(squares), 3)),), (squares,)), [10.0 * features]
+
+
+def test_what_is_left_in_most_regions_is_above_the_floor_though_three_fall_below_it_and_two_have_nearly_all():
+    left, features = regions_of(
+        [-21, 42, -6, 56, 29, 25, 38, 568, -36, 81, 31, 13, 366, 9, 33, 36], np.random.default_rng(1)
+    )
+    assert regions_above(left, features) < np.log10(FALSE)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_two_regions_alone_are_not_most_of_them(seed):
+    rng = np.random.default_rng(seed)
+    left, features = regions_of([568, 366, *rng.chisquare(12, 14) / 12.0], rng)
+    assert regions_above(left, features) > np.log10(FALSE)
