@@ -33,6 +33,11 @@ def table(path):
     return {name: np.array([float(row[name] or "nan") for row in rows]) for name in rows[0]}
 
 
+def rms_um(residuals, kind):
+    """Root mean square distance of a table of residuals, kind `gap` or `rest`."""
+    return 1e3 * np.sqrt(np.nanmean(np.sum(residuals.array(*(f"{kind}_{axis}_mm" for axis in "xyz")) ** 2, axis=1)))
+
+
 def compensated(folder, program, config, *more):
     """Outputs of one compensation: (process, joint table, paths table, summary, corrected program bytes)."""
     out = {key: folder / f"{key}" for key in ("out.nc", "joints.csv", "paths.csv", "summary.json")}

@@ -11,11 +11,11 @@ import camcomp
 from camcomp.ground.errors import CheckFailed, ConfigError
 from camcomp.ground.files import shipped
 from camcomp.terminal.cli import run
-from tests.commandline import table
+from tests.commandline import rms_um, table
 
 MACHINE = str(shipped("config/orthoglide-1deg.yaml"))
 GROOVE = str(shipped("samples/groove-circle-2.nc"))
-EXPERIMENTS = {name: shipped(f"samples/{name}/experiment.yaml") for name in ("diagnosis/clear", "ur10")}
+CLEAR = shipped("samples/diagnosis/clear/experiment.yaml")
 
 
 @pytest.fixture(scope="module")
@@ -30,7 +30,7 @@ def compensated(machine):
 
 @pytest.fixture(scope="module")
 def diagnosed():
-    return camcomp.diagnose(EXPERIMENTS["diagnosis/clear"])
+    return camcomp.diagnose(CLEAR)
 
 
 def test_compensate_gives_what_the_command_writes(tmp_path, compensated):
@@ -78,7 +78,7 @@ def test_simulate_gives_what_the_command_writes(tmp_path, machine):
 
 def test_diagnose_gives_what_the_command_writes(tmp_path, capsys, diagnosed):
     result, residuals = tmp_path / "result.json", tmp_path / "residuals.csv"
-    words = [str(EXPERIMENTS["diagnosis/clear"]), "--json", str(result), "--residuals", str(residuals)]
+    words = [str(CLEAR), "--json", str(result), "--residuals", str(residuals)]
     assert run(["diagnose", *words]) == 0
     assert capsys.readouterr().err.rstrip("\n").endswith("\n".join(diagnosed.answer))
     assert diagnosed.verdict == "identified"
@@ -87,28 +87,11 @@ def test_diagnose_gives_what_the_command_writes(tmp_path, capsys, diagnosed):
     assert residuals.read_text().startswith("run,t_s,line,gap_x_mm,gap_y_mm,gap_z_mm,gap_act_x_mm,")
 
 
-def rms_um(table, kind):
-    return 1e3 * np.sqrt(np.nanmean(np.sum(table.array(*(f"{kind}_{axis}_mm" for axis in "xyz")) ** 2, axis=1)))
-
-
 def test_residuals_are_those_of_the_result(diagnosed):
     left = diagnosed.residuals
     assert rms_um(left, "gap") == pytest.approx(diagnosed.result.gap.rms_um, rel=1e-3)
     assert rms_um(left, "rest") == pytest.approx(diagnosed.result.shrinkage.after_rms_um, rel=0.05)
     assert sorted(set(left["run"])) == sorted(run.name for run in diagnosed.opened.runs)
-
-
-def test_residuals_of_an_arm_are_those_of_its_poses():
-    done = camcomp.diagnose(EXPERIMENTS["ur10"])
-    left = done.residuals
-    fitted = ~np.isin(left["run"], done.result.shrinkage.holdout)
-    own = camcomp.ResultTable({name: values[fitted] for name, values in left.items()})
-    assert rms_um(own, "gap") == pytest.approx(done.result.gap.rms_um, rel=1e-3)
-    assert rms_um(own, "rest") < 0.6 * rms_um(own, "gap")
-    assert 0 < own.rows < left.rows
-    out = {(each.run, each.row) for each in done.result.outliers}
-    assert out.isdisjoint(zip(left["run"], left["row"], strict=True))
-    assert done.next_program_cuts is False
 
 
 def test_a_stream_is_made_of_a_machine(machine):
@@ -178,5 +161,5 @@ def test_diagnose_works_with_one_thread_of_linear_algebra(monkeypatch):
     monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
     monkeypatch.setattr("camcomp.diagnosis.experiment.open_experiment.open_experiment", opened)
     with threadpool_limits(limits=2, user_api="blas"), pytest.raises(ConfigError):
-        camcomp.diagnose(EXPERIMENTS["diagnosis/clear"])
+        camcomp.diagnose(CLEAR)
     assert seen and set(seen) == {1}

@@ -7,13 +7,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import camcomp
 from camcomp.diagnosis.arm.discrepancy import without_nuisance
 from camcomp.diagnosis.arm.fit import investigate, prepared
 from camcomp.diagnosis.arm.poses import ArmBench, Poses
 from camcomp.diagnosis.arm.study import merged
 from camcomp.model.config.load import load_config
 from camcomp.model.statics.build import build_robot
-from tests.commandline import ROOT, camcomp, table
+from tests.commandline import ROOT, rms_um, table
+from tests.commandline import camcomp as command
 from tests.schemas import check as check_schema
 
 DATA = Path(os.environ.get("CAMCOMP_DATA", "/nowhere")) / "ipa_ur10"
@@ -22,7 +24,7 @@ GEOMETRY, GRAVITY, CURVE = "link_geometry", "gravity_compliance", "joint_curve"
 
 
 def diagnosed(experiment, tmp_path):
-    done = camcomp("diagnose", experiment, "--json", tmp_path / "out.json")
+    done = command("diagnose", experiment, "--json", tmp_path / "out.json")
     assert done.returncode == 0, done.stderr.decode()
     return json.loads((tmp_path / "out.json").read_text())
 
@@ -60,8 +62,14 @@ def seen_at(curve):
     return np.any([(angle - low) % 360.0 <= high - low for low, high in curve["seen_deg"]], axis=0)
 
 
-def test_sample(tmp_path):
-    result = diagnosed("samples/ur10/experiment.yaml", tmp_path)
+@pytest.fixture(scope="module")
+def sample():
+    """The sample's diagnosis; what the command prints of it the README's test looks at."""
+    return camcomp.diagnose(ROOT / "samples/ur10/experiment.yaml")
+
+
+def test_sample(sample):
+    result = json.loads(sample.result.to_json())
     check_schema("diagnosis", result)
     assert result["floor"]["source"] == "repeats"  # 37 poses of B were visited again
     assert 20 < result["floor"]["um"] == result["gap"]["noise_floor_um"] < 40
@@ -75,8 +83,21 @@ def test_sample(tmp_path):
     assert 3e-9 < low < 1.03e-8 < high < 2e-8  # what all poses of both campaigns say
 
 
+def test_residuals_are_those_of_its_poses(sample):
+    left = sample.residuals
+    fitted = ~np.isin(left["run"], sample.result.shrinkage.holdout)
+    own = camcomp.ResultTable({name: values[fitted] for name, values in left.items()})
+
+    assert rms_um(own, "gap") == pytest.approx(sample.result.gap.rms_um, rel=1e-3)
+    assert rms_um(own, "rest") < 0.6 * rms_um(own, "gap")
+    assert 0 < own.rows < left.rows
+    out = {(each.run, each.row) for each in sample.result.outliers}
+    assert out.isdisjoint(zip(left["run"], left["row"], strict=True))
+    assert sample.next_program_cuts is False
+
+
 def test_without_the_true_effects_they_are_not_made_up_from_offsets(tmp_path):
-    done = camcomp(
+    done = command(
         "diagnose", "samples/ur10/experiment.yaml", "--json", tmp_path / "o.json", "--without", GEOMETRY,
         "--without", GRAVITY, "--without", "link_length", "--without", "screw_pitch", "--without", CURVE,
     )  # fmt: skip
@@ -93,7 +114,7 @@ def test_without_the_true_effects_they_are_not_made_up_from_offsets(tmp_path):
 )
 def test_whole_campaigns(tmp_path, held, most_um, covered_um):
     tables = [DATA / "Series_A/measurements_grid.csv", DATA / "Series_B/measurements_joint_configurations.csv"]
-    done = camcomp("import", *tables, "--config", "config/ur10.yaml", "-o", tmp_path / "x", "--holdout", held)
+    done = command("import", *tables, "--config", "config/ur10.yaml", "-o", tmp_path / "x", "--holdout", held)
     assert done.returncode == 0, done.stderr.decode()
     log = table(tmp_path / "x" / "measurements_grid.csv")
     assert len(log["t_s"]) == 11911

@@ -432,6 +432,7 @@ class Problem:
                 shapes[i][p.name] = float(np.clip(shapes[i][p.name] + s, p.low, max(high, p.low)))
         sought = dict[int, list[SoughtShape]]()
         for (i, p), of in zip(names, known[len(index) :], strict=True):
-            value, span = shapes[i][p.name], float(np.log(max(p.scan) / min(p.scan)))
-            sought.setdefault(i, []).append(SoughtShape(float(np.log(value)), value**2 * float(of), span))
+            value = abs(shapes[i][p.name])
+            span = float(np.ptp(np.log(np.abs([each for each in p.scan if each] or [1.0]))))
+            sought.setdefault(i, []).append(SoughtShape(float(np.log(value or 1.0)), value**2 * float(of), span))
         return moves, whole < 1.0 and moves > BENT, sought
