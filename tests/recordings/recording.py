@@ -15,12 +15,9 @@ from pathlib import Path
 import numpy as np
 
 HERE = Path(__file__).parent
-SHELVES = {
-    "first": HERE,
-    "second": HERE / "second",
-    "third": HERE / "third",
-    "words": HERE / "words",
-}  # of recordings: nothing saw the second one before the 56000s, and the third one before the 60000s
+# Of recordings. Nothing saw the second one before the 56000s, and the third one before the 60000s. Words are programs that say
+# things in other words (inches, increments, canned cycles, turns): nothing for generators, which read plain ones only.
+SHELVES = {"first": HERE, "second": HERE / "second", "third": HERE / "third", "words": HERE / "words"}
 STEP_S = 1e-3
 QUANTUM_MM = 1e-5
 
