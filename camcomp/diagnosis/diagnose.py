@@ -30,6 +30,7 @@ from camcomp.diagnosis.next_experiment.designed import propose
 from camcomp.diagnosis.next_experiment.outcomes import NOTHING, with_outcomes
 from camcomp.diagnosis.next_experiment.proposal import Proposal
 from camcomp.diagnosis.result.types import (
+    UNKNOWN,
     DiagnosisResult,
     Driver,
     Estimate,
@@ -289,7 +290,8 @@ def _round(value: float) -> float:
 def _alternatives(problem: Problem, found: CauseSearch) -> tuple[tuple[NamedCause, ...], ...]:
     rivals = sorted(found.verdict.rivals, key=lambda j: -found.probability[j])
     sets = [found.fits[j] for j in (found.verdict.best, *rivals[: MOST_ALTERNATIVES - 1])]
-    return tuple(tuple(_named(problem, i) for i in f.members) for f in sets)
+    named = tuple(tuple(_named(problem, i) for i in f.members) for f in sets)
+    return named if rivals else (*named, (NamedCause(effect=UNKNOWN, target=None),))
 
 
 def _named(problem: Problem, i: int) -> NamedCause:

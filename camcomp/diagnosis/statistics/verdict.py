@@ -74,14 +74,18 @@ def judge(
 
 
 def open_where_even(verdict: Verdict, fits: Sequence[Fitted], probability: Floats) -> Verdict:
-    """The verdict, but `ambiguous` where a member of what it identifies is no more likely than not: sets without it are its rivals."""
-    doubtful = {i for i in fits[verdict.best].members if verdict.inclusion[i] <= EVEN}
+    """The verdict, but `ambiguous` where a member of what it identifies is no more likely than not: sets without it are its rivals.
+
+    Where all are, and no set rivals them, something unknown does.
+    """
+    members = set(fits[verdict.best].members)
+    doubtful = {i for i in members if verdict.inclusion[i] <= EVEN}
     least = float(probability[verdict.best]) * np.exp(-EQUAL_LOG_ODDS)
     rivals = tuple(
         int(j)
         for j in np.argsort(-probability)
         if j != verdict.best and probability[j] > least and fits[j].members and doubtful - set(fits[j].members)
     )
-    if verdict.word != "identified" or not rivals:
+    if verdict.word != "identified" or not (rivals or doubtful == members):
         return verdict
     return replace(verdict, word="ambiguous", rivals=rivals)

@@ -24,3 +24,10 @@ def test_what_is_no_more_likely_than_not_is_not_identified(sure, said):
     probability = np.array([0.4, 0.25, 0.15, 0.1, 0.01, 0.09])
     verdict = open_where_even(Verdict("identified", 0, (), sure), fits, probability)
     assert (verdict.word, verdict.rivals) == said
+
+
+@pytest.mark.parametrize(("sure", "word"), [({0: 0.5}, "ambiguous"), ({0: 0.8}, "identified")])
+def test_what_something_unknown_rivals_alone_is_not_identified(sure, word):
+    fits = [Fitted(members, np.zeros(len(members)), np.eye(len(members)), 0.0, ()) for members in [(0,), ()]]
+    verdict = open_where_even(Verdict("identified", 0, (), sure), fits, np.array([1.0, 0.0]))
+    assert (verdict.word, verdict.rivals) == (word, ())
