@@ -15,12 +15,13 @@ class Cycles(Motions):
     """Executes G73, G74 and G81 to G89. `actions` lists what the last cycle did, for writing it out."""
 
     actions: list[tuple[str, list[float]]]  # (G0 or G1, end point) or (a statement, [])
+    _began: float | None = None  # height of the tool, less the offset, in front of a series
 
     def forget_cycle(self, series: bool = True) -> None:
         """The words of a cycle hold while that cycle stays in force, the height at which a series began while its cycles do."""
         self._held: dict[str, float] = {}
         if series:
-            self._began: float | None = None
+            self._began = None
 
     def cycle(self, block: Block, code: int) -> None:
         """Drill, tap or bore, once or several times."""

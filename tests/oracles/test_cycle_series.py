@@ -49,3 +49,11 @@ def test_approaches_and_retracts_are_those_of_linuxcnc(seed):
     run = rs274.run(text)
     assert not run.error, text
     assert difference(read_program(text.encode(), name="p.nc", setup=Setup(start_mm=(0.0, 0.0, 0.0))), run) == "", text
+
+
+@rs274.needs_rs274
+def test_a_program_may_begin_with_a_cycle():
+    text = "G21 F100\nG81 X1 Y1 Z-1 R1\nG98 G81 X3 Z-2 R2\nM2\n"
+    run = rs274.run(text)
+    assert not run.error
+    assert difference(read_program(text.encode(), name="p.nc", setup=Setup(start_mm=(0.0, 0.0, 0.0))), run) == ""
