@@ -20,6 +20,7 @@ FAR_MM = 5.0  # no machine is wrong by so much from one row to the next
 MANY_FAR = 0.25  # of the rows that are as far off: more are no outliers
 HEAVY = 3.5  # robust deviations beyond which a reading counts less
 LEAST_ROWS = 20
+TINY = 1e-12  # mm, rad, N: what rounding makes of nothing
 
 
 def outlying(bench: Bench) -> list[Bools]:
@@ -44,16 +45,17 @@ def outlying(bench: Bench) -> list[Bools]:
 def _jumping_off(x: Floats) -> Bools:
     beside = x - median_filter(x, SHORT, mode="mirror")
     scale = 1.4826 * float(np.median(np.abs(beside)))
-    single = np.abs(beside) > OFF * max(scale, 1e-12)
+    single = np.abs(beside) > OFF * max(scale, TINY)
     around = x - median_filter(x, min(LONG, len(x)), mode="mirror")
     wide = 1.4826 * float(np.median(np.abs(around)))
-    # what mostly stands still is told in steps
-    least = GROSS * max(wide, scale) or OFF * float(np.min(np.abs(around), where=around != 0.0, initial=np.inf))
+    # what mostly stands still is told in steps; smaller ones are those of arithmetic
+    steps = np.abs(around[np.abs(around) > TINY])
+    least = GROSS * max(wide, scale) if max(wide, scale) > TINY else OFF * float(np.min(steps, initial=np.inf))
     gross = np.abs(around) > least
     # a curve is its own median, and a machine may move from row to row: only what is far beyond what most rows do
-    if scale == 0.0 or single.mean() > MANY:
+    if scale <= TINY or single.mean() > MANY:
         most = float(np.quantile(np.abs(beside), 1.0 - MANY))
-        single = np.abs(beside) > OFF / norm.isf(0.5 * MANY) * most if most > 0.0 else np.zeros_like(single)
+        single = np.abs(beside) > OFF / norm.isf(0.5 * MANY) * most if most > TINY else np.zeros_like(single)
     return np.asarray(single | (gross if gross.mean() < 2.0 * MANY else False))
 
 

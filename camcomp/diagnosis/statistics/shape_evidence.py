@@ -5,9 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-ALIKE_LOG = float(
-    np.log(1.5)
-)  # factor by which shapes of one origin differ: drives that warm up together, alike drives
+ALIKE_LOG = float(np.log(1.5))  # by which shapes of one origin differ: drives that warm up together
 
 
 @dataclass(frozen=True)
