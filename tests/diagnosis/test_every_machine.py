@@ -1,6 +1,6 @@
 """The plainest test of the diagnosis, of every effect on every shipped machine: `simulate`, a little noise, `diagnose`.
 
-Every second pair of effect and machine is tried in CI, all of them by `python -m pytest tests/diagnosis/test_every_machine.py
+Every third pair of effect and machine is tried in CI, all of them by `python -m pytest tests/diagnosis/test_every_machine.py
 -m "campaign or not campaign"`.
 """
 
