@@ -39,6 +39,13 @@ def test_a_lag_of_all_axes_is_no_clock_where_forces_are_logged_and_encoders_are_
     assert result["verdict"] == "identified" and row["all"] and not row["false_cause"]
 
 
+def test_a_cause_that_leaves_the_gap_as_it_is_is_not_sure(tmp_path):
+    """A loop that rings after every corner, tip alone: 25 um were left of 25 by an overshoot that was sure."""
+    with recording.taken_from("second"):
+        result, row = judged(tmp_path, "serial", 59015)
+    assert result["verdict"] in ("ambiguous", "unknown") and not row["false_cause"]
+
+
 @pytest.mark.campaign
 def test_two_joints_that_do_the_same_have_the_same_minor_causes_beside_them(tmp_path):
     """A shift of A4 was told as one of A1, sure, by friction elsewhere that was minor beside that set alone."""

@@ -14,6 +14,7 @@ from camcomp.diagnosis.search.sound import GATE_SHARE, Sound, cancels
 from camcomp.diagnosis.search.tempering import TEMPERATURE, misfit, tempering
 from camcomp.diagnosis.search.unexplained import SURE_Z, Unexplained, size_um, unexplained, worst
 from camcomp.diagnosis.search.unknown import firm_prior, residual_tests
+from camcomp.diagnosis.search.whole_gap import idle
 from camcomp.diagnosis.statistics.cause_sets import (
     SIZES,
     Fitted,
@@ -164,6 +165,8 @@ def search_causes(problem: Problem) -> CauseSearch:
         verdict = replace(verdict, word=word, best=0, rivals=())
     # of what was overlooked because something unknown is there the sets without that say nothing
     inclusion = verdict.inclusion | {i: 1.0 for i in known.members if i not in best.members}
+    if kind is None:
+        inclusion |= {i: min(inclusion[i], EVEN) for i in idle(problem, known)}
     sure = {i: (1.0 - LOOKALIKE) * min(p, credible.get(i, 1.0)) for i, p in inclusion.items()}
     small = [i for i in known.members if size_um(problem, known, (i,)) < problem.floor.tip_um]
     sure |= {i: min(sure[i], UNSURE) for i in small}  # what the model itself is wrong by may be as large
