@@ -47,6 +47,9 @@ KNOWN_M = PLAIN_M | frozenset((19, 50, 51, 52, 53, 61, 62, 63, 64, 65, 66, 67, 6
 SAVES = frozenset((70, 71, 72, 73))
 STOPS = frozenset((0, 1, 2, 30, 60))
 ENDS = frozenset((2, 30))
+# What a control stands still for until it is done, as LinuxCNC does; M62, M63, M67 go with the motion.
+WAITS_M = frozenset((3, 4, 5, 6, 7, 8, 9, 19, 61, 64, 65, 66, 68))
+WAITS_G = frozenset((40, 430, 431, 490, 520, 920, 921, 922, 923))
 GROUPS_M: dict[int, int] = {
     **dict.fromkeys((0, 1, 2, 30, 60), 4),
     6: 6,

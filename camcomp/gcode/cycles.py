@@ -151,6 +151,7 @@ class Cycles(Motions):
     def _dwell(self) -> None:
         if self._held.get("P"):
             self.state.dwelt_s += self._held["P"] * self.dialect.dwell_p_s
+            self.state.waits = True
             self.actions.append((f"G4 P{self._held['P']:g}", []))
 
     def _peck(

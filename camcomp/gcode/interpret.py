@@ -6,7 +6,18 @@ One block at a time, in the order of execution of RS274/NGC: modes first, then s
 import re
 
 from camcomp.gcode.block import Block
-from camcomp.gcode.codes import AXIS_USERS, CYCLES, ENDS, HOMES, MACHINE_MOVES, PLAIN_M, STOPS, code_name
+from camcomp.gcode.codes import (
+    AXIS_USERS,
+    CYCLES,
+    ENDS,
+    HOMES,
+    MACHINE_MOVES,
+    PLAIN_M,
+    STOPS,
+    WAITS_G,
+    WAITS_M,
+    code_name,
+)
 from camcomp.gcode.cycles import Cycles
 from camcomp.gcode.detect import dialect_of
 from camcomp.gcode.flow import Flow, Siemens
@@ -70,7 +81,7 @@ class Interpreter(Settings, Cycles):
     def perform(self, block: Block) -> bool:
         """Execute a block; True when it ends the program."""
         self.record.begin_line(block.row)
-        zero_code = block.code(0)
+        zero_code, active = block.code(0), self.state.active
         motion = self._motion_of(block, zero_code)
         self.modes(block)
         if zero_code in HOMES:
@@ -78,6 +89,7 @@ class Interpreter(Settings, Cycles):
         elif zero_code is not None and zero_code not in MACHINE_MOVES:
             self.settings(block, zero_code)
         m_codes = [code for code, _ in block.m]
+        self.state.waits |= self._waits(block, m_codes) or self.state.active != active
         self._alone(block)
         self._spare_axes(block)
         if motion is not None:
@@ -87,6 +99,7 @@ class Interpreter(Settings, Cycles):
             else:
                 self.move(block, motion, machine=zero_code in MACHINE_MOVES)
         self._leftovers(block, m_codes)
+        self.state.waits |= not STOPS.isdisjoint(m_codes)
         self.record.end_line()
         if any(code in ENDS for code in m_codes):
             self.state.motion = None
@@ -130,6 +143,12 @@ class Interpreter(Settings, Cycles):
         if state.motion is None:
             self.refuse("CC134", "axis words without a motion code in force")
         return state.motion
+
+    def _waits(self, block: Block, m_codes: list[int]) -> bool:
+        """Whether the control stands still for something in the block before it moves on."""
+        if not WAITS_M.isdisjoint(m_codes) or not WAITS_G.isdisjoint(code for code, _ in block.g):
+            return True
+        return "S" in block.words
 
     def _alone(self, block: Block) -> None:
         """Codes that are passed on do not say what axis words beside them mean."""

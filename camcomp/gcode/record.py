@@ -33,7 +33,7 @@ class Recorder:
     def __init__(self, text: Text) -> None:
         self._starts = text.starts
         self._count = 0
-        self._numbers = array("d")  # 25 per motion
+        self._numbers = array("d")  # 26 per motion
         self._spans = array("q")  # 20 per motion
         self._line_first = 0
         self.code_stated = False
@@ -117,7 +117,8 @@ class Recorder:
         self._numbers.extend((block.row, kind, code, *state.position, *end, *centre, angle, feed))
         modal = math.nan if state.feed is None else state.feed
         self._numbers.extend((state.speed, state.tool, state.unit, *state.offset))
-        self._numbers.extend((state.plane, state.feed_mode, flags, modal, state.sense))
+        self._numbers.extend((state.plane, state.feed_mode, flags, modal, state.sense, state.waits))
+        state.waits = False
         base = int(self._starts[block.row])
         words = block.words
         for letter in LETTERS[:-1]:
@@ -140,7 +141,7 @@ class Recorder:
     def finish(self) -> tuple[Path, Sites]:
         """All motions as arrays."""
         n = self._count
-        a = np.frombuffer(self._numbers, float).reshape(n, -1) if n else np.zeros((0, 25))
+        a = np.frombuffer(self._numbers, float).reshape(n, -1) if n else np.zeros((0, 26))
         spans = np.frombuffer(self._spans, np.int64).reshape(n, 10, 2) if n else np.zeros((0, 10, 2), np.int64)
         kind = a[:, 1].astype(np.int8)
         flags = a[:, 22].astype(np.int64)
@@ -162,6 +163,7 @@ class Recorder:
             tool=a[:, 15].astype(np.int64),
             known=(flags & 2) > 0,
             machine=(flags & 1) > 0,
+            waits=a[:, 25] > 0,
         )
         fixed = np.zeros(n, bool)
         fixed[self._fixed] = True

@@ -197,6 +197,7 @@ class Settings(BlockReader):
         index = int(number) - 1 if number else state.active
         if extended:
             index = 8 + int(number)
+        state.waits |= index == state.active
         for axis in block.axes:
             value = words["XYZ"[axis]].value * state.unit
             if kind == 2 or extended:

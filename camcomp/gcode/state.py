@@ -52,6 +52,7 @@ class ControlState:
         self.no_speed = False  # S0
         self.tool = setup.tool
         self.next_tool = setup.tool
+        self.waits = False  # at rest, for something since the last motion
         self.dwelt_s = 0.0  # G4 so far
         self.tool_changes = 0  # M6 so far
         self.update()

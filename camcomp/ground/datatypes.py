@@ -26,6 +26,7 @@ _FORMS: dict[str, tuple[type, tuple[int, ...]]] = {
     "tool": (np.int64, ()),
     "known": (np.bool_, ()),
     "machine": (np.bool_, ()),
+    "waits": (np.bool_, ()),
 }
 
 
@@ -57,9 +58,14 @@ class Path:
     tool: Ints  # (n,) tool number
     known: Bools  # (n,) X, Y and Z have all been commanded by the end of this motion
     machine: Bools  # (n,) move in machine coordinates (G53, G28, G30)
+    waits: Bools | None = (
+        None  # (n,) the control waits at rest in front of it (G4, S, M3 to M9, another offset); None: nowhere
+    )
 
     def __post_init__(self) -> None:
         n = np.shape(self.line)[0]
+        if self.waits is None:
+            object.__setattr__(self, "waits", np.zeros(n, np.bool_))
         for name, (dtype, row) in _FORMS.items():
             array = frozen(getattr(self, name), dtype)
             if array.shape != (n, *row):

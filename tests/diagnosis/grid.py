@@ -27,7 +27,13 @@ MACHINES = {
     "orthoglide": "y", "delta": "b", "puu": "y", "cartesian": "y", "router": "y", "hexapod": "leg2", "kuka-kr210": "A2", "ur10": "elbow",
 }  # fmt: skip
 ARMS, SLIDES_IN_A_ROW = ("kuka-kr210", "ur10"), ("cartesian", "router")
-ALWAYS = ("cutting_force", "squareness", "time_sync", "tool_length", "workpiece_frame")  # so that no machine misses a stage
+ALWAYS = (
+    "cutting_force",
+    "squareness",
+    "time_sync",
+    "tool_length",
+    "workpiece_frame",
+)  # so that no machine misses a stage
 OWN = "its actuator"
 SURE = 0.8  # contract: confident and wrong
 EITHER = ("screw_growth", "servo_lag", "servo_overshoot", "thermal_growth")  # of one actuator, or of all alike

@@ -34,6 +34,7 @@ class PlainRun:
     row0: int  # lines of the program before it
     plain: Plain
     state: ControlState  # behind it; position, motion and feed as at its end
+    waits: bool  # the control waits for something in front of it
 
     @property
     def motions(self) -> int:

@@ -178,7 +178,8 @@ class Runs:
         self._at = at
         row0, self._row = self._row, self._row + rows
         self.motions += n
-        return PlainRun(self._data, begin, at, row0, room.take(0, n), deepcopy(state))
+        waits, state.waits = state.waits, False
+        return PlainRun(self._data, begin, at, row0, room.take(0, n), deepcopy(state), waits)
 
     def _interpret(self, line: bytes) -> tuple[int, bool]:
         """Executes a line: its number of motions, and whether the program ends there."""

@@ -137,11 +137,10 @@ class Totals:
         before, after = self._control
         default = self.job.config.process.feed_mm_per_min or np.nan
         self.modes[mode] = None
-        before.add(
-            line_moves(plain.kind, plain.start, plain.end, np.where(np.isnan(plain.feed), default, plain.feed), mode)
-        )
+        told = np.where(np.isnan(plain.feed), default, plain.feed)
+        before.add(line_moves(plain.kind, plain.start, plain.end, told, mode, run.waits))
         start = np.concatenate((done.begin[None], done.written[:-1]))
-        moves = line_moves(plain.kind[rows.move], start, done.written, done.feed, mode)
+        moves = line_moves(plain.kind[rows.move], start, done.written, done.feed, mode, run.waits)
         moves = replace(moves, exact=moves.exact | done.rest)
         if done.apart:
             self.apart[mode] = None

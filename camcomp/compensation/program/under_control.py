@@ -249,9 +249,10 @@ def written_moves(
     angle[bent] = arcs_out.sweeps(start[bent], end[bent], centre[bent], axis[bent], rows.arcs.angle[bent])
     exact, stop, tolerance, merged = mode_columns(modes)
     told = np.where(np.isnan(written.feed), feed, written.feed)
+    waits = np.asarray(path.waits)[motion] & (np.diff(motion, prepend=-1) > 0)
     return ToolMoves(
         np.where(arc & ~np.isfinite(centre[:, 0]), 1, rows.kind).astype(np.int64), start, end, centre, axis, angle, told,
-        exact[motion], (stop | path.machine)[motion], tolerance[motion], merged[motion],
+        exact[motion], waits, (stop | path.machine)[motion], tolerance[motion], merged[motion],
     )  # fmt: skip
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from camcomp.model.statics.compiled import entry, inner
 
-REST, ON, ROUND, OVERLAP = 0, 1, 2, 3
+REST, ON, ROUND, OVERLAP, WAIT = 0, 1, 2, 3, 4
 NORMAL = 0.5 * np.sqrt(3.0)  # of the acceleration may go into turning; the other half is kept for speeding up
 KINK = 0.1  # of the acceleration that a jump of direction may be
 BACK = (2.0 * np.pi / 180.0) ** 2  # square of the angle to a turn on the spot that counts as one
@@ -62,14 +62,14 @@ def overlap_gap(time, acceleration, next_acceleration, cosine):
 
 
 @entry
-def corners(leave, arrive, axis, radius, angle, nominal, fast, acceleration, rapid, exact, stop, tolerance, limit, cycle,
+def corners(leave, arrive, axis, radius, angle, nominal, fast, acceleration, rapid, exact, stop, waits, tolerance, limit, cycle,
             way, speed, reach, bend, around, centre, end):  # fmt: skip
     """Fills way, speed, reach, bend, around (m,), centre (m, 3) of the corners behind segments (m,); the last is at rest.
 
     leave, arrive (m, 3): unit directions at the start and at the end. axis (m, 3), radius, angle (m,): of arcs, radius 0 for
     lines. nominal (m,) mm lengths, fast (m,) mm/s, acceleration (m,) along it mm/s². rapid, exact (path is kept), stop
-    (m,): rest behind it. tolerance (m,) mm, 0: open. limit: acceleration of an axis, mm/s². cycle: s.
-    end (m, 3) mm: corners. way: REST, ON, ROUND or OVERLAP; speed: mm/s through it (OVERLAP: where it begins);
+    (m,): rest behind it; waits (m,): rest in front of it. tolerance (m,) mm, 0: open. limit: acceleration of an axis, mm/s². cycle: s.
+    end (m, 3) mm: corners. way: REST, ON, ROUND, OVERLAP or WAIT (at rest where it would overlap); speed: mm/s through it (OVERLAP: where it begins);
     reach: mm of both segments that an arc takes; bend, around: its radius and length, mm.
     """
     m = nominal.shape[0]
@@ -80,8 +80,10 @@ def corners(leave, arrive, axis, radius, angle, nominal, fast, acceleration, rap
             break
         j = i + 1
         u, v = arrive[i], leave[j]
+        if waits[j] and not (exact[i] or stop[i]):
+            way[i] = WAIT
         bx, by, bz = v[0] + u[0], v[1] + u[1], v[2] + u[2]
-        if stop[i] or rapid[i] != rapid[j] or bx * bx + by * by + bz * bz < BACK:
+        if stop[i] or waits[j] or rapid[i] != rapid[j] or bx * bx + by * by + bz * bz < BACK:
             left = nominal[j]
             continue
         slower = min(fast[i], fast[j])

@@ -11,12 +11,12 @@ MOST = 100  # ends that a control keeps in mind; the line behind them begins a n
 
 
 @entry
-def merge(start, end, goes, joins, feed, tolerance, group, first, last):
+def merge(start, end, goes, waits, joins, feed, tolerance, group, first, last):
     """Numbers the segments that moves (n,) become, group (n,); the number of segments.
 
     A line joins the segment in front of it while the ends of all lines in it stay within the tolerance of the straight
     way from the segment's start to the new end. start, end (n, 3) mm. goes (n,): moves that are no standstill; the
-    others count to the segment in front of them. joins (n,): lines that may be joined. feed (n,) in force: another
+    others count to the segment in front of them. waits (n,): moves that begin at rest. joins (n,): lines that may be joined. feed (n,) in force: another
     one begins a new segment. tolerance (n,) mm: 0 for never. first, last (n,) are filled with the moves at the
     begin and at the end of every segment.
     """
@@ -28,7 +28,7 @@ def merge(start, end, goes, joins, feed, tolerance, group, first, last):
             group[i] = max(segment, 0)
             continue
         fits = (
-            before >= 0 and joins[i] and joins[before] and tolerance[i] > 0.0 and tolerance[i] == tolerance[before]
+            before >= 0 and not waits[i] and joins[i] and joins[before] and tolerance[i] > 0.0 and tolerance[i] == tolerance[before]
             and feed[i] == feed[before] and ends <= MOST
         )  # fmt: skip
         if fits:

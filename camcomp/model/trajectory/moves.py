@@ -33,6 +33,7 @@ class ToolMoves:
     angle: Floats  # (n,) rad
     feed: Floats  # (n,) mm/min, NaN for rapids
     exact: Bools  # G61, G61.1
+    waits: Bools  # at rest in front of the move: the control waits for something
     stop: Bools  # at rest behind the move, whatever its direction: G61.1, moves in machine coordinates
     tolerance: Floats  # (n,) mm
     merge: Floats  # (n,) mm
@@ -55,7 +56,7 @@ class ToolMoves:
         return Path(
             line=np.ones(n, np.int64), kind=self.kind.astype(np.int8), start=self.start, end=self.end, centre=self.centre,
             axis=self.axis, angle=self.angle, feed=self.feed, speed=np.zeros(n), turn=np.zeros(n),
-            tool=np.zeros(n, np.int64), known=np.ones(n, np.bool_), machine=self.stop,
+            tool=np.zeros(n, np.int64), known=np.ones(n, np.bool_), machine=self.stop, waits=self.waits,
         )  # fmt: skip
 
 
@@ -64,17 +65,19 @@ def moves_of(path: Path, modes: Sequence[PathMode], feed: Floats | None = None) 
     exact, stop, tolerance, merged = mode_columns(modes)
     return ToolMoves(
         path.kind.astype(np.int64), path.start, path.end, path.centre, path.axis, path.angle,
-        path.feed if feed is None else feed, exact, stop | path.machine, tolerance, merged,
+        path.feed if feed is None else feed, exact, np.asarray(path.waits), stop | path.machine, tolerance, merged,
     )  # fmt: skip
 
 
-def line_moves(kind: np.ndarray, start: Floats, end: Floats, feed: Floats, mode: PathMode) -> ToolMoves:
-    """Rapids and straight cuts (n,) in one mode; feed (n,) mm/min."""
+def line_moves(
+    kind: np.ndarray, start: Floats, end: Floats, feed: Floats, mode: PathMode, waits: bool = False
+) -> ToolMoves:
+    """Rapids and straight cuts (n,) in one mode; feed (n,) mm/min; waits: the control does in front of them."""
     n = len(kind)
     none = np.zeros((n, 3))
     return ToolMoves(
-        kind.astype(np.int64), start, end, none, none, none[:, 0], feed, np.full(n, mode.exact), np.full(n, mode.code == 611),
-        np.full(n, mode.tolerance_mm), np.full(n, mode.merge_mm),
+        kind.astype(np.int64), start, end, none, none, none[:, 0], feed, np.full(n, mode.exact), waits & (np.arange(n) == 0),
+        np.full(n, mode.code == 611), np.full(n, mode.tolerance_mm), np.full(n, mode.merge_mm),
     )  # fmt: skip
 
 

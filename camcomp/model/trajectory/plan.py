@@ -30,7 +30,7 @@ class ControlPlan:
     start: Floats  # (m, 3) mm
     end: Floats  # (m, 3) mm
     arc: Bools  # (m,)
-    way: Ints  # (m,) of the corner: REST, ON, ROUND, OVERLAP
+    way: Ints  # (m,) of the corner: REST, ON, ROUND, OVERLAP, WAIT
     reach: Floats  # (m,) mm of either segment that the corner takes
     bend: Floats  # (m,) mm, radius of its arc
     centre: Floats  # (m, 3) mm
@@ -60,7 +60,9 @@ def plan_of(moves: ToolMoves, limits: ControlLimits, arrives: float = 0.0) -> Co
     size[bent] = path_geometry.lengths(moves.take(bent).path())
     group, first, last = (np.zeros(n, np.int64) for _ in range(3))
     joins = (moves.kind == LINE) & ~moves.exact
-    m = merge(*_read_only(moves.start, moves.end), size > SHORTEST, joins, moves.feed, moves.merge, group, first, last)
+    goes = size > SHORTEST
+    waits = _beginning_at_rest(moves.waits, goes)
+    m = merge(*_read_only(moves.start, moves.end), goes, waits, joins, moves.feed, moves.merge, group, first, last)
     first, last = first[:m], last[:m]
     start, end = moves.start[first], moves.end[last]
     kind, feed = moves.kind[last], moves.feed[last]
@@ -82,12 +84,19 @@ def plan_of(moves: ToolMoves, limits: ControlLimits, arrives: float = 0.0) -> Co
     speed, reach, bend, around, time = np.zeros((5, m))
     length, slope, fastest, passes = np.empty((4, 2 * m))
     if m:
-        corners(leave, arrive, axis, radius, angle, nominal, fast, acceleration, kind == RAPID, moves.exact[last], moves.stop[last],
+        corners(leave, arrive, axis, radius, angle, nominal, fast, acceleration, kind == RAPID, moves.exact[last], moves.stop[last], waits[first],
                 moves.tolerance[last],
                 limits.acceleration, limits.cycle_s, way, speed, reach, bend, around, centre, end)  # fmt: skip
         pieces(nominal, fast, acceleration, radius, way, speed, reach, bend, around, length, slope, fastest)
         durations(length, slope, fastest, way, speed, limits.cycle_s, limits.look_ahead, arrives, passes, time)
     return ControlPlan(moves, group, start, end, arc, way, reach, bend, centre, time, passes[::2])
+
+
+def _beginning_at_rest(waits: Bools, goes: Bools) -> Bools:
+    """Moves (n,) that go somewhere from where the control has waited, in front of them or of standstills before them."""
+    out, at = np.zeros(len(waits), np.bool_), np.flatnonzero(goes)
+    out[at] = np.diff(np.cumsum(waits)[at], prepend=0) > 0
+    return out
 
 
 def _read_only(*points: Floats) -> list[Floats]:

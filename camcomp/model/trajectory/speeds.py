@@ -6,16 +6,19 @@
 import numpy as np
 
 from camcomp.model.statics.compiled import entry, inner
-from camcomp.model.trajectory.corners import ON, OVERLAP, REST, ROUND, pace
+from camcomp.model.trajectory.corners import ON, OVERLAP, REST, ROUND, WAIT, pace
 
 STOP = 2.0  # cycles that a stop takes beside slowing down and speeding up, as measured
 
 
 @inner
 def along(i, fast, acceleration, radius, way):
-    """Acceleration of segment i along its way, mm/s²: what turning and neighbours that overlap with it leave."""
+    """Acceleration of segment i along its way, mm/s²: what turning and neighbours that overlap with it leave.
+
+    A control that waits for something behind it had made ready to overlap.
+    """
     a = pace(acceleration[i], fast[i], radius[i])
-    if way[i] == OVERLAP or (i > 0 and way[i - 1] == OVERLAP):
+    if way[i] in (OVERLAP, WAIT) or (i > 0 and way[i - 1] == OVERLAP):
         a *= 0.5
     return a
 
@@ -97,6 +100,6 @@ def durations(length, slope, most, way, speed, cycle, depth, arrives, limit, tim
             time[i] += spent
             if way[i] == OVERLAP:
                 time[i] = max(time[i] - speed[i] / (0.5 * a), 0.0)
-            elif way[i] == REST:
+            elif way[i] in (REST, WAIT):
                 time[i] += STOP * cycle
         now = goal

@@ -83,6 +83,8 @@ def assert_same(job, text, tolerance=1.0, feed=2e-4):
         assert mine[key] == other[key], key
     for key in ("before", "after"):
         assert mine[key] == pytest.approx(other[key], rel=2e-3, abs=5e-3), key
+    for key in ("cycle_time_s", "under_control"):
+        assert mine[key] == pytest.approx(other[key], rel=2e-3, abs=5e-3), key
     assert mine["actuator_change_max_mm"] == pytest.approx(other["actuator_change_max_mm"], abs=2e-4)
     assert mine["actuator_force_max_N"] == pytest.approx(other["actuator_force_max_N"], rel=2e-4)
     assert mine["interpolation"]["worst_um"] <= 0.05
@@ -192,6 +194,7 @@ def test_work_above_and_below_the_stock_top(tmp_path):
         ["X20 Y0 Z5", "X20.003 Y0.002 Z0", "X20.03 Y0 Z-1", "X20 Y0.1 Z0"],  # plunges that slant, and ramps
         ["G55", "G1 X1 Y1", "G54 X2", "G20", "X0.5 Y0.5 F20", "G21", "F300"],
         ["G91", "X1", "X1 Y1", "G90", "G93", "X5 F30", "X6 F31", "G94 F300"],
+        ["X30 Y0", "M8", "X30 Y9", "S900", "X20 Y9", "Y0"],  # where the control waits it rounds no corner
         ["G1 X15 Y0 F300.2", "M8", "X14 F300.4", "M9", "X13 F300.3"],  # feeds that differ by less than is written
     ],
 )
