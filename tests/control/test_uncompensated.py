@@ -14,9 +14,8 @@ from tests.control.measured import passes
 from tests.recordings import recording
 from tests.recordings.record import ACCELERATION, VELOCITY
 
-# What the program does not say, or the model does not: pause, override, dwells, and codes that a control stands still for.
-STOPPED = ("dwell-exact", "pause-blended", "override-blended", "eight-fast", "inward-blended", "polygons-exact", "diagonal-200um",
-           "pecks-exact", "holes-exact")  # fmt: skip
+# The feed override is what no program says.
+OVERRIDDEN = ("override-blended", "eight-fast", "inward-blended", "diagonal-200um", "pendulum-blended")
 # From a plunge onto an arc LinuxCNC stays within 4 to 7 um where the model is 5 to 12 um off.
 PLUNGES = (("second", "spiral-blended"), ("third", "circles-blended"))
 LONGEST_STOP = 2  # cycles
@@ -47,10 +46,10 @@ def looked_at(name):
 
 
 def recorded():
-    """Shelf and name of every recording of a program that says all that happened."""
+    """Shelf and name of every recording at the speed that its program says."""
     for shelf in recording.SHELVES:
         with recording.taken_from(shelf):
-            for name in sorted(set(recording.names()) - set(STOPPED)):
+            for name in sorted(set(recording.names()) - set(OVERRIDDEN)):
                 marks = (
                     [pytest.mark.xfail(reason="plunge onto an arc", strict=True)] if (shelf, name) in PLUNGES else []
                 )
