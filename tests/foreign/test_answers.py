@@ -46,6 +46,21 @@ def test_a_cause_that_leaves_the_gap_as_it_is_is_not_sure(tmp_path):
     assert result["verdict"] in ("ambiguous", "unknown") and not row["false_cause"]
 
 
+def test_lines_that_a_control_merges_are_no_gap(tmp_path):
+    """Tip alone, nothing wrong: LinuxCNC makes one line of several within 50 um in G64 P0.05."""
+    with recording.taken_from("fourth"):
+        result, _ = judged(tmp_path, "parallel", 71020)
+    assert (result["verdict"], result["causes"]) == ("none", [])
+
+
+@pytest.mark.campaign
+def test_how_fast_a_tool_is_between_stops_rows_do_not_say(tmp_path):
+    """G61.1 on lines of 1 mm, a row every 20 ms: what the force was off by seemed to be a push."""
+    with recording.taken_from("fourth"):
+        result, row = judged(tmp_path, "serial", 70005)
+    assert result["verdict"] == "ambiguous" and row["first_or_class"] and not row["false_cause"]
+
+
 @pytest.mark.campaign
 def test_two_joints_that_do_the_same_have_the_same_minor_causes_beside_them(tmp_path):
     """A shift of A4 was told as one of A1, sure, by friction elsewhere that was minor beside that set alone."""

@@ -20,6 +20,7 @@ from camcomp.diagnosis.experiment.log_checks import (
 )
 from camcomp.diagnosis.fit.measured import Measured
 from camcomp.diagnosis.fit.outliers import FAR_MM
+from camcomp.gcode.program import Program
 from camcomp.ground import path_geometry, shelf
 from camcomp.ground.datatypes import RAPID, Bools, Floats, Path
 from camcomp.ground.errors import ConfigError, Location
@@ -29,6 +30,7 @@ from camcomp.model.motion.alignment import LOST_MM, Aligned, align, way_from_lin
 from camcomp.model.motion.driven_path import BESIDE_MM, Forces, cutting_forces, driven_path
 from camcomp.model.motion.run_path import RunPath
 from camcomp.model.motion.twin import Twin
+from camcomp.model.trajectory.segments import merged
 
 SAMPLE_MM = 2.0  # of the program, where places are compared
 GAP_ROWS = 3.0  # usual steps between rows over which a motion is not led
@@ -62,9 +64,13 @@ class DrivenRun:
 
 @dataclass(frozen=True, eq=False)
 class _Program:
-    """A program with its loads, and places on it: tips (s, 3) mm, program frame, and actuators (s, m)."""
+    """A program with its loads, and places on it: tips (s, 3) mm, program frame, and actuators (s, m). merged: its path as
+    a control drives it that merges lines, None where that is no other; rests (n,): motions at whose end the control stops.
+    """
 
     track: Track
+    merged: Path | None
+    rests: Bools
     tips: Floats
     rho: Floats
 
@@ -75,11 +81,11 @@ class _Program:
 
 
 def drive(
-    log: str, name: str, measured: Measured, path: Path | None, conditions: Conditions, twin: Twin, started: float,
+    log: str, name: str, measured: Measured, text: Program | None, conditions: Conditions, twin: Twin, started: float,
     vectors: Callable[[Floats], Floats], temperature: Floats | None, acceleration: float,
 ) -> DrivenRun:  # fmt: skip
-    """The run of a log; path: of its program, None where it has none; acceleration: of the control, mm/s2. Raises ConfigError CC402, CC406 to CC408."""
-    program = None if path is None else _open(path, conditions, twin)
+    """The run of a log; text: its program, None where it has none; acceleration: of the control, mm/s2. Raises ConfigError CC402, CC406 to CC408."""
+    program = None if text is None else _open(text, conditions, twin)
     by = next((each for each in ("setpoint", "encoder", "tip") if measured.has(each)), "")
     if not by or (by == "tip" and program is None):
         message = f"run '{name}' has neither a program nor set-points: nobody knows where the machine was told to go"
@@ -112,7 +118,7 @@ def drive(
         cut = _behind(measured, rho, tip, program, twin) if by == "setpoint" else None
         told = by == "setpoint" and cut is None
         forces = cutting_forces(
-            program.track, cut or aligned, tip, measured.time, bool(np.isfinite(measured.line).any())
+            program.track, cut or aligned, tip, measured.time, program.rests, bool(np.isfinite(measured.line).any())
         )
         idle = _idle_or_not(forces, aligned, program, tip, measured.time)
         unsure |= idle
@@ -130,8 +136,12 @@ def drive(
     return DrivenRun(run_path, by, unsure, guessed, None, 0 if aligned is None else aligned.lag)
 
 
-def _open(path: Path, conditions: Conditions, twin: Twin) -> _Program:
+def _open(program: Program, conditions: Conditions, twin: Twin) -> _Program:
+    path = program.path
     track = lay_track(path, conditions)
+    rests = np.fromiter((mode.exact for mode in program.modes), np.bool_, len(path)) | np.append(
+        np.asarray(path.waits)[1:], True
+    )
     length = path_geometry.lengths(path)
     from_known = np.concatenate([[False], path.known[:-1]])
     moves = np.flatnonzero(((path.kind != RAPID) | from_known) & (length > 0.0) & ~path.machine)
@@ -141,7 +151,7 @@ def _open(path: Path, conditions: Conditions, twin: Twin) -> _Program:
     motion = np.repeat(moves, count + 1)
     u = np.concatenate([np.linspace(0.0, 1.0, c + 1) for c in count]) if len(count) else np.zeros(0)
     tips = path_geometry.points(path, motion, u)
-    return _Program(track, tips, twin.inverse(twin.to_machine(tips)))
+    return _Program(track, merged(path, program.modes), rests, tips, twin.inverse(twin.to_machine(tips)))
 
 
 def _near(log: str, name: str, measured: Measured, rho: Floats, program: _Program | None, twin: Twin) -> Floats:
@@ -267,9 +277,10 @@ def _led_by_tip(
     # what bends may be beside its program: first nobody knows by how much, and where it is on arcs follows from how it bends
     for beside in (np.inf, *[BESIDE_MM] * MOST_PASSES):
         aligned = _aligned(log, name, program, whole - bend, measured, ASIDE_MM if beside < np.inf else FAR_MM)
-        tip = path_geometry.points(path, aligned.motion, aligned.share)
+        way, on = _driven(path, aligned, program.merged, whole - bend, measured.line, np.asarray(known))
+        tip = path_geometry.points(way, on.motion, on.share)
         logged = bool(np.isfinite(measured.line).any())
-        forces = cutting_forces(program.track, aligned, tip, measured.time, logged, beside)
+        forces = cutting_forces(program.track, aligned, tip, measured.time, program.rests, logged, beside)
         run_path = driven_path(
             name, measured.time, twin.inverse(twin.to_machine(tip)), tip, forces, started=started,
             to_machine=twin.to_machine, vectors=vectors, inverse=twin.inverse, temperature=temperature,
@@ -280,12 +291,28 @@ def _led_by_tip(
         if beside < np.inf and (changed < SETTLED_MM or changed > last):
             break
     unsure = ~known | (aligned.distance > ASIDE_MM) | _idle_or_not(forces, aligned, program, tip, measured.time)
-    unsure |= _from_anywhere(path, aligned) | _at_corners(path, aligned, measured.time, acceleration)
+    unsure |= _from_anywhere(way, on) | _at_corners(way, on, measured.time, acceleration)
     later = Cause("time_sync", shelf.load("effects", "time_sync"), None, {"offset_s": -SOON_S})
     velocity = (twin.sense(run_path, [later])[0].tip - loaded) / SOON_S
     run_path = replace(run_path, feed_mm_per_min=program.feed, led=True, cut_ahead_min=_cut_ahead(program, aligned))
     guessed = np.zeros((len(tip), len(twin.actuators)), bool)
-    return DrivenRun(run_path, "tip", unsure, guessed, _across(path, aligned, velocity), aligned.lag)
+    return DrivenRun(run_path, "tip", unsure, guessed, _across(way, on, velocity), aligned.lag)
+
+
+def _driven(
+    path: Path, aligned: Aligned, other: Path | None, tip: Floats, line: Floats, known: Bools
+) -> tuple[Path, Aligned]:
+    """The path that the control drove, as programmed or with its lines merged, and where on it the tip (n, 3) was.
+
+    Nobody says whether a control merges: it is the path beside which the tip stays alike, however far it bends.
+    """
+    if other is None:
+        return path, aligned
+    found = align(other, tip, line, max(FAR_MM, LOST_MM))
+    ways = [(path, aligned), (other, found)]
+    off = [(tip - path_geometry.points(way, on.motion, on.share))[known] for way, on in ways]
+    usual = [float(np.median(np.sum((each - np.median(each, axis=0)) ** 2, axis=1))) for each in off]
+    return ways[int(usual[1] < usual[0])]
 
 
 def _from_anywhere(path: Path, aligned: Aligned) -> Bools:

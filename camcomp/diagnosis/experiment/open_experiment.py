@@ -67,11 +67,11 @@ def open_run(spec: RunSpec, job: Job, twin: Twin, notes: list[str]) -> Run:
     notes += unread(table, columns_of(twin))
     check_rows(log, measured)
     conditions = job.conditions if spec.cutting else replace(job.conditions, model=None)
-    path = None if spec.program is None else open_program(spec.program, job.config).path
-    if path is not None:
-        check_length(log, spec.name, measured, schedule(path, job.config.control.acceleration_mm_per_s2).end)
+    program = None if spec.program is None else open_program(spec.program, job.config)
+    if program is not None:
+        check_length(log, spec.name, measured, schedule(program.path, job.config.control.acceleration_mm_per_s2).end)
     run = drive(
-        log, spec.name, measured, path, conditions, twin, spec.started_s, job.frame.vectors,
+        log, spec.name, measured, program, conditions, twin, spec.started_s, job.frame.vectors,
         steadied(measured.time, measured.temperature), job.config.control.acceleration_mm_per_s2,
     )  # fmt: skip
     if run.lag:
@@ -89,7 +89,7 @@ def open_run(spec: RunSpec, job: Job, twin: Twin, notes: list[str]) -> Run:
         by=run.by,
         unsure=run.unsure,
         turn=run.turn,
-        program=path,
+        program=None if program is None else program.path,
     )
 
 

@@ -11,14 +11,17 @@ from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.search.unexplained import size_um
 from camcomp.diagnosis.statistics.cause_sets import Fitted, Members
 
-STANDS_OUT = 1.3  # of the floor: what is left of a gap from which on it is more than drifts
+STANDS_OUT = 1.3  # of the floor: what a gap, or what is left of it, has to be to be more than drifts
 REMAINS = 0.5  # of what a gap, or a cause, has to its square beyond the floor: who leaves more has not explained it
 
 
 def idle(problem: Problem, f: Fitted) -> set[int]:
-    """Members of a set that leaves most of the gap without which it is hardly larger, for all that they move the tip by."""
+    """Members without which the gap is hardly larger, for all that they move the tip by; of a set that leaves most of it, or
+    where it is no larger than the floor.
+    """
     floor, before, after = floor_um(problem) ** 2, _square(problem, f, ()), _square(problem, f, f.members)
-    if after <= STANDS_OUT**2 * floor or after - floor <= REMAINS * (before - floor):
+    usual = STANDS_OUT**2 * floor
+    if before > usual and (after <= usual or after - floor <= REMAINS * (before - floor)):
         return set()
     out = set()
     for i in f.members:

@@ -116,11 +116,17 @@ def _seams(time: Floats, grid: Floats, lead: Callable[[Floats], Floats]) -> Seam
 
 
 def cutting_forces(
-    track: Track, aligned: Aligned, tip: Floats, time: Floats, logged_line: bool, beside_mm: float = BESIDE_MM
+    track: Track,
+    aligned: Aligned,
+    tip: Floats,
+    time: Floats,
+    rests: Bools,
+    logged_line: bool,
+    beside_mm: float = BESIDE_MM,
 ) -> Forces:
     """What the model says of the force along the way that the tip (n, 3) mm, program frame, was driven at times (n,) s.
 
-    beside_mm: from the path, beyond which nothing is cut, where no line numbers say what is.
+    rests (m,): motions of the path at whose end the control stops. beside_mm: from the path, beyond which nothing is cut, where no line numbers say what is.
     """
     motion, share, on = _executed(track, aligned, tip, time, logged_line)
     piece = _piece_of(track, motion, share)
@@ -137,6 +143,7 @@ def cutting_forces(
     size = np.linalg.norm(middle, axis=1, keepdims=True)
     middle = np.where(size > 0.2, middle / np.maximum(size, 1e-12), after)
     as_told = (np.sum(middle * programmed, axis=1) > _AGREE) | (np.linalg.norm(middle, axis=1) == 0.0)
+    still = np.full(len(tip), LEAST_FEED)
     feed, behind, ahead = driven_feeds(tip, time, _programmed_feeds(track, motion))
     told, chord = track.force(piece, w, feed), track.force_along(piece, w, programmed, feed)
     force = np.where(as_told[:, None], told, track.force_along(piece, w, middle, feed))
@@ -145,6 +152,10 @@ def cutting_forces(
     turning = np.where((as_told & on)[:, None], np.abs(told - chord), 0.0)
     thicker = np.abs(track.force_along(piece, w, programmed, ahead) - track.force_along(piece, w, programmed, behind))
     turning = np.maximum(turning, np.where(on[:, None], thicker, 0.0))
+    # how fast the tip was about a stop between rows these do not say
+    most, least = (track.force_along(piece, w, programmed, each) for each in (_programmed_feeds(track, motion), still))
+    stopped = (on & _beside_stops(motion, rests))[:, None]
+    turning = np.maximum(turning, np.where(stopped, 0.5 * np.abs(most - least), 0.0))
     unsteady = _unsteady(before, after, as_told)[:, None] * np.linalg.norm(force, axis=1, keepdims=True) / np.sqrt(3.0)
     turning = np.maximum(turning, unsteady)
     # an edge that stands cuts nothing, rubs as hard as it rubs, and back along whatever it moved by last
@@ -155,6 +166,12 @@ def cutting_forces(
     return Forces(
         force, np.maximum(_doubt(force, time, on, slack), turning), on, _apart(track, motion) | _waited(tip, time, on)
     )
+
+
+def _beside_stops(motion: Ints, rests: Bools) -> Bools:
+    """Rows (n,) on motions (n,) between which and a neighbour the control has stopped."""
+    between = (np.diff(motion) > 0) & rests[motion[:-1]]
+    return np.asarray(np.append(between, False) | np.append(False, between))
 
 
 def _unsteady(before: Floats, after: Floats, as_told: Bools) -> Floats:

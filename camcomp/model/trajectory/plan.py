@@ -11,14 +11,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from camcomp.ground import path_geometry
-from camcomp.ground.datatypes import ARC, LINE, RAPID, Bools, Floats, Ints
+from camcomp.ground.datatypes import ARC, RAPID, Bools, Floats, Ints
 from camcomp.model.trajectory.corners import CYCLES, NORMAL, corners, nearest
-from camcomp.model.trajectory.merging import merge, straight
+from camcomp.model.trajectory.merging import straight
 from camcomp.model.trajectory.moves import ControlLimits, ToolMoves
+from camcomp.model.trajectory.segments import read_only, segments
 from camcomp.model.trajectory.speeds import durations, pieces
 
 RAPID_MM_PER_S = 10_000.0 / 60.0  # where no velocity is stated
-SHORTEST = 1e-9  # mm; a move to where the tip is takes no time
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,24 +53,16 @@ class ControlPlan:
 
 def plan_of(moves: ToolMoves, limits: ControlLimits, arrives: float = 0.0) -> ControlPlan:
     """What the control makes of moves (n,) that end at rest. arrives: mm/s at the start of the first one."""
-    n = len(moves)
-    size, way_of, most = np.empty(n), np.empty((n, 3)), np.empty(n)
-    straight(*_read_only(moves.start, moves.end), size, way_of, most)
-    bent = np.flatnonzero(moves.kind == ARC)
-    size[bent] = path_geometry.lengths(moves.take(bent).path())
-    group, first, last = (np.zeros(n, np.int64) for _ in range(3))
-    joins = (moves.kind == LINE) & ~moves.exact
-    goes = size > SHORTEST
-    waits = _beginning_at_rest(moves.waits, goes)
-    m = merge(*_read_only(moves.start, moves.end), goes, waits, joins, moves.feed, moves.merge, group, first, last)
-    first, last = first[:m], last[:m]
+    found = segments(moves)
+    first, last = found.first, found.last
+    m = len(first)
     start, end = moves.start[first], moves.end[last]
     kind, feed = moves.kind[last], moves.feed[last]
     nominal, leave, most = np.empty(m), np.empty((m, 3)), np.empty(m)
-    straight(*_read_only(start, end), nominal, leave, most)
+    straight(*read_only(start, end), nominal, leave, most)
     arrive, axis, radius, angle = leave, leave, np.zeros(m), np.zeros(m)
     arc = kind == ARC
-    if len(bent):
+    if arc.any():
         at = np.flatnonzero(arc)
         path = moves.take(last[at]).path()
         every, zeros = np.arange(len(at)), np.zeros(len(at))
@@ -84,27 +76,12 @@ def plan_of(moves: ToolMoves, limits: ControlLimits, arrives: float = 0.0) -> Co
     speed, reach, bend, around, time = np.zeros((5, m))
     length, slope, fastest, passes = np.empty((4, 2 * m))
     if m:
-        corners(leave, arrive, axis, radius, angle, nominal, fast, acceleration, kind == RAPID, moves.exact[last], moves.stop[last], waits[first],
+        corners(leave, arrive, axis, radius, angle, nominal, fast, acceleration, kind == RAPID, moves.exact[last], moves.stop[last], found.waits,
                 moves.tolerance[last],
                 limits.acceleration, limits.cycle_s, way, speed, reach, bend, around, centre, end)  # fmt: skip
         pieces(nominal, fast, acceleration, radius, way, speed, reach, bend, around, length, slope, fastest)
         durations(length, slope, fastest, way, speed, limits.cycle_s, limits.look_ahead, arrives, passes, time)
-    return ControlPlan(moves, group, start, end, arc, way, reach, bend, centre, time, passes[::2])
-
-
-def _beginning_at_rest(waits: Bools, goes: Bools) -> Bools:
-    """Moves (n,) that go somewhere from where the control has waited, in front of them or of standstills before them."""
-    out, at = np.zeros(len(waits), np.bool_), np.flatnonzero(goes)
-    out[at] = np.diff(np.cumsum(waits)[at], prepend=0) > 0
-    return out
-
-
-def _read_only(*points: Floats) -> list[Floats]:
-    """Views that cannot be written to, as those of paths cannot: of two kinds of arrays numba would compile for each."""
-    views = [each.view() for each in points]
-    for each in views:
-        each.flags.writeable = False
-    return views
+    return ControlPlan(moves, found.group, start, end, arc, way, reach, bend, centre, time, passes[::2])
 
 
 def _speeds(kind: Ints, feed: Floats, nominal: Floats, radius: Floats, most: Floats, limits: ControlLimits) -> Floats:

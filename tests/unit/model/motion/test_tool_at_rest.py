@@ -26,7 +26,12 @@ def test_its_force_may_be_off_by_all_of_it_and_that_of_its_way_is_known(tmp_path
     tip = np.column_stack([RADIUS * np.cos(angle), RADIUS * np.sin(angle), 0.0 * angle])
     found = align(path, tip, np.full(len(tip), 3.0))
     forces = cutting_forces(
-        lay_track(path, Job(config).conditions), found, tip, ROW_S * np.arange(len(tip)), logged_line=True
+        lay_track(path, Job(config).conditions),
+        found,
+        tip,
+        ROW_S * np.arange(len(tip)),
+        np.zeros(len(path), bool),
+        logged_line=True,
     )
     size, doubt = (np.linalg.norm(each, axis=1) for each in (forces.force, forces.doubt))
     held, on_its_way = slice(half + 1, half + HELD - 1), np.r_[5 : half - 5, half + HELD + 5 : len(tip) - 5]

@@ -1,0 +1,68 @@
+"""Which moves a control makes one segment of: lines that are straight within the tolerance of their mode."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from camcomp.gcode.path_mode import PathMode
+from camcomp.ground import path_geometry
+from camcomp.ground.datatypes import ARC, LINE, Bools, Floats, Ints, Path
+from camcomp.model.trajectory.merging import merge, straight
+from camcomp.model.trajectory.moves import ToolMoves, moves_of
+
+SHORTEST = 1e-9  # mm; a move to where the tip is takes no time
+
+
+@dataclass(frozen=True, eq=False)
+class Segments:
+    """Moves (n,) as m segments. group (n,): segment of every move; first, last (m,): moves of a segment; waits (m,): the control
+    waits for something in front of it.
+    """
+
+    group: Ints
+    first: Ints
+    last: Ints
+    waits: Bools
+
+
+def segments(moves: ToolMoves) -> Segments:
+    """The segments of moves (n,); those that go nowhere count to the one in front of them."""
+    n = len(moves)
+    size = np.empty(n)
+    straight(*read_only(moves.start, moves.end), size, np.empty((n, 3)), np.empty(n))
+    bent = np.flatnonzero(moves.kind == ARC)
+    size[bent] = path_geometry.lengths(moves.take(bent).path())
+    group, first, last = (np.zeros(n, np.int64) for _ in range(3))
+    joins = (moves.kind == LINE) & ~moves.exact
+    goes = size > SHORTEST
+    waits = _beginning_at_rest(moves.waits, goes)
+    m = merge(*read_only(moves.start, moves.end), goes, waits, joins, moves.feed, moves.merge, group, first, last)
+    return Segments(group, first[:m], last[:m], waits[first[:m]])
+
+
+def merged(path: Path, modes: Sequence[PathMode]) -> Path | None:
+    """The path that a control drives which merges lines in these modes (n,), corners sharp; None where it merges none."""
+    if not any(mode.merge_mm > 0.0 for mode in modes):
+        return None
+    found = segments(moves_of(path, modes))
+    if len(found.first) == np.count_nonzero(path_geometry.lengths(path) > SHORTEST):
+        return None
+    return replace(path.take(found.last), start=path.start[found.first])
+
+
+def read_only(*points: Floats) -> list[Floats]:
+    """Views that cannot be written to, as those of paths cannot: of two kinds of arrays numba would compile for each."""
+    views = [each.view() for each in points]
+    for each in views:
+        each.flags.writeable = False
+    return views
+
+
+def _beginning_at_rest(waits: Bools, goes: Bools) -> Bools:
+    """Moves (n,) that go somewhere from where the control has waited, in front of them or of standstills before them."""
+    out, at = np.zeros(len(waits), np.bool_), np.flatnonzero(goes)
+    out[at] = np.diff(np.cumsum(waits)[at], prepend=0) > 0
+    return out
