@@ -54,6 +54,14 @@ def test_lines_that_a_control_merges_are_no_gap(tmp_path):
 
 
 @pytest.mark.campaign
+def test_a_gap_that_is_not_above_the_floor_has_no_cause(tmp_path):
+    """A lag of all axes, tip alone, that left the gap as large as it was."""
+    with recording.taken_from("fourth"):
+        result, _ = judged(tmp_path, "parallel", 71031)
+    assert (result["verdict"], result["causes"]) == ("none", [])
+
+
+@pytest.mark.campaign
 def test_how_fast_a_tool_is_between_stops_rows_do_not_say(tmp_path):
     """G61.1 on lines of 1 mm, a row every 20 ms: what the force was off by seemed to be a push."""
     with recording.taken_from("fourth"):

@@ -14,7 +14,7 @@ from camcomp.diagnosis.search.sound import GATE_SHARE, Sound, cancels
 from camcomp.diagnosis.search.tempering import TEMPERATURE, misfit, tempering
 from camcomp.diagnosis.search.unexplained import SURE_Z, Unexplained, size_um, unexplained, worst
 from camcomp.diagnosis.search.unknown import firm_prior, residual_tests
-from camcomp.diagnosis.search.whole_gap import idle
+from camcomp.diagnosis.search.whole_gap import idle, nothing_to_explain
 from camcomp.diagnosis.statistics.cause_sets import (
     SIZES,
     Fitted,
@@ -156,6 +156,8 @@ def search_causes(problem: Problem) -> CauseSearch:
     beyond = unexplained(problem, fit(best.all_members))
     kind = unknown_kind(problem, best, beyond)
     known, credible, instead = _credible(problem, best, beyond, fit, every)
+    if kind is None and nothing_to_explain(problem, known):
+        known = null
     if known.members != best.members:
         beyond = unexplained(problem, known)
         kind = unknown_kind(problem, known, beyond) or (worst(beyond).kind if kind or instead else None)

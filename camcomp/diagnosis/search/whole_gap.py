@@ -15,15 +15,22 @@ STANDS_OUT = 1.3  # of the floor: what a gap, or what is left of it, has to be t
 REMAINS = 0.5  # of what a gap, or a cause, has to its square beyond the floor: who leaves more has not explained it
 
 
+def nothing_to_explain(problem: Problem, f: Fitted) -> bool:
+    """Whether the gap is not above the floor, and none of a set's members takes of it what it moves the tip by."""
+    at_floor = _square(problem, f, ()) <= floor_um(problem) ** 2
+    return bool(f.members) and at_floor and _idle(problem, f) == set(f.members)
+
+
 def idle(problem: Problem, f: Fitted) -> set[int]:
-    """Members without which the gap is hardly larger, for all that they move the tip by; of a set that leaves most of it, or
-    where it is no larger than the floor.
-    """
+    """Members of a set that leaves most of the gap without which that is hardly larger, for all that they move the tip by."""
     floor, before, after = floor_um(problem) ** 2, _square(problem, f, ()), _square(problem, f, f.members)
-    usual = STANDS_OUT**2 * floor
-    if before > usual and (after <= usual or after - floor <= REMAINS * (before - floor)):
+    if after <= STANDS_OUT**2 * floor or after - floor <= REMAINS * (before - floor):
         return set()
-    out = set()
+    return _idle(problem, f)
+
+
+def _idle(problem: Problem, f: Fitted) -> set[int]:
+    after, out = _square(problem, f, f.members), set()
     for i in f.members:
         taken = _square(problem, f, tuple(j for j in f.members if j != i)) - after
         if taken < (1.0 - REMAINS) * size_um(problem, f, (i,)) ** 2:
