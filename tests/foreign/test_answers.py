@@ -145,6 +145,7 @@ def test_intervals_hold_what_they_are_of(tmp_path, generator, seed):
     assert row["all"] and row["held"] and all(row["held"])
 
 
+@pytest.mark.campaign
 def test_play_where_a_tool_bends_by_a_third_of_the_arcs_that_it_goes_round(tmp_path):
     """Only the tip is logged: where on an arc of 5 mm it is follows from how its 1.5 mm of bending point, and those from where it is."""
     with recording.taken_from("second"):

@@ -109,7 +109,7 @@ def by_camcomp(job, laps, step):
     return walls(lambda q: heights(cut.memory, q) < -0.5 * DEPTH)
 
 
-@pytest.mark.parametrize("sense", [1, -1], ids=["out", "back"])
+@pytest.mark.parametrize("sense", [pytest.param(1, marks=pytest.mark.campaign), -1], ids=["out", "back"])
 def test_walls_of_a_bending_tool_are_those_of_a_plant_that_keeps_all_its_ways(tmp_path, sense):
     (tmp_path / "soft.yaml").write_text(CONFIG)
     job = Job(load_config([shipped("config/cartesian.yaml"), tmp_path / "soft.yaml"]))
