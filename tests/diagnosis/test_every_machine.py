@@ -11,7 +11,6 @@ from tests.campaign import runner
 from tests.diagnosis import grid
 from tests.diagnosis.shipped import Fault
 
-
 # One interval of twenty misses: that of the damping begins at 0.2003.
 MISSES = (("kuka-kr210", "servo_overshoot", None),)
 
