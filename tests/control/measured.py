@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 BEFORE, BEHIND = 1.5, 0.6  # mm along the way around the place where a point is expected
+SAME = 1e-4  # mm by which one place is no nearer than another
 CORNER = 0.2  # of the way between two points that the corners may have cut off
 
 
@@ -20,13 +21,14 @@ def passes(tip: np.ndarray, points: np.ndarray) -> np.ndarray:
     for i, point in enumerate(points):
         gap = float(np.linalg.norm(point - last))
         low, high = at + (1.0 - CORNER) * gap - BEFORE, at + gap + BEHIND
-        a = max(int(np.searchsorted(way, max(low, at - BEHIND))) - 1, 0)
+        a = max(int(np.searchsorted(way, max(low, at))) - 1, 0)
         b = min(int(np.searchsorted(way, high)) + 1, len(tip) - 1)
         begin, along = tip[a:b], tip[a + 1 : b + 1] - tip[a:b]
         square = np.maximum(np.sum(along**2, axis=1), 1e-30)
         share = np.clip(np.sum((point - begin) * along, axis=1) / square, 0.0, 1.0)
         places = begin + share[:, None] * along
-        best = int(np.argmin(np.linalg.norm(places - point, axis=1)))
+        beside = np.linalg.norm(places - point, axis=1)
+        best = int(np.argmax(beside < beside.min() + SAME))  # the first one: behind a turn on the spot the way comes by again
         out[i] = places[best]
         at, last = float(way[a + best] + share[best] * np.sqrt(square[best])), point
     return out

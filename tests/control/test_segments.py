@@ -58,3 +58,19 @@ def test_forces_beside_stops_are_known_to_what_the_speed_there_leaves_open():
     cut = rows.cutting & true.cutting[::ROW]
     known, thought = (np.mean(wrong[cut] < np.linalg.norm(each.doubt, axis=1)[cut] + 1.0) for each in (rows, blind))
     assert known > 0.98 and thought < 0.93
+
+
+def test_a_stop_of_a_motion_that_no_row_is_on_is_doubt_as_well():
+    """Lines of 1 mm between rows a tenth of a second apart: where only some motions end at rest, rows beside these are in doubt."""
+    found, program = recorded("squircle-exact")
+    track = lay_track(program.path, Job(load_config([shipped("config/router.yaml")])).conditions)
+    tip, time = found.tip[:: 5 * ROW], found.t[:: 5 * ROW]
+    aligned = align(program.path, tip, np.full(len(tip), np.nan))
+    passed = np.setdiff1d(np.arange(aligned.motion.min(), aligned.motion.max()), aligned.motion)
+    assert len(passed) > 20
+    rests = np.isin(np.arange(len(program.path)), passed)
+    none, some = (
+        cutting_forces(track, aligned, tip, time, stops, logged_line=False) for stops in (rests & False, rests)
+    )
+    more = np.linalg.norm(some.doubt, axis=1) - np.linalg.norm(none.doubt, axis=1)
+    assert np.all(more >= 0.0) and np.sum(more[none.cutting] > 1.0) > 10

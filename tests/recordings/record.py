@@ -85,6 +85,7 @@ net tip-z axis.z.pos-cmd => sampler.0.pin.2
 net line motion.program-line => sampler.0.pin.3
 net kind motion.motion-type => sampler.0.pin.4
 net enable iocontrol.0.user-enable-out => iocontrol.0.emc-enable-in
+net turning spindle.0.speed-out-rps => spindle.0.speed-in
 net prepared iocontrol.0.tool-prepare => iocontrol.0.tool-prepared
 net changed iocontrol.0.tool-change => iocontrol.0.tool-changed
 """

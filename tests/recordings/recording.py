@@ -15,13 +15,15 @@ from pathlib import Path
 import numpy as np
 
 HERE = Path(__file__).parent
-# Of recordings. Nothing saw the second one before the 56000s, the third one before the 60000s, the fourth one before the 70000s. Words are programs that say
-# things in other words (inches, increments, canned cycles, turns): nothing for generators, which read plain ones only.
+# Of recordings. Nothing saw the second one before the 56000s, the third one before the 60000s, the fourth one before the 70000s,
+# the fifth one before the 74000s. Words are programs that say things in other words (inches, increments, canned cycles,
+# turns): nothing for generators, which read plain ones only.
 SHELVES = {
     "first": HERE,
     "second": HERE / "second",
     "third": HERE / "third",
     "fourth": HERE / "fourth",
+    "fifth": HERE / "fifth",
     "words": HERE / "words",
 }
 STEP_S = 1e-3

@@ -169,8 +169,8 @@ def cutting_forces(
 
 
 def _beside_stops(motion: Ints, rests: Bools) -> Bools:
-    """Rows (n,) on motions (n,) between which and a neighbour the control has stopped."""
-    between = (np.diff(motion) > 0) & rests[motion[:-1]]
+    """Rows (n,) on motions (n,) between which and a neighbour the control has stopped, at the end of whichever motion."""
+    between = np.diff(np.concatenate([[0], np.cumsum(rests)])[motion]) > 0
     return np.asarray(np.append(between, False) | np.append(False, between))
 
 

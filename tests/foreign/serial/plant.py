@@ -28,20 +28,26 @@ class Line:
 
 
 def read_program(text: str) -> dict[int, Line]:
-    """Motions of a recorded program by source line. G0 to G3 are modal; a feed along Z alone is a plunge."""
-    lines, modal, feed, rpm, at = {}, None, 0.0, 0.0, {}
+    """Motions of a recorded program by source line. G0 to G3 are modal; a feed along Z alone is a plunge.
+
+    A feed in 1/min (G93) is told over the straight way: forces here are affine in the feed, so any will do for an arc.
+    """
+    lines, modal, feed, rpm, at, mode = {}, None, 0.0, 0.0, {}, 94
     for number, line in enumerate(text.splitlines(), 1):
         words = [(letter, float(value)) for letter, value in re.findall(r"([A-Z])([-\d.]+)", line)]
         for letter, value in words:
             if letter == "G" and value in (0, 1, 2, 3):
                 modal = int(value)
+            mode = int(value) if letter == "G" and value in (93, 94, 95) else mode
             feed = value if letter == "F" else feed
             rpm = value if letter == "S" else rpm
         axes = {letter: value for letter, value in words if letter in "XYZ"}
         if not axes or any(word == ("G", 4.0) for word in words):
             continue
         flat = modal in (2, 3) or any(at.get(a) != v for a, v in axes.items() if a in "XY")
-        lines[number] = Line("rapid" if modal == 0 else "feed" if flat else "plunge", feed, rpm)
+        length = np.linalg.norm([value - at.get(letter, 0.0) for letter, value in axes.items()])
+        mm_min = feed * {93: length, 94: 1.0, 95: rpm}[mode]
+        lines[number] = Line("rapid" if modal == 0 else "feed" if flat else "plunge", mm_min, rpm)
         at |= axes
     return lines
 
