@@ -18,16 +18,9 @@ from tests.recordings.record import ACCELERATION, VELOCITY
 OVERRIDDEN = (
     "override-blended", "eight-fast", "inward-blended", "diagonal-200um", "pendulum-blended", "speeds-blended",
 )  # fmt: skip
-# From a plunge onto an arc LinuxCNC stays within 0 to 8 um where the model is 5 to 16 um off. In G64 without P it readies itself
-# for corners of feeds per revolution (G95) as if they were rapids, and leaves them by 2 mm where the model says 0.2.
-PLUNGE, PER_TURN = "plunge onto an arc", "feed per revolution without a tolerance"
-MISSES = {
-    ("second", "spiral-blended"): PLUNGE,
-    ("third", "circles-blended"): PLUNGE,
-    ("fifth", "perrev-blended"): PLUNGE,
-    ("fifth", "slalom-blended"): PLUNGE,
-    ("words", "perrev-fast"): PER_TURN,
-}
+# In G64 without P LinuxCNC readies itself for corners of feeds per revolution (G95) as if they were rapids, and leaves them by
+# 2 mm where the model says 0.2; from G94 it begins an arc of G95 at rest, where the model is 11 um off.
+PER_TURN = {("fifth", "perrev-blended"), ("words", "perrev-fast")}
 LONGEST_STOP = 2  # cycles
 UM, SHARE, TIME = 0.5, 0.2, 0.05
 
@@ -60,8 +53,10 @@ def recorded():
     for shelf in recording.SHELVES:
         with recording.taken_from(shelf):
             for name in sorted(set(recording.names()) - set(OVERRIDDEN)):
-                missed = MISSES.get((shelf, name))
-                yield pytest.param(shelf, name, marks=[pytest.mark.xfail(reason=missed, strict=True)] if missed else [])
+                marks = (
+                    [pytest.mark.xfail(reason="feed per revolution", strict=True)] if (shelf, name) in PER_TURN else []
+                )
+                yield pytest.param(shelf, name, marks=marks)
 
 
 @pytest.mark.parametrize(("shelf", "name"), list(recorded()))

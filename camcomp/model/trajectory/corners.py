@@ -24,10 +24,13 @@ ANGLE, LENGTH = 1e-6, 1e-6  # rad, mm: no arc is smaller
 
 
 @inner
-def pace(acceleration, fast, radius):
-    """What of an acceleration is left along the way when the segment is an arc, radius 0 for lines, mm/s²."""
+def pace(acceleration, most, radius):
+    """What of an acceleration is left along the way when the segment is an arc, radius 0 for lines, mm/s².
+
+    most: mm/s that the machine can go along it; a control keeps in hand what turning takes at that speed, whatever the feed.
+    """
     if radius > 0.0:
-        turning = min(fast * fast / radius / acceleration, NORMAL)
+        turning = min(most * most / radius / acceleration, NORMAL)
         acceleration *= np.sqrt(1.0 - turning * turning)
     return acceleration
 
@@ -62,12 +65,12 @@ def overlap_gap(time, acceleration, next_acceleration, cosine):
 
 
 @entry
-def corners(leave, arrive, axis, radius, angle, nominal, fast, acceleration, rapid, exact, stop, waits, tolerance, limit, cycle,
+def corners(leave, arrive, axis, radius, angle, nominal, fast, most, acceleration, rapid, exact, stop, waits, tolerance, limit, cycle,
             way, speed, reach, bend, around, centre, end):  # fmt: skip
     """Fills way, speed, reach, bend, around (m,), centre (m, 3) of the corners behind segments (m,); the last is at rest.
 
     leave, arrive (m, 3): unit directions at the start and at the end. axis (m, 3), radius, angle (m,): of arcs, radius 0 for
-    lines. nominal (m,) mm lengths, fast (m,) mm/s, acceleration (m,) along it mm/s². rapid, exact (path is kept), stop
+    lines. nominal (m,) mm lengths, fast, most (m,) mm/s at the feed and at any, acceleration (m,) along it mm/s². rapid, exact (path is kept), stop
     (m,): rest behind it; waits (m,): rest in front of it. tolerance (m,) mm, 0: open. limit: acceleration of an axis, mm/s². cycle: s.
     end (m, 3) mm: corners. way: REST, ON, ROUND, OVERLAP or WAIT (at rest where it would overlap); speed: mm/s through it (OVERLAP: where it begins);
     reach: mm of both segments that an arc takes; bend, around: its radius and length, mm.
@@ -106,8 +109,8 @@ def corners(leave, arrive, axis, radius, angle, nominal, fast, acceleration, rap
         first = tolerance[i] if tolerance[i] > 0.0 else OPEN * nominal[i]
         second = tolerance[j] if tolerance[j] > 0.0 else OPEN * nominal[j]
         allowed = min(first, second, OPEN * nominal[i], OPEN * nominal[j])
-        half_pace = 0.5 * pace(acceleration[i], fast[i], radius[i])
-        next_half_pace = 0.5 * pace(acceleration[j], fast[j], radius[j])
+        half_pace = pace(0.5 * acceleration[i], most[i], radius[i])
+        next_half_pace = pace(0.5 * acceleration[j], most[j], radius[j])
         _, overlap = overlap_speed(
             0.5, half_pace, next_half_pace, tolerance[i], sine, cosine, left, nominal[j], fast[i], fast[j]
         )
@@ -189,8 +192,11 @@ def nearest(points, segment, start, end, arc, way, reach, bend, centre, out):
             t = min(max(t, 0.0), 1.0)
             x, y, z = start[s, 0] + t * mx, start[s, 1] + t * my, start[s, 2] + t * mz
         fx, fy, fz = x, y, z
+        ends = abs(fx - end[s, 0]) + abs(fy - end[s, 1]) + abs(fz - end[s, 2]) < LENGTH
         for side in range(2):
             c = s - 1 + side
+            if ends and side == 0:  # the corner where a full circle began is not where it ends
+                continue
             if c < 0 or (way[c] != ROUND and way[c] != OVERLAP):
                 continue
             dx, dy, dz = fx - end[c, 0], fy - end[c, 1], fz - end[c, 2]

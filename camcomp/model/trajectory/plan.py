@@ -71,25 +71,28 @@ def plan_of(moves: ToolMoves, limits: ControlLimits, arrives: float = 0.0) -> Co
         nominal[at], most[at], axis[at], angle[at] = path_geometry.lengths(path), 1.0, path.axis, np.abs(path.angle)
         radius[at] = np.linalg.norm(path.start - path.centre, axis=1)
     acceleration = limits.acceleration * most
-    fast = _speeds(kind, feed, nominal, radius, most, limits)
+    fast, reachable = _speeds(kind, feed, nominal, radius, most, limits)
     way, centre = np.zeros(m, np.int64), np.zeros((m, 3))
     speed, reach, bend, around, time = np.zeros((5, m))
     length, slope, fastest, passes = np.empty((4, 2 * m))
     if m:
-        corners(leave, arrive, axis, radius, angle, nominal, fast, acceleration, kind == RAPID, moves.exact[last], moves.stop[last], found.waits,
+        corners(leave, arrive, axis, radius, angle, nominal, fast, reachable, acceleration, kind == RAPID, moves.exact[last], moves.stop[last], found.waits,
                 moves.tolerance[last],
                 limits.acceleration, limits.cycle_s, way, speed, reach, bend, around, centre, end)  # fmt: skip
-        pieces(nominal, fast, acceleration, radius, way, speed, reach, bend, around, length, slope, fastest)
+        pieces(nominal, fast, reachable, acceleration, radius, way, speed, reach, bend, around, length, slope, fastest)
         durations(length, slope, fastest, way, speed, limits.cycle_s, limits.look_ahead, arrives, passes, time)
     return ControlPlan(moves, found.group, start, end, arc, way, reach, bend, centre, time, passes[::2])
 
 
-def _speeds(kind: Ints, feed: Floats, nominal: Floats, radius: Floats, most: Floats, limits: ControlLimits) -> Floats:
-    """Largest speeds (m,) mm/s along segments, of which one axis may be at its limit."""
+def _speeds(
+    kind: Ints, feed: Floats, nominal: Floats, radius: Floats, most: Floats, limits: ControlLimits
+) -> tuple[Floats, Floats]:
+    """Largest speeds (m,) mm/s along segments, of which one axis may be at its limit: at the feed, and at any feed."""
     velocity = limits.velocity * most
-    rapid = np.where(np.isinf(velocity), RAPID_MM_PER_S, velocity)
-    out = np.minimum(np.where(kind == RAPID, rapid, feed / 60.0), velocity)
-    out = np.minimum(out, nominal / (CYCLES * limits.cycle_s))
+    shortest = nominal / (CYCLES * limits.cycle_s)
     turning = np.sqrt(NORMAL * limits.acceleration * np.where(radius > 0.0, radius, np.inf))
-    speeds: Floats = np.minimum(np.where(out > 0.0, out, RAPID_MM_PER_S), turning)
-    return speeds
+    asked = np.where(kind == RAPID, RAPID_MM_PER_S, feed / 60.0)
+    any_feed = np.where(np.isinf(velocity), np.fmax(asked, RAPID_MM_PER_S), velocity)
+    reachable = np.minimum(np.minimum(any_feed, shortest), turning)
+    fast = np.where((kind == RAPID) | ~(asked > 0.0), reachable, np.minimum(asked, reachable))
+    return fast, reachable

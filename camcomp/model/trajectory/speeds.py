@@ -12,15 +12,15 @@ STOP = 2.0  # cycles that a stop takes beside slowing down and speeding up, as m
 
 
 @inner
-def along(i, fast, acceleration, radius, way):
+def along(i, reachable, acceleration, radius, way):
     """Acceleration of segment i along its way, mm/s²: what turning and neighbours that overlap with it leave.
 
     A control that waits for something behind it had made ready to overlap.
     """
-    a = pace(acceleration[i], fast[i], radius[i])
+    a = acceleration[i]
     if way[i] in (OVERLAP, WAIT) or (i > 0 and way[i - 1] == OVERLAP):
         a *= 0.5
-    return a
+    return pace(a, reachable[i], radius[i])
 
 
 @inner
@@ -35,15 +35,15 @@ def straight_part(i, nominal, way, reach):
 
 
 @entry
-def pieces(nominal, fast, acceleration, radius, way, speed, reach, bend, around, length, slope, most):
+def pieces(nominal, fast, reachable, acceleration, radius, way, speed, reach, bend, around, length, slope, most):
     """Fills length mm, slope mm/s² and most mm/s (2 m,) of the pieces that m segments and the corners behind them are.
 
-    Segments are even, corners odd. nominal (m,) mm, fast (m,) mm/s, acceleration (m,) mm/s² along the way, radius (m,) mm of arcs,
+    Segments are even, corners odd. nominal (m,) mm, fast, reachable (m,) mm/s at the feed and at any, acceleration (m,) mm/s² along the way, radius (m,) mm of arcs,
     0 for lines; way, speed, reach, bend, around (m,): of the corners (corners.py).
     """
     for i in range(nominal.shape[0]):
         length[2 * i] = straight_part(i, nominal, way, reach)
-        slope[2 * i] = along(i, fast, acceleration, radius, way)
+        slope[2 * i] = along(i, reachable, acceleration, radius, way)
         most[2 * i] = fast[i]
         length[2 * i + 1], slope[2 * i + 1], most[2 * i + 1] = 0.0, acceleration[i], 0.0
         if way[i] == ON:
