@@ -9,7 +9,7 @@ from camcomp.gcode.dialect import Dialect
 from camcomp.gcode.path_mode import PathMode
 from camcomp.gcode.setup import Setup, Triple
 from camcomp.gcode.text import Text
-from camcomp.ground.datatypes import Bools, Floats, Ints, Path
+from camcomp.ground.datatypes import RAPID, Bools, Floats, Ints, Path
 
 # Columns of Sites.begin and Sites.finish.
 X, Y, Z, I, J, K, R, F, P, G = range(10)
@@ -72,6 +72,11 @@ class Program:
     straight: bool  # no loops, subprograms, parameters, cycles: a line means at most one motion, as it stands
     dwelt_s: float = 0.0  # G4 in all
     tool_changes: int = 0  # M6 in all
+
+    @property
+    def per_turn(self) -> Bools:
+        """Whether motions (n,) are fed per revolution (G95)."""
+        return np.asarray((self.sites.feed_mode == 95) & (self.path.kind != RAPID))
 
     def step_mm(self, resolution_mm: float) -> float:
         """The coarsest step of its lengths, written for a control of this resolution."""

@@ -84,7 +84,7 @@ def account(driven: Driven, machine: Job) -> Account:
     motion = np.repeat(np.arange(len(path)), np.where(path.kind == ARC, ON_ARC, 1))
     u = np.concatenate([np.arange(1, ON_ARC + 1) / ON_ARC if kind == ARC else [1.0] for kind in path.kind])
     places = passes(tip, path_geometry.points(path, motion, u))[u == 1.0]
-    plan = plan_of(moves_of(path, program.modes), limits_of(machine.config))
+    plan = plan_of(moves_of(path, program.modes, per_turn=program.per_turn), limits_of(machine.config))
     cut = np.flatnonzero(driven.cut & (path.kind != RAPID))
     modelled = path.end[cut] + plan.leaves_by(cut, path.end[cut])
     frame = machine.frame

@@ -18,9 +18,6 @@ from tests.recordings.record import ACCELERATION, VELOCITY
 OVERRIDDEN = (
     "override-blended", "eight-fast", "inward-blended", "diagonal-200um", "pendulum-blended", "speeds-blended",
 )  # fmt: skip
-# In G64 without P LinuxCNC readies itself for corners of feeds per revolution (G95) as if they were rapids, and leaves them by
-# 2 mm where the model says 0.2; from G94 it begins an arc of G95 at rest, where the model is 11 um off.
-PER_TURN = {("fifth", "perrev-blended"), ("words", "perrev-fast")}
 LONGEST_STOP = 2  # cycles
 UM, SHARE, TIME = 0.5, 0.2, 0.05
 
@@ -42,7 +39,9 @@ def looked_at(name):
     motion = np.repeat(np.arange(len(path)), np.where(path.kind == ARC, 40, 1))
     u = np.concatenate([np.arange(1, 41) / 40 if kind == ARC else [1.0] for kind in path.kind])
     places = passes(tip, path_geometry.points(path, motion, u))[u == 1.0]
-    plan = plan_of(moves_of(path, program.modes), ControlLimits(ACCELERATION, VELOCITY, 1e-3, 50))
+    plan = plan_of(
+        moves_of(path, program.modes, per_turn=program.per_turn), ControlLimits(ACCELERATION, VELOCITY, 1e-3, 50)
+    )
     every = np.arange(len(path))
     off = [np.linalg.norm(each, axis=1) for each in (places - path.end, plan.leaves_by(every, path.end))]
     return _moving_s(tip), plan.duration_s, 1e3 * off[0], 1e3 * off[1]
@@ -53,10 +52,7 @@ def recorded():
     for shelf in recording.SHELVES:
         with recording.taken_from(shelf):
             for name in sorted(set(recording.names()) - set(OVERRIDDEN)):
-                marks = (
-                    [pytest.mark.xfail(reason="feed per revolution", strict=True)] if (shelf, name) in PER_TURN else []
-                )
-                yield pytest.param(shelf, name, marks=marks)
+                yield shelf, name
 
 
 @pytest.mark.parametrize(("shelf", "name"), list(recorded()))

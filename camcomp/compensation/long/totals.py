@@ -160,9 +160,10 @@ class Totals:
         default = self.job.config.process.feed_mm_per_min or np.nan
         mine = slice(part.first, part.last)
         self.modes |= {modes[k]: None for k in range(part.first, part.last) if path.kind[k] != RAPID}
-        before.add(moves_of(path, modes, np.where(np.isnan(path.feed), default, path.feed)).take(mine))
+        feed = np.where(np.isnan(path.feed), default, path.feed)
+        before.add(moves_of(path, modes, feed, result.program.per_turn).take(mine))
         first = int(np.flatnonzero(own)[0])
-        moves = written_moves(path, modes, result.rows, result.written, default).take(own)
+        moves = written_moves(result.program, result.rows, result.written, default).take(own)
         points = SeenPoints(control.row - first, control.told, result.missed, result.lines[control.row], control.joined)
         after.add(moves, points)
 

@@ -18,7 +18,7 @@ from camcomp.gcode.dialect import Dialect
 from camcomp.gcode.output import Rewritten
 from camcomp.gcode.path_mode import PathMode
 from camcomp.gcode.program import Program
-from camcomp.ground.datatypes import ARC, RAPID, Bools, Floats, Ints, Path
+from camcomp.ground.datatypes import ARC, RAPID, Bools, Floats, Ints
 from camcomp.model.control import limits_of, waiting_s
 from camcomp.model.job import Job
 from camcomp.model.trajectory.moves import ControlLimits, ToolMoves, mode_columns, moves_of
@@ -177,8 +177,8 @@ def under_control(
     path, limits = program.path, limits_of(job.config)
     default = job.config.process.feed_mm_per_min or np.nan
     feed = np.where(np.isnan(path.feed), default, path.feed)
-    before = plan_of(moves_of(path, program.modes, feed), limits)
-    moves = written_moves(path, program.modes, rows, written, default)
+    before = plan_of(moves_of(path, program.modes, feed, program.per_turn), limits)
+    moves = written_moves(program, rows, written, default)
     moves = replace(moves, exact=moves.exact | rest)
     if apart is not None:
         moves = replace(moves, merge=np.where(apart, 0.0, moves.merge))
@@ -235,10 +235,9 @@ def distinct(modes: Iterable[PathMode]) -> tuple[PathMode, ...]:
     return tuple(dict.fromkeys(modes))
 
 
-def written_moves(
-    path: Path, modes: tuple[PathMode, ...], rows: CorrectedRows, written: Rewritten, feed: float
-) -> ToolMoves:
-    """The moves of a corrected program as they are written; feed: mm/min where none is in force."""
+def written_moves(program: Program, rows: CorrectedRows, written: Rewritten, feed: float) -> ToolMoves:
+    """The moves of a program that was corrected as they are written; feed: mm/min where none is in force."""
+    path = program.path
     motion, arc = rows.motion, rows.kind == ARC
     bent = np.isfinite(written.centre[:, 0])
     end = written.end
@@ -247,12 +246,12 @@ def written_moves(
     axis = path.axis[motion]
     angle = np.where(arc, path.angle[motion], 0.0)
     angle[bent] = arcs_out.sweeps(start[bent], end[bent], centre[bent], axis[bent], rows.arcs.angle[bent])
-    exact, stop, tolerance, merged = mode_columns(modes)
+    exact, stop, tolerance, merged = mode_columns(program.modes)
     told = np.where(np.isnan(written.feed), feed, written.feed)
     waits = np.asarray(path.waits)[motion] & (np.diff(motion, prepend=-1) > 0)
     return ToolMoves(
         np.where(arc & ~np.isfinite(centre[:, 0]), 1, rows.kind).astype(np.int64), start, end, centre, axis, angle, told,
-        exact[motion], waits, (stop | path.machine)[motion], tolerance[motion], merged[motion],
+        exact[motion], waits, (stop | path.machine)[motion], tolerance[motion], merged[motion], program.per_turn[motion],
     )  # fmt: skip
 
 
@@ -264,7 +263,10 @@ def of_text(original: Program, corrected: Program, job: Job, move: Ints, told: F
     config, limits = job.config, limits_of(job.config)
     default = config.process.feed_mm_per_min or np.nan
     plans = [
-        plan_of(moves_of(each.path, each.modes, np.where(np.isnan(each.path.feed), default, each.path.feed)), limits)
+        plan_of(
+            moves_of(each.path, each.modes, np.where(np.isnan(each.path.feed), default, each.path.feed), each.per_turn),
+            limits,
+        )
         for each in (original, corrected)
     ]
     before, after = (

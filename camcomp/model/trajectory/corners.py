@@ -65,13 +65,13 @@ def overlap_gap(time, acceleration, next_acceleration, cosine):
 
 
 @entry
-def corners(leave, arrive, axis, radius, angle, nominal, fast, most, acceleration, rapid, exact, stop, waits, tolerance, limit, cycle,
+def corners(leave, arrive, axis, radius, angle, nominal, fast, most, acceleration, rapid, per_turn, exact, stop, waits, tolerance, limit, cycle,
             way, speed, reach, bend, around, centre, end):  # fmt: skip
     """Fills way, speed, reach, bend, around (m,), centre (m, 3) of the corners behind segments (m,); the last is at rest.
 
     leave, arrive (m, 3): unit directions at the start and at the end. axis (m, 3), radius, angle (m,): of arcs, radius 0 for
     lines. nominal (m,) mm lengths, fast, most (m,) mm/s at the feed and at any, acceleration (m,) along it mm/s². rapid, exact (path is kept), stop
-    (m,): rest behind it; waits (m,): rest in front of it. tolerance (m,) mm, 0: open. limit: acceleration of an axis, mm/s². cycle: s.
+    (m,): rest behind it; per_turn (m,): fed per revolution, for all that the control knows as fast as at any feed; waits (m,): rest in front of it. tolerance (m,) mm, 0: open. limit: acceleration of an axis, mm/s². cycle: s.
     end (m, 3) mm: corners. way: REST, ON, ROUND, OVERLAP or WAIT (at rest where it would overlap); speed: mm/s through it (OVERLAP: where it begins);
     reach: mm of both segments that an arc takes; bend, around: its radius and length, mm.
     """
@@ -89,7 +89,8 @@ def corners(leave, arrive, axis, radius, angle, nominal, fast, most, acceleratio
         if stop[i] or waits[j] or rapid[i] != rapid[j] or bx * bx + by * by + bz * bz < BACK:
             left = nominal[j]
             continue
-        slower = min(fast[i], fast[j])
+        told, told_ahead = most[i] if per_turn[i] else fast[i], most[j] if per_turn[j] else fast[j]
+        slower = min(told, told_ahead)
         jump = slower / cycle + acceleration[j]
         scale = max(abs(v[0] - u[0]), abs(v[1] - u[1]), abs(v[2] - u[2])) * jump / limit
         if radius[i] > 0.0 or radius[j] > 0.0:
@@ -134,7 +135,7 @@ def corners(leave, arrive, axis, radius, angle, nominal, fast, most, acceleratio
                 normal = NORMAL * plane
                 room = min(inner_length, outer_length, cosine * allowed / (1.0 - sine))
                 widest = sine / cosine * room
-                fastest = min(np.sqrt(normal * widest), max(fast[i], fast[j]))
+                fastest = min(np.sqrt(normal * widest), max(told, told_ahead))
                 time = min(np.sqrt(plane * room), fastest) / (0.5 * plane)
                 size = max(fastest * fastest / normal, min(time * fastest / turn, widest))
                 distance = size * cosine / sine
@@ -151,6 +152,8 @@ def corners(leave, arrive, axis, radius, angle, nominal, fast, most, acceleratio
             out = size / sine / norm
             centre[i, 0], centre[i, 1], centre[i, 2] = end[i, 0] + out * wx, end[i, 1] + out * wy, end[i, 2] + out * wz
             left = nominal[j] - distance
+        elif per_turn[j] and not per_turn[i]:
+            left = nominal[j]  # a feed that waits for the spindle does not overlap with one that does not
         elif 0.5 * overlap > straight:
             begin, _ = overlap_speed(
                 1.0, half_pace, next_half_pace, tolerance[i], sine, cosine, left, nominal[j], fast[i], fast[j]

@@ -37,6 +37,7 @@ class ToolMoves:
     stop: Bools  # at rest behind the move, whatever its direction: G61.1, moves in machine coordinates
     tolerance: Floats  # (n,) mm
     merge: Floats  # (n,) mm
+    per_turn: Bools  # feed per revolution: how fast that is the control does not know before the spindle turns
 
     def __len__(self) -> int:
         return len(self.kind)
@@ -60,12 +61,15 @@ class ToolMoves:
         )  # fmt: skip
 
 
-def moves_of(path: Path, modes: Sequence[PathMode], feed: Floats | None = None) -> ToolMoves:
-    """The motions of a path, each in its mode; feed (n,) mm/min where it is not that of the path."""
+def moves_of(
+    path: Path, modes: Sequence[PathMode], feed: Floats | None = None, per_turn: Bools | None = None
+) -> ToolMoves:
+    """The motions of a path, each in its mode; feed (n,) mm/min where it is not that of the path; per_turn (n,): G95."""
     exact, stop, tolerance, merged = mode_columns(modes)
     return ToolMoves(
         path.kind.astype(np.int64), path.start, path.end, path.centre, path.axis, path.angle,
         path.feed if feed is None else feed, exact, np.asarray(path.waits), stop | path.machine, tolerance, merged,
+        np.zeros(len(path), np.bool_) if per_turn is None else per_turn,
     )  # fmt: skip
 
 
@@ -77,7 +81,7 @@ def line_moves(
     none = np.zeros((n, 3))
     return ToolMoves(
         kind.astype(np.int64), start, end, none, none, none[:, 0], feed, np.full(n, mode.exact), waits & (np.arange(n) == 0),
-        np.full(n, mode.code == 611), np.full(n, mode.tolerance_mm), np.full(n, mode.merge_mm),
+        np.full(n, mode.code == 611), np.full(n, mode.tolerance_mm), np.full(n, mode.merge_mm), np.zeros(n, np.bool_),
     )  # fmt: skip
 
 

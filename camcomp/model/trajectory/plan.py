@@ -76,7 +76,7 @@ def plan_of(moves: ToolMoves, limits: ControlLimits, arrives: float = 0.0) -> Co
     speed, reach, bend, around, time = np.zeros((5, m))
     length, slope, fastest, passes = np.empty((4, 2 * m))
     if m:
-        corners(leave, arrive, axis, radius, angle, nominal, fast, reachable, acceleration, kind == RAPID, moves.exact[last], moves.stop[last], found.waits,
+        corners(leave, arrive, axis, radius, angle, nominal, fast, reachable, acceleration, kind == RAPID, moves.per_turn[last], moves.exact[last], moves.stop[last], found.waits,
                 moves.tolerance[last],
                 limits.acceleration, limits.cycle_s, way, speed, reach, bend, around, centre, end)  # fmt: skip
         pieces(nominal, fast, reachable, acceleration, radius, way, speed, reach, bend, around, length, slope, fastest)

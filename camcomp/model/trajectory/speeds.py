@@ -49,7 +49,7 @@ def pieces(nominal, fast, reachable, acceleration, radius, way, speed, reach, be
         if way[i] == ON:
             most[2 * i + 1] = speed[i]
         elif way[i] == ROUND:
-            length[2 * i + 1], most[2 * i + 1] = around[i], speed[i]
+            length[2 * i + 1], most[2 * i + 1] = around[i], min(speed[i], max(fast[i], fast[i + 1]))
             slope[2 * i + 1] = pace(acceleration[i], speed[i], bend[i])
 
 
