@@ -11,7 +11,7 @@ from tests.control import driven
 from tests.control.programs import LONG, SHORT
 from tests.control.record import record
 
-UM, SHARE, TIME = 0.5, 0.2, 0.05
+UM, SHARE, TIME = 0.5, 0.1, 0.03
 
 
 def near(measured, modelled):

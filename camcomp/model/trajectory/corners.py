@@ -11,16 +11,14 @@ starts while the one before still slows down.
 import numpy as np
 
 from camcomp.model.statics.compiled import entry, inner
+from camcomp.model.trajectory.rounding import ANGLE, LENGTH, NORMAL, rounded
 
 REST, ON, ROUND, OVERLAP, WAIT = 0, 1, 2, 3, 4
-NORMAL = 0.5 * np.sqrt(3.0)  # of the acceleration may go into turning; the other half is kept for speeding up
 KINK = 0.1  # of the acceleration that a jump of direction may be
 BACK = (2.0 * np.pi / 180.0) ** 2  # square of the angle to a turn on the spot that counts as one
 OPEN = 0.25  # of a segment's length that a corner may be cut by when no tolerance is given
 CYCLES = 1.02  # that a segment takes at least
-PARALLEL = 1e-12  # square of the angle between planes that are the same
 LATE = 0.7  # cycles that an overlap is longer than its speed says, as measured: it begins and ends with a cycle
-ANGLE, LENGTH = 1e-6, 1e-6  # rad, mm: no arc is smaller
 
 
 @inner
@@ -65,11 +63,11 @@ def overlap_gap(time, acceleration, next_acceleration, cosine):
 
 
 @entry
-def corners(leave, arrive, axis, radius, angle, nominal, fast, most, acceleration, rapid, per_turn, exact, stop, waits, tolerance, limit, cycle,
+def corners(leave, arrive, axis, middle, radius, angle, nominal, fast, most, acceleration, rapid, per_turn, exact, stop, waits, tolerance, limit, cycle,
             way, speed, reach, bend, around, centre, end):  # fmt: skip
     """Fills way, speed, reach, bend, around (m,), centre (m, 3) of the corners behind segments (m,); the last is at rest.
 
-    leave, arrive (m, 3): unit directions at the start and at the end. axis (m, 3), radius, angle (m,): of arcs, radius 0 for
+    leave, arrive (m, 3): unit directions at the start and at the end. axis, middle (m, 3), radius, angle (m,): of arcs, radius 0 for
     lines. nominal (m,) mm lengths, fast, most (m,) mm/s at the feed and at any, acceleration (m,) along it mm/s². rapid, exact (path is kept), stop
     (m,): rest behind it; per_turn (m,): fed per revolution, for all that the control knows as fast as at any feed; waits (m,): rest in front of it. tolerance (m,) mm, 0: open. limit: acceleration of an axis, mm/s². cycle: s.
     end (m, 3) mm: corners. way: REST, ON, ROUND, OVERLAP or WAIT (at rest where it would overlap); speed: mm/s through it (OVERLAP: where it begins);
@@ -106,7 +104,6 @@ def corners(leave, arrive, axis, radius, angle, nominal, fast, most, acceleratio
         # half the angle between the segments
         half = 0.5 * np.arccos(min(max(-(u[0] * v[0] + u[1] * v[1] + u[2] * v[2]), -1.0), 1.0))
         sine, cosine = np.sin(half), np.cos(half)
-        turn = np.pi - 2.0 * half
         first = tolerance[i] if tolerance[i] > 0.0 else OPEN * nominal[i]
         second = tolerance[j] if tolerance[j] > 0.0 else OPEN * nominal[j]
         allowed = min(first, second, OPEN * nominal[i], OPEN * nominal[j])
@@ -115,42 +112,19 @@ def corners(leave, arrive, axis, radius, angle, nominal, fast, most, acceleratio
         _, overlap = overlap_speed(
             0.5, half_pace, next_half_pace, tolerance[i], sine, cosine, left, nominal[j], fast[i], fast[j]
         )
-        arc = 0.0
-        size = distance = 0.0
+        arc, size, distance, cx, cy, cz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         if ANGLE < half < 0.5 * np.pi - ANGLE:
-            nx, ny, nz = u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]
-            norm = np.sqrt(nx * nx + ny * ny + nz * nz)
-            nx, ny, nz = nx / norm, ny / norm, nz / norm
-            flat = True
-            for k in (i, j):
-                if radius[k] > 0.0:
-                    along = abs(nx * axis[k, 0] + ny * axis[k, 1] + nz * axis[k, 2])
-                    flat = flat and 2.0 - 2.0 * along < PARALLEL
-            inner_length = (
-                min(left, 0.5 * nominal[i]) if radius[i] == 0.0 else min(2.0 / 3.0 * angle[i], half) * radius[i]
-            )
-            outer_length = 0.5 * nominal[j] if radius[j] == 0.0 else min(angle[j] / 3.0, half) * radius[j]
-            if flat and sine < 1.0:
-                plane = limit / np.sqrt(1.0 - min(nx * nx, ny * ny, nz * nz))
-                normal = NORMAL * plane
-                room = min(inner_length, outer_length, cosine * allowed / (1.0 - sine))
-                widest = sine / cosine * room
-                fastest = min(np.sqrt(normal * widest), max(told, told_ahead))
-                time = min(np.sqrt(plane * room), fastest) / (0.5 * plane)
-                size = max(fastest * fastest / normal, min(time * fastest / turn, widest))
-                distance = size * cosine / sine
-                length = size * turn
-                if length > LENGTH:
-                    rest = left - distance
-                    if radius[i] == 0.0 and rest < 4.0 * cycle * fastest:
-                        length += max(rest, 0.0)
-                    arc = min(fastest, length / (CYCLES * cycle))
+            arc, size, distance, length, cx, cy, cz = rounded(
+                u, v, half, end[i], axis[i], axis[j], middle[i], middle[j], radius[i], radius[j], 2.0 / 3.0 * angle[i],
+                angle[j] / 3.0, min(left, 0.5 * nominal[i]), 0.5 * nominal[j], allowed, max(told, told_ahead), limit,
+            )  # fmt: skip
+            if arc > 0.0:
+                rest = left - distance
+                taken = length + (max(rest, 0.0) if radius[i] == 0.0 and rest < 4.0 * cycle * arc else 0.0)
+                arc = min(arc, taken / (CYCLES * cycle))
         if arc > straight and arc > 0.5 * overlap:
-            way[i], speed[i], reach[i], bend[i], around[i] = ROUND, arc, distance, size, size * turn
-            wx, wy, wz = v[0] - u[0], v[1] - u[1], v[2] - u[2]
-            norm = np.sqrt(wx * wx + wy * wy + wz * wz)
-            out = size / sine / norm
-            centre[i, 0], centre[i, 1], centre[i, 2] = end[i, 0] + out * wx, end[i, 1] + out * wy, end[i, 2] + out * wz
+            way[i], speed[i], reach[i], bend[i], around[i] = ROUND, arc, distance, size, length
+            centre[i, 0], centre[i, 1], centre[i, 2] = cx, cy, cz
             left = nominal[j] - distance
         elif per_turn[j] and not per_turn[i]:
             left = nominal[j]  # a feed that waits for the spindle does not overlap with one that does not

@@ -12,9 +12,10 @@ import numpy as np
 
 from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import ARC, RAPID, Bools, Floats, Ints
-from camcomp.model.trajectory.corners import CYCLES, NORMAL, corners, nearest
+from camcomp.model.trajectory.corners import CYCLES, corners, nearest
 from camcomp.model.trajectory.merging import straight
 from camcomp.model.trajectory.moves import ControlLimits, ToolMoves
+from camcomp.model.trajectory.rounding import NORMAL
 from camcomp.model.trajectory.segments import read_only, segments
 from camcomp.model.trajectory.speeds import durations, pieces
 
@@ -60,15 +61,16 @@ def plan_of(moves: ToolMoves, limits: ControlLimits, arrives: float = 0.0) -> Co
     kind, feed = moves.kind[last], moves.feed[last]
     nominal, leave, most = np.empty(m), np.empty((m, 3)), np.empty(m)
     straight(*read_only(start, end), nominal, leave, most)
-    arrive, axis, radius, angle = leave, leave, np.zeros(m), np.zeros(m)
+    arrive, axis, middle, radius, angle = leave, leave, end, np.zeros(m), np.zeros(m)
     arc = kind == ARC
     if arc.any():
         at = np.flatnonzero(arc)
         path = moves.take(last[at]).path()
         every, zeros = np.arange(len(at)), np.zeros(len(at))
-        arrive, axis = leave.copy(), np.zeros((m, 3))
+        arrive, axis, middle = leave.copy(), np.zeros((m, 3)), np.zeros((m, 3))
         leave[at], arrive[at] = (path_geometry.tangents(path, every, zeros + u) for u in (0.0, 1.0))
         nominal[at], most[at], axis[at], angle[at] = path_geometry.lengths(path), 1.0, path.axis, np.abs(path.angle)
+        middle[at] = path.centre
         radius[at] = np.linalg.norm(path.start - path.centre, axis=1)
     acceleration = limits.acceleration * most
     fast, reachable = _speeds(kind, feed, nominal, radius, most, limits)
@@ -76,7 +78,7 @@ def plan_of(moves: ToolMoves, limits: ControlLimits, arrives: float = 0.0) -> Co
     speed, reach, bend, around, time = np.zeros((5, m))
     length, slope, fastest, passes = np.empty((4, 2 * m))
     if m:
-        corners(leave, arrive, axis, radius, angle, nominal, fast, reachable, acceleration, kind == RAPID, moves.per_turn[last], moves.exact[last], moves.stop[last], found.waits,
+        corners(leave, arrive, axis, middle, radius, angle, nominal, fast, reachable, acceleration, kind == RAPID, moves.per_turn[last], moves.exact[last], moves.stop[last], found.waits,
                 moves.tolerance[last],
                 limits.acceleration, limits.cycle_s, way, speed, reach, bend, around, centre, end)  # fmt: skip
         pieces(nominal, fast, reachable, acceleration, radius, way, speed, reach, bend, around, length, slope, fastest)

@@ -1,0 +1,118 @@
+"""How a control rounds the corner between two segments, compiled: by an arc that touches both.
+
+The rules are those of the planner of LinuxCNC 2.9: it works the radius out for two lines, an arc that the corner is rounded inside of
+taken for its chord, and lays the circle so that it touches what is really there.
+"""
+
+# mypy: disallow-untyped-defs=False, disallow-incomplete-defs=False
+# numba infers the types of these functions; written by hand they would only be repeated.
+
+import numpy as np
+
+from camcomp.model.statics.compiled import inner
+
+NORMAL = 0.5 * np.sqrt(3.0)  # of the acceleration may go into turning; the other half is kept for speeding up
+PARALLEL = 1e-12  # square of the angle between planes that are the same
+CLOSE = 1e-6  # by which a corner that is rounded as far as is allowed may be beyond
+ANGLE, LENGTH = 1e-6, 1e-6  # rad, mm: no arc is smaller
+
+
+@inner
+def arc_room(radius, most, inward, half):
+    """Length of an arc that a rounded corner may take, mm, and by how much its bend makes half the angle there smaller, rad.
+
+    most: rad of the arc. inward: the corner is rounded inside its circle, where a control goes by chords.
+    """
+    part = min(most, half if inward else 0.5 * np.pi)
+    if inward:
+        return np.sin(0.25 * part) * radius, 0.25 * part
+    return part * radius, 0.0
+
+
+@inner
+def touching(turn, size, first, first_x, first_y, second, second_x, second_y):
+    """Centre (x, y) mm of the circle of radius `size` that touches two segments on the inner side of their corner.
+
+    The corner is the origin, the first segment arrives along x and the second leaves it `turn` rad to the left. first, second:
+    distance of the centre from the centres (x, y) of arcs, 0 for lines. Newton's method from the circle that two lines have.
+    """
+    out = size / np.cos(0.5 * turn)
+    x, y = -out * np.sin(0.5 * turn), out * np.cos(0.5 * turn)
+    for _ in range(12):
+        a, b, f = 0.0, 1.0, y - size
+        if first > 0.0:
+            away = max(np.hypot(x - first_x, y - first_y), 1e-300)
+            a, b, f = (x - first_x) / away, (y - first_y) / away, away - first
+        c, d, g = -np.sin(turn), np.cos(turn), y * np.cos(turn) - x * np.sin(turn) - size
+        if second > 0.0:
+            away = max(np.hypot(x - second_x, y - second_y), 1e-300)
+            c, d, g = (x - second_x) / away, (y - second_y) / away, away - second
+        det = a * d - b * c
+        if abs(det) < ANGLE:
+            return x, np.inf
+        x, y = x - (f * d - g * b) / det, y - (a * g - c * f) / det
+    return x, y
+
+
+@inner
+def rounded(u, v, half, corner, axis, next_axis, middle, next_middle, radius, next_radius, most, next_most, length, next_length,
+            allowed, fast, limit):  # fmt: skip
+    """Speed mm/s (0: it is not possible), radius, length taken of a segment, length, mm, and centre (3) of an arc that rounds a corner.
+
+    u, v (3,): directions in which it is reached and left; half: of the angle between the segments. axis, middle (3,), radius: of
+    arcs; most, next_most: rad of them, length, next_length: mm of lines that may be taken. allowed: mm from the corner.
+    """
+    none = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    nx, ny, nz = u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]
+    norm = np.sqrt(nx * nx + ny * ny + nz * nz)
+    nx, ny, nz = nx / norm, ny / norm, nz / norm
+    lx, ly, lz = ny * u[2] - nz * u[1], nz * u[0] - nx * u[2], nx * u[1] - ny * u[0]  # to the side of the turn
+    turn = np.pi - 2.0 * half
+    first_x = first_y = second_x = second_y = lean = 0.0
+    inward = next_inward = False
+    if radius > 0.0:
+        if 2.0 - 2.0 * abs(nx * axis[0] + ny * axis[1] + nz * axis[2]) >= PARALLEL:
+            return none
+        mx, my, mz = middle[0] - corner[0], middle[1] - corner[1], middle[2] - corner[2]
+        first_x, first_y = mx * u[0] + my * u[1] + mz * u[2], mx * lx + my * ly + mz * lz
+        inward = first_y > 0.0
+        length, lean = arc_room(radius, most, inward, half)
+    if next_radius > 0.0:
+        if 2.0 - 2.0 * abs(nx * next_axis[0] + ny * next_axis[1] + nz * next_axis[2]) >= PARALLEL:
+            return none
+        mx, my, mz = next_middle[0] - corner[0], next_middle[1] - corner[1], next_middle[2] - corner[2]
+        second_x, second_y = mx * u[0] + my * u[1] + mz * u[2], mx * lx + my * ly + mz * lz
+        next_inward = second_y * np.cos(turn) - second_x * np.sin(turn) > 0.0
+        next_length, next_lean = arc_room(next_radius, next_most, next_inward, half)
+        lean = max(lean, next_lean)
+    sine, cosine = np.sin(half - lean), np.cos(half - lean)
+    if sine >= 1.0 or sine <= 0.0:
+        return none
+    plane = limit / np.sqrt(1.0 - min(nx * nx, ny * ny, nz * nz))
+    normal = NORMAL * plane
+    room = min(length, next_length, cosine * allowed / (1.0 - sine))
+    widest = sine / cosine * room
+    fastest = min(np.sqrt(normal * widest), fast)
+    time = min(np.sqrt(plane * room), fastest) / (0.5 * plane)
+    size = max(fastest * fastest / normal, min(time * fastest / (turn + 2.0 * lean), widest))
+    around = size * (turn + 2.0 * lean)
+    if around <= LENGTH:
+        return none
+    first = second = 0.0
+    if radius > 0.0:
+        first = radius - size if inward else radius + size
+    if next_radius > 0.0:
+        second = next_radius - size if next_inward else next_radius + size
+    if first < 0.0 or second < 0.0:
+        return none
+    x, y = touching(turn, size, first, first_x, first_y, second, second_x, second_y)
+    if not np.hypot(x, y) - size <= allowed * (1.0 + CLOSE):
+        return none
+    taken, next_taken = -x, x * np.cos(turn) + y * np.sin(turn)
+    if radius > 0.0:
+        taken = radius * abs(np.arctan2(first_x * y - first_y * x, first_x * (first_x - x) + first_y * (first_y - y)))
+    if next_radius > 0.0:
+        away = np.arctan2(second_x * y - second_y * x, second_x * (second_x - x) + second_y * (second_y - y))
+        next_taken = next_radius * abs(away)
+    cx, cy, cz = corner[0] + x * u[0] + y * lx, corner[1] + x * u[1] + y * ly, corner[2] + x * u[2] + y * lz
+    return fastest, size, max(taken, next_taken), around, cx, cy, cz
