@@ -271,3 +271,8 @@ def _values(key: tuple[str, str | None], before: dict[str, Any], after: dict[str
             if not 1 - AGREE < width / max(wide, 1e-12) < 1 / (1 - AGREE):
                 out.append(f"{key} {name} interval {wide:.3g} -> {width:.3g}")
     return out
+
+
+def applies(name: str, files: Files) -> bool:
+    """Whether a law of this name says anything about such a machine: one without chains has no names to change round."""
+    return "labels" not in name or "chains" in files.machine["robot"]
