@@ -146,30 +146,45 @@ def mixed_(out, count, seed, clean):
 @click.option("--machine", type=click.Choice(sorted(MACHINES)), default="orthoglide")
 @click.option("--rows", default=250)
 @click.option("--runs", default=3)
+@click.option(
+    "--of",
+    "of",
+    type=click.Path(path_type=Path, exists=True),
+    help="Folder of experiments to take, in place of making some.",
+)
 @click.option("--only", multiple=True, type=click.Choice([*law.LESS, *law.SAME]), help="Laws; default all.")
-def laws_(out, count, seed, machine, rows, runs, only):
-    """Try the laws of diagnosis on experiments of every kind with all or few columns."""
+def laws_(out, count, seed, machine, rows, runs, of, only):
+    """Try the laws of diagnosis on experiments of every kind with all or few columns, or on the first ones of a folder."""
     results = out / "laws.jsonl"
-    (out / "truth").mkdir(parents=True, exist_ok=True)
+    out.mkdir(parents=True, exist_ok=True)
     done = [json.loads(line) for line in results.read_text().splitlines()] if results.exists() else []
     there = {(row["name"], row["law"]) for row in done}
     wanted = tuple(only) or (*law.LESS, *law.SAME)
-    for i in range(count):
-        kind, channels = ("single", "unknown", "pair")[i % 3], sorted(CHANNELS)[(i * 5) % len(CHANNELS)]
-        base = Plan(0, machine=machine, channels=channels, rows=rows, runs=runs, stated=False)
-        name, todo = f"e-{seed + i:05d}", [each for each in wanted if (f"e-{seed + i:05d}", each) not in there]
+    taken = sorted(each.stem for each in (of / "truth").glob("*.json")) if of else []
+    for i in range(min(count, len(taken)) if of else count):
+        name = taken[i] if of else f"e-{seed + i:05d}"
+        todo = [each for each in wanted if (name, each) not in there]
         if not todo:
             continue
-        wish = plan(kind, i + seed, seed + i, base, ())
-        made = make(wish)
-        write(made, wish, out / name)
-        (out / "truth" / f"{name}.json").write_text(truth_json(made))
-        for row in judging.laws(out / name, todo, seed + i):
+        if of is None:
+            _law_experiment(out, name, i, seed, machine, rows, runs)
+        for row in judging.laws((of or out) / name, out / name, todo, seed + i):
             done.append(row)
             with results.open("a") as file:
                 file.write(json.dumps(row) + "\n")
-            click.echo(f"{name} {kind} {channels} {row['law']}: {row['said']}")
+            click.echo(f"{name} {row['law']}: {row['said']}")
     click.echo(judging.render_laws(done))
+
+
+def _law_experiment(out, name, i, seed, machine, rows, runs):
+    """Makes the i-th experiment for laws."""
+    kind, channels = ("single", "unknown", "pair")[i % 3], sorted(CHANNELS)[(i * 5) % len(CHANNELS)]
+    base = Plan(0, machine=machine, channels=channels, rows=rows, runs=runs, stated=False)
+    wish = plan(kind, i + seed, seed + i, base, ())
+    made = make(wish)
+    write(made, wish, out / name)
+    (out / "truth").mkdir(exist_ok=True)
+    (out / "truth" / f"{name}.json").write_text(truth_json(made))
 
 
 @main.command("score")

@@ -143,7 +143,7 @@ def other_names(files: Files, rng: np.random.Generator) -> tuple[Files, Names]:
 
 def shifted_clock(files: Files, rng: np.random.Generator) -> tuple[Files, Names]:
     """Loggers count from another moment, which started_s says."""
-    runs = [{**run, "started_s": run["started_s"] - CLOCK_S} for run in files.experiment["runs"]]
+    runs = [{**run, "started_s": run.get("started_s", 0.0) - CLOCK_S} for run in files.experiment["runs"]]
     moved = replace(files, experiment={**files.experiment, "runs": runs})
     return moved.each_log(lambda log: log.put("t_s", log.numbers("t_s") + CLOCK_S)), {}
 
@@ -268,7 +268,7 @@ def _values(key: tuple[str, str | None], before: dict[str, Any], after: dict[str
             wide, width = was["ci95"][1] - was["ci95"][0], now["ci95"][1] - now["ci95"][0]
             if abs(now["value"] - was["value"]) > AGREE * wide:
                 out.append(f"{key} {name} {was['value']} -> {now['value']} +- {wide / 2:.3g}")
-            if not 1 - AGREE < width / max(wide, 1e-12) < 1 / (1 - AGREE):
+            if not 1 - AGREE < max(width, 1e-12) / max(wide, 1e-12) < 1 / (1 - AGREE):
                 out.append(f"{key} {name} interval {wide:.3g} -> {width:.3g}")
     return out
 

@@ -171,14 +171,14 @@ def run(folder: Path, results: Path, jobs: int, only: tuple[str, ...] = ()) -> l
     return [rows[name] for name in sorted(rows)]
 
 
-def laws(folder: Path, names: list[str], seed: int) -> list[Row]:
-    """Every law of those names tried on one experiment."""
+def laws(folder: Path, work: Path, names: list[str], seed: int) -> list[Row]:
+    """Every law of those names tried on the experiment in a folder, the changed ones below `work`."""
     files, out = law.read(folder), []
-    before = ask(law.write(files, folder / "as it is"))
+    before = ask(law.write(files, work / "as it is"))
     for name in (each for each in names if law.applies(each, files)):
         less = name in law.LESS
         changed, labels = (law.LESS if less else law.SAME)[name](files, np.random.default_rng([seed, 7]))
-        after = ask(law.write(changed, folder / name))
+        after = ask(law.write(changed, work / name))
         row: Row = {"name": folder.name, "law": name, "less": less, "before": before.get("verdict")}
         failed = "failed" in before or "failed" in after
         if failed:
