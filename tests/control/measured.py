@@ -28,9 +28,9 @@ def passes(tip: np.ndarray, points: np.ndarray) -> np.ndarray:
         share = np.clip(np.sum((point - begin) * along, axis=1) / square, 0.0, 1.0)
         places = begin + share[:, None] * along
         beside = np.linalg.norm(places - point, axis=1)
-        best = int(
-            np.argmax(beside < beside.min() + SAME)
-        )  # the first one: behind a turn on the spot the way comes by again
+        # the first of those that are as near: behind a turn on the spot the way comes by again
+        nearest = (beside <= np.append(beside[1:], np.inf)) & (beside < beside.min() + SAME)
+        best = int(np.argmax(nearest))
         out[i] = places[best]
         at, last = float(way[a + best] + share[best] * np.sqrt(square[best])), point
     return out
