@@ -2,11 +2,13 @@
 
 import json
 
+import numpy as np
 import pytest
 
 from tests.foreign.parallel.__main__ import write as parallel
 from tests.foreign.serial.make import make as serial
 from tests.recordings import recording
+from tests.trials import laws
 from tests.trials.score import ask, judge, library
 
 
@@ -51,6 +53,15 @@ def test_lines_that_a_control_merges_are_no_gap(tmp_path):
     with recording.taken_from("fourth"):
         result, _ = judged(tmp_path, "parallel", 71020)
     assert (result["verdict"], result["causes"]) == ("none", [])
+
+
+def test_what_is_far_behind_in_rapids_is_no_outlier(tmp_path):
+    """A lag that grows with the square of the speed: at half the rate few rows are fast, which left a lag, sure."""
+    with recording.taken_from("fifth"):
+        judged(tmp_path, "serial", 74009)
+    files = laws.read(tmp_path / "e-74009")
+    result = ask(laws.write(laws.half_the_rate(files, np.random.default_rng(0))[0], tmp_path / "half"))
+    assert result["verdict"] == "unknown"
 
 
 @pytest.mark.campaign

@@ -18,6 +18,7 @@ GROSS = 160.0  # robust deviations from the rows around it by which several rows
 MANY = 0.02  # of the rows: more are no outliers
 FAR_MM = 5.0  # no machine is wrong by so much from one row to the next
 MANY_FAR = 0.25  # of the rows that are as far off: more are no outliers
+SEEN = 12.0  # twice the logarithm of the odds from which on the tip has gone where an encoder says
 HEAVY = 3.5  # robust deviations beyond which a reading counts less
 LEAST_ROWS = 20
 TINY = 1e-12  # mm, rad, N: what rounding makes of nothing
@@ -36,6 +37,7 @@ def outlying(bench: Bench) -> list[Bools]:
         if run.run_path.ordered:
             bad[:, :3] |= _sprung_off(gap[:, :3])[:, None]
         m = len(bench.actuators)
+        bad[_as_the_tip_says(bench, k, gap, bad)] = False
         for part in (slice(0, 3), slice(3 + 2 * m, 6 + 2 * m)):  # one instrument, one telegram
             bad[:, part] = np.any(bad[:, part], axis=1, keepdims=True)
         out.append(bad)
@@ -76,6 +78,39 @@ def _sprung_off(gap: Floats) -> Bools:
     return out if out.sum() < MANY_FAR * len(known) else np.zeros(len(gap), bool)
 
 
+def _as_the_tip_says(bench: Bench, k: int, gap: Floats, odd: Bools) -> Bools:
+    """Cells (n, c) of encoders that lie far from their neighbours, odd (n, c), where the tip went along: two instruments do not err alike.
+
+    gap (n, c): measured minus nominal. What is far behind in rapids is so for few rows.
+    """
+    run, encoders = bench.runs[k], slice(3, 3 + len(bench.actuators))
+    out = np.zeros(gap.shape, bool)
+    if run.by == "setpoint" and run.encoders is not None and odd[:, encoders].any():
+        tip = np.where(odd[:, :3].any(axis=1, keepdims=True), np.nan, gap[:, :3])
+        along = _gone_along(tip, gap[:, encoders], bench.row_slopes(k), odd[:, encoders])
+        out[:, encoders] = odd[:, encoders] & along[:, None]
+    return out
+
+
+def _gone_along(tip: Floats, encoder: Floats, slopes: Floats, bad: Bools) -> Bools:
+    """Rows (n,) in which the tip has gone where encoders say of which cells bad (n, m) look wrong.
+
+    tip (n, 3), encoder (n, m): measured minus model, the tip's model led by the encoders; slopes (n, 3, m) of the tip by them.
+    """
+    if not np.isfinite(tip).any():
+        return np.zeros(len(tip), bool)
+    usual = np.nanmedian(np.where(bad, np.nan, encoder), axis=0)
+    move = np.einsum("nij,nj->ni", slopes, np.where(bad, encoder - usual, 0.0))
+    off = tip - np.nanmedian(tip, axis=0)
+    scale = np.maximum(1.4826 * np.nanmedian(np.abs(off), axis=0), TINY)
+    odds = np.nansum(((off + move) ** 2 - off**2) / scale**2, axis=1)
+    edges = np.flatnonzero(np.diff(bad.any(axis=1), prepend=False, append=False))
+    out = np.zeros(len(tip), bool)
+    for first, end in zip(edges[::2], edges[1::2], strict=True):
+        out[first:end] = odds[first:end].sum() > SEEN
+    return out
+
+
 def tails(bench: Bench) -> list[Floats]:
     """Per run (n, c) >= 1: by how much a reading counts less because it lies far from its neighbours (heavy tails)."""
     out = []
@@ -90,5 +125,6 @@ def tails(bench: Bench) -> list[Floats]:
             scale = 1.4826 * float(np.median(np.abs(beside)))
             if scale > 0.0:
                 weight[known, c] = np.maximum(np.abs(beside) / (HEAVY * scale), 1.0)
+        weight[_as_the_tip_says(bench, k, gap, weight > 1.0)] = 1.0
         out.append(thinned(weight, run.thin))
     return out

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from camcomp.diagnosis.fit.outliers import _jumping_off, _sprung_off
+from camcomp.diagnosis.fit.outliers import _gone_along, _jumping_off, _sprung_off
 
 
 def test_a_beam_break_is_found_where_the_machine_itself_moves_from_row_to_row():
@@ -64,3 +64,17 @@ def test_what_arithmetic_leaves_of_nothing_is_no_outlier():
     assert not _jumping_off(x).any()
     x[[60, 200]], x[100] = 1e-4, 30.0
     assert list(np.flatnonzero(_jumping_off(x))) == [100]
+
+
+def test_an_encoder_that_is_far_behind_for_a_few_rows_is_believed_where_the_tip_was_there():
+    """Rapids are few rows; a telegram that was dropped moves no tip. Encoders lead the model of the tip."""
+    rng = np.random.default_rng(11)
+    slopes = np.broadcast_to([[1.0, 0.0], [0.0, 0.8], [0.0, 0.0]], (300, 3, 2))
+    encoder, tip = rng.normal(0, 1e-4, (300, 2)), rng.normal(0, 0.005, (300, 3)) + [0.2, 0.0, -0.1]
+    encoder[40:44, 1] += 0.07  # the tip is where this says
+    encoder[200:204, 1] += 0.07
+    tip[200:204, 1] -= 0.8 * 0.07  # and is not here
+    encoder[100, 0] += 0.003  # of which a tip measured to 5 um says nothing
+    bad = np.abs(encoder) > 1e-3
+    assert set(np.flatnonzero(_gone_along(tip, encoder, slopes, bad))) == {40, 41, 42, 43}
+    assert not _gone_along(np.full((300, 3), np.nan), encoder, slopes, bad).any()
