@@ -5,7 +5,7 @@ answer on runs it has not seen.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -47,13 +47,11 @@ from camcomp.diagnosis.search.cause_search import CauseSearch, search_causes
 from camcomp.diagnosis.search.indistinguishable import classes, likeness
 from camcomp.diagnosis.search.unexplained import size_um, worst
 from camcomp.diagnosis.search.unknown import firm_prior, residual_tests
-from camcomp.diagnosis.search.whole_gap import takes_nothing
 from camcomp.diagnosis.standards import of_runs
 from camcomp.diagnosis.statistics import places
 from camcomp.diagnosis.statistics.cause_sets import Fitted
 from camcomp.diagnosis.statistics.periods import SpectralLine, frequencies
 from camcomp.diagnosis.statistics.probability import EVEN, probability_of_chance, stated
-from camcomp.diagnosis.statistics.verdict import without_proof
 from camcomp.ground.datatypes import Floats
 from camcomp.ground.headway import part as part_of_work
 from camcomp.model.effect import Cause
@@ -112,11 +110,6 @@ def diagnose(
         stands, best = law.problem, law.fit
     shrinkage = _shrinkage(twin, runs, holdout, stands, best, found if law is None else None)
     unseen = len(used) < len(runs) or (len(used) > 1 and not holdout)
-    left_out = unseen and not holdout  # runs that are withheld by name judge and do not choose
-    sizes = [shrinkage[key] for key in ("before_rms_um", "after_rms_um", "noise_floor_um")]
-    if word == "identified" and left_out and takes_nothing(*sizes):
-        found = replace(found, verdict=without_proof(found.verdict, best.members))
-        word = found.verdict.word
     proposal = _next(problem, found, word, job)
     result = DiagnosisResult(
         verdict=word,

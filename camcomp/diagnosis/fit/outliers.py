@@ -96,18 +96,25 @@ def _gone_along(tip: Floats, encoder: Floats, slopes: Floats, bad: Bools) -> Boo
     """Rows (n,) in which the tip has gone where encoders say of which cells bad (n, m) look wrong.
 
     tip (n, 3), encoder (n, m): measured minus model, the tip's model led by the encoders; slopes (n, 3, m) of the tip by them.
+    Only of several rows in a row: what rings beside a corner may be between them.
     """
-    if not np.isfinite(tip).any():
-        return np.zeros(len(tip), bool)
-    usual = np.nanmedian(np.where(bad, np.nan, encoder), axis=0)
+    usual = _medians(np.where(bad, np.nan, encoder))
     move = np.einsum("nij,nj->ni", slopes, np.where(bad, encoder - usual, 0.0))
-    off = tip - np.nanmedian(tip, axis=0)
-    scale = np.maximum(1.4826 * np.nanmedian(np.abs(off), axis=0), TINY)
+    off = tip - _medians(tip)
+    scale = np.maximum(1.4826 * _medians(np.abs(off)), TINY)
     odds = np.nansum(((off + move) ** 2 - off**2) / scale**2, axis=1)
     edges = np.flatnonzero(np.diff(bad.any(axis=1), prepend=False, append=False))
     out = np.zeros(len(tip), bool)
     for first, end in zip(edges[::2], edges[1::2], strict=True):
-        out[first:end] = odds[first:end].sum() > SEEN
+        out[first:end] = end - first >= SHORT // 2 and odds[first:end].sum() > SEEN
+    return out
+
+
+def _medians(values: Floats) -> Floats:
+    """Of the columns (n, c), 0 of those that hold nothing."""
+    known = np.isfinite(values).any(axis=0)
+    out = np.zeros(values.shape[1])
+    out[known] = np.nanmedian(values[:, known], axis=0)
     return out
 
 
@@ -125,6 +132,5 @@ def tails(bench: Bench) -> list[Floats]:
             scale = 1.4826 * float(np.median(np.abs(beside)))
             if scale > 0.0:
                 weight[known, c] = np.maximum(np.abs(beside) / (HEAVY * scale), 1.0)
-        weight[_as_the_tip_says(bench, k, gap, weight > 1.0)] = 1.0
         out.append(thinned(weight, run.thin))
     return out

@@ -29,11 +29,6 @@ def idle(problem: Problem, f: Fitted) -> set[int]:
     return _idle(problem, f)
 
 
-def takes_nothing(before_um: float, after_um: float, floor_um: float) -> bool:
-    """Whether causes leave all of a gap on unseen runs that is above the floor there: they foretell nothing."""
-    return before_um > STANDS_OUT * floor_um and after_um >= before_um
-
-
 def _idle(problem: Problem, f: Fitted) -> set[int]:
     after, out = _square(problem, f, f.members), set()
     for i in f.members:

@@ -73,13 +73,6 @@ def judge(
     return Verdict(word, best, tuple(rivals), inclusion)
 
 
-def without_proof(verdict: Verdict, members: Members) -> Verdict:
-    """The verdict where unseen runs bear out nothing of a set of causes: none of them is more likely than not."""
-    return replace(
-        verdict, word="ambiguous", inclusion=verdict.inclusion | {i: min(verdict.inclusion[i], EVEN) for i in members}
-    )
-
-
 def open_where_even(verdict: Verdict, fits: Sequence[Fitted], probability: Floats) -> Verdict:
     """The verdict, but `ambiguous` where a member of what it identifies is no more likely than not: sets without it are its rivals.
 

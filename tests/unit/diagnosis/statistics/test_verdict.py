@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from camcomp.diagnosis.search.whole_gap import takes_nothing
 from camcomp.diagnosis.statistics.cause_sets import Fitted
-from camcomp.diagnosis.statistics.verdict import Verdict, open_where_even, without_proof, worth_a_mention
+from camcomp.diagnosis.statistics.verdict import Verdict, open_where_even, worth_a_mention
 
 
 @pytest.mark.parametrize(
@@ -32,14 +31,3 @@ def test_what_something_unknown_rivals_alone_is_not_identified(sure, word):
     fits = [Fitted(members, np.zeros(len(members)), np.eye(len(members)), 0.0, ()) for members in [(0,), ()]]
     verdict = open_where_even(Verdict("identified", 0, (), sure), fits, np.array([1.0, 0.0]))
     assert (verdict.word, verdict.rivals) == (word, ())
-
-
-def test_what_unseen_runs_do_not_bear_out_is_even_and_open():
-    sure = Verdict("identified", 0, (), {0: 0.99, 1: 0.3, 2: 0.8})
-    open_ = without_proof(sure, (0, 1))
-    assert (open_.word, open_.inclusion) == ("ambiguous", {0: 0.5, 1: 0.3, 2: 0.8})
-
-
-@pytest.mark.parametrize(("before", "after", "nothing"), [(30.0, 30.2, True), (30.0, 29.0, False), (6.0, 6.1, False)])
-def test_causes_take_nothing_where_all_of_a_gap_is_left_that_is_above_the_floor(before, after, nothing):
-    assert takes_nothing(before, after, 5.0) == nothing
