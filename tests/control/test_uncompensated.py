@@ -20,6 +20,8 @@ OVERRIDDEN = (
 )  # fmt: skip
 LONGEST_STOP = 2  # cycles
 UM, SHARE, TIME = 0.5, 0.1, 0.02
+WORST = 1.8  # um, of single corners
+APART = ("rests-fast", "perrev-plunges")  # a message, at which LinuxCNC stops; overlaps of G95, 7 um less than modelled
 
 
 def _moving_s(tip):
@@ -62,6 +64,7 @@ def test_corners_and_time_are_those_of_the_control(shelf, name):
     assert modelled == pytest.approx(measured, rel=TIME)
     for figure in (np.max, lambda off: np.sqrt(np.mean(off**2))):
         assert abs(figure(predicted) - figure(recorded)) <= max(UM, SHARE * figure(recorded))
+    assert name in APART or np.abs(predicted - recorded).max() < WORST
 
 
 @pytest.mark.parametrize(
