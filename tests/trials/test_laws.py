@@ -1,10 +1,15 @@
 """A short version of the campaign of laws: one small experiment, written differently and with less in it."""
 
+import json
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 from tests.campaign import runner
 from tests.trials import laws
+from tests.trials.__main__ import main
 from tests.trials.experiment import Plan, make, write
 
 PLAN = Plan(
@@ -55,3 +60,21 @@ def test_laws_can_be_broken():
     assert not laws.another_cause(open_, {**other, "causes": [cause]})
     assert len(laws.differences(open_, other, {})) == 2
     assert laws.differences(open_, {**other, "verdict": "ambiguous"}, {"x": "y"}) == []
+
+
+def test_laws_are_tried_on_experiments_that_are_there(files, tmp_path):
+    laws.write(files, tmp_path / "there" / "e-1")
+    (tmp_path / "there" / "truth").mkdir()
+    (tmp_path / "there" / "truth" / "e-1.json").write_text("{}")
+    given = ["laws", "--of", str(tmp_path / "there"), "--out", str(tmp_path / "out"), "--only", "other names"]
+    done = CliRunner().invoke(main, given)
+    assert done.exit_code == 0, done.output
+    (row,) = map(json.loads, (tmp_path / "out" / "laws.jsonl").read_text().splitlines())
+    assert (row["name"], row["law"], row["said"]) == ("e-1", "other names", [])
+    assert not (tmp_path / "there" / "e-1" / "other names").exists()
+
+
+def test_a_machine_without_chains_has_no_names_to_change_round(files):
+    arm = replace(files, machine={**files.machine, "robot": {"type": "serial"}})
+    assert {name for name in laws.SAME if not laws.applies(name, arm)} == {"cyclic labels", "mirrored labels"}
+    assert all(laws.applies(name, files) for name in (laws.LESS | laws.SAME))
