@@ -12,7 +12,6 @@ from camcomp.model.trajectory.moves import ControlLimits, moves_of
 from camcomp.model.trajectory.plan import plan_of
 from tests.control.measured import passes
 from tests.recordings import recording
-from tests.recordings.record import ACCELERATION, VELOCITY
 
 # The feed override is what no program says.
 OVERRIDDEN = (
@@ -41,9 +40,9 @@ def looked_at(name):
     motion = np.repeat(np.arange(len(path)), np.where(path.kind == ARC, 40, 1))
     u = np.concatenate([np.arange(1, 41) / 40 if kind == ARC else [1.0] for kind in path.kind])
     places = passes(tip, path_geometry.points(path, motion, u))[u == 1.0]
-    plan = plan_of(
-        moves_of(path, program.modes, per_turn=program.per_turn), ControlLimits(ACCELERATION, VELOCITY, 1e-3, 50)
-    )
+    velocity, acceleration = recording.limits()
+    limits = ControlLimits(acceleration, velocity, 1e-3, 50)
+    plan = plan_of(moves_of(path, program.modes, per_turn=program.per_turn), limits)
     every = np.arange(len(path))
     off = [np.linalg.norm(each, axis=1) for each in (places - path.end, plan.leaves_by(every, path.end))]
     return _moving_s(tip), plan.duration_s, 1e3 * off[0], 1e3 * off[1]

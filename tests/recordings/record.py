@@ -20,7 +20,6 @@ import numpy as np
 from tests.recordings import recording
 
 HERE = Path(__file__).parent
-VELOCITY, ACCELERATION = 100.0, 1500.0  # mm/s, mm/s²; of every axis and of the tip
 MARGIN = 0.25  # s of standstill kept at both ends
 AXES = "XYZ"
 
@@ -93,8 +92,9 @@ net changed iocontrol.0.tool-change => iocontrol.0.tool-changed
 
 def write_machine(folder: Path) -> None:
     """INI, HAL file and empty tool table of three axes with perfect drives."""
-    values = {"velocity": VELOCITY, "half": VELOCITY / 2, "acceleration": ACCELERATION}
-    values |= {"faster": 1.1 * VELOCITY, "harder": 1.1 * ACCELERATION}
+    velocity, acceleration = recording.limits()
+    values = {"velocity": velocity, "half": velocity / 2, "acceleration": acceleration}
+    values |= {"faster": 1.1 * velocity, "harder": 1.1 * acceleration}
     attendant = folder / "attendant.py"
     attendant.write_text((HERE / "attendant.py").read_text())
     attendant.chmod(0o755)

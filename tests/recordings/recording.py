@@ -24,8 +24,13 @@ SHELVES = {
     "third": HERE / "third",
     "fourth": HERE / "fourth",
     "fifth": HERE / "fifth",
+    "slow": HERE / "slow",
     "words": HERE / "words",
 }
+LIMITS = (100.0, 1500.0)  # mm/s, mm/s²; of every axis and of the tip
+LIMITS_OF = {
+    "slow": (60.0, 800.0)
+}  # programs of other shelves: what was learned of a control on one machine holds on another
 STEP_S = 1e-3
 QUANTUM_MM = 1e-5
 
@@ -61,6 +66,11 @@ def taken_from(shelf: str) -> Iterator[None]:
 def folder() -> Path:
     """Where the recordings and their programs are."""
     return SHELVES[_shelf.get()]
+
+
+def limits() -> tuple[float, float]:
+    """Velocity mm/s and acceleration mm/s² that the control kept to."""
+    return LIMITS_OF.get(_shelf.get(), LIMITS)
 
 
 def names() -> list[str]:

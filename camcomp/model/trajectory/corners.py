@@ -63,13 +63,13 @@ def overlap_gap(time, acceleration, next_acceleration, cosine):
 
 
 @entry
-def corners(leave, arrive, axis, middle, radius, angle, nominal, fast, most, acceleration, rapid, per_turn, exact, stop, waits, tolerance, limit, cycle,
+def corners(leave, arrive, axis, middle, radius, angle, nominal, fast, most, acceleration, rapid, per_turn, exact, stop, waits, tolerance, limit, velocity, cycle,
             way, speed, reach, bend, around, centre, end):  # fmt: skip
     """Fills way, speed, reach, bend, around (m,), centre (m, 3) of the corners behind segments (m,); the last is at rest.
 
     leave, arrive (m, 3): unit directions at the start and at the end. axis, middle (m, 3), radius, angle (m,): of arcs, radius 0 for
     lines. nominal (m,) mm lengths, fast, most (m,) mm/s at the feed and at any, acceleration (m,) along it mm/s². rapid, exact (path is kept), stop
-    (m,): rest behind it; per_turn (m,): fed per revolution, for all that the control knows as fast as at any feed; waits (m,): rest in front of it. tolerance (m,) mm, 0: open. limit: acceleration of an axis, mm/s². cycle: s.
+    (m,): rest behind it; per_turn (m,): fed per revolution, for all that the control knows as fast as at any feed; waits (m,): rest in front of it. tolerance (m,) mm, 0: open. limit mm/s², velocity mm/s: of an axis. cycle: s.
     end (m, 3) mm: corners. way: REST, ON, ROUND, OVERLAP or WAIT (at rest where it would overlap); speed: mm/s through it (OVERLAP: where it begins);
     reach: mm of both segments that an arc takes; bend, around: its radius and length, mm.
     """
@@ -116,7 +116,7 @@ def corners(leave, arrive, axis, middle, radius, angle, nominal, fast, most, acc
         if ANGLE < half < 0.5 * np.pi - ANGLE:
             arc, size, distance, length, cx, cy, cz = rounded(
                 u, v, half, end[i], axis[i], axis[j], middle[i], middle[j], radius[i], radius[j], 2.0 / 3.0 * angle[i],
-                angle[j] / 3.0, min(left, 0.5 * nominal[i]), 0.5 * nominal[j], allowed, max(told, told_ahead), limit,
+                angle[j] / 3.0, min(left, 0.5 * nominal[i]), 0.5 * nominal[j], allowed, max(told, told_ahead), most[i], most[j], limit, velocity,
             )  # fmt: skip
             if arc > 0.0:
                 rest = left - distance

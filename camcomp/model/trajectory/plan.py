@@ -80,7 +80,7 @@ def plan_of(moves: ToolMoves, limits: ControlLimits, arrives: float = 0.0) -> Co
     if m:
         corners(leave, arrive, axis, middle, radius, angle, nominal, fast, reachable, acceleration, kind == RAPID, moves.per_turn[last], moves.exact[last], moves.stop[last], found.waits,
                 moves.tolerance[last],
-                limits.acceleration, limits.cycle_s, way, speed, reach, bend, around, centre, end)  # fmt: skip
+                limits.acceleration, limits.velocity, limits.cycle_s, way, speed, reach, bend, around, centre, end)  # fmt: skip
         pieces(nominal, fast, reachable, acceleration, radius, way, speed, reach, bend, around, length, slope, fastest)
         durations(length, slope, fastest, way, speed, limits.cycle_s, limits.look_ahead, arrives, passes, time)
     return ControlPlan(moves, found.group, start, end, arc, way, reach, bend, centre, time, passes[::2])

@@ -55,12 +55,21 @@ def touching(turn, size, first, first_x, first_y, second, second_x, second_y):
 
 
 @inner
+def altitude(turn, first, second):
+    """Height, mm/s, of the triangle that two velocities mm/s span `turn` rad apart, each cut so that its foot lies between their ends."""
+    cosine = np.cos(min(turn, 0.49 * np.pi))
+    a, b = min(first, second / cosine), min(second, first / cosine)
+    return a * b * np.sin(turn) / np.sqrt(a * a + b * b - 2.0 * a * b * np.cos(turn))
+
+
+@inner
 def rounded(u, v, half, corner, axis, next_axis, middle, next_middle, radius, next_radius, most, next_most, length, next_length,
-            allowed, fast, limit):  # fmt: skip
+            allowed, fast, reach, next_reach, limit, velocity):  # fmt: skip
     """Speed mm/s (0: it is not possible), radius, length taken of a segment, length, mm, and centre (3) of an arc that rounds a corner.
 
     u, v (3,): directions in which it is reached and left; half: of the angle between the segments. axis, middle (3,), radius: of
-    arcs; most, next_most: rad of them, length, next_length: mm of lines that may be taken. allowed: mm from the corner.
+    arcs; most, next_most: rad of them, length, next_length: mm of lines that may be taken. allowed: mm from the corner. fast: mm/s at
+    the feed; reach, next_reach: mm/s of the segments at any; limit mm/s², velocity mm/s: of an axis.
     """
     none = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     nx, ny, nz = u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]
@@ -88,11 +97,17 @@ def rounded(u, v, half, corner, axis, next_axis, middle, next_middle, radius, ne
     sine, cosine = np.sin(half - lean), np.cos(half - lean)
     if sine >= 1.0 or sine <= 0.0:
         return none
-    plane = limit / np.sqrt(1.0 - min(nx * nx, ny * ny, nz * nz))
+    widening = 1.0 / np.sqrt(
+        1.0 - min(nx * nx, ny * ny, nz * nz)
+    )  # of what an axis can do, in every direction of the plane
+    plane = limit * widening
     normal = NORMAL * plane
     room = min(length, next_length, cosine * allowed / (1.0 - sine))
     widest = sine / cosine * room
-    fastest = min(np.sqrt(normal * widest), fast)
+    possible = velocity * widening
+    if radius == 0.0 and next_radius == 0.0:
+        possible = max(possible, altitude(turn, reach, next_reach))
+    fastest = min(np.sqrt(normal * widest), fast, possible)
     time = min(np.sqrt(plane * room), fastest) / (0.5 * plane)
     size = max(fastest * fastest / normal, min(time * fastest / (turn + 2.0 * lean), widest))
     around = size * (turn + 2.0 * lean)
