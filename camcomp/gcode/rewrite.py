@@ -9,7 +9,7 @@ import math
 import numpy as np
 
 from camcomp.gcode.arcplan import Move, Point, plan, turns_of
-from camcomp.gcode.arcs import PLANES, ArcError, centre_of_radius
+from camcomp.gcode.arcs import PLANES, SAME_POINT, ArcError, centre_of_radius
 from camcomp.gcode.edits import Edits
 from camcomp.gcode.flatten import flatten
 from camcomp.gcode.lineedit import BLANKS, LineEditor
@@ -140,6 +140,16 @@ class Writer(LineEditor):
         start = np.abs(np.array(self.position) - self.path.start[self.k]).max()
         return last - first == 1 and max(shift, start) <= self.half
 
+    def _is_programmed(self, arc: Move) -> bool:
+        """Whether it is the arc of the line as it stands, from where that begins: the control took it, however uneven."""
+        path, k = self.path, self.k
+        if not path.kind[k] == arc.kind == ARC or abs(arc.angle - path.angle[k]) > 1e-9:
+            return False
+        u, v, _ = PLANES[int(self.sites.plane[k])]
+        off = [*np.subtract(arc.end, path.end[k]), *np.subtract(arc.centre, path.centre[k])[[u, v]]]
+        begins = np.abs(np.subtract(self.position, path.start[k])).max() <= SAME_POINT
+        return bool(begins and np.abs(off).max() <= self.half)  # so that no word changes
+
     def _pass(self, first: int, last: int) -> None:
         """Keep the line as it is, and follow the control through it."""
         k = self.k
@@ -168,7 +178,9 @@ class Writer(LineEditor):
         out = self.out
         kind = int(out.kind[row])
         moves = [Move(kind, out.end[row].tolist(), out.centre[row].tolist(), float(out.angle[row]))]
-        if kind == ARC:
+        if not new and self._is_programmed(moves[0]):
+            self.centres[row] = self.path.centre[self.k]
+        elif kind == ARC:
             plane = int(self.sites.plane[self.k])
             end = self._landing(moves[0].end, new)
             moves = plan(self.position, moves[0], end, plane, self.step, self.unit, self.turns)

@@ -1,5 +1,7 @@
 """How lines are changed: words, feeds, motion codes, new lines, and what is refused."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -214,3 +216,23 @@ def test_an_offset_stated_where_the_tool_stands_keeps_decimals_that_the_resoluti
     text = "G0 X0 Y0 Z0\nG1 X10.0004 F100\nG92 X0\nG1 X5\n"
     rows = [START, (1, LINE, (10.5, 0, 0)), (2, LINE, (15.0004, 0, 0))]
     assert written(text, rows)[2] == "G92 X0.4996"
+
+
+@pytest.mark.parametrize(
+    ("unit", "arc"),
+    [
+        ("G21", "G3 X20 Y0 I5.01 J0 F100"),  # 20 um between its radii, where a control takes 28
+        ("G20", "G3 X0.8 Y0 I0.401 J0 F10"),  # 0.002 in; 0.0028
+    ],
+)
+def test_an_arc_that_a_control_takes_as_it_is_stays_when_something_else_is_moved(unit, arc):
+    text = f"{unit} G17\nG0 X{'10' if unit == 'G21' else '0'} Y0 Z0\n{arc}\nG1 X1 Y1\n"
+    program = read_program(text.encode(), name="in.nc", dialect="rs274")
+    end = program.path.end.copy()
+    end[2:] += 0.5
+    out = replace(Output.same(program.path), end=end)
+    result = rewrite(program, out, resolution_mm=1e-3, version="1")
+    lines = [line for line in result.data.decode().splitlines() if "camcomp" not in line]
+    assert lines[:3] == text.splitlines()[:3]
+    assert lines[3].startswith("G1 ") and lines[3] != "G1 X1 Y1"
+    assert np.allclose(result.centre[1], program.path.centre[1], equal_nan=True)
