@@ -8,6 +8,7 @@ from camcomp.ground.datatypes import Floats
 from camcomp.ground.machine_code import kept
 from camcomp.model.seams import Seams
 
+SAME = 1e-9  # of a step: as long as the one before, but for round-off
 STILL = 1e-9  # mm or rad, round-off of two solutions of the same point
 PRESLIDING_MM = 0.005  # rolling guides take 1 to 20 um to turn their friction round (Armstrong-Helouvry 1994)
 PRESLIDING_RAD = 1e-5
@@ -76,6 +77,8 @@ def _second_order(x, t, period, damping):  # type: ignore[no-untyped-def]  # pra
     w = 2.0 * np.pi / period
     push = np.zeros(x.shape[1])
     rate = np.zeros(x.shape[1])
+    known = 0.0  # the step of which ee to rr are
+    ee, er, re, rr = 1.0, 0.0, 0.0, 1.0
     for i in range(1, n):
         dt = t[i] - t[i - 1]
         if dt <= 0.0:
@@ -83,7 +86,9 @@ def _second_order(x, t, period, damping):  # type: ignore[no-untyped-def]  # pra
             push[:] = 0.0
             continue
         after = t[i + 1] - t[i] if i + 1 < n else 0.0
-        ee, er, re, rr = _free_swing(w, damping, dt)
+        if abs(dt - known) > SAME * dt:
+            ee, er, re, rr = _free_swing(w, damping, dt)
+            known = dt
         for j in range(x.shape[1]):
             bend = 0.0
             if after > 0.0:

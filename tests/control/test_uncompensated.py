@@ -15,7 +15,7 @@ from tests.recordings import recording
 
 # The feed override is what no program says.
 OVERRIDDEN = (
-    "override-blended", "eight-fast", "inward-blended", "diagonal-200um", "pendulum-blended", "speeds-blended",
+    "override-blended", "eight-fast", "inward-blended", "diagonal-200um", "pendulum-blended", "speeds-blended", "steep-exact",
 )  # fmt: skip
 LONGEST_STOP = 2  # cycles
 UM, SHARE, TIME = 0.5, 0.1, 0.02

@@ -27,13 +27,6 @@ MACHINES = {
     "orthoglide": "y", "delta": "b", "puu": "y", "cartesian": "y", "router": "y", "hexapod": "leg2", "kuka-kr210": "A2", "ur10": "elbow",
 }  # fmt: skip
 ARMS, SLIDES_IN_A_ROW = ("kuka-kr210", "ur10"), ("cartesian", "router")
-ALWAYS = (
-    "cutting_force",
-    "squareness",
-    "time_sync",
-    "tool_length",
-    "workpiece_frame",
-)  # so that no machine misses a stage
 OWN = "its actuator"
 SURE = 0.8  # contract: confident and wrong
 EITHER = ("screw_growth", "servo_lag", "servo_overshoot", "thermal_growth")  # of one actuator, or of all alike
@@ -108,16 +101,6 @@ ELSEWHERE = {
     "map": "tests/trials/test_found_laws.py",
     "none": "tests/diagnosis/test_every_machine.py",
 }
-
-
-def soon(machine: str, fault: Fault) -> bool:
-    """Whether CI tries it: some effects everywhere, and every third machine that has the effect, from another one on in turns."""
-    if fault.effect in ALWAYS:
-        return True
-    rows = list(dict.fromkeys((effect, target is None) for effect, target, *_ in SIZES))
-    own = (fault.effect, fault.target is None)
-    having = [each for each in MACHINES if own in [(f.effect, f.target is None) for f in faults(each)]]
-    return len(having) == 1 or (having.index(machine) + rows.index(own)) % 3 == 2
 
 
 def same_as(machine: str, fault: Fault) -> Fault:

@@ -1,8 +1,4 @@
-"""The plainest test of the diagnosis, of every effect on every shipped machine: `simulate`, a little noise, `diagnose`.
-
-Every third pair of effect and machine is tried in CI, all of them by `python -m pytest tests/diagnosis/test_every_machine.py
--m "campaign or not campaign"`.
-"""
+"""The plainest test of the diagnosis, of every effect on every shipped machine: `simulate`, a little noise, `diagnose`."""
 
 import pytest
 
@@ -11,24 +7,22 @@ from tests.campaign import runner
 from tests.diagnosis import grid
 from tests.diagnosis.shipped import Fault
 
-# One interval of twenty misses: that of the wear ends at 19.98.
-MISSES = (("cartesian", "tool_wear", None),)
+# Where a cause is named and a 95 % interval misses what is true: this one ends at 19.98.
+MISSES = {("cartesian", "tool_wear"): ["growth_per_min 20"]}
 
 
 def trials():
     for machine in grid.MACHINES:
         yield pytest.param(machine, None, id=f"{machine}-nothing")
         for fault in grid.faults(machine):
-            marks = [] if grid.soon(machine, fault) else [pytest.mark.campaign]
-            if (machine, fault.effect, fault.target) in MISSES:
-                marks.append(pytest.mark.xfail(reason="a 95 % interval that misses", strict=True))
-            yield pytest.param(machine, fault, id=f"{machine}-{fault.effect}-{fault.target}", marks=marks)
+            yield pytest.param(machine, fault, id=f"{machine}-{fault.effect}-{fault.target}")
 
 
 @pytest.mark.parametrize(("machine", "fault"), list(trials()))
 def test_what_is_wrong_is_named_and_nothing_else(machine, fault, tmp_path):
     verdict, bad = grid.answer(tmp_path, machine, fault)
-    assert not bad, (verdict, bad)
+    known = MISSES.get((machine, fault.effect), []) if fault else []
+    assert [each.partition(" not in ")[0] for each in bad] == known, (verdict, bad)
 
 
 def test_every_effect_has_its_row():
@@ -54,19 +48,6 @@ def test_what_is_not_tried_on_a_machine_is_not_there(machine):
             getattr(module, "SLIDES_ONLY", False) and (arm or (module.TARGET == "named" and not slides))
         )
         assert foreign or (effect, machine) in grid.NOT_THERE
-
-
-def test_every_effect_and_every_stage_of_every_machine_is_tried_in_ci():
-    soon = [
-        (machine, fault.effect)
-        for machine in grid.MACHINES
-        for fault in grid.faults(machine)
-        if grid.soon(machine, fault)
-    ]
-    assert {effect for _, effect in soon} == {effect for effect, *_ in grid.SIZES}
-    for machine in grid.MACHINES:
-        stages = {shelf.load("effects", fault.effect).STAGE for fault in grid.faults(machine)}
-        assert {shelf.load("effects", effect).STAGE for each, effect in soon if each == machine} == stages
 
 
 def result(verdict, *causes, alternatives=()):

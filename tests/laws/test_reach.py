@@ -1,5 +1,7 @@
 """The list of modules that no test reached says what it says."""
 
+import builtins
+
 import pytest
 
 from tests import reach
@@ -63,6 +65,28 @@ def test_what_comes_after_a_branch_has_a_mark_of_its_own():
     lines, runs = ran(lambda names: names["f"](-1))
     assert lines == [12, 15, 17, 18, 20, 22]
     assert {line: runs[line] for line in lines} == {12: 1, 15: 1, 17: 1, 18: 1, 20: 1, 22: 2}
+
+
+def test_marks_that_were_met_are_taken_out_and_the_others_stay(monkeypatch):
+    text = TEXT.replace("import a", "inner = lambda function: function")
+    tree, runs = reach.marked(text, FIRST)
+    code = compile(tree, "f.py", "exec")
+    met = [False] * (FIRST + len(runs))
+    monkeypatch.setattr(builtins, reach.RAN, met, raising=False)
+    monkeypatch.setattr(reach, "LOADED", [("f.py", text, FIRST, code)])
+    monkeypatch.setattr(reach, "OLD", [])
+    names = {}
+    exec(code, names)  # noqa: S102 - the text above
+    f = names["f"]
+    for argument, answer, lines in ((1, 1, [12, 13]), (-1, -3, [12, 13, 15, 17, 18, 20, 22])):
+        assert f(argument) == answer
+        assert [line for line, was in zip(runs, met[FIRST:], strict=True) if was] == lines
+        reach.thin()
+    met[:] = [False] * len(met)
+    f(1), f(-1)
+    assert not any(met) and reach.RAN not in f.__code__.co_names
+    names["C"]().h()
+    assert sum(met) == 1
 
 
 def test_calling_what_is_compiled_leaves_no_mark():

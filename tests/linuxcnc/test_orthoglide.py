@@ -18,7 +18,7 @@ from tests.plants import energy
 from tests.plants.legs import orthoglide
 from tests.plants.machine import ORIGIN
 
-pytestmark = [simulator.needs_linuxcnc, pytest.mark.alone]
+pytestmark = [simulator.needs_linuxcnc, *([] if simulator.goes_first() else [pytest.mark.alone])]
 FORCE = (-60.0, 80.0, -30.0)  # N on the tool
 OFFSET, TURN_DEG = np.array([12.0, -7.0, 3.0]), 20.0  # G54
 LENGTHS = (100.0, 60.0)  # of the tools, mm

@@ -16,7 +16,7 @@ import numpy as np
 
 HERE = Path(__file__).parent
 # Of recordings. Nothing saw the second one before the 56000s, the third one before the 60000s, the fourth one before the 70000s,
-# the fifth one before the 74000s. Words are programs that say things in other words (inches, increments, canned cycles,
+# the fifth one before the 74000s, the sixth one before the 76000s. Words are programs that say things in other words (inches, increments, canned cycles,
 # turns): nothing for generators, which read plain ones only.
 SHELVES = {
     "first": HERE,
@@ -24,13 +24,13 @@ SHELVES = {
     "third": HERE / "third",
     "fourth": HERE / "fourth",
     "fifth": HERE / "fifth",
+    "sixth": HERE / "sixth",
     "slow": HERE / "slow",
     "words": HERE / "words",
 }
 LIMITS = (100.0, 1500.0)  # mm/s, mm/s²; of every axis and of the tip
-LIMITS_OF = {
-    "slow": (60.0, 800.0)
-}  # programs of other shelves: what was learned of a control on one machine holds on another
+# What was learned on one machine holds on another: slow are programs of other shelves, the sixth one has programs of its own.
+LIMITS_OF = {"slow": (60.0, 800.0), "sixth": (160.0, 4000.0)}
 STEP_S = 1e-3
 QUANTUM_MM = 1e-5
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from camcomp.diagnosis.axis.block_least_squares import Gain, Series
 from camcomp.diagnosis.axis.gate import AxisGate
@@ -44,6 +45,7 @@ class AxisRun:
     started: float = 0.0
     seen: Bools | None = None
     course: tuple[Floats, Floats] | None = None
+    _finely: dict[int, tuple[Floats, Floats]] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def clear(self) -> Bools:
@@ -54,6 +56,14 @@ class AxisRun:
     def asked(self) -> tuple[Floats, Floats]:
         """Times and set-points (m,) of the whole log."""
         return self.course or (self.time, self.setpoint)
+
+    def asked_finely(self, per: int) -> tuple[Floats, Floats]:
+        """Times and set-points (k,) of the whole log with `per` steps between two rows, over which set-points go on smoothly."""
+        if per not in self._finely:
+            seen, asked = self.asked
+            time = np.interp(np.arange((len(seen) - 1) * per + 1) / per, np.arange(len(seen)), seen)
+            self._finely[per] = time, asked if per == 1 else CubicSpline(seen, asked)(time)
+        return self._finely[per]
 
     def without_spikes(self) -> tuple[AxisRun, np.ndarray]:
         """The run with neighbours in the place of rows that are no measurement, and these rows' numbers."""

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 from scipy.optimize import least_squares
 
 from camcomp.diagnosis.axis.block_least_squares import fit, series, solve
@@ -46,11 +45,9 @@ class Swing:
 
     def _swings(self, run: AxisRun, late: float) -> Floats:
         """Loop minus set-points (n,) mm at the rows of a run, behind a lag of `late` s."""
-        seen, asked = run.asked
+        seen, _ = run.asked
         per = max(int(np.ceil(FINE * float(np.median(np.diff(seen))) / self.period)), 1)
-        rows = np.arange(len(seen))
-        time = np.interp(np.arange((len(rows) - 1) * per + 1) / per, rows, seen)
-        way = asked if per == 1 else CubicSpline(seen, asked)(time)
+        time, way = run.asked_finely(per)
         swings = second_order(way[:, None], time, self.period, self.damping)
         swings = first_order(swings, time, late) if late > 0.0 else swings
         return np.asarray(swings[::per, 0][np.searchsorted(seen, run.time)])

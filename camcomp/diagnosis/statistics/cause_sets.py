@@ -69,10 +69,13 @@ class CausePrior:
     weight: Floats
     exclusive: Callable[[int, int], bool]  # whether two candidates make no sense together
     kinds: tuple[tuple[int, ...], ...] = ()  # candidates that are one effect at several targets, alike in weight
+    _priors: dict[tuple[Members, Members], float] = field(default_factory=dict, init=False, repr=False)
 
     def prior(self, members: Members, minor: Members = ()) -> float:
-        """Log prior probability of a set, and of what is minor beside it."""
-        return log_sum([odds for odds, _ in self.ways(members, minor)])
+        """Log prior probability of a set, and of what is minor beside it; asked of the same sets again and again."""
+        if (members, minor) not in self._priors:
+            self._priors[members, minor] = log_sum([odds for odds, _ in self.ways(members, minor)])
+        return self._priors[members, minor]
 
     def value(self, f: Fitted, temperature: float = 1.0) -> float:
         """Log evidence of a set and what is minor beside it, tempered, + their log prior."""

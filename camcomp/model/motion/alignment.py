@@ -47,6 +47,7 @@ def align(path: Path, tip: Floats, line: Floats, lost_mm: float = LOST_MM) -> Al
 
     lost_mm: from the path, beyond which a row is a beam break; more where the tip bends by as much.
     """
+    tip = np.ascontiguousarray(tip)  # one layout, compiled once
     motion, u0, u1 = _chords(path)
     begin, end = path_geometry.points(path, motion, u0), path_geometry.points(path, motion, u1)
     length = np.linalg.norm(end - begin, axis=1)

@@ -21,7 +21,7 @@ def loaded(machine, reference, force, springs=NONE, tool=None):
     """Tip displacement (mm) and drive forces (N) with the platform commanded to a reference point (machine frame)."""
     machine = machine if tool is None else replace(machine, tool=tool)
     tip = np.atleast_2d(reference) - machine.origin - [0, 0, machine.tool]
-    force = np.broadcast_to(np.asarray(force, float), tip.shape)
+    force = np.array(np.broadcast_to(np.asarray(force, float), tip.shape))
     out, drive, _ = structure.equilibrium(machine, tip, machine.inverse(tip)[0], force, springs)
     return out - tip, drive
 
