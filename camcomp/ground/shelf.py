@@ -11,6 +11,7 @@ import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext, redirect_stdout
 from difflib import get_close_matches
+from functools import cache
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
@@ -24,9 +25,10 @@ SHELVES = ("robots", "dialects", "forces", "effects")
 _checked: dict[tuple[str, str], tuple[Any, Any]] = {}  # what an entry point named, and the same found to be usable
 
 
-def _own(shelf: str) -> list[str]:
+@cache
+def _own(shelf: str) -> frozenset[str]:
     folder = Path(__file__).parent.parent / shelf
-    return [each.name for each in iter_modules([str(folder)]) if not each.name.startswith("_")]
+    return frozenset(each.name for each in iter_modules([str(folder)]) if not each.name.startswith("_"))
 
 
 def _announced(shelf: str) -> list[EntryPoint]:

@@ -109,7 +109,8 @@ def _inverse(scaled: Floats, size: Floats) -> tuple[Floats, float]:
     """Inverse (k, k) and log determinant of a positive matrix that is `scaled` after division by size (k,) on both sides."""
     half, _ = dpotrf(scaled + 1e-13 * np.eye(len(size)), lower=1)
     triangle, _ = dpotri(half, lower=1)
-    inverse = np.tril(triangle) + np.tril(triangle, -1).T
+    inverse = triangle + triangle.T  # above the diagonal a factor of dpotrf is clean
+    inverse.flat[:: len(size) + 1] *= 0.5
     log_det = 2.0 * np.log(np.diag(half)).sum() - 2.0 * np.log(size).sum()
     return size[:, None] * inverse * size, float(log_det)
 
