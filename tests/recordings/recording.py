@@ -16,8 +16,8 @@ import numpy as np
 
 HERE = Path(__file__).parent
 # Of recordings. Nothing saw the second one before the 56000s, the third one before the 60000s, the fourth one before the 70000s,
-# the fifth one before the 74000s, the sixth one before the 76000s. Words are programs that say things in other words (inches, increments, canned cycles,
-# turns): nothing for generators, which read plain ones only.
+# the fifth one before the 74000s, the sixth one before the 76000s. Words are programs that say things in other words (inches,
+# increments, canned cycles, turns): nothing for generators, which read plain ones only.
 SHELVES = {
     "first": HERE,
     "second": HERE / "second",
