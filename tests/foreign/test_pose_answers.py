@@ -55,6 +55,14 @@ def test_of_one_campaign_nothing_is_more_than_even_beside_what_is_left(tmp_path)
     assert all(cause["probability"] <= 0.5 for cause in result["causes"] if cause["effect"] != "unknown")
 
 
+def test_what_only_unseen_poses_show_is_not_nothing(tmp_path):
+    """A joint that warms up by half a kelvin in the fitted campaign and stands at four more in the other one: it was `none`."""
+    result, _ = judged(tmp_path, 76027)
+    assert result["shrinkage"]["before_rms_um"] > 5.0 * result["floor"]["um"]
+    assert result["verdict"] == "ambiguous"
+    assert [each for one in result["alternatives"] for each in one] == [{"effect": "unknown", "target": None}]
+
+
 @pytest.mark.parametrize("seed", some((21008, 21038, 23010), in_ci=(21008,)))
 def test_an_arm_with_nothing_but_small_errors(tmp_path, seed):
     result, _ = judged(tmp_path, seed)

@@ -222,7 +222,7 @@ def _gate(bench: ArmBench, held: ArmBench | None, found: ArmFit, judges: Court, 
         widths = np.ones(judges.blocks[0].X.shape[2])
         widths[: len(found.amount)] = np.where(found.amount != 0.0, found.taken.widths, found.few.small)
     evidence = judges.evidence(Discrepancy(0.0, 1.0, sd))
-    left = unseen(evidence, widths, sd)
+    left = unseen(evidence, widths, sd, len(found.amount))
     may_be = patterns(held or bench, judges.poses)
     judged = [evidence.blocks[fold.block] for fold in evidence.folds]
     frames = [(b.frame, b.N) for b in judged]

@@ -15,7 +15,15 @@ from scipy.stats import chi2, norm, wilcoxon
 from scipy.stats import f as f_ratio
 
 from camcomp.diagnosis.arm.dependence import Dependence, dependences
-from camcomp.diagnosis.arm.discrepancy import CHI2_3_EDGE, CHI2_3_MEDIAN, Evidence, design, regions
+from camcomp.diagnosis.arm.discrepancy import (
+    CHI2_3_EDGE,
+    CHI2_3_MEDIAN,
+    Evidence,
+    Posterior,
+    design,
+    regions,
+    without_nuisance,
+)
 from camcomp.diagnosis.arm.noise_floor import FAR, IN_A_ROW, TipFloor
 from camcomp.ground.datatypes import Floats
 
@@ -32,10 +40,15 @@ INSTANTS = 48  # of a campaign, at which something may have changed for good
 
 @dataclass(frozen=True, eq=False)
 class LeftOver:
-    """Leftovers (n, 3) mm of unseen poses, one entry per block, with their white squares (n,), which the floor makes 3 each."""
+    """Leftovers (n, 3) mm of unseen poses, one entry per block, with their white squares (n,), which the floor makes 3 each.
+
+    moved: per block by how much (rms, mm) its poses move what the effects do there, and log10 of the chance that they do so
+    within what the others leave open.
+    """
 
     rest: tuple[Floats, ...]
     squares: tuple[Floats, ...]
+    moved: tuple[tuple[float, float], ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,12 +67,13 @@ class Gate:
     structured: bool = False
 
 
-def unseen(evidence: Evidence, widths: Floats, sd: float) -> LeftOver:
-    """What the folds of an evidence, which was whitened by the floor sd alone, leave of their blocks.
+def unseen(evidence: Evidence, widths: Floats, sd: float, effects: int | None = None) -> LeftOver:
+    """What the folds of an evidence, which was whitened by the floor sd alone, leave of their blocks. effects: how many columns
+    are those of effects; all, where it is not said.
 
     Every block may move the fit within what the others leave open: what is left then is nobody's uncertainty.
     """
-    rest, squares = [], []
+    rest, squares, moved = [], [], []
     k = evidence.effects
     for fold in evidence.folds:
         b = evidence.blocks[fold.block]
@@ -68,10 +82,27 @@ def unseen(evidence: Evidence, widths: Floats, sd: float) -> LeftOver:
         D = design(b, k, len(others.mean))
         near = b.r - D @ both.mean
         own = (evidence.left(fold, others) * near).sum(axis=1) / sd**2
+        way = b.X[:, :, :effects] @ (both.mean - others.mean)[:k][:effects]
+        size = float(np.sqrt((without_nuisance(way, b.N) ** 2).sum(axis=1).mean()))
+        moved.append((size, chance_of_move(evidence.grams[fold.block], others, own.sum() - (near**2).sum() / sd**2)))
         freedom = 3.0 * len(b.r) - (9.0 if b.alone else 0.0)
         rest.append(near)
         squares.append(3.0 * own * len(b.r) / freedom)
-    return LeftOver(tuple(rest), tuple(squares))
+    return LeftOver(tuple(rest), tuple(squares), tuple(moved))
+
+
+def chance_of_move(gram: Floats, others: Posterior, square: float) -> float:
+    """log10 of the chance that a block of some Gram matrix (q, q) moves a fit to the others as far, in squares of what they leave
+    open: a sum of chi2 with the weights l / (1 + l), of which mean and variance are kept. Source: Satterthwaite, Biometrics
+    Bulletin 2 (1946) 110.
+    """
+    on = others.on
+    ratio = np.linalg.eigvals(gram[np.ix_(on, on)] @ others.covariance[np.ix_(on, on)]).real.clip(0.0)
+    weight = ratio / (1.0 + ratio)
+    mean, variance = float(weight.sum()), 2.0 * float((weight**2).sum())
+    if variance == 0.0:  # the block says nothing of what is open
+        return 0.0
+    return float(chi2.logsf(2.0 * mean * square / variance, 2.0 * mean**2 / variance) / np.log(10.0))
 
 
 def judge(
@@ -104,7 +135,8 @@ def judge(
             chance = min(chance, float(norm.logsf((mean - ABOVE) / spread) / np.log(10.0)))
         chance = min(chance, many, float(np.log10(CHANCE)) if lasting(left, times) else 0.0)
         return Gate("above", min(chance, 0.0), drivers, left, True, structured)
-    return Gate("at" if mean + norm.ppf(LIKELY) * spread < LEVEL else "open", 0.0, drivers, left, True)
+    at_it = mean + norm.ppf(LIKELY) * spread < LEVEL and moved(left, floor) > np.log10(CHANCE)
+    return Gate("at" if at_it else "open", 0.0, drivers, left, True)
 
 
 def discovered(tried: Sequence[Dependence]) -> list[Dependence]:
@@ -131,6 +163,14 @@ def regions_above(left: LeftOver, features: Sequence[Floats]) -> float:
     """
     total, n = _by_region(left, features)
     return float(np.log10(wilcoxon(total / n - ABOVE, alternative="greater").pvalue))
+
+
+def moved(left: LeftOver, floor: TipFloor) -> float:
+    """log10 of the chance that blocks move the fit as far, of those that move it by more than the floor: what an effect does there
+    and was not fitted is not at the floor, and one way among hundreds of poses does little to their mean square.
+    """
+    tried = float(np.log10(max(len(left.moved), 1)))
+    return min([0.0, *(chance + tried for size, chance in left.moved if 1e3 * size > floor.um)])
 
 
 def lasting(left: LeftOver, times: Sequence[Floats]) -> bool:

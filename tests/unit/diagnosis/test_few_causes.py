@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from scipy.special import logsumexp
 
-from camcomp.diagnosis.arm.discrepancy import FREE, Discrepancy, ResidualBlock
+from camcomp.diagnosis.arm.discrepancy import FREE, Discrepancy, Posterior, ResidualBlock
 from camcomp.diagnosis.arm.few_causes import SMALL, WIDTHS, search, sways, weighed
-from camcomp.diagnosis.arm.gate import FALSE, LeftOver, lasting, regions_above
-from camcomp.diagnosis.arm.noise_floor import far_off
+from camcomp.diagnosis.arm.gate import FALSE, LeftOver, chance_of_move, lasting, moved, regions_above
+from camcomp.diagnosis.arm.noise_floor import TipFloor, far_off
 from camcomp.diagnosis.arm.placed_effects import PlacedEffect
 from camcomp.diagnosis.arm.poses import _shapes
 from camcomp.diagnosis.arm.spells import _window
@@ -174,3 +174,22 @@ def test_two_regions_alone_are_not_most_of_them(seed):
     rng = np.random.default_rng(seed)
     left, features = regions_of([568, 366, *rng.chisquare(12, 14) / 12.0], rng)
     assert regions_above(left, features) > np.log10(FALSE)
+
+
+def test_blocks_move_a_fit_by_chance_as_far_as_is_said():
+    """Two effects, one known as well as the block knows it and one a hundred times better, 2000 blocks of 50 rows."""
+    rng = np.random.default_rng(3)
+    D, open_to = rng.normal(size=(50, 2)), np.diag([1.0 / 50, 1e-4 / 50])
+    others = Posterior(np.zeros(2), np.arange(2), np.linalg.inv(open_to), 0.0)
+    r = rng.multivariate_normal(np.zeros(2), open_to, 2000) @ D.T + rng.normal(size=(2000, 50))
+    near = r @ np.linalg.inv(np.eye(50) + D @ open_to @ D.T)
+    chances = 10.0 ** np.array([chance_of_move(D.T @ D, others, each) for each in (r * near - near**2).sum(axis=1)])
+    assert [(chances < level).mean() for level in (0.5, 0.1, 0.01)] == pytest.approx([0.5, 0.1, 0.01], rel=0.3)
+
+
+def test_only_what_moves_by_more_than_the_floor_counts():
+    floor = TipFloor(0.02, np.inf, "stated")
+    far, near = 1.1e-3 * floor.um, 0.9e-3 * floor.um
+    assert moved(LeftOver((), (), ((far, -6.0), (near, -9.0))), floor) == pytest.approx(-6.0 + np.log10(2))
+    assert moved(LeftOver((), (), ((near, -9.0),)), floor) == 0.0
+    assert moved(LeftOver((), ()), floor) == 0.0
