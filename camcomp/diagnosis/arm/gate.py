@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from scipy.linalg import eigh
 from scipy.spatial import KDTree
 from scipy.stats import chi2, norm, wilcoxon
 from scipy.stats import f as f_ratio
@@ -42,13 +43,13 @@ INSTANTS = 48  # of a campaign, at which something may have changed for good
 class LeftOver:
     """Leftovers (n, 3) mm of unseen poses, one entry per block, with their white squares (n,), which the floor makes 3 each.
 
-    moved: per block by how much (rms, mm) its poses move what the effects do there, and log10 of the chance that they do so
-    within what the others leave open.
+    moved: of every block whose poses move what the effects do there by more than the floor (rms), log10 of the chance that they
+    do so within what the others leave open.
     """
 
     rest: tuple[Floats, ...]
     squares: tuple[Floats, ...]
-    moved: tuple[tuple[float, float], ...] = ()
+    moved: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,8 +84,9 @@ def unseen(evidence: Evidence, widths: Floats, sd: float, effects: int | None = 
         near = b.r - D @ both.mean
         own = (evidence.left(fold, others) * near).sum(axis=1) / sd**2
         way = b.X[:, :, :effects] @ (both.mean - others.mean)[:k][:effects]
-        size = float(np.sqrt((without_nuisance(way, b.N) ** 2).sum(axis=1).mean()))
-        moved.append((size, chance_of_move(evidence.grams[fold.block], others, own.sum() - (near**2).sum() / sd**2)))
+        if (without_nuisance(way, b.N) ** 2).sum(axis=1).mean() > 3.0 * sd**2:
+            square = float(own.sum() - (near**2).sum() / sd**2)
+            moved.append(chance_of_move(evidence.grams[fold.block], others, square))
         freedom = 3.0 * len(b.r) - (9.0 if b.alone else 0.0)
         rest.append(near)
         squares.append(3.0 * own * len(b.r) / freedom)
@@ -96,8 +98,9 @@ def chance_of_move(gram: Floats, others: Posterior, square: float) -> float:
     open: a sum of chi2 with the weights l / (1 + l), of which mean and variance are kept. Source: Satterthwaite, Biometrics
     Bulletin 2 (1946) 110.
     """
-    on = others.on
-    ratio = np.linalg.eigvals(gram[np.ix_(on, on)] @ others.covariance[np.ix_(on, on)]).real.clip(0.0)
+    size = 1.0 / np.sqrt(np.diag(others.precision))
+    own, before = (size[:, None] * each * size for each in (gram[np.ix_(others.on, others.on)], others.precision))
+    ratio = eigh(own, before, eigvals_only=True).clip(0.0)
     weight = ratio / (1.0 + ratio)
     mean, variance = float(weight.sum()), 2.0 * float((weight**2).sum())
     if variance == 0.0:  # the block says nothing of what is open
@@ -135,7 +138,7 @@ def judge(
             chance = min(chance, float(norm.logsf((mean - ABOVE) / spread) / np.log(10.0)))
         chance = min(chance, many, float(np.log10(CHANCE)) if lasting(left, times) else 0.0)
         return Gate("above", min(chance, 0.0), drivers, left, True, structured)
-    at_it = mean + norm.ppf(LIKELY) * spread < LEVEL and moved(left, floor) > np.log10(CHANCE)
+    at_it = mean + norm.ppf(LIKELY) * spread < LEVEL and not moved(left)
     return Gate("at" if at_it else "open", 0.0, drivers, left, True)
 
 
@@ -165,12 +168,11 @@ def regions_above(left: LeftOver, features: Sequence[Floats]) -> float:
     return float(np.log10(wilcoxon(total / n - ABOVE, alternative="greater").pvalue))
 
 
-def moved(left: LeftOver, floor: TipFloor) -> float:
-    """log10 of the chance that blocks move the fit as far, of those that move it by more than the floor: what an effect does there
-    and was not fitted is not at the floor, and one way among hundreds of poses does little to their mean square.
+def moved(left: LeftOver) -> bool:
+    """Whether blocks move the fit farther than chance does: what an effect does there and was not fitted is not at the floor, and
+    one way among hundreds of poses does little to their mean square.
     """
-    tried = float(np.log10(max(len(left.moved), 1)))
-    return min([0.0, *(chance + tried for size, chance in left.moved if 1e3 * size > floor.um)])
+    return bool(min(left.moved, default=0.0) < np.log10(CHANCE / len(left.rest)))
 
 
 def lasting(left: LeftOver, times: Sequence[Floats]) -> bool:

@@ -11,7 +11,7 @@ from scipy.special import logsumexp
 from camcomp.diagnosis.arm.discrepancy import FREE, Discrepancy, Posterior, ResidualBlock
 from camcomp.diagnosis.arm.few_causes import SMALL, WIDTHS, search, sways, weighed
 from camcomp.diagnosis.arm.gate import FALSE, LeftOver, chance_of_move, lasting, moved, regions_above
-from camcomp.diagnosis.arm.noise_floor import TipFloor, far_off
+from camcomp.diagnosis.arm.noise_floor import far_off
 from camcomp.diagnosis.arm.placed_effects import PlacedEffect
 from camcomp.diagnosis.arm.poses import _shapes
 from camcomp.diagnosis.arm.spells import _window
@@ -187,9 +187,8 @@ def test_blocks_move_a_fit_by_chance_as_far_as_is_said():
     assert [(chances < level).mean() for level in (0.5, 0.1, 0.01)] == pytest.approx([0.5, 0.1, 0.01], rel=0.3)
 
 
-def test_only_what_moves_by_more_than_the_floor_counts():
-    floor = TipFloor(0.02, np.inf, "stated")
-    far, near = 1.1e-3 * floor.um, 0.9e-3 * floor.um
-    assert moved(LeftOver((), (), ((far, -6.0), (near, -9.0))), floor) == pytest.approx(-6.0 + np.log10(2))
-    assert moved(LeftOver((), (), ((near, -9.0),)), floor) == 0.0
-    assert moved(LeftOver((), ()), floor) == 0.0
+def test_a_move_is_one_of_as_many_as_there_are_blocks():
+    rest = (np.zeros((5, 3)),) * 10
+    assert moved(LeftOver(rest, (), (-0.2, -4.1)))
+    assert not moved(LeftOver(rest, (), (-3.9,)))
+    assert not moved(LeftOver(rest, ()))
