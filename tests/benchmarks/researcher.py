@@ -1,15 +1,15 @@
 """The modified target as one would write it for a paper: residuals in numpy, one point at a time, a library's root finder.
 
-The model is that of the truth plant (tests/plants/energy.py): the gradient of the potential energy by platform pose,
+The model is that of the truth plant (tests/validation/plants/energy.py): the gradient of the potential energy by platform pose,
 passive angles and bar deflections vanishes, and the loaded tip is where it is wanted. The last three unknowns are the
 tip to be commanded.
 """
 
 import numpy as np
 
-from tests.plants import energy
-from tests.plants.legs import orthoglide
-from tests.plants.rotations import rate, turn, vector
+from tests.validation.plants import energy
+from tests.validation.plants.legs import orthoglide
+from tests.validation.plants.rotations import rate, turn, vector
 
 LEG = np.arange(3)
 

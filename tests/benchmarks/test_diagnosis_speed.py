@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from tests.benchmarks.spent import spent
-from tests.campaign.runner import CONFIG
-from tests.plants.causes import Cause
-from tests.plants.experiments import Plan, make, write
+from tests.validation.plants.causes import Cause
+from tests.validation.plants.experiments import Plan, make, write
+from tests.validation.runner import CONFIG
 
 pytestmark = pytest.mark.benchmarks
 

@@ -1,0 +1,1 @@
+"""The model of the controller against LinuxCNC's planner: corners, feeds, times."""

@@ -22,8 +22,8 @@ from camcomp.model.trajectory.moves import moves_of
 from camcomp.model.trajectory.plan import plan_of
 from tests.control.measured import passes
 from tests.control.programs import CONFIG, CONTROL
-from tests.plants import energy
-from tests.plants.legs import orthoglide
+from tests.validation.plants import energy
+from tests.validation.plants.legs import orthoglide
 
 HERE = Path(__file__).parent
 STEP_S, QUANTUM_MM = 1e-3, 1e-5

@@ -7,7 +7,9 @@ import math
 MODES = {"g61": "G61", "g64": "G64", "p1": "G64 P0.001", "p10": "G64 P0.01"}
 FEEDS = (600, 3000)
 CONFIG = "config/orthoglide-1deg.yaml"
-CONTROL = {"control": {"start_mm": [0.0, 0.0, 20.0], "velocity_mm_per_s": 100.0}}  # as tests/recordings drives it
+CONTROL = {
+    "control": {"start_mm": [0.0, 0.0, 20.0], "velocity_mm_per_s": 100.0}
+}  # as tests/validation/recordings drives it
 
 
 def circle(radius: float, feed: int) -> list[str]:

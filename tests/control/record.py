@@ -1,6 +1,6 @@
 """Compensates the programs of programs.py and records what LinuxCNC makes of them: `python -m tests.control.record`.
 
-Needs what tests/recordings/record.py needs, whose machine it uses. `--long DIR` records every program of the long version there.
+Needs what tests/validation/recordings/record.py needs, whose machine it uses. `--long DIR` records every program of the long version there.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from camcomp.ground.datatypes import RAPID
 from camcomp.model.control import program_of
 from tests.control import driven
 from tests.control.programs import LONG, SHORT, arcs, source
-from tests.recordings import record as recorder
+from tests.validation.recordings import record as recorder
 
 AT_ONCE = 8  # programs of one LinuxCNC
 

@@ -11,13 +11,13 @@ from camcomp.model.job import Job
 from camcomp.model.motion.alignment import align
 from camcomp.model.motion.driven_path import cutting_forces
 from camcomp.model.trajectory.segments import merged
-from tests.recordings import recording
+from tests.validation.recordings import recording
 
 ROW = 20  # ms
 
 
 def recorded(name):
-    with recording.taken_from("fourth"):
+    with recording.taken_from("rosettes"):
         found = recording.load(name)
     return found, read_program(found.program.encode(), name=name, setup=Setup(start_mm=tuple(found.tip[0].tolist())))
 

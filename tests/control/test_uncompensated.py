@@ -11,7 +11,7 @@ from camcomp.model.motion.alignment import align
 from camcomp.model.trajectory.moves import ControlLimits, moves_of
 from camcomp.model.trajectory.plan import plan_of
 from tests.control.measured import passes
-from tests.recordings import recording
+from tests.validation.recordings import recording
 
 # The feed override is what no program says.
 OVERRIDDEN = (
@@ -49,16 +49,16 @@ def looked_at(name):
 
 
 def recorded():
-    """Shelf and name of every recording at the speed that its program says."""
-    for shelf in recording.SHELVES:
-        with recording.taken_from(shelf):
+    """Set and name of every recording at the speed that its program says."""
+    for recordings in recording.SETS:
+        with recording.taken_from(recordings):
             for name in sorted(set(recording.names()) - set(OVERRIDDEN)):
-                yield shelf, name
+                yield recordings, name
 
 
-@pytest.mark.parametrize(("shelf", "name"), list(recorded()))
-def test_corners_and_time_are_those_of_the_control(shelf, name):
-    with recording.taken_from(shelf):
+@pytest.mark.parametrize(("recordings", "name"), list(recorded()))
+def test_corners_and_time_are_those_of_the_control(recordings, name):
+    with recording.taken_from(recordings):
         measured, modelled, recorded, predicted = looked_at(name)
     assert modelled == pytest.approx(measured, rel=TIME)
     for figure in (np.max, lambda off: np.sqrt(np.mean(off**2))):
@@ -67,26 +67,27 @@ def test_corners_and_time_are_those_of_the_control(shelf, name):
 
 
 @pytest.mark.parametrize(
-    ("shelf", "name"), [("third", "gear-20um"), ("fifth", "circles-blended"), ("fifth", "valleys-blended")]
+    ("recordings", "name"),
+    [("slots", "gear-20um"), ("feed_modes", "circles-blended"), ("feed_modes", "valleys-blended")],
 )
-def test_every_corner_beside_an_arc_is_rounded_as_the_control_does(shelf, name):
+def test_every_corner_beside_an_arc_is_rounded_as_the_control_does(recordings, name):
     """Inside the circle and outside of it; a corner of two lines would be up to 30 um off here."""
-    with recording.taken_from(shelf):
+    with recording.taken_from(recordings):
         _, _, recorded, predicted = looked_at(name)
     assert np.abs(predicted - recorded).max() < UM
 
 
 def test_a_circle_does_not_end_where_it_was_rounded_to_begin():
-    with recording.taken_from("second"):
+    with recording.taken_from("spirals"):
         _, _, recorded, predicted = looked_at("circles-blended")
     assert np.sum(recorded > 9.0) > 1
     assert np.abs(predicted - recorded).max() < UM
 
 
-@pytest.mark.parametrize("shelf", recording.SHELVES)
-def test_a_control_drives_what_the_program_is_read_as(shelf):
+@pytest.mark.parametrize("recordings", recording.SETS)
+def test_a_control_drives_what_the_program_is_read_as(recordings):
     """Inches, canned cycles, turns and all: of an exact path no point lies beside the program, and no motion of it is left out."""
-    with recording.taken_from(shelf):
+    with recording.taken_from(recordings):
         for name in (each for each in recording.names() if each.endswith("-exact")):
             found = recording.load(name)
             setup = Setup(start_mm=tuple(found.tip[0].tolist()))

@@ -1,0 +1,1 @@
+"""Answers of `camcomp diagnose` on experiments whose causes are known, from log to verdict."""

@@ -4,9 +4,9 @@ import functools
 
 import pytest
 
-from tests.campaign import runner
-from tests.plants.causes import Cause
-from tests.plants.experiments import Plan, make, write
+from tests.validation import runner
+from tests.validation.plants.causes import Cause
+from tests.validation.plants.experiments import Plan, make, write
 
 
 class Workshop:

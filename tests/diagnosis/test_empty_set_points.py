@@ -8,7 +8,7 @@ import pytest
 
 from camcomp.api.diagnosis import diagnose
 from camcomp.diagnosis.experiment.driven_run import _guessed
-from tests.diagnosis import shipped
+from tests.validation.every_machine import shipped
 
 
 @pytest.mark.parametrize("encoders", [True, False])

@@ -9,9 +9,9 @@ import pytest
 from camcomp.api.diagnosis import diagnose
 from camcomp.diagnosis.next_experiment.designed import propose
 from camcomp.diagnosis.search.indistinguishable import classes, likeness, stand_ins
-from tests.campaign.cases import EQUAL
 from tests.diagnosis.conftest import plan_of
-from tests.plants.more import add_run
+from tests.validation.orthoglide.cases import EQUAL
+from tests.validation.plants.further_run import add_run
 
 FREE = plan_of(("servo_lag", None), design="both-ways", channels="tip", ratio=6.0)
 LONG = plan_of(("tool_length", None), design="both-ways", channels="no-forces", ratio=8.0)

@@ -3,9 +3,9 @@
 import pytest
 
 from camcomp.ground import shelf
-from tests.campaign import runner
-from tests.diagnosis import grid
-from tests.diagnosis.shipped import Fault
+from tests.validation import runner
+from tests.validation.every_machine import grid
+from tests.validation.every_machine.shipped import Fault
 
 # Where a cause is named and a 95 % interval misses what is true: this one ends at 19.98.
 MISSES = {("cartesian", "tool_wear"): ["growth_per_min 20"]}

@@ -6,8 +6,8 @@ Logs of a machine with nothing wrong, to which the test adds what Maxwell's bloc
 import numpy as np
 import pytest
 
-from tests.campaign import runner
-from tests.diagnosis import shipped
+from tests.validation import runner
+from tests.validation.every_machine import shipped
 
 FORCE_N, SPRING = 600.0, 2.0e4  # 30 um each way, spring of the shipped machine in N/mm
 BLOCKS_MM = (0.0008, 0.0015, 0.003, 0.006)  # ways after which each of four equal blocks slides

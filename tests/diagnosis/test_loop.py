@@ -3,11 +3,11 @@
 import pytest
 
 from camcomp.api.diagnosis import machine_with_causes
-from tests.campaign import runner
 from tests.diagnosis.conftest import plan_of
 from tests.diagnosis.test_where import SCREW
-from tests.plants.experiments import rerun
-from tests.plants.measure import path_error
+from tests.validation import runner
+from tests.validation.plants.experiments import rerun
+from tests.validation.plants.measure import path_error
 
 PAIR = plan_of(("drive_stiffness", "y"), ("cutting_force", None), ratio=30.0, seed=42)
 

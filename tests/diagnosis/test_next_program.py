@@ -17,8 +17,8 @@ from camcomp.gcode.interpret import read_program
 from camcomp.ground import path_geometry
 from camcomp.ground.errors import CheckFailed
 from camcomp.ground.files import shipped
-from tests.campaign.runner import invoke
 from tests.oracles import rs274
+from tests.validation.runner import invoke
 
 SAMPLE = shipped("samples/diagnosis/ambiguous/experiment.yaml")
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from camcomp.ground import shelf
-from tests.campaign import runner
-from tests.plants import designs
+from tests.validation import runner
+from tests.validation.plants import designs
 
 SOURCE = '''
 """The ram is wavy: the tip sways along machine x with the height at which it works."""

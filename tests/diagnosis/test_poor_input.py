@@ -7,8 +7,8 @@ import shutil
 
 import pytest
 
-from tests.campaign import runner
 from tests.diagnosis.conftest import plan_of
+from tests.validation import runner
 
 PLAN = plan_of(("backlash", "x"), design="both-ways", seed=39, samples=80)
 TIP, ENCODERS = ("x_mm", "y_mm", "z_mm"), ("act_x_mm", "act_y_mm", "act_z_mm")

@@ -9,9 +9,9 @@ from camcomp.api.diagnosis import diagnose
 from camcomp.diagnosis.experiment.open_experiment import open_experiment
 from camcomp.diagnosis.fit.bench import Bench
 from camcomp.terminal.cli import run as camcomp
-from tests.campaign import runner
 from tests.diagnosis.conftest import plan_of
-from tests.plants.experiments import make, write
+from tests.validation import runner
+from tests.validation.plants.experiments import make, write
 
 SOON_S, EARLY_S = 0.008, 0.0002
 START = "G21 G90 G17 G94\nS8000 M3\nG0 X0 Y0 Z4\nG1 Z0 F300\n"

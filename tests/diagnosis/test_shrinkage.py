@@ -9,7 +9,7 @@ from camcomp.api.diagnosis import diagnose
 from tests.diagnosis.test_loop import PAIR
 from tests.diagnosis.test_poor_input import PLAN
 from tests.diagnosis.test_where import SCREW
-from tests.plants.more import add_run
+from tests.validation.plants.further_run import add_run
 
 
 def test_steps_lead_from_the_gap_to_near_the_floor_and_the_ceiling_is_no_worse(workshop):

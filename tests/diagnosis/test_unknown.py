@@ -4,8 +4,8 @@ import pytest
 
 from camcomp.api.diagnosis import diagnose
 from tests.diagnosis.conftest import plan_of
-from tests.plants.causes import Cause
-from tests.plants.experiments import Plan
+from tests.validation.plants.causes import Cause
+from tests.validation.plants.experiments import Plan
 
 GROWTH = plan_of(("spindle_growth", None), design="six", samples=150)
 CREEP = plan_of(("creep", "x"), design="six", samples=150)

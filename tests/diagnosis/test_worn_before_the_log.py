@@ -5,7 +5,7 @@ import pytest
 
 from camcomp.diagnosis.experiment.open_experiment import open_experiment
 from camcomp.terminal.cli import run as camcomp
-from tests.campaign import runner
+from tests.validation import runner
 
 PROGRAM = "G21 G90 G17 G94\nS8000 M3\nG0 X0 Y0 Z4\nG1 Z0 F300\nG1 X30 F400\nG1 Y20\nG3 X20 Y30 I-10\nG1 X-10\nG0 Z20\nM5\nM30\n"
 

@@ -1,0 +1,1 @@
+"""A wheel and a source distribution install and run in a clean environment."""

@@ -1,0 +1,1 @@
+"""Laws of the repository: architecture, rules, names, documents that are generated."""

@@ -1,0 +1,1 @@
+"""A whole LinuxCNC simulation drives the compensated programs of an Orthoglide."""

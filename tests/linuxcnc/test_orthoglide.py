@@ -14,9 +14,9 @@ import pytest
 
 from camcomp.ground.files import shipped
 from tests.linuxcnc import simulator
-from tests.plants import energy
-from tests.plants.legs import orthoglide
-from tests.plants.machine import ORIGIN
+from tests.validation.plants import energy
+from tests.validation.plants.legs import orthoglide
+from tests.validation.plants.machine import ORIGIN
 
 pytestmark = [simulator.needs_linuxcnc, *([] if simulator.goes_first() else [pytest.mark.alone])]
 FORCE = (-60.0, 80.0, -30.0)  # N on the tool

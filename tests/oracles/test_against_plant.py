@@ -6,8 +6,8 @@ import pytest
 from camcomp.model.config.load import load_config
 from camcomp.model.job import Job
 from camcomp.model.statics.target import correct, settle
-from tests.plants import energy
-from tests.plants.legs import orthoglide, ref_puu
+from tests.validation.plants import energy
+from tests.validation.plants.legs import orthoglide, ref_puu
 
 TIP_MM = 2e-4  # 0.2 um
 DRIVE_N = 0.1

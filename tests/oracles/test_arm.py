@@ -7,7 +7,7 @@ from camcomp.model.config.load import load_config
 from camcomp.model.job import Job
 from camcomp.model.statics.target import correct, settle
 from tests.commandline import compensated
-from tests.plants import kuka, serial
+from tests.validation.plants import kuka, serial
 
 TIP_MM = 2e-4  # 0.2 um
 TORQUE_NMM = 100.0  # 0.1 N m

@@ -13,9 +13,9 @@ from camcomp.ground.files import shipped
 from camcomp.model.config.load import load_config
 from camcomp.model.control import program_of
 from camcomp.model.job import Job
-from tests.plants import energy
-from tests.plants.legs import orthoglide
-from tests.plants.machine import ORIGIN
+from tests.validation.plants import energy
+from tests.validation.plants.legs import orthoglide
+from tests.validation.plants.machine import ORIGIN
 
 RADIUS = 25.0
 PROGRAM = b"G21 G90 G17\nG0 X25 Y0 Z5\nG1 Z0 F300\nG3 X25 Y0 I-25 J0 F600\nG1 Z5 F1000\n"

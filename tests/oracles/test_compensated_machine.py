@@ -5,11 +5,11 @@ import json
 import numpy as np
 import pytest
 
-from tests.campaign import runner
-from tests.plants import designs
-from tests.plants.machine import Run, Truth, observe
-from tests.plants.measure import misses
-from tests.plants.motion import Timeline, read
+from tests.validation import runner
+from tests.validation.plants import designs
+from tests.validation.plants.machine import Run, Truth, observe
+from tests.validation.plants.measure import misses
+from tests.validation.plants.motion import Timeline, read
 
 Y = np.array([0.0, 1.0, 0.0])
 PROGRAM = designs.circle(25.0, 1200.0, False)  # its corrected plunge slants and yet does not cut

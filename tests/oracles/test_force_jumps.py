@@ -21,10 +21,10 @@ from camcomp.model.config.load import load_config
 from camcomp.model.control import program_of, setup_of
 from camcomp.model.job import Job
 from camcomp.model.motion.simulate import simulate
-from tests.plants import energy, milling
-from tests.plants.legs import orthoglide
-from tests.plants.machine import ORIGIN
-from tests.plants.motion import SMOOTH, Move, Timeline
+from tests.validation.plants import energy, milling
+from tests.validation.plants.legs import orthoglide
+from tests.validation.plants.machine import ORIGIN
+from tests.validation.plants.motion import SMOOTH, Move, Timeline
 
 AGREED_UM = 0.05
 ROLLED, NOMINAL = orthoglide(roll_deg=1.0), orthoglide()

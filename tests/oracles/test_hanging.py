@@ -10,7 +10,7 @@ from camcomp.model.job import Job
 from camcomp.model.statics.description import Link
 from camcomp.model.statics.hanging import hang
 from camcomp.model.statics.target import settle
-from tests.plants import kuka, serial
+from tests.validation.plants import kuka, serial
 
 
 @pytest.fixture(scope="module")

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from tests.plants import causes, designs, experiments, foreign
-from tests.plants.machine import ORIGIN, Run, Truth, observe
-from tests.plants.motion import Timeline, read
+from tests.validation.plants import causes, designs, experiments, unmodelled
+from tests.validation.plants.machine import ORIGIN, Run, Truth, observe
+from tests.validation.plants.motion import Timeline, read
 
 CIRCLE = Timeline(read(designs.circle(25.0, 600.0, False, plunge=False)))
 CUT, AIR = Run(CIRCLE, True, 100.0), Run(CIRCLE, False, 100.0)
@@ -58,7 +58,7 @@ def test_lag_delays_the_encoder():
 
 
 def test_backlash_holds_the_carriage_back_by_half_its_width():
-    from tests.plants import drives
+    from tests.validation.plants import drives
 
     x = np.concatenate([np.linspace(0, 1, 50), np.linspace(1, 0, 50)])
     y = drives.play(x, 0.02, 0.0)
@@ -126,7 +126,7 @@ def test_wear_counts_cutting_minutes_only():
     assert size == pytest.approx(1 + 0.1 * (2 + T / 60), rel=1e-3)
 
 
-@pytest.mark.parametrize("pair", [*causes.every_cause(), *((n, "y") for n in foreign.NAMES)])
+@pytest.mark.parametrize("pair", [*causes.every_cause(), *((n, "y") for n in unmodelled.NAMES)])
 def test_every_cause_reaches_its_size_and_nothing_else_is_larger(pair):
     effect, target = pair
     plan = experiments.Plan(3, (causes.Cause(effect, target, 5),), (3.0,), "both-ways", samples=40)

@@ -10,9 +10,9 @@ from camcomp.model.config.load import load_config
 from camcomp.model.statics.build import build_robot
 from camcomp.model.statics.machine import Machine, build_machine
 from camcomp.model.statics.target import correct, settle
-from tests.plants.legs import beam
-from tests.plants.serial import Joint, Link, Shift, Weight
-from tests.plants.serial import settle as minimise
+from tests.validation.plants.legs import beam
+from tests.validation.plants.serial import Joint, Link, Shift, Weight
+from tests.validation.plants.serial import settle as minimise
 
 TOWERS = np.radians([0.0, 120.0, 240.0])
 OUTWARD = np.stack([np.cos(TOWERS), np.sin(TOWERS)], axis=1)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from tests.plants import energy, serial
-from tests.plants.legs import orthoglide, ref_puu
+from tests.validation.plants import energy, serial
+from tests.validation.plants.legs import orthoglide, ref_puu
 
 Q0, Q1, Q2 = np.zeros(3), np.full(3, -73.205), np.full(3, 126.795)
 TOOL = np.array([0.0, 0.0, 100.0])

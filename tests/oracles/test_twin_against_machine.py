@@ -9,10 +9,10 @@ import json
 import numpy as np
 import pytest
 
-from tests.campaign import runner
-from tests.plants import designs
-from tests.plants.machine import Run, Truth, observe
-from tests.plants.motion import Timeline, read
+from tests.validation import runner
+from tests.validation.plants import designs
+from tests.validation.plants.machine import Run, Truth, observe
+from tests.validation.plants.motion import Timeline, read
 
 PROGRAM = designs.circle(25.0, 1200.0, False, plunge=False)
 CORNERS = designs.rectangle(30.0, 20.0, 900.0, plunge=False)

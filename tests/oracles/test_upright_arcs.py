@@ -13,9 +13,9 @@ from camcomp.ground.files import shipped
 from camcomp.model.config.load import load_config
 from camcomp.model.control import program_of
 from camcomp.model.job import Job
-from tests.plants import energy
-from tests.plants.legs import orthoglide
-from tests.plants.machine import ORIGIN, TRIPLE
+from tests.validation.plants import energy
+from tests.validation.plants.legs import orthoglide
+from tests.validation.plants.machine import ORIGIN, TRIPLE
 
 ROLLED, NOMINAL = orthoglide(roll_deg=1.0), orthoglide()
 # words, start, centre, and about how far round; planes (u, v, w) of G18 and G19 are (z, x, y) and (y, z, x)

@@ -1,0 +1,1 @@
+"""The HTML report: its numbers, its words, and how a browser shows it."""

@@ -1,0 +1,1 @@
+"""Figures and behaviours of the compensation paper, end to end."""

@@ -7,8 +7,8 @@ from camcomp.compensation.program.compensate import compensate
 from camcomp.model.config.load import load_config
 from camcomp.model.control import open_program
 from camcomp.model.job import Job
-from tests.plants import energy
-from tests.plants.legs import orthoglide
+from tests.validation.plants import energy
+from tests.validation.plants.legs import orthoglide
 
 FORCE = np.array([215.0, -10.0, -25.0])
 

@@ -7,8 +7,8 @@ from camcomp.compensation.program.compensate import compensate
 from camcomp.model.config.load import load_config
 from camcomp.model.control import open_program
 from camcomp.model.job import Job
-from tests.trials.faults import Faults
-from tests.trials.machines import MACHINES
+from tests.validation.recorded.faults import Faults
+from tests.validation.recorded.machines import MACHINES
 
 ARM = MACHINES["kuka-kr210"]
 # A1 turns round on the arc, at its largest Y, and A2 at its smallest X; A5 on lines

@@ -16,7 +16,7 @@ from camcomp.diagnosis.result.types import CurveCause
 from camcomp.model.config.load import load_config
 from camcomp.model.config.write_back import with_causes
 from camcomp.model.statics.build import build_robot
-from tests.plants.arm_poses import measured
+from tests.validation.plants.arm_poses import measured
 
 STATED = StatedDeviation(tip=0.02)
 FLOOR_UM = 20.0 * np.sqrt(3.0)

@@ -12,8 +12,8 @@ from camcomp.diagnosis.arm.poses import ArmBench
 from camcomp.diagnosis.next_experiment.pose_list import pose_list
 from camcomp.diagnosis.result.types import PosesToMeasure
 from tests.commandline import camcomp, table
-from tests.plants.arm_poses import platform
-from tests.real.test_ur10 import campaigns
+from tests.validation.measured.test_ur10 import campaigns
+from tests.validation.plants.arm_poses import platform
 
 NOISE = 0.05
 

@@ -19,7 +19,7 @@ from camcomp.diagnosis.axis.study import study as axis_study
 from camcomp.ground.errors import ConfigError
 from camcomp.model.config.load import load_config
 from camcomp.model.statics.build import build_robot
-from tests.plants.arm_poses import measured
+from tests.validation.plants.arm_poses import measured
 
 
 def run(name, seed, low, high, **truth):

@@ -12,8 +12,8 @@ from camcomp.model.axes import slides_of
 from camcomp.model.config.load import load_config
 from camcomp.model.effect import Motion
 from camcomp.model.job import Job
-from tests.campaign import runner
-from tests.plants.guideways import PROGRAMS, Guideways, experiment, misses
+from tests.validation import runner
+from tests.validation.plants.guideways import PROGRAMS, Guideways, experiment, misses
 
 TOOL = 60.0
 CARTESIAN, ROUTER = "config/cartesian.yaml", "config/router.yaml"

@@ -8,11 +8,11 @@ import pytest
 
 from camcomp.ground import shelf
 from camcomp.model.effect import Motion
-from tests.campaign import runner
-from tests.plants.guideways import Guideways, experiment
-from tests.plants.motion import Timeline, read
-from tests.plants.slides import Axes
-from tests.plants.slides import experiment as slides
+from tests.validation import runner
+from tests.validation.plants.guideways import Guideways, experiment
+from tests.validation.plants.motion import Timeline, read
+from tests.validation.plants.slides import Axes
+from tests.validation.plants.slides import experiment as slides
 
 EFFECT = shelf.load("effects", "disturbance")
 

@@ -6,8 +6,8 @@ import pytest
 from camcomp.ground.errors import CamcompError
 from camcomp.model.config.load import load_config
 from camcomp.model.error_table.table import comp_text, parse_comp, parse_table
-from tests.campaign import runner
-from tests.plants.guideways import PROGRAMS, dense, misses
+from tests.validation import runner
+from tests.validation.plants.guideways import PROGRAMS, dense, misses
 
 CSV = "position_mm,forward_um,reverse_um\n-100,20,30\n0,-8,0\n40,2,12\n100,-20,-5\n"
 COMP = "0.000000 0.000000 -0.001279\n0.100000 0.098742 0.051632\n0.200000 0.171529 0.194216\n"  # LinuxCNC's own example

@@ -7,8 +7,8 @@ from camcomp.ground import shelf
 from camcomp.ground.errors import ConfigError
 from camcomp.model.config.load import load_config
 from camcomp.model.effect import Motion, nominal
-from tests.campaign import runner
-from tests.plants.slides import Axes, experiment
+from tests.validation import runner
+from tests.validation.plants.slides import Axes, experiment
 
 
 def drive(name, motion, **p):

@@ -6,9 +6,9 @@ from scipy.signal import cont2discrete, lfilter
 
 from camcomp.ground import shelf
 from camcomp.model.effect import Motion, nominal
-from tests.campaign import runner
-from tests.plants.motion import Timeline, read
-from tests.plants.slides import Axes, experiment
+from tests.validation import runner
+from tests.validation.plants.motion import Timeline, read
+from tests.validation.plants.slides import Axes, experiment
 
 STEP_S = 1e-3
 T = np.arange(2000) * STEP_S

@@ -7,8 +7,8 @@ import pytest
 
 from camcomp.ground import shelf
 from camcomp.model.effect import Axes
-from tests.campaign import runner
-from tests.plants.guideways import PROGRAMS, Guideways, experiment
+from tests.validation import runner
+from tests.validation.plants.guideways import PROGRAMS, Guideways, experiment
 
 RADIUS = 40.0
 

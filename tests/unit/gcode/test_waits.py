@@ -1,11 +1,11 @@
-"""Where a control stands still for something in front of a motion; what it does is recorded in tests/recordings/words."""
+"""Where a control stands still for something in front of a motion; what it does is recorded in tests/validation/recordings/inches_and_cycles."""
 
 import numpy as np
 import pytest
 
 from camcomp.gcode.interpret import read_program
 from camcomp.gcode.setup import Setup
-from tests.recordings import recording
+from tests.validation.recordings import recording
 
 BEGIN = "G21 G90 G64\nF600\nG1 X0 Y0 Z0\nG1 X9\n"
 
@@ -58,7 +58,7 @@ def test_the_way_to_a_hole_begins_at_rest_behind_a_dwell_at_its_bottom():
 
 def test_linuxcnc_stands_still_there_and_nowhere_else():
     """But for a message, which is a remark to others: it waits for that, too."""
-    with recording.taken_from("words"):
+    with recording.taken_from("inches_and_cycles"):
         found = recording.load("rests-fast")
     path = read_program(found.program.encode(), name="rests", setup=Setup(start_mm=tuple(found.tip[0].tolist()))).path
     texts = found.program.splitlines()

@@ -22,7 +22,7 @@ from camcomp.model.statics.build import build_robot
 from camcomp.terminal import progress
 from camcomp.terminal.cli import run
 from tests.commandline import ROOT
-from tests.plants.arm_poses import measured
+from tests.validation.plants.arm_poses import measured
 
 WORDS = ["compensate", str(ROOT / "samples/groove-circle-2.nc"), "--config", str(ROOT / "config/cartesian.yaml")]
 

@@ -12,7 +12,7 @@ from camcomp.model.statics.closedform import closed_form
 from camcomp.model.statics.description import Transform
 from camcomp.model.statics.rigid import OUT_OF_REACH
 from camcomp.model.statics.solve import FREE, INVERSE, solve
-from tests.plants import kuka, serial
+from tests.validation.plants import kuka, serial
 
 
 @pytest.fixture(scope="module")

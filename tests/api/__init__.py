@@ -1,0 +1,1 @@
+"""Tests of the Python interface, as a script and as a notebook use it."""

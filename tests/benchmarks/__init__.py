@@ -1,0 +1,1 @@
+"""Times and memory of commands, run by `pytest -m benchmarks`."""

@@ -1,0 +1,120 @@
+"""What camcomp says of logs of axes by a generator that was written from the contract alone: what it has shown."""
+
+import json
+
+import pytest
+
+from tests.validation.axes.make import make
+from tests.validation.scoring import ask, judge, library
+
+
+def judged(folder, seed):
+    make(seed, folder, None)
+    truth = json.loads((folder / "truth" / f"e-{seed}.json").read_text())
+    result = ask(folder / f"e-{seed}" / "experiment.yaml")
+    return result, judge(result, truth, library())
+
+
+HEALTHY = {
+    31005: "axes that stand beside others: their columns were taken for exchanged",
+    31010: "lost rows and a coarse encoder: accelerations were off by what cubics made of the gaps",
+    31020: "single rows of 40 um while the axis moves",
+    31025: "inertia fitted to the noise of encoders in slow runs, told to a fast one",
+}
+
+
+@pytest.mark.parametrize("seed", [pytest.param(k, marks=() if k == 31005 else pytest.mark.campaign) for k in HEALTHY])
+def test_an_axis_with_nothing_wrong(tmp_path, seed):
+    result, _ = judged(tmp_path, seed)
+    assert (result["verdict"], result["causes"]) == ("none", []), HEALTHY[seed]
+
+
+WRONG = {
+    31013: "a loop that swings over, in a log that begins while the axis moves",
+    31018: "a push for a while: it was unknown",
+    31021: "one lag of all axes",
+    31028: "friction, whose sense cubics turned round before every stop",
+    31031: "a lag at one speed, which a reversal explains nearly as well",
+    34011: "a loop that swings over: forces belong to what it makes of the set-points",
+    34012: "friction that differs between the ways, on an axis that goes down and up once",
+    37016: "a push that chose how smooth the motion is taken to be",
+    37018: "a push of the run that is held out",
+    37027: "a loop that swings over in two runs of four; in the others its axis stands",
+    37041: "what a loop makes of a push",
+    37043: "a push that begins and ends at once, where the axis was that time only",
+    37051: "friction that turns round behind a spring",
+    37057: "one short move in a log of one run",
+    35036: "a loop that swings over and looks late on average",
+    35041: "a clock that trembles, of an axis that rests most of the time",
+    38007: "a loop that swings over, of which its steady sine shows the inertia only",
+    38022: "a push in the middle of friction",
+    38026: "a clock that trembles",
+    37026: "friction of a hundred times the noise, whose shape is known to a hundredth",
+    45026: "friction of an axis that moves in one of four runs, of which the others foretell nothing",
+    39028: "friction that turns round otherwise where the axis creeps back a little than where it turns",
+    50012: "friction of an axis that stops after it crept back a thousandth of a millimetre",
+    50017: "a lag that differs between the ways by a quarter of the floor",
+    50026: "a stretch of an axis that stands in which noise has heavier tails",
+    37052: "the same on two axes, where reversals fall between two rows",
+}
+
+
+IN_CI = (31018, 31031, 37016, 37026, 37051, 39028)
+
+
+@pytest.mark.parametrize("seed", [pytest.param(k, marks=() if k in IN_CI else pytest.mark.campaign) for k in WRONG])
+def test_an_axis_with_something_wrong(tmp_path, seed):
+    result, row = judged(tmp_path, seed)
+    assert result["verdict"] == "identified" and row["all"] and not row["false_cause"], WRONG[seed]
+
+
+@pytest.mark.campaign
+def test_a_cable_at_the_end_of_the_travel_is_no_push(tmp_path):
+    """The axis was there once: it may be the place as well as the time."""
+    result, row = judged(tmp_path, 33044)
+    assert result["verdict"] == "unknown" and not row["false_cause"]
+
+
+@pytest.mark.parametrize("seed", [34009, pytest.param(52049, marks=pytest.mark.campaign)])
+def test_a_lag_that_differs_between_the_ways_is_unknown_beside_the_lag(tmp_path, seed):
+    """Nothing rubs there: a loop has no way that it likes better. By less than a hundredth of the lag, but twice the floor, too."""
+    result, row = judged(tmp_path, seed)
+    assert result["verdict"] == "unknown" and row["all"] and not row["false_cause"]
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("seed", [37024, 39034, 50014, 50059])
+def test_what_takes_a_part_of_something_unknown_is_not_sure(tmp_path, seed):
+    """Friction that fades, of which a loop that swings over takes a third; an end stop that two pushes are made of; a drag of
+    which a loop that creeps takes some; play in the loop, told as friction that would push at speed.
+    """
+    result, row = judged(tmp_path, seed)
+    assert result["verdict"] == "unknown" and not row["false_cause"]
+
+
+RESTS = {
+    39004: ("time:y", "friction that fades while a run goes on"),
+    39029: ("position:y", "a loop whose gain depends on the place"),
+    39039: ("acceleration:y", "forces of another axis on this one's"),
+    39059: ("reversal:x", "play inside the loop"),
+}
+
+
+@pytest.mark.parametrize("seed", [pytest.param(k, marks=() if k == 39039 else pytest.mark.campaign) for k in RESTS])
+def test_what_the_rest_depends_on_is_named(tmp_path, seed):
+    result, row = judged(tmp_path, seed)
+    covariate, fault = RESTS[seed]
+    drivers = result["where"]["drivers"]
+    assert result["verdict"] == "unknown" and not row["false_cause"], fault
+    assert drivers and drivers[0]["covariate"] == covariate, fault
+    if covariate == "acceleration:y":
+        assert "of z when it moves alone, it goes with how y moves" in result["next_experiment"]["outcomes"][0]
+
+
+@pytest.mark.campaign
+def test_a_drag_that_grows_with_speed_is_neither_friction_that_pushes_nor_surely_a_lag(tmp_path):
+    """Friction of -55 N and a viscous part fitted its forces; what its loop makes of it is a lag in the main."""
+    result, row = judged(tmp_path, 39014)
+    assert result["verdict"] == "unknown" and not row["false_cause"]
+    assert "friction" not in [cause["effect"] for cause in result["causes"]]
+    assert "velocity:z" in [each["covariate"] for each in result["where"]["drivers"]]

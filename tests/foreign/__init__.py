@@ -1,1 +1,0 @@
-"""Truth made by others: generators that were written from the contract alone."""

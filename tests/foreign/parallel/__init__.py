@@ -1,1 +1,0 @@
-"""Parallel machines (Orthoglide, linear delta, 3-PUU): experiments whose causes are known."""

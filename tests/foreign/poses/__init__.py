@@ -1,1 +1,0 @@
-"""Blind experiments of static poses of arms, written from the contract alone."""

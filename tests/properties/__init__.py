@@ -1,0 +1,1 @@
+"""Properties that hold for random programs and for files changed at random."""

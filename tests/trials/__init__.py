@@ -1,1 +1,0 @@
-"""Trials of `camcomp diagnose`: motion from LinuxCNC's own planner, a tip from a plant that shares nothing with camcomp."""

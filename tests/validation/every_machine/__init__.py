@@ -1,0 +1,1 @@
+"""Every effect of the library on every shipped machine, simulated by camcomp itself."""

@@ -1,0 +1,1 @@
+"""Measured data sets of real machines, and their textbook opponents."""

@@ -1,0 +1,1 @@
+"""Experiments on parallel machines (Orthoglide, linear delta, 3-PUU); written from the contract alone."""

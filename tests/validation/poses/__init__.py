@@ -1,0 +1,1 @@
+"""Static poses of arms; written from the contract alone."""

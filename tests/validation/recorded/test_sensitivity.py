@@ -1,0 +1,20 @@
+"""The bench that halves and doubles constants tells one that decides from one that does not."""
+
+from tests.validation.recorded import sensitivity
+
+
+def test_a_constant_that_decides_is_told_from_one_that_does_not_and_from_one_that_is_not_met(tmp_path, monkeypatch):
+    gate, listed, milled = (
+        ("axis.block_least_squares", "LEAST_Z"),
+        ("axis.plausible", "NEAR"),
+        ("search.cause_search", "GATE"),
+    )
+    for name in ("SET", "AXES", "POSES"):
+        monkeypatch.setattr(sensitivity, name, ())
+    monkeypatch.setattr(sensitivity, "FACTORS", (1.0, 1e6))
+    (axis, _) = sensitivity.written(tmp_path)
+    bench = sensitivity.Bench([gate, listed, milled])
+    bench.ask(axis)
+    assert bench.usual[axis].startswith("unknown friction(x) servo_lag(x)")
+    assert (bench.met[gate], bench.met[listed], bench.met[milled]) == (1, 1, 0)
+    assert bench.changed[gate] == [0, 1]

@@ -1,0 +1,322 @@
+"""One answer of `camcomp diagnose` against the truth, and rates over many with Wilson's intervals."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+import os
+import tempfile
+import time
+from collections.abc import Callable
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tests.validation.recorded import added_faults, metamorphic
+
+NAMED = 0.3  # of the noise: a cause of at least this size may be named
+DUE = 2.7  # from which on it has to be: what was made as 3
+SURE = 0.8
+KNOWN_AS = {
+    "disturbed_drive": "disturbance",
+    **added_faults.KNOWN_AS,
+}  # strange faults that the tool has learnt to name
+# what control does wrong shows nowhere where no set-points are logged: encoders are the motion then
+WITHOUT_SETPOINTS, OF_CONTROL = ("no-setpoints", "no cmd", "no_cmd"), ("servo_lag", "servo_overshoot")
+Row = dict[str, Any]
+Pair = tuple[str, str | None]
+
+
+def ask(experiment: Path) -> Row:
+    """The result JSON, run in this process; `failed` when there is none."""
+    from camcomp.terminal.cli import run as camcomp
+
+    said = io.StringIO()
+    with tempfile.TemporaryDirectory() as folder:
+        answer = Path(folder) / "result.json"
+        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
+            code = camcomp(["diagnose", str(experiment), "--json", str(answer)])
+        if not answer.exists():
+            return {"failed": f"exit {code}: {said.getvalue().strip()[-300:]}"}
+        return json.loads(answer.read_text())
+
+
+def library() -> set[str]:
+    """Names of all effects that the tool has."""
+    from camcomp.terminal.cli import run as camcomp
+
+    said = io.StringIO()
+    with contextlib.redirect_stdout(said):
+        camcomp(["effects", "--json"])
+    return {each["effect"] for each in json.loads(said.getvalue())}
+
+
+def held(cause: Row, truth: dict[str, float]) -> list[bool]:
+    """Whether each interval of a named cause holds the true value."""
+    out = []
+    for name, value in truth.items():
+        got = cause.get("parameters", {}).get(name)
+        if got and got.get("ci95"):
+            low, high = got["ci95"]
+            turn = 2 * np.pi
+            value = value + turn * round((got["value"] - value) / turn) if name.startswith("phase") else value
+            if name == "offset_s":  # which of two clocks is ahead of the other, the contract leaves open
+                value = float(np.copysign(value, got["value"]))
+            out.append(bool(low <= value <= high))
+    return out
+
+
+def _by_its_name(cause: Row, known: set[str]) -> Row:
+    """A true cause as the library calls it; strange: whether the library has none such, though it may have the name for another thing."""
+    name = KNOWN_AS.get(cause["effect"], cause["effect"])
+    own = cause.get("strange", False) and cause["effect"] not in KNOWN_AS
+    return {**cause, "effect": name, "strange": own or name not in known}
+
+
+def judge(result: Row, truth: Row, known: set[str]) -> Row:
+    """What was right; keys that do not apply are missing."""
+    hidden = OF_CONTROL if truth["channels"] in WITHOUT_SETPOINTS else ()
+    real = [_by_its_name(c, known) for c in truth["causes"] if c["ratio"] >= NAMED]
+    real = [c for c in real if c["effect"] not in hidden]
+    true = {(c["effect"], c["target"]) for c in real if not c["strange"]}
+    due = {(c["effect"], c["target"]) for c in real if not c["strange"] and c["ratio"] >= DUE}
+    foreign = [c for c in real if c["strange"]]
+    out: Row = {"ratio": min((c["ratio"] for c in real), default=0.0), "true": sorted(map(str, true))}
+    out |= {
+        "foreign": [c["effect"] for c in foreign],
+        "left": min((c.get("left_ratio", 0.0) for c in foreign), default=0.0),
+    }
+    if "failed" in result:
+        return out | {"failed": result["failed"]}
+    causes = [c for c in result["causes"] if c["effect"] != "unknown"]
+    found = [(c["effect"], c["target"]) for c in causes]
+    sets = [_pairs(one) for one in result["alternatives"]]
+    out |= {
+        "verdict": result["verdict"],
+        "found": [[*pair, c.get("probability")] for pair, c in zip(found, causes, strict=True)],
+    }
+    gap, floor = result["gap"], result.get("floor") or {}
+    out |= {
+        "gap_um": gap["rms_um"],
+        "floor_um": floor.get("um", gap.get("noise_floor_um")),
+        "source": floor.get("source"),
+    }
+    out["unknown"], out["none"] = result["verdict"] == "unknown", result["verdict"] == "none"
+    if true:
+        out["first"] = bool(found) and found[0] in true
+        out["first_or_class"] = out["first"] or any(true <= one for one in sets)
+        out["all"] = due <= set(found) or any(due <= one for one in sets)
+    out["due"] = sorted(map(str, due))
+    sure = [(pair, c.get("probability") or 0.0) for pair, c in zip(found, causes, strict=True)]
+    fair = true | may_be_named(truth)
+    out["false_cause"] = any(pair not in fair and p > 0.5 for pair, p in sure)
+    out["sure_and_wrong"] = any(pair not in fair and p > SURE for pair, p in sure)
+    out["calibration"] = [[p, pair in fair] for pair, p in sure]
+    if "allowed_verdicts" in truth:
+        whole = [_pairs(one) for one in truth["allowed_sets"]]
+        found_one = not whole or out["unknown"] or any(one <= named for one in whole for named in (set(found), *sets))
+        out["honest"] = result["verdict"] in truth["allowed_verdicts"] and found_one and not out["sure_and_wrong"]
+    out["held"] = [
+        hit
+        for cause, pair in zip(causes, found, strict=True)
+        for c in real
+        if pair == (c["effect"], c["target"])
+        for hit in held(cause, c["parameters"])
+    ]
+    return out
+
+
+def may_be_named(truth: Row) -> set[Pair]:
+    """What does the same as the true causes within the noise, where a truth says so."""
+    out = {(effect, target) for effect, target in truth.get("may_be_named", [])}
+    for one in (truth.get("allowed_beside", []), *truth.get("allowed_sets", [])):
+        out |= _pairs(one)
+    return out
+
+
+def _pairs(members: list[Row]) -> set[Pair]:
+    return {(m["effect"], m["target"]) for m in members}
+
+
+def trial(task: tuple[str, str, set[str]]) -> Row:
+    """Asks and judges one experiment."""
+    folder, answer, known = Path(task[0]), Path(task[1]), task[2]
+    truth = json.loads(answer.read_text())
+    row: Row = {"name": folder.name, **{k: truth[k] for k in ("kind", "machine", "channels", "noise_um", "small_um")}}
+    begin = time.perf_counter()
+    try:
+        result = ask(folder / "experiment.yaml")
+    except Exception as error:  # noqa: BLE001 - a crash is counted, not hidden
+        result = {"failed": f"{type(error).__name__}: {error}"[:300]}
+    return row | {"seconds": time.perf_counter() - begin} | judge(result, truth, known)
+
+
+def run(folder: Path, results: Path, jobs: int, only: tuple[str, ...] = ()) -> list[Row]:
+    """Judges every experiment below `folder` that `results` (JSON lines) does not hold yet; all rows."""
+    done = map(json.loads, results.read_text().splitlines()) if results.exists() else ()
+    rows = {row["name"]: row for row in done if "failed" not in row}
+    known = library()
+    answers = sorted((folder / "truth").glob("*.json"))
+    todo = [
+        (str(folder / a.stem), str(a), known) for a in answers if a.stem not in rows and (not only or a.stem in only)
+    ]
+    for name in ("NUMBA_NUM_THREADS", "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
+    with results.open("a") as out, get_context("spawn").Pool(jobs, maxtasksperchild=50) as pool:
+        for row in pool.imap_unordered(trial, todo):
+            rows[row["name"]] = row
+            out.write(json.dumps(row) + "\n")
+            out.flush()
+    return [rows[name] for name in sorted(rows)]
+
+
+def laws(folder: Path, work: Path, names: list[str], seed: int) -> list[Row]:
+    """Every law of those names tried on the experiment in a folder, the changed ones below `work`."""
+    files, out = metamorphic.read(folder), []
+    before = ask(metamorphic.write(files, work / "as it is"))
+    for name in (each for each in names if metamorphic.applies(each, files)):
+        less = name in metamorphic.LESS
+        changed, labels = (metamorphic.LESS if less else metamorphic.SAME)[name](
+            files, np.random.default_rng([seed, 7])
+        )
+        after = ask(metamorphic.write(changed, work / name))
+        row: Row = {"name": folder.name, "law": name, "less": less, "before": before.get("verdict")}
+        failed = "failed" in before or "failed" in after
+        if failed:
+            row |= {"failed": True, "said": after.get("failed", before.get("failed"))}
+        elif less:
+            row |= {"another": metamorphic.another_cause(before, after), "surer": metamorphic.surer(before, after)}
+            row |= {
+                "said": f"{before['verdict']} {metamorphic.named(before)} -> {after['verdict']} {metamorphic.named(after)}"
+            }
+        else:
+            row |= {"said": metamorphic.differences(before, after, labels, turned=name == "turned frame")}
+        out.append(row)
+    return out
+
+
+def render_laws(rows: list[Row]) -> str:
+    """How often each law was broken."""
+    lines = []
+    for name in [*metamorphic.LESS, *metamorphic.SAME]:
+        some = [row for row in rows if row["law"] == name]
+        good = [row for row in some if "failed" not in row]
+        opened = [row for row in good if row["before"] in ("unknown", "ambiguous")]
+        if name in metamorphic.LESS:
+            broken = f"another cause {sum(r['another'] for r in good)}, of {len(opened)} open ones closed {sum(r['surer'] for r in opened)}"
+        else:
+            broken = f"changed {sum(bool(r['said']) for r in good)}"
+        lines.append(f"{name:<18} {len(some):4d} tried, {len(some) - len(good)} failed, {broken}")
+    return "\n".join(lines)
+
+
+def wilson(hits: int, total: int, z: float = 1.96) -> tuple[float, float]:
+    """Interval (95 %) of a rate."""
+    if total == 0:
+        return 0.0, 1.0
+    p, n = hits / total, total
+    middle, half = p + z * z / (2 * n), z * np.sqrt(p * (1 - p) / n + z * z / (4 * n * n))
+    return float((middle - half) / (1 + z * z / n)), float((middle + half) / (1 + z * z / n))
+
+
+def calibration_error(pairs: np.ndarray) -> float:
+    """Of probabilities and whether they came true (n, 2): their mean distance in ten bins."""
+    bins = np.clip((pairs[:, 0] * 10).astype(int), 0, 9)
+    return sum(abs(pairs[bins == b, 0].sum() - pairs[bins == b, 1].sum()) for b in range(10)) / len(pairs)
+
+
+def render(rows: list[Row]) -> str:
+    """Rates as a table."""
+    lines = []
+
+    def rate(name: str, chosen: list[Row], key: str | Callable[[Row], bool]) -> None:
+        pick = key if callable(key) else (lambda row: bool(row[key]))
+        hits, total = sum(pick(row) for row in chosen), len(chosen)
+        low, high = wilson(hits, total)
+        lines.append(
+            f"{name:<52} {hits:4d} / {total:<4d} {hits / total if total else float('nan'):6.3f} [{low:.3f}, {high:.3f}]"
+        )
+
+    good = [row for row in rows if "failed" not in row]
+    complete = [r for r in good if not r["foreign"]]
+    foreign = [r for r in good if r["foreign"]]
+    alone = [r for r in complete if len(r["true"]) == 1 and r["kind"] != "imperfect"]
+    rate("failed", rows, lambda row: "failed" in row)
+    rate("null: verdict none (0.95)", [r for r in complete if not r["true"]], "none")
+    rate("one cause below 2.7 x noise: first or in class", [r for r in alone if r["ratio"] < DUE], "first_or_class")
+    rate("one cause from 2.7 x noise on: the same (0.95)", [r for r in alone if r["ratio"] >= DUE], "first_or_class")
+    rate("pairs: all named (0.85)", [r for r in complete if r["kind"] == "pair" and len(r["due"]) > 1], "all")
+    rate("imperfect model: all from 2.7 x noise on named", [r for r in complete if r["kind"] == "imperfect"], _all_due)
+    rate("unknown named unknown (0.90)", foreign, "unknown")
+    rate("the same where the library leaves >= 1 x noise", [r for r in foreign if r["left"] >= 1], "unknown")
+    beside = [r for r in foreign if r["true"]]
+    rate("a cause beside something unknown: named", beside, "all")
+    rate("complete library: false unknown (0.03)", complete, "unknown")
+    told = [r for r in good if "honest" in r]
+    if told:
+        rate("an answer that its truth allows", told, "honest")
+    rate("a false cause at p > 0.5 (0.02)", good, "false_cause")
+    rate("sure (p > 0.8) and wrong (0.01)", good, "sure_and_wrong")
+    held_ = [{"hit": hit} for row in good for hit in row["held"]]
+    rate("95 % intervals that hold (0.90 to 0.98)", held_, "hit")
+    pairs = np.array([pair for row in good for pair in row["calibration"] if pair[0]], float).reshape(-1, 2)
+    if len(pairs):
+        missed = calibration_error(pairs)
+        drawn = np.random.default_rng(0).random((200, len(pairs))) < pairs[:, 0]
+        chance = np.mean([calibration_error(np.column_stack([pairs[:, 0], each])) for each in drawn])
+        name = "expected calibration error (0.05)"
+        lines.append(f"{name:<52} {missed:.3f} of {len(pairs)}, {chance:.3f} if they were right")
+    for name, key in (("gap", "gap_um"), ("floor", "floor_um"), ("seconds", "seconds")):
+        values = [row[key] for row in good if row.get(key) is not None]
+        if values:
+            q = np.percentile(values, [10, 50, 90])
+            lines.append(f"{name:<52} {q[0]:.1f} {q[1]:.1f} {q[2]:.1f} (10, 50, 90 %)")
+    return "\n".join(lines)
+
+
+def _all_due(row: Row) -> bool:
+    """Whether all that has to be named is; nothing has to be where everything is small."""
+    return bool(row["all"]) if row["due"] else not row["unknown"]
+
+
+def right(row: Row) -> bool:
+    """Whether an answer is the one that its kind asks for, with nothing false beside it."""
+    if "failed" in row or row["false_cause"] or row["unknown"] != bool(row["foreign"]):
+        return False
+    if row["foreign"]:
+        return not row["true"] or bool(row["all"])
+    if not row["true"]:
+        return bool(row["none"])
+    if row["kind"] in ("pair", "imperfect"):
+        return _all_due(row)
+    return bool(row["first_or_class"])
+
+
+def by_machine(rows: list[Row]) -> str:
+    """Right answers of every machine and kind, with Wilson's intervals, as a table in Markdown."""
+    kinds = sorted({row["kind"] for row in rows})
+    lines = ["| machine | " + " | ".join(kinds) + " |", "|---|" + "---|" * len(kinds)]
+    for machine in sorted({row["machine"] for row in rows}):
+        cells = []
+        for kind in kinds:
+            mine = [row for row in rows if (row["machine"], row["kind"]) == (machine, kind)]
+            hits = sum(map(right, mine))
+            low, high = wilson(hits, len(mine))
+            cells.append(f"{hits} of {len(mine)} ({low:.2f} to {high:.2f})" if mine else "")
+        lines.append(f"| {machine} | " + " | ".join(cells) + " |")
+    return "\n".join(lines)
+
+
+def listing(rows: list[Row]) -> str:
+    """One line per answer."""
+    out = []
+    for r in rows:
+        said = (
+            r.get("failed")
+            or f"{r['verdict']:<10} gap {r['gap_um'] or 0:8.1f} floor {r['floor_um'] or 0:6.1f} {r['found'][:3]}"
+        )
+        out.append(f"{r['name']} {r['kind']:<9} {r['true']} {r['foreign']} x{r['ratio']:.1f} -> {said}")
+    return "\n".join(out)

@@ -1,0 +1,1 @@
+"""Experiments on serial machines (router, arm, Cartesian); written from the contract alone."""
