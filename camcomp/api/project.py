@@ -93,9 +93,9 @@ def start_project(
 
 
 def write_tutorial(directory: Path) -> list[Path]:
-    """Writes samples, machine files and the tutorial into a folder, where its commands run. Raises FileError CC501."""
+    """Writes samples, machine files and documentation into a folder, where its commands run. Raises FileError CC501."""
     outputs: dict[Path, bytes] = {}
-    for folder in ("config", "samples"):
+    for folder in ("config", "docs", "samples"):
         root = shipped(folder)
         for path in sorted(root.rglob("*")):
             inside = path.relative_to(root)

@@ -209,7 +209,7 @@ def _lock(handle: int) -> None:
 
 
 def shipped(name: str) -> Path:
-    """Path of a file of `config/` or `samples/`, in a checkout as in an installed camcomp. Raises FileError CC500."""
+    """Path of a file of `config/`, `samples/` or `docs/`, in a checkout as in an installed camcomp. Raises FileError CC500."""
     package = Path(__file__).parent.parent
     for root in (package / "data", package.parent):
         if (root / name).exists():

@@ -413,7 +413,7 @@ RULES: dict[str, Rule] = {
         "formula not readable",
         "The formula of a law is made of numbers, + - * / ^, brackets, a few functions and the covariates that are known where "
         "it acts; their names end in their units. Nothing else can be said in it.",
-        "the functions and covariates stand in camcomp/data/library.md",
+        "docs/reference/library.md lists functions and covariates",
     ),
     "CC291": Rule(
         "map not usable",
@@ -489,8 +489,8 @@ RULES: dict[str, Rule] = {
     ),
     "CC401": Rule(
         "column missing in a log",
-        "A log needs `t_s`, and what is not named as the README says is not read.",
-        "name the columns as in the README: t_s, line, x_mm, cmd_x_mm, act_x_mm, act_x_N, fx_N, temp_C",
+        "A log needs `t_s`, and a column with another name is not read.",
+        "name the columns as docs/reference/log-columns.md does: t_s, line, x_mm, cmd_x_mm, act_x_mm, act_x_N, fx_N, temp_C",
     ),
     "CC402": Rule(
         "run without program",
@@ -555,7 +555,7 @@ RULES: dict[str, Rule] = {
         "too little to study",
         "Logs without a program are studied as static poses of an arm (joint angles and measured tips) or as axes "
         "(set-points or drive forces with encoders). What is there is too little for either.",
-        "see the README for the columns of a log",
+        "docs/reference/log-columns.md lists the columns of a log",
     ),
     "CC421": Rule(
         "column not found",

@@ -49,14 +49,13 @@ def built(tmp_path_factory):
 
 def test_the_wheel_holds_all_that_is_needed_and_nothing_else(built):
     names = set(zipfile.ZipFile(built[0]).namelist())
-    for folder in ("config", "samples"):
+    for folder in ("config", "docs", "samples"):
         files = subprocess.run(["git", "ls-files", folder], check=True, cwd=ROOT, capture_output=True, text=True).stdout
         assert files
         assert {f"camcomp/data/{each}" for each in files.splitlines()} <= names
     for each in (
         "report/assets/page.css",
         "report/assets/page.js",
-        "data/commands.md",
         "effects/backlash.py",
         "py.typed",
     ):

@@ -1,7 +1,10 @@
 """What the documents say is true: their commands run, and print what they promise."""
 
+import importlib.util
 import re
 import shutil
+import subprocess
+import sys
 
 import pytest
 
@@ -14,7 +17,10 @@ from camcomp.terminal.key_reference import ROOTS, rows, sections
 from tests.documents import ROOT, Command, Reader, TypedFile, missing, steps, text_blocks
 
 README = (ROOT / "README.md").read_text(encoding="utf-8")
-HOWTOS = sorted((ROOT / "samples/howto").glob("*.md"))
+DOCS = ROOT / "docs"
+FOLLOWED = sorted(
+    path for path in DOCS.rglob("*.md") if any(isinstance(each, Command) for each in steps(path.read_text("utf-8")))
+)
 
 
 @pytest.fixture
@@ -23,8 +29,11 @@ def reader(tmp_path):
     return Reader(tmp_path / "folder", tmp_path / "tools")
 
 
-@pytest.mark.parametrize("path", HOWTOS, ids=lambda path: path.stem)
-def test_a_howto_is_followed(path, reader):
+@pytest.mark.parametrize("path", FOLLOWED, ids=lambda path: path.relative_to(DOCS).as_posix())
+def test_commands_of_a_page_print_what_stands_there(path, reader):
+    """They run in a folder that holds config and samples."""
+    for name in ("config", "samples"):
+        shutil.copytree(ROOT / name, reader.folder / name)
     reader.follow(path.read_text(encoding="utf-8"))
 
 
@@ -34,8 +43,8 @@ def test_the_tutorial_is_followed(reader):
     reader.follow((ROOT / "samples/tutorial.md").read_text(encoding="utf-8"))
 
 
-def test_every_shelf_has_a_howto():
-    assert [path.stem for path in HOWTOS] == ["dialect", "effect", "force-model", "machine"]
+def test_every_kind_of_plug_in_has_a_page():
+    assert {"dialect.md", "effect.md", "force-model.md", "machine.md"} <= {path.name for path in FOLLOWED}
 
 
 def test_the_readme_is_followed(reader):
@@ -107,11 +116,63 @@ def test_the_changelog_is_in_form():
     assert "dev" in __version__ or f"{__version__} - " in "".join(heads[1:])
 
 
-def test_links_of_documents_lead_somewhere():
-    for path in (ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(ROOT / "samples").rglob("*.md")):
-        for target in re.findall(r"\]\(([^)#]+)[^)]*\)", path.read_text(encoding="utf-8")):
-            if "://" not in target:
-                assert (path.parent / target).exists(), f"{path.name}: {target}"
+def anchors(path):
+    """Fragments that headings of a page can be reached by."""
+    text = re.sub(r"^```.*?^```$", "", path.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
+    heads = re.findall(r"^#+ (.*)$", text, re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", each.lower()).strip().replace(" ", "-") for each in heads}
+
+
+PAGES = [
+    ROOT / "README.md",
+    ROOT / "CONTRIBUTING.md",
+    *sorted(DOCS.rglob("*.md")),
+    *sorted((ROOT / "samples").rglob("*.md")),
+]
+
+
+@pytest.mark.parametrize("path", PAGES, ids=lambda path: path.relative_to(ROOT).as_posix())
+def test_links_of_a_page_lead_somewhere(path):
+    text = re.sub(r"^```.*?^```$", "", path.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
+    for target, fragment in re.findall(r"\]\(([^)#]*)#?([^)]*)\)", text):
+        if "://" in target:
+            continue
+        other = path.parent / target if target else path
+        assert other.exists(), target
+        assert not fragment or fragment in anchors(other), f"{target}#{fragment}"
+
+
+@pytest.mark.parametrize("path", sorted(DOCS.rglob("*.md")), ids=lambda path: path.relative_to(DOCS).as_posix())
+def test_pages_of_the_documentation_link_to_pages_only(path):
+    """What is not under docs/ or a page of samples/ is named and not linked: the built site has only these."""
+    for target in re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", path.read_text(encoding="utf-8")):
+        other = (path.parent / target).resolve()
+        inside = other.is_relative_to(DOCS) or (other.is_relative_to(ROOT / "samples") and other.suffix == ".md")
+        assert inside, target
+
+
+def test_every_folder_of_the_documentation_has_an_index():
+    for folder in {path.parent for path in DOCS.rglob("*.md")}:
+        assert (folder / "index.md").exists(), folder
+
+
+@pytest.mark.skipif(importlib.util.find_spec("mkdocs") is None, reason="the extra docs is not installed")
+def test_the_site_is_built_without_a_warning(tmp_path):
+    words = [
+        sys.executable,
+        "-W",
+        "ignore",
+        "-m",
+        "mkdocs",
+        "build",
+        "--strict",
+        "--quiet",
+        "--site-dir",
+        tmp_path / "site",
+    ]
+    done = subprocess.run(words, check=False, cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert (tmp_path / "site/tutorial/diagnosis/index.html").exists()
 
 
 def test_the_readme_knows_every_command():

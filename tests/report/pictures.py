@@ -8,7 +8,7 @@ from camcomp.terminal.cli import run
 from tests.commandline import ROOT
 from tests.report.browser import Browser
 
-FOLDER = ROOT / "samples/pictures"
+FOLDER = ROOT / "docs/pictures"
 SIZE = (1000, 900)
 PAGES = {
     "compensation": (

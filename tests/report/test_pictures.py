@@ -32,4 +32,4 @@ def test_pictures_can_be_made_anew_and_look_as_large_as_those_that_are_shown(tmp
 def test_the_readme_shows_them_all():
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
     for path in pictures.FOLDER.glob("*.png"):
-        assert f"(samples/pictures/{path.name})" in readme
+        assert f"(docs/pictures/{path.name})" in readme

@@ -357,7 +357,7 @@ def test_init_refuses_what_it_cannot_start_from(printed, tmp_path):
 def test_the_tutorial_is_written_with_all_that_it_needs(printed, tmp_path):
     new = tmp_path / "tutorial"
     printed("tutorial", new)
-    for folder in ("config", "samples"):
+    for folder in ("config", "docs", "samples"):
         shown = {each.relative_to(new) for each in (new / folder).rglob("*") if each.is_file()}
         listed = subprocess.run(
             ["git", "ls-files", folder], check=True, cwd=ROOT, capture_output=True, text=True

@@ -1,0 +1,1 @@
+"""How the documentation is built: hooks of MkDocs and the scripts that make its drawings."""
