@@ -1,5 +1,6 @@
 """Fanuc 0i/30i milling and controls that follow it (Haas, Mitsubishi, Mazak EIA): custom macro B, M98/M99, G65."""
 
+from camcomp.gcode.codes import EXACT_STOP_ONCE
 from camcomp.gcode.dialect import Dialect
 from camcomp.gcode.spelling import FANUC
 
@@ -23,7 +24,18 @@ DIALECT = Dialect(
     ),
     spelling=FANUC,
     flow="macro",
-    more={541: 12, 650: 0, 740: 1, 90: 0, 600: 13, 620: 13, 630: 13},
+    more={541: 12, 650: 0, 740: 1, 760: 1, 90: EXACT_STOP_ONCE, 620: 13, 630: 13},
+    reasons={
+        70: ("CC106", "hypothetical axis interpolation, which camcomp does not follow"),
+        **dict.fromkeys((120, 130, 1500), ("CC106", "a pocket cycle of Haas, which camcomp does not follow")),
+        440: ("CC106", "a negative tool length offset, which camcomp does not follow"),
+        **dict.fromkeys((450, 460, 470, 480), ("CC106", "a tool offset along the axes, which camcomp does not follow")),
+        600: ("CC106", "positioning from one side, which camcomp does not follow"),
+        **dict.fromkeys((660, 661), ("CC124", "a modal call, which camcomp does not follow")),
+        **dict.fromkeys((700, 710, 720), ("CC106", "a pattern of holes on Haas, and no code of Fanuc milling")),
+        **dict.fromkeys((721, 722), ("CC118", "a copy of a figure, turned or moved")),
+        **dict.fromkeys((842, 843), ("CC120", "rigid tapping of the older format, which camcomp does not follow")),
+    },
     without=frozenset((281, 301, 431, 901, 911, 591, 592, 593, 921, 922, 923, 611)),
     passed=frozenset((50, 51, 80, 110, 230, 670, 1130, 1870)),
     turns=False,
@@ -31,6 +43,7 @@ DIALECT = Dialect(
     increments=True,
     machine_moves_rapid=True,
     home_beside_motion=True,
+    numbered_homes=frozenset(((30, ""),)),
     dwell="PXU",
     dwell_p_s=1e-3,
     modal_length=True,

@@ -3,7 +3,7 @@
 import math
 from typing import NoReturn
 
-from camcomp.gcode.codes import CANCELS, GROUPS_M, KNOWN_M, SAVES, code_name
+from camcomp.gcode.codes import CALLS_M, CANCELS, GROUPS_M, KNOWN_M, SAVES, code_name
 from camcomp.gcode.dialect import Dialect
 from camcomp.gcode.naming import named
 from camcomp.gcode.program import Rebase
@@ -111,9 +111,9 @@ class BlockReader:
             self.refuse("CC106", f"G{word.value:g} is not a code", word)
         code = round(tenths)
         block.g.append((code, word))
-        if code in self.dialect.passed or code in CANCELS:
+        if code in self.dialect.passed or (code in CANCELS and code not in self.dialect.without):
             return
-        if code in self._refused:
+        if code in self._refused and code not in self.dialect.without:
             rule, what = self._refused[code]
             self.refuse(rule, f"{code_name(code)} is {what}", word)
         group = self._groups.get(code)
@@ -136,12 +136,14 @@ class BlockReader:
         code = round(word.value)
         if code in SAVES:
             self.refuse("CC135", f"M{code} saves or restores modes, which camcomp does not follow", word)
+        if code in CALLS_M:
+            self.refuse("CC124", f"M{code} calls or returns, which this dialect does not do", word)
         group = GROUPS_M.get(code)
         for other, _ in block.m:
             if group is not None and GROUPS_M.get(other) == group:
                 self.refuse(
                     "CC105", f"{named(f'M{code}')} and {named(f'M{other}')} exclude each other in one block", word
                 )
-        if code not in KNOWN_M:
+        if code not in KNOWN_M and code not in self.dialect.ends:
             self.warn(f"M{code} is passed on; camcomp takes it not to move anything", once=True)
         block.m.append((code, word))

@@ -22,8 +22,10 @@ GROUPS: dict[int, int] = {
     80: 15,
 }
 
-CYCLES = frozenset((730, 810, 820, 830, 840, 850, 860, 870, 880, 890))
-HOMES = frozenset((280, 300, 740, 750))  # 74 and 75: Sinumerik
+CYCLES = frozenset((730, 740, 760, 810, 820, 830, 840, 850, 860, 870, 880, 890))
+HOMES = frozenset((280, 300, 740, 750))  # as codes of group 0; 74 and 75: Sinumerik
+EXACT_STOPS = frozenset((600, 610, 611))  # 60: Sinumerik
+EXACT_STOP_ONCE = 19  # modal group given to G9, which stops behind its own block only
 MACHINE_MOVES = frozenset((530, 1530))
 AXIS_USERS = frozenset((100, 280, 300, 520, 740, 750, 920))  # of group 0: take the axis words away from the motion code
 WORK_OFFSETS = {540: 1, 550: 2, 560: 3, 570: 4, 580: 5, 590: 6, 591: 7, 592: 8, 593: 9}
@@ -43,7 +45,8 @@ REFUSED: dict[int, tuple[str, str]] = {
 CANCELS = frozenset((150, 500, 690, 691))  # of those, the codes that switch the mode off
 
 PLAIN_M = frozenset((0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 30, 48, 49, 60))
-KNOWN_M = PLAIN_M | frozenset((19, 50, 51, 52, 53, 61, 62, 63, 64, 65, 66, 67, 68, 98, 99))
+KNOWN_M = PLAIN_M | frozenset((19, 50, 51, 52, 53, 61, 62, 63, 64, 65, 66, 67, 68))
+CALLS_M = frozenset((96, 97, 98, 99, 198))
 SAVES = frozenset((70, 71, 72, 73))
 STOPS = frozenset((0, 1, 2, 30, 60))
 ENDS = frozenset((2, 30))

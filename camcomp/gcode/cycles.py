@@ -2,19 +2,24 @@
 
 import math
 
+from camcomp.gcode.arcs import PLANES
 from camcomp.gcode.block import Block
 from camcomp.gcode.motions import Motions
 
 # Depth axis among X, Y, Z by plane.
 _DEPTH = {17: 2, 18: 1, 19: 0}
-_TAPS = (740, 840)
-_CYCLE_WORDS = "RPQLIJK"
+_TAPS = {740: 4, 840: 3}  # sense of the spindle on the way in, as M code
+_BORES_BELOW = 870
+# Words by cycle beyond R, the axis words and the count of repeats: those of LinuxCNC, and what Fanuc has beside P and Q.
+_WORDS = {730: "Q", 740: "P", 820: "P", 830: "Q", 840: "P", 860: "P", 870: "IJK", 890: "P"}
+_SHIFTED = {760: "IJ", 870: "IJ"}
 
 
 class Cycles(Motions):
-    """Executes G73, G74 and G81 to G89. `actions` lists what the last cycle did, for writing it out."""
+    """Executes G73, G74, G76 of Fanuc and G81 to G89. `actions` lists what the last cycle did, for writing it out."""
 
     actions: list[tuple[str, list[float]]]  # (G0 or G1, end point) or (a statement, [])
+    irreplaceable = ""  # why the last cycle cannot be written out as moves
     _began: float | None = None  # height of the tool, less the offset, in front of a series
 
     def forget_cycle(self, series: bool = True) -> None:
@@ -41,18 +46,25 @@ class Cycles(Motions):
         # a series of cycles of whatever kind refers to the height at which it began
         if self._began is None:
             self._began = start[depth] - state.offset[depth]
-        self._hold(block, name, depth)
+        self._hold(block, code, depth)
         initial = self._began + state.offset[depth]
+        below = code == _BORES_BELOW and self.dialect.cycles_apart
         level = self._held["R"] + (initial if state.relative else state.offset[depth])
         bottom = self._held["Z"] + (level if state.relative else state.offset[depth])
-        if level < bottom:
+        if below and level > bottom:
+            self.refuse("CC132", f"{name} bores upwards, from R below the hole to {'XYZ'[depth]}, and R lies above")
+        if level < bottom and not below:
             self.refuse("CC132", f"the retract plane of {name} lies below its bottom")
         repeats = self._repeats(block)
         self.actions = []
-        block.used |= set(_CYCLE_WORDS)
+        self.irreplaceable = "a tapping cycle" if code in _TAPS else ""
         first = True
         for _ in range(repeats):
             place = self._place(block, depth)
+            if below:
+                self._go(block, 0, self._at(place, depth, max(initial, level)), feed, always=repeats == 1)
+                self._bore_upwards(block, place, (bottom, level, max(initial, level)), feed)
+                continue
             clear = max(initial, level) if state.retract_to_start else level
             if first and initial < level:
                 self._go(block, 0, self._at(state.position, depth, level), feed)
@@ -62,11 +74,11 @@ class Cycles(Motions):
             self._go(block, 0, self._at(place, depth, level), feed)
             self._body(block, code, place, (bottom, level, clear), feed)
             first = False
-        self.record.cycle(self.actions, tapping=code in _TAPS)
+        self.record.cycle(self.actions, self.irreplaceable)
 
-    def _hold(self, block: Block, name: str, depth: int) -> None:
+    def _hold(self, block: Block, code: int, depth: int) -> None:
         """Keeps the words of a cycle as they stand, lengths in mm: in G91 they count from where its series began and from R."""
-        held, unit = self._held, self.state.unit
+        held, unit, name = self._held, self.state.unit, f"G{code // 10}"
         r = block.number("R")
         if r is not None:
             held["R"] = r * unit
@@ -78,10 +90,14 @@ class Cycles(Motions):
             held["Z"] = z
         elif "Z" not in held:
             self.refuse("CC132", f"{name} has no depth {letter}")
-        for letter in "PQIJK":
+        for letter in "PQ" + _SHIFTED.get(code, "") if self.dialect.cycles_apart else _WORDS.get(code, ""):
             value = block.number(letter)
             if value is not None:
                 held[letter] = value
+        if code in _TAPS and held.get("Q"):
+            self.refuse("CC132", f"{name} with Q taps in pecks, which are not followed", block.words.get("Q"))
+        if code in _TAPS and not self.dialect.cycles_apart and self.state.spindle != _TAPS[code]:
+            self.refuse("CC132", f"{name} needs a spindle that turns by M{_TAPS[code]}")
 
     def _repeats(self, block: Block) -> int:
         for letter in self.dialect.repeats:
@@ -130,18 +146,21 @@ class Cycles(Motions):
         if code == 870:
             self._back_bore(block, place, heights, feed)
             return
+        if code == 760:
+            self._bore_finely(block, place, heights, feed)
+            return
         go(1, bottom)
         if code in (820, 860, 890) or code in _TAPS:
             self._dwell()
         spindle = self.state.spindle
         if code in _TAPS:
-            self.actions.append(("M4" if code == 840 else "M3", []))
+            self.actions.append((f"M{7 - _TAPS[code]}", []))
         if code == 860:
             self.actions.append(("M5", []))
         if code == 850:
             go(1, level)
         elif code == 890 or code in _TAPS:
-            go(1, clear)
+            go(1, level if self.dialect.cycles_apart else clear)
         if code in _TAPS:
             self.actions.append((f"M{spindle}", []))
         go(0, clear)
@@ -207,3 +226,58 @@ class Cycles(Motions):
         go(0, beside, clear)
         go(0, place, clear)
         self.actions.append((spindle, []))
+
+    def _bore_finely(self, block: Block, place: list[float], heights: tuple[float, float, float], feed: float) -> None:
+        """G76 of Fanuc: bore, stop with the spindle oriented, and leave the wall before the tool comes up."""
+        bottom, _, clear = heights
+        depth = _DEPTH[self.state.plane]
+        beside = self._beside(place, "G76")
+        spindle = f"M{self.state.spindle}"
+        self._go(block, 1, self._at(place, depth, bottom), feed)
+        self._dwell()
+        self.actions += [("M5", []), ("M19", [])]
+        self._go(block, 0, self._at(beside, depth, bottom), feed)
+        self._go(block, 0, self._at(beside, depth, clear), feed)
+        self._go(block, 0, self._at(place, depth, clear), feed)
+        self.actions.append((spindle, []))
+
+    def _bore_upwards(self, block: Block, place: list[float], heights: tuple[float, float, float], feed: float) -> None:
+        """G87 of Fanuc: down beside the hole to R below it, cut upwards to Z, and back to the initial level."""
+        top, level, clear = heights
+        depth = _DEPTH[self.state.plane]
+        beside = self._beside(place, "G87")
+        spindle = f"M{self.state.spindle}"
+
+        def go(code: int, point: list[float], height: float) -> None:
+            self._go(block, code, self._at(point, depth, height), feed)
+
+        self.actions += [("M5", []), ("M19", [])]
+        go(0, beside, clear)
+        go(0, beside, level)
+        go(0, place, level)
+        self.actions.append((spindle, []))
+        go(1, place, top)
+        self._dwell()
+        self.actions += [("M5", []), ("M19", [])]
+        go(0, beside, top)
+        go(0, beside, clear)
+        go(0, place, clear)
+        self.actions.append((spindle, []))
+
+    def _beside(self, place: list[float], name: str) -> list[float]:
+        """A hole's position shifted away from the tool's tip: by I and J, or by Q, whose direction the control holds."""
+        held, unit = self._held, self.state.unit
+        u, v, _ = PLANES[self.state.plane]
+        out = list(place)
+        if "I" in held or "J" in held:
+            for letter, axis in zip("IJ", sorted((u, v)), strict=True):
+                out[axis] += held.get(letter, 0.0) * unit
+        elif "Q" in held:
+            out[u] += abs(held["Q"]) * unit
+            self.irreplaceable = "a boring cycle whose direction of Q only the control knows"
+            self.warn(
+                f"{name} leaves the wall by Q along +{'XYZ'[u]}; the direction is a parameter of the control", once=True
+            )
+        else:
+            self.refuse("CC132", f"{name} needs its shift as Q, or as I and J")
+        return out

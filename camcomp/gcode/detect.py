@@ -4,7 +4,7 @@ import re
 from typing import Any
 
 from camcomp.gcode.dialect import Dialect
-from camcomp.gcode.text import Text
+from camcomp.gcode.text import END_OF_LINE, Text
 from camcomp.ground.errors import ProgramError
 from camcomp.ground.shelf import load, usable
 
@@ -27,7 +27,7 @@ def dialect_of(text: Text, name: str | None = None) -> Dialect:
     """
     if name is not None:
         return _record(name)
-    sample = text.string[:_LOOKED_AT].replace("\r\n", "\n").replace("\r", "\n")
+    sample = re.sub(END_OF_LINE, "\n", text.string[:_LOOKED_AT])
     if len(_PLAINTEXT.findall(sample)) >= 2:
         found = _PLAINTEXT.search(sample)
         row = sample.count("\n", 0, found.start(1)) if found else 0
@@ -38,6 +38,8 @@ def dialect_of(text: Text, name: str | None = None) -> Dialect:
     best, most = _record(DEFAULT), _ENOUGH - 1
     for _, member in usable("dialects"):
         record = _of(member)
+        if text.name.lower().endswith(record.endings):
+            return record
         weight = record.weight(sample)
         if weight > most:
             best, most = record, weight

@@ -4,7 +4,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from camcomp.gcode.codes import GROUPS, REFUSED
+from camcomp.gcode.codes import ENDS, GROUPS, REFUSED
 from camcomp.gcode.numbers import decimals
 from camcomp.gcode.spelling import Spelling
 
@@ -15,19 +15,24 @@ class Dialect:
 
     name: str
     title: str
+    endings: tuple[str, ...] = ()  # of file names that are this dialect's alone
     marks: tuple[tuple[str, int], ...] = ()  # regular expression (multi-line, case ignored), weight for detection
     spelling: Spelling | None = None  # of expressions; None: there are none
     flow: str = ""  # subprograms, loops, jumps: "o-words", "macro" (Fanuc), or none
     more: Mapping[int, int] = field(default_factory=dict)  # codes beyond the common ones, with their modal group
+    reasons: Mapping[int, tuple[str, str]] = field(default_factory=dict)  # codes that are refused, with rule and reason
     without: frozenset[int] = frozenset()  # common codes that this control does not have
     passed: frozenset[int] = frozenset()  # codes that do not change the geometry, nor how other words are read
+    ends: frozenset[int] = ENDS  # M codes at which a program ends
     initial_motion: int | None = None
     retract_to_start: bool = True  # G98 is in force at the start
     turns: bool = True  # P of an arc counts turns
+    exact_stop: str = "G61"  # how it is told to end moves at rest
     writes_turns: bool = True  # and may be written for arcs that are made
     increments: bool = False  # numbers without a point may count increments
     machine_moves_rapid: bool = False  # G53 moves at rapid speed, whatever motion code is in force
     home_beside_motion: bool = False  # `G0 G28 Z0`: the axis words are those of G28
+    numbered_homes: frozenset[tuple[int, str]] = frozenset()  # codes whose P (mode of the word) says which position
     dwell: str = "P"  # letters that may give the time of G4
     dwell_p_s: float = 1.0  # worth of one unit of its P; X, U and F count seconds, S revolutions of the spindle
     modal_length: bool = False  # H changes the tool length offset without G43 in its block
@@ -36,7 +41,10 @@ class Dialect:
     more_offsets: Mapping[int, str] = field(default_factory=dict)  # codes and names of further work offsets
     relative_offsets: bool = False  # G10 L2 adds to the offset in G91
     repeats: str = "L"  # letters that may give the number of repeats of a cycle
-    cycles_apart: bool = False  # G80 leaves the motion code in force that was so before the cycle
+    cycles_apart: bool = (
+        False  # cycles are a modal group of their own, as on Fanuc: G80 leaves the motion code in force that
+    )
+    # was so before, and the words of a cycle hold for those that follow it
     peck_clearance_mm: float = 0.254
     idle_letters: str = "DN"  # letters that mean nothing for the path wherever they stand
     merges: bool = False  # G64 takes the tolerance of corners as P and that of lines made one as Q
@@ -53,7 +61,7 @@ class Dialect:
     def refused(self) -> dict[int, tuple[str, str]]:
         """Codes that are refused, with rule and reason."""
         own = {**self.more, **dict.fromkeys(self.passed, 0)}
-        return {code: why for code, why in REFUSED.items() if code not in own}
+        return {**{code: why for code, why in REFUSED.items() if code not in own}, **self.reasons}
 
     def digits(self, resolution_mm: float, unit_mm: float) -> int:
         """Digits behind the point of a length: those of the resolution, as far as the control reads them."""

@@ -78,10 +78,10 @@ class Printer:
         cycle = self.reader.record.cycles.get(entry.motions)
         # A line that moves nothing has the same count of motions before it as the cycle that follows.
         if cycle is not None and self.program.sites.row[entry.motions] == entry.row:
-            actions, tapping = cycle
-            if tapping:
+            actions, irreplaceable = cycle
+            if irreplaceable:
                 place = self.text.place(entry.row)
-                raise ProgramError("CC137", "a tapping cycle cannot be replaced by straight moves", at=place)
+                raise ProgramError("CC137", f"{irreplaceable} cannot be replaced by straight moves", at=place)
             changed = self._changed(entry, repeated, cycle=True)
             head = [changed] if self._code(changed).strip(BLANK) else self._remark(entry.row)
             return head + self._moves(entry.motions, actions)

@@ -183,9 +183,10 @@ class Siemens(Flow):
 
     def _read(self, row: int) -> Line:
         line = read_siemens_line(self.text, row)
-        values = [each.value for each in line.settings] + [value for _, value in line.expressions]
+        words = [value for _, value in line.expressions]
         for each in line.settings:
-            # Whether `R1=2 R2=R1` takes the new value or the old one is nothing to guess.
-            if any(each.target[1][:2] == used for value in values for used in parameters_of(value)):
+            # Of `R1=R1+1` the value is found first; whether `R1=2 R2=R1` takes the new R1 or the old one is nothing to guess.
+            others = [other.value for other in line.settings if other is not each] + words
+            if any(each.target[1][:2] == used for value in others for used in parameters_of(value)):
                 self.refuse(row, each.begin, "CC123", "a parameter is set and used in one block")
         return line

@@ -9,7 +9,7 @@ from camcomp.gcode.block import Block
 from camcomp.gcode.codes import (
     AXIS_USERS,
     CYCLES,
-    ENDS,
+    EXACT_STOP_ONCE,
     HOMES,
     MACHINE_MOVES,
     PLAIN_M,
@@ -99,9 +99,9 @@ class Interpreter(Settings, Cycles):
             else:
                 self.move(block, motion, machine=zero_code in MACHINE_MOVES)
         self._leftovers(block, m_codes)
-        self.state.waits |= not STOPS.isdisjoint(m_codes)
+        self.state.waits |= not STOPS.isdisjoint(m_codes) or EXACT_STOP_ONCE in block.groups
         self.record.end_line()
-        if any(code in ENDS for code in m_codes):
+        if any(code in self.dialect.ends for code in m_codes):
             self.state.motion = None
             return True
         return False
@@ -111,7 +111,7 @@ class Interpreter(Settings, Cycles):
         state, words = self.state, block.words
         explicit = block.code(1)
         if explicit is not None:
-            if explicit not in CYCLES or explicit != state.motion:
+            if explicit not in CYCLES or (explicit != state.motion and not self.dialect.cycles_apart):
                 self.forget_cycle(series=explicit not in CYCLES)
             if explicit == 800:
                 state.motion = state.outside_cycles if self.dialect.cycles_apart else None
@@ -151,9 +151,9 @@ class Interpreter(Settings, Cycles):
         return "S" in block.words
 
     def _alone(self, block: Block) -> None:
-        """Codes that are passed on do not say what axis words beside them mean."""
+        """Codes that are passed on, and G50, do not say what axis words beside them mean."""
         for code, word in block.g:
-            if code in self.dialect.passed and block.axes:
+            if (code in self.dialect.passed or code == 500) and block.axes:
                 self.refuse("CC108", f"axis words with {code_name(code)}", word)
 
     def _spare_axes(self, block: Block) -> None:
@@ -176,13 +176,10 @@ class Interpreter(Settings, Cycles):
 
     def _leftovers(self, block: Block, m_codes: list[int]) -> None:
         free = any(code not in PLAIN_M for code in m_codes) or any(code in self.dialect.passed for code, _ in block.g)
-        path_control = block.code(13) == 640
         for letter, word in block.words.items():
-            if letter in "XYZABCUVWFST" or letter in block.used or letter in self.dialect.idle_letters:
+            if letter in tuple("XYZABCUVWFST") or letter in block.used or letter in self.dialect.idle_letters:
                 continue
-            if free and letter in "PQRLEHIJK":
-                continue
-            if path_control and letter in "PQ":
+            if free and letter in ("PQLEH" if block.axes else "PQRLEHIJK"):
                 continue
             self.refuse("CC109", f"{letter} is not used by anything in its block", word)
 

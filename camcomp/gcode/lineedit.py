@@ -34,6 +34,7 @@ class LineEditor:
         self.begin: list[int] = sites.begin[k].tolist()
         self.finish: list[int] = sites.finish[k].tolist()
         self.unit, self.offset = float(sites.unit[k]), sites.offset[k].tolist()
+        self.feed_unit = float(sites.feed_unit[k])
         self.relative = bool(sites.relative[k])
         self.digits = self.program.language.digits(self.resolution, self.unit)
         self.step = self.program.language.step_mm(self.resolution, self.unit)
@@ -87,7 +88,7 @@ class LineEditor:
         return mode, feed / float(self.path.speed[self.k]) if mode == 95 else feed
 
     def _feed_number(self, mode: int, value: float) -> str:
-        return significant(value if mode == 93 else value / self.unit, point=self.program.feed_point)
+        return significant(value if mode == 93 else value / self.feed_unit, point=self.program.feed_point)
 
     def _feed_words(self, feed: float, length: float) -> list[str]:
         """F word for a new line, where the feed in force is another one."""

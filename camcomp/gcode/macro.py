@@ -1,4 +1,4 @@
-"""Subprograms of M98 and M99, and Fanuc's custom macro B: jumps, loops, G65."""
+"""Subprograms of M97, M98 and M99, and Fanuc's custom macro B: jumps, loops, G65."""
 
 import re
 
@@ -19,12 +19,14 @@ _DEEPEST = 100
 
 
 class Subprograms(Flow):
-    """M98 and M99, with the subprograms in the same file."""
+    """M98 and M99, with the subprograms in the same file; Q of M98 and M97 are Fanuc's and its kin's."""
+
+    words_of_m98 = frozenset("PL")
 
     def __init__(self, reader: BlockReader, trace: Trace | None = None) -> None:
         super().__init__(reader, trace)
         self._programs: dict[int, int] = {}
-        self._returns: list[tuple[int, int, int]] = []  # row of the call, row of the program, passes left
+        self._returns: list[tuple[int, int, int]] = []  # row of the call, first row that is executed, passes left
         self._called: set[int] = set()
         if re.search(r"M[ \t]*0*9[789]", self.text.string, re.IGNORECASE):
             self._find_programs()
@@ -60,18 +62,24 @@ class Subprograms(Flow):
         self.reader.straight = False
         words = self.computed(row, self.parsed(row))
         values = {word.letter: word for word in words if word.letter not in "NM"}
-        known = {"P", "L", "Q"} if code == 98 else {"P"}
+        known = self.words_of_m98 if code == 98 else frozenset("PL" if code == 97 else "P")
         strange = [word for letter, word in values.items() if letter not in known]
         if strange or len([word for word in words if word.letter == "M"]) > 1:
-            self.refuse(row, (strange or words)[0].begin, "CC124", f"M{code} stands alone with P and L")
+            self.refuse(
+                row, (strange or words)[0].begin, "CC124", f"M{code} stands alone with {' and '.join(sorted(known))}"
+            )
         self._remarked(row)
-        if code == 97:
-            self.refuse(row, words[0].begin, "CC124", "M97 is not followed")
         if code == 99:
             return self._back(row, values.get("P"))
-        if "P" not in values or values["P"].value != int(values["P"].value):
-            self.refuse(row, words[0].begin, "CC124", "M98 needs the number of a program as P")
+        for letter, word in values.items():
+            if word.value != int(word.value) or word.value < 0.0:
+                self.refuse(row, word.begin, "CC124", f"{letter} of M{code} is a whole number")
+        if "P" not in values:
+            what = "line" if code == 97 else "program"
+            self.refuse(row, words[0].begin, "CC124", f"M{code} needs the number of a {what} as P")
         number, passes = int(values["P"].value), int(values["L"].value) if "L" in values else 1
+        if code == 97:
+            return self._local(row, values["P"], passes)
         start = self._programs.get(number)
         if start is None and number > 9999 and "L" not in values:
             # Older controls write repeats and number together: P30100 is three times O0100.
@@ -79,16 +87,40 @@ class Subprograms(Flow):
             start = self._programs.get(number)
         if start is None:
             self.refuse(row, values["P"].begin, "CC125", f"program O{number} is not in this file")
-        return self._enter(row, start, passes)
+        first = start + 1
+        if "Q" in values:
+            first = self._numbered(row, values["Q"].begin, int(values["Q"].value), start, f"program O{number}")
+        return self._enter(row, start, passes, first)
 
-    def _enter(self, row: int, start: int, passes: int) -> int:
+    def _local(self, row: int, target: Word, passes: int) -> int:
+        """M97 of Haas: a part of the same program, from line N to M99."""
+        self.refuse(row, target.begin, "CC124", "M97 is not followed in this dialect")
+
+    def _program_rows(self, row: int) -> tuple[int, int]:
+        """First row of the program around `row`, and of the one behind it."""
+        starts = [0, *sorted(self._programs.values()), self.rows]
+        first = max(each for each in starts if each <= row)
+        return first, min(each for each in starts if each > row)
+
+    def _numbered(self, row: int, column: int, number: int, inside: int, name: str) -> int:
+        """Row of line N`number` of the program around row `inside`, looked for from there on and then from its begin."""
+        first, last = self._program_rows(inside)
+        rows: list[int] = [*range(inside, last), *range(first, inside)]
+        for other in rows:
+            found = _NUMBER.match(self.text.line(other))
+            if found and int(found[1]) == number:
+                return other
+        self.refuse(row, column, "CC124", f"there is no line N{number} in {name}")
+
+    def _enter(self, row: int, start: int, passes: int, first: int) -> int:
+        """Call from `row` of the program that begins at `start`, executed so many times from row `first` on."""
         if len(self._returns) >= _DEEPEST:
             self.refuse(row, 0, "CC126", "subprograms call each other without end")
         self._called.add(start)
         if passes < 1:
             return row + 1
-        self._returns.append((row, start, passes - 1))
-        return start + 1
+        self._returns.append((row, first, passes - 1))
+        return first
 
     def _back(self, row: int, target: Word | None) -> int | None:
         """M99: again while passes are left, then behind the call; in the main program it ends the run."""
@@ -96,23 +128,29 @@ class Subprograms(Flow):
             return None
         if target is not None:
             self.refuse(row, target.begin, "CC124", "M99 with P is not followed")
-        call, start, left = self._returns.pop()
+        call, first, left = self._returns.pop()
         if left > 0:
-            self._returns.append((call, start, left - 1))
-            return start + 1
+            self._returns.append((call, first, left - 1))
+            self._again_from(call)
+            return first
         self._left_program(call)
         return call + 1
 
     def _left_program(self, call: int) -> None:
         """A subprogram that `call` started is over."""
 
+    def _again_from(self, call: int) -> None:
+        """A subprogram that `call` started begins once more."""
+
 
 class Macro(Subprograms):
     """Fanuc custom macro B."""
 
+    words_of_m98 = frozenset("PLQ")
+
     def __init__(self, reader: BlockReader, trace: Trace | None = None) -> None:
         super().__init__(reader, trace)
-        self._framed: set[int] = set()
+        self._framed: dict[int, dict[int, float]] = {}  # arguments by row of the call
         self._find_programs()
 
     def run(self) -> None:
@@ -138,11 +176,10 @@ class Macro(Subprograms):
                 return self._call(row)
         return super().step(row)
 
-    def _program_rows(self, row: int) -> tuple[int, int]:
-        """First row of the program around `row`, and of the one behind it."""
-        starts = [0, *sorted(self._programs.values()), self.rows]
-        first = max(each for each in starts if each <= row)
-        return first, min(each for each in starts if each > row)
+    def _local(self, row: int, target: Word, passes: int) -> int:
+        """M97 of Haas: a part of the same program, from line N to M99."""
+        first = self._numbered(row, target.begin, int(target.value), row, "this program")
+        return self._enter(row, self._program_rows(row)[0], passes, first)
 
     def _jump(self, row: int, keyword: str, end: int) -> int:
         assert self.spelling is not None
@@ -186,13 +223,9 @@ class Macro(Subprograms):
 
     def _goto(self, row: int, expression: Expression) -> int:
         number = self.value(row, expression)
-        first, last = self._program_rows(row)
-        for other in [*range(row + 1, last), *range(first, row + 1)]:
-            found = _NUMBER.match(self.text.line(other))
-            if found and int(found[1]) == number:
-                out: int = other
-                return out
-        self.refuse(row, 0, "CC124", f"GOTO: there is no line N{number:g} in this program")
+        if number != int(number):
+            self.refuse(row, 0, "CC124", f"GOTO: N{number:g} is no line number")
+        return self._numbered(row, 0, int(number), row, "this program")
 
     def _loop_number(self, row: int, parser: Parser) -> int:
         number = parser.number() if parser.blank().isdigit() else parser.fail("DO and END need a number")
@@ -240,10 +273,16 @@ class Macro(Subprograms):
         if start is None:
             self.refuse(row, words[0].begin, "CC125", "the program that G65 calls is not in this file")
         arguments = {_ARGUMENTS[letter]: word.value for letter, word in values.items() if letter in _ARGUMENTS}
+        if repeats is not None and not 1 <= repeats.value == int(repeats.value):
+            self.refuse(row, repeats.begin, "CC124", "L of G65 counts calls, 1 or more")
         self.memory.frames.append(CallFrame(dict(arguments)))
-        self._framed.add(row)
-        return self._enter(row, start, int(repeats.value) if repeats else 1)
+        self._framed[row] = arguments
+        return self._enter(row, start, int(repeats.value) if repeats else 1, start + 1)
 
     def _left_program(self, call: int) -> None:
         if call in self._framed and len(self.memory.frames) > 1:
             self.memory.frames.pop()
+
+    def _again_from(self, call: int) -> None:
+        if call in self._framed:
+            self.memory.frames[-1] = CallFrame(dict(self._framed[call]))

@@ -3,7 +3,7 @@
 import math
 
 from camcomp.gcode.expressions import Expression, ExpressionError, Memory, evaluate, index_of
-from camcomp.gcode.spelling import FANUC
+from camcomp.gcode.spelling import FANUC, SINUMERIK
 from camcomp.gcode.state import ControlState
 
 LOCAL = 30  # #1 to #30 belong to the subprogram in RS274, #1 to #33 in Fanuc
@@ -42,6 +42,8 @@ class Parameters(Memory):
             return store[number]
         if self.macro and (number == 0 or self._local(number)):
             return math.nan  # vacant
+        if self.spelling is SINUMERIK:
+            raise ExpressionError(f"R{number} has no value in this program: {_MACHINE_ONLY}", 0)
         value = self._fanuc(number) if self.macro else self._rs274(number)
         if value is None:
             raise ExpressionError(f"parameter #{number}: {_MACHINE_ONLY}", 0)

@@ -36,7 +36,8 @@ class Motions(BlockReader):
     def home(self, block: Block, code: int) -> None:
         """G28, G30: through the point of the axis words to the reference position."""
         state = self.state
-        block.number("P")
+        if "P" in block.words and (code, block.words["P"].mode) in self.dialect.numbered_homes:
+            self._which_home(block, code)
         spare = [block.words[letter] for letter in "ABCUVW" if letter in block.words]
         if spare and not block.axes:
             if spare[0].letter in "UVW":
@@ -50,6 +51,13 @@ class Motions(BlockReader):
             end[axis] = state.homes[30 if code == 30 else 28][axis] - state.zero[axis]
             state.commanded[axis] = True
         self.record.machine_motion(block, state, -2, end, moved=block.axes or [0, 1, 2])
+
+    def _which_home(self, block: Block, code: int) -> None:
+        """P of G30, FP of G75: camcomp knows the second reference position and the first fixed point."""
+        known = 2 if code == 30 else 1
+        if block.number("P") != known:
+            word = block.words["P"]
+            self.refuse("CC129", f"position {word.value:g} of G{code} is not known, only {known}", word)
 
     def move(self, block: Block, motion: int, machine: bool) -> None:
         """G0, G1, G2 or G3 (code in tenths)."""
@@ -73,6 +81,12 @@ class Motions(BlockReader):
     def feed_of(self, block: Block) -> float:
         """Feed of a cutting motion: mm/min, or 1/min in G93."""
         state = self.state
+        if state.length_off:
+            self.refuse(
+                "CC133",
+                "a cut with D0, by which words lead the spindle nose and not the tip",
+                hint="write D1 before it",
+            )
         if state.feed_mode == 93 and "F" not in block.words:
             self.refuse("CC110", "G93 needs an F word in every block that cuts")
         if not state.feed:
@@ -85,7 +99,7 @@ class Motions(BlockReader):
 
     def _turns(self, block: Block) -> int:
         word = block.words.get("P")
-        if word is None or not self.dialect.turns:
+        if word is None or (not self.dialect.turns and word.mode != "TURN"):
             return 1
         block.used.add("P")
         turns = round(word.value) + (word.mode == "TURN")

@@ -27,6 +27,7 @@ class Sites:
     begin: NDArray[np.int64]  # (n, 10) index in the text of each word's letter, -1 when the word is not there
     finish: NDArray[np.int64]  # (n, 10) index behind each word
     unit: Floats  # (n,) mm per programmed unit
+    feed_unit: Floats  # (n,) the same for feeds
     offset: Floats  # (n, 3) mm from a local value to the program frame
     relative: Bools  # (n,) G91
     centre_absolute: Bools  # (n,) G90.1

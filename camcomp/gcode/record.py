@@ -33,7 +33,7 @@ class Recorder:
     def __init__(self, text: Text) -> None:
         self._starts = text.starts
         self._count = 0
-        self._numbers = array("d")  # 26 per motion
+        self._numbers = array("d")  # 27 per motion
         self._spans = array("q")  # 20 per motion
         self._line_first = 0
         self.code_stated = False
@@ -42,7 +42,7 @@ class Recorder:
         self.stops = False
         self._fixed: list[int] = []
         self.modes: list[PathMode] = []  # by motion
-        self.cycles: dict[int, tuple[list[tuple[str, list[float]]], bool]] = {}  # by first motion
+        self.cycles: dict[int, tuple[list[tuple[str, list[float]]], str]] = {}  # by first motion
 
     def __len__(self) -> int:
         return self._count
@@ -117,7 +117,7 @@ class Recorder:
         self._numbers.extend((block.row, kind, code, *state.position, *end, *centre, angle, feed))
         modal = math.nan if state.feed is None else state.feed
         self._numbers.extend((state.speed, state.tool, state.unit, *state.offset))
-        self._numbers.extend((state.plane, state.feed_mode, flags, modal, state.sense, state.waits))
+        self._numbers.extend((state.plane, state.feed_mode, flags, modal, state.sense, state.waits, state.feed_unit))
         state.waits = False
         base = int(self._starts[block.row])
         words = block.words
@@ -132,16 +132,16 @@ class Recorder:
             self.code_stated = self.feed_stated = False
         state.position = end
 
-    def cycle(self, actions: list[tuple[str, list[float]]], tapping: bool) -> None:
-        """The line was a canned cycle: what it did, in order."""
+    def cycle(self, actions: list[tuple[str, list[float]]], irreplaceable: str) -> None:
+        """The line was a canned cycle: what it did, in order, and why moves cannot replace it; empty: they can."""
         if self._count == self._line_first + 1:
             self._fixed.append(self._line_first)
-        self.cycles[self._line_first] = (list(actions), tapping)
+        self.cycles[self._line_first] = (list(actions), irreplaceable)
 
     def finish(self) -> tuple[Path, Sites]:
         """All motions as arrays."""
         n = self._count
-        a = np.frombuffer(self._numbers, float).reshape(n, -1) if n else np.zeros((0, 26))
+        a = np.frombuffer(self._numbers, float).reshape(n, -1) if n else np.zeros((0, 27))
         spans = np.frombuffer(self._spans, np.int64).reshape(n, 10, 2) if n else np.zeros((0, 10, 2), np.int64)
         kind = a[:, 1].astype(np.int8)
         flags = a[:, 22].astype(np.int64)
@@ -172,6 +172,7 @@ class Recorder:
             begin=frozen(spans[:, :, 0], np.int64),
             finish=frozen(spans[:, :, 1], np.int64),
             unit=frozen(a[:, 16]),
+            feed_unit=frozen(a[:, 26]),
             offset=frozen(a[:, 17:20]),
             relative=frozen((flags & 4) > 0, np.bool_),
             centre_absolute=frozen((flags & 8) > 0, np.bool_),

@@ -201,18 +201,18 @@ class Writer(LineEditor):
         self.feeds[row] = self._feed_held(row)
 
     def _path_mode(self, row: int, behind: bool) -> None:
-        """G61 in front of a row that has to end at rest, the program's own mode again in front of the next that has not.
+        """An exact stop in front of a row that has to end at rest, the program's own mode again in front of the next that has not.
 
         The own mode without merging where rows have to stay apart. behind: the row stands on a line of its own behind that
         of the motion.
         """
         out, mode = self.out, self.program.modes[self.k]
         assert out.rest is not None and out.apart is not None
-        if mode is not self.stated and self.ours != "G61":
+        if mode is not self.stated and self.ours != self.program.language.exact_stop:
             self.ours = ""
         self.stated = mode
         apart = mode.apart.said(self.unit) if out.apart[row] else ""
-        ours = "G61" if out.rest[row] else apart
+        ours = self.program.language.exact_stop if out.rest[row] else apart
         if ours == self.ours:
             return
         self.ours = ours

@@ -2,12 +2,13 @@
 
 from camcomp.gcode.block import Block, BlockReader
 from camcomp.gcode.codes import code_name
-from camcomp.gcode.path_mode import path_mode
+from camcomp.gcode.path_mode import ROUNDING_DISTANCE, path_mode
 from camcomp.gcode.program import Rebase
-from camcomp.gcode.spelling import RS274
+from camcomp.gcode.spelling import RS274, SINUMERIK
 from camcomp.gcode.words import Word
 
 _INCH = (200, 700, 7000)
+_LENGTHS_ALONE = (700, 710)  # Sinumerik: feeds stay in the units of the machine, mm; G700 and G710 change both
 _TURNS = {3: 1.0, 4: -1.0, 5: 0.0}
 _MODE_GROUPS = (2, 3, 4, 5, 6, 8, 12)
 
@@ -22,6 +23,7 @@ class Settings(BlockReader):
         self.record.modes_changed = changed or (state.feed_mode == 95 and "S" in words)
         if 6 in groups:
             state.unit = 25.4 if groups[6][0] in _INCH else 1.0
+            state.feed_unit = 1.0 if groups[6][0] in _LENGTHS_ALONE else state.unit
         if 5 in groups:
             mode = groups[5][0] // 10
             if mode != state.feed_mode:
@@ -48,17 +50,25 @@ class Settings(BlockReader):
         if 4 in groups:
             state.centre_absolute = groups[4][0] == 901
         if 13 in groups:
-            p, q = (words[each].value * state.unit if each in words else None for each in "PQ")
-            state.path_mode = path_mode(groups[13][0], p, q)
+            self._path_mode(block, groups[13][0])
         if 10 in groups:
             state.retract_to_start = groups[10][0] == 980
         state.update()
+
+    def _path_mode(self, block: Block, code: int) -> None:
+        """G64 and its like: P, Q where the control knows them, ADIS of G641, which holds until it is given anew."""
+        state, letters = self.state, "PQ" if self.dialect.merges and code == 640 else ""
+        p, q = ((block.number(each) if each in letters else None) for each in "PQ")
+        if code == ROUNDING_DISTANCE:
+            p = block.number("ADIS")
+            state.rounding = p = state.rounding if p is None else p
+        state.path_mode = path_mode(code, *(None if each is None else each * state.unit for each in (p, q)))
 
     def _feed(self, word: Word) -> None:
         state = self.state
         if word.value < 0.0 or (word.value == 0.0 and state.feed_mode == 93):
             self.refuse("CC110", "the feed has to be positive", word)
-        state.feed = word.value if state.feed_mode == 93 else word.value * state.unit
+        state.feed = word.value if state.feed_mode == 93 else word.value * state.feed_unit
         self.record.feed_stated = True
 
     def _whole(self, letter: str, word: Word) -> int:
@@ -68,6 +78,8 @@ class Settings(BlockReader):
 
     def _tool(self, block: Block) -> None:
         state, words = self.state, block.words
+        if "D" in words and self.dialect.spelling is SINUMERIK:
+            state.length_off = words["D"].value == 0.0
         if "T" in words:
             state.next_tool = self._whole("T", words["T"])
         for code, word in block.m:
@@ -85,7 +97,8 @@ class Settings(BlockReader):
         state, words = self.state, block.words
         state.length_on = code != 490
         if code == 490:
-            block.number("H")
+            if block.number("H"):
+                self.refuse("CC133", "G49 switches the length offset off, and H names one", words["H"])
             state.tool_offset = [0.0, 0.0, 0.0]
         elif code == 431:
             for axis in block.axes:
@@ -116,8 +129,8 @@ class Settings(BlockReader):
         if code == 40:
             given = [(letter, block.number(letter)) for letter in dict.fromkeys(self.dialect.dwell + "P")]
             times = [(letter, value) for letter, value in given if value is not None]
-            if not times:
-                self.refuse("CC131", "G4 has no time", block.groups[0][1])
+            if len(times) != 1:
+                self.refuse("CC131", f"G4 has {'two times' if times else 'no time'}", block.groups[0][1])
             self.dwell(*times[0])
         elif code == 100:
             self._set_offset(block)

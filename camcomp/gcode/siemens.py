@@ -30,11 +30,32 @@ IGNORED = frozenset(
 # Statements that may stand alone, to switch something off; with words behind them they change coordinates.
 RESETS = frozenset(
     """
-    TRANS ROT SCALE MIRROR CYCLE800 MCALL SUPAOF ROTS CROT
+    TRANS ATRANS ROT AROT SCALE ASCALE MIRROR AMIRROR CYCLE800 MCALL ROTS AROTS CROT CROTS
     """.split()  # noqa: SIM905
 )
 MACHINE = frozenset(("SUPA",))
-_ADDRESSES = {"CR": "R", "TURN": "P"}
+# Statements that are refused with a reason of their own: rule, reason, hint. The first pattern that matches counts.
+_NOT_FOLLOWED: tuple[tuple[str, str, str, str], ...] = (
+    ("A?TRANS|G5[89]", "CC118", "moves the coordinates, which is not followed", "put the shift into G54 or into the numbers"),
+    ("A?ROTS?|CROTS?|ROTS|CYCLE800|TOROT.*|TOFRAME.*", "CC118", "turns the coordinates, which is not followed", "post unrotated"),
+    ("A?SCALE|A?MIRROR", "CC117", "scales or mirrors, which is not followed", "post at full scale, without mirroring"),
+    ("TRAORI|TRANSMIT|TRACYL|TRAANG", "CC115", "switches a transformation on, which is not followed", "post for three axes"),
+    ("(CYCLE|POCKET|SLOT|HOLES)[0-9]+|LONGHOLE|MCALL", "CC132", "is a cycle of the control, which is not followed",
+     "post the motions instead of the cycle"),
+    ("CIP|CT", "CC112", "is an arc in a form that is not followed", "post arcs with I, J, K or CR="),
+    ("[ABC]SPLINE|POLY", "CC119", "is a spline", "post lines and arcs"),
+    ("INVCW|INVCCW", "CC119", "is an involute", "post lines and arcs"),
+)  # fmt: skip
+_ADDRESSES = {"CR": "R", "TURN": "P", "FP": "P", "ADIS": "ADIS"}
+MACHINE_AXIS = "1"  # mode of X1=, Y1=, Z1=
+_ADDRESSES_NOT_FOLLOWED = (
+    ("AP|RP", "CC116", "post in Cartesian coordinates"),
+    ("AR|[IJK]1", "CC112", "post arcs with I, J, K or CR="),
+    ("DISR|DISCL|DISC|OFFN", "CC114", "post the program with the tool's centre line (G40)"),
+    ("CHF|CHR|RND|RNDM|ANG", "CC139", "post corners as arcs and lines"),
+    ("FB|FRC|FRCM|FL|FGREF", "CC110", "write the feed as F"),
+    ("[ABC][2-7]|LEAD|TILT|ROT[ABC]?", "CC115", "post the program for three axes"),
+)
 _FLOW = frozenset(
     """
     IF ELSE ENDIF WHILE ENDWHILE FOR ENDFOR LOOP ENDLOOP REPEAT REPEATB UNTIL GOTO GOTOF GOTOB GOTOC GOTOS
@@ -91,6 +112,12 @@ class SiemensLine:
                 self._statement()
             else:
                 self._refuse("CC107" if not char.isdigit() and char not in ".+-" else "CC103", self._why(char))
+        approach = any(word.letter == "G" and word.value in (74.0, 75.0) for word in self.words)
+        for word in self.words:
+            if word.mode == MACHINE_AXIS and not approach:
+                self._refuse(
+                    "CC115", f"{word.letter}1 is an axis of the machine, which only G74 and G75 take here", word.begin
+                )
         return Line(self.words, self.deleted, "", tuple(self.expressions), tuple(self.settings))
 
     def _why(self, char: str) -> str:
@@ -102,8 +129,8 @@ class SiemensLine:
         while self.line[self.at : self.at + 1].isdigit():
             self.at += 1
 
-    def _refuse(self, rule: str, message: str, column: int | None = None) -> NoReturn:
-        refuse(self.text, self.row, self.at if column is None else column, rule, message)
+    def _refuse(self, rule: str, message: str, column: int | None = None, hint: str | None = None) -> NoReturn:
+        refuse(self.text, self.row, self.at if column is None else column, rule, message, hint)
 
     def _next(self, at: int) -> str:
         while at < self.end and self.line[at] in " \t":
@@ -132,9 +159,19 @@ class SiemensLine:
         elif name in RESETS:
             self._reset(start, found.end(), name)
         elif name in _FLOW or letters in _FLOW:
-            self._refuse("CC124", f"{name}: jumps, loops and variables are not followed")
+            self._refuse(
+                "CC124",
+                f"{name}: jumps, loops and variables are not followed",
+                hint="write the lines out as they are executed",
+            )
         else:
-            self._refuse("CC135", f"'{found[0]}' is no statement that camcomp knows")
+            self._refuse_statement(found[0], start)
+
+    def _refuse_statement(self, name: str, start: int) -> NoReturn:
+        for pattern, rule, reason, hint in _NOT_FOLLOWED:
+            if re.fullmatch(pattern, name.upper()):
+                self._refuse(rule, f"{name.upper()} {reason}", start, hint)
+        self._refuse("CC135", f"'{name}' is no statement that camcomp knows", start)
 
     def _plain(self, start: int, letter: str) -> None:
         """A letter and its number."""
@@ -149,7 +186,7 @@ class SiemensLine:
             rule = "CC101" if rest == "," else "CC102"
             self._refuse(rule, f"'{self.line[start : found.end()]}{rest}' is not one number")
         if letter == "L":
-            self._refuse("CC125", f"subprogram L{found[0]} is not followed")
+            self._refuse("CC125", f"subprogram L{found[0]} is not followed", start, "write the subprogram's lines out")
         self.words.append(Word(letter, float(found[0]), start, found.end()))
         self.at = found.end()
 
@@ -176,18 +213,20 @@ class SiemensLine:
         letter = _ADDRESSES.get(name)
         if letter is None and len(name) == 1:
             letter = name
-        if letter is None and name in ("S1", "M1", "F1"):
+        if letter is None and name in ("S1", "M1", "F1", "X1", "Y1", "Z1"):
             letter = name[0]
-        if name in ("SPOS", "SPOSA", "ADIS", "ADISPOS", "FFWON", "OVR", "FP"):
+        if name in ("SPOS", "SPOSA", "ADISPOS", "FFWON", "OVR", "LIMS"):
             letter = ""
         if letter is None:
-            known = "CC116" if name in ("AP", "RP") else "CC112" if name in ("AR", "I1", "J1", "K1") else "CC135"
-            self._refuse(known, f"'{name}=' is not followed")
+            for known, rule, hint in _ADDRESSES_NOT_FOLLOWED:
+                if re.fullmatch(known, name):
+                    self._refuse(rule, f"'{name}=' is not followed", start, hint)
+            self._refuse("CC135", f"'{name}=' is not followed", start)
         value, mode, end = self._value(equals + 1)
         self.at = end
         if not letter:
             return
-        mode = name if name == "TURN" else mode
+        mode = name if name in ("TURN", "FP") else MACHINE_AXIS if name in ("X1", "Y1", "Z1") else mode
         if value[0] == "number":
             self.words.append(Word(letter, float(value[1]), start, end, mode))
             return
@@ -224,8 +263,7 @@ class SiemensLine:
         if rest in ("", "()"):
             self.at = self.end
             return
-        rule = {"MCALL": "CC132", "SCALE": "CC117", "MIRROR": "CC117"}.get(name, "CC118")
-        self._refuse(rule, f"{name} with values is not followed", start)
+        self._refuse_statement(name, start)
 
     def _skip_group(self) -> None:
         """Pass what stands in brackets behind a statement."""

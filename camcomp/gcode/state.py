@@ -31,6 +31,7 @@ class ControlState:
         self.local = [0.0, 0.0, 0.0]  # G52 where it is an offset of its own
         self.tool_offset = [0.0, 0.0, 0.0]
         self.length_on = False  # G43
+        self.length_off = False  # D0 of Sinumerik: words lead the spindle nose
         self.tools = dict(setup.tools)
         self.homes = {28: list(setup.home_mm), 30: list(setup.second_home_mm)}
         self.offset = [0.0, 0.0, 0.0]
@@ -43,7 +44,9 @@ class ControlState:
         self.centre_absolute = False
         self.feed_mode = 94
         self.unit = 1.0  # mm per programmed unit
+        self.feed_unit = 1.0  # of feeds
         self.path_mode = setup.path_mode
+        self.rounding = 0.0  # ADIS, in units
         self.retract_to_start = dialect.retract_to_start  # G98
         self.feed: float | None = None  # G94: mm/min, G93: 1/min, G95: mm/rev
         self.speed = 0.0

@@ -13,7 +13,8 @@ import numpy as np
 from camcomp.ground.datatypes import Ints
 from camcomp.ground.errors import Location, ProgramError
 
-_END = re.compile(r"\r\n|\n|\r")
+END_OF_LINE = r"\r{0,3}\n|\r"  # LF, CR LF and CR, and the CR CR LF of files that were converted twice
+_END = re.compile(END_OF_LINE)
 LONGEST_LINE = 1 << 14  # characters; controls read some hundred
 _UTF16 = {b"\xff\xfe": "utf-16-le", b"\xfe\xff": "utf-16-be"}
 

@@ -11,6 +11,7 @@ from camcomp.ground.errors import ProgramError
 
 BLANK = " \t\0\x1a\x0b\x0c"
 _WORD = re.compile(r"([A-Za-z])[ \t]*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))")
+_COLON = re.compile(r":[ \t]*([0-9]+)(?![0-9.])")
 _FEED = re.compile(r"(?<![A-Za-z_])[Ff][ \t]*=?[ \t]*[+]?([0-9]+\.?[0-9]*|\.[0-9]+)")
 _LOOSE = re.compile(r"[A-Za-z]?[ \t]*[+-]?[0-9.,]+(?:[ \t]+[0-9.,]+)*")
 
@@ -119,6 +120,9 @@ def read_line(text: Text, row: int, spelling: Spelling | None = None, start: int
             k = end
         elif char == ";":
             break
+        elif char == ":" and not words and (found := _COLON.match(line, k)):
+            words.append(Word("O", float(found[1]), k, found.end()))  # the program number of ISO tapes
+            k = found.end()
         elif char == "(":
             k, closed = comment_end(line, k)
             if not closed:

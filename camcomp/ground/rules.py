@@ -118,7 +118,11 @@ RULES: dict[str, Rule] = {
         "Where a probing move ends is known at the machine only.",
         "take the probing out; camcomp needs to know where every move ends",
     ),
-    "CC122": Rule("turning", "Lathe modes are not followed: camcomp is for milling.", ""),
+    "CC122": Rule(
+        "turning",
+        "Lathe modes are not followed: camcomp is for milling. On Sinumerik G70 and G71 are units.",
+        "for units of Sinumerik, add --dialect sinumerik",
+    ),
     "CC123": Rule(
         "expression or parameter",
         "A parameter is not set, an expression is malformed, or its value is known at the machine only.",

@@ -19,6 +19,7 @@ from camcomp.model.statics.compiled import entry
 # Columns of Plain.begin and Plain.finish.
 X, Y, Z, F, G = range(5)
 ODD, FULL, MORE, END = 0, 1, 2, 3  # why a scan stopped: an odd line, no room, the buffer ends within a line, the end
+LONGEST_END = 4  # bytes of an end of line, CR CR CR LF; see text.END_OF_LINE
 _LARGEST_WORD = 1.0e7  # mm, as the interpreter has it
 _POWERS = 10.0 ** np.arange(23)
 
@@ -153,11 +154,14 @@ def scan_lines(data, at, stop, last, code, feed, code_stated, feed_stated, posit
             return n, row, at, ODD, code, feed, code_stated, feed_stated
         eol = i
         if i < stop and data[i] == 13:
-            i += 1
+            while i < stop and data[i] == 13 and i - eol < LONGEST_END:
+                i += 1
             if i >= stop and not last:
                 return n, row, at, MORE, code, feed, code_stated, feed_stated
-            if i < stop and data[i] == 10:
+            if i < stop and data[i] == 10 and i - eol < LONGEST_END:
                 i += 1
+            else:
+                i = eol + 1
         elif i < stop:
             i += 1
         now = code

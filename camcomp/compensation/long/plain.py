@@ -437,7 +437,7 @@ class PlainCorrector:
         begins = -1 if able and apart != carry.apart else 0
         carry.apart = apart
         own = (mode.apart if apart else mode).said(run.state.unit)
-        modes = [np.frombuffer(each.encode(), np.uint8) for each in ("G61", own)]
+        modes = [np.frombuffer(each.encode(), np.uint8) for each in (self.language.exact_stop, own)]
         first = np.searchsorted(loads.of[rows.move], np.arange(run.motions + 1))
         out = np.empty(run.text_end - run.text_at + ROOM * (N + 1 + int(rest.sum())), np.uint8)
         written, held = np.empty((N, 3)), np.empty(N)

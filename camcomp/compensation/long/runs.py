@@ -6,6 +6,7 @@ jump, loop or call cannot be cut into pieces; they are recognised and left to th
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from copy import deepcopy
 from dataclasses import dataclass, field, replace
@@ -13,14 +14,14 @@ from typing import BinaryIO
 
 import numpy as np
 
-from camcomp.compensation.long.fastread import MORE, Plain, scan
+from camcomp.compensation.long.fastread import LONGEST_END, MORE, Plain, scan
 from camcomp.compensation.long.plain_run import NotInPieces, PlainRun
 from camcomp.gcode.detect import dialect_of
 from camcomp.gcode.interpret import Interpreter, controller
 from camcomp.gcode.program import Program
 from camcomp.gcode.setup import Setup
 from camcomp.gcode.state import ControlState
-from camcomp.gcode.text import Text
+from camcomp.gcode.text import END_OF_LINE, Text
 from camcomp.gcode.words import points_in_feeds
 from camcomp.ground.errors import Location, ProgramError
 from camcomp.model.config.spec import Config
@@ -29,6 +30,7 @@ from camcomp.model.control import waiting_s
 CHUNK_BYTES = 1 << 22  # bytes read at once
 RUN = 1 << 16  # motions of a plain run at most
 PROBE_MOTIONS = 48  # plain motions in a row that make a run of their own
+_END = re.compile(END_OF_LINE.encode())
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,9 +133,9 @@ class Runs:
             rest = self._data[self._at : self._at + (1 << 16)].tobytes()
             if not rest and self._last:
                 return None
-            ends = [k for k in (rest.find(b"\n"), rest.find(b"\r")) if k >= 0]
-            if ends and (min(ends) + 1 < len(rest) or self._last):
-                end = min(ends) + (2 if rest[min(ends) : min(ends) + 2] == b"\r\n" else 1)
+            found = _END.search(rest)
+            if found and (found.end() + LONGEST_END <= len(rest) or self._last):
+                end = found.end()
                 break
             if not self._more():
                 end = len(rest)
@@ -155,7 +157,13 @@ class Runs:
     def _plain(self, limit: int) -> PlainRun | None:
         """The plain lines from here on; None when there are no motions in them."""
         state = self._state
-        if state.relative or state.feed_mode != 94 or not all(state.commanded) or state.motion not in (None, 0, 10):
+        if (
+            state.relative
+            or state.feed_mode != 94
+            or state.feed_unit != state.unit
+            or not all(state.commanded)
+            or state.motion not in (None, 0, 10)
+        ):
             return None
         room = Plain.room(limit)
         code = -1 if state.motion is None else state.motion // 10

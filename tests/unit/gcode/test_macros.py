@@ -153,3 +153,46 @@ def test_g80_leaves_the_motion_code_from_before_the_cycle():
     np.testing.assert_allclose(after.end, last.end + 0.01, atol=1e-9)
     with pytest.raises(ProgramError, match="without a motion code"):
         read_program(text.replace("O1\n", "").encode(), name="in.ngc", dialect="rs274")
+
+
+def ends_of(text, dialect="fanuc"):
+    return read_program(text.encode(), name="in.nc", dialect=dialect).path.end[:, 0].tolist()
+
+
+CALLED = "O7\nG21 G90\nG0 X0. Y0. Z0.\n{}\nM30\nO12\nG1 X50. F100.\nN50 G1 X2. F100.\nX3.\nM99\n"
+
+
+def test_q_of_m98_is_where_the_subprogram_begins():
+    assert ends_of(CALLED.format("M98 P12 Q50")) == [0, 2, 3]
+    assert ends_of(CALLED.format("M98 P12 Q50 L2")) == [0, 2, 3, 2, 3]
+    assert ends_of(CALLED.format("M98 P12")) == [0, 50, 2, 3]
+
+
+@pytest.mark.parametrize("call", ["M98 P12 Q51", "M98 P12 Q5.5", "M98 P12 L1.5", "M98 Q50", "M97 P51", "M97 L2", "M97 P50.5"])
+def test_a_call_to_a_place_that_is_not_there_is_refused(call):
+    with pytest.raises(ProgramError) as caught:
+        ends_of(CALLED.format(call))
+    assert (caught.value.rule, caught.value.at.line) == ("CC124", 4)
+
+
+def test_m97_executes_a_part_of_its_own_program():
+    text = "%\n:7 (HAAS)\nG21 G90\nG0 X0. Y0. Z0.\nM97 P100 L2\nM97 P200\nM30\nN100 G91 G0 X1.\nG90\nM99\nN200 X9.\nM99\n%\n"
+    assert ends_of(text) == [0, 1, 2, 9]
+
+
+@pytest.mark.parametrize("dialect", ["rs274", "grbl", "sinumerik"])
+@pytest.mark.parametrize("call", ["M97 P12", "M98 P12 Q50", "M96 P50", "M198 P12"])
+def test_calls_that_a_dialect_does_not_have_are_refused(dialect, call):
+    with pytest.raises(ProgramError) as caught:
+        ends_of(f"G90\nG0 X0 Y0 Z0\n{call}\nG0 X1\nM30\n", dialect)
+    assert (caught.value.rule, caught.value.at.line) == ("CC124", 3)
+
+
+def test_every_call_of_g65_begins_with_its_arguments():
+    text = "O1\nG21 G90\nG0 X0. Y0. Z0.\nG65 P2 L3 A1.\nM30\nO2\nG91 G0 X#1\n#1=#1+1\nG90\nM99\n"
+    assert ends_of(text) == [0, 1, 2, 3]
+
+
+@pytest.mark.parametrize("dialect", ["rs274", "fanuc", "grbl", "sinumerik"])
+def test_a_program_number_may_begin_with_a_colon(dialect):
+    assert ends_of(":1234\nG90 G0 X1 Y0 Z0\nM30\n", dialect) == [1]

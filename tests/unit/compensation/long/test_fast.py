@@ -64,7 +64,7 @@ def program(lines, eol="\n"):
 
 
 @pytest.mark.parametrize("seed", range(8))
-@pytest.mark.parametrize("eol", ["\n", "\r\n", "\r"])
+@pytest.mark.parametrize("eol", ["\n", "\r\n", "\r", "\r\r\n", "\r\r\r\n"])
 def test_plain_lines_are_read_as_the_interpreter_reads_them(seed, eol):
     lines = list(random_lines(np.random.default_rng(seed), 60))
     path = program(lines, eol).path
@@ -167,9 +167,9 @@ def random_output(rng, path, first):
 @pytest.mark.parametrize("seed", range(25))
 def test_lines_are_written_as_the_writer_of_whole_programs_writes_them(seed):
     rng = np.random.default_rng(seed)
-    eol = ["\n", "\r\n"][seed % 2]
+    eol = ["\n", "\r\n", "\r\r\n"][seed % 3]
     lines = ["N5 G1 X1.5 F300", *random_lines(rng, 40), "G1 X7.5 F20"]
-    text = HEAD + eol.join(lines) + (eol if seed % 3 else "")
+    text = HEAD + eol.join(lines) + (eol if seed % 5 else "")
     whole = read_program(text.encode(), name="p.nc", dialect="rs274")
     path = whole.path
     motion, end, joining, feed = random_output(rng, path, 1)

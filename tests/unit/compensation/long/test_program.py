@@ -116,7 +116,7 @@ def mixed(eol="\n"):
     return HEAD.replace("\n", eol) + eol.join(lines) + eol
 
 
-@pytest.mark.parametrize("eol", ["\n", "\r\n"])
+@pytest.mark.parametrize("eol", ["\n", "\r\n", "\r\r\n"])
 def test_programs_with_everything_between_plain_lines(cartesian, eol):
     assert_same(cartesian, mixed(eol))
 
@@ -235,7 +235,7 @@ def test_random_programs(cartesian, seed):
 
 
 @pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize("eol", ["\n", "\r\n"])
+@pytest.mark.parametrize("eol", ["\n", "\r\n", "\r\r\n"])
 def test_zero_correction_keeps_every_byte(seed, eol):
     job = Job(load_config([shipped("config/orthoglide.yaml"), shipped("config/no-force.yaml")]))
     text = random_program(seed).replace("\n", eol) if seed else mixed(eol)
