@@ -126,7 +126,7 @@ def test_work_offsets():
 @pytest.mark.parametrize(
     ("text", "rule"),
     [
-        ("TRANS X10\nG0 X1\n", "CC118"), ("CYCLE81(5,0,2,-3)\n", "CC135"), ("MCALL CYCLE81(5,0,2,-3)\n", "CC132"),
+        ("TRANS X10\nG0 X1\n", "CC118"), ("CYCLE81(5,0,2,-3)\n", "CC132"), ("MCALL CYCLE81(5,0,2,-3)\n", "CC132"),
         ("G0 X1,5\n", "CC101"), ("IF R1==1 GOTOF A\n", "CC124"), ("DEF REAL A\n", "CC124"), ("L100 P2\n", "CC125"),
         ("G0 AP=30 RP=5\n", "CC116"), ("SCALE X2\n", "CC117"), ("G1 X=FOO F1\n", "CC123"), ('MSG("a"\n', "CC123"),
         ("G2 X1 Y1 AR=90\n", "CC112"), ("G0 X=AC(1\n", "CC123"), ("CYCLE800(1,2)\n", "CC118"), ("G0 X Y\n", "CC103"),
