@@ -1,0 +1,60 @@
+"""Identifiability: which sets these data cannot tell apart, by what their columns can do of one another.
+
+The effect of the best set, d = A_S a_S with nuisances and small errors taken out, lies within the angle phi of the span
+of another set; what stays of it, |d| sin(phi), is measured in noise: below INDISTINGUISHABLE the sets are one class.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from camcomp.diagnosis.model.evidence import Members
+from camcomp.diagnosis.model.explain import Explanation
+from camcomp.ground.datatypes import Floats
+
+INDISTINGUISHABLE = 9.0  # chi-square of what another set leaves of the effect: three deviations
+EQUAL_LOG_ODDS = 3.0  # odds of 20, Kass and Raftery 1995
+MOST_SETS = 4  # contract: alternatives that are listed
+
+
+def sine_between(explanation: Explanation, first: Members, second: Members) -> float:
+    """Sine of the angle between the effect of the first set and the span of the second, nuisances taken out."""
+    data = explanation.data
+    amount = data.estimate(first)[0] if first else np.zeros(0)
+    whole, left = _remaining(data.gram, data.indices(first), amount, data.indices(second))
+    return float(np.sqrt(max(left, 0.0) / whole)) if whole > 0.0 else 0.0
+
+
+def alternatives_of(explanation: Explanation, place_of: Sequence[tuple[str, str | None]]) -> list[Members]:
+    """Sets nearly as probable as the best one, or that do the same, the best first; supersets of it are no alternatives."""
+    data = explanation.data
+    best = explanation.members
+    amount = data.estimate(best)[0] if best else np.zeros(0)
+    top = max((p for m, p in explanation.sets if m == best), default=0.0)
+    own = {place_of[i] for i in best}
+    out: list[Members] = [best]
+    for members, p in explanation.sets:
+        places = {place_of[i] for i in members}
+        if places == own or places > own:
+            continue
+        near = p >= top * np.exp(-EQUAL_LOG_ODDS)
+        if not near and len(members) <= len(best) and p > 0.0:
+            _, left = _remaining(data.gram, data.indices(best), amount, data.indices(members))
+            near = left < INDISTINGUISHABLE and p >= top * np.exp(-2.0 * EQUAL_LOG_ODDS)
+        if near:
+            out.append(members)
+    return out[:MOST_SETS]
+
+
+def _remaining(gram: Floats, on: list[int], amount: Floats, by: list[int]) -> tuple[float, float]:
+    """Square of an effect in floors, and what is left of it when other columns do all they can."""
+    whole = float(amount @ gram[np.ix_(on, on)] @ amount)
+    if not by:
+        return whole, whole
+    toward = gram[np.ix_(by, on)] @ amount
+    size = 1.0 / np.sqrt(np.maximum(np.diag(gram)[by], 1e-300))
+    own = size[:, None] * gram[np.ix_(by, by)] * size
+    taken = float((size * toward) @ np.linalg.lstsq(own, size * toward, rcond=1e-10)[0])
+    return whole, whole - taken

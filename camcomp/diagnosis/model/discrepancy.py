@@ -1,0 +1,127 @@
+"""The dictionary of discrepancy: smooth functions of one covariate, and smooth processes over posture or time.
+
+A covariate x enters by cosines sqrt(2) cos(pi k u) / k of its place u in its range, k = 1 ... ORDERS, once for every
+direction in which it may move the channels; the scale of a covariate is in noise floors. A process is the limit of all
+functions of all coordinates of a posture together, and enters by its covariance.
+
+Sources: Kennedy, O'Hagan, J. R. Statist. Soc. B 63 (2001) 425; Brynjarsdottir, O'Hagan, Inverse Problems 30 (2014) 114007.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from math import log
+
+import numpy as np
+from scipy.linalg import eigh
+
+from camcomp.diagnosis.model.evidence import Background, LinearModel, Members
+from camcomp.diagnosis.model.group import Group, SmoothProcess, split_regions
+from camcomp.ground.datatypes import Floats
+
+ORDERS = 8  # cosines of a covariate
+SCALES = (1.0, 2.0, 5.0, 10.0, 30.0, 100.0)  # of the floor: size of a covariate's function, or of a family
+SIZES_OF_PROCESS = (0.5, 1.0, 2.0, 4.0, 8.0)  # of the floor
+LENGTHS = {"posture": (0.15, 0.3, 0.6, 1.2), "time": (0.01, 0.03, 0.1, 0.3)}
+CLEAR = 3.0  # log likelihood by which a process has to be better than noise: odds of 20
+ROWS_OF_PROCESS = 400  # of a region on which a process is fitted
+UNKNOWN = 0.2  # prior probability that something unmodelled acts
+EVERYWHERE = 0.05  # prior probability that an effect acts at all its targets
+
+
+def smooth_functions(values: Floats, low: float, high: float, orders: int = ORDERS) -> Floats:
+    """Cosines (n, orders) of values (n,) between low and high, of size 1/k (rms)."""
+    place = np.clip((values - low) / max(high - low, 1e-300), 0.0, 1.0)
+    k = np.arange(1, orders + 1)
+    return np.asarray(np.sqrt(2.0) / k * np.cos(np.pi * k * place[:, None]), float)
+
+
+def covariate_columns(functions: Floats, directions: Floats) -> Floats:
+    """Columns (n, c, d orders) by which functions (n, orders) act along directions (n, c, d), which are one floor long."""
+    n, c, d = directions.shape
+    return np.asarray(np.einsum("nk,ncd->ncdk", functions, directions).reshape(n, c, d * functions.shape[1]), float)
+
+
+def prior_of_covariate(model: LinearModel) -> float:
+    """Log prior of one covariate or process at one scale, against nothing unmodelled."""
+    many = len(model.layout.covariates) - len(model.healthy) + len(LENGTHS)
+    return log(UNKNOWN / (1.0 - UNKNOWN)) - log(many)
+
+
+def prior_of_family(model: LinearModel) -> float:
+    """Log prior of an effect at all its targets, against none."""
+    return log(EVERYWHERE / (1.0 - EVERYWHERE)) - log(max(len(model.families), 1))
+
+
+def gains_of_more(model: LinearModel, background: Background, members: Members) -> dict[Background, float]:
+    """Log Bayes factors, priors included, of one covariate or family more at each of SCALES, beside a set of causes."""
+    at = model.posterior(background, model.reduced(background).slab(members))
+    active = {*model.healthy, *(name for name, _ in background.scales)}
+    out: dict[Background, float] = {}
+    for name, own in model.layout.covariates.items():
+        if name not in active:
+            found = _gains(*at.without(np.arange(own.start, own.stop)))
+            prior = prior_of_covariate(model) - log(len(SCALES))
+            for scale, gain in zip(SCALES, found, strict=True):
+                out[replace(background, scales=(*background.scales, (name, scale)))] = gain + prior
+    for name in model.families:
+        on, unit = model.family(name)
+        if len(on) and name not in dict(background.families):
+            gram, moment = at.without(on)
+            found = _gains(unit[:, None] * gram * unit, unit * moment)
+            prior = prior_of_family(model) - log(len(SCALES))
+            for scale, gain in zip(SCALES, found, strict=True):
+                out[replace(background, families=(*background.families, (name, scale)))] = gain + prior
+    return out
+
+
+def _gains(gram: Floats, moment: Floats) -> Floats:
+    """Log Bayes factors (scales,) of columns with normal equations gram (q, q), moment (q,) at SCALES, against none."""
+    size, way = eigh(gram)
+    size, toward = np.maximum(size, 0.0), (way.T @ moment) ** 2
+    square = np.array(SCALES)[:, None] ** 2
+    grown = 1.0 + square * size
+    return np.asarray(0.5 * ((square * toward / grown).sum(axis=1) - np.log(grown).sum(axis=1)), float)
+
+
+def fit_process(groups: Sequence[Group], left: Sequence[Floats], over: str) -> SmoothProcess | None:
+    """The process over posture or time that makes residuals left (n, c), in noise floors, most likely.
+
+    Its noise is free: the residual of many causes is less than the floor. None where there is no clock, or where noise
+    alone makes them as likely.
+    """
+    parts = []
+    for g, r in zip(groups, left, strict=True):
+        if over == "time" and g.order is None:
+            return None
+        at = g.positions(SmoothProcess(0.0, 1.0, over))
+        region = split_regions(at, -(-len(r) // ROWS_OF_PROCESS))
+        parts += [(at[region == i], r[region == i]) for i in np.unique(region)]
+    values = sum(r.size for _, r in parts)
+    plain = -0.5 * values * log(max(sum(float((r**2).sum()) for _, r in parts) / values, 1e-300))
+    best: tuple[float, SmoothProcess | None] = plain + CLEAR, None
+    for length in LENGTHS[over]:
+        spectra = []
+        for at, r in parts:
+            size, way = eigh(SmoothProcess(1.0, length, over).correlation(at))
+            spectra.append((np.maximum(size, 0.0), ((way.T @ r) ** 2).sum(axis=1), r.shape[1]))
+        for size_of in SIZES_OF_PROCESS:
+            square = sum(float((z / (1.0 + size_of**2 * e)).sum()) for e, z, _ in spectra) / values
+            logs = sum(0.5 * c * float(np.log1p(size_of**2 * e).sum()) for e, _, c in spectra)
+            value = -0.5 * values * log(max(square, 1e-300)) - logs
+            if value > best[0]:
+                best = value, SmoothProcess(size_of * max(square, 1e-12) ** 0.5, length, over)
+    return best[1]
+
+
+def residuals(model: LinearModel, background: Background, members: Members) -> list[Floats]:
+    """Residuals (n, c) of the fitted groups in floors, beside causes, small errors and nuisances but no discrepancy."""
+    mean = model.posterior(background, model.reduced(background).slab(members)).mean.copy()
+    for name, own in model.layout.covariates.items():
+        mean[own] = mean[own] if name in model.healthy else 0.0
+    out = []
+    for group in (model.groups[g] for g in model.own):
+        left = group.y - model.layout.design(group) @ mean
+        out.append(np.where(np.isfinite(left), left, 0.0) / group.sd)
+    return out

@@ -1,0 +1,335 @@
+"""Log evidence of sets of causes, in closed form from normal equations (spike and slab).
+
+A column of a cause has a slab of one of several WIDTHS, measured in noise floors of its effect on the channels; every
+other column has the spike: the small errors of a healthy machine (ridge). Nuisances are free. Amplitudes, nuisances and
+the dictionary are integrated out.
+
+Source: George, McCulloch, Statistica Sinica 7 (1997) 339; half-normal slabs where an amplitude has a sign.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from math import comb, log
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+from scipy.special import log_ndtr
+
+from camcomp.diagnosis.model.candidates import AmplitudeBounds, PlacedCause
+from camcomp.diagnosis.model.group import (
+    NormalEquations,
+    Group,
+    ColumnLayout,
+    SmoothProcess,
+    normal_equations,
+    sum_grams,
+)
+from camcomp.diagnosis.statistics.cause_sets import SIZES
+from camcomp.ground.datatypes import Floats, Ints
+
+WIDTHS = (2.0, 6.0, 20.0, 60.0, 200.0)  # of the floor: effect of a cause on the channels
+SMALL = 0.08  # of the floor: effect of a healthy machine's small error; sixty of them make 0.6
+FREE = 1e-6  # precision of nuisances in units of their columns
+ABSENT = 1e30  # precision of a column that takes no part
+LEAST_VISIBLE = 1e-6  # of a column's size: what nuisances leave of it; below, the column is not seen
+Members = tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Background:
+    """What acts beside single causes, each with its scale in floors.
+
+    noise: factor on the noise. scales: covariates of the dictionary. families: effects at all their targets. process: a
+    smooth process.
+    """
+
+    noise: float = 1.0
+    scales: tuple[tuple[str, float], ...] = ()
+    families: tuple[tuple[str, float], ...] = ()
+    process: SmoothProcess | None = None
+
+    @property
+    def unknown(self) -> bool:
+        """Whether a covariate or a process of the dictionary acts."""
+        return bool(self.scales or self.process)
+
+
+@dataclass(eq=False)
+class LinearModel:
+    """Groups with their candidates, linearised at one state; normal equations are kept per process.
+
+    fitted: indices of the groups that are fitted, None for all; the others are judged only. families: effect -> its columns
+    at all targets. healthy: covariates that are always there, with the scale that healthy machines and instruments have,
+    in floors.
+    """
+
+    groups: tuple[Group, ...]
+    candidates: tuple[PlacedCause, ...]
+    bounds: AmplitudeBounds
+    fitted: tuple[int, ...] | None = None
+    families: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
+    healthy: Mapping[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.layout = ColumnLayout.of(self.groups)
+        self._grams: dict[SmoothProcess | None, tuple[NormalEquations, ...]] = {}
+        self._totals: dict[tuple[SmoothProcess | None, tuple[int, ...]], NormalEquations] = {}
+
+    def grams(self, process: SmoothProcess | None = None) -> tuple[NormalEquations, ...]:
+        """Normal equations of every group."""
+        if process not in self._grams:
+            self._grams[process] = tuple(normal_equations(g, self.layout, process) for g in self.groups)
+        return self._grams[process]
+
+    @property
+    def own(self) -> tuple[int, ...]:
+        """Indices of the groups that are fitted."""
+        return tuple(range(len(self.groups))) if self.fitted is None else self.fitted
+
+    @cached_property
+    def size(self) -> Floats:
+        """Effect (k,) on the channels of one unit of every column, in floors (rms), nuisances taken out; 0: not seen."""
+        k, A = self.layout.effects, self.total(None).A
+        own = list(range(k, k + sum(s.stop - s.start for s in self.layout.nuisances.values())))
+        N, X = A[np.ix_(own, own)], A[np.ix_(own, range(k))]
+        scale = 1.0 / np.sqrt(np.maximum(np.diag(N), 1e-300))
+        inverse = np.linalg.pinv(scale[:, None] * N * scale, rcond=1e-12, hermitian=True)
+        whole = np.diag(A)[:k]
+        free = whole - np.einsum("ij,ik,kj->j", scale[:, None] * X, inverse, scale[:, None] * X, optimize=True)
+        seen = free > LEAST_VISIBLE * np.maximum(whole, LEAST_VISIBLE * self.rows)
+        return np.where(seen, np.sqrt(np.where(seen, free, 1.0) / self.rows * self.channels), 0.0)
+
+    @property
+    def rows(self) -> int:
+        """Number of values."""
+        return sum(self.grams()[i].rows for i in self.own)
+
+    @property
+    def channels(self) -> int:
+        """Channels per row."""
+        return int(self.groups[0].y.shape[1])
+
+    @cached_property
+    def small(self) -> Floats:
+        """Width (k,) of the small error of every column, 0 where it has none."""
+        out = np.zeros(self.layout.effects)
+        for c in self.candidates:
+            own = [j for j in c.columns if self.size[j] > 0.0 and not (self.bounds.shaped[j] and c.ways > 1.0)]
+            out[own] = np.maximum(out[own], SMALL / (self.size[own] * np.sqrt(len(c.columns) * c.ways)))
+        return out
+
+    def family(self, name: str) -> tuple[Ints, Floats]:
+        """Columns (d,) of a family that are seen, and their amplitudes (d,) at which it acts by one floor in all."""
+        on = np.array([j for j in self.families[name] if self.size[j] > 0.0], int)
+        return on, 1.0 / (self.size[on] * np.sqrt(max(len(on), 1)))
+
+    def precision(self, background: Background, slab: Mapping[int, float] | None = None) -> Floats:
+        """Prior precision (q,) of all columns; slab: width of the columns of causes."""
+        out = np.full(self.layout.size, ABSENT)
+        for own in self.layout.nuisances.values():
+            out[own] = FREE
+        for name, scale in (*self.healthy.items(), *background.scales):
+            out[self.layout.covariates[name]] = 1.0 / scale**2
+        width = self.small.copy()
+        for name, scale in background.families:
+            on, unit = self.family(name)
+            width[on] = np.hypot(width[on], scale * unit)
+        for j, more in (slab or {}).items():
+            width[j] = np.hypot(width[j], more)
+        out[: self.layout.effects][width > 0.0] = 1.0 / width[width > 0.0] ** 2
+        return out
+
+    def total(self, process: SmoothProcess | None, groups: Sequence[int] | None = None) -> NormalEquations:
+        """Normal equations of some groups, or of all that are fitted."""
+        key = process, tuple(self.own if groups is None else groups)
+        if key not in self._totals:
+            every = self.grams(process)
+            self._totals[key] = sum_grams([every[i] for i in key[1]])
+        return self._totals[key]
+
+    def posterior(
+        self, background: Background, slab: Mapping[int, float] | None = None, groups: Sequence[int] | None = None
+    ) -> AmplitudePosterior:
+        """Normal distribution of all columns that take part, from some groups or all that are fitted."""
+        k, data, precision = (
+            self.layout.effects,
+            self.total(background.process, groups),
+            self.precision(background, slab),
+        )
+        live = precision < ABSENT
+        live[:k] &= self.size > 0.0
+        return AmplitudePosterior.of(data, precision, np.flatnonzero(live), background.noise)
+
+    def reduced(self, background: Background, groups: Sequence[int] | None = None) -> Reduced:
+        """Normal equations of the effects with all else integrated out."""
+        at = self.posterior(background, None, groups)
+        k = self.layout.effects
+        effects = np.flatnonzero(self.size > 0.0)
+        own, by = at.without(effects)
+        gram, moment = np.zeros((k, k)), np.zeros(k)
+        gram[np.ix_(effects, effects)], moment[effects] = own, by
+        return Reduced(self, gram, moment, at.log_evidence)
+
+
+@dataclass(frozen=True, eq=False)
+class AmplitudePosterior:
+    """Columns `live` under their priors: mean (q,), 0 where a column takes no part, and log evidence of the data."""
+
+    data: NormalEquations
+    live: Ints
+    noise: float  # factor on the noise of the data
+    scale: Floats  # (live,) that make the precision's diagonal 1
+    factor: tuple[Floats, bool]  # of the scaled precision
+    mean: Floats
+    log_evidence: float
+
+    @staticmethod
+    def of(data: NormalEquations, precision: Floats, live: Ints, noise: float = 1.0) -> AmplitudePosterior:
+        """From normal equations and prior precisions (q,); noise: factor on the noise."""
+        square = noise**2
+        A, own = data.A[np.ix_(live, live)] / square, precision[live]
+        scale = 1.0 / np.sqrt(np.diag(A) + own)
+        factor = cho_factor(scale[:, None] * (A + np.diag(own)) * scale, lower=True)
+        b = scale * data.b[live] / square
+        solved = cho_solve(factor, b)
+        mean = np.zeros(len(precision))
+        mean[live] = scale * solved
+        value = -0.5 * (data.c / square - float(b @ solved)) - data.log_size - data.rows * log(noise)
+        value -= float(np.log(np.diag(factor[0])).sum() - np.log(scale).sum() - 0.5 * np.log(own).sum())
+        return AmplitudePosterior(data, live, noise, scale, factor, mean, value)
+
+    def covariance(self, columns: Sequence[int]) -> Floats:
+        """Covariance (d, d) of some of the live columns."""
+        at = np.searchsorted(self.live, columns)
+        right = np.zeros((len(self.live), len(at)))
+        right[at, np.arange(len(at))] = 1.0
+        own = cho_solve(self.factor, right)[at]
+        return np.asarray(self.scale[at][:, None] * own * self.scale[at], float)
+
+    def without(self, columns: Ints) -> tuple[Floats, Floats]:
+        """Normal equations (d, d), (d,) of further columns with all live ones integrated out."""
+        square = self.noise**2
+        left = self.scale[:, None] * self.data.A[np.ix_(self.live, columns)] / square
+        gram: Floats = self.data.A[np.ix_(columns, columns)] / square - left.T @ cho_solve(self.factor, left)
+        moment: Floats = self.data.b[columns] / square - left.T @ (self.mean[self.live] / self.scale)
+        return gram, moment
+
+
+@dataclass(frozen=True, eq=False)
+class Reduced:
+    """Normal equations of the effects (gram (k, k), moment (k,)), and the log evidence of no cause at all."""
+
+    model: LinearModel
+    gram: Floats
+    moment: Floats
+    none: float
+
+    @cached_property
+    def _unit(self) -> list[Floats]:
+        """Amplitudes (d,) of every candidate at which it acts by one floor, its columns in equal parts."""
+        size = self.model.size
+        return [
+            1.0 / (size[own] * np.sqrt(len(own))) if (size[own] > 0.0).all() else np.zeros(len(own))
+            for own in (list(c.columns) for c in self.model.candidates)
+        ]
+
+    @cached_property
+    def _places(self) -> int:
+        return len({c.place for c in self.model.candidates})
+
+    @property
+    def usable(self) -> list[int]:
+        """Candidates all of whose columns are seen."""
+        return [i for i, unit in enumerate(self._unit) if unit.all()]
+
+    def units(self, members: Members) -> Floats:
+        """Amplitudes (d,) at which every member acts by one floor."""
+        return np.concatenate([np.zeros(0), *(self._unit[i] for i in members)])
+
+    def indices(self, members: Members) -> list[int]:
+        """Columns of members, one after the other."""
+        return [j for i in members for j in self.model.candidates[i].columns]
+
+    def prior(self, members: Members) -> float:
+        """Log prior of a set: its number of causes, places equally likely, shapes of a place equally likely."""
+        ways = sum(log(self.model.candidates[i].ways) for i in members)
+        return log(SIZES[len(members)]) - log(comb(self._places, len(members))) - ways
+
+    def value(self, members: Members) -> float:
+        """Log posterior of a set up to a constant, evidence and prior."""
+        if not members:
+            return self.none + self.prior(())
+        return float(self.with_one_more(members[:-1], members[-1:])[0])
+
+    def with_one_more(self, members: Members, more: Sequence[int]) -> Floats:
+        """Log posterior (s,) of a set with one candidate more each, up to a constant."""
+        out = np.array([self.none + self.prior((*members, i)) for i in more])
+        count = np.array([len(self.model.candidates[i].columns) for i in more])
+        for d in np.unique(count):
+            own = np.flatnonzero(count == d)
+            value = self._posterior(members, [more[i] for i in own.tolist()])[0]
+            most = value.max(axis=1)
+            base = np.where(np.isfinite(most), most, 0.0)
+            with np.errstate(divide="ignore"):
+                out[own] += base + np.log(np.exp(value - base[:, None]).mean(axis=1))
+        return out
+
+    def estimate(self, members: Members) -> tuple[Floats, Floats, float]:
+        """Amplitudes (d,), covariance (d, d) and the most probable width, small errors integrated out."""
+        value, mean = self._posterior(members[:-1], members[-1:])
+        w = int(np.argmax(value[0]))
+        on, unit = self.indices(members), self.units(members)
+        M = unit[:, None] * self.gram[np.ix_(on, on)] * unit + np.eye(len(on)) / WIDTHS[w] ** 2
+        return mean[0, w], unit[:, None] * np.linalg.inv(M) * unit, WIDTHS[w]
+
+    def slab(self, members: Members) -> dict[int, float]:
+        """Width of the columns of members, where their slab is the most probable one."""
+        if not members:
+            return {}
+        width = self.estimate(members)[2]
+        return dict(zip(self.indices(members), (width * self.units(members)).tolist(), strict=True))
+
+    def _posterior(self, members: Members, more: Sequence[int]) -> tuple[Floats, Floats]:
+        """Log evidence (s, widths) and amplitudes (s, widths, d) of a set with one of s candidates more, each of e columns.
+
+        The columns of the set are eliminated once.
+        """
+        old, new = np.array(self.indices(members), int), np.array([self.model.candidates[i].columns for i in more])
+        a, b = self.units(members), np.array([self._unit[i] for i in more])
+        square = np.array(WIDTHS) ** 2
+        A = a[:, None] * self.gram[np.ix_(old, old)] * a + np.eye(len(a)) / square[:, None, None]  # (widths, o, o)
+        B = a[:, None] * self.gram[old[:, None], new[:, None, :]] * b[:, None, :]  # (s, o, e)
+        C = b[:, :, None] * self.gram[new[:, :, None], new[:, None, :]] * b[:, None, :]
+        P = np.linalg.inv(A)
+        alone = P @ (a * self.moment[old])  # (widths, o)
+        taken = np.einsum("wop,spe->swoe", P, B, optimize=True)
+        S = C[:, None] + np.eye(b.shape[1]) / square[:, None, None]
+        S = S - np.einsum("soe,swof->swef", B, taken, optimize=True)
+        Q = np.linalg.inv(S)
+        left = (b * self.moment[new])[:, None] - np.einsum("soe,wo->swe", B, alone, optimize=True)
+        gained = (Q @ left[..., None])[..., 0]
+        value = 0.5 * ((alone @ (a * self.moment[old]))[None] + (left * gained).sum(axis=2))
+        value -= 0.5 * (np.linalg.slogdet(A)[1] + np.linalg.slogdet(S)[1] + (len(a) + b.shape[1]) * np.log(square))
+        mean = np.concatenate([alone[None] - (taken @ gained[..., None])[..., 0], gained], axis=2)
+        variance = np.concatenate(
+            [
+                np.diagonal(P, axis1=1, axis2=2)[None] + ((taken @ Q) * taken).sum(axis=3),
+                np.diagonal(Q, axis1=2, axis2=3),
+            ],
+            axis=2,
+        )
+        on = np.concatenate([np.broadcast_to(old, (len(new), len(old))), new], axis=1)[:, None, :]
+        unit = np.concatenate([np.broadcast_to(a, (len(b), len(a))), b], axis=1)[:, None, :]
+        mean, sd = unit * mean, unit * np.sqrt(np.maximum(variance, 0.0))
+        return value + self._inside(mean, sd, on), mean
+
+    def _inside(self, mean: Floats, sd: Floats, on: np.ndarray) -> Floats:
+        """Log share (s, widths) of the posterior that has the right signs; minus infinity far outside of the bounds."""
+        bounds = self.model.bounds
+        signed = bounds.sign[on] > 0.0
+        out = np.where(signed, log_ndtr(np.where(signed, mean / sd, 0.0)) + log(2.0), 0.0).sum(axis=2)
+        outside = (mean < bounds.low[on] - 3.0 * sd) | (mean > bounds.high[on] + 3.0 * sd)
+        return np.where(outside.any(axis=2), -np.inf, out)

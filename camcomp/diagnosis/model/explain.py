@@ -1,0 +1,207 @@
+"""From a linear model to its explanation: probable sets of causes, and whether something unmodelled acts beside them.
+
+Steps: search sets beside noise alone; weigh every covariate and process beside the best set and its parts; search sets
+again beside the most probable discrepancy; weigh the noise itself. All sets and backgrounds that were weighed share one
+posterior.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+from math import log
+
+import numpy as np
+from scipy.special import logsumexp
+
+from camcomp.diagnosis.model.candidates import Place
+from camcomp.diagnosis.model.discrepancy import (
+    LENGTHS,
+    SCALES,
+    UNKNOWN,
+    fit_process,
+    gains_of_more,
+    prior_of_covariate,
+    prior_of_family,
+    residuals,
+)
+from camcomp.diagnosis.model.evidence import Background, LinearModel, Members, Reduced
+from camcomp.diagnosis.model.search import MOST, Visited, search_sets
+from camcomp.ground.datatypes import Floats
+
+ROUNDS = 3  # of discrepancies, one more each
+STATED = 0.08  # log deviation of a stated noise: instruments know themselves to an eighth in the square
+EXCESS = 1.2  # of the floor: noise above it is unmodelled
+NOISES = (0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2, 1.35, 1.5, 1.75, 2.0, 2.5, 3.0, 4.0, 6.0, 9.0)  # factors on the floor
+SHOWN = 1e-12  # probability of a set that is kept
+
+
+@dataclass(frozen=True)
+class KnownNoise:
+    """How well the noise of the groups is known: freedom, the number of values it rests on, infinite where it is stated.
+
+    None in place of it: unknown, so that its size says nothing of what is unmodelled.
+    """
+
+    freedom: float = np.inf
+
+    def log_prior(self, factor: float) -> float:
+        """Log prior of a factor on the noise, noise as stated against unmodelled excess of any size."""
+        spread = np.hypot(STATED, 1.0 / np.sqrt(2.0 * self.freedom))
+        inside = -0.5 * (log(factor) / spread) ** 2
+        outside = log(UNKNOWN / (1.0 - UNKNOWN)) - log(len(NOISES)) if factor > EXCESS else -np.inf
+        return float(np.logaddexp(inside, outside))
+
+
+@dataclass(frozen=True, eq=False)
+class Explanation:
+    """The posterior over sets and backgrounds.
+
+    members: the most probable set, beside `background`. sets: members and probability, one entry per set of places, the
+    most probable first; places: probability of every place; unknown: probability that something unmodelled acts.
+    """
+
+    model: LinearModel
+    background: Background
+    members: Members
+    sets: tuple[tuple[Members, float], ...]
+    places: dict[Place, float]
+    unknown: float
+    log_evidence: float
+
+    @property
+    def data(self) -> Reduced:
+        """The normal equations of the effects beside the background."""
+        return self.model.reduced(self.background)
+
+    def amplitudes(self) -> tuple[Floats, Floats]:
+        """Amplitudes (k,) of the most probable set and its families, 0 elsewhere, and their covariance (k, k)."""
+        k = self.model.layout.effects
+        amount, covariance = np.zeros(k), np.zeros((k, k))
+        if self.members:
+            data = self.data
+            on = data.indices(self.members)
+            amount[on], covariance[np.ix_(on, on)], _ = data.estimate(self.members)
+        if self.background.families:
+            on = self.columns
+            at = self.model.posterior(self.background, self.data.slab(self.members))
+            amount[on], covariance[np.ix_(on, on)] = at.mean[on], at.covariance(on)
+        return amount, covariance
+
+    @property
+    def columns(self) -> list[int]:
+        """Columns of the most probable set and of the families beside it."""
+        own = {j for name, _ in self.background.families for j in self.model.family(name)[0].tolist()}
+        return sorted({*own, *self.data.indices(self.members)})
+
+
+def explain(
+    model: LinearModel, noise: KnownNoise | None, most: int = MOST, among: Collection[Place] | None = None
+) -> Explanation:
+    """Sets of causes and what is unmodelled, from all groups that are fitted."""
+    weighed: dict[Background, dict[Members, float]] = {}
+    background = Background()
+    if noise is None:
+        background = best_noise(model, background, (), None)
+    for _ in range(ROUNDS + 1):
+        found = search_sets(model.reduced(background), most, among)
+        prior = log_prior(model, background, noise)
+        weighed[background] = {m: v + prior for m, v in found.values.items()}
+        options = further_backgrounds(model, background, found, noise)
+        options = {b: v for b, v in options.items() if b not in weighed}
+        for b, (members, value) in options.items():
+            weighed.setdefault(b, {})[members] = value
+        best = max(options, key=lambda b: options[b][1], default=None)
+        if best is None or options[best][1] <= max(weighed[background].values()):
+            break
+        background = best
+    return posterior_of(model, weighed)
+
+
+def log_prior(model: LinearModel, background: Background, noise: KnownNoise | None) -> float:
+    """Log prior of a background."""
+    out = 0.0 if noise is None else noise.log_prior(background.noise)
+    out += len(background.scales) * (prior_of_covariate(model) - log(len(SCALES)))
+    out += len(background.families) * (prior_of_family(model) - log(len(SCALES)))
+    return out + (prior_of_covariate(model) if background.process else 0.0)
+
+
+def further_backgrounds(
+    model: LinearModel, background: Background, found: Visited, noise: KnownNoise | None
+) -> dict[Background, tuple[Members, float]]:
+    """Backgrounds with one discrepancy more, each with the set of `found` that goes best with it and its log posterior.
+
+    Looked at are the best set and its parts: a large set takes up what is unmodelled.
+    """
+    data = model.reduced(background)
+    prior = log_prior(model, background, noise)
+    out: dict[Background, tuple[Members, float]] = {}
+
+    def consider(b: Background, members: Members, value: float) -> None:
+        if b not in out or value > out[b][1]:
+            out[b] = members, value
+
+    parts = parts_of(data, found.best)
+    for members in parts:
+        here = found.values.get(members, data.value(members)) + prior
+        for b, gain in gains_of_more(model, background, members).items():
+            consider(b, members, here + gain)
+    for members in {parts[0], parts[-1]}:
+        others = [best_noise(model, background, members, noise)]
+        if background.process is None:
+            left = residuals(model, background, members)
+            for over in LENGTHS:
+                process = fit_process([model.groups[g] for g in model.own], left, over)
+                others += [replace(background, process=process)] if process else []
+        for b in others:
+            if b != background:
+                consider(b, members, model.reduced(b).value(members) + log_prior(model, b, noise))
+    return out
+
+
+def parts_of(data: Reduced, members: Members) -> list[Members]:
+    """A set, and what remains of it when the member that is worth least is dropped, again and again."""
+    out = [members]
+    while members:
+        less = [(*members[:i], *members[i + 1 :]) for i in range(len(members))]
+        members = max(less, key=data.value)
+        out.append(members)
+    return out
+
+
+def best_noise(model: LinearModel, background: Background, members: Members, noise: KnownNoise | None) -> Background:
+    """The background with the most probable factor on the noise."""
+    slab = model.reduced(background).slab(members)
+    options = [replace(background, noise=factor) for factor in NOISES]
+    value = [model.posterior(b, slab).log_evidence + log_prior(model, b, noise) for b in options]
+    return options[int(np.argmax(value))]
+
+
+def posterior_of(model: LinearModel, weighed: dict[Background, dict[Members, float]]) -> Explanation:
+    """The posterior over everything that was weighed; sets of the same places count as one."""
+    flat = [(b, m, v) for b, own in weighed.items() for m, v in own.items()]
+    value = np.array([v for _, _, v in flat])
+    p = np.exp(value - logsumexp(value))
+    places: dict[Place, float] = {}
+    merged: dict[frozenset[Place], tuple[Members, float, float]] = {}
+    unknown = 0.0
+    for (background, members, _), each in zip(flat, p.tolist(), strict=True):
+        if background.unknown or background.noise > EXCESS:
+            unknown += each
+        if each < SHOWN:
+            continue
+        own = frozenset(model.candidates[i].place for i in members)
+        for place in own:
+            places[place] = places.get(place, 0.0) + each
+        first, most, total = merged.get(own, (members, 0.0, 0.0))
+        merged[own] = (members if each > most else first, max(most, each), total + each)
+    sets = sorted(((m, total) for m, _, total in merged.values()), key=lambda s: -s[1])
+    top = int(np.argmax(value))
+    return Explanation(model, flat[top][0], flat[top][1], tuple(sets), places, unknown, float(value[top]))
+
+
+def relative_evidence(explanation: Explanation, sets: Sequence[Members]) -> Floats:
+    """Log evidence (s,) of sets against the most probable one, beside its background, their priors taken out."""
+    data = explanation.data
+    base = data.value(explanation.members) - data.prior(explanation.members)
+    return np.array([data.value(m) - data.prior(m) - base for m in sets])

@@ -1,0 +1,101 @@
+"""Excess residual on held-out folds: whether groups that were not fitted keep more than their noise.
+
+A fold is a group, or a region of positions where there is one group. left (n, c): residual of the fold by the fit to the
+others; near: by the fit to all. E[left near] = noise squared, whatever the fit to the others leaves open.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from camcomp.diagnosis.model.evidence import Background, LinearModel, Members
+from camcomp.diagnosis.model.group import Group, SmoothProcess, split_regions
+from camcomp.ground.datatypes import Floats
+
+REGIONS = 16  # of positions or time, between which squares are compared
+FOLDS = 8  # regions of one group that are left out in turn
+
+
+@dataclass(frozen=True, eq=False)
+class HeldOut:
+    """Residuals of a fold: rows of the model's group g; near (n, c) in channel units; squares (n,) of values of size 1."""
+
+    group: int
+    left: Floats
+    near: Floats
+    squares: Floats
+
+
+@dataclass(frozen=True)
+class Excess:
+    """Mean square of held-out residuals in units of the noise, its standard error, and the log predictive density."""
+
+    mean: float
+    error: float
+    density: float
+
+
+def folds_of(model: LinearModel) -> list[tuple[int, tuple[int, ...]]]:
+    """Groups that are judged, each with those it is predicted from: held-out ones by the fitted, else each by the others."""
+    own = model.own
+    if len(own) < len(model.groups):
+        return [(g, own) for g in range(len(model.groups)) if g not in own]
+    return [(g, tuple(i for i in own if i != g)) for g in own]
+
+
+def split_group(g: Group, count: int = FOLDS) -> list[Group]:
+    """A group as regions of its positions, or stretches of its time."""
+    at = g.positions(SmoothProcess(0.0, 1.0, "posture" if g.position is not None else "time"))
+    region = split_regions(at, count)
+    return [replace(g.take(region == i), name=f"{g.name}/{i}") for i in np.unique(region)]
+
+
+def held_out(
+    model: LinearModel, background: Background, members: Members, folds: Sequence[tuple[int, tuple[int, ...]]]
+) -> tuple[list[HeldOut], float]:
+    """Residuals of folds beside a set and its background, and the sum of their log predictive densities."""
+    slab = model.reduced(background).slab(members)
+    out, density = [], 0.0
+    for g, others in folds:
+        group, D = model.groups[g], model.layout.design(model.groups[g])
+        before = model.posterior(background, slab, others)
+        both = model.posterior(background, slab, (*others, g))
+        density += both.log_evidence - before.log_evidence
+        left, near = group.y - D @ before.mean, group.y - D @ both.mean
+        alone = all(model.groups[i].label != group.label for i in others)
+        free = group.N.shape[2] if alone else 0
+        values = int(np.isfinite(group.y).sum())
+        product = np.nan_to_num(left * near / group.sd**2)
+        squares = product.sum(axis=1) * values / max(values - free, 1)
+        if alone:
+            left = without_nuisances(left, group.N)
+        out.append(HeldOut(g, left, near, squares))
+    return out, density
+
+
+def excess_of(model: LinearModel, parts: Sequence[HeldOut], density: float, freedom: float = np.inf) -> Excess:
+    """Mean square against the noise, with the standard error between regions and of the noise itself (freedom)."""
+    total, count = [], []
+    for part in parts:
+        group = model.groups[part.group]
+        at = group.positions(SmoothProcess(0.0, 1.0, "posture" if group.position is not None else "time"))
+        region = split_regions(at, min(REGIONS, max(len(part.squares) // 4, 2)))
+        values = np.isfinite(group.y).sum(axis=1)
+        for i in np.unique(region):
+            total.append(float(part.squares[region == i].sum()))
+            count.append(float(values[region == i].sum()))
+    s, n = np.array(total), np.array(count)
+    mean = float(s.sum() / n.sum())
+    between = float(np.sqrt(((s - mean * n) ** 2).sum() * len(n) / max(len(n) - 1, 1)) / n.sum())
+    even = mean * float(np.sqrt(2.0 / n.sum()))
+    return Excess(mean, float(np.hypot(max(between, even), mean * np.sqrt(2.0 / freedom))), density)
+
+
+def without_nuisances(left: Floats, N: Floats) -> Floats:
+    """Residual (n, c) after the best nuisances of N (n, c, p); missing values stay NaN."""
+    seen = np.isfinite(left)
+    A = N[seen]
+    return left - N @ np.linalg.lstsq(A, left[seen], rcond=1e-10)[0]

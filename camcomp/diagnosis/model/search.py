@@ -1,0 +1,60 @@
+"""Best-subset search: sets of candidates by log posterior, enlarged from the best of each size, with drops and exchanges."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+
+import numpy as np
+
+from camcomp.diagnosis.model.candidates import Place
+from camcomp.diagnosis.model.evidence import Members, Reduced
+
+MOST = 5  # causes of a set
+KEPT = 12  # sets of each size that are enlarged
+SLACK = 6.0  # log posterior by which the best set of a size may lie behind, and be enlarged
+
+
+@dataclass(frozen=True, eq=False)
+class Visited:
+    """Sets that a search has weighed, with their log posteriors; best: the most probable."""
+
+    values: dict[Members, float]
+
+    @property
+    def best(self) -> Members:
+        """The most probable set."""
+        return max(self.values, key=lambda m: (self.values[m], m))
+
+
+def search_sets(data: Reduced, most: int = MOST, among: Collection[Place] | None = None) -> Visited:
+    """Sets of up to `most` causes at some places, or all, with their log posteriors."""
+    candidates = data.model.candidates
+    usable = [i for i in data.usable if among is None or candidates[i].place in among]
+    values: dict[Members, float] = {(): data.value(())}
+
+    def enlarge(members: Members) -> list[Members]:
+        if len(members) == most:
+            return []
+        taken = {candidates[i].place for i in members}
+        more = [i for i in usable if candidates[i].place not in taken]
+        grown = {tuple(sorted((*members, i))): i for i in more}
+        new = {each: i for each, i in grown.items() if each not in values}
+        if new:
+            values.update(zip(new, data.with_one_more(members, list(new.values())).tolist(), strict=True))
+        return list(grown)
+
+    front: list[Members] = [()]
+    for size in range(1, most + 1):
+        found = {each for members in front for each in enlarge(members)}
+        front = sorted(found, key=lambda m: (-values[m], m))[: KEPT if size > 1 else 2 * KEPT]
+        if not front or (size > 1 and values[front[0]] < max(values.values()) - SLACK):
+            break
+    best = None
+    while best != (best := Visited(values).best):
+        for k in range(len(best)):
+            less = (*best[:k], *best[k + 1 :])
+            if less not in values:
+                values[less] = data.value(less)
+            enlarge(less)
+    return Visited({m: v for m, v in values.items() if np.isfinite(v)})

@@ -1,0 +1,43 @@
+"""The verdict from three calibrated probabilities: of something unmodelled, of the best set, and of its class."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+EVEN = 0.5  # probability above which something unmodelled is stated
+SURE = 0.8  # probability from which on a set stands out
+
+Word = Literal["none", "identified", "ambiguous", "unknown"]
+
+
+@dataclass(frozen=True)
+class VerdictInputs:
+    """What a verdict hangs on.
+
+    unknown, best, alike: probabilities of something unmodelled, of the best set, and of sets as good as it. causes: number
+    of causes of the best set. known_noise: whether the floor is identifiable. gap_in_noise: whether the gap is at the
+    floor. confirmed: whether groups that were not fitted bear the set out and are at their floor; None: no such group.
+    """
+
+    unknown: float
+    best: float
+    alternatives: int
+    causes: int
+    known_noise: bool
+    gap_in_noise: bool
+    confirmed: bool | None
+
+
+def decide(s: VerdictInputs) -> Word:
+    """The word of a result."""
+    if s.known_noise and s.gap_in_noise:
+        return "none"
+    if s.unknown > EVEN:
+        return "unknown"
+    if not s.known_noise:
+        return "ambiguous"
+    if not s.causes:
+        return "none" if s.best >= SURE and s.confirmed is not False else "ambiguous"
+    stands_out = s.best >= SURE and s.alternatives == 0 and s.unknown <= 1.0 - SURE
+    return "identified" if stands_out and s.confirmed else "ambiguous"
