@@ -69,7 +69,7 @@ def test_laws_are_tried_on_experiments_that_are_there(files, tmp_path):
     given = ["laws", "--of", str(tmp_path / "there"), "--out", str(tmp_path / "out"), "--only", "other names"]
     done = CliRunner().invoke(main, given)
     assert done.exit_code == 0, done.output
-    (row,) = map(json.loads, (tmp_path / "out" / "metamorphic.jsonl").read_text().splitlines())
+    (row,) = map(json.loads, (tmp_path / "out" / "laws.jsonl").read_text().splitlines())
     assert (row["name"], row["law"], row["said"]) == ("e-1", "other names", [])
     assert not (tmp_path / "there" / "e-1" / "other names").exists()
 
