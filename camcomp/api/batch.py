@@ -24,6 +24,7 @@ from camcomp.ground.errors import CamcompError, CheckFailed
 from camcomp.ground.files import write_all
 from camcomp.ground.shelf import usable
 from camcomp.model.config.load import load_config
+from camcomp.model.from_program import StockChoice
 from camcomp.report.findings import Case, findings_of_messages
 from camcomp.report.outputs import findings_files
 
@@ -36,7 +37,7 @@ OnStatus = Callable[[Status, int, int], Any]
 
 def compensate_many(
     paths: Sequence[str], configs: Sequence[str], output_dir: str, *, jobs: int | None = None, scheduler: str | None = None,
-    joints: bool = False, method: str | None = None, tolerance_um: float | None = None, sarif_file: str | None = None,
+    joints: bool = False, method: str | None = None, tolerance_um: float | None = None, stock: StockChoice | None = None, sarif_file: str | None = None,
     junit_file: str | None = None, tell: Callable[[str], None] = lambda _text: None, on_status: OnStatus = lambda *_: None,
 ) -> dict[str, Any]:  # fmt: skip
     """Corrects the programs of files, folders and patterns into a tree; the figures that DIR/camcomp-batch.json holds.
@@ -49,7 +50,7 @@ def compensate_many(
         list(usable("dialects"))  # says which plug-ins are left out; workers would say it once each
     plan = Plan(
         config, Path(output_dir), method or config.compensation.method,
-        tolerance_um or config.compensation.tolerance_um, joints, __version__,
+        tolerance_um or config.compensation.tolerance_um, joints, __version__, stock,
     )  # fmt: skip
     programs = find_programs(paths, plan.output)
     if scheduler:

@@ -20,6 +20,7 @@ from camcomp.gcode.stamp import is_stamped
 from camcomp.ground.errors import CheckFailed
 from camcomp.ground.files import display_name, open_source, read_bytes, write_all
 from camcomp.ground.places import STANDARD
+from camcomp.model.from_program import StockChoice, job_of_program
 from camcomp.report.inputs import Input
 
 __all__ = ["CompensatedProgram", "Summary", "compensate", "compensate_file"]
@@ -85,11 +86,12 @@ class CompensatedProgram:
 
 def compensate(
     program: Program | str | Path | bytes, machine: Job, *, method: str | None = None, tolerance_um: float | None = None,
-    arcs: bool | None = None, mirror: Sequence[str] = (),
+    arcs: bool | None = None, mirror: Sequence[str] = (), stock: StockChoice | None = None,
 ) -> CompensatedProgram:  # fmt: skip
     """The program with the deflection of the machine written back into it.
 
-    method, tolerance_um, arcs: None asks the machine file. mirror: logs of test cuts, whose deviation is put in reverse on the
+    method, tolerance_um, arcs: None asks the machine file. stock: where the stock comes from; None: the machine file, or
+    else the comments of the program. mirror: logs of test cuts, whose deviation is put in reverse on the
     program in place of what the model says; each is that of the program as the ones before corrected it. Raises CheckFailed CC603 for a program that was compensated
     before, PhysicsError where the machine cannot do what is asked, and what reading raises.
     """
@@ -97,6 +99,7 @@ def compensate(
     if is_stamped(source.data):
         raise CheckFailed("CC603", f"{source.name} was compensated before")
     tolerance = tolerance_um or settings.tolerance_um
+    machine = job_of_program(machine, source.data, source.name, stock)
     if mirror:
         from camcomp.compensation.program.mirror import mirrored
 
@@ -110,7 +113,7 @@ def compensate(
 def compensate_file(
     program: str, configs: Sequence[str], *, output: str | None = None, joints: str | None = None, summary: str | None = None,
     paths: str | None = None, report: str | None = None, method: str | None = None, tolerance_um: float | None = None,
-    arcs: bool | None = None, mirror: Sequence[str] = (), dry_run: bool = False,
+    arcs: bool | None = None, mirror: Sequence[str] = (), dry_run: bool = False, stock: StockChoice | None = None,
 ) -> Finished:  # fmt: skip
     """Corrects a program file into the files that are named; long programs piece by piece. "-" is a standard stream.
 
@@ -129,6 +132,7 @@ def compensate_file(
     settings, name = machine.config.compensation, display_name(program)
     with open_source(program) as file:
         done = None
+        machine = job_of_program(machine, file, name, stock)
         if not (paths or report or mirror):
             done = compensate_long(
                 file, name, machine, method=method or settings.method, tolerance_um=tolerance_um or settings.tolerance_um,
@@ -141,7 +145,7 @@ def compensate_file(
 
     result = compensate(
         program_of(data, name, machine.config), machine, method=method, tolerance_um=tolerance_um, arcs=arcs,
-        mirror=mirror,
+        mirror=mirror, stock=stock,
     )  # fmt: skip
     outputs: dict[str, bytes] = {}
     if output:

@@ -10,6 +10,7 @@ from pathlib import Path
 from camcomp.api.machine import Job, Program, program_in
 from camcomp.api.result_table import ResultTable
 from camcomp.compensation.program.cut_surface import cut_surface
+from camcomp.model.from_program import StockChoice, job_of_program
 from camcomp.model.motion import simulate as story
 from camcomp.model.motion.simulate import Simulated
 from camcomp.model.stock.surface import Surface
@@ -38,26 +39,36 @@ class SimulatedLog:
 
 
 def simulate(
-    program: Program | str | Path | bytes, machine: Job, step_s: float = 0.02, *, cutting: bool = True, started_s: float = 0.0
+    program: Program | str | Path | bytes, machine: Job, step_s: float = 0.02, *, cutting: bool = True, started_s: float = 0.0,
+    stock: StockChoice | None = None,
 ) -> SimulatedLog:  # fmt: skip
     """What the machine with its `effects:` would log in rows every step_s seconds.
 
-    started_s: on the common clock, for effects of warming up. Raises what reading raises, PhysicsError where the machine
+    started_s: on the common clock, for effects of warming up. stock: where the stock comes from; None: the machine file,
+    or else the comments of the program. Raises what reading raises, PhysicsError where the machine
     cannot be.
     """
     source = program_in(program, machine)
+    machine = job_of_program(machine, source.data, source.name, stock)
     engaged = machine.engaged(source) if cutting else None
     return SimulatedLog(
         story.simulate(machine, source.path, step_s, cutting=cutting, started_s=started_s, engaged=engaged)
     )
 
 
-def simulate_cut(program: Program | str | Path | bytes, machine: Job) -> Surface:
+def simulate_cut(program: Program | str | Path | bytes, machine: Job, *, stock: StockChoice | None = None) -> Surface:
     """What the loaded machine leaves of the stock of its machine file. Raises as `simulate`, ConfigError CC298."""
-    return cut_surface(machine, program_in(program, machine))
+    source = program_in(program, machine)
+    return cut_surface(job_of_program(machine, source.data, source.name, stock), source)
 
 
-def walls_report(program: Program | str | Path | bytes, machine: Job, inputs: Sequence[Input] = ()) -> bytes:
+def walls_report(
+    program: Program | str | Path | bytes,
+    machine: Job,
+    inputs: Sequence[Input] = (),
+    *,
+    stock: StockChoice | None = None,
+) -> bytes:
     """One HTML page with the walls that the loaded machine leaves, where they are off and by how much.
 
     Raises as `simulate_cut`, ConfigError CC216 when the plot library is not installed.
@@ -65,4 +76,5 @@ def walls_report(program: Program | str | Path | bytes, machine: Job, inputs: Se
     from camcomp.compensation.report.wall_page import walls_html
 
     source = program_in(program, machine)
+    machine = job_of_program(machine, source.data, source.name, stock)
     return walls_html(machine, source, [Input("program", source.name, source.data), *inputs])

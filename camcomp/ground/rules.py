@@ -210,6 +210,12 @@ RULES: dict[str, Rule] = {
         "machine that is a crash. Rapids are taken to be straight.",
         "retract before the rapid, or correct workpiece: stock",
     ),
+    "CC143": Rule(
+        "stock in comments not usable",
+        "The comments of the program are to state the stock (`--stock comments`, or `workpiece: {stock: {type: comments}}`), "
+        "and none does, or what they state leaves its form or its place open.",
+        "state workpiece: stock in the machine file, or use --stock program",
+    ),
     # --- CC2xx usage, YAML, config -----------------------------------------------------------------------------
     "CC200": Rule(
         "YAML cannot be read",

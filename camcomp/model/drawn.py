@@ -77,6 +77,6 @@ def uncertain_jobs(job: Job) -> list[UncertainJob]:
 
     def side(source: UncertainInput, size: float) -> DrawnJob | None:
         config = varied(job.config, source, size)
-        return None if config is None else DrawnJob(config, job)
+        return None if config is None else DrawnJob(job.taken.into(config), job)
 
     return [UncertainJob(each, side(each, 1.0), side(each, -1.0)) for each in uncertain_inputs(job.config.spreads)]

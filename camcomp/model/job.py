@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from pathlib import Path as FilePath
 from typing import Any
@@ -18,6 +18,7 @@ from camcomp.ground.datatypes import Floats, Path
 from camcomp.ground.errors import ConfigError, PhysicsError
 from camcomp.model import signal_path
 from camcomp.model.config.spec import Config
+from camcomp.model.config.taken import Taken
 from camcomp.model.cutting.cut import Cut
 from camcomp.model.cutting.engaged import Engaged
 from camcomp.model.cutting.track import Conditions, Edges
@@ -49,9 +50,10 @@ class Frame:
 
 @dataclass(frozen=True, eq=False)
 class Job:
-    """What the stories need from a Config."""
+    """What the stories need from a Config. taken: what the config has from the program instead of the machine file."""
 
     config: Config
+    taken: Taken = field(default=Taken(), kw_only=True)
 
     @cached_property
     def fingerprint(self) -> str:

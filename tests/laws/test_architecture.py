@@ -12,11 +12,11 @@ import pytest
 import camcomp
 
 PACKAGE = Path(camcomp.__file__).parent
-SHELVES = {"dialects", "effects", "forces", "robots"}
+SHELVES = {"comments", "dialects", "effects", "forces", "robots"}
 FLOORS = (
     {"ground"},
     {"gcode", "report"},
-    {"model", "dialects"},
+    {"model", "dialects", "comments"},
     {"compensation", "diagnosis", "effects", "forces", "robots", "plugins"},
     {"api"},
     {"terminal"},

@@ -17,6 +17,7 @@ from camcomp.ground.files import alone_in, read_bytes, write_all
 from camcomp.ground.places import one_place_each
 from camcomp.model.config.spec import Config
 from camcomp.model.config.yaml_tree import leaves, plain
+from camcomp.model.from_program import StockChoice
 
 SUFFIXES = frozenset((".nc", ".ngc", ".ncc", ".tap", ".gcode", ".cnc", ".mpf", ".spf", ".eia", ".min", ".iso"))
 STATE = ".camcomp"  # folder beside the outputs: what each was made from
@@ -91,10 +92,11 @@ class Plan:
     tolerance_um: float
     joints: bool
     version: str
+    stock: StockChoice | None = None
 
     def key_of_config(self) -> str:
         """Hash of the configuration, of the tables that it names, and of the options: by content, whatever the names."""
-        digest = hashlib.sha256(repr((self.version, self.method, self.tolerance_um, self.joints)).encode())
+        digest = hashlib.sha256(repr((self.version, self.method, self.tolerance_um, self.joints, self.stock)).encode())
         assert self.config._tree is not None  # every loaded config has one
         for name, node in sorted(leaves(self.config._tree), key=lambda each: each[0]):
             value = plain(node)
@@ -147,7 +149,15 @@ def run_batch(
                 continue
             pending[key] = each
             yield Task(
-                str(each.source), key, data, plan.config, config_key, plan.method, plan.tolerance_um, plan.joints
+                str(each.source),
+                key,
+                data,
+                plan.config,
+                config_key,
+                plan.method,
+                plan.tolerance_um,
+                plan.joints,
+                plan.stock,
             )
 
     try:

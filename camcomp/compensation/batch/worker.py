@@ -19,6 +19,7 @@ from camcomp.ground.old_names import keep_old_names
 from camcomp.model.config.spec import Config
 
 if TYPE_CHECKING:
+    from camcomp.model.from_program import StockChoice
     from camcomp.model.job import Job
 
 BUG = 70
@@ -38,6 +39,7 @@ class Task:
     method: str
     tolerance_um: float
     joints: bool
+    stock: StockChoice | None = None
 
 
 @dataclass(frozen=True)
@@ -94,12 +96,13 @@ def _compensate(task: Task) -> Outcome:
     from camcomp.gcode.stamp import is_stamped
     from camcomp.ground.errors import CheckFailed
     from camcomp.model.control import setup_of
+    from camcomp.model.from_program import job_of_program
 
     if is_stamped(task.data):
         raise CheckFailed("CC603", f"{task.name} was compensated before")
     config = task.config
     program = read_program(task.data, name=task.name, setup=setup_of(config), dialect=config.control.dialect)
-    job = _job(task.config_key, _Once(config))
+    job = job_of_program(_job(task.config_key, _Once(config)), task.data, task.name, task.stock)
     result = compensate(program, job, method=task.method, tolerance_um=task.tolerance_um, version=__version__)
     failed = result.failed_checks(job, task.tolerance_um)
     messages = [{"rule": rule, "message": text, "text": f"{task.name}: error[{rule}]: {text}"} for rule, text in failed]

@@ -11,7 +11,7 @@ from camcomp.compensation.long.control_account import ControlAccount, SeenPoints
 from camcomp.compensation.long.plain import Done, PlainCorrector
 from camcomp.compensation.long.plain_run import PlainRun
 from camcomp.compensation.program.compensate import Compensated
-from camcomp.compensation.program.result import CycleTime, ErrorSize, Interpolation, Summary
+from camcomp.compensation.program.result import CycleTime, ErrorSize, Interpolation, Summary, job_figures
 from camcomp.compensation.program.under_control import (
     apart_warning,
     mode_name,
@@ -226,7 +226,7 @@ class Totals:
 
     def finish(self, corrector: PlainCorrector, warnings: list[str]) -> None:
         """Solves the sample exactly and keeps the largest differences."""
-        self.warnings = list(dict.fromkeys(warnings))
+        self.warnings = list(dict.fromkeys([*self.job.taken.remarks, *warnings]))
         if self.joins:
             self.warnings.append(
                 f"{self.joins} joining lines where the cutting force jumps; they are not part of before and after"
@@ -284,6 +284,7 @@ class Totals:
                 **sizes,
                 "iterations_max": self.iterations,
                 "method": "newton",
+                **job_figures(self.job),
                 "platform_tilt_max_mrad": 1e3 * self.tilt,
                 "joining_lines": self.joins,
                 "cycle_time_s": CycleTime(before=before.seconds + self.waiting_s, after=after.seconds + self.waiting_s),

@@ -37,6 +37,7 @@ from camcomp.gcode.program import Program
 from camcomp.gcode.rewrite import rewrite
 from camcomp.ground.datatypes import ARC, RAPID, Bools, Floats, Ints
 from camcomp.ground.headway import part as part_of_work
+from camcomp.model.cutting.assumed import doubtful_force
 from camcomp.model.cutting.engaged import Engaged
 from camcomp.model.cutting.spindle import cut_without_spindle, spindle_warning
 from camcomp.model.cutting.track import Track, lay_track
@@ -265,6 +266,7 @@ def _compensated(
         warnings += apart_warning(mode for mode in control.modes if merging(mode, program.language))
     warnings += spindle_warning(still)
     if part is None:
+        warnings += [*job.taken.remarks, *doubtful_force(job.config, path)]
         warnings += stock_warnings(stock_remarks(job.config, path, track.engaged))
     iterations = int(aimed.iterations.max(initial=0))
     done = _assemble(

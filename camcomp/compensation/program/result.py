@@ -9,6 +9,8 @@ from pydantic import ConfigDict, Field
 
 from camcomp.ground.datatypes import Floats
 from camcomp.ground.result import Result, Size
+from camcomp.model.cutting.assumed import Engagement, assumed_force
+from camcomp.model.job import Job
 
 
 class ErrorSize(Result):
@@ -72,6 +74,24 @@ class TakenCorrection(Result):
     left_alone: Annotated[int, Field(description="points that take none of it")]
 
 
+class Force(Result):
+    """Which cutting force was assumed."""
+
+    model: Annotated[str, Field(description="force model of the machine file")]
+    engagement: Annotated[
+        Engagement,
+        Field(description="stock: by the stock; stated: as the machine file writes it; none: on every feed move"),
+    ]
+    text: str
+
+
+def job_figures(job: Job) -> dict[str, Any]:
+    """What a summary says of the job itself: the assumed force, and what the program's comments state."""
+    force = assumed_force(job.config)
+    said = {"stated_in_program": job.taken.said} if job.taken.said else {}
+    return {"force": Force(model=force.model, engagement=force.engagement, text=force.text), **said}
+
+
 _CONTROL_ADDS = "with what the control's merging and rounding adds, beside joining lines, too, and without what a policy leaves on purpose"
 # Figures that a compensation and a verification share.
 ControlMode = Annotated[
@@ -100,6 +120,10 @@ class Summary(Result):
     actuator_torque_max_Nmm: float | None = None
     iterations_max: int
     method: str
+    force: Force
+    stated_in_program: Annotated[
+        tuple[str, ...] | None, Field(description="stock and tools read from its comments")
+    ] = None
     platform_tilt_max_mrad: float
     joining_lines: int
     cycle_time_s: CycleTime

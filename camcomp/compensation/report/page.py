@@ -116,6 +116,8 @@ def _cards(
          f"rms {micrometres(figures.under_control.rms_um)}, with what it merges and rounds, beside joining lines, too"),
         ("Cycle time", f"{brief(times.after)} s", f"before {brief(times.before)} s; with pauses (G4)"),
     ]  # fmt: skip
+    acts = {"stock": "by the stock", "stated": "as stated", "none": "on every feed move"}
+    cards.append(("Assumed force", acts[figures.force.engagement], figures.force.text))
     if expected := figures.expected:
         cards.append(
             ("To be expected", f"{micrometres(expected.p95_um)}", "95 % of all points of machines that may be")

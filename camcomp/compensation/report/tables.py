@@ -8,7 +8,7 @@ import numpy as np
 
 from camcomp.compensation.bands.outcome import Bands, band_figures
 from camcomp.compensation.program.compensate import Compensated, Trajectories
-from camcomp.compensation.program.result import CycleTime, Summary, error_size
+from camcomp.compensation.program.result import CycleTime, Summary, error_size, job_figures
 from camcomp.compensation.program.under_control import mode_name
 from camcomp.ground.datatypes import Floats
 from camcomp.model.control import waiting_s
@@ -130,6 +130,7 @@ def summary(result: Compensated, job: Job) -> Summary:
             **sizes,
             "iterations_max": result.iterations,
             "method": result.method,
+            **job_figures(job),
             "platform_tilt_max_mrad": 1e3 * _most(np.linalg.norm(result.state.tilt, axis=1)[result.rows.corrected]),
             "joining_lines": int(result.rows.joining.sum()),
             "cycle_time_s": CycleTime(before=result.control.before_s + waiting, after=result.control.after_s + waiting),

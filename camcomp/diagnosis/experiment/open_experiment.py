@@ -23,6 +23,7 @@ from camcomp.ground.headway import steps
 from camcomp.model.config.load import load_config, load_experiment
 from camcomp.model.config.spec import Config, Experiment, RunSpec
 from camcomp.model.control import open_program
+from camcomp.model.from_program import job_of_program
 from camcomp.model.job import Job
 from camcomp.model.motion.log_columns import DYNO, LINE, TEMPERATURE, TIME, TIP, TIP_SD, LogColumns, log_columns
 from camcomp.model.motion.timeline import schedule
@@ -66,8 +67,9 @@ def open_run(spec: RunSpec, job: Job, twin: Twin, notes: list[str]) -> Run:
     measured = in_time(read_log(table, columns_of(twin)))
     notes += unread(table, columns_of(twin))
     check_rows(log, measured)
-    conditions = job.conditions if spec.cutting else replace(job.conditions, model=None)
     program = None if spec.program is None else open_program(spec.program, job.config)
+    cutting = job if program is None else job_of_program(job, program.data, program.name)
+    conditions = cutting.conditions if spec.cutting else replace(job.conditions, model=None)
     if program is not None:
         check_length(log, spec.name, measured, schedule(program.path, job.config.control.acceleration_mm_per_s2).end)
     run = drive(

@@ -92,4 +92,11 @@ class ProgramStock(Spec):
     resolution_mm: Resolution = _RESOLUTION
 
 
-Stock = Annotated[BoxStock | CylinderStock | StlStock | ProgramStock, Field(discriminator="type")]
+class CommentsStock(Spec):
+    """What the comments of the program state."""
+
+    type: Literal["comments"]
+    resolution_mm: Resolution = _RESOLUTION
+
+
+Stock = Annotated[BoxStock | CylinderStock | StlStock | ProgramStock | CommentsStock, Field(discriminator="type")]

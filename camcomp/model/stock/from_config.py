@@ -65,7 +65,7 @@ def _stock(config: Config, bounds: Bounds, tools: Mapping[int, ToolShape]) -> St
         case ProgramStock() as around:
             return _around(config, around, bounds, max(0.5 * each.diameter_mm for each in tools.values()))
         case _:
-            raise AssertionError("the caller has made sure that there is a stock")
+            raise AssertionError("the caller has made sure that there is a stock, and has read it from comments")
 
 
 def _mesh(config: Config, stl: StlStock) -> StockShape:

@@ -34,6 +34,12 @@ config_option = click.option(
     help="Machine file (YAML); may be given several times, later files override earlier ones key by key.",
 )
 quiet_option = click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
+stock_option = click.option(
+    "--stock",
+    type=click.Choice(["none", "program", "comments"]),
+    help="Where the stock comes from: none, a block about the program, or the program's comments; default: the machine "
+    "file, or else the comments where they state one.",
+)
 _FORMATS = {
     "json": ("OUT.json", "What was found, as JSON."),
     "sarif": ("OUT.sarif", "What was found, as SARIF 2.1.0 for code hosts."),

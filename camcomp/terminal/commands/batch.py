@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING
 
 import click
 
-from camcomp.terminal.commands._options import config_option, findings_options, quiet_option
+from camcomp.terminal.commands._options import config_option, findings_options, quiet_option, stock_option
 from camcomp.terminal.progress import say
 
 if TYPE_CHECKING:
     from camcomp.api.batch import Status
+    from camcomp.model.from_program import StockChoice
 
 
 @click.command()
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 @click.option("--joints", is_flag=True, help="Write a joint table beside every program.")
 @click.option("--method", type=click.Choice(["newton", "stiffness", "fixed-point", "linear"]), help="As in compensate.")
 @click.option("--tolerance-um", type=click.FloatRange(min=1e-6), help="Bound of the error left.")
+@stock_option
 @findings_options("sarif", "junit")
 @quiet_option
 def command(
@@ -37,6 +39,7 @@ def command(
     joints: bool,
     method: str | None,
     tolerance_um: float | None,
+    stock: StockChoice | None,
     sarif_file: str | None,
     junit_file: str | None,
     quiet: bool,
@@ -56,7 +59,7 @@ def command(
     from camcomp.api.batch import compensate_many
 
     done = compensate_many(
-        paths, configs, output_dir, jobs=jobs, scheduler=scheduler, joints=joints, method=method, tolerance_um=tolerance_um,
+        paths, configs, output_dir, jobs=jobs, scheduler=scheduler, joints=joints, method=method, tolerance_um=tolerance_um, stock=stock,
         sarif_file=sarif_file, junit_file=junit_file, tell=partial(say, quiet=False),
         on_status=lambda *args: _tell(*args) if not quiet or args[0].exit_code else None,
     )  # fmt: skip

@@ -6,12 +6,13 @@ import click
 
 from camcomp.ground.errors import CheckFailed
 from camcomp.ground.files import display_name
-from camcomp.terminal.commands._options import OUTPUT, quiet_option
+from camcomp.terminal.commands._options import OUTPUT, quiet_option, stock_option
 from camcomp.terminal.commands._told import control_told
 from camcomp.terminal.progress import say, working
 
 if TYPE_CHECKING:
     from camcomp.api.compensation import Summary
+    from camcomp.model.from_program import StockChoice
 
 
 @click.command()
@@ -46,6 +47,7 @@ if TYPE_CHECKING:
     multiple=True,
     help="Log of a test cut: its deviation in reverse instead of the model's; again for a cut of what that gave.",
 )
+@stock_option
 @click.option("--dry-run", is_flag=True, help="Do everything but write.")
 @quiet_option
 def command(
@@ -60,6 +62,7 @@ def command(
     tolerance_um: float | None,
     arcs: bool | None,
     mirror: tuple[str, ...],
+    stock: "StockChoice | None",
     dry_run: bool,
     quiet: bool,
 ) -> None:
@@ -73,7 +76,7 @@ def command(
     with working(f"compensating {display_name(program)}", quiet=quiet):
         done = compensate_file(
             program, configs, output=output, joints=joints, summary=summary_file, paths=paths, report=report, method=method,
-            tolerance_um=tolerance_um, arcs=arcs, mirror=mirror, dry_run=dry_run,
+            tolerance_um=tolerance_um, arcs=arcs, mirror=mirror, dry_run=dry_run, stock=stock,
         )  # fmt: skip
     _finish(done.figures, done.sizes if dry_run else {}, done.failed, quiet)
 
@@ -94,6 +97,8 @@ def _told(figures: "Summary") -> list[str]:
     efforts = ((figures.actuator_force_max_N, "N"), (figures.actuator_torque_max_Nmm, "Nmm"))
     lines = [
         f"{figures.segments_in} motions in, {figures.points} end points out ({figures.method})",
+        f"force: {figures.force.text}",
+        *(f"read from the program: {each}" for each in figures.stated_in_program or ()),
         f"tip error before: rms {before.rms_um:.2f} um, max {before.max_um:.2f} um",
         f"tip error after:  rms {after.rms_um:.2f} um, max {after.max_um:.2f} um",
         f"largest change of an actuator {_either(*changes)}",

@@ -1,12 +1,17 @@
 """camcomp simulate."""
 
+from typing import TYPE_CHECKING
+
 import click
 
 from camcomp.ground.files import display_name, read_bytes, write_all
 from camcomp.ground.headway import part
 from camcomp.ground.places import STANDARD
-from camcomp.terminal.commands._options import OUTPUT
+from camcomp.terminal.commands._options import OUTPUT, stock_option
 from camcomp.terminal.progress import say, working
+
+if TYPE_CHECKING:
+    from camcomp.model.from_program import StockChoice
 
 
 @click.command()
@@ -23,6 +28,7 @@ from camcomp.terminal.progress import say, working
     "--report", metavar="OUT.html", type=OUTPUT, help="The walls that are left, as a page. Needs workpiece: stock."
 )
 @click.option("--step-s", type=click.FloatRange(min=1e-5), default=0.02, show_default=True, help="Time between rows.")
+@stock_option
 @click.option("--air", is_flag=True, help="The tool does not cut.")
 @click.option("--started-s", type=float, default=0.0, help="Start on the common clock, for effects of warming up.")
 def command(
@@ -32,6 +38,7 @@ def command(
     surface: str | None,
     report: str | None,
     step_s: float,
+    stock: "StockChoice | None",
     air: bool,
     started_s: float,
 ) -> None:
@@ -40,27 +47,28 @@ def command(
     The model is the config with its `effects:`; there is no noise. Columns and frames are those that diagnose reads. With
     --surface or --report alone, what the loaded tool leaves of the stock is written and no log.
     """
-    from camcomp.api.machine import load_machine
+    from camcomp.api.machine import load_machine, read_program
     from camcomp.api.simulation import simulate, simulate_cut, walls_report
     from camcomp.report.inputs import Input
 
-    machine, outputs = load_machine(*configs), {}
+    machine = load_machine(*configs)
+    source, outputs = read_program(program, machine), dict[str, bytes]()
     if output or not (surface or report):
         with working(f"simulating {program}"):
             with part(0.0, 0.5):
-                log = simulate(program, machine, step_s, cutting=not air, started_s=started_s)
+                log = simulate(source, machine, step_s, cutting=not air, started_s=started_s, stock=stock)
             with part(0.5, 1.0):
                 outputs[output or STANDARD] = log.to_csv()
         for each in log.warnings:
             say(f"warning: {each}")
     if surface:
         with working(f"cutting {program}"):
-            left = simulate_cut(program, machine)
+            left = simulate_cut(source, machine, stock=stock)
         outputs[surface] = left.to_csv() if surface.endswith(".csv") else left.to_stl()
     if report:
         with working(f"drawing the walls of {program}"):
             inputs = [
                 Input("configuration", display_name(each), read_bytes(each)) for each in configs if each != STANDARD
             ]
-            outputs[report] = walls_report(program, machine, inputs)
+            outputs[report] = walls_report(source, machine, inputs, stock=stock)
     write_all(outputs, inputs=(program, *configs))

@@ -1,14 +1,19 @@
 """camcomp verify."""
 
+from typing import TYPE_CHECKING
+
 import click
 
 from camcomp.ground.errors import CamcompError, CheckFailed
 from camcomp.ground.files import display_name, write_all
 from camcomp.report.findings import Case, Finding, findings_of
 from camcomp.report.outputs import findings_files
-from camcomp.terminal.commands._options import OUTPUT, findings_options, quiet_option
+from camcomp.terminal.commands._options import OUTPUT, findings_options, quiet_option, stock_option
 from camcomp.terminal.commands._told import control_told
 from camcomp.terminal.progress import say, working
+
+if TYPE_CHECKING:
+    from camcomp.model.from_program import StockChoice
 
 
 @click.command()
@@ -18,6 +23,7 @@ from camcomp.terminal.progress import say, working
 @click.option("--json", "json_file", metavar="OUT.json", type=OUTPUT, help="Residuals, in all and per source line.")
 @findings_options("sarif", "junit")
 @quiet_option
+@stock_option
 @click.option("--tolerance-um", type=click.FloatRange(min=1e-6), help="Largest residual that passes.")
 def command(
     corrected: str,
@@ -27,6 +33,7 @@ def command(
     sarif_file: str | None,
     junit_file: str | None,
     quiet: bool,
+    stock: "StockChoice | None",
     tolerance_um: float | None,
 ) -> None:
     """Settle a compensated program on the model and measure what is left.
@@ -46,7 +53,7 @@ def command(
     try:
         source = read_program(original, machine)
         with working("settling the corrected program", quiet=quiet):
-            done = verify(corrected, source, machine)
+            done = verify(corrected, source, machine, stock)
         figures = done.figures(tolerance)
         if json_file:
             outputs[json_file] = figures.to_json()

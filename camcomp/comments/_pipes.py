@@ -1,0 +1,95 @@
+"""`@NAME|TAG|key=value|...`: how the Makera posts of FreeCAD and Fusion write tools, stock and origin.
+
+STOCK: width along X, depth along Y, height along Z. ORIGIN: the program's zero seen from the middle of the stock.
+"""
+
+from collections.abc import Iterator, Sequence
+
+from camcomp.gcode.stated import (
+    Comment,
+    Doubt,
+    StatedError,
+    StatedMaterial,
+    StatedTool,
+    Statement,
+    bar,
+    box,
+    cutter,
+    form_of,
+    numbers,
+)
+
+_FORMS = {"endmill": "flat", "ballend": "ball", "bullnose": "bull", "drill": "drill"}
+_MORE_FORMS = {
+    "flat end mill": "flat",
+    "ball end mill": "ball",
+    "bull nose end mill": "bull",
+    "bull nose mill": "bull",
+    "face mill": "flat",
+}
+SAME = 1e-6  # of a diameter
+
+
+def read_pipes(comments: Sequence[Comment], name: str) -> Iterator[Statement]:
+    """Statements of the comments that begin with `@name|`."""
+    stock: tuple[Comment, dict[str, str]] | None = None
+    origin: tuple[Comment, dict[str, str]] | None = None
+    for comment in comments:
+        head, *words = comment.text.split("|")
+        if head.strip().upper() != f"@{name}" or not words:
+            continue
+        fields = {
+            key.strip().lower(): value.strip() for key, sign, value in (w.partition("=") for w in words[1:]) if sign
+        }
+        match words[0].strip().upper():
+            case "TOOL":
+                yield _tool(comment, fields)
+            case "STOCK":
+                stock = comment, fields
+            case "ORIGIN":
+                origin = comment, fields
+            case "MATERIAL":
+                yield StatedMaterial(comment, fields.get("name", ""))
+    if stock is not None:
+        yield _stock(*stock, origin)
+
+
+def _value(comment: Comment, fields: dict[str, str], key: str) -> float:
+    if key not in fields:
+        raise StatedError(comment, f"{key} is missing")
+    return numbers(comment, [fields[key]], key)[0]
+
+
+def _stock(comment: Comment, fields: dict[str, str], origin: tuple[Comment, dict[str, str]] | None) -> Statement:
+    kind = fields.get("id", "").lower()
+    if kind not in ("box", "cylinder"):
+        return Doubt(comment, f"a stock of the form '{kind}' cannot be followed")
+    if origin is None or not {"x", "y", "z"} <= set(origin[1]):
+        return Doubt(comment, "the place of the program's zero on the stock (ORIGIN) is not stated")
+    at = [_value(origin[0], origin[1], axis) for axis in "xyz"]
+    size = [_value(comment, fields, key) for key in ("width", "depth", "height")]
+    low = [-0.5 * s - a for s, a in zip(size, at, strict=True)]
+    high = [0.5 * s - a for s, a in zip(size, at, strict=True)]
+    if kind == "box":
+        return box(comment, low, high)
+    diameter = _value(comment, fields, "diameter")
+    if abs(size[0] - diameter) > SAME * diameter or abs(size[1] - diameter) > SAME * diameter:
+        return Doubt(comment, "a bar that does not stand along Z cannot be followed")
+    return bar(comment, (-at[0], -at[1]), diameter, low[2], high[2])
+
+
+def _tool(comment: Comment, fields: dict[str, str]) -> Statement:
+    name = fields.get("type", "").lower()
+    form = _FORMS.get(name) or _MORE_FORMS.get(name)
+    number = int(_value(comment, fields, "number"))
+    if form is None:
+        return Doubt(comment, f"T{number}: a tool of the type '{fields.get('type', '')}' cannot be followed")
+    diameter = _value(comment, fields, "diameter")
+    corner = _value(comment, fields, "cornerradius") if "cornerradius" in fields else 0.0
+    if form == "bull":
+        form = form_of(diameter, corner)
+    flute = _value(comment, fields, "flutelength") if "flutelength" in fields else 0.0
+    keys = cutter(comment, form, diameter, corner, flute)
+    if form == "drill" and "tipangle" in fields and 0.0 < (tip := _value(comment, fields, "tipangle")) < 180.0:
+        keys["point_deg"] = tip
+    return StatedTool(comment, number, keys)

@@ -1,0 +1,47 @@
+"""LinuxCNC's preview: `(WORKPIECE,BOX,XMIN=0,...)`, `(WORKPIECE,CYLINDER,AXIS=Z,...)`, in the unit in force.
+
+Source: LinuxCNC pull request 4476 (2026), which draws them in the current work offset.
+"""
+
+from collections.abc import Iterator, Sequence
+
+from camcomp.gcode.stated import Comment, Doubt, StatedError, Statement, bar, box, numbers
+
+TITLE = "LinuxCNC (WORKPIECE,...)"
+MARKS = (b"WORKPIECE,",)
+_BOX = ("XMIN", "YMIN", "ZMIN", "XMAX", "YMAX", "ZMAX")
+
+
+def read(comments: Sequence[Comment]) -> Iterator[Statement]:
+    """The stock of every comment; the last one counts, and several are doubtful for the caller."""
+    for comment in comments:
+        head, *words = (each.strip() for each in comment.text.split(","))
+        if head.upper() != "WORKPIECE" or not words:
+            continue
+        shape, fields = words[0].upper(), _fields(comment, words[1:])
+        if shape == "BOX":
+            values = numbers(comment, [_need(comment, fields, key) for key in _BOX], "BOX")
+            yield box(comment, values[:3], values[3:])
+        elif shape == "CYLINDER" and fields.get("AXIS", "Z").upper() == "Z":
+            keys = ("X", "Y", "DIAMETER", "ZMIN", "ZMAX")
+            x, y, diameter, low, high = numbers(comment, [_need(comment, fields, key) for key in keys], "CYLINDER")
+            yield bar(comment, (x, y), diameter, low, high)
+        else:
+            kind = f"{shape} along {fields.get('AXIS', 'Z')}" if shape == "CYLINDER" else shape
+            yield Doubt(comment, f"a workpiece of the form {kind} cannot be followed")
+
+
+def _fields(comment: Comment, words: Sequence[str]) -> dict[str, str]:
+    out = {}
+    for word in words:
+        key, sign, value = word.partition("=")
+        if not sign:
+            raise StatedError(comment, f"'{word}' is no KEY=VALUE")
+        out[key.strip().upper()] = value.strip()
+    return out
+
+
+def _need(comment: Comment, fields: dict[str, str], key: str) -> str:
+    if key not in fields:
+        raise StatedError(comment, f"{key} is missing")
+    return fields[key]

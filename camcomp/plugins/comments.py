@@ -1,0 +1,28 @@
+"""Readers of comments: what a user's own has to be, checked when it is loaded."""
+
+from collections.abc import Iterator, Sequence
+from types import ModuleType
+from typing import Any, Protocol
+
+from camcomp.gcode.stated import Comment, Statement
+from camcomp.plugins.contract import check_functions, check_module, check_names, refusal
+
+
+class CommentsPlugin(Protocol):
+    """One way of writing stock and tools into comments. MARKS: capitals that such a comment has, in any case of letters."""
+
+    TITLE: str
+    MARKS: tuple[bytes, ...]
+
+    def read(self, comments: Sequence[Comment]) -> Iterator[Statement]:
+        """What the comments that carry a mark state; raises `camcomp.gcode.stated.StatedError` where one cannot be read."""
+
+
+def checked(name: str, found: Any, who: str) -> ModuleType:
+    """The reader behind an entry point. Raises ConfigError CC280."""
+    module = check_module(who, found)
+    check_names(who, module, {"TITLE": str, "MARKS": tuple})
+    check_functions(who, module, CommentsPlugin)
+    if not module.MARKS or not all(isinstance(each, bytes) and each and each == each.upper() for each in module.MARKS):
+        raise refusal(who, "MARKS is no tuple of byte strings in capitals")
+    return module
