@@ -152,6 +152,9 @@ def _library() -> str:
         dialect = getattr(member, "DIALECT", member)
         rows.append((f"`{name}`", dialect.title, _first(member)))
     parts.append(_table(("name", "control", "what it is"), rows))
+    parts.append("## Comments that state stock and tools (`--stock comments`)\n")
+    readers = [(name, shelf.load("comments", name)) for name in shelf.members("comments")]
+    parts.append(_table(("name", "written as", "what it is"), [(f"`{n}`", r.TITLE, _first(r)) for n, r in readers]))
     parts.append("## Effects (`effects: [{effect: NAME, target: ...}]`)\n")
     parts += [_effect(name) for name in shelf.members("effects")]
     parts += _formulas()
