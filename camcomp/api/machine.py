@@ -9,9 +9,10 @@ from camcomp.gcode.canon import canonical
 from camcomp.gcode.program import Program
 from camcomp.model.config.load import load_config
 from camcomp.model.control import open_program, program_of
+from camcomp.model.from_program import StockChoice
 from camcomp.model.job import Job
 
-__all__ = ["Job", "Program", "canonical_lines", "load_machine", "program_in", "read_program"]
+__all__ = ["Job", "Program", "StockChoice", "canonical_lines", "load_machine", "program_in", "read_program"]
 
 
 def load_machine(*files: str | Path) -> Job:

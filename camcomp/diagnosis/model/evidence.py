@@ -20,9 +20,9 @@ from scipy.special import log_ndtr
 
 from camcomp.diagnosis.model.candidates import AmplitudeBounds, PlacedCause
 from camcomp.diagnosis.model.group import (
-    NormalEquations,
-    Group,
     ColumnLayout,
+    Group,
+    NormalEquations,
     SmoothProcess,
     normal_equations,
     sum_grams,

@@ -13,7 +13,7 @@ from camcomp.terminal.progress import say
 
 if TYPE_CHECKING:
     from camcomp.api.batch import Status
-    from camcomp.model.from_program import StockChoice
+    from camcomp.api.machine import StockChoice
 
 
 @click.command()

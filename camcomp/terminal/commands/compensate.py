@@ -12,7 +12,7 @@ from camcomp.terminal.progress import say, working
 
 if TYPE_CHECKING:
     from camcomp.api.compensation import Summary
-    from camcomp.model.from_program import StockChoice
+    from camcomp.api.machine import StockChoice
 
 
 @click.command()

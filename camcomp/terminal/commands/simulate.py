@@ -11,7 +11,7 @@ from camcomp.terminal.commands._options import OUTPUT, stock_option
 from camcomp.terminal.progress import say, working
 
 if TYPE_CHECKING:
-    from camcomp.model.from_program import StockChoice
+    from camcomp.api.machine import StockChoice
 
 
 @click.command()

@@ -13,7 +13,7 @@ from camcomp.terminal.commands._told import control_told
 from camcomp.terminal.progress import say, working
 
 if TYPE_CHECKING:
-    from camcomp.model.from_program import StockChoice
+    from camcomp.api.machine import StockChoice
 
 
 @click.command()

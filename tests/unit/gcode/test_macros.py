@@ -168,7 +168,9 @@ def test_q_of_m98_is_where_the_subprogram_begins():
     assert ends_of(CALLED.format("M98 P12")) == [0, 50, 2, 3]
 
 
-@pytest.mark.parametrize("call", ["M98 P12 Q51", "M98 P12 Q5.5", "M98 P12 L1.5", "M98 Q50", "M97 P51", "M97 L2", "M97 P50.5"])
+@pytest.mark.parametrize(
+    "call", ["M98 P12 Q51", "M98 P12 Q5.5", "M98 P12 L1.5", "M98 Q50", "M97 P51", "M97 L2", "M97 P50.5"]
+)
 def test_a_call_to_a_place_that_is_not_there_is_refused(call):
     with pytest.raises(ProgramError) as caught:
         ends_of(CALLED.format(call))
