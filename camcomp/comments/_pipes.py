@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 
 from camcomp.gcode.stated import (
     Comment,
-    Doubt,
+    OpenStatement,
     StatedError,
     StatedMaterial,
     StatedTool,
@@ -63,9 +63,9 @@ def _value(comment: Comment, fields: dict[str, str], key: str) -> float:
 def _stock(comment: Comment, fields: dict[str, str], origin: tuple[Comment, dict[str, str]] | None) -> Statement:
     kind = fields.get("id", "").lower()
     if kind not in ("box", "cylinder"):
-        return Doubt(comment, f"a stock of the form '{kind}' cannot be followed")
+        return OpenStatement(comment, f"a stock of the form '{kind}' cannot be followed")
     if origin is None or not {"x", "y", "z"} <= set(origin[1]):
-        return Doubt(comment, "the place of the program's zero on the stock (ORIGIN) is not stated")
+        return OpenStatement(comment, "the place of the program's zero on the stock (ORIGIN) is not stated")
     at = [_value(origin[0], origin[1], axis) for axis in "xyz"]
     size = [_value(comment, fields, key) for key in ("width", "depth", "height")]
     low = [-0.5 * s - a for s, a in zip(size, at, strict=True)]
@@ -74,7 +74,7 @@ def _stock(comment: Comment, fields: dict[str, str], origin: tuple[Comment, dict
         return box(comment, low, high)
     diameter = _value(comment, fields, "diameter")
     if abs(size[0] - diameter) > SAME * diameter or abs(size[1] - diameter) > SAME * diameter:
-        return Doubt(comment, "a bar that does not stand along Z cannot be followed")
+        return OpenStatement(comment, "a bar that does not stand along Z cannot be followed")
     return bar(comment, (-at[0], -at[1]), diameter, low[2], high[2])
 
 
@@ -83,7 +83,7 @@ def _tool(comment: Comment, fields: dict[str, str]) -> Statement:
     form = _FORMS.get(name) or _MORE_FORMS.get(name)
     number = int(_value(comment, fields, "number"))
     if form is None:
-        return Doubt(comment, f"T{number}: a tool of the type '{fields.get('type', '')}' cannot be followed")
+        return OpenStatement(comment, f"T{number}: a tool of the type '{fields.get('type', '')}' cannot be followed")
     diameter = _value(comment, fields, "diameter")
     corner = _value(comment, fields, "cornerradius") if "cornerradius" in fields else 0.0
     if form == "bull":

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 
 from camcomp.gcode.stated import (
     Comment,
-    Doubt,
+    OpenStatement,
     StatedError,
     StatedStock,
     StatedTool,
@@ -41,13 +41,13 @@ def read(comments: Sequence[Comment]) -> Iterator[Statement]:
         elif kind in ("TOOL/MILL", "TOOL/DRILL"):
             yield _tool(comment, kind, words)
         elif kind.startswith(("STOCK/", "TOOL/")):
-            yield Doubt(comment, f"{head} cannot be followed")
+            yield OpenStatement(comment, f"{head} cannot be followed")
 
 
 def _block(comment: Comment, words: Sequence[str], corners: dict[str, list[float]]) -> Statement:
     values = numbers(comment, words, "STOCK/BLOCK")
     if len(values) == 3:
-        return Doubt(comment, "the place of the block is not stated")
+        return OpenStatement(comment, "the place of the block is not stated")
     if len(values) != 6:
         raise StatedError(comment, f"STOCK/BLOCK has 6 numbers, not {len(values)}")
     size, origin = values[:3], values[3:]
@@ -56,16 +56,18 @@ def _block(comment: Comment, words: Sequence[str], corners: dict[str, list[float
     if len(corners) == 2:
         stated = [*corners["IN"], *corners["AX"]]
         if len(stated) != 6 or any(abs(a - b) > SAME_MM for a, b in zip(stated, [*low, *high], strict=True)):
-            return Doubt(comment, "stockMin and stockMax state another block")
+            return OpenStatement(comment, "stockMin and stockMax state another block")
     elif any(not 0.0 <= o <= s for o, s in zip(origin, size, strict=True)):
-        return Doubt(comment, "the program's zero lies outside of the block, or the corner is meant instead of it")
+        return OpenStatement(
+            comment, "the program's zero lies outside of the block, or the corner is meant instead of it"
+        )
     stock: StatedStock = box(comment, low, high)
     return stock
 
 
 def _tool(comment: Comment, kind: str, words: Sequence[str]) -> Statement:
     if comment.next_tool is None:
-        return Doubt(comment, "no T word follows")
+        return OpenStatement(comment, "no T word follows")
     values = numbers(comment, words, kind)
     if not values:
         raise StatedError(comment, f"{kind} has no diameter")

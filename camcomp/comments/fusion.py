@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterator, Sequence
 
 from camcomp.comments._pipes import read_pipes
-from camcomp.gcode.stated import Comment, Doubt, StatedTool, Statement, cutter, form_of, numbers
+from camcomp.gcode.stated import Comment, OpenStatement, StatedTool, Statement, cutter, form_of, numbers
 
 TITLE = "Fusion (@F360|..., T1 D=...)"
 MARKS = (b"@F360|", b" D=")
@@ -25,6 +25,6 @@ def _tool(comment: Comment, found: re.Match[str]) -> Statement:
     if kind in ("spot drill", "center drill", "drill"):
         return StatedTool(comment, number, cutter(comment, "drill", diameter))
     if not kind.startswith(("flat", "bull nose", "ball", "face mill")):
-        return Doubt(comment, f"T{number}: a tool of the type '{kind}' cannot be followed")
+        return OpenStatement(comment, f"T{number}: a tool of the type '{kind}' cannot be followed")
     form = "ball" if kind.startswith("ball") else form_of(diameter, corner)
     return StatedTool(comment, number, cutter(comment, form, diameter, corner))

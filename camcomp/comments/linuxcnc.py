@@ -5,7 +5,7 @@ Source: LinuxCNC pull request 4476 (2026), which draws them in the current work 
 
 from collections.abc import Iterator, Sequence
 
-from camcomp.gcode.stated import Comment, Doubt, StatedError, Statement, bar, box, numbers
+from camcomp.gcode.stated import Comment, OpenStatement, StatedError, Statement, bar, box, numbers
 
 TITLE = "LinuxCNC (WORKPIECE,...)"
 MARKS = (b"WORKPIECE,",)
@@ -28,7 +28,7 @@ def read(comments: Sequence[Comment]) -> Iterator[Statement]:
             yield bar(comment, (x, y), diameter, low, high)
         else:
             kind = f"{shape} along {fields.get('AXIS', 'Z')}" if shape == "CYLINDER" else shape
-            yield Doubt(comment, f"a workpiece of the form {kind} cannot be followed")
+            yield OpenStatement(comment, f"a workpiece of the form {kind} cannot be followed")
 
 
 def _fields(comment: Comment, words: Sequence[str]) -> dict[str, str]:

@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from camcomp.gcode.stated import INCH_MM, Comment, Doubt, StatedTool, Statement, cutter, numbers
+from camcomp.gcode.stated import INCH_MM, Comment, OpenStatement, StatedTool, Statement, cutter, numbers
 
 TITLE = "Vectric (End Mill {6 mm})"
 MARKS = (b"END MILL", b"BALL NOSE", b"MATERIAL SIZE")
@@ -18,7 +18,7 @@ def read(comments: Sequence[Comment]) -> Iterator[Statement]:
     """Tools; the block is a doubt."""
     for comment in comments:
         if comment.text.upper().startswith("MATERIAL SIZE"):
-            yield Doubt(comment, "the place of the block is not stated")
+            yield OpenStatement(comment, "the place of the block is not stated")
         elif found := _TOOL.match(comment.text):
             sized = replace(comment, unit_mm=1.0 if found["unit"].lower() == "mm" else INCH_MM)
             diameter = numbers(comment, [found["size"]], "tool")[0]

@@ -67,7 +67,7 @@ class StatedMaterial:
 
 
 @dataclass(frozen=True)
-class Doubt:
+class OpenStatement:
     """A comment that states something which camcomp cannot take without guessing, and why."""
 
     comment: Comment
@@ -75,7 +75,7 @@ class Doubt:
     reader: str = ""
 
 
-Statement = StatedStock | StatedTool | StatedMaterial | Doubt
+Statement = StatedStock | StatedTool | StatedMaterial | OpenStatement
 
 
 @dataclass
@@ -85,7 +85,7 @@ class Stated:
     stocks: list[StatedStock] = field(default_factory=list)
     tools: list[StatedTool] = field(default_factory=list)
     materials: list[StatedMaterial] = field(default_factory=list)
-    doubts: list[Doubt] = field(default_factory=list)
+    doubts: list[OpenStatement] = field(default_factory=list)
     offsets: set[str] = field(default_factory=set)
 
     def add(self, statement: Statement) -> None:
@@ -97,7 +97,7 @@ class Stated:
                 self.tools.append(statement)
             case StatedMaterial():
                 self.materials.append(statement)
-            case Doubt():
+            case OpenStatement():
                 self.doubts.append(statement)
 
 
@@ -118,7 +118,7 @@ def read_stated(source: BinaryIO) -> Stated:
             for statement in reader.read(own):
                 out.add(replace(statement, reader=reader.TITLE))
         except StatedError as error:
-            out.add(Doubt(error.comment, str(error), reader.TITLE))
+            out.add(OpenStatement(error.comment, str(error), reader.TITLE))
     out.offsets = {f"G{each.decode()}" for each in set(_OFFSET.findall(data.upper()))}
     return out
 

@@ -11,7 +11,7 @@ from camcomp.gcode.stated import Stated, StatedStock, read_stated
 from camcomp.ground.errors import Location, ProgramError
 from camcomp.model.config.cutting_tool import BoxStock, CommentsStock, Cutter, CylinderStock, ProgramStock, Stock
 from camcomp.model.config.spec import Config
-from camcomp.model.config.taken import Taken
+from camcomp.model.config.taken import TakenFromProgram
 from camcomp.model.job import Job
 
 StockChoice = Literal["none", "program", "comments"]
@@ -26,13 +26,13 @@ def job_of_program(job: Job, source: BinaryIO | bytes, name: str, choice: StockC
     said. Raises ProgramError CC143 where the comments are to state the stock and do not, or not without a doubt.
     """
     if choice == "none":
-        return _taking(job, Taken(has_stock=True))
+        return _taking(job, TakenFromProgram(has_stock=True))
     stated = read_stated(BytesIO(source) if isinstance(source, bytes) else source)
     tools, said, remarks = _tools_of(job.config, stated)
     own = job.config.workpiece.stock
     if choice == "program":
         around = own if isinstance(own, ProgramStock) else ProgramStock(type="program")
-        return _taking(job, Taken(has_stock=True, stock=around, tools=tools, said=said, remarks=remarks))
+        return _taking(job, TakenFromProgram(has_stock=True, stock=around, tools=tools, said=said, remarks=remarks))
     required = choice == "comments" or isinstance(own, CommentsStock)
     found, doubts = _stock_of(stated)
     if required and found is None:
@@ -48,11 +48,11 @@ def job_of_program(job: Job, source: BinaryIO | bytes, name: str, choice: StockC
             remarks += (f"{text} contradicts workpiece: stock {_words(own)}, which counts",)
     said += tuple(f"line {each.comment.line}: material {each.name} ({each.reader})" for each in stated.materials)
     stock = _as_spec(found.keys) if found is not None and takes else None
-    return _taking(job, Taken(has_stock=takes, stock=stock, tools=tools, said=said, remarks=remarks))
+    return _taking(job, TakenFromProgram(has_stock=takes, stock=stock, tools=tools, said=said, remarks=remarks))
 
 
-def _taking(job: Job, taken: Taken) -> Job:
-    return job if taken == Taken() else replace(job, config=taken.into(job.config), taken=taken)
+def _taking(job: Job, taken: TakenFromProgram) -> Job:
+    return job if taken == TakenFromProgram() else replace(job, config=taken.into(job.config), taken=taken)
 
 
 def _refuse(name: str, stated: Stated, doubts: list[str]) -> None:

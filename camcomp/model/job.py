@@ -18,7 +18,7 @@ from camcomp.ground.datatypes import Floats, Path
 from camcomp.ground.errors import ConfigError, PhysicsError
 from camcomp.model import signal_path
 from camcomp.model.config.spec import Config
-from camcomp.model.config.taken import Taken
+from camcomp.model.config.taken import TakenFromProgram
 from camcomp.model.cutting.cut import Cut
 from camcomp.model.cutting.engaged import Engaged
 from camcomp.model.cutting.track import Conditions, Edges
@@ -53,7 +53,7 @@ class Job:
     """What the stories need from a Config. taken: what the config has from the program instead of the machine file."""
 
     config: Config
-    taken: Taken = field(default=Taken(), kw_only=True)
+    taken: TakenFromProgram = field(default=TakenFromProgram(), kw_only=True)
 
     @cached_property
     def fingerprint(self) -> str:

@@ -10,7 +10,7 @@ from camcomp.model.config.spec import Config
 
 
 @dataclass(frozen=True)
-class Taken:
+class TakenFromProgram:
     """stock: in place of the machine file's where has_stock; tools: those that the machine file does not state.
 
     said: what was read from comments, line by line; remarks: where that contradicts the machine file or is doubtful.
