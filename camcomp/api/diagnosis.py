@@ -41,6 +41,7 @@ class ExperimentDiagnosis:
     opened: OpenExperiment | None
     _residuals: Callable[[], dict[str, Any]]
     _learned: tuple[LearnedLaw, ...] = ()
+    _notes: tuple[str, ...] = ()
 
     @property
     def verdict(self) -> str:
@@ -55,7 +56,7 @@ class ExperimentDiagnosis:
     @property
     def notes(self) -> tuple[str, ...]:
         """What the reader should know about the logs."""
-        return () if self.opened is None else self.opened.notes
+        return self._notes if self.opened is None else self.opened.notes
 
     @property
     def configs(self) -> list[str]:
@@ -150,7 +151,7 @@ def _diagnosed(experiment: str | Path, without: Sequence[str], library: str | Pa
     if study is not None:
         if library is not None and study.result.law is not None and study.result.law.parts:
             keep(str(library), study.result.law, load_config(load_experiment(experiment).config).robot.name)
-        return ExperimentDiagnosis(str(experiment), study.result, None, None, study.residuals)
+        return ExperimentDiagnosis(str(experiment), study.result, None, None, study.residuals, _notes=study.notes)
     from camcomp.diagnosis.diagnose import diagnose as judge
     from camcomp.diagnosis.experiment.open_experiment import open_experiment
     from camcomp.diagnosis.residuals import of_runs

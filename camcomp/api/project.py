@@ -61,23 +61,24 @@ def machines() -> list[ShippedMachine]:
 
 
 def start_project(
-    directory: Path, *, machine: str | None = None, urdf: str | None = None, tip: str | None = None
-) -> tuple[list[Path], list[str]]:
+    directory: Path, *, machine: str | None = None, urdf: str | None = None, tip: str | None = None,
+    base: str | None = None,
+) -> tuple[list[Path], list[str]]:  # fmt: skip
     """Writes a project into a folder; its files, and notes on what is still to be filled in.
 
     machine: name of a shipped one. urdf: arm whose geometry and masses the machine file takes, tip: its link that carries
-    the tool. Raises FileError CC501 where a file is there already, ConfigError CC219 for a machine that is not shipped,
+    the tool, base: its link that stands still. Raises FileError CC501 where a file is there already, ConfigError CC219 for a machine that is not shipped,
     CC240 for a URDF that cannot be read or is no machine.
     """
     notes = list[str]()
     if urdf is not None:
         from camcomp.model.config.urdf import machine_yaml, read_urdf
 
-        arm = read_urdf(read_bytes(urdf), display_name(urdf), tip)
+        arm = read_urdf(read_bytes(urdf), display_name(urdf), tip, base)
         if len(arm.moving) not in (3, 6):
             raise ConfigError(
                 "CC240", f"{len(arm.moving)} joints move; a machine needs three (place of the tip) or six (its pose)",
-                at=Location(display_name(urdf), 1, 1), hint="--tip names the link that carries the tool",
+                at=Location(display_name(urdf), 1, 1), hint="--tip names the link that carries the tool, --base the one that stands still",
             )  # fmt: skip
         text, notes = machine_yaml(arm, Path(urdf).name).encode(), list(arm.notes)
     else:

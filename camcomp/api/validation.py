@@ -30,8 +30,13 @@ def check_file(file: str, configs: Sequence[str] = ()) -> tuple[str, list[Doubt]
     config = check_config([file])
     if config is None:
         return "configuration", []
-    _build(config)
-    return "configuration", doubts(config)
+    count = len(config.robot.actuators)
+    if count in (3, 6):
+        _build(config)
+        return "configuration", doubts(config)
+    _build_robot(config)
+    text = f"{count} actuators: logs of joints and static poses can be diagnosed; to correct programs a machine needs three or six"
+    return "configuration", [*doubts(config), Doubt(text, config.at("robot"))]
 
 
 def _build(config: Config) -> None:
@@ -40,6 +45,16 @@ def _build(config: Config) -> None:
 
     job = Job(config)
     _ = job.machine, job.real_machine
+
+
+def _build_robot(config: Config) -> None:
+    """The chains of a machine with its effects: all that logs without programs need. Raises ConfigError."""
+    from camcomp.model import signal_path
+    from camcomp.model.job import Job
+    from camcomp.model.statics.build import build_robot
+
+    robot, _ = build_robot(config.robot, config.tool.tip)
+    signal_path.edited(Job(config).causes, tuple(each.name for each in robot.actuators), robot)
 
 
 def _check_program(file: str, configs: Sequence[str]) -> tuple[str, list[Doubt]]:
@@ -58,7 +73,8 @@ def _check_experiment(file: str) -> tuple[str, list[Doubt]]:
     errors: list[CamcompError] = []
     config = _collect(errors, partial(check_config, experiment.config))
     if config is not None:
-        _collect(errors, partial(_build, config))
+        moved = any(run.program is not None for run in experiment.runs)
+        _collect(errors, partial(_build if moved else _build_robot, config))
     for run in experiment.runs:
         _collect(errors, partial(check_log, run.log, config))
         if run.program is not None:

@@ -22,7 +22,7 @@ from camcomp.diagnosis.arm.study import study as study_arm
 from camcomp.diagnosis.axis.findings import AxisDeviation, AxisRun
 from camcomp.diagnosis.axis.plausible import check_axes
 from camcomp.diagnosis.axis.study import studied as study_axes
-from camcomp.diagnosis.experiment.open_experiment import open_log, read_log
+from camcomp.diagnosis.experiment.open_experiment import open_log, read_log, unread
 from camcomp.diagnosis.fit.measured import Measured
 from camcomp.diagnosis.residuals import Columns, of_axes, of_poses
 from camcomp.diagnosis.result.types import DiagnosisResult
@@ -31,21 +31,26 @@ from camcomp.ground.datatypes import Floats
 from camcomp.ground.errors import ConfigError, Location
 from camcomp.ground.files import display_name
 from camcomp.model.config.load import load_config, load_experiment
-from camcomp.model.config.spec import Config, RunSpec
+from camcomp.model.config.spec import Config, Experiment, RunSpec
 from camcomp.model.effect import Cause
 from camcomp.model.motion.log_columns import log_columns
 from camcomp.model.statics.arm import arm_of
 from camcomp.model.statics.build import build_robot
+from camcomp.model.statics.description import Robot
 
 MOSTLY = 0.5  # share of rows with a value from which on a channel counts as logged, and rows without it as lost
 
 
 @dataclass(frozen=True, eq=False)
 class LogStudy:
-    """The result of logs without programs. residuals: what it leaves, row by row (`camcomp.diagnosis.residuals`)."""
+    """The result of logs without programs.
+
+    residuals: what it leaves, row by row (`camcomp.diagnosis.residuals`); notes: what the reader should know of the logs.
+    """
 
     result: DiagnosisResult
     residuals: Callable[[], Columns]
+    notes: tuple[str, ...] = ()
 
 
 def study_of(path: str | Path, without: Sequence[str] = ()) -> LogStudy | None:
@@ -54,39 +59,90 @@ def study_of(path: str | Path, without: Sequence[str] = ()) -> LogStudy | None:
     Raises ConfigError CC420 where the logs say too little, CC407, CC408, CC412, CC413 where they cannot be of this machine
     as they are read.
     """
-    experiment = load_experiment(path)
-    config = load_config(experiment.config)
-    robot, _ = build_robot(config.robot, config.tool.tip)
-    columns = log_columns([a.name for a in robot.actuators], [a.revolute for a in robot.actuators])
-    logs = [read_log(open_log(run.log), columns) for run in experiment.runs]
+    opened = _open(path)
+    logs, robot = opened.logs, opened.robot
     try:
         if all(m.has("tip") and m.has("encoder") and not m.has("setpoint") for m in logs):
             if arm_of(robot) is None:
                 return None
-            runs = [_poses(run, log) for run, log in zip(experiment.runs, logs, strict=True)]
-            for run, each in zip(experiment.runs, runs, strict=True):
-                check_poses(display_name(run.log), run.name, robot, each.q, each.tip)
-            sd = experiment.sd
+            runs = _checked_poses(opened)
+            sd = opened.experiment.sd
             stated = StatedDeviation(sd.tip_mm, sd.encoder_mm) if sd else StatedDeviation()
-            own = _causes(config)
-            result = study_arm(robot, own, runs, holdout=experiment.holdout, without=without, stated=stated)
-            return LogStudy(result, partial(of_poses, robot, own, merged(runs), result))
+            own = _causes(opened.config)
+            result = study_arm(robot, own, runs, holdout=opened.experiment.holdout, without=without, stated=stated)
+            return LogStudy(result, partial(of_poses, robot, own, merged(runs), result), tuple(opened.notes))
         if not any(m.has("tip") for m in logs) and all(m.has("encoder") for m in logs):
-            axes = {
-                a.name: [_axis(run, log, k, a.revolute) for run, log in zip(experiment.runs, logs, strict=True)]
-                for k, a in enumerate(robot.actuators)
-            }
-            for i, run in enumerate(experiment.runs):
-                check_axes(display_name(run.log), {name: own[i] for name, own in axes.items()})
-            sd = experiment.sd
+            axes = _checked_axes(opened)
+            sd = opened.experiment.sd
             deviation = AxisDeviation(sd.encoder_mm, sd.force_N) if sd else AxisDeviation()
-            result, found = study_axes(axes, holdout=experiment.holdout, without=without, stated=deviation)
-            return LogStudy(result, partial(of_axes, found, {a.name: a.revolute for a in robot.actuators}))
+            result, found = study_axes(axes, holdout=opened.experiment.holdout, without=without, stated=deviation)
+            return LogStudy(
+                result, partial(of_axes, found, {a.name: a.revolute for a in robot.actuators}), tuple(opened.notes)
+            )
     except ValidationError:  # a ValueError too, and a fault of ours
         raise
     except ValueError as error:
-        raise ConfigError("CC420", str(error), at=Location(display_name(path), 1, 1)) from error
+        message = f"{error}; {_channels_there(opened)}"
+        raise ConfigError("CC420", message, at=Location(display_name(path), 1, 1)) from error
     return None
+
+
+def _channels_there(opened: _Opened) -> str:
+    """The channels that the logs hold, with their actuators and the rows of the longest, for a message."""
+    actuators = [a.name for a in opened.robot.actuators]
+    parts = []
+    for channel, text in (("setpoint", "set-points"), ("encoder", "encoders"), ("drive", "drive forces or torques")):
+        rows = np.max([np.isfinite(getattr(each, channel)).sum(axis=0) for each in opened.logs], axis=0)
+        named = [name for name, count in zip(actuators, rows, strict=True) if count]
+        if named:
+            parts.append(f"{text} of {', '.join(named)} (at most {int(rows.max())} rows)")
+    return f"the logs hold {'; '.join(parts)}" if parts else "the logs hold no column of an actuator"
+
+
+@dataclass(frozen=True, eq=False)
+class _Opened:
+    """An experiment whose runs have no program: its files, a log per run, and notes for the reader."""
+
+    experiment: Experiment
+    config: Config
+    robot: Robot
+    logs: list[Measured]
+    notes: list[str]
+
+
+def _open(path: str | Path) -> _Opened:
+    experiment = load_experiment(path)
+    config = load_config(experiment.config)
+    robot, _ = build_robot(config.robot, config.tool.tip)
+    columns = log_columns([a.name for a in robot.actuators], [a.revolute for a in robot.actuators])
+    tables = [open_log(run.log) for run in experiment.runs]
+    notes = [note for table in tables for note in unread(table, columns)]
+    return _Opened(experiment, config, robot, [read_log(table, columns) for table in tables], notes)
+
+
+def open_axes(path: str | Path) -> dict[str, list[AxisRun]]:
+    """Runs of every axis by name, of an experiment whose logs have no tip. Raises ConfigError CC407, CC408."""
+    return _checked_axes(_open(path))
+
+
+def open_poses(path: str | Path) -> list[Poses]:
+    """Static poses of every run. Raises ConfigError CC407, CC408, CC412, CC413."""
+    return _checked_poses(_open(path))
+
+
+def _checked_axes(opened: _Opened) -> dict[str, list[AxisRun]]:
+    runs = list(zip(opened.experiment.runs, opened.logs, strict=True))
+    axes = {a.name: [_axis(run, log, k, a.revolute) for run, log in runs] for k, a in enumerate(opened.robot.actuators)}
+    for i, (run, _) in enumerate(runs):
+        check_axes(display_name(run.log), {name: own[i] for name, own in axes.items()}, run.cutting)
+    return axes
+
+
+def _checked_poses(opened: _Opened) -> list[Poses]:
+    runs = [_poses(run, log) for run, log in zip(opened.experiment.runs, opened.logs, strict=True)]
+    for run, each in zip(opened.experiment.runs, runs, strict=True):
+        opened.notes.extend(check_poses(display_name(run.log), run.name, opened.robot, each.q, each.tip))
+    return runs
 
 
 def _causes(config: Config) -> list[Cause]:

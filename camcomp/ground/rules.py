@@ -557,14 +557,16 @@ RULES: dict[str, Rule] = {
     "CC413": Rule(
         "poses of another machine",
         "With the best frames, the tips are further from the arm of the config than any arm of the kind is wrong, in no "
-        "other unit, order or sign of the columns they would fit, and a diagnosis would be one of the mistake.",
+        "other unit, order or sign of the columns they would fit, and neither bending of the arm nor of its base under weight "
+        "explains most of it. A diagnosis would be one of the mistake.",
         "check the config of the experiment, and which column is which joint",
     ),
     # --- CC5xx input and output --------------------------------------------------------------------------------
     "CC420": Rule(
         "too little to study",
         "Logs without a program are studied as static poses of an arm (joint angles and measured tips) or as axes "
-        "(set-points or drive forces with encoders). What is there is too little for either.",
+        "(set-points or drive forces with encoders, at least 50 rows in which the axis moves). The message says which columns "
+        "and how many rows each run has.",
         "docs/reference/log-columns.md lists the columns of a log",
     ),
     "CC421": Rule(

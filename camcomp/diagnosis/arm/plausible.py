@@ -7,9 +7,11 @@ from itertools import combinations
 
 import numpy as np
 
-from camcomp.diagnosis.arm.registration import register
+from camcomp.diagnosis.arm.registration import nuisance_columns, register
+from camcomp.diagnosis.fit.outliers import FAR_MM
 from camcomp.ground.datatypes import Floats
 from camcomp.ground.errors import ConfigError, Location
+from camcomp.model.statics.arm import arm_of, jacobian
 from camcomp.model.statics.description import Robot
 from camcomp.model.statics.hanging import hang
 
@@ -22,28 +24,47 @@ LEAST = 12  # poses; fewer fit anything
 _TIPS = {"m": 1e3, "inches": 25.4, "um": 1e-3}
 
 
-def check_poses(log: str, run: str, robot: Robot, q: Floats, tip: Floats) -> None:
-    """Raise ConfigError where poses of a log, joints q (n, m) and tips (n, 3) mm, cannot be the arm's as they are read.
+def check_poses(log: str, run: str, robot: Robot, q: Floats, tip: Floats) -> list[str]:
+    """Warnings about poses of a log, joints q (n, m) and tips (n, 3) mm, that lie far from those of the arm.
 
-    CC407: another unit, CC408: columns exchanged or reversed, CC412: joints and tips of different rows, CC413: none of it.
+    Raises:
+        ConfigError: poses that cannot be the arm's as they are read. CC407: another unit, CC408: columns exchanged or
+            reversed, CC412: joints and tips of different rows, CC413: none of these, and no elastic deflection either.
     """
     if len(q) < LEAST:
-        return
+        return []
     rows = np.unique(np.linspace(0, len(q) - 1, POSES).astype(int))
     point, pose = _stand(robot, q[rows])
     spread = float(np.sqrt(((point - point.mean(axis=0)) ** 2).sum(axis=1).mean()))
     off = _misfit(point, pose, tip[rows])
-    if off < NEAR * spread or spread <= 0.0:
-        return
+    if off < max(NEAR * spread, FAR_MM) or spread <= 0.0:
+        return []
     for rule, text, read in _readings(robot, q, tip, rows):
         if read() < BETTER * off:
             raise ConfigError(rule, f"run '{run}': {text}", at=Location(log, 1, 1))
-    if off > FAR * spread:
-        text = (
-            f"run '{run}': the tips are {off:.3g} mm from where the arm of the config would have them (median, frames "
-            f"fitted), and poses that lie {spread:.3g} mm about their centre leave no doubt about it"
-        )
-        raise ConfigError("CC413", text, at=Location(log, 1, 1))
+    if off <= FAR * spread:
+        return []
+    text = (
+        f"run '{run}': the tips are {off:.3g} mm from where the arm of the config would have them (median, frames "
+        f"fitted; the poses lie {spread:.3g} mm about their centre)"
+    )
+    for family, columns in _bending(robot, q[rows], point).items():
+        if _misfit(point, pose, tip[rows], columns) < 0.5 * off:
+            return [f"{log}: {text}; {family} explains most of it"]
+    raise ConfigError("CC413", text, at=Location(log, 1, 1))
+
+
+def _bending(robot: Robot, q: Floats, point: Floats) -> dict[str, Floats]:
+    """Columns (n, 3, k) of families of elastic deflection under a unit weight at points (n, 3) of the platform."""
+    down = np.array([0.0, 0.0, -1.0])
+    moment = np.cross(point, down)  # (n, 3) about the base
+    tilts = [np.cross(moment[:, [i]] * np.eye(3)[i], point) for i in range(2)]
+    out = {"a base that bends under the arm's weight": np.stack(tilts, axis=2)}
+    arm = arm_of(robot)
+    if arm is not None:
+        rates = np.array([jacobian(arm, row)[:3] for row in q])  # (n, 3, m)
+        out["the arm's own bending under weight"] = rates * rates[:, 2:3, :]
+    return out
 
 
 def _readings(robot: Robot, q: Floats, tip: Floats, rows: np.ndarray) -> list[tuple[str, str, Callable[[], float]]]:
@@ -90,7 +111,13 @@ def _stand(robot: Robot, q: Floats) -> tuple[Floats, Floats]:
     return hung.point, hung.rotation
 
 
-def _misfit(point: Floats, pose: Floats, tip: Floats) -> float:
-    """Median distance, mm, with the frames that fit best."""
+def _misfit(point: Floats, pose: Floats, tip: Floats, columns: Floats | None = None) -> float:
+    """Median distance, mm, with the frames that fit best, and with deflections along columns (n, 3, k)."""
     at = register(tip, point, pose, np.zeros(3))
-    return float(np.median(np.linalg.norm(at.to_machine(tip) - at.tips(point, pose), axis=1)))
+    off = at.to_machine(tip) - at.tips(point, pose)
+    if columns is not None:
+        A = np.concatenate([columns, nuisance_columns(at.tips(point, pose), pose, point.mean(axis=0))], axis=2)
+        A = A.reshape(-1, A.shape[2])
+        A = A / (np.linalg.norm(A, axis=0) + 1e-300)
+        off = (off.ravel() - A @ np.linalg.lstsq(A, off.ravel(), rcond=1e-9)[0]).reshape(-1, 3)
+    return float(np.median(np.linalg.norm(off, axis=1)))

@@ -9,7 +9,7 @@ import numpy as np
 from camcomp.diagnosis.axis.block_least_squares import solve
 from camcomp.diagnosis.axis.findings import ROWS, AxisRun
 from camcomp.diagnosis.axis.noise_floor import rows_floor
-from camcomp.diagnosis.axis.terms import WIDE, travel
+from camcomp.diagnosis.axis.terms import WIDE, AxisTravel, travel
 from camcomp.ground.datatypes import Floats
 from camcomp.ground.errors import ConfigError, Location
 
@@ -25,15 +25,18 @@ NEAR = 0.1  # of a factor between set-points and encoder
 _FACTORS = {1e3: "m", 1e-3: "um", 25.4: "inches", 180.0 / np.pi: "degrees where radians are due"}
 
 
-def check_axes(log: str, runs: Mapping[str, AxisRun]) -> None:
-    """Raise ConfigError CC407 (units) or CC408 (columns exchanged or reversed) for one log's axes by name."""
+def check_axes(log: str, runs: Mapping[str, AxisRun], cutting: bool = False) -> None:
+    """Raise ConfigError CC407 (units) or CC408 (columns exchanged or reversed) for one log's axes by name.
+
+    cutting: a cutting force that the log may not hold acts on the drives, and their forces say nothing of units.
+    """
     for name, run in runs.items():
         both = np.isfinite(run.setpoint) & np.isfinite(run.encoder)
         if both.sum() < ROWS or not _moves(run.setpoint[both], run.encoder[both]):
             continue
         _check_factor(log, name, run.setpoint[both], run.encoder[both])
         _check_order(log, name, runs)
-        _check_size(log, name, run)
+        _check_size(log, name, run, cutting)
 
 
 def _moves(setpoint: Floats, encoder: Floats) -> bool:
@@ -80,7 +83,7 @@ def _check_order(log: str, name: str, runs: Mapping[str, AxisRun]) -> None:
             raise _refused("CC408", log, f"the set-points of {name} fit the encoder of {other}: columns are exchanged")
 
 
-def _check_size(log: str, name: str, run: AxisRun) -> None:
+def _check_size(log: str, name: str, run: AxisRun, cutting: bool) -> None:
     known = np.isfinite(run.encoder)
     if known.sum() <= 2 * WIDE[-1]:
         return
@@ -89,11 +92,26 @@ def _check_size(log: str, name: str, run: AxisRun) -> None:
     gap = (run.setpoint - run.encoder)[known]
     if np.isfinite(gap).all() and solve(A, gap)[2] > SLOWEST_S:
         raise _refused("CC407", log, f"{name} follows more than {SLOWEST_S:g} s late: t_s looks as if logged in ms")
-    force = run.force[known]
-    if np.isfinite(force).all() and np.ptp(at.acceleration) > 0.0 and (mass := float(solve(A, force)[1])) > HEAVIEST_KG:
+    mass = 0.0 if cutting else _moved_kg(at, run.force[known])
+    if mass > HEAVIEST_KG:
         what = (
             f"the positions of {name} look as if logged in m"
             if mass < 1e3 * HEAVIEST_KG
             else "t_s looks as if logged in ms"
         )
         raise _refused("CC407", log, f"the drive force of {name} would move {mass:.3g} kg: {what}")
+
+
+def _moved_kg(at: AxisTravel, force: Floats) -> float:
+    """The mass that drive forces (n,) N move, kg; 0 where the rows do not tell it from a force that goes with the position.
+
+    On a circle at one speed acceleration is a multiple of position, and so is the cutting force.
+    """
+    if not np.isfinite(force).all() or not np.ptp(at.acceleration) > 0.0:
+        return 0.0
+    others = np.stack([np.ones_like(at.time), at.position, at.speed, np.sign(at.speed)], axis=1)
+    own = 1e-3 * at.acceleration
+    own, force = (each - others @ solve(others, each) for each in (own - own.mean(), force - force.mean()))
+    known = float(own @ own) > 0.5 * float(np.var(1e-3 * at.acceleration)) * len(own)
+    explains = float(own @ force) > np.sqrt(0.5 * float(own @ own) * float(force @ force))
+    return float(own @ force / (own @ own)) if known and explains else 0.0

@@ -73,7 +73,7 @@ def studied(
     found = [a for a in found if a.channels]
     if not found:
         raise ValueError(
-            "no axis has a run with set-points and encoders, or encoders and drive forces, in 50 rows or more"
+            "no axis has 50 rows or more of set-points with encoders, nor a slide of encoders with drive forces"
         )
     share_lag(found)
     main = [a.channels[0] for a in found]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 from scipy.spatial import KDTree
@@ -109,7 +110,6 @@ def drive(
         check_told(log, name, by, rho, program.rho, twin.actuators, rotary)
     near = _near(log, name, measured, rho, program, twin)
     tip = twin.to_program(twin.forward(rho, twin.to_machine(near)))
-    check_places(log, name, measured, rho, tip, twin.actuators, rotary)
     aligned = None if program is None else _aligned(log, name, program, tip, measured)
     unsure = np.asarray(guessed.any(axis=1))
     if program is None or aligned is None:
@@ -132,7 +132,10 @@ def drive(
         run_path = replace(
             run_path, feed_mm_per_min=program.feed, cut_ahead_min=_cut_ahead(program, aligned), told=told
         )
-    check_forces(log, name, measured, run_path.row_force)
+    loaded = cache(lambda: twin.sense(run_path)[0])
+    check_places(log, name, measured, rho, tip, twin.actuators, rotary, lambda: loaded().tip)
+    turns = np.array([a.revolute for a in twin.robot.actuators])
+    check_forces(log, name, measured, run_path.row_force, lambda: loaded().drive, turns)
     return DrivenRun(run_path, by, unsure, guessed, None, 0 if aligned is None else aligned.lag)
 
 

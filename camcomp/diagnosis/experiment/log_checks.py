@@ -9,8 +9,9 @@ from scipy.spatial import KDTree
 
 from camcomp.diagnosis.fit.measured import Measured
 from camcomp.diagnosis.fit.outliers import FAR_MM
-from camcomp.ground.datatypes import Floats, Ints
+from camcomp.ground.datatypes import Bools, Floats, Ints
 from camcomp.ground.errors import ConfigError, Location
+from camcomp.model.statics.arm import ARM_LENGTH
 
 FAR_RAD = 0.1  # the same as FAR_MM of a hinge: a log of another program or unit is wrong by so much
 PLACE = 0.01  # of what is far: the size of a place
@@ -21,6 +22,7 @@ _LENGTH_UNITS = {1e-3: "m", 25.4: "mm where inches are due", 1.0 / 25.4: "inches
 _TURNS = {180.0 / np.pi: "degrees"}
 _TIMES = {1e3: "ms", 1e6: "us", 1.0 / 60.0: "minutes"}
 _FORCES = {1e-3: "kN", 1e3: "mN"}
+_TORQUES = {1e-3: "N m", 1e3: "mN mm"}
 SAME_TIME = (0.7, 1.4)  # times a program that a log takes, whose clock counts in another unit
 SAME_FORCE = (0.1, 10.0)  # times the modelled force: whatever is wrong with it, a unit is a thousand
 AXES = ("x", "y", "z")
@@ -61,19 +63,46 @@ def check_length(name: str, run: str, measured: Measured, due_s: float) -> None:
             raise ConfigError("CC407", message, at=Location(name, 1, 1))
 
 
-def check_forces(name: str, run: str, measured: Measured, force: Floats) -> None:
-    """Raise CC407 when forces are a thousand times off what the model says; force (n, 3) N: modelled, on the tool."""
-    due = float(np.sqrt((force**2).sum(axis=1).mean()))
-    if due < _STRONG_N:
-        return
-    for what, found in (("drive forces", measured.drive), ("dynamometer forces", measured.dyno)):
-        rows = np.isfinite(found).all(axis=1)
-        size = float(np.sqrt((found[rows] ** 2).sum(axis=1).mean())) if rows.any() else due
-        for factor, unit in _FORCES.items():
-            if SAME_FORCE[0] < size / (factor * due) < SAME_FORCE[1]:
-                raise ConfigError(
-                    "CC407", f"run '{run}': the {what} look as if logged in {unit}", at=Location(name, 1, 1)
-                )
+def check_forces(
+    name: str, run: str, measured: Measured, force: Floats, drives: Callable[[], Floats], rotary: Bools
+) -> None:
+    """Raise CC407 when forces or torques are a thousand times those of the model, row by row.
+
+    Args:
+        name: log, for the message.
+        run: its run, for the message.
+        measured: the log.
+        force: (n, 3) N, modelled force on the tool, machine frame.
+        drives: gives (n, m) modelled drive forces, N, and torques, N mm; asked only where some are logged.
+        rotary: (m,) whether the actuator turns.
+    """
+    channels = [("dynamometer forces", measured.dyno, force, _STRONG_N, _FORCES)]
+    if measured.has("drive"):
+        due = drives()
+        channels += [
+            ("drive forces", measured.drive[:, ~rotary], due[:, ~rotary], _STRONG_N, _FORCES),
+            ("drive torques", measured.drive[:, rotary], due[:, rotary], _STRONG_N * ARM_LENGTH, _TORQUES),
+        ]
+    for what, found, due, strong, units in channels:
+        for factor, unit in units.items():
+            if _is_scaled(found, due, factor, strong):
+                message = f"run '{run}': the {what} look as if logged in {unit}"
+                raise ConfigError("CC407", message, at=Location(name, 1, 1))
+
+
+def _is_scaled(found: Floats, due: Floats, factor: float, strong: float) -> bool:
+    """Whether measured values (n, c) go with modelled ones (n, c) of some size, and are about `factor` times these.
+
+    Loads that the model lacks (weight, friction, inertia) may be far larger than those that it has; they do not go with them.
+    """
+    known = np.isfinite(found) & np.isfinite(due)
+    if not known.any():
+        return False
+    y, x = found[known], due[known]
+    size, modelled = float(np.sqrt(np.mean(y**2))), float(np.sqrt(np.mean(x**2)))
+    if modelled < strong or not SAME_FORCE[0] < size / (factor * modelled) < SAME_FORCE[1]:
+        return False
+    return float(np.mean(x * y)) > np.sqrt(0.5) * size * modelled  # half of the energy goes with the modelled one
 
 
 def check_followed(name: str, run: str, distance: Floats, agreement: float, aside_mm: float = ASIDE_MM) -> None:
@@ -119,11 +148,13 @@ def check_rows_together(name: str, run: str, what: str, time: Floats, found: Flo
 
 
 def check_places(
-    name: str, run: str, measured: Measured, rho: Floats, tip: Floats, actuators: Sequence[str], rotary: bool = False
-) -> None:
+    name: str, run: str, measured: Measured, rho: Floats, tip: Floats, actuators: Sequence[str], rotary: bool = False,
+    loaded: Callable[[], Floats] | None = None,
+) -> None:  # fmt: skip
     """Raise CC407 (units), CC408 (axes), CC406 (another program), CC412 (rows) where tip or encoders are far from where they were due.
 
-    tip (n, 3) mm, rho (n, m): where tip and actuators should have been; rotary: all actuators are hinges.
+    tip (n, 3) mm, rho (n, m): where tip and actuators should have been; rotary: all actuators are hinges; loaded: gives the
+    tips (n, 3) under the modelled force, which are asked for where the measured ones are far from the unloaded ones.
     """
     far = FAR_RAD if rotary else FAR_MM
     told = "set-point" if measured.has("setpoint") else "encoder"
@@ -133,6 +164,8 @@ def check_places(
     ):
         rows = np.isfinite(found).all(axis=1)
         if rows.any():
+            if what.startswith("tip") and loaded is not None and _distance(found[rows], due=due[rows]) >= most:
+                due = loaded()
             check_rows_together(name, run, what, measured.time, found, due, f"the {told}s")
             _check(
                 name, run, what, found[rows], partial(_distance, due=due[rows]), most, names, rotary and most == FAR_RAD
@@ -172,10 +205,10 @@ def _check(
         return
     at = Location(name, 1, 1)
     for factor, unit in (_TURNS if rotary else _LENGTH_UNITS).items():
-        if distance(found / factor) < far:
+        if distance(found / factor) < min(far, 0.5 * off):
             raise ConfigError("CC407", f"run '{run}': the {what} as if logged in {unit}", at=at)
     for order, sign in _readings(len(names)):
-        if distance(found[:, order] * sign) < far:
+        if distance(found[:, order] * sign) < min(far, 0.5 * off):
             message = f"run '{run}': the {what} right {_told(names, order, sign)}"
             raise ConfigError("CC408", message, at=at)
     unit = "rad" if rotary else "mm"

@@ -184,5 +184,5 @@ def read_log(table: CsvTable, columns: LogColumns) -> Measured:
         )
     return Measured(
         time, column(LINE), group(TIP), group(columns.setpoint), group(columns.encoder), group(columns.drive),
-        group(DYNO), column(TEMPERATURE), group(TIP_SD),
+        group(columns.load), group(DYNO), column(TEMPERATURE), group(TIP_SD),
     )  # fmt: skip

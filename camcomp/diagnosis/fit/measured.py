@@ -9,8 +9,8 @@ from camcomp.ground.datatypes import Bools, Floats, Ints
 
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """n rows, m actuators. tip (n, 3) mm program frame; setpoint, encoder, drive (n, m); dyno (n, 3) N machine frame;
-    tip_sd (n, 3) mm: what the instrument states of its own deviation.
+    """n rows, m actuators. tip (n, 3) mm program frame; setpoint, encoder, drive (n, m); load (n, m): second encoder
+    behind the gear; dyno (n, 3) N machine frame; tip_sd (n, 3) mm: what the instrument states of its own deviation.
     """
 
     time: Floats
@@ -19,6 +19,7 @@ class Measured:
     setpoint: Floats
     encoder: Floats
     drive: Floats
+    load: Floats
     dyno: Floats
     temperature: Floats
     tip_sd: Floats

@@ -207,7 +207,8 @@ def _run(problem: Problem, candidate: Candidate, job: Job) -> Run:
     nan = np.full(n, np.nan)
     encoder = run_path.row_rho if "encoder" in candidate.channels else np.full((n, m), np.nan)
     measured = Measured(
-        time, nan, np.zeros((n, 3)), np.full((n, m), np.nan), encoder, np.zeros((n, m)), np.zeros((n, 3)), nan,
+        time, nan, np.zeros((n, 3)), np.full((n, m), np.nan), encoder, np.zeros((n, m)), np.full((n, m), np.nan),
+        np.zeros((n, 3)), nan,
         np.full((n, 3), np.nan),
     )  # fmt: skip
     by = _motion(problem, candidate)

@@ -17,7 +17,14 @@ _USUAL = {  # beside the log's own names, most telling first; those of actuators
     **{own: (f"measurement_{axis}", axis) for own, axis in zip(TIP, "xyz", strict=True)},
     TEMPERATURE: ("measurement_temperature", "temperature"),
 }
+_ACTUATOR = {  # names of an actuator's channels, {a}: its name; those of a drive count only with a unit of force or torque
+    "setpoint": ("{a}_cmd", "{a}_command", "{a}_commanded", "{a}_setpoint", "{a}_target", "{a}_desired", "command_{a}", "target_{a}"),
+    "encoder": ("{a}", "{a}_joint", "{a}_act", "{a}_actual", "{a}_measured", "{a}_position", "actual_{a}"),
+    "drive": ("{a}_torque", "{a}_force", "torque_{a}", "force_{a}", "act_{a}", "{a}_act", "{a}_actual"),
+    "load": ("se_{a}", "{a}_load", "{a}_second"),
+}  # fmt: skip
 _OTHER_QUANTITIES = {"velocity", "effort", "acceleration", "rotation", "orientation", "angular", "covariance"}
+_EFFORTS = {"N", "Nmm"}
 _TURNING = re.compile(
     r"(.*[._ ])?(q[wxyz]|quat\w*|r[xyz]|rotvec\w*|roll|pitch|yaw|(rotation|orientation)[._]?[wxyz])([_ (\[].*)?",
     re.IGNORECASE,
@@ -76,13 +83,14 @@ def pick_columns(
 def usual_names(actuators: Sequence[str], columns: LogColumns) -> dict[str, tuple[str, ...]]:
     """Names by which every column of a log is looked for, in lower case, in the order of the log's columns."""
     out: dict[str, tuple[str, ...]] = {TIME: (), LINE: ()}
-    out |= {log: (f"{a}_cmd",) for a, log in zip(actuators, columns.setpoint, strict=True)}
-    out |= {log: (a, f"{a}_joint", f"{a}_act") for a, log in zip(actuators, columns.encoder, strict=True)}
-    out |= {each: () for each in (*columns.drive, *TIP, *TIP_SD, *DYNO, TEMPERATURE)}
+    for channel, names in _ACTUATOR.items():
+        for a, log in zip(actuators, getattr(columns, channel), strict=True):
+            out[log] = tuple(each.format(a=a) for each in names)
+    out |= {each: () for each in (*TIP, *TIP_SD, *DYNO, TEMPERATURE)}
     drives = set(columns.drive)  # act_x is an encoder
     return {
         log: tuple(
-            each.lower()
+            _plain(each)
             for each in (*more, *_USUAL.get(log, ()), *(() if log in drives else (log.rpartition("_")[0] or log,)))
         )
         for log, more in out.items()
@@ -161,12 +169,18 @@ def _usual(parts: Sequence[SampledColumns], log: str, usual: Sequence[str], take
     free = [
         (i, j, _plain(name)) for i, part in enumerate(parts) for j, name in enumerate(part.names) if (i, j) not in taken
     ]
+    wanted_unit = log.startswith("act_") and unit_of(log) in _EFFORTS
     for wanted in (log.lower(), *usual):
         for fits in (_same, _same_with_unit, _ends):
             hits = [(i, j) for i, j, name in free if fits(name, wanted)]
             units = {(i, j): _unit(parts[i], j, log) for i, j in hits}
             factors = {key: factor_to(log, unit) if unit else None for key, unit in units.items()}
-            good = [Pick(i, j, factors[i, j]) for i, j in hits if not units[i, j] or factors[i, j] is not None]
+            bare = wanted == log.lower() or not wanted_unit
+            good = [
+                Pick(i, j, factors[i, j])
+                for i, j in hits
+                if (bare and not units[i, j]) or (units[i, j] and factors[i, j] is not None)
+            ]
             if len(good) > 1 and fits is _same:
                 good = good[:1]  # twice in one table: told when it is read
             if good:
@@ -182,7 +196,8 @@ def _unit(part: SampledColumns, column: int, log: str) -> str:
 
 
 def _plain(name: str) -> str:
-    return name.lower().lstrip("/").replace("/", ".")
+    """A name in lower case, its words joined by underscores, steps of a path by points."""
+    return re.sub(r"(?<=\w)[\s-]+(?=\w)", "_", name.lower().lstrip("/").replace("/", "."))
 
 
 def _same(name: str, wanted: str) -> bool:

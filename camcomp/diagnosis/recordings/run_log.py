@@ -58,7 +58,7 @@ def log_of(name: str, sampled: Sequence[SampledColumns], actuators: Actuators, w
     notes += joined.notes
     lead = sampled[numbers[joined.lead]]
     row = order[joined.lead][joined.row]
-    values = _in_rad(joined.values, columns, picked, wishes.degrees, notes)
+    values = _in_rad(_without_dead_encoders(joined.values, columns, notes), columns, picked, wishes.degrees, notes)
     driven = wishes.program or all(log in values for log in columns.setpoint)
     time, keep = _times(joined, values, row, lead, driven, wishes.period_s, notes)
     keep = _thinned(keep, wishes.rows, notes)
@@ -135,7 +135,7 @@ def _in_rad(
 ) -> dict[str, Floats]:
     """Joint angles in rad: those whose unit nobody states may be degrees."""
     angles = [
-        log for log in (*columns.setpoint, *columns.encoder)
+        log for log in (*columns.setpoint, *columns.encoder, *columns.load)
         if log in values and log.endswith("_rad") and (degrees or picked.columns[log].factor is None)
     ]  # fmt: skip
     if not angles or degrees is False:
@@ -146,6 +146,18 @@ def _in_rad(
     why = "--degrees" if degrees else f"they go up to {largest:.4g}; --radians if they are not"
     notes.append(f"joint angles are read as degrees: {why}")
     return values | {log: np.radians(values[log]) for log in angles}
+
+
+def _without_dead_encoders(values: dict[str, Floats], columns: LogColumns, notes: list[str]) -> dict[str, Floats]:
+    """Without second encoders that hold one value while the motor moves: recorders write 0 for those that are not there."""
+    dead = [
+        load
+        for load, act in zip(columns.load, columns.encoder, strict=True)
+        if load in values and not np.nanstd(values[load]) and np.nanstd(values.get(act, values[load]))
+    ]
+    if dead:
+        notes.append(f"second encoders that never move dropped: {', '.join(dead)}")
+    return {name: each for name, each in values.items() if name not in dead}
 
 
 def _times(

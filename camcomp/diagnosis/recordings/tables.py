@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from camcomp.diagnosis.recordings.sampled import SampledColumns
+from camcomp.diagnosis.recordings.units import clock
 from camcomp.ground.csv_table import CsvTable, TableRules, read_csv
 from camcomp.ground.datatypes import Floats
 from camcomp.ground.errors import ConfigError, Location
@@ -51,7 +52,8 @@ def of_table(
 
     def read(k: int) -> Floats:
         table.refuse_twice([kept[k]])
-        return table.values([kept[k]])[:, 0]
+        times = _clock_times(table, kept[k])
+        return table.values([kept[k]])[:, 0] if times is None else times
 
     def at(row: int, k: int) -> Location:
         return table.at(row, kept[k] if kept else 0)
@@ -68,6 +70,22 @@ def of_table(
         tuple(notes),
         table.headed,
     )
+
+
+def _clock_times(table: CsvTable, column: int) -> Floats | None:
+    """Seconds since 2000 (n,) of a column of dates or times of day; None where its first cell is none. Raises ConfigError CC422."""
+    cells = table.texts(column)
+    if clock(next((cell for cell in cells if cell), "")) is None:
+        return None
+    out = np.full(len(cells), np.nan)
+    for row, cell in enumerate(cells):
+        if cell:
+            found = clock(cell)
+            if found is None:
+                message = f"'{cell}' in column {table.header[column]} is no date or time like the cells above it"
+                raise ConfigError("CC422", message, at=table.at(row, column))
+            out[row] = found
+    return out
 
 
 def _without_remarks(data: bytes) -> tuple[bytes, list[str]]:

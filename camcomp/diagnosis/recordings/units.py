@@ -12,14 +12,27 @@ from camcomp.ground.datatypes import Floats
 SI = "SI"
 _TO_LOG = {  # unit of the log: factors that lead to it, by unit of theirs in lower case
     "mm": {"mm": 1.0, "m": 1e3, "cm": 10.0, "um": 1e-3, "µm": 1e-3, "in": 25.4, "inch": 25.4},
-    "rad": {"rad": 1.0, "mrad": 1e-3, "deg": np.pi / 180.0, "°": np.pi / 180.0, "degrees": np.pi / 180.0},
+    "rad": {
+        "rad": 1.0,
+        "mrad": 1e-3,
+        "urad": 1e-6,
+        "µrad": 1e-6,
+        "deg": np.pi / 180.0,
+        "°": np.pi / 180.0,
+        "degrees": np.pi / 180.0,
+    },
     "s": {"s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9, "min": 60.0},
     "N": {"n": 1.0, "kn": 1e3},
-    "Nmm": {"nmm": 1.0, "nm": 1e3, "n·m": 1e3},
+    "Nmm": {"nmm": 1.0, "nm": 1e3, "n·m": 1e3, "n m": 1e3, "n mm": 1.0, "knm": 1e6},
     "C": {"c": 1.0, "°c": 1.0, "degc": 1.0},
 }
 _BASE = {"mm": "m", "rad": "rad", "s": "s", "N": "n", "Nmm": "nm", "C": "c"}
 _BRACKETS = re.compile(r"(.+?)[\s_]*[\[(]([^\[\]()]*)[\])]")
+_CLOCK = re.compile(  # 11.10.2022 15:06:48.043, 2022-10-11T15:06:48,043Z, 15:06:48.043; 10/11/2022 is of two days
+    r"(?:(?P<day>\d{1,2})\.(?P<month>\d{1,2})\.(?P<year>\d{4})[ T]+|(?P<iso>\d{4}-\d{2}-\d{2})[ T]+)?"
+    r"(?P<h>[01]?\d|2[0-3]):(?P<m>[0-5]\d):(?P<s>[0-5]\d(?:[.,]\d+)?)Z?",
+    re.ASCII,
+)
 _STAMP = (1e13, 1e14)  # 20200714163904
 _SINCE_1970 = ((1e12, 1e13, 1e-3), (1e15, 1e16, 1e-6))  # from, to, s: ms and us of this century
 
@@ -69,6 +82,25 @@ def seconds(stamps: Floats, factor: float | None) -> Floats | None:
         return np.array([_since_2000(each) for each in stamps])
     except ValueError:
         return None
+
+
+def clock(text: str) -> float | None:
+    """Seconds since 2000 of a date with its time of day, or of a time of day alone; None where the text is neither."""
+    found = _CLOCK.fullmatch(text.strip())
+    if found is None:
+        return None
+    day = 0.0
+    try:
+        if found["day"]:
+            day = (
+                datetime(int(found["year"]), int(found["month"]), int(found["day"])) - datetime(2000, 1, 1)
+            ).total_seconds()
+        elif found["iso"]:
+            day = (datetime.fromisoformat(found["iso"]) - datetime(2000, 1, 1)).total_seconds()
+    except ValueError:
+        return None
+    seconds = float(found["s"].replace(",", "."))
+    return day + 3600.0 * int(found["h"]) + 60.0 * int(found["m"]) + seconds
 
 
 def _since_2000(stamp: float) -> float:

@@ -75,8 +75,10 @@ class UrdfArm:
     notes: tuple[str, ...]
 
 
-def read_urdf(data: bytes, name: str, tip: str | None = None) -> UrdfArm:
-    """The chain from the root link to the link `tip` (default: the only leaf, or the one behind most joints).
+def read_urdf(data: bytes, name: str, tip: str | None = None, base: str | None = None) -> UrdfArm:
+    """The chain from the link `base` (default: the root) to the link `tip` (default: the only leaf, or the one behind most joints).
+
+    Joints that follow another one (mimic), such as those of a gripper, stand still where their leader stands at zero.
 
     Raises ConfigError CC240 with file and line for what is no URDF or no chain of hinges and slides.
     """
@@ -106,7 +108,9 @@ def read_urdf(data: bytes, name: str, tip: str | None = None) -> UrdfArm:
     routes = {leaf: _route(leaf, parent, refuse) for leaf in ([tip] if tip is not None else leaves) if leaf in links}
     if not routes:
         raise refuse(f"there is no link '{tip}'", root, f"ends of chains: {', '.join(leaves)}")
-    count = {leaf: sum(j.given.get("type") in MOVING for j in route) for leaf, route in routes.items()}
+    if base is not None:
+        routes = _from_base(routes, base, links, root, refuse)
+    count = {leaf: sum(_drives(joint) for joint in route) for leaf, route in routes.items()}
     most = [leaf for leaf, n in count.items() if n == max(count.values())]
     lengths = {leaf: len(routes[leaf]) for leaf in most}
     longest = [leaf for leaf in most if lengths[leaf] == max(lengths.values())]
@@ -155,6 +159,27 @@ def _route(leaf: str, parent: dict[str, UrdfNode], refuse) -> list[UrdfNode]:  #
         route.append(joint)
         leaf = _link(joint, "parent")
     return route[::-1]
+
+
+def _from_base(  # type: ignore[no-untyped-def]
+    routes: dict[str, list[UrdfNode]], base: str, links: dict[str, UrdfNode], root: UrdfNode, refuse
+) -> dict[str, list[UrdfNode]]:
+    """The parts of routes that lie behind a link; of routes that do not pass it nothing."""
+    if base not in links:
+        raise refuse(f"there is no link '{base}'", root, f"links: {', '.join(list(links)[:20])}")
+    out = {}
+    for leaf, route in routes.items():
+        parents = [_link(joint, "parent") for joint in route]
+        if base in parents:
+            out[leaf] = route[parents.index(base) :]
+    if not out:
+        raise refuse(f"no chain to {' or '.join(routes)} passes the link '{base}'", links[base])
+    return out
+
+
+def _drives(joint: UrdfNode) -> bool:
+    """Whether a joint has a drive of its own."""
+    return joint.given.get("type") in MOVING and joint.first("mimic") is None
 
 
 def _numbers(node: UrdfNode | None, key: str, default: tuple[float, float, float], refuse) -> Array:  # type: ignore[no-untyped-def]
@@ -222,9 +247,10 @@ def _arm(title: str, route: list[UrdfNode], links: dict[str, UrdfNode], tip: str
         child = _link(joint, "child")
         lines.append(_on_one_line(f"# {label} ({kind}) to {child}"))
         lines += _step(joint.first("origin"), refuse)
-        if joint.first("mimic") is not None:
-            raise refuse(f"joint '{label}' follows another joint", joint, "coupled joints cannot be modelled")
-        if kind in MOVING:
+        if kind in MOVING and not _drives(joint):
+            lines += _following(joint, label, kind, route, refuse)
+            notes.append(f"joint '{label}' follows another one, and stands where that is at zero")
+        elif kind in MOVING:
             lines += _joint(joint, label, kind, refuse)
             moving.append(_name(label))
         elif kind != "fixed":
@@ -238,6 +264,25 @@ def _arm(title: str, route: list[UrdfNode], links: dict[str, UrdfNode], tip: str
         notes.append(f"{len(moving)} driven joints; camcomp needs three or six")
     notes.insert(0, f"chain to link '{tip}': {', '.join(moving)}")
     return UrdfArm(_on_one_line(title), tuple(lines), tuple(moving), tuple(map(_on_one_line, notes)))
+
+
+def _following(joint: UrdfNode, label: str, kind: str, route: list[UrdfNode], refuse) -> list[str]:  # type: ignore[no-untyped-def]
+    """The rigid step of a joint that follows one outside the chain. Raises ConfigError CC240 where its leader is in the chain."""
+    mimic = joint.first("mimic")
+    leader = mimic.given.get("joint", "") if mimic is not None else ""
+    if leader in {each.given.get("name") for each in route}:
+        hint = "coupled joints of the arm itself cannot be modelled; --tip names a link in front of it"
+        raise refuse(f"joint '{label}' follows joint '{leader}' of the same chain", joint, hint)
+    offset = _number(mimic, "offset", refuse) or 0.0
+    axis = _numbers(joint.first("axis"), "xyz", (1.0, 0.0, 0.0), refuse)
+    if not axis.any():
+        raise refuse(f"axis of joint '{label}' is zero", joint)
+    step = offset * axis / np.linalg.norm(axis)
+    if not step.any():
+        return []
+    if MOVING[kind] == "revolute":
+        return [f"- {{type: transform, rotation_deg: {_list(np.degrees(step))}}}"]
+    return [f"- {{type: transform, translation_mm: {_list(1e3 * step)}}}"]
 
 
 def _name(label: str) -> str:

@@ -51,9 +51,13 @@ def check(
     return None, _Findings(tree, data, seen, name).errors(details)
 
 
+OTHER_NAMES = {"offset_deg": "theta_deg", "offset": "theta_deg", "theta_offset_deg": "theta_deg"}  # of DH tables
+
+
 def choose(name: Any, known: Sequence[str]) -> str:
     """Hint for a name that is not among `known`."""
-    close = get_close_matches(str(name), known, n=1)
+    same = [each for key, each in OTHER_NAMES.items() if key == name and each in known]
+    close = same or get_close_matches(str(name), known, n=1)
     start = f"did you mean '{close[0]}'? " if close else ""
     return f"{start}known here: {', '.join(known)}"
 

@@ -13,11 +13,12 @@ DYNO = ("fx_N", "fy_N", "fz_N")
 
 @dataclass(frozen=True)
 class LogColumns:
-    """Names per actuator (m): set-points, encoders, drive forces. Everything else is alike for all machines."""
+    """Names per actuator (m): set-points, encoders, drive forces, second encoders behind the gear. Everything else is alike for all machines."""
 
     setpoint: tuple[str, ...]
     encoder: tuple[str, ...]
     drive: tuple[str, ...]
+    load: tuple[str, ...]
 
     @property
     def simulated(self) -> tuple[str, ...]:
@@ -27,7 +28,7 @@ class LogColumns:
     @property
     def known(self) -> tuple[str, ...]:
         """Every column that is read."""
-        return (*self.simulated, TEMPERATURE, *TIP_SD)
+        return (*self.simulated, *self.load, TEMPERATURE, *TIP_SD)
 
 
 def log_columns(actuators: Sequence[str], rotary: Sequence[bool]) -> LogColumns:
@@ -38,4 +39,5 @@ def log_columns(actuators: Sequence[str], rotary: Sequence[bool]) -> LogColumns:
         tuple(f"cmd_{a}_{unit}" for a, unit in zip(actuators, lengths, strict=True)),
         tuple(f"act_{a}_{unit}" for a, unit in zip(actuators, lengths, strict=True)),
         tuple(f"act_{a}_{unit}" for a, unit in zip(actuators, efforts, strict=True)),
+        tuple(f"load_{a}_{unit}" for a, unit in zip(actuators, lengths, strict=True)),
     )

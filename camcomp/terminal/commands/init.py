@@ -15,7 +15,10 @@ FOLDER = click.Path(file_okay=False, path_type=Path)
 @click.option("--machine", metavar="NAME", help="Machine to start from; default: orthoglide.")
 @click.option("--from-urdf", "urdf", metavar="FILE", help="Arm whose geometry and masses the machine file takes.")
 @click.option("--tip", metavar="LINK", help="Link of the URDF that carries the tool; default: the end of the chain.")
-def command(directory: Path | None, listing: bool, machine: str | None, urdf: str | None, tip: str | None) -> None:
+@click.option("--base", metavar="LINK", help="Link of the URDF that stands still; default: the root.")
+def command(
+    directory: Path | None, listing: bool, machine: str | None, urdf: str | None, tip: str | None, base: str | None
+) -> None:
     """Start a project: a machine file, a program, a README.
 
     DIR is made when it is not there. Nothing in it is overwritten.
@@ -32,7 +35,7 @@ def command(directory: Path | None, listing: bool, machine: str | None, urdf: st
         raise click.UsageError("name the folder of the project, or ask for --list")
     if machine is not None and urdf is not None:
         raise click.UsageError("--machine and --from-urdf are two machines; ask for one")
-    written, notes = start_project(directory, machine=machine, urdf=urdf, tip=tip)
+    written, notes = start_project(directory, machine=machine, urdf=urdf, tip=tip, base=base)
     for note in notes:
         click.echo(note, err=True)
     for path in written:

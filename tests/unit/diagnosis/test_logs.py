@@ -45,7 +45,8 @@ def test_the_names_of_a_log():
     named = log_columns(["x", "c"], [False, True])
     head = "t_s,line,x_mm,y_mm,z_mm,cmd_x_mm,cmd_c_rad,act_x_mm,act_c_rad,act_x_N,act_c_Nmm,fx_N,fy_N,fz_N"
     assert ",".join(named.simulated) == head
-    assert set(named.known) == {*named.simulated, "temp_C", "x_sd_mm", "y_sd_mm", "z_sd_mm"}
+    assert set(named.known) == {*named.simulated, *named.load, "temp_C", "x_sd_mm", "y_sd_mm", "z_sd_mm"}
+    assert named.load == ("load_x_mm", "load_c_rad")
 
 
 def test_the_deviation_that_an_instrument_states_is_read(tmp_path, columns):

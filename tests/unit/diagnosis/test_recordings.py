@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
+from camcomp.diagnosis.recordings.tables import read_text_table
+from camcomp.diagnosis.recordings.units import clock
+from camcomp.ground.errors import ConfigError
 from camcomp.model.config.load import load_experiment
 from camcomp.terminal.cli import run
 from tests.importing import imported
@@ -352,3 +355,46 @@ def test_programs_and_clampings_as_told(tmp_path, capsys):
     for word, rule in ((f"other={tmp_path}/part.nc", "CC424"), (f"run={tmp_path}/pat.nc", "CC500")):
         got = imported(capsys, tmp_path / "y", tmp_path / "run.csv", "--program", word, config="cartesian")
         assert rule in got.told and got.yaml is None
+
+
+ARM = "Time;A1 command [deg];A1 actual [deg];A1 torque [Nm];act_A2_deg;cmd_A2_rad;act_A2_Nm;act_A3_Nmm;act_A3_rad;se_A1_deg;se_A2_deg\n"
+
+
+def test_names_and_units_that_joints_have_elsewhere(read):
+    """Set-points, encoders, torques and second encoders in degrees and N m; a clock with a date; a second encoder that is not there."""
+    rows = "".join(
+        f"11.10.2022 15:06:{48.043 + 0.5 * k:06.3f};90;{45 + k};2.5;{90 + k};0.25;1;7;0.5;{45.1 + k};0\n"
+        for k in range(4)
+    )
+    got = read(ARM + rows, config="kuka-kr210")
+    log = got.logs["poses"]
+    np.testing.assert_allclose(log["t_s"], [0.0, 0.5, 1.0, 1.5], atol=1e-6)
+    first = {name: values[0] for name, values in log.items()}
+    expected = {
+        "t_s": 0.0, "cmd_A1_rad": np.pi / 2, "cmd_A2_rad": 0.25, "act_A1_rad": np.pi / 4, "act_A2_rad": np.pi / 2,
+        "act_A3_rad": 0.5, "act_A1_Nmm": 2500.0, "act_A2_Nmm": 1000.0, "act_A3_Nmm": 7.0, "load_A1_rad": np.radians(45.1),
+    }  # fmt: skip
+    assert first == pytest.approx(expected, abs=1e-8)
+    assert "second encoders that never move dropped: load_A2_rad" in got.told
+
+
+@pytest.mark.parametrize(
+    ("text", "due"),
+    [
+        ("11.10.2022 15:06:48.043", 43.0),
+        ("2022-10-11T15:06:48,043Z", 43.0),
+        ("15:06:48", 43.0),
+        ("10/11/2022 15:06:48", None),
+        ("31.02.2022 15:06:48", None),
+        ("48.043", None),
+    ],
+)
+def test_clocks_are_read_as_seconds(text, due):
+    found, start = clock(text), clock(text.replace("48", "05"))
+    assert (found is None) if due is None else found - start == pytest.approx(due, abs=1e-6)
+
+
+def test_a_clock_that_breaks_off_is_refused_with_its_place(read):
+    with pytest.raises(ConfigError, match="no date or time like the cells above it") as caught:
+        read_text_table(b"Time;x\n15:06:48;1\n7;2\n", "a.csv")[0].read(0)
+    assert (caught.value.rule, caught.value.at.line) == ("CC422", 3)

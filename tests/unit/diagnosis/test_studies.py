@@ -19,6 +19,7 @@ from camcomp.diagnosis.axis.study import study as axis_study
 from camcomp.ground.errors import ConfigError
 from camcomp.model.config.load import load_config
 from camcomp.model.statics.build import build_robot
+from camcomp.model.statics.hanging import hang
 from tests.validation.plants.arm_poses import measured
 
 
@@ -407,3 +408,13 @@ def test_logs_that_say_nothing_are_refused():
     nothing = np.full(100, np.nan)
     with pytest.raises(ValueError, match="no axis"):
         axis_study({"x": [AxisRun("r", np.arange(100.0), nothing, nothing, nothing)]})
+
+
+def test_an_arm_whose_base_bends_is_judged_with_a_warning(robot, healthy):
+    """A column that turns by 4e-8 rad per N mm of the overturning moment of 1000 N at the flange."""
+    poses = healthy[0]
+    point = hang(robot, poses.q).point
+    moment = np.cross(point, [0.0, 0.0, -1000.0])
+    bent = poses.tip + np.cross(4e-8 * moment, point)
+    (warning,) = check_poses("a.csv", "A", robot, poses.q, bent)
+    assert "a base that bends" in warning and "explains most of it" in warning

@@ -139,3 +139,56 @@ def test_init_writes_no_machine_of_five_joints(tmp_path):
     done = camcomp("init", tmp_path / "job", "--from-urdf", file)
     assert done.returncode == 2 and b"CC240" in done.stderr and b"5 joints move" in done.stderr
     assert not (tmp_path / "job").exists()
+
+
+GRIPPER = """<link name="knuckle"/><link name="finger"/>
+<joint name="grip" type="revolute"><parent link="l6"/><child link="knuckle"/><axis xyz="0 0 1"/>
+<mimic joint="motor" multiplier="1" offset="0.25"/></joint>
+<joint name="tip" type="fixed"><parent link="knuckle"/><child link="finger"/><origin xyz="0.1 0 0"/></joint>"""
+
+
+def test_a_joint_that_follows_one_outside_the_chain_stands_at_its_offset():
+    arm = read_urdf(urdf(extra=GRIPPER), "arm.urdf")
+    assert arm.moving == ("pan", "lift", "elbow", "twist", "rail", "roll_6")
+    turned = next(line for line in arm.lines if f"rotation_deg: [0, 0, {np.degrees(0.25):.9g}]" in line)
+    assert "transform" in turned
+    assert any("'grip' follows another one" in note for note in arm.notes)
+
+
+def test_the_chain_begins_at_the_base_that_is_named(tmp_path):
+    """The rail of joint pan is left out: the arm behind it stands on link l0."""
+    seven = [("x", "prismatic", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (1, 0, 0)), *JOINTS]
+    whole = read_urdf(urdf(seven), "arm.urdf")
+    arm = read_urdf(urdf(seven), "arm.urdf", base="l0")
+    assert whole.moving == ("x", *arm.moving) and len(arm.moving) == 6
+    with pytest.raises(ConfigError, match="there is no link 'floor'"):
+        read_urdf(urdf(seven), "arm.urdf", base="floor")
+    with pytest.raises(ConfigError, match="passes the link 'l7'"):
+        read_urdf(urdf(seven), "arm.urdf", base="l7")
+    (tmp_path / "arm.urdf").write_bytes(urdf(seven))
+    done = camcomp("init", tmp_path / "project", "--from-urdf", tmp_path / "arm.urdf", "--base", "l0")
+    assert done.returncode == 0, done.stderr
+
+
+def test_seven_joints_are_valid_for_logs_without_programs(tmp_path):
+    """`diagnose` studies the poses of such an arm, so `validate` takes its files."""
+    seven = [("x", "prismatic", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (1, 0, 0)), *JOINTS]
+    (tmp_path / "machine.yaml").write_text(machine_yaml(read_urdf(urdf(seven), "arm.urdf"), "arm.urdf"))
+    names = ("x", "pan", "lift", "elbow", "twist", "rail", "roll_6")
+    head = ",".join(f"{kind}_{n}_{'mm' if n in ('x', 'rail') else 'rad'}" for n in names for kind in ("cmd", "act"))
+    rows = "\n".join(f"{t},{','.join(['0.1'] * 14)}" for t in range(60))
+    (tmp_path / "a.csv").write_text(f"t_s,{head}\n{rows}\n")
+    (tmp_path / "e.yaml").write_text("config: [machine.yaml]\nruns:\n- {name: a, log: a.csv, cutting: false}\n")
+    for file in ("machine.yaml", "e.yaml"):
+        done = camcomp("validate", tmp_path / file)
+        assert done.returncode == 0, done.stderr
+    assert b"7 actuators" in camcomp("validate", tmp_path / "machine.yaml").stderr
+    assert camcomp("diagnose", tmp_path / "e.yaml").returncode == 0
+
+
+def test_the_offset_of_a_table_hints_at_theta(tmp_path):
+    (tmp_path / "m.yaml").write_text(
+        "robot:\n  name: a\n  type: serial\n  joints:\n    - {name: J1, a_mm: 1, offset_deg: 90}\n"
+    )
+    done = camcomp("validate", tmp_path / "m.yaml")
+    assert done.returncode == 2 and b"did you mean 'theta_deg'?" in done.stderr
