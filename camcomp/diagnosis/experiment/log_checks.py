@@ -102,7 +102,7 @@ def _is_scaled(found: Floats, due: Floats, factor: float, strong: float) -> bool
     size, modelled = float(np.sqrt(np.mean(y**2))), float(np.sqrt(np.mean(x**2)))
     if modelled < strong or not SAME_FORCE[0] < size / (factor * modelled) < SAME_FORCE[1]:
         return False
-    return float(np.mean(x * y)) > np.sqrt(0.5) * size * modelled  # half of the energy goes with the modelled one
+    return bool(np.mean(x * y) > np.sqrt(0.5) * size * modelled)  # half of the energy goes with the modelled one
 
 
 def check_followed(name: str, run: str, distance: Floats, agreement: float, aside_mm: float = ASIDE_MM) -> None:
