@@ -111,7 +111,8 @@ def _moved_kg(at: AxisTravel, force: Floats) -> float:
         return 0.0
     others = np.stack([np.ones_like(at.time), at.position, at.speed, np.sign(at.speed)], axis=1)
     own = 1e-3 * at.acceleration
+    whole = float(np.var(own)) * len(own)
     own, force = (each - others @ solve(others, each) for each in (own - own.mean(), force - force.mean()))
-    known = float(own @ own) > 0.5 * float(np.var(1e-3 * at.acceleration)) * len(own)
+    known = float(own @ own) > 0.5 * whole
     explains = float(own @ force) > np.sqrt(0.5 * float(own @ own) * float(force @ force))
     return float(own @ force / (own @ own)) if known and explains else 0.0
