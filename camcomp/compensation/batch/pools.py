@@ -12,7 +12,7 @@ import os
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import CancelledError
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from itertools import islice
 from queue import Empty, Queue
 from typing import Any
@@ -33,11 +33,33 @@ def cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
+@contextmanager
+def safe_children() -> Iterator[None]:
+    """Child processes started within it import no module from the current folder.
+
+    Python puts that folder in front of its own modules for `python -m` and `python -c`, by which workers start.
+    """
+    before = os.environ.get("PYTHONSAFEPATH")
+    os.environ["PYTHONSAFEPATH"] = "1"
+    try:
+        yield
+    finally:
+        if before is None:
+            os.environ.pop("PYTHONSAFEPATH", None)
+        else:
+            os.environ["PYTHONSAFEPATH"] = before
+
+
 def on_this_machine(tasks: Iterable[Task], jobs: int) -> Iterator[Outcome]:
     """Outcomes of tasks done by `jobs` processes of one core each; tasks are taken from the iterable when needed."""
     if jobs == 1:
         yield from map(work, tasks)
         return
+    with safe_children():
+        yield from _on_workers(tasks, jobs)
+
+
+def _on_workers(tasks: Iterable[Task], jobs: int) -> Iterator[Outcome]:
     from joblib import Parallel, delayed
     from joblib.externals.loky import get_reusable_executor
     from joblib.externals.loky.process_executor import TerminatedWorkerError
