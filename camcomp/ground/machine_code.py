@@ -1,65 +1,82 @@
 """Compiled functions and their code on disk: whole, for exactly this source, numba and processor, or compiled anew.
 
-numba trusts its files. A damaged one ends the process or computes something else, and two processes that fill an empty
-cache at once can each put its code under the other's name. Here every file has a checksum and one name for all that it
-depends on, and whatever goes wrong with it is a note, never an error.
-
-An installed camcomp brings code along that numba has already been through: what is left for the first run is to make
-machine code of it, for the processor it finds. hatch_build.py makes these files; where they are missing or of other
-sources, Python or numba, everything is compiled.
+Every file has a checksum and one name for all that it depends on; whatever goes wrong with it is a note, never an error.
+A file of code is executed, so one that another user owns or can change is not opened, and a folder that others can
+write to holds none. Numba's own cache on disk is not used: it knows neither.
 """
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import os
 import pickle
-from collections.abc import Callable
+import re
+import sys
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import llvmlite
 import numba
-from numba.core import caching
 
 from camcomp.ground import headway
-from camcomp.ground.linked_code import Entry, finished
 from camcomp.ground.notes import note
 from camcomp.ground.replacement import Replacement
+from camcomp.ground.trust import why_file_is_not_ours, why_folder_is_not_ours
 
 _numba: Any = numba  # its annotations leave out what it has
-_caching: Any = caching
 _SUM = hashlib.sha256().digest_size
 _ANEW = "it is compiled anew, which takes half a minute"
-BROUGHT_ALONG = Path(__file__).parents[1] / "data" / "linked"
+ROOT = Path(__file__).parents[2]  # of the package
+_IMPORT = re.compile(r"^(?:from (camcomp[\w.]*) import (\([^)]*\)|.*)|import (camcomp[\w.]*))", re.MULTILINE)
 
 
-class _Bringing:
-    """Where code to bring along is put while it is made, or None."""
-
-    folder: Path | None = None
-
-
-def bring_along(folder: Path) -> None:
-    """What is compiled from now on in this process is also put there as code to bring along."""
-    _Bringing.folder = folder
-
-
-def kept(function: Callable[..., Any], *, digest: str | None = None, **options: Any) -> Any:
+def kept(function: Callable[..., Any], *, allocates: bool = True, **options: Any) -> Any:
     """Numba's dispatcher of `function`, its code kept on disk where there is a place for it; options as for njit.
 
-    digest: of all sources of the code; without it the code depends on the function's own file only, and is not brought
-    along.
+    allocates: whether the code makes arrays. Code that makes none is loaded without what numba imports for compiling,
+    a quarter of a second of declarations.
     """
-    if _numba.config.DISABLE_JIT:  # for the debugger
-        return _numba.njit(**options)(function)
-    dispatcher = _numba.njit(pipeline_class=Entry, **options)(function)
-    try:
-        dispatcher._cache = _Cache(function, digest)
-    except (OSError, RuntimeError):  # numba has found no place
-        _not_kept("no folder for it can be written to")
+    dispatcher = _numba.njit(**options)(function)
+    if not _numba.config.DISABLE_JIT:  # for the debugger
+        # A numba that asks under another name keeps nothing and compiles in every process.
+        dispatcher._cache = _Cache(function, allocates)
     return dispatcher
+
+
+@functools.cache
+def sources(file: Path) -> frozenset[Path]:
+    """Files of camcomp from which a kernel's file takes functions or constants, by whatever way, itself included.
+
+    All of it becomes part of the machine code: a constant as its value, a function as its instructions.
+    """
+    found, open_files = set(), [file]
+    while open_files:
+        each = open_files.pop()
+        if each not in found:
+            found.add(each)
+            open_files += _imported(each)
+    return frozenset(found)
+
+
+@functools.cache
+def _imported(file: Path) -> tuple[Path, ...]:
+    """Files of camcomp that a file imports when it is itself imported."""
+    found = []
+    for module, names, alone in _IMPORT.findall(file.read_text(encoding="utf-8")):
+        place = ROOT.joinpath(*(module or alone).split("."))
+        below = [place / name for name in re.findall(r"\w+", names)]
+        for each in (place, *below):
+            found += [path for path in (each.with_suffix(".py"), each / "__init__.py") if path.is_file()]
+    return tuple(found)
+
+
+@functools.cache
+def digest(file: Path) -> str:
+    """Digest of the sources of a kernel's file."""
+    return hashlib.sha256(b"".join(each.read_bytes() for each in sorted(sources(file)))).hexdigest()
 
 
 def _not_kept(reason: str) -> None:
@@ -69,77 +86,140 @@ def _not_kept(reason: str) -> None:
     )
 
 
-class _UserWide(_caching.UserWideCacheLocator):  # type: ignore[misc]
-    """The user's cache folder, for users who have one: without a home it would be one in the current folder, called ~."""
+def _folders(file: Path) -> Iterator[Path]:
+    """Folders for the code of a source file, the preferred one first.
 
-    @classmethod
-    def from_function(cls, py_func: Any, py_file: str) -> Any:
-        known = os.path.isabs(cls(py_func, py_file).get_cache_path())
-        return super().from_function(py_func, py_file) if known else None
+    Of numba's settings only the environment's count: a `.numba_config.yaml` comes with the current folder.
+    """
+    kind = f"{file.parent.name}_{_short(str(file.parent))}"
+    if given := os.environ.get("NUMBA_CACHE_DIR"):
+        yield Path(given).absolute() / kind
+    yield file.parent / "__pycache__"
+    if (user := _user_cache()) is not None:
+        yield user / "camcomp" / kind
 
 
-class _Place(_caching.CompileResultCacheImpl):  # type: ignore[misc]
-    _locator_classes: ClassVar = [_caching.UserProvidedCacheLocator, _caching.InTreeCacheLocator, _UserWide]
+def _user_cache() -> Path | None:
+    """The user's cache folder; None for users without a home."""
+    if sys.platform == "win32":
+        places = [os.environ.get("LOCALAPPDATA", "")]
+    elif sys.platform == "darwin":
+        places = [os.path.expanduser("~/Library/Caches")]
+    else:
+        places = [os.environ.get("XDG_CACHE_HOME", ""), os.path.expanduser("~/.cache")]
+    return next((Path(each) for each in places if os.path.isabs(each)), None)
 
 
-class _Cache(_caching.FunctionCache):  # type: ignore[misc]
-    _impl_class = _Place
+def find_folder(file: Path) -> Path | None:
+    """The first folder for code of `file` that can be written to and that nobody else can; None where there is none."""
+    given = bool(os.environ.get("NUMBA_CACHE_DIR"))
+    for number, folder in enumerate(_folders(file)):
+        reason = why_folder_is_not_ours(folder)
+        if reason is None:
+            with suppress(OSError):
+                folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+                if os.access(folder, os.W_OK | os.X_OK) and why_folder_is_not_ours(folder) is None:
+                    return folder
+        elif given and number == 0:
+            note(
+                "compiled code folder", f"NUMBA_CACHE_DIR is not used: {reason}, and code from there would be executed"
+            )
+    return None
 
-    def __init__(self, function: Callable[..., Any], digest: str | None) -> None:
-        super().__init__(function)
-        self._base, self._digest = self._impl.filename_base, digest
-        stamp = self._impl.locator.get_source_stamp()
-        self._cache_file = _CodeFiles(Path(self._cache_path), self._base, (stamp, digest) if digest else stamp)
 
-    def _load_overload(self, signature: Any, context: Any) -> Any:
+class _Cache:
+    """What numba's dispatcher asks for code before it compiles, and hands code to behind that."""
+
+    def __init__(self, function: Callable[..., Any], allocates: bool) -> None:
+        code, self._allocates = function.__code__, allocates
+        self._file = Path(code.co_filename)
+        module = function.__module__.rpartition(".")[2]
+        self._base = f"{module}.{function.__qualname__}-{code.co_firstlineno}.{sys.implementation.cache_tag}"
+        self._base = re.sub(r"[^\w.-]", "_", self._base)
+
+    @functools.cached_property
+    def files(self) -> CodeFiles | None:
+        """Where the code is, None when there is no place for it."""
         try:
-            return super()._load_overload(signature, context) or self._load_linked(signature, context)
+            folder, stamp = find_folder(self._file), digest(self._file)
+        except OSError:  # a function without a file
+            return None
+        return None if folder is None else CodeFiles(folder, self._base, stamp)
+
+    @property
+    def cache_path(self) -> str | None:
+        """The folder, for numba's statistics."""
+        return str(self.files.folder) if self.files is not None else None
+
+    def load_overload(self, signature: Any, context: Any) -> Any:
+        """Compile result for a signature; None when it is not there."""
+        found = None
+        if self._allocates:
+            context.refresh()
+        try:
+            if self.files is not None:
+                found = _load(self.files, signature, context)
         except Exception:  # noqa: BLE001 - whatever a file makes numba do, there is another way
             note("compiled code", f"compiled code on the disk is damaged: {_ANEW}")
-            return None
+        if found is None:
+            headway.hold(headway.COMPILING if self.files is None else headway.ONCE)
+            context.refresh()
+        return found
 
-    def _load_linked(self, signature: Any, context: Any) -> Any:
-        """Code that was brought along, made machine code and kept like other code; None when there is none."""
-        codegen = context.codegen()
-        data = self._linked_in(BROUGHT_ALONG).load(self._linked_key(signature, codegen)) if self._digest else None
-        if data is None:
-            return None
-        headway.hold(headway.ONCE)
-        result = finished(context, data)
-        self._save_overload(signature, result)
-        return result
-
-    def _linked_in(self, folder: Path) -> _CodeFiles:
-        return _CodeFiles(folder, self._base, self._digest)
-
-    def _linked_key(self, signature: Any, codegen: Any) -> tuple[Any, ...]:
-        """The key of machine code without the processor; what is left of it is the kind of machine."""
-        signature, (machine, *_), code = self._index_key(signature, codegen)
-        return signature, machine, code
-
-    def _save_overload(self, signature: Any, data: Any) -> None:
+    def save_overload(self, signature: Any, result: Any) -> None:
+        """Keeps a compile result."""
+        if self.files is None:
+            return _not_kept("no folder for it can be written to")
         try:
-            super()._save_overload(signature, data)
-            if _Bringing.folder is not None and self._digest:
-                linked = (data.library.linked, *self._impl.reduce(data)[1:])
-                self._linked_in(_Bringing.folder).save(self._linked_key(signature, data.codegen), linked)
+            if result.library.has_dynamic_globals:
+                raise ValueError("it holds addresses of this process")
+            self.files.save(_key(signature, result.library.codegen), result._reduce())
         except Exception as error:  # noqa: BLE001 - the code itself is there and works
             _not_kept(getattr(error, "strerror", None) or str(error))
 
+    def flush(self) -> None:
+        """Forgets what is kept."""
+        if self.files is not None:
+            self.files.flush()
 
-class _CodeFiles:
-    """In place of numba's index and data files: a file per function, source and signature."""
+    def enable(self) -> None:
+        """It always is."""
 
-    def __init__(self, folder: Path, base: str, source_stamp: Any) -> None:
-        self._folder, self._base = folder, base
-        self._source_stamp = source_stamp  # of what the code was made from; whoever knows of more sources adds them
+    disable = enable
+
+
+def _load(files: CodeFiles, signature: Any, context: Any) -> Any:
+    from numba.core.compiler import CompileResult
+
+    data = files.load(_key(signature, context.codegen()))
+    rebuild: Any = CompileResult._rebuild
+    return rebuild(context, *data) if data is not None else None
+
+
+def _key(signature: Any, codegen: Any) -> tuple[Any, ...]:
+    """What code depends on beside its sources: types of arguments, kind of machine and processor."""
+    return str(signature), codegen.magic_tuple()
+
+
+class CodeFiles:
+    """A file per function, source and signature."""
+
+    def __init__(self, folder: Path, base: str, source_stamp: str) -> None:
+        self.folder, self._base = folder, base
+        self._source_stamp = source_stamp  # of what the code was made from
 
     def load(self, key: Any) -> Any:
         """The code under `key`, None when there is none. Raises ValueError when the file is not what was written."""
+        path = self._path(key)
         try:
-            data = self._path(key).read_bytes()
+            handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
         except OSError:
             return None
+        with os.fdopen(handle, "rb") as file:
+            if (reason := why_file_is_not_ours(handle)) is not None:
+                note("compiled code of others", f"compiled code is not used: {path} {reason}; {_ANEW}")
+                return None
+            data = file.read()
         if hashlib.sha256(data[_SUM:]).digest() != data[:_SUM]:
             raise ValueError("checksum")
         written_for, code = pickle.loads(data[_SUM:])
@@ -147,19 +227,21 @@ class _CodeFiles:
 
     def save(self, key: Any, code: Any) -> None:
         """Keeps code; that of other sources under the same name goes. Raises OSError, FileError."""
-        data = _caching.dumps((key, code))
-        with Replacement(str(self._path(key))) as file:
+        from numba.core.serialize import dumps
+
+        data = dumps((key, code))
+        with Replacement(str(self._path(key)), mode=0o600) as file:
             file.file.write(hashlib.sha256(data).digest() + data)
             file.finish()
             file.move()
-        for each in self._folder.glob(f"{self._base}-*.nbc"):
+        for each in self.folder.glob(f"{self._base}-*.nbc"):
             if not each.name.startswith(self._stem()):
                 with suppress(OSError):
                     each.unlink()
 
     def flush(self) -> None:
         """Forgets what is kept."""
-        for each in self._folder.glob(f"{self._base}-*.nbc"):
+        for each in self.folder.glob(f"{self._base}-*.nbc"):
             with suppress(OSError):
                 each.unlink()
 
@@ -168,7 +250,7 @@ class _CodeFiles:
         return f"{self._base}-{_short(made_by)}-"
 
     def _path(self, key: Any) -> Path:
-        return self._folder / f"{self._stem()}{_short(key)}.nbc"
+        return self.folder / f"{self._stem()}{_short(key)}.nbc"
 
 
 def _short(what: Any) -> str:

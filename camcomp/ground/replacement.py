@@ -14,11 +14,12 @@ class Replacement:
     """`file` is filled; `finish` brings it to the disk, `move` puts it in place of the target; otherwise it is gone.
 
     Where the system can (Linux), the file has no name until it is moved, so that nothing is left of it however the
-    process ends. The target keeps its permissions; a link is followed. Raises OSError.
+    process ends. The target keeps its permissions, and its owner and group where the system permits that; a link is
+    followed. mode: permissions in place of those. Raises OSError.
     """
 
-    def __init__(self, name: str) -> None:
-        self.name = name
+    def __init__(self, name: str, *, mode: int | None = None) -> None:
+        self.name, self._mode = name, mode
         self._target = Path(name).resolve()
         self._aside = self._target.with_name(f".camcomp-{os.urandom(8).hex()}")
         self._named = False
@@ -52,10 +53,27 @@ class Replacement:
         self.file.flush()
         handle = self.file.fileno()
         if hasattr(os, "fchmod"):
-            os.fchmod(handle, self._target.stat().st_mode & 0o7777 if self._target.exists() else 0o666 & ~_umask())
+            os.fchmod(handle, self._permissions(handle) if self._mode is None else self._mode)
         os.fsync(handle)
         if self._named:
             self.file.close()  # some systems move no open files
+
+    def _permissions(self, handle: int) -> int:
+        """Those of the target; never its set-user and set-group bits, which would hand out the rights of another owner.
+
+        Where the target's group cannot be kept, the new one gets no more than every user.
+        """
+        try:
+            before = self._target.stat()
+        except OSError:
+            return 0o666 & ~_umask()
+        mode = before.st_mode & 0o777
+        for owner, group in ((-1, before.st_gid), (before.st_uid, -1)):
+            with contextlib.suppress(OSError):
+                os.fchown(handle, owner, group)
+        if os.fstat(handle).st_gid != before.st_gid:
+            mode &= ~0o070 | (mode & 0o007) << 3
+        return mode
 
     def move(self) -> None:
         """The finished file stands under the name of the target, and will after a loss of power."""

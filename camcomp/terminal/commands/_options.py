@@ -1,14 +1,19 @@
 """Options that several verbs share."""
 
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from camcomp.ground.places import one_place_each
 
+if TYPE_CHECKING:
+    _Text = click.ParamType[str]
+else:
+    _Text = click.ParamType  # no generic class in click 8.1
 
-class OutputFile(click.ParamType[str]):
+
+class OutputFile(_Text):
     """Name of an output, or "-": none twice in one command, which is said before the work begins."""
 
     name = "file"

@@ -294,3 +294,45 @@ def test_a_process_that_is_killed_in_the_middle_leaves_nothing(tmp_path):
             os.kill(os.getpid(), signal.SIGKILL)
     os.waitpid(child, 0)
     assert {each.name: each.read_bytes() for each in tmp_path.iterdir()} == {"a": b"old"}
+
+
+@pytest.mark.skipif(not hasattr(os, "fchmod"), reason="permissions of POSIX")
+@pytest.mark.parametrize("mode", [0o4755, 0o2755, 0o6711])
+def test_the_rights_of_another_owner_do_not_go_over_to_what_is_written(tmp_path, mode):
+    out = tmp_path / "out"
+    out.write_bytes(b"old")
+    out.chmod(mode)
+    files.write_all({out: b"new"})
+    assert stat.S_IMODE(out.stat().st_mode) == mode & 0o777
+
+
+@pytest.mark.skipif(not hasattr(os, "getuid") or os.getuid() != 0, reason="gives files away")
+def test_an_overwritten_file_keeps_its_owner_and_group(tmp_path):
+    out = tmp_path / "out"
+    out.write_bytes(b"old")
+    os.chown(out, 12345, 12346)
+    out.chmod(0o640)
+    files.write_all({out: b"new"})
+    assert (out.stat().st_uid, out.stat().st_gid, stat.S_IMODE(out.stat().st_mode)) == (12345, 12346, 0o640)
+
+
+@pytest.mark.skipif(not hasattr(os, "fchown"), reason="groups of POSIX")
+def test_a_group_that_cannot_be_kept_takes_its_rights_along(tmp_path, monkeypatch):
+    out = tmp_path / "out"
+    out.write_bytes(b"old")
+    out.chmod(0o660)
+    status = os.fstat
+
+    def refuse(*args):
+        raise PermissionError(1, "Operation not permitted")
+
+    def of_another_group(handle):
+        fields = list(status(handle))
+        fields[5] += 1
+        return os.stat_result(fields)
+
+    monkeypatch.setattr(os, "fchown", refuse)
+    monkeypatch.setattr(os, "fstat", of_another_group)
+    files.write_all({out: b"new"})
+    monkeypatch.undo()
+    assert stat.S_IMODE(out.stat().st_mode) == 0o600

@@ -1,15 +1,21 @@
 """Compiled code on disk: whatever is found there, the function computes what it says."""
 
 import errno
+import hashlib
 import os
 import pickle
 import shutil
+import stat
+import subprocess
+import sys
+from pathlib import Path
 
-import numba
+import numpy as np
 import pytest
-from numba.core import event
 
-from camcomp.ground import machine_code, notes
+from camcomp.ground import linked_code, machine_code, notes
+from camcomp.model.statics.compiled import entry, inner
+from tests.commandline import ROOT
 
 
 def twice(x):
@@ -18,7 +24,7 @@ def twice(x):
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
-    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path / "code"))
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "code"))
     monkeypatch.setattr(notes, "_told", set())
     return tmp_path / "code"
 
@@ -82,14 +88,14 @@ def test_code_under_the_name_of_other_code_is_not_taken(folder):
 def test_code_of_other_sources_goes(folder):
     fresh()
     made = machine_code.kept(twice)
-    made._cache._cache_file._source_stamp = "another"
+    made._cache.files._source_stamp = "another"
     made(21)
     assert len(files(folder)) == 1 and fresh() == (42, 0)
 
 
 def test_without_a_place_it_is_compiled_in_memory_with_one_note(folder, capsys, monkeypatch):
     folder.write_bytes(b"no folder")
-    monkeypatch.setattr(machine_code._Place, "_locator_classes", [machine_code._caching.UserProvidedCacheLocator])
+    monkeypatch.setattr(machine_code, "_folders", lambda file: [folder / "code"])
     assert fresh() == fresh() == (42, 0)
     assert capsys.readouterr().err.count("note:") == 1
 
@@ -105,61 +111,138 @@ def test_a_full_disk_is_no_error(folder, capsys, monkeypatch):
     assert [each for each in folder.rglob("*") if each.is_file()] == []
 
 
-@pytest.fixture
-def along(folder, tmp_path, monkeypatch):
-    """Code of `twice` that an installation brings along, and no code of the user's."""
-    place = tmp_path / "along"
-    place.mkdir()
-    monkeypatch.setattr(machine_code._Bringing, "folder", place)
-    assert machine_code.kept(twice, digest="sources")(21) == 42
-    monkeypatch.setattr(machine_code._Bringing, "folder", None)
-    monkeypatch.setattr(machine_code, "BROUGHT_ALONG", place)
-    shutil.rmtree(folder)
-    (path,) = files(place)
-    return path
-
-
-def compiled_for(value, digest):
-    """(What `twice` of a value is, how often numba had to compile for it)."""
-    with event.install_recorder("numba:compile") as compiled:
-        made = machine_code.kept(twice, digest=digest)(value)
-    return made, sum(each.is_start for _, each in compiled.buffer)
-
-
-def test_code_that_was_brought_along_is_not_compiled_and_then_the_users_own(along, folder, capsys):
-    assert compiled_for(21, "sources") == (42, 0)
-    assert len(files(folder)) == 1
-    along.unlink()
-    assert compiled_for(21, "sources") == (42, 0)
-    assert capsys.readouterr().err == ""
-
-
-@pytest.mark.parametrize(("value", "digest"), [(1.5, "sources"), (21, "other sources"), (21, None)])
-def test_code_that_was_brought_along_for_something_else_is_not_taken(along, value, digest):
-    assert compiled_for(value, digest) == (2 * value, 1)
-
-
-def test_code_for_another_kind_of_machine_is_not_taken(along, monkeypatch):
-    key = machine_code._Cache._linked_key
-    monkeypatch.setattr(machine_code._Cache, "_linked_key", lambda *args: (*key(*args)[:1], "z80", *key(*args)[2:]))
-    assert compiled_for(21, "sources") == (42, 1)
-
-
-def test_damaged_code_that_was_brought_along_is_one_note(along, folder, capsys):
-    along.write_bytes(along.read_bytes()[:-1])
-    assert compiled_for(21, "sources") == (42, 1)
-    assert capsys.readouterr().err.count("note:") == 1
-    assert compiled_for(21, "sources") == (42, 0)
-
-
 def test_who_has_no_home_gets_no_folder_called_tilde(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
     monkeypatch.setattr(os.path, "expanduser", lambda path: path)
-    monkeypatch.setattr(machine_code._Place, "_locator_classes", [machine_code._UserWide])
-    monkeypatch.setattr(notes, "_told", set())
-    assert fresh() == (42, 0)
-    assert list(tmp_path.iterdir()) == []
+    assert machine_code._user_cache() is None
+
+
+@pytest.mark.skipif(not hasattr(os, "getuid"), reason="asks for POSIX owners")
+class TestCodeOfOthers:
+    """A file of code is executed: what others can put there is not opened."""
+
+    @pytest.mark.parametrize("mode", [0o777, 0o733])
+    def test_a_folder_that_others_can_write_to_is_not_used(self, folder, capsys, mode):
+        folder.mkdir(mode=0o700)
+        folder.chmod(mode)
+        assert fresh()[0] == 42 and files(folder) == []
+        assert "can be written by every user, and code from there would be executed" in capsys.readouterr().err
+
+    def test_a_folder_below_one_that_others_can_write_to_is_not_used(self, folder, capsys):
+        fresh()
+        folder.chmod(0o777)
+        assert machine_code.find_folder(Path(__file__)).parent != folder
+        folder.chmod(0o1777)  # as /tmp: nobody moves what others own
+        assert machine_code.find_folder(Path(__file__)).parent == folder
+
+    @pytest.mark.parametrize("mode", [0o666, 0o602])
+    def test_a_file_that_others_can_write_is_not_opened(self, folder, capsys, mode):
+        fresh()
+        (path,) = files(folder)
+        path.write_bytes(poisoned(path.read_bytes(), folder / "executed"))
+        path.chmod(mode)
+        assert fresh() == (42, 0) and not (folder / "executed").exists()
+        assert "can be written by every user" in capsys.readouterr().err
+        assert stat.S_IMODE(path.stat().st_mode) == 0o600 and fresh() == (42, 1)
+
+    @pytest.mark.skipif(not hasattr(os, "getuid") or os.getuid() != 0, reason="gives files away")
+    @pytest.mark.parametrize("what", ["file", "folder"])
+    def test_what_another_user_owns_is_not_opened(self, folder, capsys, what):
+        fresh()
+        (path,) = files(folder)
+        path.write_bytes(poisoned(path.read_bytes(), folder / "executed"))
+        os.chown(path if what == "file" else path.parent, 12345, 12345)
+        fresh()
+        assert not (folder / "executed").exists()
+        assert "belongs to another user" in capsys.readouterr().err
+
+    def test_a_pipe_in_the_place_of_a_file_is_not_waited_for(self, folder):
+        fresh()
+        (path,) = files(folder)
+        path.unlink()
+        os.mkfifo(path)
+        assert fresh() == (42, 0)
+
+    def test_settings_of_the_current_folder_name_no_folder_for_code(self, tmp_path, monkeypatch):
+        monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
+        (tmp_path / ".numba_config.yaml").write_text("cache_dir: evil\n")
+        code = (
+            "import pathlib; from camcomp.ground import machine_code as m; "
+            f"print(*m._folders(pathlib.Path({__file__!r})))"
+        )
+        done = subprocess.run(
+            [sys.executable, "-c", code],
+            cwd=tmp_path,
+            env={**os.environ, "PYTHONPATH": str(ROOT)},
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        assert "evil" not in done.stdout and "__pycache__" in done.stdout
+
+
+class Executed:
+    def __init__(self, mark):
+        self.mark = str(mark)
+
+    def __reduce__(self):
+        return open, (self.mark, "w")
+
+
+def poisoned(data, mark):
+    """A file of code as another user would leave it, its checksum right."""
+    text = pickle.dumps(Executed(mark))
+    return hashlib.sha256(text).digest() + text
+
+
+@pytest.mark.parametrize("missing", ["_reload_init", "_final_module", "no library"])
+def test_a_numba_of_another_build_compiles_as_usual(folder, monkeypatch, missing):
+    """The private parts that are used are not there, or are otherwise: numba itself is right all the same."""
+    from numba.core import codegen
+
+    for each in (linked_code.is_usable, linked_code._part_class):
+        each.cache_clear()
+    if missing == "no library":
+        monkeypatch.delattr(codegen, "JITCodeLibrary")
+    else:
+        monkeypatch.setattr(linked_code, "_part_class", lambda: broken(codegen.JITCodeLibrary, missing))
+    try:
+        assert not linked_code.is_usable()
+        made = inner(twice)
+        assert entry(lambda x: made(x) + 1.0)(20.0) == 41.0
+    finally:
+        for each in (linked_code.is_usable, linked_code._part_class):
+            if hasattr(each, "cache_clear"):
+                each.cache_clear()
+
+
+def broken(library, name):
+    class Broken(library):
+        def finalize(self):
+            raise AttributeError(name)
+
+    return Broken
+
+
+@pytest.mark.parametrize("name", ["_reduce", "_rebuild"])
+def test_a_numba_whose_results_cannot_be_kept_compiles_every_time(folder, monkeypatch, name):
+    from numba.core.compiler import CompileResult
+
+    if name == "_rebuild":
+        assert fresh() == (42, 0)
+    monkeypatch.delattr(CompileResult, name)
+    assert fresh() == (42, 0) == fresh()
+
+
+def test_code_with_addresses_of_this_process_is_not_kept(folder, capsys):
+    big = np.arange(1 << 21, dtype=float)  # numba takes large arrays in by their address
+
+    def first(x):
+        return big[0] + x
+
+    assert machine_code.kept(first)(42.0) == 42.0
+    assert files(folder) == [] and "addresses" in capsys.readouterr().err
 
 
 def test_notes_of_workers_wait_for_their_parent(monkeypatch, capsys):

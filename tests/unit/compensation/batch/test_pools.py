@@ -67,11 +67,26 @@ def test_workers_execute_nothing_of_the_current_folder(tmp_path):
         (tmp_path / f"{name}.py").write_text(f"open({str(tmp_path / 'executed')!r}, 'a').write('{name} ')\n")
     for i in range(2):
         (tmp_path / f"{i}.nc").write_text(GOOD.format(x=i + 1))
-    words = ["batch", "0.nc", "1.nc", "--config", str(shipped("config/cartesian.yaml")), "--output-dir", "out", "--jobs", "2"]
+    words = [
+        "batch",
+        "0.nc",
+        "1.nc",
+        "--config",
+        str(shipped("config/cartesian.yaml")),
+        "--output-dir",
+        "out",
+        "--jobs",
+        "2",
+    ]
     start = f"import sys; sys.path.insert(0, {str(ROOT)!r}); from camcomp.terminal.cli import main; main(sys.argv[1:])"
     environment = {key: value for key, value in os.environ.items() if key not in ("PYTHONPATH", "PYTHONSAFEPATH")}
     done = subprocess.run(
-        [sys.executable, "-P", "-c", start, *words], cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
+        [sys.executable, "-P", "-c", start, *words],
+        cwd=tmp_path,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
     )
     assert not (tmp_path / "executed").exists(), (tmp_path / "executed").read_text()
     assert done.returncode == 0, done.stderr

@@ -11,7 +11,6 @@ from camcomp.gcode.numbers import decimals, plain, significant
 from camcomp.gcode.output import Output
 from camcomp.gcode.rewrite import rewrite
 from camcomp.ground.datatypes import LINE, RAPID
-from camcomp.ground.linked_code import Entry
 
 HEAD = "G21 G90 G94\nG0 X1 Y2 Z3 F500\n"
 RESOLUTION = 0.001
@@ -121,12 +120,12 @@ def test_a_line_cut_off_by_the_buffer_is_left_for_the_next_one(cut):
 # --- numbers ----------------------------------------------------------------------------------------------------------
 
 
-@numba.njit(pipeline_class=Entry)
+@numba.njit
 def decimal(out, value, digits):
     return put_decimal(out, 0, value, digits, True)
 
 
-@numba.njit(pipeline_class=Entry)
+@numba.njit
 def feed(out, value):
     return put_feed(out, 0, value, False)
 

@@ -8,7 +8,7 @@ from types import FunctionType, ModuleType
 import pytest
 
 import camcomp
-from camcomp.model.statics import compiled
+from camcomp.ground import machine_code
 
 PACKAGE = Path(camcomp.__file__).parent
 FILES = [path for path in PACKAGE.rglob("*.py") if re.search(r"^@entry$", path.read_text(), re.MULTILINE)]
@@ -44,7 +44,7 @@ def test_there_are_kernels():
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
 def test_every_function_and_constant_comes_from_a_source(path):
-    sources = compiled.sources(path)
+    sources = machine_code.sources(path)
     entries = [each.dispatcher.py_func for each in vars(module_of(path)).values() if hasattr(each, "dispatcher")]
     assert entries
     for function in set().union(*(compiled_into(each, set()) for each in entries)):
@@ -71,12 +71,12 @@ def test_what_is_behind_an_import_counts(way, tmp_path, monkeypatch):
     (folder / "near.py").write_text("from camcomp.middle import D\n")
     (folder / "middle.py").write_text(way + "\n")
     (folder / "far.py").write_text("C = 1\n")
-    monkeypatch.setattr(compiled, "ROOT", tmp_path)
+    monkeypatch.setattr(machine_code, "ROOT", tmp_path)
 
     def digest():
-        for each in (compiled._imported, compiled.sources, compiled.digest):
+        for each in (machine_code._imported, machine_code.sources, machine_code.digest):
             each.cache_clear()
-        return compiled.digest(folder / "near.py")
+        return machine_code.digest(folder / "near.py")
 
     before = digest()
     assert digest() == before
