@@ -65,7 +65,7 @@ def _part_class() -> Any:
 
     library: Any = JITCodeLibrary
 
-    class Part(library):  # type: ignore[misc]
+    class UnfinishedCode(library):  # type: ignore[misc]
         def __init__(self, codegen: Any, name: str) -> None:
             super().__init__(codegen, name)
             self._codegen = _WithoutPlace(codegen)
@@ -84,7 +84,7 @@ def _part_class() -> Any:
             self._ensure_finalized()
             return 0
 
-    return Part
+    return UnfinishedCode
 
 
 class _WithoutPlace:
