@@ -447,8 +447,8 @@ RULES: dict[str, Rule] = {
     ),
     "CC297": Rule(
         "stock file not usable",
-        "A stock from a file is an STL with at least one body, closed, in mm in the program frame; reading it needs the package trimesh.",
-        "check the path, close what is open in a mesh repair, or export the file anew; the reader comes with pip install 'camcomp[stock]'",
+        "A stock from a file is an STL with at least one body, closed, in mm in the program frame.",
+        "check the path, close what is open in a mesh repair, or export the file anew",
     ),
     "CC298": Rule(
         "stock never touched",

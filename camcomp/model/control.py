@@ -11,6 +11,7 @@ from camcomp.gcode.setup import ASSUMED, Setup
 from camcomp.ground.errors import Location, ProgramError
 from camcomp.ground.files import display_name, read_bytes
 from camcomp.model.config.spec import Config
+from camcomp.model.config.stated import dialect_without_config
 from camcomp.model.trajectory.moves import ControlLimits
 
 
@@ -60,7 +61,7 @@ def program_of(data: bytes, name: str, config: Config | None = None) -> Program:
     where it is no program at all.
     """
     setup = setup_of(config) if config else Setup()
-    dialect = config.control.dialect if config else None
+    dialect = config.control.dialect if config else dialect_without_config()
     try:
         return read_program(data, name=name, setup=setup, dialect=dialect)
     except ProgramError as error:

@@ -96,7 +96,8 @@ class Plan:
 
     def key_of_config(self) -> str:
         """Hash of the configuration, of the tables that it names, and of the options: by content, whatever the names."""
-        digest = hashlib.sha256(repr((self.version, self.method, self.tolerance_um, self.joints, self.stock)).encode())
+        options = (self.version, self.method, self.tolerance_um, self.joints, self.stock, self.config.control.dialect)
+        digest = hashlib.sha256(repr(options).encode())
         assert self.config._tree is not None  # every loaded config has one
         for name, node in sorted(leaves(self.config._tree), key=lambda each: each[0]):
             value = plain(node)

@@ -16,6 +16,7 @@ from camcomp.model.config.base import Spec
 from camcomp.model.config.robot import RevoluteActuator, RobotSpec
 from camcomp.model.config.spec import Config, EffectChoice, Experiment
 from camcomp.model.config.spread import Spread, UncertainInput, replaced, without_spreads
+from camcomp.model.config.stated import in_stated_dialect
 from camcomp.model.config.yaml_check import check, choose
 from camcomp.model.config.yaml_tree import Node, merge, plain, read_tree, tree_of
 
@@ -46,7 +47,7 @@ def load_config(paths: Sequence[Path | str]) -> Config:
     _raise([*errors, *more, *wrong])
     assert config is not None
     config._spreads = tuple(spreads)
-    return config
+    return in_stated_dialect(config)
 
 
 def check_config(paths: Sequence[Path | str]) -> Config | None:
@@ -67,7 +68,7 @@ def check_config(paths: Sequence[Path | str]) -> Config | None:
     if _get(tree, "robot", "name") is None:
         more = [each for each in more if each.rule != "CC203"]
     _raise([*errors, *more, *_force_files(_get(tree, "process", "force"))])
-    return config
+    return None if config is None else in_stated_dialect(config)
 
 
 def _force_files(node: Node | None) -> list[CamcompError]:

@@ -1,5 +1,6 @@
 """YAML 1.2 text as a tree in which every value knows file, line and column."""
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from math import inf
@@ -17,6 +18,7 @@ from camcomp.ground.errors import ConfigError, Location
 
 # A mapping that names another member than the earlier file did has other keys too: it replaces the earlier one whole.
 _SELECTORS = ("type", "model")
+_QUOTED_NUMBER = re.compile("0|[1-9][0-9]{0,8}")
 
 # Budgets: what is written by hand has some hundred values; a file within them is read in about a second.
 MOST_BYTES = 1 << 20
@@ -148,6 +150,8 @@ class _Builder:
             if isinstance(key.value, list | dict):
                 self.errors.append(ConfigError("CC200", "a key has to be a single word or number", at=key.at))
                 continue
+            if isinstance(key.value, str) and _QUOTED_NUMBER.fullmatch(key.value):
+                key = replace(key, value=int(key.value))  # JSON has no other keys than strings
             value = replace(self.build(value_node), key_at=key.at)
             if isinstance(value_node, ScalarNode) and not value_node.value:
                 value = replace(value, at=key.at)  # nothing after the colon: the mark is lines further down

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
-from typing import BinaryIO
 
 import numpy as np
 
@@ -17,9 +15,9 @@ from camcomp.model.cutting.track import PLUNGE_SINE
 from camcomp.model.stock.field import MESH, ROUND
 from camcomp.model.stock.memory import NO_TOOL, StockMemory
 from camcomp.model.stock.shapes import POINT_DEG, StockShape, ToolShape
+from camcomp.model.stock.stl_file import open_edges, triangles_of
 
 UPRIGHT = 1e-6  # of the sine between tool and program Z
-_MERGED_DIGITS = 3  # corners of a file's triangles are one within a micrometre
 
 
 def memory_of(config: Config, tool_axis: Floats, bounds: Bounds) -> StockMemory:
@@ -71,37 +69,19 @@ def _stock(config: Config, bounds: Bounds, tools: Mapping[int, ToolShape]) -> St
 def _mesh(config: Config, stl: StlStock) -> StockShape:
     at = config.at("workpiece", "stock", "file")
     try:
-        import trimesh
-    except ImportError:
-        message = "a stock from a file needs trimesh: pip install 'camcomp[stock]'"
-        raise ConfigError("CC297", message, at=at) from None
-    try:
         with open(stl.file, "rb") as file:
-            _whole(file)
-            body = trimesh.load_mesh(file, file_type="stl")
-        triangles = np.asarray(body.triangles, float)
-        body.merge_vertices(digits_vertex=_MERGED_DIGITS)
-        edges, triangles_of = np.unique(np.sort(body.edges, axis=1), axis=0, return_counts=True)
+            triangles = triangles_of(file.read())
     except OSError as error:
         raise ConfigError("CC297", f"the stock cannot be read: {error.strerror}", at=at) from None
-    except Exception as error:  # noqa: BLE001 - whatever a file makes the reader do
-        raise ConfigError("CC297", f"the stock cannot be read: {error}", at=at) from None
+    except ValueError as error:
+        raise ConfigError("CC297", f"the stock is no whole STL file: {error}", at=at) from None
     if not len(triangles) or not np.isfinite(triangles).all() or not (np.ptp(triangles, axis=(0, 1)) > 0.0).all():
         raise ConfigError("CC297", "the STL file holds no body", at=at)
-    if (open_edges := edges[triangles_of % 2 > 0]).size:
-        x, y, z = body.vertices[open_edges[0, 0]]
-        message = f"the STL file is no closed body: {len(open_edges)} edges have a triangle on one side only, as at {x:g} {y:g} {z:g}"
+    if (edges := open_edges(triangles)).size:
+        x, y, z = edges[0]
+        message = f"the STL file is no closed body: {len(edges)} edges have a triangle on one side only, as at {x:g} {y:g} {z:g}"
         raise ConfigError("CC297", message, at=at)
     return StockShape(triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1)), MESH, triangles)
-
-
-def _whole(file: BinaryIO) -> None:
-    """Raises ValueError for a binary STL file that ends before its triangles do."""
-    head = file.read(84)
-    size, wanted = file.seek(0, os.SEEK_END), 84 + 50 * int.from_bytes(head[80:], "little")
-    file.seek(0)
-    if not head.lstrip().startswith(b"solid") and len(head) == 84 and size < wanted:
-        raise ValueError(f"the file ends after {size} of {wanted} bytes")
 
 
 def _around(config: Config, stock: ProgramStock, bounds: Bounds, radius: float) -> StockShape:

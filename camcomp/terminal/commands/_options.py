@@ -38,6 +38,22 @@ config_option = click.option(
     required=True,
     help="Machine file (YAML); may be given several times, later files override earlier ones key by key.",
 )
+
+
+def _state_dialect(context: click.Context, _parameter: click.Parameter, name: str | None) -> None:
+    if name is not None:
+        from camcomp.model.config.stated import stated_dialect
+
+        context.with_resource(stated_dialect(name))
+
+
+dialect_option = click.option(
+    "--dialect",
+    metavar="NAME",
+    callback=_state_dialect,
+    expose_value=False,
+    help="Language of the programs, over control: dialect: of the machine file; default: found from the text.",
+)
 quiet_option = click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
 stock_option = click.option(
     "--stock",

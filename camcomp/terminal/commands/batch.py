@@ -8,7 +8,13 @@ from typing import TYPE_CHECKING
 
 import click
 
-from camcomp.terminal.commands._options import config_option, findings_options, quiet_option, stock_option
+from camcomp.terminal.commands._options import (
+    config_option,
+    dialect_option,
+    findings_options,
+    quiet_option,
+    stock_option,
+)
 from camcomp.terminal.progress import say
 
 if TYPE_CHECKING:
@@ -18,6 +24,7 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.argument("paths", metavar="PATH...", nargs=-1, required=True)
+@dialect_option
 @config_option
 @click.option("--output-dir", metavar="DIR", required=True, help="Where the tree of corrected programs goes.")
 @click.option("--jobs", type=click.IntRange(min=1), help="Worker processes, one core each; default: all cores.")

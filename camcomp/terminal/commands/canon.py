@@ -3,10 +3,12 @@
 import click
 
 from camcomp.ground.files import display_name
+from camcomp.terminal.commands._options import dialect_option
 
 
 @click.command()
 @click.argument("program", metavar="PROGRAM")
+@dialect_option
 @click.option("--config", "configs", metavar="FILE", multiple=True, help="Machine whose control reads it.")
 def command(program: str, configs: tuple[str, ...]) -> None:
     """Print what a program was understood to do, one line per motion.

@@ -6,7 +6,7 @@ import click
 
 from camcomp.ground.errors import CheckFailed
 from camcomp.ground.files import display_name
-from camcomp.terminal.commands._options import OUTPUT, quiet_option, stock_option
+from camcomp.terminal.commands._options import OUTPUT, dialect_option, quiet_option, stock_option
 from camcomp.terminal.commands._told import control_told
 from camcomp.terminal.progress import say, working
 
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.argument("program")
+@dialect_option
 @click.option("--config", "configs", metavar="FILE", multiple=True, required=True, help="Machine; later files win.")
 @click.option("-o", "--output", metavar="OUT.nc", type=OUTPUT, help="Corrected program; - is standard output.")
 @click.option(

@@ -7,12 +7,13 @@ import click
 from camcomp.ground.errors import CheckFailed
 from camcomp.ground.files import write_all
 from camcomp.ground.places import STANDARD
-from camcomp.terminal.commands._options import OUTPUT, quiet_option
+from camcomp.terminal.commands._options import OUTPUT, dialect_option, quiet_option
 from camcomp.terminal.progress import say, working
 
 
 @click.command()
 @click.argument("experiment")
+@dialect_option
 @click.option("--json", "json_file", metavar="OUT.json", type=OUTPUT, help="The result; - is standard output.")
 @click.option("--report", metavar="OUT.html", type=OUTPUT, help="What was found and why, as one page with plots.")
 @click.option(

@@ -7,7 +7,7 @@ import click
 from camcomp.ground.files import display_name, read_bytes, write_all
 from camcomp.ground.headway import part
 from camcomp.ground.places import STANDARD
-from camcomp.terminal.commands._options import OUTPUT, stock_option
+from camcomp.terminal.commands._options import OUTPUT, dialect_option, stock_option
 from camcomp.terminal.progress import say, working
 
 if TYPE_CHECKING:
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.argument("program")
+@dialect_option
 @click.option("--config", "configs", metavar="FILE", multiple=True, required=True, help="Machine; later files win.")
 @click.option("-o", "--output", metavar="LOG.csv", type=OUTPUT, help="The log; default and -: standard output.")
 @click.option(

@@ -9,7 +9,7 @@ from camcomp.ground.files import display_name, write_all
 from camcomp.ground.places import STANDARD
 from camcomp.report.findings import WARNING, Case, Finding, findings_of
 from camcomp.report.outputs import findings_files
-from camcomp.terminal.commands._options import findings_options, quiet_option
+from camcomp.terminal.commands._options import dialect_option, findings_options, quiet_option
 
 if TYPE_CHECKING:
     from camcomp.api.validation import Doubt
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.argument("files", metavar="FILE...", nargs=-1, required=True)
+@dialect_option
 @click.option("--config", "configs", metavar="FILE", multiple=True, help="Machine whose control reads the programs.")
 @findings_options("json", "sarif", "junit")
 @quiet_option

@@ -8,7 +8,7 @@ from camcomp.ground.errors import CamcompError, CheckFailed
 from camcomp.ground.files import display_name, write_all
 from camcomp.report.findings import Case, Finding, findings_of
 from camcomp.report.outputs import findings_files
-from camcomp.terminal.commands._options import OUTPUT, findings_options, quiet_option, stock_option
+from camcomp.terminal.commands._options import OUTPUT, dialect_option, findings_options, quiet_option, stock_option
 from camcomp.terminal.commands._told import control_told
 from camcomp.terminal.progress import say, working
 
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.argument("corrected")
+@dialect_option
 @click.option("--against", "original", metavar="ORIGINAL", required=True, help="Program that was compensated.")
 @click.option("--config", "configs", metavar="FILE", multiple=True, required=True, help="Machine; later files win.")
 @click.option("--json", "json_file", metavar="OUT.json", type=OUTPUT, help="Residuals, in all and per source line.")

@@ -4,7 +4,7 @@ from math import pi, radians
 
 import pytest
 
-from camcomp.ground.errors import CamcompError
+from camcomp.ground.errors import CamcompError, ConfigError
 from camcomp.model.config.links import Beam, Rectangle, Round, Square, Tube
 from camcomp.model.config.load import load_config
 from tests.commandline import ROOT
@@ -241,3 +241,18 @@ def test_a_table_that_is_missing_is_told_where_it_is_named(tmp_path):
     ).read_text() + "\neffects:\n  - {effect: error_table, target: x, file: no.csv}\n"
     (error,) = refused(tmp_path, text)
     assert error.rule == "CC500" and error.at.source[error.at.column - 1 :].startswith("no.csv")
+
+
+def test_numbers_of_tools_may_be_written_as_json_has_them(tmp_path):
+    machine = ROOT / "config/cartesian.yaml"
+    override = tmp_path / "tools.json.yaml"
+    override.write_text(
+        '{"tools": {"1": {"diameter_mm": 10}, "12": {"diameter_mm": 6}}, "control": {"tool_lengths_mm": {"1": 80}}}'
+    )
+    config = load_config([machine, override])
+    assert {number: tool.diameter_mm for number, tool in config.tools.items()} == {1: 10, 12: 6}
+    assert config.control.tool_lengths_mm == {1: 80}
+    override.write_text('tools: {1: {diameter_mm: 10}, "1": {diameter_mm: 6}}\n')
+    with pytest.raises(ConfigError) as caught:
+        load_config([machine, override])
+    assert caught.value.rule == "CC207"

@@ -48,11 +48,24 @@ def test_a_stock_that_cannot_be_used_is_refused_at_its_place(run, rule, sections
     [
         (None, "No such file"),
         (b"", "no body"),
-        (bytes(80) + (12).to_bytes(4, "little") + bytes(100), "the file ends after 184 of 684 bytes"),
+        (
+            bytes(80) + (12).to_bytes(4, "little") + bytes(100),
+            r"counts 12 triangles, which are 684 bytes, and the file has 184 \(2 triangles",
+        ),
+        (
+            b"solid x".ljust(80) + (1).to_bytes(4, "little") + bytes(100),
+            r"counts 1 triangles, which are 134 bytes, and the file has 184",
+        ),
+        (b"\0" * 84, "no body"),
+        (b"solid part\nendsolid part\n", "no body"),
+        (b"solid x\nfacet\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nendloop\nendfacet\n", "1 facets and 2 corners"),
+        (
+            b"solid x\nfacet\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 1 a 0\nendloop\nendfacet\n",
+            "no three numbers",
+        ),
     ],
 )
 def test_what_is_wrong_with_a_file_is_said(run, tmp_path, content, said):
-    pytest.importorskip("trimesh", reason="it reads the file")
     if content is not None:
         (tmp_path / "block.stl").write_bytes(content)
     with pytest.raises(ConfigError, match=said) as found:
@@ -63,7 +76,7 @@ def test_what_is_wrong_with_a_file_is_said(run, tmp_path, content, said):
 @pytest.mark.parametrize(("missing", "said"), [(0, None), (2, "4 edges have a triangle on one side only, as at -30 ")])
 def test_a_body_with_a_hole_is_refused(run, tmp_path, missing, said):
     """What stands under a hole nobody knows."""
-    trimesh = pytest.importorskip("trimesh", reason="it reads the file")
+    trimesh = pytest.importorskip("trimesh", reason="it makes the file")
     box = trimesh.creation.box(bounds=[[-30, -30, -9], [30, 30, 0]])
     up = np.argsort(-box.face_normals[:, 2], kind="stable")
     box.update_faces(np.sort(up[missing:]))
@@ -144,10 +157,14 @@ def test_tools_by_number_cut_as_wide_as_they_are(run):
     assert second.max() == pytest.approx(np.arccos(0.5), abs=0.01)
 
 
-def test_a_mesh_is_cut_as_the_block_that_it_is(run, tmp_path):
-    trimesh = pytest.importorskip("trimesh")
+@pytest.mark.parametrize("name", [None, b"block", "Werkst\u00fcck".encode("latin-1"), "\u5de5\u4ef6".encode("gb18030")])
+def test_a_mesh_is_cut_as_the_block_that_it_is(run, tmp_path, name):
+    trimesh = pytest.importorskip("trimesh", reason="it makes the file")
     block = trimesh.creation.box(bounds=[[-30, -30, -9], [30, 30, 0]])
-    block.export(tmp_path / "block.stl")
+    data = block.export(file_type="stl" if name is None else "stl_ascii")
+    if name is not None:
+        data = data.encode("ascii").replace(b"solid ", b"solid " + name, 1)
+    (tmp_path / "block.stl").write_bytes(data)
     mesh = run(PASS, "workpiece: {stock: {type: stl, file: block.stl}}\n", TOOL)
     box = run(PASS, BOX, TOOL)
     np.testing.assert_allclose(mesh.rows.engagement, box.rows.engagement, atol=1e-5)
