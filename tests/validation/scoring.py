@@ -249,7 +249,7 @@ def render(rows: list[Row]) -> str:
     rate("one cause below 2.7 x noise: first or in class", [r for r in alone if r["ratio"] < DUE], "first_or_class")
     rate("one cause from 2.7 x noise on: the same (0.95)", [r for r in alone if r["ratio"] >= DUE], "first_or_class")
     rate("pairs: all named (0.85)", [r for r in complete if r["kind"] == "pair" and len(r["due"]) > 1], "all")
-    rate("imperfect model: all from 2.7 x noise on named", [r for r in complete if r["kind"] == "imperfect"], _all_due)
+    rate("imperfect model: all from 2.7 x noise on named", [r for r in complete if r["kind"] == "imperfect"], all_due)
     rate("unknown named unknown (0.90)", foreign, "unknown")
     rate("the same where the library leaves >= 1 x noise", [r for r in foreign if r["left"] >= 1], "unknown")
     beside = [r for r in foreign if r["true"]]
@@ -277,7 +277,7 @@ def render(rows: list[Row]) -> str:
     return "\n".join(lines)
 
 
-def _all_due(row: Row) -> bool:
+def all_due(row: Row) -> bool:
     """Whether all that has to be named is; nothing has to be where everything is small."""
     return bool(row["all"]) if row["due"] else not row["unknown"]
 
@@ -291,7 +291,7 @@ def right(row: Row) -> bool:
     if not row["true"]:
         return bool(row["none"])
     if row["kind"] in ("pair", "imperfect"):
-        return _all_due(row)
+        return all_due(row)
     return bool(row["first_or_class"])
 
 

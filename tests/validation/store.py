@@ -17,7 +17,7 @@ Result = dict[str, Any]
 
 @dataclass(frozen=True)
 class Code:
-    """The code that is judged: commit and date; `tree` names the content of camcomp, whatever the commit is called."""
+    """The code that is judged: the last commit that changed it, and its date; `tree` names the content of camcomp, whatever the commit is called."""
 
     commit: str
     date: str
@@ -31,7 +31,7 @@ def _git(*words: str) -> str:
 def code() -> Code:
     """The code of this checkout; changes of camcomp that are not committed are marked by a plus sign."""
     changed = "+" if _git("status", "--porcelain", "--", "camcomp", "config") else ""
-    commit, date = _git("log", "-1", "--format=%h %cs", "--abbrev=10").split()
+    commit, date = _git("log", "-1", "--format=%h %cs", "--abbrev=10", "--", "camcomp", "config").split()
     return Code(commit + changed, date, _git("rev-parse", "--short=10", "HEAD:camcomp") + changed)
 
 

@@ -1,7 +1,7 @@
 """The plainest experiment, with every effect of the library on every shipped machine: `camcomp simulate` and a little noise.
 
 What it tries is the plumbing, the library and the gate, not physics: the model itself writes the logs here (truth plants
-stand in tests/validation/recorded and tests/validation/plants).  Tip: 3 um of white noise per axis; encoders: rounded to 0.5 um, or as much at the
+are in tests/validation/recorded and tests/validation/plants).  Tip: 3 um of white noise per axis; encoders: rounded to 0.5 um, or as much at the
 reach of an arm.
 """
 
@@ -58,9 +58,9 @@ def logged(folder: Path, machine: str, fault: Fault | None) -> dict[str, Path]:
     return logs
 
 
-def experiment(folder: Path, machine: str, fault: Fault | None) -> Path:
+def experiment(folder: Path, machine: str, fault: Fault | None, seed: int = 7) -> Path:
     """An experiment of all programs on the shipped machine with that fault; its path."""
-    rng, runs = np.random.default_rng(7), []
+    rng, runs = np.random.default_rng(seed), []
     for name, log in logged(folder, machine, fault).items():
         blur(log, rng)
         runs.append(

@@ -1,4 +1,4 @@
-"""The withheld-effect campaign: `python -m tests.validation.orthoglide` runs it and prints the table; `make` writes one experiment."""
+"""`python -m tests.validation.orthoglide make` writes one experiment, `samples` those under samples/diagnosis."""
 
 from __future__ import annotations
 
@@ -8,38 +8,15 @@ from pathlib import Path
 import click
 
 from tests.validation import runner
-from tests.validation.orthoglide import run, samples, table
-from tests.validation.orthoglide.cases import build
+from tests.validation.orthoglide import samples
 from tests.validation.plants.causes import Cause
 from tests.validation.plants.designs import DESIGNS
 from tests.validation.plants.experiments import CHANNELS, Plan, make, truth_json, write
 
 
-@click.group(invoke_without_command=True)
-@click.option(
-    "--results", type=click.Path(path_type=Path), default=Path("out/campaign.jsonl"), help="Resumed if there."
-)
-@click.option("--scale", default=1.0, help="1: at least 200 experiments behind every rate.")
-@click.option("--only", default="", help="Categories, separated by commas.")
-@click.option("--ratio", "ratios", type=float, multiple=True, help="Only these sizes over noise.")
-@click.option("--processes", default=2)
-@click.option("--seed", default=20_000)
-@click.option("--misses", is_flag=True, help="List the wrong answers too.")
-@click.pass_context
-def main(context, results, scale, only, ratios, processes, seed, misses):
-    """Run the campaign and print its table."""
-    if context.invoked_subcommand:
-        return
-    cases = build(scale, seed)
-    if only:
-        cases = [c for c in cases if c.category in only.split(",")]
-    if ratios:
-        cases = [c for c in cases if c.ratio in ratios]
-    results.parent.mkdir(parents=True, exist_ok=True)
-    rows = run.run(cases, results, processes)
-    click.echo(table.render(rows))
-    if misses:
-        click.echo("\n" + table.misses(rows))
+@click.group()
+def main():
+    """Write experiments on the reference Orthoglide."""
 
 
 @main.command("make")

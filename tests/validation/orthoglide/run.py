@@ -1,12 +1,9 @@
-"""Make the cases, ask camcomp about each, score the answers.  The truth never enters the folder that camcomp reads."""
+"""Make a case, ask camcomp about it, score the answer.  The truth never enters the folder that camcomp reads."""
 
 from __future__ import annotations
 
-import json
-import os
 import tempfile
 import time
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -34,24 +31,3 @@ def run_case(case: Case) -> dict[str, Any]:
     if case.category in ("foreign", "withheld"):
         row["left"] = absorb.left(case.plan.causes[0], case.plan, case.without)
     return row
-
-
-def run(cases: list[Case], results: Path, processes: int = 2) -> list[dict[str, Any]]:
-    """Runs the cases that `results` (JSON lines) does not hold yet and returns all rows."""
-    rows: dict[str, dict[str, Any]] = {}
-    if results.exists():
-        for line in results.read_text().splitlines():
-            row = json.loads(line)
-            if "failed" not in row:
-                rows[row["name"]] = row
-    todo = [c for c in cases if c.name not in rows]
-    os.environ.setdefault("NUMBA_NUM_THREADS", "1")
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    # not concurrent.futures: in Python 3.11 its pool stands still when all workers have done their share at once
-    with results.open("a") as out, get_context("spawn").Pool(processes, maxtasksperchild=200) as pool:
-        for row in pool.imap_unordered(run_case, todo):
-            rows[row["name"]] = row
-            out.write(json.dumps(row) + "\n")
-            out.flush()
-    wanted = {c.name for c in cases}
-    return [r for n, r in rows.items() if n in wanted]
