@@ -4,10 +4,17 @@ Commands that tests start are ended by signals as in a shell, also where the tes
 """
 
 import fcntl
+import hashlib
+import os
 import signal
+import sys
+import tempfile
 from contextlib import ExitStack, contextmanager
+from pathlib import Path
 
 import pytest
+
+_MEASURED: set[Path] = set()  # files of which a test was traced
 
 
 def pytest_configure():
@@ -25,12 +32,40 @@ def locked(path, kind):
         yield
 
 
+def turns():
+    """A folder that all processes which test this checkout share; it does not hang on pytest's cache."""
+    checkout = hashlib.sha256(str(Path(__file__).parents[1]).encode()).hexdigest()[:16]
+    folder = Path(tempfile.gettempdir()) / f"camcomp-turns-{os.getuid()}-{checkout}"
+    folder.mkdir(exist_ok=True)
+    return folder
+
+
+@contextmanager
+def traced(item):
+    """Pause coverage.py but for the first test of each file, where tracing costs as much as the test itself.
+
+    Python 3.12 and later report lines to coverage.py at no cost worth mentioning: there every test is measured.
+    """
+    coverage = getattr(sys.modules.get("coverage"), "Coverage", None)
+    running = coverage and coverage.current()
+    if not running or sys.version_info >= (3, 12) or item.path not in _MEASURED:
+        _MEASURED.add(item.path)
+        yield
+        return
+    running.stop()
+    try:
+        yield
+    finally:
+        running.start()
+
+
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_protocol(item):
     """Takes a shared turn for every test, one of its own for those marked `alone`, fixtures included."""
-    folder = item.config.cache.mkdir("turns")  # the same for all processes that test this checkout
+    folder = turns()
     kind = fcntl.LOCK_EX if item.get_closest_marker("alone") else fcntl.LOCK_SH
     with ExitStack() as turn:
         with locked(folder / "door", kind):  # who waits for a turn of its own shuts it behind those that have one
             turn.enter_context(locked(folder / "turn", kind))
+        turn.enter_context(traced(item))
         return (yield)

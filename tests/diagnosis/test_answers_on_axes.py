@@ -23,7 +23,9 @@ HEALTHY = {
 }
 
 
-@pytest.mark.parametrize("seed", [pytest.param(k, marks=() if k == 31005 else pytest.mark.campaign) for k in HEALTHY])
+@pytest.mark.parametrize(
+    "seed", [pytest.param(k, id=HEALTHY[k], marks=() if k == 31005 else pytest.mark.campaign) for k in HEALTHY]
+)
 def test_an_axis_with_nothing_wrong(tmp_path, seed):
     result, _ = judged(tmp_path, seed)
     assert (result["verdict"], result["causes"]) == ("none", []), HEALTHY[seed]
@@ -62,7 +64,9 @@ WRONG = {
 IN_CI = (31018, 31031, 37016, 37026, 37051, 39028)
 
 
-@pytest.mark.parametrize("seed", [pytest.param(k, marks=() if k in IN_CI else pytest.mark.campaign) for k in WRONG])
+@pytest.mark.parametrize(
+    "seed", [pytest.param(k, id=WRONG[k], marks=() if k in IN_CI else pytest.mark.campaign) for k in WRONG]
+)
 def test_an_axis_with_something_wrong(tmp_path, seed):
     result, row = judged(tmp_path, seed)
     assert result["verdict"] == "identified" and row["all"] and not row["false_cause"], WRONG[seed]
@@ -75,7 +79,11 @@ def test_a_cable_at_the_end_of_the_travel_is_no_push(tmp_path):
     assert result["verdict"] == "unknown" and not row["false_cause"]
 
 
-@pytest.mark.parametrize("seed", [34009, pytest.param(52049, marks=pytest.mark.campaign)])
+@pytest.mark.parametrize(
+    "seed",
+    [34009, pytest.param(52049, marks=pytest.mark.campaign)],
+    ids=["a large difference", "a difference of twice the floor"],
+)
 def test_a_lag_that_differs_between_the_ways_is_unknown_beside_the_lag(tmp_path, seed):
     """Nothing rubs there: a loop has no way that it likes better. By less than a hundredth of the lag, but twice the floor, too."""
     result, row = judged(tmp_path, seed)
@@ -83,7 +91,11 @@ def test_a_lag_that_differs_between_the_ways_is_unknown_beside_the_lag(tmp_path,
 
 
 @pytest.mark.campaign
-@pytest.mark.parametrize("seed", [37024, 39034, 50014, 50059])
+@pytest.mark.parametrize(
+    "seed",
+    [37024, 39034, 50014, 50059],
+    ids=["fading friction", "an end stop", "a drag behind a loop", "play in the loop"],
+)
 def test_what_takes_a_part_of_something_unknown_is_not_sure(tmp_path, seed):
     """Friction that fades, of which a loop that swings over takes a third; an end stop that two pushes are made of; a drag of
     which a loop that creeps takes some; play in the loop, told as friction that would push at speed.
@@ -100,7 +112,9 @@ RESTS = {
 }
 
 
-@pytest.mark.parametrize("seed", [pytest.param(k, marks=() if k == 39039 else pytest.mark.campaign) for k in RESTS])
+@pytest.mark.parametrize(
+    "seed", [pytest.param(k, id=RESTS[k][1], marks=() if k == 39039 else pytest.mark.campaign) for k in RESTS]
+)
 def test_what_the_rest_depends_on_is_named(tmp_path, seed):
     result, row = judged(tmp_path, seed)
     covariate, fault = RESTS[seed]

@@ -17,7 +17,14 @@ def judged(folder, seed):
 
 
 def some(seeds, in_ci):
-    return [pytest.param(seed, marks=() if seed in in_ci else pytest.mark.campaign, id=str(seed)) for seed in seeds]
+    """Seeds as parameters whose ids say what they show."""
+    told = dict(seeds) if isinstance(seeds, dict) else {seed: f"experiment {k}" for k, seed in enumerate(seeds, 1)}
+    return [
+        pytest.param(
+            s, marks=() if s in in_ci else pytest.mark.campaign, id=told[s] if isinstance(told[s], str) else told[s][-1]
+        )
+        for s in told
+    ]
 
 
 FEW = {

@@ -106,7 +106,7 @@ def test_wheels_are_equal_byte_by_byte(built, tmp_path):
     assert again.read_bytes() == built[0].read_bytes()
 
 
-@pytest.mark.campaign
+@pytest.mark.ecosystem
 def test_from_pip_install_to_a_corrected_program_in_two_commands(built, tmp_path):
     """With all dependencies from the package index, in an environment of its own."""
     venv.create(tmp_path / "venv", with_pip=True)

@@ -37,7 +37,8 @@ FOLLOWED = 16  # servo periods: two for the cubics, and 2 sqrt(3 um / 200 mm/s2)
 RAMP = 0.6  # um by which LinuxCNC's planner of offsets stays behind: (v + a T)^2 / 2a for v = 0.3 mm/s, a = 200 mm/s2
 
 
-def test_orthoglide():
+@pytest.mark.ecosystem  # test_simulator.py runs the loop on a Cartesian machine
+def test_corrections_follow_a_program_through_pause_abort_new_offsets_and_faults():
     """What the kernel does to a simulated control between two servo periods is not all recorded: runs may be disturbed.
 
     A defect of camcomp or of the sample shows in every run, so the last one decides.
