@@ -6,7 +6,7 @@ import json
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from camcomp import __version__
 from camcomp.compensation.batch import pools
@@ -37,7 +37,7 @@ OnStatus = Callable[[Status, int, int], Any]
 
 def compensate_many(
     paths: Sequence[str], configs: Sequence[str], output_dir: str, *, jobs: int | None = None, scheduler: str | None = None,
-    joints: bool = False, method: str | None = None, tolerance_um: float | None = None, stock: StockChoice | None = None, sarif_file: str | None = None,
+    joints: bool = False, method: str | None = None, tolerance_um: float | None = None, stock: StockChoice | None = None, if_compensated: Literal["refuse", "pass"] = "refuse", sarif_file: str | None = None,
     junit_file: str | None = None, tell: Callable[[str], None] = lambda _text: None, on_status: OnStatus = lambda *_: None,
 ) -> dict[str, Any]:  # fmt: skip
     """Corrects the programs of files, folders and patterns into a tree; the figures that DIR/camcomp-batch.json holds.
@@ -50,7 +50,7 @@ def compensate_many(
         list(usable("dialects"))  # says which plug-ins are left out; workers would say it once each
     plan = Plan(
         config, Path(output_dir), method or config.compensation.method,
-        tolerance_um or config.compensation.tolerance_um, joints, __version__, stock,
+        tolerance_um or config.compensation.tolerance_um, joints, __version__, stock, if_compensated == "pass",
     )  # fmt: skip
     programs = find_programs(paths, plan.output)
     if scheduler:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from camcomp import __version__
 from camcomp.api.machine import Job, Program, load_machine, program_in
@@ -114,11 +114,13 @@ def compensate_file(
     program: str, configs: Sequence[str], *, output: str | None = None, joints: str | None = None, summary: str | None = None,
     paths: str | None = None, report: str | None = None, method: str | None = None, tolerance_um: float | None = None,
     arcs: bool | None = None, mirror: Sequence[str] = (), dry_run: bool = False, stock: StockChoice | None = None,
-) -> Finished:  # fmt: skip
+    if_compensated: Literal["refuse", "pass"] = "refuse",
+) -> Finished | None:  # fmt: skip
     """Corrects a program file into the files that are named; long programs piece by piece. "-" is a standard stream.
 
-    Without any name the corrected program goes to standard output. sizes: of every output, by its name. Raises what
-    `compensate` raises, FileError where nothing can be written.
+    Without any name the corrected program goes to standard output. sizes: of every output, by its name. A program that
+    was compensated before is refused, or with `if_compensated="pass"` goes to `output` as it is, and there is nothing
+    to return. Raises what `compensate` raises, FileError where nothing can be written.
     """
     from camcomp.compensation.file_to_file import Finished, Wanted, compensate_long
 
@@ -132,6 +134,11 @@ def compensate_file(
     settings, name = machine.config.compensation, display_name(program)
     with open_source(program) as file:
         done = None
+        if if_compensated == "pass" and is_stamped(data := file.read()):
+            if output and not dry_run:
+                write_all({output: data}, inputs=(program, *configs, *mirror))
+            return None
+        file.seek(0)
         machine = job_of_program(machine, file, name, stock)
         if not (paths or report or mirror):
             done = compensate_long(

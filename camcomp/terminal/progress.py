@@ -16,6 +16,7 @@ from camcomp.ground.headway import Headway, watched
 
 PATIENCE = 1.0  # s before a work in progress is worth a word
 TICK = 0.5  # s
+FILTER = "AXIS_PROGRESS_BAR"  # set by LinuxCNC's AXIS for its filters
 STEPS = 1000  # of a bar
 WIDE = 24  # characters of a bar
 
@@ -31,6 +32,10 @@ def working(on: str, *, quiet: bool = False) -> Iterator[None]:
 
     Where nobody can tell that, how long it has taken. Nothing is left of it afterwards.
     """
+    if FILTER in os.environ:
+        with _filter_progress():
+            yield
+        return
     if quiet or not lively():
         yield
         return
@@ -53,6 +58,26 @@ def working(on: str, *, quiet: bool = False) -> Iterator[None]:
             teller.join()
             stream.write("\r\033[K")
             stream.flush()
+
+
+@contextmanager
+def _filter_progress() -> Iterator[None]:
+    """Lines `FILTER_PROGRESS=share` in percent, from which AXIS draws the bar of a filter program."""
+    finished = threading.Event()
+
+    def tell(headway: Headway) -> None:
+        while not finished.wait(TICK):
+            print(f"FILTER_PROGRESS={round(100.0 * (headway.share or 0.0))}", file=sys.stderr, flush=True)
+
+    with watched() as headway:
+        teller = threading.Thread(target=tell, args=(headway,), daemon=True)
+        teller.start()
+        try:
+            yield
+        finally:
+            finished.set()
+            teller.join()
+            print("FILTER_PROGRESS=100", file=sys.stderr, flush=True)
 
 
 class _Line:

@@ -93,10 +93,19 @@ class Plan:
     joints: bool
     version: str
     stock: StockChoice | None = None
+    passes: bool = False  # programs that were compensated before go through unchanged
 
     def key_of_config(self) -> str:
         """Hash of the configuration, of the tables that it names, and of the options: by content, whatever the names."""
-        options = (self.version, self.method, self.tolerance_um, self.joints, self.stock, self.config.control.dialect)
+        options = (
+            self.version,
+            self.method,
+            self.tolerance_um,
+            self.joints,
+            self.stock,
+            self.passes,
+            self.config.control.dialect,
+        )
         digest = hashlib.sha256(repr(options).encode())
         assert self.config._tree is not None  # every loaded config has one
         for name, node in sorted(leaves(self.config._tree), key=lambda each: each[0]):
@@ -159,6 +168,7 @@ def run_batch(
                 plan.tolerance_um,
                 plan.joints,
                 plan.stock,
+                plan.passes,
             )
 
     try:

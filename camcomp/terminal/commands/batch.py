@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import click
 
@@ -35,6 +35,13 @@ if TYPE_CHECKING:
 @click.option("--method", type=click.Choice(["newton", "stiffness", "fixed-point", "linear"]), help="As in compensate.")
 @click.option("--tolerance-um", type=click.FloatRange(min=1e-6), help="Bound of the error left.")
 @stock_option
+@click.option(
+    "--if-compensated",
+    type=click.Choice(["refuse", "pass"]),
+    default="refuse",
+    show_default=True,
+    help="What becomes of programs that were compensated before: exit code 1, or they pass unchanged.",
+)
 @findings_options("sarif", "junit")
 @quiet_option
 def command(
@@ -47,6 +54,7 @@ def command(
     method: str | None,
     tolerance_um: float | None,
     stock: StockChoice | None,
+    if_compensated: Literal["refuse", "pass"],
     sarif_file: str | None,
     junit_file: str | None,
     quiet: bool,
@@ -66,7 +74,7 @@ def command(
     from camcomp.api.batch import compensate_many
 
     done = compensate_many(
-        paths, configs, output_dir, jobs=jobs, scheduler=scheduler, joints=joints, method=method, tolerance_um=tolerance_um, stock=stock,
+        paths, configs, output_dir, jobs=jobs, scheduler=scheduler, joints=joints, method=method, tolerance_um=tolerance_um, stock=stock, if_compensated=if_compensated,
         sarif_file=sarif_file, junit_file=junit_file, tell=partial(say, quiet=False),
         on_status=lambda *args: _tell(*args) if not quiet or args[0].exit_code else None,
     )  # fmt: skip

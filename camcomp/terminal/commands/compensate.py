@@ -1,6 +1,6 @@
 """camcomp compensate."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import click
 
@@ -49,6 +49,13 @@ if TYPE_CHECKING:
     help="Log of a test cut: its deviation in reverse instead of the model's; again for a cut of what that gave.",
 )
 @stock_option
+@click.option(
+    "--if-compensated",
+    type=click.Choice(["refuse", "pass"]),
+    default="refuse",
+    show_default=True,
+    help="What becomes of a program that was compensated before: exit code 1, or it passes unchanged.",
+)
 @click.option("--dry-run", is_flag=True, help="Do everything but write.")
 @quiet_option
 def command(
@@ -64,6 +71,7 @@ def command(
     arcs: bool | None,
     mirror: tuple[str, ...],
     stock: "StockChoice | None",
+    if_compensated: Literal["refuse", "pass"],
     dry_run: bool,
     quiet: bool,
 ) -> None:
@@ -77,8 +85,11 @@ def command(
     with working(f"compensating {display_name(program)}", quiet=quiet):
         done = compensate_file(
             program, configs, output=output, joints=joints, summary=summary_file, paths=paths, report=report, method=method,
-            tolerance_um=tolerance_um, arcs=arcs, mirror=mirror, dry_run=dry_run, stock=stock,
+            tolerance_um=tolerance_um, arcs=arcs, mirror=mirror, dry_run=dry_run, stock=stock, if_compensated=if_compensated,
         )  # fmt: skip
+    if done is None:
+        say(f"{display_name(program)} was compensated before and passes unchanged", quiet=quiet)
+        return
     _finish(done.figures, done.sizes if dry_run else {}, done.failed, quiet)
 
 
