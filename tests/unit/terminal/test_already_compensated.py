@@ -5,6 +5,7 @@ import subprocess
 import sys
 
 import pytest
+
 from tests.commandline import ROOT, camcomp
 
 CONFIG = ROOT / "config/cartesian.yaml"
