@@ -7,6 +7,7 @@ from camcomp.gcode.flatten import flatten
 from camcomp.gcode.interpret import read_program
 from camcomp.gcode.output import Output
 from camcomp.gcode.rewrite import rewrite
+from camcomp.ground.errors import ProgramError
 
 PROGRAMS = {
     "loop": "G0 X0 Y0 Z0 (start)\n#1=0\no1 while [#1 LT 3] (three times)\nG1 X[#1*2] Y#1 F[50+#1]\n#1=[#1+1]\no1 endwhile\nM2\n",
@@ -64,3 +65,12 @@ def test_moved_and_unmoved(name):
     after = read_program(written.data, name="out")
     assert np.abs(after.path.end - out.end).max() < 0.51e-3
     assert np.abs(after.path.end - written.end).max() < 1e-9
+
+
+def test_a_program_that_would_end_elsewhere_by_ten_half_steps_is_refused(monkeypatch):
+    """As if numbers were written with a digit too few: 1/3 is off by 3 um at a resolution of 1 um."""
+    program = read_program(b"G0 X0 Y0 Z0\n#1=[1/3]\nG1 X#1 F100\nM2\n", name="x")
+    flatten(program, 1e-3)
+    monkeypatch.setattr("camcomp.gcode.flatten._SPARE_DIGITS", -1)
+    with pytest.raises(ProgramError, match="cannot be written out"):
+        flatten(program, 1e-3)

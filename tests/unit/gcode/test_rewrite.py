@@ -7,7 +7,7 @@ import pytest
 
 from camcomp.gcode.interpret import read_program
 from camcomp.gcode.output import Output
-from camcomp.gcode.rewrite import rewrite
+from camcomp.gcode.rewrite import Writer, rewrite
 from camcomp.ground.datatypes import LINE, RAPID
 from camcomp.ground.errors import ProgramError
 
@@ -236,3 +236,48 @@ def test_an_arc_that_a_control_takes_as_it_is_stays_when_something_else_is_moved
     assert lines[:3] == text.splitlines()[:3]
     assert lines[3].startswith("G1 ") and lines[3] != "G1 X1 Y1"
     assert np.allclose(result.centre[1], program.path.centre[1], equal_nan=True)
+
+
+def rewritten(text, ends, **more):
+    """Program and result where every motion has one row that ends at `ends` (n, 3)."""
+    program = read_program(text.encode(), name="in.nc")
+    out = replace(Output.same(program.path), end=np.array(ends, float), **more)
+    return program, rewrite(program, out, resolution_mm=1e-3, version="1")
+
+
+def test_a_feed_per_turn_is_given_in_mm_per_minute():
+    _, result = rewritten("G0 X0 Y0 Z0\nS2000 M3\nG95 G1 X10 F0.1\n", [(0, 0, 0), (10, 0.5, 0)])
+    assert result.feed[1] == pytest.approx(200.0)
+
+
+def test_the_way_point_of_g28_is_relative_in_g91():
+    """From a displaced start the way point is displaced as much; home is home."""
+    text = "G0 X0 Y0 Z0\nG1 X10 Z-1 F100\nG91 G28 Z3\nG90 G1 X20 Y0 Z0\n"
+    program = read_program(text.encode(), name="in.nc")
+    ends = program.path.end.copy()
+    ends[1] += (0.0, 0.0, -0.25)
+    _, result = rewritten(text, ends)
+    again = read_program(result.data, name="out.nc").path
+    way_point = 2
+    assert program.path.end[way_point, 2] == pytest.approx(2.0)
+    np.testing.assert_allclose(result.end, again.end, atol=1e-9)
+    assert result.end[way_point, 2] == pytest.approx(1.75)
+
+
+def test_an_exact_stop_is_said_once_for_rows_in_a_row_and_taken_back_behind_them():
+    text = "G64 P0.01\nG0 X0 Y0 Z0\nG1 X1 F100\nX2\nX3\nX4\n"
+    ends = [(x, 0.1 * (x > 0), 0) for x in range(5)]
+    _, result = rewritten(text, ends, rest=np.array([False, True, True, True, False]))
+    codes = [line for line in result.data.decode().splitlines() if line.startswith(("G61", "G64"))]
+    assert codes == ["G64 P0.01", "G61", "G64 P0.01"]
+
+
+def test_a_cycle_that_begins_elsewhere_than_programmed_is_refused():
+    """Its words lead from where it stands: the retract height of G98 is where the tool was."""
+    program = read_program(b"G0 X0 Y0 Z5\nG1 X1 F100\nG91 G81 X1 Z-2 R-3 F50\n", name="in.nc")
+    same = Output.same(program.path)
+    moved = same.end.copy()
+    moved[1] += (0.0, 0.25, 0.0)
+    Writer(program, same, 1e-3).run()
+    with pytest.raises(ProgramError, match="several motions stand in this line"):
+        Writer(program, replace(same, end=moved), 1e-3).run()

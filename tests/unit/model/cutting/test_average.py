@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from numpy.polynomial.legendre import leggauss
 
-from camcomp.model.cutting.average import linear_edge, power_law, sine_power, to_path
+from camcomp.model.cutting.average import linear_edge, power_law, sine_power, slanted, to_path
 
 
 def gauss(f, start: float, stop: float) -> float:  # type: ignore[no-untyped-def]
@@ -46,3 +46,14 @@ def test_a_counter_clockwise_spindle_mirrors_the_side_force_only() -> None:
     force = np.array([[-3.0, 5.0, -2.0]])
     np.testing.assert_array_equal(to_path(force, True), [[-5.0, -3.0, -2.0]])
     np.testing.assert_array_equal(to_path(force, False), [[5.0, -3.0, -2.0]])
+
+
+def test_a_force_normal_to_a_slanting_edge_is_radial_at_a_side_and_pushes_the_tool_away_under_a_tip() -> None:
+    """A unit normal force and one along the edge, at the side of a cylinder, at 30 degrees and under the tool's tip."""
+    rise, run = np.array([1.0, 0.5, 0.0]), np.array([0.0, np.sqrt(0.75), 1.0])
+    radial, axial = slanted(np.full(3, -1.0), np.zeros(3), rise, run)  # the workpiece presses towards the tool's axis
+    np.testing.assert_allclose(radial, [-1.0, -0.5, 0.0], atol=1e-15)
+    np.testing.assert_allclose(axial, [0.0, np.sqrt(0.75), 1.0], atol=1e-15)  # and up, out of the workpiece
+    radial, axial = slanted(np.zeros(3), np.ones(3), rise, run)
+    np.testing.assert_allclose(axial, [1.0, 0.5, 0.0], atol=1e-15)
+    np.testing.assert_allclose(radial, [0.0, np.sqrt(0.75), 1.0], atol=1e-15)

@@ -106,3 +106,28 @@ def test_an_upright_arc_is_cut_where_its_feed_turns_over():
     np.testing.assert_allclose(before[:2], -after[:2])
     assert before[2] == after[2] == -25.0
     np.testing.assert_allclose(before, force_at(track, 0, 0.5))
+
+
+def test_a_first_cut_behind_a_move_without_length_begins_with_a_jump():
+    track = lay_track(path_of(("line", (0, 0, 0)), ("line", (10, 0, 0))), conditions())
+    assert track.jump.tolist() == [False, True]
+    assert not lay_track(path_of(("line", (0, 0, 0)), ("rapid", (10, 0, 0))), conditions()).jump.any()
+
+
+def test_an_arc_that_dips_into_the_stock_for_a_twentieth_of_its_length_is_cut_there():
+    """A full turn in the XZ plane from its side; its lowest 0.1 mm lie below the stock's top: crossings in closed form."""
+    radius, depth = 10.0, 0.1
+    turn = path_of(("arc", (10, 0, 10), (0, 0, 10), 2 * np.pi), start=(10, 0, 10))
+    track = lay_track(replace(turn, axis=np.array([[0.0, 1.0, 0.0]])), conditions(stock_top_mm=depth))
+    half = np.arccos(1.0 - depth / radius) / (2 * np.pi)
+    below = np.flatnonzero(track.cutting)
+    assert track.u0[below].min() == pytest.approx(0.25 - half, abs=1e-9)
+    assert track.u1[below].max() == pytest.approx(0.25 + half, abs=1e-9)
+
+
+def test_the_force_ends_at_once_where_a_rapid_goes_straight_on():
+    """The rapid has the direction of the cut: nothing fades, and the tip may stop between them."""
+    track = lay_track(path_of(("line", (10, 0, 0)), ("rapid", (20, 0, 0)), ("line", (30, 0, 0))), conditions())
+    assert track.jump.tolist() == [False, True, True] and track.corner.tolist() == [True, True, True]
+    np.testing.assert_allclose(force_at(track, 0, 1.0), force_at(track, 0, 0.3))
+    assert not force_at(track, 1, 0.0).any() and not force_at(track, 1, 1.0).any()
