@@ -4,9 +4,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from camcomp.effects._aim import place
 from camcomp.model.effect import Parameter
 from camcomp.model.statics.description import Actuator, Robot, Transform
+from camcomp.model.statics.lengths import place_of
 from camcomp.model.statics.rotation import exp_rotation
 
 STAGE = "structure"
@@ -25,7 +25,7 @@ def on_robot(robot: Robot, actuators: tuple[str, ...], p: Mapping[str, float]) -
     if roll == 0.0:
         return robot
     for name in actuators:
-        chain, k = place(robot, name)
+        chain, k = place_of(robot, name)
         joint = chain.elements[k]
         assert isinstance(joint, Actuator)
         turn = Transform(rotation=exp_rotation(np.radians(roll) * joint.axis))

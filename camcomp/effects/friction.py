@@ -12,7 +12,10 @@ STAGE = "drive"
 TARGET = "actuator"
 PLAIN = "friction in the guide"
 REMEDY = "clean and lubricate the guide, check covers and preload; run the machine warm before it is measured"
-SOURCE = "force balance of the carriage; turn-round of the force after Dahl 1968, on the carriage's way; viscous by the speed of the encoder"
+SOURCE = (
+    "force balance of the carriage; turn-round of the force after Dahl 1968, on the carriage's way; viscous and Stribeck part by "
+    "the speed of the encoder: Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30 (1994) 1083"
+)
 _LENGTH = (1e-4, 1.0, 0.005, 0.0005, "rolling guides: 1 to 100 um")
 _CARRIAGE_WAY = Parameter(
     "carriage_way", "1", 1.0, 0.0, 1.0, 1.0, 0.0,
@@ -30,24 +33,46 @@ ROTARY = (
     Parameter("presliding_rad", "rad", PRESLIDING_RAD, *_ANGLE, scan=(2e-6, 5e-6, 1.5e-5, 5e-5, 1.5e-4)),
     _CARRIAGE_WAY,
 )
-# Known where drive forces are logged; the other channels hardly see them.
+_BREAKAWAY = "breakaway force beyond the Coulomb force: 0 to 100 % of it"
+# Known where drive forces are logged, or axes by themselves; programs hardly show them.
 _MORE = (
     Parameter("viscous_Ns_per_mm", "Ns/mm", 0.0, 0.0, 100.0, 0.2, 0.002, "grease and seals: 0.01 to 1 N s/mm", sign=1),
     Parameter(
         "asymmetry_Ns_per_mm", "Ns/mm", 0.0, -100.0, 100.0, 0.05, 0.001, "viscous forward minus mean of both ways"
     ),
+    Parameter("stribeck_N", "N", 0.0, 0.0, 20000.0, 20.0, 0.1, _BREAKAWAY, sign=1),
+    Parameter(
+        "stribeck_mm_per_s",
+        "mm/s",
+        1.0,
+        1e-3,
+        1e3,
+        0.5,
+        0.0,
+        "lubricated guides: 0.1 to 20 mm/s",
+        scan=(0.1, 1.0, 10.0),
+    ),
 )
-PARAMETERS = (FITTED[0], *_MORE, *FITTED[1:], *ROTARY[:2])
+_MORE_ROTARY = (
+    Parameter("viscous_Nmms_per_rad", "Nmms/rad", 0.0, 0.0, 1e7, 2e4, 200.0, "gears of arms: 1 to 30 % of the rated torque at rated speed", sign=1),
+    Parameter("asymmetry_Nmms_per_rad", "Nmms/rad", 0.0, -1e7, 1e7, 5e3, 100.0, "viscous forward minus mean of both ways"),
+    Parameter("stribeck_Nmm", "Nmm", 0.0, 0.0, 5e6, 2e4, 100.0, _BREAKAWAY, sign=1),
+    Parameter("stribeck_rad_per_s", "rad/s", 0.02, 1e-5, 10.0, 0.01, 0.0, "gears of arms: 0.005 to 0.2 rad/s", scan=(0.005, 0.02, 0.1)),
+)  # fmt: skip
+PARAMETERS = (FITTED[0], *_MORE, *FITTED[1:], *ROTARY[:2], *_MORE_ROTARY)
 
 
 def _pull(motion: Motion, which: Floats, p: Mapping[str, float]) -> Floats | None:
     """Force (n, m) of the guides against the travel, N or Nmm, of the actuators aimed at; None where there is none."""
-    torque = p.get("force_Nmm", 0.0)
-    force, viscous = p.get("force_N", 0.0) + torque, p.get("viscous_Ns_per_mm", 0.0)
-    lopsided = p.get("asymmetry_Ns_per_mm", 0.0)
-    if force == 0.0 and viscous == 0.0 and lopsided == 0.0:
+    torque, breakaway = p.get("force_Nmm", 0.0), p.get("stribeck_Nmm", 0.0)
+    hinge = torque != 0.0 or breakaway != 0.0
+    force, stribeck = p.get("force_N", 0.0) + torque, p.get("stribeck_N", 0.0) + breakaway
+    viscous = p.get("viscous_Ns_per_mm", 0.0) + p.get("viscous_Nmms_per_rad", 0.0)
+    lopsided = p.get("asymmetry_Ns_per_mm", 0.0) + p.get("asymmetry_Nmms_per_rad", 0.0)
+    if force == 0.0 and stribeck == 0.0 and viscous == 0.0 and lopsided == 0.0:
         return None
-    length = p.get("presliding_rad", PRESLIDING_RAD) if torque else p.get("presliding_mm", PRESLIDING_MM)
+    length = p.get("presliding_rad", PRESLIDING_RAD) if hinge else p.get("presliding_mm", PRESLIDING_MM)
+    slow = p.get("stribeck_rad_per_s", 0.02) if hinge else p.get("stribeck_mm_per_s", 1.0)
     nut = motion.encoder if motion.nut is None else motion.nut
     turned = motion.direction
     if motion.ordered:
@@ -55,8 +80,9 @@ def _pull(motion: Motion, which: Floats, p: Mapping[str, float]) -> Floats | Non
         turned = np.zeros_like(nut)
         with np.errstate(divide="ignore"):
             holding = motion.stiffness[aimed] / p.get("carriage_way", 1.0)
-        turned[:, aimed] = held_back(nut[:, aimed], holding, force, length)
-    return which * (force * turned + viscous * motion.speed + lopsided * np.abs(motion.speed))
+        turned[:, aimed] = held_back(nut[:, aimed], holding, force + stribeck, length)
+    sliding = force + stribeck * np.exp(-((motion.speed / slow) ** 2)) if stribeck else force
+    return which * (sliding * turned + viscous * motion.speed + lopsided * np.abs(motion.speed))
 
 
 def on_drive(error: Floats, motion: Motion, which: Floats, p: Mapping[str, float]) -> Floats:

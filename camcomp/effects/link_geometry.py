@@ -7,9 +7,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from camcomp.effects._aim import place
 from camcomp.model.effect import Parameter
 from camcomp.model.statics.description import Actuator, Robot, Transform
+from camcomp.model.statics.lengths import place_of
 from camcomp.model.statics.rotation import exp_rotation
 
 STAGE = "structure"
@@ -43,7 +43,7 @@ def on_robot(robot: Robot, actuators: tuple[str, ...], p: Mapping[str, float]) -
         return robot
     error = Transform(shift, exp_rotation(tilt))
     for name in actuators:
-        chain, k = place(robot, name)
+        chain, k = place_of(robot, name)
         end = next(
             (i for i in range(k + 1, len(chain.elements)) if isinstance(chain.elements[i], Actuator)),
             len(chain.elements),

@@ -11,6 +11,7 @@ Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 RAPID, LINE, ARC = 0, 1, 2
+STANDARD_GRAVITY = 9.80665  # m/s2
 
 _FORMS: dict[str, tuple[type, tuple[int, ...]]] = {
     "line": (np.int64, ()),

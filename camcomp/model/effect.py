@@ -6,6 +6,7 @@ camcomp/model/signal_path.py calls the hooks, stage by stage, effects in the ord
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cache
 from typing import Any, Literal, Self
 
 import numpy as np
@@ -13,6 +14,7 @@ import numpy as np
 from camcomp.ground.datatypes import Floats, Ints
 from camcomp.ground.errors import Location
 from camcomp.model.seams import Seams
+from camcomp.model.statics.masses import MassLoads
 
 Target = Literal["actuator", "machine", "either", "named"]
 
@@ -71,7 +73,7 @@ class Motion:
     `direction` is the sign of travel with its memory: +1, -1, in between while a reversal takes up its presliding
     distance, 0 where no move has been seen yet. `ordered` is false for poses that are not a movement. `held` works out, when it
     is called, what the drives `names` exert against the load as modelled; None where no load is known. `told` works out where the
-    set-points lead the tip; None where nobody knows.
+    set-points lead the tip; None where nobody knows. `masses` works out the loads of the stated masses; None where none are stated.
     """
 
     time: Floats  # (n,) s since the start of the run
@@ -89,6 +91,7 @@ class Motion:
     held: Callable[[], Floats] | None = None  # (n, m) N or N mm
     told: Callable[[], Floats] | None = None  # (n, 3) mm, program frame
     cut_before_min: float = 0.0  # of cut_min, what was cut in earlier runs
+    masses: Callable[[], MassLoads] | None = None
     seams: Seams | None = None  # where a recording begins or goes on in motion; None: it starts at rest
 
     def at(self, instants: Ints | slice) -> Self:
@@ -105,8 +108,14 @@ class Motion:
             nut=None if self.nut is None else self.nut[instants],
             held=None,
             told=None,
+            masses=self.masses_at(lambda values: values[instants]),
             seams=None,
         )
+
+    def masses_at(self, rows: Callable[[Floats], Floats]) -> Callable[[], MassLoads] | None:
+        """`masses` at other instants; rows: values (n, c) -> (k, c)."""
+        masses = self.masses
+        return None if masses is None else cache(lambda: masses().at(rows))
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,9 +159,19 @@ class Cause:
         """Names of the actuators on which this cause acts."""
         return tuple(each for each in actuators if self.target in (None, each))
 
+    @property
+    def uncorrectable(self) -> bool:
+        """Whether no set-point corrects its error, so that compensate leaves it."""
+        return bool(getattr(self.effect, "UNCORRECTABLE", False))
+
     def hook(self, name: str) -> Any:
         """The hook called `name`, or None."""
         return getattr(self.effect, name, None)
+
+
+def applies(effect: Any, robot: Any, target: str | None) -> bool:
+    """Whether a diagnosis may take an effect at a target of a robot for a cause."""
+    return not hasattr(effect, "applies") or bool(effect.applies(robot, target))
 
 
 def nominal(effect: Any) -> dict[str, float]:

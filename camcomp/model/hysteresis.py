@@ -116,6 +116,27 @@ def second_order(x: Floats, time: Floats, period: float, damping: float) -> Floa
 
 
 @kept
+def _rate_limited(x, t, speed):  # type: ignore[no-untyped-def]  # pragma: no cover
+    y = np.empty_like(x)
+    y[0] = x[0]
+    for i in range(1, x.shape[0]):
+        most = speed * (t[i] - t[i - 1])
+        for j in range(x.shape[1]):
+            y[i, j] = y[i - 1, j] + min(max(x[i, j] - y[i - 1, j], -most), most)
+    return y
+
+
+def rate_limited(x: Floats, time: Floats, speed: float) -> Floats:
+    """Positions (n, m) that follow set-points x (n, m) no faster than `speed` per s; time (n,) s, not decreasing.
+
+    On its set-point at the start. Exact for a set-point that moves linearly between two instants, but for the instant at which
+    it is caught up.
+    """
+    out: Floats = _rate_limited(np.ascontiguousarray(x), np.ascontiguousarray(time), speed)
+    return out
+
+
+@kept
 def _play(x, width):  # type: ignore[no-untyped-def]  # pragma: no cover
     y = np.empty_like(x)
     for j in range(x.shape[1]):

@@ -108,6 +108,14 @@ class Job:
         return self._build(changed, nominal) if by else self.machine
 
     @cached_property
+    def correctable(self) -> Job:
+        """The job without the effects that no set-point corrects."""
+        kept = [each for each, cause in zip(self.config.effects, self.causes, strict=True) if not cause.uncorrectable]
+        if len(kept) == len(self.config.effects):
+            return self
+        return Job(self.config.model_copy(update={"effects": kept}))
+
+    @cached_property
     def _robots(self) -> tuple[Robot, Robot]:
         """The robot as it is and as its control believes it to be, with the orientation that the tool keeps."""
         robots = build_robot(self.config.robot, self.config.tool.tip)

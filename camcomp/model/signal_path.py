@@ -24,7 +24,7 @@ ORDER = (
     ("drive", ("on_drive", "on_drive_force")),
     ("structure", ("on_robot",)),
     ("process", ("on_load",)),
-    ("tool", ("on_guideway", "on_pose")),
+    ("tool", ("on_links", "on_guideway", "on_pose")),
     ("workpiece", ("on_workpiece", "on_place")),
     ("sensor", ("on_clock", "on_reading")),
 )
@@ -109,6 +109,15 @@ def loaded(causes: Sequence[Cause], motion: Motion, force: Floats) -> Load:
     for hook, cause in _hooks(causes, "on_load"):
         load = hook(load, motion, cause.values)
     return load
+
+
+def grown(causes: Sequence[Cause], actuators: tuple[str, ...], motion: Motion) -> Floats | None:
+    """Length (n, m) mm by which the link behind every actuator has grown; None where no effect says so."""
+    length = None
+    for hook, cause in _hooks(causes, "on_links"):
+        length = np.zeros_like(motion.encoder) if length is None else length
+        length = hook(length, motion, cause.which(actuators), cause.values)
+    return length
 
 
 def led(causes: Sequence[Cause], tip: Floats, motion: Motion, robot: Robot, origin: Floats) -> Floats:

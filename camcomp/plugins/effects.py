@@ -33,7 +33,7 @@ from camcomp.plugins.parameters import check_params
 if TYPE_CHECKING:  # the solver is not needed to say what an effect is
     from camcomp.model.motion.twin import Reading
 
-_ALSO = ("public",)
+_ALSO = ("public", "applies", "first_guess")
 _SOME = slice(1, None, 3)  # instants of a trial
 _YAML_KEYS = {"effect", "target", "source"}  # stand beside the parameters
 
@@ -44,9 +44,11 @@ class EffectPlugin(Protocol):
     At their nominal values the parameters do nothing: every hook returns its input unchanged, bit for bit. May also have
     PLAIN (what it is, in the words of a workshop: "play in the drive"), REMEDY (what to do about it, without a capital),
     FITTED (tuple of Parameter: the ones a diagnosis fits, where others are easier to fit) with the function `public`
-    (their values -> those of PARAMETERS), TARGETS (tuple of names, where TARGET is "named"), ROTARY (those that a hinge
+    (their values -> those of PARAMETERS), `applies` (robot, target -> whether a diagnosis may take it for a cause there; default: always), `first_guess` (list of time (n,) s, set-points (n,),
+    encoders (n,) of an actuator -> value of its one shape to begin with), TARGETS (tuple of names, where TARGET is "named"), ROTARY (those that a hinge
     has), ARM_ONLY (for serial arms), SLIDES_ONLY (for slides), MOMENTARY (True: on_drive and on_drive_force answer for every
-    instant alone, whatever came before), WARMS (compensate asks for the temperature), Params (Spec:
+    instant alone, whatever came before), WARMS (compensate asks for the temperature), UNCORRECTABLE (True: compensate
+    leaves its error), Params (Spec:
     keys in YAML beside PARAMETERS, never fitted); where TARGET is "named", OF_TARGET (target -> those of its keys that make
     sense there) and SOUGHT (target -> the parameters that a diagnosis fits there).
     """
@@ -78,6 +80,9 @@ class EffectHooks(Protocol):
 
     def on_load(self, load: Load, motion: Motion, p: Mapping[str, float]) -> Load:
         """Load at the tool."""
+
+    def on_links(self, length: Floats, motion: Motion, which: Floats, p: Mapping[str, float]) -> Floats:
+        """Growth (n, m) mm of the links behind the actuators."""
 
     def on_guideway(self, tip: Floats, axes: Axes, target: str, p: Mapping[str, float]) -> Floats:
         """Tips (n, 3) in the machine frame of axes X, Y, Z that are neither straight nor square; target: as in YAML."""
@@ -124,6 +129,8 @@ def checked(name: str, found: Any, who: str) -> ModuleType:
     wrapped = {each: guarded(who, each, getattr(module, each), partial(_wrong, each)) for each in hooks}
     if hasattr(module, "public"):
         wrapped["public"] = guarded(who, "public", module.public, partial(_wrong_values, module))
+    if hasattr(module, "applies"):
+        wrapped["applies"] = guarded(who, "applies", module.applies, _no_answer)
     effect = with_functions(module, wrapped)
     _try(who, effect, hooks)
     return effect
@@ -210,6 +217,10 @@ def _wrong_values(module: ModuleType, result: Any, *_given: Any) -> str:
     if not isinstance(result, Mapping) or not names <= set(result) <= names | _more_keys(module):
         return f"{described(result)}, not a value for each of PARAMETERS"
     return "a value that is no number" if has_nan(dict(result)) else ""
+
+
+def _no_answer(result: Any, *_given: Any) -> str:
+    return "" if isinstance(result, (bool, np.bool_)) else f"{described(result)}, not True or False"
 
 
 def _try(who: str, effect: ModuleType, hooks: tuple[str, ...]) -> None:

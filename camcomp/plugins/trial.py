@@ -8,6 +8,7 @@ from camcomp.model.axes import axes_of
 from camcomp.model.effect import Load, Motion
 from camcomp.model.motion.twin import Reading
 from camcomp.model.statics.description import Actuator, Chain, Link, Parallelogram, Passive, Robot, Transform
+from camcomp.model.statics.masses import MassLoads
 
 _ROWS = 41
 
@@ -49,7 +50,11 @@ def inputs(robot: Robot, *, whole: bool, named: str | None = None) -> dict[str, 
     encoder = -200.0 + 20.0 * np.sin(np.outer(3.0 * time, 1.0 + 0.1 * np.arange(m)))
     speed = np.gradient(encoder, time, axis=0)
     home, stiffness = np.full(m, -300.0), np.full(m, 1e4)
-    motion = Motion(time, 100.0 + time, time / 60.0, 22.0 + time, encoder, speed, np.sign(speed), home, stiffness)
+    masses = MassLoads(0.5 * encoder, np.tile([30.0, -20.0, -900.0, 4e5, 6e5, 1e4], (_ROWS, 1)))
+    motion = Motion(
+        time, 100.0 + time, time / 60.0, 22.0 + time, encoder, speed, np.sign(speed), home, stiffness,
+        masses=lambda: masses,
+    )  # fmt: skip
     load = Load(np.tile([200.0, -10.0, -25.0], (_ROWS, 1)), np.zeros((_ROWS, 6)))
     which = np.ones(m) if whole else np.eye(m)[0]
     tip = 20.0 * np.column_stack((np.sin(time), np.cos(time), time))
@@ -62,6 +67,7 @@ def inputs(robot: Robot, *, whole: bool, named: str | None = None) -> dict[str, 
         "on_drive": (still, motion, which),
         "on_drive_force": (still, motion, which),
         "on_robot": (robot, names if whole else names[:1]),
+        "on_links": (still, motion, which),
         "on_load": (load, motion),
         "on_guideway": (tip, axes_of(robot, motion, tip, np.zeros(3)), named),
         "on_pose": (tip, load, motion),

@@ -16,10 +16,9 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
+from camcomp.ground.datatypes import STANDARD_GRAVITY
 from camcomp.model.config.base import Limits, Name, Positive, Spec, Vector, Zero
 from camcomp.model.config.links import Spring
-
-STANDARD_GRAVITY = 9.80665  # m/s2
 
 
 class Pose(Spec):

@@ -8,11 +8,13 @@ from camcomp.model.axes import axes_of
 from camcomp.model.effect import Cause, Load, Motion, nominal
 from camcomp.model.signal_path import HOOKS, STAGES
 from camcomp.model.statics.description import Actuator, Chain, Link, Parallelogram, Passive, Robot
+from camcomp.model.statics.masses import MassLoads
 
 CONTRACT = {
     "servo_lag", "backlash", "friction", "joint_offset", "screw_pitch", "screw_cyclic", "thermal_growth", "drive_stiffness",
     "link_stiffness", "chain_error", "link_length", "gravity", "cutting_force", "tool_length", "tool_deflection", "tool_wear",
-    "workpiece_frame", "time_sync", "squareness",
+    "workpiece_frame", "time_sync", "squareness", "axis_error", "disturbance", "inertia", "link_growth", "base_compliance",
+    "speed_limit",
 }  # fmt: skip
 NAMES = [
     name
@@ -39,7 +41,11 @@ def motion():
     t = np.linspace(0.0, 2.0, 201)
     encoder = -350.0 + 20.0 * np.column_stack([np.sin(3 * t), np.cos(3 * t), np.sin(5 * t)])
     speed = np.gradient(encoder, t, axis=0)
-    return Motion(t, 100.0 + t, t / 60.0, 22.0 + t, encoder, speed, np.sign(speed), np.full(3, -300.0), np.full(3, 1e4))
+    masses = MassLoads(-0.4 * encoder, np.tile([30.0, -20.0, -900.0, 4e5, 6e5, 1e4], (len(t), 1)))
+    return Motion(
+        t, 100.0 + t, t / 60.0, 22.0 + t, encoder, speed, np.sign(speed), np.full(3, -300.0), np.full(3, 1e4),
+        masses=lambda: masses,
+    )  # fmt: skip
 
 
 def inputs(hook, named=None):
@@ -50,7 +56,7 @@ def inputs(hook, named=None):
     tip = m.encoder.copy()
     return {
         "on_servo": (tip, m, which), "on_drive": (np.zeros((n, 3)), m, which), "on_drive_force": (np.zeros((n, 3)), m, which),
-        "on_guideway": (tip, axes_of(robot(), m, tip, np.zeros(3)), named),
+        "on_links": (np.zeros((n, 3)), m, which), "on_guideway": (tip, axes_of(robot(), m, tip, np.zeros(3)), named),
         "on_robot": (robot(), ("x",)), "on_load": (load, m), "on_pose": (tip, load, m), "on_workpiece": (tip,), "on_place": (tip, load, m),
         "on_clock": (m.time,), "on_reading": ({"tip": tip}, m),
     }[hook]  # fmt: skip
@@ -119,7 +125,7 @@ def test_away_from_nominal_some_hook_changes_something_finite(name):
 
 
 @pytest.mark.parametrize("name", [n for n in NAMES if shelf.load("effects", n).TARGET != "machine"])
-@pytest.mark.parametrize("hook", ["on_servo", "on_drive", "on_drive_force"])
+@pytest.mark.parametrize("hook", ["on_servo", "on_drive", "on_drive_force", "on_links"])
 def test_an_effect_of_one_actuator_leaves_the_others_alone(name, hook):
     effect = shelf.load("effects", name)
     if not hasattr(effect, hook):

@@ -14,12 +14,14 @@ from camcomp.ground.datatypes import RAPID, Bools, Floats, Ints, Path
 from camcomp.ground.errors import Location, PhysicsError, raise_all
 from camcomp.model.cutting.track import Track
 from camcomp.model.job import Job
-from camcomp.model.motion.response import Travel
+from camcomp.model.motion.response import AROUND_S, Travel
+from camcomp.model.statics.masses import has_moved_mass
 from camcomp.model.statics.solve import STATUS
 
 RULE_OF_STATUS = {2: "CC301", 3: "CC302", 4: "CC303", 5: "CC304"}
 MOST_ERRORS = 20
 WITHIN_RAPID = np.arange(1, 8) / 8.0  # where a rapid is looked at when drives remember how they came
+SAME_SPEED = 1e-6  # of two pieces that belong to one smooth stretch
 RAPID_FEED = 10_000.0  # mm/min, for the time that rapids take
 
 
@@ -104,4 +106,30 @@ def travel_of(job: Job, track: Track, piece: Ints, w: Floats) -> Travel:
     force = job.frame.vectors(track.force(piece, w))
     behind = np.concatenate((track.corner[1:], [True]))
     stop = (w == 0.0) & track.corner[piece] | (w == 1.0) & behind[piece]
-    return Travel(force, 60.0 * (start[piece] + w * minutes[piece]), worn[piece] + w * cut[piece], stop)
+    time = 60.0 * (start[piece] + w * minutes[piece])
+    around = None
+    if job.causes and has_moved_mass(job.real_machine.robot):
+        around = _around(track, 60.0 * minutes, piece, time)
+    return Travel(force, time, worn[piece] + w * cut[piece], stop, around)
+
+
+def _around(track: Track, seconds: Floats, piece: Ints, time: Floats) -> Floats:
+    """Programmed tips (3, n, 3) AROUND_S before, at and after times (n,) s in pieces (n,) of `seconds` (p,) each.
+
+    At the ends of a stretch without corners and changes of feed, those of the nearest inner instant; three times the same
+    point in a stretch that is shorter.
+    """
+    end = np.cumsum(seconds)
+    speed = track.length / np.maximum(seconds, 1e-12)
+    begins = track.corner | (np.abs(np.diff(speed, prepend=-1.0)) > SAME_SPEED * speed)
+    first = np.maximum.accumulate(np.where(begins, np.arange(len(begins)), 0))
+    last = np.minimum.accumulate(np.where(np.append(begins[1:], True), np.arange(len(begins)), len(begins))[::-1])[::-1]
+    low, high = (end - seconds)[first][piece], end[last][piece]
+    step = np.where(high - low < 2.0 * AROUND_S, 0.0, AROUND_S)
+    at = np.clip(time, np.minimum(low + step, high), np.maximum(high - step, low))
+    tips = []
+    for t in (at - step, at, at + step):
+        k = np.clip(np.searchsorted(end, t, side="left"), first[piece], last[piece])
+        w = np.clip((t - (end - seconds)[k]) / np.maximum(seconds[k], 1e-12), 0.0, 1.0)
+        tips.append(track.points(k, w))
+    return np.stack(tips)

@@ -23,7 +23,7 @@ from camcomp.ground.datatypes import Floats, Ints
 from camcomp.ground.errors import ConfigError
 from camcomp.ground.headway import steps
 from camcomp.model.axes import slides_of
-from camcomp.model.effect import Cause, Load, Parameter
+from camcomp.model.effect import Cause, Load, Parameter, applies
 from camcomp.model.statics.description import Link, Parallelogram, Robot
 
 RUN_OFFSET_MM = 0.001  # repeatability of a run
@@ -58,7 +58,7 @@ def candidate_causes(robot: Robot, without: Sequence[str] = ()) -> list[Candidat
             effect.TARGET == "either" and (slides or not getattr(effect, "SLIDES_ONLY", False))
         ):
             found.append(CandidateCause(name, None, effect))
-    return found
+    return [each for each in found if applies(each.effect, robot, each.target)]
 
 
 def working_causes(bench: Bench, candidates: Sequence[CandidateCause]) -> list[CandidateCause]:
@@ -75,6 +75,20 @@ def working_causes(bench: Bench, candidates: Sequence[CandidateCause]) -> list[C
             shelf.warn_left_out(error.message)
             failed.add(each.name)
     return [each for each in candidates if each.name not in failed]
+
+
+def first_guess(bench: Bench, candidate: CandidateCause) -> dict[str, float] | None:
+    """Shapes from which an effect that has a `first_guess` begins, from set-points and encoders; None for other effects."""
+    if not hasattr(candidate.effect, "first_guess"):
+        return None
+    j = bench.actuators.index(str(candidate.target))
+    runs = []
+    for run in bench.runs:
+        if run.by == "setpoint" and run.run_path.ordered and run.encoders is not None:
+            known = np.isfinite(run.encoders[:, j])
+            runs.append((run.run_path.time[known], run.run_path.row_rho[known, j], run.encoders[known, j]))
+    (shape,) = candidate.shapes
+    return {**shape_default(candidate), shape.name: float(candidate.effect.first_guess(runs))}
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,7 +7,15 @@ import numpy as np
 
 from camcomp.diagnosis.fit.bench import Bench, CandidateCause, thinned
 from camcomp.diagnosis.fit.cause_prior import cause_prior
-from camcomp.diagnosis.fit.columns import Columns, build, candidate_columns, healthy_sizes, patterns, shape_default
+from camcomp.diagnosis.fit.columns import (
+    Columns,
+    build,
+    candidate_columns,
+    first_guess,
+    healthy_sizes,
+    patterns,
+    shape_default,
+)
 from camcomp.diagnosis.fit.floor import MINOR, NoiseFloor, least_noise, measure_floor
 from camcomp.diagnosis.fit.grid_parameters import beside, best_shape, quick_columns, settled_interval
 from camcomp.diagnosis.fit.intervals_in_time import likely_intervals, never_ending
@@ -35,9 +43,10 @@ def open_problem(bench: Bench, candidates: Sequence[CandidateCause], stated_mm: 
     residuals = [bench.residual(k) for k in range(len(bench.runs))]
     noise = instrument_noise(bench, floor, least_noise(bench, floor), times)
     inflate = less_certain(noise, inflation(bench), tails(bench))
-    columns = build(bench, candidates, {}, floor.tip_um, MINOR * floor.tip_um)
+    guessed = {i: guess for i, each in enumerate(candidates) if (guess := first_guess(bench, each)) is not None}
+    columns = build(bench, candidates, guessed, floor.tip_um, MINOR * floor.tip_um)
     shapes: dict[int, dict[str, float]] = {
-        i: shape_default(a) for i, a in enumerate(candidates) if a.shapes or a.switches
+        i: guessed.get(i, shape_default(a)) for i, a in enumerate(candidates) if a.shapes or a.switches
     }
     words = patterns(bench)
     rough = _whiten(bench, columns, [], floor, noise, inflate, times, residuals, shapes, outliers)

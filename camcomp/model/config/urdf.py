@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from camcomp.ground.bounds import number_of
+from camcomp.ground.datatypes import STANDARD_GRAVITY
 from camcomp.ground.errors import ConfigError, Location
 
-STANDARD_GRAVITY = 9.80665  # m/s2
 LARGEST_M = 1e12  # of any number: m, kg, rad
 MOST_BYTES = 1 << 23
 MOST_PARTS = 2000  # links and joints; an arm has some twenty

@@ -18,6 +18,9 @@ from camcomp.model.effect import Load, Motion
 from camcomp.model.finite import not_finite
 from camcomp.model.hysteresis import direction, ways
 from camcomp.model.job import Job
+from camcomp.model.statics.lengths import LENGTH_STEP_MM, lengthened
+from camcomp.model.statics.machine import build_machine
+from camcomp.model.statics.masses import MassLoads, has_moved_mass, mass_loads, mass_loads_around
 from camcomp.model.statics.solve import FREE, solve
 from camcomp.model.statics.target import Correction, correct, settle
 
@@ -25,6 +28,7 @@ SETTLED_MM = 2e-5  # the correction of effects ends here
 MAX_AIM_STEPS = 50  # friction that turns round in a soft drive leaves up to nine tenths per step
 FARTHER = 2.0  # times the square of what was left before, from which on steps are halved
 REST_S = 60.0
+AROUND_S = 0.03  # before and after an instant, by which its acceleration is known: 0.6 mm at 20 mm/s
 AHEAD_MM = 2.0  # more than any play
 LEAST_MM = 2e-4  # a drive that comes back by less than this is not led through its play
 WORDS = 3  # actuators that X, Y, Z can move one by one
@@ -36,17 +40,20 @@ HINGE_MM = 1e3  # way per rad of a hinge, where lengths of slides are applied to
 class Travel:
     """n points in the order of travel: force (n, 3) N of the cut in the machine frame, when, after how much cutting.
 
-    stop: the control comes to rest there, and the drives with it.
+    stop: the control comes to rest there, and the drives with it. around (3, n, 3): programmed tips, program frame, AROUND_S
+    before, at and after the instant on the same smooth stretch that is next to each point; None where time is unknown.
     """
 
     force: Floats
     time: Floats  # (n,) s
     cut_min: Floats  # (n,) minutes
     stop: Bools
+    around: Floats | None = None
 
     def take(self, rows: np.ndarray) -> Travel:
         """Some of the points, still in order."""
-        return Travel(self.force[rows], self.time[rows], self.cut_min[rows], self.stop[rows])
+        around = None if self.around is None else self.around[:, rows]
+        return Travel(self.force[rows], self.time[rows], self.cut_min[rows], self.stop[rows], around)
 
     @property
     def rested(self) -> Floats:
@@ -84,19 +91,53 @@ def respond(
         )
         return np.nan_to_num(where.drive)
 
-    motion = replace(motion, names=job.real_machine.actuators, held=held, told=lambda: commanded)
+    nominal = control.rho_nominal if aim is None else solve(job.real_machine, FREE, aim, check=False).rho_nominal
+    masses = cache(partial(_mass_loads, job, nominal, travel)) if has_moved_mass(job.real_machine.robot) else None
+    motion = replace(motion, names=job.real_machine.actuators, held=held, told=lambda: commanded, masses=masses)
     error, guided = signal_path.driven(job.causes, job.real_machine.actuators, motion)
     effort = signal_path.drive_forces(job.causes, job.real_machine.actuators, guided)
     load = loading()
     carriage = motion.encoder + error
     state = solve(job.real_machine, FREE, told, force=load.force, wrench=load.wrench, rho=carriage)
     drive = state.drive if effort is None else state.drive + effort
-    tip = signal_path.led(job.causes, state.tip, motion, job.real_machine.nominal, job.frame.origin)
+    tip = state.tip + _lengthening(job, told, signal_path.grown(job.causes, job.real_machine.actuators, motion))
+    tip = signal_path.led(job.causes, tip, motion, job.real_machine.nominal, job.frame.origin)
     tip = job.frame.to_program(signal_path.posed(job.causes, tip, load, motion))
     tip = signal_path.placed(job.causes, signal_path.clamped(job.causes, tip), load, motion)
-    nominal = control.rho_nominal if aim is None else solve(job.real_machine, FREE, aim, check=False).rho_nominal
     state = replace(state, commanded=told, rho=control.rho_nominal, rho_nominal=nominal, drive=drive)
     return _finite(job, tip, Correction.of(state, state.passes))
+
+
+def _mass_loads(job: Job, rho: Floats, travel: Travel) -> MassLoads:
+    """Loads of the masses at set-points rho (n, m); none at points that the machine does not reach.
+
+    How a control slows down at corners and stops is not in a program: drives accelerate masses along its
+    smooth stretches only, and the base carries weights only.
+    """
+    robot, around = job.real_machine.robot, travel.around
+    loads = mass_loads(robot, np.nan_to_num(rho))
+    if around is not None:
+        tips = (job.frame.to_machine(each) for each in around)
+        near = [solve(job.real_machine, FREE, each, check=False).rho_nominal for each in tips]
+        known = np.isfinite(rho).all(axis=1) & np.isfinite(near).all(axis=(0, 2))
+        moved = mass_loads_around(robot, rho[known], [each[known] for each in near], AROUND_S)
+        loads.drive[known] = moved.drive
+    return loads
+
+
+def _lengthening(job: Job, told: Floats, grown: Floats | None) -> Floats:
+    """Way (n, 3) mm of tips told (n, 3), machine frame, by links that are longer by `grown` (n, m) mm."""
+    out = np.zeros_like(told)
+    if grown is None:
+        return out
+    machine, none = job.real_machine, np.zeros_like(told)
+    rho = solve(machine, FREE, told, check=False).rho_nominal
+    here = solve(machine, FREE, told, force=none, rho=rho, check=False).tip
+    for j in np.flatnonzero(grown.any(axis=0)):
+        longer = build_machine(lengthened(machine.robot, machine.actuators[j], LENGTH_STEP_MM), machine.nominal)
+        way = solve(longer, FREE, told, force=none, rho=rho, check=False).tip - here
+        out += way / LENGTH_STEP_MM * grown[:, j, None]
+    return out
 
 
 def _finite(job: Job, tip: Floats, state: Correction) -> tuple[Floats, Correction]:
@@ -115,7 +156,7 @@ def aim_at(job: Job, target: Floats, travel: Travel, method: str) -> Correction:
     commanded = job.frame.to_program(found.commanded)
     if job.causes and method != "linear":
         commanded = commanded + _through_play(job, found, travel)
-        share, least, near = 1.0, np.inf, commanded
+        share, least, near, job = 1.0, np.inf, commanded, job.correctable
         rings = bool(signal_path.acting(job.causes, "control"))
         for _ in range(MAX_AIM_STEPS):
             tip, state = respond(job, commanded, travel, target)

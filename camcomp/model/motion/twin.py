@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 from typing import Any
 from weakref import WeakKeyDictionary
 
@@ -21,10 +21,12 @@ from camcomp.model import signal_path
 from camcomp.model.effect import Cause, Load, Motion
 from camcomp.model.job import Job
 from camcomp.model.motion.loaded_structure import Slopes, Softer, Solved
+from camcomp.model.motion.longer_links import LongerLinks
 from camcomp.model.motion.node_pieces import Places
 from camcomp.model.motion.run_path import RunPath, travel_direction
 from camcomp.model.statics.description import Robot
 from camcomp.model.statics.machine import Machine, build_machine
+from camcomp.model.statics.masses import has_moved_mass, mass_loads
 from camcomp.model.statics.solve import FREE, INVERSE, STATUS, solve
 
 _RHO_STEP = 1e-3  # mm or 1e-3 mrad of drive, to first order linear within 1e-6
@@ -79,6 +81,11 @@ class Twin:
     def _control(self) -> Machine:
         """The machine as its control knows it."""
         return build_machine(self.nominal, self.nominal)
+
+    @cached_property
+    def _longer(self) -> LongerLinks:
+        """How tips follow links that grow."""
+        return LongerLinks(self.nominal)
 
     @cached_property
     def _at_reference(self) -> Floats:
@@ -228,6 +235,9 @@ class Twin:
         if effort is not None:
             drive = drive + path.between(effort, run_path.time)
         # tool, workpiece, sensor
+        length = signal_path.grown(causes, self.actuators, at_tip)
+        if length is not None:
+            tip = tip + self._longer.way(run_path, place_tip, length)
         tip = signal_path.led(causes, tip, at_tip, self.nominal, self.origin)
         tip = self.to_program(signal_path.posed(causes, tip, load_tip, at_tip))
         tip = signal_path.placed(causes, signal_path.clamped(causes, tip), load_tip, at_tip)
@@ -406,7 +416,14 @@ class Twin:
         )
         encoder = signal_path.controlled(servo, self.actuators, motion)
         speed = np.gradient(encoder, t, axis=0) if run_path.ordered and len(t) > 1 else zero
-        return replace(motion, encoder=encoder, speed=speed, direction=travel_direction(run_path, encoder))
+        masses = cache(partial(mass_loads, self.robot, encoder, t if run_path.ordered else None))
+        return replace(
+            motion,
+            encoder=encoder,
+            speed=speed,
+            direction=travel_direction(run_path, encoder),
+            masses=masses if has_moved_mass(self.robot) else None,
+        )
 
 
 def _knots(rho: Floats) -> tuple[Ints, Ints]:
@@ -441,6 +458,7 @@ def _at(run_path: RunPath, grid: Motion, at: Floats, rho: Floats | None) -> Moti
         direction=run_path.between(grid.direction, at),
         held=None,
         told=None,
+        masses=grid.masses_at(lambda values: run_path.between(values, at)),
         seams=None,
     )
 

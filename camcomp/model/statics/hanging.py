@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from camcomp.model.statics.arm import arm_of
 from camcomp.model.statics.description import Actuator, Link, Robot, Transform, Weight
+from camcomp.model.statics.rotation import rotations_of
 
 Array = NDArray[np.float64]
 MOST_PASSES = 50
@@ -76,7 +77,7 @@ def _walk(robot: Robot, q: Array, z: list[Array], wrench: Array | None) -> tuple
         R = R @ rotation
 
     if chain.base_error.any():
-        rigid(chain.base_error[:3], _turns(chain.base_error[None, 3:])[0])
+        rigid(chain.base_error[:3], rotations_of(chain.base_error[None, 3:])[0])
     for e in chain.elements:
         if isinstance(e, Transform):
             rigid(e.translation, e.rotation)
@@ -86,18 +87,18 @@ def _walk(robot: Robot, q: Array, z: list[Array], wrench: Array | None) -> tuple
             value = q[:, k] + z[len(axes) - 1][:, 0]
             k += 1
             if e.revolute:
-                R = R @ _turns(value[:, None] * e.axis)
+                R = R @ rotations_of(value[:, None] * e.axis)
             else:
                 p = p + axis * value[:, None]
         elif isinstance(e, Link):
             own = z[len(axes)]
             p = p + np.einsum("nij,nj->ni", R, own[:, :3])
             axes.append((own[:, 3:], p, None, R))
-            R = R @ _turns(own[:, 3:])
+            R = R @ rotations_of(own[:, 3:])
         elif isinstance(e, Weight):
             pulls.append((len(axes), np.asarray(e.force, float), p + R @ e.centre))
     if chain.end_error.any():
-        rigid(chain.end_error[:3], _turns(chain.end_error[None, 3:])[0])
+        rigid(chain.end_error[:3], rotations_of(chain.end_error[None, 3:])[0])
     loads = []
     for j, (axis, at, turns, frame) in enumerate(axes):
         force, moment = np.zeros((n, 3)), np.zeros((n, 3))
@@ -120,23 +121,6 @@ def _cross(a: Array, b: Array) -> Array:
     """Cross products of vectors in the last axis; numpy's own takes longer to look at its axes than to multiply."""
     (ax, ay, az), (bx, by, bz) = a.T, b.T
     return np.stack((ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx), axis=-1)
-
-
-def _cross_matrices(w: Array) -> Array:
-    out = np.zeros((len(w), 3, 3))
-    out[:, 0, 1], out[:, 0, 2], out[:, 1, 2] = -w[:, 2], w[:, 1], -w[:, 0]
-    return out - out.transpose(0, 2, 1)
-
-
-def _turns(w: Array) -> Array:
-    """Rotations (n, 3, 3) of rotation vectors (n, 3)."""
-    angle = np.linalg.norm(w, axis=1)[:, None, None]
-    W = _cross_matrices(w)
-    small = angle < 1e-8
-    safe = np.where(small, 1.0, angle)
-    a = np.where(small, 1.0, np.sin(safe) / safe)
-    b = np.where(small, 0.5, (1.0 - np.cos(safe)) / safe**2)
-    return np.eye(3) + a * W + b * (W @ W)
 
 
 def _left_transposed(w: Array, moment: Array) -> Array:

@@ -34,3 +34,20 @@ def rotation_vectors(R: ArrayLike) -> Array:
     s = np.linalg.norm(w, axis=-1)
     angle = np.arctan2(s, 0.5 * (np.trace(R, axis1=-2, axis2=-1) - 1.0))
     return w * np.where(s > 1e-12, angle / np.maximum(s, 1e-300), 1.0)[..., None]
+
+
+def _cross_matrices(w: Array) -> Array:
+    out = np.zeros((len(w), 3, 3))
+    out[:, 0, 1], out[:, 0, 2], out[:, 1, 2] = -w[:, 2], w[:, 1], -w[:, 0]
+    return out - out.transpose(0, 2, 1)
+
+
+def rotations_of(w: Array) -> Array:
+    """Rotations (n, 3, 3) of rotation vectors (n, 3)."""
+    angle = np.linalg.norm(w, axis=1)[:, None, None]
+    W = _cross_matrices(w)
+    small = angle < 1e-8
+    safe = np.where(small, 1.0, angle)
+    a = np.where(small, 1.0, np.sin(safe) / safe)
+    b = np.where(small, 0.5, (1.0 - np.cos(safe)) / safe**2)
+    return np.eye(3) + a * W + b * (W @ W)

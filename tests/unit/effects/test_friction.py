@@ -41,3 +41,20 @@ def test_it_turns_round_over_the_way_of_carriage_or_encoder():
     assert pull[0.0] == pytest.approx(fade[0.0], abs=1e-6)
     assert pull[1.0] == pytest.approx(fade[1.0], abs=0.1)  # the carriage came with a little less than all of the force
     assert np.abs(pull[0.0] - pull[1.0]).max() > 0.5 * force
+
+
+@pytest.mark.parametrize(("force", "more"), [
+    ("force_N", {"stribeck_N": 12.0, "stribeck_mm_per_s": 2.0, "viscous_Ns_per_mm": 0.5}),
+    ("force_Nmm", {"stribeck_Nmm": 12.0, "stribeck_rad_per_s": 2.0, "viscous_Nmms_per_rad": 0.5}),
+])  # fmt: skip
+@pytest.mark.parametrize("speed", [0.2, 2.0, 15.0])
+def test_friction_falls_from_breakaway_to_sliding_with_speed(force, more, speed):
+    """The Stribeck curve: 30 + 12 exp(-(v / 2)^2) + v / 2, both ways."""
+    t = np.linspace(0.0, 2.0, 401)
+    x = (speed * np.where(t < 1.0, t, 2.0 - t))[:, None]
+    way = np.gradient(x, t, axis=0)
+    motion = Motion(t, t, t, None, x, way, np.sign(way), np.zeros(1), np.array([np.inf]))
+    p = {**nominal(friction), force: 30.0, "presliding_mm": 1e-4, "presliding_rad": 1e-4, **more}
+    drive = friction.on_drive_force(np.zeros_like(x), motion, np.ones(1), p)[:, 0]
+    want = 30.0 + 12.0 * np.exp(-((speed / 2.0) ** 2)) + 0.5 * speed
+    assert drive[150] == pytest.approx(want, rel=1e-6) and drive[350] == pytest.approx(-want, rel=1e-6)

@@ -27,6 +27,7 @@ TIP_MM = 0.003
 ENCODER = {"mm": 5e-4, "rad": 2e-7}
 STEP_S = 0.03
 FINE_S = {"servo_overshoot": 0.015}  # rings within some rows
+CONTROL = {"inertia": {"acceleration_mm_per_s2": 60.0}}  # else over within one row
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,11 @@ class Fault:
 def logged(folder: Path, machine: str, fault: Fault | None) -> dict[str, Path]:
     """Logs without noise of all programs, by their names."""
     config, wrong = runner.ROOT / "config" / f"{machine}.yaml", folder / "wrong.yaml"
-    wrong.write_text(json.dumps({"effects": [] if fault is None else [fault.entry()]}))
+    wrong.write_text(
+        json.dumps(
+            {"effects": [fault.entry()] if fault else [], "control": CONTROL.get(fault.effect, {}) if fault else {}}
+        )
+    )
     logs = {}
     for name, program in PROGRAMS.items():
         source, logs[name] = folder / f"{name}.nc", folder / f"{name}.csv"

@@ -1,0 +1,67 @@
+"""The drive has a largest speed: an encoder whose set-point moves faster falls behind, and catches up at that speed."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from camcomp.ground.datatypes import Floats
+from camcomp.model.effect import Motion, Parameter
+from camcomp.model.hysteresis import rate_limited
+
+STAGE = "control"
+TARGET = "actuator"
+UNCORRECTABLE = True  # no set-point makes a drive faster
+PLAIN = "a drive that goes no faster"
+REMEDY = "program a lower feed or rapid, raise the speed limit of the drive, or look for what brakes it"
+SOURCE = "rate limiter: |d(encoder)/dt| at most the speed, on the set-point where that allows it (Franklin et al., Feedback Control)"
+NO_LIMIT = 1e6
+_SHARE = Parameter("share", "1", 1.0, 0.0, 1.0, 1.0, 0.01, "of what the limit holds back: 1 by definition", sign=1)
+_SOURCE = "feed drives: 0.1 to 1 m/s; axes of arms: 0.2 to 10 rad/s"
+PARAMETERS = (
+    Parameter("speed_mm_per_s", "mm/s", NO_LIMIT, 1e-3, NO_LIMIT, 100.0, 0.1, _SOURCE),
+    Parameter("speed_rad_per_s", "rad/s", NO_LIMIT, 1e-6, NO_LIMIT, 1.0, 0.001, _SOURCE),
+    _SHARE,
+)
+_SPEEDS = (1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0)
+_ABSENT = Parameter("share", "1", 0.0, 0.0, 1.0, 1.0, 0.01, _SHARE.source, sign=1)
+FITTED = (
+    _ABSENT,
+    Parameter("speed_mm_per_s", "mm/s", 10.0, 1e-3, NO_LIMIT, 10.0, 0.0, _SOURCE, scan=_SPEEDS),
+)
+ROTARY = (
+    _ABSENT,
+    Parameter("speed_rad_per_s", "rad/s", 0.1, 1e-6, NO_LIMIT, 0.1, 0.0, _SOURCE, scan=tuple(0.01 * each for each in _SPEEDS)),
+)  # fmt: skip
+
+
+def first_guess(runs: Sequence[tuple[Floats, Floats, Floats]]) -> float:
+    """The largest speed, per s, that explains most of how encoders follow their set-points; no limit where none explains any.
+
+    runs: time (n,) s, set-points (n,), encoders (n,) of one actuator.
+    """
+    runs = [run for run in runs if len(run[0]) > 1 and np.ptp(run[0]) > 0.0]
+    fastest = max((float(np.abs(np.diff(x) / np.maximum(np.diff(t), 1e-9)).max()) for t, x, _ in runs), default=0.0)
+    if fastest == 0.0:
+        return NO_LIMIT
+
+    def left(speed: float) -> float:
+        return sum(float(np.sum((y - rate_limited(x[:, None], t, speed)[:, 0]) ** 2)) for t, x, y in runs)
+
+    shares = np.geomspace(0.02, 1.0, 80)
+    best = int(np.argmin([left(share * fastest) for share in shares]))
+    near = np.geomspace(shares[max(best - 1, 0)], shares[min(best + 1, len(shares) - 1)], 41)
+    speed = fastest * float(near[np.argmin([left(share * fastest) for share in near])])
+    return speed if left(speed) < left(NO_LIMIT) else NO_LIMIT
+
+
+def on_servo(position: Floats, motion: Motion, which: Floats, p: Mapping[str, float]) -> Floats:
+    """Encoder positions (n, m); on the set-points at the start."""
+    speed = min(p.get("speed_mm_per_s", NO_LIMIT), p.get("speed_rad_per_s", NO_LIMIT))
+    share = p.get("share", 1.0)
+    if speed >= NO_LIMIT or share == 0.0 or not motion.ordered:
+        return position
+    aimed = which > 0
+    asked = position[:, aimed]
+    out = position.copy()
+    out[:, aimed] = asked + share * (rate_limited(asked, motion.time, speed) - asked)
+    return out

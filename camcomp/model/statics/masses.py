@@ -1,0 +1,166 @@
+"""Forces of the masses that a machine's drives move: weight and inertia of the bodies, along a motion, in numpy.
+
+Body k of mass m_k at c_k(t) loads the machine with m_k (g - c_k''). The drive of joint j balances the inertia of all bodies
+behind it: for a hinge about axis a through p, a . ((c_k - p) x m_k c_k''); for a slide along a, a . m_k c_k''. The base carries
+the sum of all loads. Bodies are point masses; those behind a passive joint are left out.
+
+Source: Newton-Euler equations of a serial chain of point masses (Siciliano et al., Robotics, 7.3).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+
+from camcomp.ground.datatypes import STANDARD_GRAVITY, Floats
+from camcomp.model.statics.description import (
+    Actuator,
+    Chain,
+    Parallelogram,
+    Passive,
+    Robot,
+    Transform,
+    Weight,
+)
+from camcomp.model.statics.rotation import rotations_of
+
+ACCELERATION_STEP_S = 0.01  # half width of a second difference: above it structures of 10 to 30 Hz do not follow
+_N_PER_KG_MM_S2 = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class MassLoads:
+    """Loads of the masses of a machine in n instants: on m drives and on the base.
+
+    drive (n, m): force of the drives that accelerates the masses, N or N mm; base (n, 6): force and moment of weights and
+    inertia about the machine's origin, N and N mm.
+    """
+
+    drive: Floats
+    base: Floats
+
+    def at(self, rows: Callable[[Floats], Floats]) -> Self:
+        """The same at other instants; rows: values (n, c) -> (k, c)."""
+        return replace(self, drive=rows(self.drive), base=rows(self.base))
+
+
+@dataclass(frozen=True, eq=False)
+class _Joint:
+    """Joint in front of a body: index of its actuator, axis (n, 3), point on it (n, 3), whether it is a hinge."""
+
+    index: int
+    axis: Floats
+    point: Floats
+    revolute: bool
+
+
+@dataclass(frozen=True, eq=False)
+class _Body:
+    """Weight (3,) N of a body, its centre of mass (n, 3) mm, the joints that move it."""
+
+    weight: Floats
+    centre: Floats
+    joints: tuple[_Joint, ...]
+
+    @property
+    def mass_kg(self) -> float:
+        return float(np.linalg.norm(self.weight)) / STANDARD_GRAVITY
+
+
+def has_moved_mass(robot: Robot, actuator: str | None = None) -> bool:
+    """Whether the machine file states a mass that this actuator (None: any) moves, in front of a passive joint."""
+    for chain in robot.chains:
+        names: list[str] = []
+        for e in chain.elements:
+            if isinstance(e, Passive | Parallelogram):
+                break
+            if isinstance(e, Actuator):
+                names.append(e.name)
+            elif isinstance(e, Weight) and names and actuator in (None, *names):
+                return True
+    return False
+
+
+def mass_loads(robot: Robot, q: Floats, time: Floats | None = None) -> MassLoads:
+    """Loads of all stated masses on drives and base.
+
+    Args:
+        robot: the machine.
+        q: (n, m) actuator coordinates, mm or rad.
+        time: (n,) s, not decreasing; None for poses at rest.
+    """
+    bodies = list(_all_bodies(robot, q))
+    speeding = [np.zeros_like(each.centre) if time is None else acceleration(time, each.centre) for each in bodies]
+    return _loads(bodies, speeding, q.shape)
+
+
+def mass_loads_around(robot: Robot, q: Floats, around: Sequence[Floats], step_s: float) -> MassLoads:
+    """The same at coordinates q (n, m), from those (n, m) a step before, in the middle of, and a step after some instant near by."""
+    before, here, after = (list(_all_bodies(robot, each)) for each in around)
+    speeding = [(c.centre - 2.0 * b.centre + a.centre) / step_s**2 for a, b, c in zip(before, here, after, strict=True)]
+    return _loads(list(_all_bodies(robot, q)), speeding, q.shape)
+
+
+def _loads(bodies: Sequence[_Body], speeding: Sequence[Floats], shape: tuple[int, ...]) -> MassLoads:
+    """Loads of bodies whose centres accelerate by `speeding` (n, 3) mm/s2; shape: rows and actuators."""
+    drive, base = np.zeros(shape), np.zeros((shape[0], 6))
+    for body, change in zip(bodies, speeding, strict=True):
+        inertia = _N_PER_KG_MM_S2 * body.mass_kg * change
+        for joint in body.joints:
+            along = np.cross(body.centre - joint.point, inertia) if joint.revolute else inertia
+            drive[:, joint.index] += np.einsum("ni,ni->n", joint.axis, along)
+        load = body.weight - inertia
+        base += np.hstack([load, np.cross(body.centre, load)])
+    return MassLoads(drive, base)
+
+
+def acceleration(time: Floats, values: Floats) -> Floats:
+    """Second derivative (n, c), per s2, of values (n, c) at times (n,) s; at both ends that of the nearest inner instant.
+
+    Divided differences of each instant with the next ones at least ACCELERATION_STEP_S before and after it: exact for
+    constant acceleration.
+    """
+    out = np.zeros_like(values)
+    before = np.searchsorted(time, time - ACCELERATION_STEP_S, side="right") - 1
+    after = np.searchsorted(time, time + ACCELERATION_STEP_S, side="left")
+    inner = np.flatnonzero((before >= 0) & (after < len(time)))
+    if not len(inner):
+        return out
+    low, high = before[inner], after[inner]
+    back, ahead = (time[inner] - time[low])[:, None], (time[high] - time[inner])[:, None]
+    bend = (values[high] - values[inner]) / ahead - (values[inner] - values[low]) / back
+    out[inner] = 2.0 * bend / (ahead + back)
+    out[: inner[0]], out[inner[-1] + 1 :] = out[inner[0]], out[inner[-1]]
+    return out
+
+
+def _all_bodies(robot: Robot, q: Floats) -> Iterator[_Body]:
+    """Bodies of all chains along actuator coordinates q (n, m)."""
+    start = 0
+    for chain in robot.chains:
+        yield from _bodies(chain, q, start)
+        start += sum(isinstance(e, Actuator) for e in chain.elements)
+
+
+def _bodies(chain: Chain, q: Floats, start: int) -> Iterator[_Body]:
+    """Bodies of a chain, along actuator coordinates q (n, m); start: index of the chain's first actuator."""
+    n = len(q)
+    rotation, point = np.broadcast_to(chain.frame, (n, 3, 3)), np.zeros((n, 3))
+    joints: list[_Joint] = []
+    for e in chain.elements:
+        if isinstance(e, Transform):
+            point, rotation = point + rotation @ e.translation, rotation @ e.rotation
+        elif isinstance(e, Actuator):
+            value, axis = q[:, start + len(joints)], rotation @ e.axis
+            joints.append(_Joint(start + len(joints), axis, point, e.revolute))
+            if e.revolute:
+                rotation = rotation @ rotations_of(value[:, None] * e.axis)
+            else:
+                point = point + value[:, None] * axis
+        elif isinstance(e, Weight):
+            yield _Body(np.asarray(e.force, float), point + rotation @ e.centre, tuple(joints))
+        elif isinstance(e, Passive | Parallelogram):
+            return
