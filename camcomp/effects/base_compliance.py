@@ -1,4 +1,4 @@
-"""The base of the machine gives way: it turns and shifts under the weight of what moves, its inertia and the force at the tool.
+"""The base of the machine gives way: it turns and shifts under the weight of what moves and the force at the tool.
 
 With force F and moment M about the machine's origin on the base: turn = rad_per_Nmm M + rad_per_N (z x F), shift =
 mm_per_N F + rad_per_N (M x z). A pedestal that turns about a point h below the origin has rad_per_N = h rad_per_Nmm.

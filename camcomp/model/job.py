@@ -110,10 +110,12 @@ class Job:
     @cached_property
     def correctable(self) -> Job:
         """The job without the effects that no set-point corrects."""
-        kept = [each for each, cause in zip(self.config.effects, self.causes, strict=True) if not cause.uncorrectable]
-        if len(kept) == len(self.config.effects):
+        kept = tuple(cause for cause in self.causes if not cause.uncorrectable)
+        if len(kept) == len(self.causes):
             return self
-        return Job(self.config.model_copy(update={"effects": kept}))
+        other = Job(self.config)
+        vars(other)["causes"] = kept
+        return other
 
     @cached_property
     def _robots(self) -> tuple[Robot, Robot]:

@@ -3,6 +3,9 @@
 import pytest
 
 from camcomp.ground import shelf
+from camcomp.model.config.load import load_config
+from camcomp.model.effect import applies
+from camcomp.model.job import Job
 from tests.validation import runner
 from tests.validation.every_machine import grid
 from tests.validation.every_machine.shipped import Fault
@@ -62,12 +65,15 @@ def test_every_shipped_machine_has_its_column():
 @pytest.mark.parametrize("machine", grid.MACHINES)
 def test_what_is_not_tried_on_a_machine_is_not_there(machine):
     tried = {fault.effect for fault in grid.faults(machine)}
+    robot = Job(load_config([runner.ROOT / "config" / f"{machine}.yaml"])).machine.robot
+    names = [each.name for each in robot.actuators]
     arm, slides = machine in grid.ARMS, machine in grid.SLIDES_IN_A_ROW
     for effect in {each for each, *_ in grid.SIZES} - tried:
         module = shelf.load("effects", effect)
         foreign = (getattr(module, "ARM_ONLY", False) and not arm) or (
             getattr(module, "SLIDES_ONLY", False) and (arm or (module.TARGET == "named" and not slides))
         )
+        foreign = foreign or not any(applies(module, robot, target) for target in (None, *names))
         assert foreign or (effect, machine) in grid.NOT_THERE
 
 

@@ -60,6 +60,7 @@ SETTLED_S = 0.15
 # Not nominal, and not one typical size either: what would hardly show in ten seconds, or has a size of its own.
 VALUES = {
     "thermal_growth": {"growth_mm_per_K": 0.004, "warm_up_s": 300.0},
+    "link_growth": {"growth_mm_per_K": 0.01, "warm_up_s": 300.0},
     "screw_growth": {"expansion_ppm_per_K": 100.0, "warm_up_s": 300.0},
     "servo_overshoot": {"period_ms": 60.0, "damping": 0.7},
     "friction": {"force_N": 60.0, "presliding_mm": 0.005},
@@ -89,15 +90,19 @@ def law(formula, target=None, **place):
     return Cause("formula", shelf.load("effects", "formula"), target, spec.effect_values())
 
 
+WITH_MASSES = ("inertia", "base_compliance")  # the Orthoglide states none
+LIMITED = ("speed_limit",)  # how far a drive falls behind depends on ramps, and no set-point makes up for it
 NAMES = [name for name in shelf.members("effects") if shelf.load("effects", name).PARAMETERS]
 ON_ARMS = [name for name in NAMES if getattr(shelf.load("effects", name), "ARM_ONLY", False)]
-CASES = {name: [cause(name)] for name in NAMES if name not in ON_ARMS} | {
+ANYWHERE = [name for name in NAMES if name not in (*ON_ARMS, *WITH_MASSES, *LIMITED)]
+CASES = {name: [cause(name)] for name in ANYWHERE} | {
     "viscous friction": [cause("friction", "y", force_N=40.0, viscous_Ns_per_mm=0.5, asymmetry_Ns_per_mm=0.1)],
-    "all together": [cause(name) for name in NAMES if name not in ON_ARMS],
+    "all together": [cause(name) for name in ANYWHERE],
     "place of the tip": [law("0.05*sin(y_mm/2)", stage="structure", axis="x")],
     "loads of drives": [law("1e-6*load_N*abs(load_N) - 2e-4*load_x_N", "y", stage="drive")],
 }
-ARM_CASES = {name: [cause(name, "A2")] for name in ON_ARMS} | {
+ARM_CASES = {name: [cause(name, "A2")] for name in (*ON_ARMS, "base_compliance")} | {
+    "link_growth": [cause("link_growth", "A2", growth_mm_per_K=0.01, warm_up_s=300.0)],
     "joint_coupling": [cause("joint_coupling", "A3")],  # A1 stands still
     "joint_hysteresis": [cause("joint_hysteresis", "A5")],  # A2 and A3 turn round between rows
     "joint_offset": [cause("joint_offset", "A2", offset_rad=1e-3)],
@@ -315,7 +320,7 @@ def standing(causes):
 
 def test_poses_of_an_arm_ask_the_hooks_that_a_tracker_can_see():
     order, every = asked(standing)
-    assert every == {"on_servo", "on_drive", "on_robot", "on_load", "on_pose"}
+    assert every == {"on_servo", "on_drive", "on_robot", "on_load", "on_links", "on_pose"}
     assert order == in_order(order)
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache, partial
 from itertools import pairwise
 from typing import Any
 
@@ -22,7 +23,8 @@ from camcomp.model import signal_path
 from camcomp.model.effect import Cause, Load, Motion, Parameter
 from camcomp.model.statics.arm import Arm, arm_of
 from camcomp.model.statics.description import Actuator, Link, Robot
-from camcomp.model.statics.hanging import Hung, hang
+from camcomp.model.statics.hanging import Hung, grown_way, hang
+from camcomp.model.statics.masses import mass_loads
 
 _SHARE_OF_SCALE = 0.05  # step of a difference
 _JOINT_STEP = 1e-5  # rad or mm
@@ -140,7 +142,11 @@ class ArmBench:
         motion = replace(motion, encoder=signal_path.controlled(causes, self.actuators, motion))
         error, _ = signal_path.driven(causes, self.actuators, motion)
         load = signal_path.loaded(causes, motion, np.zeros((len(campaign.q), 3)))
-        hung = hang(robot, motion.encoder + error, load.wrench if load.wrench.any() else None)
+        q = motion.encoder + error
+        hung = hang(robot, q, load.wrench if load.wrench.any() else None)
+        grown = signal_path.grown(causes, self.actuators, motion)
+        if grown is not None:
+            hung = replace(hung, point=hung.point + grown_way(robot, q, grown))
         return LoadedArm(hung, tuple(causes), load, motion)
 
     def tips(self, k: int, causes: Sequence[Cause], at: Registration) -> Floats:
@@ -351,7 +357,7 @@ def _standing(robot: Robot, campaign: Poses) -> Motion:
     way = zero if campaign.approach is None else campaign.approach
     return Motion(
         campaign.time, campaign.time, worn, campaign.temperature, campaign.q, zero, way, home,
-        signal_path.springs(robot), False,
+        signal_path.springs(robot), False, masses=cache(partial(mass_loads, robot, campaign.q)),
     )  # fmt: skip
 
 

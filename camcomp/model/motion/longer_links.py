@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import cached_property
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -13,22 +13,20 @@ from camcomp.model.motion.node_pieces import Places
 from camcomp.model.motion.run_path import RunPath
 from camcomp.model.statics.description import Robot
 from camcomp.model.statics.lengths import LENGTH_STEP_MM, lengthened
-from camcomp.model.statics.machine import Machine, build_machine
-from camcomp.model.statics.solve import FREE, solve
 
 
 @dataclass(frozen=True, eq=False)
 class LongerLinks:
-    """Links of a perfect machine, one of them longer. Derivatives are worked out once for every run path."""
+    """Links of a perfect machine, one of them longer. Derivatives are worked out once for every run path.
+
+    tips: tips (q, 3) at the nodes of a run path, of a changed machine that goes where this one is told to go.
+    """
 
     robot: Robot
+    tips: Callable[[Robot, RunPath], Floats]
     _known: WeakKeyDictionary[RunPath, dict[int, Floats]] = field(
         default_factory=WeakKeyDictionary, init=False, repr=False
     )
-
-    @cached_property
-    def _machine(self) -> Machine:
-        return build_machine(self.robot, self.robot)
 
     def way(self, run_path: RunPath, place: Places, grown: Floats) -> Floats:
         """Way (n, 3) mm of tips at a place of the run, machine frame, by links that are longer by `grown` (n, m) mm."""
@@ -41,8 +39,6 @@ class LongerLinks:
         """Way (q, 3) of the tips at the nodes per mm by which the link behind actuator j is longer."""
         ways = self._known.setdefault(run_path, {})
         if j not in ways:
-            near = run_path.node_tip
-            longer = build_machine(lengthened(self.robot, self._machine.actuators[j], LENGTH_STEP_MM), self.robot)
-            tips = [solve(each, FREE, near, rho=run_path.node_rho, check=False).tip for each in (longer, self._machine)]
-            ways[j] = (tips[0] - tips[1]) / LENGTH_STEP_MM
+            longer = lengthened(self.robot, self.robot.actuators[j].name, LENGTH_STEP_MM)
+            ways[j] = (self.tips(longer, run_path) - self.tips(self.robot, run_path)) / LENGTH_STEP_MM
         return ways[j]

@@ -112,7 +112,7 @@ def _mass_loads(job: Job, rho: Floats, travel: Travel) -> MassLoads:
     """Loads of the masses at set-points rho (n, m); none at points that the machine does not reach.
 
     How a control slows down at corners and stops is not in a program: drives accelerate masses along its
-    smooth stretches only, and the base carries weights only.
+    smooth stretches only.
     """
     robot, around = job.real_machine.robot, travel.around
     loads = mass_loads(robot, np.nan_to_num(rho))

@@ -85,7 +85,12 @@ class Twin:
     @cached_property
     def _longer(self) -> LongerLinks:
         """How tips follow links that grow."""
-        return LongerLinks(self.nominal)
+
+        def tips(robot: Robot, run_path: RunPath) -> Floats:
+            machine, near, rho = build_machine(robot, self.nominal), run_path.node_tip, run_path.node_rho
+            return solve(machine, FREE, near, rho=rho, check=False).tip
+
+        return LongerLinks(self.nominal, tips)
 
     @cached_property
     def _at_reference(self) -> Floats:
@@ -236,8 +241,7 @@ class Twin:
             drive = drive + path.between(effort, run_path.time)
         # tool, workpiece, sensor
         length = signal_path.grown(causes, self.actuators, at_tip)
-        if length is not None:
-            tip = tip + self._longer.way(run_path, place_tip, length)
+        tip = tip if length is None else tip + self._longer.way(run_path, place_tip, length)
         tip = signal_path.led(causes, tip, at_tip, self.nominal, self.origin)
         tip = self.to_program(signal_path.posed(causes, tip, load_tip, at_tip))
         tip = signal_path.placed(causes, signal_path.clamped(causes, tip), load_tip, at_tip)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from camcomp.model.statics.arm import arm_of
 from camcomp.model.statics.description import Actuator, Link, Robot, Transform, Weight
+from camcomp.model.statics.lengths import LENGTH_STEP_MM, lengthened
 from camcomp.model.statics.rotation import rotations_of
 
 Array = NDArray[np.float64]
@@ -60,6 +61,16 @@ def hang(robot: Robot, q: Array, wrench: Array | None = None) -> Hung:
             drives = [load[:, 0] for load, C in zip(loads, compliance, strict=True) if len(C) == 1]
             return Hung(point, rotation, -np.stack(drives, axis=1))
     raise ArithmeticError("the arm gives way under its own weight")
+
+
+def grown_way(robot: Robot, q: Array, grown: Array) -> Array:
+    """Way (n, 3) mm of the platform at joint coordinates q (n, m) by links that are longer by `grown` (n, m) mm."""
+    out = np.zeros((len(q), 3))
+    for j in np.flatnonzero(grown.any(axis=0)):
+        longer = lengthened(robot, robot.actuators[j].name, LENGTH_STEP_MM)
+        way = hang(longer, q).point - hang(robot, q).point
+        out += way / LENGTH_STEP_MM * grown[:, j, None]
+    return out
 
 
 def _walk(robot: Robot, q: Array, z: list[Array], wrench: Array | None) -> tuple[Array, Array, list[Array]]:

@@ -2,7 +2,7 @@
 
 Body k of mass m_k at c_k(t) loads the machine with m_k (g - c_k''). The drive of joint j balances the inertia of all bodies
 behind it: for a hinge about axis a through p, a . ((c_k - p) x m_k c_k''); for a slide along a, a . m_k c_k''. The base carries
-the sum of all loads. Bodies are point masses; those behind a passive joint are left out.
+the weights; their inertia is left out there, for a program does not say how a control slows down. Bodies are point masses; those behind a passive joint are left out.
 
 Source: Newton-Euler equations of a serial chain of point masses (Siciliano et al., Robotics, 7.3).
 """
@@ -35,8 +35,8 @@ _N_PER_KG_MM_S2 = 1e-3
 class MassLoads:
     """Loads of the masses of a machine in n instants: on m drives and on the base.
 
-    drive (n, m): force of the drives that accelerates the masses, N or N mm; base (n, 6): force and moment of weights and
-    inertia about the machine's origin, N and N mm.
+    drive (n, m): force of the drives that accelerates the masses, N or N mm; base (n, 6): force and moment of the weights
+    about the machine's origin, N and N mm.
     """
 
     drive: Floats
@@ -112,8 +112,7 @@ def _loads(bodies: Sequence[_Body], speeding: Sequence[Floats], shape: tuple[int
         for joint in body.joints:
             along = np.cross(body.centre - joint.point, inertia) if joint.revolute else inertia
             drive[:, joint.index] += np.einsum("ni,ni->n", joint.axis, along)
-        load = body.weight - inertia
-        base += np.hstack([load, np.cross(body.centre, load)])
+        base += np.hstack([np.broadcast_to(body.weight, change.shape), np.cross(body.centre, body.weight)])
     return MassLoads(drive, base)
 
 
