@@ -92,7 +92,7 @@ class Parameters(Memory):
             return self._local_position(number % 10 - 1)
         if 5021 <= number <= 5023:
             axis = number - 5021
-            return (state.position[axis] + state.zero[axis]) / state.unit
+            return state.machine_position[axis] / state.unit
         if 5221 <= number <= 5323 and 1 <= number % 20 <= 3:
             return state.work[(number - 5221) // 20][number % 20 - 1] / state.unit
         return None

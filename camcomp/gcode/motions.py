@@ -17,21 +17,23 @@ class Motions(BlockReader):
         """End point in the program frame of the block's axis words; they thereby count as commanded."""
         state = self.state
         end = list(state.position)
+        given: dict[int, float] = {}
         for axis in block.axes:
             word = block.words["XYZ"[axis]]
             value = word.value * state.unit
             if abs(value) > LARGEST_MM:
                 self.refuse("CC138", f"{word.letter}{word.value:g} is out of every machine's reach", word)
             if machine:
-                end[axis] = value - state.zero[axis]
-            elif word.mode == "IC" or (state.relative and word.mode != "AC"):
+                given[axis] = value
+                continue
+            if word.mode == "IC" or (state.relative and word.mode != "AC"):
                 end[axis] += value
                 if not state.commanded[axis]:
                     self.warn(f"{word.letter} starts with a relative move; its start counts as start_mm", once=True)
             else:
                 end[axis] = value + state.offset[axis]
             state.commanded[axis] = True
-        return end
+        return state.at_machine(given) if machine else end
 
     def home(self, block: Block, code: int) -> None:
         """G28, G30: through the point of the axis words to the reference position."""
@@ -46,10 +48,8 @@ class Motions(BlockReader):
         # Codes of group 0 that approach a fixed point directly take the axis words as a list of axes only.
         if code in (28, 30):
             self.record.machine_motion(block, state, -1, self.target(block))
-        end = list(state.position)
-        for axis in block.axes or range(3):
-            end[axis] = state.homes[30 if code == 30 else 28][axis] - state.zero[axis]
-            state.commanded[axis] = True
+        home = state.homes[30 if code == 30 else 28]
+        end = state.at_machine({axis: home[axis] for axis in block.axes or range(3)})
         self.record.machine_motion(block, state, -2, end, moved=block.axes or [0, 1, 2])
 
     def _which_home(self, block: Block, code: int) -> None:

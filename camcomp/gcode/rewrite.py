@@ -18,7 +18,7 @@ from camcomp.gcode.output import Output, Part, Rewritten, Standing
 from camcomp.gcode.program import P, Program, R, Rebase
 from camcomp.gcode.stamp import stamp_index, stamp_line
 from camcomp.gcode.text import Text
-from camcomp.ground.datatypes import ARC, RAPID
+from camcomp.ground.datatypes import ARC, RAPID, Floats
 from camcomp.ground.errors import ProgramError
 
 
@@ -159,18 +159,26 @@ class Writer(LineEditor):
             self._code_on_line(int(self.sites.code[k]))
         if self.path.kind[k] != RAPID and self.sites.feed_mode[k] != 93:
             self._feed_on_line(math.nan, 0.0)
-        for axis in range(3):
-            if self.sites.moved[k, axis]:
-                # Of G28, the point on the way (code -1) obeys G91; home does not, and neither does G53.
-                obeys = self.sites.code[k] == -1 or not self.path.machine[k]
-                if self.relative and obeys:
-                    self.position[axis] += end[axis] - start[axis]
-                else:
-                    self.position[axis] = float(end[axis])
+        # Of G28, the point on the way (code -1) obeys G91; home does not, and neither does G53.
+        if self.path.machine[k] and self.sites.code[k] != -1:
+            self.position = self._moved_in_machine_axes(end)
+        else:
+            for axis in np.flatnonzero(self.sites.moved[k]):
+                by = self.position[axis] - start[axis] if self.relative else 0.0
+                self.position[axis] = float(end[axis] + by)
         self._append()
         self.ends[first:last] = self.position
         self.feeds[first:last] = self.path.feed[k]
         self.lines[first:last] = self.row + self.inserted
+
+    def _moved_in_machine_axes(self, end: Floats) -> Point:
+        """Where a move leads whose axis words are machine coordinates, program frame: the axes that it does not name stay."""
+        moved, setup = self.sites.moved[self.k], self.program.setup
+        if setup.rotation is None:
+            return [float(end[axis]) if moved[axis] else self.position[axis] for axis in range(3)]
+        way = setup.in_machine_axes([end[axis] - self.position[axis] for axis in range(3)])
+        back = setup.in_program_axes([each if moved[axis] else 0.0 for axis, each in enumerate(way)])
+        return [float(a + b) for a, b in zip(self.position, back, strict=True)]
 
     # --- one row -----------------------------------------------------------------------------------------------
 

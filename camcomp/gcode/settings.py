@@ -135,7 +135,7 @@ class Settings(BlockReader):
         elif code == 100:
             self._set_offset(block)
         elif code in (281, 301):
-            state.homes[code // 10] = [state.position[axis] + state.zero[axis] for axis in range(3)]
+            state.homes[code // 10] = state.machine_position
             self.rebases.append(Rebase(len(self.record), block.row, (), (0.0, 0.0, 0.0), state.unit))
         elif code in (520, 920):
             self._shift(block, code)
@@ -211,6 +211,7 @@ class Settings(BlockReader):
         if extended:
             index = 8 + int(number)
         state.waits |= index == state.active
+        here: dict[int, float] = {}
         for axis in block.axes:
             value = words["XYZ"[axis]].value * state.unit
             if kind == 2 or extended:
@@ -218,6 +219,7 @@ class Settings(BlockReader):
                 state.work[index][axis] = state.work[index][axis] + value if adds else value
             else:
                 others = state.shift[axis] + state.local[axis] + state.tool_offset[axis]
-                state.work[index][axis] = state.position[axis] + state.zero[axis] - others - value
+                here[axis] = state.position[axis] - others - value
+        state.set_work(index, here)
         if kind == 20 and not extended:
             self._rebase(block)

@@ -1,6 +1,6 @@
 """What reading a program needs to know of its machine."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from camcomp.gcode.path_mode import PathMode
@@ -8,6 +8,7 @@ from camcomp.gcode.path_mode import PathMode
 Triple = tuple[float, float, float]
 ASSUMED = PathMode(stated=False)
 ZERO: Triple = (0.0, 0.0, 0.0)
+TURNS = 1e-12  # entries of a rotation below it are round-off
 
 
 @dataclass(frozen=True)
@@ -24,3 +25,28 @@ class Setup:
     table_axes: frozenset[str] = frozenset()  # A, B, C that turn the workpiece and only position it
     path_mode: PathMode = ASSUMED  # until the program says one
     skip_deleted: bool = False  # the block delete switch: lines that start with `/` are not executed
+    rotation: tuple[Triple, Triple, Triple] | None = None  # program axes in machine axes; None: parallel
+
+    def in_machine_axes(self, vector: Sequence[float]) -> list[float]:
+        """A vector (3,) of program axes in machine axes."""
+        if self.rotation is None:
+            return list(vector)
+        return [sum(row[i] * vector[i] for i in range(3)) for row in self.rotation]
+
+    def in_program_axes(self, vector: Sequence[float]) -> list[float]:
+        """A vector (3,) of machine axes in program axes."""
+        if self.rotation is None:
+            return list(vector)
+        return [sum(self.rotation[i][axis] * vector[i] for i in range(3)) for axis in range(3)]
+
+    def known_in_machine_axes(self, known: Sequence[bool]) -> list[bool]:
+        """Machine axes whose position follows from the program axes that are known."""
+        if self.rotation is None:
+            return list(known)
+        return [all(known[i] or abs(row[i]) < TURNS for i in range(3)) for row in self.rotation]
+
+    def known_in_program_axes(self, known: Sequence[bool]) -> list[bool]:
+        """Program axes whose position follows from the machine axes that are known."""
+        if self.rotation is None:
+            return list(known)
+        return [all(known[i] or abs(self.rotation[i][axis]) < TURNS for i in range(3)) for axis in range(3)]

@@ -1,6 +1,7 @@
 """ControlState of a control while it executes a program: modes, offsets and where the tool tip stands."""
 
 import math
+from collections.abc import Mapping
 
 from camcomp.gcode.codes import OFFSET_NAMES, WORK_OFFSETS
 from camcomp.gcode.dialect import Dialect
@@ -67,8 +68,34 @@ class ControlState:
 
     def update(self) -> None:
         """Recompute the sum of offsets, after one of them has changed."""
-        work = self.work[self.active]
-        self.offset = [
-            work[axis] + self.shift[axis] + self.local[axis] + self.tool_offset[axis] - self.zero[axis]
-            for axis in range(3)
-        ]
+        work = self.setup.in_program_axes([a - b for a, b in zip(self.work[self.active], self.zero, strict=True)])
+        self.offset = [work[axis] + self.shift[axis] + self.local[axis] + self.tool_offset[axis] for axis in range(3)]
+
+    @property
+    def machine_position(self) -> list[float]:
+        """Machine coordinates (3,) mm of the position."""
+        return [a + b for a, b in zip(self.setup.in_machine_axes(self.position), self.zero, strict=True)]
+
+    def at_machine(self, coordinates: Mapping[int, float]) -> list[float]:
+        """Position (3,) where the machine axes given have these coordinates, mm, and the others stay.
+
+        The program axes that follow from known machine axes count as commanded from then on.
+        """
+        place = self.machine_position
+        known = self.setup.known_in_machine_axes(self.commanded)
+        for axis, value in coordinates.items():
+            place[axis], known[axis] = value, True
+        self.commanded = self.setup.known_in_program_axes(known)
+        if self.setup.rotation is None:  # axes that stay keep their very number
+            return [coordinates[i] - self.zero[i] if i in coordinates else self.position[i] for i in range(3)]
+        return self.setup.in_program_axes([a - b for a, b in zip(place, self.zero, strict=True)])
+
+    def set_work(self, index: int, program: Mapping[int, float]) -> None:
+        """Put the origin of a work offset where it has these program coordinates, mm; its others stay."""
+        if self.setup.rotation is None:
+            for axis, value in program.items():
+                self.work[index][axis] = value + self.zero[axis]
+            return
+        origin = self.setup.in_program_axes([a - b for a, b in zip(self.work[index], self.zero, strict=True)])
+        origin = [program.get(axis, origin[axis]) for axis in range(3)]
+        self.work[index] = [a + b for a, b in zip(self.setup.in_machine_axes(origin), self.zero, strict=True)]

@@ -1,6 +1,7 @@
 """NC programs from disk, read as the control of a machine file would read them."""
 
 import math
+from collections.abc import Iterable
 from pathlib import Path
 
 from camcomp.gcode.interpret import read_program
@@ -12,6 +13,7 @@ from camcomp.ground.errors import Location, ProgramError
 from camcomp.ground.files import display_name, read_bytes
 from camcomp.model.config.spec import Config
 from camcomp.model.config.stated import dialect_without_config
+from camcomp.model.statics.build import rotation_of
 from camcomp.model.trajectory.moves import ControlLimits
 
 
@@ -19,6 +21,8 @@ def setup_of(config: Config) -> Setup:
     """The control before the program starts, in the terms of the reader."""
     control = config.control
     places = {name: _triple(value) for name, value in control.reference_positions_mm.items()}
+    turned = any(config.workpiece.rotation)
+    x, y, z = rotation_of(config.workpiece.rotation)
     return Setup(
         start_mm=_triple(control.start_mm),
         offsets={
@@ -33,6 +37,7 @@ def setup_of(config: Config) -> Setup:
         table_axes=frozenset(control.table_axes),
         skip_deleted=control.block_delete,
         path_mode=stated_mode(control.path_mode) if control.path_mode else ASSUMED,
+        rotation=(_triple(x), _triple(y), _triple(z)) if turned else None,
     )
 
 
@@ -70,6 +75,6 @@ def program_of(data: bytes, name: str, config: Config | None = None) -> Program:
         raise
 
 
-def _triple(values: list[float]) -> tuple[float, float, float]:
+def _triple(values: Iterable[float]) -> tuple[float, float, float]:
     x, y, z = values
     return float(x), float(y), float(z)

@@ -4,6 +4,7 @@ Debian's package linuxcnc-uspace ships it as `rs274`. It is looked for in the en
 on PATH; tests that need it are skipped where it is not there.
 """
 
+import math
 import os
 import re
 import shutil
@@ -42,6 +43,7 @@ class Motion:
     centre: tuple[float, float] = (0.0, 0.0)  # in the order of the plane
     turns: int = 0  # signed
     call: str = ""
+    machine: tuple[float, ...] = ()  # end in machine coordinates, mm, of lines
 
 
 @dataclass
@@ -103,6 +105,7 @@ def _parse(stdout: str, stderr: str) -> Run:
     result = Run()
     unit, plane, feed, feed_mode = 1.0, 17, 0.0, "0"
     work, shift, tool = [0.0] * 3, [0.0] * 3, [0.0] * 3  # mm
+    turned = 0.0  # rad, of the program's axes about Z
     ended = False
     for line in stdout.splitlines():
         found = _CALL.match(line)
@@ -120,6 +123,8 @@ def _parse(stdout: str, stderr: str) -> Run:
             shift = [each * unit for each in _numbers(arguments)[:3]]
         elif name == "USE_TOOL_LENGTH_OFFSET":
             tool = [each * unit for each in _numbers(arguments)[:3]]
+        elif name == "SET_XY_ROTATION":
+            turned = math.radians(float(arguments))
         elif name == "SET_FEED_RATE":
             feed = float(arguments) * unit
         elif name == "SET_FEED_MODE":
@@ -128,9 +133,12 @@ def _parse(stdout: str, stderr: str) -> Run:
             result.speeds.append(_numbers(arguments)[-1])
         elif name in ("STRAIGHT_TRAVERSE", "STRAIGHT_FEED", "RIGID_TAP"):
             x, y, z = _numbers(arguments)[:3]
-            result.motions.append(
-                Motion(name.split("_")[-1], (x, y, z), unit, offset, feed, feed_mode, plane, call=line.strip())
-            )
+            u, v, w = (each * unit + shift[a] for a, each in enumerate((x, y, z)))
+            c, s = math.cos(turned), math.sin(turned)
+            machine = tuple(a + b + d for a, b, d in zip((c * u - s * v, s * u + c * v, w), work, tool, strict=True))
+            motion = Motion(name.split("_")[-1], (x, y, z), unit, offset, feed, feed_mode, plane, call=line.strip())
+            motion.machine = machine
+            result.motions.append(motion)
         elif name == "ARC_FEED":
             a, b, ca, cb, turns, w = _numbers(arguments)[:6]
             end = [0.0, 0.0, 0.0]
