@@ -59,7 +59,8 @@ def test_the_wheel_says_what_it_needs(built):
     (name,) = [each for each in archive.namelist() if each.endswith("METADATA")]
     text = archive.read(name).decode()
     assert "Requires-Python: >=3.11" in text and "Requires-Dist: plotly>=6; extra == 'report'" in text
-    assert "# camcomp" in text  # the README
+    assert "# camcomp" in text and "## Two commands" in text  # the README
+    assert "](" not in text and "<!--" not in text and "://" not in text  # nothing that an index would show broken
 
 
 def test_an_installed_camcomp_needs_no_checkout(built, tmp_path):

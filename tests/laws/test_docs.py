@@ -10,10 +10,13 @@ import pytest
 
 from camcomp import __version__
 from camcomp.ground import shelf
+from camcomp.ground.rules import RULES
 from camcomp.model.config.schema import config_schema, experiment_schema
 from camcomp.terminal import reference
 from camcomp.terminal.cli import VERBS
+from camcomp.terminal.controls_reference import first_rows
 from camcomp.terminal.key_reference import ROOTS, rows, sections
+from tests.documentation import drawings
 from tests.documents import ROOT, Command, Reader, TypedFile, missing, steps, text_blocks
 
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -63,7 +66,7 @@ def test_the_readme_is_followed(reader):
     files = [
         path.read_text(encoding="utf-8") for path in reader.folder.rglob("*") if path.suffix in (".nc", ".csv", ".json")
     ]
-    told = {line: text for line, text in text_blocks(README).items() if "camcomp/terminal/" not in text}
+    told = text_blocks(README)
     assert told
     for line, text in told.items():
         promised = ["...", *text.splitlines()]
@@ -173,6 +176,7 @@ def test_the_site_is_built_without_a_warning(tmp_path):
     done = subprocess.run(words, check=False, cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
     assert (tmp_path / "site/tutorial/diagnosis/index.html").exists()
+    assert "<math" in (tmp_path / "site/explanation/method/index.html").read_text(encoding="utf-8")
 
 
 def test_the_readme_knows_every_command():
@@ -185,6 +189,27 @@ def test_reference_pages_are_up_to_date(name):
     assert (reference.FOLDER / name).read_text(encoding="utf-8") == reference.pages()[name], (
         "run `python -m camcomp.terminal.reference`"
     )
+
+
+def test_the_readme_is_short_and_its_table_of_controllers_is_that_of_the_code():
+    assert len(README.splitlines()) <= 200
+    assert reference.with_controls(README) == README, "run `python -m camcomp.terminal.reference`"
+
+
+def test_the_first_table_of_controllers_shows_what_is_read_and_what_is_refused():
+    cells = {cell for row in first_rows() for cell in row[1:]}
+    assert {"read", "-"} < cells and all(cell in ("read", "-") or cell in RULES for cell in cells)
+    assert not [row for row in first_rows() if set(row[1:]) == {"-"}]
+
+
+@pytest.mark.parametrize("name", sorted(drawings.DRAWINGS))
+def test_drawings_are_those_of_their_script(name):
+    """Same words and lines, coordinates within a quarter of a pixel."""
+    kept, made = (drawings.FOLDER / f"{name}.svg").read_text(encoding="utf-8"), drawings.DRAWINGS[name]().text()
+    number = r"-?\d+\.\d"
+    assert re.sub(number, "#", kept) == re.sub(number, "#", made), "run `python -m tests.documentation.drawings`"
+    pairs = zip(re.findall(number, kept), re.findall(number, made), strict=True)
+    assert all(abs(float(one) - float(other)) <= 0.25 for one, other in pairs)
 
 
 def test_the_reference_leaves_nothing_out():
