@@ -31,5 +31,10 @@ def history(folder: str, tolerance_um: float = 10.0) -> Chronicle:
     Raises ConfigError CC454 for a file that is no kept diagnosis, FileError.
     """
     if not Path(folder).is_dir():
-        raise FileError("CC500", f"there is no folder {folder}")
+        text = (
+            "is a file, and the diagnoses of a machine are kept in a folder"
+            if Path(folder).exists()
+            else "is not there"
+        )
+        raise FileError("CC500", f"{folder} {text}", hint="`camcomp history DIR --add RESULT.json` makes the folder")
     return chronicle_of(kept_in(folder), tolerance_um)

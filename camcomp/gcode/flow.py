@@ -16,6 +16,10 @@ from camcomp.ground.errors import ProgramError
 _MOST_BLOCKS = 150_000  # executed by a program that has loops
 _MOST_IDLE = 100_000  # of them in a row that move nothing
 _INCREMENTAL_LETTERS = "XYZIJKRQ"
+_AS_LENGTHS = (
+    "numbers without a point are read as mm or inch, X10 as 10 mm; a controller that counts increments reads 0.01 mm: "
+    "if yours does, state `control: {input_increment_mm: 0.001}`"
+)
 
 
 class Flow:
@@ -161,7 +165,7 @@ class Flow:
                 continue
             if increment is None:
                 self.reader.block.row = row
-                self.reader.warn("numbers without a point count as mm or inch, not as increments", once=True)
+                self.reader.warn(_AS_LENGTHS, once=True)
                 return words
             words = [*words]
             words[index] = word._replace(value=word.value * (increment / 10.0 if inch else increment))

@@ -110,7 +110,9 @@ class Settings(BlockReader):
                 number = self._whole("H", words["H"])
             length = state.tools.get(number, 0.0)
             if number and number not in state.tools:
-                self.warn(f"tool {number} is not in the tool table; its length offset counts as 0", once=True)
+                self.warn(
+                    f"tool {number} has no length in `control: tool_lengths_mm`; its offset counts as 0", once=True
+                )
             state.tool_offset = [0.0, 0.0, length if number else 0.0]
 
     def _work_offset(self, block: Block, code: int, word: Word) -> None:

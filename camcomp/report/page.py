@@ -71,6 +71,7 @@ class Page:
     cards: Sequence[tuple[str, str, str]]
     sections: Sequence[Section] = field(default_factory=tuple)
     word: str = ""  # before the verdict; default Passed or Attention
+    caution: str = ""  # a sentence behind the verdict that takes its colour of a pass away
 
 
 @cache
@@ -99,13 +100,16 @@ def render(page: Page) -> bytes:
     ]
     links = "".join(f'<li><a href="#{s.name}">{escape(s.title)}</a></li>' for s in page.sections)
     kind, word = ("good", "Passed") if page.good else ("bad", "Attention")
+    if page.good and page.caution:
+        kind, word = "caution", "Passed by the model"
     word = page.word or word
+    verdict = f"{page.verdict} {page.caution}".rstrip()
     body = [
         '<body><a class="skip" href="#main">Skip to the report</a>',
         '<header><div class="bar"><p class="brand">camcomp</p>',
-        '<button type="button" id="theme" aria-pressed="false">Dark colours</button></div>',
+        '<button type="button" id="theme">Dark colours</button></div>',
         f'<h1>{escape(page.title)}</h1><p class="subtitle">{escape(page.subtitle)}</p>',
-        f'<p class="verdict {kind}"><strong>{escape(word)}.</strong> {escape(page.verdict)}</p>',
+        f'<p class="verdict {kind}"><strong>{escape(word)}.</strong> {escape(verdict)}</p>',
         '<dl class="cards">',
         *(
             f"<div><dt>{escape(what)}</dt><dd>{escape(value)}<small>{escape(remark)}</small></dd></div>"

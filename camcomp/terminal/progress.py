@@ -108,5 +108,5 @@ class _Line:
 
 def say(*lines: str, quiet: bool = False) -> None:
     """Write lines to standard error, unless quiet."""
-    if not quiet:
+    if lines and not quiet:
         print("\n".join(lines), file=sys.stderr)

@@ -64,7 +64,10 @@ def test_a_mode_of_the_machine_file_is_in_force_until_the_program_says_another(t
     done = camcomp("compensate", tmp_path / "p.nc", *config, "--summary", tmp_path / "s.json")
     figures = json.loads((tmp_path / "s.json").read_text())
     assert figures["control_mode"] == "G64 P0.05 Q0, G61" and figures["control_mode_stated"]
-    assert set(figures["cycle_time_s"]) == {"before", "after"} and b"control in G64 P0.05 Q0, G61: " in done.stderr
+    assert (
+        set(figures["cycle_time_s"]) == {"before", "after"}
+        and b"controller drives in G64 P0.05 Q0, G61: " in done.stderr
+    )
 
 
 def test_what_is_no_mode_is_refused_with_its_place(tmp_path):
@@ -255,7 +258,7 @@ def test_verify_says_so_in_text_and_json(tmp_path):
     schemas.check("verify", figures)
     before, after = (figures["cycle_time_s"][each] for each in ("before", "after"))
     assert before - after == pytest.approx(5.0, abs=0.1)
-    assert done.returncode == 0 and f"control in G64 P0.01: {before:.1f} s become {after:.1f} s".encode() in done.stderr
+    assert done.returncode == 0 and f"cycle time {after:.1f} s, before {before:.1f} s".encode() in done.stderr
     assert figures["cycle_time_s"]["after"] > 2.0 and set(figures["under_control"]) == {"rms_um", "max_um"}
 
 

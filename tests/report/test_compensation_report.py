@@ -134,7 +134,7 @@ def test_bands_and_trust_are_drawn(tmp_path):
     joints = tmp_path / "j.csv"
     html = compensate(tmp_path, "--config", spread, "--joints", joints, "-q")
     words, figures, columns = text_of(html), figures_of(html), table(joints)
-    assert "Machines drawn from them leave" in words and "100 % of the band is the cutting force" in words
+    assert "Machines drawn from them leave" in words and "100 % of this spread comes from the cutting force" in words
     assert re.search(r"process\.force\.Fr_N\s+100\.0", words)
     upper = next(each for each in figures["band"]["traces"] if each["name"].startswith("corrected, 95 %"))
     drawn = np.array(upper["y"], float)

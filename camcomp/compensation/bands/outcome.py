@@ -153,7 +153,7 @@ def in_words(inputs: Sequence[UncertainInput], shares: Sequence[tuple[str, float
         "the cutting force" if first.startswith("process.force") else "the machine" if first.startswith("robot") else ""
     )
     called = f"{meant} ({name})" if meant else name
-    return f"{100.0 * share:.0f} % of the band is {called}: {what}"
+    return f"{100.0 * share:.0f} % of this spread comes from {called}: {what}"
 
 
 def band_figures(totals: BandTotals, policy: str) -> dict[str, Any]:

@@ -73,6 +73,7 @@ class Bulk:
         self._told.set_result(None)
         self.totals = Totals(self.job, digest.hexdigest(), size, self.tolerance_um, self.on_rows is not None)
         self._lines = max(lines, 1)
+        self.totals.lines_in = lines
         self._stock = _stock_of(self.job, source, self.name, self.setup)
         top = self.job.conditions.stock_top_mm if self.job.conditions.model and self._stock is None else None
         self._runs = Runs(

@@ -73,7 +73,7 @@ class Totals:
         """Digest and size are those of the program; they decide which points are checked. tabled: rows are asked for."""
         self.job, self._tabled = job, tabled
         self.before, self.after, self.missed = _Errors(), _Errors(), _Errors()
-        self.points = self.motions = self.lines_out = self.joins = self.iterations = 0
+        self.points = self.motions = self.lines_in = self.lines_out = self.joins = self.iterations = 0
         self.change = self.force = np.zeros(len(job.machine.actuators))
         self.tilt = 0.0
         self.warnings: list[str] = []
@@ -227,10 +227,6 @@ class Totals:
     def finish(self, corrector: PlainCorrector, warnings: list[str]) -> None:
         """Solves the sample exactly and keeps the largest differences."""
         self.warnings = list(dict.fromkeys([*self.job.taken.remarks, *warnings]))
-        if self.joins:
-            self.warnings.append(
-                f"{self.joins} joining lines where the cutting force jumps; they are not part of before and after"
-            )
         self.warnings += rest_warning(self.resting)
         for each in self._control:
             each.finish()
@@ -278,6 +274,7 @@ class Totals:
             {
                 "points": self.points,
                 "segments_in": self.motions,
+                "lines_in": self.lines_in,
                 "lines_out": self.lines_out,
                 "before": self.before.figures(),
                 "after": self.after.figures(),

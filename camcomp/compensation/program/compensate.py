@@ -259,7 +259,7 @@ def _compensated(
                     version=version,
                     model=job.fingerprint,
                 )
-    warnings = _warnings(job, rows, control.resting) + control.warnings(
+    warnings = _warnings(job, control.resting) + control.warnings(
         path.line[track.motion[points.piece[points.judged]]], tolerance_um
     )
     if control.apart:
@@ -352,12 +352,8 @@ def _kept(track: Track, nodes: Nodes, commanded: Floats, half: float) -> Bools:
     return out
 
 
-def _warnings(job: Job, rows: CorrectedRows, resting: int) -> list[str]:
-    joins = int(rows.joining.sum())
-    out = (
-        [f"{joins} joining lines where the cutting force jumps; they are not part of before and after"] if joins else []
-    )
-    out += rest_warning(resting)
+def _warnings(job: Job, resting: int) -> list[str]:
+    out = rest_warning(resting)
     if job.config.process.temperature_C is None:
         warm = dict.fromkeys(cause.name for cause in job.causes if getattr(cause.effect, "WARMS", False))
         out += [

@@ -111,7 +111,8 @@ class Summary(Result):
 
     points: Annotated[int, Field(description="end points of the corrected program")]
     segments_in: Annotated[int, Field(description="motions of the program")]
-    lines_out: int
+    lines_in: Annotated[int, Field(description="lines of the program")]
+    lines_out: Annotated[int, Field(description="lines of the corrected program")]
     before: ErrorSize
     after: ErrorSize
     actuator_change_max_mm: float

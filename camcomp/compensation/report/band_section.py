@@ -65,7 +65,7 @@ def _figure_band(drawn: DrawnPath, bands: Bands) -> Figure:
         "band",
         "Band around the residual",
         f"Between what the corrected program leaves if every number of the machine file is right, and the error that 95 % of the "
-        f"machines that may be stay below: {words}. What the control merges and rounds is a curve of its own. Logarithmic scale.",
+        f"machines within the stated spreads stay below: {words}. What the control merges and rounds is a curve of its own. Logarithmic scale.",
         f"Plot of the residual and its 95 % band along the path: {words}.",
         [between, after, driven, upper, before],
         {"xaxis": axis("path length in mm"), "yaxis": axis("error in µm", type="log", dtick=1, exponentformat="power")},

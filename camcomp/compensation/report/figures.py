@@ -30,6 +30,7 @@ from camcomp.report.plot import (
 )
 
 AXES = "xyz"
+NO_ERROR_MM = 1e-6  # below it chain errors have no curve of their own
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,6 +89,8 @@ def figure_trajectories(result: Compensated, found: Trajectories) -> Figure:
         ("both", result.uncorrected),
         ("commanded (adjusted)", result.written.end),
     ]
+    if np.nanmax(np.abs(found.chain_error - target), initial=0.0) < NO_ERROR_MM:
+        named = [("programmed", target), ("original program under load", result.uncorrected), named[-1]]
     rows = result.rows
     hidden = (rows.kind == RAPID) | ~rows.corrected
     index, gap = broken(thin(np.column_stack((target, result.uncorrected - target))), hidden)
@@ -103,11 +106,11 @@ def figure_trajectories(result: Compensated, found: Trajectories) -> Figure:
     words = ", ".join(f"{name} {micrometres(value)}" for (name, _), value in zip(named[1:], off[1:], strict=True))
     return Figure(
         "trajectories",
-        "Five trajectories of the tool tip",
-        "Where the original program would take the tip for each cause alone and for both, and the path that is "
-        "commanded instead. Deviations from the programmed path are enlarged; the slider says how much. "
+        "Trajectories of the tool tip",
+        "Where the original program takes the tip, for each cause alone and for both where the machine has chain errors, and the "
+        "path that is commanded instead. Deviations from the programmed path are enlarged; the slider says how much. "
         f"True largest deviations: {words}.",
-        f"Plot of five tool tip trajectories with enlarged deviations. Largest true deviations: {words}.",
+        f"Plot of tool tip trajectories with enlarged deviations. Largest true deviations: {words}.",
         traces,
         {"xaxis": axis(""), "yaxis": axis("", scaleanchor="x", scaleratio=1)},
         height=560,

@@ -88,14 +88,26 @@ def compensation_html(
     sections += [_machine(job), inputs_section(inputs, result.written.data)]
     page = Page(
         title=f"{name} on {job.config.robot.name}",
-        subtitle=f"Compensation report: method {result.method}, {figures.points} end points from "
-        f"{figures.segments_in} motions",
+        subtitle=f"Compensation report: method {result.method}; {figures.lines_in} lines and {figures.segments_in} motions become "
+        f"{figures.lines_out} lines and {figures.points} end points",
         verdict=verdict,
         good=not failed,
+        caution=_caution(figures, tolerance_um),
         cards=_cards(figures, tolerance_um, drawn, result.state.rho, job, len(notes)),
         sections=sections,
     )
     return render(page)
+
+
+def _caution(figures: Summary, tolerance_um: float) -> str:
+    """A sentence where the path that the controller drives is farther off than the program."""
+    left = figures.under_control.max_um
+    if left <= max(tolerance_um, figures.after.max_um):
+        return ""
+    where = f"On the path that the controller drives in {figures.control_mode} up to {micrometres(left)} remain"
+    if figures.control_mode_stated:
+        return f"{where}; see the warnings."
+    return f"{where}: this mode is assumed. State it as control: path_mode, and the program is written for it."
 
 
 def _cards(
@@ -112,28 +124,26 @@ def _cards(
     mode = figures.control_mode + ("" if figures.control_mode_stated else " (assumed)")
     times = figures.cycle_time_s
     cards += [
-        (f"Under the control, {mode}", f"{micrometres(figures.under_control.max_um)}",
-         f"rms {micrometres(figures.under_control.rms_um)}, with what it merges and rounds, beside joining lines, too"),
+        (f"As the controller drives, {mode}", f"{micrometres(figures.under_control.max_um)}",
+         f"tip error, rms {micrometres(figures.under_control.rms_um)}; with the corners that it rounds, also at joining lines"),
         ("Cycle time", f"{brief(times.after)} s", f"before {brief(times.before)} s; with pauses (G4)"),
     ]  # fmt: skip
     acts = {"stock": "by the stock", "stated": "as stated", "none": "on every feed move"}
     cards.append(("Assumed force", acts[figures.force.engagement], figures.force.text))
     if expected := figures.expected:
         cards.append(
-            ("To be expected", f"{micrometres(expected.p95_um)}", "95 % of all points of machines that may be")
+            ("Expected", f"{micrometres(expected.p95_um)}", "95 % of all points, machine within the stated spreads")
         )
     for most, what, unit in (
-        (figures.actuator_change_max_mm, "Largest change of a slide", "mm"),
-        (1e3 * (figures.actuator_change_max_rad or 0.0), "Largest change of a hinge", "mrad"),
+        (figures.actuator_change_max_mm, "Largest correction at a slide", "mm"),
+        (1e3 * (figures.actuator_change_max_rad or 0.0), "Largest correction at a hinge", "mrad"),
         (figures.actuator_force_max_N, "Largest drive force", "N"),
         (1e-3 * (figures.actuator_torque_max_Nmm or 0.0), "Largest drive torque", "N·m"),
     ):
         if most:
             cards.append((what, f"{brief(most)} {unit}", ""))
     tilt = figures.platform_tilt_max_mrad
-    cards.append(
-        ("Platform tilt left", f"{brief(tilt)} mrad", "not corrected with three actuators" if tilt > 1e-6 else "")
-    )
+    cards.append(("Platform tilt", f"{brief(tilt)} mrad", "not corrected with three actuators" if tilt > 1e-6 else ""))
     cards.append(("Joining lines", str(figures.joining_lines), "where the correction jumps"))
     cards += _travel(drawn, rho, job)
     cards.append(("Warnings", str(warnings), "read them below" if warnings else "nothing to look at"))

@@ -124,6 +124,7 @@ def summary(result: Compensated, job: Job) -> Summary:
         {
             "points": len(result.rows.piece),
             "segments_in": len(result.program.path),
+            "lines_in": result.program.data.count(b"\n"),
             "lines_out": result.written.data.count(b"\n"),
             "before": error_size(result.before),
             "after": error_size(result.after),

@@ -9,7 +9,7 @@
 
   function setTheme(name) {
     root.dataset.theme = name;
-    themeButton.setAttribute("aria-pressed", String(name === "dark"));
+    themeButton.textContent = name === "dark" ? "Light colours" : "Dark colours";
   }
   setTheme(matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light");
 

@@ -7,10 +7,19 @@ if TYPE_CHECKING:
 
 
 def control_told(figures: "Summary | Verification") -> str:
-    """What the control makes of the program."""
+    """Tip error and cycle time on the path that the controller drives."""
     mode = figures.control_mode + ("" if figures.control_mode_stated else " (assumed)")
     times, left = figures.cycle_time_s, figures.under_control
     return (
-        f"control in {mode}: {times.before:.1f} s become {times.after:.1f} s; "
-        f"it takes the tip error to rms {left.rms_um:.2f} um, max {left.max_um:.2f} um"
+        f"on the path that the controller drives in {mode}: tip error rms {left.rms_um:.2f} um, max {left.max_um:.2f} um; "
+        f"cycle time {times.after:.1f} s, before {times.before:.1f} s"
     )
+
+
+def expected_told(figures: "Summary | Verification") -> list[str]:
+    """The error to be expected of real machines, where the machine file states how sure its numbers are."""
+    if not (expected := figures.expected):
+        return []
+    low, high = expected.rms_ci95_um
+    text = f"rms {expected.rms_um:.2f} um (95 %: {low:.2f} to {high:.2f}), 95 % of all points below {expected.p95_um:.2f} um"
+    return [f"expected on a machine within the stated spreads: {text}", f"{figures.advice}"]

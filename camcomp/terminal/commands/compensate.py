@@ -7,12 +7,14 @@ import click
 from camcomp.ground.errors import CheckFailed
 from camcomp.ground.files import display_name
 from camcomp.terminal.commands._options import OUTPUT, dialect_option, quiet_option, stock_option
-from camcomp.terminal.commands._told import control_told
+from camcomp.terminal.commands._told import control_told, expected_told
 from camcomp.terminal.progress import say, working
 
 if TYPE_CHECKING:
     from camcomp.api.compensation import Summary
     from camcomp.api.machine import StockChoice
+
+LEAST_TILT_MRAD = 0.005  # below it the two decimals show none
 
 
 @click.command()
@@ -107,34 +109,36 @@ def _told(figures: "Summary") -> list[str]:
     before, after = figures.before, figures.after
     changes = ((figures.actuator_change_max_mm, "mm"), (figures.actuator_change_max_rad, "rad"))
     efforts = ((figures.actuator_force_max_N, "N"), (figures.actuator_torque_max_Nmm, "Nmm"))
+    motions = f"{figures.segments_in} motions in, {figures.points} end points out ({figures.method})"
     lines = [
-        f"{figures.segments_in} motions in, {figures.points} end points out ({figures.method})",
+        f"{motions}; {figures.lines_in} lines become {figures.lines_out}",
         f"force: {figures.force.text}",
         *(f"read from the program: {each}" for each in figures.stated_in_program or ()),
         f"tip error before: rms {before.rms_um:.2f} um, max {before.max_um:.2f} um",
         f"tip error after:  rms {after.rms_um:.2f} um, max {after.max_um:.2f} um",
-        f"largest change of an actuator {_either(*changes)}",
-        f"largest drive force {_either(*efforts)}",
-        f"platform tilt left {figures.platform_tilt_max_mrad:.2f} mrad",
+        f"largest correction at an actuator {_either(*changes)}, largest drive load {_either(*efforts)}",
     ]
+    if (tilt := figures.platform_tilt_max_mrad) >= LEAST_TILT_MRAD:
+        lines.append(f"platform tilt under load {tilt:.2f} mrad, not corrected by words X Y Z")
+    if joins := figures.joining_lines:
+        lines.append(f"{joins} joining lines where the cutting force jumps; not counted in the tip error")
     if taken := figures.taken:
         lines.append(
             f"policy {taken.policy}: of {taken.points} points {taken.shrunk} take less than all of the correction and "
             f"{taken.left_alone} none"
         )
-    if expected := figures.expected:
-        low, high = expected.rms_ci95_um
-        lines.append(
-            f"expected of machines that may be: rms {expected.rms_um:.2f} um ({low:.2f} to {high:.2f}), "
-            f"95 % of all points below {expected.p95_um:.2f} um"
-        )
-        lines.append(f"{figures.advice}")
+    lines += expected_told(figures)
     if checked := figures.interpolation:
         lines.append(
             f"interpolated between {checked.exact_solutions} exact solutions; {checked.checked} points checked: "
             f"{checked.worst_um:.4f} um at most, allowed {checked.bound_um:g} um"
         )
-    return lines + [f"warning: {each}" for each in figures.warnings] + [control_told(figures)]
+    lines.append(control_told(figures))
+    if not figures.control_mode_stated and figures.under_control.max_um > figures.after.max_um:
+        lines.append(
+            "  state the controller's mode as `control: {path_mode: G64 P0.01}` to have the program written for it"
+        )
+    return lines + [f"warning: {each}" for each in figures.warnings]
 
 
 def _either(*figures: tuple[float | None, str]) -> str:

@@ -53,7 +53,9 @@ def command(
 ) -> None:
     """Find out why a machine and its model differ.
 
-    EXPERIMENT is a YAML file that names the config under judgement and the runs with their programs and logs.
+    EXPERIMENT is a YAML file that names the config under judgement and the runs with their programs and logs. The answer goes
+    to standard error; the whole result as JSON to --json, or to standard output where that is no terminal and no other output is
+    asked for.
     """
     if report:
         from camcomp.report.page import plot_library
@@ -66,7 +68,7 @@ def command(
     for each in done.notes:
         click.echo(f"note: {each}", err=True)
     outputs: dict[str, bytes] = {}
-    if json_file or not (report or config_file or next_program or residuals):
+    if json_file or not (sys.stdout.isatty() or report or config_file or next_program or residuals):
         outputs[json_file or STANDARD] = done.result.to_json()
     if report:
         with working("drawing the report", quiet=quiet):

@@ -30,6 +30,8 @@ def command(configs: tuple[str, ...], as_json: bool, columns: str | None) -> Non
     try:
         answer_lines(machine, sys.stdin.buffer, sys.stdout.buffer, tally, columns=columns, as_json=as_json)
     finally:
-        print(f"{tally.count} set-points, {tally.text()}{tally.errors} errors", file=sys.stderr)
+        print(f"{tally.count} set-points, {tally.text()}{tally.errors} lines with an error", file=sys.stderr)
     if tally.errors:
-        raise CheckFailed("CC605", f"{tally.errors} of the lines have an error as their answer")
+        raise CheckFailed(
+            "CC605", f"{tally.errors} of the lines were answered with an error; the column `error` says why"
+        )

@@ -9,7 +9,7 @@ from camcomp.ground.files import display_name, write_all
 from camcomp.report.findings import Case, Finding, findings_of
 from camcomp.report.outputs import findings_files
 from camcomp.terminal.commands._options import OUTPUT, dialect_option, findings_options, quiet_option, stock_option
-from camcomp.terminal.commands._told import control_told
+from camcomp.terminal.commands._told import control_told, expected_told
 from camcomp.terminal.progress import say, working
 
 if TYPE_CHECKING:
@@ -70,9 +70,7 @@ def command(
         for each_warning in done.warnings:
             say(f"warning: {each_warning}", quiet=quiet)
         say(control_told(figures), quiet=quiet)
-        if expected := figures.expected:
-            text = f"expected of machines that may be: rms {expected.rms_um:.2f} um, 95 % of all points below {expected.p95_um:.2f} um"
-            say(text, f"{figures.advice}", quiet=quiet)
+        say(*expected_told(figures), quiet=quiet)
         over, worst = [each for each in done.lines if each.judged_um > tolerance], done.worst_um
         if not worst <= tolerance * (1.0 + 1e-9):
             lines = ", ".join(str(each.line) for each in over)

@@ -137,7 +137,7 @@ def test_tables_and_summary(tmp_path, capsys):
     assert low < figures["expected"]["rms_um"] < high and figures["expected"]["rms_um"] < figures["expected"]["p95_um"]
     assert sum(each["share"] for each in figures["band"]) == pytest.approx(1.0)
     assert [each["input"] for each in figures["band"]] == ["cut", "tool.length_mm", "process.force.Fz_N"]
-    assert "of the band is the cutting force (cut): cut two slots" in said
+    assert "of this spread comes from the cutting force (cut): cut two slots" in said
     with open(tmp_path / "j.csv") as file:
         rows = list(csv.DictReader(file))
     assert list(rows[0])[-2:] == ["band_um", "gain_um"]

@@ -109,7 +109,7 @@ def test_verify_repeats_the_figures_from_the_text(whole, policy, capsys):
     assert found["expected"]["p95_um"] == pytest.approx(figures["expected"]["p95_um"], rel=0.03)
     assert [each["input"] for each in found["band"]] == [each["input"] for each in figures["band"]]
     assert (policy == "full") == ("taken" not in found)
-    assert "of the band is the cutting force (cut)" in capsys.readouterr().err
+    assert "of this spread comes from the cutting force (cut)" in capsys.readouterr().err
 
 
 def test_verify_refuses_a_program_that_took_another_share(whole, capsys):
