@@ -6,7 +6,7 @@ The names below are imported when they are first asked for: `import camcomp` its
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 if TYPE_CHECKING:
     from camcomp.api.compensation import CompensatedProgram, compensate
