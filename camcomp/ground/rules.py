@@ -689,4 +689,10 @@ RULES: dict[str, Rule] = {
         "from above within the travel of its actuators.",
         "next_experiment of the result says what would help, if anything",
     ),
+    "CC609": Rule(
+        "worse than the original",
+        "By the model the corrected program has a larger error at its worst point than the original one.",
+        "use the original program, or a smaller --tolerance-um; the machine file may describe a machine that needs no "
+        "correction here",
+    ),
 }

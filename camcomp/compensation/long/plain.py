@@ -133,7 +133,7 @@ class PlainCorrector:
             loads = self._left_lines(run, loads, uncertainty)
         lead, trail = joints_at(loads, run.plain.kind, before, after)
         self.resolution = self.language.step_mm(self.job.config.control.resolution_mm, run.state.unit)
-        self.budget = chord_budget(1e3 * self.tolerance, self.resolution)
+        self.budget = float(chord_budget(np.array(self.tolerance), self.resolution))
         tolerance = np.full(run.motions, self.budget)
         hard = (loads.length > EASY_MM) & (run.plain.kind == LINE)
         settled = False

@@ -11,7 +11,14 @@ from camcomp.compensation.long.control_account import ControlAccount, SeenPoints
 from camcomp.compensation.long.plain import Done, PlainCorrector
 from camcomp.compensation.long.plain_run import PlainRun
 from camcomp.compensation.program.compensate import Compensated
-from camcomp.compensation.program.result import CycleTime, ErrorSize, Interpolation, Summary, job_figures
+from camcomp.compensation.program.result import (
+    CycleTime,
+    ErrorSize,
+    Interpolation,
+    Summary,
+    job_figures,
+    worse_than_before,
+)
 from camcomp.compensation.program.under_control import (
     apart_warning,
     mode_name,
@@ -76,6 +83,7 @@ class Totals:
         self.points = self.motions = self.lines_in = self.lines_out = self.joins = self.iterations = 0
         self.change = self.force = np.zeros(len(job.machine.actuators))
         self.tilt = 0.0
+        self.step_mm = job.config.control.resolution_mm  # of the output
         self.warnings: list[str] = []
         self.interpolated: Interpolation | None = None
         self.bands: BandTotals | None = None
@@ -107,6 +115,7 @@ class Totals:
         t = self._t + np.cumsum(np.where(moving, np.diff(s, prepend=self._s) / np.where(moving, feed, 1.0) * 60.0, 0.0))
         self._s, self._t = self._s + float(length.sum()), float(t[-1])
         joints, drive = corrector.actuators(done)
+        self.step_mm = max(self.step_mm, corrector.resolution)
         self._common(whole.motions, rows.joining, np.ones(len(s), np.bool_), plain.row[rows.move] + run.row0 + 1, answers.nominal,
                      joints, drive, answers.rest[:, :3], done.before, done.after, done.missed)  # fmt: skip
         self._plain_control(run, done)
@@ -302,6 +311,7 @@ class Totals:
         worst = 1e3 * self.missed.most
         if not worst <= tolerance_um * (1.0 + 1e-9):
             out.append(("CC601", f"{worst:.3f} um are left, more than the tolerance of {tolerance_um:g} um"))
+        out += worse_than_before(self.before.figures().max_um, self.after.figures().max_um, self.step_mm)
         for a, name in enumerate(self.job.machine.actuators):
             if self._beyond[a]:
                 low, high = self.job.machine.limits[a]

@@ -17,10 +17,18 @@ from camcomp.compensation.program.arcs_out import Arcs, Bend
 from camcomp.compensation.program.chords import Nodes, second_derivative, trial_nodes
 from camcomp.compensation.program.corrected_rows import CorrectedRows, corrected_rows, output_of
 from camcomp.compensation.program.judged_points import JudgedPoints, Seen, judged_points, see, see_original
-from camcomp.compensation.program.moves import WITHIN_RAPID, chord_budget, corrected_pieces, refuse_unsolved, travel_of
+from camcomp.compensation.program.moves import (
+    WITHIN_RAPID,
+    chord_budget,
+    corrected_pieces,
+    error_goals,
+    refuse_unsolved,
+    travel_of,
+)
 from camcomp.compensation.program.policy import Shares, shares_of
 from camcomp.compensation.program.posture import check_posture, whole_pose
 from camcomp.compensation.program.program_bands import bands_of
+from camcomp.compensation.program.result import error_size, worse_than_before
 from camcomp.compensation.program.reversals import cut_at_reversals
 from camcomp.compensation.program.table_knots import cut_at_knots
 from camcomp.compensation.program.under_control import (
@@ -93,6 +101,8 @@ class Compensated:
         worst = float(np.nanmax(size)) if len(size) else 0.0
         if not worst <= tolerance_um * (1.0 + 1e-9):
             out.append(("CC601", f"{worst:.3f} um are left, more than the tolerance of {tolerance_um:g} um"))
+        step = self.program.step_mm(job.config.control.resolution_mm)
+        out += worse_than_before(error_size(self.before).max_um, error_size(self.after).max_um, step)
         for a, name in enumerate(job.real_machine.actuators):
             low, high = job.machine.limits[a]
             value = self.state.rho[:, a]
@@ -176,24 +186,29 @@ def _compensated(
     feeding = corrected & (path.kind[track.motion] != RAPID)
     if part is not None:
         feeding &= (track.motion >= part.first) & (track.motion < part.last)
-    budget = chord_budget(tolerance_um, resolution)
-    tolerance = np.full(len(track.motion), budget)
 
     trial = trial_nodes(track.length, track.angle, feeding & ~turning & (track.length > 0.0), spacing)
     with part_of_work(0.0, 0.4, points=True):
         aimed = _aim(program, job, track, trial, corrected, method, shares)
     second = second_derivative(trial, aimed.commanded)
-    kept = _kept(track, trial, aimed.commanded, 0.5 * resolution)
+    correction = aimed.commanded - track.points(trial.piece, trial.w)
+    kept = _kept(track, trial, correction, 0.5 * resolution)
+    goal = error_goals(tolerance_um, resolution, _largest(track, trial, np.linalg.norm(correction, axis=1)))
+    budget = chord_budget(goal, resolution)
+    tolerance = budget.copy()
+    if shares is not None:
+        goal *= WITH_SHARES
     tolerance[kept | turning] = np.inf
     able = feeding & ~kept & (arcs and not job.causes)  # what drives leave over has waves that no arc follows
     bend = Bend.of(track, trial, aimed.commanded, second, tolerance, able)
-    tolerance[bend.use] = max(budget - np.sqrt(0.5) * resolution, 0.1 * budget)  # the centre is rounded, too
+    rounded = np.maximum(budget - np.sqrt(0.5) * resolution, 0.1 * budget)  # the centre is rounded, too
+    tolerance[bend.use] = rounded[bend.use]
     last, last_count = np.full(len(tolerance), np.inf), np.zeros(len(tolerance), np.int64)
     for round_ in range(MAX_ROUNDS):
         nodes, shift = bend.divided(trial, tolerance)
         if (gone := bend.pointless(nodes)).any():
             bend.use &= ~gone
-            tolerance[gone] = budget
+            tolerance[gone] = budget[gone]
             nodes, shift = bend.divided(trial, tolerance)
         with part_of_work(1.0 - 0.6 * 0.5**round_, 1.0 - 0.35 * 0.5**round_, points=True):
             commanded, circles = _bent(program, job, track, nodes, shift, corrected, method, bend, shares)
@@ -217,7 +232,6 @@ def _compensated(
         missed_by = after.error if left is None else after.error - left
         size = np.where(after.status == 0, np.linalg.norm(missed_by, axis=1), np.inf)
         np.maximum.at(worst, points.piece[points.judged], size[points.judged])
-        goal = 1e-3 * tolerance_um * (1.0 if shares is None else WITH_SHARES)
         missed = (worst > goal) & ~kept
         count = np.diff(nodes.first)
         stuck = missed & (worst >= STUCK * last) & (count > last_count)
@@ -227,7 +241,7 @@ def _compensated(
             break
         last, last_count = np.where(straighten, np.inf, worst), count
         bend.use &= ~straighten
-        tolerance[straighten] = budget
+        tolerance[straighten] = budget[straighten]
         tolerance = np.where(missed, tolerance * np.clip(0.9 * goal / np.maximum(worst, 1e-12), 0.3, 0.9), tolerance)
     with part_of_work(0.8, 1.0, points=True):
         before = see_original(job, points)
@@ -343,11 +357,16 @@ def _bent(
     return commanded, circles
 
 
-def _kept(track: Track, nodes: Nodes, commanded: Floats, half: float) -> Bools:
-    """Pieces (p,) that stay as programmed, arcs as arcs: whole motions whose correction would be rounded away."""
-    moved = np.abs(commanded - track.points(nodes.piece, nodes.w)).max(axis=1)
-    most = np.zeros(len(track.motion))
-    np.maximum.at(most, nodes.piece, moved)
+def _largest(track: Track, nodes: Nodes, size: Floats) -> Floats:
+    """The largest of sizes (k,) at the nodes of every piece (p,)."""
+    out = np.zeros(len(track.motion))
+    np.maximum.at(out, nodes.piece, size)
+    return out
+
+
+def _kept(track: Track, nodes: Nodes, correction: Floats, half: float) -> Bools:
+    """Pieces (p,) that stay as programmed, arcs as arcs: whole motions whose correction (k, 3) would be rounded away."""
+    most = _largest(track, nodes, np.abs(correction).max(axis=1))
     out: Bools = (most <= half) & (np.bincount(track.motion)[track.motion] == 1)
     return out
 

@@ -51,12 +51,22 @@ def row_layout(path: Path, track: Track, step: Floats, resolution: float) -> Lay
     return Layout(corrected, leading, trailing)
 
 
-def chord_budget(tolerance_um: float, step_mm: float) -> float:
-    """What straight lines may miss, mm, beside the rounding of their ends to steps of step_mm."""
-    tolerance, rounding = 1e-3 * tolerance_um, 0.5 * np.sqrt(3.0) * step_mm
-    if rounding >= tolerance:  # rounding alone leaves more than that, and finer lines do not help
-        return tolerance
-    return float(max(tolerance - rounding, 0.1 * tolerance))
+def error_goals(tolerance_um: float, step_mm: float, correction: Floats) -> Floats:
+    """Largest error (p,) mm that pieces may keep: the tolerance, and no more than they have without their correction.
+
+    correction (p,): size of the largest one of a piece, mm. Rounding to steps of step_mm bounds the goal from below.
+    """
+    out: Floats = np.minimum(1e-3 * tolerance_um, np.maximum(correction, np.sqrt(3.0) * step_mm))
+    return out
+
+
+def chord_budget(goal: Floats, step_mm: float) -> Floats:
+    """Share (p,) of error goals (p,) mm that straight lines may use, beside the rounding of their ends to steps of step_mm.
+
+    Where rounding alone leaves more than the goal, finer lines do not help and get all of it.
+    """
+    rounding = 0.5 * np.sqrt(3.0) * step_mm
+    return np.where(rounding >= goal, goal, np.maximum(goal - rounding, 0.1 * goal))
 
 
 def corrected_pieces(path: Path, track: Track) -> Bools:

@@ -12,6 +12,8 @@ from camcomp.ground.result import Result, Size
 from camcomp.model.cutting.assumed import Engagement, assumed_force
 from camcomp.model.job import Job
 
+WORSE_SHARE = 0.01  # by which the largest error may grow (contract, section 4)
+
 
 class ErrorSize(Result):
     """Distance of the loaded tip from the programmed one."""
@@ -27,6 +29,17 @@ def error_size(error: Floats) -> ErrorSize:
     if not len(size):
         return ErrorSize(rms_um=0.0, max_um=0.0)
     return ErrorSize(rms_um=float(np.sqrt(np.mean(size**2))), max_um=float(size.max()))
+
+
+def worse_than_before(before_um: float, after_um: float, step_mm: float) -> list[tuple[str, str]]:
+    """The failed check, rule id and text, of a program whose largest error has grown; steps of step_mm are its rounding."""
+    allowed = max((1.0 + WORSE_SHARE) * before_um, before_um + 1e3 * np.sqrt(3.0) * step_mm)
+    if after_um <= allowed:
+        return []
+    text = (
+        f"the largest error grows from {before_um:.3f} um to {after_um:.3f} um; the original program is the better one"
+    )
+    return [("CC609", text)]
 
 
 class CycleTime(Result):
