@@ -1,7 +1,8 @@
 """A carriage errs as it moves along its axis: along and about X, Y, Z, by the letters of ISO 230-1.
 
 E, the direction of the error (X, Y, Z) or the axis it turns about (A, B, C), and the axis that moves: EXX positioning, EYX
-straightness, ECX yaw. Angles move the tip by their arm (Abbe): the tool, and the carriages that this one bears.
+straightness, ECX yaw. Coefficients are zero at the program's origin (G54), tables at the places that they name in
+machine coordinates. Angles move the tip by their arm (Abbe): the tool, and the carriages that this one bears.
 """
 
 from collections.abc import Mapping

@@ -21,6 +21,8 @@ from camcomp.model.cutting.track import PLUNGE_SINE
 
 Engagement = Literal["stock", "stated", "none"]
 TWO_WAYS = "`workpiece: {stock: ...}` or `--stock program`"
+LEVEL_MM = 1e-3  # of height: moves within it stay at one depth
+MOST_LINES = 10  # named in a warning
 MOST_SAMPLES = 20_000  # of a path in the step-over test
 SAMPLE_DIAMETERS = 0.5  # distance of samples along the path, in tool diameters
 BESIDE_DIAMETERS = (0.05, 0.9)  # distance of a neighbouring pass, in tool diameters: retraced paths are no step-over
@@ -72,7 +74,7 @@ def _cut(config: Config) -> str:
 
 
 def doubtful_force(config: Config, path: Path) -> list[str]:
-    """Warnings where the assumed force cannot be right: drills, ball tools, plunges, step-overs below the diameter.
+    """Warnings where the assumed force cannot be right: drills, ball tools, step-overs below the diameter, rapids at depth.
 
     Empty where a stock gives the engagement or no force acts.
     """
@@ -84,12 +86,31 @@ def doubtful_force(config: Config, path: Path) -> list[str]:
         f"the assumed force is that of a flat end mill, and the tool is a {kind}; {TWO_WAYS}"
         for kind in sorted({str(each.type) for each in cutters} & {"ball", "drill"})
     ]
+    if lines := _rapids_at_depth(path, config.workpiece.stock_top_mm):
+        named = ", ".join(map(str, lines[:MOST_LINES])) + (" ..." if len(lines) > MOST_LINES else "")
+        out.append(
+            f"G0 at cutting depth between two cuts at source lines {named}: the model has no force there, and the "
+            "machine may cut at rapid speed; retract, or state the stock"
+        )
     if share := _beside_share(path, on, cutters):
         out.append(
             f"{100.0 * share:.0f} % of the feed path runs less than one tool diameter beside an earlier pass; "
             f"the assumed force is too large there; {TWO_WAYS}"
         )
     return out
+
+
+def _rapids_at_depth(path: Path, top_mm: float | None) -> list[int]:
+    """Source lines of lateral rapids that begin and end at the depth of the cuts before and behind them."""
+    known = path.known & ~path.machine
+    way = path.end - path.start
+    flat = known & (np.abs(way[:, 2]) < LEVEL_MM) & (np.hypot(way[:, 0], way[:, 1]) > LEVEL_MM)
+    cuts = flat & (path.kind != RAPID)
+    if top_mm is not None:
+        cuts &= path.end[:, 2] < top_mm
+    between = np.zeros(len(path), np.bool_)
+    between[1:-1] = flat[1:-1] & (path.kind[1:-1] == RAPID) & cuts[:-2] & cuts[2:]
+    return [int(line) for line in np.unique(path.line[between])]
 
 
 def _beside_share(path: Path, on: Ints, cutters: list[Cutter]) -> float:

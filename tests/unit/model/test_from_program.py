@@ -95,6 +95,23 @@ def test_a_second_pass_beside_the_first_is_warned_of(tmp_path):
     assert not any("% of the feed path" in each for each in apart)
 
 
+RAPID_CUTS = "G21 G90\nS8000 M3\nG0 X0 Y0 Z5\nG1 Z-1 F300\nG1 X10 F600\nG0 X20\nG1 X30\nG0 Z5\nG0 X0\nM30\n"
+
+
+@pytest.mark.parametrize(
+    ("more", "text", "lines"),
+    [
+        ("", RAPID_CUTS, "6"),
+        ("", RAPID_CUTS.replace("G0 X20", "G0 Z5\nG0 X20\nG0 Z-1"), None),
+        ("workpiece: {stock_top_mm: -2}\n", RAPID_CUTS, None),
+        ("workpiece: {stock_top_mm: 0}\n", RAPID_CUTS, "6"),
+    ],
+)
+def test_a_rapid_at_cutting_depth_is_warned_of(tmp_path, more, text, lines):
+    warned = [each for each in compensate(text.encode(), machine(tmp_path, more)).summary.warnings if "G0" in each]
+    assert len(warned) == (lines is not None) and all(f"source lines {lines}:" in each for each in warned)
+
+
 @pytest.mark.parametrize("kind", ["ball", "drill"])
 def test_a_tool_that_is_no_flat_mill_is_warned_of(tmp_path, kind):
     own = machine(tmp_path, f"tool: {{diameter_mm: 8, type: {kind}}}\n")
