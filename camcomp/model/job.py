@@ -113,7 +113,7 @@ class Job:
         kept = tuple(cause for cause in self.causes if not cause.uncorrectable)
         if len(kept) == len(self.causes):
             return self
-        other = Job(self.config)
+        other = replace(self)
         vars(other)["causes"] = kept
         return other
 

@@ -8,7 +8,7 @@ import pytest
 
 from camcomp.ground import shelf
 from camcomp.model.config.load import load_config
-from camcomp.model.effect import Load, Motion, applies
+from camcomp.model.effect import Cause, Load, Motion, applies
 from camcomp.model.job import Job
 from camcomp.model.motion.twin import twin_of
 from camcomp.model.statics.masses import acceleration, has_moved_mass, mass_loads
@@ -93,6 +93,27 @@ def test_a_drive_with_a_largest_speed_falls_behind_and_catches_up():
     fine, want = bodies.slow_follower(asked, 70.0, 3.0, 5e-4)
     assert got == pytest.approx(np.interp(time, fine, want), abs=0.05)
     assert np.abs(got - x[:, 0]).max() > 5.0
+
+
+def test_a_search_for_the_limit_begins_at_the_speed_that_encoders_keep_to():
+    def asked(t):
+        return 40.0 * np.sin(3.0 * t)
+
+    time, reached = bodies.slow_follower(asked, 70.0, 3.0, 5e-4)
+    rows = slice(None, None, 60)
+    guess = shelf.load("effects", "speed_limit").first_guess
+    assert guess([(time[rows], asked(time[rows]), reached[rows])]) == pytest.approx(70.0, rel=0.01)
+    assert guess([(time[rows], asked(time[rows]), asked(time[rows]))]) > 1e5
+
+
+def test_compensation_leaves_what_no_set_point_corrects():
+    job = Job(load_config([KUKA]))
+    other = [Cause(name, shelf.load("effects", name), "A2") for name in ("speed_limit", "inertia")]
+    vars(job)["causes"] = tuple(other)
+    assert [each.name for each in job.correctable.causes] == ["inertia"]
+    job = Job(load_config([KUKA]))
+    vars(job)["causes"] = tuple(other[1:])
+    assert job.correctable is job
 
 
 def simulated(folder, config, program, **more):

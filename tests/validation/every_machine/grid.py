@@ -65,7 +65,7 @@ SIZES: list[tuple[str, str | None, str, tuple[float | None, ...], dict[str, Any]
     ("link_growth", OWN, "growth_mm_per_K", (None, None, None, None, None, None, 0.004, 0.004), WARM),
     ("base_compliance", None, "rad_per_Nmm", (None, None, None, None, 7e-9, None, 5e-11, 1e-8), {}),
     ("speed_limit", OWN, "speed_mm_per_s", (19.9, 16.0, 16.0, 16.0, 16.0, 12.0, None, None), {}),
-    ("speed_limit", OWN, "speed_rad_per_s", (None, None, None, None, None, None, 0.0133, 0.0206), {}),
+    ("speed_limit", OWN, "speed_rad_per_s", (None, None, None, None, None, None, 0.0133, 0.043), {}),
     ("gravity_compliance", OWN, "compliance_rad_per_Nmm", (None, None, None, None, None, None, 1.3e-11, None), {}),
     ("joint_hysteresis", OWN, "width_rad", (None, None, None, None, None, None, 5e-5, 8.5e-5), {}),
 ]  # fmt: skip

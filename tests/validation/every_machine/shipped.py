@@ -26,7 +26,7 @@ BEGINS_S = {"left": 0, "right": 900, "ramps": 2400}  # on the common clock
 TIP_MM = 0.003
 ENCODER = {"mm": 5e-4, "rad": 2e-7}
 STEP_S = 0.03
-FINE_S = {"servo_overshoot": 0.015}  # rings within some rows
+FINE_S = {"servo_overshoot": 0.015, "speed_limit": 0.01}  # rings, or begins, within some rows
 CONTROL = {"inertia": {"acceleration_mm_per_s2": 60.0}}  # else over within one row
 
 
