@@ -348,7 +348,7 @@ def _python() -> str:
     ]
     for name in camcomp.__all__:
         member = getattr(camcomp, name)
-        parts.append(f"## {name}\n\n{_first(member)}\n\n::: {member.__module__}.{name}\n")
+        parts.append(f"## {name}\n\n::: {member.__module__}.{name}\n")
     return "\n".join(parts)
 
 

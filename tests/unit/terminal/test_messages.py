@@ -1,0 +1,83 @@
+"""What verbs print says what was done and what a user can do, in one reading."""
+
+import json
+import sys
+from types import SimpleNamespace
+
+import pytest
+
+from camcomp.api import diagnosis
+from camcomp.compensation.report.page import _caution
+from camcomp.ground.files import shipped
+from camcomp.terminal.cli import run
+from camcomp.terminal.commands import _told
+
+CARTESIAN = ("--config", str(shipped("config/cartesian.yaml")))
+SQUARE = "G21 G90 G17 G94\nT1 M6\nG43 H1\nS8000 M3\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X10 F600\nG1 Y10\nX0\nY0\nG0 Z5\nM30\n"
+
+
+@pytest.fixture
+def compensated(tmp_path, capfd):
+    """What compensate prints of the square, and its summary."""
+    (tmp_path / "p.nc").write_text(SQUARE)
+
+    def call(yaml=""):
+        (tmp_path / "more.yaml").write_text(yaml)
+        more = ("--config", str(tmp_path / "more.yaml")) if yaml else ()
+        outputs = ("-o", str(tmp_path / "o.nc"), "--summary", str(tmp_path / "s.json"))
+        assert run(["compensate", str(tmp_path / "p.nc"), *CARTESIAN, *more, *outputs]) == 0
+        return capfd.readouterr().err, json.loads((tmp_path / "s.json").read_text()), (tmp_path / "o.nc").read_bytes()
+
+    return call
+
+
+def test_compensate_counts_lines_and_says_what_to_state(compensated):
+    said, figures, written = compensated()
+    assert f"12 lines become {len(written.splitlines())}\n" in said and figures["lines_in"] == 12
+    assert "5 joining lines where the cutting force jumps; not counted in the tip error\n" in said
+    assert not [each for each in figures["warnings"] if "joining" in each]
+    assert "drives in G64 (assumed): tip error" in said and "`control: {path_mode: G64 P0.01}`" in said
+    assert "warning: " in said and "tool 1 has no length in `control: tool_lengths_mm`" in said
+    assert "platform tilt" not in said  # this machine has none
+
+
+def test_a_stated_mode_needs_no_hint(compensated):
+    said, _, _ = compensated("control: {path_mode: G61, tool_lengths_mm: {1: 0}}\n")
+    assert "path_mode" not in said and "warning" not in said
+
+
+def test_numbers_without_a_point_say_both_readings(compensated):
+    said, _, _ = compensated("control: {dialect: fanuc}\n")
+    assert "X10 as 10 mm; a controller that counts increments reads 0.01 mm" in said
+    assert "`control: {input_increment_mm: 0.001}`" in said
+
+
+def test_expected_errors_name_the_stated_spreads():
+    size = SimpleNamespace(rms_um=3.0, rms_ci95_um=(1.0, 5.0), p95_um=6.0)
+    first, second = _told.expected_told(SimpleNamespace(expected=size, advice="cut two slots"))
+    assert first.startswith("expected on a machine within the stated spreads: rms 3.00 um (95 %: 1.00 to 5.00)")
+    assert second == "cut two slots" and _told.expected_told(SimpleNamespace(expected=None)) == []
+
+
+@pytest.mark.parametrize(
+    ("terminal", "words", "shown"), [(True, (), ""), (False, (), "{}"), (True, ("--json", "-"), "{}")]
+)
+def test_diagnose_prints_json_where_asked_or_into_a_pipe(monkeypatch, capfd, terminal, words, shown):
+    done = SimpleNamespace(notes=(), result=SimpleNamespace(to_json=lambda: b"{}"), configs=(), answer=["none: ..."])
+    monkeypatch.setattr(diagnosis, "diagnose", lambda *_, **__: done)
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: terminal, raising=False)
+    assert run(["diagnose", "experiment.yaml", *words]) == 0
+    out, err = capfd.readouterr()
+    assert out == shown and "none: ..." in err
+
+
+def test_a_report_that_passes_by_its_model_alone_says_so():
+    def figures(under, stated):
+        return SimpleNamespace(
+            under_control=SimpleNamespace(max_um=under), after=SimpleNamespace(max_um=0.9),
+            control_mode="G64", control_mode_stated=stated,
+        )  # fmt: skip
+
+    assert _caution(figures(0.9, False), 1.0) == ""
+    assert "up to 95" in _caution(figures(95.0, False), 1.0) and "path_mode" in _caution(figures(95.0, False), 1.0)
+    assert "see the warnings" in _caution(figures(95.0, True), 1.0)
