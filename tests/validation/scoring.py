@@ -1,4 +1,4 @@
-"""One answer of `camcomp diagnose` against the truth, and rates over many with Wilson's intervals."""
+"""One answer of `camcomp diagnose` against the truth, and the interval of a rate."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ import json
 import os
 import tempfile
 import time
-from collections.abc import Callable
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
@@ -198,21 +197,6 @@ def laws(folder: Path, work: Path, names: list[str], seed: int) -> list[Row]:
     return out
 
 
-def render_laws(rows: list[Row]) -> str:
-    """How often each law was broken."""
-    lines = []
-    for name in [*metamorphic.LESS, *metamorphic.SAME]:
-        some = [row for row in rows if row["law"] == name]
-        good = [row for row in some if "failed" not in row]
-        opened = [row for row in good if row["before"] in ("unknown", "ambiguous")]
-        if name in metamorphic.LESS:
-            broken = f"another cause {sum(r['another'] for r in good)}, of {len(opened)} open ones closed {sum(r['surer'] for r in opened)}"
-        else:
-            broken = f"changed {sum(bool(r['said']) for r in good)}"
-        lines.append(f"{name:<18} {len(some):4d} tried, {len(some) - len(good)} failed, {broken}")
-    return "\n".join(lines)
-
-
 def wilson(hits: int, total: int, z: float = 1.96) -> tuple[float, float]:
     """Interval (95 %) of a rate."""
     if total == 0:
@@ -220,61 +204,6 @@ def wilson(hits: int, total: int, z: float = 1.96) -> tuple[float, float]:
     p, n = hits / total, total
     middle, half = p + z * z / (2 * n), z * np.sqrt(p * (1 - p) / n + z * z / (4 * n * n))
     return float((middle - half) / (1 + z * z / n)), float((middle + half) / (1 + z * z / n))
-
-
-def calibration_error(pairs: np.ndarray) -> float:
-    """Of probabilities and whether they came true (n, 2): their mean distance in ten bins."""
-    bins = np.clip((pairs[:, 0] * 10).astype(int), 0, 9)
-    return sum(abs(pairs[bins == b, 0].sum() - pairs[bins == b, 1].sum()) for b in range(10)) / len(pairs)
-
-
-def render(rows: list[Row]) -> str:
-    """Rates as a table."""
-    lines = []
-
-    def rate(name: str, chosen: list[Row], key: str | Callable[[Row], bool]) -> None:
-        pick = key if callable(key) else (lambda row: bool(row[key]))
-        hits, total = sum(pick(row) for row in chosen), len(chosen)
-        low, high = wilson(hits, total)
-        lines.append(
-            f"{name:<52} {hits:4d} / {total:<4d} {hits / total if total else float('nan'):6.3f} [{low:.3f}, {high:.3f}]"
-        )
-
-    good = [row for row in rows if "failed" not in row]
-    complete = [r for r in good if not r["foreign"]]
-    foreign = [r for r in good if r["foreign"]]
-    alone = [r for r in complete if len(r["true"]) == 1 and r["kind"] != "imperfect"]
-    rate("failed", rows, lambda row: "failed" in row)
-    rate("null: verdict none (0.95)", [r for r in complete if not r["true"]], "none")
-    rate("one cause below 2.7 x noise: first or in class", [r for r in alone if r["ratio"] < DUE], "first_or_class")
-    rate("one cause from 2.7 x noise on: the same (0.95)", [r for r in alone if r["ratio"] >= DUE], "first_or_class")
-    rate("pairs: all named (0.85)", [r for r in complete if r["kind"] == "pair" and len(r["due"]) > 1], "all")
-    rate("imperfect model: all from 2.7 x noise on named", [r for r in complete if r["kind"] == "imperfect"], all_due)
-    rate("unknown named unknown (0.90)", foreign, "unknown")
-    rate("the same where the library leaves >= 1 x noise", [r for r in foreign if r["left"] >= 1], "unknown")
-    beside = [r for r in foreign if r["true"]]
-    rate("a cause beside something unknown: named", beside, "all")
-    rate("complete library: false unknown (0.03)", complete, "unknown")
-    told = [r for r in good if "honest" in r]
-    if told:
-        rate("an answer that its truth allows", told, "honest")
-    rate("a false cause at p > 0.5 (0.02)", good, "false_cause")
-    rate("sure (p > 0.8) and wrong (0.01)", good, "sure_and_wrong")
-    held_ = [{"hit": hit} for row in good for hit in row["held"]]
-    rate("95 % intervals that hold (0.90 to 0.98)", held_, "hit")
-    pairs = np.array([pair for row in good for pair in row["calibration"] if pair[0]], float).reshape(-1, 2)
-    if len(pairs):
-        missed = calibration_error(pairs)
-        drawn = np.random.default_rng(0).random((200, len(pairs))) < pairs[:, 0]
-        chance = np.mean([calibration_error(np.column_stack([pairs[:, 0], each])) for each in drawn])
-        name = "expected calibration error (0.05)"
-        lines.append(f"{name:<52} {missed:.3f} of {len(pairs)}, {chance:.3f} if they were right")
-    for name, key in (("gap", "gap_um"), ("floor", "floor_um"), ("seconds", "seconds")):
-        values = [row[key] for row in good if row.get(key) is not None]
-        if values:
-            q = np.percentile(values, [10, 50, 90])
-            lines.append(f"{name:<52} {q[0]:.1f} {q[1]:.1f} {q[2]:.1f} (10, 50, 90 %)")
-    return "\n".join(lines)
 
 
 def all_due(row: Row) -> bool:
@@ -293,21 +222,6 @@ def right(row: Row) -> bool:
     if row["kind"] in ("pair", "imperfect"):
         return all_due(row)
     return bool(row["first_or_class"])
-
-
-def by_machine(rows: list[Row]) -> str:
-    """Right answers of every machine and kind, with Wilson's intervals, as a table in Markdown."""
-    kinds = sorted({row["kind"] for row in rows})
-    lines = ["| machine | " + " | ".join(kinds) + " |", "|---|" + "---|" * len(kinds)]
-    for machine in sorted({row["machine"] for row in rows}):
-        cells = []
-        for kind in kinds:
-            mine = [row for row in rows if (row["machine"], row["kind"]) == (machine, kind)]
-            hits = sum(map(right, mine))
-            low, high = wilson(hits, len(mine))
-            cells.append(f"{hits} of {len(mine)} ({low:.2f} to {high:.2f})" if mine else "")
-        lines.append(f"| {machine} | " + " | ".join(cells) + " |")
-    return "\n".join(lines)
 
 
 def listing(rows: list[Row]) -> str:

@@ -62,3 +62,9 @@ def test_rates_add_up_with_wilson_intervals():
     assert "| 3 | single / &lt;x> |" in text
     assert counting.calibration_error(result["calibration"]) == (pytest.approx(0.0, abs=1e-9), 10)
     assert report.plot([result]).count("<circle") == 2
+
+
+def test_the_calibration_error_is_the_distance_in_bins():
+    result = {}
+    counting.add(result, 0, [], [{"calibration": [[0.95, True], [0.95, False], [0.15, False], [0.15, True]]}])
+    assert counting.calibration_error(result["calibration"]) == (pytest.approx((0.9 + 0.7) / 4), 4)

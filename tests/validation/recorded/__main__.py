@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from pathlib import Path
 
 import click
 import numpy as np
 
+from tests.validation import counting
 from tests.validation import scoring as judging
-from tests.validation.recorded import left_out_runs as left_out
-from tests.validation.recorded import metamorphic
 from tests.validation.recorded import sensitivity as changes
 from tests.validation.recorded.experiment import Plan, make, truth_json, write
 from tests.validation.recorded.faults import every
@@ -139,56 +137,6 @@ def mixed_(out, count, seed, clean):
         click.echo(f"{name} {kind} {[(c['effect'], c['target'], round(c['ratio'], 2)) for c in made.record['causes']]}")
 
 
-@main.command("laws")
-@click.option("--out", type=click.Path(path_type=Path), required=True)
-@click.option("--count", default=4, help="Experiments; every law is tried on each.")
-@click.option("--seed", default=1)
-@click.option("--machine", type=click.Choice(sorted(MACHINES)), default="orthoglide")
-@click.option("--rows", default=250)
-@click.option("--runs", default=3)
-@click.option(
-    "--of",
-    "of",
-    type=click.Path(path_type=Path, exists=True),
-    help="Folder of experiments to take, in place of making some.",
-)
-@click.option(
-    "--only", multiple=True, type=click.Choice([*metamorphic.LESS, *metamorphic.SAME]), help="Laws; default all."
-)
-def laws_(out, count, seed, machine, rows, runs, of, only):
-    """Try the laws of diagnosis on experiments of every kind with all or few columns, or on the first ones of a folder."""
-    results = out / "laws.jsonl"
-    out.mkdir(parents=True, exist_ok=True)
-    done = [json.loads(line) for line in results.read_text().splitlines()] if results.exists() else []
-    there = {(row["name"], row["law"]) for row in done}
-    wanted = tuple(only) or (*metamorphic.LESS, *metamorphic.SAME)
-    taken = sorted(each.stem for each in (of / "truth").glob("*.json")) if of else []
-    for i in range(min(count, len(taken)) if of else count):
-        name = taken[i] if of else f"e-{seed + i:05d}"
-        todo = [each for each in wanted if (name, each) not in there]
-        if not todo:
-            continue
-        if of is None:
-            _law_experiment(out, name, i, seed, machine, rows, runs)
-        for row in judging.laws((of or out) / name, out / name, todo, seed + i):
-            done.append(row)
-            with results.open("a") as file:
-                file.write(json.dumps(row) + "\n")
-            click.echo(f"{name} {row['law']}: {row['said']}")
-    click.echo(judging.render_laws(done))
-
-
-def _law_experiment(out, name, i, seed, machine, rows, runs):
-    """Makes the i-th experiment for laws."""
-    kind, channels = ("single", "unknown", "pair")[i % 3], sorted(CHANNELS)[(i * 5) % len(CHANNELS)]
-    base = Plan(0, machine=machine, channels=channels, rows=rows, runs=runs, stated=False)
-    wish = plan(kind, i + seed, seed + i, base, ())
-    made = make(wish)
-    write(made, wish, out / name)
-    (out / "truth").mkdir(exist_ok=True)
-    (out / "truth" / f"{name}.json").write_text(truth_json(made))
-
-
 @main.command("score")
 @click.argument("folder", type=click.Path(path_type=Path, exists=True))
 @click.option("--results", type=click.Path(path_type=Path), help="Default FOLDER/results.jsonl; resumed if there.")
@@ -200,25 +148,12 @@ def score_(folder, results, jobs, only, listed):
     rows = judging.run(folder, results or folder / "results.jsonl", jobs, only)
     if listed:
         click.echo(judging.listing(rows) + "\n")
-    click.echo(judging.render(rows))
-    click.echo("\nright answers\n" + judging.by_machine(rows))
-
-
-@main.command("unseen")
-@click.argument("folder", type=click.Path(path_type=Path, exists=True))
-@click.option("--only", multiple=True, help="Names of experiments.")
-def unseen_(folder, only):
-    """Leave every run of the experiments below FOLDER out once: does the interval of the shrinkage hold what it shows?"""
-    results = folder / "unseen.jsonl"
-    rows = [json.loads(line) for line in results.read_text().splitlines()] if results.exists() else []
-    there = {row["name"] for row in rows}
-    for each in sorted(folder.glob("e-*")):
-        if each.name not in there and (not only or each.name in only):
-            more = left_out.runs_left_out(each)
-            rows += more
-            with results.open("a") as file:
-                file.writelines(json.dumps(row) + "\n" for row in more)
-    click.echo(left_out.render(rows))
+    result: dict = {}
+    for i, row in enumerate(rows):
+        counting.add(result, i, list(counting.of_answer(row)), [row])
+    for label, (hits, total) in result.get("counts", {}).items():
+        low, high = judging.wilson(hits, total)
+        click.echo(f"{label:<72} {hits} of {total} ({low:.2f} to {high:.2f})")
 
 
 @main.command("sensitivity")

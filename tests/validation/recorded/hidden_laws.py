@@ -1,29 +1,24 @@
 """Laws that no library has: experiments with one such law on recorded motions, and how well `diagnose` finds it.
 
-`python -m tests.validation.recorded.hidden_laws --out DIR` makes and judges them; a second run goes on where the first one ended. Most faults are
-those of strange.py; those of OWN are added to the tip here. Small errors of every kind are always there, each and together
+Most faults are those of unmodelled.py; those of OWN are added to the tip here. Small errors of every kind are always there, each and together
 below what is minor and below the noise, as in experiment.py.
 """
 
 from __future__ import annotations
 
-import json
-import os
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-import click
 import numpy as np
 
 from tests.validation.recorded.experiment import Bench, Character, Made, Plan, row_times, small_errors, write
 from tests.validation.recorded.faults import Fault, Faults
 from tests.validation.recorded.machines import MACHINES
 from tests.validation.recorded.plant import Run, State, observe
-from tests.validation.recorded.unmodelled import ON_ACTUATORS, STRANGE, strange
+from tests.validation.recorded.unmodelled import STRANGE, strange
 from tests.validation.recordings import recording
-from tests.validation.scoring import wilson
 
 PATHS = ("circles-exact", "zigzag-blended", "pocket-10um", "rectangle-exact", "circles-exact")
 AIR = 4  # the last run repeats the first one in the air
@@ -199,83 +194,4 @@ def place_right(law: object, truth: Truth, target: str) -> bool:
     return law.on in truth.on and (target in at if truth.own else True) and (len(at) == 1 or not truth.own)  # type: ignore[attr-defined]
 
 
-def table(rows: list[dict]) -> str:
-    """Rates with Wilson intervals, by size."""
-    out = []
-    for ratio in sorted({r["ratio"] for r in rows if r["effect"] != "null"}):
-        mine = [r for r in rows if r["ratio"] == ratio and r["effect"] != "null"]
-        for what in ("law", "form", "place"):
-            out.append(_rate(f"{ratio:g} x noise: {what}", [bool(r[what]) for r in mine]))
-        near = [r["off"] <= 0.05 for r in mine if r.get("off") is not None]
-        out.append(_rate(f"{ratio:g} x noise: shrinkage within 0.05 of the true law's", near))
-        out.append(_rate(f"{ratio:g} x noise: a cause that is not there", [_named(r) for r in mine]))
-    null = [r for r in rows if r["effect"] == "null"]
-    out.append(_rate("null: verdict none", [r["verdict"] == "none" for r in null]))
-    out.append(_rate("null: a law although nothing is there, search forced", [bool(r["law"]) for r in null]))
-    return "\n".join(out)
-
-
-def _named(row: dict) -> bool:
-    """Whether a cause of the library is named: none is there that is more than minor."""
-    return any(effect != "unknown" for effect, _ in row["causes"])
-
-
-def _rate(name: str, hits: list[bool]) -> str:
-    if not hits:
-        return f"| {name} | - | |"
-    low, high = wilson(sum(hits), len(hits))
-    return f"| {name} | {sum(hits)} of {len(hits)} | {low:.3f} to {high:.3f} |"
-
-
-@click.command()
-@click.option("--out", type=click.Path(path_type=Path), required=True)
-@click.option("--machine", "machines", multiple=True, default=("orthoglide", "puu", "router"))
-@click.option("--ratio", "ratios", type=float, multiple=True, default=(10.0, 3.0))
-@click.option("--null", "nulls", default=4, help="Experiments without a law, per machine.")
-@click.option("--seed", default=1)
-@click.option("--only", multiple=True, type=click.Choice([*TRUTH, "null"]))
-@click.option("--rows", default=220, help="Of every run.")
-@click.option(
-    "--in-turn", is_flag=True, help="Every law on one machine per size, machines in turn, nulls between them."
-)
-def main(out, machines, ratios, nulls, seed, only, rows, in_turn):
-    """Make, ask, judge, and print the rates."""
-    for name in ("NUMBA_NUM_THREADS", "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
-        os.environ.setdefault(name, "1")
-    results = out / "lawful.jsonl"
-    out.mkdir(parents=True, exist_ok=True)
-    done = [json.loads(line) for line in results.read_text().splitlines()] if results.exists() else []
-    there = {(r["effect"], r["machine"], r["ratio"], r["seed"]) for r in done}
-    wanted = [
-        (effect, machine, ratio, seed + 100 * i + 10 * j)
-        for k, ratio in enumerate(ratios)
-        for i, effect in enumerate(TRUTH)
-        for j, machine in enumerate(machines)
-        if not in_turn or j == (i + k) % len(machines)
-    ]
-    wanted += [
-        ("null", machine, 0.0, seed + 5000 + 100 * i + j) for i in range(nulls) for j, machine in enumerate(machines)
-    ]
-    if in_turn:  # a campaign that is cut short has some of everything
-        wanted = [wanted[i] for i in np.random.default_rng(seed).permutation(len(wanted))]
-    for effect, machine, ratio, number in wanted:
-        if (effect, machine, ratio, number) in there or (only and effect not in only):
-            continue
-        rng = np.random.default_rng([number, 31])
-        # along y the laws of strange.py depend on z, of which there is little
-        target = str(rng.choice(MACHINES[machine].actuators if effect in ON_ACTUATORS else ["x", "z"]))
-        folder = out / f"{effect}-{machine}-{ratio:g}-{number}"
-        row = judged(effect, target, machine, number, ratio, folder, rows)
-        done.append(row)
-        with results.open("a") as file:
-            file.write(json.dumps(row) + "\n")
-        click.echo(
-            f"{effect} {target} {machine} {ratio:g}: {row['verdict']} {row.get('form')} {row.get('place')} {row.get('off')} {row['formula']}"
-        )
-    click.echo(table(done))
-
-
 assert set(TRUTH) <= {*STRANGE, *OWN}
-
-if __name__ == "__main__":
-    main()

@@ -10,7 +10,7 @@ from typing import Any
 
 import yaml
 
-from tests.validation.scoring import Row, ask, wilson
+from tests.validation.scoring import Row, ask
 
 
 def runs_left_out(folder: Path) -> list[Row]:
@@ -39,18 +39,3 @@ def _asked(folder: Path, experiment: dict[str, Any]) -> Row:
         return ask(path)
     finally:
         path.unlink()
-
-
-def render(rows: list[Row]) -> str:
-    """How many of the runs left out show what was foretold."""
-    told = [row for row in rows if "ratio" in row]
-    held = [row for row in told if row["low"] <= row["ratio"] <= row["high"]]
-    low, high = wilson(len(held), len(told))
-    width = sorted(row["high"] - row["low"] for row in told)
-    lines = [f"{len(rows)} runs left out, {sum('failed' in row for row in rows)} failed, {len(told)} with causes"]
-    if told:
-        rate = len(held) / len(told)
-        lines.append(
-            f"held by the interval: {len(held)} ({rate:.3f} [{low:.3f}, {high:.3f}]), median width {width[len(width) // 2]:.2f}"
-        )
-    return "\n".join(lines)

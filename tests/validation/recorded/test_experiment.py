@@ -13,7 +13,7 @@ from tests.validation.recorded.machines import MACHINES
 from tests.validation.recorded.plant import Run
 from tests.validation.recorded.sensors import Sensors, beam_breaks, table, tip_noise
 from tests.validation.recordings import recording
-from tests.validation.scoring import calibration_error, judge, wilson
+from tests.validation.scoring import judge, wilson
 
 PLAN = Plan(7, "single", (("backlash", "y"),), (3.0,), runs=2, rows=120)
 
@@ -73,12 +73,6 @@ def test_a_lag_is_due_where_set_points_are_logged(made):
     nothing = {"verdict": "none", "causes": [], "alternatives": [], "gap": {"rms_um": 5.0, "noise_floor_um": 5.2}}
     assert judge(nothing, truth, {"servo_lag"})["due"]
     assert not judge(nothing, {**truth, "channels": "no-setpoints"}, {"servo_lag"})["due"]
-
-
-def test_calibration_is_the_distance_in_bins():
-    pairs = np.array([[0.95, 1.0], [0.95, 0.0], [0.15, 0.0], [0.15, 1.0]])
-    assert calibration_error(pairs) == pytest.approx((0.9 + 0.7) / 4)
-    assert calibration_error(np.array([[0.5, 1.0], [0.5, 0.0]])) == 0.0
 
 
 def test_wilson_by_the_textbook():

@@ -1,15 +1,12 @@
 """A short version of the campaign of laws: one small experiment, written differently and with less in it."""
 
-import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
-from tests.validation import runner
+from tests.validation import runner, scoring
 from tests.validation.recorded import metamorphic
-from tests.validation.recorded.__main__ import main
 from tests.validation.recorded.experiment import Plan, make, write
 
 PLAN = Plan(
@@ -62,16 +59,11 @@ def test_laws_can_be_broken():
     assert metamorphic.differences(open_, {**other, "verdict": "ambiguous"}, {"x": "y"}) == []
 
 
-def test_laws_are_tried_on_experiments_that_are_there(files, tmp_path):
-    metamorphic.write(files, tmp_path / "there" / "e-1")
-    (tmp_path / "there" / "truth").mkdir()
-    (tmp_path / "there" / "truth" / "e-1.json").write_text("{}")
-    given = ["laws", "--of", str(tmp_path / "there"), "--out", str(tmp_path / "out"), "--only", "other names"]
-    done = CliRunner().invoke(main, given)
-    assert done.exit_code == 0, done.output
-    (row,) = map(json.loads, (tmp_path / "out" / "laws.jsonl").read_text().splitlines())
+def test_a_law_is_tried_on_an_experiment_that_is_there_and_leaves_it_as_it_is(files, tmp_path):
+    metamorphic.write(files, tmp_path / "e-1")
+    (row,) = scoring.laws(tmp_path / "e-1", tmp_path / "out", ["other names"], 1)
     assert (row["name"], row["law"], row["said"]) == ("e-1", "other names", [])
-    assert not (tmp_path / "there" / "e-1" / "other names").exists()
+    assert not (tmp_path / "e-1" / "other names").exists()
 
 
 def test_a_machine_without_chains_has_no_names_to_change_round(files):
