@@ -31,7 +31,7 @@ table is of one code. Rates come with Wilson intervals of 95 %.
 |---|---|---|---|
 {rows}
 {measured}"""
-MEASURED = "\n[Measured data](measured.md): real machines, judged on runs that the fit has not seen, with textbook models on the same split.\n"
+LINK = "\n[Measured data](measured.md): real machines, judged on runs that the fit has not seen, with textbook models on the same split.\n"
 PAGE = """# {title}
 
 {about}
@@ -215,7 +215,7 @@ def pages() -> dict[Path, str]:
     if on_real:
         out[PAGES / "measured.md"] = measured(on_real[-1])
     out[PAGES / "index.md"] = INDEX.format(
-        lines="\n".join(readme_lines()), rows="\n".join(rows), measured=MEASURED if on_real else ""
+        lines="\n".join(readme_lines()), rows="\n".join(rows), measured=LINK if on_real else ""
     )
     return out
 
