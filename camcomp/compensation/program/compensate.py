@@ -16,7 +16,7 @@ from camcomp.compensation.program import arcs_out
 from camcomp.compensation.program.arcs_out import Arcs, Bend
 from camcomp.compensation.program.chords import Nodes, second_derivative, trial_nodes
 from camcomp.compensation.program.corrected_rows import CorrectedRows, corrected_rows, output_of
-from camcomp.compensation.program.judged_points import JudgedPoints, Seen, judged_points, see, see_original
+from camcomp.compensation.program.judged_points import JudgedPoints, Seen, judged_points, see, see_original, whole_pose
 from camcomp.compensation.program.moves import (
     WITHIN_RAPID,
     chord_budget,
@@ -26,7 +26,7 @@ from camcomp.compensation.program.moves import (
     travel_of,
 )
 from camcomp.compensation.program.policy import Shares, shares_of
-from camcomp.compensation.program.posture import check_posture, whole_pose
+from camcomp.compensation.program.posture import check_posture
 from camcomp.compensation.program.program_bands import bands_of
 from camcomp.compensation.program.result import error_size, worse_than_before
 from camcomp.compensation.program.reversals import cut_at_reversals
@@ -50,7 +50,7 @@ from camcomp.model.cutting.engaged import Engaged
 from camcomp.model.cutting.spindle import cut_without_spindle, spindle_warning
 from camcomp.model.cutting.track import Track, lay_track
 from camcomp.model.job import Job
-from camcomp.model.motion.response import aim_at
+from camcomp.model.motion.response import acting_force, aim_at
 from camcomp.model.statics.target import Correction, settle
 from camcomp.model.stock.warnings import stock_remarks, stock_warnings
 
@@ -72,6 +72,7 @@ class Compensated:
     t: Floats  # (N,) s
     nominal: Floats  # (N, m) inverse kinematics of the programmed tip
     state: Correction  # loaded machine at the written end points
+    force: Floats  # (N, 3) N on the tool that acts there, machine frame, effects on it included
     uncorrected: Floats  # (N, 3) loaded tip of the original program, program frame
     before: Floats  # errors (k, 3) mm of the original program along feed motions
     after: Floats  # errors (k, 3) mm of the corrected program along feed motions
@@ -393,9 +394,13 @@ def _assemble(
     moving = (rows.kind != RAPID) & (speed > 0.0)
     t = np.cumsum(np.where(moving, step / np.where(moving, speed, 1.0) * 60.0, 0.0))
     nominal = before.state.rho_nominal
-    target, force = job.frame.to_machine(rows.target), job.frame.vectors(rows.force)
+    target = job.frame.to_machine(rows.target)
     warnings = [*program.warnings, *warnings]
     warnings += check_posture(program, job, program.path.line[rows.motion], target, nominal)
-    state = after.state if method == "linear" else whole_pose(job, rows.corrected, target, force, after.state)
-    return Compensated(program, written, rows, s, t, nominal, state, before.tip, before.error[points.judged],
+    state = after.state
+    if method != "linear":
+        told = points.along(written.end, replace(rows.arcs, centre=written.centre))
+        state = whole_pose(job, points, told, rows.corrected, state)
+    force = acting_force(job, state.rho, points.travel.take(points.end))
+    return Compensated(program, written, rows, s, t, nominal, state, force, before.tip, before.error[points.judged],
                        after.error[points.judged], control, points.row[points.judged], iterations, method, still, warnings)  # fmt: skip

@@ -13,7 +13,7 @@ from camcomp.compensation.program.moves import WITHIN_RAPID, travel_of
 from camcomp.ground.datatypes import ARC, RAPID, Bools, Floats, Ints
 from camcomp.model.cutting.track import Track
 from camcomp.model.job import Job
-from camcomp.model.motion.response import Travel, respond
+from camcomp.model.motion.response import Travel, aim_pose, respond
 from camcomp.model.statics.target import Correction
 
 
@@ -101,3 +101,20 @@ def see_original(job: Job, points: JudgedPoints) -> Seen:
     tip, state = respond(job, points.target, points.travel, before=points.before)
     at = {each.name: getattr(state, each.name)[points.end] for each in fields(state)}
     return Seen(tip - points.target, state.status, tip[points.end], Correction(**at))
+
+
+def whole_pose(job: Job, points: JudgedPoints, commanded: Floats, on: Bools, state: Correction) -> Correction:
+    """The state with joint commands that bring tip and orientation to the target, for machines with six actuators.
+
+    Words X Y Z can carry the correction of the tip only, and leave the platform tilted under load; the joint table can
+    carry both. commanded (k, 3) mm: tips of the written program at the points, program frame; on (N,): end points to
+    correct. The tilt of the state stays that of the written program.
+    """
+    if len(job.machine.actuators) != 6 or not on.any():
+        return state
+    on = on[points.row]
+    exact = aim_pose(job, commanded, points.target, points.travel, on, before=points.before)
+    solved = np.flatnonzero((exact.status == 0) & on & points.end)
+    rho, drive = state.rho.copy(), state.drive.copy()
+    rho[points.row[solved]], drive[points.row[solved]] = exact.rho[solved], exact.drive[solved]
+    return replace(state, rho=rho, drive=drive)

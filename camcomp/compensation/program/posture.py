@@ -6,16 +6,13 @@ no step of the program changes it.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from camcomp.gcode.program import Program
-from camcomp.ground.datatypes import Bools, Floats, Ints
+from camcomp.ground.datatypes import Floats, Ints
 from camcomp.ground.errors import PhysicsError
 from camcomp.model.job import Job
 from camcomp.model.statics.arm import NEAR_SINGULAR, Arm, arm_of, dexterity, follow
-from camcomp.model.statics.target import Correction, correct
 
 SINGULAR = 1e-4  # dexterity: drives turn 10 000 times as far as the tip needs
 LARGE_TURN = 0.3  # rad between two end points: worth a closer look
@@ -61,20 +58,3 @@ def _refuse(program: Program, rule: str, text: str, lines: Ints) -> None:
     first, *rest = errors
     first.others = tuple(rest)
     raise first
-
-
-def whole_pose(job: Job, on: Bools, target: Floats, force: Floats, state: Correction) -> Correction:
-    """The state with joint commands that bring tip and orientation to the target, for machines with six actuators.
-
-    Words X Y Z can carry the correction of the tip only, and leave the platform tilted under load; the joint table can
-    carry both. on (N,) rows to correct, target (N, 3) mm and force (N, 3) N in the machine frame. The tilt of the state
-    stays that of the written program.
-    """
-    if len(job.machine.actuators) != 6 or not on.any():
-        return state
-    exact = correct(job.machine, target[on], force[on], pose=True)
-    solved = exact.status == 0
-    rows = np.flatnonzero(on)[solved]
-    rho, drive = state.rho.copy(), state.drive.copy()
-    rho[rows], drive[rows] = exact.rho[solved], exact.drive[solved]
-    return replace(state, rho=rho, drive=drive)

@@ -65,11 +65,10 @@ def joint_bytes(result: Compensated, job: Job, name: str) -> bytes:
     """The joint table of a program that was corrected as a whole."""
     if not name.endswith(SUFFIX):
         return joint_csv(result, job)
-    force = job.frame.vectors(result.rows.force)
     state = result.state
     file = BytesIO()
     table = joint_table(file, name, job)
-    table.batch(Batch(result.lines, result.s, result.t, result.rows.target, result.written.end, force, result.nominal, state.rho,
+    table.batch(Batch(result.lines, result.s, result.t, result.rows.target, result.written.end, result.force, result.nominal, state.rho,
                       state.drive, values_behind(result, job)))  # fmt: skip
     table.close()
     return file.getvalue()

@@ -70,7 +70,7 @@ def joint_csv(result: Compensated, job: Job) -> bytes:
     behind = values_behind(result, job)
     values = np.column_stack(
         (
-            result.s, result.t, result.rows.target, result.written.end, job.frame.vectors(result.rows.force), actuators,
+            result.s, result.t, result.rows.target, result.written.end, result.force, actuators,
             *([] if behind is None else [behind]),
         )
     )  # fmt: skip

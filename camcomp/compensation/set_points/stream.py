@@ -18,7 +18,7 @@ from camcomp.ground.errors import PhysicsError
 from camcomp.model import signal_path
 from camcomp.model.finite import not_finite
 from camcomp.model.job import Job
-from camcomp.model.motion.response import Travel, aim_at, respond
+from camcomp.model.motion.response import Travel, aim_at, aim_pose, respond
 from camcomp.model.statics.single import PointSolver
 from camcomp.model.statics.solve import POSE, STATUS, TARGET
 
@@ -93,7 +93,11 @@ class Stream:
         found = aim_at(self._job, tips, travel, "newton")
         _refuse(int(found.status[1]))
         told = replace(found, commanded=np.where(np.isfinite(found.commanded), found.commanded, tips)).commanded
-        _, state = respond(self._job, told, travel, tips)
+        if self._pose is None:
+            state = respond(self._job, told, travel, tips)[1]
+        else:
+            state = aim_pose(self._job, told, tips, travel, np.ones(2, np.bool_))
+            _refuse(int(state.status[1]))
         if (tip != before[0]).any() or self._before is None:
             self._before = (tip, load)
         return self._point(told[1], state.rho_nominal[1], state.rho[1], state.drive[1])

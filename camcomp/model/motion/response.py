@@ -21,7 +21,8 @@ from camcomp.model.job import Job
 from camcomp.model.statics.lengths import LENGTH_STEP_MM, lengthened
 from camcomp.model.statics.machine import build_machine
 from camcomp.model.statics.masses import MassLoads, has_moved_mass, mass_loads, mass_loads_around
-from camcomp.model.statics.solve import FREE, solve
+from camcomp.model.statics.rotation import exp_rotation
+from camcomp.model.statics.solve import FREE, INVERSE, solve
 from camcomp.model.statics.target import Correction, correct, settle
 
 SETTLED_MM = 2e-5  # the correction of effects ends here
@@ -33,6 +34,8 @@ AHEAD_MM = 2.0  # more than any play
 LEAST_MM = 2e-4  # a drive that comes back by less than this is not led through its play
 WORDS = 3  # actuators that X, Y, Z can move one by one
 GOES_ALONG = 1e-2  # weight of the others
+RATE_STEP = 1e-2  # mm at POSE_SCALE
+POSE_SCALE = np.array([1.0, 1.0, 1.0, 1e3, 1e3, 1e3])  # mm per mm, and per rad of a platform: 1 urad counts as 1 nm
 HINGE_MM = 1e3  # way per rad of a hinge, where lengths of slides are applied to it: an arm of 1 m
 
 
@@ -62,17 +65,22 @@ class Travel:
 
 
 def respond(
-    job: Job, commanded: Floats, travel: Travel, nominal_of: Floats | None = None, *, before: Floats | None = None
-) -> tuple[Floats, Correction]:
+    job: Job, commanded: Floats, travel: Travel, nominal_of: Floats | None = None, *, before: Floats | None = None,
+    rho: Floats | None = None,
+) -> tuple[Floats, Correction]:  # fmt: skip
     """Loaded tips (n, 3) of commanded tips (n, 3), both in the program frame, and the states of the machine.
 
     nominal_of (n, 3): tips whose inverse kinematics go into rho_nominal of the states; the commanded ones by default.
     before (3,): commanded tip from which the first one was reached; what drives remember depends on it.
+    rho (n, m): set-points of the actuators; those that the control computes from the commanded tips by default.
     """
     if before is not None and job.causes and len(commanded):
         rows = np.concatenate(([0], np.arange(len(commanded))))
         other = None if nominal_of is None else nominal_of[rows]
-        tip, found = respond(job, np.concatenate((before[None], commanded)), travel.take(rows), other)
+        if rho is not None:
+            begin = solve(job.real_machine, INVERSE, job.frame.to_machine(before[None]), check=False).rho_nominal
+            rho = np.concatenate((begin, rho))
+        tip, found = respond(job, np.concatenate((before[None], commanded)), travel.take(rows), other, rho=rho)
         return tip[1:], Correction(**{each.name: getattr(found, each.name)[1:] for each in fields(found)})
     told = job.frame.to_machine(commanded)
     aim = None if nominal_of is None else job.frame.to_machine(nominal_of)
@@ -80,7 +88,8 @@ def respond(
         loaded, settled = settle(job.real_machine, told, travel.force, None, aim)
         return _finite(job, job.frame.to_program(loaded), settled)
     control = solve(job.real_machine, FREE, told, check=False)
-    motion = _motion(job, control.rho_nominal, travel)
+    setpoint = control.rho_nominal if rho is None else rho
+    motion = _motion(job, setpoint, travel)
     loading = cache(partial(signal_path.loaded, job.causes, motion, travel.force))
 
     @cache
@@ -104,7 +113,7 @@ def respond(
     tip = signal_path.led(job.causes, tip, motion, job.real_machine.nominal, job.frame.origin)
     tip = job.frame.to_program(signal_path.posed(job.causes, tip, load, motion))
     tip = signal_path.placed(job.causes, signal_path.clamped(job.causes, tip), load, motion)
-    state = replace(state, commanded=told, rho=control.rho_nominal, rho_nominal=nominal, drive=drive)
+    state = replace(state, commanded=told, rho=setpoint, rho_nominal=nominal, drive=drive)
     return _finite(job, tip, Correction.of(state, state.passes))
 
 
@@ -174,16 +183,78 @@ def aim_at(job: Job, target: Floats, travel: Travel, method: str) -> Correction:
     return replace(found, commanded=commanded)
 
 
-def without_drives(job: Job, target: Floats, travel: Travel, method: str = "newton") -> Correction:
+def aim_pose(
+    job: Job, commanded: Floats, target: Floats, travel: Travel, on: Bools, *, before: Floats | None = None
+) -> Correction:
+    """Set-points that bring loaded tips to targets (n, 3), program frame, and the platform to its held orientation.
+
+    For machines with six actuators. commanded (n, 3): tips of the written program, whose inverse kinematics are the
+    set-points of the points that are not `on` (n,). The same signal path and memory of drives as those of the words.
+    """
+    told = job.frame.to_machine(commanded)
+    exact = without_drives(job, target, travel, pose=True)
+    rho = solve(job.real_machine, INVERSE, told, check=False).rho_nominal
+    on = on & (exact.status == 0)
+    rho[on] = exact.rho[on]
+    if not job.causes:
+        drive = np.where(on[:, None], exact.drive, np.nan)
+        return replace(exact, rho=rho, drive=drive)
+    if on.any():
+        rho[on] -= _lost_motion(job, exact.rho[on], travel.take(np.flatnonzero(on)))
+    rates = np.nan_to_num(_rates(job, job.frame.to_machine(target)))
+    aimed = job.correctable
+    share, least, near, rings = 1.0, np.inf, rho, bool(signal_path.acting(job.causes, "control"))
+    for _ in range(MAX_AIM_STEPS):
+        tip, state = respond(aimed, commanded, travel, target, before=before, rho=rho)
+        left = np.column_stack((job.frame.vectors(target - tip), -state.tilt))
+        left = np.where(on[:, None] & np.isfinite(left), left, 0.0)
+        size = float((left * POSE_SCALE).ravel() @ (left * POSE_SCALE).ravel())
+        if rings and size > FARTHER * least:
+            share, rho, least = 0.5 * share, near, np.inf
+            continue
+        if size < least:
+            least, near = size, rho
+        if not np.abs(left * POSE_SCALE).max(initial=0.0) > SETTLED_MM:
+            break
+        rho = rho + share * np.einsum("nij,nj->ni", rates, left)
+    if aimed is not job:
+        state = respond(job, commanded, travel, target, before=before, rho=state.rho)[1]
+    return state
+
+
+def _rates(job: Job, tip: Floats) -> Floats:
+    """Derivatives (n, m, 6) of the set-points by tip, mm, and by rotation of the platform about it, rad; machine axes."""
+    machine = job.real_machine
+    held = machine.nominal.held_rotation
+    out = []
+    for axis in np.eye(3):
+        out.append([solve(machine, INVERSE, tip + s * RATE_STEP * axis, check=False).rho_nominal for s in (1, -1)])
+    for axis in np.eye(3):
+        turned = [exp_rotation(s * RATE_STEP / POSE_SCALE[3] * axis) @ held for s in (1, -1)]
+        out.append([solve(machine, INVERSE, tip, aim_rotation=R, check=False).rho_nominal for R in turned])
+    steps = 2.0 * RATE_STEP / POSE_SCALE
+    return np.stack([(a - b) / step for (a, b), step in zip(out, steps, strict=True)], axis=2)
+
+
+def acting_force(job: Job, rho: Floats, travel: Travel) -> Floats:
+    """Force (n, 3) N on the tool that acts at set-points rho (n, m), machine frame, effects on it included."""
+    if not signal_path.acting(job.causes, "process"):
+        return travel.force
+    return signal_path.loaded(job.causes, _motion(job, rho, travel), travel.force).force
+
+
+def without_drives(
+    job: Job, target: Floats, travel: Travel, method: str = "newton", *, pose: bool = False
+) -> Correction:
     """Commands, machine frame, that bring the loaded tips to the targets (n, 3) if carriages go where they are told.
 
-    Their `rho` is where the carriages have to be, whatever the drives in front of them do.
+    Their `rho` is where the carriages have to be, whatever the drives in front of them do. pose: see `correct`.
     """
     load = Load(travel.force, np.zeros((len(target), 6)))
     if job.causes:
         nominal = solve(job.real_machine, FREE, job.frame.to_machine(target), check=False).rho_nominal
         load = signal_path.loaded(job.causes, _motion(job, nominal, travel), travel.force)
-    return correct(job.real_machine, job.frame.to_machine(target), load.force, load.wrench, method)
+    return correct(job.real_machine, job.frame.to_machine(target), load.force, load.wrench, method, pose=pose)
 
 
 def _through_play(job: Job, found: Correction, travel: Travel) -> Floats:
@@ -192,18 +263,23 @@ def _through_play(job: Job, found: Correction, travel: Travel) -> Floats:
     Eq. (5) alone would creep through it, by what is left to correct at every step.
     """
     solved = found.status == 0
-    carriage = found.rho[solved]
+    lag = _lost_motion(job, found.rho[solved], travel.take(np.flatnonzero(solved)))
+    out = np.zeros((len(solved), 3))
+    if lag.any():
+        out[solved] = _tip_way(job, found.commanded[solved], -lag)
+    return out
+
+
+def _lost_motion(job: Job, carriage: Floats, travel: Travel) -> Floats:
+    """What drives' memory makes of carriage minus encoder (n, m) where carriages (n, m) are led through their play at once."""
     length = way_per_unit(job)
     sense = ways(carriage * length, LEAST_MM)
-    motion = _motion(job, carriage + AHEAD_MM / length * sense, travel.take(np.flatnonzero(solved)))
+    motion = _motion(job, carriage + AHEAD_MM / length * sense, travel)
     still = replace(motion, ordered=False, direction=np.zeros_like(carriage))
     lag, standing = (signal_path.driven(job.causes, job.real_machine.actuators, each)[0] for each in (motion, still))
     lag = lag - standing
-    out = np.zeros((len(solved), 3))
-    if lag.any():
-        lag[sense == 0.0] = 0.0
-        out[solved] = _tip_way(job, found.commanded[solved], -lag)
-    return out
+    lag[sense == 0.0] = 0.0
+    return lag
 
 
 def behind_encoders(job: Job, commanded: Floats, travel: Travel) -> tuple[Floats, Floats]:
