@@ -6,22 +6,20 @@ per channel `gap_<channel>` and `rest_<channel>`, called and measured as in logs
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from camcomp.diagnosis.arm.poses import ArmBench, Poses
+from camcomp.diagnosis.arm.poses import ArmBench
+from camcomp.diagnosis.arm.unseen import acting
 from camcomp.diagnosis.experiment.open_experiment import columns_of
 from camcomp.diagnosis.fit.bench import Bench, Run, thinned
 from camcomp.diagnosis.result.types import DiagnosisResult
-from camcomp.ground import shelf
 from camcomp.ground.datatypes import Floats
-from camcomp.model.effect import Cause
 from camcomp.model.motion.log_columns import DYNO, LINE, TIME, TIP, log_columns
 from camcomp.model.motion.twin import Twin
-from camcomp.model.statics.description import Robot
 
 if TYPE_CHECKING:
     from camcomp.diagnosis.axis.findings import AxisChannel, AxisFindings
@@ -52,20 +50,16 @@ def of_runs(done: Diagnosis, twin: Twin, runs: Sequence[Run]) -> Columns:
     return _stacked(parts)
 
 
-def of_poses(robot: Robot, own: Sequence[Cause], campaigns: Sequence[Poses], result: DiagnosisResult) -> Columns:
-    """Static poses without the outliers; tips in machine axes, with the tracker's frame of every campaign fitted again."""
+def of_poses(bench_of: Callable[[], ArmBench], result: DiagnosisResult) -> Columns:
+    """Static poses without the outliers; tips in machine axes, in the frames that their result judges them in."""
     out = {(each.run, each.row) for each in result.outliers}
-    kept = [
-        each.take(np.array([(str(r), int(n)) not in out for r, n in zip(each.run, each.rows, strict=True)]))
-        for each in campaigns
-    ]
-    bench = ArmBench(robot, tuple(own), kept)
-    found = [
-        Cause(each.effect, shelf.load("effects", each.effect), each.target, _values(each.parameters) | each.settings)
-        for each in result.known
-    ]
+    bench = bench_of()
+    found = acting(result.known)
     parts = list[Columns]()
-    for k, poses in enumerate(kept):
+    for k, poses in enumerate(bench.campaigns):
+        kept = np.array([(str(r), int(n)) not in out for r, n in zip(poses.run, poses.rows, strict=True)])
+        bench.campaigns[k] = poses.take(kept)
+    for k, poses in enumerate(bench.campaigns):
         gap = bench.gap(k, ())
         rest = bench.gap(k, found) if found else gap
         parts.append({"run": poses.run, "row": poses.rows, **_both(TIP, gap, rest)})
@@ -93,10 +87,6 @@ def _lay(cells: dict[tuple[str, float], dict[str, float]], channel: AxisChannel,
         for column, at, each in ((f"gap_{name}", times, values - middle), (f"rest_{name}", move.time, rest)):
             for time, value in zip(at.tolist(), each.tolist(), strict=True):
                 cells.setdefault((channel.all_names[k], time), {})[column] = sign * value
-
-
-def _values(parameters: Mapping[str, Any]) -> dict[str, Any]:
-    return {name: each.value for name, each in parameters.items()}
 
 
 def _both(names: Sequence[str], gap: Floats, rest: Floats) -> Columns:

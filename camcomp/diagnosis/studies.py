@@ -17,8 +17,8 @@ from pydantic import ValidationError
 from camcomp.diagnosis.arm.noise_floor import StatedDeviation
 from camcomp.diagnosis.arm.plausible import check_poses
 from camcomp.diagnosis.arm.poses import Poses, approached
-from camcomp.diagnosis.arm.study import merged
-from camcomp.diagnosis.arm.study import study as study_arm
+from camcomp.diagnosis.arm.study import bench_of
+from camcomp.diagnosis.arm.study import studied as study_arm
 from camcomp.diagnosis.axis.findings import AxisDeviation, AxisRun
 from camcomp.diagnosis.axis.plausible import check_axes
 from camcomp.diagnosis.axis.study import studied as study_axes
@@ -69,8 +69,10 @@ def study_of(path: str | Path, without: Sequence[str] = ()) -> LogStudy | None:
             sd = opened.experiment.sd
             stated = StatedDeviation(sd.tip_mm, sd.encoder_mm) if sd else StatedDeviation()
             own = _causes(opened.config)
-            result = study_arm(robot, own, runs, holdout=opened.experiment.holdout, without=without, stated=stated)
-            return LogStudy(result, partial(of_poses, robot, own, merged(runs), result), tuple(opened.notes))
+            holdout = opened.experiment.holdout
+            result, notes = study_arm(robot, own, runs, holdout=holdout, without=without, stated=stated)
+            bench = partial(bench_of, robot, tuple(own), runs, holdout)
+            return LogStudy(result, partial(of_poses, bench, result), (*opened.notes, *notes))
         if not any(m.has("tip") for m in logs) and all(m.has("encoder") for m in logs):
             axes = _checked_axes(opened)
             sd = opened.experiment.sd

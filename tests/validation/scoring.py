@@ -55,6 +55,11 @@ def library() -> set[str]:
 
 def held(cause: Row, truth: dict[str, float]) -> list[bool]:
     """Whether each interval of a named cause holds the true value."""
+    return [miss <= 1.0 for miss in misses(cause, truth)]
+
+
+def misses(cause: Row, truth: dict[str, float]) -> list[float]:
+    """Distance of every true value from the one found, in the half width of the interval on its side."""
     out = []
     for name, value in truth.items():
         got = cause.get("parameters", {}).get(name)
@@ -64,7 +69,8 @@ def held(cause: Row, truth: dict[str, float]) -> list[bool]:
             value = value + turn * round((got["value"] - value) / turn) if name.startswith("phase") else value
             if name == "offset_s":  # which of two clocks is ahead of the other, the contract leaves open
                 value = float(np.copysign(value, got["value"]))
-            out.append(bool(low <= value <= high))
+            half = high - got["value"] if value > got["value"] else got["value"] - low
+            out.append(abs(value - got["value"]) / max(half, 1e-300) if not low <= value <= high or half > 0.0 else 0.0)
     return out
 
 
@@ -124,6 +130,13 @@ def judge(result: Row, truth: Row, known: set[str]) -> Row:
         for c in real
         if pair == (c["effect"], c["target"])
         for hit in held(cause, c["parameters"])
+    ]
+    out["misses"] = [
+        miss
+        for cause, pair in zip(causes, found, strict=True)
+        for c in real
+        if pair == (c["effect"], c["target"])
+        for miss in misses(cause, c["parameters"])
     ]
     return out
 

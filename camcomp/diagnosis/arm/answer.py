@@ -4,21 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
+from scipy.special import expit
+from scipy.stats import norm
 
+from camcomp.diagnosis.arm.case import PoseCase
 from camcomp.diagnosis.arm.curves import curve_of
-from camcomp.diagnosis.arm.dependence import Dependence
-from camcomp.diagnosis.arm.discrepancy import regions, without_nuisance
-from camcomp.diagnosis.arm.drivers import drivers
-from camcomp.diagnosis.arm.fit import ArmFit
-from camcomp.diagnosis.arm.forward_selection import LEAST_GAIN, Step, odds, rms
-from camcomp.diagnosis.arm.gate import MINOR, Gate, standing_out, windows
+from camcomp.diagnosis.arm.linear import covariate_of
 from camcomp.diagnosis.arm.next_poses import POSES_SEED, proposed, unseen_share
 from camcomp.diagnosis.arm.noise_floor import TipFloor
-from camcomp.diagnosis.arm.poses import CURVE, ArmBench
-from camcomp.diagnosis.arm.unseen import Court, Rival
+from camcomp.diagnosis.arm.poses import CURVE
+from camcomp.diagnosis.arm.unseen import HeldOutCheck
+from camcomp.diagnosis.model.calibration import calibration_of
+from camcomp.diagnosis.model.classes import alternatives_of
+from camcomp.diagnosis.model.discrepancy import gains_of_more, residuals
+from camcomp.diagnosis.model.evidence import Background
+from camcomp.diagnosis.model.folds import without_nuisances
+from camcomp.diagnosis.model.group import split_regions
+from camcomp.diagnosis.model.verdict import EVEN, VerdictInputs, decide
 from camcomp.diagnosis.result.types import (
     UNKNOWN,
     CurveCause,
@@ -36,26 +42,63 @@ from camcomp.diagnosis.result.types import (
     UnknownCause,
     Where,
 )
-from camcomp.diagnosis.statistics.probability import EVEN, UNSURE, probability_of_chance, stated
 from camcomp.ground.datatypes import Floats
 
-FAINT = 0.01  # of the floor: what moves the tip less is not worth a line
-LEAST_TARGET = 0.5  # probability above which an actuator is named
+MINOR = 0.3  # of the floor: an effect that moves the tip less is no cause
+FAINT = 0.01  # of the floor: an effect that moves the tip less is not listed
 PLACES = 8  # parts of the workspace
 REPEATS = 20  # poses to be visited again: a floor known to a sixth
+STRETCHES = 16  # of a campaign's time
+SHORTEST = 12  # poses in a stretch
+FALSE = 0.01  # of the stretches and places that are named
+CLEAR = 3.0  # log evidence from which on the gap depends on a covariate: odds of 20
+MOST_DRIVERS = 6  # that are listed
+POSES_MAP, BESIDE_MAP = "poses", "poses beside unknown"  # kinds of log of the calibration
 
 
 @dataclass(frozen=True, eq=False)
 class Told:
-    """All that an answer is made of."""
+    """What an answer is made of; gaps (n, 3) mm of the fitted campaigns to the arm of the config."""
 
-    bench: ArmBench
-    found: ArmFit
-    gate: Gate
-    floor: TipFloor | None
-    sets: Sequence[Rival]
-    verdict: Any
-    judges: Court
+    case: PoseCase
+    check: HeldOutCheck
+    gaps: Sequence[Floats]
+
+    @property
+    def floor(self) -> TipFloor | None:
+        """The noise floor, None where it is not identifiable."""
+        return self.case.floor
+
+    @property
+    def unmodelled(self) -> float:
+        """Calibrated probability that something unmodelled acts; unseen poses above their floor decide."""
+        if self.check.above:
+            return calibration_of(POSES_MAP).calibrate(1.0)
+        return calibration_of(POSES_MAP).calibrate(self.case.explanation.unknown)
+
+    @property
+    def kind(self) -> str:
+        """The calibration map of causes."""
+        return BESIDE_MAP if self.unmodelled > EVEN else POSES_MAP
+
+    @cached_property
+    def rest(self) -> list[Floats]:
+        """Residuals (n, 3) mm of the fitted campaigns beside the causes, frames fitted."""
+        return [self.case.bench.gap(k, self.case.causes) for k in self.case.bench.own]
+
+    @cached_property
+    def parts(self) -> list[_Part]:
+        """Members of the most probable set, and the targets of its families."""
+        return _parts(self)
+
+    @property
+    def gap_um(self) -> float:
+        """Root mean square of the gap, um."""
+        return 1e3 * _size(self.gaps)
+
+    def alternatives(self) -> list[tuple[int, ...]]:
+        """Sets that these poses cannot tell apart, the best first."""
+        return alternatives_of(self.case.explanation, [c.place for c in self.case.shelf.candidates])
 
 
 def gap(gaps: Sequence[Floats], floor: TipFloor | None) -> GapSize:
@@ -72,76 +115,85 @@ def gap(gaps: Sequence[Floats], floor: TipFloor | None) -> GapSize:
 # -- causes -----------------------------------------------------------------------------------------------------------
 
 
-def causes(told: Told, gaps: Sequence[Floats]) -> tuple[tuple[FoundCause, ...], tuple[MinorEffect, ...]]:
-    """Effects with the actuators that matter, the unknown one last, and those too small to be causes.
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """An effect at a target: its columns and the probability of the posterior."""
 
-    Shares are of unseen poses and follow the order in which the groups were taken; those of few causes are of the squares of
-    all poses. A set that has rivals is as probable as it is among them.
-    """
-    found = told.found
-    before = found.taken.none
-    whole = float(np.mean(before.squares))
-    full = found.evidence.value(np.where(found.amount != 0.0, found.taken.widths, 0.0))
-    weights = _weights(told)
+    effect: str
+    target: str | None
+    columns: list[int]
+    probability: float
+
+
+def causes(told: Told) -> tuple[tuple[FoundCause, ...], tuple[MinorEffect, ...]]:
+    """Causes of the most probable set in falling probability, and those too small to be causes."""
+    whole = sum(float((gap**2).sum()) for gap in told.gaps)
+    rows = sum(len(gap) for gap in told.gaps)
     out: list[FoundCause] = []
     minor: list[MinorEffect] = []
-    for step in found.taken.steps:
-        share = float(np.mean(before.squares) - np.mean(step.squares)) / whole
-        effect = found.effect(step.group)
-        sure = min(odds(step.density - before.density), weights.get(step.group, 1.0))
-        targets = list(dict.fromkeys(_targets(found, step.group)))
-        own = [_target(found, step, target, full) for target in targets]
-        energy = sum(e for e, _, _ in own)
-        if found.few is not None:  # some act on one campaign only, and on no other that is withheld
-            share = min(energy / sum(float((gap**2).sum()) for gap in gaps), 1.0)
-        for (e, probability, parameters), target in zip(own, targets, strict=True):
-            if found.few is not None:
-                sure, probability = weights[step.group], found.few.places[effect, target]
-                probability = min(probability, _beside_unknown(told, e))
-            size = 1e3 * float(np.sqrt(e / sum(len(b.r) for b in found.evidence.blocks)))
-            if found.few is not None and (told.floor is None or size < told.floor.um):
-                # without a floor nothing says whether all is explained; what is below it others may be wrong by
-                probability = min(probability, UNSURE)
-            if told.floor is not None and size < MINOR * told.floor.um:
-                if size >= FAINT * told.floor.um:
-                    minor.append(MinorEffect(effect=effect, target=target, size_um=_round(size)))
-            elif probability >= LEAST_TARGET:
-                cause = FoundCause(
-                    effect=effect,
-                    target=target,
-                    probability=stated(min(sure, probability)),
-                    share=round(float(share * e / energy), 4),
-                    parameters=parameters,
-                )
-                out.append(cause if effect != CURVE else _curve(told, cause))
-        before = step
-    order = [found.effect(s.group) for s in found.taken.steps]
-    out.sort(key=lambda c: (-c.probability, order.index(c.effect), -c.share))
-    if told.verdict == "unknown" or (told.verdict == "ambiguous" and not out):
-        left = round(_size(found.rest) ** 2 / _size(gaps) ** 2, 4)
-        chance = probability_of_chance(told.gate.chance) if told.verdict == "unknown" else EVEN
-        out.append(UnknownCause(target=None, probability=stated(chance), share=left))
-    return tuple(out), (*minor, *_slight(told))
+    for part in told.parts:
+        energy = energy_of(told, part.columns)
+        size = 1e3 * float(np.sqrt(energy / rows))
+        if told.floor is not None and size < MINOR * told.floor.um:
+            if size >= FAINT * told.floor.um:
+                minor.append(MinorEffect(effect=part.effect, target=part.target, size_um=_round(size)))
+            continue
+        cause = FoundCause(
+            effect=part.effect,
+            target=part.target,
+            probability=calibration_of(told.kind).calibrate(part.probability),
+            share=round(min(energy / whole, 1.0), 4),
+            parameters=parameters_of(told, part.columns),
+        )
+        out.append(cause if part.effect != CURVE else _curve(told, cause, part.columns))
+    out.sort(key=lambda c: (-c.probability, -c.share))
+    return tuple(out), tuple(minor)
 
 
-def _beside_unknown(told: Told, energy: float) -> float:
-    """Probability that a cause beside something unknown is no imitation of it. energy: of its squares over all poses, mm2.
+def _parts(told: Told) -> list[_Part]:
+    found, columns = told.case.explanation, told.case.shelf.columns
+    own = [_Part(c.effect, c.target, list(c.columns), found.places[c.place])
+           for c in (told.case.shelf.candidates[i] for i in found.members)]  # fmt: skip
+    for name, _ in found.background.families:
+        on = [j for j in found.model.family(name)[0].tolist() if told.case.amount[j] != 0.0]
+        for target in dict.fromkeys(columns[j].target for j in on):
+            here = [j for j in on if columns[j].target == target]
+            alone = next((p for p in own if (p.effect, p.target) == (name, target)), None)
+            if alone is None:
+                chance = float(expit(found.odds_of(here)))
+                own.append(_Part(name, target, here, found.families[name] * chance))
+            else:
+                alone.columns.extend(j for j in here if j not in alone.columns)
+    return own
 
-    The best of all effects takes the larger part of most of what none of them is; a cause that takes less than what is
-    left is none of that size, and one that takes more is as likely an imitation as not.
-    """
-    if told.gate.word != "above":
-        return 1.0
-    noise = 0.0 if told.floor is None else 3.0 * told.floor.sd**2
-    left = max(float(np.mean((np.concatenate(told.found.rest) ** 2).sum(axis=1))) - noise, 0.0)
-    own = energy / sum(len(r) for r in told.found.rest)
-    return min(own / max(own + left, 1e-300), EVEN)
+
+def energy_of(told: Told, on: Sequence[int]) -> float:
+    """Sum of squares, mm2, of what columns move the tips by, frames fitted."""
+    case = told.case
+    groups = [case.model.groups[k] for k in case.bench.own]
+    return sum(float((without_nuisances(g.A[:, :, on] @ case.amount[on], g.N) ** 2).sum()) for g in groups)
 
 
-def _curve(told: Told, cause: FoundCause) -> CurveCause:
+def parameters_of(told: Told, on: Sequence[int]) -> dict[str, Estimate]:
+    """Parameters of columns with their intervals."""
+    out = {}
+    wide = 1.96 * calibration_of(told.kind).interval
+    for j in on:
+        column = told.case.shelf.columns[j]
+        p, spread = column.parameter, wide * float(np.sqrt(told.case.covariance[j, j]))
+        low, high = (_digits(p.value((told.case.amount[j] + s * spread) * p.scale)) for s in (-1.0, 1.0))
+        out[p.name] = Estimate(value=_digits(p.value(told.case.amount[j] * p.scale)), ci95=(low, high))
+        for name, shape, first, last in column.shape:
+            out[name] = Estimate(value=_digits(shape), ci95=(_digits(first), _digits(last)))
+    return out
+
+
+def _curve(told: Told, cause: FoundCause, on: Sequence[int]) -> CurveCause:
     """The cause with the curve of its joint."""
-    found = curve_of(told.bench, told.found, str(cause.target))
-    low, high = (max(found.amplitude + s * 1.96 * found.amplitude_sd, 0.0) for s in (-1.0, 1.0))
+    case = told.case
+    found = curve_of(case.bench, [case.shelf.columns[j] for j in on], case.amount[on], case.covariance[np.ix_(on, on)])
+    wide = 1.96 * calibration_of(told.kind).interval
+    low, high = (max(found.amplitude + s * wide * found.amplitude_sd, 0.0) for s in (-1.0, 1.0))
     size = Estimate(value=_digits(found.amplitude), ci95=(_digits(low), _digits(high)))
     out = CurveCause(
         effect=cause.effect,
@@ -165,138 +217,147 @@ def _curve(told: Told, cause: FoundCause) -> CurveCause:
     return out
 
 
-def _weights(told: Told) -> dict[str, float]:
-    """Probability of every group among the sets that explain alike.
-
-    Within one campaign density does not count: n sets of which k hold a group make (k + 1) / (n + 2), Laplace's rule.
-    """
-    sets = told.sets
-    density = np.array([s.density for s in sets])
-    p = np.exp(density - density.max())
-    p = p / p.sum()
-    out = {}
-    for group in told.found.groups:
-        holds = np.array([group in s.groups for s in sets])
-        if not told.judges.whole:
-            some = (int(holds.sum()) + 1) / (len(sets) + 2)
-            out[group] = some if told.gate.word == "at" else min(some, EVEN)  # what is left may be all that it is
-        else:
-            out[group] = 1.0 if told.found.few is not None else float(p[holds].sum())
-    return out
+def verdict(told: Told, named: Sequence[FoundCause]) -> Any:
+    """The word of the result."""
+    found = told.case.explanation
+    best = next((p for m, p in found.sets if set(_places(told, m)) == set(_places(told, found.members))), 0.0)
+    floor = told.floor
+    inputs = VerdictInputs(
+        unknown=told.unmodelled,
+        best=min([calibration_of(told.kind).calibrate(best), *(c.probability for c in named)]),
+        alternatives=len(told.alternatives()) - 1,
+        causes=len(named),
+        known_noise=floor is not None,
+        gap_in_noise=floor is not None and told.gap_um <= floor.um and told.check.at_floor is not False,
+        confirmed=told.check.at_floor,
+    )
+    return decide(inputs)
 
 
-def _slight(told: Told) -> tuple[MinorEffect, ...]:
-    """Groups that were not taken, are there by density, and move the tip by less than matters."""
-    if told.floor is None:
+def _places(told: Told, members: Sequence[int]) -> list[tuple[str, str | None]]:
+    return [told.case.shelf.candidates[i].place for i in members]
+
+
+def with_unknown(told: Told, named: tuple[FoundCause, ...], word: str) -> tuple[FoundCause, ...]:
+    """The causes of a verdict: none for `none`; with the unknown cause where something unmodelled is, or nothing is named."""
+    if word == "none":
         return ()
-    taken = told.found.taken
-    last = (taken.none, *taken.steps)[-1]
-    out = []
-    for step in taken.refused:
-        size = 1e3 * float(np.sqrt(max(rms(last.squares) ** 2 - rms(step.squares) ** 2, 0.0)))
-        if step.density > last.density + LEAST_GAIN and FAINT * told.floor.um < size < MINOR * told.floor.um:
-            out.append(MinorEffect(effect=step.group, target=None, size_um=_round(size)))
-    return tuple(out)
+    if word == "unknown" or (word == "ambiguous" and not named):
+        share = round(min(_size(told.rest) ** 2 / _size(told.gaps) ** 2, 1.0), 4)
+        probability = told.unmodelled if word == "unknown" else EVEN
+        return (*named, UnknownCause(target=None, probability=probability, share=share))
+    return named
 
 
 def alternatives(told: Told, named: Sequence[FoundCause]) -> tuple[tuple[NamedCause, ...], ...]:
-    """Sets that the poses cannot tell apart, the one that was taken first.
-
-    Where it has no rival among effects, the rival is that something unknown is there as well.
-    """
+    """Sets that the poses cannot tell apart, the best first; where it has no rival, the rival is something unmodelled."""
     known = tuple(NamedCause(effect=c.effect, target=c.target) for c in named if not isinstance(c, UnknownCause))
-    others = [_members(told.found, each) for each in told.sets[1:]] if known else []
-    if not others:
-        others = [(*known, NamedCause(effect=UNKNOWN, target=None))]
-    return (known, *others)
-
-
-def _members(found: ArmFit, rival: Rival) -> tuple[NamedCause, ...]:
-    """Effects of a set at the targets that matter to it."""
-    widths = np.array(rival.widths)
-    full = found.evidence.value(widths)
-    out = []
-    for group in rival.groups:
-        chances = {}
-        for target in dict.fromkeys(found.columns[j].target for j in found.groups[group]):
-            less = widths.copy()
-            less[[j for j in found.groups[group] if found.columns[j].target == target]] = 0.0
-            chances[target] = odds(full - found.evidence.value(less))
-        some = [t for t, p in chances.items() if p >= LEAST_TARGET] or [max(chances, key=lambda t: chances[t])]
-        out += [NamedCause(effect=found.effect(group), target=target) for target in some]
-    return tuple(out)
-
-
-def _targets(found: ArmFit, group: str) -> list[str | None]:
-    return [found.columns[j].target for j in found.groups[group] if found.amount[j] != 0.0]
-
-
-def _target(found: ArmFit, step: Step, target: str | None, full: float) -> tuple[float, float, dict[str, Estimate]]:
-    """Energy, probability and parameters of a group at one target."""
-    own = [j for j in found.groups[step.group] if found.columns[j].target == target and found.amount[j] != 0.0]
-    widths = np.where(found.amount != 0.0, found.taken.widths, 0.0)
-    widths[own] = 0.0
-    energy = 0.0
-    for b in found.evidence.blocks:
-        energy += float((without_nuisance(b.X[:, :, own] @ found.amount[own], b.N) ** 2).sum())
-    parameters = {}
-    for j in own:
-        p = found.columns[j].parameter
-        spread = 1.96 * float(np.sqrt(found.covariance[j, j]))
-        low, high = (_digits(p.value((found.amount[j] + s * spread) * p.scale)) for s in (-1.0, 1.0))
-        value = p.value(found.amount[j] * p.scale)
-        parameters[p.name] = Estimate(value=_digits(value), ci95=(low, high))
-        for name, shape, first, last in found.columns[j].shape:
-            parameters[name] = Estimate(value=_digits(shape), ci95=(_digits(first), _digits(last)))
-    return energy, odds(full - found.evidence.value(widths)), parameters
+    others = [tuple(NamedCause(effect=e, target=t) for e, t in _places(told, m)) for m in told.alternatives()[1:]]
+    others = [each for each in others if each and known]
+    return (known, *(others or [(*known, NamedCause(effect=UNKNOWN, target=None))]))
 
 
 # -- where ------------------------------------------------------------------------------------------------------------
 
 
-def where(told: Told, gaps: Sequence[Floats]) -> Where:
+def where(told: Told, word: str) -> Where:
     """Shares of axes and actuators; with an unknown, what it depends on, when and in which places it stands out."""
-    found, bench = told.found, told.bench
-    energy = (np.concatenate(list(gaps)) ** 2).sum(axis=0)
-    actuators = dict.fromkeys(bench.actuators, 0.0)
+    case = told.case
+    energy = (np.concatenate(list(told.gaps)) ** 2).sum(axis=0)
+    actuators = dict.fromkeys(case.bench.actuators, 0.0)
     stages: dict[str, float] = {}
-    for step in found.taken.steps:
-        for target in dict.fromkeys(_targets(found, step.group)):
-            size, _, _ = _target(found, step, target, 0.0)
-            stage = found.columns[found.groups[step.group][0]].module.STAGE
-            stages[stage] = stages.get(stage, 0.0) + size
-            if target is not None:
-                actuators[target] += size
+    for part in told.parts:
+        size, stage = energy_of(told, part.columns), case.shelf.columns[part.columns[0]].module.STAGE
+        stages[stage] = stages.get(stage, 0.0) + size
+        if part.target is not None:
+            actuators[part.target] += size
     total = max(sum(actuators.values()), 1e-300)
     most: Any = max(stages, key=lambda s: stages[s]) if stages else "structure"
     whole = max(float(energy.sum()), 1e-300)
-    unknown = told.verdict == "unknown"
-    intervals = _intervals(told) if unknown else ()
+    intervals = _intervals(told) if word == "unknown" else ()
     return Where(
         stage=most,
         axes={axis: round(float(e) / whole, 4) for axis, e in zip("xyz", energy, strict=True)},
         actuators={name: round(size / total, 4) for name, size in actuators.items()},
-        drivers=_drivers(told, intervals) if unknown else (),
+        drivers=drivers(told, intervals) if word == "unknown" else (),
         intervals=intervals,
-        places=_places(told) if unknown else (),
+        places=_places_above(told) if word == "unknown" else (),
     )
 
 
-def _drivers(told: Told, intervals: Sequence[IntervalShare]) -> tuple[Driver, ...]:
-    """What the leftover depends on, the most first: the time of stretches in which it is larger, where nothing else shows."""
-    found = drivers(told.bench, told.judges.poses, told.gate)
-    if not found and intervals:
-        found = [Dependence("time", sum(each.share for each in intervals), 0.0)]
-    return tuple(Driver(covariate=d.covariate, share=round(d.share, 4)) for d in found[:6])
+def drivers(told: Told, intervals: Sequence[IntervalShare]) -> tuple[Driver, ...]:
+    """Covariates of the residual with the share of its energy that each explains alone, the most first.
+
+    Where none is clear: time where stretches of it stand out, else the covariate that explains most.
+    """
+    case, found = told.case, told.case.explanation
+    plain = Background(found.background.noise, families=found.background.families)
+    gains: dict[str, tuple[float, Background]] = {}
+    for b, gain in gains_of_more(case.model, plain, found.members).items():
+        if len(b.scales) > len(plain.scales) and gain > gains.get(b.scales[-1][0], (-np.inf, b))[0]:
+            gains[b.scales[-1][0]] = gain, b
+    if not gains:
+        return ()
+    clear = {name for name, (gain, _) in gains.items() if gain > CLEAR}
+    clear |= {name for name, _ in found.background.scales}
+    if not clear and intervals:
+        return (Driver(covariate="time", share=round(min(sum(i.share for i in intervals), 1.0), 4)),)
+    clear = clear or {max(gains, key=lambda name: gains[name][0])}
+    shares: dict[str, float] = {}
+    before = _energy(residuals(case.model, plain, found.members))
+    for name in clear & set(gains):
+        after = _energy_beside(told, gains[name][1])
+        key = covariate_of(name)
+        shares[key] = max(shares.get(key, 0.0), min(max(1.0 - after / max(before, 1e-300), 0.0), 1.0))
+    if found.background.process is not None and found.background.process.over == "time":
+        shares.setdefault("time", max(shares.values(), default=0.0))
+    order = sorted(shares, key=lambda name: -shares[name])
+    return tuple(Driver(covariate=name, share=round(shares[name], 4)) for name in order[:MOST_DRIVERS])
+
+
+def _energy(parts: Sequence[Floats]) -> float:
+    return sum(float((r**2).sum()) for r in parts)
+
+
+def _energy_beside(told: Told, background: Background) -> float:
+    """Energy of the residual, in floors, beside a covariate as well."""
+    model, found = told.case.model, told.case.explanation
+    at = model.posterior(background, model.reduced(background).slab(found.members))
+    groups = [model.groups[g] for g in model.own]
+    return _energy([(g.y - model.layout.design(g) @ at.mean) / g.sd for g in groups])
+
+
+def windows(time: Floats) -> list[np.ndarray]:
+    """Indices of at most STRETCHES stretches of time of SHORTEST poses or more."""
+    count = min(STRETCHES, len(time) // SHORTEST)
+    return list(np.array_split(np.argsort(time, kind="stable"), count)) if count > 1 else []
+
+
+def standing_out(size: Floats, groups: Sequence[np.ndarray]) -> list[int]:
+    """Groups of indices whose sizes (n,) are larger than those of the others: rank sums, 1 % over all groups.
+
+    Source: Mann, Whitney, Ann. Math. Stat. 18 (1947) 50.
+    """
+    rank = np.empty(len(size))
+    rank[np.argsort(size, kind="stable")] = np.arange(1, len(size) + 1)
+    out = []
+    for i, own in enumerate(groups):
+        n, m = len(own), len(size) - len(own)
+        if not n or not m:
+            continue
+        z = (rank[own].sum() - n * (n + m + 1) / 2.0) / np.sqrt(n * m * (n + m + 1) / 12.0)
+        if norm.sf(z) < FALSE / len(groups):
+            out.append(i)
+    return out
 
 
 def _intervals(told: Told) -> tuple[IntervalShare, ...]:
-    """Stretches of a run's time in which the leftover is larger than elsewhere."""
-    whole = max(sum(float((r**2).sum()) for r in told.gate.left.rest), 1e-300)
+    """Stretches of a run's time in which the residual is larger than elsewhere."""
+    whole = max(_energy(told.rest), 1e-300)
     out = []
-    for poses, rest in zip(told.judges.poses, told.gate.left.rest, strict=True):
-        square = (rest**2).sum(axis=1)
-        for run in dict.fromkeys(str(name) for name in poses.run):
+    for k, rest in zip(told.case.bench.own, told.rest, strict=True):
+        poses, square = told.case.bench.campaigns[k], (rest**2).sum(axis=1)
+        for run in dict.fromkeys(str(name) for name in poses.run) if poses.has_clock else ():
             rows = np.flatnonzero(poses.run == run)
             own = windows(poses.time[rows])
             for i in standing_out(square[rows], own):
@@ -309,11 +370,12 @@ def _intervals(told: Told) -> tuple[IntervalShare, ...]:
     return tuple(sorted(out, key=lambda each: -each.share))
 
 
-def _places(told: Told) -> tuple[PlaceShare, ...]:
-    """Parts of the workspace, boxes in the machine frame, in which the leftover is larger than elsewhere."""
-    point = np.concatenate([told.bench.standing(p, ()).hung.point for p in told.judges.poses])
-    square = np.concatenate([(r**2).sum(axis=1) for r in told.gate.left.rest])
-    group = regions(point, PLACES)
+def _places_above(told: Told) -> tuple[PlaceShare, ...]:
+    """Parts of the workspace, boxes in the machine frame, in which the residual is larger than elsewhere."""
+    bench = told.case.bench
+    point = np.concatenate([bench.standing(bench.campaigns[k], ()).hung.point for k in bench.own])
+    square = np.concatenate([(r**2).sum(axis=1) for r in told.rest])
+    group = split_regions(point, PLACES)
     parts = [np.flatnonzero(group == g) for g in np.unique(group)]
     whole = max(float(square.sum()), 1e-300)
     out = []
@@ -329,21 +391,22 @@ def _places(told: Told) -> tuple[PlaceShare, ...]:
 # -- what to measure next -----------------------------------------------------------------------------------------------
 
 
-def next_experiment(told: Told) -> NextExperiment | None:
+def next_experiment(told: Told, word: str) -> NextExperiment | None:
     """Poses that tell most, as a campaign of their own; repeats where there is no floor."""
-    if told.verdict in ("none", "identified"):
+    if word in ("none", "identified"):
         return None
-    if told.floor is None and told.judges.whole:
+    case, whole = told.case, len(told.case.bench.campaigns) > 1
+    if told.floor is None and whole:
         return _again(told)
-    found = told.found
-    noise = told.floor.sd if told.floor else max(found.discrepancy.noise, 1e-6)
-    q, place, gain = proposed(told.bench, found, noise)
+    on = [int(j) for j in np.flatnonzero(case.amount)]
+    columns = [case.shelf.columns[j] for j in on]
+    q, place, gain = proposed(case.bench, columns, case.covariance[np.ix_(on, on)], max(case.sd, 1e-6))
     if not len(q):
-        return None if told.judges.whole or not found.taken.steps else _second_campaign(told, q, place)
-    if not told.judges.whole:
+        return None if whole or not columns else _second_campaign(told, q, place)
+    if not whole:
         return _second_campaign(told, q, place)
-    new = 100.0 * unseen_share(told.bench, found, q)
-    effects = [*dict.fromkeys(found.effect(s.group) for s in found.taken.steps), UNKNOWN]
+    new = 100.0 * unseen_share(case.bench, columns, q)
+    effects = [*dict.fromkeys(p.effect for p in told.parts), UNKNOWN]
     action = f"measure {len(q)} more poses with a clamping of their own"
     if new:
         action += f", {new:.0f} % of them with a joint at angles that no pose had"
@@ -368,12 +431,13 @@ def next_experiment(told: Told) -> NextExperiment | None:
 
 def _second_campaign(told: Told, q: Floats, place: Floats) -> NextExperiment:
     """Other postures, where there is one campaign only: within it, effects stand in for each other."""
-    effects = list(dict.fromkeys(told.found.effect(g) for s in told.sets for g in s.groups))
-    sets = ["; ".join(s.groups) for s in told.sets]
+    sets_of = [_places(told, m) for m in told.alternatives()]
+    effects = list(dict.fromkeys(effect for each in sets_of for effect, _ in each))
+    sets = ["; ".join(e if t is None else f"{e} {t}" for e, t in each) for each in sets_of if each]
     return NextExperiment(
         action="measure a second campaign in other postures, with a clamping of its own",
         separates=tuple(effects),
-        gain=round(float(np.log2(len(told.sets) + 1)), 4),
+        gain=round(float(np.log2(len(sets) + 1)), 4),
         outcomes=(
             *(f"If {one} alone foretell the new poses, they are the cause." for one in sets[:2]),
             "If no set foretells them, something unknown is at work.",
@@ -384,8 +448,8 @@ def _second_campaign(told: Told, q: Floats, place: Floats) -> NextExperiment:
 
 def _again(told: Told) -> NextExperiment:
     """Repeats: every other quantile of the poses there are, in an order that does not stay in one place."""
-    effects = [*dict.fromkeys(told.found.effect(s.group) for s in told.found.taken.steps), UNKNOWN]
-    campaign = told.bench.campaigns[0]
+    effects = [*dict.fromkeys(p.effect for p in told.parts), UNKNOWN]
+    campaign = told.case.bench.campaigns[0]
     some = np.unique(np.linspace(0, len(campaign.q) - 1, REPEATS).astype(int))
     some = some[np.random.default_rng(POSES_SEED).permutation(len(some))]
     again = campaign.take(some)
@@ -397,13 +461,13 @@ def _again(told: Told) -> NextExperiment:
             "If visits of one pose differ by as much as the causes leave, nothing is left to explain.",
             "If they differ by less, something unknown is at work.",
         ),
-        poses=_listed(told, again.q, told.bench.standing(again, ()).hung.point),
+        poses=_listed(told, again.q, told.case.bench.standing(again, ()).hung.point),
     )
 
 
 def _listed(told: Told, q: Floats, place: Floats) -> PosesToMeasure:
     return PosesToMeasure(
-        joints=told.bench.actuators,
+        joints=told.case.bench.actuators,
         positions=tuple(tuple(round(float(v), 6) for v in row) for row in q),
         platform_mm=tuple((_round(x), _round(y), _round(z)) for x, y, z in place),
     )

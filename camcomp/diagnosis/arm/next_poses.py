@@ -7,13 +7,13 @@ how much it narrows the error of the tip there.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from camcomp.diagnosis.arm.curves import curved_joints, seen_angles
-from camcomp.diagnosis.arm.fit import ArmFit
-from camcomp.diagnosis.arm.poses import ArmBench, Poses
+from camcomp.diagnosis.arm.curves import covered, seen_angles
+from camcomp.diagnosis.arm.poses import CURVE, ArmBench, Column, Poses
 from camcomp.ground.datatypes import Floats
 
 POSES = 40  # of a proposal: an hour with a tracker
@@ -112,28 +112,29 @@ def candidates(bench: ArmBench, count: int = CANDIDATES) -> Floats:
     return np.asarray(q[inside[:count]], float)
 
 
-def proposed(bench: ArmBench, found: ArmFit, noise: float) -> tuple[Floats, Floats, float]:
-    """Joints (POSES, m) to measure in a new campaign, their platform points (POSES, 3), and what they tell of the effects (bits).
+def proposed(
+    bench: ArmBench, columns: Sequence[Column], covariance: Floats, noise: float
+) -> tuple[Floats, Floats, float]:
+    """Joints (POSES, m) to measure in a new campaign, their platform points (POSES, 3), and what they tell of effects (bits).
 
-    Empty where nothing was taken or no candidate stands where poses stood.
+    columns with their covariance (k, k): what is to be known better. Empty where that is nothing, or no candidate stands where
+    poses stood.
     """
-    on = [j for s in found.taken.steps for j in found.groups[s.group] if found.amount[j] != 0.0]
     q = candidates(bench)
-    if not on or not len(q):
+    if not columns or not len(q):
         return np.zeros((0, len(bench.actuators))), np.zeros((0, 3)), 0.0
     poses = _as_poses(q)
     place = bench.standing(poses, ()).hung.point
     poses = replace(poses, tip=bench.start[0].tips(place, bench.standing(poses, ()).hung.rotation))
     there = ArmBench(bench.robot, bench.causes, [poses])
-    block = there.blocks([found.columns[j] for j in on])[0]
-    k = len(on)
-    covariance = np.zeros((k + 9,) * 2)
-    covariance[:k, :k] = found.covariance[np.ix_(on, on)] + 1e-12 * np.eye(k)
-    covariance[k:, k:] = np.diag([FRAME / ARM_MM] * 3 + [FRAME] * 6) ** 2
-    rows = np.concatenate([block.X, block.N], axis=2)
-    design = designed(rows, covariance, noise, POSES)
+    group = there.groups(columns, noise)[0]
+    k = len(columns)
+    whole = np.zeros((k + 9,) * 2)
+    whole[:k, :k] = covariance + 1e-12 * np.eye(k)
+    whole[k:, k:] = np.diag([FRAME / ARM_MM] * 3 + [FRAME] * 6) ** 2
+    design = designed(np.concatenate([group.A, group.N], axis=2), whole, noise, POSES)
     chosen = list(design.chosen)
-    return q[chosen], place[chosen], _bits(covariance[:k, :k], design.covariance[:k, :k])
+    return q[chosen], place[chosen], _bits(whole[:k, :k], design.covariance[:k, :k])
 
 
 def _bits(before: Floats, after: Floats) -> float:
@@ -141,19 +142,13 @@ def _bits(before: Floats, after: Floats) -> float:
     return 0.5 * float(np.linalg.slogdet(before)[1] - np.linalg.slogdet(after)[1]) / float(np.log(2.0))
 
 
-def unseen_share(bench: ArmBench, found: ArmFit, q: Floats) -> float:
+def unseen_share(bench: ArmBench, columns: Sequence[Column], q: Floats) -> float:
     """Share of poses q (n, m) in which some joint with a curve stands where no pose was."""
-    joints = curved_joints(bench, found)
+    joints = sorted({bench.actuators.index(str(c.target)) for c in columns if c.effect == CURVE})
     if not joints or not len(q):
         return 0.0
-    out = np.zeros(len(q), bool)
-    for a in joints:
-        seen = seen_angles(np.concatenate([each.q[:, a] for each in bench.campaigns]))
-        inside = np.zeros(len(q), bool)
-        for low, high in seen:
-            inside |= (np.degrees(q[:, a]) - low) % 360.0 <= high - low
-        out |= ~inside
-    return float(out.mean())
+    angles = np.concatenate([bench.campaigns[k].q for k in bench.own])
+    return float(1.0 - covered({a: seen_angles(angles[:, a]) for a in joints}, q).mean())
 
 
 def _as_poses(q: Floats) -> Poses:

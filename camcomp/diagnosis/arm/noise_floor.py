@@ -6,7 +6,7 @@ What a fitted model leaves is no such measure: it holds whatever the model lacks
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -14,6 +14,7 @@ from scipy.spatial import KDTree
 from scipy.stats import chi2
 
 from camcomp.diagnosis.arm.poses import Poses
+from camcomp.diagnosis.model.noise import resolution_of, rounding_noise
 from camcomp.ground.datatypes import Floats
 from camcomp.model.statics.description import Robot
 
@@ -40,6 +41,19 @@ class TipFloor:
         return 1e3 * float(np.sqrt(3.0)) * self.sd
 
 
+def resolution(tip: Floats) -> float:
+    """Step, mm, to which tips (n, 3) are rounded: the coarsest of the three axes, 0 where none shows."""
+    return max(resolution_of(axis) for axis in tip.T)
+
+
+def _with_rounding(floor: TipFloor | None, campaigns: Sequence[Poses]) -> TipFloor | None:
+    """A floor with the rounding of the recorded positions, which repeats of one pose do not show."""
+    if floor is None:
+        return None
+    rounding = rounding_noise(max(resolution(each.tip) for each in campaigns))
+    return replace(floor, sd=float(np.hypot(floor.sd, rounding)))
+
+
 @dataclass(frozen=True)
 class StatedDeviation:
     """What an experiment states of its instruments, mm per axis; None where it says nothing."""
@@ -57,14 +71,15 @@ def tip_floor(
     in repeats, and a statement that repeats belie is none.
     """
     known = [each for each in (_stated(robot, campaigns, stated), _repeated(robot, campaigns, gaps)) if each]
-    return max(known, key=lambda each: each.sd, default=None)
+    return _with_rounding(max(known, key=lambda each: each.sd, default=None), campaigns)
 
 
 def least_floor(
     robot: Robot, campaigns: Sequence[Poses], gaps: Sequence[Floats], stated: StatedDeviation
 ) -> TipFloor | None:
     """What the floor may be at least, to begin with: what is stated, else what the quieter half of repeats shows."""
-    return _stated(robot, campaigns, stated) or _repeated(robot, campaigns, gaps, quiet=True)
+    found = _stated(robot, campaigns, stated) or _repeated(robot, campaigns, gaps, quiet=True)
+    return _with_rounding(found, campaigns)
 
 
 def far_off(size: Floats, time: Floats) -> np.ndarray:
@@ -141,7 +156,7 @@ def _scatter(groups: Sequence[tuple[float, float]], source: Literal["repeats", "
     sd = float(np.sqrt(square.sum() / freedom))
     if quiet:
         sd = min(sd, float(np.sqrt(np.median(square / chi2.median(3.0 * more)))))
-    return TipFloor(sd, freedom, source) if sd > 0.0 else None
+    return TipFloor(sd, freedom, source)
 
 
 def visits_of(robot: Robot, poses: Poses) -> list[np.ndarray]:

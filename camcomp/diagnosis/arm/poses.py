@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from camcomp.diagnosis.arm.discrepancy import ResidualBlock, without_nuisance
 from camcomp.diagnosis.arm.registration import Registration, nuisance_columns, register
+from camcomp.diagnosis.model.group import Group
 from camcomp.ground import shelf
 from camcomp.ground.datatypes import Floats
 from camcomp.model import signal_path
@@ -27,10 +27,10 @@ from camcomp.model.statics.hanging import Hung, grown_way, hang
 from camcomp.model.statics.masses import mass_loads
 
 _SHARE_OF_SCALE = 0.05  # step of a difference
+_SAME_STEP = 1e-6  # times in equal steps of 1 are row numbers
 _JOINT_STEP = 1e-5  # rad or mm
 CURVE = "joint_curve"
 _WRIST = {"joint_coupling": 2}  # effects of the last joints only: of how many
-_VISIBLE = 1e-9  # mm per scale: a column smaller than this is none
 # Effects of these hooks stand still, or are part of the registration.
 _UNSEEN = ("time_sync", "workpiece_frame", "tool_length", "chain_error", "servo_lag", "backlash", "friction", "none")
 
@@ -66,6 +66,12 @@ class Poses:
     def rows(self) -> np.ndarray:
         """Row (n,) of every pose in the log of its run, from 1."""
         return np.arange(1, len(self.q) + 1) if self.row is None else self.row
+
+    @property
+    def has_clock(self) -> bool:
+        """Whether times are more than row numbers."""
+        steps = np.diff(np.sort(self.time))
+        return bool(len(steps)) and bool(np.ptp(steps) > _SAME_STEP * max(float(np.abs(steps).max()), 1e-300))
 
     @property
     def order(self) -> Floats:
@@ -116,18 +122,36 @@ class LoadedArm:
 
 @dataclass(eq=False)
 class ArmBench:
-    """An arm's model and its campaigns. start: first registration of every campaign."""
+    """An arm's model and its campaigns, the first `fitted` of which are fitted (None: all); the others are judged.
+
+    start: first registration of every campaign; owner: of every campaign, the one whose frames it has. A judged campaign
+    has those of the fitted one with its label, else its own.
+    """
 
     robot: Robot
     causes: tuple[Cause, ...]
-    campaigns: Sequence[Poses]
+    campaigns: list[Poses]
+    fitted: int | None = None
     start: list[Registration] = field(default_factory=list)
+    owner: list[int] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.arm: Arm = _need(arm_of(self.robot))
-        for each in self.campaigns:
+        self.fitted = len(self.campaigns) if self.fitted is None else self.fitted
+        labels = [each.label for each in self.campaigns]
+        for k, each in enumerate(self.campaigns):
+            own = labels.index(each.label)
+            self.owner.append(own if own < self.fitted else k)
+            if self.owner[k] < k:
+                self.start.append(self.start[self.owner[k]])
+                continue
             hung = self.standing(each, ()).hung
             self.start.append(register(each.tip, hung.point, hung.rotation, self.robot.tool))
+
+    @property
+    def own(self) -> tuple[int, ...]:
+        """Numbers of the campaigns that are fitted."""
+        return tuple(range(self.fitted or 0))
 
     @property
     def actuators(self) -> tuple[str, ...]:
@@ -157,13 +181,15 @@ class ArmBench:
         """Every parameter of the shelf that may move a standing arm, without the waves of joints."""
         return self._of_effects(shelf.usable("effects", (*_UNSEEN, CURVE, *without)))
 
-    def waves(self) -> list[Column]:
+    def waves(self, without: Sequence[str] = ()) -> list[Column]:
         """The waves of every hinge."""
-        return self._of_effects([(CURVE, shelf.load("effects", CURVE))])
+        return [] if CURVE in without else self._of_effects([(CURVE, shelf.load("effects", CURVE))])
 
     def shaped(self, without: Sequence[str] = ()) -> list[Column]:
         """Parameters of drives' effects that need a shape nobody knows (a time of warming up), one column for each value to try."""
         found: list[Column] = []
+        if not self._warm and not all(each.has_clock for each in self.campaigns):
+            return found  # rows without a clock say nothing of a warming curve
         for name, module in shelf.usable("effects", (*_UNSEEN, CURVE, *without)):
             if "drive" not in signal_path.stages_of(module) or module.TARGET == "named":
                 continue
@@ -206,8 +232,8 @@ class ArmBench:
         """The actuator called `name`."""
         return next(a for a in self.robot.actuators if a.name == name)
 
-    def blocks(self, columns: Sequence[Column], at: Mapping[int, float] | None = None) -> list[ResidualBlock]:
-        """Linearised rows of every campaign at amplitudes `at` (index of column -> amount), about its own registration."""
+    def groups(self, columns: Sequence[Column], sd: float, at: Mapping[int, float] | None = None) -> list[Group]:
+        """Linearised rows of every campaign at amplitudes `at` (index of column -> amount); sd: noise, mm per coordinate."""
         amounts = dict(at or {})
         causes = combined(columns, amounts)
         out = []
@@ -215,20 +241,54 @@ class ArmBench:
             frame = self.registration(k, causes)
             stood = self.standing(campaign, causes)
             here = stood.tips(frame)
-            measured = frame.to_machine(campaign.tip)
-            X = np.empty((*here.shape, len(columns)))
-            waves = [j for j, column in enumerate(columns) if column.effect == CURVE]
-            if waves:
-                joints = self.joint_motion(campaign, causes, frame)
-                X[:, :, waves] = wave_motion(joints, self.actuators, campaign.q, [columns[j] for j in waves])
-            for j in sorted(set(range(len(columns))) - set(waves)):
-                step = _SHARE_OF_SCALE
-                moved = combined(columns, {**amounts, j: amounts.get(j, 0.0) + step})
-                X[:, :, j] = (self.tips(k, moved, frame) - here) / step
-            N = nuisance_columns(here, stood.hung.rotation, here.mean(axis=0))
-            left = measured - here + X @ np.array([amounts.get(j, 0.0) for j in range(len(columns))])
-            out.append(ResidualBlock(campaign.features, X, N, left, k, True, order=campaign.order))
+            X = self._motion(campaign, columns, amounts, frame, here)
+            left = frame.to_machine(campaign.tip) - here
+            for j, amount in amounts.items():
+                left = left + X[:, :, j] * amount
+            N = nuisance_columns(here, stood.hung.rotation, self._about(k))
+            clock = campaign.order if campaign.has_clock else None
+            noise = np.full(left.shape, sd)
+            out.append(
+                Group(
+                    name=f"{campaign.run[0]}", label=self.owner[k], y=left, A=X, N=N, sd=noise,
+                    position=campaign.features, order=clock,
+                )
+            )  # fmt: skip
         return out
+
+    def _motion(
+        self,
+        campaign: Poses,
+        columns: Sequence[Column],
+        amounts: Mapping[int, float],
+        frame: Registration,
+        here: Floats,
+    ) -> Floats:
+        """Motion (n, 3, k) of tips per unit of every column; those of drives by the motion of joints."""
+        causes = combined(columns, amounts)
+        joints = self.joint_motion(campaign, causes, frame)
+        X = np.empty((*here.shape, len(columns)))
+        waves = [j for j, column in enumerate(columns) if column.effect == CURVE]
+        X[:, :, waves] = wave_motion(joints, self.actuators, campaign.q, [columns[j] for j in waves])
+        for j in sorted(set(range(len(columns))) - set(waves)):
+            if is_of_drive(columns[j]) and j not in amounts:
+                X[:, :, j] = self._drive_motion(campaign, joints, columns[j])
+                continue
+            moved = combined(columns, {**amounts, j: amounts.get(j, 0.0) + _SHARE_OF_SCALE})
+            X[:, :, j] = (self.standing(campaign, moved).tips(frame) - here) / _SHARE_OF_SCALE
+        return X
+
+    def _drive_motion(self, campaign: Poses, joints: Floats, column: Column) -> Floats:
+        """Motion (n, 3) of tips by what a column does to drives. joints (n, 3, m): motion per rad (mm) of every joint."""
+        cause = column.cause(1.0)
+        cause = replace(cause, values=complete(cause))
+        error, _ = signal_path.driven([cause], self.actuators, _standing(self.robot, campaign))
+        return np.asarray(np.einsum("nim,nm->ni", joints, error), float)
+
+    def _about(self, k: int) -> Floats:
+        """Point (3,) about which the frame of a campaign turns."""
+        owner = self.owner[k]
+        return np.asarray(self.start[owner].to_machine(self.campaigns[owner].tip).mean(axis=0), float)
 
     def joint_motion(self, poses: Poses, causes: Sequence[Cause], at: Registration) -> Floats:
         """Motion (n, 3, m) of tips, machine frame, mm per rad (mm) by which a joint stands off its encoder."""
@@ -238,7 +298,8 @@ class ArmBench:
         return np.stack(moved, axis=2) / _JOINT_STEP
 
     def registration(self, k: int, causes: Sequence[Cause]) -> Registration:
-        """Frame and tool vector of campaign k that fit best with causes."""
+        """Frame and tool vector of campaign k, or of the fitted one that it shares them with, that fit best with causes."""
+        k = self.owner[k]
         campaign, at = self.campaigns[k], self.start[k]
         stood = self.standing(campaign, causes)
         for _ in range(3):
@@ -250,7 +311,7 @@ class ArmBench:
         return at
 
     def gap(self, k: int, causes: Sequence[Cause]) -> Floats:
-        """Measured minus modelled tips (n, 3) of campaign k, machine frame, frames fitted again."""
+        """Measured minus modelled tips (n, 3) of campaign k, machine frame, with its `registration`."""
         at = self.registration(k, causes)
         return at.to_machine(self.campaigns[k].tip) - self.tips(k, causes, at)
 
@@ -310,13 +371,9 @@ def _public(cause: Cause) -> Cause:
     return replace(cause, values=public({**{p.name: p.nominal for p in fitted}, **cause.values}))
 
 
-def visible(blocks: Sequence[ResidualBlock], columns: Sequence[Column]) -> list[int]:
-    """Indices of columns that move some tip by more than frames and tool vector could."""
-    size = np.zeros(len(columns))
-    for b in blocks:
-        for j in range(len(columns)):
-            size[j] = max(size[j], float(np.abs(without_nuisance(b.X[:, :, j], b.N)).max()))
-    return [int(j) for j in np.flatnonzero(size > max(_VISIBLE, 1e-9 * float(size.max(initial=0.0))))]
+def is_of_drive(column: Column) -> bool:
+    """Whether a column acts between encoder and joint alone."""
+    return signal_path.stages_of(column.module) == {"drive"} and not signal_path.pushes(column.module)
 
 
 def _parameters(module: Any, turns: bool) -> tuple[Parameter, ...]:

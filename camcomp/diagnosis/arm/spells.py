@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from camcomp.diagnosis.arm.discrepancy import without_nuisance
-from camcomp.diagnosis.arm.placed_effects import PlacedEffect
 from camcomp.diagnosis.arm.poses import ArmBench, Column
+from camcomp.diagnosis.model.candidates import PlacedCause
+from camcomp.diagnosis.model.folds import without_nuisances
 from camcomp.ground import shelf
 from camcomp.ground.datatypes import Floats
 
@@ -21,21 +21,22 @@ STEP = 256  # begins that are looked at together
 
 def spells(
     bench: ArmBench, rest: Sequence[Floats], frames: Sequence[Floats], joints: Sequence[Floats], first: int
-) -> tuple[list[Column], list[PlacedEffect]]:  # fmt: skip
+) -> tuple[list[Column], list[PlacedCause]]:  # fmt: skip
     """Columns and candidates, one per joint and campaign. rest (n, 3) mm: what is left beside the nuisances frames (n, 3, 9).
 
     joints (n, 3, m): motion of the tip per rad (mm) of every joint; first: index of the first of these columns.
     """
     module = shelf.load("effects", EFFECT)
     columns: list[Column] = []
-    found: list[PlacedEffect] = []
-    for k, poses in enumerate(bench.campaigns):
+    found: list[PlacedCause] = []
+    for k in bench.own:
+        poses = bench.campaigns[k]
         order = np.argsort(poses.time, kind="stable")
         time = poses.time[order]
         n = len(order)
-        if n < 3 * SHORTEST or not np.ptp(time) > 0.0:
+        if n < 3 * SHORTEST or not poses.has_clock:
             continue
-        left = without_nuisance(rest[k], frames[k])[order]
+        left = without_nuisances(rest[k], frames[k])[order]
         for a, drive in enumerate(bench.robot.actuators):
             begin, end = _window(joints[k][order, :, a], left, frames[k][order])
             if begin == end:
@@ -46,7 +47,7 @@ def spells(
             own = getattr(module, "ROTARY", module.PARAMETERS) if drive.revolute else module.FITTED
             parameter = next(p for p in own if p.name.startswith("shift"))
             columns.append(Column(EFFECT, drive.name, module, parameter, shape))
-            found.append(PlacedEffect(EFFECT, drive.name, (first + len(found),), 0.5 * n * n * len(bench.campaigns)))
+            found.append(PlacedCause(EFFECT, drive.name, (first + len(found),), 0.5 * n * n * len(bench.own)))
     return columns, found
 
 

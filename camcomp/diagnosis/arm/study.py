@@ -1,147 +1,221 @@
-"""Why an arm's measured poses differ from its model: causes that hold for campaigns they were not fitted on.
+"""Why an arm's measured poses differ from its model: static poses as groups of the model of every log.
 
-A few causes at single joints are asked for first. Where they are not all, an arm may be off everywhere: inside one campaign
-many effects explain the same poses, with other poses most of them make it worse. So groups of effects are judged by campaigns
-that are withheld, or by regions of postures where there is only one campaign (which then can be no more than ambiguous), and
-what none predicts is stated as unknown, with what it depends on. Whether something is left is a matter of the floor: measured
-by repeats, or stated, and never what a fit leaves.
+Steps: poses that are no measurement are left out; the floor is measured or stated; effects are linearised at the nominal
+arm and explained, then at what was found; a joint that was shifted for a while is a candidate where something is
+unmodelled; withheld campaigns check the result.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 
 from camcomp.diagnosis.arm import answer
-from camcomp.diagnosis.arm.cases import CLOSE, ArmCase, at_floor, solved
-from camcomp.diagnosis.arm.few_fit import Suspects, suspects
-from camcomp.diagnosis.arm.fit import ArmFit, Prepared, named_rows, prepared
-from camcomp.diagnosis.arm.gate import Gate
-from camcomp.diagnosis.arm.noise_floor import StatedDeviation, TipFloor, far_off, least_floor, tip_floor
+from camcomp.diagnosis.arm.case import PoseCase, named_rows
+from camcomp.diagnosis.arm.linear import Shelf, linearise
+from camcomp.diagnosis.arm.noise_floor import StatedDeviation, TipFloor, far_off, least_floor, resolution, tip_floor
 from camcomp.diagnosis.arm.pose_values import of_poses
-from camcomp.diagnosis.arm.poses import ArmBench, Poses
-from camcomp.diagnosis.arm.unseen import (
-    Court,
-    Rival,
-    shrinkage,
-)
+from camcomp.diagnosis.arm.poses import ArmBench, Poses, combined
+from camcomp.diagnosis.arm.spells import EFFECT as SPELL
+from camcomp.diagnosis.arm.spells import spells
+from camcomp.diagnosis.arm.unseen import check_held_out, notes_of_frames, shrinkage, without_far_judged
+from camcomp.diagnosis.model.discrepancy import residuals
+from camcomp.diagnosis.model.evidence import Background
+from camcomp.diagnosis.model.explain import Explanation, KnownNoise, explain
+from camcomp.diagnosis.model.verdict import EVEN
 from camcomp.diagnosis.result.types import UNKNOWN, DiagnosisResult, Floor, Outlier
 from camcomp.ground import headway
 from camcomp.ground.datatypes import Floats
-from camcomp.ground.headway import part
 from camcomp.model.effect import Cause
 from camcomp.model.statics.description import Robot
 
 MOST_POSES = 1200  # of a campaign; more are drawn from
 LEAST_POSES = 12  # of a campaign; fewer do not even tell its frames
 CAMPAIGN_SEED = 20200714  # drawing has to give the same answer twice
+PASSES = 2  # of linearising about what was found
+MANY = 4  # causes from which on a joint that was shifted for a while is looked for
+CLOSE = 1.1  # ratio of floors that need no second look
+CHI2_3_MEDIAN, CHI2_3_EDGE = 2.366, 9.348  # of chi-square with 3 degrees of freedom: 50 and 97.5 %
+LOOSE_FRAME = 1e-3  # ratio of singular values of a frame's columns below which rows do not fix it
 
 
-def study(
-    robot: Robot,
-    causes: Sequence[Cause],
-    runs: Sequence[Poses],
-    *,
-    holdout: Sequence[str] = (),
-    without: Sequence[str] = (),
-    stated: StatedDeviation | None = None,
-) -> DiagnosisResult:
-    """Result for static poses of an arm. runs: one entry per run, whose label is its campaign (clamping).
+def solve(
+    robot: Robot, causes: Sequence[Cause], runs: Sequence[Poses], holdout: Sequence[str], without: Sequence[str],
+    stated: StatedDeviation,
+) -> PoseCase:  # fmt: skip
+    """Explain the campaigns of runs; those of `holdout` are judged and never fitted.
 
-    holdout: names of runs (`Poses.run`) that are judged and never fitted; only their frames are. Raises ValueError when
-    a campaign has too few poses for its frames.
+    Raises ValueError when every run is held out, or a campaign has too few poses for its frames.
     """
-    fitted_runs = [r for r in runs if str(r.run[0]) not in holdout]
-    if not fitted_runs:
+    fitted = [r for r in runs if str(r.run[0]) not in holdout]
+    if not fitted:
         raise ValueError("every run is held out")
-    own, more = merged(fitted_runs), merged([r for r in runs if str(r.run[0]) in holdout])
-    every, gaps, outliers = _cleaned(robot, tuple(causes), [*own, *more])
-    values = of_poses(robot, every, gaps)
-    deviation = StatedDeviation() if stated is None else stated
-    floor = least_floor(robot, every, gaps, deviation)
-    whole, every = every, [drawn(each) for each in every]
-    bench = ArmBench(robot, tuple(causes), every[: len(own)])
-    held = ArmBench(robot, tuple(causes), every[len(own) :]) if more else None
-    with part(0.0, 0.05):
-        start = prepared(bench, without)
-    outliers += start.outliers
-    wanted = suspects(bench, start, without)
-    with part(0.05, 0.4):
-        case = solved(bench, held, start, wanted, floor, without)
-    if floor is not None:
-        acting = case.found.causes()
-        beside = [_gap(robot, tuple(causes), each, acting) for each in whole]
-        both = [tip_floor(robot, whole, gap, deviation) for gap in (gaps, beside)]
-        shown = min((one for one in both if one), key=lambda one: one.sd, default=floor)
-        with part(0.4, 0.75):
-            case, floor = _settled(bench, held, start, wanted, without, case, floor, shown)
-    outliers += case.outliers
-    found, judges, sets, gate = case.found, case.judges, case.sets, case.gate
-    seen_names = sorted({str(r.run[0]) for r in runs if not holdout or str(r.run[0]) in holdout})
-    shrunk = shrinkage(case.seen_by, case.chosen, seen_names, bench)
-    word = verdict(found, judges, gate, sets)
-    first = [bench.gap(k, ()) for k in range(len(bench.campaigns))]
-    told = answer.Told(bench, found, gate, floor, sets, word, judges)
-    headway.done(0.8)
-    named, minor = answer.causes(told, first)
-    headway.done(0.9)
-    if word == "identified" and not named:  # all that was taken turned out minor
-        word = "none"
-    known = any(c.effect != UNKNOWN for c in named)
-    return DiagnosisResult(
-        verdict=word,
-        gap=answer.gap(first, floor),
-        where=answer.where(told, first),
-        causes=named,
-        alternatives=answer.alternatives(told, named)
-        if word == "ambiguous" or (word == "unknown" and known and len(sets) > 1)
-        else (),
-        shrinkage=shrunk,
-        minor=minor,
-        next_experiment=answer.next_experiment(told),
-        floor=Floor(um=round(floor.um, 3), source=floor.source) if floor else Floor(um=None, source="not identifiable"),
-        outliers=tuple(Outlier(run=run, row=row) for run, row in sorted(set(outliers))),
-        standards=values,
-    )
+    own = merged(fitted)
+    held, loose = judged_campaigns(robot, [r for r in runs if str(r.run[0]) in holdout], own)
+    every = [drawn(each) for each in (*own, *held)]
+    bench, shelf, outliers, weights = cleaned(robot, tuple(causes), every, len(own), without)
+    gaps = [bench.gap(k, ()) for k in range(len(bench.campaigns))]
+    least = least_floor(robot, bench.campaigns, gaps, stated)
+    sd = least.sd if least else noise_of_richest(bench, shelf, weights)
+    with headway.part(0.1, 0.5):
+        shelf, found = explained(bench, shelf, sd, least, weights, without)
+    floor = least
+    if least is not None:
+        floor, again = settled_floor(bench, shelf, found, gaps, stated, least)
+        if again:
+            with headway.part(0.5, 0.7):
+                second = explained(bench, shelf, floor.sd, floor, weights, without)
+            hidden = found.unknown > EVEN and found.background.unknown and second[1].unknown <= EVEN
+            floor, (shelf, found) = (least, (shelf, found)) if hidden else (floor, second)
+    amount, covariance = found.amplitudes()
+    notes = tuple(f"positions are rounded to {step:g} mm" for step in [coarse_step(bench, sd)] if step)
+    final = floor.sd if floor else sd * found.background.noise
+    return PoseCase(
+        bench=bench, shelf=shelf, explanation=found, amount=amount, covariance=covariance, floor=floor, sd=final,
+        outliers=tuple(outliers), loose=loose, notes=notes,
+    )  # fmt: skip
 
 
-def _settled(
-    bench: ArmBench, held: ArmBench | None, start: Prepared, wanted: Suspects, without: Sequence[str], case: ArmCase,
-    floor: TipFloor, shown: TipFloor,
-) -> tuple[ArmCase, TipFloor]:  # fmt: skip
-    """A case found at the least floor there may be, and that floor; or what is found at the one that repeats show beside it.
+def bench_of(robot: Robot, causes: tuple[Cause, ...], runs: Sequence[Poses], holdout: Sequence[str]) -> ArmBench:
+    """All poses of the campaigns that are fitted and judged, with the frames that they are judged in."""
+    own = merged([r for r in runs if str(r.run[0]) not in holdout])
+    held, _ = judged_campaigns(robot, [r for r in runs if str(r.run[0]) in holdout], own)
+    return ArmBench(robot, causes, [*own, *held], len(own))
 
-    What follows something at the lower one, and would be hidden by the higher one, is no noise: it is in the repeats as well.
+
+def cleaned(
+    robot: Robot, causes: tuple[Cause, ...], campaigns: list[Poses], fitted: int, without: Sequence[str]
+) -> tuple[ArmBench, Shelf, list[tuple[str, int]], list[Floats]]:
+    """Bench without poses far off beside the richest model, and factors (n,) on the noise of rows that lie far out.
+
+    Weights of Huber, Ann. Math. Stat. 35 (1964) 73; the scale is that of the median.
     """
-    if shown.sd <= CLOSE * floor.sd:
-        return case, shown
-    if case.found.few is None:
-        again = at_floor(bench, held, case, shown)
-    else:
-        again = solved(bench, held, start, wanted, shown, without)
-    hidden = case.gate.word == "above" and case.gate.structured and again.gate.word != "above"
-    return (case, floor) if hidden else (again, shown)
+    bench = ArmBench(robot, causes, campaigns, fitted)
+    shelf = Shelf.of([*bench.columns(without), *bench.shaped(without), *bench.waves(without)])
+    left = beside_richest(bench, shelf)
+    outliers: list[tuple[str, int]] = []
+    weights = []
+    for k, rest in enumerate(left):
+        poses, size = campaigns[k], np.linalg.norm(rest, axis=1)
+        far = far_off(size, poses.time)
+        outliers += named_rows(poses, far)
+        campaigns[k] = poses.take(~far)
+        square = size[~far] ** 2
+        scale = max(float(np.median(square)) / CHI2_3_MEDIAN, 1e-18)
+        weights.append(np.maximum(np.sqrt(square / scale / CHI2_3_EDGE), 1.0))
+    return ArmBench(robot, causes, campaigns, fitted), shelf, outliers, weights
 
 
-def verdict(found: ArmFit, judges: Court, gate: Gate, sets: Sequence[Rival]) -> Any:
-    """The word. More data can make it firmer and less data only looser: what is not shown is not said.
-
-    `unknown`: more than the floor is left, or where there is no floor, a leftover that follows something. One campaign
-    without a floor cannot tell an unknown from the freedom of a fit, and stays `ambiguous`.
-    """
-    if gate.word == "above" and (judges.whole or gate.floor or not found.taken.steps):
-        return "unknown"
-    if not found.taken.steps:
-        return "none" if gate.word == "at" else "ambiguous"
-    as_chosen = {s.group for s in found.taken.steps} == {s.group for s in found.chosen.steps}
-    # otherwise the unseen campaigns had a say, and judge no more
-    sure = gate.word == "at" and judges.whole and len(sets) == 1 and as_chosen
-    return "identified" if sure else "ambiguous"
+def beside_richest(bench: ArmBench, shelf: Shelf) -> list[Floats]:
+    """Residuals (n, 3) mm of every campaign beside all single effects at once, of usual sizes (ridge)."""
+    plain = shelf.without_shapes()
+    model = linearise(ArmBench(bench.robot, bench.causes, bench.campaigns), plain, 1.0)
+    size = max(float(np.median(np.abs(np.concatenate([g.y for g in model.groups])))), 1e-9)
+    slab = {int(j): 1.0 for j in np.flatnonzero(model.size > 0.0)}
+    at = model.posterior(Background(noise=size), slab)
+    return [g.y - model.layout.design(g) @ at.mean for g in model.groups]
 
 
-def merged(runs: Sequence[Poses]) -> list[Poses]:
+def noise_of_richest(bench: ArmBench, shelf: Shelf, weights: Sequence[Floats]) -> float:
+    """Noise, mm per coordinate, where nothing states it: what the richest model leaves, its freedom counted."""
+    left = beside_richest(bench, shelf)[: len(bench.own)]
+    values = sum(r.size for r in left)
+    used = len(shelf.without_shapes().columns) + 9 * len(left)
+    square = sum(float(((r / w[:, None]) ** 2).sum()) for r, w in zip(left, weights, strict=False))
+    return max(float(np.sqrt(square / max(values - used, values // 4))), 1e-6)
+
+
+def explained(
+    bench: ArmBench, shelf: Shelf, sd: float, floor: TipFloor | None, weights: Sequence[Floats], without: Sequence[str]
+) -> tuple[Shelf, Explanation]:
+    """The explanation at a noise sd (mm), linearised about what it finds; with spells where few lasting causes are not all."""
+    noise = KnownNoise(floor.freedom) if floor else None
+    found = relinearised(bench, shelf, sd, noise, weights)
+    doubtful = found.unknown > 1.0 - EVEN or len(found.members) >= MANY
+    if SPELL in without or not (doubtful or noise is None):
+        return shelf, found
+    more = with_spells(bench, shelf, found)
+    if len(more.columns) == len(shelf.columns):
+        return shelf, found
+    again = relinearised(bench, more, sd, noise, weights)
+    return (more, again) if again.log_evidence > found.log_evidence else (shelf, found)
+
+
+def relinearised(
+    bench: ArmBench, shelf: Shelf, sd: float, noise: KnownNoise | None, weights: Sequence[Floats]
+) -> Explanation:
+    """Explain at the nominal arm, then at what was found (Gauss-Newton)."""
+    found = explain(linearise(bench, shelf, sd, None, weights), noise)
+    for _ in range(PASSES - 1):
+        at = found.amplitudes()[0]
+        if at.any():
+            found = explain(linearise(bench, shelf, sd, at, weights), noise, found.background)
+    return found
+
+
+def with_spells(bench: ArmBench, shelf: Shelf, found: Explanation) -> Shelf:
+    """With one stretch of time per joint and campaign in which it may have been shifted, beside what was found and beside nothing."""
+    model = found.model
+    joints = [bench.joint_motion(c, (), bench.start[k]) for k, c in enumerate(bench.campaigns)]
+    frames = [g.N for g in model.groups]
+    out = shelf
+    for members in dict.fromkeys(((), found.members)):
+        rest = [r * model.groups[k].sd for k, r in enumerate(residuals(model, Background(), members))]
+        columns, own = spells(bench, rest, frames, joints, len(out.columns))
+        new = [k for k, column in enumerate(columns) if column not in out.columns]
+        own = [replace(own[k], columns=(len(out.columns) + i,)) for i, k in enumerate(new)]
+        out = out.with_more([columns[k] for k in new], own)
+    return out
+
+
+def settled_floor(
+    bench: ArmBench, shelf: Shelf, found: Explanation, gaps: Sequence[Floats], stated: StatedDeviation, least: TipFloor
+) -> tuple[TipFloor, bool]:
+    """The floor that repeats show beside what was found, and whether it differs from the least one that there may be."""
+    amount = found.amplitudes()[0]
+    acting = combined(shelf.columns, {int(j): float(amount[j]) for j in np.flatnonzero(amount)})
+    beside = [bench.gap(k, acting) for k in range(len(bench.campaigns))]
+    both = [tip_floor(bench.robot, bench.campaigns, each, stated) for each in (gaps, beside)]
+    shown = min((one for one in both if one), key=lambda one: one.sd, default=least)
+    return shown, shown.sd > CLOSE * least.sd
+
+
+def coarse_step(bench: ArmBench, sd: float) -> float:
+    """Step of the positions, mm, where rounding to it is a fair part of the noise; else 0."""
+    step = max(resolution(each.tip) for each in bench.campaigns)
+    return step if step / np.sqrt(12.0) > EVEN * sd else 0.0
+
+
+# -- campaigns ----------------------------------------------------------------------------------------------------------
+
+
+def judged_campaigns(robot: Robot, runs: Sequence[Poses], own: Sequence[Poses]) -> tuple[list[Poses], tuple[str, ...]]:
+    """Withheld campaigns that can be judged, and names of runs that cannot: their rows do not fix a frame of their own."""
+    labels = {each.label for each in own}
+    sound, loose = [], []
+    for label in dict.fromkeys(r.label for r in runs):
+        some = [r for r in runs if r.label == label]
+        whole = merged(some, least=1)
+        if label in labels or fixes_frame(robot, whole[0]):
+            sound += whole
+        else:
+            loose += [str(r.run[0]) for r in some]
+    return sound, tuple(loose)
+
+
+def fixes_frame(robot: Robot, poses: Poses) -> bool:
+    """Whether the rows of a campaign fix the frame of its instrument and the place of its target."""
+    if len(poses.q) < LEAST_POSES:
+        return False
+    bench = ArmBench(robot, (), [poses])
+    N = bench.groups([], 1.0)[0].N.reshape(-1, 9)
+    size = np.linalg.svd(N / np.linalg.norm(N, axis=0), compute_uv=False)
+    return bool(size[-1] > LOOSE_FRAME * size[0])
+
+
+def merged(runs: Sequence[Poses], least: int = LEAST_POSES) -> list[Poses]:
     """One entry per campaign, its poses and the campaigns in an order of their own, and no row twice."""
     out = []
     for label in dict.fromkeys(r.label for r in runs):
@@ -156,7 +230,7 @@ def merged(runs: Sequence[Poses]) -> list[Poses]:
         every = Poses(label, q, tip, time, heat, run, None if all(d is None for d in deviations) else sd, row, way)
         _, first = np.unique(np.concatenate([q, tip], axis=1), axis=0, return_index=True)  # sorted by joints
         every = every.take(first)
-        if len(every.q) < LEAST_POSES:
+        if len(every.q) < least:
             raise ValueError(f"campaign '{label}' has {len(every.q)} poses; its frames alone need more")
         out.append(every)
     return sorted(out, key=lambda each: tuple(each.q[0]))
@@ -164,32 +238,71 @@ def merged(runs: Sequence[Poses]) -> list[Poses]:
 
 def drawn(poses: Poses) -> Poses:
     """At most MOST_POSES poses, drawn evenly."""
-    n = len(poses.q)
-    if n <= MOST_POSES:
+    if len(poses.q) <= MOST_POSES:
         return poses
-    return poses.take(np.sort(np.random.default_rng(CAMPAIGN_SEED).choice(n, MOST_POSES, replace=False)))
+    rng = np.random.default_rng(CAMPAIGN_SEED)
+    return poses.take(np.sort(rng.choice(len(poses.q), MOST_POSES, replace=False)))
 
 
-def _gap(robot: Robot, causes: tuple[Cause, ...], poses: Poses, found: Sequence[Cause]) -> Floats:
-    """Measured minus modelled tips (n, 3) of a campaign with what was found, its frame from some poses where they are many."""
-    bench = ArmBench(robot, causes, [drawn(poses)])
-    frame = bench.registration(0, found)
-    return frame.to_machine(poses.tip) - bench.standing(poses, found).tips(frame)
+# -- result -------------------------------------------------------------------------------------------------------------
 
 
-def _cleaned(
-    robot: Robot, causes: tuple[Cause, ...], campaigns: Sequence[Poses]
-) -> tuple[list[Poses], list[Floats], list[tuple[str, int]]]:
-    """Campaigns without poses far off their nominal model, their gaps (n, 3) mm to it, and runs and rows of the others."""
-    out, gaps, outliers = [], [], []
-    for each in campaigns:
-        for _ in range(3):
-            gap = _gap(robot, causes, each, ())
-            far = far_off(np.linalg.norm(gap, axis=1), each.time)
-            outliers += named_rows(each, far)
-            each, gap = each.take(~far), gap[~far]
-            if not far.any():
-                break
-        out.append(each)
-        gaps.append(gap)
-    return out, gaps, outliers
+def study(
+    robot: Robot,
+    causes: Sequence[Cause],
+    runs: Sequence[Poses],
+    *,
+    holdout: Sequence[str] = (),
+    without: Sequence[str] = (),
+    stated: StatedDeviation | None = None,
+) -> DiagnosisResult:
+    """Result for static poses of an arm. runs: one entry per run, whose label is its campaign (clamping).
+
+    holdout: names of runs (`Poses.run`) that are judged and never fitted. Raises ValueError when a campaign has too few poses
+    for its frames.
+    """
+    return studied(robot, causes, runs, holdout=holdout, without=without, stated=stated)[0]
+
+
+def studied(
+    robot: Robot,
+    causes: Sequence[Cause],
+    runs: Sequence[Poses],
+    *,
+    holdout: Sequence[str] = (),
+    without: Sequence[str] = (),
+    stated: StatedDeviation | None = None,
+) -> tuple[DiagnosisResult, tuple[str, ...]]:
+    """The result of `study`, and notes for the reader of the logs."""
+    with headway.part(0.0, 0.7):
+        case = solve(robot, causes, runs, holdout, without, StatedDeviation() if stated is None else stated)
+    bench = case.bench
+    gaps = [bench.gap(k, ()) for k in range(len(bench.campaigns))]
+    case = without_far_judged(case)
+    check = check_held_out(case)
+    headway.done(0.8)
+    told = answer.Told(case, check, gaps[: len(bench.own)])
+    named, minor = answer.causes(told)
+    word = answer.verdict(told, named)
+    named = answer.with_unknown(told, named, word)
+    headway.done(0.9)
+    names = [
+        n for n in dict.fromkeys(str(r.run[0]) for r in runs) if (n in holdout or not holdout) and n not in case.loose
+    ]
+    known = any(c.effect != UNKNOWN for c in named)
+    alternatives = answer.alternatives(told, named) if word == "ambiguous" or (word == "unknown" and known) else ()
+    floor = case.floor
+    result = DiagnosisResult(
+        verdict=word,
+        gap=answer.gap(told.gaps, floor),
+        where=answer.where(told, word),
+        causes=named,
+        alternatives=alternatives if word == "ambiguous" or len(alternatives) > 1 else (),
+        shrinkage=shrinkage(case, named, sorted(names), bool(holdout)),
+        minor=minor,
+        next_experiment=answer.next_experiment(told, word),
+        floor=Floor(um=round(floor.um, 3), source=floor.source) if floor else Floor(um=None, source="not identifiable"),
+        outliers=tuple(Outlier(run=run, row=row) for run, row in sorted(set(case.outliers))),
+        standards=of_poses(robot, bench.campaigns, gaps),
+    )
+    return result, (*case.notes, *notes_of_frames(case, named))

@@ -1,6 +1,6 @@
 """The calibration map: from log odds of the posterior to a stated probability, and the inflation of intervals.
 
-One monotone map per kind of log, fitted on simulated experiments by `python -m tests.validation calibrate` and stored with
+One monotone map per kind of log, fitted on simulated experiments by `python -m tests.validation.poses.calibrate` and stored with
 its seeds in camcomp/data/calibration.json. Nothing else changes a probability.
 
 Source: Platt, Advances in Large Margin Classifiers (1999); isotonic regression, Zadrozny, Elkan, KDD 2002.
@@ -19,7 +19,8 @@ import numpy as np
 from camcomp.ground.datatypes import Floats
 
 MOST_LOG_ODDS = 20.0  # beyond it a posterior is as good as certain
-LEAST_PER_LEVEL = 8  # experiments of one level of the map
+LEAST_PER_LEVEL = 20  # causes of one level of the map: a rate known to a tenth
+BELOW = 8  # log odds: knots of the map where no experiment was, one each
 PLACES = 4  # decimals of a stated probability
 
 
@@ -71,6 +72,9 @@ def fit_map(probability: Sequence[float], right: Sequence[bool], misses: Sequenc
             weight = own[2] + last[2]
             pooled[-1] = [(own[0] * own[2] + last[0] * last[2]) / weight, own[1] + last[1], weight]
     knots = np.array([[o, (r + 0.5) / (n + 1.0)] for o, r, n in pooled])
+    if knots[0, 0] > 0.0:  # below even odds nothing was seen: the posterior as it is, below the first level
+        odds = np.linspace(-BELOW, 0.0, BELOW + 1)
+        knots = np.vstack([np.column_stack([odds, 2.0 * min(knots[0, 1], 0.5) / (1.0 + np.exp(-odds))]), knots])
     factor = max(float(np.quantile(misses, 0.95)), 1.0) if len(misses) >= LEAST_PER_LEVEL else 1.0
     return CalibrationMap(tuple(knots[:, 0].tolist()), tuple(_rising(knots[:, 1]).tolist()), round(factor, 3))
 

@@ -25,9 +25,9 @@ SCALES = (1.0, 2.0, 5.0, 10.0, 30.0, 100.0)  # of the floor: size of a covariate
 SIZES_OF_PROCESS = (0.5, 1.0, 2.0, 4.0, 8.0)  # of the floor
 LENGTHS = {"posture": (0.15, 0.3, 0.6, 1.2), "time": (0.01, 0.03, 0.1, 0.3)}
 CLEAR = 3.0  # log likelihood by which a process has to be better than noise: odds of 20
-ROWS_OF_PROCESS = 400  # of a region on which a process is fitted
+ROWS_OF_PROCESS = 250  # of a region on which a process is fitted
 UNKNOWN = 0.2  # prior probability that something unmodelled acts
-EVERYWHERE = 0.05  # prior probability that an effect acts at all its targets
+EVERYWHERE = 0.01  # prior probability that an effect acts at all its targets
 
 
 def smooth_functions(values: Floats, low: float, high: float, orders: int = ORDERS) -> Floats:
@@ -58,21 +58,19 @@ def gains_of_more(model: LinearModel, background: Background, members: Members) 
     """Log Bayes factors, priors included, of one covariate or family more at each of SCALES, beside a set of causes."""
     at = model.posterior(background, model.reduced(background).slab(members))
     active = {*model.healthy, *(name for name, _ in background.scales)}
+    covariates = {name: np.arange(s.start, s.stop) for name, s in model.layout.covariates.items() if name not in active}
+    families = {name: model.family(name) for name in model.families if name not in dict(background.families)}
+    families = {name: own for name, own in families.items() if len(own[0])}
+    blocks = at.blocks_without([*covariates.values(), *(on for on, _ in families.values())])
     out: dict[Background, float] = {}
-    for name, own in model.layout.covariates.items():
-        if name not in active:
-            found = _gains(*at.without(np.arange(own.start, own.stop)))
-            prior = prior_of_covariate(model) - log(len(SCALES))
-            for scale, gain in zip(SCALES, found, strict=True):
-                out[replace(background, scales=(*background.scales, (name, scale)))] = gain + prior
-    for name in model.families:
-        on, unit = model.family(name)
-        if len(on) and name not in dict(background.families):
-            gram, moment = at.without(on)
-            found = _gains(unit[:, None] * gram * unit, unit * moment)
-            prior = prior_of_family(model) - log(len(SCALES))
-            for scale, gain in zip(SCALES, found, strict=True):
-                out[replace(background, families=(*background.families, (name, scale)))] = gain + prior
+    prior = prior_of_covariate(model) - log(len(SCALES))
+    for name, (gram, moment) in zip(covariates, blocks, strict=False):
+        for scale, gain in zip(SCALES, _gains(gram, moment), strict=True):
+            out[replace(background, scales=(*background.scales, (name, scale)))] = gain + prior
+    prior = prior_of_family(model) - log(len(SCALES))
+    for (name, (_, unit)), (gram, moment) in zip(families.items(), blocks[len(covariates) :], strict=True):
+        for scale, gain in zip(SCALES, _gains(unit[:, None] * gram * unit, unit * moment), strict=True):
+            out[replace(background, families=(*background.families, (name, scale)))] = gain + prior
     return out
 
 

@@ -32,6 +32,7 @@ from camcomp.ground.datatypes import Floats, Ints
 
 WIDTHS = (2.0, 6.0, 20.0, 60.0, 200.0)  # of the floor: effect of a cause on the channels
 SMALL = 0.08  # of the floor: effect of a healthy machine's small error; sixty of them make 0.6
+LONG = 20  # columns: a longer candidate has no small errors
 FREE = 1e-6  # precision of nuisances in units of their columns
 ABSENT = 1e30  # precision of a column that takes no part
 LEAST_VISIBLE = 1e-6  # of a column's size: what nuisances leave of it; below, the column is not seen
@@ -116,7 +117,7 @@ class LinearModel:
     def small(self) -> Floats:
         """Width (k,) of the small error of every column, 0 where it has none."""
         out = np.zeros(self.layout.effects)
-        for c in self.candidates:
+        for c in (each for each in self.candidates if len(each.columns) <= LONG):
             own = [j for j in c.columns if self.size[j] > 0.0 and not (self.bounds.shaped[j] and c.ways > 1.0)]
             out[own] = np.maximum(out[own], SMALL / (self.size[own] * np.sqrt(len(c.columns) * c.ways)))
         return out
@@ -151,9 +152,13 @@ class LinearModel:
         return self._totals[key]
 
     def posterior(
-        self, background: Background, slab: Mapping[int, float] | None = None, groups: Sequence[int] | None = None
+        self,
+        background: Background,
+        slab: Mapping[int, float] | None = None,
+        groups: Sequence[int] | None = None,
+        absent: Sequence[int] = (),
     ) -> AmplitudePosterior:
-        """Normal distribution of all columns that take part, from some groups or all that are fitted."""
+        """Normal distribution of all columns that take part, from some groups or all that are fitted, `absent` ones left out."""
         k, data, precision = (
             self.layout.effects,
             self.total(background.process, groups),
@@ -161,7 +166,19 @@ class LinearModel:
         )
         live = precision < ABSENT
         live[:k] &= self.size > 0.0
+        live[list(absent)] = False
         return AmplitudePosterior.of(data, precision, np.flatnonzero(live), background.noise)
+
+    def log_evidence(self, background: Background, slab: Mapping[int, float]) -> float:
+        """Log evidence of causes with their slab, from the columns alone that take part."""
+        if background.process is None or background.process in self._grams:
+            return self.posterior(background, slab).log_evidence
+        precision = self.precision(background, slab)
+        live = precision < ABSENT
+        live[: self.layout.effects] &= self.size > 0.0
+        on = np.flatnonzero(live)
+        data = [normal_equations(self.groups[g], self.layout, background.process, on) for g in self.own]
+        return AmplitudePosterior.of(sum_grams(data), precision[on], np.arange(len(on)), background.noise).log_evidence
 
     def reduced(self, background: Background, groups: Sequence[int] | None = None) -> Reduced:
         """Normal equations of the effects with all else integrated out."""
@@ -211,11 +228,21 @@ class AmplitudePosterior:
 
     def without(self, columns: Ints) -> tuple[Floats, Floats]:
         """Normal equations (d, d), (d,) of further columns with all live ones integrated out."""
+        return self.blocks_without([columns])[0]
+
+    def blocks_without(self, blocks: Sequence[Ints]) -> list[tuple[Floats, Floats]]:
+        """Normal equations of several groups of further columns, each alone, with all live ones integrated out."""
         square = self.noise**2
+        columns = np.concatenate(list(blocks))
         left = self.scale[:, None] * self.data.A[np.ix_(self.live, columns)] / square
-        gram: Floats = self.data.A[np.ix_(columns, columns)] / square - left.T @ cho_solve(self.factor, left)
-        moment: Floats = self.data.b[columns] / square - left.T @ (self.mean[self.live] / self.scale)
-        return gram, moment
+        solved = cho_solve(self.factor, left)
+        moment = self.data.b[columns] / square - left.T @ (self.mean[self.live] / self.scale)
+        out, start = [], 0
+        for own in blocks:
+            at = slice(start, start := start + len(own))
+            gram = self.data.A[np.ix_(own, own)] / square - left[:, at].T @ solved[:, at]
+            out.append((gram, moment[at]))
+        return out
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,8 +7,9 @@ posterior.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from math import log
 
 import numpy as np
@@ -29,10 +30,11 @@ from camcomp.diagnosis.model.evidence import Background, LinearModel, Members, R
 from camcomp.diagnosis.model.search import MOST, Visited, search_sets
 from camcomp.ground.datatypes import Floats
 
-ROUNDS = 3  # of discrepancies, one more each
+ROUNDS = 6  # of discrepancies, one more each
 STATED = 0.08  # log deviation of a stated noise: instruments know themselves to an eighth in the square
 EXCESS = 1.2  # of the floor: noise above it is unmodelled
 NOISES = (0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2, 1.35, 1.5, 1.75, 2.0, 2.5, 3.0, 4.0, 6.0, 9.0)  # factors on the floor
+SIGNED = 3  # passes in which columns of families that are below 0 and may not be are left out
 SHOWN = 1e-12  # probability of a set that is kept
 
 
@@ -58,7 +60,7 @@ class Explanation:
     """The posterior over sets and backgrounds.
 
     members: the most probable set, beside `background`. sets: members and probability, one entry per set of places, the
-    most probable first; places: probability of every place; unknown: probability that something unmodelled acts.
+    most probable first; places, families: probability of every place and family; unknown: that something unmodelled acts.
     """
 
     model: LinearModel
@@ -66,10 +68,11 @@ class Explanation:
     members: Members
     sets: tuple[tuple[Members, float], ...]
     places: dict[Place, float]
+    families: dict[str, float]
     unknown: float
     log_evidence: float
 
-    @property
+    @cached_property
     def data(self) -> Reduced:
         """The normal equations of the effects beside the background."""
         return self.model.reduced(self.background)
@@ -83,10 +86,21 @@ class Explanation:
             on = data.indices(self.members)
             amount[on], covariance[np.ix_(on, on)], _ = data.estimate(self.members)
         if self.background.families:
-            on = self.columns
-            at = self.model.posterior(self.background, self.data.slab(self.members))
-            amount[on], covariance[np.ix_(on, on)] = at.mean[on], at.covariance(on)
+            on, absent, slab = self.columns, list[int](), self.data.slab(self.members)
+            for _ in range(SIGNED):
+                at = self.model.posterior(self.background, slab, absent=absent)
+                on = [j for j in on if j not in absent]
+                amount = np.zeros(k)
+                amount[on] = at.mean[on]
+                absent += [j for j in on if self.model.bounds.sign[j] > 0.0 and amount[j] < 0.0]
+            covariance[np.ix_(on, on)] = at.covariance(on)
         return amount, covariance
+
+    def odds_of(self, columns: Sequence[int]) -> float:
+        """Log odds of some columns of a family against their absence, all else as it is."""
+        slab = self.data.slab(self.members)
+        both = [self.model.posterior(self.background, slab, absent=each).log_evidence for each in ((), columns)]
+        return both[0] - both[1]
 
     @property
     def columns(self) -> list[int]:
@@ -96,17 +110,23 @@ class Explanation:
 
 
 def explain(
-    model: LinearModel, noise: KnownNoise | None, most: int = MOST, among: Collection[Place] | None = None
+    model: LinearModel, noise: KnownNoise | None, start: Background | None = None, most: int = MOST
 ) -> Explanation:
-    """Sets of causes and what is unmodelled, from all groups that are fitted."""
+    """Sets of causes and what is unmodelled, from all groups that are fitted; start: a background to begin with."""
     weighed: dict[Background, dict[Members, float]] = {}
-    background = Background()
-    if noise is None:
-        background = best_noise(model, background, (), None)
-    for _ in range(ROUNDS + 1):
-        found = search_sets(model.reduced(background), most, among)
+
+    def search_beside(background: Background) -> Visited:
+        found = search_sets(model.reduced(background), most)
         prior = log_prior(model, background, noise)
         weighed[background] = {m: v + prior for m, v in found.values.items()}
+        return found
+
+    background = best_noise(model, Background(), {}, None) if noise is None else Background()
+    if start is not None and start != background:
+        search_beside(background)
+        background = start
+    for _ in range(ROUNDS + 1):
+        found = search_beside(background)
         options = further_backgrounds(model, background, found, noise)
         options = {b: v for b, v in options.items() if b not in weighed}
         for b, (members, value) in options.items():
@@ -146,16 +166,18 @@ def further_backgrounds(
         here = found.values.get(members, data.value(members)) + prior
         for b, gain in gains_of_more(model, background, members).items():
             consider(b, members, here + gain)
-    for members in {parts[0], parts[-1]}:
-        others = [best_noise(model, background, members, noise)]
-        if background.process is None:
+    for members in dict.fromkeys((parts[0], parts[-1])):
+        slab = data.slab(members)
+        here = found.values.get(members, data.value(members)) - model.log_evidence(background, slab)
+        others = [best_noise(model, background, slab, noise)]
+        if background.process is None and (members == parts[0] or not background.scales):
             left = residuals(model, background, members)
             for over in LENGTHS:
                 process = fit_process([model.groups[g] for g in model.own], left, over)
                 others += [replace(background, process=process)] if process else []
         for b in others:
             if b != background:
-                consider(b, members, model.reduced(b).value(members) + log_prior(model, b, noise))
+                consider(b, members, here + model.log_evidence(b, slab) + log_prior(model, b, noise))
     return out
 
 
@@ -169,12 +191,25 @@ def parts_of(data: Reduced, members: Members) -> list[Members]:
     return out
 
 
-def best_noise(model: LinearModel, background: Background, members: Members, noise: KnownNoise | None) -> Background:
-    """The background with the most probable factor on the noise."""
-    slab = model.reduced(background).slab(members)
-    options = [replace(background, noise=factor) for factor in NOISES]
-    value = [model.posterior(b, slab).log_evidence + log_prior(model, b, noise) for b in options]
-    return options[int(np.argmax(value))]
+def best_noise(
+    model: LinearModel, background: Background, slab: Mapping[int, float], noise: KnownNoise | None
+) -> Background:
+    """The background with the most probable factor on the noise, climbing from the nearest of NOISES."""
+    known: dict[int, float] = {}
+
+    def value(i: int) -> float:
+        if i not in known:
+            b = replace(background, noise=NOISES[i])
+            known[i] = model.log_evidence(b, slab) + log_prior(model, b, noise)
+        return known[i]
+
+    at = int(np.argmin(np.abs(np.array(NOISES) - background.noise)))
+    while True:
+        near = [i for i in (at - 1, at, at + 1) if 0 <= i < len(NOISES)]
+        best = max(near, key=value)
+        if best == at:
+            return replace(background, noise=NOISES[at])
+        at = best
 
 
 def posterior_of(model: LinearModel, weighed: dict[Background, dict[Members, float]]) -> Explanation:
@@ -183,6 +218,7 @@ def posterior_of(model: LinearModel, weighed: dict[Background, dict[Members, flo
     value = np.array([v for _, _, v in flat])
     p = np.exp(value - logsumexp(value))
     places: dict[Place, float] = {}
+    families: dict[str, float] = {}
     merged: dict[frozenset[Place], tuple[Members, float, float]] = {}
     unknown = 0.0
     for (background, members, _), each in zip(flat, p.tolist(), strict=True):
@@ -190,6 +226,8 @@ def posterior_of(model: LinearModel, weighed: dict[Background, dict[Members, flo
             unknown += each
         if each < SHOWN:
             continue
+        for name, _ in background.families:
+            families[name] = families.get(name, 0.0) + each
         own = frozenset(model.candidates[i].place for i in members)
         for place in own:
             places[place] = places.get(place, 0.0) + each
@@ -197,7 +235,7 @@ def posterior_of(model: LinearModel, weighed: dict[Background, dict[Members, flo
         merged[own] = (members if each > most else first, max(most, each), total + each)
     sets = sorted(((m, total) for m, _, total in merged.values()), key=lambda s: -s[1])
     top = int(np.argmax(value))
-    return Explanation(model, flat[top][0], flat[top][1], tuple(sets), places, unknown, float(value[top]))
+    return Explanation(model, flat[top][0], flat[top][1], tuple(sets), places, families, unknown, float(value[top]))
 
 
 def relative_evidence(explanation: Explanation, sets: Sequence[Members]) -> Floats:

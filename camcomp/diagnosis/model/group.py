@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 
-from camcomp.ground.datatypes import Floats
+from camcomp.ground.datatypes import Floats, Ints
 
 
 @dataclass(frozen=True)
@@ -144,9 +144,12 @@ class NormalEquations:
     log_size: float
 
 
-def normal_equations(g: Group, layout: ColumnLayout, process: SmoothProcess | None = None) -> NormalEquations:
-    """Normal equations of one group."""
-    D = np.concatenate([layout.design(g), np.nan_to_num(g.y)[:, :, None]], axis=2)
+def normal_equations(
+    g: Group, layout: ColumnLayout, process: SmoothProcess | None = None, columns: Ints | None = None
+) -> NormalEquations:
+    """Normal equations of one group, of some columns or all."""
+    D = layout.design(g)
+    D = np.concatenate([D if columns is None else D[:, :, columns], np.nan_to_num(g.y)[:, :, None]], axis=2)
     white = g.whiten(D, process)
     own, y = white[:, :-1], white[:, -1]
     return NormalEquations(own.T @ own, own.T @ y, float(y @ y), int(np.isfinite(g.y).sum()), g.log_size(process))

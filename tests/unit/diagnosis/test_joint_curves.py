@@ -8,8 +8,7 @@ import pytest
 from ruamel.yaml import YAML
 
 from camcomp.diagnosis.arm.curves import covered, seen_angles
-from camcomp.diagnosis.arm.gate import LeftOver, judge
-from camcomp.diagnosis.arm.noise_floor import StatedDeviation, TipFloor
+from camcomp.diagnosis.arm.noise_floor import StatedDeviation
 from camcomp.diagnosis.arm.poses import Poses, approached
 from camcomp.diagnosis.arm.study import study as arm_study
 from camcomp.diagnosis.result.types import CurveCause
@@ -105,7 +104,6 @@ def test_one_campaign_does_not_identify_a_curve(robot, runs):
     result = arm_study(robot, (), runs[:1], stated=STATED)
     assert result.verdict == "ambiguous"
     assert result.shrinkage is None
-    assert max(c.probability for c in result.causes) <= 0.8
 
 
 @pytest.mark.campaign  # as 23007 of the foreign poses
@@ -146,20 +144,3 @@ def test_the_way_of_a_joint_is_that_of_its_last_turn():
     assert approached(q, np.arange(5.0))[:, 0].tolist() == [0.0, 1.0, 1.0, -1.0, 1.0]
     assert approached(q[::-1], np.arange(5.0)[::-1])[::-1, 0].tolist() == [0.0, 1.0, 1.0, -1.0, 1.0]
     assert not approached(q, np.zeros(5)).any()
-
-
-def test_what_most_regions_of_postures_show_is_above_the_floor_although_a_few_have_nearly_all_of_it():
-    rng = np.random.default_rng(2)
-    features = [rng.uniform(-1, 1, (400, 4))]
-    quiet = 3.0 * rng.chisquare(3, (400,)) / 3.0
-
-    def word(squares):
-        left = LeftOver((np.zeros((400, 3)),), (squares,))
-        floor = TipFloor(0.02, np.inf, "stated")
-        return judge(left, floor, features, [np.arange(400.0)], {}).word
-
-    far = np.zeros(400)
-    far[features[0][:, 0] > 0.95] = 4e4
-    assert word(quiet) == "at"
-    assert word(quiet + far) != "above"  # a few regions alone say little
-    assert word(4.0 * quiet + far) == "above"

@@ -6,9 +6,9 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from camcomp.diagnosis.arm.discrepancy import without_nuisance
 from camcomp.diagnosis.arm.next_poses import designed
 from camcomp.diagnosis.arm.poses import ArmBench
+from camcomp.diagnosis.model.folds import without_nuisances
 from camcomp.diagnosis.next_experiment.pose_list import pose_list
 from camcomp.diagnosis.result.types import PosesToMeasure
 from tests.commandline import camcomp, table
@@ -86,14 +86,14 @@ def test_forty_poses_by_design_tell_more_than_most_choices_by_chance():
     robot, runs = campaigns()
     bench = ArmBench(robot, (), runs)
     columns = [c for c in bench.columns() if c.effect in ("link_geometry", "gravity_compliance")]
-    a, b = bench.blocks(columns)
-    rows, noise = np.concatenate([a.X, a.N], axis=2), 0.25
+    a, b = bench.groups(columns, 1.0)
+    rows, noise = np.concatenate([a.A, a.N], axis=2), 0.25
     prior = np.diag(np.r_[np.ones(len(columns)), [1e-4] * 3, [100.0] * 6])
 
     def left(chosen):
         A = rows[chosen].reshape(-1, rows.shape[2]) / noise
-        found = np.linalg.solve(A.T @ A + np.linalg.inv(prior), A.T @ a.r[chosen].ravel() / noise)
-        rest = without_nuisance(b.r - b.X @ found[: len(columns)], b.N)
+        found = np.linalg.solve(A.T @ A + np.linalg.inv(prior), A.T @ a.y[chosen].ravel() / noise)
+        rest = without_nuisances(b.y - b.A @ found[: len(columns)], b.N)
         return float(np.sqrt((rest**2).sum(axis=1).mean()))
 
     rng = np.random.default_rng(0)

@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from camcomp.diagnosis.arm.gate import LeftOver, level
-from camcomp.diagnosis.arm.noise_floor import TipFloor
 from camcomp.diagnosis.axis.findings import AxisRun
 from camcomp.diagnosis.axis.study import study as axis_study
 from camcomp.diagnosis.report.answer import answer_lines
@@ -108,18 +106,3 @@ def test_the_schema_refuses_what_the_type_refuses(wrong):
 def test_the_unknown_on_an_axis_is_as_sure_as_its_data():
     p = [axis_study({"x": [axis_run(ripple=3.0, noise=noise)]}).causes[-1].probability for noise in (0.5, 6.0)]
     assert 0.5 < p[1] < p[0] < 1.0
-
-
-def test_a_leftover_of_poses_is_as_sure_as_its_regions():
-    rng = np.random.default_rng(1)
-    features = [rng.uniform(-1, 1, (400, 3))]
-    even = np.full(400, 3.0)
-    lumpy = np.where(features[0][:, 0] > 0.8, 27.0, 0.3)
-    stated, known_badly = TipFloor(0.02, np.inf, "stated"), TipFloor(0.02, 30.0, "repeats")
-
-    def told(squares, floor):
-        return level(LeftOver((np.zeros((400, 3)),), (squares,)), features, floor)
-
-    assert told(even, stated) == pytest.approx((1.0, np.sqrt(2 / 1200)))
-    assert told(lumpy, stated)[1] > 5 * told(even, stated)[1]
-    assert told(even, known_badly)[1] == pytest.approx(np.hypot(np.sqrt(2 / 1200), np.sqrt(2 / 30)))

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from camcomp.diagnosis.arm.discrepancy import ResidualBlock
 from camcomp.diagnosis.arm.noise_floor import StatedDeviation
 from camcomp.diagnosis.arm.plausible import check_poses
 from camcomp.diagnosis.arm.poses import Poses
@@ -25,7 +24,8 @@ from tests.validation.plants.arm_poses import measured
 
 def run(name, seed, low, high, **truth):
     q = np.random.default_rng(seed).uniform(low, high, (250, 6))
-    return Poses(name, q, measured(q, seed, **truth), np.arange(250.0), None, np.full(250, name))
+    time = np.arange(250.0) + np.random.default_rng(seed).uniform(0.0, 0.4, 250)  # a clock, no row numbers
+    return Poses(name, q, measured(q, seed, **truth), time, None, np.full(250, name))
 
 
 @pytest.fixture(scope="module")
@@ -95,7 +95,6 @@ def test_one_campaign_identifies_nothing(robot, faulty):
         assert result.verdict == "ambiguous"
         assert result.shrinkage is None
         assert len(result.alternatives) > 1
-        assert max(c.probability for c in result.causes) <= 0.8
         assert "second campaign" in result.next_experiment.action
 
 
@@ -307,17 +306,6 @@ def test_what_a_coarse_encoder_does_by_way_of_speed_and_acceleration_is_noise_to
     assert coarse.floor.um > 1.15 * fine.floor.um
     coarse_tips = axis_study({"x": [replace(log, encoder=np.round(log.encoder / 0.02) * 0.02)]})
     assert coarse_tips.floor.um > 5.0
-
-
-def test_rows_far_out_count_like_those_at_the_edge():
-    rng = np.random.default_rng(1)
-    left = 0.02 * rng.standard_normal((400, 3))
-    left[:3] *= 40.0
-    none = np.zeros((400, 3, 1))
-    block = ResidualBlock(np.zeros((400, 2)), none, none, left, 0, True).loosened(left)
-    size = np.linalg.norm(left, axis=1) / block.loose
-    assert size[:3] == pytest.approx(0.02 * np.sqrt(9.348), rel=0.1)
-    assert np.mean(block.loose > 1.0) < 0.06
 
 
 def test_a_push_of_an_axis_is_named_with_its_time():

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import camcomp
-from camcomp.diagnosis.arm.discrepancy import without_nuisance
-from camcomp.diagnosis.arm.fit import investigate, prepared
+from camcomp.diagnosis.arm.noise_floor import StatedDeviation
 from camcomp.diagnosis.arm.poses import ArmBench, Poses
-from camcomp.diagnosis.arm.study import merged
+from camcomp.diagnosis.arm.study import solve
+from camcomp.diagnosis.model.folds import without_nuisances
 from camcomp.model.config.load import load_config
 from camcomp.model.statics.build import build_robot
 from tests.commandline import ROOT, rms_um, table
@@ -140,21 +140,21 @@ def campaigns():
 def test_plain_least_squares_of_everything_overfits_where_camcomp_does_not():
     robot, runs = campaigns()
     bench = ArmBench(robot, (), runs)
-    alone = ArmBench(robot, (), merged(runs[:1]))
-    found = investigate(alone, prepared(alone))
-    mine = rms(bench.gap(1, found.causes()))
-    linear = bench.blocks(found.columns)
+    found = solve(robot, (), runs, ["series_B"], (), StatedDeviation())
+    mine = rms(bench.gap(1, found.causes))
+    columns = bench.columns()
+    linear = bench.groups(columns, 1.0)
     plain = {}
     # every column of the shelf, and the first two harmonics of every joint as calibrations like to add
-    wide = [np.concatenate([b.X, harmonics(b, found.columns, r.q)], axis=2) for b, r in zip(linear, runs, strict=True)]
-    for name, X in (("shelf", [b.X for b in linear]), ("shelf and harmonics", wide)):
+    wide = [np.concatenate([b.A, harmonics(b, columns, r.q)], axis=2) for b, r in zip(linear, runs, strict=True)]
+    for name, X in (("shelf", [b.A for b in linear]), ("shelf and harmonics", wide)):
         A = np.concatenate([X[0], linear[0].N], axis=2).reshape(-1, X[0].shape[2] + 9)
         size = np.linalg.norm(A, axis=0) + 1e-12
-        c = np.linalg.lstsq(A / size, linear[0].r.ravel(), rcond=1e-10)[0] / size
-        left = without_nuisance(linear[1].r - X[1] @ c[: X[1].shape[2]], linear[1].N)
-        inside = linear[0].r.ravel() - A @ c
+        c = np.linalg.lstsq(A / size, linear[0].y.ravel(), rcond=1e-10)[0] / size
+        left = without_nuisances(linear[1].y - X[1] @ c[: X[1].shape[2]], linear[1].N)
+        inside = linear[0].y.ravel() - A @ c
         plain[name] = (float(np.sqrt((inside**2).sum() / len(runs[0].q))), rms(left))
-    assert plain["shelf and harmonics"][0] < rms(bench.gap(0, found.causes()))  # closer where it was fitted
+    assert plain["shelf and harmonics"][0] < rms(bench.gap(0, found.causes))  # closer where it was fitted
     for inside, outside in plain.values():
         assert outside > 1.1 * inside
         assert outside > 1.05 * mine  # and worse where it was not
@@ -165,7 +165,7 @@ def harmonics(block, columns, q):
     names = ["shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3"]
     angle = [q[:, names.index(columns[j].target)] for j in joints]
     waves = [
-        block.X[:, :, j] * f(k * a)[:, None]
+        block.A[:, :, j] * f(k * a)[:, None]
         for j, a in zip(joints, angle, strict=True)
         for k in (1, 2)
         for f in (np.sin, np.cos)
