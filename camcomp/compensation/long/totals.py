@@ -8,6 +8,7 @@ import numpy as np
 
 from camcomp.compensation.bands.outcome import Bands, BandTotals, band_figures
 from camcomp.compensation.long.control_account import ControlAccount, SeenPoints
+from camcomp.compensation.long.met import path_of_run
 from camcomp.compensation.long.plain import Done, PlainCorrector
 from camcomp.compensation.long.plain_run import PlainRun
 from camcomp.compensation.program.compensate import Compensated
@@ -30,6 +31,7 @@ from camcomp.gcode.output import Part
 from camcomp.gcode.path_mode import PathMode
 from camcomp.ground.datatypes import LINE, RAPID, Bools, Floats, Ints
 from camcomp.model.control import limits_of
+from camcomp.model.cutting.assumed import RapidsAtDepth
 from camcomp.model.cutting.spindle import MOST_LINES, spindle_warning
 from camcomp.model.job import Job
 from camcomp.model.statics.target import correct, settle
@@ -98,6 +100,7 @@ class Totals:
         self.apart: dict[PathMode, None] = {}  # in which lines are kept from being made one
         self.waiting_s = 0.0  # beside its moves
         self.resting = 0  # end points at which the control rests because of joining lines
+        self._rapids = RapidsAtDepth(job.config)
         self._still: list[int] = []  # source lines that cut while the spindle stands, the first ones
 
     # --- pieces --------------------------------------------------------------------------------------------------
@@ -119,6 +122,7 @@ class Totals:
         self._common(whole.motions, rows.joining, np.ones(len(s), np.bool_), plain.row[rows.move] + run.row0 + 1, answers.nominal,
                      joints, drive, answers.rest[:, :3], done.before, done.after, done.missed)  # fmt: skip
         self._plain_control(run, done)
+        self._rapids.add(path_of_run(whole))
         if run.state.sense == 0.0:
             self._stands(np.unique(plain.row[rows.move[rows.force.any(axis=1)]]) + run.row0 + 1)
         force = frame.vectors(rows.force)
@@ -185,6 +189,7 @@ class Totals:
         state, rows = result.state, result.rows
         corrected = rows.corrected[own]
         self._odd_control(result, own, part)
+        self._rapids.add(result.program.path.take(np.arange(part.first, part.last)))
         self._common(part.last - part.first, rows.joining[own], corrected, result.lines[own], result.nominal[own], state.rho[own], state.drive[own],
                      state.tilt[own], result.before, result.after, result.missed)  # fmt: skip
         self.iterations = max(self.iterations, result.iterations)
@@ -235,7 +240,7 @@ class Totals:
 
     def finish(self, corrector: PlainCorrector, warnings: list[str]) -> None:
         """Solves the sample exactly and keeps the largest differences."""
-        self.warnings = list(dict.fromkeys([*self.job.taken.remarks, *warnings]))
+        self.warnings = list(dict.fromkeys([*self.job.taken.remarks, *self._rapids.warnings(), *warnings]))
         self.warnings += rest_warning(self.resting)
         for each in self._control:
             each.finish()

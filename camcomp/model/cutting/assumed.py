@@ -7,14 +7,13 @@ diameter; there the tool meets less than a slot.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from camcomp.ground import path_geometry
-from camcomp.ground.datatypes import RAPID, Floats, Ints, Path
+from camcomp.ground.datatypes import RAPID, Bools, Floats, Ints, Path
 from camcomp.model.config.cutting_tool import Cutter
 from camcomp.model.config.spec import Config
 from camcomp.model.cutting.track import PLUNGE_SINE
@@ -73,12 +72,17 @@ def _cut(config: Config) -> str:
     return f"{shape} of {' x '.join(sizes)} mm ({choice.model} model)" if sizes else f"{shape} ({choice.model} model)"
 
 
+def _is_assumed(config: Config) -> bool:
+    """Whether a force acts whose engagement no stock and no measurement gives."""
+    return config.workpiece.stock is None and config.process.force.model not in ("none", "table")
+
+
 def doubtful_force(config: Config, path: Path) -> list[str]:
     """Warnings where the assumed force cannot be right: drills, ball tools, step-overs below the diameter, rapids at depth.
 
     Empty where a stock gives the engagement or no force acts.
     """
-    if config.workpiece.stock is not None or config.process.force.model in ("none", "table"):
+    if not _is_assumed(config):
         return []
     on = np.flatnonzero((path.kind != RAPID) & path.known & ~path.machine)
     cutters = [config.tools.get(int(number), config.tool) for number in np.unique(path.tool[on])]
@@ -86,12 +90,9 @@ def doubtful_force(config: Config, path: Path) -> list[str]:
         f"the assumed force is that of a flat end mill, and the tool is a {kind}; {TWO_WAYS}"
         for kind in sorted({str(each.type) for each in cutters} & {"ball", "drill"})
     ]
-    if lines := _rapids_at_depth(path, config.workpiece.stock_top_mm):
-        named = ", ".join(map(str, lines[:MOST_LINES])) + (" ..." if len(lines) > MOST_LINES else "")
-        out.append(
-            f"G0 at cutting depth between two cuts at source lines {named}: the model has no force there, and the "
-            "machine may cut at rapid speed; retract, or state the stock"
-        )
+    rapids = RapidsAtDepth(config)
+    rapids.add(path)
+    out += rapids.warnings()
     if share := _beside_share(path, on, cutters):
         out.append(
             f"{100.0 * share:.0f} % of the feed path runs less than one tool diameter beside an earlier pass; "
@@ -100,17 +101,38 @@ def doubtful_force(config: Config, path: Path) -> list[str]:
     return out
 
 
-def _rapids_at_depth(path: Path, top_mm: float | None) -> list[int]:
-    """Source lines of lateral rapids that begin and end at the depth of the cuts before and behind them."""
-    known = path.known & ~path.machine
-    way = path.end - path.start
-    flat = known & (np.abs(way[:, 2]) < LEVEL_MM) & (np.hypot(way[:, 0], way[:, 1]) > LEVEL_MM)
-    cuts = flat & (path.kind != RAPID)
-    if top_mm is not None:
-        cuts &= path.end[:, 2] < top_mm
-    between = np.zeros(len(path), np.bool_)
-    between[1:-1] = flat[1:-1] & (path.kind[1:-1] == RAPID) & cuts[:-2] & cuts[2:]
-    return [int(line) for line in np.unique(path.line[between])]
+@dataclass(eq=False)
+class RapidsAtDepth:
+    """Lateral rapids that begin and end at the depth of the cuts before and behind them, found part by part of a path."""
+
+    config: Config
+    lines: set[int] = field(default_factory=set)
+    _flat: Bools = field(default_factory=lambda: np.zeros(0, np.bool_))  # of the last two motions, as the next ones
+    _cuts: Bools = field(default_factory=lambda: np.zeros(0, np.bool_))
+    _line: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
+
+    def add(self, path: Path) -> None:
+        """The next motions of a path; nothing where a stock is known or no force acts."""
+        if not _is_assumed(self.config):
+            return
+        known, way, top = path.known & ~path.machine, path.end - path.start, self.config.workpiece.stock_top_mm
+        level = known & (np.abs(way[:, 2]) < LEVEL_MM) & (np.hypot(way[:, 0], way[:, 1]) > LEVEL_MM)
+        cut = level & (path.kind != RAPID) & (True if top is None else path.end[:, 2] < top)
+        flat = np.concatenate((self._flat, level & (path.kind == RAPID)))
+        cuts, line = np.concatenate((self._cuts, cut)), np.concatenate((self._line, path.line))
+        self.lines |= set(line[1:-1][flat[1:-1] & cuts[:-2] & cuts[2:]].tolist())
+        self._flat, self._cuts, self._line = flat[-2:], cuts[-2:], line[-2:]
+
+    def warnings(self) -> list[str]:
+        """One warning with the source lines, or none."""
+        if not self.lines:
+            return []
+        first = sorted(self.lines)[:MOST_LINES]
+        named = ", ".join(map(str, first)) + (" ..." if len(self.lines) > MOST_LINES else "")
+        where = f"G0 at cutting depth between two cuts at source lines {named}"
+        return [
+            f"{where}: the model has no force there, and the machine may cut at rapid speed; retract, or state the stock"
+        ]
 
 
 def _beside_share(path: Path, on: Ints, cutters: list[Cutter]) -> float:
@@ -121,6 +143,8 @@ def _beside_share(path: Path, on: Ints, cutters: list[Cutter]) -> float:
     point, along = _samples(path, on, SAMPLE_DIAMETERS * diameter)
     if len(point) < 2:
         return 0.0
+    from scipy.spatial import cKDTree  # not needed by most runs, and slow to import
+
     near, far = (share * diameter for share in BESIDE_DIAMETERS)
     scaled = point * [1.0, 1.0, 20.0]  # passes of other heights are no neighbours
     pairs = cKDTree(scaled).query_pairs(far, output_type="ndarray")
