@@ -78,7 +78,7 @@ def judge(split: Split) -> list[Row]:
         row |= {"answer": result.get("verdict", "failed"), "causes": _causes(result), "failed": result.get("failed")}
         row["nominal"] = q.scale * rms(q.nominal())
         row["file"] = _rms_of(left, "gap", q, split.judged)
-        row["camcomp"] = _rms_of(claimed, "rest", q, split.judged) or row["file"]
+        row["camcomp"] = _rms_of(claimed, "rest", q, split.judged)  # the file alone has its constants fitted again
         row["claimed"] = _claim(result, q)
         row["opponents"] = {name: q.scale * rms(residual()) for name, residual in q.opponents.items()}
         rows.append(row | compared(row))
