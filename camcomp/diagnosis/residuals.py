@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from camcomp.diagnosis.arm.poses import ArmBench
 from camcomp.diagnosis.arm.unseen import acting
+from camcomp.diagnosis.axis.at_tip import lever_mm
 from camcomp.diagnosis.experiment.open_experiment import columns_of
 from camcomp.diagnosis.fit.bench import Bench, Run, thinned
 from camcomp.diagnosis.result.types import DiagnosisResult
@@ -70,23 +71,29 @@ def of_axes(found: Sequence[AxisFindings], revolute: Mapping[str, bool]) -> Colu
     """Logs of axes: encoder minus set-point, and drive force, each about its mean over the runs of the fit."""
     cells: dict[tuple[str, float], dict[str, float]] = {}
     for axis in found:
-        names = log_columns([axis.name], [revolute[axis.name]])
-        for channel, name, sign in ((axis.following, names.encoder[0], -1.0), (axis.force, names.drive[0], 1.0)):
+        names, lever = log_columns([axis.name], [revolute[axis.name]]), lever_mm(revolute[axis.name])
+        both = ((axis.following, names.encoder[0], -1.0 / lever), (axis.force, names.drive[0], lever))
+        for channel, name, factor in both:
             if channel is not None:
-                _lay(cells, channel, name, sign)
+                _lay(cells, channel, name, factor)
     heads = list(dict.fromkeys(name for each in cells.values() for name in each))
     order = sorted(cells)
     out: Columns = {"run": np.array([run for run, _ in order]), TIME: np.array([time for _, time in order])}
     return out | {name: np.array([cells[key].get(name, np.nan) for key in order]) for name in heads}
 
 
-def _lay(cells: dict[tuple[str, float], dict[str, float]], channel: AxisChannel, name: str, sign: float) -> None:
-    """Adds the gap of every row of one channel's runs, and the rest of those that were fitted."""
+def _lay(cells: dict[tuple[str, float], dict[str, float]], channel: AxisChannel, name: str, factor: float) -> None:
+    """Adds the gap of every row of one channel's runs, and the rest by what was fitted; runs that were held out, too."""
     middle = float(np.mean(np.concatenate([values for _, values in channel.whole])))
-    for k, (times, values), move, rest in zip(channel.runs, channel.whole, channel.moves, channel.left, strict=True):
-        for column, at, each in ((f"gap_{name}", times, values - middle), (f"rest_{name}", move.time, rest)):
+    parts = [
+        (k, times, values - middle, move.time, rest)
+        for k, (times, values), move, rest in zip(channel.runs, channel.whole, channel.moves, channel.left, strict=True)
+    ]
+    parts += [(k, at, channel.held_whole[k], at, channel.held[k]) for k, at in channel.held_times.items()]
+    for k, times, gap, rest_times, rest in parts:
+        for column, at, each in ((f"gap_{name}", times, gap), (f"rest_{name}", rest_times, rest)):
             for time, value in zip(at.tolist(), each.tolist(), strict=True):
-                cells.setdefault((channel.all_names[k], time), {})[column] = sign * value
+                cells.setdefault((channel.all_names[k], time), {})[column] = factor * value
 
 
 def _both(names: Sequence[str], gap: Floats, rest: Floats) -> Columns:

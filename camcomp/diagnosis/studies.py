@@ -19,8 +19,10 @@ from camcomp.diagnosis.arm.plausible import check_poses
 from camcomp.diagnosis.arm.poses import Poses, approached
 from camcomp.diagnosis.arm.study import bench_of
 from camcomp.diagnosis.arm.study import studied as study_arm
+from camcomp.diagnosis.axis.at_tip import lever_mm
 from camcomp.diagnosis.axis.findings import AxisDeviation, AxisRun
 from camcomp.diagnosis.axis.plausible import check_axes
+from camcomp.diagnosis.axis.predicted import predict_drives, predict_encoders
 from camcomp.diagnosis.axis.study import studied as study_axes
 from camcomp.diagnosis.experiment.open_experiment import open_log, read_log, unread
 from camcomp.diagnosis.fit.measured import Measured
@@ -76,8 +78,12 @@ def study_of(path: str | Path, without: Sequence[str] = ()) -> LogStudy | None:
         if not any(m.has("tip") for m in logs) and all(m.has("encoder") for m in logs):
             axes = _checked_axes(opened)
             sd = opened.experiment.sd
-            deviation = AxisDeviation(sd.encoder_mm, sd.force_N) if sd else AxisDeviation()
-            result, found = study_axes(axes, holdout=opened.experiment.holdout, without=without, stated=deviation)
+            deviation = (
+                AxisDeviation(sd.encoder_mm, sd.force_N, sd.encoder_rad, sd.force_Nmm) if sd else AxisDeviation()
+            )
+            result, found = study_axes(
+                axes, holdout=opened.experiment.holdout, without=without, stated=deviation, robot=robot
+            )
             return LogStudy(
                 result, partial(of_axes, found, {a.name: a.revolute for a in robot.actuators}), tuple(opened.notes)
             )
@@ -133,8 +139,17 @@ def open_poses(path: str | Path) -> list[Poses]:
 
 
 def _checked_axes(opened: _Opened) -> dict[str, list[AxisRun]]:
+    robot, causes = opened.robot, _causes(opened.config)
     runs = list(zip(opened.experiment.runs, opened.logs, strict=True))
-    axes = {a.name: [_axis(run, log, k, a.revolute) for run, log in runs] for k, a in enumerate(opened.robot.actuators)}
+    late = [predict_encoders(robot, causes, log, run.started_s) for run, log in runs]
+    logs = [
+        replace(log, drive=log.drive - predict_drives(robot, causes, log, run.started_s)) if log.has("drive") else log
+        for run, log in runs
+    ]
+    axes = {
+        a.name: [_axis(run, log, k, a.revolute, own[:, k]) for (run, _), log, own in zip(runs, logs, late, strict=True)]
+        for k, a in enumerate(robot.actuators)
+    }
     for i, (run, _) in enumerate(runs):
         check_axes(display_name(run.log), {name: own[i] for name, own in axes.items()}, run.cutting)
     return axes
@@ -178,18 +193,26 @@ def _filled(time: Floats, values: Floats) -> Floats | None:
     return np.where(known, values, np.interp(time, time[order], values[order]))
 
 
-def _axis(run: RunSpec, log: Measured, k: int, revolute: bool) -> AxisRun:
-    """Rows, one per time and in its order, with all that the log has of this axis.
-
-    Torques of hinges are not studied: their friction has other units.
-    """
-    force = np.full(len(log.time), np.nan) if revolute else log.drive[:, k]
-    channels = (log.encoder[:, k], log.setpoint[:, k], force)
-    known = np.isfinite(log.encoder[:, k])
+def _axis(run: RunSpec, log: Measured, k: int, revolute: bool, expected: Floats) -> AxisRun:
+    """Rows, one per time and in its order, with all that the log has of this axis; ways and torques of hinges at the end of their arm."""
+    lever = lever_mm(revolute)
+    expected = lever * expected
+    channels = (lever * log.encoder[:, k], lever * log.setpoint[:, k], log.drive[:, k] / lever)
+    known = np.isfinite(log.encoder[:, k]) & np.isfinite(expected)
     for each in channels:
         if np.isfinite(each).mean() > MOSTLY:
             known &= np.isfinite(each)
     rows = np.flatnonzero(known)
     rows = rows[np.unique(log.time[rows], return_index=True)[1]]
     encoder, setpoint, force = (each[rows] for each in channels)
-    return AxisRun(run.name, log.time[rows], setpoint, encoder, force, rows + 1, revolute, run.started_s)
+    return AxisRun(
+        run.name,
+        log.time[rows],
+        setpoint,
+        encoder,
+        force,
+        rows + 1,
+        revolute,
+        run.started_s,
+        expected=expected[rows] if expected[rows].any() else None,
+    )

@@ -1,6 +1,11 @@
-"""The encoder follows its set-point as a first-order lag: tau d(encoder)/dt = set-point - encoder."""
+"""The encoder follows its set-point as a first-order lag: tau d(encoder)/dt = set-point - encoder.
+
+A negative time constant is a lead: the encoder is where the set-point will be, as where set-points are logged late.
+"""
 
 from collections.abc import Mapping
+
+import numpy as np
 
 from camcomp.ground.datatypes import Floats
 from camcomp.model.effect import Motion, Parameter
@@ -11,8 +16,10 @@ TARGET = "either"
 PLAIN = "lag of the position loop"
 REMEDY = "raise the gain of the position loop (kv) or switch feed-forward on, alike on all axes; or cut more slowly"
 SOURCE = "first-order position loop, tau = 1/kv (Gross, Hamann, Wiegaertner: Electrical feed drives in automation)"
+_KV = "loop gains kv of 100 to 2000 1/s"
+FITTED = (Parameter("time_constant_ms", "ms", 0.0, 0.0, 100.0, 3.0, 0.005, _KV, sign=1),)
 PARAMETERS = (
-    Parameter("time_constant_ms", "ms", 0.0, 0.0, 100.0, 3.0, 0.005, "loop gains kv of 100 to 2000 1/s", sign=1),
+    Parameter("time_constant_ms", "ms", 0.0, -500.0, 500.0, 3.0, 0.005, f"{_KV}; joints of arms up to 200 ms"),
 )
 
 
@@ -23,6 +30,10 @@ def on_servo(position: Floats, motion: Motion, which: Floats, p: Mapping[str, fl
         return position
     aimed = which > 0
     out = position.copy()
+    if tau < 0.0:
+        for j in np.flatnonzero(aimed.any(axis=0) if aimed.ndim > 1 else aimed):
+            out[:, j] = np.interp(motion.time - tau, motion.time, position[:, j])
+        return out
     seams = None if motion.seams is None else motion.seams.of(aimed)
     out[:, aimed] = first_order(position[:, aimed], motion.time, tau, seams)
     return out

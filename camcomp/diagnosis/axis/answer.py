@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Literal
 
 import numpy as np
 
+from camcomp.diagnosis.axis.at_tip import TipMotion, held_errors, lever_mm, whole_errors
 from camcomp.diagnosis.axis.findings import AxisChannel, AxisFindings
 from camcomp.diagnosis.result.types import (
+    ActuatorGap,
+    ActuatorShrinkage,
     Driver,
     FoundCause,
     GapSize,
@@ -20,6 +24,7 @@ from camcomp.diagnosis.result.types import (
 )
 from camcomp.diagnosis.statistics.one_more import log_ratio, of_one_more, scatter
 from camcomp.diagnosis.statistics.probability import EVEN, probability_of_chance, stated
+from camcomp.ground.datatypes import Floats
 from camcomp.model.motion.log_columns import log_columns
 
 STRETCHES_OF_ONE = 4  # that a run holds, at least; it differs from the next one by as much as means of these
@@ -41,16 +46,45 @@ def unknown(axis: AxisFindings, whole: int) -> UnknownCause:
     return UnknownCause(target=axis.name, probability=probability, share=share, law=axis.law)
 
 
-def gap(channels: Sequence[AxisChannel]) -> GapSize:
-    """Size of the following errors in um; where only forces were logged, of these in mN."""
-    rows = [np.concatenate([values for _, values in c.whole]) for c in channels]
-    size = 1e3 * np.abs(np.concatenate([each - np.mean(each) for each in rows]))
+def gap(found: Sequence[AxisFindings], tip: TipMotion) -> GapSize:
+    """Size of the following errors at the tip in um, and of every actuator in its own unit; where only forces were logged, of these in mN."""
+    errors = whole_errors(found)
+    if not errors:
+        rows = [np.concatenate([values for _, values in c.whole]) for a in found for c in a.channels[:1]]
+        size = np.abs(np.concatenate([each - np.mean(each) for each in rows]))
+        floor = float(np.sqrt(np.mean([a.channels[0].floor ** 2 for a in found])))
+    else:
+        size = np.concatenate([tip.errors(run, each) for run, each in errors.items()])
+        floors = {a.name: a.following.floor for a in found if a.following is not None}
+        times = {run: max((t for t, _ in each.values()), key=len) for run, each in errors.items()}
+        floor = _rms(np.concatenate([tip.floor(run, time, floors) for run, time in times.items()]))
+    actuators = {
+        a.name: ActuatorGap(
+            rms=_figure(a, _rms(np.concatenate([each[a.name][1] for each in errors.values() if a.name in each]))),
+            floor=_figure(a, a.following.floor), unit=_unit(a),
+        )
+        for a in found if a.following is not None
+    }  # fmt: skip
     return GapSize(
-        rms_um=round(float(np.sqrt(np.mean(size**2))), 3),
-        p95_um=round(float(np.quantile(size, 0.95)), 3),
-        max_um=round(float(size.max()), 3),
-        noise_floor_um=round(1e3 * float(np.sqrt(np.mean([c.floor**2 for c in channels]))), 3),
+        rms_um=round(1e3 * _rms(size), 3),
+        p95_um=round(1e3 * float(np.quantile(size, 0.95)), 3),
+        max_um=round(1e3 * float(size.max()), 3),
+        noise_floor_um=round(1e3 * floor, 3),
+        actuators=actuators,
     )
+
+
+def _figure(axis: AxisFindings, size: float) -> float:
+    """A size in the study's mm, in um of a slide and urad of a hinge."""
+    return round((1e6 / lever_mm(True) if axis.revolute else 1e3) * size, 3)
+
+
+def _unit(axis: AxisFindings) -> Literal["um", "urad"]:
+    return "urad" if axis.revolute else "um"
+
+
+def _rms(values: Floats) -> float:
+    return float(np.sqrt(np.mean(values**2)))
 
 
 def where(found: Sequence[AxisFindings], causes: Sequence[FoundCause]) -> Where:
@@ -60,7 +94,9 @@ def where(found: Sequence[AxisFindings], causes: Sequence[FoundCause]) -> Where:
     total = max(sum(energy.values()), 1e-300)
     drivers: list[Driver] = []
     for a in found:
-        if a.ripple:
+        if a.ripple and a.revolute:
+            drivers.append(Driver(covariate=f"position:{a.name}", share=round(a.ripple.share, 4)))
+        elif a.ripple:
             line = a.ripple
             drivers.append(
                 RippleDriver(
@@ -96,21 +132,54 @@ def _intervals(found: Sequence[AxisFindings]) -> tuple[IntervalShare, ...]:
     return tuple(sorted(every, key=lambda each: -each.share))
 
 
-def shrinkage(judged: Sequence[Sequence[AxisChannel]], names: Sequence[str]) -> UnseenShrinkage:
+def shrinkage(judged: Sequence[Sequence[AxisFindings]], names: Sequence[str], tip: TipMotion) -> UnseenShrinkage:
     """On whole runs that took no part in choosing and fitting; the interval is that of one more run."""
-    runs = [(_mean_square(channels, "first"), _mean_square(channels, "last")) for channels in judged]
-    before, after = (float(np.sqrt(np.mean([r[i] for r in runs]))) for i in (0, 1))
-    ratio = 1.0 - after / before if before > 0 else 0.0
-    effects = dict.fromkeys(e for channels in judged for c in channels for e, _ in c.steps)
-    low, high = _interval(judged, runs)
+    main = [[a.channels[0] for a in found if a.channels] for found in judged]
+    before, after = (_unseen(judged, tip, explained=each) for each in (False, True))
+    if before is None or after is None:  # forces alone
+        runs = [(_mean_square(channels, "first"), _mean_square(channels, "last")) for channels in main]
+    else:
+        runs = [(float(np.mean(b**2)), float(np.mean(a**2))) for b, a in zip(before, after, strict=True)]
+    sizes = [float(np.sqrt(np.mean([r[i] for r in runs]))) for i in (0, 1)]
+    ratio = 1.0 - sizes[1] / sizes[0] if sizes[0] > 0 else 0.0
+    effects = dict.fromkeys((c.effect, c.target) for found in judged for a in found for c in a.causes)
+    low, high = _interval(main, runs)
     return UnseenShrinkage(
         holdout=tuple(names),
-        before_rms_um=round(1e3 * before, 3),
-        after_rms_um=round(1e3 * after, 3),
+        before_rms_um=round(1e3 * sizes[0], 3),
+        after_rms_um=round(1e3 * sizes[1], 3),
         ratio=round(ratio, 4),
         ci95=(round(min(low, ratio), 4), round(max(high, ratio), 4)),
-        steps=tuple(ShrinkageStep(effect=e, target=None, after_rms_um=round(1e3 * after, 3)) for e in effects),
+        steps=tuple(ShrinkageStep(effect=e, target=t, after_rms_um=round(1e3 * sizes[1], 3)) for e, t in effects),
+        actuators=_actuators_unseen(judged),
     )
+
+
+def _unseen(judged: Sequence[Sequence[AxisFindings]], tip: TipMotion, *, explained: bool) -> list[Floats] | None:
+    """Distances (n,) mm of the tip per fit, on the runs that it has not seen; None where no set-points were logged."""
+    out = []
+    for found in judged:
+        runs = held_errors(found, explained=explained)
+        if not runs:
+            return None
+        out.append(np.concatenate([tip.errors(run, each) for run, each in runs.items()]))
+    return out
+
+
+def _actuators_unseen(judged: Sequence[Sequence[AxisFindings]]) -> dict[str, ActuatorShrinkage]:
+    """Sizes of every actuator's errors on unseen runs, without and with what was found."""
+    out = {}
+    for name in dict.fromkeys(a.name for found in judged for a in found if a.following is not None):
+        axes = [a for found in judged for a in found if a.name == name and a.following is not None]
+        parts = [
+            np.concatenate(
+                [values for a in axes if a.following for values in getattr(a.following, each).values()] or [np.zeros(1)]
+            )
+            for each in ("held_whole", "held")
+        ]
+        before, after = (_figure(axes[0], _rms(each)) for each in parts)
+        out[name] = ActuatorShrinkage(before_rms=before, after_rms=after, unit=_unit(axes[0]))
+    return out
 
 
 def _interval(judged: Sequence[Sequence[AxisChannel]], runs: Sequence[tuple[float, float]]) -> tuple[float, float]:

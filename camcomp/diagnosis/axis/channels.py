@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from camcomp.diagnosis.axis.at_tip import lever_mm
 from camcomp.diagnosis.axis.block_least_squares import (
     LEAST_Z,
     Gain,
@@ -62,6 +63,16 @@ def inertia(m: AxisTravel) -> Floats:
 def speed(m: AxisTravel) -> Floats:
     """mm/s (n,): a lag, or viscous friction."""
     return m.speed
+
+
+def weight_sine(m: AxisTravel) -> Floats:
+    """Sine (n,) of the angle of a hinge: torque of a weight."""
+    return np.sin(m.position / lever_mm(True))
+
+
+def weight_cosine(m: AxisTravel) -> Floats:
+    """Cosine (n,) of the angle of a hinge: torque of a weight."""
+    return np.cos(m.position / lever_mm(True))
 
 
 def either_way(m: AxisTravel) -> Floats:
@@ -137,6 +148,8 @@ def close(
             np.array([s[seen.block == b].mean() for b in range(len(seen.others))]) for s in squares
         )
         channel.held = {k: values[k] - table([k], *columns) @ c for k in test}
+        channel.held_whole = {k: values[k] - table([k], *columns[:1]) @ base for k in test}
+        channel.held_times = {k: moves[k].time for k in test}
     # runs that are held out show what the others foretell; what those cannot explain of themselves is there as well
     every, held = [*channel.runs, *test], list(channel.held.values())
     inside, left = [*channel.left, *held], [*np.split(leftover(data, A), ends), *held]

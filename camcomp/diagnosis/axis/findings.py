@@ -17,6 +17,7 @@ from camcomp.diagnosis.result.types import FoundCause, Law
 from camcomp.diagnosis.statistics.probability import EVEN
 from camcomp.ground.datatypes import Bools, Floats
 from camcomp.model.seams import missing_rows
+from camcomp.model.statics.arm import ARM_LENGTH
 
 ROWS = 50  # below which a run says nothing
 FIRST_MOVE_MM = 0.2  # after which friction has its sense
@@ -30,9 +31,10 @@ BESIDE_GAP = 5  # rows of which a gap leaves speed and acceleration uncertain
 class AxisRun:
     """Log of one axis in one run: time (n,) s; setpoint, encoder mm; force N, each (n,), NaN where nothing was logged.
 
-    row (n,): of the log, from 1. revolute: rad and N mm in the place of mm and N. started: s, on the clock common to all runs.
+    row (n,): of the log, from 1. revolute: a hinge, whose
+    way counts at the end of an arm of 1 m (`at_tip.lever_mm`), in mm and N like that of a slide. started: s, on the clock common to all runs.
     seen (n,): rows of which somebody saw how fast the axis was; all, where it is not given. course: times and set-points of the
-    whole log, (m,) each, of which these may be some rows.
+    whole log, (m,) each, of which these may be some rows. expected (n,): encoder minus set-point by the machine file's effects.
     """
 
     name: str
@@ -45,7 +47,13 @@ class AxisRun:
     started: float = 0.0
     seen: Bools | None = None
     course: tuple[Floats, Floats] | None = None
+    expected: Floats | None = None
     _finely: dict[int, tuple[Floats, Floats]] = field(default_factory=dict, init=False, repr=False)
+
+    @property
+    def gap(self) -> Floats:
+        """Expected minus measured encoder (n,)."""
+        return self.setpoint - self.encoder + (0.0 if self.expected is None else self.expected)
 
     @property
     def clear(self) -> Bools:
@@ -77,7 +85,7 @@ class AxisRun:
             y = getattr(self, name)
             bad = spikes(y, least)
             if name == "encoder":  # while the axis moves it is the following error that shows them
-                bad |= spikes(kept["setpoint"] - y, least)
+                bad |= spikes(kept["setpoint"] - y + (0.0 if self.expected is None else self.expected), least)
             good = np.isfinite(y) & ~bad
             kept[name] = np.where(bad, np.interp(self.time, self.time[good], y[good]), y) if bad.any() else y
             off |= bad
@@ -124,7 +132,7 @@ class AxisRun:
     def moved(self) -> Bools:
         """Rows (n,) from the first move on: which way friction held the axis before nobody knows. All where it stays."""
         away = np.abs(self.encoder - self.encoder[:1])
-        if self.revolute or not away.max(initial=0.0) > FAR * FIRST_MOVE_MM:
+        if not away.max(initial=0.0) > FAR * FIRST_MOVE_MM:
             return np.ones(len(away), bool)
         return np.arange(len(away)) >= int(np.argmax(away > FIRST_MOVE_MM))
 
@@ -142,6 +150,7 @@ class AxisRun:
             row=row[rows],
             seen=seen,
             course=self.asked,
+            expected=None if self.expected is None else self.expected[rows],
         )
 
 
@@ -151,6 +160,15 @@ class AxisDeviation:
 
     encoder_mm: float | None = None
     force_N: float | None = None
+    encoder_rad: float | None = None
+    force_Nmm: float | None = None
+
+    def of(self, revolute: bool) -> AxisDeviation:
+        """Of one axis, in the study's mm and N."""
+        if not revolute:
+            return self
+        rad, torque = self.encoder_rad, self.force_Nmm
+        return AxisDeviation(None if rad is None else ARM_LENGTH * rad, None if torque is None else torque / ARM_LENGTH)
 
 
 @dataclass(eq=False)
@@ -167,6 +185,10 @@ class AxisChannel:
     steps: list[tuple[str, float]] = field(default_factory=list)  # effect, rms after
     left: list[Floats] = field(default_factory=list)  # per run
     held: dict[int, Floats] = field(default_factory=dict)  # the same of runs that were never fitted, by their number
+    held_whole: dict[int, Floats] = field(
+        default_factory=dict
+    )  # of these runs, without the constant of the fitted ones
+    held_times: dict[int, Floats] = field(default_factory=dict)  # s
     floor: float = 0.0
     stated: bool = False
     all_names: list[str] = field(default_factory=list)
@@ -192,6 +214,7 @@ class AxisFindings:
 
     name: str
     stated: AxisDeviation
+    revolute: bool = False
     wide: int = WIDE[0]
     carried: Carried = field(default_factory=lambda: Carried([], WIDE[0]))
     causes: list[FoundCause] = field(default_factory=list)

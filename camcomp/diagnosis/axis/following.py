@@ -34,6 +34,7 @@ from camcomp.diagnosis.axis.channels import (
 )
 from camcomp.diagnosis.axis.findings import ROWS, AxisChannel, AxisFindings, AxisRun
 from camcomp.diagnosis.axis.gate import MINOR
+from camcomp.diagnosis.axis.hinge import follow_hinge
 from camcomp.diagnosis.axis.noise_floor import REPEATABILITY_MM, rows_floor
 from camcomp.diagnosis.axis.swing import Swing, find_swing
 from camcomp.diagnosis.axis.terms import (
@@ -61,6 +62,8 @@ def follow(
     something is left beside inertia and nothing beside it.
     """
     floor = found.stated.encoder_mm or float(np.hypot(_scatter([runs[k] for k in train]), REPEATABILITY_MM))
+    if found.revolute:
+        return follow_hinge(found, runs, moves, gaps, floor, train, test, without)
     swung = None if "servo_overshoot" in without else _swung(
         runs, moves, gaps, train, floor, without, found.carried.late or 0.0
     )  # fmt: skip
@@ -244,8 +247,9 @@ def _swung(
     other = plain if lag is None else lag.last
     if lag is not None and beside is not None:
         better = holds(gain(other, last, shown))
-    else:
-        better = float(np.mean(last)) < EQUAL * float(np.mean(other))
+    else:  # a loop that creeps to its set-point is inertia in the loop, which every axis has
+        swings = swing.damping - 1.96 * spread[1] < CRITICAL
+        better = swings and float(np.mean(last)) < EQUAL * float(np.mean(other))
     return replace(found, gain=g, better=better)
 
 

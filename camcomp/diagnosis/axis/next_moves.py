@@ -13,6 +13,7 @@ from itertools import product
 
 import numpy as np
 
+from camcomp.diagnosis.axis.at_tip import lever_mm
 from camcomp.diagnosis.axis.findings import AxisFindings, AxisRun
 from camcomp.diagnosis.axis.gate import LEVEL, STRETCH_S
 from camcomp.diagnosis.axis.terms import travel
@@ -121,7 +122,19 @@ def _designed(axis: AxisFindings, logs: Sequence[AxisRun], verdict: str) -> tupl
         if better[0] <= value:
             break
         value, bits, best = better
-    return (best, bits) if best.blocks and bits > WORTH else None
+    return (_in_own_unit(best), bits) if best.blocks and bits > WORTH else None
+
+
+def _in_own_unit(moves: AxisMoves) -> AxisMoves:
+    """Strokes of a hinge in rad, which the study has in mm at the end of its arm."""
+    if moves.unit == "mm":
+        return moves
+    lever = lever_mm(True)
+    blocks = tuple(
+        b.model_copy(update={"low": b.low / lever, "high": b.high / lever, "speed": b.speed / lever})
+        for b in moves.blocks
+    )
+    return moves.model_copy(update={"blocks": blocks, "acceleration": moves.acceleration / lever})
 
 
 def _weights(axis: AxisFindings, verdict: str) -> dict[str, float]:

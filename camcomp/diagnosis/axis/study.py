@@ -14,14 +14,17 @@ from typing import Any
 import numpy as np
 
 from camcomp.diagnosis.axis import answer
+from camcomp.diagnosis.axis.at_tip import TipMotion
 from camcomp.diagnosis.axis.block_least_squares import WHOLE_RUNS, log10_chance, solve
 from camcomp.diagnosis.axis.drive_force import force_of
 from camcomp.diagnosis.axis.drivers import dependences
 from camcomp.diagnosis.axis.findings import ROWS, AxisChannel, AxisDeviation, AxisFindings, AxisRun
 from camcomp.diagnosis.axis.following import follow, share_lag
+from camcomp.diagnosis.axis.gate import AxisGate
 from camcomp.diagnosis.axis.law import axis_law
 from camcomp.diagnosis.axis.motion import encoder_width, lateness, motion_of
 from camcomp.diagnosis.axis.next_moves import next_moves
+from camcomp.diagnosis.axis.own_unit import in_own_unit
 from camcomp.diagnosis.axis.terms import AxisTravel, travel
 from camcomp.diagnosis.result.standards import StandardValues
 from camcomp.diagnosis.result.types import (
@@ -32,6 +35,7 @@ from camcomp.diagnosis.result.types import (
     Outlier,
 )
 from camcomp.ground import headway
+from camcomp.model.statics.description import Robot
 
 NO_TIPS = "ISO 230-2: the tip was not measured"
 
@@ -42,12 +46,13 @@ def study(
     holdout: Sequence[str] = (),
     without: Sequence[str] = (),
     stated: AxisDeviation | None = None,
+    robot: Robot | None = None,
 ) -> DiagnosisResult:
-    """Result for logs of axes by name. holdout: runs that are judged and never fitted.
+    """Result for logs of axes by name. holdout: runs that are judged and never fitted; robot: carries errors to the tip.
 
     Raises ValueError where no run of any axis has enough rows.
     """
-    return studied(axes, holdout=holdout, without=without, stated=stated)[0]
+    return studied(axes, holdout=holdout, without=without, stated=stated, robot=robot)[0]
 
 
 def studied(
@@ -56,6 +61,7 @@ def studied(
     holdout: Sequence[str] = (),
     without: Sequence[str] = (),
     stated: AxisDeviation | None = None,
+    robot: Robot | None = None,
 ) -> tuple[DiagnosisResult, list[AxisFindings]]:
     """As study, with what the result was drawn from."""
     outliers: set[tuple[str, int]] = set()
@@ -75,18 +81,22 @@ def studied(
         raise ValueError(
             "no axis has 50 rows or more of set-points with encoders, nor a slide of encoders with drive forces"
         )
+    for a in found:
+        _nothing_below_the_floor(a)
     share_lag(found)
-    main = [a.channels[0] for a in found]
+    tip = TipMotion(robot, cleaned)
     whole = sum(len(a.channels) for a in found)  # every channel weighs alike
-    causes = [c.model_copy(update={"share": round(c.share / whole, 4)}) for a in found for c in a.causes]
+    causes = [
+        in_own_unit(c.model_copy(update={"share": round(c.share / whole, 4)}), a) for a in found for c in a.causes
+    ]
     causes.sort(key=lambda c: (-c.probability, -c.share))
     known = tuple(NamedCause(effect=c.effect, target=c.target) for c in causes)
     verdict = _verdict(found)
     if verdict == "unknown" or (verdict == "ambiguous" and not causes):
         causes += [answer.unknown(a, whole) for a in found if a.strange or verdict == "ambiguous"]
-    gap = answer.gap(main)
+    gap = answer.gap(found, tip)
     with headway.part(1.0 / (1 + again), 1.0):
-        judged = _judged(cleaned, held, set(without), stated or AxisDeviation()) if again else [main] if held else []
+        judged = _judged(cleaned, held, set(without), stated or AxisDeviation()) if again else [found] if held else []
     every = [c for a in found for c in a.channels]
     result = DiagnosisResult(
         verdict=verdict,
@@ -94,7 +104,7 @@ def studied(
         where=answer.where(found, causes),
         causes=tuple(causes),
         alternatives=(known, (*known, NamedCause(effect=UNKNOWN, target=None))) if verdict == "ambiguous" else (),
-        shrinkage=answer.shrinkage(judged, held) if judged else None,
+        shrinkage=answer.shrinkage(judged, held, tip) if judged else None,
         next_experiment=next_moves(found, cleaned, verdict),
         floor=Floor(um=gap.noise_floor_um, source="stated" if all(c.stated for c in every) else "rows"),
         outliers=tuple(Outlier(run=run, row=row) for run, row in sorted(outliers)),
@@ -102,6 +112,20 @@ def studied(
         standards=StandardValues(absent=(NO_TIPS,)),
     )
     return result, found
+
+
+def _nothing_below_the_floor(axis: AxisFindings) -> None:
+    """Drops causes and unknowns of a following error that is at its floor: there is no gap that they would explain."""
+    following = axis.following
+    if following is None or following.gate is None:
+        return
+    rows = np.concatenate([values for _, values in following.whole])
+    if float(np.std(rows)) > following.floor:
+        return
+    axis.causes = [c for c in axis.causes if not c.effect.startswith("servo_")]
+    following.gate = AxisGate("at", 0.0, ())
+    if axis.force is None:
+        axis.unknown_in, axis.law = [], None
 
 
 def _verdict(found: Sequence[AxisFindings]) -> Any:
@@ -117,20 +141,22 @@ def _axis(
     name: str, runs: list[AxisRun], holdout: set[str], without: set[str], stated: AxisDeviation,
     others: Mapping[str, Sequence[AxisRun]] | None = None,
 ) -> AxisFindings:  # fmt: skip
-    found = AxisFindings(name, stated=stated)
+    hinge = any(r.revolute for r in runs)
+    stated = stated.of(hinge)
+    found = AxisFindings(name, stated=stated, revolute=hinge)
     usable = [r for r in runs if np.isfinite(r.encoder).sum() >= ROWS]
     if not usable:
         return found
     train = [k for k, r in enumerate(usable) if r.name not in holdout]
     test = [k for k, r in enumerate(usable) if r.name in holdout]
-    gaps = [r.setpoint - r.encoder for r in usable]
+    gaps = [r.gap for r in usable]
     found.wide = encoder_width(usable, train)
     followed = bool(train) and all(np.isfinite(gaps[k]).all() for k in train)
     forced = bool(train) and all(np.isfinite(usable[k].force).all() for k in train)
     late = lateness(usable, gaps, train) if followed else None
     pushed = list[tuple[str, float, float]]()
     for again in (False, True):  # what pushed an axis shows in what its loop makes of it
-        found = AxisFindings(name, stated=stated, wide=found.wide)
+        found = AxisFindings(name, stated=stated, revolute=hinge, wide=found.wide)
         if followed:
             found = follow(
                 found, *motion_of(found, [r.unpushed(pushed) for r in usable], gaps, train, late), train, test, without
@@ -149,19 +175,22 @@ def _axis(
         follows = found.following
         asked = [(usable[k], m) for k, m in zip(follows.runs, follows.moves, strict=True)] if follows else []
         told = [travel(r.time, r.setpoint, found.wide).of(np.isin(r.time, m.time)) for r, m in asked]
-        found.law = axis_law(name, found.force, found.following, told)
+        found.law = None if hinge else axis_law(name, found.force, found.following, told)
     return found
 
 
 def _judged(
     axes: Mapping[str, Sequence[AxisRun]], held: Sequence[str], without: set[str], stated: AxisDeviation
-) -> list[list[AxisChannel]]:
-    """Main channels of every axis with each of the runs held out in turn: chosen and fitted without it."""
+) -> list[list[AxisFindings]]:
+    """Every axis with each of the runs held out in turn: chosen and fitted without it."""
     every = [
         [_axis(name, list(runs), {one}, without, stated) for name, runs in headway.steps(axes.items(), len(axes))]
         for one in headway.steps(held, len(held))
     ]
-    return [[a.channels[0] for a in found if a.channels] for found in every]
+    for found in every:
+        for a in found:
+            _nothing_below_the_floor(a)
+    return every
 
 
 def _name_rest(found: AxisFindings, runs: Sequence[AxisRun], others: Mapping[str, Sequence[AxisRun]]) -> None:

@@ -18,13 +18,30 @@ Pair = Annotated[tuple[float, float], Field(description="low and high end")]
 UNKNOWN: Literal["unknown"] = "unknown"
 
 
+class ActuatorGap(Result):
+    """Size of an actuator's error (rms) and of its noise, in its own unit."""
+
+    rms: float
+    floor: float
+    unit: Literal["um", "urad"]
+
+
+class ActuatorShrinkage(Result):
+    """Size of an actuator's error (rms) on unseen runs, in its own unit."""
+
+    before_rms: float
+    after_rms: float
+    unit: Literal["um", "urad"]
+
+
 class GapSize(Result):
-    """Size of measured minus modelled over all runs, um, and of its noise."""
+    """Size of measured minus modelled over all runs at the tip, um, and of its noise; of logs without a tip by actuator, too."""
 
     rms_um: float
     p95_um: float
     max_um: float
     noise_floor_um: Annotated[float | None, Field(description="null where nothing tells it")]
+    actuators: dict[str, ActuatorGap] = Field(default_factory=dict)
 
 
 class LineShare(Result):
@@ -235,6 +252,7 @@ class UnseenShrinkage(Result):
     covered_share: Annotated[
         float | None, Field(description="of unseen poses of an arm: every joint at angles its error curve was seen at")
     ] = None
+    actuators: dict[str, ActuatorShrinkage] = Field(default_factory=dict)
     covered_rms_um: Annotated[float | None, Field(description="left on these")] = None
     refitted: Annotated[tuple[str, ...], Field(description="what only the unseen runs themselves can tell")] = ()
 

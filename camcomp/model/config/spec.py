@@ -228,7 +228,9 @@ class Deviations(Spec):
 
     tip_mm: Positive | None = None
     encoder_mm: Positive | None = None
+    encoder_rad: Positive | None = None
     force_N: Positive | None = None
+    force_Nmm: Positive | None = None
 
 
 class Experiment(Spec):

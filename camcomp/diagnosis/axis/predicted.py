@@ -1,0 +1,73 @@
+"""Encoders and drive forces of a log of axes as the one signal path predicts them, with the effects of the machine file."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from camcomp.diagnosis.axis.noise_floor import REPEATABILITY_MM
+from camcomp.diagnosis.fit.measured import Measured
+from camcomp.ground.datatypes import Floats
+from camcomp.model import signal_path
+from camcomp.model.effect import Cause, Motion
+from camcomp.model.hysteresis import direction
+from camcomp.model.seams import Seams
+from camcomp.model.statics.description import Robot
+
+
+def predict_encoders(robot: Robot, causes: Sequence[Cause], log: Measured, started_s: float) -> Floats:
+    """Encoder minus set-point (n, m) that the controller makes of the logged set-points; 0 where none are logged.
+
+    NaN as long as it depends on how the axes moved before the log began: there the prediction from rest and that from a
+    settled loop differ by more than REPEATABILITY_MM.
+    """
+    servo = signal_path.acting(causes, "control")
+    if not servo:
+        return np.zeros_like(log.setpoint)
+    motion = _motion(robot, log, _filled(log.time, log.setpoint, robot), started_s)
+    late = signal_path.controlled(servo, motion.names, motion) - motion.encoder
+    from_rest = signal_path.controlled(servo, motion.names, replace(motion, seams=None)) - motion.encoder
+    unsure = np.abs(late - from_rest) > REPEATABILITY_MM
+    return np.where(np.isfinite(log.setpoint), np.where(unsure, np.nan, late), 0.0)
+
+
+def predict_drives(robot: Robot, causes: Sequence[Cause], log: Measured, started_s: float) -> Floats:
+    """Drive forces or torques (n, m), N or N mm, that the effects of the drives exert along the logged encoders."""
+    drives = [cause for cause in causes if cause.hook("on_drive_force") is not None]
+    if not drives:
+        return np.zeros_like(log.encoder)
+    motion = _motion(robot, log, _filled(log.time, log.encoder, robot), started_s)
+    _, guided = signal_path.driven(drives, motion.names, motion)
+    effort = signal_path.drive_forces(drives, motion.names, guided)
+    return np.zeros_like(log.encoder) if effort is None else effort
+
+
+def _filled(time: Floats, values: Floats, robot: Robot) -> Floats:
+    """Positions (n, m) with empty cells filled from their neighbours in time; an axis that is not logged stands at home."""
+    out = np.empty_like(values)
+    for j, (own, actuator) in enumerate(zip(values.T, robot.actuators, strict=True)):
+        known = np.isfinite(own)
+        out[:, j] = np.interp(time, time[known], own[known]) if known.any() else actuator.home
+    return out
+
+
+def _motion(robot: Robot, log: Measured, position: Floats, started_s: float) -> Motion:
+    """A motion whose encoders are the positions (n, m); the recording may begin while the axes move."""
+    time, n = log.time, len(log.time)
+    ordered = n > 1 and bool((np.diff(time) > 0.0).all())
+    speed = np.gradient(position, time, axis=0) if ordered else np.zeros_like(position)
+    warm = np.isfinite(log.temperature)
+    heat = np.interp(time, time[warm], log.temperature[warm]) if warm.any() else None
+    seams = (
+        Seams(np.zeros(1, int), np.full(1, np.inf), (position[1:2] - position[:1]) / (time[1] - time[0]))
+        if ordered
+        else None
+    )
+    plain = Motion(
+        time, started_s + time, np.zeros(n), heat, position, speed, direction(position),
+        np.array([a.home for a in robot.actuators]), signal_path.springs(robot), ordered,
+        names=tuple(a.name for a in robot.actuators),
+    )  # fmt: skip
+    return replace(plain, seams=seams)
