@@ -15,7 +15,7 @@ from camcomp.ground.errors import CheckFailed
 from camcomp.ground.files import read_bytes
 from camcomp.ground.headway import part
 from camcomp.ground.places import STANDARD
-from camcomp.model.config.load import load_experiment
+from camcomp.model.config.load import load_config, load_experiment
 from camcomp.model.config.write_back import machine_file, with_causes
 from camcomp.report.page import Listing
 
@@ -189,7 +189,7 @@ def machine_with_causes(
     to = Path.cwd() if target == STANDARD else Path(target).absolute().parent
     return with_causes(
         texts[k], [each for each in result.known if each.effect not in before], folder=str(Path(configs[k]).absolute().parent), moved_to=str(to), note=note,
-        laws=laws,
+        laws=laws, actuators=tuple(load_config(configs).robot.actuators),
     )  # fmt: skip
 
 

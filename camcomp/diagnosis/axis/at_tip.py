@@ -12,7 +12,7 @@ from camcomp.ground.datatypes import Floats
 from camcomp.model.statics.arm import ARM_LENGTH, Arm, arm_of, end_pose, jacobian
 from camcomp.model.statics.description import Robot
 
-POSES = 400  # of a run at which the machine's rates are worked out; between them they are straight
+POSES = 400  # of a run at which the rates of the machine are worked out; between them they are straight
 
 Errors = Mapping[str, tuple[Floats, Floats]]  # by axis: times (n,) s and errors (n,) mm or rad
 

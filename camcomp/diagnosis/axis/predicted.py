@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.interpolate import Akima1DInterpolator
 
 from camcomp.diagnosis.axis.noise_floor import REPEATABILITY_MM
 from camcomp.diagnosis.fit.measured import Measured
@@ -15,6 +16,9 @@ from camcomp.model.effect import Cause, Motion
 from camcomp.model.hysteresis import direction
 from camcomp.model.seams import Seams
 from camcomp.model.statics.description import Robot
+
+STEP_S = 1e-3  # of servo controllers
+MOST_STEPS = 20  # between two rows
 
 
 def predict_encoders(robot: Robot, causes: Sequence[Cause], log: Measured, started_s: float) -> Floats:
@@ -26,9 +30,10 @@ def predict_encoders(robot: Robot, causes: Sequence[Cause], log: Measured, start
     servo = signal_path.acting(causes, "control")
     if not servo:
         return np.zeros_like(log.setpoint)
-    motion = _motion(robot, log, _filled(log.time, log.setpoint, robot), started_s)
+    motion = _between_rows(_motion(robot, log, _filled(log.time, log.setpoint, robot), started_s))
     late = signal_path.controlled(servo, motion.names, motion) - motion.encoder
     from_rest = signal_path.controlled(servo, motion.names, replace(motion, seams=None)) - motion.encoder
+    late, from_rest = (each[:: (len(each) - 1) // max(len(log.time) - 1, 1) or 1] for each in (late, from_rest))
     unsure = np.abs(late - from_rest) > REPEATABILITY_MM
     return np.where(np.isfinite(log.setpoint), np.where(unsure, np.nan, late), 0.0)
 
@@ -51,6 +56,21 @@ def _filled(time: Floats, values: Floats, robot: Robot) -> Floats:
         known = np.isfinite(own)
         out[:, j] = np.interp(time, time[known], own[known]) if known.any() else actuator.home
     return out
+
+
+def _between_rows(motion: Motion) -> Motion:
+    """The motion with instants between its rows, STEP_S apart at most, over which set-points go on smoothly."""
+    time, n = motion.time, len(motion.time)
+    per = int(np.clip(np.ceil(float(np.median(np.diff(time))) / STEP_S), 1, MOST_STEPS)) if motion.ordered else 1
+    if per == 1 or n < 5:
+        return motion
+    fine = np.interp(np.arange((n - 1) * per + 1) / per, np.arange(n), time)
+    position = Akima1DInterpolator(time, motion.encoder)(np.clip(fine, time[0], time[-1]))
+    return replace(
+        motion, time=fine, common=motion.common[0] + fine - time[0], cut_min=np.zeros(len(fine)), encoder=position,
+        speed=np.gradient(position, fine, axis=0), direction=direction(position),
+        temperature=None if motion.temperature is None else np.interp(fine, time, motion.temperature),
+    )  # fmt: skip
 
 
 def _motion(robot: Robot, log: Measured, position: Floats, started_s: float) -> Motion:

@@ -17,6 +17,7 @@ from camcomp.model.config.robot import RevoluteActuator, RobotSpec
 from camcomp.model.config.spec import Config, EffectChoice, Experiment
 from camcomp.model.config.spread import Spread, UncertainInput, replaced, without_spreads
 from camcomp.model.config.stated import in_stated_dialect
+from camcomp.model.config.write_back import key_of_effect
 from camcomp.model.config.yaml_check import check, choose
 from camcomp.model.config.yaml_tree import Node, merge, plain, read_tree, tree_of
 
@@ -294,6 +295,25 @@ def _check_targets(config: Config) -> list[CamcompError]:
         else:
             continue
         errors.append(ConfigError("CC205", f"effects[{i + 1}]: {message}", at=at, hint=hint))
+    return errors + _check_twice(config)
+
+
+def _check_twice(config: Config) -> list[CamcompError]:
+    """Whether an effect is there twice at one place: what it does would count twice, and a diagnosis could not change it."""
+    errors: list[CamcompError] = []
+    seen: dict[tuple[Any, ...], int] = {}
+    for i, each in enumerate(config.effects):
+        key = key_of_effect(each.effect, each.target, each.values)
+        other = seen.get(key)
+        if other is None and getattr(shelf.load("effects", each.effect), "TARGET", "either") == "either":
+            alike = [k for k in seen if k[0] == each.effect and k[2:] == key[2:] and None in (k[1], each.target)]
+            other = seen[alike[0]] if alike else None
+        if other is not None:
+            where = "" if each.target is None else f" at {each.target}"
+            message = f"effects[{i + 1}]: '{each.effect}'{where} is there already, as effects[{other + 1}]"
+            at = config.at("effects", i, "effect")
+            errors.append(ConfigError("CC205", message, at=at, hint="write one entry with the value of both together"))
+        seen.setdefault(key, i)
     return errors
 
 

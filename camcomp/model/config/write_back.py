@@ -9,7 +9,12 @@ from typing import Any, Protocol
 from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 
+from camcomp.ground import shelf
 from camcomp.model.config.spread import HALF_95
+
+# Parameters by which several entries of one effect and target differ; laws are unique by all that they say.
+_APART = {"disturbance": ("from_s", "to_s"), "screw_cyclic": ("pitch_mm",), "joint_curve": ("seen_deg",)}
+_LAWS = {"formula", "map"}
 
 
 class EstimatedValue(Protocol):
@@ -64,12 +69,13 @@ def with_causes(
     moved_to: str = "",
     note: str = "",
     laws: Sequence[Mapping[str, Any]] = (),
+    actuators: Sequence[str] = (),
 ) -> str:
-    """The text of a machine file with the `causes` of a diagnosis appended to its effects.
+    """The text of a machine file with the `causes` of a diagnosis among its effects: those that are there already are changed.
 
     Values are those found, intervals are written as their standard deviations, and go into a comment behind them. folder, moved_to: where
     the file stands and where the new one will; relative paths in it are changed to match. note: comment above the causes.
-    laws: more entries, key by key.
+    laws: more entries, key by key; actuators: names, where an effect of all of them is to differ between them.
     """
     yaml = YAML()
     yaml.preserve_quotes = True
@@ -80,12 +86,13 @@ def with_causes(
     effects = tree.get("effects")
     if effects is None and (causes or laws):
         effects = tree["effects"] = CommentedSeq()
+    new = [each for cause in causes for each in _new_ones(effects, cause, actuators)]
     first = len(effects or ())
-    for cause in causes:
+    for cause, target in new:
         entry = CommentedMap()
         entry["effect"] = cause.effect
-        if cause.target is not None:
-            entry["target"] = cause.target
+        if target is not None:
+            entry["target"] = target
         for name, found in cause.parameters.items():
             low, high = found.ci95
             sd = (high - low) / (2.0 * HALF_95)
@@ -96,11 +103,72 @@ def with_causes(
         effects.append(entry)
     for law in laws:
         effects.append(_entry(law))
-    if note and (causes or laws):
+    if note and (new or laws):
         effects.yaml_set_comment_before_after_key(first, before=note, indent=2)
     out = io.StringIO()
     yaml.dump(tree, out)
     return out.getvalue()
+
+
+def key_of_effect(effect: str, target: str | None, values: Mapping[str, Any]) -> tuple[Any, ...]:
+    """What makes an entry of `effects:` unique: effect, target, and what tells several of a kind apart."""
+    names = _APART.get(effect, ())
+    own = tuple(str(values.get(name)) for name in names)
+    return (effect, target, str(sorted(values.items(), key=str)) if effect in _LAWS else own)
+
+
+def _new_ones(
+    effects: CommentedSeq, cause: NamedEffect, actuators: Sequence[str]
+) -> list[tuple[NamedEffect, str | None]]:
+    """The cause where it is new, with its targets; where it is there already the entries are changed in place."""
+    values = {**{name: each.value for name, each in cause.parameters.items()}, **cause.settings}
+    wanted = key_of_effect(cause.effect, cause.target, values)
+    plain = [{key: _plain(value) for key, value in each.items()} for each in effects]
+    keys = [key_of_effect(str(each.get("effect")), each.get("target"), each) for each in plain]
+    if cause.target is not None and (wanted[0], None, *wanted[2:]) in keys and actuators:
+        _part(effects, keys.index((wanted[0], None, *wanted[2:])), actuators)
+        return _new_ones(effects, cause, actuators)
+    targets = [cause.target]
+    if cause.target is None and any(key[0] == wanted[0] and key[2:] == wanted[2:] and key[1] for key in keys):
+        targets = [*actuators] or targets
+    out: list[tuple[NamedEffect, str | None]] = []
+    for target in targets:
+        key = (wanted[0], target, *wanted[2:])
+        if key in keys:
+            _change(effects[keys.index(key)], cause)
+        else:
+            out.append((cause, target))
+    return out
+
+
+def _part(effects: CommentedSeq, at: int, actuators: Sequence[str]) -> None:
+    """Puts one entry per actuator in the place of one for all of them."""
+    whole = effects.pop(at)
+    for name in reversed(actuators):
+        entry = CommentedMap([("effect", whole["effect"]), ("target", name)])
+        entry.update({key: value for key, value in whole.items() if key not in ("effect", "target")})
+        effects.insert(at, entry)
+
+
+def _change(entry: CommentedMap, cause: NamedEffect) -> None:
+    """Adds what was found on top of an entry: sums, of factors products; shapes take the value found."""
+    records = {each.name: each for each in getattr(shelf.load("effects", cause.effect), "PARAMETERS", ())}
+    for name, found in cause.parameters.items():
+        low, high = found.ci95
+        record = records.get(name)
+        before = _plain(entry.get(name))
+        value = found.value
+        if record is not None and not record.scan and not record.either and isinstance(before, int | float):
+            value = record.value(record.coordinate(float(before)) + record.coordinate(found.value))
+            value = float(f"{value:.6g}")
+        sd = (high - low) / (2.0 * HALF_95)
+        entry[name] = _spread(value, sd) if 0.0 < sd < inf else value
+        entry.yaml_add_eol_comment(f"found on top: {found.value:g}, 95 %: {low:g} to {high:g}", name)
+
+
+def _plain(value: Any) -> Any:
+    """A number that may be written as {value, sd}."""
+    return value["value"] if isinstance(value, Mapping) and "value" in value else value
 
 
 def _entry(law: Mapping[str, Any]) -> CommentedMap:
