@@ -248,8 +248,8 @@ def _swung(
     if lag is not None and beside is not None:
         better = holds(gain(other, last, shown))
     else:  # a loop that creeps to its set-point is inertia in the loop, which every axis has
-        swings = swing.damping - 1.96 * spread[1] < CRITICAL
-        better = swings and float(np.mean(last)) < EQUAL * float(np.mean(other))
+        lowest_damping = swing.damping - 1.96 * spread[1]
+        better = lowest_damping < CRITICAL and float(np.mean(last)) < EQUAL * float(np.mean(other))
     return replace(found, gain=g, better=better)
 
 
