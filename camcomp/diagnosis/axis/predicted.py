@@ -40,7 +40,7 @@ def predict_encoders(robot: Robot, causes: Sequence[Cause], log: Measured, start
 
 def predict_drives(robot: Robot, causes: Sequence[Cause], log: Measured, started_s: float) -> Floats:
     """Drive forces or torques (n, m), N or N mm, that the effects of the drives exert along the logged encoders."""
-    drives = [cause for cause in causes if cause.hook("on_drive_force") is not None]
+    drives = [cause for cause in signal_path.acting(causes, "drive") if signal_path.pushes(cause.effect)]
     if not drives:
         return np.zeros_like(log.encoder)
     motion = _motion(robot, log, _filled(log.time, log.encoder, robot), started_s)
