@@ -111,8 +111,9 @@ class Interpreter(Settings, Cycles):
         state, words = self.state, block.words
         explicit = block.code(1)
         if explicit is not None:
-            if explicit not in CYCLES or (explicit != state.motion and not self.dialect.cycles_apart):
-                self.forget_cycle(series=explicit not in CYCLES)
+            begins = explicit in CYCLES and state.motion not in CYCLES
+            if begins or explicit not in CYCLES or (explicit != state.motion and not self.dialect.cycles_apart):
+                self.forget_cycle(series=begins or explicit not in CYCLES)
             if explicit == 800:
                 state.motion = state.outside_cycles if self.dialect.cycles_apart else None
             else:

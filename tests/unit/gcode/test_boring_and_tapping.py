@@ -102,3 +102,9 @@ def test_boring_with_its_shift_in_words_is_written_out():
     flat = flatten(program, 1e-3)
     assert [tuple(each) for each in flat.path.end.tolist()] == [tuple(each) for each in program.path.end.tolist()]
     assert "M19" in flat.text.string
+
+
+@pytest.mark.parametrize("dialect", ["fanuc", "rs274"])
+def test_a_program_may_begin_with_a_cycle(dialect):
+    path = read("G21 G90 F100.\nG81 X1. Y1. Z-1. R1.\nX2.\nM2\n", dialect).path
+    assert path.end[:3].tolist() == [[0, 0, 1], [1, 1, 1], [1, 1, -1]] and path.end[-1].tolist() == [2, 1, 1]
