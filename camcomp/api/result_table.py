@@ -12,13 +12,14 @@ from numpy.typing import NDArray
 
 from camcomp.ground.bounds import number_of
 from camcomp.ground.csv_table import TableRules, read_csv
-from camcomp.ground.errors import ConfigError
+from camcomp.ground.errors import ConfigError, shown
 
 if TYPE_CHECKING:
     import pandas
 
 PARQUET = ".parquet"
 DECIMALS, DECIMALS_RAD = 6, 9  # as joint tables and logs have them
+FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r")  # of cells that spreadsheets compute
 COUNTS = ("line", "row")
 _RULES = TableRules(table="CC450", column="CC450", cell="CC450")
 
@@ -61,12 +62,15 @@ class ResultTable(Mapping[str, NDArray[Any]]):
         return np.column_stack([np.asarray(self[name], float) for name in names])
 
     def to_csv(self) -> bytes:
-        """One row of names, then the numbers with six decimals, angles with nine; an empty cell where there is none."""
+        """One row of names, then the numbers with six decimals, angles with nine; an empty cell where there is none.
+
+        Texts that spreadsheets would take for formulas have an apostrophe in front.
+        """
         out = io.StringIO()
         write = csv.writer(out, lineterminator="\n")
         write.writerow(self)
         write.writerows(zip(*(_cells(name, values) for name, values in self.items()), strict=True))
-        return out.getvalue().encode("utf-8")
+        return out.getvalue().encode("utf-8", "backslashreplace")
 
     def to_parquet(self) -> bytes:
         """As a Parquet file in full precision. Raises ConfigError CC216 when pyarrow is not installed."""
@@ -98,7 +102,8 @@ def _numbers(cells: list[str]) -> NDArray[Any]:
 
 def _cells(name: str, values: NDArray[Any]) -> list[str]:
     if values.dtype.kind not in "fiu":
-        return [str(value) for value in values]
+        texts = (shown(str(value)) for value in values)
+        return [f"'{text}" if text.startswith(FORMULA_STARTS) and number_of(text) is None else text for text in texts]
     digits = 0 if name in COUNTS else DECIMALS_RAD if name.endswith("_rad") else DECIMALS
     zero = f"-{0.0:.{digits}f}"
     texts = ("" if np.isnan(value) else f"{value:.{digits}f}" for value in values.astype(float))

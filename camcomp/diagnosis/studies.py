@@ -87,6 +87,11 @@ def study_of(path: str | Path, without: Sequence[str] = ()) -> LogStudy | None:
             return LogStudy(
                 result, partial(of_axes, found, {a.name: a.revolute for a in robot.actuators}), tuple(opened.notes)
             )
+    except np.linalg.LinAlgError as error:  # a ValueError too
+        message = (
+            f"the rows do not determine the fit: some columns do not move, or repeat others; {_channels_there(opened)}"
+        )
+        raise ConfigError("CC420", message, at=Location(display_name(path), 1, 1)) from error
     except ValidationError:  # a ValueError too, and a fault of ours
         raise
     except ValueError as error:

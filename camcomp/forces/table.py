@@ -7,6 +7,7 @@ from pydantic import Field
 
 from camcomp.ground.datatypes import Floats
 from camcomp.ground.errors import FileError
+from camcomp.ground.files import read_bytes
 from camcomp.model.config.base import Spec
 from camcomp.model.cutting.cut import Cut
 from camcomp.model.cutting.forcetable import ForceTable, look_up, parse_table
@@ -49,4 +50,4 @@ def _table(name: str) -> ForceTable:
 
 @lru_cache(maxsize=8)
 def _cached(name: str, _time: int, _size: int) -> ForceTable:
-    return parse_table(Path(name).read_text(encoding="utf-8"), name)
+    return parse_table(read_bytes(name).decode("utf-8", errors="replace"), name)

@@ -12,6 +12,7 @@ import io
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 
@@ -23,6 +24,9 @@ MOST_TABLE_ROWS = 5_000_000  # more than an hour at 1 kHz
 MOST_TABLE_BYTES = 1 << 30
 NEEDED = "a table is a row of column names and rows of numbers below it"
 TOO_MANY = "look for a mark too many, or a decimal comma"
+LINES_LOOKED_AT = 400
+NUMBERS_SHARE = 0.2  # of cells, from which a text counts as a table with mistakes
+_CELLS = re.compile(r"[,;\s]+")
 _BLANK = " "  # any number of blanks and tabs between cells
 
 
@@ -122,6 +126,10 @@ def read_csv(
     text = text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
     refuse_long(text.count("\n"), "the table", Location(name, 1, 1))
     source = text.split("\n")
+    if not like_a_table(source):
+        raise ConfigError(
+            rules.table, "this is no table of numbers; nothing of it is shown", at=Location(name, 1, 1), hint=NEEDED
+        )
     first = next((each for each in source if each.strip()), "")
     mark = _mark(first) if spreadsheet else ","
     lines, rows = _rows(text, mark, name, rules, source)
@@ -131,7 +139,7 @@ def read_csv(
     if not headed:
         rows, lines = [[str(j + 1) for j in range(len(rows[0]))], *rows], [lines[0], *lines]
     header = tuple(cell.strip() for cell in rows[0])
-    at = Location(name, lines[0], 1, source[lines[0] - 1])
+    at = Location(name, lines[0], 1, source[lines[0] - 1] if len(rows) > 1 else "")
     if len(header) == 1 and ";" in header[0]:
         raise ConfigError(rules.table, "cells are separated by commas, not by semicolons", at=at)
     if len(rows) < 2 and not rowless:
@@ -143,6 +151,17 @@ def read_csv(
             message = f"{len(row)} cells under {len(header)} column{' names' if headed else 's'}"
             raise ConfigError(rules.cell, message, at=table.at(i, beyond), hint=TOO_MANY)
     return table
+
+
+def like_a_table(lines: Sequence[str]) -> bool:
+    """Whether a good part of what stands below the first line is numbers, if there is anything.
+
+    What is not meant as a table may be a file that was never meant to be read aloud.
+    """
+    filled = list(islice((line for line in lines if line.strip()), LINES_LOOKED_AT))
+    cells = [cell.strip("\"' ") for line in filled[1:] for cell in _CELLS.split(line)]
+    numbers = [number_of(cell) is not None for cell in cells if cell]
+    return sum(numbers) >= NUMBERS_SHARE * len(numbers)
 
 
 def refuse_long(rows: float, what: str, at: Location | None = None) -> None:

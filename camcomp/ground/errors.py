@@ -3,6 +3,7 @@
 Several mistakes of one file travel together: the first is raised and carries the `others`.
 """
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
@@ -96,6 +97,21 @@ def raise_all(errors: Sequence[CamcompError]) -> None:
         raise first
 
 
+# Signs that move a terminal's cursor, change the order of letters, or stand for bytes of a name that are no UTF-8.
+_UNSHOWN = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
+
+
+def shown(text: str) -> str:
+    """A text as it may stand on a terminal or in a report: control characters and lone surrogates as escapes."""
+    return _UNSHOWN.sub(lambda found: _escaped(ord(found[0])), text)
+
+
+def _escaped(code: int) -> str:
+    if 0xDC80 <= code <= 0xDCFF:  # a byte of a file name
+        code -= 0xDC00
+    return f"\\x{code:02x}" if code < 0x100 else f"\\u{code:04x}"
+
+
 _RED, _BOLD, _CYAN, _OFF = "\033[31;1m", "\033[1m", "\033[36m", "\033[0m"
 
 
@@ -105,14 +121,15 @@ def format_error(error: CamcompError, color: bool = False) -> str:
     blocks = []
     for each in error.all():
         at = each.at
-        place = f"{at.file}:{at.line}:{at.column}" if at else "camcomp"
-        block = [f"{bold}{place}:{off} {red}error[{each.rule}]{off}: {each.message}"]
+        place = shown(f"{at.file}:{at.line}:{at.column}") if at else "camcomp"
+        block = [f"{bold}{place}:{off} {red}error[{each.rule}]{off}: {shown(each.message)}"]
         if at and at.source.strip():
             source = at.source.rstrip("\r\n")
             # Tabs stay tabs under the line, so that the caret stands below its character.
             padding = "".join(c if c == "\t" else " " for c in source[: at.column - 1])
-            block += [f"  {source}", f"  {padding}{red}^{off}"]
+            padding += " " * (len(shown(source[: at.column - 1])) - len(padding))
+            block += [f"  {shown(source)}", f"  {padding}{red}^{off}"]
         if each.hint:
-            block.append(f"  {cyan}hint:{off} {each.hint}")
+            block.append(f"  {cyan}hint:{off} {shown(each.hint)}")
         blocks.append("\n".join(block))
     return "\n".join(blocks)

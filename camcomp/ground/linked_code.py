@@ -11,11 +11,9 @@ from __future__ import annotations
 import functools
 from typing import Any
 
-import numba
-from numba.core import compiler
+from camcomp.ground.compiler import numba
 
-_numba: Any = numba  # its annotations leave out what it has
-_compiler: Any = compiler
+_compiler: Any = numba.core.compiler
 
 
 class Inner(_compiler.CompilerBase):  # type: ignore[misc]
@@ -38,8 +36,8 @@ def is_usable() -> bool:
     """Whether this numba compiles a small function and a caller of it this way, and the caller is right."""
     _trying.append(True)
     try:
-        part = _numba.njit(no_cpython_wrapper=True, pipeline_class=Inner)(_doubled)
-        whole = _numba.njit(_calling(part))
+        part = numba.njit(no_cpython_wrapper=True, pipeline_class=Inner)(_doubled)
+        whole = numba.njit(_calling(part))
         return bool(whole(20.0) == 41.0)
     except Exception:  # noqa: BLE001 - whatever a numba of another build raises, it compiles as usual
         return False

@@ -19,14 +19,13 @@ from pathlib import Path
 from typing import Any
 
 import llvmlite
-import numba
 
 from camcomp.ground import headway
+from camcomp.ground.compiler import numba
 from camcomp.ground.notes import note
 from camcomp.ground.replacement import Replacement
 from camcomp.ground.trust import why_file_is_not_ours, why_folder_is_not_ours
 
-_numba: Any = numba  # its annotations leave out what it has
 _SUM = hashlib.sha256().digest_size
 _ANEW = "it is compiled anew, which takes half a minute"
 ROOT = Path(__file__).parents[2]  # of the package
@@ -39,8 +38,8 @@ def kept(function: Callable[..., Any], *, allocates: bool = True, **options: Any
     allocates: whether the code makes arrays. Code that makes none is loaded without what numba imports for compiling,
     a quarter of a second of declarations.
     """
-    dispatcher = _numba.njit(**options)(function)
-    if not _numba.config.DISABLE_JIT:  # for the debugger
+    dispatcher = numba.njit(**options)(function)
+    if not numba.config.DISABLE_JIT:  # for the debugger
         # A numba that asks under another name keeps nothing and compiles in every process.
         dispatcher._cache = _Cache(function, allocates)
     return dispatcher

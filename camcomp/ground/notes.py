@@ -2,6 +2,8 @@
 
 import sys
 
+from camcomp.ground.errors import shown
+
 _told: set[str] = set()
 _held: dict[str, str] | None = None
 
@@ -14,7 +16,7 @@ def note(topic: str, text: str) -> None:
     if _held is not None:
         _held[topic] = text
     elif sys.stderr is not None:
-        print(f"camcomp: note: {text}", file=sys.stderr)
+        print(f"camcomp: note: {shown(text)}", file=sys.stderr)
 
 
 def hold() -> None:

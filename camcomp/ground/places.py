@@ -29,6 +29,10 @@ def unusable(path: str) -> str | None:
     """Why nothing can be written under this name, as far as its kind goes."""
     if path == STANDARD or _descriptor(path) is not None:
         return None
+    if path.endswith(("/", os.sep)):
+        return "the name is that of a folder"
+    if os.path.islink(path) and os.path.islink(os.path.realpath(path)):
+        return "its links lead round in a circle"
     mode = _mode(path)
     kinds = {"a folder": stat.S_ISDIR, "a socket": stat.S_ISSOCK, "a block device": stat.S_ISBLK}
     return next((f"it is {kind}" for kind, test in kinds.items() if test(mode)), None)
@@ -77,7 +81,7 @@ def _places(path: str, standard: int) -> set[Hashable]:
         found.add((status.st_dev, status.st_ino))
     if number is not None:
         return found | {number}
-    return found | {Path(path).resolve()}
+    return found | {Path(os.path.realpath(path))}  # of a loop of links as far as it leads
 
 
 def _mode(path: str) -> int:

@@ -20,7 +20,7 @@ class Replacement:
 
     def __init__(self, name: str, *, mode: int | None = None) -> None:
         self.name, self._mode = name, mode
-        self._target = Path(name).resolve()
+        self._target = Path(os.path.realpath(name))
         self._aside = self._target.with_name(f".camcomp-{os.urandom(8).hex()}")
         self._named = False
         try:

@@ -97,4 +97,4 @@ def relative(file: str) -> str | None:
     try:
         return PurePath(os.path.relpath(file)).as_posix()
     except ValueError:  # another drive
-        return Path(file).resolve().as_posix()
+        return Path(os.path.realpath(file)).as_posix()

@@ -17,7 +17,9 @@ def findings_files(
     """Contents by file name, for camcomp.ground.files.write_all."""
     out: dict[str, bytes] = {}
     if json_file:
-        out[json_file] = (json.dumps(as_json(cases), indent=2, ensure_ascii=False) + "\n").encode()
+        out[json_file] = (json.dumps(as_json(cases), indent=2, ensure_ascii=False) + "\n").encode(
+            "utf-8", "backslashreplace"
+        )
     if sarif_file:
         out[sarif_file] = sarif(cases)
     if junit_file:

@@ -126,7 +126,9 @@ def render(page: Page) -> bytes:
         f'<script type="text/plain" id="library">{plot_library() if figures else ""}</script>',
         f"<script>{_asset('page.js')}</script></body></html>",
     ]
-    return "\n".join([*head, *(_UNIT.sub("\\1\u00a0\\2", each) for each in body), *scripts, ""]).encode()
+    return "\n".join([*head, *(_UNIT.sub("\\1\u00a0\\2", each) for each in body), *scripts, ""]).encode(
+        "utf-8", "backslashreplace"
+    )
 
 
 @cache

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections import Counter
 from collections.abc import Sequence
 from hashlib import sha256
@@ -10,6 +11,7 @@ from typing import Any
 from urllib.parse import quote
 
 from camcomp import __version__
+from camcomp.ground.errors import shown
 from camcomp.ground.rules import RULES
 from camcomp.report.findings import Case, Finding, relative
 
@@ -37,7 +39,16 @@ def sarif(cases: Sequence[Case]) -> bytes:
             }
         ],
     }
-    return (json.dumps(log, indent=1, ensure_ascii=False) + "\n").encode()
+    return (json.dumps(_shown(log), indent=1, ensure_ascii=False) + "\n").encode()
+
+
+def _shown(value: Any) -> Any:
+    """The same with texts as they may be shown: no viewer's control characters, no bytes that are no UTF-8."""
+    if isinstance(value, str):
+        return shown(value)
+    if isinstance(value, dict):
+        return {key: _shown(each) for key, each in value.items()}
+    return [_shown(each) for each in value] if isinstance(value, list) else value
 
 
 def _rule(rule: str) -> dict[str, Any]:
@@ -62,10 +73,10 @@ def _result(finding: Finding, rules: Sequence[str], seen: Counter[str]) -> dict[
         "ruleIndex": rules.index(finding.rule),
         "level": finding.level,
         "message": {"text": finding.message},
-        "partialFingerprints": {"camcomp/v1": sha256(f"{said}\0{seen[said]}".encode()).hexdigest()[:32]},
+        "partialFingerprints": {"camcomp/v1": sha256(os.fsencode(f"{said}\0{seen[said]}")).hexdigest()[:32]},
     }
     if uri is not None:
-        place: dict[str, Any] = {"artifactLocation": {"uri": quote(uri), "uriBaseId": "%SRCROOT%"}}
+        place: dict[str, Any] = {"artifactLocation": {"uri": quote(os.fsencode(uri)), "uriBaseId": "%SRCROOT%"}}
         if finding.line:
             region: dict[str, Any] = {"startLine": finding.line}
             if finding.column:

@@ -11,7 +11,7 @@ import sys
 import warnings
 from _thread import interrupt_main
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from importlib import import_module
 from threading import Timer, main_thread
 from types import FrameType
@@ -20,7 +20,7 @@ from typing import Any
 import click
 
 from camcomp import __version__
-from camcomp.ground.errors import CamcompError, FileError, PluginWarning, Terminated, format_error
+from camcomp.ground.errors import CamcompError, FileError, PluginWarning, Terminated, format_error, shown
 from camcomp.ground.files import remembering_inputs
 from camcomp.ground.garbage import collect_seldom
 from camcomp.terminal.standard_streams import stand_in_for_closed
@@ -153,13 +153,14 @@ def run(args: list[str]) -> int:
     except click.exceptions.FileError as error:
         return _report(FileError("CC500", f"cannot open {error.ui_filename}: {error.message}"))
     except click.ClickException as error:
-        error.show()
+        with suppress(OSError):
+            error.show()
         return 2
     except (KeyboardInterrupt, click.Abort):
-        click.echo("camcomp: interrupted", err=True)
+        _tell("camcomp: interrupted")
         return 130
     except Terminated as end:
-        click.echo("camcomp: terminated", err=True)
+        _tell("camcomp: terminated")
         return 128 + end.number
     except BrokenPipeError:
         _forget_output()
@@ -203,7 +204,7 @@ def _plugins_left_out() -> Iterator[None]:
                 others(message, category, *rest, **more)
             elif str(message) not in told:
                 told.add(str(message))
-                click.echo(f"camcomp: warning: {message}", err=True)
+                _tell(f"camcomp: warning: {shown(str(message))}")
 
         warnings.showwarning = show
         yield
@@ -211,7 +212,7 @@ def _plugins_left_out() -> Iterator[None]:
 
 def _report(error: CamcompError) -> int:
     color = sys.stderr.isatty() and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
-    click.echo(format_error(error, color), err=True, color=color)
+    _tell(format_error(error, color), color)
     if error.__cause__ is not None and os.environ.get("CAMCOMP_DEBUG"):
         import traceback
 
@@ -219,15 +220,20 @@ def _report(error: CamcompError) -> int:
     return error.exit_code
 
 
+def _tell(text: str, color: bool = False) -> None:
+    """To standard error; where nothing can be written there, the exit code says it alone."""
+    with suppress(OSError):
+        click.echo(text, err=True, color=color)
+
+
 def _bug(error: Exception) -> int:
     if os.environ.get("CAMCOMP_DEBUG"):
         import traceback
 
         traceback.print_exc()
-    click.echo(
-        f"camcomp: internal error: {type(error).__name__}: {error}\n"
+    _tell(
+        f"camcomp: internal error: {type(error).__name__}: {shown(str(error))}\n"
         f"  This is a bug in camcomp {__version__}, not a mistake in your files.\n"
-        "  Run again with CAMCOMP_DEBUG=1 for the traceback, and report it with the files that show it.",
-        err=True,
+        "  Run again with CAMCOMP_DEBUG=1 for the traceback, and report it with the files that show it."
     )
     return 70

@@ -12,6 +12,7 @@ from typing import Any
 
 import click
 
+from camcomp.ground.errors import shown
 from camcomp.ground.headway import Headway, watched
 
 PATIENCE = 1.0  # s before a work in progress is worth a word
@@ -84,10 +85,10 @@ class _Line:
     """The line that is drawn anew: a bar with share and remaining time, or what is known instead."""
 
     def __init__(self, on: str) -> None:
-        self._on, self._start = on, time.monotonic()
+        self._on, self._start = shown(on), time.monotonic()
         bar: Any = click.progressbar(
             length=STEPS,
-            label=on,
+            label=self._on,
             width=WIDE,
             show_percent=True,
             show_eta=True,
@@ -109,4 +110,5 @@ class _Line:
 def say(*lines: str, quiet: bool = False) -> None:
     """Write lines to standard error, unless quiet."""
     if lines and not quiet:
-        print("\n".join(lines), file=sys.stderr)
+        print(shown("
+".join(lines)), file=sys.stderr)

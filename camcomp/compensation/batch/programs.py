@@ -5,6 +5,7 @@ from __future__ import annotations
 import glob
 import hashlib
 import json
+import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -51,7 +52,7 @@ def find_programs(paths: Sequence[str], output: Path) -> list[FoundProgram]:
     lies behind its part without wildcards. A link is a program of its own, beside the file that it leads to.
     """
     found: dict[Path, Path] = {}
-    out = output.resolve()
+    out = Path(os.path.realpath(output))
     for text in paths:
         path = Path(text)
         if path.is_dir():
@@ -65,7 +66,7 @@ def find_programs(paths: Sequence[str], output: Path) -> list[FoundProgram]:
             base = Path(*fixed) if fixed else Path()
             files = [Path(each) for each in glob.glob(text, recursive=True)]
         for each in sorted(files):
-            place = each.parent.resolve() / each.name
+            place = Path(os.path.realpath(each.parent)) / each.name
             if (each.is_file() or (each.is_symlink() and not each.exists())) and not place.is_relative_to(out):
                 found.setdefault(place, each.relative_to(base))
     if not found:
@@ -153,7 +154,7 @@ def run_batch(
                 early.append(_refused(each, error))
                 continue
             name = each.relative.as_posix()
-            key = hashlib.sha256(f"{config_key} {name} ".encode() + hashlib.sha256(data).digest()).hexdigest()
+            key = hashlib.sha256(os.fsencode(f"{config_key} {name} ") + hashlib.sha256(data).digest()).hexdigest()
             if (known := _known(plan, each, key)) is not None:
                 early.append(known)
                 continue

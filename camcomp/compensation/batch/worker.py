@@ -93,10 +93,9 @@ def work(task: Task) -> Outcome:
 def _compensate(task: Task) -> Outcome:
     from camcomp.compensation.program.compensate import compensate
     from camcomp.compensation.report import tables
-    from camcomp.gcode.interpret import read_program
     from camcomp.gcode.stamp import is_stamped
     from camcomp.ground.errors import CheckFailed
-    from camcomp.model.control import setup_of
+    from camcomp.model.control import program_of
     from camcomp.model.from_program import job_of_program
 
     if is_stamped(task.data):
@@ -104,7 +103,7 @@ def _compensate(task: Task) -> Outcome:
             return Outcome(task.key, 0, program=task.data)
         raise CheckFailed("CC603", f"{task.name} was compensated before")
     config = task.config
-    program = read_program(task.data, name=task.name, setup=setup_of(config), dialect=config.control.dialect)
+    program = program_of(task.data, task.name, config)
     job = job_of_program(_job(task.config_key, _Once(config)), task.data, task.name, task.stock)
     result = compensate(program, job, method=task.method, tolerance_um=task.tolerance_um, version=__version__)
     failed = result.failed_checks(job, task.tolerance_um)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-import io
-
 import numpy as np
 
+from camcomp.diagnosis.recordings.mat_file import read_mat
 from camcomp.diagnosis.recordings.run_log import Actuators, Recording, Wishes, csv_of
+from camcomp.diagnosis.recordings.sampled import reading
 from camcomp.ground.errors import ConfigError, Location
 from camcomp.model.motion.log_columns import TIME, log_columns
+
+MOST = 1e12  # s or m, beyond every recording
 
 
 def read_axis(
@@ -18,20 +20,21 @@ def read_axis(
 
     Raises ConfigError CC423 where something is missing.
     """
-    from scipy.io import loadmat
-    from scipy.io.matlab import MatReadError
-
     at = Location(file, 1, 1)
     if wishes.columns:
         raise ConfigError("CC423", "variables of a MATLAB file cannot be named by --column", at=at)
-    try:
-        found = {key: np.ravel(value) for key, value in loadmat(io.BytesIO(data)).items() if not key.startswith("__")}
-    except (ValueError, TypeError, NotImplementedError, OSError, MatReadError) as error:
-        raise ConfigError("CC423", f"not a MATLAB file that can be read: {error}", at=at) from error
+    with reading(file, "a MATLAB file"):
+        found = read_mat(data)
     missing = [key for key in ("t", "qg", "qm") if key not in found]
     if missing:
         there = ", ".join(found) or "nothing"
         raise ConfigError("CC423", f"no variable {', '.join(missing)}; there is {there}", at=at)
+    if len({len(found[key]) for key in ("t", "qg", "qm", *(["vir"] if "vir" in found else []))}) > 1 or not len(
+        found["t"]
+    ):
+        raise ConfigError("CC423", "t, qg, qm and vir are not of one length", at=at)
+    if not all((np.abs(found[key]) < MOST).all() for key in ("t", "qg", "qm")):
+        raise ConfigError("CC423", "t, qg or qm holds what is no time or place", at=at)
     target = actuator or next(iter(actuators))
     if target not in actuators:
         raise ConfigError("CC423", f"the machine has no actuator '{target}'", at=at)
@@ -41,7 +44,7 @@ def read_axis(
         named.setpoint[0]: 1e3 * found["qg"],
         named.encoder[0]: 1e3 * found["qm"],
     }
-    if "vir" in found and "gtau" in found:
+    if "vir" in found and found.get("gtau", np.zeros(0)).size:
         values[named.drive[0]] = found["vir"] * float(found["gtau"][0])
     unused = sorted(set(found) - {"t", "qg", "qm", "vir", "gtau"})
     notes = [f"variables dropped: {', '.join(unused)}"] if unused else []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 from collections.abc import Mapping, Sequence
 from os.path import relpath
@@ -55,12 +56,15 @@ def experiment_yaml(
 def _from(folder: Path, file: str) -> str:
     """The path of a file from a folder; links are followed, for `..` of a link leads elsewhere."""
     try:
-        return Path(relpath(Path(file).resolve(), folder.resolve())).as_posix()
+        return Path(relpath(os.path.realpath(file), os.path.realpath(folder))).as_posix()
     except ValueError:  # on another drive
-        return str(Path(file).resolve())
+        return os.path.realpath(file)
 
 
 def _text(value: str) -> str:
-    """A YAML string, in quotes where it would be read as something else."""
+    """A YAML string, in quotes where it would be read as something else. Raises ConfigError CC424."""
+    if not value.isprintable():
+        hint = "rename the file, or the folder"
+        raise ConfigError("CC424", f"'{value}' is no name that an experiment file can hold", hint=hint)
     plain = _PLAIN.fullmatch(value) and value.lower() not in _WORDS
     return value if plain else json.dumps(value)

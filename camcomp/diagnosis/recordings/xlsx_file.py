@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import zipfile
 from collections.abc import Sequence
 from datetime import datetime
 from typing import Any
@@ -11,22 +12,28 @@ import numpy as np
 
 from camcomp.diagnosis.recordings.sampled import SampledColumns, library, reading, some
 from camcomp.ground.bounds import number_of
+from camcomp.ground.csv_table import MOST_TABLE_BYTES
 from camcomp.ground.datatypes import Floats
 from camcomp.ground.errors import ConfigError, Location
+
+MOST_CELLS = 20_000_000  # as many numbers as a log of five million rows and four columns
 
 
 def read_xlsx(data: bytes, name: str, names: Sequence[str] = ()) -> list[SampledColumns]:
     """A sheet; names: of its columns, where it has no header. Raises ConfigError CC216, CC421, CC422, CC452."""
     openpyxl = library("openpyxl", "openpyxl", "XLSX files")
     with reading(name, "an XLSX file"):
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            refuse_large(sum(each.file_size for each in archive.infolist()), MOST_TABLE_BYTES, "bytes", name)
         book = openpyxl.load_workbook(io.BytesIO(data), read_only=True, data_only=True)
-        sheets = {sheet.title: [list(row) for row in sheet.iter_rows(values_only=True)] for sheet in book.worksheets}
-    filled = {title: rows for title, rows in sheets.items() if sum(map(_is_filled, rows)) > 1}
+        sheets = {sheet.title: _filled_rows(sheet, name) for sheet in book.worksheets}
+    filled = {title: rows for title, rows in sheets.items() if len(rows) > 1}
     if not filled:
         raise ConfigError("CC452", "no sheet of the workbook holds a table", at=Location(name, 1, 1))
     title, others = next(iter(filled)), list(filled)[1:]
     rows = filled[title]
-    first = next(i for i, row in enumerate(rows) if _is_filled(row))
+    first, width = min(rows), max(map(len, rows.values()))
+    rows[first] += [None] * (width - len(rows[first]))
     words = [
         isinstance(cell, str) and number_of(cell.replace(",", ".")) is None for cell in rows[first] if cell is not None
     ]
@@ -37,7 +44,7 @@ def read_xlsx(data: bytes, name: str, names: Sequence[str] = ()) -> list[Sampled
     if len(header) != len(rows[first]):
         what = f"{len(names)} names for {len(rows[first])} columns"
         raise ConfigError("CC421", what, at=Location(name, first + 1, 1))
-    lines = [i for i in range(first + headed, len(rows)) if _is_filled(rows[i])]
+    lines = [i for i in rows if i >= first + headed]
     kept = [j for j, label in enumerate(header) if label not in ("", "-")]
 
     def at(row: int, k: int) -> Location:
@@ -55,8 +62,28 @@ def read_xlsx(data: bytes, name: str, names: Sequence[str] = ()) -> list[Sampled
     return [SampledColumns(name, labels, ("",) * len(labels), len(lines), None, read, at, tuple(notes), headed)]
 
 
-def _is_filled(row: Sequence[Any]) -> bool:
-    return any(cell is not None and str(cell).strip() for cell in row)
+def _filled_rows(sheet: Any, name: str) -> dict[int, list[Any]]:
+    """Rows by their number from 0, without empty ones and without empty cells at their ends."""
+    sheet.reset_dimensions()  # stated ones may be a million rows of thousands of cells, whatever there is
+    out: dict[int, list[Any]] = {}
+    cells = 0
+    for i, row in enumerate(sheet.iter_rows(values_only=True)):
+        width = max((k + 1 for k, cell in enumerate(row) if _is_filled(cell)), default=0)
+        cells += len(row)
+        refuse_large(cells, MOST_CELLS, "cells", name)
+        if width:
+            out[i] = list(row[:width])
+    return out
+
+
+def refuse_large(size: int, most: int, what: str, name: str) -> None:
+    """Raise ConfigError CC425 for more than any recording in a workbook has."""
+    if size > most:
+        raise ConfigError("CC425", f"the workbook has more than {most:.3g} {what}", at=Location(name, 1, 1))
+
+
+def _is_filled(cell: Any) -> bool:
+    return cell is not None and bool(str(cell).strip())
 
 
 def _number(cell: Any, label: str, at: Location) -> float:

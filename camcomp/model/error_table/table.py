@@ -15,10 +15,10 @@ from pathlib import Path
 
 import numpy as np
 
-from camcomp.ground.csv_table import CsvTable, TableRules, read_csv
+from camcomp.ground.csv_table import CsvTable, TableRules, like_a_table, read_csv
 from camcomp.ground.datatypes import Floats
 from camcomp.ground.errors import CamcompError, ConfigError, FileError, Location, raise_all
-from camcomp.ground.files import display_name
+from camcomp.ground.files import display_name, read_bytes
 
 UNITS = {"mm": 1.0, "um": 1e-3, "rad": 1.0, "mrad": 1e-3, "urad": 1e-6}
 LENGTHS = ("mm", "um")
@@ -70,7 +70,7 @@ def read_table(name: str, comp_type: int | None) -> ErrorTable:
 
 @lru_cache(maxsize=64)
 def _cached(name: str, comp_type: int | None, _time: int, _size: int) -> ErrorTable:
-    text = Path(name).read_text(encoding="utf-8")
+    text = read_bytes(name).decode("utf-8", errors="replace")
     return (
         parse_table(text, display_name(name)) if comp_type is None else parse_comp(text, display_name(name), comp_type)
     )
@@ -115,9 +115,10 @@ def parse_comp(text: str, name: str, comp_type: int) -> ErrorTable:
 
     LinuxCNC itself stops without a word at the first line that is no triplet; here only blank lines may stand behind.
     """
+    readable = like_a_table(["", *text.splitlines()])
     rows: list[list[float]] = []
     for number, line in enumerate(text.rstrip().splitlines(), 1):
-        at = Location(name, number, 1, line)
+        at = Location(name, number, 1, line if readable else "")
         try:
             values = [float(cell) for cell in line.split()]
         except ValueError:

@@ -10,11 +10,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from scipy.optimize import isotonic_regression
 
 from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import ARC, Floats, Ints, Path
+from camcomp.ground.machine_code import kept
 
 _CHORD_RAD = 0.05  # of an arc
 _LINE_MM2 = 0.01  # squared distance that a wrong line number weighs as much as, and by how many times it adds to it
@@ -92,7 +92,7 @@ def _chords(path: Path) -> tuple[Ints, Floats, Floats]:
     return motion, within / of, (within + 1) / of
 
 
-@njit(cache=True)
+@kept
 def _put(place, weight, found, at, weighs):  # type: ignore[no-untyped-def]  # pragma: no cover
     """One more place, in the stead of the worst one when there are too many; their number."""
     k = found
@@ -104,7 +104,7 @@ def _put(place, weight, found, at, weighs):  # type: ignore[no-untyped-def]  # p
     return min(found + 1, _PLACES)
 
 
-@njit(cache=True)
+@kept
 def _places(begin, way, length, at, line, low, high, tip, hint, lost):  # type: ignore[no-untyped-def]  # pragma: no cover
     """Where along the path it comes nearest to a tip (3,) and leaves again, mm, and what these places weigh."""
     place, weight = np.empty(_PLACES), np.empty(_PLACES)
@@ -140,7 +140,7 @@ def _places(begin, way, length, at, line, low, high, tip, hint, lost):  # type: 
     return place[:found], weight[:found]
 
 
-@njit(cache=True)
+@kept
 def _follow(begin, way, length, at, line, low, high, tip, hint, lost):  # type: ignore[no-untyped-def]  # pragma: no cover
     """Way along the path (n,) mm: of all sequences of places near the rows the one that fits best and leads from row to row.
 

@@ -10,12 +10,10 @@ import gc
 from collections.abc import Callable
 from typing import Any
 
-import numba
-from numba.core.types import unliteral
+from camcomp.ground.compiler import numba
 
 # Nothing is allocated, raised or handed to Python inside: what numba would build for that costs time to compile.
 _OPTIONS = {"nogil": True, "error_model": "numpy", "_nrt": False, "no_cfunc_wrapper": True}
-_numba: Any = numba  # its annotations leave out what it has
 
 
 def inner(function: Callable[..., Any], *, fastmath: bool = False) -> Any:
@@ -26,16 +24,16 @@ def inner(function: Callable[..., Any], *, fastmath: bool = False) -> Any:
     Constants among its arguments count as plain numbers: numba would compile the function anew for every one of them,
     which takes half as long again.
     """
-    if _numba.config.DISABLE_JIT:  # for the debugger
+    if numba.config.DISABLE_JIT:  # for the debugger
         return function
     from camcomp.ground.linked_code import Inner
 
-    dispatcher = _numba.njit(no_cpython_wrapper=True, fastmath=fastmath, pipeline_class=Inner, **_OPTIONS)(function)
+    dispatcher = numba.njit(no_cpython_wrapper=True, fastmath=fastmath, pipeline_class=Inner, **_OPTIONS)(function)
     template = getattr(dispatcher, "get_call_template", None)
     if template is not None:  # a numba without it compiles more
 
         def plain(args: Any, kws: Any) -> Any:
-            return template(tuple(unliteral(a) for a in args), kws)
+            return template(tuple(numba.core.types.unliteral(a) for a in args), kws)
 
         dispatcher.get_call_template = plain
     return dispatcher
@@ -47,7 +45,7 @@ def entry(function: Callable[..., Any]) -> Callable[..., Any]:
     Where nothing can be cached it is compiled anew in every process. While compiling, the search for
     unreachable objects rests: it takes a sixth of the time and finds nothing.
     """
-    if _numba.config.DISABLE_JIT:
+    if numba.config.DISABLE_JIT:
         return function
     from camcomp.ground.machine_code import kept  # only those who compile need it
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from functools import partial
 from typing import TYPE_CHECKING, Literal
 
@@ -89,4 +88,4 @@ def _tell(status: Status, number: int, total: int) -> None:
     if status.figures:
         before, after = (status.figures[each]["max_um"] for each in ("before", "after"))
         text += f": largest error {before:.1f} um, now {after:.2f} um"
-    print("\n".join([text, *("  " + each["text"].replace("\n", "\n  ") for each in status.messages)]), file=sys.stderr)
+    say(text, *("  " + each["text"].replace("\n", "\n  ") for each in status.messages))

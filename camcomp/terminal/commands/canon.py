@@ -2,8 +2,10 @@
 
 import click
 
+from camcomp.ground.errors import shown
 from camcomp.ground.files import display_name
 from camcomp.terminal.commands._options import dialect_option
+from camcomp.terminal.progress import say
 
 
 @click.command()
@@ -20,7 +22,7 @@ def command(program: str, configs: tuple[str, ...]) -> None:
 
     read = read_program(program, load_machine(*configs) if configs else None)
     for warning in read.warnings:
-        click.echo(f"{display_name(program)}: warning: {warning}", err=True)
+        say(f"{display_name(program)}: warning: {warning}")
     click.echo(f"; {read.dialect}, {len(read.path)} motions")
     for line in canonical_lines(read):
-        click.echo(line)
+        click.echo(shown(line))

@@ -2,6 +2,7 @@
 
 import click
 
+from camcomp.ground.errors import shown
 from camcomp.ground.files import write_all
 from camcomp.ground.places import STANDARD
 from camcomp.terminal.commands._options import OUTPUT, config_option
@@ -20,7 +21,7 @@ def show(configs: tuple[str, ...], origin: bool) -> None:
     from camcomp.api.settings import values
 
     for name, value, place in values(configs):
-        click.echo(f"{name} = {value}" + (f"  # {place}" if origin else ""))
+        click.echo(shown(f"{name} = {value}" + (f"  # {place}" if origin else "")))
 
 
 @command.command("screw-file")

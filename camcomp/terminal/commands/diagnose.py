@@ -66,7 +66,7 @@ def command(
     with working(f"diagnosing {experiment}", quiet=quiet):
         done = diagnose(experiment, without, library)
     for each in done.notes:
-        click.echo(f"note: {each}", err=True)
+        say(f"note: {each}")
     outputs: dict[str, bytes] = {}
     if json_file or not (sys.stdout.isatty() or report or config_file or next_program or residuals):
         outputs[json_file or STANDARD] = done.result.to_json()
@@ -74,7 +74,7 @@ def command(
         with working("drawing the report", quiet=quiet):
             outputs[report] = done.report()
     if config_file:
-        outputs[config_file] = done.machine_with_causes(config_file).encode()
+        outputs[config_file] = done.machine_with_causes(config_file).encode("utf-8", "backslashreplace")
     if residuals:
         outputs[residuals] = done.residuals.to_file(residuals)
     failure: CheckFailed | None = None
@@ -82,7 +82,7 @@ def command(
         try:
             outputs[next_program] = done.next_program(next_program).encode()
             if done.next_program_cuts:
-                click.echo("warning: the proposed program cuts; look through it before it runs", err=True)
+                say("warning: the proposed program cuts; look through it before it runs")
         except CheckFailed as error:
             failure = error
     write_all(outputs, inputs=(experiment, *(done.configs if config_file else ())))

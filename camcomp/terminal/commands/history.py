@@ -6,9 +6,11 @@ from typing import TYPE_CHECKING
 
 import click
 
+from camcomp.ground.errors import shown
 from camcomp.ground.files import write_all
 from camcomp.ground.places import STANDARD
 from camcomp.terminal.commands._options import OUTPUT
+from camcomp.terminal.progress import say
 
 if TYPE_CHECKING:
     from camcomp.api.history import Chronicle, ParameterCourse
@@ -44,12 +46,12 @@ def command(
 
     when = day.date() if day else date.today()
     for each in added:
-        click.echo(f"kept: {keep_diagnosis(folder, each, when)}", err=True)
+        say(f"kept: {keep_diagnosis(folder, each, when)}")
     found = history(folder, tolerance_um)
     if json_file:
         write_all({json_file: found.to_json()})
     if json_file != STANDARD:
-        click.echo("\n".join(_text(found)))
+        click.echo(shown("\n".join(_text(found))))
 
 
 def _text(found: "Chronicle") -> list[str]:

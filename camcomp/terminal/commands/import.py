@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 
 from camcomp.terminal.commands._options import config_option
-from camcomp.terminal.progress import working
+from camcomp.terminal.progress import say, working
 
 
 @click.command()
@@ -67,5 +67,5 @@ def command(
         )  # fmt: skip
     for each, file in zip(runs, files, strict=True):
         renamed = "" if each.name == Path(file.split("+")[0]).stem or file == "-" else f" ({file})"
-        click.echo(f"{each.name}{renamed}: {each.rows} rows; {'; '.join(each.notes) or 'complete'}", err=True)
-    click.echo(f"next: camcomp diagnose {experiment}", err=True)
+        say(f"{each.name}{renamed}: {each.rows} rows; {'; '.join(each.notes) or 'complete'}")
+    say(f"next: camcomp diagnose {experiment}")

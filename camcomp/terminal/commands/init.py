@@ -4,6 +4,8 @@ from pathlib import Path
 
 import click
 
+from camcomp.terminal.progress import say
+
 FOLDER = click.Path(file_okay=False, path_type=Path)
 
 
@@ -37,7 +39,7 @@ def command(
         raise click.UsageError("--machine and --from-urdf are two machines; ask for one")
     written, notes = start_project(directory, machine=machine, urdf=urdf, tip=tip, base=base)
     for note in notes:
-        click.echo(note, err=True)
+        say(note)
     for path in written:
-        click.echo(f"wrote {path}", err=True)
-    click.echo(f"next: camcomp compensate {directory / 'groove.nc'} --config {directory / 'machine.yaml'}", err=True)
+        say(f"wrote {path}")
+    say(f"next: camcomp compensate {directory / 'groove.nc'} --config {directory / 'machine.yaml'}")

@@ -5,6 +5,7 @@ from pathlib import Path
 import click
 
 from camcomp.terminal.commands.init import FOLDER
+from camcomp.terminal.progress import say
 
 
 @click.command()
@@ -17,5 +18,5 @@ def command(directory: Path) -> None:
     from camcomp.api.project import write_tutorial
 
     written = write_tutorial(directory)
-    click.echo(f"wrote {len(written)} files", err=True)
-    click.echo(f"next: cd {directory}, and read {Path('samples', 'tutorial.md')}", err=True)
+    say(f"wrote {len(written)} files")
+    say(f"next: cd {directory}, and read {Path('samples', 'tutorial.md')}")

@@ -4,12 +4,13 @@ from typing import TYPE_CHECKING
 
 import click
 
-from camcomp.ground.errors import CamcompError, raise_all
+from camcomp.ground.errors import CamcompError, raise_all, shown
 from camcomp.ground.files import display_name, write_all
 from camcomp.ground.places import STANDARD
 from camcomp.report.findings import WARNING, Case, Finding, findings_of
 from camcomp.report.outputs import findings_files
 from camcomp.terminal.commands._options import dialect_option, findings_options, quiet_option
+from camcomp.terminal.progress import say
 
 if TYPE_CHECKING:
     from camcomp.api.validation import Doubt
@@ -46,12 +47,12 @@ def command(
         try:
             kind, warnings = check_file(file, configs)
             if not silent:
-                click.echo(f"{name}: ok ({kind})")
+                click.echo(shown(f"{name}: ok ({kind})"))
         except CamcompError as error:
             found.append(error)
         if not quiet:
             for each in warnings:
-                click.echo(f"{_place(each, name)}: warning: {each.text}", err=True)
+                say(f"{_place(each, name)}: warning: {each.text}")
         notes = [_note(each, name) for each in warnings]
         cases.append(Case(name, [*(f for each in found for f in findings_of(each, name)), *notes], kind))
         errors += found

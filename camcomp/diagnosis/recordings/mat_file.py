@@ -1,0 +1,89 @@
+"""Numeric variables of a MATLAB file of level 5 (MATLAB 5 to 7), read without trust in what its bytes say.
+
+Source: The MathWorks, "MAT-File Format", R2023b, chapter "Level 5 MAT-File Format".
+"""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from camcomp.ground.csv_table import MOST_TABLE_BYTES
+from camcomp.ground.datatypes import Floats
+
+_HEADER, _MATRIX, _COMPRESSED = 128, 14, 15  # bytes; types of data elements
+_NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
+_NUMERIC_CLASSES = range(6, 16)  # mxDOUBLE_CLASS to mxUINT64_CLASS
+_HDF5 = b"MATLAB 7.3"
+
+
+@dataclass(frozen=True)
+class _Element:
+    """A data element: its type, and its bytes."""
+
+    kind: int
+    data: memoryview
+
+
+def read_mat(data: bytes) -> dict[str, Floats]:
+    """Numeric arrays by name, each flattened column by column. Raises ValueError for what is no such file."""
+    if data.startswith(_HDF5):
+        raise ValueError("it is an HDF5 file; save it with -v7")
+    order = {b"IM": "<", b"MI": ">"}.get(data[126:128])
+    if order is None:
+        raise ValueError("it has no header of level 5")
+    found: dict[str, Floats] = {}
+    for each in _elements(memoryview(data)[_HEADER:], order):
+        inside = [each]
+        if each.kind == _COMPRESSED:
+            unpacker = zlib.decompressobj()
+            try:
+                unpacked = unpacker.decompress(each.data, MOST_TABLE_BYTES)
+            except zlib.error as error:
+                raise ValueError("a compressed variable is damaged") from error
+            if unpacker.unconsumed_tail:
+                raise ValueError("a variable is too large")
+            inside = list(_elements(memoryview(unpacked), order))
+        for one in inside:
+            if one.kind == _MATRIX and (named := _array(one.data, order)) is not None:
+                found[named[0]] = named[1]
+    return found
+
+
+def _elements(data: memoryview, order: str) -> Iterator[_Element]:
+    """Data elements one after the other. Raises ValueError where one ends behind the file."""
+    at = 0
+    while at + 8 <= len(data):
+        kind, size = struct.unpack_from(f"{order}II", data, at)
+        if kind >> 16:  # small format: type, size and up to four bytes in one
+            kind, size = kind & 0xFFFF, kind >> 16
+            start, after = at + 4, at + 8
+        else:
+            start = at + 8
+            after = start + size + (-size % 8 if kind != _COMPRESSED else 0)
+        if start + size > len(data) or (start == at + 4 and size > 4):
+            raise ValueError("a variable ends behind the file")
+        yield _Element(kind, data[start : start + size])
+        at = after
+
+
+def _array(data: memoryview, order: str) -> tuple[str, Floats] | None:
+    """Name and numbers of a matrix; None for text, cells, structures and sparse ones. Raises ValueError."""
+    inside = list(_elements(data, order))
+    if len(inside) < 3 or len(inside[0].data) < 4:
+        raise ValueError("a variable is damaged")
+    flags, shape, name, *parts = inside
+    if struct.unpack_from(f"{order}I", flags.data)[0] & 0xFF not in _NUMERIC_CLASSES or not parts:
+        return None
+    lengths = np.frombuffer(shape.data[: len(shape.data) // 4 * 4], f"{order}i4")
+    size = np.dtype(_NUMBERS.get(parts[0].kind, "f8")).itemsize
+    if parts[0].kind not in _NUMBERS or len(parts[0].data) % size:
+        raise ValueError("a variable is damaged")
+    values = np.frombuffer(parts[0].data, f"{order}{_NUMBERS[parts[0].kind]}").astype(float)
+    if len(values) != int(np.prod(lengths.astype(float))):
+        raise ValueError("a variable has other dimensions than numbers")
+    return bytes(name.data).decode("latin-1"), values
