@@ -110,5 +110,4 @@ class _Line:
 def say(*lines: str, quiet: bool = False) -> None:
     """Write lines to standard error, unless quiet."""
     if lines and not quiet:
-        print(shown("
-".join(lines)), file=sys.stderr)
+        print(shown("\n".join(lines)), file=sys.stderr)
