@@ -11,7 +11,9 @@ from __future__ import annotations
 import functools
 from typing import Any
 
-from camcomp.ground.compiler import numba
+import numba as _imported
+
+numba: Any = _imported  # its annotations leave out what it has
 
 _compiler: Any = numba.core.compiler
 

@@ -20,7 +20,7 @@ from typing import Any
 import click
 
 from camcomp import __version__
-from camcomp.ground.errors import CamcompError, FileError, PluginWarning, Terminated, format_error, shown
+from camcomp.ground.errors import CamcompError, ConfigError, FileError, PluginWarning, Terminated, format_error, shown
 from camcomp.ground.files import remembering_inputs
 from camcomp.ground.garbage import collect_seldom
 from camcomp.terminal.standard_streams import stand_in_for_closed
@@ -175,7 +175,25 @@ def run(args: list[str]) -> int:
             return _bug(error)
         return _report(FileError("CC503", f"a library cannot be loaded: {error}"))
     except Exception as error:  # noqa: BLE001 - whatever else comes is a bug, and is called one
-        return _report(FileError("CC503", SHORT_OF_MEMORY)) if _short_of_memory() else _bug(error)
+        if _short_of_memory():
+            return _report(FileError("CC503", SHORT_OF_MEMORY))
+        return _report(_settings_of_numba(error)) if _is_from_import_of_numba(error) else _bug(error)
+
+
+def _is_from_import_of_numba(error: Exception) -> bool:
+    """Whether numba did not start: it reads settings then, and raises what it likes over them."""
+    place = error.__traceback__
+    while place is not None:
+        if place.tb_frame.f_globals.get("__name__") == "numba":
+            return place.tb_frame.f_code.co_name == "<module>"
+        place = place.tb_next
+    return False
+
+
+def _settings_of_numba(error: Exception) -> ConfigError:
+    reason = (str(error) or type(error).__name__).splitlines()[0]
+    hint = "look at the environment variables NUMBA_* and at .numba_config.yaml in the current folder"
+    return ConfigError("CC205", f"numba does not start: {reason}", hint=hint)
 
 
 def _short_of_memory() -> bool:
