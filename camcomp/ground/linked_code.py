@@ -11,9 +11,9 @@ from __future__ import annotations
 import functools
 from typing import Any
 
-import numba as _imported
+import numba as _numba
 
-numba: Any = _imported  # its annotations leave out what it has
+numba: Any = _numba  # its annotations leave out what it has
 
 _compiler: Any = numba.core.compiler
 

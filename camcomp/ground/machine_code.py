@@ -19,14 +19,14 @@ from pathlib import Path
 from typing import Any
 
 import llvmlite
-import numba as _imported
+import numba as _numba
 
 from camcomp.ground import headway
 from camcomp.ground.notes import note
 from camcomp.ground.replacement import Replacement
 from camcomp.ground.trust import why_file_is_not_ours, why_folder_is_not_ours
 
-numba: Any = _imported  # its annotations leave out what it has
+numba: Any = _numba  # its annotations leave out what it has
 
 _SUM = hashlib.sha256().digest_size
 _ANEW = "it is compiled anew, which takes half a minute"

@@ -10,9 +10,9 @@ import gc
 from collections.abc import Callable
 from typing import Any
 
-import numba as _imported
+import numba as _numba
 
-numba: Any = _imported  # its annotations leave out what it has
+numba: Any = _numba  # its annotations leave out what it has
 
 # Nothing is allocated, raised or handed to Python inside: what numba would build for that costs time to compile.
 _OPTIONS = {"nogil": True, "error_model": "numpy", "_nrt": False, "no_cfunc_wrapper": True}
