@@ -127,7 +127,7 @@ def test_what_the_library_lacks_is_unknown_and_named_by_what_it_depends_on(robot
     assert result.verdict == "unknown"
     assert FAULTS <= known(result)
     assert result.where.drivers[0].covariate == "force:shoulder_lift"
-    assert result.causes[-1].probability > 0.99
+    assert result.causes[-1].probability > 0.9  # the calibration map states no more
 
 
 def test_a_disturbance_for_a_while_is_located_in_time(robot, faulty):
