@@ -6,6 +6,7 @@ from camcomp.model.effect import Load, Motion, Parameter
 
 STAGE = "process"
 TARGET = "machine"
+MODELLED_FORCE = True
 PLAIN = "a cutting force other than modelled"
 REMEDY = (
     "cut two slots of different depth and let diagnose fit the force, and check material, tool and engagement "

@@ -6,6 +6,7 @@ from camcomp.model.effect import Load, Motion, Parameter
 
 STAGE = "process"
 TARGET = "machine"
+MODELLED_FORCE = True
 PLAIN = "a tool that wears"
 REMEDY = "change the tool earlier, or halve its time in the cut; the force grows while it cuts"
 SOURCE = "linear middle part of the wear curve (ISO 8688-2)"

@@ -50,10 +50,14 @@ class Frame:
 
 @dataclass(frozen=True, eq=False)
 class Job:
-    """What the stories need from a Config. taken: what the config has from the program instead of the machine file."""
+    """What the stories need from a Config. taken: what the config has from the program instead of the machine file.
+
+    measured_force: the cutting forces come from a measurement, not from the force model.
+    """
 
     config: Config
     taken: TakenFromProgram = field(default=TakenFromProgram(), kw_only=True)
+    measured_force: bool = field(default=False, kw_only=True)
 
     @cached_property
     def fingerprint(self) -> str:
@@ -88,8 +92,8 @@ class Job:
 
     @cached_property
     def causes(self) -> tuple[Cause, ...]:
-        """The effects of the config, in its order."""
-        return tuple(
+        """The effects of the config, in its order; without those on the modelled force where the force is measured."""
+        causes = tuple(
             Cause(
                 each.effect,
                 shelf.load("effects", each.effect),
@@ -99,6 +103,8 @@ class Job:
             )
             for i, each in enumerate(self.config.effects)
         )
+        measured = self.measured_force or self.config.process.force.model == "table"
+        return signal_path.under_measured_force(causes) if measured else causes
 
     @cached_property
     def real_machine(self) -> Machine:

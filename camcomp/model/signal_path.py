@@ -48,6 +48,11 @@ def acting(causes: Sequence[Cause], stage: str) -> list[Cause]:
     return [cause for cause in causes if any(hasattr(cause.effect, hook) for hook in _AT[stage])]
 
 
+def under_measured_force(causes: Sequence[Cause]) -> tuple[Cause, ...]:
+    """The causes that act where the cutting force is measured: those that say how the force model errs do not."""
+    return tuple(cause for cause in causes if not getattr(cause.effect, "MODELLED_FORCE", False))
+
+
 def momentary(causes: Sequence[Cause]) -> bool:
     """Whether drives have no memory: what they do at an instant depends on that instant alone."""
     return all(getattr(cause.effect, "MOMENTARY", False) for cause in acting(causes, "drive"))

@@ -47,7 +47,7 @@ class EffectPlugin(Protocol):
     (their values -> those of PARAMETERS), `applies` (robot, target -> whether a diagnosis may take it for a cause there; default: always), `first_guess` (list of time (n,) s, set-points (n,),
     encoders (n,) of an actuator -> value of its one shape to begin with), TARGETS (tuple of names, where TARGET is "named"), ROTARY (those that a hinge
     has), ARM_ONLY (for serial arms), SLIDES_ONLY (for slides), MOMENTARY (True: on_drive and on_drive_force answer for every
-    instant alone, whatever came before), WARMS (compensate asks for the temperature), UNCORRECTABLE (True: compensate
+    instant alone, whatever came before), WARMS (compensate asks for the temperature), MODELLED_FORCE (True: says how the force model errs; measured forces are taken as they are), UNCORRECTABLE (True: compensate
     leaves its error), Params (Spec:
     keys in YAML beside PARAMETERS, never fitted); where TARGET is "named", OF_TARGET (target -> those of its keys that make
     sense there) and SOUGHT (target -> the parameters that a diagnosis fits there).

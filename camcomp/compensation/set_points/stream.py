@@ -37,11 +37,14 @@ class Stream:
     """A machine that answers set-points. Not to be shared between threads.
 
     Effects of the config that live in the structure, the load, the tool or the drives are part of it; where one depends
-    on the direction of travel, that is the way from the set-point before.
+    on the direction of travel, that is the way from the set-point before. Forces count as measured: `cutting_force` and
+    `tool_wear` leave them as they are.
     """
 
     def __init__(self, job: Job) -> None:
         """Builds the machine and solves one point, so that the first set-point does not wait for compilation."""
+        if signal_path.under_measured_force(job.causes) != job.causes:
+            job = replace(job, measured_force=True)
         self._job, self._machine = job, job.real_machine
         self._origin, self._rotation = job.frame.origin.tolist(), job.frame.rotation.tolist()
         self._names = self._machine.actuators
