@@ -72,6 +72,8 @@ _EXAMPLES = {
     "clock": "tracker",
     "tip_mm": "0.003",
     "encoder_mm": "0.0005",
+    "encoder_rad": "0.00001",
+    "force_Nmm": "500",
     "force_N": "2",
     "side_mm": "15",
     "outer_diameter_mm": "16",
