@@ -13,6 +13,7 @@ from camcomp.compensation.program.cut_surface import cut_surface
 from camcomp.model.from_program import StockChoice, job_of_program
 from camcomp.model.motion import simulate as story
 from camcomp.model.motion.simulate import Simulated
+from camcomp.model.oriented import refuse_orientation
 from camcomp.model.stock.surface import Surface
 from camcomp.report.inputs import Input
 
@@ -49,6 +50,7 @@ def simulate(
     cannot be.
     """
     source = program_in(program, machine)
+    refuse_orientation(source, "the simulation")
     machine = job_of_program(machine, source.data, source.name, stock)
     engaged = machine.engaged(source) if cutting else None
     return SimulatedLog(
@@ -59,6 +61,7 @@ def simulate(
 def simulate_cut(program: Program | str | Path | bytes, machine: Job, *, stock: StockChoice | None = None) -> Surface:
     """What the loaded machine leaves of the stock of its machine file. Raises as `simulate`, ConfigError CC298."""
     source = program_in(program, machine)
+    refuse_orientation(source, "the simulation")
     return cut_surface(job_of_program(machine, source.data, source.name, stock), source)
 
 
@@ -76,5 +79,6 @@ def walls_report(
     from camcomp.compensation.report.wall_page import walls_html
 
     source = program_in(program, machine)
+    refuse_orientation(source, "the simulation")
     machine = job_of_program(machine, source.data, source.name, stock)
     return walls_html(machine, source, [Input("program", source.name, source.data), *inputs])

@@ -6,6 +6,7 @@ import numpy as np
 
 from camcomp.gcode.numbers import plain
 from camcomp.ground.datatypes import ARC, LINE, RAPID, Path
+from camcomp.ground.orientation import LETTERS
 
 _KINDS = {RAPID: "rapid", LINE: "line", ARC: "arc"}
 
@@ -22,6 +23,10 @@ def canonical(path: Path, digits: int = 4) -> Iterator[str]:
             axis = "XYZ"[int(np.argmax(path.axis[k]))]
             angle = plain(float(np.degrees(path.angle[k])), digits, point=False)
             words += ["centre", _point("XYZ", path.centre[k], digits), f"about {axis} by {angle} deg"]
+        if path.orientation is not None:
+            turn = path.orientation
+            signs = [letter + "=" * (len(letter) > 1) for letter in LETTERS[turn.form]]
+            words += [s + plain(float(each), digits + 2) for s, each in zip(signs, turn.end[k], strict=True)]
         if kind != RAPID:
             words += [f"F{plain(float(path.feed[k]), digits, point=False)}"]
         words += [f"S{plain(float(path.speed[k]), digits, point=False)}", f"T{path.tool[k]}"]

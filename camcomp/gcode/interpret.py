@@ -91,7 +91,10 @@ class Interpreter(Settings, Cycles):
         m_codes = [code for code, _ in block.m]
         self.state.waits |= self._waits(block, m_codes) or self.state.active != active
         self._alone(block)
-        self._spare_axes(block)
+        if "TRAORI" in block.words:
+            self.state.transformed = block.number("TRAORI") == 1.0
+        if block.words.keys() & {"A", "B", "C", "U", "V", "W", "A3", "B3", "C3"}:
+            self._spare_axes(block, motion, zero_code)
         if motion is not None:
             self.record.stops = any(code in STOPS for code in m_codes)
             if motion in CYCLES:
@@ -130,7 +133,7 @@ class Interpreter(Settings, Cycles):
                 first = code_name(431 if dynamic else zero_code or 0)
                 self.refuse("CC108", f"{first} and {code_name(explicit or 0)} both want the axis words")
             return None
-        wants = bool(block.axes)
+        wants = bool(block.axes or self.orientation_words(block))
         if state.motion in (20, 30):
             wants = wants or any(letter in words for letter in "IJK") or (explicit is not None and "R" in words)
         elif explicit in CYCLES:
@@ -157,12 +160,22 @@ class Interpreter(Settings, Cycles):
             if (code in self.dialect.passed or code == 500) and block.axes:
                 self.refuse("CC108", f"axis words with {code_name(code)}", word)
 
-    def _spare_axes(self, block: Block) -> None:
-        """Words for axes that camcomp does not follow: they may stay where they are, and tables may turn alone."""
+    def _spare_axes(self, block: Block, motion: int | None, zero_code: int | None) -> None:
+        """Words for axes that camcomp does not follow: they may stay where they are, and tables may turn alone.
+
+        The orientation of a tool turns with G0 to G3 in the workpiece's coordinates.
+        """
         table, offset = self.state.table, block.code(0) in (100, 520, 920)
+        free = motion in (0, 10, 20, 30) and zero_code not in MACHINE_MOVES
+        turning = self.orientation_words(block) if free else []
+        for letter in ("A3", "B3", "C3"):
+            if letter in block.words and letter not in turning:
+                self.refuse(
+                    "CC115", f"{letter}= turns the tool, which this machine or block does not", block.words[letter]
+                )
         for letter in "ABCUVW":
             word = block.words.get(letter)
-            if word is None or letter in block.used:
+            if word is None or letter in block.used or letter in turning:
                 continue
             place = word.value
             if letter in table and self.state.relative:

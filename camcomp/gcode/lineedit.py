@@ -7,11 +7,14 @@ from camcomp.gcode.arcs import PLANES, sweep
 from camcomp.gcode.edits import Edits
 from camcomp.gcode.numbers import plain, significant
 from camcomp.gcode.output import FEED_SLACK
-from camcomp.gcode.program import F, G, P, Program, R
+from camcomp.gcode.program import A, B, C, F, G, P, Program, R
+from camcomp.ground import orientation
 from camcomp.ground.datatypes import ARC, RAPID
 
-SHAPE_WORDS = (0, 1, 2, 3, 4, 5, R, P)  # words that say where a motion goes
+TURNS = (A, B, C)
+SHAPE_WORDS = (0, 1, 2, 3, 4, 5, R, P, *TURNS)  # words that say where a motion goes
 BLANKS = " \t"
+TURN_DIGITS = {orientation.RPY: 6, orientation.VECTOR: 9}  # 0.02 urad and less
 
 
 class LineEditor:
@@ -23,6 +26,8 @@ class LineEditor:
         self.edits = Edits()
         self.resolution = resolution_mm
         self.position: Point = self.path.start[0].tolist()
+        self.form = self.path.orientation.form if self.path.orientation is not None else orientation.RPY
+        self.turned = list(orientation.UPRIGHT[self.form])  # words of the orientation in force in the output
         self.code: int | None = None  # motion code in force in the output
         self.feed: tuple[int, float] | None = None  # feed mode and value in force in the output
 
@@ -130,6 +135,47 @@ class LineEditor:
 
     def _number(self, value: float) -> str:
         return plain(value, self.digits)
+
+    def _turn_words(self, wanted: list[float], in_place: bool) -> list[str]:
+        """Words that lead the orientation on to `wanted` (3), rounded; those of the line are replaced."""
+        relative = self.relative and self.form == orientation.RPY
+        ends = (
+            [float(each) for each in self.path.orientation.end[self.k]]
+            if self.path.orientation is not None
+            else self.turned
+        )
+        starts = (
+            [float(each) for each in self.path.orientation.start[self.k]]
+            if self.path.orientation is not None
+            else self.turned
+        )
+        digits, words = self.turn_digits, []
+        half = 0.5 * 10.0**-digits * (1.0 + 1e-9)
+        goes = list(self.turned)
+        for axis in range(3):
+            if in_place and self.begin[TURNS[axis]] >= 0:
+                goes[axis] = self.turned[axis] + ends[axis] - starts[axis] if relative else ends[axis]
+        fresh = [abs(now - then) > half for now, then in zip(goes, wanted, strict=True)]
+        if self.form == orientation.VECTOR and any(fresh):
+            fresh = [True] * 3  # a direction is one value
+        for axis, letter in enumerate(orientation.LETTERS[self.form]):
+            if not fresh[axis]:
+                continue
+            base = self.turned[axis] if relative else 0.0
+            value = round(wanted[axis] - base, digits)
+            goes[axis] = base + value
+            text = f"{letter}={plain(value, digits)}" if len(letter) > 1 else letter + plain(value, digits)
+            if in_place and self.begin[TURNS[axis]] >= 0:
+                self.edits.replace(self.begin[TURNS[axis]], self.finish[TURNS[axis]], self._cased(text))
+            else:
+                words.append(text)
+        self.turned = goes
+        return words
+
+    @property
+    def turn_digits(self) -> int:
+        """Digits behind the point of an angle in degrees, or of a part of a direction."""
+        return min(TURN_DIGITS[self.form], self.program.language.decimals_max)
 
     def _cased(self, word: str) -> str:
         lower = any(self.begin[each] >= 0 and self.text.string[self.begin[each]].islower() for each in SHAPE_WORDS)

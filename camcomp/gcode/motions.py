@@ -4,6 +4,7 @@ import math
 
 from camcomp.gcode import arcs
 from camcomp.gcode.block import Block, BlockReader
+from camcomp.ground.orientation import LETTERS, NEAR_POLE_DEG, RPY, VECTOR
 
 LARGEST_MM = 1.0e7  # mm; a machine of ten kilometres is a typing mistake
 _MOST_TURNS = 1000
@@ -13,8 +14,8 @@ _NOTHING = 1.0e-9  # mm; arithmetic leaves that much between equal points
 class Motions(BlockReader):
     """Executes the motion of a block."""
 
-    def target(self, block: Block, machine: bool = False) -> list[float]:
-        """End point in the program frame of the block's axis words; they thereby count as commanded."""
+    def target(self, block: Block, machine: bool = False, turns: bool = True) -> list[float]:
+        """End point in the program frame of the block's axis words; they thereby count as commanded. turns: so do A, B, C."""
         state = self.state
         end = list(state.position)
         given: dict[int, float] = {}
@@ -33,7 +34,47 @@ class Motions(BlockReader):
             else:
                 end[axis] = value + state.offset[axis]
             state.commanded[axis] = True
+        if turns:
+            self._turn(block)
         return state.at_machine(given) if machine else end
+
+    def orientation_words(self, block: Block) -> list[str]:
+        """Letters of the block's words that lead the orientation of the tool."""
+        state = self.state
+        if not state.setup.orients:
+            return []
+        return [each for each in LETTERS[state.orientation_form] if each in block.words and each not in state.table]
+
+    def _turn(self, block: Block) -> None:
+        """Where the words of the block turn the tool."""
+        state, letters = self.state, self.orientation_words(block)
+        if not letters:
+            return
+        form = state.orientation_form
+        if form == VECTOR:
+            self._check_vector(block, letters)
+        words = list(state.turned)
+        for k, letter in enumerate(LETTERS[form]):
+            value = block.number(letter)
+            if value is not None:
+                words[k] = words[k] + value if state.relative and form == RPY else value
+        size = math.hypot(*words)
+        if form == VECTOR:
+            words = [each / size for each in words]
+        elif abs(words[1]) > NEAR_POLE_DEG:
+            self.refuse(
+                "CC115", f"B{words[1]:g} is near the pole, where A and C turn about one axis", block.words.get("B")
+            )
+        state.turns_to = words
+        if self.record.oriented is None:
+            self.record.oriented = form
+
+    def _check_vector(self, block: Block, letters: list[str]) -> None:
+        word = block.words[letters[0]]
+        if not self.state.transformed:
+            self.refuse("CC115", f"{letters[0]}= without TRAORI", word)
+        if len(letters) < 3 or not math.hypot(*(block.words[each].value for each in letters)) > 0.0:
+            self.refuse("CC115", "the direction of the tool needs A3=, B3= and C3=, not all zero", word)
 
     def home(self, block: Block, code: int) -> None:
         """G28, G30: through the point of the axis words to the reference position."""
@@ -47,7 +88,7 @@ class Motions(BlockReader):
             return
         # Codes of group 0 that approach a fixed point directly take the axis words as a list of axes only.
         if code in (28, 30):
-            self.record.machine_motion(block, state, -1, self.target(block))
+            self.record.machine_motion(block, state, -1, self.target(block, turns=False))
         home = state.homes[30 if code == 30 else 28]
         end = state.at_machine({axis: home[axis] for axis in block.axes or range(3)})
         self.record.machine_motion(block, state, -2, end, moved=block.axes or [0, 1, 2])
@@ -69,7 +110,9 @@ class Motions(BlockReader):
         if motion in (20, 30):
             self._arc(block, motion // 10, feed)
             return
-        end = self.target(block, machine)
+        end = self.target(block, machine, turns=not machine)
+        if motion and not machine and state.turns_to != state.turned and math.dist(state.position, end) <= _NOTHING:
+            self.refuse("CC115", "a cut that only turns the tool is fed in degrees; turn it with G0, or with X, Y or Z")
         if motion and not rapid and state.feed_mode == 93:
             length = math.dist(state.position, end)
             feed *= length if length > _NOTHING else 1.0

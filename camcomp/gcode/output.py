@@ -23,6 +23,7 @@ class Output:
     joining: Bools  # (N,) a line added between two motions, before or after the motion's own rows
     rest: Bools | None = None  # (N,) ends at rest, whatever the path mode of the program says; None: none does
     apart: Bools | None = None  # (N,) the control does not make one line of it and others; None: as the program says
+    words: Floats | None = None  # (N, 3) of the orientation; None: those of the program, if any
 
     def __post_init__(self) -> None:
         n = len(self.motion)
@@ -63,6 +64,8 @@ class Output:
         """Whether this asks for the path as it is, within half a resolution and FEED_SLACK of the feed."""
         half = 0.5 * resolution_mm * (1.0 + 1e-9)
         n = len(path)
+        if self.words is not None:
+            return False
         if len(self.motion) != n or (self.motion != np.arange(n)).any() or (self.kind != path.kind).any():
             return False
         free = path.known & ~path.machine
@@ -118,3 +121,4 @@ class Rewritten:
     centre: Floats  # (N, 3) mm, of rows that came out as arcs, as rounded; else NaN
     feed: Floats  # (N,) mm/min in force, NaN for rapids
     behind: Standing | None = None  # of a part
+    words: Floats | None = None  # (N, 3) of the orientation, as rounded

@@ -12,8 +12,8 @@ from camcomp.gcode.text import Text
 from camcomp.ground.datatypes import RAPID, Bools, Floats, Ints, Path
 
 # Columns of Sites.begin and Sites.finish.
-X, Y, Z, I, J, K, R, F, P, G = range(10)
-LETTERS = "XYZIJKRFPG"
+X, Y, Z, I, J, K, R, F, P, A, B, C, G = range(13)
+LETTERS = "XYZIJKRFPABCG"  # A, B, C: those of the orientation, whatever they are called
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,8 +24,8 @@ class Sites:
     """
 
     row: Ints  # (n,) line index, from 0
-    begin: NDArray[np.int64]  # (n, 10) index in the text of each word's letter, -1 when the word is not there
-    finish: NDArray[np.int64]  # (n, 10) index behind each word
+    begin: NDArray[np.int64]  # (n, 13) index in the text of each word's letter, -1 when the word is not there
+    finish: NDArray[np.int64]  # (n, 13) index behind each word
     unit: Floats  # (n,) mm per programmed unit
     feed_unit: Floats  # (n,) the same for feeds
     offset: Floats  # (n, 3) mm from a local value to the program frame

@@ -13,6 +13,7 @@ from camcomp.gcode.program import LETTERS, Sites
 from camcomp.gcode.state import ControlState
 from camcomp.gcode.text import Text
 from camcomp.gcode.words import Word
+from camcomp.ground import orientation
 from camcomp.ground.datatypes import ARC, LINE, RAPID, Path, frozen
 
 _NO_CENTRE = [math.nan, math.nan, math.nan]
@@ -33,13 +34,14 @@ class Recorder:
     def __init__(self, text: Text) -> None:
         self._starts = text.starts
         self._count = 0
-        self._numbers = array("d")  # 27 per motion
-        self._spans = array("q")  # 20 per motion
+        self._numbers = array("d")  # 33 per motion
+        self._spans = array("q")  # 26 per motion
         self._line_first = 0
         self.code_stated = False
         self.feed_stated = False
         self.modes_changed = False
         self.stops = False
+        self.oriented: str | None = None  # form of the orientation words, once there are some
         self._fixed: list[int] = []
         self.modes: list[PathMode] = []  # by motion
         self.cycles: dict[int, tuple[list[tuple[str, list[float]]], str]] = {}  # by first motion
@@ -118,11 +120,13 @@ class Recorder:
         modal = math.nan if state.feed is None else state.feed
         self._numbers.extend((state.speed, state.tool, state.unit, *state.offset))
         self._numbers.extend((state.plane, state.feed_mode, flags, modal, state.sense, state.waits, state.feed_unit))
+        self._numbers.extend((*state.turned, *state.turns_to))
+        state.turned = state.turns_to
         state.waits = False
         base = int(self._starts[block.row])
         words = block.words
-        for letter in LETTERS[:-1]:
-            word = words.get(letter)
+        for k, letter in enumerate((*LETTERS[:9], *orientation.LETTERS[state.orientation_form])):
+            word = None if letter in state.table or (k >= 9 and not state.setup.orients) else words.get(letter)
             self._spans.extend((base + word.begin, base + word.end) if word else (-1, -1))
         g = block.groups.get(1)
         self._spans.extend((base + g[1].begin, base + g[1].end) if g else (-1, -1))
@@ -138,11 +142,17 @@ class Recorder:
             self._fixed.append(self._line_first)
         self.cycles[self._line_first] = (list(actions), irreplaceable)
 
+    def _orientation(self, a: np.ndarray) -> orientation.Orientation | None:
+        """Words of the orientation by motion; None where the program has none."""
+        if self.oriented is None:
+            return None
+        return orientation.Orientation(self.oriented, frozen(a[:, 27:30]), frozen(a[:, 30:33]))
+
     def finish(self) -> tuple[Path, Sites]:
         """All motions as arrays."""
         n = self._count
-        a = np.frombuffer(self._numbers, float).reshape(n, -1) if n else np.zeros((0, 27))
-        spans = np.frombuffer(self._spans, np.int64).reshape(n, 10, 2) if n else np.zeros((0, 10, 2), np.int64)
+        a = np.frombuffer(self._numbers, float).reshape(n, -1) if n else np.zeros((0, 33))
+        spans = np.frombuffer(self._spans, np.int64).reshape(n, 13, 2) if n else np.zeros((0, 13, 2), np.int64)
         kind = a[:, 1].astype(np.int8)
         flags = a[:, 22].astype(np.int64)
         plane = a[:, 20].astype(np.int8)
@@ -164,6 +174,7 @@ class Recorder:
             known=(flags & 2) > 0,
             machine=(flags & 1) > 0,
             waits=a[:, 25] > 0,
+            orientation=self._orientation(a),
         )
         fixed = np.zeros(n, bool)
         fixed[self._fixed] = True

@@ -54,7 +54,9 @@ def rewrite(
     writer = Writer(program, out, resolution_mm)
     writer.run()
     data = _stamped(program.text, writer.edits, stamp)
-    return Rewritten(data=data, end=writer.ends, line=writer.lines + 2, centre=writer.centres, feed=writer.feeds)
+    return Rewritten(
+        data=data, end=writer.ends, line=writer.lines + 2, centre=writer.centres, feed=writer.feeds, words=writer.words
+    )
 
 
 def _stamped(text: Text, edits: Edits, stamp: str) -> bytes:
@@ -76,6 +78,7 @@ class Writer(LineEditor):
         self.lines = np.empty(len(out.motion), np.int64)
         self.centres = np.full((len(out.motion), 3), np.nan)
         self.feeds = np.full(len(out.motion), np.nan)
+        self.words = None if out.words is None else np.empty((len(out.motion), 3))
 
     def run(self) -> None:
         """Fill `edits`, `ends` (N, 3) and `lines` (N,), which counts from 0 and without the stamp."""
@@ -166,6 +169,9 @@ class Writer(LineEditor):
             for axis in np.flatnonzero(self.sites.moved[k]):
                 by = self.position[axis] - start[axis] if self.relative else 0.0
                 self.position[axis] = float(end[axis] + by)
+        if self.path.orientation is not None:
+            self.turned = [float(each) for each in self.path.orientation.end[k]]
+        self._told_words(first, last)
         self._append()
         self.ends[first:last] = self.position
         self.feeds[first:last] = self.path.feed[k]
@@ -206,7 +212,20 @@ class Writer(LineEditor):
             else:
                 self._line(each, row, before=number < at_line)
         self.ends[row] = self.position
+        self._told_words(row, row + 1)
         self.feeds[row] = self._feed_held(row)
+
+    def _told_words(self, first: int, last: int) -> None:
+        if self.words is not None:
+            self.words[first:last] = self.turned
+
+    def _turning(self, row: int, in_place: bool) -> list[str]:
+        """New words of the orientation for a row; none where the program keeps its own."""
+        if self.out.words is not None:
+            return self._turn_words(self.out.words[row].tolist(), in_place)
+        if self.path.orientation is not None:
+            return self._turn_words(self.path.orientation.end[self.k].tolist(), in_place)
+        return []
 
     def _path_mode(self, row: int, behind: bool) -> None:
         """An exact stop in front of a row that has to end at rest, the program's own mode again in front of the next that has not.
@@ -266,11 +285,12 @@ class Writer(LineEditor):
             self.code = code
         start, end = self.position, self._landing(move.end, new=True)
         axes = [axis for axis in range(3) if end[axis] != start[axis]]
-        if not axes and move.kind != ARC:
+        turning = self._turning(row, in_place=False)
+        if not axes and not turning and move.kind != ARC:
             # A move of its own has a word, and the word may lead half a step away.
             axes = [0]
             end[0] = start[0] if self.relative else self.offset[0] + self._value(start, 0) * self.unit
-        words += ["XYZ"[axis] + self._number(self._value(end, axis)) for axis in axes]
+        words += ["XYZ"[axis] + self._number(self._value(end, axis)) for axis in axes] + turning
         if move.kind == ARC:
             words += self._centre_words(move)
         if move.kind != RAPID:
@@ -304,6 +324,7 @@ class Writer(LineEditor):
                 self._replace(axis, number)
             else:
                 self.fresh.append("XYZ"[axis] + number)
+        self.fresh += self._turning(row, in_place=True)
         if move.kind == ARC:
             self._centre_on_line(move, start, end)
         elif self.path.kind[k] == ARC:

@@ -22,6 +22,7 @@ class Setup:
     second_home_mm: Triple = ZERO  # G30
     tool: int = 0  # in the spindle
     increment_mm: float | None = None  # what a number without a point counts, on a control that has it so
+    orients: bool = False  # the machine has six actuators, so that words of orientation lead its tool
     table_axes: frozenset[str] = frozenset()  # A, B, C that turn the workpiece and only position it
     path_mode: PathMode = ASSUMED  # until the program says one
     skip_deleted: bool = False  # the block delete switch: lines that start with `/` are not executed

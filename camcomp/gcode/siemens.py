@@ -20,9 +20,9 @@ _QUOTED = re.compile(r'"[^"]*"')
 # Statements without influence on the path, with or without brackets behind them.
 IGNORED = frozenset(
     """
-    MSG STOPRE CYCLE832 WORKPIECE TRAFOOF SOFT BRISK DRIVE FFWON FFWOF COMPOF COMPON COMPCURV COMPCAD
-    COMPSURF CFC CFTCP CFIN CUTCONOF CUTCONON WALIMON WALIMOF DIAMOF DIAMCYCOF KONT NORM ORIWKS ORIMKS
-    ORIAXES ORIVECT UPATH SPATH DISPLOF DISPLON SAVE EXTERN DYNNORM DYNPOS DYNROUGH DYNSEMIFIN DYNFINISH
+    MSG STOPRE CYCLE832 WORKPIECE SOFT BRISK DRIVE FFWON FFWOF COMPOF COMPON COMPCURV COMPCAD
+    COMPSURF CFC CFTCP CFIN CUTCONOF CUTCONON WALIMON WALIMOF DIAMOF DIAMCYCOF KONT NORM ORIWKS
+    ORIVECT UPATH SPATH DISPLOF DISPLON SAVE EXTERN DYNNORM DYNPOS DYNROUGH DYNSEMIFIN DYNFINISH
     DYNPREC FNORM RTLION RTLIOF PUTFTOCF FTOCON FTOCOF G0EXT GROUP_BEGIN GROUP_END TOFFOF CDOF CPRECOF PTPG0
     CP BLSYNC ADISPOS ADIS FIFOCTRL STARTFIFO STOPFIFO LIMS SETMS
     """.split()  # noqa: SIM905
@@ -39,14 +39,16 @@ _NOT_FOLLOWED: tuple[tuple[str, str, str, str], ...] = (
     ("A?TRANS|G5[89]", "CC118", "moves the coordinates, which is not followed", "put the shift into G54 or into the numbers"),
     ("A?ROTS?|CROTS?|ROTS|CYCLE800|TOROT.*|TOFRAME.*", "CC118", "turns the coordinates, which is not followed", "post unrotated"),
     ("A?SCALE|A?MIRROR", "CC117", "scales or mirrors, which is not followed", "post at full scale, without mirroring"),
-    ("TRAORI|TRANSMIT|TRACYL|TRAANG", "CC115", "switches a transformation on, which is not followed", "post for three axes"),
+    ("ORIMKS|ORIAXES|ORICURVE|ORICON.*", "CC115", "turns the tool in another way than on a great circle", "write ORIWKS and ORIVECT"),
+    ("TRANSMIT|TRACYL|TRAANG", "CC115", "switches a transformation on, which is not followed", "post for three axes"),
     ("(CYCLE|POCKET|SLOT|HOLES)[0-9]+|LONGHOLE|MCALL", "CC132", "is a cycle of the control, which is not followed",
      "post the motions instead of the cycle"),
     ("CIP|CT", "CC112", "is an arc in a form that is not followed", "post arcs with I, J, K or CR="),
     ("[ABC]SPLINE|POLY", "CC119", "is a spline", "post lines and arcs"),
     ("INVCW|INVCCW", "CC119", "is an involute", "post lines and arcs"),
 )  # fmt: skip
-_ADDRESSES = {"CR": "R", "TURN": "P", "FP": "P", "ADIS": "ADIS"}
+_ADDRESSES = {"CR": "R", "TURN": "P", "FP": "P", "ADIS": "ADIS", "A3": "A3", "B3": "B3", "C3": "C3"}
+_TRANSFORMS = {"TRAORI": 1.0, "TRAFOOF": 0.0}
 MACHINE_AXIS = "1"  # mode of X1=, Y1=, Z1=
 _ADDRESSES_NOT_FOLLOWED = (
     ("AP|RP", "CC116", "post in Cartesian coordinates"),
@@ -54,7 +56,7 @@ _ADDRESSES_NOT_FOLLOWED = (
     ("DISR|DISCL|DISC|OFFN", "CC114", "post the program with the tool's centre line (G40)"),
     ("CHF|CHR|RND|RNDM|ANG", "CC139", "post corners as arcs and lines"),
     ("FB|FRC|FRCM|FL|FGREF", "CC110", "write the feed as F"),
-    ("[ABC][2-7]|LEAD|TILT|ROT[ABC]?", "CC115", "post the program for three axes"),
+    ("[ABC][24-7]|LEAD|TILT|ROT[ABC]?", "CC115", "post the program for three axes"),
 )
 _FLOW = frozenset(
     """
@@ -150,6 +152,10 @@ class SiemensLine:
             self._assigned(start, found.end(), name, letters)
         elif len(letters) == 1:
             self._plain(start, letters)
+        elif name in _TRANSFORMS:
+            self.words.append(Word("TRAORI", _TRANSFORMS[name], start, found.end()))
+            self.at = found.end()
+            self._skip_group()
         elif letters in IGNORED or name in IGNORED:
             self.at = found.end()
             self._skip_group()

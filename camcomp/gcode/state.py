@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from camcomp.gcode.codes import OFFSET_NAMES, WORK_OFFSETS
 from camcomp.gcode.dialect import Dialect
 from camcomp.gcode.setup import Setup
+from camcomp.gcode.spelling import SINUMERIK
+from camcomp.ground import orientation
 
 _EXTENDED = 300  # G54.1 P1 to P300
 
@@ -37,6 +39,10 @@ class ControlState:
         self.homes = {28: list(setup.home_mm), 30: list(setup.second_home_mm)}
         self.offset = [0.0, 0.0, 0.0]
         self.table = dict.fromkeys(setup.table_axes, 0.0)  # deg
+        self.orientation_form = orientation.VECTOR if dialect.spelling is SINUMERIK else orientation.RPY
+        self.turned = list(orientation.UPRIGHT[self.orientation_form])  # words of the tool's orientation in force
+        self.turns_to = self.turned  # behind the motion of the block
+        self.transformed = False  # TRAORI
 
         self.motion: int | None = dialect.initial_motion  # code in tenths: 0 to 30, a cycle, or None after G80
         self.outside_cycles = self.motion  # the last one that is no cycle

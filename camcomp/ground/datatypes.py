@@ -1,10 +1,15 @@
 """The nouns that more than one room uses: struct of arrays, first axis = motion, float64, read-only."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, fields
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+if TYPE_CHECKING:
+    from camcomp.ground.orientation import Orientation
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -63,6 +68,8 @@ class Path:
         None  # (n,) the control waits at rest in front of it (G4, S, M3 to M9, another offset); None: nowhere
     )
 
+    orientation: Orientation | None = None  # of the tool; None: the program states none
+
     def __post_init__(self) -> None:
         n = np.shape(self.line)[0]
         if self.waits is None:
@@ -76,6 +83,7 @@ class Path:
     def __len__(self) -> int:
         return int(self.line.shape[0])
 
-    def take(self, rows: NDArray[Any]) -> "Path":
+    def take(self, rows: NDArray[Any]) -> Path:
         """The motions that `rows` (indices or mask) picks."""
-        return Path(**{each.name: getattr(self, each.name)[rows] for each in fields(self)})
+        columns = {each.name: getattr(self, each.name)[rows] for each in fields(self) if each.name != "orientation"}
+        return Path(**columns, orientation=None if self.orientation is None else self.orientation.take(rows))

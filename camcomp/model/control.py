@@ -16,6 +16,8 @@ from camcomp.model.config.stated import dialect_without_config
 from camcomp.model.statics.build import rotation_of
 from camcomp.model.trajectory.moves import ControlLimits
 
+ORIENTING_ACTUATORS = 6  # of a machine that holds the orientation of its tool
+
 
 def setup_of(config: Config) -> Setup:
     """The control before the program starts, in the terms of the reader."""
@@ -35,6 +37,7 @@ def setup_of(config: Config) -> Setup:
         tool=control.tool_number,
         increment_mm=control.input_increment_mm,
         table_axes=frozenset(control.table_axes),
+        orients=len(config.robot.actuators) == ORIENTING_ACTUATORS,
         skip_deleted=control.block_delete,
         path_mode=stated_mode(control.path_mode) if control.path_mode else ASSUMED,
         rotation=(_triple(x), _triple(y), _triple(z)) if turned else None,

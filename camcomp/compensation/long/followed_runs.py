@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 import numpy as np
 
@@ -72,6 +72,6 @@ class FollowedRuns:
 
 
 def _joined(first: Path, second: Path) -> Path:
-    return Path(
-        **{name: np.concatenate((getattr(first, name), getattr(second, name))) for name in Path.__dataclass_fields__}
-    )
+    columns = [name for name in Path.__dataclass_fields__ if name != "orientation"]
+    both: dict[str, Any] = {name: np.concatenate((getattr(first, name), getattr(second, name))) for name in columns}
+    return Path(**both)

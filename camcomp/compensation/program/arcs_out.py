@@ -51,7 +51,8 @@ class Bend:
         along = tangents(trial, commanded)
         side = np.cross(axis, along)
         side /= np.maximum(np.linalg.norm(side, axis=1, keepdims=True), 1e-300)
-        rest = second - np.sum(second * side, axis=1, keepdims=True) * side
+        rest = second.copy()  # columns behind those of the tip bend with arcs as with lines
+        rest[:, :3] -= np.sum(second[:, :3] * side, axis=1, keepdims=True) * side
         arc = track.path.kind[track.motion] == ARC
         sweep = np.where(arc, np.abs(np.nan_to_num(track.path.angle[track.motion])) * (track.u1 - track.u0), 0.0)
         bend = cls(second, rest, sweep, np.zeros(len(arc), np.bool_), np.zeros(len(arc), np.int64))

@@ -42,7 +42,7 @@ def _spread(count: Ints) -> Nodes:
 
 
 def second_derivative(nodes: Nodes, x: Floats) -> Floats:
-    """x''(w) (k, 3) at every node, from parabolas through three even-spaced neighbours; x (k, 3) mm."""
+    """x''(w) (k, c) at every node, from parabolas through three even-spaced neighbours; x (k, c) mm."""
     count = np.diff(nodes.first)[nodes.piece]
     second = np.zeros_like(x)
     second[1:-1] = x[2:] - 2.0 * x[1:-1] + x[:-2]
@@ -53,13 +53,13 @@ def second_derivative(nodes: Nodes, x: Floats) -> Floats:
 
 
 def divide(nodes: Nodes, second: Floats, tolerance: Floats, least: Floats | None = None) -> tuple[Nodes, Floats]:
-    """Division points of every piece for a tolerance (p,) mm, and the shift (k, 3) mm that shares the miss.
+    """Division points of every piece for a tolerance (p,) mm, and the shift (k, c) mm that shares the miss.
 
-    second (k, 3): x'' at the trial nodes. least (p,): |x''|^(1/2) counts as at least that much. The ends of a piece are
+    second (k, c): x'' at the trial nodes. least (p,): |x''|^(1/2) counts as at least that much. The ends of a piece are
     included and never shifted.
     """
     if not len(tolerance):
-        return nodes, np.zeros((0, 3))
+        return nodes, np.zeros((0, second.shape[1]))
     floor = np.zeros(len(tolerance)) if least is None else least
     g = np.maximum(np.sqrt(np.linalg.norm(second, axis=1)), floor[nodes.piece])
     dw = np.diff(nodes.w)
@@ -78,7 +78,7 @@ def divide(nodes: Nodes, second: Floats, tolerance: Floats, least: Floats | None
     w = np.interp(goal + 1e-9 * out.piece, area + 1e-9 * nodes.piece, nodes.w + 2.0 * nodes.piece) - 2.0 * out.piece
     w = np.where(inner, np.clip(w, 0.0, 1.0), np.where(k == 0, 0.0, 1.0))
     key, at = nodes.w + 2.0 * nodes.piece, w + 2.0 * out.piece
-    bend = np.stack([np.interp(at, key, second[:, j]) for j in range(3)], axis=1)
+    bend = np.stack([np.interp(at, key, each) for each in second.T], axis=1)
     size = np.maximum(np.linalg.norm(bend, axis=1), floor[out.piece] ** 2)
     miss = (total[out.piece] / np.maximum(n - slack, 1.0)) ** 2 / SHARE  # |x''| h^2 / SHARE, the same at every step
     shift = np.where((inner & (size > 0.0))[:, None], -bend * (miss / np.maximum(size, 1e-300))[:, None], 0.0)

@@ -25,6 +25,7 @@ from camcomp.compensation.program.moves import (
     refuse_unsolved,
     travel_of,
 )
+from camcomp.compensation.program.orienting import MOST_TILT_RAD, Orienting, refuse_unfollowed
 from camcomp.compensation.program.policy import Shares, shares_of
 from camcomp.compensation.program.posture import check_posture
 from camcomp.compensation.program.program_bands import bands_of
@@ -45,6 +46,7 @@ from camcomp.gcode.program import Program
 from camcomp.gcode.rewrite import rewrite
 from camcomp.ground.datatypes import ARC, RAPID, Bools, Floats, Ints
 from camcomp.ground.headway import part as part_of_work
+from camcomp.ground.orientation import UPRIGHT
 from camcomp.model.cutting.assumed import doubtful_force
 from camcomp.model.cutting.engaged import Engaged
 from camcomp.model.cutting.spindle import cut_without_spindle, spindle_warning
@@ -84,11 +86,23 @@ class Compensated:
     warnings: list[str]
     bands: Bands | None = None  # None: every number of the config is exact
     left: Floats | None = None  # (k, 3) mm of `after` that a policy leaves on purpose
+    orienting: Orienting | None = None  # how the program states the orientation of the tool; None: it does not
+    tilt_after: Floats | None = None  # (k,) rad of the loaded platform where the tip is judged
+    fraction: Floats | None = None  # (N,) of the motion at every end point
 
     @property
     def missed(self) -> Floats:
         """What `after` (k, 3) mm has beside what a policy leaves on purpose."""
         return self.after if self.left is None else self.after - self.left
+
+    @property
+    def programmed_words(self) -> Floats:
+        """Words (N, 3) of the program's orientation at every end point; only in programs with orientation."""
+        assert self.fraction is not None and self.orienting is not None
+        turn, rows = self.program.path.orientation, self.rows
+        if turn is None:
+            return np.tile(UPRIGHT[self.orienting.form], (len(rows.piece), 1))
+        return turn.words(rows.motion, self.fraction)
 
     @property
     def lines(self) -> Ints:
@@ -128,8 +142,9 @@ def trajectories(result: Compensated, job: Job) -> Trajectories:
     """The trajectories of the original program that a compensation does not need itself."""
     target = job.frame.to_machine(result.rows.target)
     force = job.frame.vectors(result.rows.force)
-    alone, _ = settle(job.real_machine, target, np.zeros_like(force))
-    loaded, _ = settle(job.perfect_machine, target, force)
+    rotation = None if result.orienting is None else result.orienting.platform(result.programmed_words)
+    alone, _ = settle(job.real_machine, target, np.zeros_like(force), rotation=rotation)
+    loaded, _ = settle(job.perfect_machine, target, force, rotation=rotation)
     return Trajectories(job.frame.to_program(alone), job.frame.to_program(loaded))
 
 
@@ -178,6 +193,10 @@ def _compensated(
     path, resolution = program.path, program.step_mm(job.config.control.resolution_mm)
     spacing = _spacing(job)
     base = lay_track(path, job.conditions, engaged)
+    orienting = Orienting.of(program, job)
+    if orienting is not None:
+        arcs = False  # a circle of the tip does not turn the tool as a correction needs it
+        refuse_unfollowed(program, job, method, part)
     track, turning = cut_at_reversals(job, cut_at_knots(job, base, spacing), spacing)
     shares = shares_of(job, base)
     if shares is not None:
@@ -190,10 +209,14 @@ def _compensated(
 
     trial = trial_nodes(track.length, track.angle, feeding & ~turning & (track.length > 0.0), spacing)
     with part_of_work(0.0, 0.4, points=True):
-        aimed = _aim(program, job, track, trial, corrected, method, shares)
-    second = second_derivative(trial, aimed.commanded)
+        aimed = _aim(program, job, track, trial, corrected, method, shares, orienting)
+    curve, weight = aimed.commanded, 1e-3 * tolerance_um
     correction = aimed.commanded - track.points(trial.piece, trial.w)
     kept = _kept(track, trial, correction, 0.5 * resolution)
+    if orienting is not None:
+        curve = np.column_stack((curve, orienting.lengths(aimed.words, weight)))
+        kept &= orienting.kept(track, trial, aimed.words)
+    second = second_derivative(trial, curve)
     goal = error_goals(tolerance_um, resolution, _largest(track, trial, np.linalg.norm(correction, axis=1)))
     budget = chord_budget(goal, resolution)
     tolerance = budget.copy()
@@ -212,10 +235,15 @@ def _compensated(
             tolerance[gone] = budget[gone]
             nodes, shift = bend.divided(trial, tolerance)
         with part_of_work(1.0 - 0.6 * 0.5**round_, 1.0 - 0.35 * 0.5**round_, points=True):
-            commanded, circles = _bent(program, job, track, nodes, shift, corrected, method, bend, shares)
+            commanded, circles, words = _bent(
+                program, job, track, nodes, shift, corrected, method, bend, shares, orienting
+            )
+        if orienting is not None:
+            words = words + orienting.from_lengths(shift[:, 3:], weight)
         rows = corrected_rows(
-            program, job, track, nodes, commanded, kept, circles, begins=part is None or part.first == 0, shares=shares
-        )
+            program, job, track, nodes, commanded, kept, circles, begins=part is None or part.first == 0, shares=shares,
+            orienting=orienting, words=None if orienting is None else words,
+        )  # fmt: skip
         written = rewrite(
             program,
             output_of(path, rows),
@@ -225,13 +253,15 @@ def _compensated(
             model=job.fingerprint,
         )
         points = judged_points(job, track, rows, feeding)
-        after = see(job, points, written.end, replace(rows.arcs, centre=written.centre))
+        after = see(job, points, written.end, replace(rows.arcs, centre=written.centre), orienting, written.words)
         left = None
         if shares is not None:
             left = shares.left(job, track, points.piece, points.w, points.travel, points.before)
         worst = np.zeros(len(tolerance))
         missed_by = after.error if left is None else after.error - left
         size = np.where(after.status == 0, np.linalg.norm(missed_by, axis=1), np.inf)
+        if after.tilt is not None:
+            size = np.maximum(size, np.nan_to_num(after.tilt) * goal[points.piece] / MOST_TILT_RAD)
         np.maximum.at(worst, points.piece[points.judged], size[points.judged])
         missed = (worst > goal) & ~kept
         count = np.diff(nodes.first)
@@ -290,7 +320,10 @@ def _compensated(
     told = points.along(written.end, replace(rows.arcs, centre=written.centre))
     share = None if shares is None else shares.of_ends(track, rows.piece, rows.w, rows.joining)
     bands = bands_of(job, track, rows, points, told, before, after, share)
-    return replace(done, bands=bands, left=None if left is None else left[points.judged])
+    return replace(
+        done, bands=bands, left=None if left is None else left[points.judged], orienting=orienting,
+        tilt_after=None if after.tilt is None else after.tilt[points.judged], fraction=track.u(rows.piece, rows.w),
+    )  # fmt: skip
 
 
 def _spacing(job: Job) -> float:
@@ -303,11 +336,13 @@ def _spacing(job: Job) -> float:
 class _Aimed:
     commanded: Floats  # (k, 3) program frame
     iterations: Ints
+    words: Floats  # (k, 3) of the orientation, zero where the program states none
 
 
 def _aim(
-    program: Program, job: Job, track: Track, nodes: Nodes, corrected: Bools, method: str, shares: Shares | None
-) -> _Aimed:
+    program: Program, job: Job, track: Track, nodes: Nodes, corrected: Bools, method: str, shares: Shares | None,
+    orienting: Orienting | None = None,
+) -> _Aimed:  # fmt: skip
     """Modified targets at nodes, program frame; nodes of uncorrected pieces stay as programmed."""
     on = corrected[nodes.piece]
     piece, w = nodes.piece[on], nodes.w[on]
@@ -319,7 +354,13 @@ def _aim(
     asked = np.argsort(order, kind="stable")[: len(piece)]
     piece, w = np.concatenate((piece, between))[order], np.concatenate((w, np.tile(WITHIN_RAPID, len(rapids))))[order]
     target = track.points(piece, w)
-    result = aim_at(job, target, travel_of(job, track, piece, w), method)
+    words = np.zeros((len(nodes.piece), 3))
+    if orienting is None:
+        result = aim_at(job, target, travel_of(job, track, piece, w), method)
+    else:
+        words = orienting.programmed(track, nodes.piece, nodes.w)
+        result, turned = orienting.aim(target, travel_of(job, track, piece, w), orienting.programmed(track, piece, w))
+        words[on] = turned[asked]
     refuse_unsolved(program, track, piece, target, result.status)
     out = track.points(nodes.piece, nodes.w)
     out[on] = result.commanded[asked]
@@ -327,7 +368,7 @@ def _aim(
         out = shares.taken(track, nodes.piece, nodes.w, track.points(nodes.piece, nodes.w), out)
     iterations = np.zeros(len(out), np.int64)
     iterations[on] = result.iterations[asked]
-    return _Aimed(out, iterations)
+    return _Aimed(out, iterations, words)
 
 
 def _bent(
@@ -340,11 +381,15 @@ def _bent(
     method: str,
     bend: Bend,
     shares: Shares | None,
-) -> tuple[Floats, Arcs]:
-    """Commanded tips (k, 3) at nodes, and the circles of the moves that lead there as arcs. Turns off what cannot bend."""
+    orienting: Orienting | None = None,
+) -> tuple[Floats, Arcs, Floats]:
+    """Commanded tips (k, 3) at nodes, the circles of the moves that lead there as arcs, and the words (k, 3) of the
+    orientation there. Turns off what cannot bend.
+    """
     both, middle = arcs_out.middles(nodes, bend.use)
-    solved = _aim(program, job, track, both, corrected, method, shares).commanded
-    commanded = solved[~middle] + shift
+    aimed = _aim(program, job, track, both, corrected, method, shares, orienting)
+    solved = aimed.commanded
+    commanded = solved[~middle] + shift[:, :3]
     circles = Arcs.none(len(commanded))
     to = np.flatnonzero((np.diff(nodes.piece, prepend=-1) == 0) & bend.use[nodes.piece])
     if len(to):
@@ -355,7 +400,7 @@ def _bent(
         )
         circles.centre[to], circles.angle[to] = found.centre, found.angle
         bend.use[nodes.piece[to[wrong]]] = False
-    return commanded, circles
+    return commanded, circles, aimed.words[~middle]
 
 
 def _largest(track: Track, nodes: Nodes, size: Floats) -> Floats:
@@ -398,7 +443,7 @@ def _assemble(
     warnings = [*program.warnings, *warnings]
     warnings += check_posture(program, job, program.path.line[rows.motion], target, nominal)
     state = after.state
-    if method != "linear":
+    if method != "linear" and rows.words is None:  # words of orientation say what the control makes of them
         told = points.along(written.end, replace(rows.arcs, centre=written.centre))
         state = whole_pose(job, points, told, rows.corrected, state)
     force = acting_force(job, state.rho, points.travel.take(points.end))

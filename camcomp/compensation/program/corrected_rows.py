@@ -19,6 +19,7 @@ from camcomp.model.job import Job
 from camcomp.model.motion.response import aim_at
 
 if TYPE_CHECKING:
+    from camcomp.compensation.program.orienting import Orienting
     from camcomp.compensation.program.policy import Shares
 
 
@@ -38,6 +39,7 @@ class CorrectedRows:
     feed: Floats  # (N,) mm/min
     arcs: Arcs  # (N,) circles of corrected arcs that come out as arcs
     engagement: Floats  # (N, 2) depth of the cut mm, sum of the engaged arcs rad; NaN where no stock is known
+    words: Floats | None = None  # (N, 3) of the orientation to be commanded; None: those of the program, if any
 
 
 def corrected_rows(
@@ -51,8 +53,13 @@ def corrected_rows(
     *,
     begins: bool,
     shares: Shares | None = None,
+    orienting: Orienting | None = None,
+    words: Floats | None = None,
 ) -> CorrectedRows:
-    """End points of the corrected program: the nodes but the first of each piece, and joining lines at jumps."""
+    """End points of the corrected program: the nodes but the first of each piece, and joining lines at jumps.
+
+    words (k, 3): of the orientation at the nodes, where there are some.
+    """
     path = program.path
     k = np.arange(len(nodes.w)) - nodes.first[nodes.piece]
     kind = path.kind[track.motion]
@@ -66,10 +73,14 @@ def corrected_rows(
     piece = np.concatenate((nodes.piece[keep], extra))
     w = np.concatenate((nodes.w[keep], np.ones(len(extra))))
     joining = np.concatenate(((k == 0)[keep], np.ones(len(extra), np.bool_)))
-    free = track.points(extra, np.ones(len(extra)))
+    free, turned = track.points(extra, np.ones(len(extra))), np.zeros((len(extra), 3))
     if len(extra):  # behind the cut, without its force
         unloaded = replace(travel_of(job, track, extra, np.ones(len(extra))), force=np.zeros((len(extra), 3)))
-        result = aim_at(job, free, unloaded, "newton")
+        if orienting is None:
+            result = aim_at(job, free, unloaded, "newton")
+        else:
+            near = orienting.programmed(track, extra, np.ones(len(extra)))
+            result, turned = orienting.aim(free, unloaded, near)
         refuse_unsolved(program, track, extra, free, result.status)
         aimed = result.commanded
         behind = np.minimum(extra + 1, len(kind) - 1)  # where the next piece begins, with its share
@@ -88,6 +99,9 @@ def corrected_rows(
     rows_kind = np.where(circles.on, ARC, np.where(whole, kind[piece], rows_kind))
     end[whole & ~circles.on] = target[whole & ~circles.on]
     engagement = np.column_stack(track.sizes(piece, w))
+    if orienting is not None and words is not None:
+        words = np.concatenate((words[keep], turned))[order]
+        words[whole] = orienting.programmed(track, piece, w)[whole]
     rows = CorrectedRows(
         piece,
         track.motion[piece],
@@ -101,6 +115,7 @@ def corrected_rows(
         np.empty(len(piece)),
         circles,
         engagement,
+        words,
     )
     return replace(rows, feed=_feeds(program, track, rows))
 
@@ -133,4 +148,5 @@ def output_of(path: Path, rows: CorrectedRows, rest: Bools | None = None, apart:
         joining=rows.joining,
         rest=rest,
         apart=apart,
+        words=rows.words,
     )

@@ -10,7 +10,9 @@ from camcomp.compensation.program import arcs_out
 from camcomp.compensation.program.arcs_out import Arcs
 from camcomp.compensation.program.corrected_rows import CorrectedRows
 from camcomp.compensation.program.moves import WITHIN_RAPID, travel_of
+from camcomp.compensation.program.orienting import Orienting
 from camcomp.ground.datatypes import ARC, RAPID, Bools, Floats, Ints
+from camcomp.ground.orientation import UPRIGHT
 from camcomp.model.cutting.track import Track
 from camcomp.model.job import Job
 from camcomp.model.motion.response import Travel, aim_pose, respond
@@ -86,14 +88,39 @@ class Seen:
     status: Ints
     tip: Floats
     state: Correction
+    tilt: Floats | None = (
+        None  # (k,) rad of the loaded platform against the programmed orientation; None: not looked at
+    )
 
 
-def see(job: Job, points: JudgedPoints, ends: Floats, arcs: Arcs) -> Seen:
-    """The loaded machine along the moves between commanded end points (N, 3), program frame."""
+def see(
+    job: Job, points: JudgedPoints, ends: Floats, arcs: Arcs, orienting: Orienting | None = None, words: Floats | None = None
+) -> Seen:  # fmt: skip
+    """The loaded machine along the moves between commanded end points (N, 3), program frame.
+
+    words (N, 3): of the orientation there.
+    """
     told = points.along(ends, arcs)
+    if orienting is not None and words is not None:
+        return _see_oriented(job, points, told, orienting, words)
     tip, state = respond(job, told, points.travel, points.target, before=points.before)
     at = {each.name: getattr(state, each.name)[points.end] for each in fields(state)}
     return Seen(tip - points.target, state.status, tip[points.end], Correction(**at))
+
+
+def _see_oriented(job: Job, points: JudgedPoints, told: Floats, orienting: Orienting, words: Floats) -> Seen:
+    before = np.array(UPRIGHT[orienting.form])  # the first move begins where nothing is judged
+    row = points.row
+    along = orienting.along(words, before, row, points.fraction)
+    travel = orienting.told(points.travel, along)
+    assert travel.rotation is not None
+    tip, state = respond(job, told, travel, points.target, before=points.before)
+    wanted = points.travel.rotation
+    if wanted is None:
+        wanted = np.broadcast_to(job.machine.nominal.held_rotation, (len(row), 3, 3))
+    tilt = orienting.tilt(travel.rotation, state, wanted)
+    at = {each.name: getattr(state, each.name)[points.end] for each in fields(state)}
+    return Seen(tip - points.target, state.status, tip[points.end], Correction(**at), tilt)
 
 
 def see_original(job: Job, points: JudgedPoints) -> Seen:

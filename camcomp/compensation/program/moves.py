@@ -15,6 +15,7 @@ from camcomp.ground.errors import Location, PhysicsError, raise_all
 from camcomp.model.cutting.track import Track
 from camcomp.model.job import Job
 from camcomp.model.motion.response import AROUND_S, Travel
+from camcomp.model.oriented import platform_rotations
 from camcomp.model.statics.masses import has_moved_mass
 from camcomp.model.statics.solve import STATUS
 
@@ -120,7 +121,10 @@ def travel_of(job: Job, track: Track, piece: Ints, w: Floats) -> Travel:
     around = None
     if job.causes and has_moved_mass(job.real_machine.robot):
         around = _around(track, 60.0 * minutes, piece, time)
-    return Travel(force, time, worn[piece] + w * cut[piece], stop, around)
+    turn, rotation = track.path.orientation, None
+    if turn is not None:
+        rotation = platform_rotations(job, turn.form, turn.words(track.motion[piece], track.u(piece, w)))
+    return Travel(force, time, worn[piece] + w * cut[piece], stop, around, rotation)
 
 
 def _around(track: Track, seconds: Floats, piece: Ints, time: Floats) -> Floats:

@@ -29,7 +29,8 @@ def check_posture(program: Program, job: Job, line: Ints, tip: Floats, rho: Floa
         return []
     room = dexterity(arm, rho)
     _refuse(program, "CC303", "the arm is singular", np.unique(line[room < SINGULAR]))
-    _refuse(program, "CC305", "the joints change to another branch", _flips(job, arm, line, tip, rho))
+    if program.path.orientation is None:
+        _refuse(program, "CC305", "the joints change to another branch", _flips(job, arm, line, tip, rho))
     near = np.unique(line[room < NEAR_SINGULAR])
     if not len(near):
         return []

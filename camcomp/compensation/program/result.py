@@ -139,6 +139,7 @@ class Summary(Result):
         tuple[str, ...] | None, Field(description="stock and tools read from its comments")
     ] = None
     platform_tilt_max_mrad: float
+    tilt_after_mrad: Annotated[float | None, Field(description="largest, of programs with orientation")] = None
     joining_lines: int
     cycle_time_s: CycleTime
     control_mode: ControlMode

@@ -7,7 +7,7 @@ not counted.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -22,6 +22,7 @@ from camcomp.compensation.program.moves import (
     row_layout,
     travel_of,
 )
+from camcomp.compensation.program.orienting import Orienting
 from camcomp.compensation.program.policy import Shares, shares_of
 from camcomp.compensation.program.result import ErrorSize, LineResult, Verification
 from camcomp.compensation.program.uncertainty import Uncertainty
@@ -33,7 +34,8 @@ from camcomp.ground.datatypes import ARC, RAPID, Bools, Floats, Ints, Path
 from camcomp.ground.headway import part, steps
 from camcomp.model.cutting.track import Track, lay_track
 from camcomp.model.job import Job
-from camcomp.model.motion.response import aim_at, respond
+from camcomp.model.motion.response import Travel, aim_at, respond
+from camcomp.model.statics.target import Correction
 
 PER_SECTION = 4  # points looked at within each straight move or section of an arc
 ARC_STEP = 0.1  # rad, section of an arc
@@ -89,11 +91,12 @@ def verify(corrected: Program, original: Program, job: Job) -> Verified:
     if shares is not None:
         track = shares.with_jumps(track)
     corrected_ones = corrected_pieces(original.path, track)
+    orienting = Orienting.of(original, job, corrected)
     with part(0.0, 0.3, points=True):
-        begin, expected = (_expected(original, job, track, corrected_ones, w, shares) for w in (0.0, 1.0))
+        begin, expected = (_expected(original, job, track, corrected_ones, w, shares, orienting) for w in (0.0, 1.0))
     step = np.linalg.norm(begin - np.concatenate((original.path.start[:1], expected[:-1])), axis=1)
     layout = row_layout(original.path, track, step, original.step_mm(job.config.control.resolution_mm))
-    reach = _reach(original, job, track, corrected_ones)
+    reach = _reach(original, job, track, corrected_ones, orienting)
     warnings = _other_model(corrected, job)
     first, last, joins = match_moves(
         corrected.path, track, expected, reach, layout, stamped=is_stamped(corrected.data), foreign=bool(warnings)
@@ -101,13 +104,14 @@ def verify(corrected: Program, original: Program, job: Job) -> Verified:
     moving = np.flatnonzero(layout.corrected & (track.length > 0.0))
     piece, move, f = _samples(corrected.path, moving, first[moving], last[moving])
     commanded = path_geometry.points(corrected.path, move, f)
-    guess = _fraction(job, track, reach, corrected.path, piece, move, f)
+    guess = _fraction(job, track, reach, corrected.path, piece, move, f, orienting)
+    rotation = None if orienting is None else orienting.of_moves(corrected.path, move, f)
     with part(0.3, 0.9):
-        residual, w = _residual(job, track, piece, commanded, guess, shares)
+        residual, w = _residual(job, track, piece, commanded, guess, shares, rotation)
     # Rapids and starts are only there because drives remember them.
     judged = (f > 0.0) & (original.path.kind[track.motion[piece]] != RAPID)
     end = judged & (f == 1.0)
-    control = _under_control(original, corrected, job, track, piece, move, commanded, w, judged, shares)
+    control = _under_control(original, corrected, job, track, piece, move, commanded, w, judged, shares, rotation)
     missed, totals = None, None
     if shares is not None:
         residual, missed = _beside(job, track, piece, commanded, w, shares)
@@ -122,10 +126,10 @@ def verify(corrected: Program, original: Program, job: Job) -> Verified:
 
 def _under_control(
     original: Program, corrected: Program, job: Job, track: Track, piece: Ints, move: Ints, commanded: Floats, w: Floats,
-    judged: Bools, shares: Shares | None,
+    judged: Bools, shares: Shares | None, rotation: Floats | None = None,
 ) -> dict[str, Any]:  # fmt: skip
     """What the control adds to the error at the points (k,) that are judged, without what a policy leaves on purpose."""
-    travel = travel_of(job, track, piece, w)
+    travel = _told(travel_of(job, track, piece, w), rotation)
     error = respond(job, commanded, travel)[0] - track.points(piece, w)
     if shares is not None:
         error = error - shares.left(job, track, piece, w, travel)
@@ -188,31 +192,48 @@ def _samples(path: Path, pieces: Ints, first: Ints, last: Ints) -> tuple[Ints, I
     return np.repeat(piece, points), np.repeat(move, points), k / np.repeat(count, points)
 
 
-def _expected(program: Program, job: Job, track: Track, corrected: Bools, w: float, shares: Shares | None) -> Floats:
+def _told(travel: Travel, rotation: Floats | None) -> Travel:
+    """The travel with the orientation that the corrected program commands."""
+    return travel if rotation is None else replace(travel, rotation=rotation)
+
+
+def _aimed(job: Job, track: Track, piece: Ints, w: Floats, orienting: Orienting | None) -> Correction:
+    """Commands for the programmed points, as compensate has them."""
+    target, travel = track.points(piece, w), travel_of(job, track, piece, w)
+    if orienting is None:
+        return aim_at(job, target, travel, "newton")
+    return orienting.aim(target, travel, orienting.programmed(track, piece, w))[0]
+
+
+def _expected(
+    program: Program, job: Job, track: Track, corrected: Bools, w: float, shares: Shares | None, orienting: Orienting | None
+) -> Floats:  # fmt: skip
     """Commanded tip (p, 3) at fraction w of every piece, as compensate would have it."""
     pieces = np.arange(len(track.motion))
     at = np.full(len(pieces), w)
     out = track.points(pieces, at)
     on = np.flatnonzero(corrected)
-    result = aim_at(job, out[on], travel_of(job, track, on, at[on]), "newton")
+    result = _aimed(job, track, on, at[on], orienting)
     refuse_unsolved(program, track, on, out[on], result.status)
     out[on] = result.commanded
     return out if shares is None else shares.taken(track, pieces, at, track.points(pieces, at), out)
 
 
-def _reach(program: Program, job: Job, track: Track, corrected: Bools) -> Floats:
+def _reach(program: Program, job: Job, track: Track, corrected: Bools, orienting: Orienting | None) -> Floats:
     """Length (p,) mm of the commanded path of every piece; where the correction is large, a small arc grows or shrinks."""
     angle = np.where(program.path.kind == ARC, np.abs(program.path.angle), 0.0)[track.motion] * (track.u1 - track.u0)
     nodes = trial_nodes(track.length, angle, corrected & (angle > 0.0))
     points = track.points(nodes.piece, nodes.w)
     on = corrected[nodes.piece]
-    points[on] = aim_at(job, points[on], travel_of(job, track, nodes.piece[on], nodes.w[on]), "newton").commanded
+    points[on] = _aimed(job, track, nodes.piece[on], nodes.w[on], orienting).commanded
     step = np.linalg.norm(np.diff(points, axis=0), axis=1)
     inside = np.diff(nodes.piece) == 0
     return np.bincount(nodes.piece[1:][inside], step[inside], len(corrected)).astype(np.float64)
 
 
-def _fraction(job: Job, track: Track, reach: Floats, path: Path, piece: Ints, move: Ints, f: Floats) -> Floats:
+def _fraction(
+    job: Job, track: Track, reach: Floats, path: Path, piece: Ints, move: Ints, f: Floats, orienting: Orienting | None
+) -> Floats:  # fmt: skip
     """First guess (k,) of the fraction of each piece: by the length of the path that ought to be commanded."""
     length = path_geometry.lengths(path)
     before = np.cumsum(length) - length
@@ -230,9 +251,7 @@ def _fraction(job: Job, track: Track, reach: Floats, path: Path, piece: Ints, mo
     uneven = np.flatnonzero((moves > first) & (np.abs(reach - track.length)[:n] > UNEVEN * track.length[:n]))
     w = np.linspace(0.0, 1.0, ALONG + 1)
     at, along = np.repeat(uneven, len(w)), np.tile(w, len(uneven))
-    aimed = aim_at(job, track.points(at, along), travel_of(job, track, at, along), "newton").commanded.reshape(
-        -1, len(w), 3
-    )
+    aimed = _aimed(job, track, at, along, orienting).commanded.reshape(-1, len(w), 3)
     for i, curve in zip(uneven, aimed, strict=True):
         way = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(curve, axis=0), axis=1))))
         on = piece == i
@@ -242,7 +261,7 @@ def _fraction(job: Job, track: Track, reach: Floats, path: Path, piece: Ints, mo
 
 
 def _residual(
-    job: Job, track: Track, piece: Ints, commanded: Floats, w: Floats, shares: Shares | None
+    job: Job, track: Track, piece: Ints, commanded: Floats, w: Floats, shares: Shares | None, rotation: Floats | None
 ) -> tuple[Floats, Floats]:
     """Distance (k,) mm of the loaded tip from the programmed path, and the fraction of the nearest point.
 
@@ -251,7 +270,7 @@ def _residual(
 
     def seen(w: Floats) -> tuple[Floats, Floats]:
         """Distance from the place, and how far the tip lies ahead of it, mm."""
-        travel = travel_of(job, track, piece, w)
+        travel = _told(travel_of(job, track, piece, w), rotation)
         tip, _ = respond(job, commanded, travel)
         gap = tip - track.points(piece, w)
         if shares is not None:

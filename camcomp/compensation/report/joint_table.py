@@ -55,9 +55,9 @@ class _Csv:
         pass
 
 
-def joint_table(file: BinaryIO, name: str, job: Job) -> JointTable:
-    """A table of the kind that the file's name asks for. Raises ConfigError CC216 when a package is missing."""
-    names = joint_columns(job)
+def joint_table(file: BinaryIO, name: str, job: Job, oriented: bool = False) -> JointTable:
+    """A table of the kind that the file's name asks for; oriented: of a program with orientation. Raises ConfigError CC216 when a package is missing."""
+    names = joint_columns(job, oriented)
     return JointTable(ParquetTable(file, names) if name.endswith(SUFFIX) else _Csv(file, names))
 
 
@@ -67,7 +67,7 @@ def joint_bytes(result: Compensated, job: Job, name: str) -> bytes:
         return joint_csv(result, job)
     state = result.state
     file = BytesIO()
-    table = joint_table(file, name, job)
+    table = joint_table(file, name, job, result.orienting is not None)
     table.batch(Batch(result.lines, result.s, result.t, result.rows.target, result.written.end, result.force, result.nominal, state.rho,
                       state.drive, values_behind(result, job)))  # fmt: skip
     table.close()

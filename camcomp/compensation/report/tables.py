@@ -11,12 +11,14 @@ from camcomp.compensation.program.compensate import Compensated, Trajectories
 from camcomp.compensation.program.result import CycleTime, Summary, error_size, job_figures
 from camcomp.compensation.program.under_control import mode_name
 from camcomp.ground.datatypes import Floats
+from camcomp.ground.orientation import angles_of
 from camcomp.model.control import waiting_s
 from camcomp.model.job import Job
 
 CHUNK_ROWS = 20_000
 DECIMALS = 6
 DECIMALS_RAD = 9  # 2 m of reach make 2 nm of it
+ORIENTATION = ["a_deg", "b_deg", "c_deg", "ac_deg", "bc_deg", "cc_deg"]  # programmed, corrected
 ENGAGEMENT = ["depth_mm", "engaged_rad"]  # where a stock is known
 
 
@@ -31,11 +33,12 @@ def actuator_columns(job: Job) -> tuple[list[str], list[str], list[str]]:
     return nominal, commanded, force
 
 
-def joint_columns(job: Job) -> list[str]:
-    """Column names of the joint table."""
+def joint_columns(job: Job, oriented: bool = False) -> list[str]:
+    """Column names of the joint table; oriented: of a program with orientation."""
     head = ["line", "s_mm", "t_s", "x_mm", "y_mm", "z_mm", "xc_mm", "yc_mm", "zc_mm", "fx_N", "fy_N", "fz_N"]
     head += [name for trio in zip(*actuator_columns(job), strict=True) for name in trio]
-    return head + band_columns(job) + (ENGAGEMENT if job.config.workpiece.stock is not None else [])
+    head += band_columns(job) + (ENGAGEMENT if job.config.workpiece.stock is not None else [])
+    return head + (ORIENTATION if oriented else [])
 
 
 def band_columns(job: Job) -> list[str]:
@@ -55,6 +58,9 @@ def values_behind(result: Compensated, job: Job) -> Floats | None:
     parts = band_values(result.bands, job)
     if job.config.workpiece.stock is not None:
         parts.append(result.rows.engagement)
+    if result.orienting is not None and result.written.words is not None:
+        form = result.orienting.form
+        parts += [angles_of(form, each) for each in (result.programmed_words, result.written.words)]
     return np.column_stack(parts) if parts else None
 
 
@@ -65,7 +71,7 @@ def decimals_of(names: Sequence[str]) -> list[int]:
 
 def joint_csv(result: Compensated, job: Job) -> bytes:
     """One row per end point of every motion of the corrected program."""
-    head, m = joint_columns(job), len(job.machine.actuators)
+    head, m = joint_columns(job, result.orienting is not None), len(job.machine.actuators)
     actuators = np.stack((result.nominal, result.state.rho, result.state.drive), axis=2).reshape(-1, 3 * m)
     behind = values_behind(result, job)
     values = np.column_stack(
@@ -132,7 +138,7 @@ def summary(result: Compensated, job: Job) -> Summary:
             "iterations_max": result.iterations,
             "method": result.method,
             **job_figures(job),
-            "platform_tilt_max_mrad": 1e3 * _most(np.linalg.norm(result.state.tilt, axis=1)[result.rows.corrected]),
+            **_tilt(result),
             "joining_lines": int(result.rows.joining.sum()),
             "cycle_time_s": CycleTime(before=result.control.before_s + waiting, after=result.control.after_s + waiting),
             "control_mode": mode_name(result.control.modes),
@@ -142,6 +148,13 @@ def summary(result: Compensated, job: Job) -> Summary:
             "warnings": result.warnings,
         }
     )
+
+
+def _tilt(result: Compensated) -> dict[str, float]:
+    if result.tilt_after is None:
+        return {"platform_tilt_max_mrad": 1e3 * _most(np.linalg.norm(result.state.tilt, axis=1)[result.rows.corrected])}
+    most = 1e3 * _most(result.tilt_after)
+    return {"platform_tilt_max_mrad": most, "tilt_after_mrad": most}
 
 
 def _most(values: Floats) -> float:

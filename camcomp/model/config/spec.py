@@ -145,6 +145,11 @@ class Control(Spec):
         default_factory=list,
         description="rotary axes that turn the workpiece between cuts: lines that move nothing else pass unchanged",
     )
+    orientation_words: Literal["ABC"] | None = Field(
+        None,
+        description="machines with six actuators: A, B, C are written into programs that do not state the tool's orientation, "
+        "so that it is corrected too",
+    )
     block_delete: bool = Field(False, description="the switch is on: lines that start with / are not executed")
     input_increment_mm: Positive | None = Field(
         None,

@@ -142,8 +142,10 @@ class Track:
         """Cutting force on the tool (k, 3) N, program frame, where the tip is driven along unit vectors direction (k, 3)."""
         if self.grip is not None and feed is not None and not self.conditions.plunges:
             return self._driven(piece, w, direction, feed)
+        turn = self.path.orientation
+        turned = None if turn is None else turn.rotations(self.motion[piece], self.u(piece, w))
         return _force(self.path, self.conditions, self.cutting, self.motion, self.s0, self.length, self.grip, piece, w,
-                      direction, self.points(piece, w), feed)  # fmt: skip
+                      direction, self.points(piece, w), feed, turned)  # fmt: skip
 
     def force_meeting(self, piece: Ints, w: Floats, direction: Floats, depth: Floats, bites: Bites) -> Floats:
         """Cutting force (k, 3) N, program frame, of a tool that meets these arcs (k places) and goes on along `direction`."""
@@ -171,9 +173,18 @@ class Track:
 
 def _force(
     path: Path, c: Conditions, cutting: Bools, motion: Ints, s0: Floats, length: Floats, grip: Grip | None, piece: Ints,
-    w: Floats, direction: Floats, tip: Floats, driven: Floats | None = None,
+    w: Floats, direction: Floats, tip: Floats, driven: Floats | None = None, turned: Floats | None = None,
 ) -> Floats:  # fmt: skip
-    """Model force (k, 3) N for given feed directions, program frame."""
+    """Model force (k, 3) N for given feed directions, program frame.
+
+    turned (k, 3, 3): how the tool is turned from where its axis is that of the conditions. The model sees the feed from a tool
+    that stands still.
+    """
+    if turned is not None:
+        seen = np.einsum("kji,kj->ki", turned, direction)
+        force = _force(path, c, cutting, motion, s0, length, grip, piece, w, seen, tip, driven)
+        out: Floats = np.einsum("kij,kj->ki", turned, force)
+        return out
     out = np.zeros((len(piece), 3))
     on = cutting[piece] & (np.linalg.norm(direction, axis=1) > 0.0)
     if c.model is None or not on.any():
@@ -275,9 +286,16 @@ def lay_track(path: Path, conditions: Conditions, engaged: Engaged | None = None
     arcs = bool((path.kind == ARC).any())  # lines have one direction from end to end
     last = path_geometry.tangents(path, motion, u1 - beside1) if arcs else first
     feeding = (path.kind[motion] != RAPID) & path.known[motion] & ~path.machine[motion] & (piece_length > 0.0)
-    sine = lateral(first, axis)
+    turn = path.orientation
+
+    def across(direction: Floats, u: Floats) -> Floats:
+        if turn is not None:
+            direction = np.einsum("kji,kj->ki", turn.rotations(motion, u), direction)
+        return lateral(direction, axis)
+
+    sine = across(first, u0)
     if arcs:
-        sine = np.maximum(sine, lateral(path_geometry.tangents(path, motion, middle), axis))
+        sine = np.maximum(sine, across(path_geometry.tangents(path, motion, middle), middle))
     cutting = feeding & ((sine > PLUNGE_SINE) | conditions.plunges)
     grip = None
     if places is not None:
@@ -287,8 +305,12 @@ def lay_track(path: Path, conditions: Conditions, engaged: Engaged | None = None
         cutting &= path_geometry.points(path, motion, middle)[:, 2] < conditions.stock_top_mm
 
     def force(piece: Ints, w: Floats, direction: Floats) -> Floats:
-        tip = path_geometry.points(path, motion[piece], np.where(w == 0.0, u0[piece], u1[piece]))
-        return _force(path, conditions, cutting, motion, s0, piece_length, grip, piece, w, direction, tip)
+        u = np.where(w == 0.0, u0[piece], u1[piece])
+        tip = path_geometry.points(path, motion[piece], u)
+        turned = None if turn is None else turn.rotations(motion[piece], u)
+        return _force(
+            path, conditions, cutting, motion, s0, piece_length, grip, piece, w, direction, tip, turned=turned
+        )
 
     every = np.arange(n)
     own0, own1 = force(every, np.zeros(n), first), force(every, np.ones(n), last)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
 from functools import cache, partial
+from typing import Any
 
 import numpy as np
 
@@ -19,10 +20,10 @@ from camcomp.model.finite import not_finite
 from camcomp.model.hysteresis import direction, ways
 from camcomp.model.job import Job
 from camcomp.model.statics.lengths import LENGTH_STEP_MM, lengthened
-from camcomp.model.statics.machine import build_machine
+from camcomp.model.statics.machine import Machine, build_machine
 from camcomp.model.statics.masses import MassLoads, has_moved_mass, mass_loads, mass_loads_around
 from camcomp.model.statics.rotation import exp_rotation
-from camcomp.model.statics.solve import FREE, INVERSE, solve
+from camcomp.model.statics.solve import FREE, INVERSE, State, solve
 from camcomp.model.statics.target import Correction, correct, settle
 
 SETTLED_MM = 2e-5  # the correction of effects ends here
@@ -45,6 +46,7 @@ class Travel:
 
     stop: the control comes to rest there, and the drives with it. around (3, n, 3): programmed tips, program frame, AROUND_S
     before, at and after the instant on the same smooth stretch that is next to each point; None where time is unknown.
+    rotation (n, 3, 3): orientation of the platform that the control is told, machine frame; None: the one that it holds.
     """
 
     force: Floats
@@ -52,11 +54,13 @@ class Travel:
     cut_min: Floats  # (n,) minutes
     stop: Bools
     around: Floats | None = None
+    rotation: Floats | None = None
 
     def take(self, rows: np.ndarray) -> Travel:
         """Some of the points, still in order."""
         around = None if self.around is None else self.around[:, rows]
-        return Travel(self.force[rows], self.time[rows], self.cut_min[rows], self.stop[rows], around)
+        rotation = None if self.rotation is None else self.rotation[rows]
+        return Travel(self.force[rows], self.time[rows], self.cut_min[rows], self.stop[rows], around, rotation)
 
     @property
     def rested(self) -> Floats:
@@ -85,9 +89,9 @@ def respond(
     told = job.frame.to_machine(commanded)
     aim = None if nominal_of is None else job.frame.to_machine(nominal_of)
     if not job.causes:
-        loaded, settled = settle(job.real_machine, told, travel.force, None, aim)
+        loaded, settled = settle(job.real_machine, told, travel.force, None, aim, rotation=travel.rotation)
         return _finite(job, job.frame.to_program(loaded), settled)
-    control = solve(job.real_machine, FREE, told, check=False)
+    control = solve(job.real_machine, FREE, told, aim_rotation=travel.rotation, check=False)
     setpoint = control.rho_nominal if rho is None else rho
     motion = _motion(job, setpoint, travel)
     loading = cache(partial(signal_path.loaded, job.causes, motion, travel.force))
@@ -96,20 +100,32 @@ def respond(
     def held() -> Floats:  # where carriages stand where they are told
         load = loading()
         where = solve(
-            job.real_machine, FREE, told, force=load.force, wrench=load.wrench, rho=motion.encoder, check=False
+            job.real_machine,
+            FREE,
+            told,
+            aim_rotation=travel.rotation,
+            force=load.force,
+            wrench=load.wrench,
+            rho=motion.encoder,
+            check=False,
         )
         return np.nan_to_num(where.drive)
 
-    nominal = control.rho_nominal if aim is None else solve(job.real_machine, FREE, aim, check=False).rho_nominal
+    nominal = control.rho_nominal
+    if aim is not None:
+        nominal = solve(job.real_machine, FREE, aim, aim_rotation=travel.rotation, check=False).rho_nominal
     masses = cache(partial(_mass_loads, job, nominal, travel)) if has_moved_mass(job.real_machine.robot) else None
     motion = replace(motion, names=job.real_machine.actuators, held=held, told=lambda: commanded, masses=masses)
     error, guided = signal_path.driven(job.causes, job.real_machine.actuators, motion)
     effort = signal_path.drive_forces(job.causes, job.real_machine.actuators, guided)
     load = loading()
     carriage = motion.encoder + error
-    state = solve(job.real_machine, FREE, told, force=load.force, wrench=load.wrench, rho=carriage)
+    state = solve(
+        job.real_machine, FREE, told, aim_rotation=travel.rotation, force=load.force, wrench=load.wrench, rho=carriage
+    )
     drive = state.drive if effort is None else state.drive + effort
-    tip = state.tip + _lengthening(job, told, signal_path.grown(job.causes, job.real_machine.actuators, motion))
+    grown = signal_path.grown(job.causes, job.real_machine.actuators, motion)
+    tip = state.tip + _lengthening(job, told, grown, travel.rotation)
     tip = signal_path.led(job.causes, tip, motion, job.real_machine.nominal, job.frame.origin)
     tip = job.frame.to_program(signal_path.posed(job.causes, tip, load, motion))
     tip = signal_path.placed(job.causes, signal_path.clamped(job.causes, tip), load, motion)
@@ -127,26 +143,33 @@ def _mass_loads(job: Job, rho: Floats, travel: Travel) -> MassLoads:
     loads = mass_loads(robot, np.nan_to_num(rho))
     if around is not None:
         tips = (job.frame.to_machine(each) for each in around)
-        near = [solve(job.real_machine, FREE, each, check=False).rho_nominal for each in tips]
+        near = [
+            solve(job.real_machine, FREE, each, aim_rotation=travel.rotation, check=False).rho_nominal for each in tips
+        ]
         known = np.isfinite(rho).all(axis=1) & np.isfinite(near).all(axis=(0, 2))
         moved = mass_loads_around(robot, rho[known], [each[known] for each in near], AROUND_S)
         loads.drive[known] = moved.drive
     return loads
 
 
-def _lengthening(job: Job, told: Floats, grown: Floats | None) -> Floats:
-    """Way (n, 3) mm of tips told (n, 3), machine frame, by links that are longer by `grown` (n, m) mm."""
+def _lengthening(job: Job, told: Floats, grown: Floats | None, rotation: Floats | None) -> Floats:
+    """Way (n, 3) mm of tips told (n, 3) in orientations (n, 3, 3), machine frame, by links that are longer by `grown` (n, m) mm."""
     out = np.zeros_like(told)
     if grown is None:
         return out
     machine, none = job.real_machine, np.zeros_like(told)
-    rho = solve(machine, FREE, told, check=False).rho_nominal
-    here = solve(machine, FREE, told, force=none, rho=rho, check=False).tip
+    aim = told, rotation
+    rho = _turned(machine, *aim).rho_nominal
+    here = _turned(machine, *aim, force=none, rho=rho).tip
     for j in np.flatnonzero(grown.any(axis=0)):
         longer = build_machine(lengthened(machine.robot, machine.actuators[j], LENGTH_STEP_MM), machine.nominal)
-        way = solve(longer, FREE, told, force=none, rho=rho, check=False).tip - here
+        way = _turned(longer, *aim, force=none, rho=rho).tip - here
         out += way / LENGTH_STEP_MM * grown[:, j, None]
     return out
+
+
+def _turned(machine: Machine, told: Floats, rotation: Floats | None, **given: Any) -> State:
+    return solve(machine, FREE, told, aim_rotation=rotation, check=False, **given)
 
 
 def _finite(job: Job, tip: Floats, state: Correction) -> tuple[Floats, Correction]:
@@ -248,13 +271,17 @@ def without_drives(
 ) -> Correction:
     """Commands, machine frame, that bring the loaded tips to the targets (n, 3) if carriages go where they are told.
 
-    Their `rho` is where the carriages have to be, whatever the drives in front of them do. pose: see `correct`.
+    pose: they bring the platform to the orientation of the travel, too, and `rotation` is the one to be commanded.
+
+    Their `rho` is where the carriages have to be, whatever the drives in front of them do.
     """
     load = Load(travel.force, np.zeros((len(target), 6)))
     if job.causes:
-        nominal = solve(job.real_machine, FREE, job.frame.to_machine(target), check=False).rho_nominal
+        told = job.frame.to_machine(target)
+        nominal = solve(job.real_machine, FREE, told, aim_rotation=travel.rotation, check=False).rho_nominal
         load = signal_path.loaded(job.causes, _motion(job, nominal, travel), travel.force)
-    return correct(job.real_machine, job.frame.to_machine(target), load.force, load.wrench, method, pose=pose)
+    aim = job.frame.to_machine(target)
+    return correct(job.real_machine, aim, load.force, load.wrench, method, pose=pose, rotation=travel.rotation)
 
 
 def _through_play(job: Job, found: Correction, travel: Travel) -> Floats:
@@ -266,7 +293,8 @@ def _through_play(job: Job, found: Correction, travel: Travel) -> Floats:
     lag = _lost_motion(job, found.rho[solved], travel.take(np.flatnonzero(solved)))
     out = np.zeros((len(solved), 3))
     if lag.any():
-        out[solved] = _tip_way(job, found.commanded[solved], -lag)
+        rotation = None if travel.rotation is None else travel.rotation[solved]
+        out[solved] = _tip_way(job, found.commanded[solved], -lag, rotation)
     return out
 
 
@@ -284,22 +312,24 @@ def _lost_motion(job: Job, carriage: Floats, travel: Travel) -> Floats:
 
 def behind_encoders(job: Job, commanded: Floats, travel: Travel) -> tuple[Floats, Floats]:
     """Encoders (n, m) of commanded tips (n, 3), program frame, and what drives' memory makes of carriage minus encoder (n, m)."""
-    rho = solve(job.real_machine, FREE, job.frame.to_machine(commanded), check=False).rho_nominal
+    rho = solve(
+        job.real_machine, FREE, job.frame.to_machine(commanded), aim_rotation=travel.rotation, check=False
+    ).rho_nominal
     motion = _motion(job, rho, travel)
     still = replace(motion, ordered=False, direction=np.zeros_like(rho))
     moving, standing = (signal_path.driven(job.causes, job.real_machine.actuators, each)[0] for each in (motion, still))
     return motion.encoder, moving - standing
 
 
-def _tip_way(job: Job, tip: Floats, by: Floats) -> Floats:
+def _tip_way(job: Job, tip: Floats, by: Floats, rotation: Floats | None = None) -> Floats:
     """Way (n, 3) mm of the tip, program frame, that moves the actuators by `by` (n, m), to first order.
 
     Where they are more than X, Y, Z can move one by one, those go along that are not asked to move.
     """
     h = 1e-3
     rates = [
-        (solve(job.real_machine, FREE, tip + h * axis, check=False).rho_nominal
-         - solve(job.real_machine, FREE, tip - h * axis, check=False).rho_nominal) / (2.0 * h)
+        (solve(job.real_machine, FREE, tip + h * axis, aim_rotation=rotation, check=False).rho_nominal
+         - solve(job.real_machine, FREE, tip - h * axis, aim_rotation=rotation, check=False).rho_nominal) / (2.0 * h)
         for axis in np.eye(3)
     ]  # fmt: skip
     slopes = np.stack(rates, axis=2)

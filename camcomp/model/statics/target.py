@@ -28,7 +28,8 @@ class Correction:
     """Solved targets. Rows with status != 0 hold NaN.
 
     commanded (n, 3) tip to be commanded, mm; rho_nominal, rho (n, m) actuator coordinates of the point asked for and
-    to be commanded; drive (n, m) drive forces under load; tilt (n, 3) rad; status, iterations (n,).
+    to be commanded; drive (n, m) drive forces under load; tilt (n, 3) rad, of the loaded platform against the orientation
+    asked for; status, iterations (n,); rotation (n, 3, 3) of the platform to be commanded.
     """
 
     commanded: Array
@@ -38,13 +39,15 @@ class Correction:
     tilt: Array
     status: NDArray[np.int64]
     iterations: NDArray[np.int64]
+    rotation: Array
 
     @staticmethod
     def of(state: State, iterations: NDArray[np.int64]) -> Correction:
         """The part of a solver state that a correction is."""
         return Correction(
-            state.commanded, state.rho_nominal, state.rho, state.drive, state.tilt, state.status, iterations
-        )
+            state.commanded, state.rho_nominal, state.rho, state.drive, state.tilt, state.status, iterations,
+            state.commanded_rotation,
+        )  # fmt: skip
 
 
 def correct(
@@ -55,17 +58,21 @@ def correct(
     method: str = "newton",
     *,
     pose: bool = False,
+    rotation: Array | None = None,
 ) -> Correction:
     """Commanded tips t0F with F = f(t0 | t0F) at every point.
 
     aim (n, 3) mm programmed tips, force (n, 3) N at the tip, wrench (n, 6) at the platform reference; machine frame.
     method: newton = eq. (3), stiffness = eq. (4), fixed-point = eq. (5), linear = one step with the unloaded Cartesian
     compliance (baseline, no iteration). pose (newton, machines with six actuators): the orientation is brought back
-    too, not only the tip. Raises ValueError for an unknown method.
+    too, not only the tip. rotation (n, 3, 3): orientation of the platform that is asked for, and without pose commanded;
+    None: the one that the machine holds. Raises ValueError for an unknown method.
     """
     if method == "newton":
-        state = solve(machine, POSE if pose else TARGET, aim, force=force, wrench=wrench)
+        state = solve(machine, POSE if pose else TARGET, aim, aim_rotation=rotation, force=force, wrench=wrench)
         return Correction.of(replace(state, status=_why(machine, state)), state.passes)
+    if rotation is not None:
+        raise ValueError("only the method newton knows orientations")
     if method in ("stiffness", "fixed-point"):
         return _iterate(machine, aim, force, wrench, method)
     if method == "linear":
@@ -86,13 +93,17 @@ def _why(machine: Machine, state: State) -> NDArray[np.int64]:
 
 
 def settle(
-    machine: Machine, commanded: Array, force: Array, wrench: Array | None = None, aim: Array | None = None
-) -> tuple[Array, Correction]:
-    """Loaded tips (n, 3) of commanded tips, tF = f^-1(F | t0) (eq. 1), and the states as corrections of `aim`."""
-    state = solve(machine, FREE, commanded, force=force, wrench=wrench)
+    machine: Machine, commanded: Array, force: Array, wrench: Array | None = None, aim: Array | None = None, *,
+    rotation: Array | None = None,
+) -> tuple[Array, Correction]:  # fmt: skip
+    """Loaded tips (n, 3) of commanded tips, tF = f^-1(F | t0) (eq. 1), and the states as corrections of `aim`.
+
+    rotation (n, 3, 3): commanded orientation of the platform; None: the one that the machine holds.
+    """
+    state = solve(machine, FREE, commanded, aim_rotation=rotation, force=force, wrench=wrench)
     rho_nominal = state.rho_nominal
     if aim is not None:
-        rho_nominal = solve(machine, FREE, aim, force=np.zeros(3), check=False).rho_nominal
+        rho_nominal = solve(machine, FREE, aim, aim_rotation=rotation, force=np.zeros(3), check=False).rho_nominal
     state = replace(state, rho_nominal=rho_nominal, commanded=np.where(state.status[:, None] == 0, commanded, np.nan))
     return state.tip, Correction.of(state, state.passes)
 

@@ -1,0 +1,111 @@
+"""Orientation of the tool as programs state it, and what a control makes of it between two blocks.
+
+rpy: words A, B, C in degrees, roll, pitch and yaw: R = Rz(C) Ry(B) Rx(A). Between blocks each word goes linearly with the
+way, as in LinuxCNC, whose genserkins and genhexkins read them so. vector: words A3, B3, C3 of Sinumerik, the direction from
+the tip along the tool; between blocks it turns on a great circle (ORIVECT), and R is the smallest turn from +Z to it.
+
+R (3, 3) turns the tool from the orientation that the machine holds without such words, in axes of the program frame.
+
+Sources: LinuxCNC, posemath, pmRpyMatConvert; Siemens, Sinumerik 840D sl Job Planning, chapter Orientation.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from camcomp.ground.datatypes import Floats, Ints
+
+RPY, VECTOR = "rpy", "vector"
+LETTERS = {RPY: ("A", "B", "C"), VECTOR: ("A3", "B3", "C3")}
+UPRIGHT = {RPY: (0.0, 0.0, 0.0), VECTOR: (0.0, 0.0, 1.0)}
+NEAR_POLE_DEG = 89.0  # of B, from which on A and C turn about nearly the same axis
+_SAME_DIRECTION = 1e-12  # of the sine between two directions
+
+
+@dataclass(frozen=True, eq=False)
+class Orientation:
+    """Words (n, 3) of n motions at their starts and ends; deg for rpy, a unit vector for vector."""
+
+    form: str
+    start: Floats
+    end: Floats
+
+    def take(self, rows: Ints) -> Orientation:
+        """Those of some motions."""
+        return Orientation(self.form, self.start[rows], self.end[rows])
+
+    def words(self, motion: Ints, u: Floats) -> Floats:
+        """Words (k, 3) at fractions u (k,) of motions (k,)."""
+        return between(self.form, self.start[motion], self.end[motion], u)
+
+    def rotations(self, motion: Ints, u: Floats) -> Floats:
+        """Rotations (k, 3, 3) at fractions u (k,) of motions (k,)."""
+        return rotations_of(self.form, self.words(motion, u))
+
+
+def between(form: str, start: Floats, end: Floats, u: Floats) -> Floats:
+    """Words (k, 3) at fractions u (k,) between words (k, 3), as the control interpolates them."""
+    u = u[:, None]
+    if form == RPY:
+        return start + u * (end - start)
+    angle = np.arctan2(np.linalg.norm(np.cross(start, end), axis=1), np.einsum("ni,ni->n", start, end))[:, None]
+    sine = np.sin(angle)
+    near = sine < _SAME_DIRECTION
+    safe = np.where(near, 1.0, sine)
+    arc = (np.sin((1.0 - u) * angle) * start + np.sin(u * angle) * end) / safe
+    return _unit(np.where(near, start + u * (end - start), arc))
+
+
+def rotations_of(form: str, words: Floats) -> Floats:
+    """Rotations (k, 3, 3) of words (k, 3)."""
+    if form == VECTOR:
+        return _from_upright(_unit(words))
+    (a, b, c), one = np.radians(words.T), np.ones(len(words))
+    ca, sa, cb, sb, cc, sc = np.cos(a), np.sin(a), np.cos(b), np.sin(b), np.cos(c), np.sin(c)
+    rows = [
+        [cc * cb, cc * sb * sa - sc * ca, cc * sb * ca + sc * sa],
+        [sc * cb, sc * sb * sa + cc * ca, sc * sb * ca - cc * sa],
+        [-sb * one, cb * sa, cb * ca],
+    ]
+    out: Floats = np.moveaxis(np.array(rows), 2, 0)
+    return out
+
+
+def words_of(form: str, rotation: Floats, near: Floats) -> Floats:
+    """Words (k, 3) of rotations (k, 3, 3); of angles that differ by full turns those next to `near` (k, 3)."""
+    if form == VECTOR:
+        direction: Floats = rotation[:, :, 2].copy()
+        return direction
+    b = np.arctan2(-rotation[:, 2, 0], np.hypot(rotation[:, 2, 1], rotation[:, 2, 2]))
+    a = np.arctan2(rotation[:, 2, 1], rotation[:, 2, 2])
+    c = np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0])
+    one = np.degrees(np.stack((a, b, c), axis=1))
+    other = one * [1.0, -1.0, 1.0] + 180.0  # the same orientation over the other side of the pole
+    one, other = (each + 360.0 * np.round((near - each) / 360.0) for each in (one, other))
+    closer = np.linalg.norm(other - near, axis=1) < np.linalg.norm(one - near, axis=1)
+    out: Floats = np.where(closer[:, None], other, one)
+    return out
+
+
+def angles_of(form: str, words: Floats) -> Floats:
+    """Words (k, 3) of either form as A, B, C in degrees."""
+    return words if form == RPY else words_of(RPY, rotations_of(form, words), np.zeros_like(words))
+
+
+def _unit(vectors: Floats) -> Floats:
+    out: Floats = vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-300)
+    return out
+
+
+def _from_upright(direction: Floats) -> Floats:
+    """The smallest rotations (k, 3, 3) that bring +Z to directions (k, 3); about X where that is -Z."""
+    x, y, z = direction.T
+    down = z < -1.0 + 1e-12
+    f = 1.0 / np.where(down, 1.0, 1.0 + z)
+    out: Floats = np.moveaxis(
+        np.array([[1.0 - x * x * f, -x * y * f, x], [-x * y * f, 1.0 - y * y * f, y], [-x, -y, z]]), 2, 0
+    )
+    out[down] = np.diag([1.0, -1.0, -1.0])
+    return out
