@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-if TYPE_CHECKING:
-    from camcomp.ground.orientation import Orientation
+from camcomp.ground.orientation import Orientation
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

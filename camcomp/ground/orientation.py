@@ -14,8 +14,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from camcomp.ground.datatypes import Floats, Ints
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 RPY, VECTOR = "rpy", "vector"
 LETTERS = {RPY: ("A", "B", "C"), VECTOR: ("A3", "B3", "C3")}
