@@ -29,6 +29,7 @@ from camcomp.terminal.standard_streams import stand_in_for_closed
 # machine that does other things too. It has to be said before numpy is imported; a user's own setting stands.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+COMPLETING = "_CAMCOMP_COMPLETE"  # variable by which a shell asks what it may offer
 SHORT_OF_MEMORY = "there is not enough memory"
 SOON_S = 0.02  # longer than any object takes to be finalised
 ENOUGH = 1 << 26  # bytes; every verb that computes needs more
@@ -65,7 +66,11 @@ class _Verbs(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in self.list_commands(ctx):
             return None
-        out: click.Command | None = import_module(f"camcomp.terminal.commands.{cmd_name}").command
+        out: click.Command = import_module(f"camcomp.terminal.commands.{cmd_name}").command
+        if COMPLETING in os.environ:
+            from camcomp.terminal.completion import complete_values
+
+            return complete_values(out)
         return out
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
@@ -137,10 +142,10 @@ def main(args: list[str] | None = None) -> None:
 
 def run(args: list[str]) -> int:
     """Run one command line; the exit code. Messages go to standard error."""
-    if "_CAMCOMP_COMPLETE" in os.environ:
+    if COMPLETING in os.environ:
         from click.shell_completion import shell_complete
 
-        return shell_complete(cli, {}, "camcomp", "_CAMCOMP_COMPLETE", os.environ["_CAMCOMP_COMPLETE"])
+        return shell_complete(cli, {}, "camcomp", COMPLETING, os.environ[COMPLETING])
     try:
         with remembering_inputs(), _plugins_left_out(), cli.make_context("camcomp", list(args)) as context:
             code = cli.invoke(context)

@@ -1,0 +1,61 @@
+"""What a shell offers behind <TAB>: files, folders, and names of rules, machines, effects and dialects.
+
+The protocols of bash, zsh and fish are click's; here every parameter gets its kind by its name and metavar.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable
+
+import click
+from click.shell_completion import CompletionItem
+
+_FOLDER = re.compile(r"DIR$")
+_FILE = re.compile(r"FILE|PATH|\.(csv|json|html|yaml|nc|stl|sarif|xml)$|^(PROGRAM|ORIGINAL|CORRECTED|EXPERIMENT)$", re.IGNORECASE)
+
+
+def complete_values(command: click.Command) -> click.Command:
+    """The command, its parameters offering what they take; choices offer themselves."""
+    for each in command.params:
+        offer = _offer_of(each)
+        if offer is not None:
+            setattr(each, "shell_complete", offer)  # noqa: B010 - a method of this one parameter
+    return command
+
+
+def _offer_of(parameter: click.Parameter) -> Callable[[click.Context, str], list[CompletionItem]] | None:
+    metavar = (getattr(parameter, "metavar", None) or parameter.name or "").upper()
+    names = {"without": _effects, "rule": _rules, "machine": _machines, "dialect": _dialects}.get(parameter.name or "")
+    if names is not None and not isinstance(parameter.type, click.Choice):
+        return lambda _context, begun: [
+            CompletionItem(each) for each in sorted(names()) if each.lower().startswith(begun.lower())
+        ]
+    kind = "dir" if _FOLDER.search(metavar) else "file" if _FILE.search(metavar) else None
+    if kind is None:
+        return None
+    return lambda _context, begun: [CompletionItem(begun, type=kind)]
+
+
+def _effects() -> Iterable[str]:
+    from camcomp.ground.shelf import members
+
+    return members("effects")
+
+
+def _dialects() -> Iterable[str]:
+    from camcomp.ground.shelf import members
+
+    return members("dialects")
+
+
+def _machines() -> Iterable[str]:
+    from camcomp.api.project import machines
+
+    return (each.name for each in machines())
+
+
+def _rules() -> Iterable[str]:
+    from camcomp.ground.rules import RULES
+
+    return RULES
