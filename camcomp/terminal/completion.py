@@ -12,7 +12,9 @@ import click
 from click.shell_completion import CompletionItem
 
 _FOLDER = re.compile(r"DIR$")
-_FILE = re.compile(r"FILE|PATH|\.(csv|json|html|yaml|nc|stl|sarif|xml)$|^(PROGRAM|ORIGINAL|CORRECTED|EXPERIMENT)$", re.IGNORECASE)
+_FILE = re.compile(
+    r"FILE|PATH|\.(csv|json|html|yaml|nc|stl|sarif|xml)$|^(PROGRAM|ORIGINAL|CORRECTED|EXPERIMENT)$", re.IGNORECASE
+)
 
 
 def complete_values(command: click.Command) -> click.Command:

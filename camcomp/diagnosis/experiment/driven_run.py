@@ -24,7 +24,7 @@ from camcomp.diagnosis.fit.outliers import FAR_MM
 from camcomp.gcode.program import Program
 from camcomp.ground import path_geometry, shelf
 from camcomp.ground.datatypes import RAPID, Bools, Floats, Path
-from camcomp.ground.errors import ConfigError, Location
+from camcomp.ground.errors import ConfigError, Location, PhysicsError
 from camcomp.model.cutting.track import JOIN_ANGLE, Conditions, Track, lay_track
 from camcomp.model.effect import Cause
 from camcomp.model.motion.alignment import LOST_MM, Aligned, align, way_from_lines
@@ -115,7 +115,11 @@ def drive(
     if program is None or aligned is None:
         forces, told = Forces.none(len(tip)), False
     else:
-        cut = _behind(measured, rho, tip, program, twin) if by == "setpoint" else None
+        try:
+            cut = _behind(measured, rho, tip, program, twin) if by == "setpoint" else None
+        except PhysicsError:  # encoders in another unit are out of reach, too
+            check_places(log, name, measured, rho, tip, twin.actuators, rotary, lambda: tip)
+            raise
         told = by == "setpoint" and cut is None
         forces = cutting_forces(
             program.track, cut or aligned, tip, measured.time, program.rests, bool(np.isfinite(measured.line).any())

@@ -243,7 +243,6 @@ def test_drives_of_arms_in_newton_metres_are_doubted(capsys, tmp_path):
     [
         (MACHINE.replace("constant, Fr_N: 100, Ft_N: -50, Fz_N: 0", "table, file: none.csv"), "CC500", 12, 5),
         ("process: {force: {model: table, file: none.csv}}", "CC500", 1, 5),
-        ("".join(each for each in MACHINE.splitlines(True) if "name: y" not in each), "CC205", 2, 2),
         (MACHINE.replace("name: y", "name: x"), "CC205", 7, 2),
         (MACHINE + "process: {depth_mm: 1}\n", "CC207", 13, 2),
         (MACHINE + "effects: [{effect: backlash, target: q, width_mm: 0.1}]\n", "CC205", 13, 2),
