@@ -232,6 +232,8 @@ class AmplitudePosterior:
 
     def blocks_without(self, blocks: Sequence[Ints]) -> list[tuple[Floats, Floats]]:
         """Normal equations of several groups of further columns, each alone, with all live ones integrated out."""
+        if not blocks:
+            return []
         square = self.noise**2
         columns = np.concatenate(list(blocks))
         left = self.scale[:, None] * self.data.A[np.ix_(self.live, columns)] / square

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from camcomp.diagnosis.model.candidates import Place
-from camcomp.diagnosis.model.evidence import Members, Reduced
+from camcomp.diagnosis.model.evidence import LONG, Members, Reduced
 
 MOST = 5  # causes of a set
 KEPT = 12  # sets of each size that are enlarged
@@ -28,16 +28,21 @@ class Visited:
 
 
 def search_sets(data: Reduced, most: int = MOST, among: Collection[Place] | None = None) -> Visited:
-    """Sets of up to `most` causes at some places, or all, with their log posteriors."""
+    """Sets of up to `most` causes at some places, or all, with their log posteriors.
+
+    A set has at most one candidate of more than LONG columns, which is tried with the best set of each size.
+    """
     candidates = data.model.candidates
     usable = [i for i in data.usable if among is None or candidates[i].place in among]
+    long = {i for i in usable if len(candidates[i].columns) > LONG}
     values: dict[Members, float] = {(): data.value(())}
 
     def enlarge(members: Members) -> list[Members]:
         if len(members) == most:
             return []
         taken = {candidates[i].place for i in members}
-        more = [i for i in usable if candidates[i].place not in taken]
+        full = bool(long & set(members)) or members not in leaders
+        more = [i for i in usable if candidates[i].place not in taken and not (full and i in long)]
         grown = {tuple(sorted((*members, i))): i for i in more}
         new = {each: i for each, i in grown.items() if each not in values}
         if new:
@@ -45,13 +50,16 @@ def search_sets(data: Reduced, most: int = MOST, among: Collection[Place] | None
         return list(grown)
 
     front: list[Members] = [()]
+    leaders: set[Members] = {()}
     for size in range(1, most + 1):
         found = {each for members in front for each in enlarge(members)}
         front = sorted(found, key=lambda m: (-values[m], m))[: KEPT if size > 1 else 2 * KEPT]
+        leaders |= set(front[:1])
         if not front or (size > 1 and values[front[0]] < max(values.values()) - SLACK):
             break
     best = None
     while best != (best := Visited(values).best):
+        leaders.add(best)
         for k in range(len(best)):
             less = (*best[:k], *best[k + 1 :])
             if less not in values:
