@@ -268,7 +268,7 @@ def test_every_line_is_answered_and_errors_do_not_stop_it(job, stream):
     for name, q, f in zip("xyz", point.actuators, point.drive, strict=True):
         assert float(rows[0][f"act_{name}_mm"]) == pytest.approx(q, abs=2e-6)
         assert float(rows[0][f"act_{name}_N"]) == pytest.approx(f, abs=2e-3)
-    assert b"2 set-points" in done.stderr and b"2 errors" in done.stderr
+    assert b"2 set-points" in done.stderr and b"2 lines with an error" in done.stderr
 
 
 def test_json_answers(job):
