@@ -301,7 +301,7 @@ def test_as_many_answers_as_lines_in_their_order():
     text = "\n".join(rows).encode("utf-8", "surrogatepass") + b"\n25,0"
     wrong = [False, True, True, False, True, True, True, False, True, True, True]
     told, said = served(text)
-    assert [row["error"] != "" for row in csv.DictReader(told)] == wrong and "8 errors" in said
+    assert [row["error"] != "" for row in csv.DictReader(told)] == wrong and "8 lines with an error" in said
     told, _ = served(text, "--json")
     assert ["error" in json.loads(line) for line in told] == wrong
     assert [json.loads(line).get("line", 0) for line in told] == [0, 2, 3, 0, 5, 6, 7, 0, 9, 10, 11]
@@ -324,7 +324,7 @@ def test_a_supervisor_ends_the_stream_and_is_told_what_was_done():
         process.terminate()
         assert process.wait(10) == 128 + signal.SIGTERM
         said = process.stderr.read()
-    assert b"1 set-points" in said and b"0 errors" in said and b"Traceback" not in said
+    assert b"1 set-points" in said and b"0 lines with an error" in said and b"Traceback" not in said
 
 
 def test_what_is_no_number_is_no_answer(monkeypatch, tmp_path):
