@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from camcomp.forces.table import Params, force
-from camcomp.ground.errors import FileError
+from camcomp.ground.errors import ConfigError, FileError
 from camcomp.model.cutting.cut import Cut
 from camcomp.model.cutting.frame import to_vector
 
@@ -39,13 +39,17 @@ def test_path_forces_are_taken_as_they_are_and_a_changed_file_is_read_again(tmp_
     np.testing.assert_array_equal(force(cut(), Params(file=str(file))), [[10, 20, 30]] * 3)
 
 
-@pytest.mark.parametrize("content", [None, b"s_mm,\xff\n"])
-def test_a_file_that_cannot_be_read(tmp_path: Path, content: bytes | None) -> None:
-    if content is not None:
-        (tmp_path / "forces.csv").write_bytes(content)
+def test_a_file_that_is_not_there(tmp_path: Path) -> None:
     with pytest.raises(FileError) as caught:
         force(cut(), Params(file=str(tmp_path / "forces.csv")))
     assert caught.value.rule == "CC500" and "forces.csv" in caught.value.message
+
+
+def test_bytes_that_are_no_text_are_refused_in_their_cell(tmp_path: Path) -> None:
+    (tmp_path / "forces.csv").write_bytes(b"s_mm,Fr_N,Ft_N,Fz_N\n0,\xff,2,3\n")
+    with pytest.raises(ConfigError) as caught:
+        force(cut(), Params(file=str(tmp_path / "forces.csv")))
+    assert (caught.value.rule, caught.value.at.line, caught.value.at.column) == ("CC262", 2, 3)
 
 
 def test_before_a_jump_the_end_of_a_motion_takes_the_row_before_it(tmp_path: Path) -> None:

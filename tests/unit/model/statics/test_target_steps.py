@@ -22,7 +22,9 @@ def test_steps_are_halved_until_the_iteration_converges(gain, monkeypatch):
     def settle(machine, commanded, force, wrench, aim):
         n = len(commanded)
         blank, whole = np.zeros((n, 3)), np.zeros(n, np.int64)
-        return None, target.Correction(commanded, blank, blank, blank, blank, whole, whole)
+        return None, target.Correction(
+            commanded, blank, blank, blank, blank, whole, whole, np.tile(np.eye(3), (n, 1, 1))
+        )
 
     monkeypatch.setattr(target, "solve", solve)
     monkeypatch.setattr(target, "settle", settle)
