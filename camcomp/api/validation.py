@@ -9,8 +9,9 @@ from typing import TypeVar
 
 from camcomp.ground.errors import CamcompError, raise_all
 from camcomp.ground.files import read_bytes
+from camcomp.model.config.doubt import Doubt
 from camcomp.model.config.load import check_config, is_experiment, load_config, load_experiment
-from camcomp.model.config.plausible import Doubt, doubts
+from camcomp.model.config.plausible import doubts
 from camcomp.model.config.spec import Config
 
 __all__ = ["Doubt", "check_file"]

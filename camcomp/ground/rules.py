@@ -455,6 +455,12 @@ RULES: dict[str, Rule] = {
         "No motion of the program takes anything off the stock, so the stock lies elsewhere or the program is another one.",
         "the stock is given in mm in the program frame of G54: check its place, the unit of an STL file, and the zero of the program",
     ),
+    "CC299": Rule(
+        "tool table not usable",
+        "`tools: {file: ...}` names the tool table of a control or a CAM system: LinuxCNC (.tbl), FreeCAD (.fctl, .fctb), CSV "
+        "(.csv). It is not one of these, or a line of it cannot be read.",
+        "docs/how-to/stock.md shows the files that are read",
+    ),
     # --- CC3xx physics -----------------------------------------------------------------------------------------
     "CC301": Rule(
         "no convergence",

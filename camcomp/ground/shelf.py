@@ -20,7 +20,7 @@ from typing import Any
 
 from camcomp.ground.errors import ConfigError, Location, PluginWarning, Terminated
 
-SHELVES = ("robots", "dialects", "forces", "effects", "comments")
+SHELVES = ("robots", "dialects", "forces", "effects", "comments", "tool_tables")
 
 _checked: dict[tuple[str, str], tuple[Any, Any]] = {}  # what an entry point named, and the same found to be usable
 

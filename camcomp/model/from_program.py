@@ -52,6 +52,11 @@ def job_of_program(job: Job, source: BinaryIO | bytes, name: str, choice: StockC
 
 
 def _taking(job: Job, taken: TakenFromProgram) -> Job:
+    tables = tuple(
+        f"{each.at.file}:{each.at.line}: {each.text}" if each.at else each.text for each in job.config.doubts
+    )
+    if tables:
+        taken = replace(taken, remarks=(*tables, *taken.remarks))
     return job if taken == TakenFromProgram() else replace(job, config=taken.into(job.config), taken=taken)
 
 
@@ -82,7 +87,7 @@ def _tools_of(config: Config, stated: Stated) -> tuple[dict[int, Cutter], tuple[
     for each in stated.tools:
         own = Cutter.model_validate({"teeth": config.tool.teeth, **each.keys})
         here = f"line {each.comment.line}: T{each.number} {own.type} {own.diameter_mm:g} mm ({each.reader})"
-        known = tools.get(each.number) or config.tools.get(each.number, config.tool)
+        known: Cutter = tools.get(each.number) or config.tools.get(each.number) or config.tool
         if known.diameter_mm is None:
             tools[each.number] = own
             said.append(here)

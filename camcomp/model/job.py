@@ -67,7 +67,8 @@ class Job:
         """
         parts = self.config.model_dump(mode="json", include={"robot", "workpiece", "tool", "process", "effects"})
         if self.config.tools:
-            parts["tools"] = self.config.model_dump(mode="json", include={"tools"})["tools"]
+            own = {"tools": {"__all__": {"file"}}}
+            parts["tools"] = self.config.model_dump(mode="json", include={"tools"}, exclude=own)["tools"]
         for section, keys in _LATER.items():  # what was not there before changes nothing where it is not given
             parts[section] = {key: v for key, v in parts[section].items() if v is not None or key not in keys}
         if self.config.uncertain and self.config.compensation.policy != "full":  # then the program depends on them

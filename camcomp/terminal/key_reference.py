@@ -19,6 +19,7 @@ from pydantic.fields import FieldInfo
 from camcomp.ground import shelf
 from camcomp.ground.files import shipped
 from camcomp.model.config.base import Spec
+from camcomp.model.config.cutting_tool import ToolTableFile
 from camcomp.model.config.load import params_of
 from camcomp.model.config.spec import Config, EffectChoice, Experiment, ForceChoice
 from camcomp.model.config.yaml_tree import Node, plain, read_tree
@@ -138,6 +139,8 @@ def sections(root: type[BaseModel]) -> list[KeySection]:
         found[key] = KeySection(spec, [path], picked, note)
         for name, each in spec.model_fields.items():
             below = each.alias or name
+            if (spec, name) == (Config, "tools"):
+                visit(ToolTableFile, "tools", {})
             for kind, where in _specs_in(each.annotation, f"{path}.{below}" if path else below):
                 visit(kind, where, _picks(kind))
         if spec in _CHOICES:
@@ -241,6 +244,8 @@ def default_text(given: FieldInfo) -> str:
 
 def example_of(key: str, given: FieldInfo, section: KeySection) -> str:
     """A value that a file may have, as YAML in one line; empty where nobody has given one."""
+    if given.examples:
+        return _flow(given.examples[0])
     shown = _shipped_examples()
     for path in section.paths:
         for words in (tuple(sorted(section.picked.values())), ()):

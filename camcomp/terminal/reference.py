@@ -158,6 +158,10 @@ def _library() -> str:
     parts.append("## Comments that state stock and tools (`--stock comments`)\n")
     readers = [(name, shelf.load("comments", name)) for name in shelf.members("comments")]
     parts.append(_table(("name", "written as", "what it is"), [(f"`{n}`", r.TITLE, _first(r)) for n, r in readers]))
+    parts.append("## Tool tables (`tools: {file: NAME}`)\n")
+    tables = [(name, shelf.load("tool_tables", name)) for name in shelf.members("tool_tables")]
+    shown = [(f"`{name}`", ", ".join(f"`{each}`" for each in r.SUFFIXES), r.TITLE, _first(r)) for name, r in tables]
+    parts.append(_table(("name", "suffix", "file", "what it is"), shown))
     parts.append("## Effects (`effects: [{effect: NAME, target: ...}]`)\n")
     parts += [_effect(name) for name in shelf.members("effects")]
     parts += _formulas()

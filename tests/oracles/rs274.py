@@ -61,8 +61,12 @@ def run(
     offsets: Mapping[int, tuple[float, float, float]] | None = None,
     tools: Mapping[int, float] | None = None,
     homes: Mapping[int, tuple[float, float, float]] | None = None,
+    table: str = "",
 ) -> Run:
-    """Execute a program. `offsets` in mm by work offset number 1 to 9, `tools` lengths in mm, `homes` by G code."""
+    """Execute a program. `offsets` in mm by work offset number 1 to 9, `tools` lengths in mm, `homes` by G code.
+
+    table: a tool table in inches, in place of `tools`.
+    """
     with tempfile.TemporaryDirectory() as folder:
         root = Path(folder)
         data = program if isinstance(program, bytes) else program.encode()
@@ -76,8 +80,8 @@ def run(
                 variables[(5161 if code == 28 else 5181) + axis] = place[axis] / 25.4
         (root / "rs274.var").write_text("".join(f"{n}\t{v:.9f}\n" for n, v in sorted(variables.items())))
         # The stand-alone interpreter takes tool table and variables for inches.
-        table = "".join(f"T{n} P{n} Z{z / 25.4:.9f} D0\n" for n, z in (tools or {}).items())
-        (root / "tool.tbl").write_text(table or "T99 P99 Z0 D0\n")
+        lengths = "".join(f"T{n} P{n} Z{z / 25.4:.9f} D0\n" for n, z in (tools or {}).items())
+        (root / "tool.tbl").write_text(table or lengths or "T99 P99 Z0 D0\n")
         command = [str(binary()), "-g", "-v", "rs274.var", "-t", "tool.tbl", "program.ngc"]
         for _ in range(3):
             done = subprocess.run(

@@ -35,6 +35,28 @@ class Cutter(Spec):
         return self
 
 
+class NumberedCutter(Cutter):
+    """The cutting part of the tool with this T number."""
+
+    file: str | None = Field(
+        None,
+        examples=["6mm_Ball_End.fctb"],
+        description="FreeCAD tool bit (.fctb) that states the keys which are left out; from the folder of the config file",
+    )
+
+
+class ToolTableFile(Spec):
+    """Tools from a table of another program; tools that stand under their numbers as well count as written there."""
+
+    file: str | None = Field(
+        None,
+        examples=["tool.tbl"],
+        description="tool table: LinuxCNC (.tbl), FreeCAD (.fctl) or CSV (.csv), from the folder of the config file; "
+        "`tools: FILE` means the same",
+    )
+    unit: Literal["mm", "inch"] = Field("mm", description="of a tool.tbl, which states none: that of the machine")
+
+
 Resolution = Annotated[float, Field(ge=0.01, le=5.0)] | None
 _RESOLUTION = Field(None, description="distance of the nodes of the height field; default: by the smallest tool")
 

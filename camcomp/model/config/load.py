@@ -17,6 +17,7 @@ from camcomp.model.config.robot import RevoluteActuator, RobotSpec
 from camcomp.model.config.spec import Config, EffectChoice, Experiment
 from camcomp.model.config.spread import Spread, UncertainInput, replaced, without_spreads
 from camcomp.model.config.stated import in_stated_dialect
+from camcomp.model.config.tool_table import with_tool_tables
 from camcomp.model.config.write_back import key_of_effect
 from camcomp.model.config.yaml_check import check, choose
 from camcomp.model.config.yaml_tree import Node, merge, plain, read_tree, tree_of
@@ -41,13 +42,14 @@ def load_config(paths: Sequence[Path | str]) -> Config:
     if tree is None:
         _raise(errors)
         raise ConfigError("CC212", "no configuration is given", hint="name one with --config FILE")
+    tree, table_doubts, wrong_tables = with_tool_tables(tree)
     if _get(tree, "robot") is None:
         errors.append(ConfigError("CC212", "there is no section 'robot'", at=tree.at))
     tree, spreads, more = _certain(tree)
     config, wrong = _check_config(tree)
-    _raise([*errors, *more, *wrong])
+    _raise([*errors, *wrong_tables, *more, *wrong])
     assert config is not None
-    config._spreads = tuple(spreads)
+    config._spreads, config._doubts = tuple(spreads), tuple(table_doubts)
     return in_stated_dialect(config)
 
 
@@ -61,11 +63,12 @@ def check_config(paths: Sequence[Path | str]) -> Config | None:
     more: list[CamcompError] = []
     config: Config | None = None
     if tree is not None:
+        tree, table_doubts, wrong_tables = with_tool_tables(tree)
         tree, spreads, more = _certain(tree)
         config, wrong = _check_config(tree)
-        more += wrong
+        more += [*wrong_tables, *wrong]
         if config is not None:
-            config._spreads = tuple(spreads)
+            config._spreads, config._doubts = tuple(spreads), tuple(table_doubts)
     if _get(tree, "robot", "name") is None:
         more = [each for each in more if each.rule != "CC203"]
     _raise([*errors, *more, *_force_files(_get(tree, "process", "force"))])

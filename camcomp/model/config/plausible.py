@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
-from camcomp.ground.errors import Location
+from camcomp.model.config.doubt import Doubt
 from camcomp.model.config.links import Spring
 from camcomp.model.config.robot import LinkSpec, ParallelogramSpec, PrismaticActuator, RevoluteActuator
 from camcomp.model.config.spec import Config
@@ -19,20 +18,9 @@ USUAL_NMM_PER_RAD = (3.0e6, 1.0e12)
 SHORTEST_LEVER_MM = 1.0
 
 
-@dataclass(frozen=True)
-class Doubt:
-    """Something that is hardly meant, and where it stands."""
-
-    text: str
-    at: Location | None
-
-    def __str__(self) -> str:
-        return f"{self.text} (line {self.at.line})" if self.at else self.text
-
-
 def doubts(config: Config) -> list[Doubt]:
     """What in a machine file is hardly meant."""
-    return [*_drives(config), *_links(config), *_process(config), *_tool(config)]
+    return [*config.doubts, *_drives(config), *_links(config), *_process(config), *_tool(config)]
 
 
 def _drives(config: Config) -> Iterator[Doubt]:

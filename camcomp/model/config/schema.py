@@ -7,6 +7,7 @@ from typing import Any
 from pydantic import BaseModel
 
 from camcomp.ground import shelf
+from camcomp.model.config.cutting_tool import ToolTableFile
 from camcomp.model.config.load import ROBOT_KEYS, params_of
 from camcomp.model.config.spec import Config, EffectChoice, Experiment, ForceChoice
 from camcomp.model.config.spread import SECTIONS
@@ -42,9 +43,18 @@ def config_schema() -> Schema:
     _offer(definitions, ForceChoice.__name__, "forces", "model", {}, [])
     target = definitions[EffectChoice.__name__]["properties"]["target"]
     _offer(definitions, EffectChoice.__name__, "effects", "effect", {"target": target}, [])
+    schema["properties"]["tools"] = _or_file(schema["properties"]["tools"])
     definitions |= _uncertain(definitions, schema["properties"])
     definitions[_UNCERTAIN] = _SPREAD
     return {"$schema": _DRAFT, **schema, "title": "camcomp machine file"}
+
+
+def _or_file(tools: Schema) -> Schema:
+    """Tools by number, with the keys of a tool table, or the name of one alone."""
+    about = {key: each for key, each in tools.items() if key in ("title", "description", "default")}
+    keys = _draft07(ToolTableFile.model_json_schema(by_alias=True))["properties"]
+    named = {key: each for key, each in tools.items() if key not in about}
+    return {**about, "anyOf": [{**named, "properties": keys}, {"type": "string"}]}
 
 
 def _uncertain(definitions: Schema, sections: Schema) -> Schema:

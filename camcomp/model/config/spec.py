@@ -8,7 +8,8 @@ from pydantic_core import PydanticCustomError
 from camcomp.gcode.path_mode import PATTERN
 from camcomp.ground.errors import Location
 from camcomp.model.config.base import NotNegative, Positive, Spec, Vector, Zero, exactly_one
-from camcomp.model.config.cutting_tool import Cutter, Stock
+from camcomp.model.config.cutting_tool import Cutter, NumberedCutter, Stock
+from camcomp.model.config.doubt import Doubt
 from camcomp.model.config.robot import RobotSpec
 from camcomp.model.config.spread import Spread
 from camcomp.model.config.yaml_tree import Node, find
@@ -190,7 +191,7 @@ class Config(Spec):
     robot: RobotSpec
     workpiece: Workpiece = Field(default_factory=lambda: Workpiece())
     tool: Tool = Field(default_factory=lambda: Tool())
-    tools: dict[ToolNumber, Cutter] = Field(
+    tools: dict[ToolNumber, NumberedCutter] = Field(
         default_factory=dict, description="cutting parts by T number; other tools are as in the section tool"
     )
     process: Process = Field(default_factory=lambda: Process())
@@ -200,11 +201,17 @@ class Config(Spec):
 
     _tree: Node | None = PrivateAttr(None)
     _spreads: tuple[Spread, ...] = PrivateAttr(())
+    _doubts: tuple[Doubt, ...] = PrivateAttr(())
 
     @property
     def spreads(self) -> tuple[Spread, ...]:
         """The numbers that are not known exactly; everywhere else they count as their values."""
         return self._spreads
+
+    @property
+    def doubts(self) -> tuple[Doubt, ...]:
+        """What the tool tables of the file contradict or leave open."""
+        return self._doubts
 
     @property
     def uncertain(self) -> bool:

@@ -7,6 +7,7 @@ diameter; there the tool meets less than a slot.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -135,7 +136,7 @@ class RapidsAtDepth:
         ]
 
 
-def _beside_share(path: Path, on: Ints, cutters: list[Cutter]) -> float:
+def _beside_share(path: Path, on: Ints, cutters: Sequence[Cutter]) -> float:
     """Share of the lateral feed path (motions `on`) beside an earlier pass of the same height; 0 below the least share."""
     diameter = min((each.diameter_mm for each in cutters if each.diameter_mm), default=None)
     if diameter is None or not len(on):
