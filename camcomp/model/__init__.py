@@ -1,3 +1,1 @@
-"""The machine as camcomp believes it to be, which compensation and diagnosis share; neither of them may be imported
-here.
-"""
+"""Forward model of machine, controller and cut, shared by compensation and diagnosis; it imports neither of them."""

@@ -1,4 +1,4 @@
-"""The axes X, Y, Z of a machine as its guideways know them: where they stand, which way they came, what they bear."""
+"""Axes X, Y, Z of a machine for hooks of guideways: position, direction of travel, and arm to the tip."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ _ALONG = 0.999  # cosine to an axis of the machine from which on a slide is that
 def axes_of(robot: Robot, motion: Motion, tip: Floats, origin: Floats) -> Axes:
     """Axes for tips (n, 3), machine frame; origin (3,) of the program.
 
-    A carriage bears the slides that follow it in the chain. Where several chains hold the platform, or no slide runs
-    along an axis, the axis is that of the tip's own coordinate and bears the tool alone.
+    A carriage carries the slides that follow it in the chain. With several chains, or without a slide along an axis, the
+    axis is that of the tip's coordinate and carries the tool alone.
     """
     tool = robot.held_rotation @ robot.tool
     position = tip - tool
@@ -30,7 +30,7 @@ def axes_of(robot: Robot, motion: Motion, tip: Floats, origin: Floats) -> Axes:
 
 
 def slides_of(robot: Robot) -> list[tuple[int, int, float]]:
-    """(axis, actuator, sense) of the slides along X, Y, Z from the base on; none where several chains hold the platform."""
+    """(axis, actuator, sense) of the slides along X, Y, Z from the base on; empty for machines with several chains."""
     if len(robot.chains) != 1:
         return []
     turned, actuator = np.asarray(robot.chains[0].frame), -1

@@ -1,4 +1,4 @@
-"""NC programs from disk, read as the control of a machine file would read them."""
+"""NC programs from disk, read as the controller of a machine file reads them."""
 
 import math
 from collections.abc import Iterable
@@ -20,7 +20,7 @@ ORIENTING_ACTUATORS = 6  # of a machine that holds the orientation of its tool
 
 
 def setup_of(config: Config) -> Setup:
-    """The control before the program starts, in the terms of the reader."""
+    """State of the controller at the start of the program, for the reader."""
     control = config.control
     places = {name: _triple(value) for name, value in control.reference_positions_mm.items()}
     turned = any(config.workpiece.rotation)
@@ -45,28 +45,32 @@ def setup_of(config: Config) -> Setup:
 
 
 def limits_of(config: Config) -> ControlLimits:
-    """What the control keeps to."""
+    """Limits of the controller: acceleration, velocity, cycle time and look-ahead."""
     control = config.control
     velocity = math.inf if control.velocity_mm_per_s is None else control.velocity_mm_per_s
     return ControlLimits(control.acceleration_mm_per_s2, velocity, control.block_time_s, control.look_ahead_blocks)
 
 
 def waiting_s(config: Config, dwelt_s: float, tool_changes: int) -> float:
-    """Time of a program beside its moves."""
+    """Time (s) of dwells and tool changes, which the moves of a program do not contain."""
     return dwelt_s + tool_changes * config.control.tool_change_s
 
 
 def open_program(path: str | Path, config: Config | None = None) -> Program:
-    """A program read with the control of `config`, or with a control's defaults.
+    """Read a program with the controller of `config`, or with a controller's defaults.
 
-    Raises FileError when there is no such file, ProgramError with every mistake in it.
+    Raises:
+        FileError: the file cannot be read.
+        ProgramError: one entry per error of the program.
     """
     return program_of(read_bytes(path), display_name(path), config)
 
 
 def program_of(data: bytes, name: str, config: Config | None = None) -> Program:
-    """A program from its bytes, read with the control of `config`. Raises ProgramError with every mistake in it, or with one
-    where it is no program at all.
+    """Read a program from its bytes with the controller of `config`.
+
+    Raises:
+        ProgramError: one entry per error of the program; a single one if the bytes are no program.
     """
     setup = setup_of(config) if config else Setup()
     dialect = config.control.dialect if config else dialect_without_config()

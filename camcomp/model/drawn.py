@@ -1,4 +1,4 @@
-"""Machines as they may be: what is not known exactly differs from what the control and the compensation take it to be."""
+"""Machines within the stated spreads: true values of uncertain inputs against the believed ones of the controller."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from camcomp.model.statics.description import Robot
 
 @dataclass(frozen=True, eq=False)
 class DrawnJob(Job):
-    """A job whose config is one that may be true; its control goes by the numbers of the job that is believed.
+    """A job with one possible true config, whose controller computes with the numbers of the believed job.
 
-    Geometry, the tool's length and the place of the workpiece are those of the believed job wherever the control computes
-    with them, and those of the own config where the tip goes.
+    Inverse kinematics, tool length and workpiece position of the controller are those of the believed job; the motion of
+    the tip follows the own config.
     """
 
     believed: Job
 
     @cached_property
     def frame(self) -> Frame:
-        """Program frame as the control has it."""
+        """Program frame of the controller."""
         return self.believed.frame
 
     @cached_property
@@ -36,7 +36,7 @@ class DrawnJob(Job):
         return (replace(own, held=nominal.held) if len(own.actuators) == 6 else own), nominal
 
     def on_the_workpiece(self, tip: Floats) -> Floats:
-        """Tips (n, 3), in the frame that the control believes in, as seen from the workpiece."""
+        """Tips (n, 3) mm relative to the true workpiece, for tips in the frame of the controller."""
         if self.config.workpiece == self.believed.config.workpiece:
             return tip
         own = Job(self.config).frame
@@ -45,7 +45,7 @@ class DrawnJob(Job):
 
 @dataclass(frozen=True, eq=False)
 class UncertainJob:
-    """A job and one uncertain input of it, a standard deviation above its value and below; None where that is not allowed."""
+    """One uncertain input of a job, and the jobs one standard deviation above and below its value; None where refused."""
 
     source: UncertainInput
     above: DrawnJob | None
@@ -53,27 +53,27 @@ class UncertainJob:
 
     @property
     def sections(self) -> set[str]:
-        """Sections of the config that it is in."""
+        """Sections of the config that contain the input."""
         return {str(each.keys[0]) for each in self.source.members}
 
     @property
     def moves_machine(self) -> bool:
-        """Whether the machine depends on it, not only the cutting force."""
+        """Whether the machine depends on the input, in addition to the cutting force."""
         return bool(self.sections & {"robot", "tool", "workpiece"})
 
     @property
     def moves_force(self) -> bool:
-        """Whether the cutting force may depend on it."""
+        """Whether the cutting force may depend on the input."""
         return bool(self.sections & {"process", "tool", "workpiece"})
 
     @property
     def sides(self) -> Sequence[DrawnJob]:
-        """The allowed ones."""
+        """The jobs above and below that the spec allows."""
         return [each for each in (self.above, self.below) if each is not None]
 
 
 def uncertain_jobs(job: Job) -> list[UncertainJob]:
-    """One for every uncertain input of the config."""
+    """One UncertainJob per uncertain input of the config."""
 
     def side(source: UncertainInput, size: float) -> DrawnJob | None:
         config = varied(job.config, source, size)

@@ -1,6 +1,6 @@
-"""What an effect is: one way in which a machine differs from its model, as a module with parameters and hooks.
+"""Types of effects: a module with parameters and hooks describes one difference between a machine and its model.
 
-What such a module has to have, and what its hooks are given, stands in camcomp/plugins/effects.py.
+camcomp/plugins/effects.py states the interface of such a module and the arguments of its hooks.
 camcomp/model/signal_path.py calls the hooks, stage by stage, effects in the order of the config.
 """
 
@@ -21,14 +21,14 @@ Target = Literal["actuator", "machine", "either", "named"]
 
 @dataclass(frozen=True)
 class Parameter:
-    """One number of an effect: unit, bounds and what is known about its size before any measurement.
+    """One number of an effect: unit, bounds and prior size.
 
-    `scale` is the size that is typical where the effect is present, `tolerance` the size that every healthy machine
-    has and no model states; both in `unit`, or as differences of the natural logarithm where `log` (factors). `sign` +1: never below
-    nominal. `scan`: a shape (a pitch, a time constant) that nothing shows while the effect is absent; the values to
-    try first. `turns`: such a shape is a period of the drive's way, and what was driven has to hold it that often to tell it from
-    any other curve. `placed`: such a shape is an instant on the common clock, found where something begins or ends. `either`: a
-    shape that is one of a few values (which of two laws holds); the fit takes the one that explains more.
+    `scale` is the typical size where the effect is present, `tolerance` the size on a healthy machine; both in `unit`, or as
+    differences of the natural logarithm where `log` (factors). `sign` +1: never below nominal.
+
+    A shape parameter (a pitch, a time constant) has no influence while the effect is absent:
+    `scan`: its starting values. `turns`: it is a period of the drive's travel, which has to contain at least so many periods
+    to identify it. `placed`: it is an instant on the common clock. `either`: it takes one of these values; the fit chooses.
     """
 
     name: str
@@ -48,7 +48,7 @@ class Parameter:
 
     @property
     def shape(self) -> bool:
-        """Whether nothing shows of it while the effect is absent."""
+        """Whether it is a shape parameter: without influence while the effect is absent."""
         return bool(self.scan or self.either)
 
     def value(self, coordinate: float) -> float:
@@ -68,12 +68,12 @@ class Parameter:
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """How the machine moves through n instants in order: what hooks may depend on. m actuators, mm or rad, s.
+    """Motion of the machine through n instants in order, as hooks see it; m actuators, mm or rad, s.
 
-    `direction` is the sign of travel with its memory: +1, -1, in between while a reversal takes up its presliding
-    distance, 0 where no move has been seen yet. `ordered` is false for poses that are not a movement. `held` works out, when it
-    is called, what the drives `names` exert against the load as modelled; None where no load is known. `told` works out where the
-    set-points lead the tip; None where nobody knows. `masses` works out the loads of the stated masses; None where none are stated.
+    `direction` is the sign of travel with memory: +1, -1, between them within the presliding distance of a reversal, 0
+    before the first move. `ordered` is false for poses that are not a movement. `held` computes the modelled forces of the
+    drives `names` against the load; `told` the tips of the set-points; `masses` the loads of the stated masses. These three
+    are None where they are unknown.
     """
 
     time: Floats  # (n,) s since the start of the run
@@ -86,16 +86,16 @@ class Motion:
     home: Floats  # (m,)
     stiffness: Floats  # (m,) of the drives, N/mm or N mm/rad; inf = rigid
     ordered: bool = True
-    nut: Floats | None = None  # (n, m) encoder and what the screw makes of it, for guides; None: as the encoder
+    nut: Floats | None = None  # (n, m) encoder plus errors of the screw, for guides; None: as the encoder
     names: tuple[str, ...] = ()  # of the actuators
     held: Callable[[], Floats] | None = None  # (n, m) N or N mm
     told: Callable[[], Floats] | None = None  # (n, 3) mm, program frame
-    cut_before_min: float = 0.0  # of cut_min, what was cut in earlier runs
+    cut_before_min: float = 0.0  # part of cut_min in earlier runs
     masses: Callable[[], MassLoads] | None = None
     seams: Seams | None = None  # where a recording begins or goes on in motion; None: it starts at rest
 
     def at(self, instants: Ints | slice) -> Self:
-        """The same at some of the instants: no movement any more, nor what is worked out for all of them."""
+        """Some of the instants, as unordered poses without the functions of all instants."""
         return replace(
             self,
             time=self.time[instants],
@@ -120,7 +120,7 @@ class Motion:
 
 @dataclass(frozen=True, eq=False)
 class Load:
-    """Load on the tool in the machine frame: cutting force at the tip, and what pulls at the platform reference."""
+    """Load on the tool in the machine frame: cutting force at the tip, and wrench at the platform reference."""
 
     force: Floats  # (n, 3) N
     wrench: Floats  # (n, 6) N, N mm
@@ -128,11 +128,11 @@ class Load:
 
 @dataclass(frozen=True, eq=False)
 class Axes:
-    """Where the axes X, Y, Z of a machine stand in n instants: what hooks of guideways may depend on; mm, machine frame.
+    """Axes X, Y, Z of a machine at n instants, as hooks of guideways see them; mm, machine frame.
 
-    `position` is that of the platform reference, which on a machine of slides is what their scales read. `direction` is
-    the sign of travel with its memory, 0 where no slide moves along the axis. `arm` leads from the carriage of an axis to
-    the tip: along the tool, and along the axes that the carriage bears.
+    `position` is that of the platform reference, which equals the readings of the scales on a machine of slides.
+    `direction` is the sign of travel with memory, 0 where no slide moves along the axis. `arm` leads from the carriage of
+    an axis to the tip: along the tool, and along the axes that the carriage carries.
     """
 
     place: Floats  # (n, 3) of the tip, from the program's origin
@@ -143,7 +143,7 @@ class Axes:
 
 @dataclass(frozen=True)
 class Cause:
-    """An effect at work: the module, its target, its parameter values, where a config names it."""
+    """An effect in use: module, target, parameter values, and location in the config."""
 
     name: str
     effect: Any
@@ -152,7 +152,7 @@ class Cause:
     at: Location | None = field(default=None, compare=False)
 
     def which(self, actuators: tuple[str, ...]) -> Floats:
-        """(m,) 1.0 where this cause acts."""
+        """Mask (m,) of the actuators on which this cause acts, 1.0 or 0.0."""
         return np.array([1.0 if self.target in (None, each) else 0.0 for each in actuators])
 
     def aimed(self, actuators: tuple[str, ...]) -> tuple[str, ...]:
@@ -161,7 +161,7 @@ class Cause:
 
     @property
     def uncorrectable(self) -> bool:
-        """Whether no set-point corrects its error, so that compensate leaves it."""
+        """Whether set-points cannot correct its error; compensate then ignores it."""
         return bool(getattr(self.effect, "UNCORRECTABLE", False))
 
     def hook(self, name: str) -> Any:
@@ -170,10 +170,10 @@ class Cause:
 
 
 def applies(effect: Any, robot: Any, target: str | None) -> bool:
-    """Whether a diagnosis may take an effect at a target of a robot for a cause."""
+    """Whether an effect at a target of a robot is a candidate of the diagnosis."""
     return not hasattr(effect, "applies") or bool(effect.applies(robot, target))
 
 
 def nominal(effect: Any) -> dict[str, float]:
-    """Parameter values at which the effect does nothing."""
+    """Parameter values at which the effect vanishes."""
     return {each.name: each.nominal for each in effect.PARAMETERS}

@@ -1,13 +1,13 @@
-"""Results that are no numbers are errors, never zeros or gaps: NaN passes every comparison and every mean unseen."""
+"""Error for results that are NaN or infinite, which comparisons and means would pass on silently."""
 
 from camcomp.ground.errors import Location, PhysicsError
 from camcomp.model.config.spec import Config
 
 
 def not_finite(config: Config, what: str, at: Location | None = None) -> PhysicsError:
-    """The error CC306 for a result; it names the effects and the force model, one of which has to be its cause.
+    """Error CC306 for a result; it names the effects and the force model as possible origins.
 
-    at: the place in the program; without one, that of the effects or the force model in the YAML.
+    at: location in the program; default: the effects or the force model in the YAML.
     """
     effects = list(dict.fromkeys(f"effect '{each.effect}'" for each in config.effects))
     force = config.process.force.model

@@ -1,4 +1,4 @@
-"""Stock and tools of a job as the comments of its program state them, where the machine file does not."""
+"""Stock and tools from the comments of a program, for values that the machine file does not state."""
 
 from __future__ import annotations
 
@@ -15,15 +15,23 @@ from camcomp.model.config.taken import TakenFromProgram
 from camcomp.model.job import Job
 
 StockChoice = Literal["none", "program", "comments"]
-SAME_MM = 1e-3  # lengths that are alike: posts write three decimals
+SAME_MM = 1e-3  # difference below which lengths are equal: posts write three decimals
 
 
 def job_of_program(job: Job, source: BinaryIO | bytes, name: str, choice: StockChoice | None = None) -> Job:
-    """The job with what it takes from its program.
+    """Add stock and tools of the program's comments to a job; values of the machine file take precedence.
 
-    source: the program, a file at its begin, which is left there, or its bytes. choice: where the stock comes from;
-    None: the machine file, or else the comments. What the machine file states counts, and what contradicts it is
-    said. Raises ProgramError CC143 where the comments are to state the stock and do not, or not without a doubt.
+    Args:
+        job: the job of the machine file.
+        source: the program's bytes, or a file at its start, which is reset to it.
+        name: of the program, for messages.
+        choice: source of the stock; None: the machine file, else the comments.
+
+    Returns:
+        The job; contradictions between comments and machine file are among its remarks.
+
+    Raises:
+        ProgramError: CC143, the stock is to come from comments that do not state it, or contradict each other.
     """
     if choice == "none":
         return _taking(job, TakenFromProgram(has_stock=True))
@@ -67,7 +75,7 @@ def _refuse(name: str, stated: Stated, doubts: list[str]) -> None:
 
 
 def _stock_of(stated: Stated) -> tuple[StatedStock | None, list[str]]:
-    """The stock on which all comments agree, and what makes it doubtful."""
+    """Stock on which all comments agree, and reasons to doubt it."""
     doubts = [f"line {each.comment.line}: {each.reader}: {each.why}" for each in stated.doubts]
     if not stated.stocks:
         return None, doubts
@@ -81,7 +89,7 @@ def _stock_of(stated: Stated) -> tuple[StatedStock | None, list[str]]:
 
 
 def _tools_of(config: Config, stated: Stated) -> tuple[dict[int, Cutter], tuple[str, ...], tuple[str, ...]]:
-    """The tools that the config does not state itself, what was read, and what contradicts it."""
+    """Tools that the config does not state, texts of the values read, and contradictions."""
     tools: dict[int, Cutter] = {}
     said, remarks = list[str](), list[str]()
     for each in stated.tools:

@@ -1,4 +1,4 @@
-"""What remembers: lag, play and the direction of travel, as sweeps over ordered instants."""
+"""Elements with memory: lags, rate limit, play, presliding friction and direction of travel, over ordered instants."""
 
 from itertools import pairwise
 
@@ -8,9 +8,9 @@ from camcomp.ground.datatypes import Floats
 from camcomp.ground.machine_code import kept
 from camcomp.model.seams import Seams
 
-SAME = 1e-9  # of a step: as long as the one before, but for round-off
+SAME = 1e-9  # relative difference below which two time steps are equal
 STILL = 1e-9  # mm or rad, round-off of two solutions of the same point
-PRESLIDING_MM = 0.005  # rolling guides take 1 to 20 um to turn their friction round (Armstrong-Helouvry 1994)
+PRESLIDING_MM = 0.005  # rolling guides reverse their friction within 1 to 20 um (Armstrong-Helouvry 1994)
 PRESLIDING_RAD = 1e-5
 
 
@@ -41,7 +41,7 @@ def _first_order(x, t, tau, at, unseen, speed):  # type: ignore[no-untyped-def] 
 def first_order(x: Floats, time: Floats, tau: float, seams: Seams | None = None) -> Floats:
     """First-order lag of x (n, m) with time constant tau s; time (n,) s, not decreasing.
 
-    At rest and settled at the start; at seams settled at the speed with which the recording goes on.
+    At rest and settled at the start; at seams settled at the speed with which the recording continues.
     """
     if seams is None:
         seams = Seams(np.zeros(0, np.int64), np.zeros(0), np.zeros((0, x.shape[1])))
@@ -57,7 +57,7 @@ def first_order(x: Floats, time: Floats, tau: float, seams: Seams | None = None)
 
 @kept
 def _free_swing(w, damping, dt):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """What a loop left alone for dt keeps: of its error by error and by rate, of its rate by error and by rate."""
+    """Free response of a second-order loop over dt: its state transition matrix (error, rate), four elements."""
     fade, square = damping * w, (damping * damping - 1.0) * w * w
     if square < 0.0:
         q = np.sqrt(-square)
@@ -77,7 +77,7 @@ def _second_order(x, t, period, damping):  # type: ignore[no-untyped-def]  # pra
     w = 2.0 * np.pi / period
     push = np.zeros(x.shape[1])
     rate = np.zeros(x.shape[1])
-    known = 0.0  # the step of which ee to rr are
+    known = 0.0  # the time step to which ee, er, re, rr belong
     ee, er, re, rr = 1.0, 0.0, 0.0, 1.0
     for i in range(1, n):
         dt = t[i] - t[i - 1]
@@ -93,7 +93,7 @@ def _second_order(x, t, period, damping):  # type: ignore[no-untyped-def]  # pra
             bend = 0.0
             if after > 0.0:
                 bend = 2.0 * ((x[i + 1, j] - x[i, j]) / after - (x[i, j] - x[i - 1, j]) / dt) / (dt + after)
-            # where the loop runs straight along with an acceleration that is straight, and what swings about that
+            # particular solution for a linear acceleration, and the free response about it
             slope = (bend - push[j]) / dt
             run = -slope / (w * w)
             late = 2.0 * damping * slope / w
@@ -127,10 +127,10 @@ def _rate_limited(x, t, speed):  # type: ignore[no-untyped-def]  # pragma: no co
 
 
 def rate_limited(x: Floats, time: Floats, speed: float) -> Floats:
-    """Positions (n, m) that follow set-points x (n, m) no faster than `speed` per s; time (n,) s, not decreasing.
+    """Positions (n, m) that follow set-points x (n, m) at `speed` per s at most; time (n,) s, not decreasing.
 
-    On its set-point at the start. Exact for a set-point that moves linearly between two instants, but for the instant at which
-    it is caught up.
+    On its set-point at the start. Exact for a set-point that moves linearly between two instants, except for the instant
+    at which it is reached again.
     """
     out: Floats = _rate_limited(np.ascontiguousarray(x), np.ascontiguousarray(time), speed)
     return out
@@ -184,7 +184,7 @@ def _direction(x, distance):  # type: ignore[no-untyped-def]  # pragma: no cover
 
 
 def direction(x: Floats, distance: float = PRESLIDING_MM) -> Floats:
-    """Sign of travel with memory (n, m): Dahl's law turns it round over `distance`; 0 before the first move.
+    """Sign of travel with memory (n, m): Dahl's law reverses it over `distance`; 0 before the first move.
 
     Source: Dahl 1968 with exponent 1. Holds while: rate-independent friction.
     """
@@ -223,17 +223,17 @@ def _held(x, stiffness, force, distance):  # type: ignore[no-untyped-def]  # pra
 def held_back(x: Floats, stiffness: Floats, force: float, distance: float = PRESLIDING_MM) -> Floats:
     """Friction over its Coulomb force (n, m), -1 to 1, of carriages that encoders x (n, m) pull through springs (m,).
 
-    Dahl's law on the way of the carriage, not of the encoder: until the spring has turned round by 2 force/stiffness the
-    carriage hardly moves. distance mm; force N; stiffness inf = rigid. 0 before the first move.
+    Dahl's law over the travel of the carriage, not of the encoder: the carriage hardly moves until the spring has reversed
+    by 2 force/stiffness. distance mm; force N; stiffness inf = rigid. 0 before the first move.
     """
     out: Floats = _held(np.ascontiguousarray(x), np.ascontiguousarray(stiffness, dtype=float), force, distance)
     return out
 
 
 def ways(x: Floats, least: float) -> Floats:
-    """Sense (n, m) in which x (n, m) was travelling when it arrived: +1, -1, 0 before the first move.
+    """Direction of travel (n, m) in which x (n, m) arrives: +1, -1, 0 before the first move.
 
-    A reversal counts from the extremum on, and only when at least `least` of way back follow it.
+    A reversal counts from the extremum on, and only if a travel of at least `least` follows it.
     """
     out = np.zeros_like(x)
     for j in range(x.shape[1]):
@@ -246,7 +246,7 @@ def ways(x: Floats, least: float) -> Floats:
 
 
 def turning_points(x: Floats, least: float) -> tuple[list[int], float]:
-    """Indices where x (n,) begins to travel at least `least` one way, and the sense of the first; ([], 0) if it never does."""
+    """Indices where x (n,) begins a travel of at least `least`, and the sign of the first one; ([], 0) without any."""
     steps = np.diff(x)
     moving = np.flatnonzero(np.abs(steps) > STILL)
     if not len(moving):

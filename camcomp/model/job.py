@@ -1,4 +1,4 @@
-"""A configuration made ready for work: the machine, the frames, the cutting conditions, the control."""
+"""Objects built from a configuration: machine, program frame, cutting conditions, effects, engagement."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Frame:
 
 @dataclass(frozen=True, eq=False)
 class Job:
-    """What the stories need from a Config. taken: what the config has from the program instead of the machine file.
+    """A Config and the objects built from it. taken: its values from comments of the program.
 
     measured_force: the cutting forces come from a measurement, not from the force model.
     """
@@ -61,15 +61,15 @@ class Job:
 
     @cached_property
     def fingerprint(self) -> str:
-        """16 hex digits that change with the machine, the tool, the workpiece's place, the process and the effects.
+        """16 hex digits that change with machine, tool, workpiece position, process and effects.
 
-        Files that a section names count by their content, remarks about sources do not.
+        Files that a section names count by their content; `source` remarks do not count.
         """
         parts = self.config.model_dump(mode="json", include={"robot", "workpiece", "tool", "process", "effects"})
         if self.config.tools:
             own = {"tools": {"__all__": {"file"}}}
             parts["tools"] = self.config.model_dump(mode="json", include={"tools"}, exclude=own)["tools"]
-        for section, keys in _LATER.items():  # what was not there before changes nothing where it is not given
+        for section, keys in _LATER.items():  # keys of later versions: omitted unless they are given
             parts[section] = {key: v for key, v in parts[section].items() if v is not None or key not in keys}
         if self.config.uncertain and self.config.compensation.policy != "full":  # then the program depends on them
             parts["policy"] = [self.config.compensation.policy]
@@ -83,7 +83,7 @@ class Job:
 
     @cached_property
     def machine(self) -> Machine:
-        """The machine with its chain errors. Raises ConfigError CC216 when it cannot be built."""
+        """The machine with its chain errors. Raises ConfigError CC216 if it cannot be built."""
         return self._build(*self._robots)
 
     @cached_property
@@ -93,7 +93,7 @@ class Job:
 
     @cached_property
     def causes(self) -> tuple[Cause, ...]:
-        """The effects of the config, in its order; without those on the modelled force where the force is measured."""
+        """Effects of the config in its order; those on the modelled force only where the force is modelled."""
         causes = tuple(
             Cause(
                 each.effect,
@@ -109,14 +109,14 @@ class Job:
 
     @cached_property
     def real_machine(self) -> Machine:
-        """The machine with its chain errors and with what the effects of the config change in it."""
+        """The machine with its chain errors and the effects of the config."""
         robot, nominal = self._robots
         changed, by = signal_path.edited(self.causes, tuple(each.name for each in robot.actuators), robot)
         return self._build(changed, nominal) if by else self.machine
 
     @cached_property
     def correctable(self) -> Job:
-        """The job without the effects that no set-point corrects."""
+        """The job with the effects that set-points can correct."""
         kept = tuple(cause for cause in self.causes if not cause.uncorrectable)
         if len(kept) == len(self.causes):
             return self
@@ -126,7 +126,7 @@ class Job:
 
     @cached_property
     def _robots(self) -> tuple[Robot, Robot]:
-        """The robot as it is and as its control believes it to be, with the orientation that the tool keeps."""
+        """The true robot and the robot of the controller's kinematics, with the orientation that the tool keeps."""
         robots = build_robot(self.config.robot, self.config.tool.tip)
         if len(robots[0].actuators) != 6:
             return robots
@@ -163,22 +163,24 @@ class Job:
         )
 
     def engaged(self, program: Program) -> Engaged | None:
-        """What the tool meets along a program, None where no stock is known.
+        """Engagement along a program; None for a job that states no stock.
 
-        Raises ProgramError CC142 for rapids through material, ConfigError CC295 to CC298.
+        Raises:
+            ProgramError: CC142, a rapid moves through material.
+            ConfigError: CC295 to CC298, the stock or a tool cannot be simulated.
         """
         if self.config.workpiece.stock is None:
             return None
         return self._engage(program.path, program)
 
     def _engage(self, path: Path, program: Program | None = None) -> Engaged:
-        from camcomp.model.stock.follow import followed  # only those with a stock wait for it
+        from camcomp.model.stock.follow import followed  # slow import, needed with a stock only
 
         return followed(self.config, self.tool_axis, path, program)[0]
 
     @property
     def tool_axis(self) -> Floats:
-        """(3,) of the tool in the program frame, away from the workpiece."""
+        """Unit vector (3,) of the tool axis in the program frame, away from the workpiece."""
         out: Floats = self.frame.rotation.T @ self.machine.nominal.held_rotation[:, 2]
         return out
 
@@ -187,7 +189,7 @@ _LATER = {"workpiece": {"stock"}, "tool": {"type", "corner_radius_mm", "point_de
 
 
 def _bare(value: Any) -> Any:
-    """What counts of a section: no remarks, and files by their content."""
+    """A section for the fingerprint: `source` remarks removed, file names replaced by a digest of the content."""
     if isinstance(value, dict):
         return {key: _bare(each) for key, each in value.items() if key != "source"}
     if isinstance(value, list):
@@ -198,9 +200,10 @@ def _bare(value: Any) -> Any:
 
 
 def _forces(force: Callable[[Cut, Any], Floats], params: Any, config: Config, cut: Cut) -> Floats:
-    """Forces of a model; what it asks for in vain stands, or ought to stand, in the machine file.
+    """Forces (k, 3) N of a model; its errors about missing values get the location of the process section.
 
-    Raises what the model raises, PhysicsError CC306 where a force is not finite.
+    Raises:
+        PhysicsError: CC306, a force is not finite; and all errors of the model.
     """
     try:
         found = force(cut, params)

@@ -1,4 +1,4 @@
-"""The platform of a machine as words of orientation lead it.
+"""Orientation of the platform commanded by words of orientation in a program.
 
 With D (3, 3) of the words, in program axes, F the program frame in the machine frame and H the orientation that the machine
 holds without words, the platform is turned to F D F^T H.
@@ -16,7 +16,7 @@ from camcomp.model.job import Job
 
 
 def refuse_orientation(program: Program, what: str) -> None:
-    """Raises ProgramError CC115 where a program turns the tool, which `what` does not follow."""
+    """Raise ProgramError CC115 for a program that turns the tool, which `what` does not support."""
     turn = program.path.orientation
     if turn is None:
         return
@@ -37,7 +37,7 @@ def platform_rotations(job: Job, form: str, words: Floats) -> Floats:
 
 
 def platform_words(job: Job, form: str, rotation: Floats, near: Floats) -> Floats:
-    """Words (k, 3) that lead the platform to orientations (k, 3, 3), next to words near (k, 3)."""
+    """Words (k, 3) of orientations (k, 3, 3) of the platform, on the branch nearest to words near (k, 3)."""
     F = job.frame.rotation
     return words_of(form, F.T @ (rotation @ job.machine.nominal.held_rotation.T) @ F, near)
 

@@ -1,4 +1,4 @@
-"""What all effects of a drive together make of its travel: the error table that a control with a map of the screw needs."""
+"""Error table of a drive over its travel from all its effects, for controllers with screw compensation."""
 
 from __future__ import annotations
 
@@ -16,9 +16,10 @@ MOST_ROWS = 10_000
 
 
 def screw_map(job: Job, actuator: str, start: float, end: float, step: float) -> ErrorTable:
-    """Carriage minus encoder of a slide along its travel, forward and in reverse, at rest, unloaded.
+    """Carriage minus encoder of a slide along its travel, forward and in reverse, at standstill, unloaded.
 
-    Raises ConfigError CC205 for an actuator that is no slide of the machine, or a travel without rows.
+    Raises:
+        ConfigError: CC205, the actuator is no slide of the machine, or the travel has no rows.
     """
     machine = job.real_machine
     names = machine.actuators
@@ -35,7 +36,7 @@ def screw_map(job: Job, actuator: str, start: float, end: float, step: float) ->
 
 
 def _errors(job: Job, j: int, way: Floats) -> Floats:
-    """Carriage minus encoder (n,) of slide j at the ends of slow moves from place to place (n,), the others at home."""
+    """Carriage minus encoder (n,) of slide j at the ends of slow moves between positions (n,), the others at home."""
     machine = job.real_machine
     n = len(way)
     encoder = np.tile(machine.home, (n, 1)).astype(float)

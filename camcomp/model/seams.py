@@ -1,4 +1,4 @@
-"""Where the recording of a motion begins, and where it goes on."""
+"""Seams of a recording: its start in motion, and its continuations after missing rows."""
 
 from dataclasses import dataclass, replace
 
@@ -6,14 +6,15 @@ import numpy as np
 
 from camcomp.ground.datatypes import Bools, Floats, Ints
 
-_MISSING = 1.5  # usual steps between rows from which on rows are missing between them
+_MISSING = 1.5  # of the median time step: longer steps mean missing rows
 
 
 @dataclass(frozen=True, eq=False)
 class Seams:
-    """Where a recording begins, or goes on after rows that nobody logged, in motion: k instants.
+    """k instants at which a recording begins, or continues after missing rows, while the machine moves.
 
-    at (k,): their indices, rising; unseen (k,) s before them, inf at the beginning; speed (k, m) with which it goes on, per s.
+    at (k,): indices, rising; unseen (k,): s without rows before them, inf at the beginning; speed (k, m): of the actuators
+    behind them, per s.
     """
 
     at: Ints
@@ -21,7 +22,7 @@ class Seams:
     speed: Floats
 
     def of(self, actuators: Bools) -> "Seams":
-        """Of some of the actuators."""
+        """Seams of some of the actuators."""
         return replace(self, speed=self.speed[:, actuators])
 
 

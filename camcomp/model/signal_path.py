@@ -1,7 +1,7 @@
-"""The signal path: in which order the hooks of effects act between set-point and sensor. It is written here and nowhere else.
+"""The signal path: order of the hooks of effects between set-point and sensor, defined in this file only.
 
-Whoever runs the model (the twin in time, the response along a program, poses of an arm, a stream of set-points) does its
-own solving in between and calls these functions for the hooks. Each applies one stage, effects in the order given.
+Callers of the model (the twin in time, the response along a program, poses of an arm, a stream of set-points) solve the
+structure themselves and call these functions for the hooks. Each applies one stage, effects in the order given.
 """
 
 from __future__ import annotations
@@ -49,12 +49,12 @@ def acting(causes: Sequence[Cause], stage: str) -> list[Cause]:
 
 
 def under_measured_force(causes: Sequence[Cause]) -> tuple[Cause, ...]:
-    """The causes that act where the cutting force is measured: those that say how the force model errs do not."""
+    """Causes that act where the cutting force is measured: all except errors of the force model."""
     return tuple(cause for cause in causes if not getattr(cause.effect, "MODELLED_FORCE", False))
 
 
 def momentary(causes: Sequence[Cause]) -> bool:
-    """Whether drives have no memory: what they do at an instant depends on that instant alone."""
+    """Whether drives have no memory: their state at an instant depends on that instant alone."""
     return all(getattr(cause.effect, "MOMENTARY", False) for cause in acting(causes, "drive"))
 
 
@@ -67,8 +67,7 @@ def controlled(causes: Sequence[Cause], actuators: tuple[str, ...], motion: Moti
 
 
 def driven(causes: Sequence[Cause], actuators: tuple[str, ...], motion: Motion) -> tuple[Floats, Motion]:
-    """Carriage minus encoder (n, m), and the motion as the guides see it, if there are any: with the nut where play and screw
-    leave it.
+    """Carriage minus encoder (n, m), and the motion with the nut behind screw and play, for effects of guides.
 
     Effects with a force of their own come last: guides hold back the carriage, behind the screw and its play.
     """
@@ -84,7 +83,10 @@ def driven(causes: Sequence[Cause], actuators: tuple[str, ...], motion: Motion) 
 
 
 def drive_forces(causes: Sequence[Cause], actuators: tuple[str, ...], guided: Motion) -> Floats | None:
-    """Force (n, m) of the drives beyond the load of the structure; None where no effect has one. guided: as `driven` says."""
+    """Force (n, m) N or N mm of the drives beyond the load of the structure; None if all effects lack one.
+
+    guided: the motion from `driven`.
+    """
     effort = None
     for hook, cause in _hooks(causes, "on_drive_force"):
         effort = np.zeros_like(guided.encoder) if effort is None else effort
@@ -93,7 +95,7 @@ def drive_forces(causes: Sequence[Cause], actuators: tuple[str, ...], guided: Mo
 
 
 def edited(causes: Sequence[Cause], actuators: tuple[str, ...], robot: Robot) -> tuple[Robot, tuple[Cause, ...]]:
-    """The machine with the effects on it, and the causes that changed it."""
+    """The machine changed by effects, and the causes that changed it."""
     by = []
     for hook, cause in _hooks(causes, "on_robot"):
         changed = hook(robot, cause.aimed(actuators), cause.values)
@@ -117,7 +119,7 @@ def loaded(causes: Sequence[Cause], motion: Motion, force: Floats) -> Load:
 
 
 def grown(causes: Sequence[Cause], actuators: tuple[str, ...], motion: Motion) -> Floats | None:
-    """Length (n, m) mm by which the link behind every actuator has grown; None where no effect says so."""
+    """Growth (n, m) mm of the link behind every actuator; None without such an effect."""
     length = None
     for hook, cause in _hooks(causes, "on_links"):
         length = np.zeros_like(motion.encoder) if length is None else length
@@ -126,9 +128,9 @@ def grown(causes: Sequence[Cause], actuators: tuple[str, ...], motion: Motion) -
 
 
 def led(causes: Sequence[Cause], tip: Floats, motion: Motion, robot: Robot, origin: Floats) -> Floats:
-    """Tips (n, 3), machine frame, where guideways that are neither straight nor square lead them.
+    """Tips (n, 3), machine frame, with the errors of guideways (straightness, squareness).
 
-    origin (3,): of the program; all hooks see the axes where perfect guideways have them.
+    origin (3,): of the program; all hooks see the axes of perfect guideways.
     """
     hooks = list(_hooks(causes, "on_guideway"))
     axes = axes_of(robot, motion, tip, origin) if hooks else None
@@ -145,28 +147,28 @@ def posed(causes: Sequence[Cause], tip: Floats, load: Load, motion: Motion) -> F
 
 
 def clamped(causes: Sequence[Cause], tip: Floats) -> Floats:
-    """Tips (n, 3), program frame, as the workpiece meets them where it is clamped."""
+    """Tips (n, 3), program frame, relative to the clamped workpiece."""
     for hook, cause in _hooks(causes, "on_workpiece"):
         tip = hook(tip, cause.values)
     return tip
 
 
 def placed(causes: Sequence[Cause], tip: Floats, load: Load, motion: Motion) -> Floats:
-    """Tips (n, 3), program frame, with what depends on place, load and motion there."""
+    """Tips (n, 3), program frame, with errors that depend on position, load and motion."""
     for hook, cause in _hooks(causes, "on_place"):
         tip = hook(tip, load, motion, cause.values)
     return tip
 
 
 def clock(causes: Sequence[Cause], time: Floats) -> Floats:
-    """Times (n,) s at which the tip stood where rows stamped `time` (n,) say; `time` itself without such an effect."""
+    """True times (n,) s of tip rows with time stamps `time` (n,); `time` itself without such an effect."""
     for hook, cause in _hooks(causes, "on_clock"):
         time = hook(time, cause.values)
     return time
 
 
 def read(causes: Sequence[Cause], reading: Any, motion: Motion) -> Any:
-    """Readings as the sensors show them."""
+    """Readings with the effects of the sensors."""
     for hook, cause in _hooks(causes, "on_reading"):
         reading = hook(reading, motion, cause.values)
     return reading
@@ -179,7 +181,7 @@ def _hooks(causes: Sequence[Cause], name: str) -> Iterator[tuple[Callable[..., A
 
 
 def _finite(hook: Callable[..., Any], cause: Cause, *given: Any) -> Any:
-    """What the hook answers. Raises PhysicsError CC306 when that is no number although all that it was given were."""
+    """Result of a hook. Raises PhysicsError CC306 if it is not finite although all arguments are."""
     answer = hook(*given)
     if not all(map(_all_finite, _numbers(answer))) and all(
         _all_finite(each) for one in given for each in _numbers(one)
@@ -189,7 +191,7 @@ def _finite(hook: Callable[..., Any], cause: Cause, *given: Any) -> Any:
 
 
 def _numbers(value: Any) -> tuple[Floats, ...]:
-    """The arrays in what hooks are given and answer with. A rigid drive has an infinite stiffness: that counts as known."""
+    """Arrays in an argument or a result of a hook, without the infinite stiffness of rigid drives."""
     if isinstance(value, Load):
         return value.force, value.wrench
     if isinstance(value, Motion):

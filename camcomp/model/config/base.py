@@ -1,4 +1,4 @@
-"""What all YAML specs share: no unknown keys, no silent conversions, finite numbers, positions for error messages.
+"""Base of all YAML specs: no unknown keys, no silent conversions, finite numbers, positions for error messages.
 
 A value that fails a check of our own raises PydanticCustomError with a rule id as its type; config.py turns it into an
 error with file, line and column.
@@ -34,7 +34,7 @@ class Spec(BaseModel):
     @model_validator(mode="before")
     @classmethod
     def _note_spec(cls, data: Any, info: ValidationInfo) -> Any:
-        # Which spec a mapping was checked against is what a did-you-mean needs, and pydantic does not tell.
+        # Hints for misspelt keys need the spec of a mapping, which pydantic does not report.
         if info.context is not None:
             info.context[id(data)] = cls
         return data

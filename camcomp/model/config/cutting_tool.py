@@ -1,4 +1,4 @@
-"""YAML specs of what cuts, and of what it cuts."""
+"""YAML specs of the cutting tool and of the stock."""
 
 from __future__ import annotations
 
@@ -115,7 +115,7 @@ class ProgramStock(Spec):
 
 
 class CommentsStock(Spec):
-    """What the comments of the program state."""
+    """The stock that comments of the program state."""
 
     type: Literal["comments"]
     resolution_mm: Resolution = _RESOLUTION

@@ -27,7 +27,7 @@ def values_in_force(config: Config, *, folders: bool = False) -> Iterator[tuple[
 
 
 def _spread(known: dict[str, Spread], name: str) -> str:
-    """What is known about how far a value, or the numbers of a list, may be off."""
+    """Text of the standard deviation of a value, or of the numbers of a list."""
     own = [each for key, each in known.items() if key == name or key.rpartition("[")[0] == name]
     if not own:
         return ""

@@ -34,9 +34,11 @@ _NO_FORCE = Node({"model": Node("none", Location("", 1, 1))}, Location("", 1, 1)
 
 
 def load_config(paths: Sequence[Path | str]) -> Config:
-    """The configuration that `paths` make together: later files over earlier ones, key by key.
+    """Load one configuration from `paths`: later files over earlier ones, key by key.
 
-    Raises ConfigError (exit code 2) with every mistake of every file, FileError (5) when a file cannot be read.
+    Raises:
+        ConfigError: exit code 2, one entry per error of any file.
+        FileError: exit code 5, a file cannot be read.
     """
     tree, errors = _read_merged(paths)
     if tree is None:
@@ -54,10 +56,10 @@ def load_config(paths: Sequence[Path | str]) -> Config:
 
 
 def check_config(paths: Sequence[Path | str]) -> Config | None:
-    """Raise what is wrong with `paths`, which need not be complete; the configuration where they are.
+    """Check `paths`, complete or not, including the files of the force model; return a complete configuration.
 
-    Without the name of a robot they are overrides of some machine file, where any key may be missing. Files that the
-    force model reads are looked at, too.
+    Files without the name of a robot are overrides of another machine file, in which any key may be missing. Raises as
+    load_config.
     """
     tree, errors = _read_merged(paths)
     more: list[CamcompError] = []
@@ -76,7 +78,7 @@ def check_config(paths: Sequence[Path | str]) -> Config | None:
 
 
 def _force_files(node: Node | None) -> list[CamcompError]:
-    """What is wrong with the files of a force model, as far as the model can tell by its function `check`."""
+    """Errors in the files of a force model, found by the model's function `check`."""
     params, _ = _plugin("forces", "model", node)
     if node is None or params is None:
         return []
@@ -122,7 +124,7 @@ def _raise(errors: Sequence[CamcompError]) -> None:
 
 
 def varied(config: Config, source: UncertainInput, size: float) -> Config | None:
-    """The configuration with one input `size` standard deviations off its value; None where that is not allowed."""
+    """The configuration with one input `size` standard deviations off its value; None if the spec refuses it."""
     assert config._tree is not None  # every loaded config has one
     found, errors = _check_config(replaced(config._tree, _moved(source.members, size)))
     return None if errors else found
@@ -133,9 +135,9 @@ def _moved(spreads: Sequence[Spread], size: float) -> dict[tuple[str | int, ...]
 
 
 def _certain(tree: Node) -> tuple[Node, list[Spread], list[CamcompError]]:
-    """The tree with the values of uncertain numbers, their spreads, and what is wrong with them.
+    """The tree with plain values for uncertain numbers, their spreads, and the errors found.
 
-    A number that is refused one deviation above its value and one below it cannot be uncertain, such as a number of teeth.
+    A number that the spec refuses one deviation above and one below its value cannot be uncertain (a number of teeth).
     """
     bare, spreads, errors = without_spreads(tree)
     if spreads:
@@ -171,7 +173,7 @@ def _read_merged(paths: Sequence[Path | str]) -> tuple[Node | None, list[Camcomp
 
 
 def _is_ours(tree: Node | None, data: bytes) -> bool:
-    """Whether a file can be meant for camcomp: it has a section, or a key that is nearly called like one."""
+    """Whether a file can be meant for camcomp: it has a section, or a key with a name like one."""
     if tree is None:  # not YAML: by the look of its lines
         return bool(_SECTION.search(data))
     keys = tree.value if isinstance(tree.value, dict) else {}
@@ -219,7 +221,7 @@ def _robot_from_plugin(node: Node) -> tuple[RobotSpec | None, list[CamcompError]
         return None, errors
     chains = shelf.load("robots", chosen.value).chains(params)
     own = {key: node.value[key] for key in ROBOT_KEYS if key in node.value}
-    # What is wrong with chains that a plug-in made is told where the plug-in is named.
+    # Errors in the chains of a plug-in get the location of the plug-in's name.
     tree = replace(node, value={**own, "chains": tree_of(chains, chosen.at)})
     data = {**{key: plain(each) for key, each in own.items()}, "chains": chains}
     robot, errors = check(RobotSpec, tree, data, name=f"robot '{chosen.value}'")
@@ -229,7 +231,7 @@ def _robot_from_plugin(node: Node) -> tuple[RobotSpec | None, list[CamcompError]
 def _plugin(
     shelf_name: str, key: str, node: Node | None, *, name: str = "", also: Sequence[str] = ()
 ) -> tuple[Any, list[CamcompError]]:
-    """Parameters of the plug-in that `node` names under `key`, as its own spec; None when it has none."""
+    """Parameters of the plug-in that `node` names under `key`, as its own spec, and errors; None for a bad name."""
     chosen = _get(node, key)
     if node is None or chosen is None or not isinstance(chosen.value, str):
         return None, []  # missing or mistyped: the spec of the section says so
@@ -268,7 +270,7 @@ def params_of(member: Any) -> type[Spec]:
 
 
 def _check_targets(config: Config) -> list[CamcompError]:
-    """Whether every effect has the target it needs: an actuator of this robot, a name of its own, or none."""
+    """Errors for effects with a wrong target; it is an actuator of this robot, a name of the effect, or absent."""
     actuators = list(config.robot.actuators)
     errors: list[CamcompError] = []
     for i, each in enumerate(config.effects):
@@ -302,7 +304,7 @@ def _check_targets(config: Config) -> list[CamcompError]:
 
 
 def _check_twice(config: Config) -> list[CamcompError]:
-    """Whether an effect is there twice at one place: what it does would count twice, and a diagnosis could not change it."""
+    """Errors for an effect that is listed twice at one target: it would act twice, and a diagnosis could not change it."""
     errors: list[CamcompError] = []
     seen: dict[tuple[Any, ...], int] = {}
     for i, each in enumerate(config.effects):
@@ -321,7 +323,7 @@ def _check_twice(config: Config) -> list[CamcompError]:
 
 
 def _not_of_target(effect: Any, choice: EffectChoice) -> str | None:
-    """A key of an effect that its target does not have."""
+    """A key of an effect that does not apply to its target, or None."""
     of = getattr(effect, "OF_TARGET", {})
     some = {key for keys in of.values() for key in keys}
     return next((key for key in choice.given if key in some and key not in of.get(choice.target, ())), None)

@@ -1,4 +1,4 @@
-"""Values that the specs allow and that are hardly meant: wrong units, wrong signs, something left out. Warnings, never errors."""
+"""Warnings about allowed but implausible values: wrong units, wrong signs, missing keys."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from camcomp.model.config.links import Spring
 from camcomp.model.config.robot import LinkSpec, ParallelogramSpec, PrismaticActuator, RevoluteActuator
 from camcomp.model.config.spec import Config
 
-# Drives of machine tools and robots, screws with their bearings to gears of heavy arms; units mixed up miss by 1000.
+# Stiffness of drives, from screws with their bearings to gears of heavy arms; confused units differ by 1000.
 USUAL_N_PER_MM = (100.0, 3.0e6)
 USUAL_NMM_PER_RAD = (3.0e6, 1.0e12)
-# Where a part yields both ways, deflection over turning under unit loads is a length squared: a few mm to some metres.
+# Translational over rotational compliance of a part is a length squared: a few mm to some metres.
 SHORTEST_LEVER_MM = 1.0
 
 
 def doubts(config: Config) -> list[Doubt]:
-    """What in a machine file is hardly meant."""
+    """Implausible values of a machine file."""
     return [*config.doubts, *_drives(config), *_links(config), *_process(config), *_tool(config)]
 
 
@@ -57,7 +57,7 @@ def _links(config: Config) -> Iterator[Doubt]:
 
 
 def _lever_mm(spring: Spring) -> float | None:
-    """Square root of deflection over turning, each under unit loads; None for beams and what yields one way only."""
+    """Square root of translational over rotational compliance, mm; None for beams and springs that have only one of them."""
     if spring.compliance is not None:
         values = np.diag(np.asarray(spring.compliance, float))
     elif spring.compliance_diagonal is not None:

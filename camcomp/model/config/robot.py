@@ -1,7 +1,7 @@
 """YAML specs of a robot: chains of elements from the base to the platform. mm, N, rad; degrees only in `_deg` keys.
 
-Elements stand in chain order and in the local frame left by the elements before them. Joints offer `stiffness`, `home`,
-`limits`, `rest`, `start` in mm or rad whatever their kind, so that nobody else needs to look at the unit of a key.
+Elements are in chain order, each in the local frame behind the elements before it. Joints provide `stiffness`, `home`,
+`limits`, `rest`, `start` in mm or rad for both kinds, so that only this file handles the units of keys.
 """
 
 from math import radians
@@ -187,7 +187,7 @@ Element = Annotated[
 
 
 class GeometricError(Spec):
-    """Where a part really is, against where it should be: translation, then rotation vector, in the chain's frame."""
+    """Error of a part's pose: translation, then rotation vector, in the chain's frame."""
 
     translation_mm: Vector = Zero
     rotation_deg: Vector = Zero
@@ -196,7 +196,7 @@ class GeometricError(Spec):
 class ChainSpec(Spec):
     """Elements from the base to the platform in a local frame that permutes the machine's axes.
 
-    `frame: yzx` means: local x, y, z point along machine y, z, x. The platform end is turned back, so that at zero the
+    `frame: yzx` means: local x, y, z point along machine y, z, x. The platform end is rotated back, so that at zero the
     platform's frame is parallel to the machine's.
     """
 
@@ -206,7 +206,7 @@ class ChainSpec(Spec):
     elements: Annotated[list[Element], Field(min_length=1)]
 
     def actuators(self, chain: str) -> dict[str, PrismaticActuator | RevoluteActuator]:
-        """The actuators in order by name; one that has no name of its own bears the name of the `chain`."""
+        """The actuators in order by name; the default name is that of the `chain`."""
         found = [each for each in self.elements if isinstance(each, PrismaticActuator | RevoluteActuator)]
         return {each.name or chain: each for each in found}
 

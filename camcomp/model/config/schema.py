@@ -1,4 +1,4 @@
-"""JSON schemas (draft-07) of the YAML files, plug-ins included, for editors, and of results, for those who read them."""
+"""JSON schemas (draft-07) of the YAML files including plug-ins, for editors, and of results, for their readers."""
 
 import json
 import re
@@ -28,11 +28,11 @@ _SPREAD = {
     "additionalProperties": False,
 }  # fmt: skip
 _DRAFT = "http://json-schema.org/draft-07/schema#"
-_OLDER = {"$defs": "definitions", "prefixItems": "items"}  # what newer drafts call otherwise
+_OLDER = {"$defs": "definitions", "prefixItems": "items"}  # newer name -> name in draft-07
 
 
 def config_schema() -> Schema:
-    """Schema of a machine file; the robot is not required, so that files of overrides pass."""
+    """Schema of a machine file; the robot is optional, so that files of overrides pass."""
     schema = _draft07(Config.model_json_schema(by_alias=True, ref_template="#/definitions/{model}"))
     definitions = schema["definitions"]
     del schema["required"]
@@ -58,7 +58,7 @@ def _or_file(tools: Schema) -> Schema:
 
 
 def _uncertain(definitions: Schema, sections: Schema) -> Schema:
-    """The definitions that the sections with uncertain numbers use, with the choice to write a number that way."""
+    """Definitions of the sections with uncertain numbers, in which a number may be written with its spread."""
     wanted, found = [sections[name] for name in SECTIONS], set[str]()
     while wanted:
         names = set(re.findall(r'"#/definitions/([^"]+)"', json.dumps(wanted.pop()))) - found
@@ -116,7 +116,7 @@ def _offer(
 
 
 def _draft07(value: Any) -> Any:
-    """Pydantic's schema (2020-12) in draft-07: `definitions`, nothing beside a `$ref`, no OpenAPI discriminators."""
+    """Pydantic's schema (2020-12) in draft-07: `definitions`, a `$ref` alone, no OpenAPI discriminators."""
     if isinstance(value, list):
         return [_draft07(each) for each in value]
     if not isinstance(value, dict):
@@ -137,5 +137,5 @@ def _draft07(value: Any) -> Any:
 
 
 def _noun(name: str) -> str:
-    """A YAML mapping by what it describes: the class RobotSpec is called Robot outside."""
+    """Name of a YAML mapping in the schema: Robot for the class RobotSpec."""
     return name.removesuffix("Spec") or name

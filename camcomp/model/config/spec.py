@@ -20,7 +20,7 @@ NotEmpty = Annotated[str, Field(min_length=1)]
 
 
 class Workpiece(Spec):
-    """Where G54 lies in the machine frame, and where the stock begins."""
+    """Position of G54 in the machine frame, and the stock."""
 
     origin_mm: Vector = Zero
     rotation_deg: float | None = Field(None, description="about the tool axis (machine z)")
@@ -70,9 +70,9 @@ class Tool(Cutter):
 
 
 class Choice(Spec):
-    """A plug-in chosen by name, with its own parameters beside the name.
+    """A plug-in chosen by name, with its own parameters as further keys.
 
-    `given` are these parameters as written; `params` the same as checked and completed by the plug-in's own spec.
+    `given`: these parameters as written; `params`: checked and completed by the plug-in's own spec.
     """
 
     model_config = ConfigDict(extra="allow")
@@ -97,14 +97,14 @@ class ForceChoice(Choice):
 
 
 class EffectChoice(Choice):
-    """Something real the ideal model leaves out, a member of the shelf `effects`; target = actuator, or none."""
+    """One difference between the machine and its ideal model, a member of the shelf `effects`; target = actuator, or none."""
 
     effect: str
     target: str | None = None
 
     @property
     def values(self) -> dict[str, Any]:
-        """Every parameter of the effect by name; what the file leaves out has its nominal value."""
+        """All parameters of the effect by name; those missing in the file have their nominal values."""
         if hasattr(self.params, "effect_values"):  # of parameters that are more than numbers
             return dict(self.params.effect_values())
         out: dict[str, Any] = self.params.model_dump(exclude={"source"})
@@ -125,7 +125,7 @@ class Process(Spec):
 
 
 class Control(Spec):
-    """The NC control: what the program text alone does not say."""
+    """The controller: settings that the program text does not contain."""
 
     resolution_mm: Annotated[float, Field(ge=1e-9)] = 0.001
     start_mm: Vector = Zero
@@ -205,7 +205,7 @@ class Config(Spec):
 
     @property
     def spreads(self) -> tuple[Spread, ...]:
-        """The numbers that are not known exactly; everywhere else they count as their values."""
+        """The uncertain numbers; all other readers of the config see their values."""
         return self._spreads
 
     @property
@@ -215,7 +215,7 @@ class Config(Spec):
 
     @property
     def uncertain(self) -> bool:
-        """Whether there are any with a deviation."""
+        """Whether a number has a positive standard deviation."""
         return any(each.sd > 0.0 for each in self._spreads)
 
     def at(self, *keys: str | int) -> Location | None:
@@ -224,7 +224,7 @@ class Config(Spec):
 
 
 class RunSpec(Spec):
-    """One run of an experiment: a program, its log, and what was the same or different about it."""
+    """One run of an experiment: program, log, and conditions shared with other runs (clamping, clock)."""
 
     name: NotEmpty
     program: NotEmpty | None = None

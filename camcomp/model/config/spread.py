@@ -1,6 +1,6 @@
-"""Numbers that are not known exactly: `{value: 215, sd: 20}`, or `{low: 180, high: 250}`, wherever a number may stand.
+"""Uncertain numbers: `{value: 215, sd: 20}`, or `{low: 180, high: 250}`, in place of any number.
 
-The tree is read as if the value alone stood there; its spread is kept beside it. A number that anchors repeat is one number.
+The tree is read with the plain value; its spread is stored separately. A number that anchors repeat is one number.
 """
 
 from __future__ import annotations
@@ -39,14 +39,14 @@ class Spread:
 
 @dataclass(frozen=True)
 class UncertainInput:
-    """What is drawn as one: a number with all its repetitions, or a group of numbers."""
+    """One independent random input: a number with all its repetitions, or a group of numbers."""
 
     name: str
     members: tuple[Spread, ...]
 
 
 def uncertain_inputs(spreads: Sequence[Spread]) -> list[UncertainInput]:
-    """What is drawn by itself, in the order of the file; numbers with no deviation are left out."""
+    """Independent random inputs in the order of the file; only numbers with a positive deviation."""
     found: dict[Any, list[Spread]] = {}
     for each in spreads:
         if each.sd > 0.0:
@@ -58,7 +58,7 @@ def uncertain_inputs(spreads: Sequence[Spread]) -> list[UncertainInput]:
 
 
 def without_spreads(tree: Node) -> tuple[Node, list[Spread], list[CamcompError]]:
-    """The tree with the values alone, the spreads that stood in it, and what is wrong with them."""
+    """The tree with plain values, its spreads, and the errors found in them."""
     found: list[Spread] = []
     errors: list[CamcompError] = []
     bare = _stripped(tree, (), found, errors)
@@ -73,7 +73,7 @@ def is_meant(node: Node) -> bool:
 
 
 def replaced(tree: Node, values: Mapping[Keys, float]) -> Node:
-    """The tree with other numbers under some keys."""
+    """The tree with new numbers under some keys."""
     for keys, value in values.items():
         tree = _put(tree, keys, value)
     return tree
@@ -99,7 +99,7 @@ def _stripped(node: Node, keys: Keys, found: list[Spread], errors: list[CamcompE
 
 
 def _number(node: Node, keys: Keys, found: list[Spread], errors: list[CamcompError]) -> Node:
-    """The value of an uncertain number, which joins those found; some number where it is wrong."""
+    """The plain value of an uncertain number, which is appended to `found`; an arbitrary number if it is wrong."""
     name = dotted(keys)
     wrong = list(_mistakes(node, keys, name))
     errors += wrong

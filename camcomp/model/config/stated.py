@@ -1,4 +1,4 @@
-"""What a command line states over every machine file that the command reads: the dialect of programs."""
+"""Dialect of programs that the command line states with precedence over machine files."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -12,7 +12,7 @@ _DIALECT: ContextVar[str | None] = ContextVar("dialect", default=None)
 
 @contextmanager
 def stated_dialect(name: str) -> Iterator[None]:
-    """Within it programs are read in this dialect, whatever machine files say. Raises ConfigError CC213 for an unknown one."""
+    """Context in which programs are read in this dialect, with precedence over machine files. Raises ConfigError CC213."""
     shelf.load("dialects", name)
     token = _DIALECT.set(name)
     try:
@@ -22,12 +22,12 @@ def stated_dialect(name: str) -> Iterator[None]:
 
 
 def dialect_without_config() -> str | None:
-    """Dialect in which programs are read without a machine file; None: the one that they look like."""
+    """Dialect for programs without a machine file; None: detected from the text."""
     return _DIALECT.get()
 
 
 def in_stated_dialect(config: Config) -> Config:
-    """The configuration with the dialect of the command line, where that names one."""
+    """The configuration with the dialect of the command line, if there is one."""
     name = _DIALECT.get()
     if name is None:
         return config

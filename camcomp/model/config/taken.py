@@ -1,4 +1,4 @@
-"""What a job takes from its program instead of its machine file: stock and tools."""
+"""Stock and tools that a job takes from its program instead of its machine file."""
 
 from __future__ import annotations
 
@@ -11,9 +11,10 @@ from camcomp.model.config.spec import Config
 
 @dataclass(frozen=True)
 class TakenFromProgram:
-    """stock: in place of the machine file's where has_stock; tools: those that the machine file does not state.
+    """Stock and tools from the comments of a program.
 
-    said: what was read from comments, line by line; remarks: where that contradicts the machine file or is doubtful.
+    stock: replaces the machine file's if has_stock; tools: those that the machine file does not state. said: the values read,
+    line by line; remarks: contradictions with the machine file, and doubts.
     """
 
     has_stock: bool = False
@@ -23,7 +24,7 @@ class TakenFromProgram:
     remarks: tuple[str, ...] = ()
 
     def into(self, config: Config) -> Config:
-        """A config with it."""
+        """The config with this stock and these tools."""
         if self.has_stock:
             workpiece = config.workpiece.model_copy(update={"stock": self.stock})
             config = config.model_copy(update={"workpiece": workpiece})

@@ -1,6 +1,6 @@
 """Arms from URDF files: geometry, limits, masses and centres of mass, as the robot section of a machine file.
 
-A URDF knows nothing of stiffness. The keys are written as comments, to be filled in; until then joints and links are
+A URDF contains no stiffness. The keys are written as comments, to be filled in; until then joints and links are
 rigid. Lengths become mm, angles deg. Format: http://wiki.ros.org/urdf/XML.
 """
 
@@ -43,7 +43,7 @@ class UrdfNode:
 
 
 class _UrdfReader(handler.ContentHandler):
-    """Builds Nodes. Only the tree of tags counts; text between them has no meaning in a URDF."""
+    """Build the tree of UrdfNodes; text between tags has no meaning in a URDF."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -76,11 +76,13 @@ class UrdfArm:
 
 
 def read_urdf(data: bytes, name: str, tip: str | None = None, base: str | None = None) -> UrdfArm:
-    """The chain from the link `base` (default: the root) to the link `tip` (default: the only leaf, or the one behind most joints).
+    """Read the chain from the link `base` (default: the root) to the link `tip`.
 
-    Joints that follow another one (mimic), such as those of a gripper, stand still where their leader stands at zero.
+    Default of `tip`: the only leaf, or the one behind most joints. Joints that follow another one (mimic), such as those of a
+    gripper, are fixed at the position for a leader at zero.
 
-    Raises ConfigError CC240 with file and line for what is no URDF or no chain of hinges and slides.
+    Raises:
+        ConfigError: CC240 with file and line, no URDF, or no chain of hinges and slides.
     """
     root = _parse(data, name)
 
@@ -131,7 +133,7 @@ def _parse(data: bytes, name: str) -> UrdfNode:
     except SAXParseException as error:
         at = Location(name, error.getLineNumber() or 1, (error.getColumnNumber() or 0) + 1)
         raise ConfigError("CC240", f"not XML: {error.getMessage()}", at=at) from error
-    except (LookupError, ValueError) as error:  # encodings that Python does not know, or that are none of text
+    except (LookupError, ValueError) as error:  # encodings unknown to Python, or not for text
         raise ConfigError("CC240", "not XML: its encoding is not known", at=Location(name, 1, 1)) from error
     root = reader.root
     assert root is not None
@@ -164,7 +166,7 @@ def _route(leaf: str, parent: dict[str, UrdfNode], refuse) -> list[UrdfNode]:  #
 def _from_base(  # type: ignore[no-untyped-def]
     routes: dict[str, list[UrdfNode]], base: str, links: dict[str, UrdfNode], root: UrdfNode, refuse
 ) -> dict[str, list[UrdfNode]]:
-    """The parts of routes that lie behind a link; of routes that do not pass it nothing."""
+    """The parts of routes behind the link `base`, for the routes that pass it."""
     if base not in links:
         raise refuse(f"there is no link '{base}'", root, f"links: {', '.join(list(links)[:20])}")
     out = {}
@@ -208,7 +210,7 @@ def _value(text: str) -> float:
 
 
 def _on_one_line(text: str) -> str:
-    """Text of the file as it may stand in a comment or a message: names in XML may hold ends of lines and signs of control."""
+    """Text of the file on one line, for comments and messages: names in XML may contain line ends and control characters."""
     return " ".join("".join(each if each.isprintable() else " " for each in text).split())
 
 

@@ -1,4 +1,4 @@
-"""Causes into a machine file: the YAML text gains entries under `effects:`; its comments and layout stay."""
+"""Write causes into a machine file: add entries under `effects:`, keep comments and layout of the YAML text."""
 
 import io
 import os
@@ -12,21 +12,21 @@ from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from camcomp.ground import shelf
 from camcomp.model.config.spread import HALF_95
 
-# Parameters by which several entries of one effect and target differ; laws are unique by all that they say.
+# Parameters that distinguish several entries of one effect and target; a law is unique by all its keys.
 _APART = {"disturbance": ("from_s", "to_s"), "screw_cyclic": ("pitch_mm",), "joint_curve": ("seen_deg",)}
 _LAWS = {"formula", "map"}
 
 
 class EstimatedValue(Protocol):
-    """What is known of a parameter."""
+    """Estimate of a parameter."""
 
     @property
     def value(self) -> float:
-        """As estimated."""
+        """Estimated value."""
 
     @property
     def ci95(self) -> tuple[float, float]:
-        """Its 95 % interval."""
+        """95 % interval."""
 
 
 class NamedEffect(Protocol):
@@ -34,24 +34,26 @@ class NamedEffect(Protocol):
 
     @property
     def effect(self) -> str:
-        """Its name on the shelf."""
+        """Name of the effect on the shelf."""
 
     @property
     def target(self) -> str | None:
-        """Where it is at work."""
+        """Target of the effect."""
 
     @property
     def parameters(self) -> Mapping[str, EstimatedValue]:
-        """By name."""
+        """Estimates by name of the parameter."""
 
     @property
     def settings(self) -> Mapping[str, Any]:
-        """What it has in YAML beside its parameters: numbers, and lists of them."""
+        """Further YAML keys of the effect: numbers, and lists of them."""
 
 
 def machine_file(texts: Sequence[str]) -> int:
-    """Which of the config files, in the order in which they count, has to gain the causes: a later list of effects replaces
-    an earlier one, so it is the last that has one; where none has, the last that describes a robot.
+    """Index of the config file, in order of precedence, to which causes are added.
+
+    It is the last file with a list of effects, because a later list replaces an earlier one; else the last that describes
+    a robot.
     """
     trees = [YAML(typ="safe").load(text) or {} for text in texts]
     for key in ("effects", "robot"):
@@ -71,11 +73,18 @@ def with_causes(
     laws: Sequence[Mapping[str, Any]] = (),
     actuators: Sequence[str] = (),
 ) -> str:
-    """The text of a machine file with the `causes` of a diagnosis among its effects: those that are there already are changed.
+    """Text of a machine file with the `causes` of a diagnosis in its effects; existing entries are changed.
 
-    Values are those found, intervals are written as their standard deviations, and go into a comment behind them. folder, moved_to: where
-    the file stands and where the new one will; relative paths in it are changed to match. note: comment above the causes.
-    laws: more entries, key by key; actuators: names, where an effect of all of them is to differ between them.
+    Estimates are written as {value, sd}, with their 95 % intervals in a comment behind them.
+
+    Args:
+        text: of the machine file.
+        causes: of the diagnosis.
+        folder: of the file.
+        moved_to: folder of the new file; relative paths in it are changed to match.
+        note: comment above the causes.
+        laws: more entries, key by key.
+        actuators: names; an entry for all actuators is divided into one per actuator if a cause needs it.
     """
     yaml = YAML()
     yaml.preserve_quotes = True
@@ -111,7 +120,7 @@ def with_causes(
 
 
 def key_of_effect(effect: str, target: str | None, values: Mapping[str, Any]) -> tuple[Any, ...]:
-    """What makes an entry of `effects:` unique: effect, target, and what tells several of a kind apart."""
+    """Identity of an entry of `effects:`: effect, target, and the parameters that distinguish several of a kind."""
     names = _APART.get(effect, ())
     own = tuple(str(values.get(name)) for name in names)
     return (effect, target, str(sorted(values.items(), key=str)) if effect in _LAWS else own)
@@ -120,7 +129,7 @@ def key_of_effect(effect: str, target: str | None, values: Mapping[str, Any]) ->
 def _new_ones(
     effects: CommentedSeq, cause: NamedEffect, actuators: Sequence[str]
 ) -> list[tuple[NamedEffect, str | None]]:
-    """The cause where it is new, with its targets; where it is there already the entries are changed in place."""
+    """The cause with its targets that have no entry yet; existing entries are changed in place."""
     values = {**{name: each.value for name, each in cause.parameters.items()}, **cause.settings}
     wanted = key_of_effect(cause.effect, cause.target, values)
     plain = [{key: _plain(value) for key, value in each.items()} for each in effects]
@@ -142,7 +151,7 @@ def _new_ones(
 
 
 def _part(effects: CommentedSeq, at: int, actuators: Sequence[str]) -> None:
-    """Puts one entry per actuator in the place of one for all of them."""
+    """Replace an entry for all actuators by one per actuator."""
     whole = effects.pop(at)
     for name in reversed(actuators):
         entry = CommentedMap([("effect", whole["effect"]), ("target", name)])
@@ -151,7 +160,7 @@ def _part(effects: CommentedSeq, at: int, actuators: Sequence[str]) -> None:
 
 
 def _change(entry: CommentedMap, cause: NamedEffect) -> None:
-    """Adds what was found on top of an entry: sums, of factors products; shapes take the value found."""
+    """Add an estimate to an entry: sum, product for factors; shape parameters take the estimate itself."""
     records = {each.name: each for each in getattr(shelf.load("effects", cause.effect), "PARAMETERS", ())}
     for name, found in cause.parameters.items():
         low, high = found.ci95
@@ -167,7 +176,7 @@ def _change(entry: CommentedMap, cause: NamedEffect) -> None:
 
 
 def _plain(value: Any) -> Any:
-    """A number that may be written as {value, sd}."""
+    """The plain value of a number that may be written as {value, sd}."""
     return value["value"] if isinstance(value, Mapping) and "value" in value else value
 
 

@@ -1,4 +1,4 @@
-"""A YAML tree against a spec: pydantic's findings in words for a machine builder, with rule ids, places and hints."""
+"""Check of a YAML tree against a spec: pydantic's findings as messages with rule ids, locations and hints."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -37,10 +37,10 @@ _PYDANTIC_WORDS = {
 def check(
     spec: type[Model], tree: Node, data: Any = None, *, name: str = "", skip: Sequence[str] = ()
 ) -> tuple[Model | None, list[CamcompError]]:
-    """`tree` as a `spec`, or None and every error with its place in the YAML text.
+    """`tree` as a `spec`, or None, and all errors with their locations in the YAML text.
 
-    `data` replaces the bare values of the tree where some of them are built already; `name` is what the tree is called
-    in messages; what is wrong with the top-level keys in `skip` is left out.
+    `data` replaces the plain values of the tree if some are built already; `name` is the tree's name in messages; errors of
+    the top-level keys in `skip` are omitted.
     """
     seen: dict[int, type[Spec]] = {}
     data = plain(tree) if data is None else data
@@ -55,7 +55,7 @@ OTHER_NAMES = {"offset_deg": "theta_deg", "offset": "theta_deg", "theta_offset_d
 
 
 def choose(name: Any, known: Sequence[str]) -> str:
-    """Hint for a name that is not among `known`."""
+    """Hint for an unknown name: the nearest ones of `known`."""
     same = [each for key, each in OTHER_NAMES.items() if key == name and each in known]
     close = same or get_close_matches(str(name), known, n=1)
     start = f"did you mean '{close[0]}'? " if close else ""
@@ -64,7 +64,7 @@ def choose(name: Any, known: Sequence[str]) -> str:
 
 @dataclass(frozen=True)
 class _Findings:
-    """What pydantic said about one tree. `seen` tells by id against which spec a mapping was checked."""
+    """Pydantic's findings about one tree. `seen`: id of a mapping -> the spec it was checked against."""
 
     tree: Node
     data: Any
@@ -81,7 +81,7 @@ class _Findings:
         found: dict[Any, CamcompError] = {}
         for detail in details:
             if detail["type"] == "missing" and (detail["loc"][:-1], detail["loc"][-1]) in meant:
-                continue  # it is there, with a typing mistake that is told
+                continue  # present, with a misspelt key that has its own error
             each = self._explain(detail)
             # An anchor used in three chains is one mistake, and so is a value that fits neither of two types.
             which = detail["loc"][-1] if each.rule == "CC203" else None
@@ -92,7 +92,7 @@ class _Findings:
         kind, loc, context = detail["type"], detail["loc"], detail.get("ctx", {})
         rule = _rule(detail)
         name, node, value = self._walk(loc)
-        if "below" in context:  # a mistake between parts, told at one of them
+        if "below" in context:  # an error between parts, located at one of them
             node = self._walk((*loc, *context["below"]))[1]
         if rule == "CC201":
             return self._unknown_key(str(loc[-1]), loc[:-1], node)
@@ -113,7 +113,7 @@ class _Findings:
         if kind in ("model_type", "dict_type"):
             what = {type(None): "nothing", list: "a list"}.get(type(node.value), f"'{node.value}'")
             return ConfigError(rule, f"{name}: has to be a mapping (key: value), not {what}", at=at)
-        if at is not None and "offset" in context:  # within a text that is read further
+        if at is not None and "offset" in context:  # within a text with its own parser
             quoted = at.source[at.column - 1 : at.column] in ("'", '"')
             at = replace(at, column=at.column + int(context["offset"]) + quoted)
         words = detail["msg"]
@@ -131,7 +131,7 @@ class _Findings:
         return ConfigError("CC201", message, at=at, hint=choose(key, self._known(above)))
 
     def _meant(self, key: str, above: Keys) -> list[str]:
-        """The keys that an unknown key may stand for: with its unit added, or else spelt alike."""
+        """Known keys that an unknown key may mean: with its unit added, else of similar spelling."""
         known = self._known(above)
         units = [
             each for each in known if each.startswith(f"{key}_") and each[len(key) + 1 :].split("_")[0] in _UNIT_WORDS
@@ -143,7 +143,7 @@ class _Findings:
         return [key for key in spec.yaml_keys() if key != "source"] if spec else []
 
     def _walk(self, loc: Keys) -> tuple[str, Node, Any]:
-        """Dotted name, node and bare value under `loc`; parts that are no keys (tags of unions) are passed over."""
+        """Dotted name, node and plain value under `loc`; parts that are no keys (tags of unions) are skipped."""
         name, node, data = self.name, self.tree, self.data
         for part in loc:
             below = child(node, part)

@@ -1,4 +1,4 @@
-"""YAML 1.2 text as a tree in which every value knows file, line and column."""
+"""YAML 1.2 text as a tree of values with file, line and column."""
 
 import re
 from collections.abc import Iterator, Sequence
@@ -16,11 +16,11 @@ from ruamel.yaml.reader import ReaderError
 from camcomp.ground.bounds import LARGEST_NUMBER
 from camcomp.ground.errors import ConfigError, Location
 
-# A mapping that names another member than the earlier file did has other keys too: it replaces the earlier one whole.
+# A mapping that names another member than the earlier file has other keys too: it replaces the earlier one as a whole.
 _SELECTORS = ("type", "model")
 _QUOTED_NUMBER = re.compile("0|[1-9][0-9]{0,8}")
 
-# Budgets: what is written by hand has some hundred values; a file within them is read in about a second.
+# Budgets: a file written by hand has some hundred values; a file within them is read in about a second.
 MOST_BYTES = 1 << 20
 MOST_VALUES = 20_000  # an alias counts as often as it is used
 DEEPEST = 50
@@ -28,7 +28,7 @@ DEEPEST = 50
 
 @dataclass(frozen=True)
 class Node:
-    """A value (scalar, list of Nodes, dict of Nodes), where it stands and, in a mapping, where its key stands."""
+    """A value (scalar, list of Nodes, dict of Nodes), its location and, in a mapping, the location of its key."""
 
     value: Any
     at: Location
@@ -36,9 +36,9 @@ class Node:
 
 
 def read_tree(data: bytes, name: str) -> tuple[Node | None, list[ConfigError]]:
-    """The tree of one YAML document and every error found in its text; None when there is no tree.
+    """The tree of one YAML document, or None, and all errors of its text.
 
-    Raises nothing: syntax, encoding, budgets, duplicate keys, unknown tags and emptiness come back as errors.
+    Errors of syntax, encoding, budgets, duplicate keys, unknown tags and empty documents are returned, not raised.
     """
     if len(data) > MOST_BYTES:
         return None, [ConfigError("CC217", f"more than {MOST_BYTES} bytes", at=Location(name, 1, 1))]
@@ -79,7 +79,7 @@ def read_tree(data: bytes, name: str) -> tuple[Node | None, list[ConfigError]]:
 
 
 class _BeyondBudget(Exception):
-    """A file asks for more than any machine file needs."""
+    """A file exceeds the budgets of a machine file."""
 
     def __init__(self, what: str, mark: Any) -> None:
         super().__init__(what)
@@ -87,7 +87,7 @@ class _BeyondBudget(Exception):
 
 
 class _Composer(Composer):
-    """Composes no more than the budgets allow."""
+    """Composer of ruamel that stops at the budgets."""
 
     values = level = 0
 
@@ -96,7 +96,7 @@ class _Composer(Composer):
         self.warn_double_anchors = False  # YAML allows them
 
     def compose_node(self, parent: Any, index: Any) -> Any:
-        """A node with all below it."""
+        """Compose a node with its children."""
         self.values += 1
         self.level += 1
         if self.values > MOST_VALUES:
@@ -110,7 +110,7 @@ class _Composer(Composer):
 
 
 class _Builder:
-    """Turns ruamel's composed nodes into Nodes and collects what is wrong with them."""
+    """Convert ruamel's composed nodes to Nodes and collect their errors."""
 
     def __init__(self, name: str, lines: list[str]) -> None:
         self.name = name
@@ -198,7 +198,7 @@ class _Builder:
         return text
 
     def _bounded(self, value: float, at: Location) -> float:
-        """The value; one beyond every machine is an error, infinity is one of the spec."""
+        """The value, with an error if it is implausibly large; infinity is refused by the spec."""
         if LARGEST_NUMBER < abs(value) < inf:
             message = f"the number is larger than {LARGEST_NUMBER:g}, beyond every machine"
             self.errors.append(ConfigError("CC205", message, at=at))
@@ -207,12 +207,12 @@ class _Builder:
 
 
 def merge(base: Node, over: Node) -> Node:
-    """`over` laid on `base` key by key: mappings merge, everything else (lists too) is replaced whole.
+    """Merge `over` into `base` key by key: mappings merge, all other values (lists too) are replaced as a whole.
 
-    An `sd` alone is laid beside the number that it belongs to.
+    An `sd` alone is added to the number that it belongs to.
     """
     if isinstance(over.value, dict) and "sd" in over.value and "value" not in over.value and _is_scalar(base):
-        return replace(over, value={"value": base, **over.value})  # the spread of a number that stands in another file
+        return replace(over, value={"value": base, **over.value})  # the spread of a number of another file
     if not (isinstance(base.value, dict) and isinstance(over.value, dict)):
         return over
     for key in _SELECTORS:
@@ -227,7 +227,7 @@ def _is_scalar(node: Node) -> bool:
 
 
 def plain(node: Node) -> Any:
-    """The bare values. A string under the key `file` or `..._file` is a path: made relative to its own YAML file."""
+    """Plain values of a tree. A string under the key `file` or `..._file` is a path relative to its own YAML file."""
     if isinstance(node.value, list):
         return [plain(each) for each in node.value]
     if isinstance(node.value, dict):
@@ -242,7 +242,7 @@ def _resolved(key: Any, node: Node) -> Any:
 
 
 def find(node: Node, keys: Sequence[str | int]) -> Node:
-    """The node under `keys`; keys that are not in the tree are skipped, so the result is the nearest one above."""
+    """The node under `keys`; missing keys are skipped, so that the result is the nearest node above."""
     for key in keys:
         node = child(node, key) or node
     return node
@@ -259,7 +259,7 @@ def child(node: Node, key: str | int) -> Node | None:
 
 
 def tree_of(value: Any, at: Location) -> Node:
-    """Bare values as a tree in which every node stands at one place."""
+    """Plain values as a tree in which every node has one location."""
     if isinstance(value, dict):
         return Node({key: tree_of(each, at) for key, each in value.items()}, at)
     if isinstance(value, list):

@@ -1,1 +1,1 @@
-"""Where along a path the tool cuts and what it feels there, for whatever force model is on the shelf."""
+"""Cutting force along a path: pieces that cut, engagement, and the averaged models behind the force plug-ins."""

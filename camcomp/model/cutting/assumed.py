@@ -1,4 +1,4 @@
-"""Which cutting force a compensation assumes, in words, and where that assumption cannot be right.
+"""Text of the cutting force that a compensation assumes, and warnings where that assumption cannot hold.
 
 Without a stock every feed move gets the force of the stated cut, or of a full slot: air moves and finishing passes
 too. The step-over test looks for feed moves that run beside an earlier one of the same height by less than the tool's
@@ -62,7 +62,7 @@ def assumed_force(config: Config) -> AssumedForce:
 
 
 def _cut(config: Config) -> str:
-    """The cut that a force model is told of, or its constant force."""
+    """Text of the stated cut, or of a constant force."""
     choice, process = config.process.force, config.process
     if choice.model == "constant":
         triple = ", ".join(f"{getattr(choice.params, key):g}" for key in ("Fr_N", "Ft_N", "Fz_N"))
@@ -74,12 +74,12 @@ def _cut(config: Config) -> str:
 
 
 def _is_assumed(config: Config) -> bool:
-    """Whether a force acts whose engagement no stock and no measurement gives."""
+    """Whether a force acts with an assumed engagement, known neither from a stock nor from a measurement."""
     return config.workpiece.stock is None and config.process.force.model not in ("none", "table")
 
 
 def doubtful_force(config: Config, path: Path) -> list[str]:
-    """Warnings where the assumed force cannot be right: drills, ball tools, step-overs below the diameter, rapids at depth.
+    """Warnings where the assumed force cannot hold: drills, ball tools, step-overs below the diameter, rapids at depth.
 
     Empty where a stock gives the engagement or no force acts.
     """
@@ -113,7 +113,7 @@ class RapidsAtDepth:
     _line: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
 
     def add(self, path: Path) -> None:
-        """The next motions of a path; nothing where a stock is known or no force acts."""
+        """Examine the next motions of a path; without effect if a stock is known or the force is zero."""
         if not _is_assumed(self.config):
             return
         known, way, top = path.known & ~path.machine, path.end - path.start, self.config.workpiece.stock_top_mm
@@ -137,7 +137,7 @@ class RapidsAtDepth:
 
 
 def _beside_share(path: Path, on: Ints, cutters: Sequence[Cutter]) -> float:
-    """Share of the lateral feed path (motions `on`) beside an earlier pass of the same height; 0 below the least share."""
+    """Share of the lateral feed path (motions `on`) next to an earlier pass of the same height; 0 below MIN_BESIDE_SHARE."""
     diameter = min((each.diameter_mm for each in cutters if each.diameter_mm), default=None)
     if diameter is None or not len(on):
         return 0.0

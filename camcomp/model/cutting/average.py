@@ -62,7 +62,7 @@ def power_law(
 ) -> Floats:
     """Mean (Fx, Fy, Fz) (n, 3) in N of Kienzle's law dFt = kc11 h^(1-mc) dz, h in mm, kc11 in N/mm2.
 
-    ratios: radial and axial force over tangential force, which Kienzle's law says nothing about; they and kc11 may be (n,).
+    ratios: radial and axial force over tangential force, which Kienzle's law does not state; they and kc11 may be (n,).
     """
     c, a, kc11 = np.asarray(chip, float), np.asarray(depth, float), np.asarray(kc11, float)
     radial, axial = np.asarray(ratios, float)
@@ -76,7 +76,7 @@ def power_law(
 
 
 def slanted(radial: ArrayLike, axial: ArrayLike, rise: Floats, run: Floats) -> tuple[Floats, Floats]:
-    """Radial and axial parts (n,), about the tool's axis, of what acts normal to a slanting surface and along its edge.
+    """Radial and axial parts (n,), about the tool's axis, of forces normal to a slanted surface and along its edge.
 
     rise, run (n,): of the surface per length of its edge; (1, 0) at the side of a cylinder, (0, 1) under a tool's tip.
     """

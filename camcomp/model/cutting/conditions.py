@@ -53,9 +53,9 @@ def clockwise(cut: Cut, stated: Literal["clockwise", "counterclockwise"] | None)
 
 
 def engagement(cut: Cut, milling: Milling | None) -> tuple[Floats, Floats]:
-    """Entry and exit angle (n,) in rad; a width that is not known is a slot, which needs no other data.
+    """Entry and exit angle (n,) in rad; an unknown width is a slot and needs neither diameter nor milling direction.
 
-    Raises ConfigError CC254 (diameter), CC255 (width not between 0 and the diameter), CC256 (up or down not said).
+    Raises ConfigError CC254 (diameter), CC255 (width not between 0 and the diameter), CC256 (up or down not stated).
     """
     given = ~np.isnan(cut.width)
     if not given.any():
@@ -73,9 +73,9 @@ def engagement(cut: Cut, milling: Milling | None) -> tuple[Floats, Floats]:
 
 
 def bites_of(cut: Cut, milling: Milling | None, clockwise: Bools) -> Bites:
-    """The arcs in which the tool cuts, in the sense of its rotation: of the stock, or one to a point from width and depth.
+    """Engagement arcs in the direction of rotation: of the stock, or one per point from width and depth.
 
-    Raises what `axial_depth` and `engagement` raise, where the stock is not known.
+    Raises the errors of `axial_depth` and `engagement` if the stock is unknown.
     """
     if cut.bites is not None:
         start, stop = cut.bites.turned(clockwise)

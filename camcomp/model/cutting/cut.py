@@ -1,4 +1,4 @@
-"""What a force model may look at: the cut at n points of a path, as a struct of arrays."""
+"""Input of a force model: the cut at n points of a path, as a struct of arrays."""
 
 from dataclasses import dataclass, field
 
@@ -12,8 +12,8 @@ from camcomp.model.cutting.engaged import Bites
 class Cut:
     """n points at which the tool cuts; rapids and air moves are not among them.
 
-    Raises ValueError when the arrays do not have one row per point. Missing data (NaN, None) is allowed here; the
-    force model that needs it complains.
+    Missing data (NaN, None) are allowed here; a force model that needs them raises an error. Raises ValueError for arrays
+    without one row per point.
     """
 
     tangent: Floats  # (n, 3) unit feed direction, program frame
@@ -27,11 +27,11 @@ class Cut:
     diameter_mm: float | None = None
     teeth: int | None = None
     to_machine: Floats = field(default_factory=lambda: np.eye(3))  # (3, 3) program axes to machine axes
-    # (n,) the point is seen as the end of a motion, not as the start of the next; empty: nowhere
+    # (n,) the point counts as the end of a motion, not as the start of the next; empty: all False
     ends: Bools = field(default_factory=lambda: np.zeros(0, np.bool_))
-    # (n,) sense of the spindle by the program, +1 clockwise, -1, 0 stopped, NaN not said; empty: nowhere said
+    # (n,) direction of the spindle by the program, +1 clockwise, -1, 0 stopped, NaN not stated; empty: all NaN
     turn: Floats = field(default_factory=lambda: np.zeros(0))
-    # What the tool meets, where the stock is known; depth and width then are the highest material and its extent
+    # Engagement arcs if the stock is known; depth and width are then the highest material and its extent
     bites: Bites | None = None
 
     def __post_init__(self) -> None:

@@ -1,4 +1,4 @@
-"""What the tool meets along a path, where the stock is known: arcs of the turn at places of every motion."""
+"""Engagement of the tool along a path with a known stock: arcs of its turn at places of every motion."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from camcomp.ground.datatypes import Bools, Floats, Ints, Path
 
 @dataclass(frozen=True, eq=False)
 class Bites:
-    """Arcs (b,) of a tool's turn in which it cuts, several to a place where material stands at several heights.
+    """Engagement arcs (b,) of a tool's turn, several per place if the material has several heights.
 
     Angles count as in engagement.py for a clockwise spindle. rise, run: of the tool's surface per length of its edge;
     (1, 0) at the side of a cylinder.
@@ -26,7 +26,7 @@ class Bites:
     run: Floats
 
     def of(self, rows: Ints) -> Bites:
-        """The arcs of some places (r,), numbered anew."""
+        """The arcs of some places (r,), renumbered from 0."""
         if len(rows) and rows[-1] - rows[0] + 1 == len(rows) and bool((np.diff(rows) == 1).all()):
             a, b = np.searchsorted(self.place, (rows[0], rows[-1] + 1)).tolist()
             own = slice(a, b)
@@ -53,9 +53,9 @@ class Bites:
 
 @dataclass(frozen=True, eq=False)
 class EngagedAt:
-    """Places (k,) along the motions of a path, in order; between them the engagement is a straight line.
+    """Places (k,) along the motions of a path, in order; between them the engagement is linear.
 
-    Two places at one fraction of a motion: it jumps there. Motions without places meet nothing.
+    Two places at one fraction of a motion are a jump. Motions without places do not cut.
     """
 
     motion: Ints  # (k,)
@@ -64,7 +64,7 @@ class EngagedAt:
     turn: Floats  # (k,) rad, sum of the engaged arcs
 
     def around(self, motion: Ints, u: Floats) -> tuple[Ints, Ints, Bools]:
-        """Rows of the places before and behind points of motions (n,) that are no places, and whether there are any."""
+        """Rows of the places before and after points (n,) of motions, and mask (n,) of points that have both."""
         n = len(self.u)
         right = np.clip(np.searchsorted(self.motion + 0.5 * self.u, motion + 0.5 * u), min(1, n), max(n - 1, 0))
         left = np.maximum(right - 1, 0)
@@ -74,7 +74,7 @@ class EngagedAt:
     def between(self, motion: Ints, u: Floats, behind: Bools) -> tuple[Ints, Ints, Floats]:
         """Rows of the places on both sides of points (n,) of motions with places, and the share of the second one.
 
-        behind (n,): behind a jump that is there, not in front of it.
+        behind (n,): after a jump at the point, otherwise before it.
         """
         hair = np.where(behind, 1e-9, -1e-9)
         left, right, known = self.around(motion, np.clip(u + hair, 1e-12, 1.0 - 1e-12))
@@ -94,14 +94,14 @@ class EngagedAt:
 
 @dataclass(frozen=True, eq=False)
 class Engaged(EngagedAt):
-    """Places with all that the force depends on."""
+    """Places with the engagement arcs that determine the force."""
 
-    bends: Bools  # (k,) the force depends on it; others only tell how deep the tool is
+    bends: Bools  # (k,) the place determines the force; others only depth and sum of the arcs
     bites: Bites
 
     @classmethod
     def joined(cls, parts: list[Engaged]) -> Engaged:
-        """Parts one behind the other."""
+        """Concatenation of consecutive parts."""
         first = np.cumsum([0] + [len(each.u) for each in parts])
         bites = Bites(
             np.concatenate([each.bites.place + n for each, n in zip(parts, first, strict=False)]),
@@ -127,7 +127,7 @@ class Engaged(EngagedAt):
         )
 
     def of_motions(self, first: int, last: int, number: int = 0) -> Engaged:
-        """The places of motions first to last, the last one not included, of which the first is now called `number`."""
+        """The places of motions first to last (excluded), renumbered from `number`."""
         out = self.take(np.arange(np.searchsorted(self.motion, first), np.searchsorted(self.motion, last)))
         return replace(out, motion=out.motion - first + number)
 

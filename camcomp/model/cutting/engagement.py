@@ -1,4 +1,4 @@
-"""Where in its turn a tooth cuts, from radial width and diameter.
+"""Entry and exit angle of a tooth from radial width and diameter.
 
 Immersion angle phi is counted in the sense of rotation from the direction square to the feed, left of it for a
 clockwise spindle; the tooth points along the feed at phi = pi/2 (Altintas, Manufacturing Automation, section 2.7).

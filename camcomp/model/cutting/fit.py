@@ -32,10 +32,11 @@ class SlotFit:
 def fit_slot(chip: ArrayLike, force: ArrayLike, *, depth_mm: float, teeth: int, clockwise: bool = True) -> SlotFit:
     """Least squares of mean slot forces on the tool, (Fr, Ft, Fz) (k, 3) in N, over the feed per tooth (k,) in mm.
 
-    No command calls it: it is for those who measured and write their own YAML.
+    For scripts that evaluate dynamometer tests and write their own YAML. A dynamometer under the work measures the
+    opposite force: change all signs first.
 
-    A dynamometer under the work measures the opposite force: change all signs first. Raises ConfigError CC265 when
-    there are fewer than two different feeds, or numbers that are not finite or not positive.
+    Raises:
+        ConfigError: CC265, fewer than two different feeds, or values that are not finite or not positive.
     """
     c, f = np.asarray(chip, float), np.asarray(force, float)
     if c.ndim != 1 or f.shape != (c.size, 3) or not (np.isfinite(c).all() and np.isfinite(f).all()):

@@ -1,9 +1,9 @@
 """A measured force along a path, read from CSV text: one header row, plain numbers, each column named with its unit.
 
 Columns used: `s_mm` (path length) or `line` (source line), and three forces on the tool, either `Fr_N, Ft_N, Fz_N` in
-the path frame or `fx_N, fy_N, fz_N` in the machine frame. Other columns are left alone, so that a log or a joint table
-can be given as it is. With `s_mm` rows are in path order and may repeat a place, where the force jumps: the first row
-holds for the motion that ends there, the last for the one that starts, and a `line` column settles which is which.
+the path frame or `fx_N, fy_N, fz_N` in the machine frame. Other columns are ignored, so that a log or a joint table
+can be used directly. With `s_mm` rows are in path order and may repeat a position, where the force jumps: the first row
+holds for the motion that ends there, the last for the one that starts, and a `line` column distinguishes them.
 With `line` alone the rows of a line are averaged. Rows without any force are skipped.
 """
 
@@ -19,7 +19,7 @@ from camcomp.ground.errors import CamcompError, ConfigError, raise_all
 PATH_COLUMNS = ("Fr_N", "Ft_N", "Fz_N")
 MACHINE_COLUMNS = ("fx_N", "fy_N", "fz_N")
 
-# Lengths of path and table are both rounded sums; closer than this they are the same place.
+# Tolerance of equal path lengths: lengths of path and table are both rounded sums.
 SAME_PLACE_MM = 1e-3
 
 
@@ -31,7 +31,7 @@ class ForceTable:
     force: Floats  # (k, 3) N
     by_length: bool
     in_machine: bool  # frame of `force`: machine axes, or the path frame
-    line: Floats | None = None  # (k,) source line of each row, beside a path length
+    line: Floats | None = None  # (k,) source line of each row of a table by path length
 
 
 def parse_table(text: str, name: str) -> ForceTable:
@@ -82,8 +82,8 @@ def _no_force(table: CsvTable) -> ConfigError:
 def look_up(table: ForceTable, arc_length: Floats, line: Ints, ends: Bools) -> Floats:
     """Force (n, 3) in N, in the table's own frame: linear between rows, or that of the source line.
 
-    ends (n,): the point closes a motion, so that before a jump the row before it holds. Raises ConfigError CC264 for a
-    point that the table does not cover.
+    ends (n,): the point ends a motion, so that the row before a jump holds. Raises ConfigError CC264 for a point outside
+    the table.
     """
     if table.by_length:
         outside = (arc_length < table.key[0] - SAME_PLACE_MM) | (arc_length > table.key[-1] + SAME_PLACE_MM)
@@ -108,7 +108,7 @@ def _along(table: ForceTable, s: Floats, line: Ints, ends: Bools) -> Floats:
     step = key[high] - key[low]
     share = np.clip((s - key[low]) / np.where(step > 0, step, 1.0), 0.0, 1.0)[:, None]
     between = force[low] + share * (force[high] - force[low])
-    # A jump is one place with several rows, from `first` to `final`.
+    # A jump is one path length with several rows, from `first` to `final`.
     first = np.clip(np.searchsorted(key, s - SAME_PLACE_MM, side="left"), 0, last)
     final = np.maximum(np.searchsorted(key, s + SAME_PLACE_MM, side="right") - 1, 0)
     jump = (final > first) & (key[first] == key[final])

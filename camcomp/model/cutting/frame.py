@@ -1,8 +1,8 @@
 """The path frame: e_t along the feed, e_z the tool axis away from the workpiece, e_r = e_t x e_z, right of the feed.
 
 On a ramp e_t is the part of the feed direction across the tool axis (the horizontal part of an upright tool's feed), so
-that the frame stays square to the tool. On a plunge there is no such part; e_t is then, by our convention, the frame's own x (or y) axis turned across the tool, so
-that a measured vector keeps all of its parts on the way through components.
+that the frame stays square to the tool. On a plunge there is no such part; e_t is then by convention the frame's own x
+(or y) axis, projected across the tool, so that conversion to components and back preserves a measured vector.
 """
 
 import numpy as np

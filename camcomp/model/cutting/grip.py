@@ -1,4 +1,4 @@
-"""The load of pieces of a path whose stock is known: a straight line between the places where the engagement was found."""
+"""Load of the pieces of a path with a known stock: linear between the places of the engagement."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ import numpy as np
 from camcomp.ground.datatypes import Bools, Floats, Ints
 from camcomp.model.cutting.engaged import Engaged
 
-STRAIGHT = 1e-9  # of the force: a place on the line between its neighbours is not needed
+STRAIGHT = 1e-9  # of the force: deviation from the line between its neighbours below which a place is redundant
 
 
 @dataclass(frozen=True, eq=False)
 class Grip:
-    """Pieces (p,): force of the model (p, 3) N as Fr, Ft, Fz at both ends, and whether the tool meets material."""
+    """Pieces (p,): force of the model (p, 3) N as Fr, Ft, Fz at both ends, and whether the tool cuts."""
 
     base0: Floats
     base1: Floats
@@ -22,7 +22,7 @@ class Grip:
 
     @classmethod
     def of(cls, engaged: Engaged, base: Floats, motion: Ints, u0: Floats, u1: Floats) -> Grip:
-        """From the forces (k, 3) at the places, for parts u0 to u1 of motions (p,); a place stands at every jump."""
+        """Loads of parts u0 to u1 of motions (p,) from the forces (k, 3) at the places; every jump has a place."""
         left, right, known = engaged.around(motion, 0.5 * (u0 + u1))
         if not len(engaged.u):
             return cls(np.zeros((len(motion), 3)), np.zeros((len(motion), 3)), np.zeros(len(motion), np.bool_))
@@ -39,12 +39,12 @@ class Grip:
         return self.base0[piece] * (1.0 - w)[:, None] + self.base1[piece] * w[:, None]
 
     def cut(self, of: Ints, begin: Floats, end: Floats) -> Grip:
-        """The same for parts `begin` to `end` (q,) of pieces (q,)."""
+        """Loads of parts `begin` to `end` (q,) of pieces (q,)."""
         return Grip(self.base(of, begin), self.base(of, end), self.on[of])
 
 
 def needed(motion: Ints, u: Floats, turn: Floats, bends: Bools, base: Floats) -> Ints:
-    """The places (q,) without which the force (k, 3) would not be the same: a cut begins or ends there, or the force bends.
+    """Places (q,) that linear interpolation of the force (k, 3) needs: starts and ends of cuts, and bends of the force.
 
     motion, u, turn, bends (k,): as in Engaged.
     """

@@ -1,4 +1,4 @@
-"""Lines that feed into material while the program has stopped the spindle: nothing cuts there, something breaks."""
+"""Check for lines that feed into material with a stopped spindle."""
 
 import numpy as np
 
@@ -16,7 +16,7 @@ def cut_without_spindle(track: Track) -> Ints:
 
 
 def spindle_warning(lines: Ints) -> list[str]:
-    """What to say of source lines, ascending, that cut with a stopped spindle."""
+    """Warning for source lines, ascending, that cut with a stopped spindle; empty without any."""
     if not len(lines):
         return []
     named = ", ".join(str(line) for line in lines[:MOST_LINES]) + (" ..." if len(lines) > MOST_LINES else "")

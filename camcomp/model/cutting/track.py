@@ -33,7 +33,7 @@ SAME_FORCE = 1e-6  # of the force: lengths of the path are rounded sums, and a t
 
 
 class Edges(NamedTuple):
-    """What a force model asks of a tool."""
+    """Diameter and number of teeth of a tool, for force models."""
 
     diameter_mm: float | None
     teeth: int | None
@@ -41,9 +41,9 @@ class Edges(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Conditions:
-    """What the program does not say about the cut. model: Cut -> (Fr, Ft, Fz) (k, 3) N, None = no force.
+    """Cutting conditions from the machine file. model: Cut -> (Fr, Ft, Fz) (k, 3) N, None = no force.
 
-    engage: what the tool meets along a path of which nothing has been seen before, None: the stock is not known.
+    engage: engagement of a path with the uncut stock, None: the stock is unknown.
     """
 
     model: Callable[[Cut], Floats] | None
@@ -57,7 +57,7 @@ class Conditions:
     diameter_mm: float | None = None
     teeth: int | None = None
     to_machine: Floats | None = None
-    tools: Mapping[int, Edges] = field(default_factory=dict)  # by T number; others are as said above
+    tools: Mapping[int, Edges] = field(default_factory=dict)  # by T number; other tools: diameter_mm and teeth above
     engage: Engage | None = None
 
     def edges(self, tool: int) -> Edges:
@@ -81,14 +81,14 @@ class Track:
     fade1: Floats  # (p, 3) N, at its end
     jump: Bools  # the force jumps at the start of the piece
     corner: Bools  # the tip cannot pass the start of the piece without a stop
-    beside0: Floats  # fraction of the motion behind the start of the piece where the direction is that farther in
-    beside1: Floats  # the same in front of its end
-    grip: Grip | None = None  # where the stock is known
-    engaged: Engaged | None = None  # the same
+    beside0: Floats  # fraction of the motion after the start of the piece at which its direction is taken
+    beside1: Floats  # fraction of the motion before its end at which its direction is taken
+    grip: Grip | None = None  # if the stock is known
+    engaged: Engaged | None = None  # if the stock is known
 
     @property
     def angle(self) -> Floats:
-        """(p,) rad, part of the arc; 0 where the motion is none."""
+        """(p,) rad, part of the arc; 0 for lines."""
         angle = self.path.angle[self.motion]
         return np.where(np.isnan(angle), 0.0, angle) * (self.u1 - self.u0)
 
@@ -108,7 +108,7 @@ class Track:
         return float(np.sum((done * self.length)[self.cutting] / feed))
 
     def cut(self, piece: Ints, w: Floats) -> Track:
-        """The same track with pieces cut at fractions w (k,), inside, of pieces (k,): the load of a piece fades linearly."""
+        """Track with pieces divided at fractions w (k,), inside, of pieces (k,); loads are interpolated linearly."""
         n = len(self.motion)
         of = np.concatenate((np.arange(n), piece))
         begin = np.concatenate((np.zeros(n), w))
@@ -133,13 +133,13 @@ class Track:
         return out + (1.0 - w)[:, None] * self.fade0[piece] + w[:, None] * self.fade1[piece]
 
     def sizes(self, piece: Ints, w: Floats) -> tuple[Floats, Floats]:
-        """Depth of the cut (k,) mm and sum of the engaged arcs (k,) rad, NaN where the stock is not known."""
+        """Depth of the cut (k,) mm and sum of the engagement arcs (k,) rad, NaN if the stock is unknown."""
         if self.engaged is None:
             return np.full(len(piece), np.nan), np.full(len(piece), np.nan)
         return self.engaged.sizes(self.motion[piece], self.u(piece, w), w == 0.0)
 
     def force_along(self, piece: Ints, w: Floats, direction: Floats, feed: Floats | None = None) -> Floats:
-        """Cutting force on the tool (k, 3) N, program frame, where the tip is driven along unit vectors direction (k, 3)."""
+        """Cutting force on the tool (k, 3) N, program frame, for a tip driven along unit vectors direction (k, 3)."""
         if self.grip is not None and feed is not None and not self.conditions.plunges:
             return self._driven(piece, w, direction, feed)
         turn = self.path.orientation
@@ -148,14 +148,14 @@ class Track:
                       direction, self.points(piece, w), feed, turned)  # fmt: skip
 
     def force_meeting(self, piece: Ints, w: Floats, direction: Floats, depth: Floats, bites: Bites) -> Floats:
-        """Cutting force (k, 3) N, program frame, of a tool that meets these arcs (k places) and goes on along `direction`."""
+        """Cutting force (k, 3) N, program frame, of a tool with these engagement arcs (k places) that moves along `direction`."""
         c, rows = self.conditions, self.motion[piece]
         s = self.s0[piece] + w * self.length[piece]
         found = _components(self.path, c, rows, direction, depth, bites.reach(len(rows)), s, w == 1.0, bites)
         return to_vector(found, direction, c.tool_axis)
 
     def _driven(self, piece: Ints, w: Floats, direction: Floats, feed: Floats) -> Floats:
-        """Cutting force (k, 3) N at other feeds than the program's: between the places on both sides, asked for these feeds."""
+        """Cutting force (k, 3) N at driven feeds (k,): linear between the model's forces at the places on both sides."""
         assert self.engaged is not None
         out = np.zeros((len(piece), 3))
         on = np.flatnonzero(self.cutting[piece] & (np.linalg.norm(direction, axis=1) > 0.0))
@@ -177,8 +177,7 @@ def _force(
 ) -> Floats:  # fmt: skip
     """Model force (k, 3) N for given feed directions, program frame.
 
-    turned (k, 3, 3): how the tool is turned from where its axis is that of the conditions. The model sees the feed from a tool
-    that stands still.
+    turned (k, 3, 3): rotation of the tool from the axis of the conditions. The model sees the feed in the frame of the tool.
     """
     if turned is not None:
         seen = np.einsum("kji,kj->ki", turned, direction)
@@ -209,7 +208,7 @@ def _components(
     path: Path, c: Conditions, motion: Ints, direction: Floats, depth: Floats, width: Floats, s: Floats, ends: Bools,
     bites: Bites | None = None, driven: Floats | None = None,
 ) -> Floats:  # fmt: skip
-    """Fr, Ft, Fz (k, 3) N of the model, asked tool by tool. width (k,) mm, in radii of the tool where there are bites."""
+    """Fr, Ft, Fz (k, 3) N of the model, evaluated tool by tool. width (k,) mm, with bites: radii of the tool."""
     if c.model is None:
         return np.zeros((len(motion), 3))
     feed, speed = path.feed[motion] if driven is None else driven, path.speed[motion]
@@ -244,7 +243,7 @@ def _components(
 def base_of(path: Path, c: Conditions, engaged: Engaged, length: Floats, *, extent: bool = True) -> Floats:
     """Fr, Ft, Fz (k, 3) N of the model at the places of the engagement where the tool cuts, and at those next to them.
 
-    extent: whether the model asks how wide the cut is; those of camcomp do with the arcs alone.
+    extent: the model uses the width of the cut; those of camcomp need the arcs only.
     """
     near = engaged.turn > 0.0
     on, beside = near.copy(), engaged.motion[1:] == engaged.motion[:-1]
@@ -262,9 +261,9 @@ def base_of(path: Path, c: Conditions, engaged: Engaged, length: Floats, *, exte
 
 
 def lay_track(path: Path, conditions: Conditions, engaged: Engaged | None = None) -> Track:
-    """Pieces of a path with the loads at their corners. Raises what the force model raises.
+    """Pieces of a path with the loads at their corners. Raises the errors of the force model.
 
-    engaged: what the tool meets along the path, when somebody has followed it before.
+    engaged: engagement along the path, if it has been computed before.
     """
     length = path_geometry.lengths(path)
     axis = np.asarray(conditions.tool_axis, float)
@@ -329,7 +328,7 @@ def lay_track(path: Path, conditions: Conditions, engaged: Engaged | None = None
     ahead, behind = force(a, np.ones(len(a)), bisector), force(b, np.zeros(len(b)), bisector)
     smooth &= np.linalg.norm(behind - ahead, axis=1) <= SAME_FORCE * np.linalg.norm(ahead, axis=1) + NO_FORCE
     jump[b] = ~smooth & (np.linalg.norm(own0[b] - own1[a], axis=1) > NO_FORCE)
-    if len(real) and real[0] > 0:  # moves without length stand before the first cut
+    if len(real) and real[0] > 0:  # moves without length before the first cut
         jump[real[0]] = bool(np.linalg.norm(own0[real[0]]) > NO_FORCE)
     a, b = a[smooth], b[smooth]
     shared = 0.5 * (ahead + behind)[smooth]
@@ -358,7 +357,7 @@ def lay_track(path: Path, conditions: Conditions, engaged: Engaged | None = None
 
 
 def _cut_at_swings(track: Track, upright: Verticals) -> Track:
-    """The track with parts of their own where the force turns round quickly, so that other parts need not be as fine."""
+    """Track with separate parts where the force changes direction quickly, so that other parts can be coarser."""
     motion, u = upright.swings(track.path)
     piece = np.searchsorted(track.motion + 0.5 * track.u0, motion + 0.5 * u, side="right") - 1
     u0, u1 = track.u0[piece], track.u1[piece]
@@ -368,7 +367,7 @@ def _cut_at_swings(track: Track, upright: Verticals) -> Track:
 
 
 def _carry_over(moves: Bools, end_force: Floats, fade0: Floats, fade1: Floats) -> None:
-    """A feed motion without length keeps the force of the piece before it."""
+    """Give feed motions without length the force of the piece before them."""
     before = np.maximum.accumulate(np.where(moves, np.arange(len(moves)), -1))
     still = np.flatnonzero(~moves & (before >= 0))
     fade0[still] = fade1[still] = end_force[before[still]]
@@ -382,10 +381,10 @@ def _beside(track: Track, piece: Ints, w: Floats) -> Floats:
 def _pieces(
     path: Path, conditions: Conditions, upright: Verticals, engaged: Engaged | None
 ) -> tuple[Ints, Floats, Floats, Bools]:
-    """Every motion once, or in parts where a feed motion crosses the stock's top or an arc passes the vertical.
+    """Motions, divided where a feed motion crosses the stock's top or an arc passes the vertical.
 
-    Where the stock is known there are parts between the places of its engagement instead of parts below its top. The
-    last result says which parts begin at the vertical.
+    With a known stock they are divided at the places of its engagement instead of at its top. The last result is a mask of
+    the parts that begin at the vertical.
     """
     n = len(path)
     whole = np.arange(n), np.zeros(n), np.ones(n), np.zeros(n, np.bool_)
@@ -433,7 +432,7 @@ def _crossings(path: Path, top: float | None) -> list[tuple[int, float]]:
 
 
 def _crossing(path: Path, motion: int, a: float, b: float, height: float) -> float:
-    """Bisects for the fraction at which a motion passes a height."""
+    """Fraction of a motion at which it passes a height (mm), by bisection."""
     row = np.array([motion])
     below = path_geometry.points(path, row, np.array([a]))[0, 2] < height
     for _ in range(60):

@@ -1,8 +1,8 @@
-"""Arcs in planes along the tool axis (G18, G19): where the direction across the tool turns over.
+"""Arcs in planes along the tool axis (G18, G19): positions at which the direction across the tool reverses.
 
-Such an arc goes up or down the tool twice a turn. There its direction across the tool turns round, and the side force with it:
-at once where the arc stays in its plane, and over a short way where it also climbs out of it. Everything counts along the
-curve as it is: rounded end points make it a spiral, whose tangent is vertical somewhat beside the end of the radius.
+The tangent of such an arc is parallel to the tool twice a turn. There the direction across the tool reverses, and the side
+force with it: at once if the arc stays in its plane, over a short distance if it also moves out of it. Rounded end points
+make the arc a spiral, whose tangent is vertical at a slightly different angle; the positions are those of the spiral.
 """
 
 from __future__ import annotations
@@ -13,21 +13,21 @@ import numpy as np
 
 from camcomp.ground.datatypes import ARC, Floats, Ints, Path
 
-BESIDE = 2e-4  # rad from a sharp turn at which the directions on its sides are taken
-AT_END = 1e-5  # rad from the ends of an arc at which its directions there are taken; at the vertical it has none
-NEAR_END = 1e-3  # rad: an arc that turns over so near to its end begins or ends there; its end points are rounded
-SHARP = 3e-4  # sine of the angle to the tool axis below which the direction turns over at once
-LEVEL = 1e-7  # sine of an arc that stays in its plane
-SPREAD, WIDE = 3.0, 0.3  # a turn that takes its time is divided at its width times powers of SPREAD, up to WIDE rad
-SIDES = 3.0  # times the width of a turn: where the direction beside it is taken
+BESIDE = 2e-4  # rad from a sharp reversal at which the directions on its sides are taken
+AT_END = 1e-5  # rad from the ends of an arc at which its directions there are taken; undefined at the vertical itself
+NEAR_END = 1e-3  # rad: a reversal so near to an end of an arc, whose end points are rounded, is at that end
+SHARP = 3e-4  # sine of the angle to the tool axis below which the direction reverses at once
+LEVEL = 1e-7  # sine of the slope of an arc that stays in its plane
+SPREAD, WIDE = 3.0, 0.3  # a gradual reversal is divided at its width times powers of SPREAD, up to WIDE rad
+SIDES = 3.0  # times the width of a reversal: distance at which the directions on its sides are taken
 ROUNDS = 6
 
 
 @dataclass(frozen=True, eq=False)
 class Verticals:
-    """Places (k,) where arcs come nearest to the direction of the tool: motion, fraction u, and the sine of what is left.
+    """Positions (k,) where arcs are nearest to the direction of the tool: motion, fraction u, sine of the angle between them.
 
-    Those of a motion follow each other by u.
+    Those of a motion are ascending in u.
     """
 
     motion: Ints
@@ -36,12 +36,12 @@ class Verticals:
 
     @classmethod
     def none(cls) -> Verticals:
-        """No such place."""
+        """An empty list of positions."""
         return cls(np.zeros(0, np.int64), np.zeros(0), np.zeros(0))
 
     @classmethod
     def of(cls, path: Path, tool_axis: Floats) -> Verticals:
-        """All of a path."""
+        """All positions of a path."""
         tool = np.asarray(tool_axis, float)
         arcs = np.flatnonzero((path.kind == ARC) & (np.abs(path.axis @ tool) < 1e-3) & path.known & ~path.machine)
         axis, angle = path.axis[arcs], path.angle[arcs]
@@ -68,17 +68,17 @@ class Verticals:
 
     @property
     def sides(self) -> Floats:
-        """Angles (k,) rad from sharp turns at which the directions beside them are taken."""
+        """Angles (k,) rad from the reversals at which the directions on their sides are taken."""
         return np.maximum(BESIDE, SIDES * self.sine)
 
     def overturns(self, path: Path) -> list[tuple[int, float]]:
-        """Motions and fractions, away from their ends, at which the direction turns over at once."""
+        """Motions and fractions, away from their ends, at which the direction reverses at once."""
         end = NEAR_END / np.abs(path.angle[self.motion])
         sharp = (self.sine < SHARP) & (self.u > end) & (self.u < 1.0 - end)
         return [(int(i), float(u)) for i, u in zip(self.motion[sharp], self.u[sharp], strict=True)]
 
     def swings(self, path: Path) -> tuple[Ints, Floats]:
-        """Motions and fractions at which arcs are divided because their direction turns round quickly beside them."""
+        """Motions and fractions at which arcs are divided around gradual reversals of their direction."""
         slow = np.flatnonzero(self.sine > LEVEL)
         powers = SPREAD ** np.arange(np.ceil(np.log(WIDE / BESIDE) / np.log(SPREAD)))
         width = np.where(self.sine < SHARP, self.sides, self.sine)[slow, None] * powers
@@ -89,7 +89,7 @@ class Verticals:
         return motion[inside], u[inside]
 
     def beside(self, path: Path, tool_axis: Floats, motion: Ints, u0: Floats, u1: Floats) -> tuple[Floats, Floats]:
-        """Fractions of the motion next to both ends of parts (p,) where the direction is that farther in."""
+        """Fractions of the motion near both ends of parts (p,) at which the directions of the ends are taken."""
         upright = (path.kind[motion] == ARC) & (np.abs(path.axis[motion] @ np.asarray(tool_axis, float)) < 0.999)
         angle = np.where(upright, np.maximum(np.abs(path.angle[motion]), 4.0 * AT_END), 1.0)
         head = np.where(upright, AT_END / angle, 0.0)

@@ -1,1 +1,1 @@
-"""Tables of what an axis errs by over its travel: files, YAML, look-up."""
+"""Error tables of an axis over its travel: files, YAML, look-up."""

@@ -45,7 +45,12 @@ class ErrorTableSpec(Spec):
         return {name: each for name, each in found.items() if each is not None}
 
     def read(self) -> ErrorTable | None:
-        """The table, None where none is named. Raises ValueError, ConfigError CC266, FileError CC500."""
+        """The table; None if the YAML names neither file nor columns.
+
+        Raises:
+            ValueError, ConfigError: CC266, the table is invalid.
+            FileError: CC500, the file cannot be read.
+        """
         if self.file is not None:
             return read_table(self.file, self.comp_type)
         errors = self._errors()
@@ -57,13 +62,13 @@ class ErrorTableSpec(Spec):
         return table_of(self.positions_mm, errors[f"forward_{unit}"], errors.get(f"reverse_{unit}"), unit)
 
     def effect_values(self) -> dict[str, Any]:
-        """What the hooks are given: every number, and the table."""
+        """Values for the hooks: every number of the YAML, and the table."""
         numbers = self.model_dump(exclude={"source", *ErrorTableSpec.model_fields, *_COLUMNS})
         return {**numbers, "table": self.read()}
 
 
 class AxisErrorSpec(ErrorTableSpec):
-    """The same of errors that may be angles."""
+    """Errors over the travel of an axis that are lengths or angles."""
 
     forward_mrad: ErrorColumn = Field(None, description="the same of angles")
     reverse_mrad: ErrorColumn = Field(None, description="the same of angles")

@@ -1,9 +1,9 @@
 """Measured errors of an axis over its travel, one column or one per direction: from CSV, from LinuxCNC, from YAML.
 
 CSV: a column `position_mm`, and either `error_U` or `forward_U` and `reverse_U` with U one of mm, um, rad,
-mrad, urad. The error is where the axis is minus where its scale says. LinuxCNC's file for screws (COMP_FILE) has three
-numbers per line: nominal position, then where the axis really is when it comes up to it forward and in reverse
-(COMP_FILE_TYPE 0), or what has to be added to the command there (1).
+mrad, urad. The error is the true position of the axis minus the reading of its scale. LinuxCNC's file for screws
+(COMP_FILE) has three numbers per line: nominal position, then the true positions reached forward and in reverse
+(COMP_FILE_TYPE 0), or the corrections added to the command (1).
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ POSITION = "position_mm"
 class ErrorTable:
     """Errors of k rows at rising positions (k,), mm or rad, for travel forward and in reverse (k,), mm or rad.
 
-    Straight between rows; beyond the ends the last value holds.
+    Linear between rows, constant beyond the ends.
     """
 
     position: Floats
@@ -47,7 +47,7 @@ class ErrorTable:
 def table_of(
     position: Sequence[float], forward: Sequence[float], reverse: Sequence[float] | None, unit: str
 ) -> ErrorTable:
-    """A table from columns of equal length; errors in `unit`. Raises ValueError for columns that do not fit together."""
+    """Table from columns of equal length, errors in `unit`. Raises ValueError for inconsistent columns."""
     if len(position) < 2 or np.any(np.diff(position) <= 0.0):
         raise ValueError("positions have to rise from row to row, in two rows at least")
     columns = [forward, forward if reverse is None else reverse]
@@ -113,7 +113,7 @@ def _error_columns(table: CsvTable) -> tuple[tuple[str, ...], str]:
 def parse_comp(text: str, name: str, comp_type: int) -> ErrorTable:
     """The table in the text of LinuxCNC's file for screws, mm. Raises ConfigError CC266.
 
-    LinuxCNC itself stops without a word at the first line that is no triplet; here only blank lines may stand behind.
+    LinuxCNC silently ends the table at the first line that is no triplet; here only blank lines may follow the rows.
     """
     readable = like_a_table(["", *text.splitlines()])
     rows: list[list[float]] = []
@@ -137,7 +137,7 @@ def parse_comp(text: str, name: str, comp_type: int) -> ErrorTable:
 
 
 def comp_text(table: ErrorTable, comp_type: int) -> str:
-    """The text of LinuxCNC's file for screws that makes up for a table."""
+    """Text of LinuxCNC's screw file that compensates for a table."""
     there, back = table.forward, table.reverse
     pair = (table.position + there, table.position + back) if comp_type == 0 else (-there, -back)
     rows = zip(table.position, *pair, strict=True)

@@ -1,1 +1,1 @@
-"""Laws and maps that were found rather than known: formulas over what the machine does, and where they were seen."""
+"""Empirical laws and maps: formulas over covariates, with the envelope of the data that support them."""

@@ -1,4 +1,4 @@
-"""What a law may depend on, row by row: names with units, and their values from the motion, the load and the tip."""
+"""Covariates of a law: names with units, and their values per row from motion, load and tip."""
 
 from __future__ import annotations
 
@@ -48,10 +48,11 @@ REFERENCE_C = 20.0
 
 @dataclass(frozen=True, eq=False)
 class TipRows(Mapping[str, Floats]):
-    """Covariates of n rows at the tip: tip (n, 3) mm in the program frame, for where nobody knows where the set-points lead it; each
-    is worked out when it is asked for.
+    """Covariates of n rows at the tip, computed on access.
 
-    What axes and guides do goes with where they were told to be: the load bends the tip away from there, by a millimetre on a robot.
+    Positions are those commanded by the set-points where they are known, because errors of axes and guides depend on the
+    commanded position: under load the tip of a robot may be a millimetre away from it. tip (n, 3) mm in the program frame
+    is used otherwise.
     """
 
     tip: Floats
@@ -102,9 +103,9 @@ class TipRows(Mapping[str, Floats]):
 
 @dataclass(frozen=True, eq=False)
 class DriveRows(Mapping[str, Floats]):
-    """Covariates of n rows at drive j: its set-points where the control is meant, else its encoder; worked out when asked for.
+    """Covariates of n rows at drive j, computed on access: of its set-points at the stage control, else of its encoder.
 
-    loads: names of loads of drives that are listed, too; any can be asked for.
+    loads: names of drive loads that iteration lists in addition; access works for any.
     """
 
     motion: Motion
@@ -129,7 +130,7 @@ class DriveRows(Mapping[str, Floats]):
         return position
 
     def _load(self, actuator: str | None) -> Floats:
-        """What this drive or another one exerts (n,); nothing where no load is known."""
+        """Force (n,) N or torque N mm of this drive or another one; zero where the load is unknown."""
         if self.motion.held is None:
             return np.zeros(self.rows)
         return self.motion.held()[:, self.j if actuator is None else self.motion.names.index(actuator)]
@@ -158,11 +159,11 @@ def load_of(name: str) -> str | None:
 
 
 def rate(values: Floats, motion: Motion) -> Floats:
-    """Change per second (n, k) of values (n, k); 0 for poses that are no movement."""
+    """Rate of change per second (n, k) of values (n, k); 0 for poses that are no movement."""
     t = motion.time
     if not motion.ordered or len(t) < 2:
         return np.zeros_like(values)
-    apart = np.concatenate([[True], np.diff(t) > 1e-9])  # instants that stand twice count once
+    apart = np.concatenate([[True], np.diff(t) > 1e-9])  # repeated instants count once
     if apart.sum() < 2:
         return np.zeros_like(values)
     found = np.gradient(values[apart], t[apart], axis=0)

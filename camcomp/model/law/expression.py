@@ -6,7 +6,7 @@
     power   = atom ("^" sign)?
     atom    = number | name | name "(" sum ("," sum)* ")" | "(" sum ")"
 
-Nothing else can be said in it, so a formula out of a file can do nothing but compute.
+The grammar has no other constructs, so a formula from a file can only compute.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from camcomp.ground.datatypes import Floats
 from camcomp.model.hysteresis import direction, play
 
 LONGEST = 4000  # characters
-DEEPEST = 60  # brackets and signs inside each other
+DEEPEST = 60  # nested brackets and signs
 _TOKEN = re.compile(r"\s*(?:(\d+\.?\d*(?:[eE][+-]?\d+)?|\.\d+(?:[eE][+-]?\d+)?)|([A-Za-z_]\w*)|([-+*/^(),]))")
 CONSTANTS = {"pi": float(np.pi)}
 
 
 class FormulaError(ValueError):
-    """What is wrong with a formula, and at which of its characters, from 0."""
+    """An error in a formula, with the index of its character, from 0."""
 
     def __init__(self, message: str, at: int, hint: str = "") -> None:
         super().__init__(message)
@@ -36,17 +36,17 @@ class FormulaError(ValueError):
 
 
 def way(u: Floats, length: float) -> Floats:
-    """Sense (n,) in which u (n,) travels, -1 to 1; a reversal takes `length` of way to turn it round."""
+    """Direction (n,) in which u (n,) travels, -1 to 1; a reversal changes it over a travel of `length`."""
     return direction(u[:, None], max(length, 1e-9))[:, 0]
 
 
 def drag(u: Floats, width: float) -> Floats:
-    """What a play of full `width` adds to u (n,): -width/2 to width/2."""
+    """Output minus input (n,) of a play of full `width` driven by u (n,): -width/2 to width/2."""
     return play(u[:, None], max(width, 0.0))[:, 0]
 
 
 def since(u: Floats) -> Floats:
-    """Way (n,) that u (n,) has gone since it last turned round; 1e9 before the first time."""
+    """Travel (n,) of u (n,) since its last reversal; 1e9 before the first one."""
     step = np.diff(u, prepend=u[:1])
     gone = np.cumsum(np.abs(step))
     sense = np.sign(step)
@@ -57,7 +57,7 @@ def since(u: Floats) -> Floats:
     return np.asarray(gone - np.maximum.accumulate(last))
 
 
-# name -> (number of arguments, function, what it says)
+# name -> (number of arguments, function, description)
 FUNCTIONS: dict[str, tuple[int, Callable[..., Floats], str]] = {
     "sin": (1, np.sin, "sine of rad"),
     "cos": (1, np.cos, "cosine of rad"),
@@ -81,7 +81,7 @@ _OF_ROWS_IN_ORDER = {*_LENGTHS, "since"}
 
 @dataclass(frozen=True)
 class FormulaNode:
-    """A number, a name, or an operation on parts; `at` is the character where it begins."""
+    """A number, a name, or an operation on parts; `at`: index of its first character."""
 
     kind: str  # "number", "name", "call", or the operator
     value: float | str
@@ -97,7 +97,7 @@ class FormulaNode:
 
 @dataclass(frozen=True)
 class Expression:
-    """A formula: its text and what it means."""
+    """A formula: its text and its tree."""
 
     text: str
     root: FormulaNode
@@ -109,17 +109,17 @@ class Expression:
 
     @property
     def remembers(self) -> bool:
-        """Whether a value hangs on the rows before it, which are those of one run then."""
+        """Whether a value depends on the rows before it, which then have to belong to one run."""
         return any(each.kind == "call" and each.value in _OF_ROWS_IN_ORDER for each in self.root.walk())
 
     def __call__(self, rows: Mapping[str, Floats], n: int) -> Floats:
-        """Values (n,) where every covariate has its values (n,); NaN or infinite where the formula has none."""
+        """Values (n,) for covariates with n rows; NaN or infinite where the formula is undefined."""
         with np.errstate(all="ignore"):
             return np.array(np.broadcast_to(_value(self.root, rows), (n,)), float)
 
 
 def parse(text: str, names: Mapping[str, object]) -> Expression:
-    """The formula that a text says; `names` are the covariates that it may use. Raises FormulaError."""
+    """Parse a formula; `names` are the allowed covariates. Raises FormulaError."""
     if len(text) > LONGEST:
         raise FormulaError(f"longer than {LONGEST} characters", LONGEST)
     reader = _Reader(text)

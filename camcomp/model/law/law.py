@@ -1,7 +1,7 @@
-"""A law: what it adds, on which channel, and the envelope in which it was seen.
+"""An empirical law: its formula, its channel, and the envelope of the covariates that support it.
 
-Inside the envelope it holds in full; beyond it fades to nothing over a tenth of the envelope's width, smoothly, for what was
-never seen is not known.
+Inside the envelope the law holds in full; outside, where no data support it, it fades smoothly to zero over a tenth of the
+envelope's width.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from camcomp.model.law.covariates import DriveRows, TipRows
 
 On = Literal["control", "drive", "structure", "tool", "workpiece"]
 AT_DRIVES = ("control", "drive")
-FADE = 0.1  # of the envelope's width, over which a law ends outside it
+FADE = 0.1  # of the envelope's width: distance outside over which a law fades to zero
 
 
 class Shape(Protocol):
@@ -34,9 +34,10 @@ class Shape(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class EmpiricalLaw:
-    """on: control and drive shift actuators (mm or rad), the others the tip along `axis` of the program (0 to 2), mm.
+    """A formula or map with channel, envelope and factor.
 
-    envelope: covariate -> (low, high) in which it was seen; factor: what its size is multiplied by.
+    on: control and drive shift actuators (mm or rad), the others the tip along `axis` of the program (0 to 2), mm.
+    envelope: covariate -> (low, high) of the supporting data; factor: multiplies the values.
     """
 
     on: str
@@ -47,7 +48,7 @@ class EmpiricalLaw:
     label: str = ""
 
     def values(self, rows: TipRows | DriveRows) -> Floats:
-        """What it adds (n,); fades outside the envelope, and says so once."""
+        """Error (n,) that the law adds; it fades outside the envelope, with one warning."""
         n = rows.rows
         out = self.factor * self.shape(rows, n)
         if self.factor == 0.0 or not self.envelope:

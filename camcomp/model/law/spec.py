@@ -22,7 +22,7 @@ _WORD = re.compile(r"[A-Za-z_]\w*")
 
 
 def known_names(on: str, text: str = "") -> dict[str, str]:
-    """Covariates that a law on that stage may use, with what they are; those in a text by the actuators that it names."""
+    """Covariates of a law at a stage, with descriptions; loads of drives are those whose names occur in `text`."""
     if on == "drive":
         return {**AT_DRIVE, **LOADS, **{word: "load of a drive" for word in _WORD.findall(text) if is_load(word)}}
     return AT_DRIVE if on in AT_DRIVES else AT_TIP
@@ -55,12 +55,12 @@ class _LawSpec(Spec):
 
     @property
     def shape(self) -> Expression | SplineMap:
-        """What is evaluated."""
+        """The function to be evaluated: a formula or a map."""
         raise NotImplementedError
 
     @property
     def loads_of(self) -> tuple[str, ...]:
-        """Other actuators whose loads it depends on."""
+        """Other actuators on whose loads the law depends."""
         return tuple(other for other in map(load_of, (*self.shape.names, *self.envelope)) if other is not None)
 
     @cached_property
@@ -71,7 +71,7 @@ class _LawSpec(Spec):
         return EmpiricalLaw(self.stage, self.shape, envelope, "xyz".index(self.axis or "x"), label=label)
 
     def effect_values(self) -> dict[str, Any]:
-        """What the hooks are given."""
+        """Values for the hooks: the law."""
         return {"law": self.law}
 
 

@@ -24,7 +24,7 @@ class SplineMap:
     coefficients: Floats
 
     def __call__(self, rows: Mapping[str, Floats], n: int) -> Floats:
-        """Values (n,); those at the limits beyond them."""
+        """Values (n,); constant beyond the limits."""
         basis = [
             splines(rows[name], low, high, count)
             for name, (low, high), count in zip(self.names, self.limits, self.coefficients.shape, strict=True)

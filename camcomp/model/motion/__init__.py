@@ -1,3 +1,1 @@
-"""The machine in time and along a program: signal path, run path, the twin that simulates and is compared with
-logs.
-"""
+"""Motion of the machine in time and along a program: run path, response to commands, and the twin of a logged run."""

@@ -1,8 +1,8 @@
-"""Where along its program a machine was, row by row: geometry says it, line numbers settle what geometry leaves open.
+"""Alignment of log rows with the program: position on the path of every row, from the tip and the line numbers.
 
-Real controls blend corners, merge lines and report line numbers early or late. So rows are led along the path by the
-place of the tip, all of them together, so that passes over the same place and beam breaks mislead nobody. The column `line`
-counts as a hint; by how many rows it leads or lags is found from the rows at which it changes.
+Controllers blend corners, merge lines and report line numbers early or late. The alignment therefore follows the tip
+along the path for all rows jointly, by dynamic programming, which copes with repeated passes and beam breaks. The column
+`line` is a weak prior; its lead or lag in rows is estimated from the rows at which it changes.
 """
 
 from __future__ import annotations
@@ -16,23 +16,25 @@ from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import ARC, Floats, Ints, Path
 from camcomp.ground.machine_code import kept
 
-_CHORD_RAD = 0.05  # of an arc
-_LINE_MM2 = 0.01  # squared distance that a wrong line number weighs as much as, and by how many times it adds to it
+_CHORD_RAD = 0.05  # chord of an arc
+_LINE_MM2 = 0.01  # mm²: cost of a wrong line number, plus _LINE_TIMES times the squared distance
 _LINE_TIMES = 4.0
-_SLACK_MM = 0.5  # by which a row may be further along than the way between two rows says
-LOST_MM = 2.0  # from the path: a row that is further off says nothing about where the machine was
-_JUMP_MM2 = 10.0  # what a place weighs that the row before does not lead to: rows are missing, or the log begins again
-_BACK_MM2 = 10.0  # and every mm back along the path
-_PLACES = 16  # that are followed at a time
-_BOX = 32  # chords that are looked at together
-_MOST_LAG = 250  # rows: a quarter of a second where a control logs every millisecond
-_GAINED = 0.35  # of the shift, in rows per change of line: short lines hide a part of it
+_SLACK_MM = 0.5  # tolerance of the path length between two rows
+LOST_MM = 2.0  # distance from the path beyond which a row has no position on it
+_JUMP_MM2 = 10.0  # mm²: cost of a position that the row before does not lead to (missing rows, or a restarted log)
+_BACK_MM2 = 10.0  # mm² per mm of motion back along the path
+_PLACES = 16  # most candidate positions per row
+_BOX = 32  # chords per bounding box
+_MOST_LAG = 250  # rows: a quarter of a second for a log at 1 kHz
+_GAINED = 0.35  # of the shift, in rows per change of line: least gain in agreement, which short lines reduce
 
 
 @dataclass(frozen=True, eq=False)
 class Aligned:
-    """n rows on a path. motion (n,): index into the path; share (n,) of its length; distance (n,) mm from it; lag: rows by
-    which the column `line` is late (early where negative); line (n,): source line being executed, corrected by it.
+    """Positions of n rows on a path.
+
+    motion (n,): index into the path; share (n,) of its length; distance (n,) mm from it; lag: delay of the column `line` in
+    rows (negative: early); line (n,): executed source line, corrected by it.
     """
 
     motion: Ints
@@ -43,9 +45,9 @@ class Aligned:
 
 
 def align(path: Path, tip: Floats, line: Floats, lost_mm: float = LOST_MM) -> Aligned:
-    """Rows of tips (n, 3) mm, program frame, in the order of time; line (n,): as logged, NaN where it is not known.
+    """Align rows of tips (n, 3) mm, program frame, in the order of time; line (n,): as logged, NaN where unknown.
 
-    lost_mm: from the path, beyond which a row is a beam break; more where the tip bends by as much.
+    lost_mm: distance from the path beyond which a row is a beam break; larger for machines with large deflections.
     """
     tip = np.ascontiguousarray(tip)  # one layout, compiled once
     motion, u0, u1 = _chords(path)
@@ -66,23 +68,23 @@ def align(path: Path, tip: Floats, line: Floats, lost_mm: float = LOST_MM) -> Al
 
 
 def _onward(way: Floats) -> Floats:
-    """The way along the path (n,) mm without going back, the nearest such one by squares: noise moves nobody backward.
+    """Monotone path length (n,) mm nearest to `way` by least squares, which removes backward steps of noise.
 
-    Where it goes back by more than _SLACK_MM the log begins again. Source: pool adjacent violators (Barlow et al. 1972).
+    A step back by more than _SLACK_MM restarts it. Source: pool adjacent violators (Barlow et al. 1972).
     """
     parts = np.split(way, np.flatnonzero(np.diff(way) < -_SLACK_MM) + 1)
     return np.concatenate([isotonic_regression(each).x for each in parts])
 
 
 def _boxes(begin: Floats, end: Floats) -> tuple[Floats, Floats]:
-    """Lowest and highest corners (b, 3) of the chords, _BOX of them at a time."""
+    """Bounding boxes (lowest, highest corner (b, 3)) of _BOX chords each."""
     first = np.arange(0, len(begin), _BOX)
     low = np.minimum.reduceat(np.minimum(begin, end), first)
     return low, np.maximum.reduceat(np.maximum(begin, end), first)
 
 
 def _chords(path: Path) -> tuple[Ints, Floats, Floats]:
-    """Every motion with a length as straight chords: motion (k,), begin and end (k,) as shares of it."""
+    """Straight chords of every motion with a length: motion (k,), start and end (k,) as shares of it."""
     moves = np.flatnonzero(path_geometry.lengths(path) > 0.0)
     angle = np.where(path.kind[moves] == ARC, np.abs(np.nan_to_num(path.angle[moves])), 0.0)
     count = np.maximum(np.ceil(angle / _CHORD_RAD), 1.0).astype(np.int64)
@@ -94,7 +96,7 @@ def _chords(path: Path) -> tuple[Ints, Floats, Floats]:
 
 @kept
 def _put(place, weight, found, at, weighs):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """One more place, in the stead of the worst one when there are too many; their number."""
+    """Add a candidate, in place of the worst one if there are _PLACES, and return their number."""
     k = found
     if found == _PLACES:
         k = int(np.argmax(weight))
@@ -106,10 +108,10 @@ def _put(place, weight, found, at, weighs):  # type: ignore[no-untyped-def]  # p
 
 @kept
 def _places(begin, way, length, at, line, low, high, tip, hint, lost):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """Where along the path it comes nearest to a tip (3,) and leaves again, mm, and what these places weigh."""
+    """Candidates for a tip (3,): path lengths (mm) of local minima of the distance, and their costs (mm²)."""
     place, weight = np.empty(_PLACES), np.empty(_PLACES)
     found, previous = 0, -2
-    ended = False  # the nearest place on the chord before is its end: the way goes on to fall, or it is the nearest one
+    ended = False  # the distance falls up to the end of the chord before
     last_at, last_weight = 0.0, 0.0
     for box in range(low.shape[0]):
         gap = 0.0
@@ -127,7 +129,7 @@ def _places(begin, way, length, at, line, low, high, tip, hint, lost):  # type: 
                 gap += (begin[c, j] + x / length[c] * way[c, j] - tip[j]) ** 2
             if gap > lost**2:
                 continue
-            # the line that is said to be executed has a nearest place of its own
+            # the logged line gets a candidate of its own
             on = c == previous + 1 and (hint < 0 or (line[c] == hint) == (line[previous] == hint))
             if ended and (not on or x == 0.0):
                 found = _put(place, weight, found, last_at, last_weight)
@@ -142,15 +144,15 @@ def _places(begin, way, length, at, line, low, high, tip, hint, lost):  # type: 
 
 @kept
 def _follow(begin, way, length, at, line, low, high, tip, hint, lost):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """Way along the path (n,) mm: of all sequences of places near the rows the one that fits best and leads from row to row.
+    """Path length (n,) mm of the cheapest consistent sequence of candidates.
 
-    Dynamic programming over the nearest places of every row, at most _PLACES of them, each with the row it was last seen at:
-    a row may be no place at all (a beam break), for which it counts as `lost` mm off.
+    Dynamic programming over at most _PLACES candidates per row, each with its last row; a row without a position (a beam
+    break) costs as much as `lost` mm of distance.
     """
     n = tip.shape[0]
     where, cost = np.zeros((n, _PLACES)), np.full((n, _PLACES), np.inf)
     before, seen = np.full((n, _PLACES), -1), np.full((n, _PLACES), -1)
-    held = 0  # places of the row before
+    held = 0  # candidates of the row before
     for i in range(n):
         near, off = _places(begin, way, length, at, line, low, high, tip[i], hint[i], lost)
         count = len(near) + held
@@ -168,9 +170,7 @@ def _follow(begin, way, length, at, line, low, high, tip, hint, lost):  # type: 
                     jump = min(-_BACK_MM2 * ahead, _JUMP_MM2)
                 elif ahead > 2.0 * np.sqrt(step) + _SLACK_MM:
                     jump = _JUMP_MM2
-                value = (
-                    cost[i - 1, j] + jump + 1e-9 * max(ahead, 0.0)
-                )  # of two that fit alike the nearer along the path
+                value = cost[i - 1, j] + jump + 1e-9 * max(ahead, 0.0)  # of two equal costs the nearer along the path
                 if value < c[k]:
                     c[k], b[k] = value, j
             if held == 0:
@@ -188,7 +188,7 @@ def _follow(begin, way, length, at, line, low, high, tip, hint, lost):  # type: 
     j = 0
     for i in range(n - 1, -1, -1):
         out[i] = where[i, j]
-        if before[i, j] < 0:  # rows before the first place: they lie wherever that is
+        if before[i, j] < 0:  # rows before the first candidate take its position
             out[:i] = out[i]
             break
         j = before[i, j]
@@ -196,7 +196,7 @@ def _follow(begin, way, length, at, line, low, high, tip, hint, lost):  # type: 
 
 
 def _nearest(path: Path, motion: Ints, share: Floats, tip: Floats) -> Floats:
-    """Shares (n,) of the points of the motions that are nearest to the tips, from those on the chords."""
+    """Shares (n,) of the nearest points on the motions, refined from those on the chords."""
     arc = np.flatnonzero(path.kind[motion] == ARC)
     length = np.maximum(path_geometry.lengths(path)[motion[arc]], 1e-12)
     out = share.copy()
@@ -208,9 +208,9 @@ def _nearest(path: Path, motion: Ints, share: Floats, tip: Floats) -> Floats:
 
 
 def _lag(geometric: Ints, hint: Ints) -> int:
-    """Rows by which the line numbers are late, from what the place of the tip says; 0 where that is not plain to see.
+    """Lag of the line numbers in rows against the lines at the tip's positions; 0 without clear evidence.
 
-    Standing at the end of a line either number may be shown, so only agreement counts that a shift gains.
+    At standstill on the end of a line both numbers are possible, so that only the gain in agreement by a shift counts.
     """
     known = hint >= 0
     change = np.flatnonzero(np.diff(geometric) != 0)
@@ -231,7 +231,7 @@ def _lag(geometric: Ints, hint: Ints) -> int:
 
 
 def way_from_lines(path: Path, aligned: Aligned) -> Floats:
-    """Way along the path (n,) mm from where a row lies to the line that it names; NaN where it names none of the program."""
+    """Path length (n,) mm from the position of a row to its logged line; NaN for numbers outside the program."""
     length = path_geometry.lengths(path)
     at = np.concatenate([[0.0], np.cumsum(length)])
     own = at[aligned.motion] + aligned.share * length[aligned.motion]
@@ -245,6 +245,6 @@ def way_from_lines(path: Path, aligned: Aligned) -> Floats:
 
 
 def _shifted(line: Floats, lag: int) -> Floats:
-    """Line numbers (n,) moved to earlier rows by `lag`; the ends keep what they have."""
+    """Line numbers (n,) shifted to earlier rows by `lag`, constant at the ends."""
     index = np.clip(np.arange(len(line)) + lag, 0, len(line) - 1)
     return line[index]

@@ -1,8 +1,8 @@
-"""A run as it was really driven: what moved is what was logged, and the program says what was cut and where.
+"""Run path of a logged run: motion from the log, cutting force from the program.
 
-The set-points (or encoders) of a log are the motion. Between rows they are led smoothly; the cutting force acts along
-the way that the tip takes, while the line being executed cuts; where the force cannot be known (on which side of a
-corner, at which instant a cut begins) the rows say so.
+The set-points (or encoders) of a log define the motion, interpolated smoothly between rows. The cutting force acts along
+the path of the tip while the executed line cuts. Rows with an uncertain force (the side of a corner, the instant at which
+a cut begins) carry a bound of its error.
 """
 
 from __future__ import annotations
@@ -22,27 +22,26 @@ from camcomp.model.motion.driven_pieces import DrivenPieces, beside_most, node_l
 from camcomp.model.motion.run_path import MOST_STEPS, STEP_S, Driven, RunPath, moving
 from camcomp.model.seams import Seams, missing_rows
 
-CLOCK_S = 0.010  # by which the clock of a tip measurement may be off that of the control
-_JUMP_SHARE = 0.1  # of the largest force: what the force changes from row to row is more than the turn of an arc
-_USUAL = 4.0  # times the usual change from row to row
-_AGREE = np.cos(
-    np.radians(2.0)
-)  # driven and programmed direction are the same: digits of set-points turn it by as much
+CLOCK_S = 0.010  # largest offset between the clocks of tip measurement and controller
+_JUMP_SHARE = 0.1  # of the largest force: a change from row to row above it is a jump, not the turn of an arc
+_USUAL = 4.0  # times the median change from row to row
+_AGREE = np.cos(np.radians(2.0))  # cosine of the angle by which digits of set-points turn the driven direction
 _STILL_MM_PER_S = 0.05
-BESIDE_MM = 0.6  # from the path: no blended corner leaves it further, and what does so is no cut of it
-_SURE_N = 20.0  # what the force may be off by for the nodes between rows to be led by it
-_REST_S = 0.1  # within which a tip that stands goes no further than _CHORD_MM
-_CREEPS = 0.05  # of the speed with which the run cuts: between rows that are so far apart in time and so near in place it stood
-_SAME_FEED = 0.03  # by which a driven feed may differ from the programmed one and still be it
-LEAST_FEED = 1e-3  # mm/min, of what stands still
-_RESTS = 1e-3  # of the longest way between two rows: less, twice in a row, is rest
-_CHORD_MM = 0.02  # over which a direction is taken: digits and noise of set-points are small beside it
+BESIDE_MM = 0.6  # distance from the path beyond which a row does not cut: blended corners deviate less
+_SURE_N = 20.0  # largest error of a force that determines the nodes between rows
+_REST_S = 0.1  # time in which a tip at standstill moves by less than _CHORD_MM
+_CREEPS = 0.05  # of the cutting speed: a slower mean speed over missing rows means a standstill
+_SAME_FEED = 0.03  # relative tolerance of driven against programmed feed
+LEAST_FEED = 1e-3  # mm/min, in place of zero
+_RESTS = 1e-3  # of the longest step between two rows: two shorter steps in succession are a standstill
+_CHORD_MM = 0.02  # length over which a direction is taken: large against digits and noise of set-points
 
 
 @dataclass(frozen=True, eq=False)
 class Forces:
-    """Cutting force at n rows. force, doubt (n, 3) N, program frame: doubt is half of what it may be off by. apart (n - 1,):
-    between a row and the next the machine did something that does not cut, or waited, and that was not logged.
+    """Cutting force (n, 3) N at n rows, program frame, with half the width of its error interval (`doubt`).
+
+    apart (n - 1,): between a row and the next the machine moved without cutting, or waited, and no row was logged.
     """
 
     force: Floats
@@ -52,7 +51,7 @@ class Forces:
 
     @classmethod
     def none(cls, n: int) -> Forces:
-        """Of a run in which nothing is known to cut."""
+        """Zero forces of a run without a known cut."""
         return cls(np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(n, bool), np.zeros(max(n - 1, 0), bool))
 
     def cut_at(self, time: Floats, at: Floats) -> Floats:
@@ -78,7 +77,7 @@ def driven_path(
     inverse: Callable[[Floats], Floats],
     temperature: Floats | None = None,
 ) -> RunPath:
-    """Run path of driven actuators rho (n, m) at times (n,) s, and the nominal tips tip (n, 3), program frame, that go with them.
+    """Run path of logged actuators rho (n, m) at times (n,) s with their nominal tips (n, 3) mm, program frame.
 
     to_machine, vectors: program -> machine frame. inverse: machine tips (q, 3) -> set-points (q, m).
     """
@@ -92,7 +91,7 @@ def driven_path(
     pieces = DrivenPieces.along(time, grid, grid_tip, jump)
     pieces = pieces.around(time, beside_most(time, row_force, sure, jump, pieces))
     node_time = pieces.node_times()
-    # the tip is led between rows, and the drives where it asks them to be: an arm keeps its tool upright there
+    # the tip is interpolated, and the drives follow from it: an arm keeps its tool upright between rows
     node_tip = lead_tip(node_time)
     node_rho = inverse(node_tip)
     node_force = node_loads(time, row_force, sure, jump, node_time, pieces)
@@ -104,11 +103,11 @@ def driven_path(
 
 
 def _seams(time: Floats, grid: Floats, lead: Callable[[Floats], Floats]) -> Seams:
-    """Where rows (n,) s begin, and go on after some that are missing: the instants on either side of such a row."""
+    """Seams of rows at times (n,) s: their start, and the instants on either side of missing rows."""
     rows = np.repeat(np.flatnonzero(np.append(True, missing_rows(time))), 2)
     before = np.searchsorted(grid, time[rows], side="right") - 1
     instants = np.minimum(before + np.arange(len(rows)) % 2, len(grid) - 1)
-    at, last = np.unique(instants[::-1], return_index=True)  # of several in one step of the grid the last
+    at, last = np.unique(instants[::-1], return_index=True)  # the last one in each step of the grid
     rows = rows[::-1][last]
     unseen = np.where(rows > 0, time[rows] - time[rows - 1], np.inf)
     speed = (lead(time[rows] + STEP_S) - lead(time[rows])) / STEP_S
@@ -124,9 +123,10 @@ def cutting_forces(
     logged_line: bool,
     beside_mm: float = BESIDE_MM,
 ) -> Forces:
-    """What the model says of the force along the way that the tip (n, 3) mm, program frame, was driven at times (n,) s.
+    """Modelled cutting force along the driven path of the tip (n, 3) mm, program frame, at times (n,) s.
 
-    rests (m,): motions of the path at whose end the control stops. beside_mm: from the path, beyond which nothing is cut, where no line numbers say what is.
+    rests (m,): motions of the path with a stop at their end. beside_mm: distance from the path beyond which rows without line
+    numbers do not cut.
     """
     motion, share, on = _executed(track, aligned, tip, time, logged_line)
     piece = _piece_of(track, motion, share)
@@ -148,20 +148,20 @@ def cutting_forces(
     told, chord = track.force(piece, w, feed), track.force_along(piece, w, programmed, feed)
     force = np.where(as_told[:, None], told, track.force_along(piece, w, middle, feed))
     force[~on] = 0.0
-    # on fine polygons a control turns somewhere between the corner alone and the whole of its lines
+    # on fine polygons the turn of the controller is somewhere between the corner alone and the whole of its lines
     turning = np.where((as_told & on)[:, None], np.abs(told - chord), 0.0)
     thicker = np.abs(track.force_along(piece, w, programmed, ahead) - track.force_along(piece, w, programmed, behind))
     turning = np.maximum(turning, np.where(on[:, None], thicker, 0.0))
-    # how fast the tip was about a stop between rows these do not say
+    # the speed around a stop between rows is unknown
     most, least = (track.force_along(piece, w, programmed, each) for each in (_programmed_feeds(track, motion), still))
     stopped = (on & _beside_stops(motion, rests))[:, None]
     turning = np.maximum(turning, np.where(stopped, 0.5 * np.abs(most - least), 0.0))
     unsteady = _unsteady(before, after, as_told)[:, None] * np.linalg.norm(force, axis=1, keepdims=True) / np.sqrt(3.0)
     turning = np.maximum(turning, unsteady)
-    # an edge that stands cuts nothing, rubs as hard as it rubs, and back along whatever it moved by last
+    # at standstill only the edge force remains, against the last direction of motion
     standing = (on & _standing(tip, time))[:, None] * np.linalg.norm(force, axis=1, keepdims=True)
     turning = np.maximum(turning, standing)
-    # line numbers that were late or early are right to a row
+    # line numbers corrected for their lag are exact to one row
     slack = CLOCK_S + (float(np.median(np.diff(time))) if aligned.lag else 0.0)
     return Forces(
         force, np.maximum(_doubt(force, time, on, slack), turning), on, _apart(track, motion) | _waited(tip, time, on)
@@ -169,16 +169,16 @@ def cutting_forces(
 
 
 def _beside_stops(motion: Ints, rests: Bools) -> Bools:
-    """Rows (n,) on motions (n,) between which and a neighbour the control has stopped, at the end of whichever motion."""
+    """Mask (n,) of rows on motions (n,) with a stop of the controller between them and a neighbour."""
     between = np.diff(np.concatenate([[0], np.cumsum(rests)])[motion]) > 0
     return np.asarray(np.append(between, False) | np.append(False, between))
 
 
 def _unsteady(before: Floats, after: Floats, as_told: Bools) -> Floats:
-    """Angle (n,) rad by which a direction between rows may be off where the way is not that of the program.
+    """Error bound (n,) rad of a direction between rows where the driven path deviates from the program.
 
-    before, after (n, 3): directions in which rows were reached and left. A way that turns evenly is known; where it begins or
-    ceases to turn, on which side of a row nobody knows, it is off by half of what the turn changes by.
+    before, after (n, 3): directions before and after a row. A constant rate of turning is known exactly; where it changes,
+    the bound is half of the change, because the side of the row is unknown.
     """
     change = np.linalg.norm(np.diff(after - before, axis=0), axis=1)
     most = 0.5 * np.maximum(np.append(change, 0.0), np.concatenate([[0.0], change]))
@@ -189,7 +189,7 @@ def _unsteady(before: Floats, after: Floats, as_told: Bools) -> Floats:
 
 
 def _apart(track: Track, motion: Ints) -> Bools:
-    """Whether, between rows on motions (n,), one lies that does not cut."""
+    """Mask (n - 1,) of neighbouring rows on motions (n,) with a motion that does not cut between them."""
     cuts = np.zeros(len(track.path), bool)
     cuts[track.motion[track.cutting]] = True
     idle = np.concatenate([[0], np.cumsum(~cuts & (path_geometry.lengths(track.path) > 0.0))])
@@ -197,7 +197,7 @@ def _apart(track: Track, motion: Ints) -> Bools:
 
 
 def _waited(tip: Floats, time: Floats, on: Bools) -> Bools:
-    """Whether a tool that cuts at rows (n,) `on` stood for most of the time between a row and the next, where rows are missing."""
+    """Mask (n - 1,) of gaps between cutting rows (n,) `on` in which the tool stood still for most of the time."""
     speed = np.linalg.norm(np.diff(tip, axis=0), axis=1) / np.maximum(np.diff(time), 1e-9)
     cutting = speed[on[1:] & on[:-1]]
     return np.asarray(missing_rows(time) & (speed < _CREEPS * float(np.median(cutting) if len(cutting) else 0.0)))
@@ -209,10 +209,10 @@ def path_tangents(track: Track, piece: Ints, w: Floats) -> Floats:
 
 
 def driven_feeds(tip: Floats, time: Floats, programmed: Floats) -> tuple[Floats, Floats, Floats]:
-    """Feeds (n,) mm/min at which tips (n, 3) were driven at times (n,) s: at the rows, on their way there, and from there on.
+    """Driven feeds (n,) mm/min of tips (n, 3) at times (n,) s: at the rows, before them, and after them.
 
-    Chips are as thick as the tip is fast. What is as fast as programmed (n,), on one side of a row at least, is programmed:
-    next to a corner or a rapid the other side says nothing. At standstill the edges still rub.
+    They determine the chip thickness. A feed that equals the programmed one (n,) on one side of a row is taken as
+    programmed, because a corner or a rapid falsifies the other side. At standstill it is LEAST_FEED.
     """
     at = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(tip, axis=0), axis=1))])
     left, right = _beside(at)
@@ -233,7 +233,7 @@ def _programmed_feeds(track: Track, motion: Ints) -> Floats:
 
 
 def _beside(at: Floats) -> tuple[Ints, Ints]:
-    """Rows at least _CHORD_MM away along the way (n,) behind and ahead of each row, neighbours where these are further."""
+    """Rows at least _CHORD_MM of path length `at` (n,) before and after each row; neighbours if these are farther."""
     rows = np.arange(len(at))
     left = np.minimum(np.searchsorted(at, at - _CHORD_MM, side="right") - 1, rows - 1)
     right = np.maximum(np.searchsorted(at, at + _CHORD_MM, side="left"), rows + 1)
@@ -241,7 +241,7 @@ def _beside(at: Floats) -> tuple[Ints, Ints]:
 
 
 def driven_directions(tip: Floats, time: Floats) -> tuple[Floats, Floats]:
-    """Directions (n, 3) in which a row was reached and is left; at standstill those of the last movement, zero before any."""
+    """Unit directions (n, 3) before and after every row; at standstill those of the last movement, zero before the first."""
     step = np.diff(tip, axis=0)
     length = np.linalg.norm(step, axis=1)
     at = np.concatenate([[0.0], np.cumsum(length)])
@@ -262,7 +262,7 @@ def driven_directions(tip: Floats, time: Floats) -> tuple[Floats, Floats]:
 
 
 def _held_at_rest(tip: Floats, time: Floats) -> Floats:
-    """Tips (n, 3) with those of a rest in its middle: what measured ones, and digits, tremble by is no way and has no direction."""
+    """Tips (n, 3) with the mean position in every standstill, so that noise and digits there have no direction."""
     rows = 2 * max(round(0.5 * _REST_S / max(float(np.median(np.diff(time))), 1e-9)), 2) + 1 if len(time) > 1 else 1
     if len(time) < rows:
         return tip
@@ -280,7 +280,7 @@ def _held_at_rest(tip: Floats, time: Floats) -> Floats:
 
 
 def _standing(tip: Floats, time: Floats) -> Bools:
-    """Whether a row (n,) was neither reached nor left by a movement."""
+    """Mask (n,) of rows without a movement before and after them."""
     speed = np.linalg.norm(np.diff(tip, axis=0), axis=1) / np.maximum(np.diff(time), 1e-9)
     slow = speed < _STILL_MM_PER_S
     return np.asarray(np.append(slow, True) & np.append(True, slow), bool)
@@ -293,7 +293,7 @@ def _unit(vectors: Floats) -> Floats:
 
 
 def _executed(track: Track, aligned: Aligned, tip: Floats, time: Floats, logged: bool) -> tuple[Ints, Floats, Bools]:
-    """Motion and share (n,) that the control says it executes, and whether it executes any."""
+    """Executed motion and share of it (n,) by the controller's line numbers, and mask (n,) of rows with one."""
     path = track.path
     motion, share = aligned.motion.copy(), aligned.share.copy()
     on = np.ones(len(motion), bool)
@@ -316,7 +316,7 @@ def _piece_of(track: Track, motion: Ints, share: Floats) -> Ints:
 
 
 def _doubt(force: Floats, time: Floats, cutting: Bools, slack: float) -> Floats:
-    """Half of what the force (n, 3) may be off by where it jumps between rows: the jump itself, as far as clocks reach."""
+    """Error bound (n, 3) of the force at jumps between rows: half the jump, for rows within the clock offset."""
     change = np.diff(force, axis=0)
     size = np.linalg.norm(change, axis=1)
     out = np.zeros_like(force)
@@ -335,16 +335,16 @@ def _abrupt(size: Floats, force: Floats) -> Bools:
 
 
 def _jumps(force: Floats, cutting: Bools) -> Ints:
-    """Rows behind which the force jumps."""
+    """Rows after which the force jumps."""
     size = np.linalg.norm(np.diff(force, axis=0), axis=1)
     return np.flatnonzero(_abrupt(size, force) | np.diff(cutting)) if len(force) > 1 else np.zeros(0, np.int64)
 
 
 def _smooth(time: Floats, values: Floats) -> Callable[[Floats], Floats]:
-    """Values (n, c) between rows: smooth, and without overshoot where a line begins or ends (Akima 1970).
+    """Interpolant of values (n, c) between rows, smooth and without overshoot at ends of lines (Akima 1970).
 
-    Where rows are missing, and where it comes to rest or leaves it, the way leads from one row to the next without turning
-    round (Fritsch, Carlson 1980): a reversal that nobody saw would leave play and friction on the wrong side.
+    Across missing rows and at standstills it is monotone (Fritsch, Carlson 1980): a spurious reversal would put play and
+    friction on the wrong side.
     """
     if len(time) < 3:
         return lambda at: np.column_stack([np.interp(at, time, v) for v in values.T])
@@ -352,7 +352,7 @@ def _smooth(time: Floats, values: Floats) -> Callable[[Floats], Floats]:
     rest = np.pad(way <= _RESTS * way.max(axis=0), ((2, 2), (0, 0)))
     held = missing_rows(time)[:, None] | (rest[3:-1] & rest[4:]) | (rest[1:-3] & rest[:-4])
     lead = Akima1DInterpolator(time, values, axis=0)
-    with np.errstate(over="ignore"):  # beside slopes of round-off, whose harmonic mean is nothing
+    with np.errstate(over="ignore"):  # slopes of round-off size, whose harmonic mean is negligible
         over = PchipInterpolator(time, values, axis=0)
 
     def between(at: Floats) -> Floats:

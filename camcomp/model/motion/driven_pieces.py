@@ -1,7 +1,7 @@
-"""A driven run cut into pieces with nodes, and the loads under which the structure is solved there.
+"""Pieces with nodes of a logged run, and the loads at which the structure is solved there.
 
-Pieces end where the force jumps, and rows whose force is far beside that of their neighbours, as in corners that a control
-blends, have pieces of their own.
+Pieces end where the force jumps; rows with a force far from that of their neighbours, as in blended corners, have pieces
+of their own.
 """
 
 from __future__ import annotations
@@ -19,25 +19,25 @@ _PIECE_MM = 60.0
 _PIECE_RAD = np.pi / 3
 # of a load along a piece, and rows for it; the cubic misses 60 degrees of an arc by 4e-4 of it
 _DEGREES = ((0, 1), (1, 2), (3, 7))
-_CORNER = 0.1  # of the largest force, beside most of a piece: beyond it first derivatives are not enough
-_EVEN = 1e-3  # of the largest force: what most rows may be off by where a lower degree will do
-_LARGER = 1.01  # times the largest force: what a load along a piece may grow to where its rows lead it on
+_CORNER = 0.1  # of the largest force: difference from the polynomial beyond which first derivatives do not suffice
+_EVEN = 1e-3  # of the largest force: median residual below which the lower degree suffices
+_LARGER = 1.01  # times the largest force: bound of an extrapolated load
 _REWEIGHTED = 12
 
 
 @dataclass(frozen=True, eq=False)
 class DrivenPieces:
-    """p pieces of a run, one after the other in time. begin, end (p,) s; way (p + 1 per piece) along the tip's path on the grid."""
+    """p consecutive pieces of a run: start and end (p,) s, path length of the tip on the grid."""
 
     begin: Floats
     end: Floats
     grid: Floats
-    way: Floats  # (g,) mm that the tip has come so far
-    stretch: NDArray[np.int64]  # (p,) which stretch without a jump of the force
+    way: Floats  # (g,) mm, path length of the tip
+    stretch: NDArray[np.int64]  # (p,) number of the interval between jumps of the force
 
     @classmethod
     def along(cls, time: Floats, grid: Floats, tip: Floats, jump: Ints) -> DrivenPieces:
-        """Of a run with rows at times (n,) s, the force jumping behind some; tip (g, 3) mm on its grid (g,) s."""
+        """Pieces of a run with rows at times (n,) s and jumps of the force after some; tip (g, 3) mm on the grid (g,) s."""
         step = np.diff(tip, axis=0)
         length = np.linalg.norm(step, axis=1)
         way = np.concatenate([[0.0], np.cumsum(length)])
@@ -64,7 +64,7 @@ class DrivenPieces:
         return cls(start, np.append(start[1:], time[-1]), grid, way, np.array(stretch))
 
     def around(self, time: Floats, rows: Bools) -> DrivenPieces:
-        """The same with pieces of their own for rows (n,) that follow each other."""
+        """Pieces with separate ones for consecutive rows of a mask (n,)."""
         changes = np.flatnonzero(rows[1:] != rows[:-1])
         right = np.clip(np.searchsorted(time, self.begin), 1, len(time) - 1)
         new_stretch = np.diff(self.stretch, prepend=-1) > 0
@@ -77,7 +77,7 @@ class DrivenPieces:
         return np.clip(np.searchsorted(self.begin, at, side="right") - 1, 0, len(self.begin) - 1)
 
     def local(self, piece: Ints, at: Floats) -> Floats:
-        """Fraction (n,) of the piece that is done: of its way, or of its time where it stands still."""
+        """Fraction (n,) of the piece: of its path length, or of its time at standstill."""
         first, last = np.interp(self.begin, self.grid, self.way), np.interp(self.end, self.grid, self.way)
         way = (last - first)[piece]
         moved = (np.interp(at, self.grid, self.way) - first[piece]) / np.where(way > 1e-3, way, 1.0)
@@ -85,7 +85,7 @@ class DrivenPieces:
         return np.clip(np.where(way > 1e-3, moved, spent), 0.0, 1.0)
 
     def at(self, at: Floats) -> Places:
-        """Where times (n,) lie between the nodes."""
+        """Interpolation between the nodes at times (n,)."""
         piece = self.of(at)
         return Places(piece, piece[:, None] * NODES + np.arange(NODES), basis_at(self.local(piece, at)))
 
@@ -102,10 +102,10 @@ class DrivenPieces:
 
 
 def node_loads(time: Floats, force: Floats, sure: Bools, jump: Ints, at: Floats, pieces: DrivenPieces) -> Floats:
-    """Loads (q, 3) N under which the structure is solved at node times (q,): smooth along a piece, as most of its sure rows have them.
+    """Loads (q, 3) N of the structure at node times (q,): a robust low-degree polynomial of the sure rows of each piece.
 
-    What a row's force (n, 3) is beside, first derivatives add. A polynomial that went through all of them would swing between
-    nodes wherever a piece begins or ends in a corner, and the structure with it.
+    First derivatives add the difference to the force (n, 3) of a row. A polynomial through all rows would oscillate between
+    nodes where a piece begins or ends in a corner.
     """
     out = _of_stretches(time, force, sure, jump, at, pieces)
     piece, most = pieces.of(time), float(np.linalg.norm(force, axis=1).max(initial=0.0))
@@ -125,15 +125,16 @@ def node_loads(time: Floats, force: Floats, sure: Bools, jump: Ints, at: Floats,
 
 
 def beside_most(time: Floats, force: Floats, sure: Bools, jump: Ints, pieces: DrivenPieces) -> Bools:
-    """Sure rows (n,) whose force is far beside that of most of their piece, as in a corner that a control blends."""
+    """Mask (n,) of sure rows with a force far from the polynomial of their piece, as in a blended corner."""
     loads = node_loads(time, force, sure, jump, pieces.node_times(), pieces)
     off = np.linalg.norm(force - pieces.at(time).of(loads), axis=1)
     return np.asarray(sure & (off > _CORNER * float(np.linalg.norm(force, axis=1).max(initial=0.0))))
 
 
 def _mostly(at: Floats, values: Floats, degree: int) -> tuple[Floats, float]:
-    """The polynomial at the nodes (NODES, 3) that is nearest to most values (n, 3) at places (n,) from 0 to 1, and the median of
-    what it misses: least absolute deviations (iteratively reweighted, Schlossmacher 1973).
+    """Polynomial of values (n, 3) at positions (n,) from 0 to 1 by least absolute deviations, and its median residual.
+
+    Returns values at the nodes (NODES, 3). Source: iteratively reweighted least squares (Schlossmacher 1973).
     """
     ways, at_nodes = np.vander(2.0 * at - 1.0, degree + 1), np.vander(2.0 * SPLIT - 1.0, degree + 1)
     weight = np.ones(len(at))
@@ -145,7 +146,7 @@ def _mostly(at: Floats, values: Floats, degree: int) -> tuple[Floats, float]:
 
 
 def _of_stretches(time: Floats, values: Floats, sure: Bools, jump: Ints, at: Floats, pieces: DrivenPieces) -> Floats:
-    """Values (n, 3) at node times (q,), led between the sure rows (n,) of the node's own stretch."""
+    """Values (n, 3) at node times (q,), interpolated between the sure rows (n,) of the node's own interval."""
     edge = np.concatenate([[0], jump + 1, [len(time)]])
     stretch = np.repeat(pieces.stretch, NODES)
     out = np.empty((len(at), values.shape[1]))

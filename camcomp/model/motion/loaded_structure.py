@@ -1,6 +1,6 @@
-"""The loaded structure along one run: solved at the nodes of its path, and followed from there by first derivatives.
+"""Loaded structure along one run: solved at the nodes of its path, and extended by first derivatives.
 
-What many readings of a run ask for again (values between the nodes, what the usual load adds) is worked out once.
+Values that many readings of a run share (between the nodes, under the usual load) are computed once.
 """
 
 from __future__ import annotations
@@ -20,8 +20,9 @@ from camcomp.model.motion.run_path import RunPath
 
 @dataclass(frozen=True, eq=False)
 class Softer:
-    """By how much more (mm/N, N/N) a changed machine gives way to a force at the tip than the one whose slopes carry on from its
-    nodes, piece by piece: tip (pieces, 3, 3), drive (pieces, m, 3).
+    """Additional response of a changed machine to a force at the tip, against the machine of the slopes, per piece.
+
+    tip (pieces, 3, 3) mm/N; drive (pieces, m, 3) N/N.
     """
 
     tip: Floats
@@ -30,25 +31,25 @@ class Softer:
 
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """The structure at a run path's nodes, for the drive positions and loads it was solved with."""
+    """The solved structure at the nodes of a run path, with the drive positions and loads of the solution."""
 
     key: tuple[Any, ...]
     shift: Floats  # (pieces, m) carriage minus set-point, piece by piece
     load: Load  # (q)
     tip: Floats  # (q, 3) machine frame
     drive: Floats  # (q, m)
-    softer: Softer | None = None  # where the nodes' loads are not those between them
+    softer: Softer | None = None  # if the loads between nodes differ from those at the nodes
     _tips: WeakKeyDictionary[Places, Floats] = field(default_factory=WeakKeyDictionary, init=False, repr=False)
     _drives: WeakKeyDictionary[Places, Floats] = field(default_factory=WeakKeyDictionary, init=False, repr=False)
 
     def tips(self, run_path: RunPath, place: Places, at: Floats) -> Floats:
-        """Tips (n, 3), machine frame, at times (n,) that lie at `place` between the nodes, worked out once for every `place`."""
+        """Tips (n, 3), machine frame, at times (n,) with interpolation `place`, computed once per `place`."""
         if place not in self._tips:
             self._tips[place] = run_path.tips(self.tip, place, at)
         return self._tips[place]
 
     def drives(self, place: Places) -> Floats:
-        """Drives (n, m) between the nodes, worked out once for every `place`."""
+        """Drive forces (n, m) between the nodes, computed once per `place`."""
         if place not in self._drives:
             self._drives[place] = place.of(self.drive)
         return self._drives[place]
@@ -56,10 +57,10 @@ class Solved:
 
 @dataclass(frozen=True, eq=False)
 class Following:
-    """How a quantity (n, 3 or m) at a place between the nodes follows the carriages and the load.
+    """First derivatives of a quantity (n, 3 or m) between the nodes by carriages and load.
 
-    by_rho (n, ., m), by_wrench (n, ., 6): first derivatives; at_reference (3, 6): wrench there per force at the tip. The place
-    itself is not kept: those of one reading only could never go.
+    by_rho (n, ., m), by_wrench (n, ., 6); at_reference (3, 6): wrench there per force at the tip. It holds no reference to
+    the interpolation, so that the caches can release those of a single reading.
     """
 
     by_rho: Floats
@@ -80,10 +81,10 @@ class Following:
         usual: bool,
         softer: Floats | None = None,
     ) -> Floats:
-        """Values that stand in a structure, with what carriages (n, m) beside set-points and a load (n) change beyond it.
+        """Values of a solved structure, changed to first order by carriages (n, m) off the solution and by a load (n).
 
-        usual: it is the load of the run path itself, under which what it changes is worked out once. softer (pieces, ., 3): of
-        a structure that gives way to forces otherwise than the slopes say.
+        usual: the load is that of the run path itself, whose contribution is computed once. softer (pieces, ., 3): additional
+        response of a changed structure.
         """
         known = self._by_usual_load.get(solved.load) if usual else None
         if known is None:
@@ -109,13 +110,13 @@ class Slopes:
     drive_rho: Floats
     drive_wrench: Floats
     at_reference: Floats  # wrench (3, 6) there per force at the tip
-    key: tuple[Any, ...] = ()  # the machine that they are of
+    key: tuple[Any, ...] = ()  # key of the machine
     _at: WeakKeyDictionary[Places, Slopes] = field(default_factory=WeakKeyDictionary, init=False, repr=False)
     _tips: WeakKeyDictionary[Places, Following] = field(default_factory=WeakKeyDictionary, init=False, repr=False)
     _drives: WeakKeyDictionary[Places, Following] = field(default_factory=WeakKeyDictionary, init=False, repr=False)
 
     def at(self, place: Places) -> Slopes:
-        """The same between the nodes, worked out once for every `place`."""
+        """Derivatives between the nodes, computed once per `place`."""
         if place not in self._at:
             nodes = (self.tip_rho, self.tip_wrench, self.drive_rho, self.drive_wrench)
             tip_rho, tip_wrench, drive_rho, drive_wrench = (rows_together(place.of(each)) for each in nodes)
@@ -123,14 +124,14 @@ class Slopes:
         return self._at[place]
 
     def tips(self, place: Places) -> Following:
-        """How the tips follow there."""
+        """Derivatives of the tips between the nodes."""
         if place not in self._tips:
             there = self.at(place)
             self._tips[place] = Following(there.tip_rho, there.tip_wrench, self.at_reference)
         return self._tips[place]
 
     def drives(self, place: Places) -> Following:
-        """How the drives follow there."""
+        """Derivatives of the drive forces between the nodes."""
         if place not in self._drives:
             there = self.at(place)
             self._drives[place] = Following(there.drive_rho, there.drive_wrench, self.at_reference)
@@ -148,11 +149,11 @@ def _behind(slope, piece, values, gap, shift, by_load, out):  # type: ignore[no-
 
 
 def applied(slope: Floats, change: Floats) -> Floats:
-    """Slopes (n, 3, k) times changes (n, k); row behind row lies together, for a sum over k is too short to be fast."""
+    """Slopes (n, 3, k) times changes (n, k), fastest with the memory layout of rows_together."""
     rows_last = np.ascontiguousarray(change.T)
     return np.ascontiguousarray(np.einsum("ikn,kn->in", slope.transpose(1, 2, 0), rows_last).T)
 
 
 def rows_together(slope: Floats) -> Floats:
-    """Slopes (n, 3, k) as applied is fast with them: the same array, in memory row behind row of each of its elements."""
+    """Slopes (n, 3, k) in the memory layout that `applied` needs: the rows of each element are contiguous."""
     return np.ascontiguousarray(slope.transpose(1, 2, 0)).transpose(2, 0, 1)

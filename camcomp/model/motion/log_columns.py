@@ -1,4 +1,4 @@
-"""The columns of a log: the one place that has their names, for logs that are written and for those that are read."""
+"""Names of the columns of a log, for writing and for reading."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ DYNO = ("fx_N", "fy_N", "fz_N")
 
 @dataclass(frozen=True)
 class LogColumns:
-    """Names per actuator (m): set-points, encoders, drive forces, second encoders behind the gear. Everything else is alike for all machines."""
+    """Names per actuator (m): set-points, encoders, drive forces, second encoders behind the gear."""
 
     setpoint: tuple[str, ...]
     encoder: tuple[str, ...]
@@ -22,17 +22,17 @@ class LogColumns:
 
     @property
     def simulated(self) -> tuple[str, ...]:
-        """What a simulated machine logs, in the order of its columns: a log in full but for what it cannot know."""
+        """Columns of a simulated log in order: all quantities that the model computes."""
         return (TIME, LINE, *TIP, *self.setpoint, *self.encoder, *self.drive, *DYNO)
 
     @property
     def known(self) -> tuple[str, ...]:
-        """Every column that is read."""
+        """All columns that a log may have."""
         return (*self.simulated, *self.load, TEMPERATURE, *TIP_SD)
 
 
 def log_columns(actuators: Sequence[str], rotary: Sequence[bool]) -> LogColumns:
-    """For actuators by name, in their order; rotary: whether they turn."""
+    """Column names for actuators by name, in their order; rotary: whether each is a hinge."""
     lengths = ["rad" if each else "mm" for each in rotary]
     efforts = ["Nmm" if each else "N" for each in rotary]
     return LogColumns(

@@ -1,4 +1,4 @@
-"""How tips follow links that grow while a run goes on: first derivatives by length at the nodes of its path."""
+"""Tip error of links that grow during a run: first derivatives by length at the nodes of its path."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from camcomp.model.statics.lengths import LENGTH_STEP_MM, lengthened
 
 @dataclass(frozen=True, eq=False)
 class LongerLinks:
-    """Links of a perfect machine, one of them longer. Derivatives are worked out once for every run path.
+    """Tip displacement by longer links of a perfect machine; derivatives are computed once per run path.
 
-    tips: tips (q, 3) at the nodes of a run path, of a changed machine that goes where this one is told to go.
+    tips: function of a changed machine and a run path that returns tips (q, 3) at the nodes for the same set-points.
     """
 
     robot: Robot
@@ -29,14 +29,14 @@ class LongerLinks:
     )
 
     def way(self, run_path: RunPath, place: Places, grown: Floats) -> Floats:
-        """Way (n, 3) mm of tips at a place of the run, machine frame, by links that are longer by `grown` (n, m) mm."""
+        """Displacement (n, 3) mm of the tips, machine frame, by links that are longer by `grown` (n, m) mm."""
         out = np.zeros((len(grown), 3))
         for j in np.flatnonzero(grown.any(axis=0)):
             out += place.of(self._by_length(run_path, int(j))) * grown[:, j, None]
         return out
 
     def _by_length(self, run_path: RunPath, j: int) -> Floats:
-        """Way (q, 3) of the tips at the nodes per mm by which the link behind actuator j is longer."""
+        """Displacement (q, 3) mm of the tips at the nodes per mm of growth of the link behind actuator j."""
         ways = self._known.setdefault(run_path, {})
         if j not in ways:
             longer = lengthened(self.robot, self.robot.actuators[j].name, LENGTH_STEP_MM)

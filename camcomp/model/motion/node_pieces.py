@@ -72,7 +72,7 @@ class Places:
 
 
 def cut(path: Path, motion: Ints, u0: Floats, u1: Floats, length: Floats) -> tuple[Ints, Floats, Floats]:
-    """Parts of path motions (k,), `length` (k,) mm, made short enough: which part (p,), its u0 (p,) and u1 (p,)."""
+    """Split motions (k,) of `length` (k,) mm into pieces of at most _LINE_MM or _ARC_RAD: part (p,), u0 (p,) and u1 (p,)."""
     arc = path.kind[motion] == ARC
     wanted = np.where(arc, np.abs(path.angle[motion]) * (u1 - u0) / _ARC_RAD, length / _LINE_MM)
     count = np.maximum(np.ceil(wanted - 1e-9), 1).astype(np.int64)

@@ -1,8 +1,8 @@
-"""What the whole machine does with commanded tips: control, drives, loaded structure, tool, workpiece.
+"""Response of the whole machine to commanded tips: controller, drives, loaded structure, tool, workpiece.
 
 Without effects in the config this is the loaded equilibrium alone. With effects the same hooks act in the same order as
 in the twin, on a sequence of points in the order of travel; their correction is found by seed eq. (5) on top of the
-exact solution of the structure. Effects of the sensors change no part and are left out.
+exact solution of the structure. Effects of sensors change no part and do not act.
 """
 
 from __future__ import annotations
@@ -26,27 +26,27 @@ from camcomp.model.statics.rotation import exp_rotation
 from camcomp.model.statics.solve import FREE, INVERSE, State, solve
 from camcomp.model.statics.target import Correction, correct, settle
 
-SETTLED_MM = 2e-5  # the correction of effects ends here
-MAX_AIM_STEPS = 50  # friction that turns round in a soft drive leaves up to nine tenths per step
-FARTHER = 2.0  # times the square of what was left before, from which on steps are halved
+SETTLED_MM = 2e-5  # residual at which the correction of effects ends
+MAX_AIM_STEPS = 50  # reversing friction in a soft drive reduces the residual by only a tenth per step
+FARTHER = 2.0  # times the squared residual before: growth beyond which steps are halved
 REST_S = 60.0
-AROUND_S = 0.03  # before and after an instant, by which its acceleration is known: 0.6 mm at 20 mm/s
+AROUND_S = 0.03  # half width of the difference for the acceleration: 0.6 mm at 20 mm/s
 AHEAD_MM = 2.0  # more than any play
-LEAST_MM = 2e-4  # a drive that comes back by less than this is not led through its play
+LEAST_MM = 2e-4  # smallest reversal after which a drive is moved through its play
 WORDS = 3  # actuators that X, Y, Z can move one by one
 GOES_ALONG = 1e-2  # weight of the others
 RATE_STEP = 1e-2  # mm at POSE_SCALE
-POSE_SCALE = np.array([1.0, 1.0, 1.0, 1e3, 1e3, 1e3])  # mm per mm, and per rad of a platform: 1 urad counts as 1 nm
-HINGE_MM = 1e3  # way per rad of a hinge, where lengths of slides are applied to it: an arm of 1 m
+POSE_SCALE = np.array([1.0, 1.0, 1.0, 1e3, 1e3, 1e3])  # mm per mm, mm per rad of a platform: 1 urad counts as 1 nm
+HINGE_MM = 1e3  # mm per rad of a hinge, where limits in mm apply to it: an arm of 1 m
 
 
 @dataclass(frozen=True, eq=False)
 class Travel:
-    """n points in the order of travel: force (n, 3) N of the cut in the machine frame, when, after how much cutting.
+    """n points in the order of travel: cutting force (n, 3) N in the machine frame, time, minutes of cutting.
 
-    stop: the control comes to rest there, and the drives with it. around (3, n, 3): programmed tips, program frame, AROUND_S
-    before, at and after the instant on the same smooth stretch that is next to each point; None where time is unknown.
-    rotation (n, 3, 3): orientation of the platform that the control is told, machine frame; None: the one that it holds.
+    stop: the controller stops there. around (3, n, 3): programmed tips, program frame, AROUND_S before, at and after the
+    nearest instant on the same smooth part of the path; None where time is unknown. rotation (n, 3, 3): commanded
+    orientation of the platform, machine frame; None: the one that the machine holds.
     """
 
     force: Floats
@@ -57,14 +57,14 @@ class Travel:
     rotation: Floats | None = None
 
     def take(self, rows: np.ndarray) -> Travel:
-        """Some of the points, still in order."""
+        """Some of the points; rows have to be ascending."""
         around = None if self.around is None else self.around[:, rows]
         rotation = None if self.rotation is None else self.rotation[rows]
         return Travel(self.force[rows], self.time[rows], self.cut_min[rows], self.stop[rows], around, rotation)
 
     @property
     def rested(self) -> Floats:
-        """Times (n,) s with a pause of REST_S on the way to every stop, so that a servo has no lag there."""
+        """Times (n,) s with a pause of REST_S before every stop, after which a servo has settled."""
         return self.time + REST_S * np.cumsum(self.stop)
 
 
@@ -75,7 +75,7 @@ def respond(
     """Loaded tips (n, 3) of commanded tips (n, 3), both in the program frame, and the states of the machine.
 
     nominal_of (n, 3): tips whose inverse kinematics go into rho_nominal of the states; the commanded ones by default.
-    before (3,): commanded tip from which the first one was reached; what drives remember depends on it.
+    before (3,): commanded tip before the first one; the memory of drives depends on it.
     rho (n, m): set-points of the actuators; those that the control computes from the commanded tips by default.
     """
     if before is not None and job.causes and len(commanded):
@@ -97,7 +97,7 @@ def respond(
     loading = cache(partial(signal_path.loaded, job.causes, motion, travel.force))
 
     @cache
-    def held() -> Floats:  # where carriages stand where they are told
+    def held() -> Floats:  # for carriages at their set-points
         load = loading()
         where = solve(
             job.real_machine,
@@ -134,10 +134,10 @@ def respond(
 
 
 def _mass_loads(job: Job, rho: Floats, travel: Travel) -> MassLoads:
-    """Loads of the masses at set-points rho (n, m); none at points that the machine does not reach.
+    """Loads of the masses at set-points rho (n, m); zero at points out of reach.
 
-    How a control slows down at corners and stops is not in a program: drives accelerate masses along its
-    smooth stretches only.
+    Drives accelerate masses along smooth parts of the path only, because a program does not state the deceleration at
+    corners and stops.
     """
     robot, around = job.real_machine.robot, travel.around
     loads = mass_loads(robot, np.nan_to_num(rho))
@@ -153,7 +153,10 @@ def _mass_loads(job: Job, rho: Floats, travel: Travel) -> MassLoads:
 
 
 def _lengthening(job: Job, told: Floats, grown: Floats | None, rotation: Floats | None) -> Floats:
-    """Way (n, 3) mm of tips told (n, 3) in orientations (n, 3, 3), machine frame, by links that are longer by `grown` (n, m) mm."""
+    """Displacement (n, 3) mm of commanded tips (n, 3), machine frame, by links that are longer by `grown` (n, m) mm.
+
+    rotation (n, 3, 3): commanded orientations.
+    """
     out = np.zeros_like(told)
     if grown is None:
         return out
@@ -173,7 +176,7 @@ def _turned(machine: Machine, told: Floats, rotation: Floats | None, **given: An
 
 
 def _finite(job: Job, tip: Floats, state: Correction) -> tuple[Floats, Correction]:
-    """Both as they are. Raises PhysicsError CC306 for a point that counts as solved and is no number."""
+    """Return both unchanged. Raises PhysicsError CC306 for a solved point that is not finite."""
     known = np.isfinite(tip).all(axis=1) & np.isfinite(state.drive).all(axis=1) & np.isfinite(state.rho).all(axis=1)
     bad = ~known & (state.status == 0)
     if bad.any():
@@ -194,7 +197,7 @@ def aim_at(job: Job, target: Floats, travel: Travel, method: str) -> Correction:
             tip, state = respond(job, commanded, travel, target)
             left = target - tip
             size = float(np.nansum(left**2))
-            if rings and size > FARTHER * least:  # a loop that swings answers to a step by more than the step
+            if rings and size > FARTHER * least:  # an oscillating loop overshoots
                 share, commanded, least = 0.5 * share, near, np.inf
                 continue
             if size < least:
@@ -212,7 +215,7 @@ def aim_pose(
     """Set-points that bring loaded tips to targets (n, 3), program frame, and the platform to its held orientation.
 
     For machines with six actuators. commanded (n, 3): tips of the written program, whose inverse kinematics are the
-    set-points of the points that are not `on` (n,). The same signal path and memory of drives as those of the words.
+    set-points of all points outside the mask `on` (n,). Signal path and memory of drives as for words.
     """
     told = job.frame.to_machine(commanded)
     exact = without_drives(job, target, travel, pose=True)
@@ -260,7 +263,7 @@ def _rates(job: Job, tip: Floats) -> Floats:
 
 
 def acting_force(job: Job, rho: Floats, travel: Travel) -> Floats:
-    """Force (n, 3) N on the tool that acts at set-points rho (n, m), machine frame, effects on it included."""
+    """Force (n, 3) N on the tool at set-points rho (n, m), machine frame, with the effects on the force."""
     if not signal_path.acting(job.causes, "process"):
         return travel.force
     return signal_path.loaded(job.causes, _motion(job, rho, travel), travel.force).force
@@ -269,11 +272,10 @@ def acting_force(job: Job, rho: Floats, travel: Travel) -> Floats:
 def without_drives(
     job: Job, target: Floats, travel: Travel, method: str = "newton", *, pose: bool = False
 ) -> Correction:
-    """Commands, machine frame, that bring the loaded tips to the targets (n, 3) if carriages go where they are told.
+    """Commands, machine frame, that bring the loaded tips to the targets (n, 3) for drives without errors.
 
-    pose: they bring the platform to the orientation of the travel, too, and `rotation` is the one to be commanded.
-
-    Their `rho` is where the carriages have to be, whatever the drives in front of them do.
+    pose: also the platform to the orientation of the travel; `rotation` of the result is then the commanded one.
+    `rho` of the result is the required position of the carriages, whatever the errors of the drives.
     """
     load = Load(travel.force, np.zeros((len(target), 6)))
     if job.causes:
@@ -285,9 +287,9 @@ def without_drives(
 
 
 def _through_play(job: Job, found: Correction, travel: Travel) -> Floats:
-    """Way (n, 3) mm of the commanded tips that takes every drive through its play as soon as its carriage turns round.
+    """Displacement (n, 3) mm of the commanded tips that moves every drive through its play where its carriage reverses.
 
-    Eq. (5) alone would creep through it, by what is left to correct at every step.
+    Eq. (5) alone would pass the play in steps of the residual.
     """
     solved = found.status == 0
     lag = _lost_motion(job, found.rho[solved], travel.take(np.flatnonzero(solved)))
@@ -299,7 +301,7 @@ def _through_play(job: Job, found: Correction, travel: Travel) -> Floats:
 
 
 def _lost_motion(job: Job, carriage: Floats, travel: Travel) -> Floats:
-    """What drives' memory makes of carriage minus encoder (n, m) where carriages (n, m) are led through their play at once."""
+    """Lost motion (n, m), carriage minus encoder, for carriages (n, m) that pass through their play at once."""
     length = way_per_unit(job)
     sense = ways(carriage * length, LEAST_MM)
     motion = _motion(job, carriage + AHEAD_MM / length * sense, travel)
@@ -311,7 +313,7 @@ def _lost_motion(job: Job, carriage: Floats, travel: Travel) -> Floats:
 
 
 def behind_encoders(job: Job, commanded: Floats, travel: Travel) -> tuple[Floats, Floats]:
-    """Encoders (n, m) of commanded tips (n, 3), program frame, and what drives' memory makes of carriage minus encoder (n, m)."""
+    """Encoders (n, m) of commanded tips (n, 3), program frame, and carriage minus encoder (n, m) by the memory of drives."""
     rho = solve(
         job.real_machine, FREE, job.frame.to_machine(commanded), aim_rotation=travel.rotation, check=False
     ).rho_nominal
@@ -322,9 +324,9 @@ def behind_encoders(job: Job, commanded: Floats, travel: Travel) -> tuple[Floats
 
 
 def _tip_way(job: Job, tip: Floats, by: Floats, rotation: Floats | None = None) -> Floats:
-    """Way (n, 3) mm of the tip, program frame, that moves the actuators by `by` (n, m), to first order.
+    """Displacement (n, 3) mm of the tip, program frame, that moves the actuators by `by` (n, m), to first order.
 
-    Where they are more than X, Y, Z can move one by one, those go along that are not asked to move.
+    With more actuators than X, Y, Z can move independently, the others move along.
     """
     h = 1e-3
     rates = [
@@ -341,22 +343,22 @@ def _tip_way(job: Job, tip: Floats, by: Floats, rotation: Floats | None = None) 
 
 
 def way_per_unit(job: Job) -> Floats:
-    """Way (m,) in mm per unit of the actuators: 1 for slides."""
+    """Travel (m,) in mm per unit of the actuators: 1 for slides, HINGE_MM for hinges."""
     return np.where(job.real_machine.revolute, HINGE_MM, 1.0)
 
 
 def plays(job: Job, rho: Floats, travel: Travel) -> Bools:
-    """Actuators (m,) whose carriage stands still while its drive turns round: play, or wind-up against friction."""
+    """Mask (m,) of actuators with lost motion: play, or wind-up against friction."""
     return _differs(job, rho, travel, ordered=True)
 
 
 def winds_up(job: Job, rho: Floats, travel: Travel) -> Bools:
-    """Actuators (m,) whose drive winds up against friction, over some way of the carriage."""
+    """Mask (m,) of actuators whose drive winds up against friction over some travel of the carriage."""
     return _differs(job, rho, travel, ordered=False)
 
 
 def _differs(job: Job, rho: Floats, travel: Travel, *, ordered: bool) -> Bools:
-    """Actuators (m,) whose carriage depends on the movement, or on its sense alone."""
+    """Mask (m,) of actuators whose carriage depends on the movement (ordered), or only on its direction."""
     motion = _motion(job, rho, travel)
     poses = replace(motion, ordered=False)
     other = motion if ordered else replace(poses, direction=-motion.direction)
@@ -368,7 +370,7 @@ def _differs(job: Job, rho: Floats, travel: Travel, *, ordered: bool) -> Bools:
 
 
 def _motion(job: Job, setpoint: Floats, travel: Travel) -> Motion:
-    """The movement that the hooks see, with the encoders where the servos bring them."""
+    """Motion for the hooks, with the encoders behind the servos."""
     stiffness = signal_path.springs(job.real_machine.robot)
     zero = np.zeros_like(setpoint)
     warm = job.config.process.temperature_C

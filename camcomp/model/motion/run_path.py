@@ -1,4 +1,4 @@
-"""One run as the twin sees it: where the set-points are in time, and where in the program every row of a log stands."""
+"""Run path of the twin: set-points of one run over time, and the positions of log rows between its nodes."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -15,22 +15,22 @@ from camcomp.model.motion.node_pieces import Pieces, Places, cut
 from camcomp.model.motion.timeline import Timeline
 from camcomp.model.seams import Seams
 
-STEP_S = 0.001  # grid of what has memory: 0.2 um of interpolation at 1500 mm/s2
+STEP_S = 0.001  # time grid of elements with memory: 0.2 um of interpolation error at 1500 mm/s2
 MOST_STEPS = 40000
-_IN_DOUBT = 0.05  # of the largest force
-MOVES_S = 0.05  # to both sides of an instant, in which a tip that moves is told from its noise
-STANDS_MM_PER_S = 0.05  # speed below which it stands
-_HARDLY_OTHERS = 0.8  # of the rows that cut are in doubt
-_UNEVEN = 1e-3  # of the largest force
-_FEW = 0.5  # of the grid, below which instants are worth picking
+_IN_DOUBT = 0.05  # of the largest force: error bound from which a row is uncertain
+MOVES_S = 0.05  # half width of the window in which a motion is distinguished from noise
+STANDS_MM_PER_S = 0.05  # speed below which the tip is at standstill
+_HARDLY_OTHERS = 0.8  # share of uncertain rows from which they are used all the same
+_UNEVEN = 1e-3  # of the largest force: error of the interpolated force from which a node is added
+_FEW = 0.5  # of the grid: share of instants below which a selection is worth its cost
 
 
 @dataclass(frozen=True, eq=False)
 class Driven:
-    """What is known at the rows of a run that was really driven, machine frame.
+    """Data of a logged run at its rows, machine frame.
 
-    tip (n, 3) mm: nominal, where the set-points of the row lead; force (n, 3) N; doubt (n, 3) N: half of what the force
-    may be off by; lead: times (k,) -> nominal tips (k, 3); seams: instants of the grid where the recording begins or goes on.
+    tip (n, 3) mm: nominal tip of the set-points; force (n, 3) N; doubt (n, 3) N: half the width of its error interval; lead:
+    times (k,) -> nominal tips (k, 3); seams: starts and continuations of the recording on the grid.
     """
 
     tip: Floats
@@ -42,9 +42,9 @@ class Driven:
 
 @dataclass(frozen=True, eq=False)
 class RunPath:
-    """A run's set-points and nodes. n rows, q nodes, g instants of a fine time grid, m actuators.
+    """Set-points and nodes of a run: n rows, q nodes, g instants of a fine time grid, m actuators.
 
-    Everything that needs inverse kinematics is computed once, when the run_path is made.
+    All inverse kinematics are computed once, when the run path is built.
     """
 
     name: str
@@ -60,23 +60,21 @@ class RunPath:
     grid_cut: Floats  # (g,) 1 where the model cuts and the tool moves
     grid_piece: np.ndarray  # (g,) piece
     pieces: int
-    place: Callable[[Floats], Places]  # times (n,) -> where they lie between the nodes
+    place: Callable[[Floats], Places]  # times (n,) -> interpolation between the nodes
     row_rho: Floats  # (n, m) set-points at the rows
     temperature: Floats | None  # (n,) deg C at the rows
     driven: Driven | None = None
-    feed_mm_per_min: float = np.nan  # of the program, in the middle
+    feed_mm_per_min: float = np.nan  # median of the program
     cut_before_min: float = 0.0  # in earlier runs
     cut_ahead_min: float = 0.0  # by the program in this run, before its log begins
-    clock_s: float = 0.0  # by which the clock of the tip is known to be late
-    between_s: float = (
-        0.0  # by which the tip seems to have been read beside the instants of the rows, whatever the reason
-    )
-    told: bool = False  # forces are where set-points lead: what a loop makes of these makes the forces late, too
-    led: bool = False  # the motion is that of the measured tip, which has no clock beside it then
+    clock_s: float = 0.0  # known lag of the clock of the tip
+    between_s: float = 0.0  # estimated offset of the tip readings from the instants of the rows
+    told: bool = False  # forces are those at the set-points, so that a lag of the loop delays them too
+    led: bool = False  # the motion is that of the measured tip, which then has no clock offset
 
     @cached_property
     def tip_time(self) -> Floats:
-        """Times (n,) s at which the tips of the rows stood there, as far as that is known."""
+        """Times (n,) s of the tip readings of the rows, corrected by the known offsets of their clock."""
         return self.time - self.clock_s if self.clock_s else self.time
 
     @cached_property
@@ -84,11 +82,11 @@ class RunPath:
         return self._between_instants(self.time)
 
     def in_grid(self, at: Floats) -> tuple[Ints, Floats]:
-        """Times (n,) on the grid: the instant (n,) before each, and its share (n, 1) of the way to the next."""
+        """Position of times (n,) on the grid: index (n,) of the instant before, and share (n, 1) of the step."""
         return self._rows_in_grid if at is self.time else self._between_instants(at)
 
     def between(self, values: Floats, at: Floats) -> Floats:
-        """Grid values (g, c) at times (n,); rows of unordered poses are the grid itself."""
+        """Grid values (g, c) interpolated to times (n,); rows of unordered poses are the grid itself."""
         if not self.ordered:
             return values
         i, u = self.in_grid(at)
@@ -103,13 +101,13 @@ class RunPath:
 
     @cached_property
     def near_rows(self) -> Ints:
-        """Instants of the grid between which rows and their tips lie."""
+        """Instants of the grid next to the rows and their tip readings."""
         before = np.concatenate([self.in_grid(self.time)[0], self.in_grid(self.tip_time)[0]])
         return np.unique(np.concatenate([before, before + 1]))
 
     @cached_property
     def around_rows(self) -> "RunPath":
-        """The same run on these instants of the grid alone, itself where they are most of it."""
+        """This run reduced to the instants `near_rows`; unchanged where they are most of the grid."""
         if not self.ordered or len(self.near_rows) > _FEW * len(self.grid):
             return self
         grid = {each: getattr(self, each)[self.near_rows] for each in ("grid", "grid_rho", "grid_cut", "grid_piece")}
@@ -117,17 +115,17 @@ class RunPath:
 
     @cached_property
     def row_place(self) -> Places:
-        """Where the rows lie between the nodes."""
+        """Interpolation between the nodes at the rows."""
         return self.place(self.time)
 
     @cached_property
     def grid_place(self) -> Places:
-        """Where the grid lies between the nodes."""
+        """Interpolation between the nodes at the instants of the grid."""
         return self.place(self.grid)
 
     @cached_property
     def tip_place(self) -> Places:
-        """Where the rows' tips lie between the nodes."""
+        """Interpolation between the nodes at the tip readings of the rows."""
         return self.place(self.tip_time) if self.clock_s else self.row_place
 
     @cached_property
@@ -142,7 +140,7 @@ class RunPath:
 
     @cached_property
     def uneven(self) -> Ints:
-        """A node in the middle of every piece along which the force at the rows is not what its nodes lead to."""
+        """Middle node of every piece whose interpolated force differs from the force at its rows."""
         if self.driven is None:
             return np.zeros(0, np.int64)
         off = np.abs(self.row_force - self.row_place.of(self.node_force)).max(axis=1)
@@ -150,14 +148,14 @@ class RunPath:
         return np.asarray(np.searchsorted(self.node_piece, pieces) + len(self.node_tip) // max(self.pieces, 1) // 2)
 
     def forces(self, place: Places) -> Floats:
-        """Cutting force (n, 3) N, machine frame, at a `place` that lies little beside that of the rows."""
+        """Cutting force (n, 3) N, machine frame, at an interpolation `place` close to that of the rows."""
         found = place.of(self.node_force)
         return found if self.driven is None else found + self.row_force - self.row_place.of(self.node_force)
 
     def tips(self, at_nodes: Floats, place: Places, at: Floats) -> Floats:
         """Loaded tips (n, 3), machine frame, at times (n,) from those at the nodes (q, 3).
 
-        Along a program they lie between the nodes; where a log says what was driven, only what the structure adds does.
+        Along a program the tips are interpolated; for a logged run only the deflection is.
         """
         if self.driven is None:
             return place.of(at_nodes)
@@ -171,9 +169,9 @@ class RunPath:
 
     @cached_property
     def jumping(self) -> Bools:
-        """Rows (n,) of which nobody knows on which side of a jump of the force they were taken: the tip springs there.
+        """Mask (n,) of rows with an unknown side of a force jump, where the tip springs.
 
-        Where hardly any others cut, none: what such rows are off by is all that the run can tell.
+        All false where hardly any other rows cut, because these rows then are the only evidence of the run.
         """
         if self.driven is None:
             return np.zeros(len(self.time), bool)
@@ -211,7 +209,7 @@ def path_of_program(
     inverse: Callable[[Floats], Floats],
     temperature: Floats | None = None,
 ) -> RunPath:
-    """Run path of a program's feed motions on its own timeline, whose loads are those of `track`.
+    """Run path of a program's feed motions on its own timeline, with the loads of `track`.
 
     to_machine: tips (q, 3) program -> machine frame; vectors: the same for vectors. inverse: machine tips (q, 3) ->
     set-points (q, m).
@@ -247,7 +245,7 @@ def path_of_program(
 
 
 def moving(time: Floats, tip: Floats) -> Floats:
-    """1 where a tip (n, 3) mm moves at times (n,) s, else 0: a tool that dwells or waits in its cut is not worn by it."""
+    """1 where a tip (n, 3) mm moves at times (n,) s, 0 at standstill, which does not wear the tool."""
     if len(time) < 2:
         return np.zeros(len(time))
     around = [np.clip(time + d, time[0], time[-1]) for d in (-MOVES_S, MOVES_S)]
@@ -257,7 +255,7 @@ def moving(time: Floats, tip: Floats) -> Floats:
 
 
 def _node_times(timeline: Timeline, k: np.ndarray, share: Floats) -> Floats:
-    """Time (q,) at which motion k (q,) has done a share (q,); the trapezoid turned round on a table."""
+    """Time (q,) s at which motion k (q,) reaches a share (q,) of its length: inverse of the trapezoid, by table."""
     table = np.linspace(0.0, 1.0, 201)
     out = np.empty(len(k))
     for motion in np.unique(k):

@@ -1,4 +1,4 @@
-"""What the modelled machine would log while it executes a program: the twin, read row by row."""
+"""Simulated log of a program: readings of the twin, row by row."""
 
 from dataclasses import dataclass, replace
 
@@ -18,7 +18,7 @@ from camcomp.model.motion.run_path import path_of_program
 from camcomp.model.motion.timeline import schedule
 from camcomp.model.motion.twin import Reading, twin_of
 
-TOLD_ROWS = 1000  # of a log, after which it is said how far it is
+TOLD_ROWS = 1000  # rows between two progress messages
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,10 +37,15 @@ class Simulated:
 def simulate(
     job: Job, path: Path, step_s: float, *, cutting: bool = True, started_s: float = 0.0, engaged: Engaged | None = None
 ) -> Simulated:
-    """Rows every step_s seconds from the first feed move to the end of the last, that end included.
+    """Simulate a log with a row every step_s seconds from the first feed move to the end of the last, inclusive.
 
-    engaged: what the tool meets along the path, when somebody has followed it through its stock before. Speed is trapezoidal along every motion and zero at its ends; rapids are not logged. Raises ProgramError CC420 when
-    the program has no feed move, ConfigError CC425 for too many rows, PhysicsError where the machine cannot be.
+    Speed is trapezoidal along every motion and zero at its ends; rapids are not logged. engaged: engagement along the path,
+    if it has been computed before.
+
+    Raises:
+        ProgramError: CC420, the program has no feed move.
+        ConfigError: CC425, too many rows.
+        PhysicsError: a pose of the machine is impossible.
     """
     twin = twin_of(job)
     timeline = schedule(path, job.config.control.acceleration_mm_per_s2)
@@ -76,7 +81,7 @@ def simulate(
 
 
 def log_table(run: Simulated) -> str:
-    """The log as CSV text: the columns that a controller, encoders, drives, a dynamometer and a tracker would log."""
+    """The log as CSV text, with the columns of controller, encoders, drives, dynamometer and tracker."""
     r = run.reading
     table = np.concatenate([r.tip, run.setpoint, r.encoder, r.drive, r.dyno], axis=1)
     rows = [",".join(log_columns(run.actuators, run.rotary).simulated)]

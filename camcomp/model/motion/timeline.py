@@ -1,6 +1,6 @@
-"""When a program is where: trapezoidal speed along each motion, exact stop at its end, time 0 at the first feed move.
+"""Time along a program: trapezoidal speed along each motion, exact stop at its end, time 0 at the first feed move.
 
-Motions are those of a Path; rapids take no time here, because logs leave them out.
+Motions are those of a Path; rapids take no time here, because logs do not contain them.
 """
 
 from dataclasses import dataclass
@@ -33,7 +33,7 @@ class Timeline:
         return float(self.start[-1] + self.duration[-1]) if len(self.start) else 0.0
 
     def locate(self, time: Floats) -> tuple[Ints, Floats]:
-        """Which feed motion (n,) and which share of its length, 0 to 1 (n,), at each time (n,) s."""
+        """Feed motion (n,) and share of its length, 0 to 1 (n,), at each time (n,) s."""
         k = np.clip(np.searchsorted(self.start, time, side="right") - 1, 0, len(self.start) - 1)
         return k, self.share(k, time)
 
@@ -62,7 +62,7 @@ def _trapezoid(t: Floats, duration: Floats, length: Floats, feed: Floats, accele
 
 
 def schedule(path: Path, acceleration: float) -> Timeline:
-    """Timeline of a path's feed motions, one after the other from time 0; motions without length take no time."""
+    """Timeline of a path's feed motions in succession from time 0; the duration of motions without length is 0."""
     length = path_geometry.lengths(path)
     index = np.flatnonzero((path.kind != RAPID) & (length > 0) & ~path.machine)
     feed = path.feed[index] / 60.0

@@ -1,8 +1,7 @@
 """The one forward model: set-points in time -> control -> drive -> structure -> tool -> workpiece -> sensor.
 
-simulate prints it, diagnose compares it with logs, compensate inverts it. Hooks of effects act where signal_path.py says.
-The loaded equilibrium is solved at the nodes of a run path; between them, and for small differences, its first derivatives
-carry on.
+simulate prints it, diagnose compares it with logs, compensate inverts it. signal_path.py orders the hooks of effects. The
+loaded equilibrium is solved at the nodes of a run path, and extended by its first derivatives between them.
 """
 
 from __future__ import annotations
@@ -35,17 +34,17 @@ _MOMENT_STEP = 100.0  # N mm
 _KNOT_MM = 0.25  # or mrad / 4: 0.1 um of a circle of 300 mm
 _FORWARD_PASSES = 12
 _FORWARD_MM = 1e-7
-_FORWARD_FAR_MM = 3.0  # from which on slopes are worked out anew for Newton's method,
-_FORWARD_NEAR_MM = 0.3  # and for what lies between its points
-_LATELY = 4  # changed machines that are kept
-_CREEPING = 1e-4  # of the square of the fastest speed: what moves as slowly is late by nobody knows how much
-_LATEST_S = 0.1  # of a position loop
-_SAME_LOAD = 1e-3  # share of the load by which a changed machine's may differ from that it was solved with
+_FORWARD_FAR_MM = 3.0  # step from which Newton's method recomputes its slopes,
+_FORWARD_NEAR_MM = 0.3  # and distance from its points for first order
+_LATELY = 4  # changed machines kept in the cache
+_CREEPING = 1e-4  # of the squared largest speed: below it the lateness is undefined
+_LATEST_S = 0.1  # largest lateness of a position loop
+_SAME_LOAD = 1e-3  # share of the load: tolerance for reusing a solution
 
 
 @dataclass(frozen=True, eq=False)
 class Reading:
-    """What the sensors show in n rows: tip (n, 3) mm program frame, encoder (n, m), drive (n, m) N, dyno (n, 3) N."""
+    """Readings of the sensors in n rows: tip (n, 3) mm program frame, encoder (n, m), drive (n, m) N, dyno (n, 3) N."""
 
     tip: Floats
     encoder: Floats
@@ -56,14 +55,14 @@ class Reading:
 
 @dataclass(frozen=True, eq=False)
 class Twin:
-    """A machine under judgement. origin (3,), rotation (3, 3): program frame in the machine frame."""
+    """Forward model of a machine with effects. origin (3,), rotation (3, 3): program frame in the machine frame."""
 
     robot: Robot
     nominal: Robot
     origin: Floats
     rotation: Floats
     causes: tuple[Cause, ...] = ()
-    # what was worked out before, for this machine with these causes; a copy of a changed twin starts without
+    # caches of this machine with these causes; a changed copy starts empty
     _machines: dict[tuple[Any, ...], Machine] = field(default_factory=dict, init=False, repr=False)
     _edited: dict[tuple[int, ...], tuple[tuple[Cause, ...], Robot, tuple[Any, ...]]] = field(
         default_factory=dict, init=False, repr=False
@@ -79,12 +78,12 @@ class Twin:
 
     @cached_property
     def _control(self) -> Machine:
-        """The machine as its control knows it."""
+        """The machine of the controller's kinematics."""
         return build_machine(self.nominal, self.nominal)
 
     @cached_property
     def _longer(self) -> LongerLinks:
-        """How tips follow links that grow."""
+        """Tip displacement by links that grow."""
 
         def tips(robot: Robot, run_path: RunPath) -> Floats:
             machine, near, rho = build_machine(robot, self.nominal), run_path.node_tip, run_path.node_rho
@@ -115,10 +114,10 @@ class Twin:
         return state.rho_nominal
 
     def forward(self, rho: Floats, near: Floats) -> Floats:
-        """Machine tips (n, 3) to which actuators rho (n, m) lead the perfect, unloaded machine; near (n, 3): tips near by.
+        """Forward kinematics of the perfect, unloaded machine: tips (n, 3) of actuators rho (n, m), machine frame.
 
-        Newton's method on the inverse kinematics at points some way apart, with the slopes of where it begins, and first
-        order between them: both ways are short against the size of the machine. Raises PhysicsError CC410.
+        near (n, 3): approximate tips. Newton's method on the inverse kinematics at points _KNOT_MM apart, first order
+        between them. Raises PhysicsError CC410.
         """
         knots, nearest = _knots(rho * np.where([a.revolute for a in self.robot.actuators], 1000.0, 1.0))
         tip = begun = near[knots]
@@ -144,7 +143,7 @@ class Twin:
         return back
 
     def edited(self, causes: Sequence[Cause]) -> tuple[Robot, tuple[Any, ...]]:
-        """The machine with the effects on it, and a key that tells equal ones."""
+        """The machine changed by effects, and a key that is equal for equal machines."""
         editing = tuple(signal_path.acting(causes, "structure"))
         asked = tuple(map(id, editing))
         if asked not in self._edited:
@@ -152,7 +151,7 @@ class Twin:
                 self._edited.clear()
             robot, by = signal_path.edited(editing, self.actuators, self.robot)
             key = tuple((cause.name, cause.target, tuple(sorted(cause.values.items()))) for cause in by)
-            self._edited[asked] = editing, robot, key  # those causes stay alive, and so no other one is taken for them
+            self._edited[asked] = editing, robot, key  # keeps the causes alive, so that their ids stay unique
         return self._edited[asked][1:]
 
     # -- the signal path ----------------------------------------------------------------------------------------------
@@ -166,11 +165,11 @@ class Twin:
         slopes: Slopes | None = None,
         measured: Floats | None = None,
     ) -> tuple[Reading, Solved]:
-        """Readings of a run with the machine's own causes and `causes` on top, and the structure they stand on.
+        """Readings of a run with the machine's own causes plus `causes`, and the solved structure.
 
-        solved: structure to reuse when the machine is the same and drives and loads differ little (needs slopes).
-        measured (n, m): logged encoders; the difference to the model's encoders then moves the carriages too, so that
-        what the control does differently is not blamed on what follows it.
+        solved: structure to reuse for the same machine and nearly equal drives and loads (needs slopes).
+        measured (n, m): logged encoders; their difference to the modelled ones moves the carriages too, which keeps errors of
+        the controller out of the later stages.
         """
         causes = (*self.causes, *causes)
         # control, drive
@@ -250,9 +249,9 @@ class Twin:
     def _node_load(
         self, run_path: RunPath, grid: Motion, causes: Sequence[Cause], known: Solved | None, key: tuple[Any, ...]
     ) -> Load:
-        """Load to solve the nodes with: that of the structure known so far where slopes may carry on from it.
+        """Load for the solution at the nodes: that of the known structure if first derivatives can extend it.
 
-        Slopes are those of the unchanged machine; a changed one gives way by its own, so its nodes are solved under the load.
+        Slopes belong to the unchanged machine, so that the nodes of a changed one are solved under their own load.
         """
         loading = bool(signal_path.acting(causes[len(self.causes) :], "process"))
         if known is not None and (not loading or key == self.edited(self.causes)[1]):
@@ -270,7 +269,7 @@ class Twin:
         return known.load if near and known.key == key else load
 
     def _told(self, run_path: RunPath, place: Places, at: Floats) -> Floats:
-        """Tips (n, 3), program frame, to which the set-points lead at times (n,)."""
+        """Commanded tips (n, 3), program frame, at times (n,)."""
         return self.to_program(run_path.tips(run_path.node_tip, place, at))
 
     def _held(
@@ -282,9 +281,7 @@ class Twin:
         robot: Robot,
         key: tuple[Any, ...],
     ) -> Callable[[], Floats]:
-        """What gives the forces (q, m) of the drives at the nodes, for carriages that stand where they are told: what drives make
-        of their loads moves the loads by next to nothing.
-        """
+        """Function that returns the drive forces (q, m) at the nodes for carriages at their set-points."""
 
         @cache
         def at_nodes() -> Floats:
@@ -305,10 +302,10 @@ class Twin:
         load: Load,
         slopes: Slopes | None = None,
     ) -> Solved:
-        """Loaded equilibrium at the nodes. Raises PhysicsError CC411 when a node cannot be solved.
+        """Loaded equilibrium at the nodes. Raises PhysicsError CC411 if a node cannot be solved.
 
-        slopes: those with which values between the nodes follow it. Where they are of another machine, a node of every piece with
-        uneven forces is solved under a force more in every direction as well: all in one call, which costs more than its points.
+        slopes: derivatives for values between the nodes. If they belong to another machine, one node of every piece with an
+        uneven force is also solved under an additional force in every direction.
         """
         q, uneven = len(run_path.node_tip), run_path.uneven
         if slopes is None or slopes.key == key or not len(uneven):
@@ -325,7 +322,7 @@ class Twin:
         return Solved(key, shift, load, tip[:q], drive[:q], softer)
 
     def _more(self, run_path: RunPath, values: Floats, usual: Floats) -> Floats:
-        """Slopes (pieces, ., 3) by force less usual ones (q, ., 6) by wrench, from values at the nodes and at the pushed ones."""
+        """Slopes (pieces, ., 3) by force minus usual ones (q, ., 6) by wrench, from nodes with and without additional force."""
         q, uneven = len(run_path.node_tip), run_path.uneven
         pushed = values[q:].reshape(3, len(uneven), -1).transpose(1, 2, 0)
         own = (pushed - values[uneven][:, :, None]) / _FORCE_STEP
@@ -376,7 +373,7 @@ class Twin:
     # -- pieces of the path -------------------------------------------------------------------------------------------
 
     def _machine(self, robot: Robot, key: tuple[Any, ...]) -> Machine:
-        """The packed machine; runs of one experiment ask for the same one after each other."""
+        """The packed machine, cached because consecutive runs of an experiment use the same one."""
         if key not in self._machines:
             if len(self._machines) > _LATELY:
                 self._machines.clear()
@@ -384,7 +381,7 @@ class Twin:
         return self._machines[key]
 
     def _motions(self, run_path: RunPath, causes: Sequence[Cause]) -> tuple[Motion, Motion, Motion]:
-        """Motion on the fine grid, on that around the rows, and at the rows; the same for all causes that leave the control alone."""
+        """Motion on the fine grid, on the grid around the rows, and at the rows; cached for causes without servo hooks."""
         servo = signal_path.acting(causes, "control")
         if not servo and run_path in self._usual:
             return self._usual[run_path]
@@ -431,7 +428,7 @@ class Twin:
 
 
 def _knots(rho: Floats) -> tuple[Ints, Ints]:
-    """Rows that are some _KNOT_MM of way apart in the actuators (n, m), mm or mrad, and which of them (n,) is next to a row."""
+    """Rows _KNOT_MM of travel apart in the actuators (n, m), mm or mrad, and the nearest of them (n,) for every row."""
     way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(rho, axis=0)).max(axis=1))])
     knots = np.flatnonzero(np.diff(np.floor(way / _KNOT_MM), prepend=-1.0) > 0)
     right = np.clip(np.searchsorted(way[knots], way), 0, len(knots) - 1)
@@ -477,7 +474,7 @@ def _around_rows(run_path: RunPath, grid: Motion) -> Motion:
 
 
 def _lateness(run_path: RunPath, grid: Motion) -> Floats:
-    """By how much (n,) s the encoders of a run are behind their set-points at the rows, along the way that these go."""
+    """Lateness (n,) s of the encoders of a run behind their set-points at the rows, along the direction of travel."""
     speed = np.gradient(run_path.grid_rho, run_path.grid, axis=0)
     fast = np.maximum((speed**2).sum(axis=1), 1e-12)
     late = ((run_path.grid_rho - grid.encoder) * speed).sum(axis=1) / fast
@@ -486,7 +483,7 @@ def _lateness(run_path: RunPath, grid: Motion) -> Floats:
 
 
 def _gap_at(run_path: RunPath, at: Floats, gap: Floats | None, ahead: Floats | None) -> Floats:
-    """Carriage minus set-point (n, m) at times (n,): the model's own, and what the logged encoders add."""
+    """Carriage minus set-point (n, m) at times (n,): the model's own plus the difference of the logged encoders."""
     if gap is None:
         return np.zeros_like(run_path.row_rho) if ahead is None else ahead
     own = run_path.between(gap, at)

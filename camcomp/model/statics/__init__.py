@@ -1,1 +1,1 @@
-"""The paper: chains, loaded equilibrium, stiffness, modified target, compiled; no G-code, no time."""
+"""Statics of the machine: chains, loaded equilibrium, stiffness and modified target (Klimchik et al. 2012), compiled."""

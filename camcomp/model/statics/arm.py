@@ -1,6 +1,6 @@
 """A serial arm as a rigid chain: forward kinematics and Jacobian of all joints, in plain numpy. mm, rad.
 
-Joint offsets and elastic links are left to the solver; this is what the control of an arm knows.
+These are the kinematics of an arm's controller; the solver adds joint offsets and elastic links.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class Arm:
 
 
 def arm_of(robot: Robot) -> Arm | None:
-    """The robot as an arm, None where it has several chains or joints without a drive."""
+    """The robot as an arm; None for several chains or undriven joints."""
     if len(robot.chains) != 1:
         return None
     chain = robot.chains[0]
@@ -82,7 +82,7 @@ def _walk(arm: Arm, q: Array) -> tuple[Array, Array, list[tuple[Array, Array, bo
 def dexterity(arm: Arm, q: Array) -> Array:
     """Smallest over largest singular value (n,) of the Jacobian at joint coordinates q (n, m): 0 = singular.
 
-    Turns count as the way they make at ARM_LENGTH, so that the figure is free of units.
+    Rotations count times ARM_LENGTH, so that the figure is free of units.
     """
     scale = np.array([1.0, 1.0, 1.0, ARM_LENGTH, ARM_LENGTH, ARM_LENGTH])[:, None]
     slides = np.array([1.0 if a.revolute else ARM_LENGTH for a in arm.actuators])
@@ -94,8 +94,9 @@ def dexterity(arm: Arm, q: Array) -> Array:
 
 
 def follow(arm: Arm, q: Array, rotation: Array, start: Array, end: Array, step: float = 5.0) -> Array | None:
-    """Joint coordinates (m,) at `end` (3,) after walking straight from `start` (3,), where they are q, with the
-    platform kept at rotation (3, 3); None where the walk gets stuck. For arms with six joints.
+    """Joint coordinates (m,) at `end` (3,) after a straight motion from `start` (3,), where they are q.
+
+    The platform keeps its rotation (3, 3). None if Newton's method fails on the line. For arms with six joints.
     """
     q = np.array(q, float)
     count = max(int(np.ceil(np.linalg.norm(end - start) / step)), 1)

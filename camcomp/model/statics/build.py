@@ -99,10 +99,10 @@ def _six(error: spec.GeometricError) -> Array:
 
 
 def build_robot(given: spec.RobotSpec, tip_mm: list[float]) -> tuple[Robot, Robot]:
-    """The robot as it is, and as its control believes it to be (perfect chains).
+    """The true robot, and the robot of the controller's kinematics (perfect chains).
 
-    tip_mm (3,): tool tip seen from the platform reference point. Source of the distinction: the seed's chain errors
-    are unknown to the inverse kinematics of the control (Klimchik et al. 2012, section 2).
+    tip_mm (3,): tool tip seen from the platform reference point. Source of the distinction: chain errors are unknown to
+    the inverse kinematics of the controller (Klimchik et al. 2012, section 2).
     """
     chains = []
     for name, chain in given.chains.items():
@@ -130,8 +130,8 @@ def held_orientation(robot: Robot, program: Array, turn_deg: float | None) -> Ar
     """Orientation (3, 3) in which a machine with six actuators keeps its platform along a path.
 
     program (3, 3): program frame in the machine frame. The platform's z axis (away from the workpiece) is the program's Z.
-    The turn about it is free: its x axis stands at turn_deg from program X, or as near as it can to where it points
-    in the start pose, so that any program is milled in the posture in which the arm was set up.
+    The rotation about it is free: its x axis is at turn_deg from program X, or as near as possible to its direction in
+    the start pose, so that every program is milled in the posture in which the arm was set up.
     """
     if turn_deg is not None:
         c, s = np.cos(np.radians(turn_deg)), np.sin(np.radians(turn_deg))

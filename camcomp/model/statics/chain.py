@@ -50,14 +50,14 @@ from camcomp.model.statics.layout import (
 )
 from camcomp.model.statics.vectors import log_product, part
 
-SMALLEST_PIVOT = 1e-6  # of a spring, relative to its stiffness; Newton's method makes good for it in the next pass
+SMALLEST_PIVOT = 1e-6  # of a spring, relative to its stiffness; the next pass of Newton's method corrects the error
 
 
 @inner
 def add_springs(P, c, z, rho, W, M, full):
-    """Subtracts the spring forces of chain c from the residual; if full, adds their derivatives to M.
+    """Subtract the spring forces of chain c from the residual; if full, add their derivatives to M.
 
-    The last column of M keeps the stiffness alone of each spring coordinate: what its pivot is measured with.
+    The last column of M keeps the stiffness alone of each spring coordinate, the scale of its pivot.
     """
     n = P.chain[c, SIZE]
     alone = n + 1 + P.chain[c, ACTS]
@@ -134,7 +134,7 @@ def evaluate(P, c, z, rho, pose, W, full):
 
 @inner
 def add_loads(P, c, z, W, M, full):
-    """Walks chain c; its residual becomes what wrench and weights do to its coordinates; if full, M gets their derivatives."""
+    """Set the residual of chain c to the generalised forces of wrench and weights; if full, add their derivatives to M."""
     walk(P, c, z, W)
     for i in range(P.chain[c, SIZE]):
         W.residual[i] = 0.0

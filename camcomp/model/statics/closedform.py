@@ -17,9 +17,7 @@ from camcomp.model.statics.arm import Arm, joint_lines
 from camcomp.model.statics.rotation import exp_rotation
 
 Array = NDArray[np.float64]
-EXACT = (
-    1e-9  # how well axes have to be parallel, perpendicular (rad); a thousand times that in mm for meeting in a point
-)
+EXACT = 1e-9  # rad, tolerance of parallel and perpendicular axes; times 1000 mm for axes that meet in a point
 
 
 _BRANCHES = tuple(product((1.0, -1.0), repeat=3))  # side, elbow, flip
@@ -43,7 +41,7 @@ class ClosedForm:
         return None if q is None else q + 2.0 * np.pi * np.round((self.start - q) / (2.0 * np.pi))
 
     def all(self, rotation: Array, position: Array) -> list[Array | None]:
-        """The eight branches, each (6,) rad or None where the arm does not reach."""
+        """The eight branches, each (6,) rad, or None if the pose is out of reach."""
         at = self._wrist_at(rotation, position)
         return [self._in_branch(branch, *at) for branch in range(len(_BRANCHES))]
 
@@ -85,7 +83,7 @@ class ClosedForm:
 
 
 def closed_form(arm: Arm) -> ClosedForm | None:
-    """Closed form of an arm, None where its axes do not lie as they have to."""
+    """Closed form of an arm; None for other arrangements of axes."""
     if len(arm.actuators) != 6 or not all(a.revolute for a in arm.actuators):
         return None
     axes, points, rotation, position = joint_lines(arm, np.zeros(6))
@@ -111,7 +109,7 @@ def closed_form(arm: Arm) -> ClosedForm | None:
 
 
 def _sine(a: float, b: float, c: float, sign: float) -> float | None:
-    """Angle with a cos + b sin = c; None if there is none."""
+    """Angle with a cos + b sin = c, rad; None for |c| > hypot(a, b)."""
     size = float(np.hypot(a, b))
     if not size > 0.0 or abs(c) > size:
         return None

@@ -1,6 +1,6 @@
-"""How the solver's functions are compiled.
+"""Compilation of kernels by numba: decorators for entry functions and for functions inside them.
 
-Only the entry functions, those that Python calls, are cached; what they call is compiled into them.
+Only the entry functions, those that Python calls, are cached; the functions that they call are compiled into them.
 """
 
 from __future__ import annotations
@@ -14,17 +14,15 @@ import numba as _numba
 
 numba: Any = _numba  # its annotations leave out what it has
 
-# Nothing is allocated, raised or handed to Python inside: what numba would build for that costs time to compile.
+# Kernels allocate, raise and return no Python objects: numba's support for that costs compile time.
 _OPTIONS = {"nogil": True, "error_model": "numpy", "_nrt": False, "no_cfunc_wrapper": True}
 
 
 def inner(function: Callable[..., Any], *, fastmath: bool = False) -> Any:
-    """Compiles a function that only compiled functions call. It allocates nothing, needs no interpreter lock, never raises.
+    """Compile a function that only compiled functions call, without allocation, interpreter lock and exceptions.
 
-    fastmath: sums may be formed in any order, and so in vectors.
-
-    Constants among its arguments count as plain numbers: numba would compile the function anew for every one of them,
-    which takes half as long again.
+    fastmath: sums may be formed in any order, which allows vector instructions. Constant arguments count as plain numbers:
+    numba would otherwise compile the function for every constant.
     """
     if numba.config.DISABLE_JIT:  # for the debugger
         return function
@@ -42,14 +40,14 @@ def inner(function: Callable[..., Any], *, fastmath: bool = False) -> Any:
 
 
 def entry(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Compiles a function that Python calls, cached on disk for as long as nothing changes that goes into it.
+    """Compile a function that Python calls, cached on disk until its source or the source of its callees changes.
 
-    Where nothing can be cached it is compiled anew in every process. While compiling, the search for
-    unreachable objects rests: it takes a sixth of the time and finds nothing.
+    Without a cache folder every process compiles anew. Garbage collection is disabled meanwhile, which saves a sixth of the
+    time.
     """
     if numba.config.DISABLE_JIT:
         return function
-    from camcomp.ground.machine_code import kept  # only those who compile need it
+    from camcomp.ground.machine_code import kept  # slow import, needed to compile only
 
     dispatcher = kept(function, allocates=False, **_OPTIONS)
 
@@ -73,9 +71,9 @@ def entry(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def direct(function: Callable[..., Any], args: tuple[Any, ...]) -> Callable[..., Any]:
-    """An entry function for arguments of exactly the types of `args`, with which it has been called before.
+    """Machine code of an entry function for exactly the types of `args`, with which it has been called before.
 
-    It is the machine code without numba's search for it, which takes longer than small work does.
+    Calling it avoids numba's dispatch by types, which takes longer than a small kernel.
     """
     dispatcher: Any = getattr(function, "dispatcher", None)
     if dispatcher is None:

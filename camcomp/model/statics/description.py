@@ -1,4 +1,4 @@
-"""What a machine is made of: chains of elements, before it is packed for the solver.
+"""Description of a machine: chains of elements, before they are packed for the solver.
 
 A machine is a set of serial chains between base and platform (one chain: a serial robot). A chain is a tuple of
 elements from base to platform; springs displace by xi = (translation, rotation vector) in the frame in front of them
@@ -45,7 +45,7 @@ class Actuator:
 
 @dataclass(frozen=True)
 class Passive:
-    """Unactuated joint, free (stiffness 0) or preloaded by a spring that rests at `rest` (mm or rad).
+    """Unactuated joint, free (stiffness 0) or with a spring that is relaxed at `rest` (mm or rad).
 
     `start` is the coordinate guessed at the machine's start pose; it fixes the assembly mode.
     """
@@ -107,7 +107,7 @@ class Chain:
 class Robot:
     """A machine: chains, the tool (3,) mm from the platform reference to the tip, and the start pose (3,) mm, (3, 3).
 
-    held (3, 3): orientation in which the control keeps the platform along a path; None = that of the start pose.
+    held (3, 3): orientation in which the controller keeps the platform along a path; None = that of the start pose.
     """
 
     name: str

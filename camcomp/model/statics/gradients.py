@@ -1,4 +1,4 @@
-"""Derivatives at solved points, compiled: loaded stiffness of chains and machine, and what moves the tip and the drives."""
+"""Derivatives at solved points, compiled: loaded stiffness of chains and machine, responses of tip and drive forces."""
 
 # mypy: disallow-untyped-defs=False, disallow-incomplete-defs=False
 # numba infers the types of these functions; written by hand they would only be repeated.
@@ -14,7 +14,7 @@ from camcomp.model.statics.vectors import cross, part, turned, unit
 
 @entry
 def gradients_many(P, tool, z, rho, pose, force, solved, chains, total, by_rho, tip_by, drive_by, held, W):
-    """At every solved point, the actuators being given (mode FREE).
+    """Fill the derivatives at every solved point for given actuators (mode FREE).
 
     Shapes: z (n, c, nz), rho (n, m), pose (n, 12), force (n, 3), solved (n,) int. Fills chains (n, c, 6, 6) = d(chain
     wrench)/d(pose), total (n, 6, 6) = their sum minus the change of the tip load's moment, by_rho (n, 6, m) = d(sum of
@@ -28,7 +28,7 @@ def gradients_many(P, tool, z, rho, pose, force, solved, chains, total, by_rho, 
     for i in range(rho.shape[0]):
         if solved[i] == 0:
             continue
-        for a in range(m):  # what holds the carriage beside its drive, before the elimination goes over it
+        for a in range(m):  # stiffness of the carriage without its drive, before the elimination overwrites it
             c = P.actuator[a, A_CHAIN]
             v = P.actuator[a, A_VAR]
             evaluate(P, c, z[i, c], rho[i], pose[i], W, True)
@@ -56,7 +56,7 @@ def gradients_many(P, tool, z, rho, pose, force, solved, chains, total, by_rho, 
                     chains[i, c, r, k] = W.answer[c, r, 1 + k]
             for a in range(m):
                 by_rho[i, r, a] = S[r, 6 + a]
-        for c in range(P.chain.shape[0]):  # at a solved point there is nothing left to mend
+        for c in range(P.chain.shape[0]):  # the residual of a solved point is zero
             for r in range(P.chain[c, SIZE]):
                 W.matrix[c, r, P.chain[c, SIZE]] = 0.0
                 W.answer[c, r, 0] = 0.0

@@ -34,7 +34,7 @@ class Hung:
 def hang(robot: Robot, q: Array, wrench: Array | None = None) -> Hung:
     """Poses at joint coordinates q (n, m) under the weights of the arm and a wrench (n, 6) at the platform reference.
 
-    Raises ValueError for a machine that is no arm, ArithmeticError where an arm gives way without end.
+    Raises ValueError for a machine that is no arm, ArithmeticError if the deflections diverge.
     """
     arm = arm_of(robot)
     if arm is None:
@@ -64,7 +64,7 @@ def hang(robot: Robot, q: Array, wrench: Array | None = None) -> Hung:
 
 
 def grown_way(robot: Robot, q: Array, grown: Array) -> Array:
-    """Way (n, 3) mm of the platform at joint coordinates q (n, m) by links that are longer by `grown` (n, m) mm."""
+    """Displacement (n, 3) mm of the platform at joint coordinates q (n, m) by links longer by `grown` (n, m) mm."""
     out = np.zeros((len(q), 3))
     for j in np.flatnonzero(grown.any(axis=0)):
         longer = lengthened(robot, robot.actuators[j].name, LENGTH_STEP_MM)
@@ -129,7 +129,7 @@ def _walk(robot: Robot, q: Array, z: list[Array], wrench: Array | None) -> tuple
 
 
 def _cross(a: Array, b: Array) -> Array:
-    """Cross products of vectors in the last axis; numpy's own takes longer to look at its axes than to multiply."""
+    """Cross products of vectors in the last axis, faster than numpy.cross for few vectors."""
     (ax, ay, az), (bx, by, bz) = a.T, b.T
     return np.stack((ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx), axis=-1)
 

@@ -1,4 +1,4 @@
-"""One chain at one point, compiled: its pose, the velocities of its slots, and what loads do to them.
+"""One chain at one point, compiled: its pose, the velocities of its slots, and the generalised forces of loads.
 
 The Hessian of a load (F; M) is taken as the derivative of J^T (F; M), which under moments is not symmetric.
 Rotations of springs are rotation vectors; their left Jacobian and its derivative follow Sola, Deray, Atchuthan, "A micro
@@ -126,7 +126,7 @@ def walk(P, c, z, W):
 
 @inner
 def pull(P, c, W, n, f, m, at):
-    """A load, force f and moment m at the place `at`, on the first n slots: adds J^T (f; m) to the residual.
+    """Add J^T (f; m) of a load, force f and moment m at the position `at`, on the first n slots to the residual.
 
     Fills MOVE, MOMENT, AHEAD, BEHIND of the slots; the load's Hessian is, for slots a and b,
     h_ab = AHEAD_a . MOVE_b if b is not before a, BEHIND_a . OMEGA_b if b is before a.

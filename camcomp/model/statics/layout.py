@@ -80,7 +80,7 @@ class Work(NamedTuple):
 
 
 class Workspace(NamedTuple):
-    """What the solver remembers from point to point: the start of the next one."""
+    """State that the solver keeps from point to point as the start of the next one."""
 
     y: Floats  # (c, rigid n) nominal joint coordinates
     z: Floats  # (c, n) chain states
@@ -92,7 +92,7 @@ class Workspace(NamedTuple):
 
 
 def new_memory(elastic: Packed, rigid: Packed) -> Workspace:
-    """Workspace that knows no point yet."""
+    """Workspace before the first point."""
     z, y = np.zeros, rigid.scale.shape
     return Workspace(z(y), z(elastic.scale.shape), z(12), z(12), z(y), z(12), np.zeros(1, np.int64))
 

@@ -1,4 +1,4 @@
-"""Links that are longer or shorter than stated, and how the end of an arm follows."""
+"""Machines with links longer or shorter than stated."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def place_of(robot: Robot, actuator: str) -> tuple[Chain, int]:
 
 
 def link_of(robot: Robot, actuator: str) -> tuple[Chain, int] | None:
-    """Chain and index of the first arm or rigid step behind an actuator; None where the next actuator follows at once."""
+    """Chain and index of the first arm or rigid step behind an actuator; None if the next element is an actuator."""
     chain, k = place_of(robot, actuator)
     for i in range(k + 1, len(chain.elements)):
         each = chain.elements[i]
@@ -33,7 +33,7 @@ def link_of(robot: Robot, actuator: str) -> tuple[Chain, int] | None:
 
 
 def lengthened(robot: Robot, actuator: str, length_mm: float) -> Robot:
-    """Copy of a machine whose link behind an actuator is longer along itself; the machine where it has no such link."""
+    """Copy of a machine with a longer link behind an actuator; the machine itself if it has no such link."""
     found = link_of(robot, actuator)
     if found is None:
         return robot

@@ -53,8 +53,8 @@ def swinging_pair(bar: Array, half: Array) -> tuple[Array, Array]:
     """Stiffness of two hinged bars at +-half of a cross-bar that keeps its orientation while the arm swings by q.
 
     bar (6, 6): stiffness of one bar (hinged_bar_stiffness) in the arm's frame, whose y is the hinge; half (3,) mm: half
-    the cross-bar in the same frame at q = 0. Returns (K, by_swing): K (6, 6) constant, by_swing (4, 6, 6) what is added
-    times cos^2 q, cos q sin q, cos q, sin q. It is 2 (bar + E^T B E) with E = -[r(q)],
+    the cross-bar in the same frame at q = 0. Returns (K, by_swing): K (6, 6) constant, by_swing (4, 6, 6) coefficients of
+    cos^2 q, cos q sin q, cos q, sin q. The sum is 2 (bar + E^T B E) with E = -[r(q)],
     r(q) = Ry(-q) half and B the translational block of the bar; r = cos q A + sin q S + C is quadratic after E.
     """
     x, y, z = half

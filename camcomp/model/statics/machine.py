@@ -1,4 +1,4 @@
-"""A machine ready to be solved: the packed elastic model and the rigid model that its control uses."""
+"""A machine ready to be solved: the packed elastic model and the rigid model of its controller."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Machine:
-    """Packed robot. robot: what is; nominal: what the control believes (perfect chains, nominal lengths)."""
+    """Packed robot. robot: the true one; nominal: that of the controller (perfect chains, nominal lengths)."""
 
     robot: Robot
     nominal: Robot
@@ -40,7 +40,7 @@ class Machine:
 
     @cached_property
     def closed_form(self) -> ClosedForm | None:
-        """Inverse kinematics in closed form, where the control's arm has one."""
+        """Inverse kinematics of the controller in closed form, if the arm has one."""
         arm = arm_of(self.nominal)
         return None if arm is None else closed_form(arm)
 
@@ -61,7 +61,7 @@ class Machine:
 
 
 def build_machine(robot: Robot, nominal: Robot | None = None) -> Machine:
-    """Packs a robot. nominal: the robot as its control knows it, by default the same one.
+    """Pack a robot. nominal: the robot of the controller's kinematics, default: the same one.
 
     Raises ValueError if the machine has neither three nor six actuators, or none of its chains is complete.
     """

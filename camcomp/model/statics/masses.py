@@ -1,8 +1,9 @@
 """Forces of the masses that a machine's drives move: weight and inertia of the bodies, along a motion, in numpy.
 
 Body k of mass m_k at c_k(t) loads the machine with m_k (g - c_k''). The drive of joint j balances the inertia of all bodies
-behind it: for a hinge about axis a through p, a . ((c_k - p) x m_k c_k''); for a slide along a, a . m_k c_k''. The base carries
-the weights; their inertia is left out there, for a program does not say how a control slows down. Bodies are point masses; those behind a passive joint are left out.
+behind it: for a hinge about axis a through p, a . ((c_k - p) x m_k c_k''); for a slide along a, a . m_k c_k''. The base
+carries the weights, without their inertia, because a program does not state decelerations. Bodies are point masses; those
+behind a passive joint do not count.
 
 Source: Newton-Euler equations of a serial chain of point masses (Siciliano et al., Robotics, 7.3).
 """
@@ -43,7 +44,7 @@ class MassLoads:
     base: Floats
 
     def at(self, rows: Callable[[Floats], Floats]) -> Self:
-        """The same at other instants; rows: values (n, c) -> (k, c)."""
+        """Loads at other instants; rows: values (n, c) -> (k, c)."""
         return replace(self, drive=rows(self.drive), base=rows(self.base))
 
 
@@ -98,7 +99,10 @@ def mass_loads(robot: Robot, q: Floats, time: Floats | None = None) -> MassLoads
 
 
 def mass_loads_around(robot: Robot, q: Floats, around: Sequence[Floats], step_s: float) -> MassLoads:
-    """The same at coordinates q (n, m), from those (n, m) a step before, in the middle of, and a step after some instant near by."""
+    """Loads of all stated masses at coordinates q (n, m), accelerated as at an instant near by.
+
+    around: coordinates (n, m) step_s before, at and step_s after that instant.
+    """
     before, here, after = (list(_all_bodies(robot, each)) for each in around)
     speeding = [(c.centre - 2.0 * b.centre + a.centre) / step_s**2 for a, b, c in zip(before, here, after, strict=True)]
     return _loads(list(_all_bodies(robot, q)), speeding, q.shape)

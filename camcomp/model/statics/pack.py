@@ -1,4 +1,4 @@
-"""Packs a Robot into the flat arrays that the compiled solver walks through element by element."""
+"""Packing of a Robot into the flat arrays that the compiled solver reads element by element."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class _Rows:
     _pending: tuple[Array, Array] = field(default_factory=lambda: (np.zeros(3), np.eye(3)))
 
     def add(self, kind: int, **ints: int) -> tuple[NDArray[np.int64], Array]:
-        """Appends an element behind what was shifted so far; returns its two rows."""
+        """Append an element behind the pending displacement, and return its two rows."""
         self.flush()
         row, values = np.full(lay.ELEMENT_INTS, 0, np.int64), np.zeros(lay.ELEMENT_FLOATS)
         row[[lay.KIND, lay.SLOT, lay.SWING, lay.ACT]] = kind, len(self.slots), -1, -1
@@ -71,7 +71,7 @@ class _Rows:
         return len(self.variables) - 1
 
     def joint(self, revolute: bool, axis: Array, variable: int, sign: float = 1.0) -> tuple[NDArray[np.int64], Array]:
-        """A joint along any axis; the solver knows coordinate axes, others are turned onto x and back."""
+        """Append a joint along any axis; the solver has coordinate axes, others are rotated onto x and back."""
         k = int(np.argmax(np.abs(axis)))
         aligned = np.count_nonzero(axis) == 1
         turn = np.eye(3) if aligned else _x_onto(axis)
@@ -187,7 +187,7 @@ def _parallelogram(rows: _Rows, e: Parallelogram, rigid: bool) -> None:
 
 @dataclass(frozen=True)
 class Model:
-    """A packed machine and what belongs to it: z (c, n) at the start pose, and per chain the entries of its joints."""
+    """A packed machine, its state z (c, n) at the start pose, and per chain the entries of its joints."""
 
     packed: Packed
     start: Array

@@ -1,4 +1,4 @@
-"""The whole machine at one point, compiled: all chains, their common platform, and what is asked for.
+"""The whole machine at one point, compiled: equilibrium of all chains and their common platform in six modes.
 
 One pass linearises every chain (chain.evaluate), eliminates the chains' own coordinates, and solves a 6 x 6 system for
 the machine; while steps are short the factored matrices serve several passes. The unknowns depend on the mode:
@@ -8,7 +8,7 @@ the machine; while steps are short the factored matrices serve several passes. T
     TARGET   tip given, force given       -> tilt, commanded tip      F = f(t0 | t0F), seed eqs. (2)-(3)
     CLAMP    rho given, pose given        -> wrench (6,)              f(t | t0) with the full pose held
     POSE     pose given, force given      -> commanded pose           TARGET without tilt; needs six actuators
-    INVERSE  tip given                    -> rho                      nothing gives way: the control's own kinematics
+    INVERSE  tip given                    -> rho                      rigid: kinematics of the controller
 """
 
 # mypy: disallow-untyped-defs=False, disallow-incomplete-defs=False
@@ -48,7 +48,7 @@ CLEARLY_STABLE = 0.02  # smallest relative pivot that needs no second look at th
 
 @inner
 def evaluate_machine(P, tool, force, pose, z, rho, W, full):
-    """Newton answer of every chain (W.answer); if full with a new linearisation, else with the factored one there is.
+    """Newton step of every chain (W.answer); if full with a new linearisation, else with the factored one.
 
     full also fills W.margin and W.machine = [S | K_rho]: S (6, 6) = sum of the loaded chain stiffnesses minus that of the
     dead tip load, whose moment follows the turning lever; K_rho (6, m) = sum of the wrenches by actuator coordinate.
@@ -171,7 +171,7 @@ def solve_point(mode, P, rigid, tool, aim, tip_aim, force, wrench, rho, pose, z,
         before = size
         size = evaluate_machine(P, tool, force, pose, z, rho, W, fresh)
         if fresh:
-            size = 0.0  # the step says it all
+            size = 0.0  # the step decides
         if not machine_step(mode, P, tool, aim, tip_aim, force, wrench, pose, z, W):
             return SINGULAR, passes
         for k in range(6):
@@ -259,7 +259,7 @@ def smallest_pivot(S, L):
 def drive_forces(P, z, W, out):
     """Fills out (m,): force the drive exerts on its carriage, positive along the actuator.
 
-    By the carriage's equilibrium with everything else: the way that a nearly rigid drive gives is too small to be counted.
+    From the equilibrium of the carriage: the deflection of a nearly rigid drive is too small to be evaluated.
     """
     for c in range(P.chain.shape[0]):
         add_loads(P, c, z[c], W, W.matrix[c], False)

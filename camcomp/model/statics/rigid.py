@@ -1,4 +1,4 @@
-"""Kinematics of the perfect rigid machine, compiled: what its control computes.
+"""Inverse kinematics of the perfect rigid machine, as its controller computes them, compiled.
 
 A chain's joint coordinates y bring its end to the platform pose; Gauss-Newton, started from the point before, keeps the
 assembly mode. Position and orientation are weighed with MACHINE_LENGTH.
@@ -28,7 +28,7 @@ OK, MAX_ITERATIONS, OUT_OF_REACH, SINGULAR, UNSTABLE = 0, 2, 3, 4, 5
 RIGID_STEP_DONE = (
     3e-5  # mm: after a Newton step this short the next one is below 1e-11 (step^2 over the size of a machine)
 )
-CLOSED = 1e-7  # mm: what may stay open of a closed chain
+CLOSED = 1e-7  # mm, largest gap of a closed chain
 MAX_PASSES = 60
 LARGEST_RIGID_STEP = 50.0  # mm
 
@@ -62,8 +62,10 @@ def lu_solve(M, n, width):
 
 @inner
 def close_chain(P, c, y, pose, W, twists):
-    """Linearised inverse kinematics of chain c at y (n,): in W.solve, columns n..n+twists, the step of y that closes the
-    chain on `pose` (12,) and the rates of y per platform twist. Returns the largest gap left by the linear step, mm.
+    """Linearise the inverse kinematics of chain c at y (n,), and return the largest gap after the linear step, mm.
+
+    Columns n..n+twists of W.solve: the step of y that closes the chain on `pose` (12,), and the rates of y per platform
+    twist.
     """
     n = P.chain[c, SIZE]
     first = P.chain[c, SLOT_FIRST]

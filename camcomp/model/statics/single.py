@@ -15,18 +15,17 @@ from camcomp.model.statics.sweep import solve_many
 
 
 class PointSolver:
-    """Solves set-points in one mode of camcomp.statics.point, TARGET or POSE; each starts from the one before.
+    """Solver of set-points in mode TARGET or POSE of camcomp.model.statics.point; each starts from the one before.
 
-    The arrays it answers with are its own: they hold the present point until the next one is solved. rho (m,) to be
-    commanded, rho_nominal (m,) of the point asked for, mm or rad; drive (m,) N or N mm. After a status other than 0 rho
-    and drive are NaN.
+    Its arrays hold the present point until the next one is solved: rho (m,) to be commanded, rho_nominal (m,) of the
+    requested point, mm or rad; drive (m,) N or N mm. After a status other than 0 rho and drive are NaN.
     """
 
     def __init__(self, machine: Machine, mode: int) -> None:
         m = len(machine.actuators)
         tool = np.ascontiguousarray(machine.robot.tool, float)
         held = np.ascontiguousarray(machine.nominal.held_rotation, float)
-        self._longer = (held @ (tool - machine.nominal.tool)).tolist()  # the control aims with the tool it knows
+        self._longer = (held @ (tool - machine.nominal.tool)).tolist()  # the controller aims with its own tool length
         self._known_tool = machine.nominal.tool.tolist()
         self._near, self._aim, self._force, tip = (np.zeros((1, 3)) for _ in range(4))
         rho, nominal, drive = (np.zeros((1, m)) for _ in range(3))

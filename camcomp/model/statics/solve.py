@@ -1,4 +1,4 @@
-"""The machine's answers for arrays of points: inverse kinematics, loaded pose, holding force.
+"""Solution of the machine for arrays of points: inverse kinematics, loaded pose, holding force.
 
 Arrays over points, machine frame, mm, N, rad. Long arrays are solved in pieces of fixed size on all cores; the pieces
 start cold, so results do not depend on the number of cores.
@@ -37,11 +37,11 @@ class State:
     """Solved points. Rows whose status is not 0 hold NaN.
 
     tip (n, 3) loaded tool tip; rotation (n, 3, 3) platform; tilt (n, 3) its rotation vector against the nominal
-    orientation, rad; commanded (n, 3) tip the control is told; rho (n, m) actuator coordinates that go with it;
-    rho_nominal (n, m) inverse kinematics of the point asked for; drive (n, m) force of each drive on its carriage;
-    force (n, 3) at the tip; status, passes (n,) int; x (n, c, nz), F (n, c, 6): internal states and wrenches of the
-    chains, empty unless asked for; commanded_rotation (n, 3, 3); wrench (n, 6): sum of the chains' wrenches, the whole
-    load at the platform reference (the answer of CLAMP, and of HOLD with six actuators). INVERSE answers rho_nominal alone.
+    orientation, rad; commanded (n, 3) tip; rho (n, m) its actuator coordinates; rho_nominal (n, m) inverse kinematics of
+    the requested point; drive (n, m) force of each drive on its carriage; force (n, 3) at the tip; status, passes (n,) int;
+    x (n, c, nz), F (n, c, 6): internal states and wrenches of the chains, empty without keep; commanded_rotation (n, 3, 3);
+    wrench (n, 6): sum of the chains' wrenches, the whole load at the platform reference (the result of CLAMP, and of HOLD
+    with six actuators). INVERSE sets rho_nominal only.
     """
 
     tip: Array
@@ -67,21 +67,21 @@ def _per_point(value: Array | None, n: int, shape: tuple[int, ...]) -> Array:
 
 
 def _start(machine: Machine, rotation: Array, reference: Array) -> tuple[Array, Array]:
-    """Pose and joint coordinates from which the numeric inverse kinematics begins: the first point, if in closed form."""
+    """Initial pose and joint coordinates of the numeric inverse kinematics: the first point, if in closed form."""
     if machine.closed_form is not None and (q := machine.closed_form.near(rotation, reference)) is not None:
         return np.concatenate((rotation.ravel(), reference)), q[None]
     return machine.start_pose, machine.start_y
 
 
 def threads() -> int:
-    """Threads of the solver: as many as there are cores for this process, or what CAMCOMP_THREADS says."""
+    """Number of threads of the solver: CAMCOMP_THREADS, default the cores of this process."""
     limit = os.environ.get("CAMCOMP_THREADS", "")
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     return max(1, int(limit)) if limit.isdigit() else cores
 
 
 def in_pieces(work: Callable[[slice], None], n: int) -> None:
-    """Runs work on slices of PIECE points, on every core; says how many of them are done."""
+    """Run work on slices of PIECE points on all cores, with progress messages."""
     pieces = [slice(a, min(a + PIECE, n)) for a in range(0, n, PIECE)]
     workers = min(threads(), len(pieces))
     if workers < 2:
@@ -108,17 +108,17 @@ def solve(
     """Solves every point in one of the modes of camcomp.statics.point.
 
     near (n, 3): a tip position near the answer (its nominal joint coordinates start the solver). force (n, 3) at the
-    tip, wrench (n, 6) at the platform reference. rho (n, m) commanded in FREE, HOLD and CLAMP; without it the control is
-    told to go to `near`. check: prove stability.
+    tip, wrench (n, 6) at the platform reference. rho (n, m) commanded in FREE, HOLD and CLAMP; default: the set-points of
+    `near`. check: verify stability.
     """
     near = np.ascontiguousarray(near, float)
     n, m = len(near), len(machine.actuators)
     tool = np.ascontiguousarray(machine.robot.tool, float)
     aim = near if aim is None else np.ascontiguousarray(aim, float)
     R_aim = _per_point(machine.nominal.held_rotation if aim_rotation is None else aim_rotation, n, (3, 3))
-    # a clamped pose need not be one that the rigid machine can take
+    # a clamped pose may be out of reach of the rigid machine
     R_near = _per_point(machine.nominal.held_rotation, n, (3, 3)) if mode == CLAMP else R_aim
-    # the control aims with the tool it knows; the kernels have one tool, the real one
+    # the controller aims with its own tool length; the kernels have one tool, the true one
     longer = tool - machine.nominal.tool
     near = near + R_near @ longer
     f, w = _per_point(force, n, (3,)), _per_point(wrench, n, (6,))

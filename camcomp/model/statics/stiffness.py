@@ -1,4 +1,4 @@
-"""Cartesian stiffness of every chain and of the machine, loaded and unloaded, and what moves the tip.
+"""Cartesian stiffness of every chain and of the machine, loaded and unloaded, and first derivatives of the tip.
 
 Loaded: derivative of the wrench by the pose at the solved equilibrium, with all Hessian terms (Pashkevich, Klimchik,
 Chablat, Mech. Mach. Theory 46 (2011) 662-679). Unloaded: the same where nothing is strained. Assembly: Klimchik et al.
@@ -86,7 +86,7 @@ def unloaded_stiffness(machine: Machine, tips: Array) -> Stiffness:
 
 
 def tip_sensitivity(machine: Machine, state: State) -> TipSensitivity:
-    """What moves the tip and the drive forces at points solved with keep=True, to first order; exact at the loaded point."""
+    """First derivatives of tip and drive forces at points solved with keep=True, exact at the loaded point."""
     m = state.rho.shape[1]
     tip, drive = _gradients(machine, state)[3:]
     parts = [(a[..., :m], a[..., m : m + 3], a[..., m + 3 :]) for a in (tip, drive)]

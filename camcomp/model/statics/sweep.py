@@ -188,7 +188,7 @@ def solve_many(
 
     Shapes: turn, aim (n, 9), orientation near the answer and asked for; commanded, pose (n, 12); near, tip_aim, force,
     tip (n, 3); wrench, total (n, 6); rho, rho_nominal, drive (n, m); kept (n or 0, c, nz) keeps the states. follow: the
-    control is told to go to `near`. total = sum of the wrenches on the chains.
+    commanded tip is `near`. total = sum of the wrenches on the chains.
     """
     for i in range(rho.shape[0]):
         status[i], passes[i] = solve_one(

@@ -1,4 +1,4 @@
-"""The modified target: which tip must be commanded so that the loaded machine is where the program wants it.
+"""The modified target: commanded tip for which the loaded tip is at the programmed position.
 
 Klimchik, Pashkevich, Chablat, Hovland, "Compensation of compliance errors in parallel manipulators composed of
 non-perfect kinematic chains" (2012), eqs. (2)-(5). A machine with three actuators corrects the tip position; the
@@ -27,9 +27,9 @@ MAX_TARGET_STEPS = 60
 class Correction:
     """Solved targets. Rows with status != 0 hold NaN.
 
-    commanded (n, 3) tip to be commanded, mm; rho_nominal, rho (n, m) actuator coordinates of the point asked for and
-    to be commanded; drive (n, m) drive forces under load; tilt (n, 3) rad, of the loaded platform against the orientation
-    asked for; status, iterations (n,); rotation (n, 3, 3) of the platform to be commanded.
+    commanded (n, 3) tip to be commanded, mm; rho_nominal, rho (n, m) actuator coordinates of the requested and of the
+    commanded point; drive (n, m) drive forces under load; tilt (n, 3) rad, of the loaded platform against the requested
+    orientation; status, iterations (n,); rotation (n, 3, 3) of the platform to be commanded.
     """
 
     commanded: Array
@@ -43,7 +43,7 @@ class Correction:
 
     @staticmethod
     def of(state: State, iterations: NDArray[np.int64]) -> Correction:
-        """The part of a solver state that a correction is."""
+        """The correction in a solver state."""
         return Correction(
             state.commanded, state.rho_nominal, state.rho, state.drive, state.tilt, state.status, iterations,
             state.commanded_rotation,
@@ -64,9 +64,9 @@ def correct(
 
     aim (n, 3) mm programmed tips, force (n, 3) N at the tip, wrench (n, 6) at the platform reference; machine frame.
     method: newton = eq. (3), stiffness = eq. (4), fixed-point = eq. (5), linear = one step with the unloaded Cartesian
-    compliance (baseline, no iteration). pose (newton, machines with six actuators): the orientation is brought back
-    too, not only the tip. rotation (n, 3, 3): orientation of the platform that is asked for, and without pose commanded;
-    None: the one that the machine holds. Raises ValueError for an unknown method.
+    compliance (baseline, no iteration). pose (newton, machines with six actuators): the orientation is corrected too, not
+    only the tip. rotation (n, 3, 3): requested orientation of the platform, and without pose the commanded one; None: the
+    one that the machine holds. Raises ValueError for an unknown method.
     """
     if method == "newton":
         state = solve(machine, POSE if pose else TARGET, aim, aim_rotation=rotation, force=force, wrench=wrench)
@@ -82,7 +82,7 @@ def correct(
 
 
 def _why(machine: Machine, state: State) -> NDArray[np.int64]:
-    """Status (n,), where an arm that did not converge near a singular configuration is called singular."""
+    """Status (n,); SINGULAR for an arm that did not converge near a singular configuration."""
     stuck = np.flatnonzero(state.status == MAX_ITERATIONS)
     arm = arm_of(machine.nominal) if len(stuck) else None
     if arm is None:
@@ -110,7 +110,7 @@ def settle(
 
 def tip_compliance(machine: Machine, tips: Array) -> Array:
     """Tip compliance (n, 3, 3) mm/N of the unloaded machine, by the unit responses of the linearised model."""
-    small = 1e-3  # N: so small that the response is linear to round-off of the solver
+    small = 1e-3  # N, for which the response is linear within the round-off of the solver
     columns = []
     for axis in np.eye(3):
         plus = solve(machine, FREE, tips, force=small * axis, check=False).tip
@@ -120,7 +120,7 @@ def tip_compliance(machine: Machine, tips: Array) -> Array:
 
 
 def _iterate(machine: Machine, aim: Array, force: Array, wrench: Array | None, method: str) -> Correction:
-    """Eqs. (4) and (5): the target moves against the error left, by alpha of it; alpha halves when the error grows."""
+    """Iterate eqs. (4) and (5): the target moves by -alpha times the residual error; alpha halves if the error grows."""
     n = len(aim)
     force = np.broadcast_to(force, (n, 3))
     w = np.zeros((n, 6)) if wrench is None else np.broadcast_to(wrench, (n, 6))

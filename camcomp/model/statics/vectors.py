@@ -1,4 +1,4 @@
-"""Three-vectors as tuples, compiled: they live in registers, and code that uses them stays short.
+"""Three-vectors as tuples, compiled to registers.
 
 A pose is an array of 12: rotation row by row, position. A table of vectors keeps each in three rows of one column.
 """
@@ -136,7 +136,7 @@ def log_product(A, B):
 
 @inner
 def move(pose, shift, turn, share):
-    """Moves a pose by `share` of a translation and of a rotation vector (left, fixed axes)."""
+    """Move a pose by `share` of a translation and of a rotation vector in fixed axes (multiplied from the left)."""
     add_to(pose, 9, plus((0.0, 0.0, 0.0), shift, share))
     w = plus((0.0, 0.0, 0.0), turn, share)
     a, b, _, _, _ = coefficients(dot(w, w))

@@ -1,1 +1,1 @@
-"""The stock remembered: what has been cut away, move by move, and where the tool meets what still stands."""
+"""Model of the stock: a height field from which moves cut material, and the engagement of the tool with it."""

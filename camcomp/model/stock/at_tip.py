@@ -1,7 +1,7 @@
-"""The stock under a tool that is led by hand: what it meets at a tip, and a straight way of the tip taken away.
+"""Engagement at a tip position that the caller chooses, and removal of one straight sweep.
 
-`march` looks for places along a leg by itself; here the caller says where to look, because where the tip goes next depends
-on what it meets.
+`march` chooses the positions along a leg itself. Here the caller does, because the next position of a deflected tip
+depends on the force at this one.
 """
 
 # mypy: disallow-untyped-defs=False, disallow-incomplete-defs=False
@@ -18,9 +18,10 @@ from camcomp.model.stock.removal import put_sweep
 
 @entry
 def meet(nodes, place, found, tip, direction, tool):
-    """What the tool meets at a tip (3,) mm that goes on along a direction (3,): arcs into found.bites; their number.
+    """Measure the engagement at a tip (3,) mm that moves along a direction (3,), and return the number of arcs.
 
-    Depth and sum of the arcs stand in place.told. What was taken last, and so may still be cut again, counts as standing.
+    The arcs go into found.bites, the depth and the sum of the arcs into place.told. Recent sweeps that the field does not
+    contain yet count as material.
     """
     size = math.sqrt(direction[0] * direction[0] + direction[1] * direction[1])
     at = place.at
@@ -34,7 +35,7 @@ def meet(nodes, place, found, tip, direction, tool):
 
 @entry
 def take_way(nodes, place, found, start, end, tool, lag):
-    """Takes away what the tool goes through from tip to tip (3,) mm, as soon as the tip has gone on by lag mm."""
+    """Remove the sweep of the tool between two tip positions (3,) mm from the stock once the tip is `lag` mm farther."""
     k = put_sweep(nodes, start[0], start[1], start[2], end[0], end[1], end[2], tool)
     if k < 0:
         return

@@ -1,4 +1,8 @@
-"""Short legs that go on from each other: where the engagement along them is a straight line they are not looked at one by one."""
+"""Engagement along a chain of short legs without corners.
+
+The engagement is measured at a few ends of legs only, where it is linear along the chain (bisection until the error of
+the linear interpolation is below BENT).
+"""
 
 # mypy: disallow-untyped-defs=False, disallow-incomplete-defs=False
 # numba infers the types of these functions; written by hand they would only be repeated.
@@ -35,7 +39,7 @@ from camcomp.model.stock.places import (
 
 @inner
 def blend(found, a, b, w, out):
-    """Puts what lies at share w between slots a and b into slot `out`."""
+    """Interpolate the engagement linearly at share w between slots a and b into slot `out`."""
     first, rows = found.told_of[ROWS], found.bites
     for i in range(WHAT):
         found.stack[out, i] = found.stack[a, i] + w * (found.stack[b, i] - found.stack[a, i])
@@ -61,7 +65,7 @@ def blend(found, a, b, w, out):
 
 @inner
 def put_straight(found, k, a, b, slot_a, slot_b):
-    """Puts down the places of short legs k + a to k + b - 1 between two slots, along which the engagement is a straight line."""
+    """Store the places of short legs k + a to k + b - 1, interpolated between two slots."""
     ends, at = found.chain_way, found.told_of[PLACES]
     copy_slot(found, slot_a, 0)
     for j in range(a, b):
@@ -77,7 +81,7 @@ def put_straight(found, k, a, b, slot_a, slot_b):
 
 @inner
 def foreseen_between(nodes, place, found, legs, k, a, b, slot_a, slot_b, radius, before):
-    """Whether the engagement behind short legs k + a to k + b - 2 is foreseen wherever it would be looked at."""
+    """Whether interpolation predicts the engagement at the ends of short legs k + a to k + b - 2."""
     ends = found.chain_way
     gap = ends[b] - ends[a]
     parts = max(math.ceil(gap / (0.5 * STEP * radius)), 2)
@@ -94,7 +98,7 @@ def foreseen_between(nodes, place, found, legs, k, a, b, slot_a, slot_b, radius,
 
 @inner
 def along_chain(nodes, place, found, legs, k, count, radius, before, joined_on):
-    """Puts down the places of short legs that go on from each other; slot FIRST tells what is met at their begin."""
+    """Store the places of a chain of short legs; slot FIRST holds the engagement at its start."""
     ends, number = found.chain_way, found.chain_number
     look(nodes, place, found, legs, k + count - 1, 1.0, before + count - (0 if joined_on else 1), FIRST + 1)
     number[0], number[1] = 0, count
@@ -105,7 +109,7 @@ def along_chain(nodes, place, found, legs, k, count, radius, before, joined_on):
         if b - a == 1:
             copy_slot(found, FIRST, 0)
             copy_slot(found, slot, 1)
-            found.stack_u[0] = 0.0  # what was the end of the leg before
+            found.stack_u[0] = 0.0  # the end of the leg before
             put_place(found, k + a, 0, 0.0, found.told_of[PLACES])
             found.told_of[PLACES] += 1
             between(nodes, place, found, legs, k + a, gap, radius, before + a)
@@ -134,7 +138,10 @@ def along_chain(nodes, place, found, legs, k, count, radius, before, joined_on):
 
 @inner
 def chain_from(found, kind, legs, joined, leg, most_way, lately):
-    """How many short legs from `leg` on go on from each other, for most_way mm; chain_way gets the ways to their ends."""
+    """Number of short legs from `leg` on without a corner between them, at most most_way mm long in all.
+
+    Fills found.chain_way with the path length (mm) to their ends.
+    """
     ends, count = found.chain_way, 0
     most = min(MOST_CHAIN, MOST_RECENT - found.told_of[RECENT] - 2)
     ends[0] = 0.0

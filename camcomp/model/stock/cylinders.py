@@ -1,4 +1,4 @@
-"""Arcs in which a cylinder cuts, as high as the material is in each."""
+"""Engagement arcs of a cylindrical tool, each with the mean height of the material in it."""
 
 # mypy: disallow-untyped-defs=False, disallow-incomplete-defs=False
 # numba infers the types of these functions; written by hand they would only be repeated.
@@ -8,12 +8,12 @@ import math
 from camcomp.model.statics.compiled import inner
 from camcomp.model.stock.front import DEPTH, EDGE, END_ANGLE, TURNS, add_bite, angles_of, stands
 
-ASIDE = 0.02  # of the step between two angles: beside an edge
+ASIDE = 0.02  # share of the step between two angles: distance from an edge
 
 
 @inner
 def edge_between(nodes, place, radius, z, a, b, level):
-    """Angle between a and b at which the material passes a height `level` over z."""
+    """Angle between a and b (rad) at which the height of the material over z crosses `level` (mm), by bisection."""
     above = stands(nodes, place, radius, z, a) > level
     for _ in range(TURNS):
         middle = 0.5 * (a + b)
@@ -26,7 +26,7 @@ def edge_between(nodes, place, radius, z, a, b, level):
 
 @inner
 def step_beside(nodes, place, radius, z, edge, psi, here):
-    """Angle between an edge and an angle psi at which the material, `here` mm high at psi, steps, and its height before."""
+    """Angle between an edge and psi at which the height of the material steps to `here` (mm), and its height before."""
     first = edge + ASIDE * (psi - edge)
     high = stands(nodes, place, radius, z, first)
     if high <= 0.0 or abs(high - here) <= 2.0 * EDGE + 0.02 * max(high, here):
@@ -36,7 +36,7 @@ def step_beside(nodes, place, radius, z, edge, psi, here):
 
 @inner
 def look_round(nodes, place, bites, n, radius, z):
-    """Arcs of a cylinder, as high as the material is in each; the number of arcs."""
+    """Append the engagement arcs of a cylinder to `bites` from row n on, and return the new number of rows."""
     count = angles_of(nodes, radius)
     begin, end = END_ANGLE, math.pi - END_ANGLE
     start, top, sum_, members = -1.0, 0.0, 0.0, 0
@@ -44,7 +44,7 @@ def look_round(nodes, place, bites, n, radius, z):
     for k in range(count + 2):
         psi = end if k == count + 1 else (begin if k == 0 else begin + (k - 0.5) / count * (end - begin))
         now = stands(nodes, place, radius, z, psi)
-        mean = sum_ / members if members > 0 else 0.0  # a slope is divided as often as it takes
+        mean = sum_ / members if members > 0 else 0.0  # a slope becomes several arcs
         same = abs(now - mean) <= 2.0 * EDGE + 0.02 * max(now, mean)
         if k == 0:
             if now > 0.0:

@@ -1,4 +1,4 @@
-"""Which triangle of a mesh lies on top of every node of a field."""
+"""Topmost triangle of a mesh over every node of a height field."""
 
 # mypy: disallow-untyped-defs=False, disallow-incomplete-defs=False
 # numba infers the types of these functions; written by hand they would only be repeated.
@@ -19,7 +19,7 @@ from camcomp.model.stock.sweeps import NOWHERE
 
 @entry
 def lay_facets(mesh, place, facet, top):
-    """Fills facet and top (ny, nx) with the highest triangle at every node, counted from 1, and its height."""
+    """Fill facet (ny, nx) with the number (from 1) of the highest triangle at every node, and top (ny, nx) with its height."""
     for f in range(mesh.shape[0]):
         x0, x1, y0, y1 = NOWHERE, -NOWHERE, NOWHERE, -NOWHERE
         for c in range(3):
@@ -37,7 +37,7 @@ def lay_facets(mesh, place, facet, top):
 
 
 def facets_on(stock: StockShape, place: Floats, size: Any) -> tuple[Any, Floats]:
-    """The triangle on top of every node (ny, nx), and the triangles; next to nothing for a stock without a mesh."""
+    """Number of the topmost triangle at every node (ny, nx), and the triangles (f, 3, 3) mm; (1, 1) and (0, 3, 3) without a mesh."""
     if stock.mesh is None:
         return np.zeros((1, 1), np.int32), np.zeros((0, 3, 3))
     facet = np.zeros((int(size[1]), int(size[0])), np.int32)

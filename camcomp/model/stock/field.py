@@ -1,9 +1,9 @@
-"""The stock as a field of nodes, each of which knows the sweep that cut lowest there.
+"""Height field of the stock: every node stores the sweep that cuts lowest there.
 
-Between nodes nothing is interpolated: the sweeps of the nodes around a point are put to the point itself, so that edges
-and floors are as exact as the moves are, and only what is smaller than a cell, such as a sliver between two passes, can
-be missed. A node also knows which sweep passes nearest, of those that cut about as low and of all: the walls between
-nodes are theirs.
+The height over a point between nodes is the minimum over the sweeps of the nodes around it, evaluated at the point
+itself. Edges and floors are therefore as exact as the moves; only features below one cell, such as a sliver between two
+passes, can be missed. A node also stores the nearest sweep, among those of about the same height and among all: these
+form the walls between nodes.
 """
 
 # mypy: disallow-untyped-defs=False, disallow-incomplete-defs=False
@@ -23,34 +23,34 @@ GX, GY, CELL, FORM, XMIN, YMIN, ZMIN, XMAX, YMAX, ZMAX, RISE = range(
 )  # of `place`; a round stock fills its rectangle
 TIE = 1e-5  # mm: heights are kept with seven digits
 HAIR = 1e-9  # mm
-ONE, TWO, THREE = np.uint64(1), np.uint64(2), np.uint64(3)  # numba looks whether an index with a sign is below 0
+ONE, TWO, THREE = np.uint64(1), np.uint64(2), np.uint64(3)  # unsigned: numba then skips the test for negative indices
 USED, FREE, TOUCHED, BEGUN = range(4)  # of `counts`
-# Cells: a circle as large has a node inside. A sweep is low over circles, so where it is, a node near is as low, but for
-# what its tool rises on so much.
+# Radius in cells of the smallest circle that always contains a node. A sweep is low over circles: within SPAN of a low
+# point lies a node that is as low, except for the rise of the tool over SPAN.
 SPAN = 0.7072
 
 
 class HeightField(NamedTuple):
-    """The field. ny, nx nodes; M sweeps; T rows of tools; the mesh of a stock from a file."""
+    """Height field of ny times nx nodes with M sweeps, T rows of tools and the F triangles of a stock from a file."""
 
     place: Floats  # (11,) first node, cell, form and bounds of the stock, how much a tool rises within SPAN, mm
-    own: Any  # (ny, nx) int32, sweep that cut a node lowest, counted from 1; 0: nothing did
-    low: Any  # (ny, nx) float32, height there, mm; the top of a box where nothing did
+    own: Any  # (ny, nx) int32, sweep that cuts a node lowest, counted from 1; 0: uncut
+    low: Any  # (ny, nx) float32, height there, mm; the top of a box where uncut
     near: Any  # (ny, nx) int32, sweep that passes nearest, of those that cut about as low
     over: Any  # (ny, nx) int32, sweep that passes nearest of all
     sweeps: Floats  # (M, 12)
     tools: Floats  # (T, 5)
-    kept: Any  # (M,) int32, how often a sweep stands in these; below 0: it is still to be cut away
-    free: Any  # (M,) int32, stack of places in `sweeps` that can be used again
+    kept: Any  # (M,) int32, number of references to a sweep in these; below 0: not in the field yet
+    free: Any  # (M,) int32, stack of free rows of `sweeps`
     counts: Any  # (4,) int64
-    last: Floats  # (8,) end, tool and direction of the sweep cut away last, from where on it left something, its slant
+    last: Floats  # (8,) of the sweep cut last: end, tool, direction, overhang that it did not cut (mm), slant
     facet: Any  # (ny, nx) int32 triangle on top of a node, counted from 1; 0: none
     mesh: Floats  # (F, 3, 3) mm, its triangles
 
 
 @inner
 def over_facet(mesh, f, x, y):
-    """Height of a triangle over a point, -NOWHERE beside it."""
+    """Height of a triangle over a point, mm; -NOWHERE outside its outline."""
     ax, ay, az = mesh[f, 0, 0], mesh[f, 0, 1], mesh[f, 0, 2]
     bx, by, bz = mesh[f, 1, 0] - ax, mesh[f, 1, 1] - ay, mesh[f, 1, 2] - az
     cx, cy, cz = mesh[f, 2, 0] - ax, mesh[f, 2, 1] - ay, mesh[f, 2, 2] - az
@@ -66,7 +66,7 @@ def over_facet(mesh, f, x, y):
 
 @inner
 def top_at(nodes, x, y, i, j):
-    """Height of the uncut stock over a point of the cell (i, j), -NOWHERE beside it."""
+    """Height of the uncut stock over a point of the cell (i, j), mm; -NOWHERE outside its outline."""
     place = nodes.place
     if x < place[XMIN] - HAIR or x > place[XMAX] + HAIR or y < place[YMIN] - HAIR or y > place[YMAX] + HAIR:
         return -NOWHERE
@@ -90,7 +90,10 @@ def top_at(nodes, x, y, i, j):
 
 @inner
 def height(nodes, x, y, below):
-    """Height of what stands over a point, mm; -NOWHERE where there is nothing. What is lower than `below` is only said to be."""
+    """Height of the material over a point, mm; -NOWHERE outside the stock.
+
+    Where the material is lower than `below`, the value is only an upper bound that is at most `below`.
+    """
     place, own, low = nodes.place, nodes.own, nodes.low
     fx = (x - place[GX]) / place[CELL]
     fy = (y - place[GY]) / place[CELL]
@@ -109,10 +112,10 @@ def height(nodes, x, y, below):
         if highest <= below + TIE:
             return min(float(highest), below)
         lowest = min(min(low[i, j], low[i, j + 1]), min(low[i + 1, j], low[i + 1, j + 1]))
-        if highest - lowest <= TIE:  # a level floor; what bulges in between is thinner than what counts
+        if highest - lowest <= TIE:  # a level floor: bulges between its nodes are below the resolution
             return float(highest)
     best = top_at(nodes, x, y, i, j)
-    for corner in range(4):  # most of what nothing stands over is found out here
+    for corner in range(4):  # most points without material end here
         k = (a, b, c, d)[corner]
         if k > 0:
             best = min(best, bottom(nodes.sweeps, nodes.tools, k - 1, 0, x, y))
@@ -142,7 +145,7 @@ def height(nodes, x, y, below):
 
 @inner
 def above(nodes, x, y, z):
-    """Whether what stands over a point is higher than z: as `height` has it, but mostly without asking any sweep."""
+    """Whether the material over a point is higher than z (mm): equals `height(...) > z`, mostly without evaluating sweeps."""
     place, own, low = nodes.place, nodes.own, nodes.low
     cell = place[CELL]
     fx = (x - place[GX]) / cell
@@ -206,7 +209,7 @@ def above(nodes, x, y, z):
 def room_for(
     place: Floats, rows: int, columns: int, tools: Floats, sweeps: int, facet: Any, mesh: Floats
 ) -> HeightField:
-    """An uncut field. Pages that no tool has touched take no memory, but for the heights of a box."""
+    """Allocate an uncut height field; untouched pages of it take no memory, except the heights of a box."""
     low = (
         np.full((rows, columns), place[ZMAX], np.float32)
         if place[FORM] == BOX

@@ -1,4 +1,4 @@
-"""A whole program through its stock: the engagement, and what is wrong with it."""
+"""Engagement of a whole program with its stock, and the errors of programs that crash into it or miss it."""
 
 from __future__ import annotations
 
@@ -18,9 +18,11 @@ MOST_ERRORS = 20
 def followed(
     config: Config, tool_axis: Floats, path: Path, program: Program | None = None
 ) -> tuple[Engaged, StockMemory]:
-    """The engagement along a path, and the stock behind it.
+    """Engagement along a path, and the stock after it.
 
-    Raises ProgramError CC142 for rapids through material, at their places in the program; ConfigError CC295 to CC298.
+    Raises:
+        ProgramError: CC142, a rapid moves through material; at its line of the program.
+        ConfigError: CC295 to CC298, the stock or a tool cannot be simulated.
     """
     memory = memory_of(config, tool_axis, Bounds().add(path))
     engaged, crashes = memory.follow(path)
@@ -30,7 +32,7 @@ def followed(
 
 
 def refuse_crashes(path: Path, crashes: Ints, program: Program | None) -> None:
-    """Raises ProgramError CC142 for rapids that go through material."""
+    """Raise ProgramError CC142 for rapids that move through material."""
     errors = []
     for line in np.unique(path.line[crashes])[:MOST_ERRORS].tolist():
         at: Location | None = program.text.place(line - 1, 0) if program is not None else None
@@ -39,7 +41,7 @@ def refuse_crashes(path: Path, crashes: Ints, program: Program | None) -> None:
 
 
 def refuse_untouched(config: Config, memory: StockMemory) -> None:
-    """Raises ConfigError CC298 when nothing has been cut of the stock."""
+    """Raise ConfigError CC298 for a program that never cuts the stock."""
     if not memory.touched:
         low, high = memory.bounds
         lies = ", ".join(f"{axis} {a:.6g} to {b:.6g}" for axis, a, b in zip("XYZ", low, high, strict=True))

@@ -1,8 +1,8 @@
-"""Whether the engagement between two places is what lies between theirs, without measuring it.
+"""Cheap test whether interpolation between two places predicts the engagement between them.
 
-A tool that is no cylinder is asked at several hundred points to find all of its arcs. Where they are known on both sides
-and are the same ones, a tenth of that tells whether they lie where they are foreseen: on both sides of every edge, and at
-angles in between that change from slice to slice.
+A full measurement of a ball, bull or drill tool evaluates the field at several hundred points. Where both places have
+the same arcs, a tenth of the points suffices: two at every predicted edge, and some angles between that change from slice
+to slice.
 """
 
 # mypy: disallow-untyped-defs=False, disallow-incomplete-defs=False
@@ -15,13 +15,13 @@ from camcomp.model.stock.field import ZMIN
 from camcomp.model.stock.front import AT, BITE, EDGE, END_ANGLE, FLOOR, least_angle, meets
 from camcomp.model.stock.sweeps import FLAT, KIND, radius_at, slope
 
-OFF, FINEST = 5e-3, 1e-3  # rad by which an edge may be elsewhere at most, and what is worth looking for
-BETWEEN, TURN = 4, 8  # angles at which a slice is looked at, and after how many slices they come again
+OFF, FINEST = 5e-3, 1e-3  # rad: largest tolerance of an edge, and the smallest for which the test is cheaper
+BETWEEN, TURN = 4, 8  # number of angles tested per slice, and of slices after which they repeat
 
 
 @inner
 def alike(found, a, b):
-    """Whether the arcs in two slots are the same ones, slice by slice."""
+    """Whether two slots have the same number of arcs in every slice."""
     rows, n = found.bites, found.stack_rows[a, 1]
     first, second = found.stack_rows[a, 0], found.stack_rows[b, 0]
     if n == 0 or n != found.stack_rows[b, 1]:
@@ -35,7 +35,7 @@ def alike(found, a, b):
 
 @inner
 def mix(found, a, b, w):
-    """Arcs at share w between two slots with the same ones, behind all others; told_of is left as it is. Their first row."""
+    """Append the arcs at share w between two slots with the same arcs, and return their first row; counts do not change."""
     rows, first = found.bites, found.told_of[2]
     for r in range(found.stack_rows[a, 1]):
         p, q = found.stack_rows[a, 0] + r, found.stack_rows[b, 0] + r
@@ -46,7 +46,7 @@ def mix(found, a, b, w):
 
 @inner
 def expected(rows, first, last, psi, off):
-    """Whether an angle lies in an arc (1) or in none (0) of a slice; -1: next to an edge."""
+    """1 for an angle inside an arc of a slice, 0 outside, -1 within `off` (rad) of an edge."""
     for r in range(first, last):
         if rows[r, 0] + off < psi < rows[r, 1] - off:
             return 1
@@ -57,7 +57,7 @@ def expected(rows, first, last, psi, off):
 
 @inner
 def looks_so(nodes, place, found, first, last, radius, run, level, least, number, off):
-    """Whether one slice is as foreseen; number: which one it is."""
+    """Whether the material at one slice of the tool agrees with its predicted arcs; number: index of the slice."""
     rows = found.bites
     begin, end = least + END_ANGLE, math.pi - least - END_ANGLE
     for r in range(first, last):
@@ -82,9 +82,9 @@ def looks_so(nodes, place, found, first, last, radius, run, level, least, number
 
 @inner
 def as_foreseen(nodes, place, found, a, b, w, missed):
-    """Whether the arcs where the tool stands now (place.at) are those at share w between slots a and b.
+    """Whether the arcs at the present place (place.at) are those at share w between slots a and b.
 
-    missed: by how much the engagement may be off, as in places.py. False also where that is not known.
+    missed: tolerance of the engagement, as in places.py. False also where the test cannot decide.
     """
     row, rows = int(place.row[0]), found.bites
     n = found.stack_rows[a, 1]

@@ -21,9 +21,10 @@ UPRIGHT = 1e-6  # of the sine between tool and program Z
 
 
 def memory_of(config: Config, tool_axis: Floats, bounds: Bounds) -> StockMemory:
-    """The uncut stock of a machine file that has one, for a program within some bounds.
+    """Uncut stock of a machine file that has one, for a program within given bounds.
 
-    Raises ConfigError CC295 (diameter), CC296 (tool not along Z), CC297 (file).
+    Raises:
+        ConfigError: CC295 (a tool without diameter), CC296 (tool not along Z), CC297 (STL file).
     """
     if np.linalg.norm(np.asarray(tool_axis)[:2]) > UPRIGHT:
         message = "a stock is followed by a height field, for which the tool has to stand along the program's Z"
@@ -96,14 +97,14 @@ def _around(config: Config, stock: ProgramStock, bounds: Bounds, radius: float) 
 
 
 class Bounds:
-    """Where a program feeds (3,) mm, how high it does so across the tool, and with which tools."""
+    """Box (3,), (3,) mm of the feed motions of a program, highest lateral feed motion (mm), and tool numbers."""
 
     def __init__(self) -> None:
         self.low, self.high, self.across = np.full(3, np.inf), np.full(3, -np.inf), -np.inf
         self.tools: set[int] = set()
 
     def add(self, path: Path) -> Bounds:
-        """Widened by the feed motions of a path."""
+        """Extend the bounds by the feed motions of a path, and return them."""
         feeds = np.flatnonzero((path.kind != RAPID) & path.known & ~path.machine)
         self.tools |= set(np.unique(path.tool[feeds]).tolist())
         u = np.linspace(0.0, 1.0, 9)

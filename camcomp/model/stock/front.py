@@ -1,10 +1,9 @@
-"""The front of a tool at one place of its path, and whether material stands at one angle of it.
+"""Material at an angle of the front of a tool.
 
 Angles count as in camcomp/model/cutting/engagement.py for a clockwise spindle: 0 left of the feed, pi/2 along it, pi
-right of it. Material counts on the front half of the tool, where its surface moves towards it, when it is thicker than
-EDGE across the tool's axis and stands higher than FLOOR: a finished wall or floor is not cut again because numbers are
-rounded. What was taken on the last bit of the way lies against the tool all round its front; such sweeps, `recent`, are
-put to the test one by one, with a tool slimmer by EDGE.
+right of it. Material counts on the front half of the tool, where its surface moves towards it, if it is thicker than
+EDGE across the tool's axis and higher than FLOOR: rounding does not cut a finished wall or floor again. The latest sweeps
+lie against the tool all round its front; these, `recent`, are evaluated one by one with a tool slimmer by EDGE.
 """
 
 # mypy: disallow-untyped-defs=False, disallow-incomplete-defs=False
@@ -19,30 +18,31 @@ from camcomp.model.stock.field import CELL, ZMIN, above, height
 from camcomp.model.stock.sweeps import NOWHERE, TOOL, X0, X1, Y0, Y1, Z0, Z1, bottom, passes
 
 EDGE, FLOOR = 0.002, 0.001  # mm
-FEWEST = 16  # angles at which the front of a tool is looked at
+FEWEST = 16  # least number of sampled angles of the front
 TURNS = 8  # halvings of the step between them
-NEAR = 1e-4  # mm to which the lowest and highest cut of a tool that is no cylinder are found
-END_ANGLE = 1e-3  # rad from the sides of the front half; on less, a wall just cut lies against the tool
-# Columns of an arc: entry, exit (rad), height (mm), rise and run of the tool's surface per length of its edge, and where
-# it is (AT), mm over the tip.
+NEAR = 1e-4  # mm, accuracy of the lowest and the highest cut of a ball, bull or drill tool
+END_ANGLE = 1e-3  # rad from the sides of the front half; within it, a wall just cut lies against the tool
+# Columns of an arc: entry, exit (rad), height (mm), rise and run of the tool's surface per length of its edge, height
+# over the tip (AT, mm).
 BITE, AT = 6, 5
-DEPTH, ENGAGED, WHAT = 5, 6, 8  # of what is told of a place; in front: five integrals over the engagement
+# Columns of the sums of a place, and their number; columns 0 to 4 are integrals over the arcs.
+DEPTH, ENGAGED, WHAT = 5, 6, 8
 
 
 class Place(NamedTuple):
-    """Room to work in at a place, and what was found there."""
+    """Work space of a measurement at one place, and its sums."""
 
-    at: Floats  # (8,) tip (mm), direction of the feed in the plane, climb per mm; what lay_back notes
+    at: Floats  # (8,) tip (mm), direction of the feed in the plane, climb per mm; slopes from lay_back
     row: Any  # (1,) int64, row of the tool
-    recent: Any  # (n,) int64, sweeps that are not cut away yet
-    many: Any  # (1,) int64, how many of them count
-    told: Floats  # (WHAT,)
+    recent: Any  # (n,) int64, sweeps that the field does not contain yet
+    many: Any  # (1,) int64, number of them that count here
+    told: Floats  # (WHAT,) sums
     arcs: Floats  # (r, 2) arcs of a place, to be united
 
 
 @inner
 def stands(nodes, place, radius, z, psi):
-    """Height of material over z at an angle of the tool's front, mm; 0 when it does not count."""
+    """Height of the material over z at an angle of the tool's front, mm; 0 where it does not count."""
     ex, ey = place.at[3], place.at[4]
     c, s = math.cos(psi), math.sin(psi)
     x = place.at[0] + radius * (s * ex - c * ey)
@@ -58,13 +58,13 @@ def stands(nodes, place, radius, z, psi):
 
 @inner
 def angles_of(nodes, radius):
-    """At how many angles the front is looked at: two cells apart, and at FEWEST."""
+    """Number of sampled angles of the front: two cells apart, at least FEWEST."""
     return max(int(math.pi * radius / (2.0 * nodes.place[CELL])), FEWEST)
 
 
 @inner
 def add_bite(bites, n, start, stop, tall, rise, run, at):
-    """Puts down an arc; the number of arcs."""
+    """Append an arc, and return the new number of arcs."""
     if stop <= start or n >= bites.shape[0]:
         return n
     bites[n, 0], bites[n, 1], bites[n, 2], bites[n, 3], bites[n, 4], bites[n, AT] = start, stop, tall, rise, run, at
@@ -73,14 +73,17 @@ def add_bite(bites, n, start, stop, tall, rise, run, at):
 
 @inner
 def point_of(place, radius, c, s):
-    """Where the tool's front has a radius at an angle with this cosine and sine."""
+    """Position (x, y) mm of the tool's front at a radius (mm) and the angle with this cosine and sine."""
     ex, ey = place.at[3], place.at[4]
     return place.at[0] + radius * (s * ex - c * ey), place.at[1] + radius * (s * ey + c * ex)
 
 
 @inner
 def lay_back(nodes, place):
-    """Notes how far beside and below the tip the ways of the last bit lie, per mm behind it; without bound ahead of it."""
+    """Store the largest lateral and downward offset of the recent sweeps from the tip, per mm behind it.
+
+    Both go into place.at; NOWHERE if a recent sweep reaches ahead of the tip.
+    """
     at = place.at
     aside = below = 0.0
     for r in range(place.many[0]):
@@ -103,17 +106,17 @@ def lay_back(nodes, place):
 
 @inner
 def reach_back(place, run):
-    """Sine of the angle of the front beyond which nothing that was taken lies, where the radius grows by `run` per height.
+    """Sine of the angle of the front beyond which the recent sweeps do not reach; the radius grows by `run` per height.
 
-    A tool that stood b mm behind the tip, l beside and d below it, is over a point of the front at psi where
-    b sin(psi) <= l + d run, as long as it would not have been so everywhere.
+    A tool b mm behind the tip, l to its side and d below it covers a point of the front at psi where
+    b sin(psi) <= l + d run.
     """
     return place.at[6] + place.at[7] * run
 
 
 @inner
 def taken(nodes, place, x, y, level):
-    """Whether what is not cut away yet, but taken, is as low as a level over a point."""
+    """Whether a recent sweep removes the material over a point down to a level (mm)."""
     for r in range(place.many[0]):
         if passes(nodes.sweeps, nodes.tools, place.recent[r], 1, x, y, level):
             return True
@@ -122,14 +125,14 @@ def taken(nodes, place, x, y, level):
 
 @inner
 def meets(nodes, place, radius, run, level, c, s):
-    """Whether material stands higher than a level at an angle of the tool's front, whose radius grows by `run` per height."""
+    """Whether the material is higher than a level at an angle of the tool's front; the radius grows by `run` per height."""
     x, y = point_of(place, radius, c, s)
     return above(nodes, x, y, level) and (s > reach_back(place, run) or not taken(nodes, place, x, y, level))
 
 
 @inner
 def least_angle(climb, run):
-    """From which angle on a surface with this run per rise moves towards what is in front of it, on a climbing way."""
+    """Smallest angle (rad) from which a surface with this run per rise moves towards the material on a climbing path."""
     if climb <= 0.0:
         return 0.0
     sine = climb * run

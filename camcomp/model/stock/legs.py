@@ -17,22 +17,22 @@ MOST_CHORDS = 20_000
 
 @dataclass(frozen=True, eq=False)
 class Legs:
-    """Legs (m,) of the motions of a path; those without length are left out."""
+    """Straight legs (m,) of the motions of a path that have a length."""
 
     motion: Ints
     u0: Floats
     u1: Floats
     kind: Ints
     table: Floats  # (m, 10), columns of places.py
-    joined: Bools  # (m + 1,) a leg goes on from the one before without a corner
+    joined: Bools  # (m + 1,) no corner between a leg and the one before
     ends: Floats  # (m, 3) direction in which a leg ends
 
 
 @dataclass(frozen=True, eq=False)
 class LegBefore:
-    """The leg in front of a path."""
+    """The last leg before a path."""
 
-    known: bool = False  # the position is
+    known: bool = False  # whether the position is known
     end: Floats | None = None  # (3,) direction in which it ends, if it cuts
     tool: int = -1
 

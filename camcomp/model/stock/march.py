@@ -1,4 +1,4 @@
-"""Along the program, leg by leg: what the tool meets, and then the cut."""
+"""Engagement along the legs of a program in order, and removal of their sweeps from the stock."""
 
 # mypy: disallow-untyped-defs=False, disallow-incomplete-defs=False
 # numba infers the types of these functions; written by hand they would only be repeated.
@@ -37,14 +37,14 @@ from camcomp.model.stock.places import (
 from camcomp.model.stock.removal import cut_away, drop_one, hits, put_sweep
 from camcomp.model.stock.sweeps import FLAT, KIND, RADIUS
 
-LATELY = 1.5  # times the way on which a sweep lies against the front of the tool by less than EDGE
-FARTHER = 1.0  # of the radius, instead of STEP, where what lies between can be foreseen
-ROOM_FOR_PLACES, ROOM_FOR_ARCS = 4096, 65536  # that a leg may take up
+LATELY = 1.5  # times the path length on which a sweep lies against the front of the tool by less than EDGE
+FARTHER = 1.0  # of the radius, in place of STEP, where interpolation is tested cheaply
+ROOM_FOR_PLACES, ROOM_FOR_ARCS = 4096, 65536  # most of one leg
 
 
 @inner
 def settle_recent(nodes, place, found, until):
-    """Cuts away what was taken before `until` mm of the way."""
+    """Remove the recent sweeps that end before the path length `until` (mm) from the field."""
     n = int(found.told_of[RECENT])
     done = 0
     while done < n and found.recent_end[done] <= until:
@@ -58,7 +58,7 @@ def settle_recent(nodes, place, found, until):
 
 @inner
 def push_recent(nodes, place, found, k, end):
-    """Puts a sweep behind the others; when there are too many the oldest is cut away."""
+    """Append a sweep to the recent ones; at MOST_RECENT the oldest is removed from the field first."""
     if found.told_of[RECENT] == MOST_RECENT:
         settle_recent(nodes, place, found, found.recent_end[0])
     n = found.told_of[RECENT]
@@ -69,7 +69,7 @@ def push_recent(nodes, place, found, k, end):
 
 @inner
 def take(nodes, place, found, legs, k, tool, length, lately):
-    """Puts the sweep of a leg behind the others, its end apart when it is long; the number of sweeps."""
+    """Append the sweep of a leg to the recent ones, the end of a long leg as a sweep of its own; return their number."""
     end = found.way[PATH] + length
     ax, ay, az, bx, by, bz = legs[k, FX], legs[k, FY], legs[k, FZ], legs[k, TX], legs[k, TY], legs[k, TZ]
     if length < 3.0 * lately:
@@ -84,10 +84,10 @@ def take(nodes, place, found, legs, k, tool, length, lately):
 
 @entry
 def march(nodes, place, found, kind, legs, tool, joined, leg):
-    """Goes on from leg number `leg`; the leg before which it stopped because there was no more room.
+    """Measure and cut the legs from number `leg` on, and return the number of the first leg that found no room.
 
-    kind (m,): what a leg is. legs (m, 10). tool (m,). joined (m + 1,): the leg goes on from the one before without a
-    corner, so that both see the same at the point between them.
+    kind (m,): RAPID_LEG to UNSEEN_LEG. legs (m, 10): columns of places.py. tool (m,): row of the tool. joined (m + 1,):
+    no corner between the leg and the one before, so that both share the place between them.
     """
     m = kind.shape[0]
     while leg < m:
@@ -157,13 +157,13 @@ def march(nodes, place, found, kind, legs, tool, joined, leg):
 
 @entry
 def settle(nodes, place, found):
-    """Cuts away everything that was taken."""
+    """Remove all recent sweeps from the field."""
     settle_recent(nodes, place, found, found.way[PATH] + 1.0)
 
 
 @entry
 def peek(nodes, place, found, legs, tool, leg):
-    """Puts down the place at the begin of a leg that is not gone."""
+    """Store the place at the start of a leg without cutting the leg."""
     place.row[0] = 2 * int(tool[leg])
     look(nodes, place, found, legs, leg, 0.0, found.told_of[RECENT], 0)
     put_place(found, leg, 0, 0.0, found.told_of[PLACES])

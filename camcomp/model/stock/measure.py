@@ -1,4 +1,4 @@
-"""Where the tool meets material at one place of its path: arcs of the turn, with the height of tool that cuts in each."""
+"""Engagement at one place: arcs of the tool's turn, with the height of the tool that cuts in each."""
 
 # mypy: disallow-untyped-defs=False, disallow-incomplete-defs=False
 # numba infers the types of these functions; written by hand they would only be repeated.
@@ -15,7 +15,10 @@ from camcomp.model.stock.sweeps import FLAT, KIND, RADIUS
 
 @inner
 def sum_up(place, bites, first, n):
-    """Integrals over the arcs from row `first` on, and the sum of the angles that lie in any of them, rad."""
+    """Sum integrals over the arcs from row `first` on, and the angle (rad) of their union, for the place.
+
+    Columns 0 to 4: integrals of h, h sin, h cos, h cos 2psi, h sin 2psi over psi, h: height of the tool that cuts, mm.
+    """
     told, arcs, k = place.told, place.arcs, 0
     for r in range(first, n):
         start, stop, tall = bites[r, 0], bites[r, 1], bites[r, 2]
@@ -40,7 +43,7 @@ def sum_up(place, bites, first, n):
 
 @inner
 def measure(nodes, place, bites, n):
-    """What the tool meets at a place: arcs into `bites` from row n on, sums into place.told; the number of rows."""
+    """Measure the engagement at a place: sums into the place, arcs into `bites`; return the new number of arcs."""
     told = place.told
     for k in range(WHAT):
         told[k] = 0.0

@@ -1,4 +1,4 @@
-"""The stock while a program is followed: what every motion meets, and what it leaves."""
+"""Stock during a program: engagement of every motion, and removal of its material in order."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ from camcomp.model.stock.shapes import StockShape, ToolShape
 from camcomp.model.stock.thinning import thin
 
 COARSEST_MM, FINEST_MM = 0.25, 0.05
-MOST_NODES = 1 << 25  # of 16 bytes, and only those count that a tool has touched
+MOST_NODES = 1 << 25  # of 16 bytes; only nodes that a tool touches take memory
 MARGIN = 5  # nodes around the stock
 ARCS = 256  # of one place
 NO_TOOL = -1
 
 
 def cell_for(stock: StockShape, tools: Mapping[int, ToolShape]) -> float:
-    """Distance of the nodes, mm: so small that no wall bulges by EDGE between them."""
+    """Distance of the nodes (mm) at which a wall bulges by less than EDGE between them."""
     radius = min((0.5 * each.diameter_mm for each in tools.values()), default=1.0)
     fine = float(np.clip(0.9 * np.sqrt(8.0 * radius * EDGE), FINEST_MM, COARSEST_MM))
     area = float(np.prod(np.maximum(stock.high[:2] - stock.low[:2], fine)))
@@ -35,10 +35,10 @@ def cell_for(stock: StockShape, tools: Mapping[int, ToolShape]) -> float:
 
 
 class StockMemory:
-    """A stock from which motions take material, in the order in which they are shown."""
+    """A stock from which motions remove material in the order of the calls."""
 
     def __init__(self, stock: StockShape, tools: Mapping[int, ToolShape], cell_mm: float | None = None) -> None:
-        """tools: by T number; NO_TOOL stands for all others. cell_mm: distance of the nodes, None: cell_for."""
+        """tools: by T number; NO_TOOL: all numbers without an entry. cell_mm: distance of the nodes, None: cell_for."""
         self.cell = cell_for(stock, tools) if cell_mm is None else cell_mm
         self._number = {number: k for k, number in enumerate(tools)}
         rows = np.array([row for each in tools.values() for row in each.rows()])
@@ -61,11 +61,11 @@ class StockMemory:
             np.zeros(CHAIN_DEEP, np.int64),
         )  # fmt: skip
         self._before = LegBefore()
-        self._kept = self._kept_rows = 0  # places and arcs that stand in the room from before
+        self._kept = self._kept_rows = 0  # places and arcs kept from the call before
 
     @property
     def touched(self) -> bool:
-        """Whether anything has been cut away yet."""
+        """Whether a motion has removed material yet."""
         return bool(self.nodes.counts[TOUCHED])
 
     @property
@@ -74,13 +74,13 @@ class StockMemory:
         return self.nodes.place[XMIN : ZMIN + 1].copy(), self.nodes.place[XMAX : ZMAX + 1].copy()
 
     def settle(self) -> None:
-        """Cuts away what was taken last, too."""
+        """Remove the recent sweeps from the field."""
         settle(self.nodes, self._place, self._found)
 
     def follow(self, path: Path, *, ahead: int = 0) -> tuple[Engaged, Ints]:
-        """What the motions meet, and which rapids go through material.
+        """Engagement of the motions of a path, and numbers of the rapids that move through material.
 
-        ahead: so many motions at the end are only looked at: they tell how the one before them goes on.
+        ahead: number of motions at the end that are not cut; they only determine how the motion before them ends.
         """
         legs = legs_of(path, self._before)
         tool = np.array([self._tool(int(t)) for t in np.unique(path.tool)])
@@ -105,16 +105,16 @@ class StockMemory:
         return _engaged(parts, legs), np.unique(legs.motion[:own][crash[:own]])
 
     def meet(self, tip: Floats, direction: Floats, tool: int) -> tuple[float, Bites]:
-        """What a tool (T number) meets at a tip (3,) mm from where it goes on along a unit direction (3,).
+        """Depth (mm) and engagement arcs of a tool (T number) at a tip (3,) mm that moves along a unit direction (3,).
 
-        The depth in mm, and the arcs of this one place. Not to be mixed with `follow`.
+        Not to be mixed with `follow`.
         """
         n = meet(self.nodes, self._place, self._found, tip, direction, self._tool(tool))
         start, stop, height, rise, run, _ = self._found.bites[:n].T.copy()
         return float(self._place.told[DEPTH]), Bites(np.zeros(n, np.int64), start, stop, height, rise, run)
 
     def take(self, start: Floats, end: Floats, tool: int, lag_mm: float) -> None:
-        """Takes away what a tool goes through on a straight way from tip to tip (3,) mm, once it has gone lag_mm farther."""
+        """Remove the straight sweep of a tool between two tip positions (3,) mm once the tip is lag_mm farther."""
         self._make_room()
         take_way(self.nodes, self._place, self._found, start, end, self._tool(tool), lag_mm)
 
@@ -122,7 +122,7 @@ class StockMemory:
         return self._number.get(number, self._number.get(NO_TOOL, 0))
 
     def _behind(self, path: Path, legs: Legs, own: int, motion: int) -> LegBefore:
-        """What the next legs go on from; motions without length change nothing but the position."""
+        """The last leg of this path for the next one; motions without length only change the position."""
         known = bool(path.known[motion] & ~path.machine[motion])
         if own == 0:
             return replace(self._before, known=known)
@@ -131,12 +131,12 @@ class StockMemory:
         return LegBefore(known, legs.ends[own - 1], int(path.tool[legs.motion[own - 1]]))
 
     def _carry_over(self) -> None:
-        """The last place of what was shown before belongs to the leg in front of the next ones."""
+        """Assign the last place of the call before to the leg before the next ones (number -1)."""
         if self._found.told_of[PLACES]:
             self._found.leg[0] = -1
 
     def _taken(self, *, keep: bool = True) -> _Places:
-        """The places found since the last time; the last of them stays, for the next leg may go on from there."""
+        """Places found since the last call; the last of them is kept, because the next leg may start there."""
         found = self._found
         n, r = int(found.told_of[PLACES]), int(found.told_of[ROWS])
         first = self._kept
@@ -163,7 +163,7 @@ class StockMemory:
         return out
 
     def _make_room(self) -> None:
-        """Twice as many sweeps when those there are will soon be used up."""
+        """Double the room for sweeps before it is used up."""
         nodes = self.nodes
         if nodes.counts[USED] + 1024 < len(nodes.sweeps):
             return
@@ -177,7 +177,7 @@ class StockMemory:
 
 @dataclass(frozen=True, eq=False)
 class _Places:
-    """Places of some legs as they were found."""
+    """Places of consecutive legs before thinning; columns as in places.Found."""
 
     leg: Ints
     u: Floats
@@ -188,7 +188,7 @@ class _Places:
 
 
 def _engaged(parts: list[_Places], legs: Legs) -> Engaged:
-    """All places that are needed, in order."""
+    """The places that linear interpolation needs, in order."""
     rows = np.cumsum([0] + [len(each.bites) for each in parts])
     leg, u, told = (
         np.concatenate([getattr(each, name) for each in parts] or [empty])

@@ -1,7 +1,7 @@
-"""Places on a leg: they lie so close that the engagement between two of them is a straight line, or a jump.
+"""Places on a leg between which the engagement is linear or jumps.
 
-A leg is a straight way of the tip: a line, or a chord of an arc. Places are added until the engagement between two of
-them is a straight line, or until they are JUMP_MM apart and it still differs by much: there it jumps.
+A leg is a straight motion of the tip: a line, or a chord of an arc. Places are added by bisection until the engagement
+between neighbours is linear within BENT, or until they are JUMP_MM apart and differ by more than JUMP: a jump.
 """
 
 # mypy: disallow-untyped-defs=False, disallow-incomplete-defs=False
@@ -18,32 +18,32 @@ from camcomp.model.stock.measure import measure
 
 RAPID_LEG, CUT_LEG, PLUNGE_LEG, UNSEEN_LEG = 0, 1, 2, 3
 FX, FY, FZ, TX, TY, TZ, AX, AY, BX, BY = range(10)  # of a leg: from, to (mm); directions in the plane at both ends
-JUMP_MM = 0.02  # less than a tooth goes on in a turn
-JUMP = 0.2  # of the largest engagement: a steep rise by less is no jump
-FINE_MM = 0.0015  # places are no closer than that
-BENT = 2e-3  # of it: what a straight line between two places may miss
-SHORT, CALM = 0.05, 0.02  # a leg of this share of the radius whose ends differ by this share is not looked at between
+JUMP_MM = 0.02  # length of a jump: below the usual feed per tooth
+JUMP = 0.2  # of the largest engagement: least height of a jump
+FINE_MM = 0.0015  # least distance of two places
+BENT = 2e-3  # of the largest engagement: tolerance of the linear interpolation
+SHORT, CALM = 0.05, 0.02  # shares of the radius and of the engagement below which a leg gets no places between its ends
 MOST_RECENT, DEEP = 64, 64
-PATH, SCALE = 0, 1  # of `way`: mm gone, largest engagement so far
-RECENT, PLACES, ROWS = range(3)  # of `told`
-MOST_CHAIN, CHAIN_DEEP = 32, 8  # short legs that are looked at together
-FIRST = DEEP  # slot of the stack from which on they are kept
-STEP = 0.5  # of the radius: places at first
+PATH, SCALE = 0, 1  # of `way`: path length (mm), largest engagement so far
+RECENT, PLACES, ROWS = range(3)  # of `told_of`
+MOST_CHAIN, CHAIN_DEEP = 32, 8  # most short legs of a chain, most of its open intervals
+FIRST = DEEP  # first slot of the stack that a chain uses
+STEP = 0.5  # of the radius: distance of the first places
 
 
 class Found(NamedTuple):
-    """Places (n,) found on legs, and their arcs."""
+    """Places (n,) on legs, their arcs (r,), and the work space of the bisection."""
 
     leg: Any  # (n,) int64
     u: Floats  # (n,) fraction of the leg
     first: Any  # (n,) int64 row in `bites`
     many: Any  # (n,) int64
-    told: Floats  # (n, WHAT), the last one: largest engagement so far
+    told: Floats  # (n, WHAT) sums of front.py; the last column: largest engagement so far
     bites: Floats  # (r, BITE)
     crash: Any  # (legs,) bool
-    recent_end: Floats  # (MOST_RECENT,) mm of the way
+    recent_end: Floats  # (MOST_RECENT,) path length at the end of a recent sweep, mm
     way: Floats  # (2,)
-    told_of: Any  # (3,) int64
+    told_of: Any  # (3,) int64, numbers of recent sweeps, places and arcs
     stack_u: Floats  # (DEEP + CHAIN_DEEP,)
     stack: Floats  # (DEEP + CHAIN_DEEP, WHAT)
     stack_rows: Any  # (DEEP + CHAIN_DEEP, 2) int64
@@ -61,7 +61,7 @@ def leg_length(legs, k):
 
 @inner
 def stand(nodes, place, legs, k, u, many):
-    """Puts the tool at fraction u of leg k, when `many` of the recent sweeps have been taken."""
+    """Move the tool to fraction u of leg k; `many` of the recent sweeps count there."""
     at = place.at
     for i in range(3):
         at[i] = legs[k, FX + i] + u * (legs[k, TX + i] - legs[k, FX + i])
@@ -82,7 +82,7 @@ def stand(nodes, place, legs, k, u, many):
 
 @inner
 def look(nodes, place, found, legs, k, u, many, slot):
-    """Measures at fraction u of leg k into a slot of the stack."""
+    """Measure the engagement at fraction u of leg k into a slot of the stack."""
     stand(nodes, place, legs, k, u, many)
     rows = found.told_of[ROWS]
     n = measure(nodes, place, found.bites, rows)
@@ -97,7 +97,7 @@ def look(nodes, place, found, legs, k, u, many, slot):
 
 @inner
 def copy_slot(found, a, b):
-    """Copies slot a of the stack to slot b."""
+    """Copy slot a of the stack to slot b."""
     found.stack_u[b] = found.stack_u[a]
     found.stack_rows[b, 0], found.stack_rows[b, 1] = found.stack_rows[a, 0], found.stack_rows[a, 1]
     for i in range(WHAT):
@@ -106,7 +106,7 @@ def copy_slot(found, a, b):
 
 @inner
 def put_place(found, k, slot, u, at):
-    """Writes a slot down as place number `at` of the program."""
+    """Store a slot as place number `at` of the program."""
     found.leg[at] = k
     found.u[at] = u
     found.first[at], found.many[at] = found.stack_rows[slot, 0], found.stack_rows[slot, 1]
@@ -116,7 +116,7 @@ def put_place(found, k, slot, u, at):
 
 @inner
 def apart(found, a, b):
-    """How much the engagement in two slots differs."""
+    """Largest difference between the integrals of two slots."""
     most = 0.0
     for i in range(DEPTH):
         most = max(most, abs(found.stack[a, i] - found.stack[b, i]))
@@ -125,13 +125,13 @@ def apart(found, a, b):
 
 @inner
 def begins(found, a, b):
-    """Whether the tool meets material in one of two slots only: there models of one force for all cuts switch on and off."""
+    """Whether the tool cuts in exactly one of two slots: there a constant force model switches."""
     return (found.stack[a, 0] > 0.0) != (found.stack[b, 0] > 0.0)
 
 
 @inner
 def bent(found, a, middle, b, w):
-    """How far the engagement in the slot `middle` is from the straight line between its neighbours, at share w of it."""
+    """Error of the linear interpolation at share w between slots a and b for the integrals of the slot `middle`."""
     most = 0.0
     for i in range(DEPTH):
         line = found.stack[a, i] + w * (found.stack[b, i] - found.stack[a, i])
@@ -141,7 +141,7 @@ def bent(found, a, middle, b, w):
 
 @inner
 def between(nodes, place, found, legs, k, length, radius, before):
-    """Puts down the places behind slot 0 up to slot 1, which is the last one put on the stack."""
+    """Store the places between slot 0 and slot 1 of the stack, including that of slot 1."""
     top = 1
     jumped = False
     while top > 0:

@@ -1,4 +1,4 @@
-"""Takes sweeps out of a field, and tells whether one would go through what stands."""
+"""Removal of sweeps from a height field, and the test of rapids for collisions with the material."""
 
 # mypy: disallow-untyped-defs=False, disallow-incomplete-defs=False
 # numba infers the types of these functions; written by hand they would only be repeated.
@@ -45,14 +45,14 @@ from camcomp.model.stock.sweeps import (
     bottom_at,
 )
 
-SAME_LEVEL = 0.02  # mm, and what a sweep climbs within its tool
-LEAN = 1e-6  # a direction along a row or across it
-CRASH_DEEP, CRASH_INSIDE = 0.01, 0.02  # mm that a rapid has to be in material before it is called a crash
+SAME_LEVEL = 0.02  # mm, tolerance of "about as low", plus the climb of a sweep within its tool
+LEAN = 1e-6  # sine below which a direction is along a row or across it
+CRASH_DEEP, CRASH_INSIDE = 0.01, 0.02  # mm: least depth of a collision, and reduction of the tool's radius
 
 
 @inner
 def strip(low, high, over, by):
-    """Where low <= over * x + by * y <= high: the ends of x on the row y = 0, and how much they move from row to row."""
+    """Interval of x with low <= over * x + by * y <= high on the row y = 0, and its shift per mm of y."""
     if abs(over) <= LEAN:
         return -NOWHERE, NOWHERE, 0.0
     a, b = low / over, high / over
@@ -61,7 +61,7 @@ def strip(low, high, over, by):
 
 @inner
 def rows_between(nodes, k, radius, first, last):
-    """The first and the last row of the field that a sweep can reach between two places of its way, mm."""
+    """First and last row of the field within reach of a sweep between two path lengths (mm)."""
     y0, ux, uy = nodes.sweeps[k, Y0], nodes.sweeps[k, UX], nodes.sweeps[k, UY]
     low = y0 + min(first * uy, last * uy) - radius * abs(ux) - nodes.place[GY] - HAIR
     high = y0 + max(first * uy, last * uy) + radius * abs(ux) - nodes.place[GY] + HAIR
@@ -71,7 +71,7 @@ def rows_between(nodes, k, radius, first, last):
 
 @inner
 def put_sweep(nodes, x0, y0, z0, x1, y1, z1, tool):
-    """Number of a new sweep, which nothing is cut by yet; -1 when there is no room."""
+    """Store a sweep that the field does not contain yet, and return its number, or -1 if there is no room."""
     counts = nodes.counts
     if counts[FREE] > 0:
         counts[FREE] -= 1
@@ -98,7 +98,7 @@ def put_sweep(nodes, x0, y0, z0, x1, y1, z1, tool):
 
 @inner
 def drop_one(nodes, k):
-    """Sweep k stands at a place less; without any its number is free."""
+    """Remove one reference to sweep k; its row becomes free with the last one."""
     nodes.kept[k] -= 1
     if nodes.kept[k] == 0:
         nodes.free[nodes.counts[FREE]] = k
@@ -107,7 +107,7 @@ def drop_one(nodes, k):
 
 @inner
 def overhang(sweeps, tools, k, climb):
-    """How far beyond the end of a sweep, mm, the tool reaches lowest before it is there; climb: towards that end."""
+    """Distance (mm) beyond an end of a sweep in which the tool is lowest before that end; climb: towards the end, per mm."""
     row = 2 * int(sweeps[k, TOOL])
     if climb <= 0.0:
         return 0.0
@@ -120,10 +120,10 @@ def overhang(sweeps, tools, k, climb):
 
 @inner
 def cut_away(nodes, k, after):
-    """Takes the material of sweep k out of the field. after: the sweep that is going to be next, -1: not known.
+    """Remove the material of sweep k from the field. after: number of the next sweep, -1: unknown.
 
-    Where sweeps go on from each other, what lies beyond the end of one is left to the next, which begins there, and what
-    lies behind its begin has been cut by the one before.
+    Consecutive sweeps share the region around their common point: a sweep skips the nodes beyond its end, which the next
+    one cuts, and the nodes behind its start, which the one before has cut.
     """
     place, own, sweeps, tools = nodes.place, nodes.own, nodes.sweeps, nodes.tools
     tool, length = sweeps[k, TOOL], sweeps[k, LENGTH]
@@ -144,10 +144,10 @@ def cut_away(nodes, k, after):
     before, bx, by = last[6], last[4], last[5]
     first, beyond = -radius, min(length + left, length + radius)
     ball, slant = tools[2 * int(tool), KIND] == BALL, sweeps[k, CLIMB] / sweeps[k, WAY]
-    if begun > -NOWHERE and bx * ux + by * uy > 0.0:  # of what the one before has left beyond its end
+    if begun > -NOWHERE and bx * ux + by * uy > 0.0:  # only the overhang that the sweep before skipped
         back = min(begun, radius * last[7]) if ball else begun
         first = max(first, back - radius * abs(bx * uy - by * ux))
-    nodes.kept[k] = 1  # it must not be freed meanwhile
+    nodes.kept[k] = 1  # reference that keeps its row during the removal
     bottom_row, top_row = rows_between(nodes, k, radius, first, beyond)
     if min(sweeps[k, Z0], sweeps[k, Z1]) >= place[ZMAX]:
         top_row = -1
@@ -166,7 +166,7 @@ def cut_away(nodes, k, after):
             if s > length + left or (s < begun and behind <= before and not ball):
                 continue
             n = (x - x0) * uy - dy * ux
-            if ball:  # it leaves to others exactly what is theirs
+            if ball:  # skip exactly the nodes of its neighbours
                 square = radius * radius - n * n
                 if square < 0.0:
                     continue
@@ -187,7 +187,7 @@ def cut_away(nodes, k, after):
 
 @inner
 def cut_node(nodes, k, i, j, x, y, n, s):
-    """Takes the material of sweep k out of a node, which lies at n and s `across` its way."""
+    """Remove the material of sweep k at one node; n, s: coordinates of the node by `across`, mm."""
     own, low, near, over, sweeps, tools = nodes.own, nodes.low, nodes.near, nodes.over, nodes.sweeps, nodes.tools
     z = bottom_at(sweeps, tools, k, 0, n, s)
     if z >= NOWHERE:
@@ -230,7 +230,7 @@ def cut_node(nodes, k, i, j, x, y, n, s):
 
 @inner
 def hits(nodes, k):
-    """Whether the tool goes through material on sweep k."""
+    """Whether the tool moves through material on sweep k."""
     place, own, low, sweeps, tools = nodes.place, nodes.own, nodes.low, nodes.sweeps, nodes.tools
     radius = tools[2 * int(sweeps[k, TOOL]), RADIUS] - CRASH_INSIDE
     cell, gx, gy = place[CELL], place[GX], place[GY]

@@ -1,4 +1,4 @@
-"""The shapes that the engine works with: tools as rows of numbers, the stock before the first cut."""
+"""Shapes of tools and of the uncut stock, in the form that the height field takes."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ POINT_DEG = 118.0  # of a drill
 
 @dataclass(frozen=True)
 class ToolShape:
-    """A tool; flute_mm: length of its cutting edges, None: not known."""
+    """Shape of a tool; flute_mm: length of its cutting edges, None: unknown."""
 
     kind: str
     diameter_mm: float
@@ -27,10 +27,10 @@ class ToolShape:
     flute_mm: float | None = None
 
     def rows(self) -> list[list[float]]:
-        """The tool, and the same slimmer by EDGE, in columns of sweeps.py.
+        """Rows of the tool and of the same tool slimmer by EDGE, in columns of sweeps.py.
 
-        What slants is as much higher as it has to be for the skin between both to count as material, which is looked
-        for EDGE inside the tool and FLOOR over its surface.
+        Material is sampled EDGE inside the tool and FLOOR over its surface. The slim tool is lifted just so much that the
+        skin between both counts as material on slanted surfaces too.
         """
         radius = 0.5 * self.diameter_mm
         corner = radius if self.kind == "ball" else self.corner_mm if self.kind == "bull" else 0.0
@@ -42,7 +42,7 @@ class ToolShape:
         return [[radius, KINDS[self.kind], corner, cone, 0.0], [*slim, lift]]
 
     def rise(self, aside: float) -> float:
-        """Height of its surface over the tip at a distance from its axis, mm; infinite beside it."""
+        """Height of the surface over the tip (mm) at a distance from the axis (mm); infinite beyond the radius."""
         radius, _, corner, cone, _ = self.rows()[0]
         if aside > radius:
             return np.inf
@@ -54,7 +54,7 @@ class ToolShape:
 
 @dataclass(frozen=True, eq=False)
 class StockShape:
-    """What the tool begins with, program frame. low, high (3,) mm; mesh (f, 3, 3): triangles of a stock from a file."""
+    """Uncut stock in the program frame: corners low, high (3,) mm; mesh (f, 3, 3) mm, triangles of a stock from a file."""
 
     low: Floats
     high: Floats

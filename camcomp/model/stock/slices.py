@@ -1,4 +1,4 @@
-"""Arcs in which a tool that is no cylinder cuts, slice by slice of its height."""
+"""Engagement arcs of ball, bull and drill tools, slice by slice of their height."""
 
 # mypy: disallow-untyped-defs=False, disallow-incomplete-defs=False
 # numba infers the types of these functions; written by hand they would only be repeated.
@@ -21,16 +21,17 @@ from camcomp.model.stock.front import (
 )
 from camcomp.model.stock.sweeps import RADIUS, radius_at, slope
 
-SCAN, SLICES = 12, 8  # heights of the tool: to find where it cuts, and there
-CLOSER = 6  # halvings of the angle beside the one where the highest was found
+SCAN, SLICES = 12, 8  # sampled heights of the tool to find the range of the cut, and slices within it
+CLOSER = 6  # halvings of the angle around the one with the highest cut
 
 
 @inner
 def look_slice(nodes, place, bites, n, radius, lift, tall, rise, run, least, thin, stride, first):
-    """Arcs of a slice, `lift` mm over the tip and `tall` mm high, with this rise and run; the number of arcs.
+    """Append the arcs of a slice, `lift` mm over the tip and `tall` mm high, and return the new number of arcs.
 
-    least (rad): angle at both sides at which the surface begins to move towards the material. thin: how much the radius
-    grows per height there. stride: 2 for every second angle only, from number `first` on.
+    rise, run: of the tool's surface per length of its edge. least (rad): angle from both sides at which the surface begins
+    to move towards the material. thin: growth of the radius per height. stride: 2 for every second angle only, from
+    number `first` on.
     """
     count = angles_of(nodes, radius)
     level = max(place.at[2] + lift, nodes.place[ZMIN]) + FLOOR
@@ -73,7 +74,7 @@ def look_slice(nodes, place, bites, n, radius, lift, tall, rise, run, least, thi
 
 @inner
 def cuts_at(nodes, place, row, lift, k, count):
-    """Whether a tool that is no cylinder meets material at a height over its tip and at an angle of its front."""
+    """Whether a ball, bull or drill tool meets material at a height over its tip and an angle of its front."""
     radius = radius_at(nodes.tools, row, lift)
     run = 1.0 / max(slope(nodes.tools, row, radius), 1e-12)
     least = least_angle(place.at[5], run)
@@ -86,7 +87,7 @@ def cuts_at(nodes, place, row, lift, k, count):
 
 @inner
 def limit(nodes, place, row, inside, outside, k, count):
-    """Height over the tip between one where the tool cuts, at angle k, and one where it does not, to which it cuts at any angle."""
+    """Height over the tip up to which the tool cuts at any angle, between `inside` (cut at angle k) and `outside` (no cut)."""
     best, most = inside, float(k)
     for turn in range(count):
         best, most = farther(nodes, place, row, best, outside, most, float(turn), count)
@@ -104,7 +105,7 @@ def limit(nodes, place, row, inside, outside, k, count):
 
 @inner
 def farther(nodes, place, row, best, outside, most, at, count):
-    """How far the tool cuts, and at which angle: `best` at `most`, or more at another one."""
+    """Height up to which the tool cuts, and its angle: `best` at angle `most`, or a larger one at a neighbour."""
     step = 1.0 if outside > best else -1.0
     if step * (outside - best) <= NEAR or not cuts_at(nodes, place, row, best + 0.1 * step * NEAR, at, count):
         return best, most
@@ -128,8 +129,8 @@ def farther(nodes, place, row, best, outside, most, at, count):
 
 @inner
 def look_over(nodes, place, bites, n, row):
-    """Arcs of a tool that is no cylinder, slice by slice."""
-    highest = nodes.place[ZMAX] - FLOOR - place.at[2]  # nothing counts as higher
+    """Append the arcs of a ball, bull or drill tool slice by slice, and return the new number of arcs."""
+    highest = nodes.place[ZMAX] - FLOOR - place.at[2]  # upper bound
     count = angles_of(nodes, nodes.tools[row, RADIUS])
     low, high, above, below = -1.0, -1.0, highest, 0.0
     before, last, first = 0.0, 0, 0
@@ -137,7 +138,7 @@ def look_over(nodes, place, bites, n, row):
         lift = highest * ((j + 0.5) / SCAN) ** 2
         found = False
         for turn in range(count):
-            k = (last + turn) % count  # where it cuts a little lower it mostly does here
+            k = (last + turn) % count  # the angle of the cut below is the likeliest
             if cuts_at(nodes, place, row, lift, float(k), count):
                 found, last = True, k
                 break
@@ -167,7 +168,7 @@ def look_over(nodes, place, bites, n, row):
         radius -= EDGE
         if least < 0.5 * math.pi and radius > 0.0:
             own, tall, rise, lean = n, b - a, (b - a) / edge, run / edge
-            if arcs >= 0:  # other angles than in the slice below, and all where it is not alike
+            if arcs >= 0:  # alternate angles from slice to slice, and all angles where neighbours differ
                 n = look_slice(nodes, place, bites, own, radius, middle, tall, rise, lean, least, thin, 2, 1 + j % 2)
             if n - own != arcs:
                 n = look_slice(nodes, place, bites, own, radius, middle, tall, rise, lean, least, thin, 1, 1)

@@ -21,7 +21,11 @@ _MERGED_DIGITS = 3  # corners are one within a micrometre
 
 
 def triangles_of(data: bytes) -> Floats:
-    """Corners (n, 3, 3) of an STL file's bytes. Raises ValueError where it is none."""
+    """Corners (n, 3, 3) of the triangles of an STL file's bytes.
+
+    Raises:
+        ValueError: the bytes are no STL file.
+    """
     count = int.from_bytes(data[80:_HEADER_BYTES], "little")
     wanted = _HEADER_BYTES + _TRIANGLE_BYTES * count
     if len(data) >= _HEADER_BYTES and len(data) == wanted:

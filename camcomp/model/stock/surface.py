@@ -1,4 +1,4 @@
-"""The surface that a program leaves: heights at the nodes of a field, and the same as a body of triangles."""
+"""Machined surface of a stock: heights over a grid, as a table or as a body of triangles."""
 
 # mypy: disallow-untyped-defs=False, disallow-incomplete-defs=False
 # numba infers the types of these functions; written by hand they would only be repeated.
@@ -21,7 +21,10 @@ FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("unused", "
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """Heights z (ny, nx) mm over points x (nx,), y (ny,) mm, program frame; NaN where nothing stands. bottom: of the stock."""
+    """Heights z (ny, nx) mm over points x (nx,), y (ny,) mm in the program frame; NaN outside the material.
+
+    bottom: of the stock, mm.
+    """
 
     x: Floats
     y: Floats
@@ -29,14 +32,14 @@ class Surface:
     bottom: float
 
     def to_csv(self) -> bytes:
-        """The points where something stands, one to a row."""
+        """CSV text with one row x_mm, y_mm, z_mm per point of the material."""
         rows, columns = np.nonzero(np.isfinite(self.z))
         points = np.column_stack((self.x[columns], self.y[rows], self.z[rows, columns]))
         lines = ["x_mm,y_mm,z_mm", *(f"{a:.4f},{b:.4f},{c:.6f}" for a, b, c in points.tolist())]
         return ("\n".join(lines) + "\n").encode()
 
     def to_stl(self) -> bytes:
-        """The body between the surface and the bottom of the stock as a binary STL; cells without material are left out."""
+        """Binary STL of the body between the surface and the bottom of the stock, without cells that are cut through."""
         z = np.where(np.isfinite(self.z), self.z, self.bottom)
         solid = z > self.bottom
         cell = solid[:-1, :-1] & solid[1:, :-1] & solid[:-1, 1:] & solid[1:, 1:]
@@ -69,14 +72,14 @@ class Surface:
 
 @entry
 def read_heights(nodes, x, y, out):
-    """Fills out (ny, nx) with the heights of what stands over points."""
+    """Fill out (ny, nx) with the heights of the material over points, mm."""
     for i in range(y.shape[0]):
         for j in range(x.shape[0]):
             out[i, j] = height(nodes, x[j], y[i], -NOWHERE)
 
 
 def surface_of(memory: StockMemory) -> Surface:
-    """What stands, at about the distance of the field's nodes."""
+    """Surface of the material, sampled at about the distance of the field's nodes."""
     memory.settle()
     low, high = memory.bounds
     bottom, size = float(low[2]), (high - low)[:2]

@@ -1,8 +1,8 @@
-"""What a tool takes away on a straight way, exactly: the lowest height that its sweep reaches over a point.
+"""Exact swept volume of a tool on a straight line: lowest height of the sweep over a point.
 
-A tool is a body of revolution, given by its radius over height. Columns of a sweep: begin and end of the tip, tool,
-length and direction in the plane, climb per mm, and way per mm in the plane. Columns of a tool: radius, kind, corner radius, tangent of the tip's
-half angle, lift of the tip. Every tool has a second row, a hair slimmer: what the tool has just taken counts by that.
+A tool is a body of revolution, given by its radius over height. Columns of a sweep: start and end of the tip, tool,
+length and direction in the plane, climb per mm, path length per mm in the plane. Columns of a tool: radius, kind, corner
+radius, tangent of the tip's half angle, lift of the tip. Every tool has a second, slimmer row for the latest sweeps.
 """
 
 # mypy: disallow-untyped-defs=False, disallow-incomplete-defs=False
@@ -15,7 +15,7 @@ from camcomp.model.statics.compiled import inner
 FLAT, BALL, BULL, DRILL = 0, 1, 2, 3
 X0, Y0, Z0, X1, Y1, Z1, TOOL, LENGTH, UX, UY, CLIMB, WAY = range(12)
 RADIUS, KIND, CORNER, CONE, LIFT = range(5)
-NOWHERE = 1e30  # mm, the height of what is not there
+NOWHERE = 1e30  # mm, in place of infinity
 LEVEL = 1e-12  # climb per mm
 HALVINGS = 30
 
@@ -70,7 +70,7 @@ def radius_at(tools, row, height):
 
 @inner
 def across(sweeps, k, x, y):
-    """Where a point lies in the plane, mm: right of the way of a sweep, and along it from its begin."""
+    """Coordinates of a point in the plane of a sweep, mm: to the right of its line, and along it from its start."""
     dx = x - sweeps[k, X0]
     dy = y - sweeps[k, Y0]
     return dx * sweeps[k, UY] - dy * sweeps[k, UX], dx * sweeps[k, UX] + dy * sweeps[k, UY]
@@ -78,28 +78,28 @@ def across(sweeps, k, x, y):
 
 @inner
 def beside(sweeps, k, n, s):
-    """Square of the distance, in the plane, of a point `across` the way of a sweep from that way, mm2."""
+    """Square of the distance in the plane (mm2) of a point with coordinates by `across` from the line of a sweep."""
     off = s - min(max(s, 0.0), sweeps[k, LENGTH])
     return n * n + off * off
 
 
 @inner
 def rises(tools, row, climb, aside, along):
-    """Whether the tool's surface over a point rises while it goes on; aside, along: from the point to the tool, mm."""
+    """Whether the tool's surface over a point rises with its motion; aside, along: from the point to the tool, mm."""
     rho = math.sqrt(aside * aside + along * along)
     return climb + slope(tools, row, rho) * along / max(rho, 1e-12) > 0.0
 
 
 @inner
 def bottom(sweeps, tools, k, slim, x, y):
-    """Lowest height of sweep k over a point, mm; NOWHERE where it does not pass. slim: 1 for the slimmer tool."""
+    """Lowest height of sweep k over a point, mm; NOWHERE beyond its reach. slim: 1 for the slimmer tool."""
     n, s = across(sweeps, k, x, y)
     return bottom_at(sweeps, tools, k, slim, n, s)
 
 
 @inner
 def bottom_at(sweeps, tools, k, slim, n, s):
-    """The same over a point `across` its way."""
+    """Lowest height of sweep k over a point with coordinates n, s by `across`, mm."""
     row = 2 * int(sweeps[k, TOOL]) + slim
     radius = tools[row, RADIUS]
     square = beside(sweeps, k, n, s)
@@ -140,7 +140,7 @@ def bottom_at(sweeps, tools, k, slim, n, s):
 
 @inner
 def passes(sweeps, tools, k, slim, x, y, z):
-    """Whether sweep k reaches as low as a height over a point: `bottom` is not above it."""
+    """Whether sweep k reaches a height over a point: `bottom(...) <= z`."""
     row = 2 * int(sweeps[k, TOOL]) + slim
     length, climb = sweeps[k, LENGTH], sweeps[k, CLIMB]
     if tools[row, KIND] != BALL or length == 0.0:
@@ -149,7 +149,7 @@ def passes(sweeps, tools, k, slim, x, y, z):
     left = tools[row, RADIUS] * tools[row, RADIUS] - n * n
     if left < 0.0:
         return False
-    # To the way of the ball's centre, over which the tool is a cylinder.
+    # Distance from the line of the ball's centre, around which the sweep is a cylinder.
     up = z - (sweeps[k, Z0] + tools[row, LIFT] + tools[row, RADIUS])
     t = min(max((s + climb * up) / (sweeps[k, WAY] * sweeps[k, WAY]), 0.0), length)
     off, over = t - s, up - climb * t

@@ -1,4 +1,4 @@
-"""Which of the places found the engagement would not be the same without."""
+"""Choice of the places that linear interpolation of the engagement needs (Douglas and Peucker, 1973)."""
 
 # mypy: disallow-untyped-defs=False, disallow-incomplete-defs=False
 # numba infers the types of these functions; written by hand they would only be repeated.
@@ -10,7 +10,7 @@ from camcomp.model.stock.places import BENT
 
 @inner
 def off_line(told, u, a, b, i, columns):
-    """How far place i is from the straight line between places a and b, in units of what may be missed, by some columns."""
+    """Largest error of the linear interpolation between places a and b at place i, in units of its tolerance."""
     w = (u[i] - u[a]) / (u[b] - u[a])
     most = 0.0
     allowed = BENT * max(told[b, WHAT - 1], 1e-12)
@@ -23,9 +23,9 @@ def off_line(told, u, a, b, i, columns):
 
 @entry
 def thin(motion, u, told, columns, keep, stack):
-    """Marks in keep (n,) the places without which the engagement along its motion would not be the same; stack (n, 2).
+    """Mark in keep (n,) the places that linear interpolation along their motion needs; stack (n, 2): work space.
 
-    columns: DEPTH for all that the force depends on, two more for depth and sum of the arcs.
+    columns: DEPTH for the integrals that determine the force, two more for depth and sum of the arcs.
     """
     n = motion.shape[0]
     a = 0

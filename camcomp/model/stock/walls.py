@@ -1,4 +1,4 @@
-"""Walls of a stock at one height, and by how much those of another stock stand beside them."""
+"""Walls of a stock at one height, and their distance from the walls of another stock."""
 
 # mypy: disallow-untyped-defs=False, disallow-incomplete-defs=False
 # numba infers the types of these functions; written by hand they would only be repeated.
@@ -16,15 +16,15 @@ from camcomp.model.stock.memory import StockMemory
 from camcomp.model.stock.surface import Surface, surface_of
 from camcomp.model.stock.sweeps import NOWHERE
 
-WIDEST_MM, SCAN_MM = 1.0, 0.02  # how far a wall is looked for, and in which steps
+WIDEST_MM, SCAN_MM = 1.0, 0.02  # range and step of the search for a wall
 HALVINGS = 24
 MOST_FLOORS = 6
-FLAT_MM, LEAST_SHARE = 0.02, 0.005  # heights so near are one floor, and so much of what was cut lies on one
+FLAT_MM, LEAST_SHARE = 0.02, 0.005  # width of the bins of heights, and least share of the cut area that is a floor
 
 
 @dataclass(frozen=True, eq=False)
 class Wall:
-    """A wall as it was meant, along its way; `inward` points into the material. closed: its end is its begin."""
+    """Points along a wall with normals that point into the material. closed: the last point is the first one."""
 
     level: float
     points: Floats  # (n, 2) mm
@@ -33,27 +33,27 @@ class Wall:
 
     @property
     def length(self) -> Floats:
-        """Way (n,) mm to every point."""
+        """Length (n,) mm along the wall to every point."""
         steps = np.linalg.norm(np.diff(self.points, axis=0), axis=1)
         return np.concatenate(([0.0], np.cumsum(steps)))
 
 
 @entry
 def read_points(nodes, points, out):
-    """Fills out (n,) with the heights of what stands over points (n, 2)."""
+    """Fill out (n,) with the heights of the material over points (n, 2), mm."""
     for i in range(points.shape[0]):
         out[i] = height(nodes, points[i, 0], points[i, 1], -NOWHERE)
 
 
 def heights(memory: StockMemory, points: Floats) -> Floats:
-    """Heights (n,) mm over points (n, 2), hugely negative where nothing stands."""
+    """Heights (n,) mm of the material over points (n, 2) mm; -NOWHERE outside the stock."""
     out = np.empty(len(points))
     read_points(memory.nodes, np.ascontiguousarray(points), out)
     return out
 
 
 def floors(surface: Surface, top: float) -> list[float]:
-    """Heights of what the program leaves level, ascending, and of the stock's top; two when it leaves nothing level."""
+    """Heights (mm) of the level floors of a surface, ascending, and of the stock's top; its lowest point if it has none."""
     z = surface.z[np.isfinite(surface.z)]
     cut = z[z < top - FLAT_MM]
     if not len(cut):
@@ -68,7 +68,7 @@ def floors(surface: Surface, top: float) -> list[float]:
 
 
 def walls_of(memory: StockMemory) -> list[Wall]:
-    """Walls half-way between the floors that stand in a stock, the upper ones first."""
+    """Walls of a stock half-way between neighbouring floors, the upper ones first."""
     surface = surface_of(memory)
     levels = floors(surface, float(memory.bounds[1][2]))
     out = []
@@ -78,13 +78,13 @@ def walls_of(memory: StockMemory) -> list[Wall]:
 
 
 def offsets(wall: Wall, memory: StockMemory) -> Floats:
-    """By how much (n,) mm a stock stands out of a wall, negative where more was cut; NaN where it has no wall near."""
+    """Excess material (n,) mm of a stock at a wall, negative where more was cut; NaN without a wall within WIDEST_MM."""
     n = len(wall.points)
     stands = _standing(memory, wall, np.zeros(n))
     out = np.full(n, np.nan)
     inner, outer = np.zeros(n), np.zeros(n)
     looking = np.ones(n, np.bool_)
-    for reach in np.arange(SCAN_MM, WIDEST_MM + SCAN_MM, SCAN_MM):  # outwards where it stands, inwards where it is gone
+    for reach in np.arange(SCAN_MM, WIDEST_MM + SCAN_MM, SCAN_MM):  # outwards from material, inwards from air
         beside = np.where(stands, -reach, reach)
         found = looking & (_standing(memory, wall, beside) != stands)
         other = np.where(stands, -(reach - SCAN_MM), reach - SCAN_MM)
@@ -106,7 +106,7 @@ def _standing(memory: StockMemory, wall: Wall, inwards: Floats) -> Bools:
 
 
 def _walls_at(memory: StockMemory, surface: Surface, level: float) -> list[Wall]:
-    """Contours of what stands above a level, point by point where they cross the lines of the grid."""
+    """Contours of the material above a level, with points where they cross the lines of the grid."""
     solid = np.where(np.isfinite(surface.z), surface.z, -np.inf) > level
     x, y = surface.x, surface.y
     at: dict[tuple[int, int, int], int] = {}  # side of a cell (0 along x, 1 along y; row, column): number of the point
@@ -130,7 +130,7 @@ def _walls_at(memory: StockMemory, surface: Surface, level: float) -> list[Wall]
 
 
 def _neighbours(at: dict[tuple[int, int, int], int]) -> dict[int, list[int]]:
-    """Points that share a cell; a cell that a wall crosses twice is taken as two corners."""
+    """Neighbours of every point within a cell; a cell that a wall crosses twice counts as two corners."""
     cells: dict[tuple[int, int], list[int]] = {}
     for (kind, i, j), number in at.items():
         for cell in ((i, j), (i - 1, j) if kind == 0 else (i, j - 1)):
@@ -144,7 +144,7 @@ def _neighbours(at: dict[tuple[int, int, int], int]) -> dict[int, list[int]]:
 
 
 def _chains(beside: dict[int, list[int]]) -> list[tuple[list[int], bool]]:
-    """Points one behind the other, and whether the last one goes on to the first."""
+    """Chains of neighbouring points, and whether each is closed."""
     out, left = [], set(beside)
     for start in sorted(beside, key=lambda each: (len(beside[each]), each)):  # open ends first
         if start not in left:
@@ -160,7 +160,7 @@ def _chains(beside: dict[int, list[int]]) -> list[tuple[list[int], bool]]:
 
 
 def _wall(memory: StockMemory, level: float, points: Floats, closed: bool) -> Wall:
-    """A wall with its normals, which are those of the chords around a point."""
+    """Wall with normals of the chords around every point."""
     if closed:
         points = np.vstack((points, points[:1]))
         along = np.vstack((points[1] - points[-2], points[2:] - points[:-2], points[1] - points[-2]))

@@ -1,4 +1,4 @@
-"""Where a stock and what the machine file says beside it do not go together."""
+"""Contradictions between the engagement in a stock and the process that a machine file states."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from camcomp.model.config.spec import Config
 from camcomp.model.cutting.engaged import Engaged
 
 MOST_LINES = 10
-SHARE, HAIR_MM = 0.01, 0.005  # by which a stated depth or width may be off
+SHARE, HAIR_MM = 0.01, 0.005  # tolerance of a stated depth or width
 
 
-Remarks = dict[str, Ints]  # what is wrong, and the source lines, ascending
+Remarks = dict[str, Ints]  # text of a remark to its source lines, ascending
 
 
 def stock_remarks(config: Config, path: Path, engaged: Engaged | None) -> Remarks:
-    """What to say of a path whose engagement is known; nothing where no stock is."""
+    """Remarks on contradictions along a path with known engagement; empty without a stock."""
     if engaged is None:
         return {}
     on = np.flatnonzero(engaged.turn > 0.0)
@@ -55,7 +55,7 @@ def _widths(config: Config, path: Path, engaged: Engaged, on: Ints) -> Floats:
 
 
 def _by_tool(tool: Ints, of: Mapping[int, float | None], other: float | None, unknown: float) -> Floats:
-    """What the tools of some places (n,) have, `other` those that are not in the table."""
+    """Value (n,) of the tool at every place; `other` for tools without an entry, `unknown` where there is none."""
     numbers, which = np.unique(tool, return_inverse=True)
     return np.array([of.get(int(t), other) or unknown for t in numbers], float)[which]
 

@@ -1,1 +1,1 @@
-"""What a control makes of the moves of a program: lines merged, corners blended, the speed along them; no machine, no text."""
+"""Trajectory of a controller for the moves of a program: merged lines, blended corners, speed along them."""

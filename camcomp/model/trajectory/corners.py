@@ -1,8 +1,10 @@
-"""How a control takes the corner between two segments, compiled: at rest, straight on, by an arc, or overlapping in time.
+"""Corner between two segments of a controller's trajectory, compiled: stop, tangent, arc, or overlap in time.
 
-The rules are those of the planner of LinuxCNC 2.9, which goes the way that lets it be fastest: straight on where the jump of
-direction is a small acceleration within one cycle; else by an arc that touches both segments; else the next segment
+The rules are those of the planner of LinuxCNC 2.9, which chooses the fastest possibility: straight on where the jump of
+direction is a small acceleration within one cycle; else an arc that touches both segments; else the next segment
 starts while the one before still slows down.
+
+Source: LinuxCNC 2.9, src/emc/tp/tp.c and blendmath.c.
 """
 
 # mypy: disallow-untyped-defs=False, disallow-incomplete-defs=False
@@ -14,18 +16,19 @@ from camcomp.model.statics.compiled import entry, inner
 from camcomp.model.trajectory.rounding import ANGLE, LENGTH, NORMAL, rounded
 
 REST, ON, ROUND, OVERLAP, WAIT = 0, 1, 2, 3, 4
-KINK = 0.1  # of the acceleration that a jump of direction may be
-BACK = (2.0 * np.pi / 180.0) ** 2  # square of the angle to a turn on the spot that counts as one
-OPEN = 0.25  # of a segment's length that a corner may be cut by when no tolerance is given
-CYCLES = 1.02  # that a segment takes at least
-LATE = 0.7  # cycles that an overlap is longer than its speed says, as measured: it begins and ends with a cycle
+KINK = 0.1  # of the acceleration: largest jump of direction within a cycle
+BACK = (2.0 * np.pi / 180.0) ** 2  # rad², square of the angle to a full reversal that counts as one
+OPEN = 0.25  # of a segment's length: largest deviation at a corner without a tolerance
+CYCLES = 1.02  # least duration of a segment
+LATE = 0.7  # cycles, measured: extra duration of an overlap, which begins and ends with a cycle
 
 
 @inner
 def pace(acceleration, most, radius):
-    """What of an acceleration is left along the way when the segment is an arc, radius 0 for lines, mm/s².
+    """Tangential acceleration (mm/s²) of a segment after its centripetal share; radius mm, 0 for lines.
 
-    most: mm/s that the machine can go along it; a control keeps in hand what turning takes at that speed, whatever the feed.
+    most: largest speed of the machine along it, mm/s; the controller reserves the centripetal acceleration of that speed,
+    whatever the feed.
     """
     if radius > 0.0:
         turning = min(most * most / radius / acceleration, NORMAL)
@@ -35,9 +38,9 @@ def pace(acceleration, most, radius):
 
 @inner
 def overlap_speed(part, acceleration, next_acceleration, tolerance, sine, cosine, length, ahead, fast, fast_ahead):
-    """Speed at which one segment begins to give way to the next, mm/s, and how fast that is through the corner.
+    """Speed (mm/s) at which the overlap of two segments begins, and the speed through their corner.
 
-    part: of both lengths that is left; half of it while corners behind them may still take the other half.
+    part: share of both lengths that is available; half while the next corners may take the other half.
     """
     reach = min(np.sqrt(acceleration * part * length), fast)
     reach_ahead = min(np.sqrt(next_acceleration * part * ahead), fast_ahead)
@@ -52,7 +55,7 @@ def overlap_speed(part, acceleration, next_acceleration, tolerance, sine, cosine
 
 @inner
 def overlap_gap(time, acceleration, next_acceleration, cosine):
-    """How near the sum of a motion that slows down to rest within `time` and of one that begins comes to the corner, mm."""
+    """Least distance (mm) from the corner of the sum of a motion that stops within `time` (s) and one that starts."""
     straight = 2.0 * cosine * cosine - 1.0  # minus the cosine of the turn
     nearest = np.inf
     for k in range(33):
@@ -65,13 +68,23 @@ def overlap_gap(time, acceleration, next_acceleration, cosine):
 @entry
 def corners(leave, arrive, axis, middle, radius, angle, nominal, fast, most, acceleration, rapid, per_turn, exact, stop, waits, tolerance, limit, velocity, cycle,
             way, speed, reach, bend, around, centre, end):  # fmt: skip
-    """Fills way, speed, reach, bend, around (m,), centre (m, 3) of the corners behind segments (m,); the last is at rest.
+    """Fill way, speed, reach, bend, around (m,) and centre (m, 3) of the corners after segments (m,); the last is a stop.
 
-    leave, arrive (m, 3): unit directions at the start and at the end. axis, middle (m, 3), radius, angle (m,): of arcs, radius 0 for
-    lines. nominal (m,) mm lengths, fast, most (m,) mm/s at the feed and at any, acceleration (m,) along it mm/s². rapid, exact (path is kept), stop
-    (m,): rest behind it; per_turn (m,): fed per revolution, for all that the control knows as fast as at any feed; waits (m,): rest in front of it. tolerance (m,) mm, 0: open. limit mm/s², velocity mm/s: of an axis. cycle: s.
-    end (m, 3) mm: corners. way: REST, ON, ROUND, OVERLAP or WAIT (at rest where it would overlap); speed: mm/s through it (OVERLAP: where it begins);
-    reach: mm of both segments that an arc takes; bend, around: its radius and length, mm.
+    Shapes and units:
+        leave, arrive: (m, 3) unit directions at the start and at the end.
+        axis, middle, radius, angle: (m, 3), (m, 3), (m,), (m,) of arcs; radius 0 for lines.
+        nominal: (m,) lengths, mm.
+        fast, most: (m,) speeds at the programmed feed and at any feed, mm/s.
+        acceleration: (m,) along the segment, mm/s².
+        rapid, exact, stop, waits: (m,) rapid; exact path; stop after the segment; stop before it.
+        per_turn: (m,) feed per revolution, which the controller plans as if at any feed.
+        tolerance: (m,) mm, 0: open.
+        limit, velocity: of an axis, mm/s² and mm/s.
+        cycle: s.
+        end: (m, 3) corners, mm.
+        way: REST, ON, ROUND, OVERLAP or WAIT (a stop in place of an overlap).
+        speed: through the corner (OVERLAP: at its start), mm/s.
+        reach, bend, around, centre: of the arc: length taken of both segments, radius, length, centre, mm.
     """
     m = nominal.shape[0]
     left = nominal[0]
@@ -127,13 +140,13 @@ def corners(leave, arrive, axis, middle, radius, angle, nominal, fast, most, acc
             centre[i, 0], centre[i, 1], centre[i, 2] = cx, cy, cz
             left = nominal[j] - distance
         elif per_turn[j] and not per_turn[i]:
-            left = nominal[j]  # a feed that waits for the spindle does not overlap with one that does not
+            left = nominal[j]  # a feed per revolution does not overlap with a feed per minute
         elif 0.5 * overlap > straight:
             begin, _ = overlap_speed(
                 1.0, half_pace, next_half_pace, tolerance[i], sine, cosine, left, nominal[j], fast[i], fast[j]
             )
             way[i], speed[i] = OVERLAP, begin
-            # an arc that passes the corner as far away as the sum of the two motions does
+            # an arc at the same distance from the corner as the sum of the two motions
             time = begin / half_pace + (LATE * cycle if begin < fast[i] else 0.0)
             gap = overlap_gap(time, half_pace, next_half_pace, cosine)
             distance = gap * cosine / (1.0 - sine) if sine < 1.0 else 0.0
@@ -150,10 +163,10 @@ def corners(leave, arrive, axis, middle, radius, angle, nominal, fast, most, acc
 
 @entry
 def nearest(points, segment, start, end, arc, way, reach, bend, centre, out):
-    """Fills out (k, 3) mm: from points (k, 3) mm on segments (k,) to the nearest places where the control goes.
+    """Fill out (k, 3) mm: vectors from points (k, 3) mm on segments (k,) to the nearest points of the trajectory.
 
-    start, end (m, 3) mm, arc (m,), way, reach, bend (m,) and centre (m, 3) of the corners behind the segments (m,). The points of
-    an arc are on it, those of a line may lie beside it.
+    start, end (m, 3) mm, arc (m,), way, reach, bend (m,) and centre (m, 3) of the corners after the segments (m,). Points of
+    an arc are on it; points of a line may deviate from it.
     """
     for k in range(points.shape[0]):
         s = segment[k]
@@ -172,7 +185,7 @@ def nearest(points, segment, start, end, arc, way, reach, bend, centre, out):
         ends = abs(fx - end[s, 0]) + abs(fy - end[s, 1]) + abs(fz - end[s, 2]) < LENGTH
         for side in range(2):
             c = s - 1 + side
-            if ends and side == 0:  # the corner where a full circle began is not where it ends
+            if ends and side == 0:  # a full circle has two corners at one position: before its start and after its end
                 continue
             if c < 0 or (way[c] != ROUND and way[c] != OVERLAP):
                 continue

@@ -1,4 +1,4 @@
-"""Lines that a control makes one of because they are straight within a tolerance, compiled."""
+"""Merging of consecutive lines that are straight within a tolerance, as controllers do, compiled."""
 
 # mypy: disallow-untyped-defs=False, disallow-incomplete-defs=False
 # numba infers the types of these functions; written by hand they would only be repeated.
@@ -7,22 +7,29 @@ import numpy as np
 
 from camcomp.model.statics.compiled import entry
 
-MOST = 100  # ends that a control keeps in mind; the line behind them begins a new one
+MOST = 100  # most lines of a segment
 
 
 @entry
 def merge(start, end, goes, waits, joins, feed, tolerance, group, first, last):
-    """Numbers the segments that moves (n,) become, group (n,); the number of segments.
+    """Fill group (n,) with the segment of every move, and return the number of segments.
 
-    A line joins the segment in front of it while the ends of all lines in it stay within the tolerance of the straight
-    way from the segment's start to the new end. start, end (n, 3) mm. goes (n,): moves that are no standstill; the
-    others count to the segment in front of them. waits (n,): moves that begin at rest. joins (n,): lines that may be joined. feed (n,) in force: another
-    one begins a new segment. tolerance (n,) mm: 0 for never. first, last (n,) are filled with the moves at the
-    begin and at the end of every segment.
+    A line joins the segment before it while the ends of all its lines stay within the tolerance of the straight line from
+    the segment's start to the new end.
+
+    Shapes and units:
+        start, end: (n, 3) mm.
+        goes: (n,) moves with a length; standstills belong to the segment before them.
+        waits: (n,) moves that start from a stop.
+        joins: (n,) lines that may be merged.
+        feed: (n,) feed in force; a change starts a new segment.
+        tolerance: (n,) mm, 0: never.
+        group: (n,) filled.
+        first, last: (n,) filled with the first and the last move of every segment.
     """
     segment = -1
-    before = -1  # the move before that went somewhere
-    ends = 0  # of lines in the segment
+    before = -1  # the last move with a length
+    ends = 0  # number of lines in the segment
     for i in range(end.shape[0]):
         if not goes[i]:
             group[i] = max(segment, 0)
@@ -58,7 +65,7 @@ def merge(start, end, goes, waits, joins, feed, tolerance, group, first, last):
 
 @entry
 def straight(start, end, nominal, way, most):
-    """Fills length nominal (n,) mm and unit direction way (n, 3) of lines; most (n,): 1 / the largest of its components."""
+    """Fill length nominal (n,) mm, unit direction way (n, 3) of lines, and most (n,): 1 / its largest component."""
     for i in range(end.shape[0]):
         x, y, z = end[i, 0] - start[i, 0], end[i, 1] - start[i, 1], end[i, 2] - start[i, 2]
         size = np.sqrt(x * x + y * y + z * z)

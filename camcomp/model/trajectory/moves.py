@@ -1,4 +1,4 @@
-"""What a control is asked to do, and what it keeps to."""
+"""Moves of a program as the controller reads them, and the controller's limits."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from camcomp.ground.datatypes import Bools, Floats, Ints, Path
 
 @dataclass(frozen=True)
 class ControlLimits:
-    """What a control keeps to."""
+    """Limits of the planner of a controller."""
 
     acceleration: float  # mm/s², of every axis
-    velocity: float  # mm/s, of every axis; infinite when it is not stated
-    cycle_s: float  # no segment takes less
+    velocity: float  # mm/s, of every axis; infinite if not stated
+    cycle_s: float  # least duration of a segment
     look_ahead: int  # segments
 
 
 @dataclass(frozen=True, eq=False)
 class ToolMoves:
-    """Moves (n,) of the tip as a control reads them; program frame."""
+    """Moves (n,) of the tip as the controller reads them; program frame."""
 
     kind: Ints
     start: Floats  # (n, 3) mm
@@ -33,26 +33,26 @@ class ToolMoves:
     angle: Floats  # (n,) rad
     feed: Floats  # (n,) mm/min, NaN for rapids
     exact: Bools  # G61, G61.1
-    waits: Bools  # at rest in front of the move: the control waits for something
-    stop: Bools  # at rest behind the move, whatever its direction: G61.1, moves in machine coordinates
+    waits: Bools  # stop before the move: the controller waits for an event
+    stop: Bools  # stop after the move, whatever its direction: G61.1, moves in machine coordinates
     tolerance: Floats  # (n,) mm
     merge: Floats  # (n,) mm
-    per_turn: Bools  # feed per revolution: how fast that is the control does not know before the spindle turns
+    per_turn: Bools  # feed per revolution: its speed is unknown to the controller before the spindle turns
 
     def __len__(self) -> int:
         return len(self.kind)
 
     def take(self, rows: np.ndarray | slice) -> ToolMoves:
-        """Some of them."""
+        """Some of the moves, in the given order."""
         return ToolMoves(**{each.name: getattr(self, each.name)[rows] for each in fields(self)})
 
     @classmethod
     def joined(cls, parts: Sequence[ToolMoves]) -> ToolMoves:
-        """One behind the other."""
+        """Concatenation of several lists of moves."""
         return cls(**{each.name: np.concatenate([getattr(part, each.name) for part in parts]) for each in fields(cls)})
 
     def path(self) -> Path:
-        """The same as a path, for its geometry."""
+        """The moves as a path, for its geometry."""
         n = len(self)
         return Path(
             line=np.ones(n, np.int64), kind=self.kind.astype(np.int8), start=self.start, end=self.end, centre=self.centre,
@@ -64,7 +64,7 @@ class ToolMoves:
 def moves_of(
     path: Path, modes: Sequence[PathMode], feed: Floats | None = None, per_turn: Bools | None = None
 ) -> ToolMoves:
-    """The motions of a path, each in its mode; feed (n,) mm/min where it is not that of the path; per_turn (n,): G95."""
+    """Moves of a path, each in its path mode; feed (n,) mm/min: default the path's; per_turn (n,): G95."""
     exact, stop, tolerance, merged = mode_columns(modes)
     return ToolMoves(
         path.kind.astype(np.int64), path.start, path.end, path.centre, path.axis, path.angle,
@@ -76,7 +76,7 @@ def moves_of(
 def line_moves(
     kind: np.ndarray, start: Floats, end: Floats, feed: Floats, mode: PathMode, waits: bool = False
 ) -> ToolMoves:
-    """Rapids and straight cuts (n,) in one mode; feed (n,) mm/min; waits: the control does in front of them."""
+    """Rapids and straight cuts (n,) in one path mode; feed (n,) mm/min; waits: the controller stops before each."""
     n = len(kind)
     none = np.zeros((n, 3))
     return ToolMoves(
@@ -86,7 +86,7 @@ def line_moves(
 
 
 def mode_columns(modes: Sequence[PathMode]) -> tuple[Bools, Bools, Floats, Floats]:
-    """exact, stop, tolerance and merge (n,) of ToolMoves."""
+    """Columns exact, stop, tolerance (mm) and merge (mm) (n,) of ToolMoves for path modes (n,)."""
     known = list(dict.fromkeys(modes))
     at = {each: i for i, each in enumerate(known)}
     which = np.fromiter((at[each] for each in modes), np.int64, len(modes))

@@ -1,7 +1,7 @@
-"""What a control does with the moves of a program: the way it takes and the time it needs.
+"""Planned trajectory of a controller: path with blended corners, and time.
 
-The model is that of a planner that reads some segments ahead and keeps to the acceleration of every axis: lines are merged
-(merging.py), corners taken (corners.py), speeds laid along them (speeds.py).
+Model of a planner with limited look-ahead and limited acceleration of every axis: it merges lines (merging.py), blends
+corners (corners.py) and sets the speed along them (speeds.py).
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from camcomp.model.trajectory.rounding import NORMAL
 from camcomp.model.trajectory.segments import read_only, segments
 from camcomp.model.trajectory.speeds import durations, pieces
 
-RAPID_MM_PER_S = 10_000.0 / 60.0  # where no velocity is stated
+RAPID_MM_PER_S = 10_000.0 / 60.0  # default without a stated velocity
 
 
 @dataclass(frozen=True, eq=False)
 class ControlPlan:
-    """The way and the time of moves (n,) as m segments; corners are those behind the segments."""
+    """Trajectory and time of moves (n,) as m segments; every corner is the one after its segment."""
 
     moves: ToolMoves
     group: Ints  # (n,) segment of every move
@@ -36,15 +36,15 @@ class ControlPlan:
     bend: Floats  # (m,) mm, radius of its arc
     centre: Floats  # (m, 3) mm
     time: Floats  # (m,) s
-    passes: Floats  # (m,) mm/s where the straight part of a segment begins
+    passes: Floats  # (m,) mm/s at the start of the straight part of a segment
 
     @property
     def duration_s(self) -> float:
-        """Of all moves."""
+        """Duration of all moves, s."""
         return float(self.time.sum())
 
     def leaves_by(self, move: Ints, points: Floats) -> Floats:
-        """From points (k, 3) mm on moves (k,) to the nearest ones on the control's way, (k, 3) mm."""
+        """Vectors (k, 3) mm from points (k, 3) mm on moves (k,) to the nearest points of the trajectory."""
         out = np.zeros((len(move), 3))
         if len(self.time):
             nearest(np.ascontiguousarray(points), self.group[move], self.start, self.end, self.arc, self.way, self.reach,
@@ -53,7 +53,7 @@ class ControlPlan:
 
 
 def plan_of(moves: ToolMoves, limits: ControlLimits, arrives: float = 0.0) -> ControlPlan:
-    """What the control makes of moves (n,) that end at rest. arrives: mm/s at the start of the first one."""
+    """Plan of the controller for moves (n,) that end at standstill. arrives: mm/s at the start of the first one."""
     found = segments(moves)
     first, last = found.first, found.last
     m = len(first)
@@ -89,7 +89,7 @@ def plan_of(moves: ToolMoves, limits: ControlLimits, arrives: float = 0.0) -> Co
 def _speeds(
     kind: Ints, feed: Floats, nominal: Floats, radius: Floats, most: Floats, limits: ControlLimits
 ) -> tuple[Floats, Floats]:
-    """Largest speeds (m,) mm/s along segments, of which one axis may be at its limit: at the feed, and at any feed."""
+    """Largest speeds (m,) mm/s along segments within the limits of every axis: at the feed, and at any feed."""
     velocity = limits.velocity * most
     shortest = nominal / (CYCLES * limits.cycle_s)
     turning = np.sqrt(NORMAL * limits.acceleration * np.where(radius > 0.0, radius, np.inf))

@@ -1,7 +1,9 @@
-"""How a control rounds the corner between two segments, compiled: by an arc that touches both.
+"""Arc with which a controller blends the corner between two segments, tangent to both, compiled.
 
-The rules are those of the planner of LinuxCNC 2.9: it works the radius out for two lines, an arc that the corner is rounded inside of
-taken for its chord, and lays the circle so that it touches what is really there.
+The rules are those of the planner of LinuxCNC 2.9: it computes the radius for two lines, with the chord in place of an arc
+that encloses the corner, and then places the circle tangent to the true segments.
+
+Source: LinuxCNC 2.9, src/emc/tp/blendmath.c.
 """
 
 # mypy: disallow-untyped-defs=False, disallow-incomplete-defs=False
@@ -11,17 +13,17 @@ import numpy as np
 
 from camcomp.model.statics.compiled import inner
 
-NORMAL = 0.5 * np.sqrt(3.0)  # of the acceleration may go into turning; the other half is kept for speeding up
-PARALLEL = 1e-12  # square of the angle between planes that are the same
-CLOSE = 1e-6  # by which a corner that is rounded as far as is allowed may be beyond
-ANGLE, LENGTH = 1e-6, 1e-6  # rad, mm: no arc is smaller
+NORMAL = 0.5 * np.sqrt(3.0)  # of the acceleration: centripetal share; the tangential share is one half
+PARALLEL = 1e-12  # rad², square of the angle below which two planes are equal
+CLOSE = 1e-6  # relative excess over the allowed deviation of a corner
+ANGLE, LENGTH = 1e-6, 1e-6  # rad, mm: least size of an arc
 
 
 @inner
 def arc_room(radius, most, inward, half):
-    """Length of an arc that a rounded corner may take, mm, and by how much its bend makes half the angle there smaller, rad.
+    """Length (mm) of an arc segment available for blending, and the reduction (rad) of half the corner angle by its curvature.
 
-    most: rad of the arc. inward: the corner is rounded inside its circle, where a control goes by chords.
+    most: available rad of the arc. inward: the corner lies inside its circle, where the controller computes with chords.
     """
     part = min(most, half if inward else 0.5 * np.pi)
     if inward:
@@ -56,7 +58,7 @@ def touching(turn, size, first, first_x, first_y, second, second_x, second_y):
 
 @inner
 def altitude(turn, first, second):
-    """Height, mm/s, of the triangle that two velocities mm/s span `turn` rad apart, each cut so that its foot lies between their ends."""
+    """Height (mm/s) of the triangle of two velocities (mm/s) `turn` rad apart, each limited so that its foot lies inside."""
     cosine = np.cos(min(turn, 0.49 * np.pi))
     a, b = min(first, second / cosine), min(second, first / cosine)
     return a * b * np.sin(turn) / np.sqrt(a * a + b * b - 2.0 * a * b * np.cos(turn))
@@ -65,11 +67,11 @@ def altitude(turn, first, second):
 @inner
 def rounded(u, v, half, corner, axis, next_axis, middle, next_middle, radius, next_radius, most, next_most, length, next_length,
             allowed, fast, reach, next_reach, limit, velocity):  # fmt: skip
-    """Speed mm/s (0: it is not possible), radius, length taken of a segment, length, mm, and centre (3) of an arc that rounds a corner.
+    """Speed (mm/s, 0: impossible), radius, length taken of a segment, length (mm) and centre (3,) of a blend arc.
 
-    u, v (3,): directions in which it is reached and left; half: of the angle between the segments. axis, middle (3,), radius: of
-    arcs; most, next_most: rad of them, length, next_length: mm of lines that may be taken. allowed: mm from the corner. fast: mm/s at
-    the feed; reach, next_reach: mm/s of the segments at any; limit mm/s², velocity mm/s: of an axis.
+    u, v (3,): directions before and after the corner; half: of the angle between the segments. axis, middle (3,), radius: of
+    arcs; most, next_most: rad of them, length, next_length: mm of lines that may be taken. allowed: mm from the corner. fast:
+    mm/s at the feed; reach, next_reach: mm/s of the segments at any feed; limit mm/s², velocity mm/s: of an axis.
     """
     none = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     nx, ny, nz = u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]

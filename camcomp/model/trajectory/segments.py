@@ -1,4 +1,4 @@
-"""Which moves a control makes one segment of: lines that are straight within the tolerance of their mode."""
+"""Segments of a controller: consecutive lines that are straight within the tolerance of their path mode become one."""
 
 from __future__ import annotations
 
@@ -13,13 +13,14 @@ from camcomp.ground.datatypes import ARC, LINE, Bools, Floats, Ints, Path
 from camcomp.model.trajectory.merging import merge, straight
 from camcomp.model.trajectory.moves import ToolMoves, moves_of
 
-SHORTEST = 1e-9  # mm; a move to where the tip is takes no time
+SHORTEST = 1e-9  # mm; shorter moves are standstills and take no time
 
 
 @dataclass(frozen=True, eq=False)
 class Segments:
-    """Moves (n,) as m segments. group (n,): segment of every move; first, last (m,): moves of a segment; waits (m,): the control
-    waits for something in front of it.
+    """Moves (n,) as m segments.
+
+    group (n,): segment of every move; first, last (m,): moves of a segment; waits (m,): the controller stops before it.
     """
 
     group: Ints
@@ -29,7 +30,7 @@ class Segments:
 
 
 def segments(moves: ToolMoves) -> Segments:
-    """The segments of moves (n,); those that go nowhere count to the one in front of them."""
+    """Segments of moves (n,); standstills belong to the segment before them."""
     n = len(moves)
     size = np.empty(n)
     straight(*read_only(moves.start, moves.end), size, np.empty((n, 3)), np.empty(n))
@@ -44,7 +45,7 @@ def segments(moves: ToolMoves) -> Segments:
 
 
 def merged(path: Path, modes: Sequence[PathMode]) -> Path | None:
-    """The path that a control drives which merges lines in these modes (n,), corners sharp; None where it merges none."""
+    """Path with lines merged by the controller in path modes (n,), corners sharp; None if all lines stay as they are."""
     if not any(mode.merge_mm > 0.0 for mode in modes):
         return None
     found = segments(moves_of(path, modes))
@@ -54,7 +55,7 @@ def merged(path: Path, modes: Sequence[PathMode]) -> Path | None:
 
 
 def read_only(*points: Floats) -> list[Floats]:
-    """Views that cannot be written to, as those of paths cannot: of two kinds of arrays numba would compile for each."""
+    """Read-only views, like the arrays of paths, so that numba compiles for one kind of array."""
     views = [each.view() for each in points]
     for each in views:
         each.flags.writeable = False
@@ -62,7 +63,7 @@ def read_only(*points: Floats) -> list[Floats]:
 
 
 def _beginning_at_rest(waits: Bools, goes: Bools) -> Bools:
-    """Moves (n,) that go somewhere from where the control has waited, in front of them or of standstills before them."""
+    """Mask (n,) of moves with a length that start from a stop, before them or before the standstills in front of them."""
     out, at = np.zeros(len(waits), np.bool_), np.flatnonzero(goes)
     out[at] = np.diff(np.cumsum(waits)[at], prepend=0) > 0
     return out

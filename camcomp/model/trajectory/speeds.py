@@ -1,4 +1,4 @@
-"""How long a control takes for segments and the corners between them, compiled: as fast as acceleration lets it be."""
+"""Duration of segments and corners at the largest speed that acceleration and look-ahead allow, compiled."""
 
 # mypy: disallow-untyped-defs=False, disallow-incomplete-defs=False
 # numba infers the types of these functions; written by hand they would only be repeated.
@@ -8,14 +8,14 @@ import numpy as np
 from camcomp.model.statics.compiled import entry, inner
 from camcomp.model.trajectory.corners import ON, OVERLAP, REST, ROUND, WAIT, pace
 
-STOP = 2.0  # cycles that a stop takes beside slowing down and speeding up, as measured
+STOP = 2.0  # cycles, measured: duration of a stop in addition to deceleration and acceleration
 
 
 @inner
 def along(i, reachable, acceleration, radius, way):
-    """Acceleration of segment i along its way, mm/s²: what turning and neighbours that overlap with it leave.
+    """Tangential acceleration of segment i (mm/s²), less the shares of turning and of overlapping neighbours.
 
-    A control that waits for something behind it had made ready to overlap.
+    A stop that replaces an overlap (WAIT) counts as an overlap.
     """
     a = acceleration[i]
     if way[i] in (OVERLAP, WAIT) or (i > 0 and way[i - 1] == OVERLAP):
@@ -25,7 +25,7 @@ def along(i, reachable, acceleration, radius, way):
 
 @inner
 def straight_part(i, nominal, way, reach):
-    """Length of segment i without the arcs that round its corners, mm."""
+    """Length of segment i without the blend arcs at its corners, mm."""
     length = nominal[i]
     if way[i] == ROUND:
         length -= reach[i]
@@ -36,10 +36,10 @@ def straight_part(i, nominal, way, reach):
 
 @entry
 def pieces(nominal, fast, reachable, acceleration, radius, way, speed, reach, bend, around, length, slope, most):
-    """Fills length mm, slope mm/s² and most mm/s (2 m,) of the pieces that m segments and the corners behind them are.
+    """Fill length mm, slope mm/s² and most mm/s (2 m,) of the pieces: segments at even, corners at odd indices.
 
-    Segments are even, corners odd. nominal (m,) mm, fast, reachable (m,) mm/s at the feed and at any, acceleration (m,) mm/s² along the way, radius (m,) mm of arcs,
-    0 for lines; way, speed, reach, bend, around (m,): of the corners (corners.py).
+    nominal (m,) mm, fast, reachable (m,) mm/s at the feed and at any feed, acceleration (m,) mm/s² along the path, radius
+    (m,) mm of arcs, 0 for lines; way, speed, reach, bend, around (m,): of the corners (corners.py).
     """
     for i in range(nominal.shape[0]):
         length[2 * i] = straight_part(i, nominal, way, reach)
@@ -55,13 +55,13 @@ def pieces(nominal, fast, reachable, acceleration, radius, way, speed, reach, be
 
 @entry
 def durations(length, slope, most, way, speed, cycle, depth, arrives, limit, time):
-    """Fills time (m,) s of segments (m,), each with the corner behind it.
+    """Fill time (m,) s of segments (m,), each with the corner after it.
 
-    length mm, slope mm/s², most mm/s (2 m,): of pieces. way, speed (m,): of corners. cycle: s. depth: segments that the control
-    looks ahead. arrives: mm/s at the start of the first one. limit (2 m,): is filled with the speeds at the start of every piece.
+    length mm, slope mm/s², most mm/s (2 m,): of pieces. way, speed (m,): of corners. cycle: s. depth: segments of look-ahead.
+    arrives: mm/s at the start of the first one. limit (2 m,): filled with the speeds at the start of every piece.
     """
     count = length.shape[0]
-    ahead = 0.0  # what the control sees adds to the square of a speed
+    ahead = 0.0  # mm²/s², gain of the squared speed over the look-ahead
     behind = count - 1
     leaves = 0.0  # mm/s
     for k in range(count - 1, -1, -1):
