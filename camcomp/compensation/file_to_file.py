@@ -12,7 +12,7 @@ from camcomp.ground.errors import ProgramError
 from camcomp.ground.files import writing
 from camcomp.model.job import Job
 
-LONG = 1 << 20  # bytes from which it pays to interpolate
+LONG = 1 << 16  # bytes from which it pays to interpolate: some 2 000 lines
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,6 @@ from functools import cached_property, lru_cache
 from statistics import NormalDist
 
 import numpy as np
-from scipy.special import gammaincinv
 
 from camcomp.ground.datatypes import Floats
 
@@ -57,6 +56,8 @@ class TipMoves:
 @lru_cache(maxsize=8)
 def _quantiles(level: float) -> tuple[Floats, Floats]:
     """Standardised quantiles of chi-square over 1 / sqrt(degrees of freedom), from 0 (normal) to 1."""
+    from scipy.special import gammaincinv  # a quarter of a second, for configs that state deviations
+
     root = np.linspace(0.0, 1.0, 401)
     freedom = 1.0 / root[1:] ** 2
     found = (2.0 * gammaincinv(0.5 * freedom, level) - freedom) / np.sqrt(2.0 * freedom)

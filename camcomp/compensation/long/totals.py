@@ -38,7 +38,7 @@ from camcomp.model.statics.target import correct, settle
 from camcomp.model.trajectory.moves import line_moves, moves_of
 
 BOUND_UM = 0.05  # no point may differ by more from its exact solution
-SAMPLE = 1000  # points that are solved exactly
+SAMPLE, SAMPLE_SHARE = 1000, 0.05  # points that are solved exactly, at most and of all
 
 
 @dataclass(frozen=True, eq=False)
@@ -251,7 +251,8 @@ class Totals:
         if known is None or not self._sample:
             return
         sample = np.concatenate(self._sample)
-        sample = sample[self._random.permutation(len(sample))[:SAMPLE]]
+        wanted = min(SAMPLE, max(SAMPLE // 10, int(SAMPLE_SHARE * self.points)))
+        sample = sample[self._random.permutation(len(sample))[:wanted]]
         sample = sample[np.lexsort(sample[:, :3].T)]
         p, f, correction, unloaded, joints, drive, off = np.split(sample, np.cumsum([3, 3, 3, 3, m, m]), axis=1)
         machine = corrector.machine
