@@ -17,36 +17,36 @@ from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from camcomp.ground.datatypes import STANDARD_GRAVITY
-from camcomp.model.config.base import Limits, Name, Positive, Spec, Vector, Zero
+from camcomp.model.config.base import Limits, Name, Positive, Spec, Vector, zero
 from camcomp.model.config.links import Spring
 
 
 class Pose(Spec):
     """A rigid step: first the translation, then the rotation (rotation vector)."""
 
-    translation_mm: Vector = Zero
-    rotation_deg: Vector = Zero
+    translation_mm: Vector = zero("step along x, y, z")
+    rotation_deg: Vector = zero("rotation vector behind the step")
 
 
 class Joint(Spec):
     """A row of the table: a driven joint, its spring, and the link that it moves."""
 
-    name: Name
-    joint: Literal["revolute", "prismatic"] = "revolute"
-    a_mm: float = 0.0
-    alpha_deg: float = 0.0
-    d_mm: float = 0.0
-    theta_deg: float = 0.0
+    name: Name = Field(description="name of the actuator")
+    joint: Literal["revolute", "prismatic"] = Field("revolute", description="kind of the joint")
+    a_mm: float = Field(0.0, description="length of the link")
+    alpha_deg: float = Field(0.0, description="twist of the link")
+    d_mm: float = Field(0.0, description="offset along the joint's axis")
+    theta_deg: float = Field(0.0, description="angle of the joint at its zero")
     reversed: bool = Field(False, description="the control counts the joint the other way round")
-    stiffness_Nmm_per_rad: Positive | None = None
-    stiffness_N_per_mm: Positive | None = None
-    home_deg: float | None = None
-    home_mm: float | None = None
+    stiffness_Nmm_per_rad: Positive | None = Field(None, description="of the drive of a hinge; default: rigid")
+    stiffness_N_per_mm: Positive | None = Field(None, description="of the drive of a slide; default: rigid")
+    home_deg: float | None = Field(None, description="angle of the home switch; default: 0")
+    home_mm: float | None = Field(None, description="position of the home switch; default: 0")
     start_deg: float | None = Field(None, description="in the start pose, which fixes the branch; default: home")
-    start_mm: float | None = None
-    limits_deg: Limits | None = None
-    limits_mm: Limits | None = None
-    mass_kg: Positive | None = None
+    start_mm: float | None = Field(None, description="position in the start pose; default: home")
+    limits_deg: Limits | None = Field(None, description="travel [low, high] of a hinge; default: no limits are checked")
+    limits_mm: Limits | None = Field(None, description="travel [low, high] of a slide; default: no limits are checked")
+    mass_kg: Positive | None = Field(None, description="mass of the link behind the joint")
     centre_mm: Vector | None = Field(None, description="of mass, in the frame behind the row")
     link: Spring | None = Field(None, description="elastic link: a 6-dof spring in the frame behind the row")
 
@@ -67,11 +67,13 @@ class Params(Spec):
     The platform frame stands at the tool's reference point, its z axis points away from the workpiece.
     """
 
-    convention: Literal["dh", "modified"]
-    chain: Name = "arm"
-    base: Pose = Field(default_factory=lambda: Pose())
-    flange: Pose = Field(default_factory=lambda: Pose())
-    joints: Annotated[list[Joint], Field(min_length=1)]
+    convention: Literal["dh", "modified"] = Field(description="dh: Denavit and Hartenberg; modified: Craig")
+    chain: Name = Field("arm", description="name of the one chain")
+    base: Pose = Field(default_factory=lambda: Pose(), description="frame of the first joint in the machine frame")
+    flange: Pose = Field(default_factory=lambda: Pose(), description="platform frame behind the last row")
+    joints: Annotated[list[Joint], Field(min_length=1)] = Field(
+        description="rows of the table from the base to the flange"
+    )
 
     @model_validator(mode="after")
     def _names(self) -> "Params":

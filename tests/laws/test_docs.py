@@ -7,11 +7,11 @@ import pytest
 from camcomp import __version__
 from camcomp.ground import shelf
 from camcomp.ground.rules import RULES
+from camcomp.model.config.key_reference import ROOTS, rows, sections
 from camcomp.model.config.schema import config_schema, experiment_schema
 from camcomp.terminal import reference
 from camcomp.terminal.cli import VERBS
 from camcomp.terminal.controls_reference import first_rows
-from camcomp.terminal.key_reference import ROOTS, rows, sections
 from tests.documents import ROOT, Command, Reader, TypedFile, missing, steps
 
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -159,7 +159,7 @@ KEYS = [(root, section, row) for _, root in ROOTS for section in sections(root) 
 
 
 def test_every_key_of_the_yaml_files_has_an_example_and_its_unit():
-    """A new key without an example: give it one in camcomp/terminal/key_reference.py."""
+    """A new key without an example: give it one in camcomp/model/config/key_reference.py."""
     bare = [
         (section.paths[0], row.key) for _, section, row in KEYS if not row.example and not row.value.endswith("below")
     ]

@@ -29,7 +29,9 @@ class Spec(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 
-    source: str | None = Field(None, description="where the values of this mapping come from")
+    source: str | None = Field(
+        None, description="where the values of this mapping come from", examples=["data sheet of the maker"]
+    )
 
     @model_validator(mode="before")
     @classmethod
@@ -43,6 +45,11 @@ class Spec(BaseModel):
     def yaml_keys(cls) -> list[str]:
         """The YAML keys of this spec."""
         return [field.alias or name for name, field in cls.model_fields.items()]
+
+
+def zero(description: str) -> Any:
+    """A field of three zeros, with its meaning."""
+    return Field(default_factory=lambda: [0.0, 0.0, 0.0], description=description)
 
 
 def exactly_one(spec: Spec, *names: str) -> None:
@@ -121,7 +128,6 @@ ComplianceMatrix = Annotated[list[list[float]], AfterValidator(_matrix("complian
 StiffnessMatrix = Annotated[list[list[float]], AfterValidator(_matrix("stiffness", False)), _MATRIX_SCHEMA]
 
 AxisLetter = Literal["x", "y", "z", "-x", "-y", "-z"]
-Zero = Field(default_factory=lambda: [0.0, 0.0, 0.0])
 
 
 def _axis(value: Any) -> str | list[float]:

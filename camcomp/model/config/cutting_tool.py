@@ -13,8 +13,8 @@ from camcomp.model.config.base import NotNegative, Positive, Spec, Vector
 class Cutter(Spec):
     """The cutting part of a tool."""
 
-    diameter_mm: Positive | None = None
-    teeth: Annotated[int, Field(ge=1)] | None = None
+    diameter_mm: Positive | None = Field(None, description="diameter of the cutting part")
+    teeth: Annotated[int, Field(ge=1)] | None = Field(None, description="number of cutting edges")
     type: Literal["flat", "ball", "bull", "drill"] | None = Field(
         None, description="form of the tip, for a known stock; default: flat"
     )
@@ -65,8 +65,8 @@ class BoxStock(Spec):
     """A block with its edges along the program's axes."""
 
     type: Literal["box"]
-    min_mm: Vector
-    max_mm: Vector
+    min_mm: Vector = Field(description="lowest corner in the program frame")
+    max_mm: Vector = Field(description="highest corner in the program frame")
     resolution_mm: Resolution = _RESOLUTION
 
     @model_validator(mode="after")
@@ -80,10 +80,12 @@ class CylinderStock(Spec):
     """A round bar that stands along the tool."""
 
     type: Literal["cylinder"]
-    diameter_mm: Positive
-    centre_mm: Annotated[list[float], Field(min_length=2, max_length=2)] = Field(default_factory=lambda: [0.0, 0.0])
-    bottom_mm: float
-    top_mm: float
+    diameter_mm: Positive = Field(description="diameter of the bar")
+    centre_mm: Annotated[list[float], Field(min_length=2, max_length=2)] = Field(
+        default_factory=lambda: [0.0, 0.0], description="its axis in X and Y of the program frame"
+    )
+    bottom_mm: float = Field(description="Z of its lower face")
+    top_mm: float = Field(description="Z of its upper face")
     resolution_mm: Resolution = _RESOLUTION
 
     @model_validator(mode="after")

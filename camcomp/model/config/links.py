@@ -21,10 +21,10 @@ class Explicit(Spec):
     """Cross-section by its numbers; y and z are the local axes across the beam."""
 
     type: Literal["explicit"]
-    area_mm2: Positive
-    Iy_mm4: Positive
-    Iz_mm4: Positive
-    J_mm4: Positive
+    area_mm2: Positive = Field(description="area of the section")
+    Iy_mm4: Positive = Field(description="second moment of area about the local y axis")
+    Iz_mm4: Positive = Field(description="second moment of area about the local z axis")
+    J_mm4: Positive = Field(description="torsion constant")
 
     def moments(self) -> tuple[float, float, float, float]:
         """Area mm2, Iy mm4, Iz mm4, torsion constant J mm4."""
@@ -35,7 +35,7 @@ class Square(Spec):
     """Solid square."""
 
     type: Literal["square"]
-    side_mm: Positive
+    side_mm: Positive = Field(description="side of the square")
 
     def moments(self) -> tuple[float, float, float, float]:
         """Area mm2, Iy mm4, Iz mm4, J mm4 (J = 0.141 a^4, Saint-Venant)."""
@@ -47,8 +47,8 @@ class Rectangle(Spec):
     """Solid rectangle: width along local y, height along local z."""
 
     type: Literal["rectangle"]
-    width_mm: Positive
-    height_mm: Positive
+    width_mm: Positive = Field(description="along the local y axis")
+    height_mm: Positive = Field(description="along the local z axis")
 
     def moments(self) -> tuple[float, float, float, float]:
         """Area mm2, Iy mm4, Iz mm4, J mm4 (J within 0.2 % of Saint-Venant's series, a >= b)."""
@@ -62,7 +62,7 @@ class Round(Spec):
     """Solid circle."""
 
     type: Literal["round"]
-    diameter_mm: Positive
+    diameter_mm: Positive = Field(description="diameter of the bar")
 
     def moments(self) -> tuple[float, float, float, float]:
         """Area mm2, Iy mm4, Iz mm4, J mm4."""
@@ -74,8 +74,8 @@ class Tube(Spec):
     """Round tube."""
 
     type: Literal["tube"]
-    outer_diameter_mm: Positive
-    inner_diameter_mm: Positive
+    outer_diameter_mm: Positive = Field(description="outer diameter")
+    inner_diameter_mm: Positive = Field(description="inner diameter, below the outer one")
 
     @model_validator(mode="after")
     def _hollow(self) -> "Tube":
@@ -96,11 +96,13 @@ Section = Annotated[Explicit | Square | Rectangle | Round | Tube, Field(discrimi
 class Beam(Spec):
     """Euler-Bernoulli cantilever along local x: the spring only; its length as an offset is a transform element."""
 
-    length_mm: Positive
-    E_N_per_mm2: Positive
-    nu: Annotated[float, Field(gt=-1, lt=0.5)] | None = None
-    G_N_per_mm2: Positive | None = None
-    section: Section
+    length_mm: Positive = Field(description="length of the cantilever")
+    E_N_per_mm2: Positive = Field(description="modulus of elasticity")
+    nu: Annotated[float, Field(gt=-1, lt=0.5)] | None = Field(
+        None, description="Poisson's ratio; in place of G_N_per_mm2"
+    )
+    G_N_per_mm2: Positive | None = Field(None, description="shear modulus; in place of nu")
+    section: Section = Field(description="cross-section by its shape or its numbers")
 
     @model_validator(mode="after")
     def _shear(self) -> "Beam":
@@ -116,15 +118,17 @@ class Beam(Spec):
 class ComplianceDiagonal(Spec):
     """Diagonal of a compliance; 0 = rigid in that direction."""
 
-    translation_mm_per_N: NotNegativeVector
-    rotation_rad_per_Nmm: NotNegativeVector
+    translation_mm_per_N: NotNegativeVector = Field(
+        description="deflection per force along the local x, y, z; 0: rigid"
+    )
+    rotation_rad_per_Nmm: NotNegativeVector = Field(description="turn per moment about the local x, y, z; 0: rigid")
 
 
 class StiffnessDiagonal(Spec):
     """Diagonal of a stiffness."""
 
-    translation_N_per_mm: PositiveVector
-    rotation_Nmm_per_rad: PositiveVector
+    translation_N_per_mm: PositiveVector = Field(description="force per deflection along the local x, y, z")
+    rotation_Nmm_per_rad: PositiveVector = Field(description="moment per turn about the local x, y, z")
 
 
 class Spring(Spec):
@@ -138,9 +142,13 @@ class Spring(Spec):
     stiffness: StiffnessMatrix | None = Field(
         None, alias="stiffness_mm_N_rad", description="6x6 in N/mm, N/rad, N mm/rad"
     )
-    compliance_diagonal: ComplianceDiagonal | None = None
-    stiffness_diagonal: StiffnessDiagonal | None = None
-    beam: Beam | None = None
+    compliance_diagonal: ComplianceDiagonal | None = Field(
+        None, description="compliance without coupling between directions"
+    )
+    stiffness_diagonal: StiffnessDiagonal | None = Field(
+        None, description="stiffness without coupling between directions"
+    )
+    beam: Beam | None = Field(None, description="spring of a cantilever of this size")
 
     @model_validator(mode="after")
     def _one_notation(self) -> "Spring":

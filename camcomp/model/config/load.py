@@ -261,12 +261,20 @@ def _dialect(chosen: Node | None) -> list[CamcompError]:
 def params_of(member: Any) -> type[Spec]:
     """A plug-in's spec: its class Params, and for an effect one with its records PARAMETERS as well."""
     if getattr(member, "PARAMETERS", ()) or not hasattr(member, "Params"):
-        fields: dict[str, Any] = {
-            each.name: (Annotated[float, Field(ge=each.low, le=each.high)], each.nominal) for each in member.PARAMETERS
-        }
+        fields: dict[str, Any] = {each.name: (_number_of(each, member), each.nominal) for each in member.PARAMETERS}
         return create_model("Parameters", __base__=getattr(member, "Params", Spec), **fields)
     out: type[Spec] = member.Params
     return out
+
+
+def _number_of(parameter: Any, member: Any) -> Any:
+    """Type of an effect's number: its bounds, what it is, and its typical size as an example."""
+    about = (member.__doc__ or "").strip().split("\n")[0].removesuffix(".")
+    text = f"{about}; {parameter.low:g} to {parameter.high:g}, {parameter.source}"
+    size = parameter.scan[len(parameter.scan) // 2] if parameter.scan else parameter.value(parameter.scale)
+    return Annotated[
+        float, Field(ge=parameter.low, le=parameter.high, description=text, examples=[float(f"{size:.3g}")])
+    ]
 
 
 def _check_targets(config: Config) -> list[CamcompError]:

@@ -10,7 +10,7 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import AfterValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from camcomp.model.config.base import Axis, AxisLetter, Limits, Name, Positive, Spec, Vector, Zero
+from camcomp.model.config.base import Axis, AxisLetter, Limits, Name, Positive, Spec, Vector, zero
 from camcomp.model.config.links import Spring
 
 SHORTEST_ARM_MM = 1e-6
@@ -23,14 +23,17 @@ class TransformSpec(Spec):
     """A rigid step: first the translation, then the rotation (rotation vector), both in the frame before it."""
 
     type: Literal["transform"]
-    translation_mm: Vector = Zero
-    rotation_deg: Vector = Zero
+    translation_mm: Vector = zero("step along the local x, y, z")
+    rotation_deg: Vector = zero("rotation vector behind the step")
 
 
 class _Prismatic(Spec):
-    joint: Literal["prismatic"]
-    axis: Axis
-    stiffness_N_per_mm: Positive | None = None
+    joint: Literal["prismatic"] = Field(description="kind of the joint: a slide")
+    axis: Axis = Field(description="local axis of the slide")
+    stiffness_N_per_mm: Positive | None = Field(
+        None,
+        description="of the drive, or of the spring of a passive slide; default: a drive is rigid, a passive slide free",
+    )
     rotary: ClassVar[bool] = False
 
     @property
@@ -40,9 +43,12 @@ class _Prismatic(Spec):
 
 
 class _Revolute(Spec):
-    joint: Literal["revolute"]
-    axis: Axis
-    stiffness_Nmm_per_rad: Positive | None = None
+    joint: Literal["revolute"] = Field(description="kind of the joint: a hinge")
+    axis: Axis = Field(description="local axis of the hinge")
+    stiffness_Nmm_per_rad: Positive | None = Field(
+        None,
+        description="of the drive, or of the spring of a passive hinge; default: a drive is rigid, a passive hinge free",
+    )
     rotary: ClassVar[bool] = True
 
     @property
@@ -56,9 +62,9 @@ class PrismaticActuator(_Prismatic):
 
     type: Literal["actuator"]
     name: Name | None = Field(None, description="default: the name of the chain")
-    home_mm: float = 0.0
+    home_mm: float = Field(0.0, description="position of the home switch, from which screw errors count")
     start_mm: float | None = Field(None, description="position in the start pose of an arm; default: home_mm")
-    limits_mm: Limits | None = None
+    limits_mm: Limits | None = Field(None, description="travel [low, high]; default: no limits are checked")
 
     @property
     def home(self) -> float:
@@ -81,11 +87,11 @@ class RevoluteActuator(_Revolute):
 
     type: Literal["actuator"]
     name: Name | None = Field(None, description="default: the name of the chain")
-    home_deg: float = 0.0
+    home_deg: float = Field(0.0, description="angle of the home switch")
     start_deg: float | None = Field(
         None, description="angle in the start pose, which fixes the branch of an arm; default: home_deg"
     )
-    limits_deg: Limits | None = None
+    limits_deg: Limits | None = Field(None, description="travel [low, high]; default: no limits are checked")
 
     @property
     def home(self) -> float:
@@ -107,7 +113,7 @@ class PrismaticPassive(_Prismatic):
     """Free slide; with a stiffness a spring that rests at `rest_mm`."""
 
     type: Literal["passive"]
-    rest_mm: float = 0.0
+    rest_mm: float = Field(0.0, description="position at which its spring is relaxed")
     start_mm: float = Field(0.0, description="guess of its position at robot.start_reference_mm")
 
     @property
@@ -125,7 +131,7 @@ class RevolutePassive(_Revolute):
     """Free hinge; with a stiffness a spring that rests at `rest_deg`."""
 
     type: Literal["passive"]
-    rest_deg: float = 0.0
+    rest_deg: float = Field(0.0, description="angle at which its spring is relaxed")
     start_deg: float = Field(0.0, description="guess of its angle at robot.start_reference_mm")
 
     @property
@@ -155,11 +161,13 @@ class ParallelogramSpec(Spec):
     """Two equal bars between hinges: the arm turns about `hinge`, the cross-bar keeps its orientation."""
 
     type: Literal["parallelogram"]
-    arm_mm: Annotated[Vector, AfterValidator(_some_length)]
-    hinge: AxisLetter
-    crossbar: AxisLetter
-    width_mm: Positive
-    bar: Spring
+    arm_mm: Annotated[Vector, AfterValidator(_some_length)] = Field(
+        description="vector from the first to the second hinge, at angle zero"
+    )
+    hinge: AxisLetter = Field(description="local axis about which the arm turns")
+    crossbar: AxisLetter = Field(description="local axis of the cross-bar")
+    width_mm: Positive = Field(description="distance of the two bars")
+    bar: Spring = Field(description="spring of one bar")
     start_deg: float = Field(0.0, description="guess of the arm's angle at robot.start_reference_mm")
 
     @property
@@ -172,8 +180,8 @@ class WeightSpec(Spec):
     """Weight of a link, along machine -z at `centre_mm` of the local frame."""
 
     type: Literal["weight"]
-    force_N: Positive
-    centre_mm: Vector = Zero
+    force_N: Positive = Field(description="weight of the link")
+    centre_mm: Vector = zero("centre of mass in the local frame")
 
 
 Actuator = Annotated[PrismaticActuator | RevoluteActuator, Field(discriminator="joint")]
@@ -189,8 +197,8 @@ Element = Annotated[
 class GeometricError(Spec):
     """Error of a part's pose: translation, then rotation vector, in the chain's frame."""
 
-    translation_mm: Vector = Zero
-    rotation_deg: Vector = Zero
+    translation_mm: Vector = zero("shift in the chain's frame")
+    rotation_deg: Vector = zero("rotation vector in the chain's frame")
 
 
 class ChainSpec(Spec):
@@ -200,10 +208,16 @@ class ChainSpec(Spec):
     platform's frame is parallel to the machine's.
     """
 
-    frame: Literal["xyz", "yzx", "zxy"] = "xyz"
-    base_error: GeometricError = Field(default_factory=lambda: GeometricError())
-    end_error: GeometricError = Field(default_factory=lambda: GeometricError())
-    elements: Annotated[list[Element], Field(min_length=1)]
+    frame: Literal["xyz", "yzx", "zxy"] = Field("xyz", description="machine axes along which the local x, y, z point")
+    base_error: GeometricError = Field(
+        default_factory=lambda: GeometricError(), description="where the chain's base really is"
+    )
+    end_error: GeometricError = Field(
+        default_factory=lambda: GeometricError(), description="where the chain's end on the platform really is"
+    )
+    elements: Annotated[list[Element], Field(min_length=1)] = Field(
+        description="joints, links and steps from the base to the platform"
+    )
 
     def actuators(self, chain: str) -> dict[str, PrismaticActuator | RevoluteActuator]:
         """The actuators in order by name; the default name is that of the `chain`."""
@@ -214,9 +228,13 @@ class ChainSpec(Spec):
 class RobotSpec(Spec):
     """A machine: chains that all carry the same platform."""
 
-    name: str
-    type: str | None = Field(None, description="member of the shelf robots that builds the chains from its parameters")
-    chains: Annotated[dict[Name, ChainSpec], Field(min_length=1)]
+    name: str = Field(description="name of the machine, in reports")
+    type: str | None = Field(
+        None, examples=["serial"], description="member of the shelf robots that builds the chains from its parameters"
+    )
+    chains: Annotated[dict[Name, ChainSpec], Field(min_length=1)] = Field(
+        description="kinematic chains by name; all carry the same platform"
+    )
     start_reference_mm: Vector = Field(
         default_factory=lambda: [0.0, 0.0, 0.0],
         description="platform reference point at which the start guesses of the passive joints hold; an arm's start "

@@ -5,9 +5,11 @@ import re
 from typing import Any
 
 from pydantic import BaseModel
+from pydantic.json_schema import GenerateJsonSchema
 
 from camcomp.ground import shelf
 from camcomp.model.config.cutting_tool import ToolTableFile
+from camcomp.model.config.key_reference import facts, hover_text, section_of
 from camcomp.model.config.load import ROBOT_KEYS, params_of
 from camcomp.model.config.spec import Config, EffectChoice, Experiment, ForceChoice
 from camcomp.model.config.spread import SECTIONS
@@ -16,13 +18,18 @@ Schema = dict[str, Any]
 
 _UNCERTAIN = "UncertainNumber"
 _NUMBER = {"type": "number"}
+_OF = "that of its key"
 _SPREAD = {
     "type": "object",
     "description": "a number that is not known exactly: normally distributed, with its standard deviation or 95 % interval; "
     "numbers of one group are drawn together",
     "properties": {
-        "value": _NUMBER, "sd": {"type": "number", "minimum": 0}, "low": _NUMBER, "high": _NUMBER,
-        "group": {"type": "string", "minLength": 1}, "source": {"type": "string"},
+        "value": _NUMBER | {"description": facts("the number as known", _OF, "middle of low and high", "215")},
+        "sd": {"type": "number", "minimum": 0, "description": facts("its standard deviation", _OF, "none", "20")},
+        "low": _NUMBER | {"description": facts("lower end of its 95 % interval", _OF, "none", "180")},
+        "high": _NUMBER | {"description": facts("upper end of its 95 % interval", _OF, "none", "250")},
+        "group": {"type": "string", "minLength": 1, "description": facts("name of numbers drawn together", "", "none", "force")},
+        "source": {"type": "string", "description": facts("where the numbers come from", "", "none", "ballbar, 3 runs")},
     },
     "anyOf": [{"required": ["sd"]}, {"required": ["low", "high"]}],
     "additionalProperties": False,
@@ -31,9 +38,29 @@ _DRAFT = "http://json-schema.org/draft-07/schema#"
 _OLDER = {"$defs": "definitions", "prefixItems": "items"}  # newer name -> name in draft-07
 
 
+class _Described(GenerateJsonSchema):
+    """Pydantic's schemas, in which every key says what it means, with its unit, default and an example."""
+
+    def model_schema(self, schema: Any) -> Schema:
+        """Schema of one mapping."""
+        made = super().model_schema(schema)
+        spec: type[BaseModel] = schema["cls"]
+        section = section_of(spec)
+        for name, given in spec.model_fields.items():
+            key = given.alias or name
+            made["properties"][key]["description"] = hover_text(key, given, section)
+            made["properties"][key].pop("title", None)
+        return made
+
+
 def config_schema() -> Schema:
+<<<<<<< HEAD
     """Schema of a machine file; the robot is optional, so that files of overrides pass."""
     schema = _draft07(Config.model_json_schema(by_alias=True, ref_template="#/definitions/{model}"))
+=======
+    """Schema of a machine file; the robot is not required, so that files of overrides pass."""
+    schema = _draft07(_schema_of(Config))
+>>>>>>> d58ccf5 (Say of every key of the YAML files what it means, with unit and example)
     definitions = schema["definitions"]
     del schema["required"]
     general = definitions["Robot"]
@@ -49,10 +76,14 @@ def config_schema() -> Schema:
     return {"$schema": _DRAFT, **schema, "title": "camcomp machine file"}
 
 
+def _schema_of(spec: type[BaseModel], template: str = "#/definitions/{model}") -> Schema:
+    return spec.model_json_schema(by_alias=True, ref_template=template, schema_generator=_Described)
+
+
 def _or_file(tools: Schema) -> Schema:
     """Tools by number, with the keys of a tool table, or the name of one alone."""
-    about = {key: each for key, each in tools.items() if key in ("title", "description", "default")}
-    keys = _draft07(ToolTableFile.model_json_schema(by_alias=True))["properties"]
+    about = {key: each for key, each in tools.items() if key in ("title", "description", "default", "examples")}
+    keys = _draft07(_schema_of(ToolTableFile))["properties"]
     named = {key: each for key, each in tools.items() if key not in about}
     return {**about, "anyOf": [{**named, "properties": keys}, {"type": "string"}]}
 
@@ -73,7 +104,7 @@ def _choice(value: Any) -> Any:
     if not isinstance(value, dict):
         return value
     if value.get("type") == "number":
-        about = {key: each for key, each in value.items() if key in ("title", "description", "default")}
+        about = {key: each for key, each in value.items() if key in ("title", "description", "default", "examples")}
         number = {key: each for key, each in value.items() if key not in about}
         return {**about, "anyOf": [number, {"$ref": f"#/definitions/{_UNCERTAIN}"}]}
     return {key: _choice(each) for key, each in value.items()}
@@ -81,7 +112,7 @@ def _choice(value: Any) -> Any:
 
 def experiment_schema() -> Schema:
     """Schema of an experiment file."""
-    schema = _draft07(Experiment.model_json_schema(by_alias=True, ref_template="#/definitions/{model}"))
+    schema = _draft07(_schema_of(Experiment))
     return {"$schema": _DRAFT, **schema, "title": "camcomp experiment file"}
 
 
@@ -106,13 +137,41 @@ def _offer(
         spec: type[BaseModel] = params_of(plugin)
         # Two plug-ins may have classes of one name.
         template = f"#/definitions/{shelf_name}.{member}.{{model}}"
-        one = _draft07(spec.model_json_schema(by_alias=True, ref_template=template))
+        one = _draft07(_schema_of(spec, template))
         definitions.update({f"{shelf_name}.{member}.{key}": each for key, each in one.pop("definitions", {}).items()})
         one["title"] = member
-        one["properties"] = {key: {"const": member}, **shared, **one["properties"]}
+        about = facts(_first_line(plugin), "", "required", member)
+        own = {key: {"const": member, "description": about}, **shared}
+        if shelf_name == "effects":
+            own["target"] = _target_of(plugin, shared["target"])
+        one["properties"] = {**own, **one["properties"]}
         one["required"] = [key, *required, *one.get("required", [])]
         options.append(one)
-    definitions[name] = {"anyOf": options, "description": definitions[name].get("description", "")}
+    names = [each["title"] for each in options[len(first or []) :]]
+    known = {key: {"enum": names, "description": facts("which one, by its name", "", "required", names[0])}}
+    if first:
+        known[key]["description"] = facts("kind of machine that has keys of its own, by its name", "", "none", names[0])
+    about = definitions[name].get("description", "")
+    definitions[name] = {"properties": known, "anyOf": options, "description": about}  # editors offer the names
+
+
+def _first_line(member: Any) -> str:
+    return (member.__doc__ or "").strip().split("\n")[0].removesuffix(".")
+
+
+def _target_of(effect: Any, general: Schema) -> Schema:
+    """The key `target` of an effect: names where it has some, and whether it may be left out."""
+    match getattr(effect, "TARGET", "either"):
+        case "named":
+            text = facts("axis, pair of axes or letters that err", "", "required", effect.TARGETS[0])
+            return {"enum": list(effect.TARGETS), "description": text}
+        case "machine":
+            return {"type": "null", "description": facts("none: it concerns the machine", "", "none", "null")}
+        case "actuator":
+            text = facts("name of the actuator on which it acts", "", "required", "x")
+        case _:
+            text = facts("name of the actuator on which it acts; none: one common value for all", "", "none", "x")
+    return {**general, "description": text}
 
 
 def _draft07(value: Any) -> Any:

@@ -7,7 +7,7 @@ from pydantic_core import PydanticCustomError
 
 from camcomp.gcode.path_mode import PATTERN
 from camcomp.ground.errors import Location
-from camcomp.model.config.base import NotNegative, Positive, Spec, Vector, Zero, exactly_one
+from camcomp.model.config.base import NotNegative, Positive, Spec, Vector, exactly_one, zero
 from camcomp.model.config.cutting_tool import Cutter, NumberedCutter, Stock
 from camcomp.model.config.doubt import Doubt
 from camcomp.model.config.robot import RobotSpec
@@ -22,7 +22,7 @@ NotEmpty = Annotated[str, Field(min_length=1)]
 class Workpiece(Spec):
     """Position of G54 in the machine frame, and the stock."""
 
-    origin_mm: Vector = Zero
+    origin_mm: Vector = zero("origin of G54 in the machine frame")
     rotation_deg: float | None = Field(None, description="about the tool axis (machine z)")
     rotation_vector_deg: Vector | None = Field(None, description="rotation vector in machine axes")
     stock_top_mm: float | None = Field(
@@ -93,14 +93,14 @@ class Choice(Spec):
 class ForceChoice(Choice):
     """Cutting-force model, a member of the shelf `forces`."""
 
-    model: str
+    model: str = Field(description="name of the force model")
 
 
 class EffectChoice(Choice):
     """One difference between the machine and its ideal model, a member of the shelf `effects`; target = actuator, or none."""
 
-    effect: str
-    target: str | None = None
+    effect: str = Field(description="name of the effect")
+    target: str | None = Field(None, description="actuator on which it acts; none where it concerns the machine")
 
     @property
     def values(self) -> dict[str, Any]:
@@ -114,7 +114,9 @@ class EffectChoice(Choice):
 class Process(Spec):
     """The cut."""
 
-    force: ForceChoice = Field(default_factory=lambda: ForceChoice(model="none"))
+    force: ForceChoice = Field(
+        default_factory=lambda: ForceChoice(model="none"), description="cutting-force model with its parameters"
+    )
     spindle_rpm: Positive | None = Field(None, description="used where the program has no S")
     feed_mm_per_min: Positive | None = Field(None, description="used where the program has no F")
     depth_mm: Positive | None = Field(None, description="axial depth of cut")
@@ -127,8 +129,14 @@ class Process(Spec):
 class Control(Spec):
     """The controller: settings that the program text does not contain."""
 
-    resolution_mm: Annotated[float, Field(ge=1e-9)] = 0.001
-    start_mm: Vector = Zero
+    resolution_mm: Annotated[float, Field(ge=1e-9)] = Field(
+        0.001, description="smallest step of a number in the corrected program; sets its decimals"
+    )
+    start_mm: Vector = Field(
+        default_factory=lambda: [0.0, 0.0, 0.0],
+        examples=[[0, 0, 50]],
+        description="position of the tip before the first motion, program frame",
+    )
     dialect: str | None = Field(None, description="member of the shelf dialects; default: found from the text")
     offsets_mm: dict[WorkOffset, Vector] = Field(
         default_factory=dict,
@@ -171,8 +179,13 @@ class Control(Spec):
 class Compensation(Spec):
     """How the correction is found."""
 
-    method: Literal["newton", "stiffness", "fixed-point", "linear"] = "newton"
-    tolerance_um: Annotated[float, Field(ge=1e-6)] = 1.0
+    method: Literal["newton", "stiffness", "fixed-point", "linear"] = Field(
+        "newton",
+        description="newton: eq. (3), stiffness: eq. (4), fixed-point: eq. (5), linear: Cartesian compliance as baseline",
+    )
+    tolerance_um: Annotated[float, Field(ge=1e-6)] = Field(
+        1.0, description="largest distance between the corrected path and the exact correction"
+    )
     arcs: bool | None = Field(
         None,
         description="programmed arcs come out as arcs (G2, G3) where those are fewer than straight lines; default: where "
@@ -188,16 +201,22 @@ class Compensation(Spec):
 class Config(Spec):
     """All sections of a machine file; several files make one Config, later keys win."""
 
-    robot: RobotSpec
-    workpiece: Workpiece = Field(default_factory=lambda: Workpiece())
-    tool: Tool = Field(default_factory=lambda: Tool())
+    robot: RobotSpec = Field(description="chains of joints and links, or a kind of robot with its parameters")
+    workpiece: Workpiece = Field(
+        default_factory=lambda: Workpiece(), description="where the workpiece lies, and its stock"
+    )
+    tool: Tool = Field(default_factory=lambda: Tool(), description="the tool in the spindle")
     tools: dict[ToolNumber, NumberedCutter] = Field(
         default_factory=dict, description="cutting parts by T number; other tools are as in the section tool"
     )
-    process: Process = Field(default_factory=lambda: Process())
-    control: Control = Field(default_factory=lambda: Control())
-    compensation: Compensation = Field(default_factory=lambda: Compensation())
-    effects: list[EffectChoice] = Field(default_factory=list)
+    process: Process = Field(default_factory=lambda: Process(), description="cutting force and cutting conditions")
+    control: Control = Field(default_factory=lambda: Control(), description="what the NC control does")
+    compensation: Compensation = Field(
+        default_factory=lambda: Compensation(), description="how the correction is found"
+    )
+    effects: list[EffectChoice] = Field(
+        default_factory=list, description="ways in which the real machine differs from the ideal one"
+    )
 
     _tree: Node | None = PrivateAttr(None)
     _spreads: tuple[Spread, ...] = PrivateAttr(())
@@ -226,32 +245,41 @@ class Config(Spec):
 class RunSpec(Spec):
     """One run of an experiment: program, log, and conditions shared with other runs (clamping, clock)."""
 
-    name: NotEmpty
-    program: NotEmpty | None = None
-    log: NotEmpty
-    cutting: bool
-    started_s: float = 0.0
-    clamping: str | int | None = None
-    clock: str | int | None = None
+    name: NotEmpty = Field(description="name of the run, in results and for holdout")
+    program: NotEmpty | None = Field(
+        None, description="NC program that was run; none where set-points or poses are logged"
+    )
+    log: NotEmpty = Field(description="CSV of what was measured")
+    cutting: bool = Field(description="whether the tool cut")
+    started_s: float = Field(0.0, description="start of the run on the common clock of all runs")
+    clamping: str | int | None = Field(None, description="label of the clamping; default: one for all runs")
+    clock: str | int | None = Field(
+        None, description="label of the clock between tip and controller; default: one for all runs"
+    )
 
 
 class Deviations(Spec):
     """Standard deviations of the instruments over a run, per axis, drift and their own frame included."""
 
-    tip_mm: Positive | None = None
-    encoder_mm: Positive | None = None
-    encoder_rad: Positive | None = None
-    force_N: Positive | None = None
-    force_Nmm: Positive | None = None
+    tip_mm: Positive | None = Field(None, description="of the measured tip")
+    encoder_mm: Positive | None = Field(None, description="of the encoders of slides")
+    encoder_rad: Positive | None = Field(None, description="of the encoders of hinges")
+    force_N: Positive | None = Field(None, description="of measured forces")
+    force_Nmm: Positive | None = Field(None, description="of measured torques")
 
 
 class Experiment(Spec):
     """An experiment file; paths are relative to it as written and absolute once loaded."""
 
-    config: Annotated[list[NotEmpty], Field(min_length=1)]
-    runs: Annotated[list[RunSpec], Field(min_length=1)]
-    holdout: list[str] = Field(default_factory=list)
-    sd: Deviations | None = None
+    config: Annotated[list[NotEmpty], Field(min_length=1)] = Field(
+        description="machine files of the model under judgement, later ones over earlier ones"
+    )
+    runs: Annotated[list[RunSpec], Field(min_length=1)] = Field(description="the runs that were logged")
+    holdout: list[str] = Field(
+        default_factory=list,
+        description="names of the runs that are withheld from the fit; default: chosen by the tool",
+    )
+    sd: Deviations | None = Field(None, description="standard deviations of the instruments")
 
     @model_validator(mode="after")
     def _names(self) -> "Experiment":

@@ -1,6 +1,6 @@
-"""The reference page of the YAML files: every key with its unit, default, meaning and an example, from the specs themselves.
+"""Every key of the YAML files with its unit, default, meaning and an example, from the specs themselves.
 
-Examples are those of the files that camcomp ships; for a key that none of them has there is one below.
+The reference page and the schemas are made of it. Examples are those of the files that camcomp ships; for a key that none of them has there is one below.
 """
 
 from __future__ import annotations
@@ -30,7 +30,6 @@ _SPELLED = {"C": "°C", "mm2": "mm²", "mm4": "mm⁴"}
 _CHOICES = {ForceChoice: ("forces", "model"), EffectChoice: ("effects", "effect")}
 
 _EXAMPLES = {
-    "type": "serial",
     "compliance_mm_N_rad": "[[2e-5, 0, 0, 0, 0, 0], ...]",
     "start_mm": "0",
     "stiffness_mm_N_rad": "[[5e4, 0, 0, 0, 0, 0], ...]",
@@ -88,6 +87,26 @@ _EXAMPLES = {
     "point_deg": "118",
     "flute_length_mm": "24",
     "teeth": "3",
+    "comp_type": "0",
+    "positions_mm": "[0, 100, 200]",
+    "forward_um": "[0, 4.5, 7]",
+    "reverse_um": "[1, 5.2, 7.4]",
+    "forward_mrad": "[0, 0.02, 0.03]",
+    "reverse_mrad": "[0, 0.03, 0.04]",
+    "sine": "[1, 0.3]",
+    "cosine": "[0, 0.2]",
+    "seen_deg": "[[-90, 90]]",
+    "band_rad": "[1e-5, 2e-5]",
+    "formula": "0.002 * sin(x_mm / 20)",
+    "envelope": "{x_mm: [-100, 100]}",
+    "over": "[x_mm]",
+    "coefficients_mm": "[0, 0.003, 0.001, 0]",
+    "end_error": "{rotation_deg: [0, 0, 0.01]}",
+    "effects": "[{effect: backlash, target: x, width_mm: 0.02}]",
+    "compliance_diagonal": "{translation_mm_per_N: [1e-5, 1e-5, 2e-5], rotation_rad_per_Nmm: [0, 0, 0]}",
+    "stiffness_diagonal": "{translation_N_per_mm: [1e5, 1e5, 5e4], rotation_Nmm_per_rad: [1e8, 1e8, 1e8]}",
+    "link": "{stiffness_diagonal: {translation_N_per_mm: [1e5, 1e5, 5e4], rotation_Nmm_per_rad: [1e8, 1e8, 1e8]}}",
+    "sd": "{tip_mm: 0.003}",
 }
 _MAPPINGS = {"": "mapping, below", "[]": "list of mappings, below", ".NAME": "mappings by name, below"}
 
@@ -244,6 +263,8 @@ def default_text(given: FieldInfo) -> str:
 
 def example_of(key: str, given: FieldInfo, section: KeySection) -> str:
     """A value that a file may have, as YAML in one line; empty where nobody has given one."""
+    if len(words := get_args(given.annotation)) == 1 and isinstance(words[0], str):
+        return words[0]
     if given.examples:
         return _flow(given.examples[0])
     shown = _shipped_examples()
@@ -259,7 +280,7 @@ def example_of(key: str, given: FieldInfo, section: KeySection) -> str:
     default = None if given.is_required() else given.get_default(call_default_factory=True)
     if isinstance(default, bool):
         return _flow(not default)
-    return "" if default in (None, [], {}) else _flow(default)
+    return "" if default in (None, [], {}) or isinstance(default, BaseModel) else _flow(default)
 
 
 @cache
@@ -307,6 +328,31 @@ def _flow(value: Any) -> str:
         return f"{value:g}"
     text = str(value)
     return json.dumps(text, ensure_ascii=False) if re.search(r"[:,#{}\[\]]", text) else text
+
+
+def hover_text(key: str, given: FieldInfo, section: KeySection) -> str:
+    """Meaning, unit, default and example of a key in one paragraph, for editors."""
+    meaning = given.description or ""
+    if len(words := get_args(given.annotation)) == 1 and isinstance(words[0], str) and not meaning:
+        meaning = (section.spec.__doc__ or "").strip().split("\n")[0].removesuffix(".")
+    default = "required" if given.is_required() else default_text(given) or "none"
+    return facts(meaning, unit_of(key), default, example_of(key, given, section))
+
+
+def facts(meaning: str, unit: str, default: str, example: str) -> str:
+    """The parts of a hover text in their order."""
+    return f"{meaning}. Unit: {unit or 'none'}. Default: {default}. Example: {example}"
+
+
+def section_of(spec: type[BaseModel]) -> KeySection:
+    """The mapping that a spec describes, where it may stand in either file."""
+    return _sections().get(spec) or KeySection(spec, [])
+
+
+@cache
+def _sections() -> dict[type[BaseModel], KeySection]:
+    found = {each.spec: each for _, root in reversed(ROOTS) for each in reversed(sections(root))}
+    return found
 
 
 ROOTS = (("The machine file", Config), ("The experiment file", Experiment))

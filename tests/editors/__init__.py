@@ -1,0 +1,1 @@
+"""Editors on the YAML files, by the schemas that camcomp ships."""
