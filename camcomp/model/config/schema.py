@@ -54,13 +54,8 @@ class _Described(GenerateJsonSchema):
 
 
 def config_schema() -> Schema:
-<<<<<<< HEAD
     """Schema of a machine file; the robot is optional, so that files of overrides pass."""
-    schema = _draft07(Config.model_json_schema(by_alias=True, ref_template="#/definitions/{model}"))
-=======
-    """Schema of a machine file; the robot is not required, so that files of overrides pass."""
     schema = _draft07(_schema_of(Config))
->>>>>>> d58ccf5 (Say of every key of the YAML files what it means, with unit and example)
     definitions = schema["definitions"]
     del schema["required"]
     general = definitions["Robot"]
