@@ -30,7 +30,7 @@ PARAMETERS = (
     ),
 )
 FITTED = tuple(
-    Parameter(f"{name}_{k}_rad", "rad", 0.0, -0.01, 0.01, 3e-5, 1e-6, _SIZE)
+    Parameter(f"{name}_{k}_rad", "rad", 0.0, -0.003, 0.003, 3e-5, 1e-6, _SIZE)
     for name in ("sine", "cosine")
     for k in range(1, WAVES + 1)
 )

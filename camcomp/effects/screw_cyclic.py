@@ -26,8 +26,8 @@ PARAMETERS = (
 )
 # The effect is linear in its two components, which is what a fit needs; the scan finds the pitch.
 FITTED = (
-    Parameter("sine_mm", "mm", 0.0, -0.3, 0.3, 0.004, 0.00005, "as the amplitude"),
-    Parameter("cosine_mm", "mm", 0.0, -0.3, 0.3, 0.004, 0.00005, "as the amplitude"),
+    Parameter("sine_mm", "mm", 0.0, -0.2, 0.2, 0.004, 0.00005, "as the amplitude"),
+    Parameter("cosine_mm", "mm", 0.0, -0.2, 0.2, 0.004, 0.00005, "as the amplitude"),
     Parameter("pitch_mm", "mm", 5.0, 0.5, 100.0, 1.0, 0.0, "as above", scan=_PITCHES, turns=1.5),  # one wave is a bow
 )
 

@@ -152,3 +152,21 @@ def test_what_says_that_it_acts_at_every_instant_alone_does(name):
         got = getattr(effect, hook)(before[some], m.at(some), which, away(effect))
         whole = getattr(effect, hook)(before, m, which, away(effect))
         np.testing.assert_allclose(got, whole[some], rtol=1e-13)
+
+
+@pytest.mark.parametrize("name", [n for n in shelf.members("effects") if hasattr(shelf.load("effects", n), "public")])
+def test_what_a_fit_may_find_the_machine_file_takes(name):
+    """The corners of the fitted box, and its middle with one end each."""
+    module = shelf.load("effects", name)
+    ends = np.array([[p.low, p.high] for p in module.FITTED])
+    middle = np.clip(0.0, *ends.T)
+    points = [
+        *np.random.default_rng(1).choice([0, 1], (50, len(ends)))[:, :, None],
+        *([[[0]] * len(ends), [[1]] * len(ends)]),
+    ]
+    points = [np.take_along_axis(ends, np.array(each), 1)[:, 0] for each in points]
+    points += [np.where(np.arange(len(ends)) == j, ends[j, k], middle) for j in range(len(ends)) for k in (0, 1)]
+    for point in points:
+        values = module.public({p.name: float(v) for p, v in zip(module.FITTED, point, strict=True)})
+        for p in module.PARAMETERS:
+            assert p.low <= values[p.name] <= p.high, (p.name, point)

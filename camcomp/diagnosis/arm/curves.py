@@ -43,7 +43,7 @@ def curve_of(bench: ArmBench, columns: Sequence[Column], amount: Floats, covaria
     joint = list(bench.actuators).index(str(columns[0].target))
     angle = np.arange(0.0, 360.0, DRAWN_DEG)
     shapes = np.stack([wave(c, np.radians(angle)) for c in columns], axis=1)
-    size = np.array([c.parameter.scale for c in columns]) * amount
+    size = np.array([c.parameter.value(a * c.parameter.scale) for c, a in zip(columns, amount, strict=True)])
     amplitude = float(np.sqrt(0.5 * np.sum(size**2)))
     slope = 0.5 * size * np.array([c.parameter.scale for c in columns]) / max(amplitude, 1e-300)
     seen = seen_angles(np.concatenate([bench.campaigns[k].q[:, joint] for k in bench.own]))

@@ -125,7 +125,18 @@ class LinearModel:
     def family(self, name: str) -> tuple[Ints, Floats]:
         """Columns (d,) of a family that are seen, and their amplitudes (d,) at which it acts by one floor in all."""
         on = np.array([j for j in self.families[name] if self.size[j] > 0.0], int)
-        return on, 1.0 / (self.size[on] * np.sqrt(max(len(on), 1)))
+        return on, self.unit(on)
+
+    def unit(self, columns: Ints) -> Floats:
+        """Amplitudes (d,) at which columns act by one floor in equal parts, 0 where one is not seen.
+
+        The widest slab of an amplitude reaches to its bound: nuisances may hide nearly all that a column does.
+        """
+        size, bounds = self.size[columns], self.bounds
+        if not (size > 0.0).all():
+            return np.zeros(len(columns))
+        most = np.maximum(np.abs(bounds.low[columns]), np.abs(bounds.high[columns])) / WIDTHS[-1]
+        return np.asarray(np.minimum(1.0 / (size * np.sqrt(max(len(columns), 1))), most), float)
 
     def precision(self, background: Background, slab: Mapping[int, float] | None = None) -> Floats:
         """Prior precision (q,) of all columns; slab: width of the columns of causes."""
@@ -259,11 +270,7 @@ class Reduced:
     @cached_property
     def _unit(self) -> list[Floats]:
         """Amplitudes (d,) of every candidate at which it acts by one floor, its columns in equal parts."""
-        size = self.model.size
-        return [
-            1.0 / (size[own] * np.sqrt(len(own))) if (size[own] > 0.0).all() else np.zeros(len(own))
-            for own in (list(c.columns) for c in self.model.candidates)
-        ]
+        return [self.model.unit(np.array(c.columns, int)) for c in self.model.candidates]
 
     @cached_property
     def _places(self) -> int:

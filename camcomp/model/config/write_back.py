@@ -102,10 +102,10 @@ def with_causes(
         entry["effect"] = cause.effect
         if target is not None:
             entry["target"] = target
+        records = _records(cause.effect)
         for name, found in cause.parameters.items():
             low, high = found.ci95
-            sd = (high - low) / (2.0 * HALF_95)
-            entry[name] = _spread(found.value, sd) if 0.0 < sd < inf else found.value
+            entry[name] = _number(records.get(name), found.value, found.ci95)
             entry.yaml_add_eol_comment(f"95 %: {low:g} to {high:g}", name)
         for name, value in cause.settings.items():
             entry[name] = _in_a_row(value)
@@ -161,7 +161,7 @@ def _part(effects: CommentedSeq, at: int, actuators: Sequence[str]) -> None:
 
 def _change(entry: CommentedMap, cause: NamedEffect) -> None:
     """Add an estimate to an entry: sum, product for factors; shape parameters take the estimate itself."""
-    records = {each.name: each for each in getattr(shelf.load("effects", cause.effect), "PARAMETERS", ())}
+    records = _records(cause.effect)
     for name, found in cause.parameters.items():
         low, high = found.ci95
         record = records.get(name)
@@ -170,8 +170,7 @@ def _change(entry: CommentedMap, cause: NamedEffect) -> None:
         if record is not None and not record.scan and not record.either and isinstance(before, int | float):
             value = record.value(record.coordinate(float(before)) + record.coordinate(found.value))
             value = float(f"{value:.6g}")
-        sd = (high - low) / (2.0 * HALF_95)
-        entry[name] = _spread(value, sd) if 0.0 < sd < inf else value
+        entry[name] = _number(record, value, found.ci95)
         entry.yaml_add_eol_comment(f"found on top: {found.value:g}, 95 %: {low:g} to {high:g}", name)
 
 
@@ -198,7 +197,18 @@ def _in_a_row(value: Any) -> Any:
     return out
 
 
-def _spread(value: float, sd: float) -> CommentedMap:
+def _records(effect: str) -> dict[str, Any]:
+    """Parameters of an effect by name."""
+    return {each.name: each for each in getattr(shelf.load("effects", effect), "PARAMETERS", ())}
+
+
+def _number(record: Any, value: float, ci95: tuple[float, float]) -> float | CommentedMap:
+    """A value within the bounds of its parameter, with the deviation where one deviation off is allowed on either side."""
+    low, high = (-inf, inf) if record is None else (record.low, record.high)
+    value = min(max(value, low), high)
+    sd = (ci95[1] - ci95[0]) / (2.0 * HALF_95)
+    if not 0.0 < sd < inf or (value - sd < low and value + sd > high):
+        return value
     out = CommentedMap([("value", value), ("sd", float(f"{sd:.3g}"))])
     out.fa.set_flow_style()
     return out

@@ -80,6 +80,12 @@ def test_sample(sample):
     assert 3e-9 < low < 1.03e-8 < high < 2e-8  # what all poses of both campaigns say
 
 
+def test_the_written_machine_file_is_one(sample, tmp_path):
+    path = tmp_path / "ur10.yaml"
+    path.write_text(sample.machine_with_causes(str(path)))
+    assert len(load_config([path]).effects) > len(sample.result.known) - 1
+
+
 def test_residuals_are_those_of_its_poses(sample):
     left = sample.residuals
     fitted = ~np.isin(left["run"], sample.result.shrinkage.holdout)

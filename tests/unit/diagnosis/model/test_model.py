@@ -1,5 +1,6 @@
 """The model of every log against closed forms: evidence as the density of a normal distribution, search, discrepancy, folds."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -171,3 +172,17 @@ def test_verdicts(more, word):
         "confirmed": True,
     }  # fmt: skip
     assert decide(VerdictInputs(**{**own, **more})) == word
+
+
+def test_a_family_keeps_to_the_bounds_of_columns_that_nuisances_hide():
+    """The first column is nearly the constant of each group: 1 % of it is left, and the noise there is not its amplitude."""
+    m = model(np.random.default_rng(10), (0.0, 0.1, 0.0, 0.1, 0.1))
+    hidden = [replace(g, A=np.concatenate([1.0 + 0.01 * g.A[:, :, :1], g.A[:, :, 1:]], axis=2)) for g in m.groups]
+    ends = SimpleNamespace(low=-0.1, high=0.1, scale=1.0, log=False, sign=0, coordinate=lambda v: v)
+    bounds = AmplitudeBounds.of([ends] * 6, [False] * 6)
+    bounded = LinearModel(tuple(hidden), (), bounds, families={"wave": tuple(range(6))})
+    found = explain(bounded, KnownNoise())
+    assert found.background.families
+    amount, covariance = found.amplitudes()
+    assert np.abs(amount[0]) < 0.1 and covariance[0, 0] < 0.1**2
+    assert amount[1:] == pytest.approx([0.1, 0.0, 0.1, 0.1, 0.0], abs=0.02)

@@ -63,3 +63,11 @@ def test_nothing_found_changes_nothing():
 def test_a_note_stands_above_the_causes():
     lines = with_causes(TEXT, CAUSES, note="found by someone").splitlines()
     assert lines[lines.index("  # found by someone") + 1].strip() == "- effect: backlash"
+
+
+def test_a_deviation_that_is_refused_on_both_sides_is_left_out():
+    found = SimpleNamespace(value=0.012, ci95=(-200.0, 200.0))
+    out = with_causes(
+        TEXT, [SimpleNamespace(effect="backlash", target="x", parameters={"width_mm": found}, settings={})]
+    )
+    assert "width_mm: 0.012 " in out
