@@ -21,6 +21,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -137,15 +138,15 @@ def _dragged(tip: np.ndarray, reach: float = 6.0) -> np.ndarray:
     return np.tanh(np.stack(axes, 1) / (0.4 * reach))
 
 
-_SETPOINTS: dict[tuple[str, str], np.ndarray] = {}
+_SETPOINTS: WeakKeyDictionary[Recording, dict[str, np.ndarray]] = WeakKeyDictionary()
 
 
 def _setpoints(machine: Machine, recording: Recording) -> np.ndarray:
-    """Actuators (n, m) of a recording, found once."""
-    key = (machine.name, recording.name)
-    if key not in _SETPOINTS:
-        _SETPOINTS[key] = machine.inverse(recording.tip + machine.origin)
-    return _SETPOINTS[key]
+    """Actuators (n, m) of a recording, calculated once per machine; recordings of two sets may share a name."""
+    of_machines = _SETPOINTS.setdefault(recording, {})
+    if machine.name not in of_machines:
+        of_machines[machine.name] = machine.inverse(recording.tip + machine.origin)
+    return of_machines[machine.name]
 
 
 class Motion:

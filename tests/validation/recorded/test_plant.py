@@ -35,6 +35,13 @@ def test_a_perfect_machine_in_air_is_where_it_is_commanded(name):
     assert np.abs(state.drive).max() < 1e-6
 
 
+def test_recordings_of_two_sets_may_share_a_name():
+    for name in ("pockets", "fast_machine"):
+        with recording.taken_from(name):
+            state = tips("circles-blended", NOTHING)
+        assert np.abs(state.tip - state.commanded).max() < 1e-9
+
+
 def test_a_rigid_machine_stays_there_under_force():
     stiff = [Fault("link_stiffness", None, {"factor": 1e7})]
     stiff += [Fault("drive_stiffness", a, {"factor": 1e7}) for a in "xyz"]

@@ -25,7 +25,7 @@ STEP_S = 1e-3
 QUANTUM_MM = 1e-5
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Recording:
     """One program as it was run: t (n,) s, tip (n, 3) mm in the program frame, line (n,), kind (n,) of motion.
 
