@@ -1,1 +1,1 @@
-"""camcomp for programs: what `import camcomp` offers, and what every verb of the command line calls."""
+"""Python interface of camcomp: functions of `import camcomp`, which the verbs of the command line call."""

@@ -1,4 +1,4 @@
-"""Many programs at once, in parallel, here or on a cluster, resumed where an earlier batch has ended."""
+"""Compensation of many programs in parallel, on this machine or on a cluster; an interrupted batch is resumed."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from camcomp.report.outputs import findings_files
 __all__ = ["Status", "compensate_many"]
 
 SUMMARY = "camcomp-batch.json"
-INTERRUPTED = 130  # stands in the summary when a signal or a bug ended the batch
+INTERRUPTED = 130  # exit code in the summary of a batch ended by a signal or a bug
 OnStatus = Callable[[Status, int, int], Any]
 
 
@@ -40,14 +40,15 @@ def compensate_many(
     joints: bool = False, method: str | None = None, tolerance_um: float | None = None, stock: StockChoice | None = None, if_compensated: Literal["refuse", "pass"] = "refuse", sarif_file: str | None = None,
     junit_file: str | None = None, tell: Callable[[str], None] = lambda _text: None, on_status: OnStatus = lambda *_: None,
 ) -> dict[str, Any]:  # fmt: skip
-    """Corrects the programs of files, folders and patterns into a tree; the figures that DIR/camcomp-batch.json holds.
+    """Compensate the programs of files, folders and patterns into a tree, and return the figures of DIR/camcomp-batch.json.
 
-    on_status: called with what became of a program, its number and how many there are. tell: called with what is to be
-    said while a cluster is waited for. Raises what stops the whole batch; a program that fails does not.
+    on_status: called with the status of a finished program, its number and the number of programs. tell: called with
+    messages while the batch waits for a cluster. Raises errors of the whole batch; those of single programs are in its
+    figures.
     """
     config = load_config(configs)
     if config.control.dialect is None:
-        list(usable("dialects"))  # says which plug-ins are left out; workers would say it once each
+        list(usable("dialects"))  # warns about unusable plug-ins here, instead of once per worker
     plan = Plan(
         config, Path(output_dir), method or config.compensation.method,
         tolerance_um or config.compensation.tolerance_um, joints, __version__, stock, if_compensated == "pass",
@@ -86,7 +87,7 @@ def _work(
 def _note_down(
     plan: Plan, statuses: Sequence[Status], programs: Sequence[FoundProgram], stopped: int
 ) -> dict[str, Any]:
-    """Writes what became of every program so far; the figures."""
+    """Write the status of every program so far, and return the figures of the batch."""
     figures = summary(statuses, programs, stopped)
     write_all({plan.output / SUMMARY: (json.dumps(figures, indent=2) + "\n").encode()})
     return figures

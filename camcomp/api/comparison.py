@@ -1,4 +1,4 @@
-"""Two tables of one program side by side."""
+"""Comparison of two tables of one program."""
 
 from camcomp.diagnosis import compare as story
 from camcomp.diagnosis.compare import Comparison, Difference
@@ -10,9 +10,9 @@ _COLUMNS = {"s": "s_mm", "t": "t_s", "row": "row"}
 
 
 def compare(a: str, b: str, by: str | None = None) -> Comparison:
-    """How far two logs or joint tables are apart. by: align by s, t or row; None = what fits.
+    """Compare two logs or joint tables column by column. by: align by s, t or row; None: the first that both have.
 
-    Raises ConfigError CC451 where they cannot be aligned.
+    Raises ConfigError CC451 for tables that cannot be aligned.
     """
     first, second = story.read_columns(a), story.read_columns(b)
     try:

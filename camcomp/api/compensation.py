@@ -1,4 +1,4 @@
-"""Programs corrected: in memory for programs, from file to files for the command line."""
+"""Compensation of programs: in memory, or from file to files."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class CompensatedProgram:
-    """A corrected program and what is known about it. outcome: everything, as arrays."""
+    """A corrected program and its figures. outcome: all quantities as arrays."""
 
     outcome: Compensated
     machine: Job
@@ -39,12 +39,12 @@ class CompensatedProgram:
 
     @property
     def data(self) -> bytes:
-        """The corrected program, byte by byte."""
+        """The corrected program as bytes."""
         return self.outcome.written.data
 
     @property
     def text(self) -> str:
-        """The corrected program."""
+        """The corrected program as text."""
         return self.data.decode("utf-8", "surrogateescape")
 
     @cached_property
@@ -64,11 +64,11 @@ class CompensatedProgram:
 
     @property
     def failed(self) -> list[tuple[str, str]]:
-        """Rule id and text of every check that the corrected program does not pass; empty when it may run."""
+        """Rule id and text of every failed check; empty: the corrected program may run."""
         return self.outcome.failed_checks(self.machine, self.tolerance_um)
 
     def joint_file(self, name: str) -> bytes:
-        """The joint table as the file called `name` holds it: CSV, or Parquet by its suffix."""
+        """The joint table as the bytes of a file called `name`: CSV, or Parquet by its suffix."""
         return joint_bytes(self.outcome, self.machine, name)
 
     def paths_file(self) -> bytes:
@@ -76,7 +76,7 @@ class CompensatedProgram:
         return tables.paths_csv(self.outcome, story.trajectories(self.outcome, self.machine))
 
     def report(self, inputs: Sequence[Input] = ()) -> bytes:
-        """One HTML page with plots. Raises ConfigError CC216 when the plot library is not installed."""
+        """One HTML page with plots. Raises ConfigError CC216 without the plot library."""
         from camcomp.compensation.report.page import compensation_html
 
         return compensation_html(
@@ -88,12 +88,25 @@ def compensate(
     program: Program | str | Path | bytes, machine: Job, *, method: str | None = None, tolerance_um: float | None = None,
     arcs: bool | None = None, mirror: Sequence[str] = (), stock: StockChoice | None = None,
 ) -> CompensatedProgram:  # fmt: skip
-    """The program with the deflection of the machine written back into it.
+    """Compensate the deflection of the machine in a program.
 
-    method, tolerance_um, arcs: None asks the machine file. stock: where the stock comes from; None: the machine file, or
-    else the comments of the program. mirror: logs of test cuts, whose deviation is put in reverse on the
-    program in place of what the model says; each is that of the program as the ones before corrected it. Raises CheckFailed CC603 for a program that was compensated
-    before, PhysicsError where the machine cannot do what is asked, and what reading raises.
+    Args:
+        program: a program, its file, or its bytes.
+        machine: of `load_machine`.
+        method: of the correction; None: of the machine file.
+        tolerance_um: largest tip error by the model; None: of the machine file.
+        arcs: arcs come out as arcs; None: of the machine file.
+        mirror: logs of test cuts, whose measured deviation is subtracted in place of the modelled one; each log belongs to
+            the program that the logs before it correct.
+        stock: source of the stock; None: the machine file, else the comments of the program.
+
+    Returns:
+        The corrected program with its figures.
+
+    Raises:
+        CheckFailed: CC603, the program was compensated before.
+        PhysicsError: the machine cannot reach a commanded point.
+        ConfigError, ProgramError, FileError: as from `load_machine` and `read_program`.
     """
     source, settings = program_in(program, machine), machine.config.compensation
     if is_stamped(source.data):
@@ -116,11 +129,16 @@ def compensate_file(
     arcs: bool | None = None, mirror: Sequence[str] = (), dry_run: bool = False, stock: StockChoice | None = None,
     if_compensated: Literal["refuse", "pass"] = "refuse",
 ) -> Finished | None:  # fmt: skip
-    """Corrects a program file into the files that are named; long programs piece by piece. "-" is a standard stream.
+    """Compensate a program file into the named files, long programs in pieces; "-" is a standard stream.
 
-    Without any name the corrected program goes to standard output. sizes: of every output, by its name. A program that
-    was compensated before is refused, or with `if_compensated="pass"` goes to `output` as it is, and there is nothing
-    to return. Raises what `compensate` raises, FileError where nothing can be written.
+    Without any name the corrected program goes to standard output. A program that was compensated before is refused, or with
+    `if_compensated="pass"` copied unchanged to `output`; the result is then None.
+
+    Returns:
+        Figures and the size of every output by its name.
+
+    Raises:
+        FileError: an output cannot be written; and the errors of `compensate`.
     """
     from camcomp.compensation.file_to_file import Finished, Wanted, compensate_long
 
@@ -128,7 +146,7 @@ def compensate_file(
     if report:
         from camcomp.report.page import plot_library
 
-        plot_library()  # a missing library is told before the work, not after it
+        plot_library()  # a missing library raises before the work
     if not (output or joints or summary or paths or report):
         output = STANDARD
     settings, name = machine.config.compensation, display_name(program)

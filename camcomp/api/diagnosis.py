@@ -1,4 +1,4 @@
-"""Why a machine and its model differ: the result of an experiment file, and everything that is drawn from it."""
+"""Diagnosis of the differences between a machine and its model: result of an experiment file, report, machine file."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ if TYPE_CHECKING:
     from camcomp.diagnosis.law.library import LearnedLaw
 
 
-MOST_LISTED = 200_000  # characters of a next experiment's file that a page holds
+MOST_LISTED = 200_000  # characters: largest file of a next experiment on the page
 
 
 @dataclass(frozen=True, eq=False)
 class ExperimentDiagnosis:
     """The diagnosis of an experiment file. result: as `diagnose --json` writes it.
 
-    behind, opened: what it was drawn from; None for logs that have a study of their own (poses of arms, axes).
+    behind, opened: the fit and the opened experiment; None for logs without programs (poses of arms, axes).
     """
 
     experiment: str
@@ -55,7 +55,7 @@ class ExperimentDiagnosis:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What the reader should know about the logs."""
+        """Remarks on the logs."""
         return self._notes if self.opened is None else self.opened.notes
 
     @property
@@ -71,14 +71,14 @@ class ExperimentDiagnosis:
         return answer_lines(self.result)
 
     def report(self) -> bytes:
-        """One HTML page with plots. Raises ConfigError CC216 when the plot library is not installed."""
+        """One HTML page with plots. Raises ConfigError CC216 without the plot library."""
         from camcomp.diagnosis.report.views import report_of
 
         rows = self._residuals() if self.behind is None else None
         return report_of(self.experiment, self.result, self.behind, self.opened, rows, self._next_listing())
 
     def _next_listing(self) -> Listing | None:
-        """The file of the next experiment for the page; None where there is none, or it is too long for a page."""
+        """The file of the next experiment for the page; None if there is no proposal or it exceeds MOST_LISTED."""
         proposal = self.result.next_experiment
         if proposal is None:
             return None
@@ -90,7 +90,7 @@ class ExperimentDiagnosis:
         return Listing(name, text) if len(text) <= MOST_LISTED else None
 
     def machine_with_causes(self, target: str = STANDARD) -> str:
-        """Text of the machine file with the causes in it, for a file called `target`."""
+        """Text of the machine file with the causes, for a file called `target`."""
         return machine_with_causes(self.configs, self.result, target, self._learned)
 
     @property
@@ -103,7 +103,7 @@ class ExperimentDiagnosis:
         """NC program of the proposed next experiment, for a file called `target`; of an arm its poses (.json, else CSV), of an axis
         its set-points (CSV).
 
-        Raises CheckFailed CC608 where there is none.
+        Raises CheckFailed CC608 without a proposal.
         """
         proposal = self.result.next_experiment
         if proposal is not None and proposal.poses is not None:
@@ -126,15 +126,20 @@ class ExperimentDiagnosis:
 def diagnose(
     experiment: str | Path, without: Sequence[str] = (), library: str | Path | None = None
 ) -> ExperimentDiagnosis:
-    """Why the machine of an experiment file differs from its model; `without`: effects that count as unknown.
+    """Diagnose why the machine of an experiment file differs from its model.
 
-    library: a folder of laws found before, which are candidates too; a law that is found is added to it.
+    Args:
+        experiment: the experiment file.
+        without: effects that are no candidates.
+        library: folder of laws found before, which are candidates too; a new law is added to it.
 
-    Raises ConfigError, ProgramError, FileError, PhysicsError.
+    Raises:
+        ConfigError, ProgramError, FileError: an input cannot be used.
+        PhysicsError: a pose of the machine is impossible.
     """
     from threadpoolctl import threadpool_limits
 
-    # numpy is there already in a user's Python: threads of small matrices wait for each other longer than they compute
+    # threads of numpy slow small matrices down; in a user's process they are limited here, because numpy is loaded already
     with threadpool_limits(limits=int(os.environ.get("OPENBLAS_NUM_THREADS", "1")), user_api="blas"):
         return _diagnosed(experiment, without, library)
 
@@ -144,7 +149,7 @@ def _diagnosed(experiment: str | Path, without: Sequence[str], library: str | Pa
     from camcomp.model.config.load import load_config
 
     study = None
-    if all(run.program is None for run in load_experiment(experiment).runs):  # else their import would be for nothing
+    if all(run.program is None for run in load_experiment(experiment).runs):  # slow import
         from camcomp.diagnosis.studies import study_of
 
         study = study_of(experiment, without)
@@ -175,7 +180,7 @@ def _diagnosed(experiment: str | Path, without: Sequence[str], library: str | Pa
 def machine_with_causes(
     configs: Sequence[str], result: DiagnosisResult, target: str, learned: Sequence[LearnedLaw] = ()
 ) -> str:
-    """Text of the machine file of `configs` with the causes in it, for a file called `target`; learned: laws by name."""
+    """Text of the machine file of `configs` with the causes, for a file called `target`; learned: laws by name."""
     before = {each.name: each for each in learned}
     laws = [] if result.law is None else [each.model_dump(exclude_none=True) for each in result.law.parts]
     for cause in result.known:
@@ -194,7 +199,7 @@ def machine_with_causes(
 
 
 def why_none(verdict: str, *, logs_only: bool = False) -> str:
-    """Why a diagnosis proposes nothing; logs_only: of logs that have a study of their own."""
+    """Reason for a diagnosis without a proposed experiment; logs_only: a diagnosis of logs without programs."""
     if verdict == "none":
         return "machine and model agree as far as these runs can tell, so no next experiment is proposed"
     if verdict == "identified":
@@ -205,7 +210,7 @@ def why_none(verdict: str, *, logs_only: bool = False) -> str:
 
 
 def next_program(done: Any, opened: Any) -> str:
-    """Text of the proposed program of a diagnosis. Raises CheckFailed CC608 where there is none."""
+    """Text of the proposed program of a diagnosis. Raises CheckFailed CC608 without a proposal."""
     if done is None or opened is None or done.proposal is None:
         raise CheckFailed("CC608", "what is proposed is no motion of the machine: next_experiment says what to measure")
     from camcomp.diagnosis.next_experiment.ready_program import dialect_of_runs, ready_program

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def described_effects(library: str | None = None) -> list[dict[str, Any]]:
-    """Every effect of the shelf, those of entry points included, ready for JSON; library: a folder of laws found before."""
+    """All effects of the shelf and of entry points, in JSON types; library: a folder of laws found before."""
     out: list[dict[str, Any]] = []
     for name, effect in shelf.usable("effects"):
         if not effect.PARAMETERS:

@@ -1,4 +1,4 @@
-"""The history of a machine: diagnoses that are kept, and what drifts in them."""
+"""History of a machine: stored diagnoses, and the drift of parameters over them."""
 
 from datetime import date
 from pathlib import Path
@@ -12,7 +12,7 @@ __all__ = ["Chronicle", "ParameterCourse", "history", "keep_diagnosis"]
 
 
 def keep_diagnosis(folder: str, result: str, day: date) -> str:
-    """Keeps the result file of a diagnosis whose runs were measured on `day`; the path of what was written.
+    """Store the result file of a diagnosis whose runs were measured on `day`, and return the path of the copy.
 
     Raises ConfigError CC454, CC455, FileError.
     """
@@ -26,9 +26,10 @@ def keep_diagnosis(folder: str, result: str, day: date) -> str:
 
 
 def history(folder: str, tolerance_um: float = 10.0) -> Chronicle:
-    """What the kept diagnoses of a machine say together. tolerance_um: how far the tip may drift before it is measured again.
+    """Course of all parameters over the stored diagnoses of a machine.
 
-    Raises ConfigError CC454 for a file that is no kept diagnosis, FileError.
+    tolerance_um: drift of the tip that makes a new measurement due, µm. Raises ConfigError CC454 for a file that is no stored
+    diagnosis, FileError.
     """
     if not Path(folder).is_dir():
         text = (

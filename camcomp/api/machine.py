@@ -1,4 +1,4 @@
-"""A machine from its files, and programs as its control reads them."""
+"""A machine from its files, and programs as its controller reads them."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ __all__ = ["Job", "Program", "StockChoice", "canonical_lines", "load_machine", "
 
 
 def load_machine(*files: str | Path) -> Job:
-    """The machine that YAML files make together, later ones over earlier ones key by key.
+    """Load a machine from YAML files; later files override earlier ones key by key.
 
-    Its parts are worked out when they are asked for: `.config`, `.machine`, `.frame`. Raises ConfigError, FileError.
+    Its parts `.config`, `.machine`, `.frame` are computed on access. Raises ConfigError, FileError.
     """
     return Job(load_config(files))
 
 
 def read_program(program: str | Path | bytes, machine: Job | None = None) -> Program:
-    """An NC program from its file or its bytes, read as the control of `machine` does, or as controls do by default.
+    """Read an NC program from its file or its bytes as the controller of `machine` does, or with default settings.
 
     Its motions are the arrays of `.path` (mm, program frame of G54). Raises FileError, ProgramError.
     """
@@ -35,10 +35,10 @@ def read_program(program: str | Path | bytes, machine: Job | None = None) -> Pro
 
 
 def program_in(program: Program | str | Path | bytes, machine: Job) -> Program:
-    """A program that is one already, or is read."""
+    """`program` itself if it is a Program, else the program read from its file or bytes."""
     return program if isinstance(program, Program) else read_program(program, machine)
 
 
 def canonical_lines(program: Program) -> Iterable[str]:
-    """What a program was understood to do, one line per motion."""
+    """Motions of a program as text, one line per motion."""
     return canonical(program.path)

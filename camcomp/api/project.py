@@ -1,4 +1,4 @@
-"""New projects: a machine file to start from, a program, a schema for the editor; and the tutorial with its samples."""
+"""New projects: a machine file, a program, a schema for the editor; and the tutorial with its samples."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ _DEFAULT = "orthoglide"
 
 @dataclass(frozen=True)
 class ShippedMachine:
-    """A machine file that camcomp brings along. title: the robot's name; source: where its numbers come from."""
+    """A machine file shipped with camcomp. title: name of the robot; source: of its numbers."""
 
     name: str
     title: str
@@ -50,7 +50,7 @@ class ShippedMachine:
 
 
 def machines() -> list[ShippedMachine]:
-    """Every machine that a project can start from."""
+    """All machine files shipped with camcomp."""
     out = []
     for path in sorted(shipped("config").glob("*.yaml")):
         tree, _ = read_tree(path.read_bytes(), path.name)
@@ -64,11 +64,18 @@ def start_project(
     directory: Path, *, machine: str | None = None, urdf: str | None = None, tip: str | None = None,
     base: str | None = None,
 ) -> tuple[list[Path], list[str]]:  # fmt: skip
-    """Writes a project into a folder; its files, and notes on what is still to be filled in.
+    """Write a project into a folder, and return its files and notes on values to be filled in.
 
-    machine: name of a shipped one. urdf: arm whose geometry and masses the machine file takes, tip: its link that carries
-    the tool, base: its link that stands still. Raises FileError CC501 where a file is there already, ConfigError CC219 for a machine that is not shipped,
-    CC240 for a URDF that cannot be read or is no machine.
+    Args:
+        directory: of the project.
+        machine: name of a shipped machine.
+        urdf: file of an arm, for geometry and masses of the machine file.
+        tip: link of the URDF that carries the tool.
+        base: fixed link of the URDF.
+
+    Raises:
+        FileError: CC501, a file exists already.
+        ConfigError: CC219, unknown machine; CC240, the URDF is unreadable or no machine.
     """
     notes = list[str]()
     if urdf is not None:
@@ -94,7 +101,7 @@ def start_project(
 
 
 def write_tutorial(directory: Path) -> list[Path]:
-    """Writes samples, machine files and documentation into a folder, where its commands run. Raises FileError CC501."""
+    """Write samples, machine files and documentation into a folder, in which their commands run. Raises FileError CC501."""
     outputs: dict[Path, bytes] = {}
     for folder in ("config", "docs", "samples"):
         root = shipped(folder)
@@ -121,7 +128,7 @@ def _machine_text(name: str) -> bytes:
 
 
 def _write_new(directory: Path, outputs: Mapping[Path, bytes]) -> None:
-    """Writes files that are not there yet, and the folders for them. Raises FileError CC501."""
+    """Write new files and their folders. Raises FileError CC501 for an existing file."""
     for path in outputs:
         if path.exists():
             raise FileError("CC501", f"{path} is there already", hint="choose another folder")

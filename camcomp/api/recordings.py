@@ -1,4 +1,4 @@
-"""Recordings of others turned into logs and an experiment file."""
+"""Import of recordings of other systems as logs and an experiment file."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ def import_recordings(
     by: str | None = None, programs: Sequence[str] = (), cutting: bool = False, one_clamping: bool = False,
     holdout: Sequence[str] = (), rows: int | None = None,
 ) -> tuple[list[Recording], Path]:  # fmt: skip
-    """Writes a log for every file (or FILE+FILE) and an experiment file; what was read, run by run, and that file.
+    """Write a log for every file (or FILE+FILE) and an experiment file; return the recordings and the experiment file.
 
-    The options are those of `camcomp import`. Raises ConfigError where a recording cannot be understood, FileError.
+    The options are those of `camcomp import`. Raises ConfigError for an unusable recording, FileError.
     """
     actuators = load_config(configs).robot.actuators
     groups = [_files_of(each) for each in files]
@@ -56,7 +56,7 @@ def _files_of(word: str) -> list[str]:
 
 
 def _parts(group: Sequence[str], names: Sequence[Sequence[str]], period_s: float | None) -> list[SampledColumns]:
-    """What the files of one run hold; names: of columns of tables without header, by file, the last for all others."""
+    """Contents of the files of one run; names: of columns of tables without header, by file, the last for all others."""
     parts = list[SampledColumns]()
     for k, file in enumerate(group):
         own = names[min(k, len(names) - 1)] if names else ()
@@ -66,7 +66,7 @@ def _parts(group: Sequence[str], names: Sequence[Sequence[str]], period_s: float
 
 
 def _programs(words: Sequence[str], runs: Sequence[str]) -> dict[str, str]:
-    """Program by run. Raises FileError CC500 for one that is not there."""
+    """Program by run. Raises FileError CC500 for a missing file."""
     out: dict[str, str] = {}
     for word in words:
         run, mark, file = word.partition("=")

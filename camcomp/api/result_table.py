@@ -1,4 +1,4 @@
-"""Tables of results: columns as NumPy arrays, and from there to CSV, Parquet and pandas."""
+"""Tables of results: columns as NumPy arrays, with conversion to CSV, Parquet and pandas."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ if TYPE_CHECKING:
     import pandas
 
 PARQUET = ".parquet"
-DECIMALS, DECIMALS_RAD = 6, 9  # as joint tables and logs have them
+DECIMALS, DECIMALS_RAD = 6, 9  # of joint tables and logs
 FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r")  # of cells that spreadsheets compute
 COUNTS = ("line", "row")
 _RULES = TableRules(table="CC450", column="CC450", cell="CC450")
 
 
 class ResultTable(Mapping[str, NDArray[Any]]):
-    """Columns by name in their order, all (n,): numbers with NaN where there is none, or text."""
+    """Columns by name in their order, all (n,): numbers with NaN for missing ones, or text."""
 
     def __init__(self, columns: Mapping[str, NDArray[Any]]) -> None:
-        """Raises ValueError where columns differ in length."""
+        """Raise ValueError for columns of different lengths."""
         self._columns = {name: np.asarray(values) for name, values in columns.items()}
         lengths = {len(values) for values in self._columns.values()}
         if len(lengths) > 1:
@@ -37,7 +37,7 @@ class ResultTable(Mapping[str, NDArray[Any]]):
 
     @classmethod
     def of_csv(cls, data: bytes) -> ResultTable:
-        """The table that `to_csv` and the commands write: numbers, whole columns of text where they are none.
+        """Read a table that `to_csv` or a command has written; a column with other texts than numbers is text.
 
         Raises ConfigError CC450.
         """
@@ -62,9 +62,9 @@ class ResultTable(Mapping[str, NDArray[Any]]):
         return np.column_stack([np.asarray(self[name], float) for name in names])
 
     def to_csv(self) -> bytes:
-        """One row of names, then the numbers with six decimals, angles with nine; an empty cell where there is none.
+        """CSV with a row of names, then numbers with six decimals, angles with nine; missing numbers are empty cells.
 
-        Texts that spreadsheets would take for formulas have an apostrophe in front.
+        Texts that a spreadsheet would read as formulas start with an apostrophe.
         """
         out = io.StringIO()
         write = csv.writer(out, lineterminator="\n")
@@ -73,7 +73,7 @@ class ResultTable(Mapping[str, NDArray[Any]]):
         return out.getvalue().encode("utf-8", "backslashreplace")
 
     def to_parquet(self) -> bytes:
-        """As a Parquet file in full precision. Raises ConfigError CC216 when pyarrow is not installed."""
+        """Parquet file in full precision. Raises ConfigError CC216 without pyarrow."""
         from camcomp.compensation.report.parquet import library
 
         arrow, parquet = library()
@@ -82,11 +82,11 @@ class ResultTable(Mapping[str, NDArray[Any]]):
         return file.getvalue()
 
     def to_file(self, name: str) -> bytes:
-        """What the file called `name` is to hold: Parquet by its suffix, else CSV."""
+        """Bytes of a file called `name`: Parquet by its suffix, else CSV."""
         return self.to_parquet() if name.endswith(PARQUET) else self.to_csv()
 
     def to_pandas(self) -> pandas.DataFrame:
-        """As a data frame. Raises ConfigError CC216 when pandas is not installed."""
+        """Data frame of pandas. Raises ConfigError CC216 without pandas."""
         try:
             import pandas
         except ImportError as error:

@@ -1,4 +1,4 @@
-"""Set-points corrected one by one: for a control of one's own, or line by line between two streams."""
+"""Compensation of single set-points: one by one for the user's own controller, or line by line between two streams."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ __all__ = ["Stream", "Tally", "answer_lines"]
 def answer_lines(
     machine: Job, source: BinaryIO, sink: BinaryIO, tally: Tally, *, columns: str | None = None, as_json: bool = False
 ) -> None:
-    """Answers every line of `source` with one line in `sink` until it ends; `tally` counts them.
+    """Answer every line of `source` with one line in `sink` until it ends; `tally` counts them.
 
-    columns: names in the order of CSV lines without a header. Raises ConfigError CC270 for names that cannot be used.
+    columns: names in the order of CSV lines without a header. Raises ConfigError CC270 for unusable names.
     """
     reader = Reader(columns)
     names = [name for trio in zip(*actuator_columns(machine), strict=True) for name in trio]

@@ -1,4 +1,4 @@
-"""The YAML files from outside: what is in force in them, and the schemas of what is read and written."""
+"""Values in force in YAML files, screw files for LinuxCNC, and schemas of inputs and results."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from camcomp.model.screw_map import screw_map
 
 
 def values(configs: Sequence[str]) -> list[tuple[str, str, str]]:
-    """(key, value, place) of everything in force in a machine's files, defaults included."""
+    """(key, value, location) of all values in force in a machine's files, defaults included."""
     return list(values_in_force(load_config(configs), folders=True))
 
 
 def screw_file(machine: Job, actuator: str, start: float, end: float, step: float, comp_type: int = 0) -> bytes:
-    """LinuxCNC's screw file (COMP_FILE) that makes up for the machine's effects in one drive, mm; comp_type as COMP_FILE_TYPE.
+    """LinuxCNC's screw file (COMP_FILE) that compensates for the effects in one drive, mm; comp_type as COMP_FILE_TYPE.
 
     Raises ConfigError CC205 for an actuator that is no slide, or a travel without rows.
     """

@@ -1,4 +1,4 @@
-"""Logs that the modelled machine would write."""
+"""Simulation: log and machined surface of the modelled machine."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from camcomp.report.inputs import Input
 
 @dataclass(frozen=True, eq=False)
 class SimulatedLog:
-    """A log without noise. outcome: its signals as arrays."""
+    """A simulated log without noise. outcome: its signals as arrays."""
 
     outcome: Simulated
 
     @property
     def warnings(self) -> list[str]:
-        """What the reader of the log should know."""
+        """Warnings about the log."""
         return self.outcome.warnings
 
     @cached_property
@@ -35,7 +35,7 @@ class SimulatedLog:
         return ResultTable.of_csv(self.to_csv())
 
     def to_csv(self) -> bytes:
-        """The log as a file."""
+        """The log as the bytes of a CSV file."""
         return story.log_table(self.outcome).encode()
 
 
@@ -43,11 +43,14 @@ def simulate(
     program: Program | str | Path | bytes, machine: Job, step_s: float = 0.02, *, cutting: bool = True, started_s: float = 0.0,
     stock: StockChoice | None = None,
 ) -> SimulatedLog:  # fmt: skip
-    """What the machine with its `effects:` would log in rows every step_s seconds.
+    """Simulate the log of the machine with its `effects:`, with a row every step_s seconds.
 
-    started_s: on the common clock, for effects of warming up. stock: where the stock comes from; None: the machine file,
-    or else the comments of the program. Raises what reading raises, PhysicsError where the machine
-    cannot be.
+    started_s: on the common clock, for effects of warming up. stock: source of the stock; None: the machine file, else the
+    comments of the program.
+
+    Raises:
+        PhysicsError: a pose of the machine is impossible.
+        ConfigError, ProgramError, FileError: as from `load_machine` and `read_program`.
     """
     source = program_in(program, machine)
     refuse_orientation(source, "the simulation")
@@ -59,7 +62,7 @@ def simulate(
 
 
 def simulate_cut(program: Program | str | Path | bytes, machine: Job, *, stock: StockChoice | None = None) -> Surface:
-    """What the loaded machine leaves of the stock of its machine file. Raises as `simulate`, ConfigError CC298."""
+    """Surface that the loaded machine cuts from the stock. Raises as `simulate`, ConfigError CC298."""
     source = program_in(program, machine)
     refuse_orientation(source, "the simulation")
     return cut_surface(job_of_program(machine, source.data, source.name, stock), source)
@@ -72,9 +75,9 @@ def walls_report(
     *,
     stock: StockChoice | None = None,
 ) -> bytes:
-    """One HTML page with the walls that the loaded machine leaves, where they are off and by how much.
+    """One HTML page with the walls that the loaded machine cuts, and their deviations.
 
-    Raises as `simulate_cut`, ConfigError CC216 when the plot library is not installed.
+    Raises as `simulate_cut`, ConfigError CC216 without the plot library.
     """
     from camcomp.compensation.report.wall_page import walls_html
 

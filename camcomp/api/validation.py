@@ -1,4 +1,4 @@
-"""YAML files and NC programs checked for what a run would stumble over, and for what is hardly meant."""
+"""Validation of YAML files and NC programs: all errors of a later run, and warnings about implausible values."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ T = TypeVar("T")
 
 
 def check_file(file: str, configs: Sequence[str] = ()) -> tuple[str, list[Doubt]]:
-    """What a file is, and warnings about it; configs: the machine whose control reads programs.
+    """Kind of a file, and warnings about it; configs: the machine whose controller reads programs.
 
-    Raises CamcompError with all that is wrong with it.
+    Raises CamcompError with all errors of the file.
     """
     if Path(file).suffix.lower() not in (".yaml", ".yml"):
         return _check_program(file, configs)
@@ -41,7 +41,7 @@ def check_file(file: str, configs: Sequence[str] = ()) -> tuple[str, list[Doubt]
 
 
 def _build(config: Config) -> None:
-    """The machine of a file, with its effects. Raises ConfigError where it cannot be built."""
+    """Build the machine of a file with its effects. Raises ConfigError."""
     from camcomp.model.job import Job
 
     job = Job(config)
@@ -49,7 +49,7 @@ def _build(config: Config) -> None:
 
 
 def _build_robot(config: Config) -> None:
-    """The chains of a machine with its effects: all that logs without programs need. Raises ConfigError."""
+    """Build the chains of a machine with its effects, which suffices for logs without programs. Raises ConfigError."""
     from camcomp.model import signal_path
     from camcomp.model.job import Job
     from camcomp.model.statics.build import build_robot
@@ -59,7 +59,7 @@ def _build_robot(config: Config) -> None:
 
 
 def _check_program(file: str, configs: Sequence[str]) -> tuple[str, list[Doubt]]:
-    from camcomp.model.control import open_program  # NumPy and the reader: only when there is a program
+    from camcomp.model.control import open_program  # slow import, needed for programs only
 
     program = open_program(file, load_config(configs) if configs else None)
     warnings = [Doubt(each, None) for each in program.warnings]
@@ -85,7 +85,7 @@ def _check_experiment(file: str) -> tuple[str, list[Doubt]]:
 
 
 def _collect(errors: list[CamcompError], read: Callable[[], T]) -> T | None:
-    """What `read` gives, or None and one more of `errors`."""
+    """Result of `read`, or None with its error appended to `errors`."""
     try:
         return read()
     except CamcompError as error:

@@ -1,4 +1,4 @@
-"""Corrected programs put through the model again, from their text alone."""
+"""Verification of corrected programs by the model, from their text alone."""
 
 from __future__ import annotations
 
@@ -18,9 +18,10 @@ def verify(
     machine: Job,
     stock: StockChoice | None = None,
 ) -> Verified:
-    """What is left of the error: `.residual` (k,) mm at the points looked at, `.figures(tolerance_um)` as JSON has them.
+    """Residual error of a corrected program: `.residual` (k,) mm at the checked points, `.figures(tolerance_um)` for JSON.
 
-    stock: where the stock comes from; None: the machine file, or else the comments of the original. Raises CheckFailed CC604 when `corrected` is not one of `original`.
+    stock: source of the stock; None: the machine file, else the comments of the original. Raises CheckFailed CC604 if
+    `corrected` is no correction of `original`.
     """
     source = program_in(original, machine)
     machine = job_of_program(machine, source.data, source.name, stock)

@@ -1,1 +1,1 @@
-"""One file per control language, each with its DIALECT; what all dialects share lives in gcode."""
+"""One file per dialect of NC programs, each with its DIALECT; the common reader is camcomp/gcode."""

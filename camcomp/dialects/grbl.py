@@ -1,4 +1,4 @@
-"""Grbl 1.1 and its kin: RS274 without expressions, cycles, tool table and turns."""
+"""Grbl 1.1 and related firmware: RS274 without expressions, cycles, tool table and turns of arcs."""
 
 from camcomp.gcode.dialect import Dialect
 

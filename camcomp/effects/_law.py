@@ -12,7 +12,7 @@ from camcomp.model.law.law import AT_DRIVES, EmpiricalLaw
 
 
 def shifted(values: Floats, motion: Motion, which: Floats, law: EmpiricalLaw) -> Floats:
-    """Values (n, m) of actuators with the law added to those aimed at; nothing is changed in place."""
+    """Copy of values (n, m) of actuators with the law added at its targets."""
     out = values.copy()
     for j in np.flatnonzero(which):
         out[:, j] += law.values(DriveRows(motion, int(j)))

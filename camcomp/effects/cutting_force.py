@@ -1,4 +1,4 @@
-"""The cutting force is a constant factor of what the force model says."""
+"""The cutting force is a constant factor times the modelled one."""
 
 from collections.abc import Mapping
 

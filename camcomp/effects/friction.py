@@ -63,7 +63,7 @@ PARAMETERS = (FITTED[0], *_MORE, *FITTED[1:], *ROTARY[:2], *_MORE_ROTARY)
 
 
 def _pull(motion: Motion, which: Floats, p: Mapping[str, float]) -> Floats | None:
-    """Force (n, m) of the guides against the travel, N or Nmm, of the actuators aimed at; None where there is none."""
+    """Friction force (n, m) of the guides of the target actuators, N or Nmm; None at nominal parameters."""
     torque, breakaway = p.get("force_Nmm", 0.0), p.get("stribeck_Nmm", 0.0)
     hinge = torque != 0.0 or breakaway != 0.0
     force, stribeck = p.get("force_N", 0.0) + torque, p.get("stribeck_N", 0.0) + breakaway

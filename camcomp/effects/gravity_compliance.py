@@ -21,7 +21,7 @@ PARAMETERS = (
 
 
 def on_robot(robot: Robot, actuators: tuple[str, ...], p: Mapping[str, float]) -> Robot:
-    """Copy of the arm with softer hinges; slides are left as they are."""
+    """Copy of the arm with softer hinges and unchanged slides."""
     more = p["compliance_rad_per_Nmm"]
     if more == 0.0:
         return robot

@@ -48,7 +48,7 @@ _Interval = Annotated[list[_Angle], Field(min_length=2, max_length=2), AfterVali
 
 
 class Params(Spec):
-    """What a number cannot say of a curve."""
+    """Measured deviations of a curve, for reports."""
 
     sine: list[float] = Field([], max_length=500, description="of 1, 2, ... waves per turn, over amplitude_rad")
     cosine: list[float] = Field([], max_length=500, description="of 1, 2, ... waves per turn, over amplitude_rad")

@@ -36,7 +36,7 @@ FITTED = (
 
 
 def public(fitted: Mapping[str, float]) -> dict[str, float]:
-    """Period and damping from what is fitted."""
+    """Period and damping from the fitted parameters."""
     period = 2.0 * np.pi * float(np.sqrt(max(fitted["by_acceleration_ms2"], 0.0)))
     return {"period_ms": period, "damping": fitted["damping"]}
 

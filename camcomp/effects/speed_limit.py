@@ -35,7 +35,7 @@ ROTARY = (
 
 
 def first_guess(runs: Sequence[tuple[Floats, Floats, Floats]]) -> float:
-    """The largest speed, per s, that explains most of how encoders follow their set-points; no limit where none explains any.
+    """The largest speed, per s, that best explains the following error of encoders; NO_LIMIT if every limit is worse.
 
     runs: time (n,) s, set-points (n,), encoders (n,) of one actuator.
     """

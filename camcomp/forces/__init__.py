@@ -1,1 +1,1 @@
-"""One file per cutting force model, each with PARAMS and a function `force`."""
+"""One file per cutting force model, each with a class Params and a function `force`."""

@@ -22,7 +22,7 @@ RAKE_LOSS_PER_DEG = 0.01
 
 
 class Params(Spec):
-    """Specific cutting force of the material, and what the user knows of the directions."""
+    """Specific cutting force of the material, and ratios of the force components."""
 
     kc11_N_per_mm2: float = Field(gt=0, description="specific cutting force at a chip of 1 mm x 1 mm")
     mc: float = Field(ge=0, lt=1, description="exponent of the chip thickness")
@@ -44,7 +44,7 @@ def force(cut: Cut, params: Params) -> Floats:
     chip, sense = feed_per_tooth(cut), clockwise(cut, params.spindle)
     bites = bites_of(cut, params.milling, sense)
     ratios = np.stack(slanted(params.radial_ratio, params.axial_ratio, bites.rise, bites.run))
-    # On an edge that slants the chip is thinner by `rise`, and longer.
+    # On a slanted edge the chip is thinner by `rise`, and longer.
     thin = kc11 * bites.rise**-params.mc
     mean = power_law(chip[bites.place], bites.height, cut.teeth or 0, bites.start, bites.stop, thin, params.mc, ratios)
     return to_path(summed(mean, bites.place, len(cut)), sense)

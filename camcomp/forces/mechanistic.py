@@ -41,7 +41,7 @@ def force(cut: Cut, params: Params) -> Floats:
     cutting = np.stack(
         [params.Ktc_N_per_mm2 * np.ones_like(rise), *slanted(params.Krc_N_per_mm2, params.Kac_N_per_mm2, rise, run)]
     )
-    # An edge that slants is longer than the height on which it cuts.
+    # A slanted edge is longer than the height on which it cuts.
     edge = np.stack(
         [params.Kte_N_per_mm * np.ones_like(rise), *slanted(params.Kre_N_per_mm, params.Kae_N_per_mm, rise, run)]
     )

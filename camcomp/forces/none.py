@@ -1,4 +1,4 @@
-"""No cutting force: the machine bends under gravity and its own errors only. The smallest force model."""
+"""No cutting force: the machine deflects under gravity and its own errors only. The smallest force model."""
 
 import numpy as np
 

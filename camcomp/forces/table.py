@@ -15,19 +15,19 @@ from camcomp.model.cutting.frame import to_components
 
 SOURCES = "The user's own measurement; the table is interpolated linearly along the path."
 
-# The table says itself where the tool cuts, plunges included.
+# The table determines where the tool cuts, plunges included.
 PLUNGES = True
 
 
 class Params(Spec):
-    """Where the table is."""
+    """File of the table and kind of measurement."""
 
     file: str = Field(description="CSV file; a relative path counts from the folder of the config file")
     on_workpiece: bool = Field(False, description="true when a dynamometer under the work measured; all signs change")
 
 
 def check(params: Params) -> None:
-    """Raise what `force` would raise for the table itself."""
+    """Raise the errors of `force` that concern the table itself."""
     _table(params.file)
 
 

@@ -1,3 +1,1 @@
-"""NC text to tool path and back, byte for byte where nothing changes; dialect-independent reading and rewriting
-live here, no machine does.
-"""
+"""Reading of NC programs to tool paths and rewriting of their text, for all dialects; unchanged lines keep their bytes."""

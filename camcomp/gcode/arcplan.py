@@ -1,7 +1,7 @@
-"""How an arc is written so that the control, which sees only rounded words, makes the arc that was meant.
+"""Blocks for an arc that give the intended arc although their words are rounded.
 
-A block says where an arc ends, not how far it turns. When rounding lets start and end coincide, a tiny arc would
-become a full circle; when it separates them, a full circle would become a tiny arc. Both are written otherwise here.
+A block states the end of an arc, not its sweep. Where rounding makes start and end coincide, a tiny arc would become a full
+circle; where it separates them, a full circle would become a tiny arc. Both are divided or replaced by lines here.
 """
 
 import math
@@ -16,7 +16,7 @@ Point = list[float]
 
 
 class Move(NamedTuple):
-    """One block to be written; lengths in mm, program frame."""
+    """One block of the output; lengths in mm, program frame."""
 
     kind: int
     end: Point
@@ -38,10 +38,10 @@ def plan(
     unit: float = 1.0,
     turns_allowed: bool = True,
 ) -> list[Move]:
-    """Blocks for an arc from `start` to `end`, the points where its words, as they are rounded, begin and lead.
+    """Blocks for an arc from `start` to `end`, the points of its rounded words.
 
-    One block where it says what is meant, else several arcs of at most half a turn, or a line where the arc is not
-    longer than a few steps of the resolution.
+    One block if it is unambiguous, else several arcs of at most half a turn, or a line for an arc of a few steps of the
+    resolution.
     """
     u, v, _ = PLANES[plane]
     radius = math.hypot(start[u] - move.centre[u], start[v] - move.centre[v])
@@ -49,13 +49,13 @@ def plan(
     s, e, c = (start[u], start[v]), (end[u], end[v]), (move.centre[u], move.centre[v])
     slack = 8.0 * resolution
     if _uneven(s, e, c, unit):
-        # The tool does not start where the arc needs it; short lines lead from one radius to the other.
+        # The tool does not start on the arc; short lines connect the two radii.
         short = divide(start, move, plane, math.ceil(abs(move.angle) / _CHORD))
         return [Move(LINE, each.end, [math.nan] * 3, 0.0) for each in short]
     if radius > slack and (turns == 1 or turns_allowed) and math.dist(e, c) > slack:
         seen = sweep(s, e, c, move.angle > 0.0, turns)
         same = math.dist(s, e) <= SAME_POINT
-        # Words that differ by less than the control's own arithmetic are no safe way to say "full circle".
+        # Words that differ by less than the controller's arithmetic do not define a full circle safely.
         near = not same and math.dist(s, e) < 0.5 * resolution
         if abs(seen - move.angle) * radius <= slack and not near:
             return [move]
@@ -72,7 +72,7 @@ def _uneven(s: tuple[float, float], e: tuple[float, float], c: tuple[float, floa
 
 
 def divide(start: Point, move: Move, plane: int, pieces: int) -> list[Move]:
-    """The arc in equal parts; radius and height go linearly from start to end."""
+    """Divide an arc into equal parts; radius and height change linearly from start to end."""
     u, v, w = PLANES[plane]
     c = (move.centre[u], move.centre[v])
     first = math.hypot(start[u] - c[0], start[v] - c[1])

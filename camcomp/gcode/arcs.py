@@ -9,7 +9,7 @@ import math
 # Indices of u, v and of the axis among X, Y, Z.
 PLANES: dict[int, tuple[int, int, int]] = {17: (0, 1, 2), 18: (2, 0, 1), 19: (1, 2, 0)}
 
-# Limits within which LinuxCNC takes the two radii of an I/J/K arc as equal, and the end of an R arc as reachable,
+# Tolerances of LinuxCNC for the two radii of an I/J/K arc, and for the end of an R arc,
 # in programmed units; measured on its stand-alone interpreter, for (mm, inch).
 SPIRAL_MM, SPIRAL_INCH = 2.0e-2 * math.sqrt(2.0), 2.0e-3 * math.sqrt(2.0)
 SPIRAL_RELATIVE = 1.0e-3
@@ -19,7 +19,7 @@ SAME_POINT = 1.0e-9
 
 
 class ArcError(Exception):
-    """The words give no arc; rule id and message for the reader, which knows the place."""
+    """The words define no arc; rule id and message for the reader, which adds the location."""
 
     def __init__(self, rule: str, message: str) -> None:
         super().__init__(message)
@@ -30,7 +30,7 @@ class ArcError(Exception):
 def centre_of_radius(
     start: tuple[float, float], end: tuple[float, float], radius: float, ccw: bool, inch: bool = False
 ) -> tuple[float, float]:
-    """Centre of the arc of given radius; a negative radius asks for the arc longer than a half circle."""
+    """Centre of the arc of given radius; a negative radius selects the arc longer than a half circle."""
     u, v = end[0] - start[0], end[1] - start[1]
     chord = math.hypot(u, v)
     size = abs(radius)
@@ -54,7 +54,7 @@ def centre_of_radius(
 def check_radii(
     start: tuple[float, float], end: tuple[float, float], centre: tuple[float, float], inch: bool = False
 ) -> None:
-    """Raise ArcError when start and end are not on one circle about the centre, as far as a control looks."""
+    """Raise ArcError if start and end are not on one circle about the centre within a controller's tolerance."""
     first = math.hypot(start[0] - centre[0], start[1] - centre[1])
     last = math.hypot(end[0] - centre[0], end[1] - centre[1])
     limit = SPIRAL_INCH if inch else SPIRAL_MM

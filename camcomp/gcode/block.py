@@ -1,4 +1,4 @@
-"""The words of one line, sorted by what they do, each checked against the others."""
+"""Words of one line sorted by function, with checks for contradictions."""
 
 import math
 from typing import NoReturn
@@ -16,7 +16,7 @@ from camcomp.ground.errors import ProgramError
 
 
 class Block:
-    """The words of one line, sorted by what they do."""
+    """Words of one line, sorted by function."""
 
     __slots__ = ("axes", "column", "g", "groups", "m", "row", "used", "words")
 
@@ -31,12 +31,12 @@ class Block:
         self.column = 0
 
     def code(self, group: int) -> int | None:
-        """Code of a modal group that stands in this block."""
+        """Code of a modal group in this block, or None."""
         found = self.groups.get(group)
         return found[0] if found else None
 
     def number(self, letter: str) -> float | None:
-        """Value of a word, which thereby counts as used; None when it is not there."""
+        """Value of a word, marked as used; None for a missing word."""
         word = self.words.get(letter)
         if word is None:
             return None
@@ -45,9 +45,9 @@ class Block:
 
 
 class BlockReader:
-    """Makes blocks of words; holds what all of the interpreter shares, and says what a flow of lines may ask of it."""
+    """Builds blocks from words; shared state of the interpreter, and its interface for the flow of lines."""
 
-    straight = True  # no loops, subprograms, parameters: each line was executed at most once, as it stands
+    straight = True  # no loops, subprograms, parameters: each line was executed at most once, unchanged
 
     def __init__(self, text: Text, setup: Setup, dialect: Dialect) -> None:
         self.text = text
@@ -121,7 +121,7 @@ class BlockReader:
             known = f"{self.dialect.title} as camcomp knows it" if code in self.dialect.without else "camcomp"
             self.refuse("CC106", f"{named(code_name(code))} is not a code that {known} has", word)
         if group == 1 and group in block.groups and 800 in (code, block.groups[1][0]):
-            # `G0 G80` ends a cycle and goes on with G0.
+            # `G0 G80` ends a cycle and continues with G0.
             if code != 800:
                 block.groups[1] = (code, word)
             return

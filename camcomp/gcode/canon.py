@@ -1,4 +1,4 @@
-"""The path of a program as text, one line per motion: what camcomp understood, independent of dialect and modes."""
+"""The path of a program as text, one line per motion, independent of dialect and modes."""
 
 from collections.abc import Iterator
 
@@ -12,7 +12,7 @@ _KINDS = {RAPID: "rapid", LINE: "line", ARC: "arc"}
 
 
 def canonical(path: Path, digits: int = 4) -> Iterator[str]:
-    """Source line, kind, end point in mm in the program frame; arcs with centre, axis and sweep; feed where it cuts.
+    """Source line, kind, end point in mm in the program frame; for arcs centre, axis and sweep; feed of cutting moves.
 
     `machine` marks moves in machine coordinates, `start unknown` those before X, Y and Z have all been commanded.
     """

@@ -1,4 +1,4 @@
-"""G and M codes as data: modal groups, and what is refused and why. Codes count in tenths, so G59.1 is 591.
+"""G and M codes as data: modal groups, and refused codes with reasons. Codes count in tenths, so G59.1 is 591.
 
 Group numbers are those of RS274/NGC: 0 not modal, 1 motion, 2 plane, 3 distance, 4 arc centres, 5 feed mode, 6 units,
 7 cutter radius, 8 tool length, 10 retract, 12 work offset, 13 path control, 14 spindle mode, 15 lathe diameter.
@@ -25,9 +25,9 @@ GROUPS: dict[int, int] = {
 CYCLES = frozenset((730, 740, 760, 810, 820, 830, 840, 850, 860, 870, 880, 890))
 HOMES = frozenset((280, 300, 740, 750))  # as codes of group 0; 74 and 75: Sinumerik
 EXACT_STOPS = frozenset((600, 610, 611))  # 60: Sinumerik
-EXACT_STOP_ONCE = 19  # modal group given to G9, which stops behind its own block only
+EXACT_STOP_ONCE = 19  # modal group of G9, which stops after its own block only
 MACHINE_MOVES = frozenset((530, 1530))
-AXIS_USERS = frozenset((100, 280, 300, 520, 740, 750, 920))  # of group 0: take the axis words away from the motion code
+AXIS_USERS = frozenset((100, 280, 300, 520, 740, 750, 920))  # of group 0: use the axis words of their block
 WORK_OFFSETS = {540: 1, 550: 2, 560: 3, 570: 4, 580: 5, 590: 6, 591: 7, 592: 8, 593: 9}
 OFFSET_NAMES = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
 
@@ -50,7 +50,7 @@ CALLS_M = frozenset((96, 97, 98, 99, 198))
 SAVES = frozenset((70, 71, 72, 73))
 STOPS = frozenset((0, 1, 2, 30, 60))
 ENDS = frozenset((2, 30))
-# What a control stands still for until it is done, as LinuxCNC does; M62, M63, M67 go with the motion.
+# Codes for which a controller stops the motion, as LinuxCNC does; M62, M63, M67 act during the motion.
 WAITS_M = frozenset((3, 4, 5, 6, 7, 8, 9, 19, 61, 64, 65, 66, 68))
 WAITS_G = frozenset((40, 430, 431, 490, 520, 920, 921, 922, 923))
 GROUPS_M: dict[int, int] = {

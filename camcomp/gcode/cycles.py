@@ -1,4 +1,4 @@
-"""Canned cycles as the motions that they stand for, in the order in which LinuxCNC makes them."""
+"""Canned cycles as sequences of motions, in the order of LinuxCNC."""
 
 import math
 
@@ -8,22 +8,22 @@ from camcomp.gcode.motions import Motions
 
 # Depth axis among X, Y, Z by plane.
 _DEPTH = {17: 2, 18: 1, 19: 0}
-_TAPS = {740: 4, 840: 3}  # sense of the spindle on the way in, as M code
+_TAPS = {740: 4, 840: 3}  # direction of the spindle on the way in, as M code
 _BORES_BELOW = 870
-# Words by cycle beyond R, the axis words and the count of repeats: those of LinuxCNC, and what Fanuc has beside P and Q.
+# Words by cycle in addition to R, the axis words and the count of repeats: of LinuxCNC, and the further ones of Fanuc.
 _WORDS = {730: "Q", 740: "P", 820: "P", 830: "Q", 840: "P", 860: "P", 870: "IJK", 890: "P"}
 _SHIFTED = {760: "IJ", 870: "IJ"}
 
 
 class Cycles(Motions):
-    """Executes G73, G74, G76 of Fanuc and G81 to G89. `actions` lists what the last cycle did, for writing it out."""
+    """Executes G73, G74, G76 of Fanuc and G81 to G89. `actions`: motions of the last cycle, for writing it out."""
 
     actions: list[tuple[str, list[float]]]  # (G0 or G1, end point) or (a statement, [])
     irreplaceable = ""  # why the last cycle cannot be written out as moves
-    _began: float | None = None  # height of the tool, less the offset, in front of a series
+    _began: float | None = None  # height of the tool, minus the offset, before a series
 
     def forget_cycle(self, series: bool = True) -> None:
-        """The words of a cycle hold while that cycle stays in force, the height at which a series began while its cycles do."""
+        """Forget the words of the cycle in force, and with `series` the height at which its series began."""
         self._held: dict[str, float] = {}
         if series:
             self._began = None
@@ -43,7 +43,7 @@ class Cycles(Motions):
         start = list(state.position)
         if self._held.setdefault("plane", state.plane) != state.plane:
             self.refuse("CC132", f"the plane changes while {name} is in force")
-        # a series of cycles of whatever kind refers to the height at which it began
+        # all cycles of a series refer to the height at its start
         if self._began is None:
             self._began = start[depth] - state.offset[depth]
         self._hold(block, code, depth)
@@ -69,7 +69,7 @@ class Cycles(Motions):
             if first and initial < level:
                 self._go(block, 0, self._at(state.position, depth, level), feed)
             here = state.position[depth]
-            across = here if first and here > level else clear  # from below it comes aslant
+            across = here if first and here > level else clear  # from below on a slanted line
             self._go(block, 0, self._at(place, depth, across), feed, always=repeats == 1 and first)
             self._go(block, 0, self._at(place, depth, level), feed)
             self._body(block, code, place, (bottom, level, clear), feed)
@@ -77,7 +77,7 @@ class Cycles(Motions):
         self.record.cycle(self.actions, self.irreplaceable)
 
     def _hold(self, block: Block, code: int, depth: int) -> None:
-        """Keeps the words of a cycle as they stand, lengths in mm: in G91 they count from where its series began and from R."""
+        """Store the words of a cycle, lengths in mm; in G91 they count from the start of its series and from R."""
         held, unit, name = self._held, self.state.unit, f"G{code // 10}"
         r = block.number("R")
         if r is not None:
@@ -109,7 +109,7 @@ class Cycles(Motions):
         return 1
 
     def _place(self, block: Block, depth: int) -> list[float]:
-        """Position of the hole; the depth axis is left as it is."""
+        """Position of the hole, with the present position on the depth axis."""
         state = self.state
         place = list(state.position)
         for axis in block.axes:
@@ -182,7 +182,7 @@ class Cycles(Motions):
         step = abs(self._held.get("Q", 0.0)) * state.unit
         if step <= 0.0 or (level - bottom) / step > 1e5:
             self.refuse("CC132", f"G{code // 10} needs its peck depth as Q")
-        # LinuxCNC backs off by 0.01 inch, which is a hundredth of the unit in G20; nobody sets it finer than that.
+        # LinuxCNC backs off by 0.01 inch, a hundredth of the unit in G20, which no setting changes.
         gap = self.dialect.peck_clearance_mm
         gap = gap if state.unit == 1.0 else round(gap / state.unit, 2) * state.unit
         reached = level - step
@@ -198,7 +198,7 @@ class Cycles(Motions):
         self._go(block, 0, self._at(place, depth, clear), feed)
 
     def _back_bore(self, block: Block, place: list[float], heights: tuple[float, float, float], feed: float) -> None:
-        """G87: down beside the hole with the spindle oriented, then cut upwards."""
+        """G87: down at the shifted position with the spindle oriented, then cut upwards."""
         bottom, level, clear = heights
         state = self.state
         depth = _DEPTH[state.plane]
@@ -242,7 +242,7 @@ class Cycles(Motions):
         self.actions.append((spindle, []))
 
     def _bore_upwards(self, block: Block, place: list[float], heights: tuple[float, float, float], feed: float) -> None:
-        """G87 of Fanuc: down beside the hole to R below it, cut upwards to Z, and back to the initial level."""
+        """G87 of Fanuc: down at the shifted position to R below the hole, cut upwards to Z, back to the initial level."""
         top, level, clear = heights
         depth = _DEPTH[self.state.plane]
         beside = self._beside(place, "G87")
@@ -265,7 +265,7 @@ class Cycles(Motions):
         self.actions.append((spindle, []))
 
     def _beside(self, place: list[float], name: str) -> list[float]:
-        """A hole's position shifted away from the tool's tip: by I and J, or by Q, whose direction the control holds."""
+        """A hole's position shifted away from the tool's tip: by I and J, or by Q, whose direction is a setting."""
         held, unit = self._held, self.state.unit
         u, v, _ = PLANES[self.state.plane]
         out = list(place)

@@ -1,4 +1,4 @@
-"""Which dialect a program is written in: told by the user, or by the marks that each dialect's record lists."""
+"""Detection of a program's dialect: named by the user, or found by the marks in the record of each dialect."""
 
 import re
 from typing import Any
@@ -17,11 +17,11 @@ _PLAIN_LINES = re.compile(
     r"^(?:[ \t]*+(?:[NXYZF][ \t]*+[-+.\d]++|G[ \t]*+0?[01](?![\d.])))++[ \t]*+\n", re.MULTILINE | re.IGNORECASE
 )
 DEFAULT = "rs274"
-_ENOUGH = 4  # weight of marks below which a text could be anything
+_ENOUGH = 4  # weight of marks below which the default applies
 
 
 def dialect_of(text: Text, name: str | None = None) -> Dialect:
-    """Record of the dialect called `name`, or of the one that the text looks like; RS274 where nothing tells.
+    """Record of the dialect called `name`, else of the one with the most marks in the text, else of RS274.
 
     Raises ProgramError CC127 for Heidenhain conversational programs, ConfigError CC213 for an unknown name.
     """
@@ -34,7 +34,7 @@ def dialect_of(text: Text, name: str | None = None) -> Dialect:
         raise ProgramError(
             "CC127", "this is a Heidenhain conversational program", at=text.place(min(row, len(text) - 1))
         )
-    sample = _PLAIN_LINES.sub("", sample)  # most of a program; every control reads them, so no mark is in them
+    sample = _PLAIN_LINES.sub("", sample)  # most of a program, in all dialects, so without marks
     best, most = _record(DEFAULT), _ENOUGH - 1
     for _, member in usable("dialects"):
         record = _of(member)
@@ -51,6 +51,6 @@ def _record(name: str) -> Dialect:
 
 
 def _of(member: Any) -> Dialect:
-    """A plug-in is a module with its record, or, from an entry point, the record itself."""
+    """Record of a plug-in: a module with the record, or, from an entry point, the record itself."""
     record: Dialect = getattr(member, "DIALECT", member)
     return record

@@ -1,4 +1,4 @@
-"""What distinguishes one control's language from another's, as data; the records stand in camcomp/dialects."""
+"""Type of the records in camcomp/dialects: differences between the languages of controllers, as data."""
 
 import re
 from collections.abc import Mapping
@@ -11,28 +11,28 @@ from camcomp.gcode.spelling import Spelling
 
 @dataclass(frozen=True)
 class Dialect:
-    """One control's language. Codes count in tenths (G59.1 is 591)."""
+    """The language of a family of controllers. Codes count in tenths (G59.1 is 591)."""
 
     name: str
     title: str
     endings: tuple[str, ...] = ()  # of file names that are this dialect's alone
     marks: tuple[tuple[str, int], ...] = ()  # regular expression (multi-line, case ignored), weight for detection
-    spelling: Spelling | None = None  # of expressions; None: there are none
+    spelling: Spelling | None = None  # of expressions; None: no expressions
     flow: str = ""  # subprograms, loops, jumps: "o-words", "macro" (Fanuc), or none
     more: Mapping[int, int] = field(default_factory=dict)  # codes beyond the common ones, with their modal group
     reasons: Mapping[int, tuple[str, str]] = field(default_factory=dict)  # codes that are refused, with rule and reason
-    without: frozenset[int] = frozenset()  # common codes that this control does not have
+    without: frozenset[int] = frozenset()  # common codes that this controller does not have
     passed: frozenset[int] = frozenset()  # codes that do not change the geometry, nor how other words are read
     ends: frozenset[int] = ENDS  # M codes at which a program ends
     initial_motion: int | None = None
     retract_to_start: bool = True  # G98 is in force at the start
     turns: bool = True  # P of an arc counts turns
-    exact_stop: str = "G61"  # how it is told to end moves at rest
+    exact_stop: str = "G61"  # code for a stop at the end of moves
     writes_turns: bool = True  # and may be written for arcs that are made
     increments: bool = False  # numbers without a point may count increments
     machine_moves_rapid: bool = False  # G53 moves at rapid speed, whatever motion code is in force
     home_beside_motion: bool = False  # `G0 G28 Z0`: the axis words are those of G28
-    numbered_homes: frozenset[tuple[int, str]] = frozenset()  # codes whose P (mode of the word) says which position
+    numbered_homes: frozenset[tuple[int, str]] = frozenset()  # codes whose P (mode of the word) is a position
     dwell: str = "P"  # letters that may give the time of G4
     dwell_p_s: float = 1.0  # worth of one unit of its P; X, U and F count seconds, S revolutions of the spindle
     modal_length: bool = False  # H changes the tool length offset without G43 in its block
@@ -46,15 +46,15 @@ class Dialect:
     )
     # was so before, and the words of a cycle hold for those that follow it
     peck_clearance_mm: float = 0.254
-    idle_letters: str = "DN"  # letters that mean nothing for the path wherever they stand
-    merges: bool = False  # G64 takes the tolerance of corners as P and that of lines made one as Q
+    idle_letters: str = "DN"  # letters without influence on the path
+    merges: bool = False  # G64 has the tolerance of corners as P and that of merged lines as Q
     brackets_comment: bool = True  # `(...)` is a comment
     comment: tuple[str, str] = ("(", ")")
     decimals_max: int = 9  # behind the point of a length, in either unit
 
     @property
     def groups(self) -> dict[int, int]:
-        """Modal group of every code that the control has."""
+        """Modal group of every code of the controller."""
         return {code: group for code, group in {**GROUPS, **self.more}.items() if code not in self.without}
 
     @property
@@ -64,14 +64,14 @@ class Dialect:
         return {**{code: why for code, why in REFUSED.items() if code not in own}, **self.reasons}
 
     def digits(self, resolution_mm: float, unit_mm: float) -> int:
-        """Digits behind the point of a length: those of the resolution, as far as the control reads them."""
+        """Decimals of a length: those of the resolution, at most decimals_max."""
         return min(decimals(resolution_mm, unit_mm), self.decimals_max)
 
     def step_mm(self, resolution_mm: float, unit_mm: float) -> float:
-        """What lengths can be told apart by, as written: the resolution, or a step of the last digit if that is coarser."""
+        """Step of written lengths, mm: the resolution, or a step of the last digit if that is coarser."""
         return max(resolution_mm, unit_mm * 10.0 ** -self.digits(resolution_mm, unit_mm))
 
     def weight(self, text: str) -> int:
-        """How much a text looks like this dialect."""
+        """Sum of the weights of this dialect's marks in a text."""
         flags = re.MULTILINE | re.IGNORECASE
         return sum(score for pattern, score in self.marks if re.search(pattern, text, flags))

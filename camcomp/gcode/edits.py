@@ -1,4 +1,4 @@
-"""Changes of a text, collected in any order and applied at once; what is not touched stays as it is."""
+"""Changes of a text, collected in any order and applied at once."""
 
 
 class Edits:
@@ -11,11 +11,11 @@ class Edits:
         return len(self._list)
 
     def replace(self, begin: int, end: int, new: str) -> None:
-        """Put `new` where characters `begin` to `end` stand."""
+        """Replace characters `begin` to `end` by `new`."""
         self._list.append((begin, len(self._list), end, new))
 
     def insert(self, at: int, new: str, first: bool = False) -> None:
-        """Put `new` before character `at`; several at one place keep their order, `first` goes before them."""
+        """Insert `new` before character `at`; several at one index keep their order, `first` goes before them."""
         self._list.append((at, -1 if first else len(self._list), at, new))
 
     def apply(self, string: str) -> str:

@@ -1,4 +1,4 @@
-"""Expressions and parameters of programs: parsed once, evaluated exactly as the control would, or refused.
+"""Expressions and parameters of programs: parsed once, evaluated exactly as by the controller, or refused.
 
 Two spellings: `#1`, `#<name>`, `[...]` of RS274 and Fanuc, and `R1`, `(...)` of Sinumerik.
 """
@@ -10,7 +10,7 @@ from camcomp.gcode.spelling import FANUC, RS274, Spelling
 
 
 class ExpressionError(Exception):
-    """Message and character at which an expression goes wrong; the reader knows the line."""
+    """Message and character of an error in an expression; the reader adds the line."""
 
     def __init__(self, message: str, column: int) -> None:
         super().__init__(message)
@@ -38,20 +38,20 @@ class Parser:
         raise ExpressionError(message, min(self.at, max(len(self.line) - 1, 0)))
 
     def blank(self) -> str:
-        """Skip blanks; the character that follows, upper case, or nothing at the end."""
+        """Skip blanks, and return the next character in upper case, or an empty string at the end."""
         while self.at < len(self.line) and self.line[self.at] in " \t":
             self.at += 1
         return self.line[self.at : self.at + 1].upper()
 
     def behind(self) -> int:
-        """Index behind what was read, without the blanks that were skipped after it."""
+        """Index behind the last character read, before the blanks skipped after it."""
         at = self.at
         while at > 0 and self.line[at - 1] in " \t":
             at -= 1
         return at
 
     def value(self) -> Expression:
-        """What may stand behind a letter: a number, a parameter, a function, a group, with a sign."""
+        """A value behind a letter: a number, a parameter, a function, a group, with a sign."""
         char, column = self.blank(), self.at
         self.depth += 1
         if self.depth > _DEEPEST:
@@ -162,7 +162,7 @@ class Parser:
         return ("atan", first, second, start)
 
     def expression(self, level: int) -> Expression:
-        """Operators from `level` upwards; those of one level are taken from the left."""
+        """Operators from `level` upwards; those of one level associate in reading order."""
         if level == len(self.spelling.operators):
             return self.value()
         left = self.expression(level + 1)
@@ -183,14 +183,14 @@ class Parser:
 
 
 class Memory:
-    """What an expression can read; the interpreter fills it from its state."""
+    """Values that an expression can read; the interpreter provides them from its state."""
 
     def parameter(self, number: int) -> float:
         """Value of `#number`."""
         raise NotImplementedError
 
     def named(self, name: str) -> float | None:
-        """Value of `#<name>`, None when it was never set."""
+        """Value of `#<name>`, None before it is set."""
         raise NotImplementedError
 
     def exists(self, expression: Expression) -> bool:
@@ -199,7 +199,7 @@ class Memory:
 
 
 def evaluate(expression: Expression, memory: Memory, spelling: Spelling) -> float:
-    """Value of an expression. Raises ExpressionError where it has none."""
+    """Value of an expression. Raises ExpressionError for an undefined one."""
     kind, column = expression[0], expression[-1]
     if kind == "number":
         return float(expression[1])
@@ -240,12 +240,12 @@ def index_of(expression: Expression, memory: Memory, spelling: Spelling, column:
     return round(value)
 
 
-_EQUAL = 1e-4  # within which LinuxCNC takes two numbers as equal
+_EQUAL = 1e-4  # tolerance of LinuxCNC for equal numbers
 
 
 def _operate(symbol: str, a: float, b: float, column: int, spelling: Spelling) -> float:
     if spelling is FANUC and (math.isnan(a) or math.isnan(b)):
-        # A vacant variable equals only a vacant one; everything else takes it as zero.
+        # A vacant variable equals a vacant one only; in all other operations it is zero.
         if symbol in ("EQ", "NE"):
             return float((math.isnan(a) and math.isnan(b)) == (symbol == "EQ"))
         a, b = (0.0 if math.isnan(each) else each for each in (a, b))
@@ -298,7 +298,7 @@ def _operate(symbol: str, a: float, b: float, column: int, spelling: Spelling) -
 
 
 def parameters_of(expression: Expression) -> list[Expression]:
-    """What stands behind the sigil of every parameter in an expression, without columns."""
+    """Expressions behind the sigil of every parameter in an expression, without columns."""
     found = [expression[1][:2]] if expression[0] == "parameter" else []
     for each in expression[1:-1]:
         if isinstance(each, tuple):

@@ -1,7 +1,7 @@
 """Loops, subprograms, parameters and canned cycles written out as plain code, line by line as they were executed.
 
-A line inside a loop stands for many motions, and no two of them get the same correction; so a program that is to be
-changed has to be written out first. Comments stay; jumps, calls and cycles stay as comments.
+A line inside a loop means many motions with different corrections, so that such a program is written out before it is
+changed. Comments are kept; jumps, calls and cycles become comments.
 """
 
 import numpy as np
@@ -16,13 +16,13 @@ from camcomp.ground.errors import ProgramError
 
 _LENGTHS = "XYZIJKRQ"
 _CYCLE_WORDS = "XYZIJKRPQL"
-_SPARE_DIGITS = 2  # beyond the resolution, so that writing out costs nothing
+_SPARE_DIGITS = 2  # beyond the resolution, so that writing out does not round
 
 
 def flatten(program: Program, resolution_mm: float) -> Program:
-    """The same motions as a program without jumps, parameters and cycles.
+    """Program with the same motions without jumps, parameters and cycles.
 
-    Raises ProgramError CC137 where a motion cannot be written as G0 or G1 (tapping), or would end elsewhere.
+    Raises ProgramError CC137 for a motion that cannot be written as G0 or G1 (tapping), or would end elsewhere.
     """
     trace = Trace()
     reader = Interpreter(program.text, program.setup, program.language)
@@ -38,7 +38,7 @@ def flatten(program: Program, resolution_mm: float) -> Program:
 
 
 class Printer:
-    """Makes the text of the executed lines."""
+    """Writer of the text of the executed lines."""
 
     def __init__(self, program: Program, reader: Interpreter, trace: Trace, resolution_mm: float) -> None:
         self.program, self.reader, self.trace = program, reader, trace
@@ -76,7 +76,7 @@ class Printer:
         if entry.remark:
             return [] if repeated else self._remark(entry.row)
         cycle = self.reader.record.cycles.get(entry.motions)
-        # A line that moves nothing has the same count of motions before it as the cycle that follows.
+        # A line without a motion has the same count of motions before it as the cycle that follows.
         if cycle is not None and self.program.sites.row[entry.motions] == entry.row:
             actions, irreplaceable = cycle
             if irreplaceable:
@@ -106,7 +106,7 @@ class Printer:
         return [" ".join([f"{opening}{code}{closing}", *remarks])]
 
     def _changed(self, entry: Executed, repeated: bool, cycle: bool) -> str:
-        """The line with values instead of expressions; without its number when it comes again."""
+        """The line with values instead of expressions; without its number in repetitions."""
         line = self.text.line(entry.row)
         edits = Edits()
         unit = self._unit(entry.motions)
@@ -119,7 +119,7 @@ class Printer:
         self.code = stated[-1] if stated else self.code
         apart = self.program.language.cycles_apart and not stated and self.code is not None
         for index, word in enumerate(entry.words):
-            if apart and word.letter == "G" and word.value == 80.0:  # the moves of the cycle brought their own code
+            if apart and word.letter == "G" and word.value == 80.0:  # the moves of the cycle have their own code
                 edits.replace(word.begin, word.end, f"G{self.code:.0f}")
                 continue
             gone = word.letter == "N" and (repeated or index > 0)
@@ -163,7 +163,7 @@ class Printer:
         return float(sites.unit[min(motion, len(sites.unit) - 1)])
 
     def _moves(self, motion: int, actions: list[tuple[str, list[float]]]) -> list[str]:
-        """What a cycle did, as G0, G1, G4 and M statements."""
+        """Actions of a cycle as G0, G1, G4 and M statements."""
         sites, path = self.program.sites, self.program.path
         unit, offset, relative = float(sites.unit[motion]), sites.offset[motion], bool(sites.relative[motion])
         digits = self._digits(unit)

@@ -1,4 +1,4 @@
-"""Which line is executed next: top to bottom, or as O-words and macro statements say."""
+"""Order of execution of lines: top to bottom, or by O-words and macro statements."""
 
 import math
 from typing import NoReturn
@@ -14,7 +14,7 @@ from camcomp.gcode.words import BLANK, Line, Word, code_of, read_line
 from camcomp.ground.errors import ProgramError
 
 _MOST_BLOCKS = 150_000  # executed by a program that has loops
-_MOST_IDLE = 100_000  # of them in a row that move nothing
+_MOST_IDLE = 100_000  # consecutive blocks without a motion
 _INCREMENTAL_LETTERS = "XYZIJKRQ"
 _AS_LENGTHS = (
     "numbers without a point are read as mm or inch, X10 as 10 mm; a controller that counts increments reads 0.01 mm: "
@@ -51,7 +51,7 @@ class Flow:
             row = after
 
     def _end_of_tape(self) -> int:
-        """Rows that count: where the first line is a `%`, those before the next one."""
+        """Number of valid rows: if the first line is a `%`, those before the next one."""
         begun = False
         for row in range(len(self.text)):
             stripped = self.text.line(row).strip(BLANK)
@@ -64,7 +64,7 @@ class Flow:
         return len(self.text)
 
     def step(self, row: int) -> int | None:
-        """Execute line `row`; the row that comes next, None at the end."""
+        """Execute line `row`, and return the next row, None at the end."""
         if self.text.line(row).lstrip(BLANK).startswith("%"):
             self._traced(row, Line([]))
             return row + 1
@@ -102,7 +102,7 @@ class Flow:
             self.trace.remark(row)
 
     def _count(self, row: int) -> None:
-        """A program that does not come to an end is refused, not waited for."""
+        """Count executed lines, and refuse a program with an endless loop."""
         self._blocks += 1
         motions = len(self.reader.record)
         self._idle = self._idle + 1 if motions == self._motions else 0
@@ -117,7 +117,7 @@ class Flow:
         raise ProgramError(rule, message, at=self.text.place(row, column))
 
     def parsed(self, row: int) -> Line:
-        """Words of a line; read once, however often it is executed."""
+        """Words of a line, cached for repetitions."""
         line = self._lines.get(row)
         if line is None:
             line = self._read(row)
@@ -131,7 +131,7 @@ class Flow:
         return read_line(self.text, row, self.spelling)
 
     def value(self, row: int, expression: Expression) -> float:
-        """Value of an expression, now."""
+        """Present value of an expression."""
         self.memory.row = row
         try:
             return self.memory.value(expression)
@@ -145,7 +145,7 @@ class Flow:
             words = list(words)
             for index, expression in line.expressions:
                 words[index] = words[index]._replace(value=self.value(row, expression))
-            # A word whose variable is vacant is as good as not there (Fanuc).
+            # A word with a vacant variable counts as missing (Fanuc).
             words = [word for word in words if not math.isnan(word.value)]
         if self.reader.dialect.increments:
             words = self._scaled(row, line, words)
@@ -172,7 +172,7 @@ class Flow:
         return words
 
     def _assign(self, row: int, line: Line) -> None:
-        # All values are found before any parameter changes, so `#1=#2 #2=#1` swaps.
+        # All values are computed before any parameter changes, so that `#1=#2 #2=#1` swaps.
         self.reader.straight = False
         found = [(each, self.value(row, each.value)) for each in line.settings]
         for each, value in found:
@@ -189,7 +189,7 @@ class Siemens(Flow):
         line = read_siemens_line(self.text, row)
         words = [value for _, value in line.expressions]
         for each in line.settings:
-            # Of `R1=R1+1` the value is found first; whether `R1=2 R2=R1` takes the new R1 or the old one is nothing to guess.
+            # In `R1=R1+1` the value is computed first; `R1=2 R2=R1` is ambiguous and refused.
             others = [other.value for other in line.settings if other is not each] + words
             if any(each.target[1][:2] == used for value in others for used in parameters_of(value)):
                 self.refuse(row, each.begin, "CC123", "a parameter is set and used in one block")

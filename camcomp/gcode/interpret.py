@@ -1,4 +1,4 @@
-"""A program's text becomes the path that it asks of the tool tip.
+"""Interpretation of a program's text as the path of the tool tip.
 
 One block at a time, in the order of execution of RS274/NGC: modes first, then settings, then the motion, then a stop.
 """
@@ -33,17 +33,17 @@ from camcomp.ground.errors import ProgramError
 
 _NO_AXES = frozenset((40, 921, 922, 923, 281, 301))
 
-# What is said in vain, and what would move if it were executed: it stands behind the end, or in a subroutine.
+# Text without effect; and lines with a motion, which a program without any executed motion has behind its end or in an
+# uncalled subroutine.
 _IDLE = re.compile(r"%|\b[NO:]\d+|\bM0?2\b|\bM30\b|[\0\x1a]", re.IGNORECASE)
 _MOVES = re.compile(r"(?!.*G[ \t]*0*(4|10|52|92)(?!\d)).*[XYZ][ \t]*[-+.\d\[#=]", re.IGNORECASE)
 
 
 def read_program(data: bytes, *, name: str, setup: Setup | None = None, dialect: str | None = None) -> Program:
-    """Path of the tool tip, and what is needed to write the program again.
+    """Read a program: path of the tool tip, and the data for rewriting its text.
 
     `data` is the file's content, `name` its name in messages; `dialect` is the name of a dialect, or None to detect it.
-    Raises ProgramError, with the place, for every statement that cannot be read with certainty or whose geometry
-    camcomp cannot follow.
+    Raises ProgramError, with the location, for every ambiguous statement and every unsupported geometry.
     """
     text = Text.read(data, name)
     setup = setup or Setup()
@@ -79,7 +79,7 @@ class Interpreter(Settings, Cycles):
     """Executes blocks and records every motion."""
 
     def perform(self, block: Block) -> bool:
-        """Execute a block; True when it ends the program."""
+        """Execute a block; True if it ends the program."""
         self.record.begin_line(block.row)
         zero_code, active = block.code(0), self.state.active
         motion = self._motion_of(block, zero_code)
@@ -110,7 +110,7 @@ class Interpreter(Settings, Cycles):
         return False
 
     def _motion_of(self, block: Block, zero_code: int | None) -> int | None:
-        """Motion code that the block executes, in tenths, or None; sets the modal one."""
+        """Motion code of the block in tenths, or None; sets the modal one."""
         state, words = self.state, block.words
         explicit = block.code(1)
         if explicit is not None:
@@ -149,21 +149,21 @@ class Interpreter(Settings, Cycles):
         return state.motion
 
     def _waits(self, block: Block, m_codes: list[int]) -> bool:
-        """Whether the control stands still for something in the block before it moves on."""
+        """Whether the controller stops for a word of the block before the motion."""
         if not WAITS_M.isdisjoint(m_codes) or not WAITS_G.isdisjoint(code for code, _ in block.g):
             return True
         return "S" in block.words
 
     def _alone(self, block: Block) -> None:
-        """Codes that are passed on, and G50, do not say what axis words beside them mean."""
+        """Refuse axis words in a block with a passed code or G50, for which they have no defined meaning."""
         for code, word in block.g:
             if (code in self.dialect.passed or code == 500) and block.axes:
                 self.refuse("CC108", f"axis words with {code_name(code)}", word)
 
     def _spare_axes(self, block: Block, motion: int | None, zero_code: int | None) -> None:
-        """Words for axes that camcomp does not follow: they may stay where they are, and tables may turn alone.
+        """Check words of additional axes: they may keep their positions, and tables may rotate in blocks of their own.
 
-        The orientation of a tool turns with G0 to G3 in the workpiece's coordinates.
+        The orientation of a tool changes with G0 to G3 in the workpiece's coordinates.
         """
         table, offset = self.state.table, block.code(0) in (100, 520, 920)
         free = motion in (0, 10, 20, 30) and zero_code not in MACHINE_MOVES
@@ -199,6 +199,6 @@ class Interpreter(Settings, Cycles):
 
 
 def controller(reader: Interpreter, trace: Trace | None = None) -> Flow:
-    """What decides which line comes next, in the dialect of the reader."""
+    """Flow of lines in the dialect of the reader."""
     kinds: dict[str, type[Flow]] = {"o-words": OWords, "macro": Macro, "sinumerik": Siemens}
     return kinds.get(reader.dialect.flow, Flow)(reader, trace)

@@ -1,4 +1,4 @@
-"""One line of the program under change: its words, the feed and the motion code in force, the numbers to be written."""
+"""Editing of one line of the program: its words, feed and motion code in force, and the new numbers."""
 
 import math
 
@@ -12,13 +12,13 @@ from camcomp.ground import orientation
 from camcomp.ground.datatypes import ARC, RAPID
 
 TURNS = (A, B, C)
-SHAPE_WORDS = (0, 1, 2, 3, 4, 5, R, P, *TURNS)  # words that say where a motion goes
+SHAPE_WORDS = (0, 1, 2, 3, 4, 5, R, P, *TURNS)  # words that define the geometry of a motion
 BLANKS = " \t"
 TURN_DIGITS = {orientation.RPY: 6, orientation.VECTOR: 9}  # 0.02 urad and less
 
 
 class LineEditor:
-    """Follows the control through the output, and changes words of the line of one motion at a time."""
+    """Tracks the state of the controller through the output, and changes words in the line of one motion at a time."""
 
     def __init__(self, program: Program, resolution_mm: float) -> None:
         self.program = program
@@ -45,15 +45,15 @@ class LineEditor:
         self.step = self.program.language.step_mm(self.resolution, self.unit)
         self.half = 0.5 * self.step * (1.0 + 1e-9)
         self.fresh: list[str] = []  # words to append to the line
-        # What the text stated since the previous motion is in force, or is about to be.
+        # Codes stated since the previous motion are in force, or will be.
         if sites.code_stated[k]:
             self.code = None if self.begin[G] >= 0 else int(sites.code[k])
         if sites.feed_stated[k]:
-            cuts = self.path.kind[k] != RAPID  # the F word of a rapid stays as it is
+            cuts = self.path.kind[k] != RAPID  # the F word of a rapid is kept
             self.feed = None if self.begin[F] >= 0 and cuts else self._programmed_feed()
 
     def _strip(self) -> None:
-        """Take the motion out of its line; what else the line says stays."""
+        """Remove the words of the motion from its line, and keep the others."""
         gone = [*SHAPE_WORDS, G] + ([F] if self.sites.feed_mode[self.k] == 93 else [])
         for word in gone:
             self._remove(word)
@@ -96,7 +96,7 @@ class LineEditor:
         return significant(value if mode == 93 else value / self.feed_unit, point=self.program.feed_point)
 
     def _feed_words(self, feed: float, length: float) -> list[str]:
-        """F word for a new line, where the feed in force is another one."""
+        """F word for a new line, if the feed in force differs."""
         mode, value = self._wanted_feed(feed, length)
         held = self.feed[1] if mode != 93 and self.feed is not None and self.feed[0] == mode else math.inf
         if abs(value - held) <= FEED_SLACK * held and held < math.inf:
@@ -121,7 +121,7 @@ class LineEditor:
             return math.dist(start, end)
         u, v, w = PLANES[int(self.sites.plane[self.k])]
         radius = math.hypot(start[u] - move.centre[u], start[v] - move.centre[v])
-        # The sweep that the control will see: it differs from the one asked for where the arc starts elsewhere.
+        # The sweep for the controller, which differs from the requested one if the arc starts elsewhere.
         a, b, c = ((point[u], point[v]) for point in (start, end, move.centre))
         angle = sweep(a, b, c, move.angle > 0.0, turns_of(move.angle))
         return math.hypot(radius * angle, end[w] - start[w])
@@ -129,7 +129,7 @@ class LineEditor:
     # --- numbers and words -------------------------------------------------------------------------------------
 
     def _value(self, point: Point, axis: int) -> float:
-        """Number of the word that leads to `point` from the present position."""
+        """Number of the word for `point` from the present position."""
         base = self.position[axis] if self.relative else self.offset[axis]
         return round((point[axis] - base) / self.unit, self.digits)
 
@@ -137,7 +137,7 @@ class LineEditor:
         return plain(value, self.digits)
 
     def _turn_words(self, wanted: list[float], in_place: bool) -> list[str]:
-        """Words that lead the orientation on to `wanted` (3), rounded; those of the line are replaced."""
+        """Words for the orientation `wanted` (3), rounded; those of the line are replaced."""
         relative = self.relative and self.form == orientation.RPY
         ends = (
             [float(each) for each in self.path.orientation.end[self.k]]
@@ -174,7 +174,7 @@ class LineEditor:
 
     @property
     def turn_digits(self) -> int:
-        """Digits behind the point of an angle in degrees, or of a part of a direction."""
+        """Decimals of an angle in degrees, or of a component of a direction."""
         return min(TURN_DIGITS[self.form], self.program.language.decimals_max)
 
     def _cased(self, word: str) -> str:
@@ -182,7 +182,7 @@ class LineEditor:
         return word.lower() if lower else word
 
     def _gap(self) -> str:
-        """What stands between the words of this line: nothing in packed lines, else a blank."""
+        """Separator between the words of this line: empty in packed lines, else a blank."""
         string, starts = self.text.string, [each for each in self.begin if each >= 0]
         line = int(self.text.starts[self.row])
         packed = any(each > line and string[each - 1].isdigit() for each in starts)

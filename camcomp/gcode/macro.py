@@ -19,14 +19,14 @@ _DEEPEST = 100
 
 
 class Subprograms(Flow):
-    """M98 and M99, with the subprograms in the same file; Q of M98 and M97 are Fanuc's and its kin's."""
+    """M98 and M99, with the subprograms in the same file; Q of M98 and M97 exist on Fanuc and related controllers."""
 
     words_of_m98 = frozenset("PL")
 
     def __init__(self, reader: BlockReader, trace: Trace | None = None) -> None:
         super().__init__(reader, trace)
         self._programs: dict[int, int] = {}
-        self._returns: list[tuple[int, int, int]] = []  # row of the call, first row that is executed, passes left
+        self._returns: list[tuple[int, int, int]] = []  # row of the call, first executed row, remaining passes
         self._called: set[int] = set()
         if re.search(r"M[ \t]*0*9[789]", self.text.string, re.IGNORECASE):
             self._find_programs()
@@ -40,7 +40,7 @@ class Subprograms(Flow):
                 self._programs.setdefault(int(found[1]), row)
 
     def step(self, row: int) -> int | None:
-        """Execute line `row`; the row that comes next, None at the end."""
+        """Execute line `row`, and return the next row, None at the end."""
         line = self.text.line(row)
         if "9" in line and ("m" in line or "M" in line):
             code = self._subprogram_code(row)
@@ -97,13 +97,13 @@ class Subprograms(Flow):
         self.refuse(row, target.begin, "CC124", "M97 is not followed in this dialect")
 
     def _program_rows(self, row: int) -> tuple[int, int]:
-        """First row of the program around `row`, and of the one behind it."""
+        """First row of the program around `row`, and of the program after it."""
         starts = [0, *sorted(self._programs.values()), self.rows]
         first = max(each for each in starts if each <= row)
         return first, min(each for each in starts if each > row)
 
     def _numbered(self, row: int, column: int, number: int, inside: int, name: str) -> int:
-        """Row of line N`number` of the program around row `inside`, looked for from there on and then from its begin."""
+        """Row of line N`number` of the program around row `inside`, searched from there on and then from its start."""
         first, last = self._program_rows(inside)
         rows: list[int] = [*range(inside, last), *range(first, inside)]
         for other in rows:
@@ -113,7 +113,7 @@ class Subprograms(Flow):
         self.refuse(row, column, "CC124", f"there is no line N{number} in {name}")
 
     def _enter(self, row: int, start: int, passes: int, first: int) -> int:
-        """Call from `row` of the program that begins at `start`, executed so many times from row `first` on."""
+        """Call from `row` the program that begins at `start`, and execute it `passes` times from row `first` on."""
         if len(self._returns) >= _DEEPEST:
             self.refuse(row, 0, "CC126", "subprograms call each other without end")
         self._called.add(start)
@@ -123,7 +123,7 @@ class Subprograms(Flow):
         return first
 
     def _back(self, row: int, target: Word | None) -> int | None:
-        """M99: again while passes are left, then behind the call; in the main program it ends the run."""
+        """M99: repeat for the remaining passes, then return behind the call; in the main program it ends the run."""
         if not self._returns:
             return None
         if target is not None:
@@ -137,10 +137,10 @@ class Subprograms(Flow):
         return call + 1
 
     def _left_program(self, call: int) -> None:
-        """A subprogram that `call` started is over."""
+        """Restore the parameters after the subprogram of `call`."""
 
     def _again_from(self, call: int) -> None:
-        """A subprogram that `call` started begins once more."""
+        """Reset the parameters for a repetition of the subprogram of `call`."""
 
 
 class Macro(Subprograms):
@@ -165,7 +165,7 @@ class Macro(Subprograms):
                 self.refuse(row, 0, "CC136", f"O{number} is a program of its own, and is not called")
 
     def step(self, row: int) -> int | None:
-        """Execute line `row`; the row that comes next, None at the end."""
+        """Execute line `row`, and return the next row, None at the end."""
         line = self.text.line(row)
         found = _JUMP_WORD.match(line)
         if found:

@@ -1,4 +1,4 @@
-"""Parameters of a running program: its own, and those that show the control's state."""
+"""Parameters of a running program: its own, and those of the controller's state."""
 
 import math
 
@@ -21,11 +21,11 @@ class CallFrame:
 
 
 class Parameters(Memory):
-    """Values by number and by name. Reading what only the machine knows raises ExpressionError."""
+    """Values by number and by name. Values that only the machine knows raise ExpressionError."""
 
     def __init__(self, state: ControlState, macro: bool) -> None:
         self.state = state
-        self.macro = macro  # Fanuc: a parameter that was never set is vacant, not zero
+        self.macro = macro  # Fanuc: an unset parameter is vacant, not zero
         self.spelling = FANUC
         self.common: dict[int, float] = {}
         self.shared: dict[str, float] = {}
@@ -147,7 +147,7 @@ class Parameters(Memory):
         return None
 
     def set_named(self, name: str, value: float) -> None:
-        """Give `#<name>` a value; names that start with `_` are known everywhere."""
+        """Give `#<name>` a value; names that start with `_` are global."""
         if name.startswith("_"):
             self.shared[name] = value
         else:
@@ -175,7 +175,7 @@ class Parameters(Memory):
             self.set(index_of(target[1], self, self.spelling, target[-1]), value)
 
     def value(self, expression: Expression) -> float:
-        """Value of an expression, with the place of what goes wrong."""
+        """Value of an expression; its errors get the column."""
         try:
             return evaluate(expression, self, self.spelling)
         except ExpressionError as error:

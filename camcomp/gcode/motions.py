@@ -6,16 +6,16 @@ from camcomp.gcode import arcs
 from camcomp.gcode.block import Block, BlockReader
 from camcomp.ground.orientation import LETTERS, NEAR_POLE_DEG, RPY, VECTOR
 
-LARGEST_MM = 1.0e7  # mm; a machine of ten kilometres is a typing mistake
+LARGEST_MM = 1.0e7  # ten kilometres: larger coordinates are typing errors
 _MOST_TURNS = 1000
-_NOTHING = 1.0e-9  # mm; arithmetic leaves that much between equal points
+_NOTHING = 1.0e-9  # mm, round-off between equal points
 
 
 class Motions(BlockReader):
     """Executes the motion of a block."""
 
     def target(self, block: Block, machine: bool = False, turns: bool = True) -> list[float]:
-        """End point in the program frame of the block's axis words; they thereby count as commanded. turns: so do A, B, C."""
+        """End point of the block's axis words in the program frame; marks the axes as commanded, with turns also A, B, C."""
         state = self.state
         end = list(state.position)
         given: dict[int, float] = {}
@@ -39,14 +39,14 @@ class Motions(BlockReader):
         return state.at_machine(given) if machine else end
 
     def orientation_words(self, block: Block) -> list[str]:
-        """Letters of the block's words that lead the orientation of the tool."""
+        """Letters of the block's words of orientation."""
         state = self.state
         if not state.setup.orients:
             return []
         return [each for each in LETTERS[state.orientation_form] if each in block.words and each not in state.table]
 
     def _turn(self, block: Block) -> None:
-        """Where the words of the block turn the tool."""
+        """Set the orientation of the tool by the words of the block."""
         state, letters = self.state, self.orientation_words(block)
         if not letters:
             return
@@ -86,7 +86,7 @@ class Motions(BlockReader):
             if spare[0].letter in "UVW":
                 self.refuse("CC115", f"{spare[0].letter} is no axis of the machine", spare[0])
             return
-        # Codes of group 0 that approach a fixed point directly take the axis words as a list of axes only.
+        # Codes of group 0 that approach a fixed point directly use the axis words only as a list of axes.
         if code in (28, 30):
             self.record.machine_motion(block, state, -1, self.target(block, turns=False))
         home = state.homes[30 if code == 30 else 28]
@@ -94,7 +94,7 @@ class Motions(BlockReader):
         self.record.machine_motion(block, state, -2, end, moved=block.axes or [0, 1, 2])
 
     def _which_home(self, block: Block, code: int) -> None:
-        """P of G30, FP of G75: camcomp knows the second reference position and the first fixed point."""
+        """Check P of G30 and FP of G75: only the second reference position and the first fixed point are known."""
         known = 2 if code == 30 else 1
         if block.number("P") != known:
             word = block.words["P"]
@@ -192,7 +192,7 @@ class Motions(BlockReader):
         state = self.state
         plane = arcs.PLANES[state.plane][:2]
         letters = ["IJK"[axis] for axis in plane]
-        # A zero for the third letter, as some posts write it, says nothing.
+        # A zero for the third letter, as some posts write it, has no meaning.
         block.used |= {letter for letter in "IJK" if letter in block.words and block.words[letter].value == 0.0}
         missing = [letter for letter in letters if letter not in block.words]
         if len(missing) == 2 or (state.centre_absolute and missing):

@@ -1,7 +1,6 @@
-"""What codes are called, from pygcode; the only place that imports it, and only when a message needs a name.
+"""Names of codes for messages, from pygcode, which only this file imports.
 
-pygcode knows RS274/NGC. It is asked for names and modal groups and for nothing else: it rounds what it writes and
-misreads numbers that are not quite as it expects.
+pygcode covers RS274/NGC. It is used for names and modal groups only, because it rounds numbers and misreads some.
 """
 
 import warnings
@@ -23,16 +22,16 @@ def _class_of(word: str) -> type | None:
 
 
 def name_of(word: str) -> str:
-    """`arc move (clockwise)` of `G2`; empty for a code that pygcode does not know."""
+    """`arc move (clockwise)` of `G2`; empty for a code unknown to pygcode."""
     found = _class_of(word)
     text = (found.__doc__ or "").strip().splitlines() if found is not None else []
     return text[0].rpartition(": ")[2].strip().lower() if text else ""
 
 
 def modal_group_of(word: str) -> int | None:
-    """Modal group of a code as pygcode has it, in the numbering of RS274/NGC; None: not modal, or not known.
+    """Modal group of a code in pygcode, in the numbering of RS274/NGC; None: not modal, or unknown.
 
-    For the test that holds the own table of groups against it.
+    For the test that compares camcomp's table of groups with it.
     """
     found = _class_of(word)
     return getattr(found, "modal_group", None)

@@ -11,7 +11,7 @@ def decimals(resolution_mm: float, unit_mm: float) -> int:
 def plain(value: float, digits: int, point: bool = True) -> str:
     """`value` rounded to `digits` decimals: no exponent, no minus zero, no useless zeros.
 
-    With `point`, a whole number keeps `.0`, because some controls read a number without a point in micrometres.
+    With `point`, a whole number keeps `.0`, because some controllers read a number without a point in micrometres.
     """
     text = f"{value:.{digits}f}"
     if digits:
@@ -24,7 +24,7 @@ def plain(value: float, digits: int, point: bool = True) -> str:
 
 
 def significant(value: float, digits: int = 6, point: bool = False) -> str:
-    """A feed: `digits` significant digits, whole numbers with a point only where that is asked for."""
+    """A feed with `digits` significant digits; whole numbers get a decimal point only with `point`."""
     if value <= 0.0:
         return "0"
     return plain(value, max(0, digits - 1 - math.floor(math.log10(value))), point)

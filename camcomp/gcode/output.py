@@ -1,4 +1,4 @@
-"""What a program is to become, and what became of it."""
+"""Requested moves of a corrected program, and the result of writing them."""
 
 from dataclasses import dataclass
 
@@ -7,12 +7,12 @@ from numpy.typing import NDArray
 
 from camcomp.ground.datatypes import ARC, LINE, RAPID, Bools, Floats, Ints, Path, frozen
 
-FEED_SLACK = 1.0e-3  # relative difference of a feed that is not worth an F word
+FEED_SLACK = 1.0e-3  # relative difference of a feed below which no F word is written
 
 
 @dataclass(frozen=True, eq=False)
 class Output:
-    """The moves to be written, N rows in order; every motion of the program has at least one row."""
+    """Moves to be written, N rows in order; every motion of the program has at least one row."""
 
     motion: Ints  # (N,) index into the program's path, not decreasing
     kind: NDArray[np.int8]  # (N,) RAPID, LINE or ARC
@@ -21,8 +21,8 @@ class Output:
     angle: Floats  # (N,) rad, signed, for arcs; the axis is that of the motion
     feed: Floats  # (N,) mm/min; NaN: as programmed
     joining: Bools  # (N,) a line added between two motions, before or after the motion's own rows
-    rest: Bools | None = None  # (N,) ends at rest, whatever the path mode of the program says; None: none does
-    apart: Bools | None = None  # (N,) the control does not make one line of it and others; None: as the program says
+    rest: Bools | None = None  # (N,) ends at standstill in any path mode; None: all False
+    apart: Bools | None = None  # (N,) the controller must not merge it with other lines; None: by the path mode
     words: Floats | None = None  # (N, 3) of the orientation; None: those of the program, if any
 
     def __post_init__(self) -> None:
@@ -61,7 +61,7 @@ class Output:
         )
 
     def repeats(self, path: Path, resolution_mm: float) -> bool:
-        """Whether this asks for the path as it is, within half a resolution and FEED_SLACK of the feed."""
+        """Whether these moves equal the path within half a resolution and FEED_SLACK of the feed."""
         half = 0.5 * resolution_mm * (1.0 + 1e-9)
         n = len(path)
         if self.words is not None:
@@ -95,7 +95,7 @@ class Output:
 
 @dataclass(frozen=True)
 class Standing:
-    """What the control holds somewhere in the output: tool tip, motion code, feed mode and value; None: not known."""
+    """State of the controller at a point of the output: tool tip, motion code, feed mode and value; None: unknown."""
 
     position: tuple[float, float, float]  # mm, program frame
     code: int | None = None
@@ -104,7 +104,7 @@ class Standing:
 
 @dataclass(frozen=True)
 class Part:
-    """The motions first to last - 1 of a program, to be written behind other output. The others keep their lines."""
+    """Motions first to last - 1 of a program, to be written after other output. The others keep their lines."""
 
     first: int
     last: int
@@ -113,12 +113,12 @@ class Part:
 
 @dataclass(frozen=True, eq=False)
 class Rewritten:
-    """The program as written, N rows as in Output."""
+    """The written program, N rows as in Output."""
 
     data: bytes  # stamped, unless it is a part
-    end: Floats  # (N, 3) mm, program frame: where the words, rounded as they are, lead
+    end: Floats  # (N, 3) mm, program frame: end points of the rounded words
     line: Ints  # (N,) line of the output, from 1
-    centre: Floats  # (N, 3) mm, of rows that came out as arcs, as rounded; else NaN
+    centre: Floats  # (N, 3) mm, of rows written as arcs, rounded; else NaN
     feed: Floats  # (N,) mm/min in force, NaN for rapids
     behind: Standing | None = None  # of a part
     words: Floats | None = None  # (N, 3) of the orientation, as rounded

@@ -29,14 +29,14 @@ class Statement(NamedTuple):
 
 
 class Call(NamedTuple):
-    """Where a subroutine returns to."""
+    """Return address of a subroutine."""
 
     row: int
     name: str
 
 
 class OWords(Subprograms):
-    """Executes a program with O-words. The partner of every statement is found by its label beforehand."""
+    """Flow of a program with O-words; the partner of every statement is found by its label beforehand."""
 
     def __init__(self, reader: BlockReader, trace: Trace | None = None) -> None:
         super().__init__(reader, trace)
@@ -44,8 +44,8 @@ class OWords(Subprograms):
         self._subs: dict[str, int] = {}
         self._partner: dict[int, int] = {}  # loop start -> end, if -> next branch, sub -> endsub, and loop end -> start
         self._calls: list[Call] = []
-        self._repeats: dict[tuple[int, int], int] = {}  # (depth, row of repeat) -> passes left
-        self._taken: set[tuple[int, int]] = set()  # (depth, row of endif) whose branch was executed
+        self._repeats: dict[tuple[int, int], int] = {}  # (depth, row of repeat) -> remaining passes
+        self._taken: set[tuple[int, int]] = set()  # (depth, row of endif) with an executed branch
         if "o" in self.text.string.lower():
             self._scan()
 
@@ -101,7 +101,7 @@ class OWords(Subprograms):
     # --- execution ---------------------------------------------------------------------------------------------
 
     def step(self, row: int) -> int | None:
-        """Execute line `row`; the row that comes next, None at the end."""
+        """Execute line `row`, and return the next row, None at the end."""
         statement = self._statements.get(row)
         if statement is None:
             if _NAMED.match(self.text.line(row)):
@@ -201,7 +201,7 @@ class OWords(Subprograms):
             self._taken.add(end)
             return row + 1
         following = self._match(row)
-        # The next branch is evaluated when it is reached; `else` and `endif` are passed.
+        # The next branch is evaluated when it is reached; `else` and `endif` are skipped.
         return following
 
     def _do_elseif(self, row: int, statement: Statement) -> int:
@@ -261,7 +261,7 @@ class OWords(Subprograms):
         self.refuse(row, 0, "CC124", f"o{statement.label} {statement.keyword} stands outside a loop")
 
     def _nothing_between(self, row: int, end: int, statement: Statement) -> None:
-        """LinuxCNC looks for the next line of that label, and takes a second `break` on its way for the loop's end."""
+        """Refuse another line of that label before the loop's end, which LinuxCNC would take for the end."""
         for other in range(row + 1, end):
             if other in self._statements and self._statements[other].label == statement.label:
                 self.refuse(

@@ -1,4 +1,4 @@
-"""G60, G61, G61.1, G64, G641: whether a control stops at the ends of moves, and how far it may leave the path when it does not."""
+"""Path modes G60, G61, G61.1, G64, G641: exact stop at the ends of moves, or tolerance of blended corners."""
 
 import re
 from dataclasses import dataclass, replace
@@ -7,7 +7,7 @@ from functools import cached_property
 from camcomp.gcode.codes import EXACT_STOPS, code_name
 
 NUMBER = r"\d+(?:\.\d*)?|\.\d+"
-ROUNDING_DISTANCE = 6410  # Sinumerik: corners are rounded from ADIS mm before them on
+ROUNDING_DISTANCE = 6410  # Sinumerik: corners are blended from ADIS mm before them on
 PATTERN = rf"^G(61|61\.1|64)( P({NUMBER}))?( Q({NUMBER}))?$"
 
 
@@ -15,24 +15,24 @@ PATTERN = rf"^G(61|61\.1|64)( P({NUMBER}))?( Q({NUMBER}))?$"
 class PathMode:
     """A mode of the modal group 13, lengths in mm."""
 
-    exact: bool = False  # G61, G61.1, G60 of Sinumerik: every move ends at rest
-    tolerance_mm: float = 0.0  # P of G64, ADIS of G641: how far a corner may be cut; 0: as far as the speed asks for
+    exact: bool = False  # G61, G61.1, G60 of Sinumerik: every move ends at standstill
+    tolerance_mm: float = 0.0  # P of G64, ADIS of G641: largest deviation at a corner; 0: determined by the speed
     merge_mm: float = 0.0  # Q of G64, else P: lines that are straight within it become one; 0: never
     code: int = 640
-    stated: bool = True  # False: nobody said so, it is what a control does when it is switched on
+    stated: bool = True  # False: not stated, the default of controllers
 
     @cached_property
     def name(self) -> str:
-        """As a program says it, in mm."""
+        """Text of the mode in a program, in mm."""
         return self.said(1.0)
 
     @property
     def apart(self) -> "PathMode":
-        """The same without making one line of several."""
+        """The mode without merging of lines."""
         return replace(self, merge_mm=0.0)
 
     def said(self, unit: float) -> str:
-        """As a program says it, in units of so many mm."""
+        """Text of the mode in a program, in units of `unit` mm."""
         name = code_name(self.code)
         if self.code == ROUNDING_DISTANCE:
             return f"{name} ADIS={self.tolerance_mm / unit:g}"
@@ -51,7 +51,7 @@ def path_mode(code: int, tolerance: float | None, merge: float | None) -> PathMo
 
 
 def stated_mode(text: str) -> PathMode:
-    """The mode that a text of PATTERN names, lengths in mm."""
+    """The mode of a text of PATTERN, lengths in mm."""
     found = re.match(PATTERN, text)
     assert found is not None
     code, p, q = found[1], found[3], found[5]

@@ -1,4 +1,4 @@
-"""What reading a program gives: its path, and where in the text every number of it stands."""
+"""Result of reading a program: its path, and the positions of its numbers in the text."""
 
 from dataclasses import dataclass
 
@@ -13,39 +13,39 @@ from camcomp.ground.datatypes import RAPID, Bools, Floats, Ints, Path
 
 # Columns of Sites.begin and Sites.finish.
 X, Y, Z, I, J, K, R, F, P, A, B, C, G = range(13)
-LETTERS = "XYZIJKRFPABCG"  # A, B, C: those of the orientation, whatever they are called
+LETTERS = "XYZIJKRFPABCG"  # A, B, C: words of the orientation of any notation
 
 
 @dataclass(frozen=True, eq=False)
 class Sites:
-    """Where each motion stands in the text and in which modal state, so that it can be written anew; n motions.
+    """Position in the text and modal state of each of n motions, for rewriting.
 
-    Opaque to everybody but gcode: the reader fills it, the writer uses it.
+    Internal to camcomp/gcode: the reader fills it, the writer uses it.
     """
 
     row: Ints  # (n,) line index, from 0
-    begin: NDArray[np.int64]  # (n, 13) index in the text of each word's letter, -1 when the word is not there
+    begin: NDArray[np.int64]  # (n, 13) index in the text of each word's letter, -1 for a missing word
     finish: NDArray[np.int64]  # (n, 13) index behind each word
     unit: Floats  # (n,) mm per programmed unit
-    feed_unit: Floats  # (n,) the same for feeds
+    feed_unit: Floats  # (n,) mm per programmed unit of feeds
     offset: Floats  # (n, 3) mm from a local value to the program frame
     relative: Bools  # (n,) G91
     centre_absolute: Bools  # (n,) G90.1
-    code: NDArray[np.int8]  # (n,) 0..3, the motion code in force; -1 and -2 where the statement needs none (G28)
+    code: NDArray[np.int8]  # (n,) 0..3, the motion code in force; -1 and -2 for statements without one (G28)
     plane: NDArray[np.int8]  # (n,) 17, 18 or 19
     feed_mode: NDArray[np.int8]  # (n,) 93, 94 or 95
     modal_feed: Floats  # (n,) feed in force: mm/min in G94, mm/rev in G95, 1/min in G93; NaN: none
     moved: Bools  # (n, 3) axes that the statement commands
-    code_stated: Bools  # (n,) the motion code was stated since the previous motion, here or before
+    code_stated: Bools  # (n,) the motion code was stated since the previous motion
     feed_stated: Bools  # (n,) an F word was read since the previous motion
-    modes_changed: Bools  # (n,) the line itself changes a mode that the meaning of its words depends on
+    modes_changed: Bools  # (n,) the line changes a mode on which the meaning of its words depends
     stops: Bools  # (n,) the line stops the program after its motion (M0, M2, ...)
-    fixed: Bools  # (n,) more than one motion stands in the line, or it is no G0..G3: not to be rewritten in place
+    fixed: Bools  # (n,) the line has several motions or no G0..G3: not to be rewritten in place
 
 
 @dataclass(frozen=True)
 class Rebase:
-    """A statement whose effect depends on where the machine stands (G92 X0): line, words, and what it set."""
+    """A statement whose effect depends on the position of the machine (G92 X0): line, words, values."""
 
     motion: int  # number of motions before it
     row: int
@@ -56,7 +56,7 @@ class Rebase:
 
 @dataclass(frozen=True, eq=False)
 class Program:
-    """A program as read: its bytes, the path of the tool tip, and what is needed to write it again."""
+    """A program that has been read: its bytes, the path of the tool tip, and the data for rewriting it."""
 
     data: bytes
     name: str
@@ -68,19 +68,19 @@ class Program:
     rebases: tuple[Rebase, ...]
     setup: Setup
     language: Dialect
-    feed_point: bool  # feeds are written with a point; some controls read whole numbers in smaller units
-    modes: tuple[PathMode, ...]  # (n,) whether the control stops behind each motion, and how far it may leave the path
-    straight: bool  # no loops, subprograms, parameters, cycles: a line means at most one motion, as it stands
+    feed_point: bool  # feeds have a decimal point; some controllers read whole numbers in smaller units
+    modes: tuple[PathMode, ...]  # (n,) path mode of each motion
+    straight: bool  # no loops, subprograms, parameters, cycles: a line is at most one motion
     dwelt_s: float = 0.0  # G4 in all
     tool_changes: int = 0  # M6 in all
 
     @property
     def per_turn(self) -> Bools:
-        """Whether motions (n,) are fed per revolution (G95)."""
+        """Mask (n,) of motions with feed per revolution (G95)."""
         return np.asarray((self.sites.feed_mode == 95) & (self.path.kind != RAPID))
 
     def step_mm(self, resolution_mm: float) -> float:
-        """The coarsest step of its lengths, written for a control of this resolution."""
+        """Coarsest step of its lengths (mm) for a controller of this resolution."""
         return max(
             self.language.step_mm(resolution_mm, float(each)) for each in np.unique(np.append(self.sites.unit, 1.0))
         )

@@ -1,4 +1,4 @@
-"""Collects motions while a program is executed, and packs them into arrays."""
+"""Recorder of the motions of an executed program, as arrays."""
 
 import math
 from array import array
@@ -20,7 +20,7 @@ _NO_CENTRE = [math.nan, math.nan, math.nan]
 
 
 class RecordedBlock(Protocol):
-    """What the recorder needs of a block."""
+    """Interface of a block for the recorder."""
 
     row: int
     words: dict[str, Word]
@@ -29,7 +29,7 @@ class RecordedBlock(Protocol):
 
 
 class Recorder:
-    """Motions in program order. Flags about the text are set by the interpreter before each motion."""
+    """Motions in program order. The interpreter sets flags about the text before each motion."""
 
     def __init__(self, text: Text) -> None:
         self._starts = text.starts
@@ -50,18 +50,18 @@ class Recorder:
         return self._count
 
     def begin_line(self, row: int) -> None:
-        """A new block starts."""
+        """Start a block."""
         self._line_first = self._count
         self.modes_changed = False
         self.stops = False
 
     def end_line(self) -> None:
-        """The block is over: where it moved more than once, no single motion owns its words."""
+        """End a block; the words of a block with several motions belong to none of them."""
         if self._count > self._line_first + 1:
             self._fixed.extend(range(self._line_first, self._count))
 
     def line_motion(self, block: RecordedBlock, state: ControlState, code: int, end: list[float], feed: float) -> None:
-        """A rapid (code 0) or a straight cut (code 1)."""
+        """Record a rapid (code 0) or a straight cut (code 1)."""
         self._add(block, state, LINE if code else RAPID, code, end, _NO_CENTRE, 0.0, feed, False, block.axes)
 
     def machine_motion(
@@ -73,7 +73,7 @@ class Recorder:
         feed: float = math.nan,
         moved: Sequence[int] | None = None,
     ) -> None:
-        """A move in machine coordinates; code -1 on the way home, -2 at home (G28), where no motion code is needed."""
+        """Record a move in machine coordinates; code -1 to the intermediate point, -2 to the reference point of G28."""
         axes = block.axes if moved is None else moved
         kind = LINE if code == 1 else RAPID
         self._add(block, state, kind, code, end, _NO_CENTRE, 0.0, feed, True, axes)
@@ -88,7 +88,7 @@ class Recorder:
         angle: float,
         feed: float,
     ) -> None:
-        """An arc or helix."""
+        """Record an arc or helix."""
         self._add(block, state, ARC, code, end, centre, angle, feed, False, block.axes)
 
     def _add(
@@ -137,13 +137,13 @@ class Recorder:
         state.position = end
 
     def cycle(self, actions: list[tuple[str, list[float]]], irreplaceable: str) -> None:
-        """The line was a canned cycle: what it did, in order, and why moves cannot replace it; empty: they can."""
+        """Record a canned cycle: its actions in order, and the reason why moves cannot replace it (empty: they can)."""
         if self._count == self._line_first + 1:
             self._fixed.append(self._line_first)
         self.cycles[self._line_first] = (list(actions), irreplaceable)
 
     def _orientation(self, a: np.ndarray) -> orientation.Orientation | None:
-        """Words of the orientation by motion; None where the program has none."""
+        """Words of the orientation by motion; None for a program that has no such words."""
         if self.oriented is None:
             return None
         return orientation.Orientation(self.oriented, frozen(a[:, 27:30]), frozen(a[:, 30:33]))

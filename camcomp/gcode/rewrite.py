@@ -1,7 +1,7 @@
-"""Writes a program with other end points: only the words that have to change do, everything else keeps its bytes.
+"""Rewriting of a program with new end points; all characters except the changed words keep their bytes.
 
-The writer follows the control through its own output: where the tool stands after rounding, and which motion code and
-feed are in force. So a word is written exactly where the control would otherwise do something else.
+The writer tracks the state of the controller through its own output: rounded position, motion code and feed in force. A
+word is written exactly if the controller would otherwise move differently.
 """
 
 import math
@@ -25,11 +25,11 @@ from camcomp.ground.errors import ProgramError
 def rewrite(
     program: Program, out: Output, *, resolution_mm: float, version: str, part: Part | None = None, model: str = ""
 ) -> Rewritten:
-    """The program with the moves of `out`, rounded to `resolution_mm`, and stamped.
+    """Write the moves of `out`, rounded to `resolution_mm`, into the program, with a stamp.
 
-    A motion with one row that ends where it was programmed (within half a resolution) keeps its bytes, as do moves in
-    machine coordinates and moves before X, Y and Z are all known. Raises ProgramError CC137 where a line does too much
-    at once to be written anew. model: hash of machine and process. part: only these motions are written, and there is no stamp.
+    A motion with one row that ends at its programmed point (within half a resolution) keeps its bytes, as do moves in
+    machine coordinates and moves before X, Y and Z are all known. model: hash of machine and process. part: only these
+    motions are written, without a stamp. Raises ProgramError CC137 for a line with too many functions to be rewritten.
     """
     if part is not None:
         writer = Writer(program, out, resolution_mm)
@@ -65,15 +65,15 @@ def _stamped(text: Text, edits: Edits, stamp: str) -> bytes:
 
 
 class Writer(LineEditor):
-    """Goes through the motions in order and collects the edits."""
+    """Writer that collects the edits of all motions in order."""
 
     def __init__(self, program: Program, out: Output, resolution_mm: float) -> None:
         super().__init__(program, resolution_mm)
         self.out = out
         self.turns = program.language.writes_turns
         self.inserted = 0  # new lines so far
-        self.ours = ""  # the path mode of our own that is in force; none: the program's
-        self.stated = program.setup.path_mode  # by the program, where that was
+        self.ours = ""  # path mode written by this writer and in force; empty: the program's
+        self.stated = program.setup.path_mode  # last one of the program
         self.ends = np.empty((len(out.motion), 3))
         self.lines = np.empty(len(out.motion), np.int64)
         self.centres = np.full((len(out.motion), 3), np.nan)
@@ -95,7 +95,7 @@ class Writer(LineEditor):
             self._rebase(each)
 
     def run_part(self, part: Part) -> Standing:
-        """Fill `edits` for some motions, and `ends` (N, 3) for all rows; what the control holds behind them."""
+        """Fill `edits` for some motions, and `ends` (N, 3) for all rows; return the state of the controller after them."""
         bounds = np.searchsorted(self.out.motion, np.arange(len(self.path) + 1)).tolist()
         self.ends[:] = self.out.end
         self.lines[:] = 0
@@ -144,7 +144,7 @@ class Writer(LineEditor):
         return last - first == 1 and max(shift, start) <= self.half
 
     def _is_programmed(self, arc: Move) -> bool:
-        """Whether it is the arc of the line as it stands, from where that begins: the control took it, however uneven."""
+        """Whether an arc equals the programmed one from its programmed start, which the controller accepts as it is."""
         path, k = self.path, self.k
         if not path.kind[k] == arc.kind == ARC or abs(arc.angle - path.angle[k]) > 1e-9:
             return False
@@ -154,7 +154,7 @@ class Writer(LineEditor):
         return bool(begins and np.abs(off).max() <= self.half)  # so that no word changes
 
     def _pass(self, first: int, last: int) -> None:
-        """Keep the line as it is, and follow the control through it."""
+        """Keep the line unchanged, and update the state of the controller."""
         k = self.k
         self._path_mode(first, behind=False)
         start, end = self.path.start[k], self.path.end[k]
@@ -162,7 +162,7 @@ class Writer(LineEditor):
             self._code_on_line(int(self.sites.code[k]))
         if self.path.kind[k] != RAPID and self.sites.feed_mode[k] != 93:
             self._feed_on_line(math.nan, 0.0)
-        # Of G28, the point on the way (code -1) obeys G91; home does not, and neither does G53.
+        # The intermediate point of G28 (code -1) obeys G91; the reference point and G53 do not.
         if self.path.machine[k] and self.sites.code[k] != -1:
             self.position = self._moved_in_machine_axes(end)
         else:
@@ -178,7 +178,7 @@ class Writer(LineEditor):
         self.lines[first:last] = self.row + self.inserted
 
     def _moved_in_machine_axes(self, end: Floats) -> Point:
-        """Where a move leads whose axis words are machine coordinates, program frame: the axes that it does not name stay."""
+        """End point, program frame, of a move in machine coordinates; axes without a word keep their positions."""
         moved, setup = self.sites.moved[self.k], self.program.setup
         if setup.rotation is None:
             return [float(end[axis]) if moved[axis] else self.position[axis] for axis in range(3)]
@@ -220,7 +220,7 @@ class Writer(LineEditor):
             self.words[first:last] = self.turned
 
     def _turning(self, row: int, in_place: bool) -> list[str]:
-        """New words of the orientation for a row; none where the program keeps its own."""
+        """New words of the orientation for a row; empty if the program's own words remain."""
         if self.out.words is not None:
             return self._turn_words(self.out.words[row].tolist(), in_place)
         if self.path.orientation is not None:
@@ -228,10 +228,10 @@ class Writer(LineEditor):
         return []
 
     def _path_mode(self, row: int, behind: bool) -> None:
-        """An exact stop in front of a row that has to end at rest, the program's own mode again in front of the next that has not.
+        """Write an exact stop before a row that has to end at standstill, and the program's path mode before the next one.
 
-        The own mode without merging where rows have to stay apart. behind: the row stands on a line of its own behind that
-        of the motion.
+        Rows that must not be merged get the program's mode without merging. behind: the row is on a line of its own after
+        that of the motion.
         """
         out, mode = self.out, self.program.modes[self.k]
         assert out.rest is not None and out.apart is not None
@@ -252,7 +252,7 @@ class Writer(LineEditor):
         self.inserted += 1
 
     def _feed_held(self, row: int) -> float:
-        """Feed in force behind a row, mm/min; NaN for rapids."""
+        """Feed in force after a row, mm/min; NaN for rapids."""
         if self.out.kind[row] == RAPID:
             return math.nan
         mode, value = self.feed or (93, 0.0)
@@ -262,7 +262,7 @@ class Writer(LineEditor):
         return value * float(self.path.speed[self.k]) if mode == 95 else value
 
     def _landing(self, point: Point, new: bool) -> Point:
-        """Where the control goes for `point`: to the rounded words, or where no word has to change, as it was."""
+        """End point of the controller for `point`: that of the rounded words, or the programmed one if all words stay."""
         k, here = self.k, self.position
         base = here if self.relative else self.offset
         end = []
@@ -287,7 +287,7 @@ class Writer(LineEditor):
         axes = [axis for axis in range(3) if end[axis] != start[axis]]
         turning = self._turning(row, in_place=False)
         if not axes and not turning and move.kind != ARC:
-            # A move of its own has a word, and the word may lead half a step away.
+            # A move of its own needs a word, whose rounding may move the point by half a step.
             axes = [0]
             end[0] = start[0] if self.relative else self.offset[0] + self._value(start, 0) * self.unit
         words += ["XYZ"[axis] + self._number(self._value(end, axis)) for axis in axes] + turning
@@ -343,7 +343,7 @@ class Writer(LineEditor):
         return round((move.centre[axis] - base) / self.unit, self.digits)
 
     def _centre_said(self, move: Move) -> Point:
-        """Centre of an arc from the present position as its words will say it."""
+        """Centre of an arc from the present position by its rounded words."""
         out = list(move.centre)
         for axis in PLANES[int(self.sites.plane[self.k])][:2]:
             base = self.offset[axis] if self.sites.centre_absolute[self.k] else self.position[axis]
@@ -357,7 +357,7 @@ class Writer(LineEditor):
         return words + ([f"P{turns}"] if turns > 1 else [])
 
     def _radius_holds(self, move: Move, start: Point, end: Point, plane: tuple[int, int]) -> bool:
-        """Whether the R word of the line leads to the centre that is wanted."""
+        """Whether the R word of the line gives the requested centre."""
         number = self.text.string[self.begin[R] + 1 : self.finish[R]].rpartition("=")[2].lstrip("rR ")
         a, b = ((point[plane[0]] / self.unit, point[plane[1]] / self.unit) for point in (start, end))
         try:
@@ -401,7 +401,7 @@ class Writer(LineEditor):
     # --- statements that depend on the position ----------------------------------------------------------------
 
     def _rebase(self, rebase: Rebase) -> None:
-        """G92 and its like set an offset from where the tool stands: state where it stands now."""
+        """Update the words of G92 and similar statements, whose offset depends on the position, to the new position."""
         if rebase.motion:
             programmed = self.path.end[rebase.motion - 1]
         else:

@@ -1,4 +1,4 @@
-"""Statements that move nothing and change what later words mean: units, modes, offsets, feed, tool."""
+"""Statements without motion that change the meaning of later words: units, modes, offsets, feed, tool."""
 
 from camcomp.gcode.block import Block, BlockReader
 from camcomp.gcode.codes import code_name
@@ -17,7 +17,7 @@ class Settings(BlockReader):
     """Executes the modes and settings of a block, in the order of RS274/NGC."""
 
     def modes(self, block: Block) -> None:
-        """Everything modal but the motion code."""
+        """Execute all modal codes except the motion code."""
         state, groups, words = self.state, block.groups, block.words
         changed = any(group in groups for group in _MODE_GROUPS)
         self.record.modes_changed = changed or (state.feed_mode == 95 and "S" in words)
@@ -56,7 +56,7 @@ class Settings(BlockReader):
         state.update()
 
     def _path_mode(self, block: Block, code: int) -> None:
-        """G64 and its like: P, Q where the control knows them, ADIS of G641, which holds until it is given anew."""
+        """Set the path mode: G64 with P and Q if the controller has them, G641 with the modal ADIS."""
         state, letters = self.state, "PQ" if self.dialect.merges and code == 640 else ""
         p, q = ((block.number(each) if each in letters else None) for each in "PQ")
         if code == ROUNDING_DISTANCE:
@@ -126,7 +126,7 @@ class Settings(BlockReader):
         self.state.active = 8 + int(number)
 
     def settings(self, block: Block, code: int) -> None:
-        """A code of group 0 that moves nothing."""
+        """Execute a code of group 0 without motion."""
         state = self.state
         if code == 40:
             given = [(letter, block.number(letter)) for letter in dict.fromkeys(self.dialect.dwell + "P")]
@@ -149,7 +149,7 @@ class Settings(BlockReader):
         state.update()
 
     def dwell(self, letter: str, value: float) -> None:
-        """The control waits as long as a word of G4 says."""
+        """Wait for the time of a word of G4."""
         if letter == "S":
             seconds = 60.0 * value / self.state.speed if self.state.speed > 0.0 else 0.0
         else:

@@ -1,4 +1,4 @@
-"""What reading a program needs to know of its machine."""
+"""Settings of the machine for reading a program."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -13,7 +13,7 @@ TURNS = 1e-12  # entries of a rotation below it are round-off
 
 @dataclass(frozen=True)
 class Setup:
-    """The control before the program starts; lengths in mm."""
+    """State of the controller at the start of the program; lengths in mm."""
 
     start_mm: Triple = ZERO  # tool tip in the program frame
     offsets: Mapping[str, Triple] = field(default_factory=dict)  # "G54".."G59.3": origin in the machine frame
@@ -21,10 +21,10 @@ class Setup:
     home_mm: Triple = ZERO  # G28, machine coordinates
     second_home_mm: Triple = ZERO  # G30
     tool: int = 0  # in the spindle
-    increment_mm: float | None = None  # what a number without a point counts, on a control that has it so
-    orients: bool = False  # the machine has six actuators, so that words of orientation lead its tool
+    increment_mm: float | None = None  # unit of a number without a point, on controllers that count increments
+    orients: bool = False  # the machine has six actuators, so that words of orientation move its tool
     table_axes: frozenset[str] = frozenset()  # A, B, C that turn the workpiece and only position it
-    path_mode: PathMode = ASSUMED  # until the program says one
+    path_mode: PathMode = ASSUMED  # until the program states one
     skip_deleted: bool = False  # the block delete switch: lines that start with `/` are not executed
     rotation: tuple[Triple, Triple, Triple] | None = None  # program axes in machine axes; None: parallel
 

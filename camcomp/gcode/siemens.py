@@ -1,7 +1,7 @@
 """Lines of Sinumerik programs as words: `X=IC(3)`, `CR=5`, `I=AC(10)`, R parameters, statements of several letters.
 
-Where an address of several letters means what a letter means elsewhere, it becomes that letter (CR is R, TURN is P),
-so that everything behind the reader is the same for all dialects.
+An address of several letters with the meaning of a letter in other dialects becomes that letter (CR is R, TURN is P), so
+that all code behind the reader is independent of the dialect.
 """
 
 import re
@@ -27,14 +27,14 @@ IGNORED = frozenset(
     CP BLSYNC ADISPOS ADIS FIFOCTRL STARTFIFO STOPFIFO LIMS SETMS
     """.split()  # noqa: SIM905
 )
-# Statements that may stand alone, to switch something off; with words behind them they change coordinates.
+# Statements that switch a function off without arguments; with arguments they change coordinates.
 RESETS = frozenset(
     """
     TRANS ATRANS ROT AROT SCALE ASCALE MIRROR AMIRROR CYCLE800 MCALL ROTS AROTS CROT CROTS
     """.split()  # noqa: SIM905
 )
 MACHINE = frozenset(("SUPA",))
-# Statements that are refused with a reason of their own: rule, reason, hint. The first pattern that matches counts.
+# Refused statements with rule, reason and hint. The first matching pattern counts.
 _NOT_FOLLOWED: tuple[tuple[str, str, str, str], ...] = (
     ("A?TRANS|G5[89]", "CC118", "moves the coordinates, which is not followed", "put the shift into G54 or into the numbers"),
     ("A?ROTS?|CROTS?|ROTS|CYCLE800|TOROT.*|TOFRAME.*", "CC118", "turns the coordinates, which is not followed", "post unrotated"),
@@ -91,7 +91,7 @@ class SiemensLine:
         self.deleted = False
 
     def read(self) -> Line:
-        """Words of the line. Raises ProgramError with the place of what cannot be read."""
+        """Words of the line. Raises ProgramError with the location of an unreadable one."""
         code = self.line[: self.end]
         if code.strip(BLANK).startswith("%"):
             return Line([])
@@ -246,7 +246,7 @@ class SiemensLine:
         return count
 
     def _value(self, at: int) -> tuple[Expression, str, int]:
-        """Expression behind `=`, whether absolute (AC) or relative (IC), and where it ends."""
+        """Expression behind `=`, its mode (AC absolute, IC relative), and its end."""
         at += self._blanks(at)
         mode = self.line[at : at + 2].upper()
         parser = Parser(self.line[: self.end], at, SINUMERIK)
@@ -272,7 +272,7 @@ class SiemensLine:
         self._refuse_statement(name, start)
 
     def _skip_group(self) -> None:
-        """Pass what stands in brackets behind a statement."""
+        """Skip the brackets behind a statement."""
         at = self.at + self._blanks(self.at)
         if self.line[at : at + 1] != "(":
             return

@@ -1,4 +1,4 @@
-"""How dialects write expressions, as data: brackets, parameters, functions, operators."""
+"""Notation of expressions in dialects, as data: brackets, parameters, functions, operators."""
 
 import math
 from collections.abc import Callable
@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Spelling:
-    """How a dialect writes expressions."""
+    """Notation of expressions in one dialect."""
 
     opening: str  # of a group
     closing: str
     sigil: str  # of a parameter
     functions: dict[str, Callable[[float], float]]
-    operators: tuple[tuple[str, ...], ...]  # from the one that binds least
+    operators: tuple[tuple[str, ...], ...]  # by rising precedence
     named: bool  # `#<name>`
 
 

@@ -1,4 +1,4 @@
-"""The mark that camcomp leaves in what it writes, so that no program is compensated twice."""
+"""Stamp in compensated programs, by which a second compensation is refused."""
 
 import hashlib
 import re
@@ -11,7 +11,7 @@ _MARKS = (b"\xef\xbb\xbf", b"\xff\xfe", b"\xfe\xff")
 
 
 def is_stamped(data: bytes) -> bool:
-    """True when the program was written by camcomp, whatever else was done to it since."""
+    """Whether a program contains camcomp's stamp, even if it was edited afterwards."""
     for mark in _MARKS:
         data = data.removeprefix(mark)
     # The stamp is ASCII, so without its zero bytes UTF-16 of either order reads like ASCII.
@@ -19,23 +19,23 @@ def is_stamped(data: bytes) -> bool:
 
 
 def stamp_line(data: bytes, version: str, opening: str = "(", closing: str = ")", model: str = "") -> str:
-    """The comment that names camcomp, its version, the hash of the input, and that of machine and process if given."""
+    """The comment with camcomp's version, the hash of the input, and that of machine and process if given."""
     return opening + stamp_text(hashlib.sha256(data).hexdigest(), version, model) + closing
 
 
 def stamp_text(digest: str, version: str, model: str = "") -> str:
-    """What the comment says."""
+    """Text of the stamp without comment brackets."""
     return f"camcomp {version} sha256:{digest}" + (f" model:{model}" if model else "")
 
 
 def stamped_model(data: bytes) -> str | None:
-    """The hash of machine and process in a stamp; None where there is none."""
+    """The hash of machine and process in a stamp, or None."""
     found = _MODEL.search(data.replace(b"\0", b""))
     return found[1].decode() if found else None
 
 
 def stamp_index(text: Text) -> int:
-    """Index of the character before which the stamp's line goes: the first, or behind a leading `%` line."""
+    """Index at which the line of the stamp is inserted: the start, or behind a leading `%` line."""
     for index in range(len(text)):
         line = text.line(index).strip(" \t\0")
         if line.startswith("%"):

@@ -1,4 +1,4 @@
-"""ControlState of a control while it executes a program: modes, offsets and where the tool tip stands."""
+"""State of a controller while it executes a program: modes, offsets and position of the tool tip."""
 
 import math
 from collections.abc import Mapping
@@ -69,7 +69,7 @@ class ControlState:
 
     @property
     def sense(self) -> float:
-        """Sense in which the spindle turns, as in Path."""
+        """Direction of the spindle, as in Path."""
         return 0.0 if self.no_speed else self.turn
 
     def update(self) -> None:
@@ -83,21 +83,21 @@ class ControlState:
         return [a + b for a, b in zip(self.setup.in_machine_axes(self.position), self.zero, strict=True)]
 
     def at_machine(self, coordinates: Mapping[int, float]) -> list[float]:
-        """Position (3,) where the machine axes given have these coordinates, mm, and the others stay.
+        """Position (3,) mm with new coordinates of the given machine axes.
 
-        The program axes that follow from known machine axes count as commanded from then on.
+        Program axes that follow from known machine axes count as commanded from then on.
         """
         place = self.machine_position
         known = self.setup.known_in_machine_axes(self.commanded)
         for axis, value in coordinates.items():
             place[axis], known[axis] = value, True
         self.commanded = self.setup.known_in_program_axes(known)
-        if self.setup.rotation is None:  # axes that stay keep their very number
+        if self.setup.rotation is None:  # the other axes keep their exact values
             return [coordinates[i] - self.zero[i] if i in coordinates else self.position[i] for i in range(3)]
         return self.setup.in_program_axes([a - b for a, b in zip(place, self.zero, strict=True)])
 
     def set_work(self, index: int, program: Mapping[int, float]) -> None:
-        """Put the origin of a work offset where it has these program coordinates, mm; its others stay."""
+        """Move the origin of a work offset so that the tip has these program coordinates, mm, on the given axes."""
         if self.setup.rotation is None:
             for axis, value in program.items():
                 self.work[index][axis] = value + self.zero[axis]

@@ -1,7 +1,7 @@
-"""What CAM systems write about stock, tools and material into the comments of a program.
+"""Stock, tools and material in the comments that CAM systems write into programs.
 
-A reader per way of writing lies in `camcomp/comments`, one file each. It gets the comments that carry its mark and
-returns what they state. Lengths are in the unit of the comment; `Comment.unit_mm` is what one of them measures.
+`camcomp/comments` has one reader per notation. It gets the comments with its mark and returns their statements. Lengths are
+in the unit of the comment, `Comment.unit_mm` mm each.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ _OFFSET = re.compile(rb"G(5[4-9](?:\.[123])?)(?![0-9])")
 
 @dataclass(frozen=True)
 class Comment:
-    """A comment without its brackets. line, column: from 1; unit_mm: mm per unit of length where it stands.
+    """A comment without its brackets. line, column: from 1; unit_mm: mm per unit of length in force there.
 
-    next_tool: the next T word behind it, None where there is none.
+    next_tool: the next T word after it, or None.
     """
 
     line: int
@@ -40,7 +40,7 @@ class Comment:
 
 @dataclass(frozen=True)
 class StatedStock:
-    """A stock as YAML would state it, without resolution: keys of `workpiece: stock` (mm, program frame)."""
+    """A stock as keys of `workpiece: stock` (mm, program frame), without resolution."""
 
     comment: Comment
     keys: dict[str, Any]
@@ -49,7 +49,7 @@ class StatedStock:
 
 @dataclass(frozen=True)
 class StatedTool:
-    """A tool as YAML would state it, by its T word."""
+    """A tool as keys of `tools:`, by its T word."""
 
     comment: Comment
     number: int
@@ -59,7 +59,7 @@ class StatedTool:
 
 @dataclass(frozen=True)
 class StatedMaterial:
-    """The material of the workpiece in the words of the comment."""
+    """The material of the workpiece as named in the comment."""
 
     comment: Comment
     name: str
@@ -68,7 +68,7 @@ class StatedMaterial:
 
 @dataclass(frozen=True)
 class OpenStatement:
-    """A comment that states something which camcomp cannot take without guessing, and why."""
+    """An ambiguous or incomplete statement in a comment, and the reason."""
 
     comment: Comment
     why: str
@@ -80,7 +80,7 @@ Statement = StatedStock | StatedTool | StatedMaterial | OpenStatement
 
 @dataclass
 class Stated:
-    """Everything that the comments of a program state. offsets: work offsets that the program uses, G54 to G59.3."""
+    """All statements in the comments of a program. offsets: work offsets that the program uses, G54 to G59.3."""
 
     stocks: list[StatedStock] = field(default_factory=list)
     tools: list[StatedTool] = field(default_factory=list)
@@ -89,7 +89,7 @@ class Stated:
     offsets: set[str] = field(default_factory=set)
 
     def add(self, statement: Statement) -> None:
-        """Sorts a reader's statement in."""
+        """Add a reader's statement to its list."""
         match statement:
             case StatedStock():
                 self.stocks.append(statement)
@@ -102,9 +102,9 @@ class Stated:
 
 
 def read_stated(source: BinaryIO) -> Stated:
-    """What a program's comments state. source: seekable, at its begin, and left there.
+    """Read the statements in a program's comments. source: seekable, at its start, and reset to it.
 
-    A comment with a reader's mark that does not read as it should is a doubt.
+    A comment with a reader's mark that the reader cannot parse is a doubt.
     """
     readers = [reader for _, reader in shelf.usable("comments")]
     if not _is_marked(source, [mark for reader in readers for mark in reader.MARKS]):
@@ -124,7 +124,7 @@ def read_stated(source: BinaryIO) -> Stated:
 
 
 class StatedError(ValueError):
-    """A comment with a reader's mark that does not read as it should."""
+    """A comment with a reader's mark that the reader cannot parse."""
 
     def __init__(self, comment: Comment, message: str) -> None:
         super().__init__(message)
@@ -132,7 +132,7 @@ class StatedError(ValueError):
 
 
 def _is_marked(source: BinaryIO, marks: Sequence[bytes]) -> bool:
-    """Whether any mark (capitals) occurs in the source, in whatever case; the source is left at its begin."""
+    """Whether any mark (capitals) occurs in the source in any case; the source is reset to its start."""
     longest, rest = max(map(len, marks)), b""
     try:
         while block := source.read(CHUNK):
@@ -146,12 +146,12 @@ def _is_marked(source: BinaryIO, marks: Sequence[bytes]) -> bool:
 
 
 def _comments(data: bytes, marks: bytes) -> list[Comment]:
-    """The comments with one of the marks (an expression of capitals), with the unit in force where they stand.
+    """Comments with one of the marks (an expression of capitals), with the unit in force there.
 
-    In front of the first unit code the unit is that of the whole program where it has one only, else mm.
+    Before the first unit code the unit is that of the program if it has a single one, else mm.
     """
     spans = [each.span() for each in _COMMENT.finditer(data)]
-    capitals, marked = data.upper(), re.compile(marks)  # a search for a letter of one case is many times faster
+    capitals, marked = data.upper(), re.compile(marks)  # a search in one case is many times faster
     units, tools = _words(_UNIT, capitals, spans), _words(_TOOL, capitals, spans)
     sizes = {_UNIT_CODES[each[1]] for each in units}
     first = sizes.pop() if len(sizes) == 1 else 1.0
@@ -171,7 +171,7 @@ def _comments(data: bytes, marks: bytes) -> list[Comment]:
 
 
 def _words(pattern: re.Pattern[bytes], data: bytes, spans: Sequence[tuple[int, int]]) -> list[re.Match[bytes]]:
-    """The matches of a word that begin a word and lie in none of the spans (ascending)."""
+    """Matches of a word at the start of a word and outside of the spans (ascending)."""
     starts = [start for start, _ in spans]
     out = []
     for each in pattern.finditer(data):
@@ -198,7 +198,7 @@ def numbers(comment: Comment, words: Sequence[str], what: str) -> list[float]:
 
 
 def box(comment: Comment, low: Sequence[float], high: Sequence[float]) -> StatedStock:
-    """A block between two corners (3,), units of the comment. Raises StatedError where it has no room."""
+    """A block between two corners (3,), units of the comment. Raises StatedError for an empty one."""
     if not all(a < b for a, b in zip(low, high, strict=True)):
         raise StatedError(comment, "the block has no room: its lower corner is not below its upper one")
     k = comment.unit_mm
@@ -206,7 +206,7 @@ def box(comment: Comment, low: Sequence[float], high: Sequence[float]) -> Stated
 
 
 def bar(comment: Comment, centre: Sequence[float], diameter: float, bottom: float, top: float) -> StatedStock:
-    """A round bar along Z, units of the comment. Raises StatedError where it has no room."""
+    """A round bar along Z, units of the comment. Raises StatedError for an empty one."""
     if not (diameter > 0.0 and bottom < top):
         raise StatedError(comment, "the bar has no room: diameter and height have to be above zero")
     k = comment.unit_mm
@@ -229,7 +229,7 @@ def cutter(comment: Comment, kind: str, diameter: float, corner: float = 0.0, fl
 
 
 def form_of(diameter: float, corner: float) -> str:
-    """Form of a mill by its corner radius: flat, bull, or ball where the radius is half the diameter."""
+    """Form of a mill by its corner radius: flat, bull, or ball (radius equal to half the diameter)."""
     if not corner > 0.0:
         return "flat"
     return "ball" if corner > 0.499 * diameter else "bull"

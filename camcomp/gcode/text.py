@@ -1,7 +1,7 @@
 """Bytes of a program as text with numbered lines, so that writing the text back gives the same bytes.
 
-Words of a program are ASCII in every encoding met in shops, and only comments are not. One-byte encodings and UTF-8
-are therefore kept as one character per byte, which cannot fail and cannot change anything; only UTF-16 is decoded.
+Words of a program are ASCII in all encodings in use; only comments are not. One-byte encodings and UTF-8 are therefore kept
+as one character per byte, which is lossless; only UTF-16 is decoded.
 """
 
 import re
@@ -15,7 +15,7 @@ from camcomp.ground.errors import Location, ProgramError
 
 END_OF_LINE = r"\r{0,3}\n|\r"  # LF, CR LF and CR, and the CR CR LF of files that were converted twice
 _END = re.compile(END_OF_LINE)
-LONGEST_LINE = 1 << 14  # characters; controls read some hundred
+LONGEST_LINE = 1 << 14  # characters; controllers read some hundred
 _UTF16 = {b"\xff\xfe": "utf-16-le", b"\xfe\xff": "utf-16-be"}
 
 
@@ -30,7 +30,7 @@ class Text:
 
     @classmethod
     def read(cls, data: bytes, name: str) -> "Text":
-        """Text of `data`. Raises ProgramError CC128 when a file marked as UTF-16 is none, CC140 for a line beyond reason."""
+        """Text of `data`. Raises ProgramError CC128 for invalid UTF-16, CC140 for a line over LONGEST_LINE."""
         text = cls._decoded(data, name)
         if len(text) and (length := int((text.ends - text.starts).max())) > LONGEST_LINE:
             at = Location(name, int(np.argmax(text.ends - text.starts)) + 1, 1)
@@ -67,7 +67,7 @@ class Text:
             breaks, nexts = np.array(spans, np.int64).reshape(-1, 2).T
         starts = np.concatenate([[0], nexts]).astype(np.int64)
         ends = np.concatenate([breaks, [len(string)]]).astype(np.int64)
-        # The text after the last end of line is a line only if there is any.
+        # Text after the last end of line is a line only if it is not empty.
         full = np.concatenate([nexts, [len(string)]]).astype(np.int64)
         if len(starts) > 1 and starts[-1] == len(string):
             starts, ends, full = starts[:-1], ends[:-1], full[:-1]
@@ -80,7 +80,7 @@ class Text:
 
     @property
     def ends(self) -> Ints:
-        """(lines,) index behind each line's last character, the end of line not counted."""
+        """(lines,) index behind each line's last character, before the end of line."""
         return self._bounds[1]
 
     @property
@@ -96,14 +96,14 @@ class Text:
         return self.string[self.starts[index] : self.ends[index]]
 
     def end_of_line(self, index: int) -> str:
-        """End of line `index`, or that of the line before where the last line has none; LF in a file without any."""
+        """End of line `index`; for an unterminated last line that of the line before, or LF."""
         for each in (index, index - 1):
             if 0 <= each and self.ends[each] < self.nexts[each]:
                 return self.string[self.ends[each] : self.nexts[each]]
         return "\n"
 
     def readable(self, string: str) -> str:
-        """A piece of the text as a person sees it: UTF-8 where it is valid, else Western European."""
+        """A piece of the text for display: decoded as UTF-8 if valid, else as Western European."""
         if self.codec != "latin-1":
             return string
         raw = string.encode("latin-1")
@@ -113,7 +113,7 @@ class Text:
             return raw.decode("cp1252", "replace")
 
     def place(self, index: int, column: int = 0) -> Location:
-        """Place of character `column` (from 0) of line `index` (from 0), for a message."""
+        """Location of character `column` (from 0) of line `index` (from 0), for a message."""
         line = self.line(index) if 0 <= index < len(self) else ""
         before = self.readable(line[:column])
         return Location(self.name, index + 1, len(before) + 1, self.readable(line).rstrip("\0"))

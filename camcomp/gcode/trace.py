@@ -1,4 +1,4 @@
-"""What a program did line by line, so that loops and subprograms can be written out as plain code."""
+"""Record of the executed lines of a program, for writing out loops and subprograms."""
 
 from typing import NamedTuple
 
@@ -6,7 +6,7 @@ from camcomp.gcode.words import Line, Word
 
 
 class Executed(NamedTuple):
-    """One line that was executed, or passed (a remark: jumps, calls, labels)."""
+    """One executed line, or a line of flow control (a remark: jumps, calls, labels)."""
 
     row: int
     line: Line
@@ -23,9 +23,9 @@ class Trace:
         self.motions = 0
 
     def line(self, row: int, line: Line, words: list[Word]) -> None:
-        """An ordinary line is about to be executed."""
+        """Record an ordinary line before its execution."""
         self.entries.append(Executed(row, line, words, False, self.motions))
 
     def remark(self, row: int) -> None:
-        """A line that only says where to go on."""
+        """Record a line of flow control."""
         self.entries.append(Executed(row, Line([]), [], True, self.motions))

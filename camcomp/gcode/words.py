@@ -1,4 +1,4 @@
-"""One line of a program as words, strictly: what a control might read in two ways is refused, never guessed."""
+"""One line of a program as words; ambiguous text is refused."""
 
 import re
 from collections.abc import Iterable
@@ -23,11 +23,11 @@ class Word(NamedTuple):
     value: float
     begin: int
     end: int
-    mode: str = ""  # AC or IC: absolute or relative, whatever G90 or G91 say; TURN: full circles beyond the arc
+    mode: str = ""  # AC or IC: absolute or relative, with precedence over G90, G91; TURN: full circles beyond the arc
 
 
 class Setting(NamedTuple):
-    """`#1 = ...`: which parameter, to what, and where it stands."""
+    """`#1 = ...`: parameter, value, and position in the line."""
 
     target: Expression
     value: Expression
@@ -36,7 +36,7 @@ class Setting(NamedTuple):
 
 
 class Line(NamedTuple):
-    """What one line says. Words whose value is an expression carry 0 until it is executed."""
+    """Content of one line. Words whose value is an expression have 0 until the line is executed."""
 
     words: list[Word]
     deleted: bool = False  # starts with a block delete character
@@ -53,8 +53,8 @@ def refuse(text: Text, row: int, column: int, rule: str, message: str, hint: str
 def comment_end(line: str, start: int) -> tuple[int, bool]:
     """Index behind the comment that opens at `start`, and whether it is closed.
 
-    Comments nest where that closes them: read without nesting, the same text would leave a stray `)` behind, which no
-    control accepts, so there is only one reading.
+    Comments nest if that closes them: without nesting the same text would end with a stray `)`, which all controllers
+    refuse, so that the reading is unique.
     """
     depth = 0
     for k in range(start, len(line)):
@@ -95,7 +95,7 @@ def points_in_feeds(lines: Iterable[str]) -> bool:
 def read_line(text: Text, row: int, spelling: Spelling | None = None, start: int = 0) -> Line:
     """Words of line `row` in their order, from character `start`.
 
-    Raises ProgramError with the place of what cannot be read.
+    Raises ProgramError with the location of unreadable text.
     """
     line = text.line(row)
     words: list[Word] = []

@@ -1,3 +1,1 @@
-"""Nouns and small tools that every room uses (arrays, errors, rules, files, tables, plug-in shelves); nothing here
-knows of machines or programs of a certain kind, and nothing here imports another room.
-"""
+"""Shared data types and tools: arrays, errors, rules, files, tables, plug-in shelves; it imports no other folder."""

@@ -1,4 +1,4 @@
-"""Whose fault an error is: what a user's own code raises is told as an error of theirs, with its place, and not as a bug."""
+"""Errors of users' plug-ins: exceptions in their code become ConfigError with its location, not reports of a bug."""
 
 import linecache
 import traceback
@@ -13,7 +13,7 @@ _PACKAGE = str(Path(__file__).parent.parent)
 
 @contextmanager
 def blamed(who: str) -> Iterator[None]:
-    """Turns what is raised inside into ConfigError CC281 about `who`, chained to it; not what camcomp says itself or is told."""
+    """Convert exceptions inside the block to ConfigError CC281 about `who`; errors of camcomp itself pass unchanged."""
     try:
         yield
     except (CamcompError, KeyboardInterrupt, Terminated, GeneratorExit):
@@ -24,7 +24,7 @@ def blamed(who: str) -> Iterator[None]:
 
 
 def place_of(error: BaseException) -> Location | None:
-    """Where in code that is not camcomp's own an error arose: the innermost line of the first file on the way to it."""
+    """Location of an error in foreign code: the innermost line of the first file outside of camcomp in its traceback."""
     if isinstance(error, SyntaxError) and error.filename and error.lineno:
         return Location(error.filename, error.lineno, max(error.offset or 1, 1), error.text or "")
     frames = [(each.filename, each.lineno or 1) for each in traceback.extract_tb(error.__traceback__)]
@@ -37,5 +37,5 @@ def place_of(error: BaseException) -> Location | None:
 
 
 def _is_machinery(file: str) -> bool:
-    """Frames between camcomp and a plug-in."""
+    """Whether a file belongs to the import machinery between camcomp and a plug-in."""
     return file.startswith(("<frozen", _PACKAGE)) or "importlib" in Path(file).parts or file.endswith("contextlib.py")

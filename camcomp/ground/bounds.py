@@ -1,13 +1,13 @@
-"""What is too much for any input, so that arithmetic stays finite and an answer comes soon."""
+"""Limits of the size of any input, which keep arithmetic finite and run times short."""
 
-LARGEST_NUMBER = 1e18  # in mm, N, rad, s and what is made of them; a rigid drive is written as 1e14 N/mm
-SMALLEST_NUMBER = 1e-18  # of what is divided by
+LARGEST_NUMBER = 1e18  # in mm, N, rad, s and their products; a rigid drive is written as 1e14 N/mm
+SMALLEST_NUMBER = 1e-18  # of a divisor
 
 
 def number_of(text: str) -> float | None:
-    """The number that a cell holds, NaN for `nan`; None for what is none, and for what is too large.
+    """Number in a cell, NaN for `nan`; None for other texts and numbers beyond LARGEST_NUMBER.
 
-    Python takes more for a number than any control or spreadsheet writes: 1_0, infinity, digits of other scripts.
+    Stricter than Python's float(), which also accepts 1_0, infinity and digits of other scripts.
     """
     if "_" in text or not text.isascii():
         return None

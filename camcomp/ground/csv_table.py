@@ -1,8 +1,8 @@
-"""The one reader of CSV files: logs, joint tables, measured forces, recordings of others.
+"""Reader of all CSV files: logs, joint tables, measured forces, recordings of other systems.
 
-A file is UTF-8 with or without a mark at its start; lines end in LF, CR LF or CR; blank lines count for nothing. The first
-row names the columns. Cells may stand in quotes; an empty cell, one that is missing at the end of a row, and `nan` hold no
-value. What is neither that nor a finite number is refused with its place, and so is a cell beyond the last column.
+A file is UTF-8 with or without a byte order mark; lines end in LF, CR LF or CR; blank lines are ignored. The first row names
+the columns. Cells may be quoted; an empty cell, a cell missing at the end of a row, and `nan` have no value. Other texts
+that are no finite number are refused with their location, and so are cells beyond the last column.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ MOST_TABLE_BYTES = 1 << 30
 NEEDED = "a table is a row of column names and rows of numbers below it"
 TOO_MANY = "look for a mark too many, or a decimal comma"
 LINES_LOOKED_AT = 400
-NUMBERS_SHARE = 0.2  # of cells, from which a text counts as a table with mistakes
+NUMBERS_SHARE = 0.2  # of cells: least share of numbers in a table with errors
 _CELLS = re.compile(r"[,;\s]+")
 _BLANK = " "  # any number of blanks and tabs between cells
 
 
 @dataclass(frozen=True)
 class TableRules:
-    """Ids of the rules under which one kind of table is refused: for what it is, for its columns, for one of its cells."""
+    """Rule ids for errors of one kind of table: of the file as a whole, of its columns, of a cell."""
 
     table: str
     column: str
@@ -41,14 +41,14 @@ class TableRules:
 
 @dataclass(frozen=True, eq=False)
 class CsvTable:
-    """Cells as text, each with its place. header: names of the columns; rows: n rows of cells, of any length.
+    """Cells as text, each with its location. header: names of the columns; rows: n rows of cells, of any length.
 
-    headed: whether the names stand in the file; without, columns are called 1, 2, 3 and so on.
+    headed: the file contains the names; otherwise columns are called 1, 2, 3 and so on.
     """
 
     name: str
     rules: TableRules
-    mark: str  # between cells
+    mark: str  # delimiter of cells
     header: tuple[str, ...]
     rows: tuple[list[str], ...]
     _line: tuple[int, ...]  # of the header and of every row, from 1
@@ -56,22 +56,22 @@ class CsvTable:
     headed: bool = True
 
     def at(self, row: int, column: int = 0) -> Location:
-        """Place of a cell; row -1 is the header, or the first row where there is none. A cell that is missing stands behind the last of its row."""
+        """Location of a cell; row -1 is the header, or the first row without one. A missing cell is behind the last one."""
         line = self._line[row + 1]
         source = self._source[line - 1]
         return Location(self.name, line, min(_start(source, self.mark, column), len(source)) + 1, source)
 
     def text(self, row: int, column: int) -> str:
-        """A cell without the blanks around it; empty where the row ends before it."""
+        """A cell without surrounding blanks; empty if the row ends before it."""
         cells = self.rows[row]
         return cells[column].strip() if column < len(cells) else ""
 
     def texts(self, column: int) -> list[str]:
-        """A column, as `text` has its cells."""
+        """Cells of a column, as from `text`."""
         return [self.text(row, column) for row in range(len(self.rows))]
 
     def value(self, row: int, column: int) -> float:
-        """A number, NaN where there is none. Raises ConfigError."""
+        """Number in a cell, NaN if it is empty. Raises ConfigError for other texts."""
         cell = self.text(row, column)
         if not cell:
             return float("nan")
@@ -82,7 +82,7 @@ class CsvTable:
         return number
 
     def required(self, row: int, column: int, errors: list[CamcompError]) -> float:
-        """A number; where there is none an error is added to those given, and NaN is the answer."""
+        """Number in a cell; for an empty cell NaN, with an error appended to `errors`."""
         try:
             value = self.value(row, column)
         except ConfigError as error:
@@ -95,7 +95,7 @@ class CsvTable:
         return value
 
     def values(self, columns: Sequence[int] | None = None) -> Floats:
-        """Numbers (n, k) of some columns, of all without names. Raises ConfigError."""
+        """Numbers (n, k) of some columns, default all. Raises ConfigError."""
         wanted = range(len(self.header)) if columns is None else columns
         out = np.empty((len(self.rows), len(wanted)))
         for i in range(len(self.rows)):
@@ -103,7 +103,7 @@ class CsvTable:
         return out
 
     def refuse_twice(self, columns: Sequence[int] | None = None) -> None:
-        """Raise ConfigError where a named column (of those given, or of all) is there twice."""
+        """Raise ConfigError for a column name (of those given, or of all) that occurs twice."""
         for j in range(len(self.header)) if columns is None else columns:
             first = self.header.index(self.header[j])
             again = next((k for k in range(first + 1, len(self.header)) if self.header[k] == self.header[j]), None)
@@ -115,10 +115,10 @@ class CsvTable:
 def read_csv(
     data: bytes | str, name: str, rules: TableRules, *, spreadsheet: bool = False, rowless: bool = False
 ) -> CsvTable:
-    """Cells of a CSV file; `name` is the file's for messages. Raises ConfigError.
+    """Read the cells of a CSV file; `name` is the file's for messages. Raises ConfigError.
 
-    spreadsheet: cells may be parted by semicolons, tabs or blanks, and then numbers may have decimal commas; a first row
-    of numbers, most of its cells at least, is no header. rowless: a header alone is a table, too.
+    spreadsheet: the delimiter may be a semicolon, tab or blank, and numbers may then have decimal commas; a first row with
+    mostly numbers is no header. rowless: a header without rows is accepted.
     """
     if len(data) > MOST_TABLE_BYTES:
         raise ConfigError("CC425", f"more than {MOST_TABLE_BYTES} bytes", at=Location(name, 1, 1))
@@ -154,9 +154,9 @@ def read_csv(
 
 
 def like_a_table(lines: Sequence[str]) -> bool:
-    """Whether a good part of what stands below the first line is numbers, if there is anything.
+    """Whether at least NUMBERS_SHARE of the cells below the first line are numbers; True without such lines.
 
-    What is not meant as a table may be a file that was never meant to be read aloud.
+    Error messages quote lines of tables only, because another file may be confidential.
     """
     filled = list(islice((line for line in lines if line.strip()), LINES_LOOKED_AT))
     cells = [cell.strip("\"' ") for line in filled[1:] for cell in _CELLS.split(line)]
@@ -165,13 +165,13 @@ def like_a_table(lines: Sequence[str]) -> bool:
 
 
 def refuse_long(rows: float, what: str, at: Location | None = None) -> None:
-    """Raise ConfigError CC425 for more rows than any work here needs."""
+    """Raise ConfigError CC425 for more than MOST_TABLE_ROWS rows."""
     if not rows <= MOST_TABLE_ROWS:
         raise ConfigError("CC425", f"{what} has {rows:.3g} rows, more than {MOST_TABLE_ROWS}", at=at)
 
 
 def _mark(first: str) -> str:
-    """What stands between the cells of a spreadsheet, by its first line."""
+    """Delimiter of the cells of a spreadsheet, found from its first line."""
     for mark in ";\t":
         if mark in first:
             return mark
@@ -181,7 +181,7 @@ def _mark(first: str) -> str:
 
 
 def _share_of_numbers(cells: Sequence[str], *, decimal_comma: bool) -> float:
-    """How many of the cells that are not empty hold numbers, 0 to 1."""
+    """Share of numbers among the cells with text, 0 to 1."""
     numbers = [_number(cell.strip(), decimal_comma=decimal_comma) is not None for cell in cells if cell.strip()]
     return sum(numbers) / max(len(numbers), 1)
 
@@ -189,7 +189,7 @@ def _share_of_numbers(cells: Sequence[str], *, decimal_comma: bool) -> float:
 def _rows(
     text: str, mark: str, name: str, rules: TableRules, source: Sequence[str]
 ) -> tuple[list[int], list[list[str]]]:
-    """Line on which each row starts, and its cells; rows without any text are left out."""
+    """First line and cells of every row with text."""
     if mark == _BLANK:
         filled = [(i + 1, line.split()) for i, line in enumerate(source) if line.strip()]
         return [line for line, _ in filled], [cells for _, cells in filled]
@@ -210,12 +210,12 @@ def _rows(
 
 
 def _number(cell: str, *, decimal_comma: bool) -> float | None:
-    """A number or NaN; None where the text is neither, or no number of this world."""
+    """A number or NaN; None for other texts and numbers out of bounds."""
     return number_of(cell.replace(",", ".") if decimal_comma else cell)
 
 
 def _start(source: str, mark: str, column: int) -> int:
-    """Where a cell begins in its line, from 0; behind the last where there are fewer."""
+    """Index of the first character of a cell in its line; the end of the line for a missing cell."""
     if mark == _BLANK:
         starts = [word.start() for word in re.finditer(r"\S+", source)]
         return starts[column] if column < len(starts) else len(source)

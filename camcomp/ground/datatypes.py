@@ -1,4 +1,4 @@
-"""The nouns that more than one room uses: struct of arrays, first axis = motion, float64, read-only."""
+"""Shared data types: structs of read-only float64 arrays with motions along the first axis."""
 
 from __future__ import annotations
 
@@ -44,10 +44,10 @@ def frozen(values: ArrayLike, dtype: type = np.float64) -> NDArray[Any]:
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """What a program asks the tool tip to do: n motions in program order, whatever the dialect.
+    """Programmed path of the tool tip: n motions in program order, independent of the dialect.
 
-    Points are tool tips in mm in the program frame of G54 as it stands at program start; every other offset is
-    resolved. Raises ValueError when the arrays do not have one row per motion.
+    Points are tool tips in mm in the program frame of G54 at program start; all other offsets are resolved. Raises
+    ValueError for arrays without one row per motion.
     """
 
     line: Ints  # (n,) source line, counted from 1
@@ -59,13 +59,11 @@ class Path:
     angle: Floats  # (n,) rad about `axis`, + = counter-clockwise seen from its tip; extra turns add 2 pi
     feed: Floats  # (n,) mm/min of the tip; NaN for rapids
     speed: Floats  # (n,) spindle, rev/min
-    turn: Floats  # (n,) sense of the spindle: +1 clockwise (M3), -1 (M4), 0 stopped (M5, S0), NaN: not said
+    turn: Floats  # (n,) direction of the spindle: +1 clockwise (M3), -1 (M4), 0 stopped (M5, S0), NaN: not stated
     tool: Ints  # (n,) tool number
     known: Bools  # (n,) X, Y and Z have all been commanded by the end of this motion
     machine: Bools  # (n,) move in machine coordinates (G53, G28, G30)
-    waits: Bools | None = (
-        None  # (n,) the control waits at rest in front of it (G4, S, M3 to M9, another offset); None: nowhere
-    )
+    waits: Bools | None = None  # (n,) the controller stops before it (G4, S, M3 to M9, another offset); None: all False
 
     orientation: Orientation | None = None  # of the tool; None: the program states none
 
@@ -83,6 +81,6 @@ class Path:
         return int(self.line.shape[0])
 
     def take(self, rows: NDArray[Any]) -> Path:
-        """The motions that `rows` (indices or mask) picks."""
+        """The motions with indices or mask `rows`."""
         columns = {each.name: getattr(self, each.name)[rows] for each in fields(self) if each.name != "orientation"}
         return Path(**columns, orientation=None if self.orientation is None else self.orientation.take(rows))

@@ -1,6 +1,6 @@
-"""Errors a user can act on: each has a rule id, a place in a file, a hint, and the exit code of its family.
+"""Errors for the user: each has a rule id, a location in a file, a hint, and the exit code of its family.
 
-Several mistakes of one file travel together: the first is raised and carries the `others`.
+Several errors of one file are raised together: the first one carries the `others`.
 """
 
 import re
@@ -13,7 +13,7 @@ from camcomp.ground.rules import RULES
 
 @dataclass(frozen=True)
 class Location:
-    """A place in a text file; `line` and `column` count from 1, `source` is the text of that line."""
+    """A location in a text file; `line` and `column` count from 1, `source` is the text of that line."""
 
     file: str
     line: int
@@ -22,7 +22,7 @@ class Location:
 
 
 class CamcompError(Exception):
-    """Base of every error that is the input's fault, not the program's. Only its subclasses are raised."""
+    """Base of every error of the input, as opposed to bugs of camcomp. Only its subclasses are raised."""
 
     exit_code: ClassVar[int]
 
@@ -48,7 +48,7 @@ class CamcompError(Exception):
 
 
 class Terminated(BaseException):
-    """A signal asks the process to end; whatever is open is closed on the way out, and no file is left half-written."""
+    """A signal asks the process to end; raised so that open files are closed and no output is half-written."""
 
     def __init__(self, number: int) -> None:
         super().__init__(number)
@@ -56,11 +56,11 @@ class Terminated(BaseException):
 
 
 class PluginWarning(UserWarning):
-    """A plug-in of the user's cannot be used and is left out of a list; a run that names it gets an error instead."""
+    """A plug-in of the user cannot be used and is missing in a list; a run that names it raises an error instead."""
 
 
 class CheckFailed(CamcompError):
-    """The work is finished, and a check says no (residual, limit, already compensated)."""
+    """The work is finished, and a check failed (residual, limit, already compensated)."""
 
     exit_code = 1
 
@@ -72,13 +72,13 @@ class ConfigError(CamcompError):
 
 
 class ProgramError(CamcompError):
-    """NC program not readable or not supported."""
+    """Unreadable or unsupported NC program."""
 
     exit_code = 3
 
 
 class PhysicsError(CamcompError):
-    """No convergence, unreachable, singular or not stable."""
+    """The model has no solution: no convergence, out of reach, singular or unstable."""
 
     exit_code = 4
 
@@ -90,19 +90,19 @@ class FileError(CamcompError):
 
 
 def raise_all(errors: Sequence[CamcompError]) -> None:
-    """Raise the first of `errors` with the rest attached; do nothing when there is none."""
+    """Raise the first of `errors` with the others attached, if there are any."""
     if errors:
         first, *rest = errors
         first.others = (*first.others, *rest)
         raise first
 
 
-# Signs that move a terminal's cursor, change the order of letters, or stand for bytes of a name that are no UTF-8.
+# Characters that move a terminal's cursor, change the order of letters, or represent invalid UTF-8 bytes of a name.
 _UNSHOWN = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
 
 
 def shown(text: str) -> str:
-    """A text as it may stand on a terminal or in a report: control characters and lone surrogates as escapes."""
+    """A text for terminals and reports: control characters and lone surrogates as escapes."""
     return _UNSHOWN.sub(lambda found: _escaped(ord(found[0])), text)
 
 
@@ -125,7 +125,7 @@ def format_error(error: CamcompError, color: bool = False) -> str:
         block = [f"{bold}{place}:{off} {red}error[{each.rule}]{off}: {shown(each.message)}"]
         if at and at.source.strip():
             source = at.source.rstrip("\r\n")
-            # Tabs stay tabs under the line, so that the caret stands below its character.
+            # Tabs stay tabs under the line, so that the caret is below its character.
             padding = "".join(c if c == "\t" else " " for c in source[: at.column - 1])
             padding += " " * (len(shown(source[: at.column - 1])) - len(padding))
             block += [f"  {shown(source)}", f"  {padding}{red}^{off}"]

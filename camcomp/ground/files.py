@@ -1,4 +1,4 @@
-"""The only disk access: bytes in, bytes out, `-` for the standard streams, several outputs all or none."""
+"""Disk access: bytes in, bytes out, `-` for the standard streams, several outputs all or none."""
 
 import errno
 import os
@@ -16,7 +16,7 @@ from camcomp.ground.replacement import Replacement
 
 
 class _Inputs:
-    """What the command that is running has read: never to be overwritten, and read again where that works but once."""
+    """Inputs of the running command: protected against being overwritten, and kept if they can be read only once."""
 
     def __init__(self) -> None:
         self.places: set[Hashable] = set()
@@ -28,7 +28,7 @@ _reading: list[_Inputs] = []  # innermost last; empty outside of commands
 
 @contextmanager
 def remembering_inputs() -> Iterator[None]:
-    """Within it no output may be a file that was read, and a pipe gives the same bytes every time it is read."""
+    """Context in which inputs cannot be overwritten, and every read of a pipe returns the same bytes."""
     _reading.append(_Inputs())
     try:
         yield
@@ -56,8 +56,8 @@ def read_bytes(path: str | Path) -> bytes:
 
 
 def _unread(path: str | Path, error: OSError) -> FileError:
-    """What a user needs to put it right: a folder holds the file meant, and a mistyped name has a neighbour."""
-    from difflib import get_close_matches  # only a failure needs it
+    """Error with a hint: for a folder its files, for a misspelt name the nearest one."""
+    from difflib import get_close_matches  # slow import, needed for errors only
 
     wanted, hint = Path(path), None
     if isinstance(error, IsADirectoryError):
@@ -69,7 +69,7 @@ def _unread(path: str | Path, error: OSError) -> FileError:
 
 
 def open_source(path: str | Path) -> BinaryIO:
-    """A file to be read from the begin as often as wanted; a pipe is put aside on disk. Raises FileError CC500."""
+    """Open a seekable file; a pipe is copied to a temporary one. Raises FileError CC500."""
     try:
         if _reading:
             _reading[-1].places |= source_places(str(path))
@@ -88,8 +88,8 @@ def open_source(path: str | Path) -> BinaryIO:
 
 
 def _aside() -> BinaryIO:
-    """A file without a name, in memory as long as it is small: a folder for such files is needed by large ones only."""
-    import tempfile  # only streams and pipes need it
+    """Temporary file, in memory while it is small, so that only large ones need a folder."""
+    import tempfile  # slow import, needed for streams and pipes only
 
     return cast(BinaryIO, tempfile.SpooledTemporaryFile(max_size=1 << 24))
 
@@ -100,11 +100,13 @@ def display_name(path: str | Path) -> str:
 
 
 def write_all(outputs: Mapping[str, bytes] | Mapping[Path, bytes], *, inputs: Sequence[str | Path] = ()) -> None:
-    """Write every output or none: whole files are made beside their targets first and then moved into place.
+    """Write every output or none: whole files are written next to their targets first and then moved into place.
 
-    A target keeps its permissions; a link is followed; what is written is on the disk when this returns. Standard output
-    ("-"), pipes and character devices are written to, after the files. Raises FileError: CC502 when an output is one of
-    `inputs` or of what the command has read, or another output; CC501 when one cannot be written.
+    A target keeps its permissions; links are followed; the data are on the disk when this returns. Standard output ("-"),
+    pipes and character devices are written to after the files.
+
+    Raises:
+        FileError: CC502, an output is an input of the command or another output; CC501, it cannot be written.
     """
     contents = {str(path): data for path, data in outputs.items()}
     with writing(list(contents), inputs=inputs) as files:
@@ -116,9 +118,9 @@ def write_all(outputs: Mapping[str, bytes] | Mapping[Path, bytes], *, inputs: Se
 def writing(
     paths: Sequence[str], *, inputs: Sequence[str | Path] = (), keep: bool = True
 ) -> Iterator[dict[str, BinaryIO]]:
-    """Open files to be filled bit by bit; they take the place of `paths` when the block ends well, or none of them does.
+    """Open files to be written in parts; all of them replace `paths` when the block succeeds, otherwise none.
 
-    keep: false writes nothing in the end. Raises FileError as write_all does.
+    keep: False discards them. Raises FileError as write_all.
     """
     sources = [source_places(str(each)) for each in inputs]
     one_place_each(paths, *sources, *(each.places for each in _reading[-1:]))
@@ -158,7 +160,7 @@ def _naming(path: str) -> Iterator[None]:
 
 
 def _pour(file: BinaryIO, path: str, stream: str | int) -> None:
-    """What was put aside into a stream. A reader that goes away is no error of the output's."""
+    """Copy a temporary file into a stream; a closed reader is no error."""
     file.seek(0)
     try:
         if path == STANDARD:
@@ -177,9 +179,10 @@ def _pour(file: BinaryIO, path: str, stream: str | int) -> None:
 
 @contextmanager
 def alone_in(folder: Path, lock: Path) -> Iterator[None]:
-    """Within it no other process is in here with `folder`; a dead process is in no one's way. `lock`: a file for it.
+    """Context with exclusive use of `folder`; the system releases the lock of a dead process. `lock`: a file for it.
 
-    Raises FileError: CC504 when another one is there, CC501 when the lock cannot be made.
+    Raises:
+        FileError: CC504, another process uses the folder; CC501, the lock cannot be written.
     """
     try:
         lock.parent.mkdir(parents=True, exist_ok=True)
@@ -197,7 +200,7 @@ def alone_in(folder: Path, lock: Path) -> Iterator[None]:
 
 
 def _lock(handle: int) -> None:
-    """The system lets go of the lock when the process ends."""
+    """Lock an open file until the process ends."""
     if sys.platform == "win32":
         import msvcrt
 
@@ -209,7 +212,7 @@ def _lock(handle: int) -> None:
 
 
 def shipped(name: str) -> Path:
-    """Path of a file of `config/`, `samples/` or `docs/`, in a checkout as in an installed camcomp. Raises FileError CC500."""
+    """Path of a file of `config/`, `samples/` or `docs/`, in a checkout and in an installed camcomp. Raises FileError CC500."""
     package = Path(__file__).parent.parent
     for root in (package / "data", package.parent):
         if (root / name).exists():

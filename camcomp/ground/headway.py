@@ -1,6 +1,6 @@
-"""How far long work has come: stories say it, and whoever watches may show it. Without a watcher nothing happens.
+"""Progress of long work: the work reports its share, and a watcher may display it.
 
-A share never goes back: work that is repeated until it is good enough stands still meanwhile.
+The reported share never decreases: it is constant while work is repeated.
 """
 
 from __future__ import annotations
@@ -16,9 +16,10 @@ COMPILING, ONCE = "compiling", "compiling, once per installation"
 
 @dataclass
 class Headway:
-    """share: of the work that is done, 0 to 1, None as long as nobody has said. doing: what holds it up, or nothing.
+    """Progress of the work in a context.
 
-    span: of the whole that the part at work makes up; points: whether points solved are what this part consists of.
+    share: 0 to 1, None before the first report. doing: text of a step that delays the work, or empty. span: interval of the
+    whole that the present part covers; points: the part consists of solved points.
     """
 
     share: float | None = None
@@ -32,7 +33,7 @@ _watched: list[Headway] = []  # innermost last
 
 @contextmanager
 def watched() -> Iterator[Headway]:
-    """Within it, what is done can be read from what is given."""
+    """Context whose progress can be read from the yielded object."""
     headway = Headway()
     _watched.append(headway)
     try:
@@ -42,7 +43,7 @@ def watched() -> Iterator[Headway]:
 
 
 def done(share: float) -> None:
-    """Says that this share of the part at work is done, 0 to 1."""
+    """Report the share of the present part, 0 to 1."""
     if _watched:
         headway = _watched[-1]
         low, high = headway.span
@@ -51,9 +52,9 @@ def done(share: float) -> None:
 
 @contextmanager
 def part(low: float, high: float, *, points: bool = False) -> Iterator[None]:
-    """Within it, what is done counts as done between these shares of the part around it.
+    """Context that maps reported shares to the interval low to high of the surrounding part.
 
-    points: the part consists of points that are solved, so that these count.
+    points: the part consists of solved points, whose number is the share.
     """
     headway = _watched[-1] if _watched else Headway()
     before = headway.span, headway.points
@@ -67,14 +68,14 @@ def part(low: float, high: float, *, points: bool = False) -> Iterator[None]:
 
 
 def steps(items: Iterable[T], count: int) -> Iterator[T]:
-    """The items, of which there are `count`; each is a part of the part at work."""
+    """Iterate over `count` items, each an equal part of the present part."""
     for k, each in enumerate(items):
         with part(k / count, (k + 1) / count):
             yield each
 
 
 def points(items: Iterable[T], count: int) -> Iterator[T]:
-    """Pieces of points that are solved; they count where the part at work consists of them."""
+    """Iterate over `count` pieces of points, and report them if the present part consists of points."""
     counting = bool(_watched) and _watched[-1].points
     for k, each in enumerate(items):
         yield each
@@ -83,6 +84,6 @@ def points(items: Iterable[T], count: int) -> Iterator[T]:
 
 
 def hold(what: str) -> None:
-    """Says what holds up the work from now on; nothing, where it goes on."""
+    """Report a step that delays the work from now on; empty: the delay is over."""
     if _watched:
         _watched[-1].doing = what

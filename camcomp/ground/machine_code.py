@@ -1,8 +1,7 @@
-"""Compiled functions and their code on disk: whole, for exactly this source, numba and processor, or compiled anew.
+"""Cache of compiled functions on disk, valid for exactly one state of source, numba and processor.
 
-Every file has a checksum and one name for all that it depends on; whatever goes wrong with it is a note, never an error.
-A file of code is executed, so one that another user owns or can change is not opened, and a folder that others can
-write to holds none. Numba's own cache on disk is not used: it knows neither.
+Every file has a checksum and a name made of all its dependencies; a failure is a note, never an error. Because the code is
+executed, files and folders that other users own or can write to are not used. Numba's own cache has neither check.
 """
 
 from __future__ import annotations
@@ -26,7 +25,7 @@ from camcomp.ground.notes import note
 from camcomp.ground.replacement import Replacement
 from camcomp.ground.trust import why_file_is_not_ours, why_folder_is_not_ours
 
-numba: Any = _numba  # its annotations leave out what it has
+numba: Any = _numba  # its annotations are incomplete
 
 _SUM = hashlib.sha256().digest_size
 _ANEW = "it is compiled anew, which takes half a minute"
@@ -35,23 +34,23 @@ _IMPORT = re.compile(r"^(?:from (camcomp[\w.]*) import (\([^)]*\)|.*)|import (ca
 
 
 def kept(function: Callable[..., Any], *, allocates: bool = True, **options: Any) -> Any:
-    """Numba's dispatcher of `function`, its code kept on disk where there is a place for it; options as for njit.
+    """Numba's dispatcher of `function`, with its code cached on disk if a folder is usable; options as for njit.
 
-    allocates: whether the code makes arrays. Code that makes none is loaded without what numba imports for compiling,
-    a quarter of a second of declarations.
+    allocates: the code creates arrays. Other code is loaded without numba's compiler, whose import takes a quarter of a
+    second.
     """
     dispatcher = numba.njit(**options)(function)
     if not numba.config.DISABLE_JIT:  # for the debugger
-        # A numba that asks under another name keeps nothing and compiles in every process.
+        # Without this attribute (another numba version) every process compiles.
         dispatcher._cache = _Cache(function, allocates)
     return dispatcher
 
 
 @functools.cache
 def sources(file: Path) -> frozenset[Path]:
-    """Files of camcomp from which a kernel's file takes functions or constants, by whatever way, itself included.
+    """Files of camcomp from which a kernel's file imports functions or constants, directly or indirectly, and itself.
 
-    All of it becomes part of the machine code: a constant as its value, a function as its instructions.
+    All of them are part of the machine code: a constant as its value, a function as its instructions.
     """
     found, open_files = set(), [file]
     while open_files:
@@ -64,7 +63,7 @@ def sources(file: Path) -> frozenset[Path]:
 
 @functools.cache
 def _imported(file: Path) -> tuple[Path, ...]:
-    """Files of camcomp that a file imports when it is itself imported."""
+    """Files of camcomp that a file imports at module level."""
     found = []
     for module, names, alone in _IMPORT.findall(file.read_text(encoding="utf-8")):
         place = ROOT.joinpath(*(module or alone).split("."))
@@ -88,9 +87,9 @@ def _not_kept(reason: str) -> None:
 
 
 def _folders(file: Path) -> Iterator[Path]:
-    """Folders for the code of a source file, the preferred one first.
+    """Cache folders for a source file, the preferred one first.
 
-    Of numba's settings only the environment's count: a `.numba_config.yaml` comes with the current folder.
+    Of numba's settings only environment variables count, because a `.numba_config.yaml` belongs to the current folder.
     """
     kind = f"{file.parent.name}_{_short(str(file.parent))}"
     if given := os.environ.get("NUMBA_CACHE_DIR"):
@@ -101,7 +100,7 @@ def _folders(file: Path) -> Iterator[Path]:
 
 
 def _user_cache() -> Path | None:
-    """The user's cache folder; None for users without a home."""
+    """The user's cache folder; None if the home folder is unknown."""
     if sys.platform == "win32":
         places = [os.environ.get("LOCALAPPDATA", "")]
     elif sys.platform == "darwin":
@@ -112,7 +111,7 @@ def _user_cache() -> Path | None:
 
 
 def find_folder(file: Path) -> Path | None:
-    """The first folder for code of `file` that can be written to and that nobody else can; None where there is none."""
+    """The first cache folder for `file` that only this user can write to, or None."""
     given = bool(os.environ.get("NUMBA_CACHE_DIR"))
     for number, folder in enumerate(_folders(file)):
         reason = why_folder_is_not_ours(folder)
@@ -129,7 +128,7 @@ def find_folder(file: Path) -> Path | None:
 
 
 class _Cache:
-    """What numba's dispatcher asks for code before it compiles, and hands code to behind that."""
+    """Cache in the form of numba's dispatcher, which loads code before it compiles and saves it afterwards."""
 
     def __init__(self, function: Callable[..., Any], allocates: bool) -> None:
         code, self._allocates = function.__code__, allocates
@@ -140,7 +139,7 @@ class _Cache:
 
     @functools.cached_property
     def files(self) -> CodeFiles | None:
-        """Where the code is, None when there is no place for it."""
+        """Files of the code; None if no folder is usable."""
         try:
             folder, stamp = find_folder(self._file), digest(self._file)
         except OSError:  # a function without a file
@@ -153,14 +152,14 @@ class _Cache:
         return str(self.files.folder) if self.files is not None else None
 
     def load_overload(self, signature: Any, context: Any) -> Any:
-        """Compile result for a signature; None when it is not there."""
+        """Compile result for a signature, or None."""
         found = None
         if self._allocates:
             context.refresh()
         try:
             if self.files is not None:
                 found = _load(self.files, signature, context)
-        except Exception:  # noqa: BLE001 - whatever a file makes numba do, there is another way
+        except Exception:  # noqa: BLE001 - any failure means compilation
             note("compiled code", f"compiled code on the disk is damaged: {_ANEW}")
         if found is None:
             headway.hold(headway.COMPILING if self.files is None else headway.ONCE)
@@ -168,23 +167,23 @@ class _Cache:
         return found
 
     def save_overload(self, signature: Any, result: Any) -> None:
-        """Keeps a compile result."""
+        """Save a compile result."""
         if self.files is None:
             return _not_kept("no folder for it can be written to")
         try:
             if result.library.has_dynamic_globals:
                 raise ValueError("it holds addresses of this process")
             self.files.save(_key(signature, result.library.codegen), result._reduce())
-        except Exception as error:  # noqa: BLE001 - the code itself is there and works
+        except Exception as error:  # noqa: BLE001 - the compiled code works without the cache
             _not_kept(getattr(error, "strerror", None) or str(error))
 
     def flush(self) -> None:
-        """Forgets what is kept."""
+        """Delete the cached code."""
         if self.files is not None:
             self.files.flush()
 
     def enable(self) -> None:
-        """It always is."""
+        """Do nothing: the cache is always enabled."""
 
     disable = enable
 
@@ -198,19 +197,19 @@ def _load(files: CodeFiles, signature: Any, context: Any) -> Any:
 
 
 def _key(signature: Any, codegen: Any) -> tuple[Any, ...]:
-    """What code depends on beside its sources: types of arguments, kind of machine and processor."""
+    """Key of compiled code in addition to its sources: types of arguments, platform and processor."""
     return str(signature), codegen.magic_tuple()
 
 
 class CodeFiles:
-    """A file per function, source and signature."""
+    """Files of compiled code, one per function, source and signature."""
 
     def __init__(self, folder: Path, base: str, source_stamp: str) -> None:
         self.folder, self._base = folder, base
-        self._source_stamp = source_stamp  # of what the code was made from
+        self._source_stamp = source_stamp  # digest of the sources
 
     def load(self, key: Any) -> Any:
-        """The code under `key`, None when there is none. Raises ValueError when the file is not what was written."""
+        """Code under `key`, or None. Raises ValueError for a damaged file."""
         path = self._path(key)
         try:
             handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
@@ -227,7 +226,7 @@ class CodeFiles:
         return code if written_for == key else None
 
     def save(self, key: Any, code: Any) -> None:
-        """Keeps code; that of other sources under the same name goes. Raises OSError, FileError."""
+        """Save code, and delete that of other sources under the same name. Raises OSError, FileError."""
         from numba.core.serialize import dumps
 
         data = dumps((key, code))
@@ -241,7 +240,7 @@ class CodeFiles:
                     each.unlink()
 
     def flush(self) -> None:
-        """Forgets what is kept."""
+        """Delete the cached code."""
         for each in self.folder.glob(f"{self._base}-*.nbc"):
             with suppress(OSError):
                 each.unlink()

@@ -1,4 +1,4 @@
-"""A word to the user from deep inside, once per topic: to standard error, or held until somebody passes it on."""
+"""Notes to the user from inside the library, once per topic: on standard error, or held for the parent process."""
 
 import sys
 
@@ -9,7 +9,7 @@ _held: dict[str, str] | None = None
 
 
 def note(topic: str, text: str) -> None:
-    """Says `text` unless something was said on `topic` before."""
+    """Print `text`, unless `topic` already had a note."""
     if topic in _told:
         return
     _told.add(topic)
@@ -20,13 +20,13 @@ def note(topic: str, text: str) -> None:
 
 
 def hold() -> None:
-    """From now on notes wait for `held`: a worker's are its parent's to tell, who hears the same from others."""
+    """Collect notes for `held` from now on, in workers whose parent prints them once for all."""
     global _held
     _held = {}
 
 
 def held() -> dict[str, str]:
-    """Notes by topic that nobody has seen yet."""
+    """Collected notes by topic; they are removed from the collection."""
     found = dict(_held or {})
     if _held is not None:
         _held.clear()

@@ -1,6 +1,6 @@
-"""Modules that users' plug-ins import by the names of the first releases; asked for again, they are found where they are now.
+"""Aliases of modules that users' plug-ins import by names of earlier releases.
 
-Only what documents named, or what camcomp's own plug-ins showed by example, is kept.
+The list contains the modules named in the documentation or imported by camcomp's own plug-ins.
 """
 
 import sys
@@ -18,11 +18,11 @@ _MOVED = {
     "camcomp.speclink": "camcomp.model.config.links",
     "camcomp.statics": "camcomp.model.statics",
 }
-_EMPTY = "camcomp.gap"  # a package of which nothing else is left
+_EMPTY = "camcomp.gap"  # a package without other modules
 
 
 class _OldNames:
-    """Finder and loader in one, asked after all others: what it gives under an old name is the very module of the new one."""
+    """Finder and loader, last in order: the module under an old name is the identical object of the new name."""
 
     def find_spec(self, name: str, _path: object = None, _target: object = None) -> ModuleSpec | None:
         if name == _EMPTY or _new_name(name) is not None:
@@ -46,6 +46,6 @@ def _new_name(old: str) -> str | None:
 
 
 def keep_old_names() -> None:
-    """From now on modules are found under their old names, too."""
+    """Install the finder of old module names."""
     if not any(isinstance(each, _OldNames) for each in sys.meta_path):
         sys.meta_path.append(_OldNames())

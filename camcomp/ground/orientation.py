@@ -1,10 +1,10 @@
-"""Orientation of the tool as programs state it, and what a control makes of it between two blocks.
+"""Orientation of the tool in programs, and its interpolation by controllers between two blocks.
 
-rpy: words A, B, C in degrees, roll, pitch and yaw: R = Rz(C) Ry(B) Rx(A). Between blocks each word goes linearly with the
-way, as in LinuxCNC, whose genserkins and genhexkins read them so. vector: words A3, B3, C3 of Sinumerik, the direction from
-the tip along the tool; between blocks it turns on a great circle (ORIVECT), and R is the smallest turn from +Z to it.
+rpy: words A, B, C in degrees, roll, pitch and yaw: R = Rz(C) Ry(B) Rx(A). Between blocks each word is linear in the path
+length, as in LinuxCNC's genserkins and genhexkins. vector: words A3, B3, C3 of Sinumerik, the direction from the tip along
+the tool; between blocks it moves on a great circle (ORIVECT), and R is the smallest rotation from +Z to it.
 
-R (3, 3) turns the tool from the orientation that the machine holds without such words, in axes of the program frame.
+R (3, 3) rotates the tool from the orientation that the machine holds without such words, in axes of the program frame.
 
 Sources: LinuxCNC, posemath, pmRpyMatConvert; Siemens, Sinumerik 840D sl Job Planning, chapter Orientation.
 """
@@ -22,7 +22,7 @@ Ints = NDArray[np.int64]
 RPY, VECTOR = "rpy", "vector"
 LETTERS = {RPY: ("A", "B", "C"), VECTOR: ("A3", "B3", "C3")}
 UPRIGHT = {RPY: (0.0, 0.0, 0.0), VECTOR: (0.0, 0.0, 1.0)}
-NEAR_POLE_DEG = 89.0  # of B, from which on A and C turn about nearly the same axis
+NEAR_POLE_DEG = 89.0  # of B: beyond it A and C rotate about nearly the same axis
 _SAME_DIRECTION = 1e-12  # of the sine between two directions
 
 
@@ -35,7 +35,7 @@ class Orientation:
     end: Floats
 
     def take(self, rows: Ints) -> Orientation:
-        """Those of some motions."""
+        """Orientation of some motions."""
         return Orientation(self.form, self.start[rows], self.end[rows])
 
     def words(self, motion: Ints, u: Floats) -> Floats:
@@ -48,7 +48,7 @@ class Orientation:
 
 
 def between(form: str, start: Floats, end: Floats, u: Floats) -> Floats:
-    """Words (k, 3) at fractions u (k,) between words (k, 3), as the control interpolates them."""
+    """Words (k, 3) at fractions u (k,) between words (k, 3), as the controller interpolates them."""
     u = u[:, None]
     if form == RPY:
         return start + u * (end - start)
@@ -76,7 +76,7 @@ def rotations_of(form: str, words: Floats) -> Floats:
 
 
 def words_of(form: str, rotation: Floats, near: Floats) -> Floats:
-    """Words (k, 3) of rotations (k, 3, 3); of angles that differ by full turns those next to `near` (k, 3)."""
+    """Words (k, 3) of rotations (k, 3, 3); among angles that differ by full turns those nearest to `near` (k, 3)."""
     if form == VECTOR:
         direction: Floats = rotation[:, :, 2].copy()
         return direction

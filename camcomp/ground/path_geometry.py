@@ -10,7 +10,7 @@ from camcomp.ground.datatypes import ARC, Floats, Ints, Path
 
 
 def turn(vectors: Floats, axis: Floats, angle: Floats) -> Floats:
-    """Vectors (k, 3) turned about unit axes (k, 3) by angles (k,) rad."""
+    """Vectors (k, 3) rotated about unit axes (k, 3) by angles (k,) rad."""
     c, s = np.cos(angle)[:, None], np.sin(angle)[:, None]
     along = np.sum(vectors * axis, axis=1, keepdims=True) * axis
     out: Floats = along + (vectors - along) * c + np.cross(axis, vectors) * s

@@ -1,4 +1,4 @@
-"""What stands under the name of an output: a file to be replaced, a stream to be written to, or neither."""
+"""Kinds of output names: a file to be replaced, a stream to be written to, or neither; and identity of files."""
 
 import os
 import re
@@ -16,7 +16,7 @@ _LINKS = 40  # as many as the kernel follows
 
 
 def stream_at(path: str) -> str | int | None:
-    """The pipe or character device called `path`, or the number of an open descriptor; None for files, there or not."""
+    """The pipe or character device called `path`, or the number of an open descriptor; None for regular and new files."""
     if path == STANDARD:
         return 1
     if (number := _descriptor(path)) is not None:
@@ -26,7 +26,7 @@ def stream_at(path: str) -> str | int | None:
 
 
 def unusable(path: str) -> str | None:
-    """Why nothing can be written under this name, as far as its kind goes."""
+    """Reason why a name of this kind cannot be an output, or None."""
     if path == STANDARD or _descriptor(path) is not None:
         return None
     if path.endswith(("/", os.sep)):
@@ -39,7 +39,7 @@ def unusable(path: str) -> str | None:
 
 
 def one_place_each(outputs: Sequence[str], *sources: AbstractSet[Hashable], capitals_count: bool = False) -> None:
-    """Raises FileError CC502 when two outputs, or an output and an input, are one file under whatever names.
+    """Raise FileError CC502 if two outputs, or an output and an input, are the same file under any names.
 
     sources: `source_places` of inputs. capitals_count: names that differ in capitals only are two files; on many
     disks they are one.
@@ -60,7 +60,7 @@ def one_place_each(outputs: Sequence[str], *sources: AbstractSet[Hashable], capi
 
 
 def source_places(path: str) -> set[Hashable]:
-    """All by which an input is known again under another name."""
+    """Identifiers by which an input is recognised under another name."""
     found = _places(path, 0)
     return {each for each in found if not (isinstance(each, Path) and each.is_char_device())}  # /dev/null, terminals
 
@@ -70,7 +70,7 @@ def _shown(path: str) -> str:
 
 
 def _places(path: str, standard: int) -> set[Hashable]:
-    """All that tells a file from others; standard: the descriptor that "-" stands for."""
+    """Identifiers of a file; standard: the descriptor of "-"."""
     number = standard if path == STANDARD else _descriptor(path)
     try:
         status = os.stat(path if number is None else number)
@@ -81,7 +81,7 @@ def _places(path: str, standard: int) -> set[Hashable]:
         found.add((status.st_dev, status.st_ino))
     if number is not None:
         return found | {number}
-    return found | {Path(os.path.realpath(path))}  # of a loop of links as far as it leads
+    return found | {Path(os.path.realpath(path))}  # a loop of links is followed partly
 
 
 def _mode(path: str) -> int:
@@ -92,7 +92,7 @@ def _mode(path: str) -> int:
 
 
 def _descriptor(path: str) -> int | None:
-    """Number of the open descriptor that a name such as /dev/stdout, or a link to it, stands for."""
+    """Number of the open descriptor of a name such as /dev/stdout, or of a link to it."""
     for _ in range(_LINKS):
         whole = os.path.abspath(path)
         if whole in _DESCRIPTORS:

@@ -1,4 +1,4 @@
-"""A file that takes the place of another when it is whole, and is on the disk then."""
+"""Atomic replacement of a file by one that is completely written and synchronised to disk."""
 
 import contextlib
 import io
@@ -11,11 +11,11 @@ from camcomp.ground.errors import FileError
 
 
 class Replacement:
-    """`file` is filled; `finish` brings it to the disk, `move` puts it in place of the target; otherwise it is gone.
+    """A new file for a target: write to `file`, `finish` synchronises it to disk, `move` replaces the target.
 
-    Where the system can (Linux), the file has no name until it is moved, so that nothing is left of it however the
-    process ends. The target keeps its permissions, and its owner and group where the system permits that; a link is
-    followed. mode: permissions in place of those. Raises OSError.
+    On Linux the file has no name until it is moved, so that it vanishes if the process ends early. The target keeps its
+    permissions, and its owner and group where the system permits that; links are followed. mode: permissions in place of
+    those. Raises OSError.
     """
 
     def __init__(self, name: str, *, mode: int | None = None) -> None:
@@ -31,7 +31,7 @@ class Replacement:
 
     def _open(self) -> int:
         if hasattr(os, "O_TMPFILE") and os.path.isdir("/proc/self/fd"):
-            with contextlib.suppress(OSError):  # a kind of disk that has no such files
+            with contextlib.suppress(OSError):  # a file system without nameless files
                 return os.open(self._target.parent, os.O_TMPFILE | os.O_RDWR | os.O_CLOEXEC, 0o600)
         self._named = True
         return os.open(self._aside, os.O_CREAT | os.O_EXCL | os.O_RDWR | getattr(os, "O_BINARY", 0), 0o600)
@@ -42,14 +42,14 @@ class Replacement:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        with contextlib.suppress(FileError, OSError):  # what could not be written has been said
+        with contextlib.suppress(FileError, OSError):  # the failed write has already raised
             self.file.close()
         if self._named:
             with contextlib.suppress(OSError):
                 os.unlink(self._aside)
 
     def finish(self) -> None:
-        """All that was written is on the disk, with the permissions that the target has or a new file gets."""
+        """Synchronise the data to disk, with the permissions of the target or of a new file."""
         self.file.flush()
         handle = self.file.fileno()
         if hasattr(os, "fchmod"):
@@ -59,9 +59,9 @@ class Replacement:
             self.file.close()  # some systems move no open files
 
     def _permissions(self, handle: int) -> int:
-        """Those of the target; never its set-user and set-group bits, which would hand out the rights of another owner.
+        """Permissions of the target without its set-user and set-group bits, which would grant rights of another owner.
 
-        Where the target's group cannot be kept, the new one gets no more than every user.
+        If the target's group cannot be kept, the new group gets the permissions of other users only.
         """
         try:
             before = self._target.stat()
@@ -76,7 +76,7 @@ class Replacement:
         return mode
 
     def move(self) -> None:
-        """The finished file stands under the name of the target, and will after a loss of power."""
+        """Rename the finished file to the target, durable after a loss of power."""
         if self._named:
             self._replace()
         else:
@@ -98,10 +98,10 @@ class Replacement:
         self._named = False
 
     def _link(self, name: str) -> None:
-        """Names the nameless file."""
+        """Give the nameless file a name."""
         folder = os.open(self._target.parent, os.O_PATH)
         try:
-            # With the descriptor of a folder Python asks for links to be followed, and this one leads to the file.
+            # With the descriptor of a folder Python follows links, and this link leads to the file.
             source = f"/proc/self/fd/{self.file.fileno()}"
             os.link(source, name, src_dir_fd=folder, dst_dir_fd=folder, follow_symlinks=True)
         finally:
@@ -109,7 +109,7 @@ class Replacement:
 
 
 class _Named(io.FileIO):
-    """A file whose errors say which output it is to become."""
+    """A file whose errors name the output."""
 
     def __init__(self, handle: int, output: str) -> None:
         super().__init__(handle, "r+b")

@@ -1,4 +1,4 @@
-"""What results of commands share: they are frozen types, and here is where they become JSON."""
+"""Base of the results of commands: frozen types, and their conversion to JSON."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Size = Annotated[float, AllowInfNan(True), PlainSerializer(_finite, when_used="j
 
 
 class Result(BaseModel):
-    """Base of every part of a result: no other keys, finite numbers; keys stand in the order of the fields."""
+    """Base of every part of a result: no other keys, finite numbers, keys in the order of the fields."""
 
     model_config = ConfigDict(
         extra="forbid", frozen=True, allow_inf_nan=False, json_schema_serialization_defaults_required=True
@@ -26,9 +26,9 @@ class Result(BaseModel):
     INDENT: ClassVar[int] = 2
 
     def as_json(self) -> dict[str, Any]:
-        """As a mapping of what JSON knows."""
+        """The result as a mapping of JSON types."""
         return self.model_dump(mode="json")
 
     def to_json(self) -> bytes:
-        """As a JSON file."""
+        """The result as the bytes of a JSON file."""
         return (json.dumps(self.as_json(), indent=self.INDENT, allow_nan=False) + "\n").encode()

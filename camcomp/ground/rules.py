@@ -1,4 +1,4 @@
-"""The one catalogue of rule ids: what `camcomp explain` says, and the hint an error gives when it has no better one.
+"""Catalogue of rule ids: texts of `camcomp explain`, and default hints of errors.
 
 CC1xx NC programs · CC2xx usage, YAML, config · CC3xx physics · CC4xx logs, experiments · CC5xx input and output ·
 CC6xx checks. An id is never given a second meaning; a retired id is not used again.
@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 
 class Rule(NamedTuple):
-    """One way in which an input can be refused."""
+    """One reason to refuse an input."""
 
     title: str
     explanation: str

@@ -1,9 +1,9 @@
 """Plug-ins by file name: a robot, dialect, force model or effect is one file in its folder, or one entry point.
 
-The YAML name is the file name. A user's own plug-in is announced in the entry-point group `camcomp.<shelf>`. It is held
-against its contract (camcomp/plugins) when it is loaded: one that a run names is refused with CC280, one that is merely
-there is left out with a warning. camcomp's own are held against it by tests, and what serves users' ones alone is
-imported when there is one, so that starting stays fast.
+The YAML name is the file name. A user's own plug-in is announced in the entry-point group `camcomp.<shelf>`. It is checked
+against its contract (camcomp/plugins) when it is loaded: a plug-in that a run names is refused with CC280, others are
+skipped with a warning. Tests check camcomp's own plug-ins; the code for users' plug-ins is imported only if there is one,
+which keeps the start fast.
 """
 
 import sys
@@ -22,7 +22,7 @@ from camcomp.ground.errors import ConfigError, Location, PluginWarning, Terminat
 
 SHELVES = ("robots", "dialects", "forces", "effects", "comments", "tool_tables")
 
-_checked: dict[tuple[str, str], tuple[Any, Any]] = {}  # what an entry point named, and the same found to be usable
+_checked: dict[tuple[str, str], tuple[Any, Any]] = {}  # object of an entry point, and the same after its check
 
 
 @cache
@@ -42,15 +42,18 @@ def is_own(shelf: str, name: str) -> bool:
 
 
 def members(shelf: str) -> tuple[str, ...]:
-    """Names of all members of a shelf, sorted; nothing is imported."""
+    """Names of all members of a shelf, sorted, without importing them."""
     return tuple(sorted({*_own(shelf), *(each.name for each in _announced(shelf))}))
 
 
 def load(shelf: str, name: str, *, at: Location | None = None) -> Any:
-    """The member called `name`: a module of camcomp, or whatever its entry point names.
+    """Load the member called `name`: a module of camcomp, or the object of an entry point.
 
-    An own file wins over an entry point of the same name, so that installing a package cannot change what a shipped
-    name means. Raises ConfigError CC213, which lists what there is, CC280 where an entry point names what is no plug-in.
+    A file of camcomp has precedence over an entry point of the same name, so that installing a package cannot change the
+    meaning of a shipped name.
+
+    Raises:
+        ConfigError: CC213, unknown name (lists the members); CC280, the entry point names no valid plug-in.
     """
     if name in _own(shelf):
         return import_module(f"camcomp.{shelf}.{name}")
@@ -74,7 +77,7 @@ def load(shelf: str, name: str, *, at: Location | None = None) -> Any:
 
 
 def usable(shelf: str, without: Sequence[str] = ()) -> Iterator[tuple[str, Any]]:
-    """Name and member of all of a shelf; a user's own that is no plug-in is left out with a PluginWarning that names it."""
+    """Name and member for all of a shelf; an invalid one of the user is skipped with a PluginWarning."""
     own = _own(shelf)
     for each in _announced(shelf):
         if each.name in own:
@@ -92,12 +95,12 @@ def usable(shelf: str, without: Sequence[str] = ()) -> Iterator[tuple[str, Any]]
 
 
 def warn_left_out(why: str) -> None:
-    """Tells that something of the user's is there and is not used."""
+    """Warn that a plug-in of the user is not used."""
     warnings.warn(PluginWarning(f"left out: {why}"), stacklevel=3)
 
 
 def blaming(shelf: str, name: str) -> AbstractContextManager[None]:
-    """Inside it errors are the member's fault: CC281 for a user's own; those of camcomp's own stay what they are."""
+    """Context in which errors of a user's member become CC281; those of camcomp's own members pass unchanged."""
     if name in _own(shelf):
         return nullcontext()
     from camcomp.ground.blame import blamed

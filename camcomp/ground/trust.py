@@ -1,8 +1,8 @@
-"""Whether others than the user can put or change files in a folder: code from there would be theirs, run as the user.
+"""Check whether other users can write to a folder or file, whose code would run with the rights of this user.
 
-Owners other than the user and root, and write permission for others, count as distrust. Write permission of a group counts
-unless the group is the user's own (same name as the user, no further members), which is what umask 002 is made for. On
-systems without POSIX owners nothing is asked.
+Files are distrusted if their owner is neither the user nor root, or if others have write permission. Write permission of a
+group counts unless the group is the user's own (same name as the user, no further members), as with umask 002. Systems
+without POSIX owners are not checked.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from pathlib import Path
 
 
 def why_folder_is_not_ours(folder: Path) -> str | None:
-    """Who else can change what lies in `folder`, itself or through a folder above it; None where nobody can."""
+    """Reason why other users can change files in `folder`, directly or through a folder above it, or None."""
     if not hasattr(os, "getuid"):
         return None
     real = Path(os.path.realpath(folder))
@@ -21,15 +21,15 @@ def why_folder_is_not_ours(folder: Path) -> str | None:
         try:
             status = os.stat(each)
         except OSError:
-            continue  # not there yet: who makes it decides, and the folder above is asked
-        sticky = each != real and bool(status.st_mode & stat.S_ISVTX)  # as /tmp: entries belong to those who made them
+            continue  # missing: its creator will own it, so the folder above decides
+        sticky = each != real and bool(status.st_mode & stat.S_ISVTX)  # /tmp: only owners rename
         if (reason := _why(status, sticky)) is not None:
             return f"{each} {reason}"
     return None
 
 
 def why_file_is_not_ours(handle: int) -> str | None:
-    """Who else can change the open file; None where nobody can."""
+    """Reason why other users can change the open file, or None."""
     status = os.fstat(handle)
     if not stat.S_ISREG(status.st_mode):
         return "is no regular file"
@@ -49,7 +49,7 @@ def _why(status: os.stat_result, sticky: bool) -> str | None:
 
 
 def _is_own_group(number: int) -> bool:
-    """Whether the group is the one that systems make for the user alone."""
+    """Whether the group is the private group of the user."""
     if number == 0:
         return True  # root's
     import grp

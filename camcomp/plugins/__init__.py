@@ -1,6 +1,6 @@
-"""What a user's plug-in may import, and nothing else: names that stay when the rooms behind them move.
+"""Stable names for users' plug-ins to import, and the contracts of the plug-ins.
 
-One file per shelf says what its plug-ins have to be, as a protocol, and holds a user's own against it when it is loaded.
+One file per shelf states the contract of its plug-ins as a protocol, and checks a user's plug-in when it is loaded.
 """
 
 from camcomp.gcode.dialect import Dialect

@@ -1,4 +1,4 @@
-"""Readers of comments: what a user's own has to be, checked when it is loaded."""
+"""Contract of readers of comments, checked when a user's reader is loaded."""
 
 from collections.abc import Iterator, Sequence
 from types import ModuleType
@@ -9,13 +9,13 @@ from camcomp.plugins.contract import check_functions, check_module, check_names,
 
 
 class CommentsPlugin(Protocol):
-    """One way of writing stock and tools into comments. MARKS: capitals that such a comment has, in any case of letters."""
+    """One notation of stock and tools in comments. MARKS: words (in capitals) of such comments, matched in any case."""
 
     TITLE: str
     MARKS: tuple[bytes, ...]
 
     def read(self, comments: Sequence[Comment]) -> Iterator[Statement]:
-        """What the comments that carry a mark state; raises `camcomp.gcode.stated.StatedError` where one cannot be read."""
+        """Statements in comments that contain a mark; raises `camcomp.gcode.stated.StatedError` for an unreadable one."""
 
 
 def checked(name: str, found: Any, who: str) -> ModuleType:

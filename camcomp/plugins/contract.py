@@ -1,4 +1,4 @@
-"""What the contracts of all shelves have in common: names, functions and their arguments, and guarded calls."""
+"""Common parts of the contracts of all shelves: checks of names, functions and arguments, and guarded calls."""
 
 import inspect
 import math
@@ -17,24 +17,24 @@ from camcomp.ground.errors import ConfigError, Location
 
 
 def refusal(who: str, message: str, *, at: Location | None = None, hint: str | None = None) -> ConfigError:
-    """The error of a plug-in that does not keep to its contract."""
+    """Error CC280 of a plug-in that violates its contract."""
     return ConfigError("CC280", f"{who}: {message}", at=at, hint=hint)
 
 
 def failure(who: str, message: str) -> ConfigError:
-    """The error of a plug-in that fails in the middle of the work."""
+    """Error CC281 of a plug-in that fails during the work."""
     return ConfigError("CC281", f"{who}: {message}")
 
 
 def check_module(who: str, found: Any) -> ModuleType:
-    """What an entry point has to name. Raises ConfigError CC280."""
+    """The module of an entry point. Raises ConfigError CC280 for other objects."""
     if not isinstance(found, ModuleType):
         raise refusal(who, f"the entry point names {described(found)}, not a module")
     return found
 
 
 def check_names(who: str, module: ModuleType, needed: Mapping[str, type | tuple[type, ...]]) -> None:
-    """Whether all that a protocol needs is there, and of the right type. Raises ConfigError CC280."""
+    """Raise ConfigError CC280 for names of a protocol that are missing or have a wrong type."""
     for name, kind in needed.items():
         if not hasattr(module, name):
             there = [each for each in vars(module) if not each.startswith("_") and each not in needed]
@@ -49,9 +49,9 @@ def check_names(who: str, module: ModuleType, needed: Mapping[str, type | tuple[
 def check_functions(who: str, module: ModuleType, protocol: type, also: Sequence[str] = ()) -> tuple[str, ...]:
     """Names of the protocol's functions that a module has, in the protocol's order.
 
-    Raises ConfigError CC280 for a public function of the module's own that the protocol does not know (`also`: others
-    that may be there), and for arguments other than the protocol's. Arguments are handed over by their places; their
-    names are free, but what the protocol calls one argument must not stand where another one comes.
+    Raises ConfigError CC280 for a public function of the module outside of the protocol (`also`: further allowed ones), and
+    for arguments other than the protocol's. Arguments are passed by position; their names are free, except that a name of
+    the protocol must not be at another position.
     """
     known = {name: each for name, each in vars(protocol).items() if inspect.isfunction(each) and name[0] != "_"}
     for name, value in vars(module).items():
@@ -76,7 +76,7 @@ def _check_arguments(who: str, name: str, function: Callable[..., Any], wanted: 
     try:
         arguments = list(inspect.signature(function).parameters.values())
     except (TypeError, ValueError):
-        return  # compiled ones do not tell
+        return  # compiled functions have no signature
     by_place = [a for a in arguments if a.kind in (a.POSITIONAL_ONLY, a.POSITIONAL_OR_KEYWORD)]
     names = [a.name for a in by_place]
     loose = any(a.kind == a.VAR_POSITIONAL for a in arguments)
@@ -95,16 +95,16 @@ def _place(function: Any) -> Location | None:
 
 
 def with_functions(module: ModuleType, functions: Mapping[str, Callable[..., Any]]) -> ModuleType:
-    """A copy of a module in which some functions are other ones."""
+    """A copy of a module with some functions replaced."""
     copy = ModuleType(module.__name__, module.__doc__)
     vars(copy).update(vars(module), **functions)
     return copy
 
 
 def guarded(who: str, name: str, function: Callable[..., Any], sound: Callable[..., str]) -> Callable[..., Any]:
-    """`function`, whose errors and unsound results are ConfigError CC281; `sound(result, *arguments)` says what is wrong.
+    """`function` with errors and invalid results as ConfigError CC281; `sound(result, *arguments)` returns the error text.
 
-    The first argument, if an array, cannot be written to: camcomp goes on using it.
+    The first argument, if an array, is read-only in the call, because camcomp uses it afterwards.
     """
     at_work = f"{who}: {name}"
 
@@ -127,7 +127,7 @@ def guarded(who: str, name: str, function: Callable[..., Any], sound: Callable[.
 
 
 def wrong_array(result: Any, like: Floats, *given: Any) -> str:
-    """What is wrong with a result that should be an array of the shape of `like`, in words; empty: nothing."""
+    """Error text for a result that is no finite array of the shape of `like`; empty: valid."""
     if not isinstance(result, np.ndarray) or result.shape != like.shape:
         return f"{described(result)}, not an array {like.shape}"
     if result.dtype.kind not in "fiu":
@@ -170,7 +170,7 @@ def same(a: Any, b: Any) -> bool:
 
 
 def described(value: Any) -> str:
-    """A value in few words."""
+    """Short text for a value, for messages."""
     if isinstance(value, np.ndarray):
         return f"an array {value.shape}"
     if value is None or isinstance(value, (bool, int, float, str)):

@@ -1,4 +1,4 @@
-"""Dialects: what a user's own has to be, checked when it is loaded."""
+"""Contract of dialects, checked when a user's dialect is loaded."""
 
 import re
 from collections.abc import Mapping
@@ -15,13 +15,13 @@ _KINDS: dict[Any, type] = {bool: bool, str: str, float: float, "bool": bool, "st
 
 
 class DialectPlugin(Protocol):
-    """What distinguishes one control's language, as data. The entry point may name the record itself."""
+    """The language of one controller, as data. The entry point may name the record itself."""
 
     DIALECT: Dialect
 
 
 class _NoFunctions(Protocol):
-    """A dialect is data."""
+    """Functions of a dialect: a dialect is data and has none."""
 
 
 def checked(name: str, found: Any, who: str) -> Any:
@@ -48,7 +48,7 @@ def _check_record(who: str, name: str, record: Dialect) -> None:
 
 
 def _wrong(record: Dialect) -> str:
-    """What is wrong with a record, in words; empty: nothing."""
+    """Error text for an invalid record; empty: valid."""
     marks: Any = record.marks
     for mark in marks if isinstance(marks, tuple) else (marks,):
         try:

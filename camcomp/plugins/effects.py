@@ -1,4 +1,4 @@
-"""Effects: what a user's own has to be, checked when it is loaded."""
+"""Contract of effects, checked when a user's effect is loaded."""
 
 import math
 import warnings
@@ -30,40 +30,45 @@ from camcomp.plugins.contract import (
 )
 from camcomp.plugins.parameters import check_params
 
-if TYPE_CHECKING:  # the solver is not needed to say what an effect is
+if TYPE_CHECKING:  # the contract does not need the solver
     from camcomp.model.motion.twin import Reading
 
 _ALSO = ("public", "applies", "first_guess")
 _SOME = slice(1, None, 3)  # instants of a trial
-_YAML_KEYS = {"effect", "target", "source"}  # stand beside the parameters
+_YAML_KEYS = {"effect", "target", "source"}  # keys of the same mapping as the parameters
 
 
 class EffectPlugin(Protocol):
-    """One way in which a machine differs from its model: a module with these names and at least one hook of EffectHooks.
+    """One difference between a machine and its model: a module with these names and at least one hook of EffectHooks.
 
-    At their nominal values the parameters do nothing: every hook returns its input unchanged, bit for bit. May also have
-    PLAIN (what it is, in the words of a workshop: "play in the drive"), REMEDY (what to do about it, without a capital),
-    FITTED (tuple of Parameter: the ones a diagnosis fits, where others are easier to fit) with the function `public`
-    (their values -> those of PARAMETERS), `applies` (robot, target -> whether a diagnosis may take it for a cause there; default: always), `first_guess` (list of time (n,) s, set-points (n,),
-    encoders (n,) of an actuator -> value of its one shape to begin with), TARGETS (tuple of names, where TARGET is "named"), ROTARY (those that a hinge
-    has), ARM_ONLY (for serial arms), SLIDES_ONLY (for slides), MOMENTARY (True: on_drive and on_drive_force answer for every
-    instant alone, whatever came before), WARMS (compensate asks for the temperature), MODELLED_FORCE (True: says how the force model errs; measured forces are taken as they are), UNCORRECTABLE (True: compensate
-    leaves its error), Params (Spec:
-    keys in YAML beside PARAMETERS, never fitted); where TARGET is "named", OF_TARGET (target -> those of its keys that make
-    sense there) and SOUGHT (target -> the parameters that a diagnosis fits there).
+    At the nominal values of the parameters every hook returns its input unchanged, bit for bit. Optional names:
+
+    - PLAIN: short text in the language of a workshop, "play in the drive". REMEDY: advice, without a capital.
+    - FITTED: tuple of Parameter that a diagnosis fits in place of PARAMETERS, with the function `public` (values of FITTED
+      -> values of PARAMETERS).
+    - `applies`: (robot, target) -> whether it is a candidate of a diagnosis there; default: always.
+    - `first_guess`: list of time (n,) s, set-points (n,), encoders (n,) of an actuator -> initial value of its one shape.
+    - TARGETS: tuple of names for TARGET "named", with OF_TARGET (target -> keys that apply there) and SOUGHT (target ->
+      parameters that a diagnosis fits there).
+    - ROTARY: parameters of a hinge. ARM_ONLY: for serial arms. SLIDES_ONLY: for slides.
+    - MOMENTARY: True: on_drive and on_drive_force have no memory.
+    - WARMS: compensate needs the temperature.
+    - MODELLED_FORCE: True: an error of the force model, which does not change measured forces.
+    - UNCORRECTABLE: True: compensate does not correct its error.
+    - Params: Spec of further YAML keys, which are never fitted.
     """
 
-    STAGE: str  # control | drive | structure | process | tool | workpiece | sensor: where the difference arises
+    STAGE: str  # control | drive | structure | process | tool | workpiece | sensor: origin of the difference
     TARGET: Target  # "actuator": one cause per actuator; "machine": target null; "either"; "named": one of TARGETS
     PARAMETERS: tuple[Parameter, ...]
-    SOURCE: str  # where the formula comes from
+    SOURCE: str  # reference of the formula
 
 
 class EffectHooks(Protocol):
-    """Where effects act, in the order of the signal path; n rows, m actuators, mm or rad, N, s.
+    """Hooks of effects in the order of the signal path; n rows, m actuators, mm or rad, N, s.
 
-    `p` maps parameter names to values; `which` (m,) is 1.0 for the actuators aimed at, else 0.0. Nothing that is given
-    may be changed in place.
+    `p` maps parameter names to values; `which` (m,) is 1.0 for the target actuators, else 0.0. Arguments must not be
+    changed in place.
     """
 
     def on_servo(self, position: Floats, motion: Motion, which: Floats, p: Mapping[str, float]) -> Floats:
@@ -73,10 +78,10 @@ class EffectHooks(Protocol):
         """Carriage minus encoder (n, m)."""
 
     def on_drive_force(self, force: Floats, motion: Motion, which: Floats, p: Mapping[str, float]) -> Floats:
-        """What the drives exert (n, m) beyond the load of the structure."""
+        """Force (n, m) of the drives beyond the load of the structure."""
 
     def on_robot(self, robot: Robot, actuators: tuple[str, ...], p: Mapping[str, float]) -> Robot:
-        """Description of the machine -> changed copy; `actuators` are the names aimed at."""
+        """Description of the machine -> changed copy; `actuators`: names of the targets."""
 
     def on_load(self, load: Load, motion: Motion, p: Mapping[str, float]) -> Load:
         """Load at the tool."""
@@ -97,10 +102,10 @@ class EffectHooks(Protocol):
         """Tips (n, 3) in the program frame, behind the workpiece."""
 
     def on_clock(self, time: Floats, p: Mapping[str, float]) -> Floats:
-        """Times (n,) of rows -> times at which the tip stood where the rows say."""
+        """Time stamps (n,) of rows -> times at which the tip was at the positions of the rows."""
 
     def on_reading(self, reading: "Reading", motion: Motion, p: Mapping[str, float]) -> "Reading":
-        """What the sensors show."""
+        """Readings of the sensors."""
 
 
 def checked(name: str, found: Any, who: str) -> ModuleType:
@@ -155,7 +160,7 @@ def _check_parameters(who: str, key: str, parameters: Any) -> None:
 
 
 def _wrong_parameter(p: Any) -> str:
-    """What is wrong with a parameter, in words; empty: nothing."""
+    """Error text for an invalid parameter; empty: valid."""
     if not isinstance(p.name, str) or not p.name.isidentifier() or p.name in _YAML_KEYS or p.name.startswith("_"):
         return "cannot be a key in YAML"
     if not (isinstance(p.unit, str) and isinstance(p.source, str)):
@@ -177,7 +182,7 @@ def _wrong_parameter(p: Any) -> str:
 
 
 def _check_spec(who: str, module: ModuleType) -> None:
-    """Whether the parameters can be keys of a YAML mapping."""
+    """Raise ConfigError CC280 for parameters that cannot be keys of a YAML mapping."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
@@ -187,7 +192,7 @@ def _check_spec(who: str, module: ModuleType) -> None:
 
 
 def _wrong(hook: str, result: Any, given: Any, *rest: Any) -> str:
-    """What is wrong with the result of a hook, in words; empty: nothing."""
+    """Error text for an invalid result of a hook; empty: valid."""
     if hook == "on_robot":
         return _wrong_robot(result, given)
     if hook == "on_load":
@@ -224,9 +229,9 @@ def _no_answer(result: Any, *_given: Any) -> str:
 
 
 def _try(who: str, effect: ModuleType, hooks: tuple[str, ...]) -> None:
-    """Every hook on small machines: unchanged at nominal; a typical size away it works on one of them at least.
+    """Try every hook on small machines: no change at nominal, and no error at a typical size on at least one machine.
 
-    An effect may be meant for one kind of machine and know nothing of another one; what it does on it does not count.
+    An effect may be meant for one kind of machine only, so that its failure on the other one does not count.
     """
     from camcomp.plugins import trial
 
@@ -261,12 +266,12 @@ def _try_hook(who: str, effect: ModuleType, hook: str, given: Mapping[str, tuple
 
 
 def _more_keys(effect: Any) -> set[str]:
-    """Keys in YAML of its class Params."""
+    """YAML keys of the effect's class Params."""
     return set(effect.Params.yaml_keys()) if hasattr(effect, "Params") else set()
 
 
 def _away(who: str, effect: ModuleType) -> dict[str, float]:
-    """Parameters a typical size from nominal; shapes stay."""
+    """Parameters at a typical size from nominal, shape parameters at nominal."""
     fitted = getattr(effect, "FITTED", effect.PARAMETERS)
     values = {p.name: p.nominal if p.shape else p.value(p.scale) for p in fitted}
     if hasattr(effect, "public"):

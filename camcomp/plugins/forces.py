@@ -1,4 +1,4 @@
-"""Force models: what a user's own has to be, checked when it is loaded."""
+"""Contract of force models, checked when a user's model is loaded."""
 
 from types import ModuleType
 from typing import Any, Protocol
@@ -21,12 +21,14 @@ from camcomp.plugins.parameters import check_params
 
 
 class ForcePlugin(Protocol):
-    """Which force acts on the tool at the points of a path. May also have PLUNGES (True: it acts in plunges, too) and
-    check(params), which raises CamcompError for files that are missing or wrong, before there is a program.
+    """Cutting force on the tool at the points of a path.
+
+    May also have PLUNGES (True: it acts in plunges, too) and check(params), which raises CamcompError for missing or invalid
+    files before a program is read.
     """
 
-    Params: type[Spec]  # the keys that stand beside `model:` in YAML
-    SOURCES: str  # where the law and its numbers come from
+    Params: type[Spec]  # YAML keys in addition to `model:`
+    SOURCES: str  # references of the law and its numbers
 
     def force(self, cut: Cut, params: Any) -> Floats:
         """(Fr, Ft, Fz) (n, 3) N on the tool: right of the feed, along it, along the tool axis away from the workpiece."""
@@ -46,7 +48,7 @@ def checked(name: str, found: Any, who: str) -> ModuleType:
 
 
 def _wrong(result: Any, cut: Cut, _params: Any) -> str:
-    """What is wrong with a result, in words; empty: nothing."""
+    """Error text for an invalid result; empty: valid."""
     if not isinstance(result, np.ndarray) or result.shape != (len(cut), 3) or result.dtype.kind not in "fiu":
         return f"{described(result)}, not an array {(len(cut), 3)} of floats"
     bad = ~np.isfinite(result).all(axis=1)

@@ -8,7 +8,7 @@ from camcomp.plugins.contract import described, refusal
 
 
 def check_params(who: str, params: Any, taken: set[str]) -> None:
-    """Whether Params is a Spec whose keys can stand in YAML; `taken`: keys that mean something else there.
+    """Check that Params is a Spec with valid YAML keys; `taken`: keys with another meaning there.
 
     Raises ConfigError CC280.
     """

@@ -1,4 +1,4 @@
-"""Robots: what a user's own has to be, checked when it is loaded."""
+"""Contract of robots, checked when a user's robot is loaded."""
 
 from types import ModuleType
 from typing import Any, Protocol
@@ -18,12 +18,12 @@ from camcomp.plugins.parameters import check_params
 
 
 class RobotPlugin(Protocol):
-    """A family of machines: its parameters, and the chains of one of them in the words of a machine file."""
+    """A family of machines: its parameters, and the chains of one machine in the keys of a machine file."""
 
-    Params: type[Spec]  # the keys that stand beside `type:` in YAML
+    Params: type[Spec]  # YAML keys in addition to `type:`
 
     def chains(self, params: Any) -> dict[str, Any]:
-        """The chains by name, each a mapping as it would stand below `chains:`."""
+        """The chains by name, each a mapping as below `chains:` in a machine file."""
 
 
 def checked(name: str, found: Any, who: str) -> ModuleType:

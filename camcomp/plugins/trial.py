@@ -1,4 +1,4 @@
-"""Small machines and a movement of them, on which the hooks of an effect are tried before it is believed."""
+"""Small machines and a movement of them, on which the hooks of a user's effect are tried when it is loaded."""
 
 from typing import Any
 
@@ -42,8 +42,9 @@ def arm() -> Robot:
 
 
 def inputs(robot: Robot, *, whole: bool, named: str | None = None) -> dict[str, tuple[Any, ...]]:
-    """What every hook gets but the parameters. whole: aimed at the machine, else at its first actuator; named: the target
-    of an effect with names of its own.
+    """Arguments of every hook except the parameters.
+
+    whole: the target is the machine, else its first actuator; named: target of an effect with names of its own.
     """
     m = len(robot.actuators)
     time = np.linspace(0.0, 2.0, _ROWS)

@@ -1,1 +1,1 @@
-"""Formats that any story may use (page, plot, SARIF, JUnit); no story is known here."""
+"""Report formats for all commands: HTML page, plots, SARIF, JUnit."""

@@ -1,4 +1,4 @@
-"""What was found wrong, file by file, in the terms of the machine-readable reports."""
+"""Findings per file for the machine-readable reports."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from typing import Any
 from camcomp.ground.errors import CamcompError, CheckFailed
 from camcomp.ground.places import STANDARD
 
-WARNING = "warning"  # rule of what is only a warning; warnings have no ids of their own
+WARNING = "warning"  # rule of all warnings, which have no ids of their own
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing said about one place. line and column count from 1; 0 = the file as a whole; file None = no file."""
+    """One message about one location. line and column count from 1; 0: the whole file; file None: no file."""
 
     rule: str
     message: str
@@ -24,7 +24,7 @@ class Finding:
     line: int = 0
     column: int = 0
     source: str = ""
-    check: bool = False  # the work was finished, and a check said no
+    check: bool = False  # the work was finished, and a check failed
 
     @property
     def level(self) -> str:
@@ -34,7 +34,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class Case:
-    """One file that was looked at. note: what it is, when it is sound."""
+    """One checked file. note: its kind if it has no errors."""
 
     name: str
     findings: Sequence[Finding] = field(default_factory=tuple)
@@ -47,7 +47,7 @@ class Case:
 
 
 def findings_of(error: CamcompError, file: str | None = None) -> list[Finding]:
-    """An error and those found with it; those without a place belong to `file`."""
+    """Findings of an error and of those raised with it; those without a location belong to `file`."""
     out = []
     for each in error.all():
         check = isinstance(each, CheckFailed)
@@ -60,7 +60,7 @@ def findings_of(error: CamcompError, file: str | None = None) -> list[Finding]:
 
 
 def findings_of_messages(messages: Sequence[Mapping[str, Any]], file: str, *, check: bool) -> list[Finding]:
-    """The messages of one program of a batch; check: its outputs are written, and a check said no."""
+    """Findings of one program of a batch from its messages; check: its outputs are written, and a check failed."""
     return [
         Finding(
             each.get("rule") or "CC-BUG", each["message"], file, int(each.get("line") or 0), int(each.get("column") or 0),

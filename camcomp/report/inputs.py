@@ -1,4 +1,4 @@
-"""The files that went into a report, with their fingerprints."""
+"""Input files of a report, with their fingerprints."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from camcomp.report.page import Section, Table
 
 @dataclass(frozen=True)
 class Input:
-    """A file that went in: what it is, its name (the page shows it without folder), its bytes."""
+    """An input file: role, name (shown without folder), bytes."""
 
     role: str
     name: str
@@ -20,7 +20,7 @@ class Input:
 
 
 def inputs_section(inputs: Sequence[Input], output: bytes | None = None) -> Section:
-    """The section that tells which files were used, and what came out."""
+    """Section of the page with names and fingerprints of inputs and output."""
     rows = [
         [each.role, PurePath(each.name).name, str(len(each.data)), sha256(each.data).hexdigest()] for each in inputs
     ]

@@ -8,12 +8,12 @@ from xml.etree import ElementTree as xml
 
 from camcomp.report.findings import Case, Finding, relative
 
-# What XML 1.0 cannot hold at all.
+# Characters that XML 1.0 forbids.
 _FORBIDDEN = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
 def junit(suite: str, cases: Sequence[Case]) -> bytes:
-    """A test suite. A failed check is a failure; whatever kept the work from being done is an error."""
+    """JUnit XML of a test suite: a failed check is a failure, an error that stopped the work is an error."""
     failed = sum(bool(case.errors) and all(f.check for f in case.errors) for case in cases)
     broken = sum(not all(f.check for f in case.errors) for case in cases)
     # Times are zero: equal inputs give equal bytes.

@@ -1,4 +1,4 @@
-"""Findings to the files that the options name."""
+"""Output files of findings, by the options of the commands."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""A report as one HTML file that needs nothing else: style, script, plot library and data are all inside.
+"""A report as one self-contained HTML file with style, script, plot library and data.
 
-No clock, no user, no folder goes in, so that equal inputs give equal bytes.
+It contains no time, user or folder, so that equal inputs give equal bytes.
 """
 
 from __future__ import annotations
@@ -20,18 +20,18 @@ from camcomp import __version__
 from camcomp.ground.errors import ConfigError
 from camcomp.report.plot import Figure
 
-# Scripts and styles only from this file, nothing from anywhere else: the browser itself enforces it.
+# The browser enforces that scripts and styles come from this file only.
 _POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"
 
 _UNIT = re.compile(r"(\d) (µm|mm|mrad|rad|N·m|N|s|times)\b")  # number and unit stay on one line
 
 
-WORDY, PROSE = 24, 90  # characters, from which on a cell is a text that needs some width, and more
+WORDY, PROSE = 24, 90  # characters from which a cell of text gets a medium and a large width
 
 
 @dataclass(frozen=True)
 class Table:
-    """Rows of text or numbers under heads. A number is (value to sort by, text to show)."""
+    """A table with heads; cells are texts, or numbers as (value to sort by, text to show)."""
 
     caption: str
     heads: Sequence[str]
@@ -41,7 +41,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Listing:
-    """A text file that the reader may look at and save."""
+    """A text file that the reader can view and save."""
 
     name: str
     text: str
@@ -62,7 +62,7 @@ class Section:
 
 @dataclass(frozen=True)
 class Page:
-    """A report. verdict: one line that says it all, good or not; cards: (what, value, remark)."""
+    """A report. verdict: its conclusion in one line; good: passed; cards: (quantity, value, remark)."""
 
     title: str
     subtitle: str
@@ -71,12 +71,12 @@ class Page:
     cards: Sequence[tuple[str, str, str]]
     sections: Sequence[Section] = field(default_factory=tuple)
     word: str = ""  # before the verdict; default Passed or Attention
-    caution: str = ""  # a sentence behind the verdict that takes its colour of a pass away
+    caution: str = ""  # a reservation behind the verdict, which then has no colour of a pass
 
 
 @cache
 def plot_library() -> str:
-    """The plot library, packed: base64 of gzip. Raises ConfigError CC216 when plotly is not installed."""
+    """The plot library as base64 of gzip. Raises ConfigError CC216 without plotly."""
     try:
         from plotly.offline import get_plotlyjs
     except ImportError as error:

@@ -20,17 +20,17 @@ INK = "var(--ink)"
 # From small to large; blue to yellow with rising lightness, which every kind of sight can order.
 SCALE = [[0, "var(--m0)"], [0.5, "var(--m1)"], [1, "var(--m2)"]]
 
-SMALLEST_UM = 0.01  # that people are told
-BAR_MARGIN = {"l": 70, "r": 60, "t": 34, "b": 50}  # room for what stands beside the longest bar
+SMALLEST_UM = 0.01  # smallest length shown in texts
+BAR_MARGIN = {"l": 70, "r": 60, "t": 34, "b": 50}  # px, with room for the label of the longest bar
 
 Json = dict[str, Any]
 
 
 @dataclass(frozen=True)
 class Figure:
-    """One plot of a page. label: what a screen reader says; caption: what everybody reads below it.
+    """One plot of a page. label: for screen readers; caption: below the plot.
 
-    exaggerate: base curve and shifts of the plot whose deviations a slider enlarges: one base for all curves in one of
+    exaggerate: base curve and shifts of a plot whose deviations a slider enlarges: one base for all curves in one of
     `planes`, or in space a base for each curve and no planes (see assets/page.js).
     """
 
@@ -44,13 +44,13 @@ class Figure:
     exaggerate: Json | None = None
 
     def as_json(self) -> Json:
-        """What the script of the page needs."""
+        """Data of the plot for the script of the page."""
         out: Json = {"name": self.name, "traces": list(self.traces), "layout": dict(self.layout), "height": self.height}
         return out | ({"exaggerate": self.exaggerate} if self.exaggerate else {})
 
 
 def numbers(values: Floats, decimals: int = 5) -> list[float | None]:
-    """Values for JSON; what is not finite becomes null, which plotly draws as a gap."""
+    """Values for JSON, with null for values that are not finite, which plotly draws as gaps."""
     rounded = np.round(np.asarray(values, float), decimals) + 0.0
     return [value if np.isfinite(value) else None for value in rounded.tolist()]
 
@@ -71,14 +71,14 @@ def thin(values: Floats, most: int = MOST_POINTS) -> Ints:
 
 
 def broken(rows: Ints, hidden: Bools) -> tuple[Ints, Bools]:
-    """Indices of `rows` with a repeated one wherever a hidden move lies between two, and which of them are gaps."""
+    """Indices of `rows` with a repeated one at every hidden move between two, and mask of these gaps."""
     count = np.cumsum(hidden)
     gap = np.flatnonzero(np.diff(count[rows]) > 0) + 1
     return np.insert(rows, gap, rows[gap]), np.insert(np.zeros(len(rows), np.bool_), gap, True)
 
 
 def gapped(values: Floats, index: Ints, gap: Bools, decimals: int = 5) -> list[float | None]:
-    """Values at `index`, null where a gap is."""
+    """Values at `index`, with null for gaps."""
     return numbers(np.where(gap, np.nan, values[index]), decimals)
 
 
@@ -104,7 +104,7 @@ def axis(title: str, **more: Any) -> Json:
 
 
 def brief(value: float, digits: int = 3) -> str:
-    """A number for people: so many significant digits, no exponent from 1e-4 to 1e6."""
+    """Number as text with `digits` significant digits, without exponent from 1e-4 to 1e6."""
     if value == 0.0 or not np.isfinite(value):
         return "0" if value == 0.0 else "–"
     if 1e-4 <= abs(value) < 1e6:
@@ -114,12 +114,12 @@ def brief(value: float, digits: int = 3) -> str:
 
 
 def micrometres(value: float) -> str:
-    """A length in um for people: never smaller than a hundredth."""
+    """Length in um as text, at least SMALLEST_UM."""
     return f"below {SMALLEST_UM:g} µm" if 0.0 <= value < SMALLEST_UM else f"{brief(value)} µm"
 
 
 def digits_alike(value: float, low: float, high: float) -> list[str]:
-    """A value and the ends of its interval, with decimals that show two digits of the doubt."""
+    """Texts of a value and the ends of its interval, with two significant digits of the interval's width."""
     doubt = 0.5 * (high - low)
     if not doubt > 0.0 or not np.isfinite(doubt) or doubt < 1e-4:
         return [brief(each) for each in (value, low, high)]

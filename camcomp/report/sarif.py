@@ -1,4 +1,4 @@
-"""Findings as SARIF 2.1.0, the format that code hosts show beside the lines of a change."""
+"""Findings as SARIF 2.1.0, the format that code hosts show at the lines of a change."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from camcomp.report.findings import Case, Finding, relative
 
 
 def sarif(cases: Sequence[Case]) -> bytes:
-    """A log with one run. Paths are relative to the working folder; equal findings give equal bytes."""
+    """SARIF log with one run. Paths are relative to the working folder; equal findings give equal bytes."""
     found = [each for case in cases for each in case.findings]
     rules = sorted({each.rule for each in found})
     seen: Counter[str] = Counter()
@@ -43,7 +43,7 @@ def sarif(cases: Sequence[Case]) -> bytes:
 
 
 def _shown(value: Any) -> Any:
-    """The same with texts as they may be shown: no viewer's control characters, no bytes that are no UTF-8."""
+    """The value with all texts in displayable form: control characters and invalid UTF-8 as escapes."""
     if isinstance(value, str):
         return shown(value)
     if isinstance(value, dict):
@@ -65,7 +65,7 @@ def _rule(rule: str) -> dict[str, Any]:
 
 def _result(finding: Finding, rules: Sequence[str], seen: Counter[str]) -> dict[str, Any]:
     uri = relative(finding.file) if finding.file else None
-    # The text of the line names the finding, not its number: it stays the same when lines are put in above it.
+    # A finding is identified by the text of its line, not by its number, which changes with lines inserted above.
     said = f"{finding.rule}\0{uri}\0{finding.source.strip() or finding.message}"
     seen[said] += 1
     out: dict[str, Any] = {

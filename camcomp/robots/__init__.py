@@ -1,1 +1,1 @@
-"""One file per way to describe a robot in YAML, each with PARAMS and a function that makes its chains."""
+"""One file per description of robots in YAML, each with a class Params and a function `chains`."""

@@ -85,7 +85,7 @@ class Params(Spec):
 
 
 def chains(params: Params) -> dict[str, Any]:
-    """The one chain of the arm, in the words of a machine file."""
+    """The single chain of the arm, in the keys of a machine file."""
     elements = _step(params.base)
     for row in params.joints:
         elements += _row(row, modified=params.convention == "modified")

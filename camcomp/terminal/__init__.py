@@ -1,3 +1,1 @@
-"""The door of the shell: command line, exit codes, progress, generated reference; stories are called here, not
-told.
-"""
+"""Command line: verbs, exit codes, progress, completion, and the generated reference."""

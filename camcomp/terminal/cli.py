@@ -25,26 +25,26 @@ from camcomp.ground.files import remembering_inputs
 from camcomp.ground.garbage import collect_seldom
 from camcomp.terminal.standard_streams import stand_in_for_closed
 
-# Matrices here are small: threads of the linear algebra wait for each other longer than they compute, most of all on a
-# machine that does other things too. It has to be said before numpy is imported; a user's own setting stands.
+# Threads of the linear algebra slow small matrices down, in particular on a busy machine. The variables have to be set
+# before numpy is imported; a setting of the user has precedence.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-COMPLETING = "_CAMCOMP_COMPLETE"  # variable by which a shell asks what it may offer
+COMPLETING = "_CAMCOMP_COMPLETE"  # variable by which a shell asks for completions
 SHORT_OF_MEMORY = "there is not enough memory"
-SOON_S = 0.02  # longer than any object takes to be finalised
-ENOUGH = 1 << 26  # bytes; every verb that computes needs more
+SOON_S = 0.02  # longer than the finalisation of any object
+ENOUGH = 1 << 26  # bytes; less than every verb with computations needs
 
-# One line per verb, so that `camcomp --help` imports none of them; a test keeps the table and the commands equal.
+# One line per verb, so that `camcomp --help` imports none of them; a test compares the table with the commands.
 VERBS = {
     "batch": "Compensate many programs at once.",
-    "canon": "Print what a program was understood to do, one line per motion.",
+    "canon": "Print the motions of a program as camcomp reads them, one line each.",
     "compare": "Compare two logs or joint tables of one program.",
     "compensate": "Write the deflection of the machine back into an NC program.",
-    "config": "Show what several YAML files make together, or hand it to a control.",
+    "config": "Show the values in force of several YAML files, or write a screw file.",
     "diagnose": "Find out why a machine and its model differ.",
-    "effects": "List what can make a machine differ from its model.",
-    "explain": "Say what a rule id of an error message means.",
-    "history": "Keep the diagnoses of a machine and show what drifts in them.",
+    "effects": "List the effects by which a machine can differ from its model.",
+    "explain": "Explain a rule id of an error message.",
+    "history": "Store the diagnoses of a machine and show the drift of its parameters.",
     "import": "Turn recordings of others into logs and an experiment file.",
     "init": "Start a project: a machine file, a program, a README.",
     "schema": "Print the JSON schema of the YAML files, or of a result.",
@@ -52,7 +52,7 @@ VERBS = {
     "stream": "Compensate single set-points, line by line, from standard input to standard output.",
     "tutorial": "Write the tutorial with its samples and machine files into a folder.",
     "validate": "Check YAML files and NC programs; report every error at once.",
-    "verify": "Settle a compensated program on the model and measure what is left.",
+    "verify": "Run a compensated program through the model and measure the residual error.",
 }
 
 
@@ -99,7 +99,7 @@ def _terminate(number: int, _frame: FrameType | None) -> None:
 
 
 def _send_again(dropped: "sys.UnraisableHookArgs") -> None:
-    """A signal that came while an object was finalised, where Python drops what is raised, comes again a moment later."""
+    """Repeat a signal a moment later if it came during the finalisation of an object, where Python drops exceptions."""
     error = dropped.exc_value
     if not isinstance(error, KeyboardInterrupt | Terminated):
         sys.__unraisablehook__(dropped)
@@ -111,7 +111,7 @@ def _send_again(dropped: "sys.UnraisableHookArgs") -> None:
 
 
 def _interrupt(number: signal.Signals) -> None:
-    """A signal to the main thread, which wakes it where it waits as well, where the system can do that."""
+    """Send a signal to the main thread, which also interrupts its waiting calls where the system permits it."""
     if hasattr(signal, "pthread_kill"):
         signal.pthread_kill(main_thread().ident or 0, number)
     else:
@@ -135,8 +135,8 @@ def main(args: list[str] | None = None) -> None:
     try:
         sys.stdout.flush()
     except OSError:
-        _forget_output()  # the error has been said when it first occurred
-    gc.freeze()  # the interpreter need not look through everything once more when it ends
+        _forget_output()  # the error was reported when it occurred
+    gc.freeze()  # saves a last garbage collection at exit
     sys.exit(code)
 
 
@@ -179,14 +179,14 @@ def run(args: list[str]) -> int:
         if isinstance(error, ModuleNotFoundError):
             return _bug(error)
         return _report(FileError("CC503", f"a library cannot be loaded: {error}"))
-    except Exception as error:  # noqa: BLE001 - whatever else comes is a bug, and is called one
+    except Exception as error:  # noqa: BLE001 - any other exception is a bug and reported as one
         if _short_of_memory():
             return _report(FileError("CC503", SHORT_OF_MEMORY))
         return _report(_settings_of_numba(error)) if _is_from_import_of_numba(error) else _bug(error)
 
 
 def _is_from_import_of_numba(error: Exception) -> bool:
-    """Whether numba did not start: it reads settings then, and raises what it likes over them."""
+    """Whether the import of numba failed, which reads its settings and raises various errors about them."""
     place = error.__traceback__
     while place is not None:
         if place.tb_frame.f_globals.get("__name__") == "numba":
@@ -202,7 +202,7 @@ def _settings_of_numba(error: Exception) -> ConfigError:
 
 
 def _short_of_memory() -> bool:
-    """Whether there is too little left to go on with: then Python and libraries fail in ways that name something else."""
+    """Whether free memory is below ENOUGH, which makes Python and libraries fail with misleading errors."""
     try:
         bytearray(ENOUGH)
     except MemoryError:
@@ -211,13 +211,13 @@ def _short_of_memory() -> bool:
 
 
 def _forget_output() -> None:
-    """Python flushes standard output once more at exit; there must be something left to flush into."""
+    """Redirect standard output to the null device, because Python flushes it once more at exit."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 @contextmanager
 def _plugins_left_out() -> Iterator[None]:
-    """Warnings about users' plug-ins as lines like those of errors, each once; other warnings stay what they are."""
+    """Context that prints warnings about users' plug-ins like errors, each once; other warnings are unchanged."""
     with warnings.catch_warnings():
         warnings.simplefilter("always", PluginWarning)
         others, told = warnings.showwarning, set()
@@ -244,7 +244,7 @@ def _report(error: CamcompError) -> int:
 
 
 def _tell(text: str, color: bool = False) -> None:
-    """To standard error; where nothing can be written there, the exit code says it alone."""
+    """Write a text to standard error; failures to write are ignored, so that the exit code remains."""
     with suppress(OSError):
         click.echo(text, err=True, color=color)
 

@@ -1,4 +1,4 @@
-"""What a shell offers behind <TAB>: files, folders, and names of rules, machines, effects and dialects.
+"""Completion in shells with <TAB>: files, folders, and names of rules, machines, effects and dialects.
 
 The protocols of bash, zsh and fish are click's; here every parameter gets its kind by its name and metavar.
 """
@@ -18,7 +18,7 @@ _FILE = re.compile(
 
 
 def complete_values(command: click.Command) -> click.Command:
-    """The command, its parameters offering what they take; choices offer themselves."""
+    """The command with completion of the values of its parameters; click completes choices itself."""
     for each in command.params:
         offer = _offer_of(each)
         if offer is not None:

@@ -1,4 +1,4 @@
-"""Which statements of which controllers are read, and which are refused?
+"""Table of statements per controller: read, or refused with a rule id.
 
 Every cell of the table is the result of reading a short program in that dialect: `read`, or the rule id of the refusal.
 Sources of the programs: LinuxCNC 2.9 user manual, Fanuc 30i operator's manual, Siemens 840D fundamentals, Grbl 1.1 wiki.
@@ -23,7 +23,7 @@ _START = "G90\nG17\nG94\nG0 X0 Y0 Z5\nF600\n"
 
 @dataclass(frozen=True)
 class ProbedStatement:
-    """What a controller may be asked to do: a program text for all dialects, other texts for some; None: it has no such thing."""
+    """A statement of NC programs: a text for all dialects, other texts for some; None: the dialect has no such statement."""
 
     title: str
     text: str
@@ -32,7 +32,7 @@ class ProbedStatement:
     first_screen: bool = False  # also in the table of the README
 
     def result(self, dialect: str) -> str:
-        """`read`, the rule id of the refusal, or `-` where the controller has no such statement."""
+        """`read`, the rule id of the refusal, or `-` for a controller without such a statement."""
         text = self.other.get(dialect, self.text)
         if text is None:
             return NOT_THERE
@@ -101,7 +101,7 @@ def first_rows() -> list[tuple[str, ...]]:
 
 
 def code_rows() -> Iterator[tuple[str, ...]]:
-    """Every G code that some dialect names, with what each controller does with it: read, passed on, refused, unknown."""
+    """Every G code of any dialect, with its treatment for each controller: read, passed on, refused, unknown."""
     dialects = [_record(name) for name in CONTROLS]
     codes = {*GROUPS, *REFUSED, *(code for each in dialects for code in (*each.more, *each.passed))}
     for code in sorted(codes):

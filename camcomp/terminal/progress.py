@@ -1,4 +1,4 @@
-"""What people see while camcomp works: standard error, and moving text only on a terminal."""
+"""Display of progress on standard error; a line is redrawn on terminals only."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ import click
 from camcomp.ground.errors import shown
 from camcomp.ground.headway import Headway, watched
 
-PATIENCE = 1.0  # s before a work in progress is worth a word
+PATIENCE = 1.0  # s before the progress is shown
 TICK = 0.5  # s
 FILTER = "AXIS_PROGRESS_BAR"  # set by LinuxCNC's AXIS for its filters
 STEPS = 1000  # of a bar
@@ -23,15 +23,15 @@ WIDE = 24  # characters of a bar
 
 
 def lively() -> bool:
-    """Whether standard error is a terminal that can draw a line anew."""
+    """Whether standard error is a terminal that can redraw a line."""
     return sys.stderr.isatty() and os.environ.get("TERM") != "dumb"
 
 
 @contextmanager
 def working(on: str, *, quiet: bool = False) -> Iterator[None]:
-    """Say after a moment what is being worked on, how much of it is done and how long the rest may take.
+    """Context that shows the input, the share done and the remaining time, or else the elapsed time, after PATIENCE.
 
-    Where nobody can tell that, how long it has taken. Nothing is left of it afterwards.
+    The line is erased at the end.
     """
     if FILTER in os.environ:
         with _filter_progress():
@@ -82,7 +82,7 @@ def _filter_progress() -> Iterator[None]:
 
 
 class _Line:
-    """The line that is drawn anew: a bar with share and remaining time, or what is known instead."""
+    """The redrawn line: a bar with share and remaining time, or the elapsed time."""
 
     def __init__(self, on: str) -> None:
         self._on, self._start = shown(on), time.monotonic()

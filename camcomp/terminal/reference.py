@@ -1,6 +1,6 @@
-"""The pages of docs/reference, generated from the commands, the keys, the plug-ins and the rules themselves.
+"""The pages of docs/reference, generated from commands, keys, plug-ins and rules.
 
-`python -m camcomp.terminal.reference` writes them anew; a test compares them with what stands there.
+`python -m camcomp.terminal.reference` writes them; a test compares them with the committed pages.
 """
 
 from __future__ import annotations
@@ -173,7 +173,7 @@ def _library() -> str:
 
 
 def _formulas() -> list[str]:
-    """What the text of a formula may be made of."""
+    """Elements of the text of a formula, as lines of a page."""
     covariates = [(f"`{name}`", where, text) for where, names in _COVARIATES for name, text in names.items()]
     functions = [(f"`{name}`", str(count), text) for name, (count, _, text) in FUNCTIONS.items()]
     return [
@@ -297,7 +297,7 @@ def _controls() -> str:
 
 
 def with_controls(readme: str) -> str:
-    """The README with its table of controllers made anew."""
+    """The README with a new table of controllers."""
     before, rest = readme.split(_BEGIN)
     _, after = rest.split(_END)
     table = _table(("statement", *CONTROLS.values()), first_rows())

@@ -1,13 +1,13 @@
-"""Standard streams that the caller has closed (`<&-`, `>&-`, `2>&-`): their numbers must not go to the next file opened."""
+"""Replacement of standard streams that the caller has closed (`<&-`, `>&-`, `2>&-`), so that no file gets their numbers."""
 
 import os
 import sys
 
 
 def stand_in_for_closed() -> None:
-    """Puts something in place of every closed standard stream.
+    """Open a replacement for every closed standard stream.
 
-    Reading input and writing output fail with an OSError, as they do in other programs; messages go nowhere.
+    Reading input and writing output raise OSError, as in other programs; messages are discarded.
     """
     ways = (("stdin", os.O_WRONLY, "r"), ("stdout", os.O_RDONLY, "w"), ("stderr", os.O_WRONLY, "w"))
     for number, (name, way, mode) in enumerate(ways):

@@ -24,7 +24,7 @@ from camcomp.model.config.load import params_of
 from camcomp.model.config.spec import Config, EffectChoice, Experiment, ForceChoice
 from camcomp.model.config.yaml_tree import Node, plain, read_tree
 
-SOURCE = "source"  # of every mapping; told once
+SOURCE = "source"  # key of every mapping, described once
 _UNIT = re.compile(r"(?:^|_)((?:mm[24]?|um|Nmm|N|rad|deg|s|ms|min|rpm|kg|C|ppm|mrad)(?:_per_[A-Za-z]+2?)?)$")
 _SPELLED = {"C": "°C", "mm2": "mm²", "mm4": "mm⁴"}
 _CHOICES = {ForceChoice: ("forces", "model"), EffectChoice: ("effects", "effect")}
@@ -113,7 +113,7 @@ _MAPPINGS = {"": "mapping, below", "[]": "list of mappings, below", ".NAME": "ma
 
 @dataclass
 class KeySection:
-    """One mapping of a YAML file. paths: where it may stand; picked: the keys that choose it among others."""
+    """One mapping of a YAML file. paths: its possible paths; picked: the keys that choose it among others."""
 
     spec: type[BaseModel]
     paths: list[str]
@@ -123,7 +123,7 @@ class KeySection:
 
 @dataclass(frozen=True)
 class KeyRow:
-    """One key. unit, default: empty where there is none; example: as YAML, empty where the value is a mapping of its own."""
+    """One key. unit, default: may be empty; example: as YAML, empty for a value that is a mapping."""
 
     key: str
     unit: str
@@ -134,7 +134,7 @@ class KeyRow:
 
 
 def unit_of(key: str) -> str:
-    """The unit that a key's name ends in."""
+    """Unit at the end of a key's name."""
     if key.endswith("_mm_N_rad"):
         return "mm, N, rad"
     found = _UNIT.search(key)
@@ -146,7 +146,7 @@ def unit_of(key: str) -> str:
 
 
 def sections(root: type[BaseModel]) -> list[KeySection]:
-    """Every mapping that a file may hold, the file itself first."""
+    """Every mapping of a file, the file itself first."""
     found: dict[tuple[type[BaseModel], tuple[tuple[str, str], ...]], KeySection] = {}
 
     def visit(spec: type[BaseModel], path: str, picked: dict[str, str], note: str = "") -> None:
@@ -170,7 +170,7 @@ def sections(root: type[BaseModel]) -> list[KeySection]:
 
     def _visit_shelf(shelf_name: str, word: str, path: str) -> None:
         if shelf_name == "effects":
-            return  # their parameters stand in library.md, with ranges and sources
+            return  # library.md lists their parameters with ranges and sources
         for member in shelf.members(shelf_name):
             params = params_of(shelf.load(shelf_name, member))
             if set(params.model_fields) - {SOURCE}:
@@ -181,7 +181,7 @@ def sections(root: type[BaseModel]) -> list[KeySection]:
 
 
 def _specs_in(kind: Any, path: str) -> Iterator[tuple[type[BaseModel], str]]:
-    """Mappings inside the type of a field, each with where it stands."""
+    """Mappings inside the type of a field, each with its path."""
     if isinstance(kind, type) and issubclass(kind, BaseModel):
         yield kind, path
         return
@@ -198,7 +198,7 @@ def _specs_in(kind: Any, path: str) -> Iterator[tuple[type[BaseModel], str]]:
 
 
 def _picks(spec: type[BaseModel]) -> dict[str, str]:
-    """Keys with one possible value, by which a mapping is told from others in its place."""
+    """Keys with one possible value, which distinguish alternative mappings."""
     out = {}
     for name, each in spec.model_fields.items():
         words = get_args(each.annotation)
@@ -208,7 +208,7 @@ def _picks(spec: type[BaseModel]) -> dict[str, str]:
 
 
 def rows(section: KeySection) -> list[KeyRow]:
-    """The keys of a mapping in their order, without those that choose it and without `source`."""
+    """The keys of a mapping in their order, except those that choose it and `source`."""
     out = []
     for name, each in section.spec.model_fields.items():
         key = each.alias or name
@@ -223,14 +223,14 @@ def rows(section: KeySection) -> list[KeyRow]:
 
 
 def title(section: KeySection, root: str) -> str:
-    """Where a mapping stands, and by which words."""
+    """Title of a mapping: its path, and the keys that choose it."""
     path = " and ".join(f"`{each}`" for each in section.paths if each) or root
     words = ", ".join(f"`{key}: {value}`" for key, value in section.picked.items())
     return f"{path} with {words}" if words else path
 
 
 def type_text(given: FieldInfo) -> str:
-    """A type as a user thinks of it."""
+    """Name of a type for users."""
     return _type_name(given.annotation).removesuffix(" or nothing")
 
 
@@ -254,7 +254,7 @@ def _type_name(kind: Any) -> str:
 
 
 def default_text(given: FieldInfo) -> str:
-    """A default as YAML; empty where there is none."""
+    """A default as YAML, or empty."""
     value = given.get_default(call_default_factory=True)
     if value is None or isinstance(value, BaseModel):
         return ""
@@ -285,7 +285,7 @@ def example_of(key: str, given: FieldInfo, section: KeySection) -> str:
 
 @cache
 def _shipped_examples() -> dict[tuple[str, tuple[str, ...], str], str]:
-    """First value of every key in the shipped files by path, words that choose its mapping, and key."""
+    """First value of every key in the shipped files by path, keys that choose its mapping, and key."""
     out: dict[tuple[str, tuple[str, ...], str], str] = {}
 
     def walk(node: Any, path: str) -> None:

@@ -13,7 +13,7 @@ from camcomp.terminal.progress import say
 @dialect_option
 @click.option("--config", "configs", metavar="FILE", multiple=True, help="Machine whose control reads it.")
 def command(program: str, configs: tuple[str, ...]) -> None:
-    """Print what a program was understood to do, one line per motion.
+    """Print the motions of a program as camcomp reads them, one line each.
 
     Source line, kind, end point in mm in the program frame of G54, and for arcs the centre and the sweep; all units,
     offsets, modes, loops and cycles are resolved.

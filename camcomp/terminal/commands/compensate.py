@@ -96,7 +96,7 @@ def command(
 
 
 def _finish(figures: "Summary", sizes: dict[str, int], failed: list[tuple[str, str]], quiet: bool) -> None:
-    """Says what was done, or would have been, and raises the checks that failed."""
+    """Print the figures of a compensation or dry run, and raise the checks that failed."""
     say(*_told(figures), quiet=quiet)
     say(*(f"would write {name}: {size} bytes" for name, size in sizes.items()), quiet=quiet)
     if failed:

@@ -10,7 +10,7 @@ from camcomp.terminal.commands._options import OUTPUT, config_option
 
 @click.group()
 def command() -> None:
-    """Show what several YAML files make together, or hand it to a control."""
+    """Show the values in force of several YAML files, or write a screw file."""
 
 
 @command.command()
@@ -37,7 +37,7 @@ def screw_file(
 ) -> None:
     """Write LinuxCNC's screw file (COMP_FILE) for the effects in one drive: pitch, wobble, play, error table.
 
-    A control that uses it makes up for them itself; take them out of the machine file then.
+    A controller with this file compensates for these effects itself; remove them from the machine file then.
     """
     from camcomp.api.machine import load_machine
     from camcomp.api.settings import screw_file as written

@@ -9,7 +9,7 @@ import click
 @click.option("--json", "as_json", is_flag=True, help="Machine-readable.")
 @click.option("--library", metavar="DIR", help="With the laws that diagnoses have found before.")
 def command(as_json: bool, library: str | None) -> None:
-    """List what can make a machine differ from its model.
+    """List the effects by which a machine can differ from its model.
 
     Each is one plug-in; a config names them under `effects:`, diagnose finds them, compensate removes them.
     """

@@ -11,7 +11,7 @@ from camcomp.ground.rules import RULES
 @click.command()
 @click.argument("rule", required=False)
 def command(rule: str | None) -> None:
-    """Say what a rule id of an error message means.
+    """Explain a rule id of an error message.
 
     Without RULE all ids are listed.
     """

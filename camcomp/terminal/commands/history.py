@@ -36,7 +36,7 @@ SHOWN = {
 def command(
     folder: str, added: Sequence[str], day: datetime | None, json_file: str | None, tolerance_um: float
 ) -> None:
-    """Keep the diagnoses of a machine and show what drifts in them.
+    """Store the diagnoses of a machine and show the drift of its parameters.
 
     DIR is a folder of one machine; --add puts results of `camcomp diagnose --json` into it. For every parameter that was
     ever found: its values over the days, whether it stays, drifts or has jumped, and when to measure again. So are values of

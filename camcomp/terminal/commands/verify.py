@@ -37,7 +37,7 @@ def command(
     stock: "StockChoice | None",
     tolerance_um: float | None,
 ) -> None:
-    """Settle a compensated program on the model and measure what is left.
+    """Run a compensated program through the model and measure the residual error.
 
     Only the text of CORRECTED counts. Exit code 1 when the residual is over the tolerance.
     """
