@@ -35,12 +35,14 @@ def test_a_bending_tool_that_one_run_of_three_shows(tmp_path):
     assert [each["effect"] for each in result["causes"]] == ["tool_deflection"]
 
 
+@pytest.mark.campaign  # the longest of this file
 def test_a_lag_of_all_axes_is_no_clock_where_forces_are_logged_and_encoders_are_not(tmp_path):
     """Forces and what bends under them come as late as the axes; of set-points' forces a clock made the tip's late, by itself."""
     result, row = judged(tmp_path, "serial", 44084)
     assert result["verdict"] == "identified" and row["all"] and not row["false_cause"]
 
 
+@pytest.mark.campaign  # the longest of this file
 def test_a_cause_that_leaves_the_gap_as_it_is_is_not_sure(tmp_path):
     """A loop that rings after every corner, tip alone: 25 um were left of 25 by an overshoot that was sure."""
     with recording.taken_from("spirals"):
@@ -48,6 +50,7 @@ def test_a_cause_that_leaves_the_gap_as_it_is_is_not_sure(tmp_path):
     assert result["verdict"] in ("ambiguous", "unknown") and not row["false_cause"]
 
 
+@pytest.mark.campaign  # the longest of this file
 def test_lines_that_a_control_merges_are_no_gap(tmp_path):
     """Tip alone, nothing wrong: LinuxCNC makes one line of several within 50 um in G64 P0.05."""
     with recording.taken_from("rosettes"):

@@ -38,7 +38,7 @@ def named(result):
     [
         ((-6.0, 4.0, 9.0, -3.0), "abcd", False, []),
         pytest.param((12.0, 0.0, 0.0, 0.0), ("other", None, None, None), True, [], marks=pytest.mark.campaign),
-        ((5.0, 5.0, 5.2, 5.2), "aabb", True, [("time_sync", None)]),
+        pytest.param((5.0, 5.0, 5.2, 5.2), "aabb", True, [("time_sync", None)], marks=pytest.mark.campaign),
         # all that an unknown function of velocity would do here is what a late clock does
         ((5.0, 5.0, 5.2, 5.2), "aabb", False, [("time_sync", None)]),
     ],

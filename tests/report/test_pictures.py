@@ -16,6 +16,7 @@ def size(path):
     return struct.unpack(">II", data[16:24])
 
 
+@pytest.mark.campaign  # pictures change when their script does
 @needs_browser
 def test_pictures_can_be_made_anew_and_look_as_large_as_those_that_are_shown(tmp_path):
     made = pictures.make(tmp_path)

@@ -130,6 +130,7 @@ def test_what_the_library_lacks_is_unknown_and_named_by_what_it_depends_on(robot
     assert result.causes[-1].probability > 0.9  # the calibration map states no more
 
 
+@pytest.mark.campaign  # an axis is in the plain run
 def test_a_disturbance_for_a_while_is_located_in_time(robot, faulty):
     runs = []
     for r in faulty:
@@ -164,6 +165,7 @@ def test_heavy_tails_change_no_cause(robot, faulty):
     assert known(result) == FAULTS
 
 
+@pytest.mark.campaign  # programs are in the plain run (tests/validation/recorded)
 def test_order_and_doubled_rows_change_nothing(robot, faulty):
     first = arm_study(robot, (), faulty, holdout=["B"], stated=STATED)
     mixed = np.random.default_rng(0).permutation(250)
@@ -256,6 +258,7 @@ def test_what_is_not_there_is_not_found():
     assert still.causes == ()
 
 
+@pytest.mark.campaign  # friction of all runs is in the plain run
 def test_friction_that_one_run_of_four_lacks_is_not_named():
     """It lowers the mean rms of runs that were not fitted, and one of them speaks against it."""
 

@@ -99,6 +99,7 @@ def test_residuals_are_those_of_its_poses(sample):
     assert sample.next_program_cuts is False
 
 
+@pytest.mark.campaign  # test_arms_in_mujoco and orthoglide leave effects out, too
 def test_without_the_true_effects_they_are_not_made_up_from_offsets(tmp_path):
     done = command(
         "diagnose", "samples/ur10/experiment.yaml", "--json", tmp_path / "o.json", "--without", GEOMETRY,
@@ -140,6 +141,7 @@ def campaigns():
     return robot, runs
 
 
+@pytest.mark.campaign  # the bench of measured data has all opponents
 def test_plain_least_squares_of_everything_overfits_where_camcomp_does_not():
     robot, runs = campaigns()
     bench = ArmBench(robot, (), runs)

@@ -12,7 +12,10 @@ from tests.validation.recorded.experiment import Plan, make, write
 PLAN = Plan(
     5, "single", (("backlash", "y"),), (4.0,), runs=2, rows=150, paths=("circles-blended",), rapids=False, stated=False
 )  # fmt: skip
-QUICK_SAME = ("order of runs", "cyclic labels", "turned frame")
+QUICK_SAME = (
+    "order of runs",
+    *(pytest.param(each, marks=pytest.mark.campaign) for each in ("cyclic labels", "turned frame")),
+)
 
 
 @pytest.fixture(scope="module")
@@ -59,6 +62,7 @@ def test_laws_can_be_broken():
     assert metamorphic.differences(open_, {**other, "verdict": "ambiguous"}, {"x": "y"}) == []
 
 
+@pytest.mark.campaign  # the laws themselves are in the plain run
 def test_a_law_is_tried_on_an_experiment_that_is_there_and_leaves_it_as_it_is(files, tmp_path):
     metamorphic.write(files, tmp_path / "e-1")
     (row,) = scoring.laws(tmp_path / "e-1", tmp_path / "out", ["other names"], 1)
