@@ -15,6 +15,7 @@ from camcomp.ground.errors import CheckFailed
 from camcomp.ground.files import read_bytes
 from camcomp.ground.headway import part
 from camcomp.ground.places import STANDARD
+from camcomp.model.config.linuxcnc_ini import SUFFIX as INI_SUFFIX
 from camcomp.model.config.load import load_config, load_experiment
 from camcomp.model.config.write_back import machine_file, with_causes
 from camcomp.report.page import Listing
@@ -181,11 +182,12 @@ def machine_with_causes(
     configs: Sequence[str], result: DiagnosisResult, target: str, learned: Sequence[LearnedLaw] = ()
 ) -> str:
     """Text of the machine file of `configs` with the causes, for a file called `target`; learned: laws by name."""
-    before = {each.name: each for each in learned}
+    every, before = configs, {each.name: each for each in learned}
     laws = [] if result.law is None else [each.model_dump(exclude_none=True) for each in result.law.parts]
     for cause in result.known:
         if cause.effect in before:
             laws += before[cause.effect].entries({name: each.value for name, each in cause.parameters.items()})
+    configs = [each for each in configs if Path(each).suffix.lower() != INI_SUFFIX]
     texts = [read_bytes(each).decode("utf-8-sig") for each in configs]
     k = machine_file(texts)
     note = f"found by camcomp diagnose, verdict {result.verdict}"
@@ -194,7 +196,7 @@ def machine_with_causes(
     to = Path.cwd() if target == STANDARD else Path(target).absolute().parent
     return with_causes(
         texts[k], [each for each in result.known if each.effect not in before], folder=str(Path(configs[k]).absolute().parent), moved_to=str(to), note=note,
-        laws=laws, actuators=tuple(load_config(configs).robot.actuators),
+        laws=laws, actuators=tuple(load_config(every).robot.actuators),
     )  # fmt: skip
 
 

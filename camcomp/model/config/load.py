@@ -12,7 +12,9 @@ from pydantic import Field, create_model
 from camcomp.ground import shelf
 from camcomp.ground.errors import CamcompError, ConfigError, FileError, Location, raise_all
 from camcomp.ground.files import display_name, read_bytes
+from camcomp.model.config import linuxcnc_ini
 from camcomp.model.config.base import Spec
+from camcomp.model.config.doubt import Doubt
 from camcomp.model.config.robot import RevoluteActuator, RobotSpec
 from camcomp.model.config.spec import Config, EffectChoice, Experiment
 from camcomp.model.config.spread import Spread, UncertainInput, replaced, without_spreads
@@ -44,14 +46,14 @@ def load_config(paths: Sequence[Path | str]) -> Config:
     if tree is None:
         _raise(errors)
         raise ConfigError("CC212", "no configuration is given", hint="name one with --config FILE")
-    tree, table_doubts, wrong_tables = with_tool_tables(tree)
+    tree, file_doubts, wrong_files = _with_other_files(tree)
     if _get(tree, "robot") is None:
         errors.append(ConfigError("CC212", "there is no section 'robot'", at=tree.at))
     tree, spreads, more = _certain(tree)
     config, wrong = _check_config(tree)
-    _raise([*errors, *wrong_tables, *more, *wrong])
+    _raise([*errors, *wrong_files, *more, *wrong])
     assert config is not None
-    config._spreads, config._doubts = tuple(spreads), tuple(table_doubts)
+    config._spreads, config._doubts = tuple(spreads), tuple(file_doubts)
     return in_stated_dialect(config)
 
 
@@ -65,12 +67,12 @@ def check_config(paths: Sequence[Path | str]) -> Config | None:
     more: list[CamcompError] = []
     config: Config | None = None
     if tree is not None:
-        tree, table_doubts, wrong_tables = with_tool_tables(tree)
+        tree, file_doubts, wrong_files = _with_other_files(tree)
         tree, spreads, more = _certain(tree)
         config, wrong = _check_config(tree)
-        more += [*wrong_tables, *wrong]
+        more += [*wrong_files, *wrong]
         if config is not None:
-            config._spreads, config._doubts = tuple(spreads), tuple(table_doubts)
+            config._spreads, config._doubts = tuple(spreads), tuple(file_doubts)
     if _get(tree, "robot", "name") is None:
         more = [each for each in more if each.rule != "CC203"]
     _raise([*errors, *more, *_force_files(_get(tree, "process", "force"))])
@@ -161,6 +163,11 @@ def _read_merged(paths: Sequence[Path | str]) -> tuple[Node | None, list[Camcomp
         except FileError as error:
             errors.append(error)
             continue
+        if Path(path).suffix.lower() == linuxcnc_ini.SUFFIX:
+            tree, wrong = linuxcnc_ini.read_layer(data, display_name(path))
+            errors += wrong
+            merged = tree if merged is None else merge(merged, tree) if tree is not None else merged
+            continue
         tree, more = read_tree(data, display_name(path))
         if not _is_ours(tree, data) and not any(each.rule in ("CC211", "CC217") for each in more):
             message = "this is neither a machine file nor an experiment: it has none of their sections"
@@ -170,6 +177,13 @@ def _read_merged(paths: Sequence[Path | str]) -> tuple[Node | None, list[Camcomp
         if tree is not None:
             merged = tree if merged is None else merge(merged, tree)
     return merged, errors
+
+
+def _with_other_files(tree: Node) -> tuple[Node, list[Doubt], list[CamcompError]]:
+    """The tree with the travel of LinuxCNC's axes and the tools of tool tables, what is doubtful of them, and errors."""
+    tree, doubts = linuxcnc_ini.with_travel(tree)
+    tree, more, errors = with_tool_tables(tree)
+    return tree, doubts + more, errors
 
 
 def _is_ours(tree: Node | None, data: bytes) -> bool:
