@@ -8,7 +8,8 @@ from typing import Any
 from camcomp.model.config.in_force import values_in_force
 from camcomp.model.config.load import load_config
 from camcomp.model.config.schema import config_schema, experiment_schema, result_schema
-from camcomp.model.error_table.table import comp_text
+from camcomp.model.error_table.controls import table_text
+from camcomp.model.firmware_skew import skew_command
 from camcomp.model.job import Job
 from camcomp.model.screw_map import screw_map
 
@@ -18,12 +19,27 @@ def values(configs: Sequence[str]) -> list[tuple[str, str, str]]:
     return list(values_in_force(load_config(configs), folders=True))
 
 
-def screw_file(machine: Job, actuator: str, start: float, end: float, step: float, comp_type: int = 0) -> bytes:
-    """LinuxCNC's screw file (COMP_FILE) that compensates for the effects in one drive, mm; comp_type as COMP_FILE_TYPE.
+def screw_file(
+    machine: Job, actuator: str, travel: tuple[float, float, float], control: str = "linuxcnc", comp_type: int = 0
+) -> bytes:
+    """A control's table that makes up for the machine's effects in one drive: LinuxCNC (COMP_FILE), Siemens, Heidenhain.
 
-    Raises ConfigError CC205 for an actuator that is no slide, or a travel without rows.
+    Args:
+        machine: the machine with its effects.
+        actuator: name of the slide.
+        travel: start, end and step of the table, mm.
+        control: one of linuxcnc, siemens, heidenhain.
+        comp_type: COMP_FILE_TYPE of LinuxCNC.
+
+    Raises:
+        ConfigError: CC205, the actuator is no slide, the travel has no rows, or its steps are unequal for Siemens.
     """
-    return comp_text(screw_map(machine, actuator, start, end, step), comp_type).encode()
+    return table_text(screw_map(machine, actuator, *travel), control, actuator, comp_type).encode()
+
+
+def skew(machine: Job, control: str) -> bytes:
+    """The command by which a firmware, marlin or klipper, corrects the squareness of the machine. Raises ConfigError CC205."""
+    return skew_command(machine, control).encode()
 
 
 def schema_of(kind: str) -> dict[str, Any]:

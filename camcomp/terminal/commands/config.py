@@ -30,17 +30,38 @@ def show(configs: tuple[str, ...], origin: bool) -> None:
 @click.option("--from-mm", "start", type=float, required=True, help="Where the table begins on the slide's scale.")
 @click.option("--to-mm", "end", type=float, required=True, help="Where it ends.")
 @click.option("--step-mm", "step", type=float, default=10.0, show_default=True, help="Between its rows.")
+@click.option(
+    "--control", type=click.Choice(["linuxcnc", "siemens", "heidenhain"]), default="linuxcnc", show_default=True,
+    help="Whose table: LinuxCNC's COMP_FILE, or CSV of Siemens' $AA_ENC_COMP or of Heidenhain's *.COM.",
+)  # fmt: skip
 @click.option("--comp-type", type=click.Choice(["0", "1"]), default="0", show_default=True, help="COMP_FILE_TYPE.")
 @click.option("-o", "--output", metavar="FILE", type=OUTPUT, help="The file; default and -: standard output.")
 def screw_file(
-    configs: tuple[str, ...], actuator: str, start: float, end: float, step: float, comp_type: str, output: str | None
-) -> None:
-    """Write LinuxCNC's screw file (COMP_FILE) for the effects in one drive: pitch, wobble, play, error table.
+    configs: tuple[str, ...], actuator: str, start: float, end: float, step: float, control: str, comp_type: str,
+    output: str | None,
+) -> None:  # fmt: skip
+    """Write a control's table for the effects in one drive: pitch, wobble, play, error table.
 
-    A controller with this file compensates for these effects itself; remove them from the machine file then.
+    A control that uses it makes up for them itself; take them out of the machine file then. Siemens' table has one value per
+    position, the mean of both directions. Heidenhain's holds errors, carriage minus scale.
     """
     from camcomp.api.machine import load_machine
     from camcomp.api.settings import screw_file as written
 
-    text = written(load_machine(*configs), actuator, start, end, step, int(comp_type))
+    text = written(load_machine(*configs), actuator, (start, end, step), control, int(comp_type))
     write_all({output or STANDARD: text}, inputs=configs)
+
+
+@command.command("skew")
+@config_option
+@click.option("--control", type=click.Choice(["marlin", "klipper"]), required=True, help="Firmware of the control.")
+@click.option("-o", "--output", metavar="FILE", type=OUTPUT, help="The command; default and -: standard output.")
+def skew(configs: tuple[str, ...], control: str, output: str | None) -> None:
+    """Write the command by which a firmware corrects squareness itself: Marlin's M852, Klipper's SET_SKEW.
+
+    It goes by the `squareness` among the effects; take these out of the machine file then.
+    """
+    from camcomp.api.machine import load_machine
+    from camcomp.api.settings import skew as written
+
+    write_all({output or STANDARD: written(load_machine(*configs), control)}, inputs=configs)
