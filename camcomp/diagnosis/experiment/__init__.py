@@ -1,1 +1,1 @@
-"""Experiment files and logs to runs: reading, checking, importing the recordings of others; nothing is fitted here."""
+"""Runs from experiment files and logs: reading and checks, without any fit."""

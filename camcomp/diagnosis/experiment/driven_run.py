@@ -1,4 +1,4 @@
-"""The motion of a run as its log has it: set-points, else encoders, else the tip itself, led along the program."""
+"""Motion of a run from its log: set-points, else encoders, else the tip itself, aligned with the program."""
 
 from __future__ import annotations
 
@@ -33,26 +33,28 @@ from camcomp.model.motion.run_path import RunPath
 from camcomp.model.motion.twin import Twin
 from camcomp.model.trajectory.segments import merged
 
-SAMPLE_MM = 2.0  # of the program, where places are compared
-GAP_ROWS = 3.0  # usual steps between rows over which a motion is not led
+SAMPLE_MM = 2.0  # distance of points of the program for comparisons
+GAP_ROWS = 3.0  # times the median step: longer gaps are not interpolated
 GUESSED_MM, GUESSED_RAD = (
     1e-3,
     1e-6,
 )  # by which an empty cell's actuator may stand beside the line between its neighbours
-STILL_S = 0.1  # from which on standing at the end of a line may be idleness
+STILL_S = 0.1  # duration from which a standstill at the end of a line may be idle time
 STILL_MM = 0.005
-MOST_PASSES = 8  # of finding where a tool that bends is
-SETTLED_MM = 1e-3  # rms by which it may bend otherwise in one more of them
-SOON_S = 1e-4  # in which a tip moves in one direction
+MOST_PASSES = 8  # of the alignment with a deflected tip
+SETTLED_MM = 1e-3  # rms change of the deflection at which the passes end
+SOON_S = 1e-4  # time step of the tip's direction
 STANDING_MM_PER_S = 0.05
-_UPRIGHT = 0.9  # cosine beyond which a path goes along z, and its sides are found from x
+_UPRIGHT = 0.9  # cosine of the path to z beyond which x defines its lateral directions
 
 
 @dataclass(frozen=True, eq=False)
 class DrivenRun:
-    """run_path; by: the channel that is the motion ("setpoint", "encoder", "tip"); unsure (n,): rows whose tip says
-    nothing, because nobody knows where the machine was told to be; guessed (n, m): actuators of which nobody does; turn
-    (n, 3, 3): program axes to along and across the path, where the tip is the motion.
+    """Run path of a log.
+
+    by: channel of the motion ("setpoint", "encoder", "tip"); unsure (n,): rows with an unknown commanded position, whose tip
+    is no evidence; guessed (n, m): actuators with an unknown commanded position; turn (n, 3, 3): rotation from program axes
+    to directions along and across the path, if the tip is the motion.
     """
 
     run_path: RunPath
@@ -65,8 +67,9 @@ class DrivenRun:
 
 @dataclass(frozen=True, eq=False)
 class _Program:
-    """A program with its loads, and places on it: tips (s, 3) mm, program frame, and actuators (s, m). merged: its path as
-    a control drives it that merges lines, None where that is no other; rests (n,): motions at whose end the control stops.
+    """A program with its loads and sampled positions: tips (s, 3) mm, program frame, and actuators (s, m).
+
+    merged: its path with lines merged by the controller, or None; rests (n,): motions with a stop at their end.
     """
 
     track: Track
@@ -85,7 +88,10 @@ def drive(
     log: str, name: str, measured: Measured, text: Program | None, conditions: Conditions, twin: Twin, started: float,
     vectors: Callable[[Floats], Floats], temperature: Floats | None, acceleration: float,
 ) -> DrivenRun:  # fmt: skip
-    """The run of a log; text: its program, None where it has none; acceleration: of the control, mm/s2. Raises ConfigError CC402, CC406 to CC408."""
+    """The run of a log; text: its program, or None; acceleration: of the controller, mm/s2.
+
+    Raises ConfigError CC402, CC406 to CC408.
+    """
     program = None if text is None else _open(text, conditions, twin)
     by = next((each for each in ("setpoint", "encoder", "tip") if measured.has(each)), "")
     if not by or (by == "tip" and program is None):
@@ -117,7 +123,7 @@ def drive(
     else:
         try:
             cut = _behind(measured, rho, tip, program, twin) if by == "setpoint" else None
-        except PhysicsError:  # encoders in another unit are out of reach, too
+        except PhysicsError:  # also for encoders in another unit
             check_places(log, name, measured, rho, tip, twin.actuators, rotary, lambda: tip)
             raise
         told = by == "setpoint" and cut is None
@@ -126,7 +132,7 @@ def drive(
         )
         idle = _idle_or_not(forces, aligned, program, tip, measured.time)
         unsure |= idle
-        # the drives of a tool that stands in a cut may bear its force or none
+        # at standstill in a cut the drives may carry the cutting force or not
         forces = replace(forces, doubt=np.where(idle[:, None], 0.5 * np.abs(forces.force), forces.doubt))
     run_path = driven_path(
         name, measured.time, rho, tip, forces, started=started, to_machine=twin.to_machine, vectors=vectors,
@@ -177,9 +183,9 @@ def _near(log: str, name: str, measured: Measured, rho: Floats, program: _Progra
 def _aligned(
     log: str, name: str, program: _Program, tip: Floats, measured: Measured, aside_mm: float = ASIDE_MM
 ) -> Aligned:
-    """Where on its program the tip (n, 3) was; most of it within aside_mm of the path. Raises ConfigError CC406.
+    """Positions of the tip (n, 3) on its program, mostly within aside_mm of the path. Raises ConfigError CC406.
 
-    What may be further aside than a control leaves its path bends by it, and may lie nearer to another pass than to its own.
+    An aside_mm above ASIDE_MM is for machines with large deflections, whose tip may be nearer to another pass.
     """
     path = program.track.path
     line = measured.line
@@ -196,9 +202,9 @@ def _aligned(
 
 
 def _cut_ahead(program: _Program, aligned: Aligned | None) -> float:
-    """Minutes that the program had cut when its log began: the tool is no sharper for what nobody logged.
+    """Minutes of cutting in the program before the log begins, for tool wear.
 
-    By the first row on a cut: on its way there the tool may be nearest to where the program ends.
+    From the first row on a cut, because before it the tool may be nearest to the end of the program.
     """
     track = program.track
     if aligned is None or track.conditions.model is None:
@@ -209,9 +215,9 @@ def _cut_ahead(program: _Program, aligned: Aligned | None) -> float:
 
 
 def _behind(measured: Measured, rho: Floats, tip: Floats, program: _Program, twin: Twin) -> Aligned | None:
-    """Where on the program the drives are, behind set-points rho (n, m) of tips (n, 3) mm: the force turns when they do.
+    """Positions of the drives on the program, behind set-points rho (n, m) of tips (n, 3) mm, for the direction of the force.
 
-    None where no encoders are logged, or where they lie beside the path because of more than a delay.
+    None without logged encoders, or if more than a delay separates them from the path.
     """
     if np.isfinite(measured.encoder).sum(axis=0).min() < 2:
         return None
@@ -222,7 +228,7 @@ def _behind(measured: Measured, rho: Floats, tip: Floats, program: _Program, twi
 
 
 def _agreement(path: Path, found: Aligned, tip: Floats) -> float:
-    """Share of the moving rows that go the way of the program and not back, 1 where none moves."""
+    """Share of the moving rows in the direction of the program, 1 if no row moves."""
     length = path_geometry.lengths(path)
     at = np.concatenate([[0.0], np.cumsum(length)])[found.motion] + found.share * length[found.motion]
     step = np.linalg.norm(np.diff(tip, axis=0), axis=1)
@@ -231,14 +237,15 @@ def _agreement(path: Path, found: Aligned, tip: Floats) -> float:
 
 
 def _over_time(time: Floats, values: Floats) -> Floats:
-    """Values (n,) with empty cells filled from their neighbours in time."""
+    """Values (n,) with empty cells interpolated over time."""
     known = np.isfinite(values)
     return np.interp(time, time[known], values[known])
 
 
 def _guessed(time: Floats, values: Floats, most: float) -> Bools:
-    """Empty cells (n,) of which their neighbours say too little: where those are far in time, or where the actuator changes its
-    speed there by so much that it may stand further than `most` from between them.
+    """Mask (n,) of empty cells whose interpolation is uncertain.
+
+    Their neighbours are distant in time, or the change of speed there allows an error above `most`.
     """
     known = np.isfinite(values)
     out = ~known
@@ -256,7 +263,7 @@ def _guessed(time: Floats, values: Floats, most: float) -> Bools:
 
 
 def _idle_or_not(forces: Forces, aligned: Aligned, program: _Program, tip: Floats, time: Floats) -> Bools:
-    """Rows (n,) that stand still for a while where a cutting line begins or ends: whether it is executed nobody says."""
+    """Mask (n,) of rows at standstill where a cutting line begins or ends, so that its execution is uncertain."""
     path = program.track.path
     ends = (
         np.min([np.linalg.norm(at[aligned.motion] - tip, axis=1) for at in (path.start, path.end)], axis=0) < STILL_MM
@@ -275,13 +282,13 @@ def _led_by_tip(
     log: str, name: str, measured: Measured, program: _Program, twin: Twin, started: float,
     vectors: Callable[[Floats], Floats], temperature: Floats | None, acceleration: float,
 ) -> DrivenRun:  # fmt: skip
-    """The tip led along the program: its time along the path is free, and only what lies across is evidence."""
+    """Run of a measured tip aligned with the program: its timing is free, and only its lateral deviation is evidence."""
     path = program.track.path
     known = np.isfinite(measured.tip).all(axis=1)
     check_on_program(log, name, measured.tip[known], program.tips)
     whole = np.column_stack([_over_time(measured.time, np.where(known, v, np.nan)) for v in measured.tip.T])
     bend, changed = np.zeros_like(whole), np.inf
-    # what bends may be beside its program: first nobody knows by how much, and where it is on arcs follows from how it bends
+    # a deflected tip is off its program by an unknown amount at first, and its position on arcs depends on the deflection
     for beside in (np.inf, *[BESIDE_MM] * MOST_PASSES):
         aligned = _aligned(log, name, program, whole - bend, measured, ASIDE_MM if beside < np.inf else FAR_MM)
         way, on = _driven(path, aligned, program.merged, whole - bend, measured.line, np.asarray(known))
@@ -309,9 +316,9 @@ def _led_by_tip(
 def _driven(
     path: Path, aligned: Aligned, other: Path | None, tip: Floats, line: Floats, known: Bools
 ) -> tuple[Path, Aligned]:
-    """The path that the control drove, as programmed or with its lines merged, and where on it the tip (n, 3) was.
+    """The driven path, as programmed or with merged lines, and the positions of the tip (n, 3) on it.
 
-    Nobody says whether a control merges: it is the path beside which the tip stays alike, however far it bends.
+    The choice is the path from which the distance of the tip varies less, for any constant deflection.
     """
     if other is None:
         return path, aligned
@@ -323,14 +330,14 @@ def _driven(
 
 
 def _from_anywhere(path: Path, aligned: Aligned) -> Bools:
-    """Rows (n,) on their way to the first place that the program names: the machine comes from where it happened to stand."""
+    """Mask (n,) of rows before the first programmed position, whose start is unknown."""
     named = np.concatenate([[False], path.known[:-1]]) if path.known.any() else np.arange(len(path)) > 0
     begins = named & ~np.concatenate([[False], named[:-1]])
     return np.asarray(~named[aligned.motion] | (begins[aligned.motion] & (aligned.share <= 0.0)))
 
 
 def _at_corners(path: Path, aligned: Aligned, time: Floats, acceleration: float) -> Bools:
-    """Rows (n,) about the corners of a path that controls round off, from where they brake for it at `acceleration`, mm/s2."""
+    """Mask (n,) of rows near blended corners of a path, within the braking distance at `acceleration`, mm/s2."""
     length = path_geometry.lengths(path)
     moves = np.flatnonzero(length > 0.0)
     ends = path_geometry.tangents(path, moves[:-1], np.ones(len(moves) - 1))
@@ -349,7 +356,7 @@ def _at_corners(path: Path, aligned: Aligned, time: Floats, acceleration: float)
 
 
 def _across(path: Path, aligned: Aligned, velocity: Floats) -> Floats:
-    """Axes (n, 3, 3) along the way of the loaded tip, velocity (n, 3) mm/s, and across it; where it stands that of the path."""
+    """Axes (n, 3, 3) along the velocity (n, 3) mm/s of the loaded tip and across it; at standstill along the path."""
     along = path_geometry.tangents(path, aligned.motion, aligned.share)
     speed = np.linalg.norm(velocity, axis=1, keepdims=True)
     along = np.where(speed > STANDING_MM_PER_S, velocity / np.maximum(speed, 1e-12), along)

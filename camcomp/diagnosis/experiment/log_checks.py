@@ -1,4 +1,4 @@
-"""Whether a log can be what its run says: right program, units, axes and order. What cannot is refused with the reason."""
+"""Checks of a log against its run: program, units, axes and order of rows; contradictions are refused with the reason."""
 
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
@@ -13,28 +13,28 @@ from camcomp.ground.datatypes import Bools, Floats, Ints
 from camcomp.ground.errors import ConfigError, Location
 from camcomp.model.statics.arm import ARM_LENGTH
 
-FAR_RAD = 0.1  # the same as FAR_MM of a hinge: a log of another program or unit is wrong by so much
-PLACE = 0.01  # of what is far: the size of a place
-ASIDE_MM = 1.0  # no control leaves its path by so much for half of the time
-LEAST_AGREEMENT = 0.7  # of the moving rows go the way of the program
-LEAST_ROWS = 10  # of a run that executes a program; fewer say nothing about their own noise
+FAR_RAD = 0.1  # FAR_MM of a hinge: error of a log of another program or unit
+PLACE = 0.01  # of FAR_MM or FAR_RAD: rows within it are one position
+ASIDE_MM = 1.0  # median distance from the path above that of any controller
+LEAST_AGREEMENT = 0.7  # share of the moving rows in the direction of the program
+LEAST_ROWS = 10  # of a run with a program, for an estimate of its noise
 _LENGTH_UNITS = {1e-3: "m", 25.4: "mm where inches are due", 1.0 / 25.4: "inches", 1e3: "um"}
 _TURNS = {180.0 / np.pi: "degrees"}
 _TIMES = {1e3: "ms", 1e6: "us", 1.0 / 60.0: "minutes"}
 _FORCES = {1e-3: "kN", 1e3: "mN"}
 _TORQUES = {1e-3: "N m", 1e3: "mN mm"}
-SAME_TIME = (0.7, 1.4)  # times a program that a log takes, whose clock counts in another unit
-SAME_FORCE = (0.1, 10.0)  # times the modelled force: whatever is wrong with it, a unit is a thousand
+SAME_TIME = (0.7, 1.4)  # ratio of durations of log and program after the change of unit
+SAME_FORCE = (0.1, 10.0)  # ratio of measured to modelled force after the change of unit, which is a factor of 1000
 AXES = ("x", "y", "z")
 ROWS_APART = (1, -1, 2, -2, 3, -3)  # between channels of one log
-LATEST_S = 0.05  # no clock is further off than that, and no drive later
-TOGETHER = 0.35  # of the distance: what a shift by rows has to leave to be what was meant
+LATEST_S = 0.05  # largest clock offset and largest lateness of a drive
+TOGETHER = 0.35  # of the distance: largest residual after a shift by rows that is accepted as the cause
 _HOT_C = 150.0
 _STRONG_N = 20.0
 
 
 def check_rows(name: str, measured: Measured) -> None:
-    """Raise CC404 when nothing is measured, CC405 when time does not run forward, CC407 for temperatures in kelvin."""
+    """Raise CC404 for a log without measurements, CC405 for times that do not rise, CC407 for temperatures in kelvin."""
     if not any(measured.has(each) for each in ("tip", "encoder", "drive", "dyno")):
         message = "the log measures nothing: no tip, encoder, drive force or dynamometer column holds a number"
         raise ConfigError("CC404", message, at=Location(name, 1, 1))
@@ -49,7 +49,7 @@ def check_rows(name: str, measured: Measured) -> None:
 
 
 def check_length(name: str, run: str, measured: Measured, due_s: float) -> None:
-    """Raise CC409 when a run has too few rows, CC407 when its time is in another unit; due_s: length of the program."""
+    """Raise CC409 for a run with too few rows, CC407 for times in another unit; due_s: duration of the program."""
     rows = len(measured.time)
     if rows < LEAST_ROWS:
         message = f"run '{run}': the log has {rows} row{'s' if rows > 1 else ''}, {LEAST_ROWS} are the least"
@@ -66,14 +66,14 @@ def check_length(name: str, run: str, measured: Measured, due_s: float) -> None:
 def check_forces(
     name: str, run: str, measured: Measured, force: Floats, drives: Callable[[], Floats], rotary: Bools
 ) -> None:
-    """Raise CC407 when forces or torques are a thousand times those of the model, row by row.
+    """Raise CC407 for forces or torques that differ from the modelled ones by a factor of 1000, row by row.
 
     Args:
         name: log, for the message.
         run: its run, for the message.
         measured: the log.
         force: (n, 3) N, modelled force on the tool, machine frame.
-        drives: gives (n, m) modelled drive forces, N, and torques, N mm; asked only where some are logged.
+        drives: returns (n, m) modelled drive forces, N, and torques, N mm; called only if some are logged.
         rotary: (m,) whether the actuator turns.
     """
     channels = [("dynamometer forces", measured.dyno, force, _STRONG_N, _FORCES)]
@@ -91,9 +91,9 @@ def check_forces(
 
 
 def _is_scaled(found: Floats, due: Floats, factor: float, strong: float) -> bool:
-    """Whether measured values (n, c) go with modelled ones (n, c) of some size, and are about `factor` times these.
+    """Whether measured values (n, c) correlate with modelled ones (n, c) above `strong`, and are about `factor` times these.
 
-    Loads that the model lacks (weight, friction, inertia) may be far larger than those that it has; they do not go with them.
+    Unmodelled loads (weight, friction, inertia) may be far larger, but do not correlate with the modelled ones.
     """
     known = np.isfinite(found) & np.isfinite(due)
     if not known.any():
@@ -102,11 +102,11 @@ def _is_scaled(found: Floats, due: Floats, factor: float, strong: float) -> bool
     size, modelled = float(np.sqrt(np.mean(y**2))), float(np.sqrt(np.mean(x**2)))
     if modelled < strong or not SAME_FORCE[0] < size / (factor * modelled) < SAME_FORCE[1]:
         return False
-    return bool(np.mean(x * y) > np.sqrt(0.5) * size * modelled)  # half of the energy goes with the modelled one
+    return bool(np.mean(x * y) > np.sqrt(0.5) * size * modelled)  # half of the energy correlates
 
 
 def check_followed(name: str, run: str, distance: Floats, agreement: float, aside_mm: float = ASIDE_MM) -> None:
-    """Raise CC406 where the motion does not lie along the program: distance (n,) mm from it; share of rows that go its way."""
+    """Raise CC406 for a motion off the program: distance (n,) mm from it; agreement: share of rows in its direction."""
     off = float(np.median(distance))
     if off > aside_mm or agreement < LEAST_AGREEMENT:
         way = f"{off:.3g} mm beside the program" if off > aside_mm else "against the way of the program"
@@ -114,7 +114,7 @@ def check_followed(name: str, run: str, distance: Floats, agreement: float, asid
 
 
 def check_lines(name: str, run: str, away: Floats) -> None:
-    """Raise CC406 where line numbers are not those of what is driven: away (n,) mm of way from the line that a row names."""
+    """Raise CC406 for line numbers of other positions: away (n,) mm of path length from the line of a row."""
     known = away[np.isfinite(away)]
     if len(known) >= LEAST_ROWS and np.median(known) > FAR_MM:
         message = (
@@ -125,9 +125,9 @@ def check_lines(name: str, run: str, away: Floats) -> None:
 
 
 def check_rows_together(name: str, run: str, what: str, time: Floats, found: Floats, due: Floats, other: str) -> None:
-    """Raise CC412 where a channel found (n, k) fits what was due (n, k) in the rows before or behind, other, by far better.
+    """Raise CC412 for a channel found (n, k) that fits the expected one, due (n, k), far better when shifted by rows.
 
-    Only where a row lasts longer than clocks are apart and drives late, or that is what it would be.
+    Only for rows longer than LATEST_S, because a clock offset or a late drive could otherwise be the reason.
     """
     usual = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
 
@@ -137,7 +137,7 @@ def check_rows_together(name: str, run: str, what: str, time: Floats, found: Flo
         apart = (found[rows] - due[rows + by])[(step > 0.0) & np.isfinite(found[rows]).all(axis=1)]
         if len(apart) < LEAST_ROWS:
             return np.inf
-        return float(np.median(np.linalg.norm(apart - np.median(apart, axis=0), axis=1)))  # what sags stays where it is
+        return float(np.median(np.linalg.norm(apart - np.median(apart, axis=0), axis=1)))  # less the constant part
 
     here = off(0)
     for by in ROWS_APART:
@@ -151,10 +151,10 @@ def check_places(
     name: str, run: str, measured: Measured, rho: Floats, tip: Floats, actuators: Sequence[str], rotary: bool = False,
     loaded: Callable[[], Floats] | None = None,
 ) -> None:  # fmt: skip
-    """Raise CC407 (units), CC408 (axes), CC406 (another program), CC412 (rows) where tip or encoders are far from where they were due.
+    """Raise CC407 (units), CC408 (axes), CC406 (another program), CC412 (rows) for tip or encoders far from the expected ones.
 
-    tip (n, 3) mm, rho (n, m): where tip and actuators should have been; rotary: all actuators are hinges; loaded: gives the
-    tips (n, 3) under the modelled force, which are asked for where the measured ones are far from the unloaded ones.
+    tip (n, 3) mm, rho (n, m): expected tips and actuators; rotary: all actuators are hinges; loaded: returns the tips (n, 3)
+    under the modelled force, called if the measured ones are far from the unloaded ones.
     """
     far = FAR_RAD if rotary else FAR_MM
     told = "set-point" if measured.has("setpoint") else "encoder"
@@ -175,18 +175,18 @@ def check_places(
 def check_told(
     name: str, run: str, what: str, told: Floats, program: Floats, actuators: Sequence[str], rotary: bool = False
 ) -> None:
-    """Like `check_places` for the motion itself: told (n, m) against the actuators program (s, m) along the program."""
+    """Like `check_places` for the motion itself: set-points told (n, m) against actuators program (s, m) of the program."""
     far = FAR_RAD if rotary else FAR_MM
     _check(name, run, f"{what}s look", told, _to_nearest(program, far), far, actuators, rotary)
 
 
 def check_on_program(name: str, run: str, tip: Floats, program: Floats) -> None:
-    """Like `check_places` where the tip is the motion: tip (n, 3) against points program (s, 3) along the program."""
+    """Like `check_places` if the tip is the motion: tip (n, 3) against points program (s, 3) of the program."""
     _check(name, run, "tip looks", tip, _to_nearest(program, FAR_MM), FAR_MM, AXES, False)
 
 
 def places(points: Floats, far: float = FAR_MM) -> Ints:
-    """One row of every place of points (n, k): how long a machine stands says nothing of its program."""
+    """One row per distinct position of points (n, k), so that standstills do not count by their duration."""
     rows: Ints = np.unique(np.round(points / (PLACE * far)), axis=0, return_index=True)[1]
     return rows
 
@@ -217,7 +217,7 @@ def _check(
 
 
 def _readings(m: int) -> Iterator[tuple[list[int], Floats]]:
-    """Orders of m columns with their signs, simple ones first: of many columns one at a time is reversed, or the order is another."""
+    """Orders of m columns with their signs, simple ones first; for many columns one reversal or another order at a time."""
     same = list(range(m))
     for j in same:
         yield same, np.where(np.arange(m) == j, -1.0, 1.0)
@@ -227,7 +227,7 @@ def _readings(m: int) -> Iterator[tuple[list[int], Floats]]:
 
 
 def _told(names: Sequence[str], order: Sequence[int], sign: Floats) -> str:
-    """What a reading does, in words."""
+    """Text of an order and signs of columns."""
     moved = [names[i] for i, j in enumerate(order) if i != j]
     turned = [names[i] for i, s in enumerate(sign) if s < 0.0]
     out = [f"with {' and '.join(moved)} exchanged"] if len(moved) == 2 else [f"with {', '.join(moved)} in another order"] if moved else []  # fmt: skip

@@ -1,4 +1,4 @@
-"""Experiment files and logs to runs on the bench: what is read is checked, what does not fit is refused with a reason."""
+"""Opening of an experiment file: logs and programs as runs, with checks."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -30,14 +30,14 @@ from camcomp.model.motion.timeline import schedule
 from camcomp.model.motion.twin import Twin, twin_of
 from camcomp.model.oriented import refuse_orientation
 
-STEADY_S = 15.0  # half the width of a temperature's local straight line
-MOST_ROWS = 3000  # rows of a run beyond which neighbours are averaged
+STEADY_S = 15.0  # half width of the local regression of a temperature
+MOST_ROWS = 3000  # rows of a run; neighbours of longer runs are averaged
 LOG_RULES = TableRules(table="CC400", column="CC401", cell="CC403")
 
 
 @dataclass(frozen=True, eq=False)
 class OpenExperiment:
-    """An experiment ready for the bench. notes: what the reader should know about the logs."""
+    """An opened experiment. notes: remarks on the logs."""
 
     experiment: Experiment
     job: Job
@@ -47,7 +47,7 @@ class OpenExperiment:
 
 
 def open_experiment(path: str | FilePath) -> OpenExperiment:
-    """Reads an experiment file with everything it names. Raises ConfigError, ProgramError, FileError, PhysicsError."""
+    """Open an experiment file with all its files. Raises ConfigError, ProgramError, FileError, PhysicsError."""
     experiment = load_experiment(path)
     config = load_config(experiment.config)
     job = Job(config)
@@ -81,7 +81,7 @@ def open_run(spec: RunSpec, job: Job, twin: Twin, notes: list[str]) -> Run:
     )  # fmt: skip
     if run.lag:
         notes.append(f"{log}: line numbers are {abs(run.lag)} rows {'late' if run.lag > 0 else 'early'}")
-    if run.by == "setpoint":  # against what was not told no encoder says anything
+    if run.by == "setpoint":  # encoders are evidence only against set-points
         measured = replace(measured, encoder=np.where(run.guessed, np.nan, measured.encoder))
     thin = int(np.ceil(len(measured.time) / MOST_ROWS))
     return Run(
@@ -99,7 +99,7 @@ def open_run(spec: RunSpec, job: Job, twin: Twin, notes: list[str]) -> Run:
 
 
 def in_time(measured: Measured) -> Measured:
-    """The rows in the order of their times, each once: loggers write some of them late or twice."""
+    """The rows in the order of their times without repetitions: loggers write some rows late or twice."""
     order = np.argsort(measured.time, kind="stable")
     measured = measured.take(order) if (np.diff(order) < 0).any() else measured
     again = np.zeros(len(measured.time), bool)
@@ -112,9 +112,9 @@ def in_time(measured: Measured) -> Measured:
 
 
 def steadied(time: Floats, values: Floats) -> Floats | None:
-    """Temperatures (n,) without the noise of their sensor, which a growth would turn into motion: local straight lines.
+    """Temperatures (n,) smoothed by local linear regression, because a growth would turn sensor noise into motion.
 
-    Machines warm in minutes, so half a minute (and no more than a quarter of the run) is straight.
+    Machines warm within minutes, so that half a minute (at most a quarter of the run) is linear.
     """
     known = np.isfinite(values)
     if not known.any():
@@ -133,7 +133,7 @@ def steadied(time: Floats, values: Floats) -> Floats | None:
 
 
 def unread(table: CsvTable, columns: LogColumns) -> list[str]:
-    """Notes on columns of a log that are not read, each with the name that may have been meant."""
+    """Notes on unknown columns of a log, each with the nearest known name."""
     lower = {name.lower(): name for name in columns.known}
     out = []
     for each in table.header:
@@ -153,7 +153,7 @@ def columns_of(twin: Twin) -> LogColumns:
 
 
 def check_log(path: str, config: Config | None) -> None:
-    """Raise what is wrong with a log on its own: no table, no times, cells that are no numbers; with a machine, of its columns."""
+    """Raise the errors of a log on its own: no table, no times, invalid cells; with a config also of its columns."""
     table = open_log(path)
     if config is not None:
         actuators = config.robot.actuators
@@ -161,14 +161,14 @@ def check_log(path: str, config: Config | None) -> None:
 
 
 def open_log(path: str) -> CsvTable:
-    """A log as it stands in its file. Raises ConfigError CC400 (not a table), CC401 (column), CC403 (cell), FileError."""
+    """Table of a log file. Raises ConfigError CC400 (not a table), CC401 (column), CC403 (cell), FileError."""
     table = read_csv(read_bytes(path), display_name(path), LOG_RULES)
     table.refuse_twice()
     return table
 
 
 def read_log(table: CsvTable, columns: LogColumns) -> Measured:
-    """What a log holds. Raises ConfigError CC401 (column), CC403 (cell)."""
+    """Measurements of a log. Raises ConfigError CC401 (column), CC403 (cell)."""
     every = table.values()
 
     def column(label: str) -> Floats:

@@ -1,1 +1,1 @@
-"""Diagnoses of one machine over months: kept in a folder, and what drifts or jumps in them. May know results and numbers, no runs."""
+"""Diagnoses of one machine over months: stored in a folder, with drifts and jumps of their parameters."""

@@ -1,4 +1,4 @@
-"""A machine over the days: for every parameter that was ever found its values, its course, and when to measure again."""
+"""History of a machine: values, course and next measurement of every parameter found so far."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class ParameterCourse(Result):
 
 
 class DatedVerdict(Result):
-    """What one diagnosis said."""
+    """Verdict of one diagnosis, with its day."""
 
     day: date
     verdict: Literal["none", "identified", "ambiguous", "unknown"]
@@ -68,7 +68,7 @@ class Chronicle(Result):
 
 
 def chronicle_of(kept: Sequence[Kept], tolerance_um: float) -> Chronicle:
-    """The history of diagnoses in order; tolerance_um: how far the tip may have drifted since the last one."""
+    """The history of diagnoses in order; tolerance_um: allowed drift of the tip since the last one, um."""
     found: dict[tuple[str, str | None, str], list[tuple[Kept, Any, float]]] = {}
     for each in kept:
         for cause in each.result.known:
@@ -89,7 +89,7 @@ def chronicle_of(kept: Sequence[Kept], tolerance_um: float) -> Chronicle:
 
 
 def _standards(kept: Sequence[Kept]) -> Iterator[StandardCourse]:
-    """Values of acceptance tests by name and place, in the order in which they were first found."""
+    """Values of acceptance tests by name and position, in order of first occurrence."""
     found: dict[tuple[Any, str, str], list[tuple[date, float]]] = {}
     for each in kept:
         held = each.result.standards
@@ -152,7 +152,7 @@ def _due(
     rows: Sequence[tuple[Kept, Any, float]],
     tolerance_um: float,
 ) -> date | None:
-    """The day on which what the parameter does at the tip may have changed by more than the tolerance."""
+    """The day on which the effect of the parameter at the tip may have changed by more than the tolerance."""
     last, estimate, size = rows[-1]
     if not size > 0.0 or not abs(estimate.value) > 0.0:
         return None
@@ -160,7 +160,7 @@ def _due(
     if course.kind != "drift":
         since = slice(course.jumps[-1] if course.jumps else 0, None)
         bound = drift_bound(days[since], deviations[since])
-        if bound == 0.0:  # one measurement tells nothing of what comes
+        if bound == 0.0:  # one measurement does not predict
             return None
         course = Course(course.kind, course.level, course.level_sd, 0.0, bound, course.jumps, course.spread)
     return last.day + timedelta(days=int(days_until(course, limit)))

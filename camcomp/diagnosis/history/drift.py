@@ -1,8 +1,8 @@
-"""What a parameter did over the days: stayed, drifted, or jumped, and when its next measurement is due.
+"""Course of a parameter over the days: steady, drift or jumps, and the day of its next measurement.
 
-A parameter that was found at n days with known deviations is described by the cheapest of: one value; a straight line;
-values that change at up to MOST_JUMPS days. Cheapest by the Bayesian information criterion (Schwarz 1978); a jump pays for
-its day too (Yao 1988). Steps of least squares over all divisions by dynamic programming (Jackson et al. 2005).
+Estimates of n days with known deviations are described by one value, a straight line, or values that change at up to
+MOST_JUMPS days. The Bayesian information criterion chooses (Schwarz 1978); a jump counts its day as a parameter (Yao 1988).
+Least squares over all divisions by dynamic programming (Jackson et al. 2005).
 """
 
 from __future__ import annotations
@@ -15,14 +15,16 @@ import numpy as np
 from camcomp.ground.datatypes import Floats
 
 MOST_JUMPS = 3
-FEWEST = 4  # measurements from which on more than one value can be told
-_MARGIN = 4.0  # by which a richer description has to be cheaper: odds of 7 to 1
+FEWEST = 4  # measurements needed for a line or a jump
+_MARGIN = 4.0  # least difference of the criterion for a richer description: odds of 7 to 1
 
 
 @dataclass(frozen=True)
 class Course:
-    """How a value went: kind; rate per day and its deviation (line); rows at which it changed (jumps); level now and its
-    deviation; spread: scatter about the description in units of the stated deviations (1 = as stated).
+    """Course of a value.
+
+    rate, rate_sd: per day (drift); jumps: rows at which it changed; level, level_sd: present value; spread: scatter about the
+    description in units of the stated deviations.
     """
 
     kind: Literal["steady", "drift", "jumps", "too few"]
@@ -64,9 +66,9 @@ def course_of(days: Floats, values: Floats, deviations: Floats) -> Course:
 
 
 def days_until(course: Course, limit: float, most: float = 730.0) -> float:
-    """Days from the last measurement after which the value may have left it by more than `limit` (95 %), at most `most`.
+    """Days from the last measurement until the value may have changed by more than `limit` (95 %), at most `most`.
 
-    A steady value whose past shows no drift may still have as much of one as its line's deviation allows.
+    For a steady value the drift is bounded by the deviation of its fitted line.
     """
     rate = abs(course.rate) + 1.96 * course.rate_sd
     room = limit - 1.96 * course.level_sd
@@ -76,7 +78,7 @@ def days_until(course: Course, limit: float, most: float = 730.0) -> float:
 
 
 def drift_bound(days: Floats, deviations: Floats) -> float:
-    """Deviation per day of the straight line through measurements at days (n,) with deviations (n,); 0 for fewer than two."""
+    """Deviation of the slope (per day) of a line through measurements at days (n,) with deviations (n,); 0 for fewer than two."""
     weight = 1.0 / np.maximum(deviations, 1e-300) ** 2
     centred = days - np.average(days, weights=weight)
     spread = float(np.sum(weight * centred**2))
@@ -89,7 +91,7 @@ def _constant(values: Floats, weight: Floats) -> tuple[float, float]:
 
 
 def _line(days: Floats, values: Floats, weight: Floats) -> tuple[float, float, float, float, float]:
-    """Value at the last day with its deviation, rate with its deviation, weighted squares left."""
+    """Value at the last day with its deviation, rate with its deviation, weighted sum of squared residuals."""
     since = days - days[-1]
     matrix = np.column_stack((np.ones(len(days)), since))
     normal = matrix.T @ (weight[:, None] * matrix)
@@ -100,7 +102,7 @@ def _line(days: Floats, values: Floats, weight: Floats) -> tuple[float, float, f
 
 
 def _steps(values: Floats, weight: Floats) -> list[tuple[list[int], float]]:
-    """For one, two, ... jumps: where the pieces of the best division start (the first at 0), and the squares left."""
+    """For one, two, ... jumps: first rows of the pieces of the best division, and its weighted sum of squared residuals."""
     n = len(values)
     w, wv, wvv = (np.concatenate(([0.0], np.cumsum(each))) for each in (weight, weight * values, weight * values**2))
 

@@ -1,4 +1,4 @@
-"""The folder in which diagnoses of a machine are kept: a file each, named by its date and by what stands in it."""
+"""Folder with the diagnoses of a machine: a file each, named by its date and a digest of its content."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ class Kept:
 
 
 def keep(folder: str, result: bytes, *, name: str, day: date) -> tuple[str, bytes]:
-    """Path and content of the file that keeps a result (its JSON, from the file `name`).
+    """Path and content of the stored file of a result (its JSON, from the file `name`).
 
-    Raises ConfigError CC454 when that is no result of a diagnosis, CC455 when the folder has it already.
+    Raises ConfigError CC454 for other content, CC455 if the folder has the result already.
     """
     found = _result(result, name)
     data = json.dumps({"day": day.isoformat(), "result": found.as_json()}, indent=1, allow_nan=False).encode() + b"\n"
@@ -37,7 +37,7 @@ def keep(folder: str, result: bytes, *, name: str, day: date) -> tuple[str, byte
 
 
 def kept_in(folder: str) -> list[Kept]:
-    """Everything that a folder keeps, the oldest first. Raises ConfigError CC454, FileError."""
+    """All stored diagnoses of a folder, the oldest first. Raises ConfigError CC454, FileError."""
     return sorted((_read(str(path)) for path in Path(folder).glob("*.json")), key=lambda each: each.day)
 
 

@@ -1,1 +1,1 @@
-"""What to measure next and the program that does it."""
+"""Design of the next experiment, and its program."""

@@ -1,8 +1,8 @@
-"""What to measure when the cause is unknown: change one thing that it may depend on, and nothing else.
+"""Next experiment for an unknown cause: a run in which a single covariate changes.
 
-Each covariate that the leftover follows is a hypothesis, weighed by the share that it carries alone. An experiment that
-changes some of them and leaves the others tells whether the driver is among those; its gain is the entropy of that
-answer, in bits, if it comes out clear.
+Each covariate of the residual is a hypothesis, weighted by the share that it explains alone. An experiment that changes some
+covariates and keeps the others shows whether the true one is among the former; its gain is the entropy of that outcome, in
+bits.
 """
 
 from collections.abc import Sequence
@@ -20,9 +20,9 @@ from camcomp.model.job import Job
 
 
 def explore(problem: Problem, labels: Sequence[tuple[str, float]], job: Job) -> Proposal | None:
-    """The experiment that tells most about what an unknown effect depends on; None where nothing would.
+    """The experiment with the largest gain about the covariate of an unknown effect, or None.
 
-    labels: covariates (`time:x`) with the share of the leftover that each carries alone.
+    labels: covariates (`time:x`) with the share of the residual that each explains alone.
     """
     weight: dict[str, float] = {}
     for name, share in labels:

@@ -1,6 +1,6 @@
-"""Experiments that a machine can do next: a coarse grid of designs about the place of work, what else can be measured, neighbours.
+"""Feasible experiments: a coarse grid of designs about the region of work, additional channels, and neighbours of a design.
 
-In the air the tool stays above `Site.low`; it cuts only where the runs have cut, as fast as they did.
+In the air the tool stays above `Site.low`; it cuts only where the runs have cut, at their speed.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ from camcomp.diagnosis.next_experiment.design import PLANES, MotionDesign
 from camcomp.diagnosis.next_experiment.site import Room, Site
 from camcomp.ground.datatypes import Floats
 
-LATER_S = 3600.0  # to a run that is made later
-DWELL_S = 900.0  # of a rest that shows a drift
+LATER_S = 3600.0  # delay of a later run
+DWELL_S = 900.0  # duration of a standstill that shows a drift
 FASTER = (0.25, 1.0, 4.0)  # times the feed of the runs, in the air
 CUT_FASTER = (0.5, 1.0, 1.5)  # times the feed of the runs, cutting
-OUT = (0.5, 0.9)  # of the reach: where circles are tried
-SMALL = 0.3  # of the reach: the radius of a circle out there; of the radius at work: that of a small one
+OUT = (0.5, 0.9)  # of the reach: distances of circles
+SMALL = 0.3  # of the reach: radius of a distant circle; of the radius of work: that of a small one
 NEIGHBOUR_MM, NEIGHBOUR_TIMES = 12.0, 1.5  # steps to a neighbouring design
 _NEEDS = {
     "tip": ("the tip with a tracker", 30.0),
@@ -38,9 +38,10 @@ _BY_HAND = (
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """A feasible experiment. channels: what it logs; started: s on the common clock; minutes: of machine time and hands;
-    knows: parameters (effect, name) that are measured by other means, with their deviation; varies: covariates that it
-    changes while the others stay as they were.
+    """A feasible experiment.
+
+    channels: logged ones; started: s on the common clock; minutes: of machine time and work; knows: parameters (effect,
+    name) measured by other means, with their deviation; varies: covariates that change while all others are kept.
     """
 
     action: str
@@ -58,25 +59,25 @@ class Candidate:
 
     @property
     def cutting(self) -> bool:
-        """Whether it cuts."""
+        """Whether the experiment cuts."""
         return self.design.cutting
 
 
 def candidate(site: Site, design: MotionDesign, varies: tuple[str, ...] = ()) -> Candidate:
-    """A design as an experiment that logs what the runs logged."""
+    """Experiment of a design, with the channels of the runs."""
     design = design.tidy()
     return Candidate(design.action, design, site.channels, site.end + design.wait_s, design.minutes, varies=varies)
 
 
 def usual(site: Site) -> MotionDesign:
-    """What the runs did, as a circle."""
+    """Circle with the position, size and feed of the runs."""
     if site.cut is not None:
         return MotionDesign(_triple(site.cut.centre), site.cut.radius, site.cut.feed, cutting=True)
     return _in_air(site, MotionDesign(_triple(site.work.centre), site.work.radius, site.work.feed))
 
 
 def coarse(site: Site, room: Room) -> Iterator[Candidate]:
-    """Designs that differ in everything: at work, far out, large, in other planes, straight, slow and fast, later."""
+    """Coarse grid of designs: region of work, distant, large, other planes, straight, slow and fast, later."""
     base = usual(site)
     here = _in_air(site, replace(base, cutting=False))
     if site.cut is not None:
@@ -112,7 +113,7 @@ def coarse(site: Site, room: Room) -> Iterator[Candidate]:
 
 
 def in_time(site: Site) -> Iterator[Candidate]:
-    """What shows what passes: rests, and the same once more, later."""
+    """Experiments about time: standstills, and later repetitions."""
     base = usual(site)
     still = _in_air(site, replace(base, cutting=False, dwell_s=DWELL_S))
     yield candidate(site, still, varies=("time", "temperature"))
@@ -120,7 +121,7 @@ def in_time(site: Site) -> Iterator[Candidate]:
 
 
 def by_other_means(site: Site) -> Iterator[Candidate]:
-    """The usual circle with one more channel in the log, or with something measured by hand before it."""
+    """The usual circle with an additional channel, or with a parameter measured by hand before it."""
     design = usual(site)
     base = candidate(site, design)
     for channel, (name, cost) in _NEEDS.items():
@@ -134,7 +135,7 @@ def by_other_means(site: Site) -> Iterator[Candidate]:
 
 
 def single_changes(site: Site, room: Room) -> Iterator[Candidate]:
-    """What the runs did with one thing changed, for what nobody knows."""
+    """Repetitions of the runs with one covariate changed, for unknown causes."""
     base = usual(site)
     yield candidate(site, replace(base, turns=(-1,)), ("reversal", "direction"))
     if not base.cutting:
@@ -155,7 +156,7 @@ def single_changes(site: Site, room: Room) -> Iterator[Candidate]:
 
 
 def neighbours(site: Site, design: MotionDesign, step: float) -> Iterator[MotionDesign]:
-    """Designs beside one; step: 1 far to 0 near."""
+    """Designs next to one; step: 1 far to 0 near."""
     for axis, sign in product(range(3), (1.0, -1.0)):
         if not design.cutting:
             moved = np.array(design.centre) + sign * step * NEIGHBOUR_MM * np.eye(3)[axis]
@@ -177,7 +178,7 @@ def _ways() -> Floats:
 
 
 def _in_air(site: Site, design: MotionDesign) -> MotionDesign:
-    """As high as it takes not to meet what may stand below."""
+    """The design raised above obstacles (`Site.low`)."""
     if design.cutting:
         return design
     x, y, z = design.centre

@@ -1,4 +1,4 @@
-"""A motion that a machine can be asked for next, in numbers that can be chosen: place, plane, radius, feed, direction, load, dwell."""
+"""Parameters of a proposed motion: position, plane, radius, feed, direction, load, dwell; and its program."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from camcomp.ground.datatypes import Floats
 PLANES = {"XY": ("G17", (0, 1)), "XZ": ("G18", (0, 2)), "YZ": ("G19", (1, 2))}
 _WORDS = {0: "I", 1: "J", 2: "K"}
 _SENSES = {1: ("G3", "counter-clockwise"), -1: ("G2", "clockwise")}
-REMARK = 120  # characters of a line that every control reads
-SETUP_MIN = 3.0  # to load a program, start the log and look at it
+REMARK = 120  # characters of a line that all controllers read
+SETUP_MIN = 3.0  # to load a program, start the log and check it
 STOCK_MIN = 10.0  # to clamp material for a cut
 SOON_S = 60.0  # after the last run, at the earliest
 
 
 @dataclass(frozen=True)
 class MotionDesign:
-    """A full circle in a plane, or a straight line there and back through its centre; then a rest.
+    """A full circle in a plane, or a straight line forth and back through its centre; then a standstill.
 
-    centre mm and radius mm (half the length of a line), program frame; feed mm/min; turns: senses of the circles, one after
-    the other, +1 counter-clockwise seen from the plane's positive axis; along: unit direction of a line; cutting: whether it
-    cuts; wait_s: from the end of the last run to its start; dwell_s: rest at its end, logged too.
+    centre mm and radius mm (half the length of a line), program frame; feed mm/min; turns: directions of the circles in
+    order, +1 counter-clockwise seen from the plane's positive axis; along: unit direction of a line; cutting: whether it
+    cuts; wait_s: from the end of the last run to its start; dwell_s: logged standstill at its end.
     """
 
     centre: tuple[float, float, float]
@@ -38,7 +38,7 @@ class MotionDesign:
     dwell_s: float = 0.0
 
     def tidy(self) -> MotionDesign:
-        """The same in round numbers: 0.1 mm, three digits of feed."""
+        """The design in round numbers: 0.1 mm, three digits of feed."""
         x, y, z = (round(v, 1) + 0.0 for v in self.centre)  # no -0
         feed = float(f"{self.feed:.3g}")
         return MotionDesign(
@@ -48,17 +48,17 @@ class MotionDesign:
 
     @property
     def length(self) -> float:
-        """Of its way, mm."""
+        """Path length, mm."""
         return 4.0 * self.radius if self.along else 2.0 * np.pi * self.radius * len(self.turns)
 
     @property
     def minutes(self) -> float:
-        """Of machine time, setting up included."""
+        """Machine time in minutes, including set-up."""
         still = (self.dwell_s + self.wait_s - SOON_S) / 60.0
         return SETUP_MIN + STOCK_MIN * self.cutting + self.length / self.feed + still
 
     def points(self, count: int = 16) -> Floats:
-        """Points (count, 3) mm on its way, program frame."""
+        """Points (count, 3) mm on its path, program frame."""
         u = np.linspace(-1.0, 1.0, count)[:, None]
         if self.along:
             return np.asarray(np.array(self.centre) + self.radius * u * np.array(self.along), float)
@@ -70,7 +70,7 @@ class MotionDesign:
 
     @property
     def action(self) -> str:
-        """What it is, in words."""
+        """Text of the motion."""
         x, y, z = (f"{v:g}" for v in self.centre)
         load = "cutting" if self.cutting else "in the air, without cutting"
         place = f"about X{x} Y{y} Z{z}, {load}, F{self.feed:.0f}"
@@ -88,7 +88,7 @@ class MotionDesign:
         return text
 
     def program(self, say: str) -> str:
-        """NC text (RS274); say: what stands above it."""
+        """NC text (RS274); say: comment at its start."""
         g, (a, b) = PLANES[self.plane]
         start = self.points(2)[0] if self.along else np.array(self.centre) + self.radius * np.eye(3)[a]
         lines = [f"G0 {_point(start)}"]

@@ -1,7 +1,7 @@
-"""The next experiment, designed: a coarse grid over place, plane, radius, feed, direction, load and rest, then the best refined.
+"""Search for the next experiment: a coarse grid over position, plane, radius, feed, direction, load and dwell, then refinement.
 
-What counts is the information less the price of the machine's time (`proposal.PRICE`), so that half an answer does not win by being
-quick. No chance is in it: the same runs have the same next experiment.
+The objective is the information minus the price of machine time (`proposal.PRICE`), so that a short experiment with little
+information does not win. The search is deterministic.
 """
 
 from __future__ import annotations
@@ -31,13 +31,13 @@ from camcomp.ground.datatypes import Floats
 from camcomp.model.job import Job
 
 STEPS = (1.0, 0.5)  # of the refinement
-MOST_REFINED = 16  # designs that are looked at while refining
-MOST_JUDGED_WHOLE = 3  # of the best, with every effect of the library within its tolerance
+MOST_REFINED = 16  # designs evaluated during refinement
+MOST_JUDGED_WHOLE = 3  # best designs evaluated with every effect of the library within its tolerance
 
 
 @dataclass(eq=False)
 class Desk:
-    """Where designs are judged by what they tell of a question."""
+    """Evaluation of designs by their information about a question."""
 
     question: Question
     site: Site = field(init=False)
@@ -51,7 +51,7 @@ class Desk:
         self.weight = program_weight(problem)
 
     def judged(self, each: Candidate, *, whole: bool = False) -> Proposal | None:
-        """A candidate with what it tells; None where the machine cannot do it or nothing would be told."""
+        """A candidate with its expected gain; None if it is infeasible or has no gain."""
         there = foresee(self.question, each, whole=whole)
         if there is None:
             return None
@@ -59,7 +59,7 @@ class Desk:
         return Proposal(each, found.gain, separated(self.question.problem, self.question.rivals), told=found)
 
     def refined(self, first: Proposal) -> Proposal:
-        """The best design near one, step by step downhill."""
+        """The best design near one, by steps of descent."""
         best, looked, been = first, 0, {first.candidate.design}
         for step in STEPS:
             improved = True
@@ -77,26 +77,26 @@ class Desk:
         return best
 
     def can_run(self, each: Candidate) -> bool:
-        """Whether there is a program that leads there from above."""
+        """Whether a program can approach it from above."""
         bench = self.question.problem.bench
         return can_be_run(each, bench.runs, self.question.job, bench.twin)
 
     def within(self, design: MotionDesign) -> bool:
-        """Whether the machine can be there, and it is no farther from the work than experiments go."""
+        """Whether the design is within reach of the machine and within `Site.farther` of the work."""
         points = design.points()
         near = np.abs(points - self.site.work.centre).max() <= self.site.farther + self.site.work.half.max()
         return bool(near and self.room.allowed(points).all())
 
 
 def separated(problem: Problem, rivals: Sequence[Fitted]) -> tuple[str, ...]:
-    """Effects that are in some of the rivals and not in all; of a single set all of it."""
+    """Effects in some rivals but not in all; for a single set all of its effects."""
     sets = [set(f.members) for f in rivals]
     common = set.intersection(*sets) if len(sets) > 1 else set()
     return tuple(dict.fromkeys(problem.columns.candidates[i].name for s in sets for i in sorted(s - common)))
 
 
 def propose(problem: Problem, rivals: Sequence[Fitted], probability: Floats, job: Job) -> Proposal | None:
-    """The best next experiment between fitted sets of causes; None where nothing is left that is worth it."""
+    """The best next experiment to separate fitted sets of causes; None if no gain exceeds proposal.WORTH."""
     if not any(f.members for f in rivals):
         return None
     desk = Desk(Question(problem, rivals, probability, job))
@@ -115,7 +115,7 @@ def propose(problem: Problem, rivals: Sequence[Fitted], probability: Floats, job
 
 
 def ranked(desk: Desk, tried: Iterable[Candidate]) -> list[Proposal]:
-    """Of candidates those that are worth it, best first."""
+    """Candidates with a gain above proposal.WORTH, best first."""
     names = separated(desk.question.problem, desk.question.rivals)
     useful = (each for each in tried if all(effect in names for effect, *_ in each.knows))
     judged = (desk.judged(each) for each in useful if desk.within(each.design))

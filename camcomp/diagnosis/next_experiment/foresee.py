@@ -1,4 +1,4 @@
-"""What the logs of an experiment would show: the twin runs its program for every rival set of causes, before anybody else does."""
+"""Predicted logs of an experiment: the twin runs its program for every rival set of causes."""
 
 from __future__ import annotations
 
@@ -29,15 +29,15 @@ from camcomp.model.job import Job
 from camcomp.model.motion.run_path import path_of_program
 from camcomp.model.motion.timeline import schedule
 
-ROWS = 2500  # of a foreseen log
-WARMS_K = 5.0  # by how much a temperature may still drift
-UPRIGHT = 0.9  # of a direction along Z, beyond which another axis says what lies across
-USUAL_NOISE = (0.002, 0.0005, 1.0, 2.0)  # mm, mm, N, N: tip, encoders, drives, dynamometer, where never measured
+ROWS = 2500  # of a predicted log
+WARMS_K = 5.0  # largest further drift of a temperature
+UPRIGHT = 0.9  # of a direction along Z, beyond which another axis defines the lateral directions
+USUAL_NOISE = (0.002, 0.0005, 1.0, 2.0)  # mm, mm, N, N: default for unmeasured tip, encoders, drives, dynamometer
 
 
 @dataclass(frozen=True, eq=False)
 class Question:
-    """Which of the rivals, fitted sets of causes with their probability (r,), it is, and how large."""
+    """The question for the experiment: which of the rivals, fitted sets of causes with probability (r,), and how large."""
 
     problem: Problem
     rivals: Sequence[Fitted]
@@ -46,14 +46,15 @@ class Question:
 
     @cached_property
     def members(self) -> tuple[int, ...]:
-        """All that is in some rival."""
+        """Candidates that are in any rival."""
         return tuple(sorted({i for f in self.rivals for i in f.members}))
 
     @cached_property
     def beliefs(self) -> tuple[tuple[Floats, Floats], ...]:
-        """Per rival what is known of the amplitudes of all columns of the problem: mean (k,), members at zero, and covariance (k, k).
+        """Posterior of the amplitudes of all columns of the problem per rival: mean (k,) and covariance (k, k).
 
-        The members act through the twin itself. A fit is no better than the model that it was made with.
+        The means of its members are zero, because they act through the twin itself. The covariance includes the model
+        discrepancy.
         """
         out = []
         for f in self.rivals:
@@ -66,17 +67,18 @@ class Question:
 
     @cached_property
     def shapes(self) -> dict[int, dict[str, float]]:
-        """Scanned parameters by candidate."""
+        """Shape parameters by candidate."""
         own = {i: dict(shape) for f in self.rivals for i, shape in f.extra.items()}
         return {**self.problem.shapes, **own}
 
 
 @dataclass(frozen=True, eq=False)
 class Foreseen:
-    """A candidate with every channel logged. Per kind of channel: white rows (w, r) of what each rival lets one expect,
-    and white columns (w, k) of all that may differ, in units of their standard deviation `reach`: per rival (k, k), columns
-    that vary together are combined. mine, theirs: places of the same columns here and in the problem; size: one standard
-    deviation of a kind's rows, mm or N.
+    """Predicted logs of a candidate with all channels, per kind of channel.
+
+    signals: whitened prediction (w, r) of each rival; columns: whitened derivatives (w, k) by uncertain amplitudes; reach:
+    per rival a square root (k, k) of their covariance; mine, theirs: indices of common columns here and in the problem;
+    size: standard deviation of a kind's rows, mm or N.
     """
 
     signals: dict[str, Floats]
@@ -88,9 +90,9 @@ class Foreseen:
 
 
 def foresee(question: Question, candidate: Candidate, *, whole: bool) -> Foreseen | None:
-    """None where the machine cannot do it, the force model does not know the cut, or rivals look alike there.
+    """Predicted logs of a candidate; None if it is infeasible, its cut is unknown, or the rivals are equal there.
 
-    whole: with every effect of the library within its tolerance, not only with those that are in question.
+    whole: include every effect of the library within its tolerance, not only those of the question.
     """
     try:
         return _lay(question, candidate, whole)
@@ -99,7 +101,7 @@ def foresee(question: Question, candidate: Candidate, *, whole: bool) -> Foresee
 
 
 def feasible(problem: Problem, candidate: Candidate, job: Job) -> bool:
-    """Whether the machine can do a candidate, at a place where its model is to be trusted."""
+    """Whether a candidate is feasible in the region where the model of the machine is valid."""
     try:
         _on_bench(problem, candidate, job)
     except (CamcompError, ValueError):
@@ -159,7 +161,7 @@ def _root(covariance: Floats) -> Floats:
 
 
 def _noise(problem: Problem) -> Floats:
-    """Standard deviation (c,) of every channel in the mean of the runs; a usual one where never measured."""
+    """Standard deviation (c,) of every channel, mean of the runs; USUAL_NOISE for unmeasured channels."""
     m = len(problem.bench.actuators)
     known = np.isfinite(problem.noise.sigma)
     sigma = np.where(known, problem.noise.sigma, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
@@ -178,7 +180,7 @@ def _sizes(problem: Problem) -> dict[str, float]:
 
 
 def _whitened(problem: Problem, bench: Bench, values: Floats) -> dict[str, Floats]:
-    """White rows (w, k) of values (n, c, k), per kind of channel."""
+    """Whitened rows (w, k) of values (n, c, k), per kind of channel."""
     noise = replace(problem.noise, sigma=_noise(problem)[None, :])
     inflate = np.sqrt(1.0 + (inflation(bench)[0] / noise.sigma) ** 2)
     time = bench.runs[0].run_path.time
@@ -190,7 +192,7 @@ def _whitened(problem: Problem, bench: Bench, values: Floats) -> dict[str, Float
 
 
 def _run(problem: Problem, candidate: Candidate, job: Job) -> Run:
-    """The candidate on the bench with every channel that it could log; what it does log is picked later."""
+    """The candidate as a run with all channels; its logged channels are selected later."""
     twin = problem.bench.twin
     path = read_program(candidate.program.encode(), name="candidate", dialect="rs274").path
     timeline = schedule(path, job.config.control.acceleration_mm_per_s2)
@@ -217,7 +219,7 @@ def _run(problem: Problem, candidate: Candidate, job: Job) -> Run:
 
 
 def _motion(problem: Problem, candidate: Candidate) -> str:
-    """The channel that says what moved: as in the runs, or the set-points that come with encoders that they did not log."""
+    """The channel of the motion: as in the runs, or the set-points logged together with new encoders."""
     runs = problem.bench.runs
     known = {run.by for run in runs}
     added = "encoder" in candidate.channels and not any(run.measured.has("encoder") for run in runs)
@@ -225,7 +227,7 @@ def _motion(problem: Problem, candidate: Candidate) -> str:
 
 
 def _across(tips: Floats) -> Floats:
-    """Axes (n, 3, 3) along the way of tips (n, 3) and across it."""
+    """Axes (n, 3, 3) along the path of tips (n, 3) and across it."""
     step = np.gradient(tips, axis=0)
     moving = np.linalg.norm(step, axis=1) > 0.0
     last = np.maximum.accumulate(np.where(moving, np.arange(len(tips)), int(np.argmax(moving))))
@@ -237,7 +239,7 @@ def _across(tips: Floats) -> Floats:
 
 
 def _temperature(problem: Problem, common: Floats) -> Floats | None:
-    """Temperatures (n,) expected at common times, s: the drift so far goes on, but not by more than some kelvin."""
+    """Expected temperatures (n,) at common times, s: the past drift continues by at most WARMS_K."""
     courses = [run.run_path for run in problem.bench.runs]
     if any(c.temperature is None for c in courses):
         return None

@@ -1,10 +1,10 @@
-"""What an experiment is expected to tell, in bits: which of the rival causes it is, and how large.
+"""Expected information of an experiment in bits: which of the rival causes, and how large.
 
-Which: what tells two rivals apart in the foreseen logs, after all that may differ anyway (the fit's own uncertainty, what
-every healthy machine has, the new run's offset and clock) and less what no model gets right, gives the odds that the
-experiment is expected to produce; the gain is the expected fall of the entropy over the rivals.
-How large: parameters count by what their uncertainty does to the tip on the programs of the runs; the gain is half the
-logarithm of the ratio of that error before and after, with what stays below the noise left out.
+Which: the difference between the predicted logs of two rivals, marginalised over nuisances (uncertainty of the fit,
+tolerances of healthy machines, offset and clock of the new run) and reduced by model discrepancy, gives the expected odds;
+the gain is the expected reduction of the entropy over the rivals.
+How large: parameters count by the tip error of their uncertainty on the programs of the runs; the gain is half the logarithm
+of the ratio of that error before and after, as far as it exceeds the noise.
 Sources: expected information gain over hypotheses (Chaloner and Verdinelli, Statistical Science 10, 1995); designs by the
 variance of predictions (I-optimality, Box and Draper 1959).
 """
@@ -31,10 +31,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class ExpectedGain:
-    """What an experiment tells. separated, narrowed: bits of which cause and of how large; before_um, after_um: rms that the
-    uncertainty of the answer moves the tip by on the runs' programs; shows (r,): rms of what every rival lets one expect
-    beyond the machine file, in the kind of channel that tells most, mm or N; left (r, r): of what rival j leaves of rival i there;
-    apart (r, r): chi-square by which rival j misses the mean log of rival i.
+    """Expected information of an experiment.
+
+    separated, narrowed: bits about the cause and about its size; before_um, after_um: rms tip error of the uncertainty on the
+    runs' programs; kind: channel with the most information; shows (r,): rms signal of every rival in it, mm or N; left (r,
+    r): rms residual of rival i after a fit of rival j; apart (r, r): chi-square of rival j for the mean log of rival i.
     """
 
     separated: float
@@ -48,12 +49,12 @@ class ExpectedGain:
 
     @property
     def gain(self) -> float:
-        """Bits."""
+        """Sum of both gains, bits."""
         return self.separated + self.narrowed
 
 
 def told(question: Question, candidate: Candidate, there: Foreseen, weight: Floats) -> ExpectedGain:
-    """What a foreseen candidate tells. weight: of the columns' amplitudes on the programs (k, k), as `program_weight` has it."""
+    """Expected information of a predicted candidate. weight: (k, k) of `program_weight`."""
     problem, rivals, probability = question.problem, question.rivals, question.probability
     kinds = [k for k in candidate.channels if k in there.signals]
     columns = np.concatenate([there.columns[k] for k in kinds])
@@ -97,16 +98,16 @@ def told(question: Question, candidate: Candidate, there: Foreseen, weight: Floa
 
 
 def most_narrowed(question: Question, weight: Floats) -> float:
-    """Bits that the runs' programs would gain if nothing stayed uncertain."""
+    """Gain in bits if all parameters became certain."""
     noise = (1e-3 * question.problem.floor.tip_um) ** 2
     each = [float(np.sum(covariance * weight)) for _, covariance in question.beliefs]
     return 0.5 * float(np.log2((float(np.dot(question.probability, each)) + noise) / noise))
 
 
 def program_weight(problem: Problem) -> Floats:
-    """Mean over all rows (k, k) of tip' tip, mm2, of what every column of a cause does to the tip on the runs' programs.
+    """Mean over all rows (k, k) of tip' tip, mm2, for the effect of every column of a cause on the tip in the runs' programs.
 
-    What encoders see moves the tip too; where the workpiece lies and what the clock says is no error of the machine.
+    Errors of the drives count with their displacement of the tip; workpiece frame and clock are no errors of the machine.
     """
     machine = problem.columns.candidate >= 0
     for i, each in enumerate(problem.columns.candidates):
@@ -116,7 +117,7 @@ def program_weight(problem: Problem) -> Floats:
 
 
 def _by_other_means(problem: Problem, truth: Fitted, other: Fitted, candidate: Candidate) -> float:
-    """Chi-square between the values that two rivals give a parameter that the candidate measures directly."""
+    """Chi-square between the values of two rivals for the parameters that the candidate measures directly."""
     out = 0.0
     for effect, name, deviation in candidate.knows:
         values = [

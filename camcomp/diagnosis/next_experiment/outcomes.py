@@ -1,4 +1,4 @@
-"""What each outcome of a proposed experiment would mean, a sentence each."""
+"""Interpretation of each outcome of a proposed experiment, a sentence each."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from camcomp.diagnosis.law.words import listed
 from camcomp.diagnosis.next_experiment.proposal import Proposal
 from camcomp.report.plot import brief
 
-MOST_TOLD = 3  # rival sets that have a sentence of their own
-ALIKE = 4.0  # chi-square: two standard deviations, below which one log tells nothing apart
+MOST_TOLD = 3  # rival sets with a sentence of their own
+ALIKE = 4.0  # chi-square (two standard deviations) below which rivals are indistinguishable in one log
 NOTHING = "nothing but noise"  # the name of an empty set of causes
 _WHAT = {
     "tip": ("the tip is", 1e3, "µm"),
@@ -65,7 +65,7 @@ def _by_log(proposal: Proposal, names: Sequence[str], i: int) -> str:
 
 
 def after_unknown(varies: Sequence[str], others: Sequence[str]) -> tuple[str, ...]:
-    """The same for an unknown effect; varies: covariates that are changed, others: that may be its drivers and stay."""
+    """Outcomes for an unknown effect; varies: changed covariates, others: unchanged covariates of the residual."""
     changed, stays = " and ".join(varies), " or ".join(others[:MOST_TOLD])
     return (
         f"If what is left changes, it goes with {changed}.",

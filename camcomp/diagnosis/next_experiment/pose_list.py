@@ -1,4 +1,4 @@
-"""Poses to measure next as a file: CSV with the columns of logs, or JSON as trajectories of joints have it."""
+"""File of the poses to measure next: CSV with the columns of logs, or JSON in the form of joint trajectories."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from camcomp.diagnosis.result.types import PosesToMeasure
 def pose_list(poses: PosesToMeasure, revolute: tuple[bool, ...], target: str) -> str:
     """Text of the list: JSON for a file called .json (`joint_names`, `points`: `positions` rad or m), else CSV.
 
-    revolute: of every joint. The CSV has a row per pose: `act_<a>_rad` (`_mm`) as logs call them, then the platform's place.
+    revolute: of every joint. The CSV has a row per pose: `act_<a>_rad` (`_mm`) as in logs, then the platform's position.
     """
     if target.endswith(".json"):
         si = [[v if turns else 1e-3 * v for v, turns in zip(row, revolute, strict=True)] for row in poses.positions]

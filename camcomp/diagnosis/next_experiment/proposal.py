@@ -1,4 +1,4 @@
-"""A proposed experiment and what it is worth."""
+"""A proposed experiment and its value."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ if TYPE_CHECKING:
     from camcomp.diagnosis.next_experiment.information_gain import ExpectedGain
 
 WORTH = 0.1  # bits below which an experiment is not worth proposing
-PRICE = 0.5 / 60.0  # bits that a minute of machine time has to bring
+PRICE = 0.5 / 60.0  # bits per minute of machine time
 
 
 @dataclass(frozen=True, eq=False)
 class Proposal:
-    """An experiment, the effects that it separates, what it tells; gain: bits. rivals: names of the sets of causes."""
+    """An experiment, the effects that it separates, its expected information; gain: bits. rivals: names of the sets."""
 
     candidate: Candidate
     gain: float
@@ -27,5 +27,5 @@ class Proposal:
 
     @property
     def value(self) -> float:
-        """Bits less the price of the time."""
+        """Bits minus the price of the machine time."""
         return self.gain - PRICE * self.candidate.minutes

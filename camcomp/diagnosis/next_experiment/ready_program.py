@@ -1,6 +1,4 @@
-"""A proposed experiment as a program that a machine can run: from above, with the spindle as in the runs, inside the travel, in
-the language of the control.
-"""
+"""Executable program of a proposed experiment: approach from above, spindle of the runs, travel limits, dialect."""
 
 from __future__ import annotations
 
@@ -21,10 +19,10 @@ from camcomp.model.config.spec import Experiment
 from camcomp.model.job import Job
 from camcomp.model.motion.twin import Twin
 
-CLEAR_MM = (10.0, 5.0, 2.0)  # above all that the runs and the experiment do, where their programs went no higher
-SAMPLES = 65  # points of a motion at which it is looked whether the drives reach it
+CLEAR_MM = (10.0, 5.0, 2.0)  # clearances above all motions, to try in this order
+SAMPLES = 65  # points of a motion at which the travel is checked
 CUTS = "WARNING: THIS PROGRAM CUTS, as the runs with cutting did: clamp stock and check the depth"
-_METRIC = 710  # G71: what some controls call G21
+_METRIC = 710  # G71, the G21 of some controllers
 
 
 def ready_program(candidate: Candidate, runs: Sequence[Run], job: Job, twin: Twin, dialect: str = DEFAULT) -> str:
@@ -48,7 +46,7 @@ def ready_program(candidate: Candidate, runs: Sequence[Run], job: Job, twin: Twi
 
 
 def can_be_run(candidate: Candidate, runs: Sequence[Run], job: Job, twin: Twin) -> bool:
-    """Whether there is such a program."""
+    """Whether ready_program succeeds for the candidate."""
     try:
         ready_program(candidate, runs, job, twin)
     except CheckFailed:
@@ -57,7 +55,7 @@ def can_be_run(candidate: Candidate, runs: Sequence[Run], job: Job, twin: Twin) 
 
 
 def dialect_of_runs(experiment: Experiment, job: Job) -> str:
-    """Name of the language of the control: as the machine file says, else that of the last program."""
+    """Name of the dialect: of the machine file, else of the last program."""
     if job.config.control.dialect is not None:
         return job.config.control.dialect
     programs = [run.program for run in experiment.runs if run.program is not None]
@@ -65,7 +63,7 @@ def dialect_of_runs(experiment: Experiment, job: Job) -> str:
 
 
 def spelt(program: str, dialect: str) -> str:
-    """A proposed program, RS274, in another language: remarks, dwell, units, points in feeds."""
+    """A proposed program, RS274, in another dialect: comments, dwell, units, decimal points in feeds."""
     if dialect == DEFAULT:
         return program
     language = dialect_of(Text.read(program.encode(), "next experiment"), dialect)
@@ -87,10 +85,10 @@ def spelt(program: str, dialect: str) -> str:
 
 
 def within_travel(path: Path, job: Job, twin: Twin) -> bool:
-    """Whether no actuator leaves its travel along the motions whose ends are known."""
+    """Whether all actuators stay within their travel along the motions with known ends."""
     known = np.flatnonzero(path.known & ~path.machine)
     u = np.linspace(0.0, 1.0, SAMPLES)
-    # The start of the first known motion is where the machine happens to stand.
+    # The start of the first known motion is unknown.
     points = [path_geometry.points(path, np.full(SAMPLES, k), u) for k in known[1:]] + [path.end[known[:1]]]
     try:
         rho = twin.inverse(twin.to_machine(np.concatenate(points)))
@@ -101,7 +99,7 @@ def within_travel(path: Path, job: Job, twin: Twin) -> bool:
 
 
 def _heights(candidate: Candidate, paths: Sequence[Path]) -> list[float]:
-    """Heights of retraction to try, mm: that of the runs' own rapids, else some clearance above everything."""
+    """Heights of retraction to try, mm: that of the runs' own rapids, else clearances above all motions."""
     here = read_program(candidate.program.encode(), name="candidate", dialect=DEFAULT).path.end[:, 2].max()
     been = [float(path.end[path.known & ~path.machine, 2].max()) for path in paths]
     top = max([float(here), *been])
@@ -110,7 +108,7 @@ def _heights(candidate: Candidate, paths: Sequence[Path]) -> list[float]:
 
 
 def _spindle(paths: Sequence[Path]) -> tuple[list[str], list[str]]:
-    """Statements that start and stop the spindle as the last run that says anything about it had it."""
+    """Statements that start and stop the spindle as in the last run with a stated spindle."""
     for path in reversed(paths):
         said = np.flatnonzero(np.isfinite(path.turn) & (path.turn != 0.0) & (path.speed > 0.0))
         if len(said):

@@ -1,4 +1,4 @@
-"""Where the machine has worked, and how far from there it may go: travel, singular poses, what may stand below."""
+"""Region of the runs, and the region of feasible experiments: travel, singular poses, obstacles below."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from camcomp.model.job import Job
 from camcomp.model.motion.twin import Twin
 
 CHANNELS = ("tip", "encoder", "drive", "dyno")
-STRETCH = 2.5  # by how much a new place may be nearer to a singular pose
-FARTHER = 2.0  # half widths of the work by which an experiment may leave it
-FARTHER_MM = 80.0  # or this far, where the work was small
-RADII_MM = (3.0, 40.0)  # of a circle at the place of work
-_STEPS = 8  # at which it is looked how far a way leads
+STRETCH = 2.5  # largest ratio of the tip's motion per drive motion to that of the runs (nearness to singular poses)
+FARTHER = 2.0  # half widths of the work: largest distance of an experiment
+FARTHER_MM = 80.0  # the same for a small region of work
+RADII_MM = (3.0, 40.0)  # of a circle in the region of work
+_STEPS = 8  # samples of a straight line in the search for its end
 _DIFFERENCE_MM = 0.01
-_POSES = 40  # of the runs at which their nearness to singular poses is looked at
-USUAL_FEED = 1000.0  # mm/min, where no program says one
+_POSES = 40  # samples of the runs for STRETCH
+USUAL_FEED = 1000.0  # mm/min, default
 
 
 @dataclass(frozen=True, eq=False)
 class WorkPlace:
-    """Middle (3,) mm, half widths (3,) mm and feed mm/min of what was done there."""
+    """Centre (3,) mm, half widths (3,) mm and feed mm/min of the work in a region."""
 
     centre: Floats
     half: Floats
@@ -33,14 +33,16 @@ class WorkPlace:
 
     @property
     def radius(self) -> float:
-        """Of a circle in it, mm."""
+        """Radius of a circle in the region, mm."""
         return round(float(np.clip(np.min(self.half[:2]), *RADII_MM)), 1)
 
 
 @dataclass(frozen=True, eq=False)
 class Site:
-    """work: where the runs have been; cut: where they cut, None where none did. low: height that nothing stands above, mm;
-    end: of the last run, s on the common clock; channels: that were logged.
+    """Regions and channels of the runs.
+
+    work: of all runs; cut: of cutting, or None. low: height above which there are no obstacles, mm; end: of the last run, s on
+    the common clock; channels: logged ones.
     """
 
     work: WorkPlace
@@ -51,12 +53,12 @@ class Site:
 
     @property
     def farther(self) -> float:
-        """How far from the middle of the work an experiment may lead, mm."""
+        """Largest distance of an experiment from the centre of the work, mm."""
         return float(max(FARTHER_MM, FARTHER * self.work.half.max()))
 
 
 def site_of(bench: Bench) -> Site:
-    """The place where the runs of a bench have been."""
+    """The site of the runs of a bench."""
     each = [commanded(bench, run) for run in bench.runs]
     tips = np.concatenate(each)
     loaded = [np.abs(run.run_path.row_force).sum(axis=1) > 0.0 for run in bench.runs]
@@ -80,14 +82,14 @@ def _place(tips: Floats, feeds: list[float]) -> WorkPlace:
 
 
 def commanded(bench: Bench, run: Run) -> Floats:
-    """Tips (n, 3), program frame, where the set-points of a run lead the unloaded machine."""
+    """Tips (n, 3), program frame, of the unloaded machine at the set-points of a run."""
     path = run.run_path
     tips = path.row_place.of(path.node_tip) if path.driven is None else path.driven.tip
     return bench.twin.to_program(tips)
 
 
 def _low(bench: Bench, tips: list[Floats], loaded: list[Bools]) -> float:
-    """Height, mm, above which the tool moved freely: where runs without cutting were, else where rapids crossed, else the top of all."""
+    """Height (mm) above which the tool moved freely: of runs without cutting, else of rapids, else the top of all runs."""
     free = [tip[:, 2].min() for tip, load in zip(tips, loaded, strict=True) if not load.any()]
     if free:
         return round(float(min(free)), 1)
@@ -96,29 +98,29 @@ def _low(bench: Bench, tips: list[Floats], loaded: list[Bools]) -> float:
 
 
 def _crossings(run: Run) -> Floats:
-    """Heights of rapids across, mm."""
+    """Heights of lateral rapids, mm."""
     path = run.program
     if path is None or len(path) < 2:
         return np.zeros(0)
     across = np.linalg.norm((path.end - path.start)[:, :2], axis=1) > 0.0
     rapid = (path.kind == RAPID) & path.known & ~path.machine & across
-    rapid[1:] &= path.known[:-1]  # from a place that is known
+    rapid[1:] &= path.known[:-1]  # from a known position
     rapid[0] = False
     return np.asarray(np.minimum(path.start, path.end)[rapid, 2], float)
 
 
 class Room:
-    """How far the machine may go: within travel, and no nearer to a singular pose than STRETCH times what the runs were."""
+    """Reachable region: within travel, with a tip motion per drive motion of at most STRETCH times that of the runs."""
 
     def __init__(self, twin: Twin, limits: Floats, tips: Floats) -> None:
-        """Limits (m, 2) of the actuators; tips (n, 3) of the runs, program frame."""
+        """limits: (m, 2) of the actuators; tips: (n, 3) of the runs, program frame."""
         self.twin, self.limits = twin, limits
         self.most = np.inf
         some = tips[np.unique(np.linspace(0, len(tips) - 1, _POSES).astype(int))]
         self.most = STRETCH * float(np.max(self._stretch(some)))
 
     def allowed(self, points: Floats) -> Bools:
-        """Which (n,) of points (n, 3), program frame, are within."""
+        """Mask (n,) of points (n, 3), program frame, within the region."""
         try:
             rho = self.twin.inverse(self.twin.to_machine(points))
             near = self._stretch(points) <= self.most
@@ -131,7 +133,7 @@ class Room:
         return np.asarray(inside.all(axis=1) & near)
 
     def reaches(self, start: Floats, directions: Floats, most: float, low: float) -> Floats:
-        """How far (k,), mm, straight ways from `start` (3,) along unit directions (k, 3) may lead, and not below `low`."""
+        """Lengths (k,) mm of straight lines from `start` (3,) along unit directions (k, 3) within the region and above `low`."""
         far = most * np.arange(1, _STEPS + 1) / _STEPS
         points = start + far[None, :, None] * directions[:, None, :]
         good = self.allowed(points.reshape(-1, 3)).reshape(len(directions), _STEPS) & (
@@ -140,7 +142,7 @@ class Room:
         return np.asarray(most * np.cumprod(good, axis=1).sum(axis=1) / _STEPS, float)
 
     def _stretch(self, points: Floats) -> Floats:
-        """Motion (n,) of the tip per motion of the drives, at most; by differences of the inverse kinematics."""
+        """Largest motion (n,) of the tip per motion of the drives, by differences of the inverse kinematics."""
         moved = np.concatenate([points + s * _DIFFERENCE_MM * axis for axis in np.eye(3) for s in (1.0, -1.0)])
         rho = self.twin.inverse(self.twin.to_machine(moved)).reshape(3, 2, len(points), -1)
         slopes = np.moveaxis((rho[:, 0] - rho[:, 1]) / (2.0 * _DIFFERENCE_MM), 0, 2)  # (n, m, 3)
@@ -148,6 +150,6 @@ class Room:
 
 
 def room_of(bench: Bench, job: Job) -> Room:
-    """The room about the runs of a bench."""
+    """The reachable region around the runs of a bench."""
     tips = np.concatenate([commanded(bench, run) for run in bench.runs])
     return Room(bench.twin, np.array(job.machine.limits, float), tips)

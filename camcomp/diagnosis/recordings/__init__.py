@@ -1,1 +1,1 @@
-"""Recordings of others to logs: readers of file formats, which column is which, several files for one run."""
+"""Import of recordings of other systems as logs: readers of file formats, assignment of columns, joining of files."""

@@ -1,4 +1,4 @@
-"""A MATLAB file of one axis, as the EMPS benchmark has them."""
+"""Reader of a MATLAB file of one axis in the form of the EMPS benchmark."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def read_axis(
 ) -> Recording:
     """Time t s, reference qg m, position qm m, drive signal vir, gtau N per unit of it, of an actuator or the first.
 
-    Raises ConfigError CC423 where something is missing.
+    Raises ConfigError CC423 for missing variables.
     """
     at = Location(file, 1, 1)
     if wishes.columns:

@@ -1,4 +1,4 @@
-"""The experiment file of imported recordings, and what its runs are called."""
+"""Experiment file of imported recordings, and names of its runs."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _WORDS = {"null", "true", "false", "yes", "no", "on", "off", "y", "n"}
 
 
 def run_names(files: Sequence[str]) -> list[str]:
-    """A name per run: the stem of its file, with a number where an earlier run has it, whatever its case."""
+    """A name per run: the stem of its file, with a number if an earlier run has it in any case."""
     names: list[str] = []
     for file in files:
         stem = "stdin" if file == "-" else Path(file).stem
@@ -54,7 +54,7 @@ def experiment_yaml(
 
 
 def _from(folder: Path, file: str) -> str:
-    """The path of a file from a folder; links are followed, for `..` of a link leads elsewhere."""
+    """The path of a file from a folder; links are resolved, because `..` of a link is another folder."""
     try:
         return Path(relpath(os.path.realpath(file), os.path.realpath(folder))).as_posix()
     except ValueError:  # on another drive
@@ -62,7 +62,7 @@ def _from(folder: Path, file: str) -> str:
 
 
 def _text(value: str) -> str:
-    """A YAML string, in quotes where it would be read as something else. Raises ConfigError CC424."""
+    """A YAML string, quoted if YAML would read another type. Raises ConfigError CC424."""
     if not value.isprintable():
         hint = "rename the file, or the folder"
         raise ConfigError("CC424", f"'{value}' is no name that an experiment file can hold", hint=hint)

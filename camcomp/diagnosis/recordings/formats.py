@@ -1,4 +1,4 @@
-"""Which reader a file is for: by its suffix, and by how it begins."""
+"""Choice of the reader of a file by its suffix and its first bytes."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from camcomp.diagnosis.recordings.twincat import is_scope_text, read_scope
 from camcomp.diagnosis.recordings.xlsx_file import read_xlsx
 from camcomp.ground.errors import ConfigError, Location
 
-_ELSEWHERE = {  # formats that nothing well kept reads, and the way round
+_ELSEWHERE = {  # formats without a maintained reader, and how to convert them
     ".svdx": "export it as CSV, with time columns, in TwinCAT Scope",
     ".svb": "export it as CSV, with time columns, in TwinCAT Scope",
     ".xls": "save it as .xlsx or CSV",

@@ -1,7 +1,7 @@
 """Parts of one run on common rows: files of several instruments, topics of one container.
 
-Time counts where the parts have it in common; tables of equally many rows, of two files, are joined row by row, for poses
-stand still while they are measured one after the other.
+Parts with overlapping times are interpolated; two files with equally many rows are joined row by row, because the machine
+stands still while poses are measured one after the other.
 """
 
 from __future__ import annotations
@@ -15,23 +15,23 @@ from camcomp.ground.datatypes import Floats, Ints
 from camcomp.ground.errors import ConfigError, Location
 from camcomp.model.motion.log_columns import LINE
 
-POSES_S = 0.5  # rows further apart are poses: nothing is known between them
-_GAP = 5.0  # usual steps between rows, over which nothing is interpolated
-_COMMON = 0.5  # of the shorter part's span, from which on two clocks are one
+POSES_S = 0.5  # rows farther apart are poses, without interpolation
+_GAP = 5.0  # times the median step: longer steps are not interpolated
+_COMMON = 0.5  # of the shorter part's span: least overlap of a common clock
 
 
 @dataclass(frozen=True, eq=False)
 class SampledTable:
-    """Columns of a log that were sampled together: time (n,) s ascending or None, values (n,) by name."""
+    """Columns of a log sampled together: time (n,) s ascending or None, values (n,) by name."""
 
     file: str
     time: Floats | None
     values: Mapping[str, Floats]
-    leading: bool  # has places or coordinates: others come to its rows
+    leading: bool  # has positions or coordinates: other parts are interpolated to its rows
 
     @property
     def rows(self) -> int:
-        """How many there are."""
+        """Number of rows."""
         return len(next(iter(self.values.values())))
 
 
@@ -47,7 +47,7 @@ class Joined:
 
 
 def join(parts: Sequence[SampledTable], by: str | None) -> Joined:
-    """Parts on common rows; by: "time", "rows" or None for what fits. Raises ConfigError CC453 where nothing does."""
+    """Join parts on common rows; by: "time", "rows" or None for the first possible one. Raises ConfigError CC453."""
     if len(parts) == 1:
         return Joined(parts[0].time, dict(parts[0].values), 0, np.arange(parts[0].rows), ())
     files = {part.file for part in parts}
@@ -105,7 +105,7 @@ def _nearest(time: Floats, wanted: Floats) -> Ints:
 
 
 def _between(time: Floats, values: Floats, wanted: Floats, held: bool) -> Floats:
-    """Values at other times: straight between rows, the last one where `held`; NaN over gaps."""
+    """Values at other times: linear between rows, or the last one with `held`; NaN in gaps."""
     known = np.isfinite(values)
     if not known.any():
         return np.full(len(wanted), np.nan)

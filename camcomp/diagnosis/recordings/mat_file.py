@@ -1,4 +1,4 @@
-"""Numeric variables of a MATLAB file of level 5 (MATLAB 5 to 7), read without trust in what its bytes say.
+"""Numeric variables of a MATLAB file of level 5 (MATLAB 5 to 7), with checks of all sizes in the file.
 
 Source: The MathWorks, "MAT-File Format", R2023b, chapter "Level 5 MAT-File Format".
 """
@@ -30,7 +30,7 @@ class _Element:
 
 
 def read_mat(data: bytes) -> dict[str, Floats]:
-    """Numeric arrays by name, each flattened column by column. Raises ValueError for what is no such file."""
+    """Numeric arrays by name, each flattened column by column. Raises ValueError for other files."""
     if data.startswith(_HDF5):
         raise ValueError("it is an HDF5 file; save it with -v7")
     order = {b"IM": "<", b"MI": ">"}.get(data[126:128])
@@ -55,7 +55,7 @@ def read_mat(data: bytes) -> dict[str, Floats]:
 
 
 def _elements(data: memoryview, order: str) -> Iterator[_Element]:
-    """Data elements one after the other. Raises ValueError where one ends behind the file."""
+    """Data elements in order. Raises ValueError if one exceeds the file."""
     at = 0
     while at + 8 <= len(data):
         kind, size = struct.unpack_from(f"{order}II", data, at)

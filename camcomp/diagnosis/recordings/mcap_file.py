@@ -1,7 +1,7 @@
 """MCAP, the container of ROS 2 and others: every topic is a table, its fields are called topic.field.
 
-Lists that name their members are told apart by these names: `joint_states.position.elbow_joint`, and
-`tf.tool0.translation.x`. Messages are ROS 2's, protobuf's or JSON.
+Members of lists with names get these names: `joint_states.position.elbow_joint`, `tf.tool0.translation.x`. Messages are
+ROS 2's, protobuf's or JSON.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from camcomp.ground.datatypes import Floats
 from camcomp.ground.errors import ConfigError, Location
 
 _WHAT = "an MCAP file"
-_LONGEST = 64  # lists of more numbers are pictures, clouds or the like
+_LONGEST = 64  # longer lists of numbers are images or point clouds
 _DEEPEST = 12
 _IN_SI = ("ros2", "foxglove.")  # encodings and families of schemas whose lengths are m
 _NAMES = ("child_frame_id", "name", "joint_name")
@@ -29,7 +29,7 @@ _NOT_FIELDS = ("header", "stamp", "timestamp")
 
 
 def read_mcap(data: bytes, name: str) -> list[SampledColumns]:
-    """Topics with numbers. Raises ConfigError CC216 (package missing), CC452 (no such file, no numbers)."""
+    """Topics with numbers. Raises ConfigError CC216 (package missing), CC452 (other file, or no numbers)."""
     reader = library("mcap.reader", "mcap", "MCAP files")
     factories = [
         library("mcap_ros2.decoder", "mcap-ros2-support", "MCAP files").DecoderFactory(),
@@ -68,7 +68,7 @@ def read_mcap(data: bytes, name: str) -> list[SampledColumns]:
 
 
 def _sampled(file: str, names: list[str], table: Floats, times: Floats, unit: str, notes: list[str]) -> SampledColumns:
-    """One topic. times (n, 2) s: stamp of the message, and when it was logged; the stamps count if all have one."""
+    """One topic. times (n, 2) s: stamp of the message, and time of logging; the stamps count if all messages have one."""
     time = times[:, 0] if np.isfinite(times[:, 0]).all() else times[:, 1]
     units = (unit,) * len(names)
     return SampledColumns(
@@ -91,7 +91,7 @@ def _decoder(encoding: str, schema: Any, factories: list[Any]) -> Callable[[byte
 
 
 def _fields(content: Any) -> dict[str, Any] | None:
-    """Fields of a message by name; None where it is none."""
+    """Fields of a message by name; None for other objects."""
     if isinstance(content, dict):
         return content
     if hasattr(content, "DESCRIPTOR"):
@@ -126,7 +126,7 @@ def _is_list(content: Any) -> bool:
 
 
 def _parallel(labels: Any, values: Any) -> bool:
-    """Whether a list holds one number for every name of the list beside it, as in JointState."""
+    """Whether a list has one number for every name of a parallel list, as in JointState."""
     return (
         _is_list(labels) and _is_list(values) and 0 < len(labels) == len(values)
         and all(isinstance(a, str) and isinstance(b, Real) for a, b in zip(labels, values, strict=True))
@@ -140,7 +140,7 @@ def _label(member: Any, index: int) -> str:
 
 
 def _stamp(content: Any) -> float:
-    """The message's own time in s, of its header or of its first member; NaN where it has none."""
+    """Time stamp of a message in s, of its header or of its first member, or NaN."""
     fields = _fields(content) or {}
     for key in _NOT_FIELDS:
         inner = _fields(fields.get(key)) or {}

@@ -1,4 +1,4 @@
-"""Which column of a recording is which column of the log: as told, else by its usual names."""
+"""Assignment of a recording's columns to those of the log: as stated by the user, else by usual names."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from camcomp.diagnosis.recordings.units import SI, factor_to, split_unit, unit_o
 from camcomp.ground.errors import ConfigError
 from camcomp.model.motion.log_columns import DYNO, LINE, TEMPERATURE, TIME, TIP, TIP_SD, LogColumns, log_columns
 
-_USUAL = {  # beside the log's own names, most telling first; those of actuators are made of theirs
+_USUAL = {  # in addition to the log's own names, most specific first; those of actuators are below
     TIME: ("time_s", "time", "timestamp", "t"),
     **{own: (f"measurement_{axis}", axis) for own, axis in zip(TIP, "xyz", strict=True)},
     TEMPERATURE: ("measurement_temperature", "temperature"),
@@ -33,7 +33,7 @@ _TURNING = re.compile(
 
 @dataclass(frozen=True)
 class Pick:
-    """A column of a part; factor: to the unit of the log, None where the recording states no unit."""
+    """A column of a part; factor: to the unit of the log, None for an unstated unit."""
 
     part: int
     column: int
@@ -42,7 +42,7 @@ class Pick:
 
 @dataclass
 class Picked:
-    """Columns of the log that were found, and names of those that could be several."""
+    """Assigned columns of the log, and columns with several candidates."""
 
     columns: dict[str, Pick] = field(default_factory=dict)
     times: dict[int, Pick] = field(default_factory=dict)  # by part
@@ -53,7 +53,7 @@ class Picked:
 def pick_columns(
     parts: Sequence[SampledColumns], actuators: Sequence[str], columns: LogColumns, told: Mapping[str, str]
 ) -> Picked:
-    """Columns of a log in the parts of a run. Raises ConfigError CC421 for a name in `told` that is not there."""
+    """Columns of a log in the parts of a run. Raises ConfigError CC421 for a missing name in `told` (log: recording)."""
     picked = Picked()
     for log, theirs in told.items():
         hits = _told(parts, log, theirs, picked.notes)
@@ -81,7 +81,7 @@ def pick_columns(
 
 
 def usual_names(actuators: Sequence[str], columns: LogColumns) -> dict[str, tuple[str, ...]]:
-    """Names by which every column of a log is looked for, in lower case, in the order of the log's columns."""
+    """Usual names of every column of a log, in lower case, in the order of the log's columns."""
     out: dict[str, tuple[str, ...]] = {TIME: (), LINE: ()}
     for channel, names in _ACTUATOR.items():
         for a, log in zip(actuators, getattr(columns, channel), strict=True):
@@ -98,7 +98,7 @@ def usual_names(actuators: Sequence[str], columns: LogColumns) -> dict[str, tupl
 
 
 def check_enough(parts: Sequence[SampledColumns], picked: Picked, columns: LogColumns, *, program: bool) -> None:
-    """Raise ConfigError CC421 for the first column without which no study can use the run."""
+    """Raise ConfigError CC421 for the first missing column that every study of such a run needs."""
     missing = _missing(set(picked.columns), columns, program)
     if missing:
         log = missing[0]
@@ -106,13 +106,13 @@ def check_enough(parts: Sequence[SampledColumns], picked: Picked, columns: LogCo
         rivals = picked.doubtful.get(log)
         could = f", it could be {some(rivals)}" if rivals else ""
         hint = f"name it: --column {log}=THEIRS; there are: {some(names, 40)}"
-        if all(name.isdigit() for name in names):  # nothing names them
+        if all(name.isdigit() for name in names):  # unnamed columns
             hint += "; or name all of them: --columns 'NAME NAME ...'"
         raise ConfigError("CC421", f"no column for {log}{could}", at=parts[0].at(-1, 0), hint=hint)
 
 
 def _missing(there: set[str], columns: LogColumns, program: bool) -> list[str]:
-    """Columns that a study of what is there would need."""
+    """Missing columns that a study of the present ones needs."""
     if there.intersection(TIP) and not there.issuperset(TIP):
         return [log for log in TIP if log not in there]
     if program or there.issuperset(columns.setpoint):
@@ -127,7 +127,7 @@ def _missing(there: set[str], columns: LogColumns, program: bool) -> list[str]:
 
 
 def leftovers(parts: Sequence[SampledColumns], picked: Picked) -> list[str]:
-    """Notes on columns that nothing was made of."""
+    """Notes on unused columns."""
     used = {(each.part, each.column) for each in (*picked.columns.values(), *picked.times.values())}
     rest = [name for i, part in enumerate(parts) for j, name in enumerate(part.names) if (i, j) not in used]
     turning = [name for name in rest if _TURNING.fullmatch(name)]
@@ -143,7 +143,7 @@ def leftovers(parts: Sequence[SampledColumns], picked: Picked) -> list[str]:
 
 
 def _told(parts: Sequence[SampledColumns], log: str, theirs: str, notes: list[str]) -> list[Pick]:
-    """Columns of this name, as it is written, else whatever the case: at least one, in every part at most one."""
+    """Columns with exactly this name, else in any case: at least one, at most one per part."""
     every = [(i, j, name) for i, part in enumerate(parts) for j, name in enumerate(part.names)]
     hits = [(i, j) for i, j, name in every if name == theirs] or [
         (i, j) for i, j, name in every if _plain(name) == _plain(theirs)
@@ -165,7 +165,7 @@ def _told(parts: Sequence[SampledColumns], log: str, theirs: str, notes: list[st
 
 
 def _usual(parts: Sequence[SampledColumns], log: str, usual: Sequence[str], taken: set[tuple[int, int]]) -> list[Pick]:
-    """Columns that the first name to be there fits: the log's own, a usual one, one with a unit, the end of a path."""
+    """Columns of the first matching name: the log's own, a usual one, one with a unit, the end of a path."""
     free = [
         (i, j, _plain(name)) for i, part in enumerate(parts) for j, name in enumerate(part.names) if (i, j) not in taken
     ]
@@ -182,14 +182,14 @@ def _usual(parts: Sequence[SampledColumns], log: str, usual: Sequence[str], take
                 if (bare and not units[i, j]) or (units[i, j] and factors[i, j] is not None)
             ]
             if len(good) > 1 and fits is _same:
-                good = good[:1]  # twice in one table: told when it is read
+                good = good[:1]  # twice in one table: an error when it is read
             if good:
                 return good
     return []
 
 
 def _unit(part: SampledColumns, column: int, log: str) -> str:
-    """The unit that a recording states. Who names a column without header by the log's name need not mean its unit."""
+    """Unit stated by a recording; a name given by the user to a column without header states none."""
     name, stated = part.names[column], part.units[column]
     unit = "" if name == log and not part.headed else split_unit(name)[1]
     return unit if unit and stated in ("", SI) else stated
@@ -214,7 +214,7 @@ def _ends(name: str, wanted: str) -> bool:
 
 
 def told_columns(words: Sequence[str], actuators: Sequence[str], rotary: Sequence[bool]) -> dict[str, str]:
-    """`LOG=THEIRS` of the command line. Raises ConfigError CC421 for what is no column of this machine's logs."""
+    """Parse `LOG=THEIRS` of the command line. Raises ConfigError CC421 for an unknown column of this machine's logs."""
     known = log_columns(actuators, rotary).known
     out: dict[str, str] = {}
     for word in words:

@@ -1,4 +1,4 @@
-"""The log of one run: columns picked and joined, units, rows that are no use dropped, and everything of it said."""
+"""The log of one run from a recording: columns assigned and joined, units converted, unusable rows dropped, with notes."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from camcomp.model.config.robot import PrismaticActuator, RevoluteActuator
 from camcomp.model.motion.log_columns import LINE, TIME, LogColumns, log_columns
 
 Actuators = Mapping[str, PrismaticActuator | RevoluteActuator]
-_TWO_TURNS = 4.0 * np.pi  # no joint of an arm turns further, and angles beyond it are degrees
+_TWO_TURNS = 4.0 * np.pi  # rad, beyond every joint of an arm: larger angles are degrees
 
 
 @dataclass(frozen=True)
 class Recording:
-    """One run: its name, log as CSV, number of rows, and what the reader should know."""
+    """One imported run: name, log as CSV, number of rows, notes."""
 
     name: str
     log: bytes
@@ -33,10 +33,10 @@ class Recording:
 
 @dataclass(frozen=True)
 class Wishes:
-    """What the user says of recordings.
+    """Options of the user for recordings.
 
-    columns: theirs by the log's; rows: at most; degrees: joint angles are, are not, or None: by their size; period_s
-    between rows without times; join: "time", "rows" or None; program: the run has one.
+    columns: the recording's name by the log's; rows: at most; degrees: whether joint angles are in degrees, None: by their
+    size; period_s: between rows without times; join: "time", "rows" or None; program: the run has one.
     """
 
     columns: Mapping[str, str] = field(default_factory=dict)
@@ -82,7 +82,7 @@ def csv_of(columns: Mapping[str, Floats]) -> bytes:
 def _parts(
     sampled: Sequence[SampledColumns], picked: Picked, columns: LogColumns, notes: list[str]
 ) -> tuple[list[SampledTable], list[int], list[Ints]]:
-    """What of each is wanted: parts, which of `sampled` each is, and which of its rows are kept."""
+    """Parts with assigned columns, index of each in `sampled`, and its rows that are kept."""
     several = len({each.part for each in picked.columns.values()}) > 1
     parts, numbers, order = [], [], []
     for k, source in enumerate(sampled):
@@ -115,7 +115,7 @@ def _places(values: Mapping[str, Floats], columns: LogColumns) -> list[str]:
 
 
 def _read(source: SampledColumns, pick: Pick) -> Floats:
-    """Values (n,) in the unit of the log. Raises ConfigError CC422 for what is no number of this world."""
+    """Values (n,) in the unit of the log. Raises ConfigError CC422 for other texts and numbers out of bounds."""
     values = source.read(pick.column) * (1.0 if pick.factor is None else pick.factor)
     wild = np.flatnonzero(np.abs(values) > LARGEST_NUMBER)
     if len(wild):
@@ -125,7 +125,7 @@ def _read(source: SampledColumns, pick: Pick) -> Floats:
 
 
 def _clock(source: SampledColumns, part: int, picked: Picked) -> Floats | None:
-    """Times (n,) s of a part, by the column named for them or as it brings them."""
+    """Times (n,) s of a part, from the assigned column, else its own."""
     pick = picked.times.get(part)
     return source.time if pick is None else seconds(source.read(pick.column), pick.factor)
 
@@ -133,7 +133,7 @@ def _clock(source: SampledColumns, part: int, picked: Picked) -> Floats | None:
 def _in_rad(
     values: dict[str, Floats], columns: LogColumns, picked: Picked, degrees: bool | None, notes: list[str]
 ) -> dict[str, Floats]:
-    """Joint angles in rad: those whose unit nobody states may be degrees."""
+    """Values with joint angles in rad; angles without a stated unit may be degrees."""
     angles = [
         log for log in (*columns.setpoint, *columns.encoder, *columns.load)
         if log in values and log.endswith("_rad") and (degrees or picked.columns[log].factor is None)
@@ -149,7 +149,7 @@ def _in_rad(
 
 
 def _without_dead_encoders(values: dict[str, Floats], columns: LogColumns, notes: list[str]) -> dict[str, Floats]:
-    """Without second encoders that hold one value while the motor moves: recorders write 0 for those that are not there."""
+    """Values without second encoders that are constant while the motor moves: recorders write 0 for missing encoders."""
     dead = [
         load
         for load, act in zip(columns.load, columns.encoder, strict=True)
@@ -164,7 +164,7 @@ def _times(
     joined: Joined, values: Mapping[str, Floats], row: Ints, lead: SampledColumns, driven: bool,
     period_s: float | None, notes: list[str],
 ) -> tuple[Floats, Ints]:  # fmt: skip
-    """Seconds since the earliest row (n,), and the rows that are kept. Raises ConfigError CC405 where time runs backward."""
+    """Seconds since the earliest row (n,), and the rows that are kept. Raises ConfigError CC405 for decreasing times."""
     n = len(next(iter(values.values())))
     if joined.time is None:
         if period_s is None:

@@ -1,4 +1,4 @@
-"""What every reader of recordings hands over, and what all of them need."""
+"""Result type of all readers of recordings, and their common helpers."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from camcomp.ground.errors import CamcompError, ConfigError, Location
 
 @dataclass(frozen=True, eq=False)
 class SampledColumns:
-    """Columns that were sampled together, n rows each.
+    """Columns sampled together, n rows each.
 
-    file: name for messages; units: as the recording states them, "SI", or empty where it states none; time (n,) s on
-    whatever clock, NaN where a row has none, or None; read: values (n,) of a column by its number; at: place of a cell by
-    row (-1: header) and column; notes: what the reader left out or took for granted; headed: the names are the recording's own.
+    file: name for messages; units: as stated by the recording, "SI", or empty; time (n,) s on any clock, NaN for rows without
+    one, or None; read: values (n,) of a column by its number; at: location of a cell by row (-1: header) and column; notes:
+    omissions and assumptions of the reader; headed: the names are the recording's own.
     """
 
     file: str
@@ -33,7 +33,7 @@ class SampledColumns:
 
 
 def library(module: str, package: str, what: str) -> Any:
-    """An optional module. Raises ConfigError CC216 with what to install where it is missing."""
+    """Import an optional module. Raises ConfigError CC216 with the package to install."""
     try:
         return import_module(module)
     except ImportError as error:
@@ -43,19 +43,19 @@ def library(module: str, package: str, what: str) -> Any:
 
 @contextmanager
 def reading(name: str, what: str) -> Iterator[None]:
-    """Whatever a foreign reader raises over a broken file becomes ConfigError CC452."""
+    """Context that converts any exception of a library about a damaged file to ConfigError CC452."""
     try:
         yield
     except CamcompError:
         raise
-    except Exception as error:  # no two readers agree on what they raise
+    except Exception as error:  # libraries raise various types
         reason = (str(error) or type(error).__name__).splitlines()[0][:200]
         message = f"not {what} that can be read: {reason}"
         raise ConfigError("CC452", message, at=Location(name, 1, 1)) from error
 
 
 def refuse_names(parts: Sequence[SampledColumns], names: Sequence[Sequence[str]]) -> None:
-    """Raise ConfigError CC421 where names are given and every part of a run has its own."""
+    """Raise ConfigError CC421 for names that are given although every part of a run has its own."""
     if names and all(part.headed for part in parts):
         hint = "name columns by --column LOG=THEIRS instead of --columns"
         raise ConfigError("CC421", "the recording has names of its own", at=parts[0].at(-1, 0), hint=hint)

@@ -15,8 +15,8 @@ from camcomp.ground.errors import ConfigError, Location
 from camcomp.model.motion.log_columns import TIME
 
 TABLE_RULES = TableRules(table="CC421", column="CC421", cell="CC422")
-SERVO_PERIOD_S = 1e-3  # of LinuxCNC, where nothing else is said
-UNNAMED = "-"  # a column without header that is not wanted
+SERVO_PERIOD_S = 1e-3  # default of LinuxCNC
+UNNAMED = "-"  # name of an unused column without header
 _OVERRUN = b"overrun"
 
 
@@ -46,7 +46,7 @@ def of_table(
     table: CsvTable, columns: Sequence[int] | None = None, time: Floats | None = None, units: Sequence[str] | None = None,
     notes: Sequence[str] = (),
 ) -> SampledColumns:  # fmt: skip
-    """Some columns of a table; cells are read, and refused, only where they are wanted."""
+    """Some columns of a table; cells are read and checked on access."""
     wanted = range(len(table.header)) if columns is None else columns
     kept = [j for j in wanted if table.header[j] not in ("", UNNAMED)]
 
@@ -73,7 +73,10 @@ def of_table(
 
 
 def _clock_times(table: CsvTable, column: int) -> Floats | None:
-    """Seconds since 2000 (n,) of a column of dates or times of day; None where its first cell is none. Raises ConfigError CC422."""
+    """Seconds since 2000 (n,) of a column of dates or times of day, or None if its first cell is neither.
+
+    Raises ConfigError CC422.
+    """
     cells = table.texts(column)
     if clock(next((cell for cell in cells if cell), "")) is None:
         return None
@@ -89,7 +92,7 @@ def _clock_times(table: CsvTable, column: int) -> Floats | None:
 
 
 def _without_remarks(data: bytes) -> tuple[bytes, list[str]]:
-    """The text with lines of remarks, and halsampler's word for lost samples, left blank; how many there were."""
+    """The text with blanks in place of remarks and of halsampler's word for lost samples, and notes with their number."""
     if b"#" not in data and _OVERRUN not in data:
         return data, []
     lines = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n").split(b"\n")
@@ -104,7 +107,7 @@ def _without_remarks(data: bytes) -> tuple[bytes, list[str]]:
 
 
 def _without_torn_row(table: CsvTable, notes: list[str]) -> CsvTable:
-    """Without a last row that ends early, as a logger leaves it that is stopped while writing."""
+    """The table without an incomplete last row, which a logger stopped while writing leaves."""
     if table.mark != " " or len(table.rows) < 2 or len(table.rows[-1]) >= len(table.rows[-2]):
         return table
     notes.append("the last row ends early: dropped")
@@ -112,7 +115,7 @@ def _without_torn_row(table: CsvTable, notes: list[str]) -> CsvTable:
 
 
 def _counts(table: CsvTable) -> bool:
-    """Whether the first column is the number of the sample: it goes up by one, and by more where samples were lost."""
+    """Whether the first column is the number of the sample: it rises by one, or by more after lost samples."""
     if len(table.rows) < 3:
         return False
     first = np.array([table.value(i, 0) for i in range(len(table.rows))])
@@ -121,7 +124,7 @@ def _counts(table: CsvTable) -> bool:
 
 
 def _named(table: CsvTable, names: Sequence[str], counted: bool) -> CsvTable:
-    """The table with names; the number of the sample need not be named."""
+    """The table with names; the column of the sample number may have none."""
     if not names:
         return table
     header = ("", *names) if counted and len(names) == len(table.header) - 1 else tuple(names)

@@ -1,4 +1,4 @@
-"""TDMS, the files of LabVIEW: channels are called group.channel, waveforms bring their times."""
+"""Reader of TDMS, the files of LabVIEW: channels are called group.channel, waveforms include their times."""
 
 from __future__ import annotations
 
@@ -46,14 +46,14 @@ def read_tdms(data: bytes, name: str) -> list[SampledColumns]:
 
 @contextmanager
 def _remarks_of(nptdms: Any) -> Iterator[list[str]]:
-    """What the library says of the file, instead of its saying so itself."""
+    """Context that collects the library's log messages about the file."""
     remarks: list[str] = []
     handler = logging.Handler()
     handler.emit = lambda record: remarks.append(record.getMessage()[:120])  # type: ignore[method-assign]
     manager = nptdms.log.log_manager
     manager.console_handler.setLevel(logging.CRITICAL)
     silenced = logging.root.manager.disable
-    logging.disable(logging.NOTSET)  # other libraries silence everybody, or all that were there before them
+    logging.disable(logging.NOTSET)  # other libraries may have disabled logging
     for logger in manager.loggers.values():
         logger.disabled = False
         logger.addHandler(handler)
@@ -67,7 +67,7 @@ def _remarks_of(nptdms: Any) -> Iterator[list[str]]:
 
 
 def _sampling(properties: Any) -> tuple[float | None, float]:
-    """Step between samples, s, where the channel is a waveform, and when it starts."""
+    """Step between samples (s, None unless the channel is a waveform), and its start (s)."""
     step = properties.get("wf_increment")
     if not step:
         return None, 0.0

@@ -1,6 +1,6 @@
-"""TwinCAT Scope's export as text: a block of lines on the recording, one on its channels, then times and values.
+"""Reader of TwinCAT Scope's text export: a block about the recording, one about its channels, then times and values.
 
-In the block on the channels a column whose name is the word Name itself holds the times of the columns right of it.
+In the block about the channels, a column with the name `Name` has the times of the columns right of it.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _FILE_TIME = 1e15  # beyond it times are steps of 100 ns since 1601, else ms
 
 
 def is_scope_text(data: bytes) -> bool:
-    """Whether a text begins as the export does."""
+    """Whether a text has the first lines of the export."""
     start = data[:100_000].removeprefix(b"\xef\xbb\xbf")
     return start.startswith(_CHANNELS.encode()) and any(b"\n" + each.encode() in start for each in _OF_CHANNELS)
 

@@ -1,4 +1,4 @@
-"""Units that recordings state, in brackets or at the end of a name, and times of every kind as seconds."""
+"""Units stated by recordings, in brackets or at the end of a name, and conversion of time stamps to seconds."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from camcomp.ground.datatypes import Floats
 
 SI = "SI"
-_TO_LOG = {  # unit of the log: factors that lead to it, by unit of theirs in lower case
+_TO_LOG = {  # unit of the log: factors to it, by unit of the recording in lower case
     "mm": {"mm": 1.0, "m": 1e3, "cm": 10.0, "um": 1e-3, "µm": 1e-3, "in": 25.4, "inch": 25.4},
     "rad": {
         "rad": 1.0,
@@ -38,13 +38,13 @@ _SINCE_1970 = ((1e12, 1e13, 1e-3), (1e15, 1e16, 1e-6))  # from, to, s: ms and us
 
 
 def unit_of(log: str) -> str:
-    """Unit of a column of a log: x_mm has mm, line none."""
+    """Unit of a column of a log: mm for x_mm, empty for line."""
     unit = log.rpartition("_")[2]
     return unit if unit in _TO_LOG else ""
 
 
 def split_unit(name: str) -> tuple[str, str]:
-    """`x [mm]`, `x (mm)` and `x_mm` to name and unit; the unit is empty where there is none."""
+    """Name and unit of `x [mm]`, `x (mm)` or `x_mm`; the unit may be empty."""
     if found := _BRACKETS.fullmatch(name):
         return found[1], found[2].strip()
     base, _, unit = name.rpartition("_")
@@ -53,7 +53,7 @@ def split_unit(name: str) -> tuple[str, str]:
 
 
 def factor_to(log: str, unit: str) -> float | None:
-    """What leads from a unit of theirs to that of a column of a log; None where the unit is of another kind."""
+    """Factor from a recording's unit to that of a column of a log; None for a unit of another quantity."""
     kind = unit_of(log)
     if not kind:
         return 1.0
@@ -61,9 +61,9 @@ def factor_to(log: str, unit: str) -> float | None:
 
 
 def seconds(stamps: Floats, factor: float | None) -> Floats | None:
-    """Times (n,) as s on their own clock, NaN where there is none; None where they tell too few rows apart.
+    """Times (n,) in s on their own clock, NaN for missing ones; None if too few of them differ.
 
-    factor: of their unit; without, times are s, stamps such as 20200714163904, or ms or us since 1970.
+    factor: of their unit; None: times are s, stamps such as 20200714163904, or ms or us since 1970.
     """
     known = stamps[np.isfinite(stamps)]
     if not known.size or np.unique(known).size <= 0.5 * len(stamps):
@@ -85,7 +85,7 @@ def seconds(stamps: Floats, factor: float | None) -> Floats | None:
 
 
 def clock(text: str) -> float | None:
-    """Seconds since 2000 of a date with its time of day, or of a time of day alone; None where the text is neither."""
+    """Seconds since 2000 of a date with its time of day, or of a time of day alone; None for other texts."""
     found = _CLOCK.fullmatch(text.strip())
     if found is None:
         return None

@@ -1,4 +1,4 @@
-"""Workbooks of spreadsheets: the first sheet with a table counts."""
+"""Reader of workbooks: the first sheet with a table."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ MOST_CELLS = 20_000_000  # as many numbers as a log of five million rows and fou
 
 
 def read_xlsx(data: bytes, name: str, names: Sequence[str] = ()) -> list[SampledColumns]:
-    """A sheet; names: of its columns, where it has no header. Raises ConfigError CC216, CC421, CC422, CC452."""
+    """Read a sheet; names: of its columns if it has no header. Raises ConfigError CC216, CC421, CC422, CC452."""
     openpyxl = library("openpyxl", "openpyxl", "XLSX files")
     with reading(name, "an XLSX file"):
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
@@ -63,8 +63,8 @@ def read_xlsx(data: bytes, name: str, names: Sequence[str] = ()) -> list[Sampled
 
 
 def _filled_rows(sheet: Any, name: str) -> dict[int, list[Any]]:
-    """Rows by their number from 0, without empty ones and without empty cells at their ends."""
-    sheet.reset_dimensions()  # stated ones may be a million rows of thousands of cells, whatever there is
+    """Rows with text by their number from 0, without trailing empty cells."""
+    sheet.reset_dimensions()  # stated dimensions may be far larger than the data
     out: dict[int, list[Any]] = {}
     cells = 0
     for i, row in enumerate(sheet.iter_rows(values_only=True)):
@@ -77,7 +77,7 @@ def _filled_rows(sheet: Any, name: str) -> dict[int, list[Any]]:
 
 
 def refuse_large(size: int, most: int, what: str, name: str) -> None:
-    """Raise ConfigError CC425 for more than any recording in a workbook has."""
+    """Raise ConfigError CC425 for a size above `most`."""
     if size > most:
         raise ConfigError("CC425", f"the workbook has more than {most:.3g} {what}", at=Location(name, 1, 1))
 

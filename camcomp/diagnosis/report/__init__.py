@@ -1,1 +1,1 @@
-"""What a diagnosis prints and draws."""
+"""Texts and plots of a diagnosis."""

@@ -1,4 +1,4 @@
-"""The answer of a diagnosis in words, for the terminal and the report."""
+"""Text of the result of a diagnosis, for the terminal and the report."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from camcomp.diagnosis.result.types import UNKNOWN, DiagnosisResult, FoundCause,
 from camcomp.diagnosis.statistics.probability import EVEN
 from camcomp.report.plot import brief, micrometres
 
-SURE = 0.95  # probability beyond which none is told: diagnose is never surer than that something looks alike
-HALF = 0.5  # of what is left: what goes with less is told only where nothing goes with more
-MOST_CAUSES = 3  # that the terminal tells
-BESIDE_LAW = 1  # where a law is told, too
-MOST_LINES = 10  # of the terminal, before what outcomes mean is left to the page
+SURE = 0.95  # probability from which it is not printed
+HALF = 0.5  # of the residual: covariates with a smaller share are printed only if none has a larger one
+MOST_CAUSES = 3  # causes printed on the terminal
+BESIDE_LAW = 1  # causes printed together with a law
+MOST_LINES = 10  # lines on the terminal; outcomes beyond them are on the page only
 
 
 def cause_name(cause: NamedCause) -> str:
@@ -21,7 +21,7 @@ def cause_name(cause: NamedCause) -> str:
 
 
 def verdict_text(result: DiagnosisResult) -> str:
-    """The answer in a sentence or two."""
+    """The verdict in one or two sentences."""
     gap, shrink = result.gap, result.shrinkage
     floor = floor_text(gap)
     told = (
@@ -65,26 +65,26 @@ def verdict_text(result: DiagnosisResult) -> str:
 
 
 def by_share(result: DiagnosisResult) -> list[FoundCause]:
-    """The known causes, those with the largest share of the gap first."""
+    """The known causes by falling share of the gap."""
     return sorted(result.known, key=lambda each: -each.share)
 
 
 def floor_text(gap: GapSize) -> str:
-    """The noise floor, or that nothing tells it."""
+    """Text of the noise floor, or of its absence."""
     return "not known" if gap.noise_floor_um is None else micrometres(gap.noise_floor_um)
 
 
 def told_chance(probability: float) -> str:
-    """A probability that is worth a word; nothing where there is no doubt."""
+    """Text of a probability below SURE, else empty."""
     return "" if probability > SURE else f", probability {100 * probability:.0f} %"
 
 
 def law_lines(law: Law) -> list[str]:
-    """A law in a few lines: what it says, the formula with the size of every term, where it was seen, what it takes away."""
+    """A law in a few lines: description, formula with the size of every term, envelope, reduction of the gap."""
     seen = ", ".join(f"{name} {brief(low, 4)} to {brief(high, 4)}" for name, (low, high) in law.envelope.items())
     said = law.says
     gone = f"from {brief(law.before_rms_um)} µm to {brief(law.after_rms_um)} µm"
-    if law.after_rms_um < law.before_rms_um:  # a law of a drive force leaves the gap as it is
+    if law.after_rms_um < law.before_rms_um:  # a law of a drive force does not reduce the gap
         said += f" On parts of the data that it was not fitted to it takes the gap {gone} (rms)."
     lines = [said, shortened(law.formula)]
     if law.kind == "formula":
@@ -93,7 +93,7 @@ def law_lines(law: Law) -> list[str]:
 
 
 def answer_lines(result: DiagnosisResult) -> list[str]:
-    """The answer in ten lines at most: verdict, causes with their sizes and what to do, what to measure next."""
+    """The result in at most ten lines: verdict, causes with sizes and remedies, next experiment."""
     lines = [f"{result.verdict}: {verdict_text(result)}"]
     told = by_share(result)[: BESIDE_LAW if result.law else MOST_CAUSES]
     for cause in told:

@@ -1,4 +1,4 @@
-"""Circles that the runs drove, as a ball-bar shows them: both directions on one plot, and the values of ISO 230-4."""
+"""Circles of the runs as polar plots of a ball-bar: both directions in one plot, and the values of ISO 230-4."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _ISO = (
 
 @dataclass(frozen=True, eq=False)
 class RadialGap:
-    """Measured minus modelled along the radius of a circle that one run drove in one direction, um at every degree (360,)."""
+    """Radial gap, measured minus modelled, of a circle in one direction in one run, um at every degree (360,)."""
 
     run: str
     turn: Turn
@@ -35,7 +35,7 @@ class RadialGap:
 
 
 def gaps_of(views: Sequence[RunView]) -> list[RadialGap]:
-    """Every full circle of every run whose tip was measured, in the order of the runs."""
+    """Radial gaps of all full circles with a measured tip, in the order of the runs."""
     out = []
     for view in views:
         if view.program is not None and view.channels == _TIP:
@@ -45,7 +45,7 @@ def gaps_of(views: Sequence[RunView]) -> list[RadialGap]:
 
 
 def circles_section(views: Sequence[RunView], tests: Sequence[CircularTest]) -> Section | None:
-    """The part of a report on circles; None where no run drove one. tests: their values by ISO 230-4."""
+    """Section of the report on circles, or None without a circle. tests: values of ISO 230-4."""
     groups: dict[tuple[str, bool], list[RadialGap]] = {}
     for gap in gaps_of(views):
         groups.setdefault((gap.turn.circle.name, gap.cutting), []).append(gap)
@@ -121,6 +121,6 @@ def _figure(gaps: Sequence[RadialGap], number: int) -> Figure:
 
 
 def _round_up(value: float) -> float:
-    """The least of 1, 2, 5, 10, ... that is not below."""
+    """The smallest of 1, 2, 5, 10, ... that is at least `value`."""
     power = 10.0 ** np.floor(np.log10(max(value, 1e-3)))
     return float(next(m * power for m in (1.0, 2.0, 5.0, 10.0) if m * power >= value * (1 - 1e-9)))

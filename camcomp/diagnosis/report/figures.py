@@ -16,7 +16,7 @@ MAP_POINTS = 4000
 
 
 def figure_ladder(shrink: UnseenShrinkage, floor: float | None) -> Figure:
-    """The gap on held-out runs with one cause after the other in the model; floor: of the noise, um, where it is known."""
+    """The gap on withheld runs with one cause after the other added to the model; floor: noise floor, um, or None."""
     names = ["as it was", *(f"+ {cause_name(step)}" for step in shrink.steps)]
     values = [shrink.before_rms_um, *(step.after_rms_um for step in shrink.steps)]
     bars = {
@@ -47,7 +47,7 @@ def figure_ladder(shrink: UnseenShrinkage, floor: float | None) -> Figure:
 
 
 def figure_signed(view: RunView, number: int) -> Figure:
-    """The gap of one run along time with its sign, channel by channel, before and after."""
+    """The signed gap of one run over time, channel by channel, before and after."""
     index = thin(np.column_stack((view.before, view.after)))
     x = numbers(view.time[index], 4)
     curves = []
@@ -71,7 +71,7 @@ def figure_signed(view: RunView, number: int) -> Figure:
 
 
 def figure_size(view: RunView, number: int, floor: float | None) -> Figure:
-    """The size of the gap of one run along its path, before and after."""
+    """The size of the gap of one run over path length, before and after."""
     before, after = view.sizes
     index = thin(np.column_stack((before, after)))
     x = numbers(view.path[index], 4)
@@ -100,7 +100,7 @@ def _told(view: RunView) -> str:
 
 
 def figure_map(views: Sequence[RunView]) -> Figure:
-    """The gap where it is on the workpiece, before and after, in one scale of colours."""
+    """Map of the gap on the workpiece, before and after, with a common colour scale."""
     position = np.concatenate([view.position for view in views])
     before, after = (np.concatenate([view.sizes[i] for view in views]) for i in range(2))
     known = np.isfinite(position).all(axis=1) & np.isfinite(before)
@@ -143,7 +143,7 @@ def figure_map(views: Sequence[RunView]) -> Figure:
 
 
 def figure_shares(where: Where) -> Figure | None:
-    """Shares of the gap by axis and actuator, and what it depends on."""
+    """Shares of the gap by axis, actuator and covariate."""
     groups = [("axis", where.axes), ("actuator", where.actuators)]
     groups.append(("depends on", {each.covariate: each.share for each in where.drivers}))
     rows = [(f"{kind} {name}", share) for kind, part in groups for name, share in part.items()][::-1]
@@ -219,7 +219,7 @@ def figure_causes(causes: Sequence[FoundCause]) -> Figure:
 
 
 def figure_rivals(rivals: Sequence[RivalSignals], views: Sequence[RunView]) -> Figure | None:
-    """What sets of causes that cannot be told apart do to the run in which they do most."""
+    """Signals of indistinguishable sets of causes in the run in which they are largest."""
     if len(rivals) < 2 or not views:
         return None
     k = int(np.argmax([rms(np.linalg.norm(each, axis=1)) for each in rivals[0].signals]))

@@ -1,4 +1,4 @@
-"""Joints that turn unevenly: a curve each, with its band and where it was seen, and what that does on unseen poses."""
+"""Error curves of joints with their bands and measured ranges, and the gap on withheld poses."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ TEXT = (
 
 
 def joints_section(result: DiagnosisResult, residuals: Mapping[str, NDArray[Any]] | None = None) -> Section | None:
-    """Curves of the joints, None where none were found. residuals: rows of the poses, as `--residuals` writes them."""
+    """Section with the curves of the joints, or None. residuals: rows of the poses, as `--residuals` writes them."""
     causes = [each for each in result.causes if isinstance(each, CurveCause)]
     if not causes:
         return None
@@ -83,7 +83,7 @@ def _curve(name: str, curve: ErrorCurve) -> Figure:
 
 
 def _spread(residuals: Mapping[str, NDArray[Any]], runs: Sequence[str]) -> Figure | None:
-    """Which share of the unseen poses is below which gap, before and after."""
+    """Cumulative distribution of the gap on withheld poses, before and after."""
     unseen = np.isin(residuals["run"], list(runs))
     if not unseen.any() or unseen.all():  # without a run held out, all were fitted
         return None

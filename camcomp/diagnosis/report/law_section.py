@@ -1,4 +1,4 @@
-"""The law of an unknown effect in the report: the formula, drawn over the residuals that it explains, and what it leaves."""
+"""Section of the report on the law of an unknown effect: formula, its plot over the residuals, remaining gap."""
 
 from __future__ import annotations
 
@@ -18,9 +18,10 @@ POINTS = 1500
 
 @dataclass(frozen=True, eq=False)
 class LawView:
-    """What a law explains: covariate by name, axis of the tip, and per run its name, the covariate (n,), what is left
-    without the law (n,) and what the law says (n,) um, fitted without what it is judged on; sizes: rms of the gap (runs, 2)
-    um without and with it.
+    """Residuals explained by a law.
+
+    covariate: name; axis: of the tip; runs: per run its name, covariate (n,), residual without the law (n,) um, and cross-
+    validated prediction of the law (n,) um; sizes: rms of the gap (runs, 2) um without and with it.
     """
 
     covariate: str

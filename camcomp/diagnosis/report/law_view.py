@@ -1,4 +1,4 @@
-"""What the report draws of a law."""
+"""Data for the plot of a law in the report."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ MICRO = 1e3  # mm -> um
 
 
 def law_view(problem: Problem, answer: LawAnswer) -> LawView:
-    """Over the first covariate of the law, along the axis of the tip that it moves most."""
+    """Residuals over the first covariate of the law, along the axis of the tip with its largest effect."""
     bench = problem.bench
     part = answer.law.parts[0]
     drive = part.target is not None

@@ -1,4 +1,4 @@
-"""The report of a diagnosis, for people who have to believe a cause before they take a machine apart."""
+"""The HTML report of a diagnosis, with the evidence for every cause."""
 
 from __future__ import annotations
 
@@ -61,11 +61,11 @@ def diagnosis_html(
     law: LawView | None = None,
     residuals: Mapping[str, NDArray[Any]] | None = None,
 ) -> bytes:
-    """One HTML file. result: of any kind of study; views: runs to draw, those held out of the fit first.
+    """One HTML file. result: of any kind of study; views: runs to draw, withheld ones first.
 
-    rivals: sets of causes that explain the logs alike, the most probable first, with what each does to the runs of
-    `views`. next_program: file of the proposed experiment. law: what the law of an unknown effect explains. residuals: rows
-    of poses, as `--residuals` writes them. Raises ConfigError CC216 when the plot library is not installed.
+    rivals: sets of causes that explain the logs equally well, the most probable first, with their signals in the runs of
+    `views`. next_program: file of the proposed experiment. law: residuals explained by the law of an unknown effect.
+    residuals: rows of poses, as `--residuals` writes them. Raises ConfigError CC216 without the plot library.
     """
     seen = [view for view in views if view.held_out] or list(views)
     seen = sorted(seen, key=lambda view: -rms(view.sizes[0]))
@@ -163,7 +163,7 @@ def _shrinkage(shrink: UnseenShrinkage) -> str:
 
 
 def _to_do(result: DiagnosisResult, next_program: Listing | None) -> Section:
-    """What to do about each cause, and what to measure next."""
+    """Section with the remedy of each cause, and the next experiment."""
     rows: list[Row] = []
     for cause in by_share(result):
         share = percent(cause.share) + told_chance(cause.probability)
@@ -188,7 +188,7 @@ def _to_do(result: DiagnosisResult, next_program: Listing | None) -> Section:
 
 
 def _next(proposal: NextExperiment) -> list[str]:
-    """What to measure, and what that is worth; what its outcomes mean follows as a list."""
+    """Text of the next experiment and its expected gain; its outcomes follow as a list."""
     time = f", {brief(proposal.minutes, 2)} minutes with setting up" if proposal.minutes else ""
     gain = f"{brief(proposal.gain)} bits expected{time}."
     if proposal.moves is not None:

@@ -1,4 +1,4 @@
-"""What a diagnosis report draws of one run, and the spectrum of a gap."""
+"""Data of one run for the plots of a diagnosis report, and the spectrum of a gap."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ class RunView:
     """Rows (n,) of one run. before, after: measured minus modelled (n, c) um, without and with the causes found.
 
     time (n,) s; line (n,) source line, NaN where unknown; position (n, 3) mm modelled tip in the program frame; channels:
-    names of the c columns. held_out: the causes were fitted without this run. NaN where nothing was measured.
-    commanded (n, 3): tip where the set-points lead, program frame; program: what the control was given; cutting: any row
-    was under a cutting force.
+    names of the c columns. held_out: the causes were fitted without this run. NaN for unmeasured values.
+    commanded (n, 3): tip of the set-points, program frame; program: path of the program; cutting: any row was under a
+    cutting force.
     """
 
     name: str
@@ -38,7 +38,7 @@ class RunView:
 
     @property
     def explained(self) -> bool:
-        """Whether there are causes that take something of the gap."""
+        """Whether the causes change the gap."""
         return not np.array_equal(self.before, self.after, equal_nan=True)
 
     @property
@@ -50,20 +50,20 @@ class RunView:
 
 @dataclass(frozen=True, eq=False)
 class RivalSignals:
-    """A set of causes that the data cannot tell from the first one: its name, and what it does to each run (n, c) um."""
+    """A set of causes indistinguishable from the first one: its name, and its signal (n, c) um in each run."""
 
     name: str
     signals: tuple[Floats, ...]
 
 
 def rms(size: Floats) -> float:
-    """Root mean square of what is finite; 0 when nothing is."""
+    """Root mean square of the finite values; 0 without any."""
     known = size[np.isfinite(size)]
     return float(np.sqrt(np.mean(known**2))) if len(known) else 0.0
 
 
 def likeness(one: RivalSignals, other: RivalSignals) -> float:
-    """How much two sets of causes do the same: 1 alike up to a factor, 0 nothing in common."""
+    """Similarity of the signals of two sets of causes: 1: proportional, 0: orthogonal."""
     a = np.concatenate([each.ravel() for each in one.signals])
     b = np.concatenate([each.ravel() for each in other.signals])
     known = np.isfinite(a) & np.isfinite(b)
@@ -75,7 +75,7 @@ def likeness(one: RivalSignals, other: RivalSignals) -> float:
 def spectrum(time: Floats, values: Floats) -> tuple[Floats, Floats]:
     """Frequencies (f,) Hz and amplitudes (f,) um of values (n, c), all channels together, by a Hann window.
 
-    Rows are put on an even grid first; a gap is bridged by a straight line. Empty when there are fewer than 16 rows.
+    Rows are interpolated linearly to an even grid first. Empty for fewer than 16 rows.
     """
     known = np.isfinite(values).all(axis=1) & np.isfinite(time)
     t, v = time[known], values[known]

@@ -1,4 +1,4 @@
-"""The part of a report on values of acceptance tests, ISO 230-2 and ISO 9283, and why the logs hold no others; circles stand with their plots."""
+"""Section of a report on acceptance tests, ISO 230-2 and ISO 9283, with reasons for missing values."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _ISO_9283 = (
 
 
 def standards_section(values: StandardValues) -> Section | None:
-    """The section; None for results of times before there were such values."""
+    """The section; None for results of earlier versions without such values."""
     tables, text = [], []
     if values.positioning:
         rows: list[list[str | tuple[float, str]]] = [

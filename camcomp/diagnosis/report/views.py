@@ -1,4 +1,4 @@
-"""From a diagnosis to what its report draws: the gap of every run before and after, and the signals of rival causes."""
+"""Data of a diagnosis for its report: gap of every run before and after, and signals of rival sets of causes."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def report_of(
     residuals: Mapping[str, NDArray[Any]] | None = None,
     next_program: Listing | None = None,
 ) -> bytes:
-    """The report of an experiment file. Without `done` (studies of logs that have no program) no runs are drawn.
+    """The report of an experiment file. Without `done` (studies of logs that have no program) it has no plots of runs.
 
     next_program: file of the proposed experiment.
     """
@@ -74,7 +74,7 @@ def report_of(
 def views_of(done: Diagnosis, twin: Twin, runs: Sequence[Run], holdout: Sequence[str]) -> list[RunView]:
     """Runs of the fit in their order, then those named in `holdout`.
 
-    Without names every run is judged with causes chosen and fitted without it.
+    Without a holdout every run is shown with causes chosen and fitted without it.
     """
     problem, count = done.problem, len(done.problem.bench.runs)
     best = done.search.fits[done.search.verdict.best]
@@ -93,7 +93,7 @@ def views_of(done: Diagnosis, twin: Twin, runs: Sequence[Run], holdout: Sequence
 
 
 def rivals_of(done: Diagnosis) -> list[RivalSignals]:
-    """Sets of causes that the data cannot tell apart, the best one first; none when there is only one."""
+    """Indistinguishable sets of causes, the best one first; empty for a single set."""
     found, problem = done.search, done.problem
     if done.result.verdict != "ambiguous":
         return []

@@ -1,4 +1,4 @@
-"""What is found, in the words of a workshop: effects, sizes with as many digits as their intervals allow, places."""
+"""Texts of causes in the language of a workshop: effects, sizes with digits by their intervals, positions."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from camcomp.ground import shelf
 from camcomp.ground.errors import ConfigError
 from camcomp.report.plot import digits_alike
 
-_SMALLER = {  # units that small values are told in
+_SMALLER = {  # units of small values
     "mm": (1e3, "µm"), "rad": (1e3, "mrad"), "s": (1e3, "ms"), "mm/N": (1e3, "µm/N"), "rad/Nmm": (1e9, "µrad/Nm"),
 }  # fmt: skip
 _NOTHING = " not told from "
@@ -37,24 +37,24 @@ def _effect(name: str) -> Any:
 
 
 def plain(cause: NamedCause) -> str:
-    """The effect as a workshop calls it."""
+    """Name of the effect in a workshop."""
     return str(getattr(_effect(cause.effect), "PLAIN", cause.effect.replace("_", " ")))
 
 
 def remedy(cause: NamedCause) -> str:
-    """What to do about an effect; empty where it says nothing."""
+    """Remedy of an effect; may be empty."""
     return str(getattr(_effect(cause.effect), "REMEDY", ""))
 
 
 def percent(share: float) -> str:
-    """A share for people: never 0 % of something that is there."""
+    """A share in percent, at least the smallest printed one."""
     return "less than 1 %" if 0.0 < share < 0.01 else f"{100.0 * share:.0f} %"
 
 
 def sizes(cause: FoundCause) -> str:
-    """The parameters of a cause with their 95 % intervals; those that may as well be nothing come last, by name alone."""
+    """The parameters of a cause with their 95 % intervals; insignificant ones last, by name only."""
     kinds = {each.name: each for each in getattr(_effect(cause.effect), "PARAMETERS", ())}
-    # which of two laws holds is no size
+    # the choice between two laws is no size
     sized = {name: each for name, each in cause.parameters.items() if not (name in kinds and kinds[name].either)}
     told = {name: size(name, each, kinds.get(name)) for name, each in sized.items()}
     nothing = [name for name, text in told.items() if _NOTHING in text]
@@ -71,7 +71,7 @@ def title(name: str, parameter: Any = None) -> str:
 
 
 def size(name: str, each: Estimate, parameter: Any = None) -> str:
-    """A value with its 95 % interval, or how large it is at most where the interval holds `nothing at all`."""
+    """A value with its 95 % interval, or its upper bound if the interval includes the nominal value."""
     unit = parameter.unit if parameter is not None else ""
     nominal = parameter.nominal if parameter is not None else 0.0
     shape = parameter is not None and (bool(parameter.scan) or parameter.tolerance == 0.0)
@@ -84,12 +84,12 @@ def term_size(term: LawTerm) -> str:
 
 
 def shortened(formula: str) -> str:
-    """A formula for people, with four digits of every number."""
+    """A formula with four digits of every number."""
     return _LONG_NUMBER.sub(lambda found: f"{float(found.group()):.4g}", formula)
 
 
 def _told(value: float, ci95: tuple[float, float], unit: str, nominal: float | None) -> str:
-    """` 24.4 µm (23.3 to 25.5)`, or that it is not told from what it is nominally."""
+    """` 24.4 µm (23.3 to 25.5)`, or the text that it does not differ significantly from nominal."""
     low, high = ci95
     scale = 1.0
     if unit in _SMALLER and max(abs(low), abs(high), abs(value)) < 1.0:
@@ -102,7 +102,7 @@ def _told(value: float, ci95: tuple[float, float], unit: str, nominal: float | N
 
 
 def depends(driver: Driver) -> str:
-    """What a gap depends on, and where it stands out."""
+    """Text of a covariate of the gap, and the range in which the gap is largest."""
     kind, _, name = driver.covariate.partition(":")
     text = _COVARIATES.get(kind, driver.covariate).format(name or "the machine")
     if isinstance(driver, StretchDriver):

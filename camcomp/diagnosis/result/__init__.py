@@ -1,1 +1,1 @@
-"""What a diagnosis says: the types of its result, which every kind of study fills; nothing is worked out here."""
+"""Types of the result of a diagnosis, for all kinds of studies."""

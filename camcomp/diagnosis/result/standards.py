@@ -1,4 +1,4 @@
-"""Values of ISO 230-2, ISO 230-4 and ISO 9283 as part of a result: what acceptance tests of machines and robots report."""
+"""Values of acceptance tests of machines and robots in a result: ISO 230-2, ISO 230-4 and ISO 9283."""
 
 from __future__ import annotations
 
@@ -50,8 +50,9 @@ class CircularTest(Result):
 
 
 class PoseValues(Result):
-    """A pose that was visited again and again, ISO 9283:1998, um. The commanded pose is that of the nominal arm at the encoders,
-    in the frame and with the tool vector that fit best.
+    """A repeated pose, ISO 9283:1998, um.
+
+    The commanded pose is that of the nominal arm at the encoders, with the best-fit frame and tool vector.
     """
 
     campaign: str
@@ -62,7 +63,7 @@ class PoseValues(Result):
 
 
 class StandardValues(Result):
-    """What the logs hold of tests by standards, and why they hold no more."""
+    """Values of standard tests in the logs, and reasons for missing ones."""
 
     positioning: tuple[AxisPositioning, ...] = ()
     circles: tuple[CircularTest, ...] = ()

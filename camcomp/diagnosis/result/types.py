@@ -1,6 +1,6 @@
-"""The result of a diagnosis as types, key by key; the same for programs, poses of arms and logs of axes.
+"""Types of the result of a diagnosis, key by key, common to programs, poses of arms and logs of axes.
 
-Every key is always there: empty or null where a study has nothing to say.
+All keys are always present; those that do not apply to a study are empty or null.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class ActuatorShrinkage(Result):
 
 
 class GapSize(Result):
-    """Size of measured minus modelled over all runs at the tip, um, and of its noise; of logs without a tip by actuator, too."""
+    """Size of the gap over all runs at the tip, um, and of its noise; for logs without a tip also by actuator."""
 
     rms_um: float
     p95_um: float
@@ -45,7 +45,7 @@ class GapSize(Result):
 
 
 class LineShare(Result):
-    """A source line of a run where the gap stands out of the noise."""
+    """A source line of a run with a gap above the noise."""
 
     run: str
     line: int
@@ -54,7 +54,7 @@ class LineShare(Result):
 
 
 class IntervalShare(Result):
-    """A stretch of time of a run where the gap stands out of the noise."""
+    """An interval of time of a run with a gap above the noise."""
 
     run: str
     t0_s: float
@@ -63,7 +63,7 @@ class IntervalShare(Result):
 
 
 class Driver(Result):
-    """What the gap depends on; with an unknown cause, what the rest depends on."""
+    """A covariate of the gap; with an unknown cause, of the residual."""
 
     covariate: str
     share: Share
@@ -80,7 +80,7 @@ class RippleDriver(Driver):
 
 
 class StretchDriver(Driver):
-    """A position on which the gap depends, and the stretch of travel where it stands out."""
+    """A position as covariate of the gap, and the interval of travel with the largest gap."""
 
     low: float
     high: float
@@ -88,7 +88,7 @@ class StretchDriver(Driver):
 
 
 class DirectionShares(Result):
-    """How the gap, as motion of one actuator, goes with its direction: not at all, turning round, close behind reversals."""
+    """Shares of the gap, as motion of one actuator, by direction: independent, changing sign, shortly after reversals."""
 
     both_ways: Share
     with_direction: Share
@@ -114,7 +114,7 @@ class FrequencyLine(Result):
 
 
 class PlaceShare(Result):
-    """A part of the workspace where the gap stands out of the noise."""
+    """A region of the workspace with a gap above the noise."""
 
     x_mm: Pair
     y_mm: Pair
@@ -124,7 +124,7 @@ class PlaceShare(Result):
 
 
 class Where(Result):
-    """Where the gap arises, and where it shows."""
+    """Stage at which the gap arises, and its distribution over axes, lines, times and regions."""
 
     stage: Stage
     axes: dict[str, Share]
@@ -153,7 +153,7 @@ class Estimate(Result):
 
 
 class FoundCause(NamedCause):
-    """A cause: the probability that it is at work, its share of the gap, its parameters."""
+    """A cause: its probability, share of the gap, and parameters."""
 
     probability: Annotated[float, Field(ge=0.0, le=1.0)]
     share: Share
@@ -161,12 +161,12 @@ class FoundCause(NamedCause):
 
     @property
     def settings(self) -> dict[str, Any]:
-        """What a machine file says of it beside its parameters."""
+        """Further keys of its entry in a machine file."""
         return {}
 
 
 class ErrorCurve(Result):
-    """The error of a joint over its turn: at angles, with its deviation, and where some pose saw it."""
+    """The error of a joint over its angle, with its deviation, and the measured ranges."""
 
     angle_deg: tuple[float, ...]
     error_rad: Annotated[tuple[float, ...], Field(description="as it is taken out: 0 where nothing was seen")]
@@ -183,7 +183,7 @@ class CurveCause(FoundCause):
 
     @property
     def settings(self) -> dict[str, Any]:
-        """Shape of the curve, as YAML has it."""
+        """Shape of the curve as YAML keys."""
         return self._settings
 
 
@@ -197,7 +197,7 @@ class LawTerm(Result):
 
 
 class LawPart(Result):
-    """An effect `formula` or `map` that puts a part of a law to work, key by key as in a machine file."""
+    """An effect `formula` or `map` for a part of a law, with the keys of a machine file."""
 
     effect: Literal["formula", "map"]
     stage: Stage
@@ -210,7 +210,7 @@ class LawPart(Result):
 
 
 class Law(Result):
-    """What the unknown follows, and within which bounds that was seen."""
+    """Law of an unknown cause, with the envelope of its data."""
 
     formula: str
     on: Stage
@@ -225,20 +225,20 @@ class Law(Result):
 
 
 class UnknownCause(FoundCause):
-    """What no effect of the library explains."""
+    """The model discrepancy that the library does not explain."""
 
     effect: Literal["unknown"] = UNKNOWN
     law: Law | None = None
 
 
 class ShrinkageStep(NamedCause):
-    """What is left on unseen runs when this cause is in as well."""
+    """Residual on withheld runs with this cause added."""
 
     after_rms_um: float
 
 
 class UnseenShrinkage(Result):
-    """How far the gap shrinks on runs or campaigns that the fit has not seen, and how far it could."""
+    """Shrinkage of the gap on withheld runs or campaigns, and its upper bound."""
 
     holdout: tuple[str, ...]
     before_rms_um: float
@@ -258,7 +258,7 @@ class UnseenShrinkage(Result):
 
 
 class PosesToMeasure(Result):
-    """Poses of an arm in the order of measuring: joints by name, rad (mm), and where the platform stands, machine frame."""
+    """Poses of an arm in the order of measuring: joints by name, rad (mm), and platform position, machine frame."""
 
     joints: tuple[str, ...]
     positions: tuple[tuple[float, ...], ...]
@@ -266,7 +266,7 @@ class PosesToMeasure(Result):
 
 
 class StrokeBlock(Result):
-    """Strokes of one axis: between which places, how fast, and how many times there and back."""
+    """Strokes of one axis: end positions, speed, and number of cycles."""
 
     low: float
     high: float
@@ -275,7 +275,7 @@ class StrokeBlock(Result):
 
 
 class AxisMoves(Result):
-    """Strokes of one axis alone, block after block, each from rest to rest."""
+    """Strokes of one axis alone in consecutive blocks, each from standstill to standstill."""
 
     axis: str
     unit: Literal["mm", "rad"]
@@ -285,7 +285,7 @@ class AxisMoves(Result):
 
 
 class NextExperiment(Result):
-    """What to measure next: what it separates, what is to be gained, and how long it takes."""
+    """The next experiment: effects that it separates, expected gain, and duration."""
 
     action: str
     separates: tuple[str, ...]
@@ -301,20 +301,20 @@ class NextExperiment(Result):
 
 
 class MinorEffect(NamedCause):
-    """An effect of the size that every healthy machine has."""
+    """A minor effect, of the size of healthy machines."""
 
     size_um: float
 
 
 class Floor(Result):
-    """Noise of the gap, null where nothing tells it, and what it was told by."""
+    """Noise floor of the gap (null if unknown), and its source."""
 
     um: float | None
     source: Literal["repeats", "rest", "stated", "rows", "not identifiable"]
 
 
 class Outlier(Result):
-    """A row of a run's log that was left out, from 1."""
+    """An excluded row of a run's log, from 1."""
 
     run: str
     row: int
@@ -343,10 +343,10 @@ class DiagnosisResult(Result):
 
     @property
     def law(self) -> Law | None:
-        """What the unknown follows, where that was found."""
+        """The law of the unknown cause, or None."""
         return next((each.law for each in self.causes if isinstance(each, UnknownCause)), None)
 
     @property
     def known(self) -> tuple[FoundCause, ...]:
-        """The causes that the library has."""
+        """The causes from the library."""
         return tuple(each for each in self.causes if not isinstance(each, UnknownCause))
