@@ -74,6 +74,10 @@ class BlockReader:
         column = word.begin if word else self.block.column
         raise ProgramError(rule, message, at=self.text.place(self.block.row, column), hint=hint)
 
+    def forget_cycle(self, series: bool = True) -> None:
+        """Forget the words of the canned cycle in force; series: also the height at which its series began."""
+        raise NotImplementedError
+
     def perform(self, block: Block) -> bool:
         """Execute a block; True when it ends the program."""
         raise NotImplementedError

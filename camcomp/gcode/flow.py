@@ -1,7 +1,9 @@
 """Order of execution of lines: top to bottom, or by O-words and macro statements."""
 
+from __future__ import annotations
+
 import math
-from typing import NoReturn
+from typing import TYPE_CHECKING, NoReturn
 
 from camcomp.gcode.block import BlockReader
 from camcomp.gcode.expressions import Expression, ExpressionError, parameters_of
@@ -13,8 +15,12 @@ from camcomp.gcode.trace import Trace
 from camcomp.gcode.words import BLANK, Line, Word, code_of, read_line
 from camcomp.ground.errors import ProgramError
 
+if TYPE_CHECKING:
+    from camcomp.gcode.plain_reader import PlainReader
+
 _MOST_BLOCKS = 150_000  # executed by a program that has loops
 _MOST_IDLE = 100_000  # consecutive blocks without a motion
+MIN_ROWS = 256  # of a program that is searched for runs of plain lines
 _INCREMENTAL_LETTERS = "XYZIJKRQ"
 _AS_LENGTHS = (
     "numbers without a point are read as mm or inch, X10 as 10 mm; a controller that counts increments reads 0.01 mm: "
@@ -43,12 +49,35 @@ class Flow:
 
     def run(self) -> None:
         """Execute from the first line to the program's end."""
+        ahead = self._reader_ahead()
         row = 0
         while row < self.rows:
+            if ahead is not None:
+                behind, stated = ahead.read(row)
+                if behind > row:
+                    self._passed(behind - row, stated)
+                    row = behind
+                    continue
             after = self.step(row)
             if after is None:
                 return
             row = after
+
+    def _reader_ahead(self) -> PlainReader | None:
+        """The reader of runs of plain lines; None where the program is too short for it or every line is asked for."""
+        if self.trace is not None or self.rows < MIN_ROWS:
+            return None
+        from camcomp.gcode.plain_reader import PlainReader  # loads the compiler, which short programs do not wait for
+
+        reader = self.reader
+        return PlainReader(self.text, reader.state, reader.record, self.rows, reader.dialect.increments)
+
+    def _passed(self, rows: int, stated: bool) -> None:
+        """Count plain lines that were read at once. stated: a motion code stands in them."""
+        self._blocks += rows
+        self._idle, self._motions = 0, len(self.reader.record)
+        if stated:
+            self.reader.forget_cycle()
 
     def _end_of_tape(self) -> int:
         """Number of valid rows: if the first line is a `%`, those before the next one."""

@@ -2,6 +2,8 @@
 
 import math
 
+FEED_DIGITS = 6  # significant digits of a feed
+
 
 def decimals(resolution_mm: float, unit_mm: float) -> int:
     """Digits after the point so that one step of the last digit is not coarser than `resolution_mm`."""
@@ -23,7 +25,7 @@ def plain(value: float, digits: int, point: bool = True) -> str:
     return text[1:] if text.startswith("-") and float(text) == 0.0 else text
 
 
-def significant(value: float, digits: int = 6, point: bool = False) -> str:
+def significant(value: float, digits: int = FEED_DIGITS, point: bool = False) -> str:
     """A feed with `digits` significant digits; whole numbers get a decimal point only with `point`."""
     if value <= 0.0:
         return "0"

@@ -1,21 +1,27 @@
 """Recorder of the motions of an executed program, as arrays."""
 
+from __future__ import annotations
+
 import math
 from array import array
 from collections.abc import Sequence
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
 from camcomp.gcode.arcs import PLANES
 from camcomp.gcode.path_mode import PathMode
-from camcomp.gcode.program import LETTERS, Sites
+from camcomp.gcode.program import LETTERS, PLAIN_LETTERS, Sites
 from camcomp.gcode.state import ControlState
 from camcomp.gcode.text import Text
 from camcomp.gcode.words import Word
 from camcomp.ground import orientation
 from camcomp.ground.datatypes import ARC, LINE, RAPID, Path, frozen
 
+if TYPE_CHECKING:
+    from camcomp.gcode.plain_lines import PlainMotions
+
+NUMBERS = 33  # per motion
 _NO_CENTRE = [math.nan, math.nan, math.nan]
 
 
@@ -34,7 +40,7 @@ class Recorder:
     def __init__(self, text: Text) -> None:
         self._starts = text.starts
         self._count = 0
-        self._numbers = array("d")  # 33 per motion
+        self._numbers = array("d")  # NUMBERS per motion
         self._spans = array("q")  # 26 per motion
         self._line_first = 0
         self.code_stated = False
@@ -136,6 +142,28 @@ class Recorder:
             self.code_stated = self.feed_stated = False
         state.position = end
 
+    def plain_motions(self, row: int, found: PlainMotions, state: ControlState) -> None:
+        """Motions of plain lines, the first of which is line `row`; state: that in front of them."""
+        n = len(found.row)
+        numbers = np.zeros((n, NUMBERS))
+        numbers[:, 0], numbers[:, 1], numbers[:, 2] = row + found.row, found.kind, found.kind != RAPID
+        numbers[:, 3:6], numbers[:, 6:9], numbers[:, 9:12] = found.start, found.end, math.nan
+        numbers[:, 13] = np.where(found.kind == RAPID, math.nan, found.feed)
+        numbers[:, 14:20] = (state.speed, state.tool, state.unit, *state.offset)
+        flags = 2 | state.centre_absolute << 3 | found.code_stated.astype(int) << 4 | found.feed_stated.astype(int) << 5
+        flags |= ((found.begin[:, :3] >= 0) << np.array([8, 9, 10])).sum(axis=1)
+        numbers[:, 20:22], numbers[:, 22], numbers[:, 23] = (state.plane, state.feed_mode), flags, found.feed
+        numbers[:, 24], numbers[0, 25], numbers[:, 26] = state.sense, state.waits, state.feed_unit
+        numbers[:, 27:30] = numbers[:, 30:33] = state.turns_to
+        numbers[0, 27:30] = state.turned
+        spans = np.full((n, len(LETTERS), 2), -1, np.int64)
+        spans[:, [LETTERS.index(each) for each in PLAIN_LETTERS]] = np.stack((found.begin, found.finish), axis=2)
+        self._numbers.frombytes(numbers.tobytes())
+        self._spans.frombytes(spans.tobytes())
+        self.modes += [state.path_mode] * n
+        self._count += n
+        state.turned, state.waits = state.turns_to, False
+
     def cycle(self, actions: list[tuple[str, list[float]]], irreplaceable: str) -> None:
         """Record a canned cycle: its actions in order, and the reason why moves cannot replace it (empty: they can)."""
         if self._count == self._line_first + 1:
@@ -151,7 +179,7 @@ class Recorder:
     def finish(self) -> tuple[Path, Sites]:
         """All motions as arrays."""
         n = self._count
-        a = np.frombuffer(self._numbers, float).reshape(n, -1) if n else np.zeros((0, 33))
+        a = np.frombuffer(self._numbers, float).reshape(n, -1) if n else np.zeros((0, NUMBERS))
         spans = np.frombuffer(self._spans, np.int64).reshape(n, 13, 2) if n else np.zeros((0, 13, 2), np.int64)
         kind = a[:, 1].astype(np.int8)
         flags = a[:, 22].astype(np.int64)

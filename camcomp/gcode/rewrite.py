@@ -4,7 +4,10 @@ The writer tracks the state of the controller through its own output: rounded po
 word is written exactly if the controller would otherwise move differently.
 """
 
+from __future__ import annotations
+
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,8 +21,14 @@ from camcomp.gcode.output import Output, Part, Rewritten, Standing
 from camcomp.gcode.program import P, Program, R, Rebase
 from camcomp.gcode.stamp import stamp_index, stamp_line
 from camcomp.gcode.text import Text
-from camcomp.ground.datatypes import ARC, RAPID, Floats
+from camcomp.ground.datatypes import ARC, RAPID, Floats, Ints
 from camcomp.ground.errors import ProgramError
+
+if TYPE_CHECKING:
+    from camcomp.gcode.plain_writer import PlainWriter
+
+MIN_MOTIONS = 256  # of a program that is searched for runs of plain motions
+MIN_RUN = 4  # motions; shorter runs are written one by one
 
 
 def rewrite(
@@ -72,6 +81,7 @@ class Writer(LineEditor):
         self.out = out
         self.turns = program.language.writes_turns
         self.inserted = 0  # new lines so far
+        self._runs: PlainWriter | None = None
         self.ours = ""  # path mode written by this writer and in force; empty: the program's
         self.stated = program.setup.path_mode  # last one of the program
         self.ends = np.empty((len(out.motion), 3))
@@ -83,29 +93,80 @@ class Writer(LineEditor):
     def run(self) -> None:
         """Fill `edits`, `ends` (N, 3) and `lines` (N,), which counts from 0 and without the stamp."""
         n = len(self.path)
-        bounds = np.searchsorted(self.out.motion, np.arange(n + 1)).tolist()
+        bounds = np.searchsorted(self.out.motion, np.arange(n + 1))
+        if (np.diff(bounds) == 0).any():
+            raise ValueError(f"Output has no row for motion {int(np.argmin(np.diff(bounds)))}")
         rebases = list(self.program.rebases)
-        for k in range(n):
+        self._find_runs(bounds)
+        k = 0
+        while k < n:
             while rebases and rebases[0].motion <= k:
                 self._rebase(rebases.pop(0))
-            if bounds[k] == bounds[k + 1]:
-                raise ValueError(f"Output has no row for motion {k}")
-            self._motion(k, bounds[k], bounds[k + 1])
+            k = self._advance(k, n, bounds)
         for each in rebases:
             self._rebase(each)
 
     def run_part(self, part: Part) -> Standing:
         """Fill `edits` for some motions, and `ends` (N, 3) for all rows; return the state of the controller after them."""
-        bounds = np.searchsorted(self.out.motion, np.arange(len(self.path) + 1)).tolist()
+        bounds = np.searchsorted(self.out.motion, np.arange(len(self.path) + 1))
         self.ends[:] = self.out.end
         self.lines[:] = 0
         if bounds[part.first]:
             self.ends[bounds[part.first] - 1] = part.before.position
         self.position, self.code, self.feed = [*part.before.position], part.before.code, part.before.feed
-        for k in range(part.first, part.last):
-            self._motion(k, bounds[k], bounds[k + 1])
+        self._find_runs(bounds)
+        k = part.first
+        while k < part.last:
+            k = self._advance(k, part.last, bounds)
         x, y, z = map(float, self.position)
         return Standing((x, y, z), self.code, self.feed)
+
+    # --- runs of plain motions ---------------------------------------------------------------------------------
+
+    def _find_runs(self, bounds: Ints) -> None:
+        """Load the compiled writer where the program is long enough for it."""
+        if len(self.path) < MIN_MOTIONS:
+            return
+        from camcomp.gcode.plain_writer import PlainWriter  # loads the compiler, which short programs do not wait for
+
+        self._runs = PlainWriter(self.program, self.out, self.resolution, bounds)
+
+    def _advance(self, k: int, last: int, bounds: Ints) -> int:
+        """Write motion k, or the run of plain motions that it begins, up to `last`; the motion behind it."""
+        if self._runs is not None:
+            behind = min(int(self._runs.behind[k]), last)
+            if behind - k >= MIN_RUN and self._holds_mode(k, int(bounds[k])):
+                self._run(k, behind, bounds)
+                return behind
+        self._motion(k, int(bounds[k]), int(bounds[k + 1]))
+        return k + 1
+
+    def _holds_mode(self, k: int, row: int) -> bool:
+        """Whether the path mode in force is that of the row, so that no line has to state it."""
+        assert self.out.rest is not None and self.out.apart is not None
+        mode, apart = self.program.modes[k], self.out.apart[row]
+        said = mode.apart.said(float(self.sites.unit[k])) if apart else ""
+        return mode is self.stated and self.ours == (self.program.language.exact_stop if self.out.rest[row] else said)
+
+    def _run(self, a: int, b: int, bounds: Ints) -> None:
+        """Motions a to b by the compiled writer."""
+        assert self._runs is not None
+        self.open(a)
+        feed = self.feed[1] if self.feed is not None and self.feed[0] == 94 else None
+        done = self._runs.write(a, b, self.position, self.code, feed, self.half)
+        rows, sites = slice(int(bounds[a]), int(bounds[b])), self.sites
+        motion, joining = self.out.motion[rows], self.out.joining[rows]
+        position = np.arange(rows.start, rows.stop)
+        first_own = np.full(b - a, rows.stop)
+        np.minimum.at(first_own, motion[~joining] - a, position[~joining])
+        main = first_own[motion - a]
+        new = position != main
+        before = self.inserted + np.cumsum(new) - new
+        self.lines[rows] = sites.row[motion] + before + (position > main)
+        self.inserted += int(new.sum())
+        self.ends[rows], self.feeds[rows] = done.ends, done.feeds
+        self.edits.replace(int(self.text.starts[sites.row[a]]), int(self.text.ends[sites.row[b - 1]]), done.text)
+        self.position, self.code, self.feed = done.position, done.code, None if done.feed is None else (94, done.feed)
 
     # --- one motion --------------------------------------------------------------------------------------------
 

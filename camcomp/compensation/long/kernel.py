@@ -18,8 +18,8 @@ from typing import Any
 
 import numpy as np
 
+from camcomp.ground.compiled import entry, inner
 from camcomp.ground.datatypes import RAPID, Floats, Ints
-from camcomp.model.statics.compiled import entry, inner
 from camcomp.model.statics.vectors import cross, dot, part, plus
 
 MISSING, SPLIT, EXACT = -3, -1, -2  # what a cell can be besides a tile

@@ -6,9 +6,9 @@
 import math
 
 from camcomp.compensation.long.kernel import path_force, set_row
+from camcomp.ground.compiled import entry, inner
 from camcomp.ground.datatypes import RAPID
 from camcomp.model.cutting.track import NO_FORCE, SAME_FORCE
-from camcomp.model.statics.compiled import entry, inner
 from camcomp.model.statics.vectors import dot, part, plus
 
 

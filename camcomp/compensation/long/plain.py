@@ -10,7 +10,6 @@ import numpy as np
 from camcomp.compensation.bands.outcome import Bands, BandTotals
 from camcomp.compensation.bands.scatter import best_share, excess
 from camcomp.compensation.long.carry import Carry
-from camcomp.compensation.long.fastwrite import ROOM, write_rows
 from camcomp.compensation.long.field import Field, Tiles
 from camcomp.compensation.long.kernel import BASIC, follow, look_up
 from camcomp.compensation.long.loads import Edge, Loads, constant_of, joints_at, loads_of
@@ -22,10 +21,11 @@ from camcomp.compensation.program.moves import chord_budget
 from camcomp.compensation.program.policy import left_alone
 from camcomp.compensation.program.under_control import apart_pays, merging, rests_of, rounds
 from camcomp.gcode.dialect import Dialect
+from camcomp.gcode.plain_rows import MAX_ROW_BYTES, write_rows
 from camcomp.ground.datatypes import LINE, RAPID, Bools, Floats, Ints
 from camcomp.model.control import limits_of
 from camcomp.model.job import Job
-from camcomp.model.statics.solve import FREE, TARGET, solve, threads
+from camcomp.model.statics.solve import FREE, TARGET, inverse, solve, threads
 from camcomp.model.trajectory.moves import line_moves
 
 ROUNDS = 5
@@ -368,7 +368,7 @@ class PlainCorrector:
         far = np.abs(off).max(axis=1) > COARSE_MM
         lost = np.flatnonzero((tile < 0) | (self.resolution > COARSE_MM) | far)
         if len(lost):
-            out[lost] = solve(self.machine, FREE, frame.to_machine(done.written[lost]), check=False).rho_nominal
+            out[lost] = inverse(self.machine, frame.to_machine(done.written[lost]))
         if far.any():
             told, force = frame.to_machine(done.written[far]), frame.vectors(done.rows.force[far])
             drive = drive.copy()
@@ -439,7 +439,7 @@ class PlainCorrector:
         own = (mode.apart if apart else mode).said(run.state.unit)
         modes = [np.frombuffer(each.encode(), np.uint8) for each in (self.language.exact_stop, own)]
         first = np.searchsorted(loads.of[rows.move], np.arange(run.motions + 1))
-        out = np.empty(run.text_end - run.text_at + ROOM * (N + 1 + int(rest.sum())), np.uint8)
+        out = np.empty(run.text_end - run.text_at + MAX_ROW_BYTES * (N + 1 + int(rest.sum())), np.uint8)
         written, held = np.empty((N, 3)), np.empty(N)
         position, state = carry.written.copy(), np.array([carry.code, carry.feed])
         unit = run.state.unit

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from camcomp.compensation.long.fastread import Plain
+from camcomp.gcode.plain_lines import PlainMotions
 from camcomp.gcode.state import ControlState
 from camcomp.ground.datatypes import Floats, Ints
 
@@ -32,7 +32,7 @@ class PlainRun:
     text_at: int
     text_end: int
     row0: int  # lines of the program before it
-    plain: Plain
+    plain: PlainMotions
     state: ControlState  # behind it; position, motion and feed as at its end
     waits: bool  # the control waits for something in front of it
 
@@ -43,7 +43,7 @@ class PlainRun:
 
     def parts(self, of: Ints, start: Floats, end: Floats) -> PlainRun:
         """A run of parts (n,) of these motions, from start (n, 3) to end (n, 3)."""
-        plain = Plain(*(each[of] for each in self.plain))  # type: ignore[arg-type]
+        plain = PlainMotions(*(each[of] for each in self.plain))  # type: ignore[arg-type]
         return replace(self, plain=plain._replace(start=start, end=end))
 
     def before(self, motion: int) -> ControlState:

@@ -14,10 +14,10 @@ from typing import BinaryIO
 
 import numpy as np
 
-from camcomp.compensation.long.fastread import LONGEST_END, MORE, Plain, scan
 from camcomp.compensation.long.plain_run import NotInPieces, PlainRun
 from camcomp.gcode.detect import dialect_of
 from camcomp.gcode.interpret import Interpreter, controller
+from camcomp.gcode.plain_lines import LONGEST_END, MORE, PlainMotions, scan
 from camcomp.gcode.program import Program
 from camcomp.gcode.setup import Setup
 from camcomp.gcode.state import ControlState
@@ -165,7 +165,7 @@ class Runs:
             or state.motion not in (None, 0, 10)
         ):
             return None
-        room = Plain.room(limit)
+        room = PlainMotions.room(limit)
         code = -1 if state.motion is None else state.motion // 10
         position, offset = np.array(state.position), np.array(state.offset)
         pointed = self.language.increments

@@ -16,7 +16,7 @@ from camcomp.model.cutting.track import Track
 from camcomp.model.effect import Cause
 from camcomp.model.error_table.table import ErrorTable
 from camcomp.model.job import Job
-from camcomp.model.statics.solve import FREE, solve
+from camcomp.model.statics.solve import inverse
 
 _LEAST = 1e-6  # of a piece: what lies nearer to its ends is an end
 
@@ -37,7 +37,7 @@ def cut_at_knots(job: Job, track: Track, spacing: float) -> Track:
     tip = job.frame.to_machine(track.points(trial.piece, trial.w))
     machine = job.real_machine
     reference = tip - machine.nominal.held_rotation @ machine.nominal.tool
-    actuators = solve(machine, FREE, tip, check=False).rho_nominal
+    actuators = inverse(machine, tip)
     on = corrected[trial.piece]
     within = on[:-1] & on[1:] & (trial.piece[1:] == trial.piece[:-1])
     passed: list[tuple[Floats, Iterable[float]]] = []

@@ -8,11 +8,11 @@ from typing import BinaryIO, Protocol
 
 import numpy as np
 
-from camcomp.compensation.long.fastwrite import csv_rows
 from camcomp.compensation.long.totals import Batch
 from camcomp.compensation.program.compensate import Compensated
 from camcomp.compensation.report.parquet import SUFFIX, ParquetTable
 from camcomp.compensation.report.tables import decimals_of, joint_columns, joint_csv, values_behind
+from camcomp.gcode.plain_rows import csv_rows
 from camcomp.ground.datatypes import Floats, Ints
 from camcomp.model.job import Job
 

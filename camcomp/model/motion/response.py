@@ -23,7 +23,7 @@ from camcomp.model.statics.lengths import LENGTH_STEP_MM, lengthened
 from camcomp.model.statics.machine import Machine, build_machine
 from camcomp.model.statics.masses import MassLoads, has_moved_mass, mass_loads, mass_loads_around
 from camcomp.model.statics.rotation import exp_rotation
-from camcomp.model.statics.solve import FREE, INVERSE, State, solve
+from camcomp.model.statics.solve import FREE, State, inverse, solve
 from camcomp.model.statics.target import Correction, correct, settle
 
 SETTLED_MM = 2e-5  # residual at which the correction of effects ends
@@ -82,7 +82,7 @@ def respond(
         rows = np.concatenate(([0], np.arange(len(commanded))))
         other = None if nominal_of is None else nominal_of[rows]
         if rho is not None:
-            begin = solve(job.real_machine, INVERSE, job.frame.to_machine(before[None]), check=False).rho_nominal
+            begin = inverse(job.real_machine, job.frame.to_machine(before[None]))
             rho = np.concatenate((begin, rho))
         tip, found = respond(job, np.concatenate((before[None], commanded)), travel.take(rows), other, rho=rho)
         return tip[1:], Correction(**{each.name: getattr(found, each.name)[1:] for each in fields(found)})
@@ -91,8 +91,8 @@ def respond(
     if not job.causes:
         loaded, settled = settle(job.real_machine, told, travel.force, None, aim, rotation=travel.rotation)
         return _finite(job, job.frame.to_program(loaded), settled)
-    control = solve(job.real_machine, FREE, told, aim_rotation=travel.rotation, check=False)
-    setpoint = control.rho_nominal if rho is None else rho
+    nominal = inverse(job.real_machine, told, travel.rotation)
+    setpoint = nominal if rho is None else rho
     motion = _motion(job, setpoint, travel)
     loading = cache(partial(signal_path.loaded, job.causes, motion, travel.force))
 
@@ -111,9 +111,8 @@ def respond(
         )
         return np.nan_to_num(where.drive)
 
-    nominal = control.rho_nominal
     if aim is not None:
-        nominal = solve(job.real_machine, FREE, aim, aim_rotation=travel.rotation, check=False).rho_nominal
+        nominal = inverse(job.real_machine, aim, travel.rotation)
     masses = cache(partial(_mass_loads, job, nominal, travel)) if has_moved_mass(job.real_machine.robot) else None
     motion = replace(motion, names=job.real_machine.actuators, held=held, told=lambda: commanded, masses=masses)
     error, guided = signal_path.driven(job.causes, job.real_machine.actuators, motion)
@@ -143,9 +142,7 @@ def _mass_loads(job: Job, rho: Floats, travel: Travel) -> MassLoads:
     loads = mass_loads(robot, np.nan_to_num(rho))
     if around is not None:
         tips = (job.frame.to_machine(each) for each in around)
-        near = [
-            solve(job.real_machine, FREE, each, aim_rotation=travel.rotation, check=False).rho_nominal for each in tips
-        ]
+        near = [inverse(job.real_machine, each, travel.rotation) for each in tips]
         known = np.isfinite(rho).all(axis=1) & np.isfinite(near).all(axis=(0, 2))
         moved = mass_loads_around(robot, rho[known], [each[known] for each in near], AROUND_S)
         loads.drive[known] = moved.drive
@@ -162,7 +159,7 @@ def _lengthening(job: Job, told: Floats, grown: Floats | None, rotation: Floats 
         return out
     machine, none = job.real_machine, np.zeros_like(told)
     aim = told, rotation
-    rho = _turned(machine, *aim).rho_nominal
+    rho = inverse(machine, *aim)
     here = _turned(machine, *aim, force=none, rho=rho).tip
     for j in np.flatnonzero(grown.any(axis=0)):
         longer = build_machine(lengthened(machine.robot, machine.actuators[j], LENGTH_STEP_MM), machine.nominal)
@@ -219,7 +216,7 @@ def aim_pose(
     """
     told = job.frame.to_machine(commanded)
     exact = without_drives(job, target, travel, pose=True)
-    rho = solve(job.real_machine, INVERSE, told, check=False).rho_nominal
+    rho = inverse(job.real_machine, told)
     on = on & (exact.status == 0)
     rho[on] = exact.rho[on]
     if not job.causes:
@@ -254,10 +251,10 @@ def _rates(job: Job, tip: Floats) -> Floats:
     held = machine.nominal.held_rotation
     out = []
     for axis in np.eye(3):
-        out.append([solve(machine, INVERSE, tip + s * RATE_STEP * axis, check=False).rho_nominal for s in (1, -1)])
+        out.append([inverse(machine, tip + s * RATE_STEP * axis) for s in (1, -1)])
     for axis in np.eye(3):
         turned = [exp_rotation(s * RATE_STEP / POSE_SCALE[3] * axis) @ held for s in (1, -1)]
-        out.append([solve(machine, INVERSE, tip, aim_rotation=R, check=False).rho_nominal for R in turned])
+        out.append([inverse(machine, tip, R) for R in turned])
     steps = 2.0 * RATE_STEP / POSE_SCALE
     return np.stack([(a - b) / step for (a, b), step in zip(out, steps, strict=True)], axis=2)
 
@@ -280,7 +277,7 @@ def without_drives(
     load = Load(travel.force, np.zeros((len(target), 6)))
     if job.causes:
         told = job.frame.to_machine(target)
-        nominal = solve(job.real_machine, FREE, told, aim_rotation=travel.rotation, check=False).rho_nominal
+        nominal = inverse(job.real_machine, told, travel.rotation)
         load = signal_path.loaded(job.causes, _motion(job, nominal, travel), travel.force)
     aim = job.frame.to_machine(target)
     return correct(job.real_machine, aim, load.force, load.wrench, method, pose=pose, rotation=travel.rotation)
@@ -314,9 +311,7 @@ def _lost_motion(job: Job, carriage: Floats, travel: Travel) -> Floats:
 
 def behind_encoders(job: Job, commanded: Floats, travel: Travel) -> tuple[Floats, Floats]:
     """Encoders (n, m) of commanded tips (n, 3), program frame, and carriage minus encoder (n, m) by the memory of drives."""
-    rho = solve(
-        job.real_machine, FREE, job.frame.to_machine(commanded), aim_rotation=travel.rotation, check=False
-    ).rho_nominal
+    rho = inverse(job.real_machine, job.frame.to_machine(commanded), travel.rotation)
     motion = _motion(job, rho, travel)
     still = replace(motion, ordered=False, direction=np.zeros_like(rho))
     moving, standing = (signal_path.driven(job.causes, job.real_machine.actuators, each)[0] for each in (motion, still))
@@ -330,8 +325,7 @@ def _tip_way(job: Job, tip: Floats, by: Floats, rotation: Floats | None = None) 
     """
     h = 1e-3
     rates = [
-        (solve(job.real_machine, FREE, tip + h * axis, aim_rotation=rotation, check=False).rho_nominal
-         - solve(job.real_machine, FREE, tip - h * axis, aim_rotation=rotation, check=False).rho_nominal) / (2.0 * h)
+        (inverse(job.real_machine, tip + h * axis, rotation) - inverse(job.real_machine, tip - h * axis, rotation)) / (2.0 * h)
         for axis in np.eye(3)
     ]  # fmt: skip
     slopes = np.stack(rates, axis=2)

@@ -19,7 +19,7 @@ Source: Pashkevich, Klimchik, Chablat, Mech. Mach. Theory 46 (2011) 662-679, loa
 
 import math
 
-from camcomp.model.statics.compiled import inner
+from camcomp.ground.compiled import inner
 from camcomp.model.statics.kernel import pull, subtract_hessian, walk
 from camcomp.model.statics.layout import (
     ACT,

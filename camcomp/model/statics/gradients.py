@@ -3,8 +3,8 @@
 # mypy: disallow-untyped-defs=False, disallow-incomplete-defs=False
 # numba infers the types of these functions; written by hand they would only be repeated.
 
+from camcomp.ground.compiled import entry
 from camcomp.model.statics.chain import advance, evaluate
-from camcomp.model.statics.compiled import entry
 from camcomp.model.statics.kernel import walk
 from camcomp.model.statics.layout import A_CHAIN, A_ELEMENT, A_VAR, ACT_FIRST, ACTS, SIZE, SPRINGS, STIFFNESS
 from camcomp.model.statics.point import evaluate_machine

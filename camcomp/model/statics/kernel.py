@@ -10,7 +10,7 @@ Lie theory for state estimation in robotics", eqs. (132)-(145).
 
 import math
 
-from camcomp.model.statics.compiled import inner
+from camcomp.ground.compiled import inner
 from camcomp.model.statics.layout import (
     AHEAD,
     AXIS,

@@ -16,8 +16,8 @@ the machine; while steps are short the factored matrices serve several passes. T
 
 import math
 
+from camcomp.ground.compiled import inner
 from camcomp.model.statics.chain import add_loads, advance, answer, carry, evaluate, factor
-from camcomp.model.statics.compiled import inner
 from camcomp.model.statics.layout import (
     A_CHAIN,
     A_VAR,

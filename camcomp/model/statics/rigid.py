@@ -7,7 +7,7 @@ assembly mode. Position and orientation are weighed with MACHINE_LENGTH.
 # mypy: disallow-untyped-defs=False, disallow-incomplete-defs=False
 # numba infers the types of these functions; written by hand they would only be repeated.
 
-from camcomp.model.statics.compiled import inner
+from camcomp.ground.compiled import inner
 from camcomp.model.statics.kernel import walk
 from camcomp.model.statics.layout import (
     A_VAR,

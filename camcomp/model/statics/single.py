@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from camcomp.model.statics.compiled import direct
+from camcomp.ground.compiled import direct
 from camcomp.model.statics.layout import new_memory, new_work
 from camcomp.model.statics.machine import Machine
 from camcomp.model.statics.rigid import OK

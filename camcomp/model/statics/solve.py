@@ -150,3 +150,11 @@ def solve(
     f0 = machine.elastic.chain[:, SPRINGS]
     F = np.stack([kept[:, c, k : k + 6] for c, k in enumerate(f0)], axis=1)
     return State(tip, R, tilt, commanded, r, nominal, drive, f, status, passes, kept, F, R_cmd, total)
+
+
+def inverse(machine: Machine, tip: Array, rotation: Array | None = None) -> Array:
+    """Actuator coordinates (n, m) that the controller computes for tips (n, 3); NaN out of reach.
+
+    rotation (n, 3, 3): commanded orientation of the platform; None: the one that the machine holds.
+    """
+    return solve(machine, INVERSE, tip, aim_rotation=rotation, check=False).rho_nominal

@@ -5,7 +5,7 @@
 
 import math
 
-from camcomp.model.statics.compiled import entry, inner
+from camcomp.ground.compiled import entry, inner
 from camcomp.model.statics.layout import A_CHAIN, A_VAR, SPRINGS
 from camcomp.model.statics.point import HOLD, INVERSE, POSE, TARGET, drive_forces, solve_point
 from camcomp.model.statics.rigid import OK, OUT_OF_REACH, kinematics

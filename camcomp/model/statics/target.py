@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from camcomp.model.statics.arm import NEAR_SINGULAR, arm_of, dexterity
 from camcomp.model.statics.machine import Machine
 from camcomp.model.statics.rigid import MAX_ITERATIONS, SINGULAR
-from camcomp.model.statics.solve import FREE, HOLD, POSE, TARGET, State, solve
+from camcomp.model.statics.solve import FREE, HOLD, POSE, TARGET, State, inverse, solve
 
 Array = NDArray[np.float64]
 METHODS = ("newton", "stiffness", "fixed-point", "linear")
@@ -103,7 +103,7 @@ def settle(
     state = solve(machine, FREE, commanded, aim_rotation=rotation, force=force, wrench=wrench)
     rho_nominal = state.rho_nominal
     if aim is not None:
-        rho_nominal = solve(machine, FREE, aim, aim_rotation=rotation, force=np.zeros(3), check=False).rho_nominal
+        rho_nominal = inverse(machine, aim, rotation)
     state = replace(state, rho_nominal=rho_nominal, commanded=np.where(state.status[:, None] == 0, commanded, np.nan))
     return state.tip, Correction.of(state, state.passes)
 

@@ -8,7 +8,7 @@ A pose is an array of 12: rotation row by row, position. A table of vectors keep
 
 import math
 
-from camcomp.model.statics.compiled import inner
+from camcomp.ground.compiled import inner
 
 SERIES = 0.04  # rad^2: below it the closed forms lose digits and the series are exact to round-off
 

@@ -9,7 +9,7 @@ depends on the force at this one.
 
 import math
 
-from camcomp.model.statics.compiled import entry
+from camcomp.ground.compiled import entry
 from camcomp.model.stock.march import push_recent, settle_recent
 from camcomp.model.stock.measure import measure
 from camcomp.model.stock.places import PATH

@@ -9,7 +9,7 @@ the linear interpolation is below BENT).
 
 import math
 
-from camcomp.model.statics.compiled import inner
+from camcomp.ground.compiled import inner
 from camcomp.model.stock.foreseen import alike, as_foreseen, mix
 from camcomp.model.stock.front import BITE, WHAT
 from camcomp.model.stock.places import (

@@ -5,7 +5,7 @@
 
 import math
 
-from camcomp.model.statics.compiled import inner
+from camcomp.ground.compiled import inner
 from camcomp.model.stock.front import DEPTH, EDGE, END_ANGLE, TURNS, add_bite, angles_of, stands
 
 ASIDE = 0.02  # share of the step between two angles: distance from an edge

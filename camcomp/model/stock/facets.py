@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from camcomp.ground.compiled import entry
 from camcomp.ground.datatypes import Floats
-from camcomp.model.statics.compiled import entry
 from camcomp.model.stock.field import CELL, GX, GY, over_facet
 from camcomp.model.stock.shapes import StockShape
 from camcomp.model.stock.sweeps import NOWHERE

@@ -13,8 +13,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from camcomp.ground.compiled import inner
 from camcomp.ground.datatypes import Floats
-from camcomp.model.statics.compiled import inner
 from camcomp.model.stock.sweeps import NOWHERE, bottom, passes
 
 BOX, ROUND, MESH = 0, 1, 2

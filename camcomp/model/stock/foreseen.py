@@ -10,7 +10,7 @@ to slice.
 
 import math
 
-from camcomp.model.statics.compiled import inner
+from camcomp.ground.compiled import inner
 from camcomp.model.stock.field import ZMIN
 from camcomp.model.stock.front import AT, BITE, EDGE, END_ANGLE, FLOOR, least_angle, meets
 from camcomp.model.stock.sweeps import FLAT, KIND, radius_at, slope

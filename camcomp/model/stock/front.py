@@ -12,8 +12,8 @@ lie against the tool all round its front; these, `recent`, are evaluated one by 
 import math
 from typing import Any, NamedTuple
 
+from camcomp.ground.compiled import inner
 from camcomp.ground.datatypes import Floats
-from camcomp.model.statics.compiled import inner
 from camcomp.model.stock.field import CELL, ZMIN, above, height
 from camcomp.model.stock.sweeps import NOWHERE, TOOL, X0, X1, Y0, Y1, Z0, Z1, bottom, passes
 

@@ -5,7 +5,7 @@
 
 import math
 
-from camcomp.model.statics.compiled import entry, inner
+from camcomp.ground.compiled import entry, inner
 from camcomp.model.stock.chain import along_chain, chain_from
 from camcomp.model.stock.field import FREE, USED
 from camcomp.model.stock.front import EDGE, WHAT

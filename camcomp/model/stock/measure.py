@@ -5,7 +5,7 @@
 
 import math
 
-from camcomp.model.statics.compiled import inner
+from camcomp.ground.compiled import inner
 from camcomp.model.stock.cylinders import look_round
 from camcomp.model.stock.field import XMAX, XMIN, YMAX, YMIN, ZMAX
 from camcomp.model.stock.front import EDGE, ENGAGED, FLOOR, WHAT

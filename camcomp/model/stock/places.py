@@ -10,8 +10,8 @@ between neighbours is linear within BENT, or until they are JUMP_MM apart and di
 import math
 from typing import Any, NamedTuple
 
+from camcomp.ground.compiled import inner
 from camcomp.ground.datatypes import Floats
-from camcomp.model.statics.compiled import inner
 from camcomp.model.stock.foreseen import as_foreseen
 from camcomp.model.stock.front import DEPTH, WHAT, lay_back
 from camcomp.model.stock.measure import measure

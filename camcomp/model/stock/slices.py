@@ -5,7 +5,7 @@
 
 import math
 
-from camcomp.model.statics.compiled import inner
+from camcomp.ground.compiled import inner
 from camcomp.model.stock.field import ZMAX, ZMIN
 from camcomp.model.stock.front import (
     DEPTH,

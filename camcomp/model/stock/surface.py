@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from camcomp.ground.compiled import entry
 from camcomp.ground.datatypes import Floats
-from camcomp.model.statics.compiled import entry
 from camcomp.model.stock.field import height
 from camcomp.model.stock.memory import StockMemory
 from camcomp.model.stock.sweeps import NOWHERE

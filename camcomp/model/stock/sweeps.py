@@ -10,7 +10,7 @@ radius, tangent of the tip's half angle, lift of the tip. Every tool has a secon
 
 import math
 
-from camcomp.model.statics.compiled import inner
+from camcomp.ground.compiled import inner
 
 FLAT, BALL, BULL, DRILL = 0, 1, 2, 3
 X0, Y0, Z0, X1, Y1, Z1, TOOL, LENGTH, UX, UY, CLIMB, WAY = range(12)

@@ -3,7 +3,7 @@
 # mypy: disallow-untyped-defs=False, disallow-incomplete-defs=False
 # numba infers the types of these functions; written by hand they would only be repeated.
 
-from camcomp.model.statics.compiled import entry, inner
+from camcomp.ground.compiled import entry, inner
 from camcomp.model.stock.front import DEPTH, WHAT
 from camcomp.model.stock.places import BENT
 

@@ -12,7 +12,7 @@ Source: LinuxCNC 2.9, src/emc/tp/tp.c and blendmath.c.
 
 import numpy as np
 
-from camcomp.model.statics.compiled import entry, inner
+from camcomp.ground.compiled import entry, inner
 from camcomp.model.trajectory.rounding import ANGLE, LENGTH, NORMAL, rounded
 
 REST, ON, ROUND, OVERLAP, WAIT = 0, 1, 2, 3, 4

@@ -5,7 +5,7 @@
 
 import numpy as np
 
-from camcomp.model.statics.compiled import entry
+from camcomp.ground.compiled import entry
 
 MOST = 100  # most lines of a segment
 

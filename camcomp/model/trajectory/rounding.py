@@ -11,7 +11,7 @@ Source: LinuxCNC 2.9, src/emc/tp/blendmath.c.
 
 import numpy as np
 
-from camcomp.model.statics.compiled import inner
+from camcomp.ground.compiled import inner
 
 NORMAL = 0.5 * np.sqrt(3.0)  # of the acceleration: centripetal share; the tangential share is one half
 PARALLEL = 1e-12  # rad², square of the angle below which two planes are equal

@@ -5,7 +5,7 @@
 
 import numpy as np
 
-from camcomp.model.statics.compiled import entry, inner
+from camcomp.ground.compiled import entry, inner
 from camcomp.model.trajectory.corners import ON, OVERLAP, REST, ROUND, WAIT, pace
 
 STOP = 2.0  # cycles, measured: duration of a stop in addition to deceleration and acceleration

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from camcomp.ground import linked_code, machine_code, notes
-from camcomp.model.statics.compiled import entry, inner
+from camcomp.ground.compiled import entry, inner
 from tests.commandline import ROOT
 
 

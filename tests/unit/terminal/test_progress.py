@@ -224,13 +224,13 @@ import numpy as np, sys
 from camcomp.ground import headway
 told = []
 headway.hold = told.append
-from camcomp.model.statics import compiled
+from camcomp.ground import compiled
 sys.path.insert(0, sys.argv[1])
 import kernel
 kernel.twice(np.zeros(3))
 print("|".join(told))
 """
-    kernel = "from camcomp.model.statics.compiled import entry\n@entry\ndef twice(x):\n    x[0] = 2.0 * x[0]\n"
+    kernel = "from camcomp.ground.compiled import entry\n@entry\ndef twice(x):\n    x[0] = 2.0 * x[0]\n"
     (tmp_path / "kernel.py").write_text(kernel)
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": str(ROOT)}
     first, second = (

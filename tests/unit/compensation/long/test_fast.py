@@ -4,11 +4,11 @@ import numba
 import numpy as np
 import pytest
 
-from camcomp.compensation.long.fastread import MORE, ODD, Plain, scan
-from camcomp.compensation.long.fastwrite import ROOM, put_decimal, put_feed, write_rows
 from camcomp.gcode.interpret import read_program
 from camcomp.gcode.numbers import decimals, plain, significant
 from camcomp.gcode.output import Output
+from camcomp.gcode.plain_lines import MORE, ODD, PlainMotions, scan
+from camcomp.gcode.plain_rows import MAX_ROW_BYTES, put_decimal, put_feed, write_rows
 from camcomp.gcode.rewrite import rewrite
 from camcomp.ground.datatypes import LINE, RAPID
 
@@ -30,7 +30,7 @@ def scanned(
 ):
     """(motions, rows, index, reason, code, feed, ...) and the arrays of a scan."""
     data = np.frombuffer(text.encode("latin-1"), np.uint8)
-    room = Plain.room(1000)
+    room = PlainMotions.room(1000)
     place = np.array(position)
     found = scan(
         data, 0, len(data), last, code, feed, False, False, place, unit, np.array(offset), pointed, top, room, 1000
@@ -185,7 +185,7 @@ def test_lines_are_written_as_the_writer_of_whole_programs_writes_them(seed):
     body = text[len(HEAD) :]
     _, read = scanned(body)
     data = np.frombuffer(body.encode(), np.uint8)
-    out = np.empty(len(data) + ROOM * len(motion), np.uint8)
+    out = np.empty(len(data) + MAX_ROW_BYTES * len(motion), np.uint8)
     written, held = np.empty((len(motion), 3)), np.empty(len(motion))
     first = np.searchsorted(motion - 1, np.arange(len(read.row) + 1))
     position, state = np.array([1.0, 2.0, 3.0]), np.array([0.0, 500.0])

@@ -13,12 +13,12 @@ from typing import Any
 
 import numpy as np
 
-from camcomp.compensation.long.fastread import F, G
+from camcomp.gcode.plain_lines import F, G
+from camcomp.ground.compiled import entry, inner
 from camcomp.ground.datatypes import RAPID, Floats, Ints
-from camcomp.model.statics.compiled import entry, inner
 
 FEED_SLACK = 1.0e-3
-ROOM = 128  # bytes that a row needs at most, beside its line
+MAX_ROW_BYTES = 128  # bytes that a row needs at most, beside its line
 CELL_BYTES = 32  # bytes that a cell needs at most
 _LARGEST_NUMBER = 9.0e9  # a larger number with nine decimals does not fit into 64 bits
 _TENS = 10 ** np.arange(18)
@@ -105,7 +105,7 @@ def write_lines(data, text_at, text_end, lines, begin, finish, kind, programmed,
     """The bytes text_at..text_end of `data`, which hold n motions, with N rows in their place.
 
     lines (n, 3), begin and finish (n, 5), kind (n,), programmed (n, 3) mm, program_feed (n,): see
-    fastread.Plain.
+    plain_lines.PlainMotions.
     first (n + 1,): rows of every motion. joining (N,), rest (N,): ends at rest; at_rest, on: bytes of the
     lines in front of such rows and of the next that is none (begins -1: of the first in any case, else 0), wanted (N, 3) mm, feed (N,) mm/min (NaN: as programmed).
     position (3,) mm and state (2,) = motion code in force (-1 unknown), feed in force (NaN unknown):

@@ -13,10 +13,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from camcomp.ground.compiled import entry
 from camcomp.ground.datatypes import LINE, RAPID, Floats, Ints
-from camcomp.model.statics.compiled import entry
 
-# Columns of Plain.begin and Plain.finish.
+# Columns of PlainMotions.begin and Plain.finish.
 X, Y, Z, F, G = range(5)
 ODD, FULL, MORE, END = 0, 1, 2, 3  # why a scan stopped: an odd line, no room, the buffer ends within a line, the end
 LONGEST_END = 4  # bytes of an end of line, CR CR CR LF; see text.END_OF_LINE
@@ -24,7 +24,7 @@ _LARGEST_WORD = 1.0e7  # mm, as the interpreter has it
 _POWERS = 10.0 ** np.arange(23)
 
 
-class Plain(NamedTuple):
+class PlainMotions(NamedTuple):
     """Motions of consecutive plain lines, n of them."""
 
     row: Ints  # (n,) line, counted from the first line of the scan
@@ -39,16 +39,16 @@ class Plain(NamedTuple):
     feed_stated: np.ndarray
 
     @staticmethod
-    def room(n: int) -> Plain:
+    def room(n: int) -> PlainMotions:
         """Arrays for n motions."""
-        return Plain(
+        return PlainMotions(
             np.empty(n, np.int64), np.empty((n, 3), np.int64), np.empty((n, 5), np.int64), np.empty((n, 5), np.int64),
             np.empty(n, np.int8), np.empty((n, 3)), np.empty((n, 3)), np.empty(n), np.empty(n, np.bool_), np.empty(n, np.bool_),
         )  # fmt: skip
 
-    def take(self, a: int, b: int) -> Plain:
+    def take(self, a: int, b: int) -> PlainMotions:
         """Motions a to b, as views."""
-        return Plain(*(each[a:b] for each in self))  # type: ignore[arg-type]
+        return PlainMotions(*(each[a:b] for each in self))  # type: ignore[arg-type]
 
 
 def scan(*args: Any) -> tuple[Any, ...]:
