@@ -39,7 +39,7 @@ def watched() -> Iterator[Headway]:
     try:
         yield headway
     finally:
-        _watched.remove(headway)
+        _watched.pop()
 
 
 def done(share: float) -> None:

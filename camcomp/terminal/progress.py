@@ -6,8 +6,8 @@ import os
 import sys
 import threading
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from typing import Any
 
 import click
@@ -17,9 +17,12 @@ from camcomp.ground.headway import Headway, watched
 
 PATIENCE = 1.0  # s before the progress is shown
 TICK = 0.5  # s
+SELDOM = 10.0  # s between lines where nothing can be drawn anew
+WIPE = "\r\033[K"
 FILTER = "AXIS_PROGRESS_BAR"  # set by LinuxCNC's AXIS for its filters
 STEPS = 1000  # of a bar
 WIDE = 24  # characters of a bar
+_drawing: list[bool] = []  # whether the works in progress, innermost last, draw a line anew
 
 
 def lively() -> bool:
@@ -29,46 +32,45 @@ def lively() -> bool:
 
 @contextmanager
 def working(on: str, *, quiet: bool = False) -> Iterator[None]:
-    """Context that shows the input, the share done and the remaining time, or else the elapsed time, after PATIENCE.
+    """Say what is being worked on, how much of it is done and how long the rest may take; where that is unknown, the time so far.
 
-    The line is erased at the end.
+    On a terminal a line is drawn anew after a moment, and wiped at the end. Elsewhere a line is written every 10 s, so that
+    logs of CI jobs and services show it. LinuxCNC's AXIS gets the lines that it asks of filters.
     """
+    tell: AbstractContextManager[None]
     if FILTER in os.environ:
-        with _filter_progress():
+        tell = _telling(lambda headway: f"FILTER_PROGRESS={round(100.0 * (headway.share or 0.0))}\n", (TICK, TICK))
+        end = "FILTER_PROGRESS=100\n"
+    elif quiet:
+        tell, end = nullcontext(), ""
+    elif lively():
+        line = _Line(on)
+        tell, end = _telling(lambda headway: f"{WIPE}{line.text(headway)}", (PATIENCE, TICK)), WIPE
+    else:
+        spoken, began = shown(on), time.monotonic()
+        tell, end = _telling(lambda headway: f"{_spoken(spoken, began, headway)}\n", (SELDOM, SELDOM)), ""
+    _drawing.append(end == WIPE)
+    try:
+        with tell:
             yield
-        return
-    if quiet or not lively():
-        yield
-        return
-    stream, finished = sys.stderr, threading.Event()
-
-    def tell(headway: Headway) -> None:
-        line, pause = _Line(on), PATIENCE
-        while not finished.wait(pause):
-            stream.write(f"\r\033[K{line.text(headway)}")
-            stream.flush()
-            pause = TICK
-
-    with watched() as headway:
-        teller = threading.Thread(target=tell, args=(headway,), daemon=True)
-        teller.start()
-        try:
-            yield
-        finally:
-            finished.set()
-            teller.join()
-            stream.write("\r\033[K")
-            stream.flush()
+    finally:
+        _drawing.pop()
+        if end:
+            print(end, end="", file=sys.stderr, flush=True)
 
 
 @contextmanager
-def _filter_progress() -> Iterator[None]:
-    """Lines `FILTER_PROGRESS=share` in percent, from which AXIS draws the bar of a filter program."""
-    finished = threading.Event()
+def _telling(text: Callable[[Headway], str], pauses: tuple[float, float]) -> Iterator[None]:
+    """Write texts to standard error from another thread, the first after pauses[0] s, further ones pauses[1] s apart."""
+    stream, finished = sys.stderr, threading.Event()
 
     def tell(headway: Headway) -> None:
-        while not finished.wait(TICK):
-            print(f"FILTER_PROGRESS={round(100.0 * (headway.share or 0.0))}", file=sys.stderr, flush=True)
+        pause, later = pauses
+        while not finished.wait(pause):
+            with suppress(OSError):
+                stream.write(text(headway))
+                stream.flush()
+            pause = later
 
     with watched() as headway:
         teller = threading.Thread(target=tell, args=(headway,), daemon=True)
@@ -78,7 +80,20 @@ def _filter_progress() -> Iterator[None]:
         finally:
             finished.set()
             teller.join()
-            print("FILTER_PROGRESS=100", file=sys.stderr, flush=True)
+
+
+def _spoken(on: str, began: float, headway: Headway) -> str:
+    """One line of a log: share and remaining time, or what is known instead."""
+    spent = time.monotonic() - began
+    if headway.doing or not headway.share:
+        return f"{on}: {headway.doing + ', ' if headway.doing else ''}{_duration(spent)} so far"
+    rest = spent * (1.0 - headway.share) / headway.share
+    return f"{on}: {100.0 * headway.share:.0f} %, about {_duration(rest)} left"
+
+
+def _duration(seconds: float) -> str:
+    minutes, rest = divmod(round(seconds), 60)
+    return f"{minutes} min {rest} s" if minutes else f"{rest} s"
 
 
 class _Line:
@@ -108,6 +123,8 @@ class _Line:
 
 
 def say(*lines: str, quiet: bool = False) -> None:
-    """Write lines to standard error, unless quiet."""
+    """Write lines to standard error, unless quiet; a line that is being drawn there makes room."""
     if lines and not quiet:
+        if any(_drawing):
+            print(WIPE, end="", file=sys.stderr)
         print(shown("\n".join(lines)), file=sys.stderr)

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from camcomp import __version__
 from camcomp.ground.errors import CamcompError, FileError, PluginWarning, format_error
 from camcomp.ground.garbage import collect_seldom, keep_what_lives
+from camcomp.ground.headway import watched
 from camcomp.ground.notes import held, hold
 from camcomp.ground.old_names import keep_old_names
 from camcomp.model.config.spec import Config
@@ -77,7 +78,8 @@ def work(task: Task) -> Outcome:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", PluginWarning)  # told once, by the process that asks for the batch
-            return _compensate(task)
+            with watched():  # a program is one step of the batch around it
+                return _compensate(task)
     except CamcompError as error:
         return Outcome(task.key, error.exit_code, [_message(each, format_error(each)) for each in error.all()])
     except MemoryError:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
+from camcomp.ground import headway
 from camcomp.terminal.commands._options import (
     config_option,
     dialect_option,
@@ -14,7 +15,7 @@ from camcomp.terminal.commands._options import (
     quiet_option,
     stock_option,
 )
-from camcomp.terminal.progress import say
+from camcomp.terminal.progress import say, working
 
 if TYPE_CHECKING:
     from camcomp.api.batch import Status
@@ -72,11 +73,16 @@ def command(
         raise click.UsageError("--jobs is about this machine; a scheduler has its own workers")
     from camcomp.api.batch import compensate_many
 
-    done = compensate_many(
-        paths, configs, output_dir, jobs=jobs, scheduler=scheduler, joints=joints, method=method, tolerance_um=tolerance_um, stock=stock, if_compensated=if_compensated,
-        sarif_file=sarif_file, junit_file=junit_file, tell=partial(say, quiet=False),
-        on_status=lambda *args: _tell(*args) if not quiet or args[0].exit_code else None,
-    )  # fmt: skip
+    def on_status(status: Status, number: int, total: int) -> None:
+        headway.done(number / total)
+        if not quiet or status.exit_code:
+            _tell(status, number, total)
+
+    with working(f"compensating into {output_dir}", quiet=quiet):
+        done = compensate_many(
+            paths, configs, output_dir, jobs=jobs, scheduler=scheduler, joints=joints, method=method, tolerance_um=tolerance_um, stock=stock, if_compensated=if_compensated,
+            sarif_file=sarif_file, junit_file=junit_file, tell=partial(say, quiet=False), on_status=on_status,
+        )  # fmt: skip
     counts = ", ".join(f"{count} {name}" for name, count in done["counts"].items() if count)
     say(f"{done['programs']} programs: {counts}", quiet=quiet)
     out: int = done["exit_code"]

@@ -1,4 +1,4 @@
-"""Progress on a terminal, silence elsewhere."""
+"""Progress: a line drawn anew on a terminal, seldom lines elsewhere, nothing when quiet."""
 
 import io
 import os
@@ -215,6 +215,45 @@ def test_pipes_stay_silent_while_the_share_is_known(screen):
         headway.done(0.5)
         time.sleep(0.05)
     assert seen.getvalue() == ""
+
+
+def test_logs_get_a_line_now_and_then_with_share_and_remaining_time(screen, monkeypatch):
+    seen = screen(is_terminal=False)
+    monkeypatch.setattr(progress, "SELDOM", 0.05)
+    with progress.working("turning"):
+        time.sleep(0.07)
+        began = time.monotonic()
+        monkeypatch.setattr(progress.time, "monotonic", lambda: began + 90.0)
+        headway.done(0.25)
+        time.sleep(0.07)
+    told = seen.getvalue().splitlines()
+    assert told[0] == "turning: 0 s so far"
+    assert re.fullmatch(r"turning: 25 %, about 4 min (29|30|31) s left", told[1]), told
+    with progress.working("turning", quiet=True):
+        time.sleep(0.07)
+    assert seen.getvalue().splitlines() == told
+
+
+def test_what_is_said_meanwhile_has_a_line_of_its_own(screen):
+    seen = screen()
+    with progress.working("turning"):
+        time.sleep(0.05)
+        progress.say("a program is done")
+    assert "\r\033[Ka program is done\n" in seen.getvalue()
+    progress.say("the end")
+    assert seen.getvalue().endswith("\r\033[Kthe end\n")
+
+
+def test_a_batch_says_how_far_it_is(screen, tmp_path, monkeypatch):
+    for name in "ab":
+        (tmp_path / f"{name}.nc").write_text("G21 G90\nG0 X0 Y0 Z0\nG1 X1 F600\nM2\n")
+    screen(is_terminal=False)
+    told = []
+    original = headway.done
+    monkeypatch.setattr(headway, "done", lambda share: (original(share), told.append(headway._watched[0].share)))
+    words = ["batch", str(tmp_path), *WORDS[2:], "--output-dir", str(tmp_path / "out"), "--jobs", "1"]
+    assert run(words) == 0
+    assert [each for each in dict.fromkeys(told) if each is not None] == [0.5, 1.0]
 
 
 def test_compiling_is_told_for_what_it_is(tmp_path):
