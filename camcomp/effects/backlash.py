@@ -1,8 +1,13 @@
-"""Play between encoder and carriage: after a reversal the encoder moves by the full width before the carriage does."""
+"""Play between encoder and carriage: after a reversal the encoder moves by the full width before the carriage does.
+
+Where the load exceeds the friction behind the play it pushes the carriage to one flank, whatever the sense of travel.
+"""
 
 from collections.abc import Mapping
 
-from camcomp.ground.datatypes import Floats
+import numpy as np
+
+from camcomp.ground.datatypes import Bools, Floats
 from camcomp.model.effect import Motion, Parameter
 from camcomp.model.hysteresis import play
 
@@ -25,14 +30,34 @@ ROTARY = (
     ),
 )
 PARAMETERS = FITTED + ROTARY
+ROUND_OFF = 1e-6  # of the largest load of a drive: what the solver leaves of a load that is zero
 
 
 def on_drive(error: Floats, motion: Motion, which: Floats, p: Mapping[str, float]) -> Floats:
     """Carriage minus encoder (n, m), mm, or rad for a hinge; the carriage starts in the middle of its play."""
-    width = p.get("width_mm", 0.0) + p.get("width_rad", 0.0)
-    if width == 0.0 or not motion.ordered:
+    slide, hinge = p.get("width_mm", 0.0), p.get("width_rad", 0.0)
+    width, aimed = slide + hinge, which > 0
+    if width == 0.0:
         return error
-    aimed = which > 0
+    pushed = _load_side(motion, aimed, 0.0 if hinge else np.inf)
     out = error.copy()
-    out[:, aimed] += play(motion.encoder[:, aimed], width)
+    if motion.ordered:
+        out[:, aimed] += play(motion.encoder[:, aimed], width, pushed)
+    else:
+        out[:, aimed] += 0.5 * width * pushed
     return out
+
+
+def _load_side(motion: Motion, aimed: Bools, unstated: float) -> Floats:
+    """Flank (n, k) to which the load pushes the k carriages aimed at: 1 or -1, 0 where the friction behind the play holds them.
+
+    unstated: friction, N or N mm, where none is stated. Guides of slides hold the carriage; gears give way to weight.
+    """
+    friction = np.full(int(aimed.sum()), np.nan) if motion.friction is None else motion.friction[aimed]
+    friction = np.where(np.isnan(friction), unstated, friction)
+    if motion.held is None or np.isinf(friction).all():
+        return np.zeros((len(motion.time), len(friction)))
+    load = -motion.held()
+    nothing = ROUND_OFF * np.abs(load).max(axis=1, keepdims=True, initial=0.0)
+    load = load[:, aimed]
+    return np.asarray(np.sign(load) * (np.abs(load) > np.maximum(friction, nothing)), float)

@@ -59,6 +59,7 @@ _MORE_ROTARY = (
     Parameter("stribeck_Nmm", "Nmm", 0.0, 0.0, 5e6, 2e4, 100.0, _BREAKAWAY, sign=1),
     Parameter("stribeck_rad_per_s", "rad/s", 0.02, 1e-5, 10.0, 0.01, 0.0, "gears of arms: 0.005 to 0.2 rad/s", scan=(0.005, 0.02, 0.1)),
 )  # fmt: skip
+COULOMB = ("force_N", "force_Nmm")
 PARAMETERS = (FITTED[0], *_MORE, *FITTED[1:], *ROTARY[:2], *_MORE_ROTARY)
 
 

@@ -92,6 +92,7 @@ class Motion:
     told: Callable[[], Floats] | None = None  # (n, 3) mm, program frame
     cut_before_min: float = 0.0  # part of cut_min in earlier runs
     masses: Callable[[], MassLoads] | None = None
+    friction: Floats | None = None  # (m,) Coulomb force behind the play of a drive, N or N mm; NaN: not stated
     seams: Seams | None = None  # where a recording begins or goes on in motion; None: it starts at rest
 
     def at(self, instants: Ints | slice) -> Self:

@@ -137,19 +137,25 @@ def rate_limited(x: Floats, time: Floats, speed: float) -> Floats:
 
 
 @kept
-def _play(x, width):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _play(x, width, pushed):  # type: ignore[no-untyped-def]  # pragma: no cover
     y = np.empty_like(x)
     for j in range(x.shape[1]):
         state = x[0, j]
         for i in range(x.shape[0]):
+            if pushed[i, j] != 0.0:
+                state = x[i, j] + 0.5 * width * pushed[i, j]
             state = min(max(state, x[i, j] - 0.5 * width), x[i, j] + 0.5 * width)
             y[i, j] = state - x[i, j]
     return y
 
 
-def play(x: Floats, width: float) -> Floats:
-    """Carriage minus encoder (n, m) of a play of full `width` mm driven by x (n, m), centred at the start."""
-    out: Floats = _play(np.ascontiguousarray(x), width)
+def play(x: Floats, width: float, pushed: Floats | None = None) -> Floats:
+    """Carriage minus encoder (n, m) of a play of full `width` mm driven by x (n, m), centred at the start.
+
+    pushed (n, m): flank on which a load holds the carriage, 1 or -1; 0, and None: it stays on that of the last motion.
+    """
+    pushed = np.zeros_like(x) if pushed is None else pushed
+    out: Floats = _play(np.ascontiguousarray(x), width, np.ascontiguousarray(pushed))
     return out
 
 

@@ -72,6 +72,8 @@ def driven(causes: Sequence[Cause], actuators: tuple[str, ...], motion: Motion) 
     Effects with a force of their own come last: guides hold back the carriage, behind the screw and its play.
     """
     error = np.zeros_like(motion.encoder)
+    friction = friction_behind_play(causes, actuators)
+    motion = motion if friction is None else replace(motion, friction=friction)
     drives = list(_hooks(causes, "on_drive"))
     for guide in (False, True):
         if guide and any(cause.hook("on_drive_force") is not None for cause in causes):
@@ -80,6 +82,19 @@ def driven(causes: Sequence[Cause], actuators: tuple[str, ...], motion: Motion) 
             if (cause.hook("on_drive_force") is not None) == guide:
                 error = hook(error, motion, cause.which(actuators), cause.values)
     return error, motion
+
+
+def friction_behind_play(causes: Sequence[Cause], actuators: tuple[str, ...]) -> Floats | None:
+    """Coulomb force (m,) of the guides behind the play of every drive, N or N mm; NaN where no cause states one, None where none do.
+
+    What is within the tolerance of every healthy machine is not stated.
+    """
+    total = np.zeros(len(actuators))
+    for cause in causes:
+        for p in cause.effect.PARAMETERS:
+            if p.name in getattr(cause.effect, "COULOMB", ()) and cause.values.get(p.name, 0.0) > p.tolerance:
+                total += cause.values[p.name] * cause.which(actuators)
+    return np.where(total > 0.0, total, np.nan) if total.any() else None
 
 
 def drive_forces(causes: Sequence[Cause], actuators: tuple[str, ...], guided: Motion) -> Floats | None:

@@ -54,6 +54,7 @@ class EffectPlugin(Protocol):
     - MOMENTARY: True: on_drive and on_drive_force have no memory.
     - WARMS: compensate needs the temperature.
     - MODELLED_FORCE: True: an error of the force model, which does not change measured forces.
+    - COULOMB: names of parameters: Coulomb force at the guide, which holds a carriage within the play of its drive.
     - UNCORRECTABLE: True: compensate does not correct its error.
     - Params: Spec of further YAML keys, which are never fitted.
     """

@@ -17,6 +17,7 @@ from camcomp.compensation.program.arcs_out import Arcs, Bend
 from camcomp.compensation.program.chords import Nodes, second_derivative, trial_nodes
 from camcomp.compensation.program.corrected_rows import CorrectedRows, corrected_rows, output_of
 from camcomp.compensation.program.judged_points import JudgedPoints, Seen, judged_points, see, see_original, whole_pose
+from camcomp.compensation.program.load_turns import load_turns
 from camcomp.compensation.program.moves import (
     WITHIN_RAPID,
     chord_budget,
@@ -197,11 +198,14 @@ def _compensated(
     if orienting is not None:
         arcs = False  # a circle of the tip does not turn the tool as a correction needs it
         refuse_unfollowed(program, job, method, part)
-    track, turning = cut_at_reversals(job, cut_at_knots(job, base, spacing), spacing)
+    turns = load_turns(job, base)
+    track, turning = cut_at_reversals(job, cut_at_knots(job, turns.cut(base), spacing), spacing)
     shares = shares_of(job, base)
     if shares is not None:
         track, of = shares.divided(shares.with_jumps(track))
         turning = turning[of]
+    pushed = turns.pieces(base, track)
+    turning |= pushed
     corrected = corrected_pieces(path, track)
     feeding = corrected & (path.kind[track.motion] != RAPID)
     if part is not None:
@@ -252,7 +256,7 @@ def _compensated(
             part=part,
             model=job.fingerprint,
         )
-        points = judged_points(job, track, rows, feeding)
+        points = judged_points(job, track, rows, feeding & ~pushed)
         after = see(job, points, written.end, replace(rows.arcs, centre=written.centre), orienting, written.words)
         left = None
         if shares is not None:
@@ -309,7 +313,7 @@ def _compensated(
     )
     if control.apart:
         warnings += apart_warning(mode for mode in control.modes if merging(mode, program.language))
-    warnings += spindle_warning(still)
+    warnings += [*spindle_warning(still), *turns.warning()]
     if part is None:
         warnings += [*job.taken.remarks, *doubtful_force(job.config, path)]
         warnings += stock_warnings(stock_remarks(job.config, path, track.engaged))

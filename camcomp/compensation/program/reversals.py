@@ -42,12 +42,12 @@ def cut_at_reversals(job: Job, track: Track, spacing: float) -> tuple[Track, Boo
     on = corrected[trial.piece]
     piece, w = trial.piece[on], trial.w[on]
     travel = travel_of(job, track, piece, w)
-    carriage = without_drives(job, track.points(piece, w), travel).rho
-    if not np.isfinite(carriage).all():  # told later, with the line
+    found = without_drives(job, track.points(piece, w), travel)
+    if not np.isfinite(found.rho).all():  # told later, with the line
         return track, none
     feed = track.path.kind[track.motion] != RAPID
-    memory, friction = plays(job, carriage, travel), winds_up(job, carriage, travel)
-    carriage = carriage * way_per_unit(job)
+    memory, friction = plays(job, found, travel), winds_up(job, found, travel)
+    carriage = found.rho * way_per_unit(job)
     lines: set[tuple[int, float, float]] = set()
     cuts: Cuts = set()
     arm = carriage.shape[1] > WORDS
@@ -65,7 +65,7 @@ def cut_at_reversals(job: Job, track: Track, spacing: float) -> tuple[Track, Boo
             cuts.update((int(piece[k]), at) for at in (begin, *ends) if 0.0 < at < 1.0)
     if not cuts:
         return track, none
-    if arm:
+    if arm and memory.any():
         cuts |= taken_up(job, track, cuts, np.flatnonzero(memory), spacing)
     divided = cut_at(track, cuts)
     middle = 0.5 * (divided.u0 + divided.u1)

@@ -14,6 +14,7 @@ import numpy as np
 
 from camcomp.compensation.bands.outcome import BandTotals, band_figures
 from camcomp.compensation.program.chords import trial_nodes
+from camcomp.compensation.program.load_turns import load_turns
 from camcomp.compensation.program.matching import match_moves
 from camcomp.compensation.program.moves import (
     WITHIN_RAPID,
@@ -110,6 +111,7 @@ def verify(corrected: Program, original: Program, job: Job) -> Verified:
         residual, w = _residual(job, track, piece, commanded, guess, shares, rotation)
     # Rapids and starts are only there because drives remember them.
     judged = (f > 0.0) & (original.path.kind[track.motion[piece]] != RAPID)
+    judged &= ~load_turns(job, track).passed(piece, move, f, w)
     end = judged & (f == 1.0)
     control = _under_control(original, corrected, job, track, piece, move, commanded, w, judged, shares, rotation)
     missed, totals = None, None

@@ -32,6 +32,7 @@ FARTHER = 2.0  # times the squared residual before: growth beyond which steps ar
 REST_S = 60.0
 AROUND_S = 0.03  # half width of the difference for the acceleration: 0.6 mm at 20 mm/s
 AHEAD_MM = 2.0  # more than any play
+SURELY = 1.5  # times the play: farthest position of an encoder that is checked for a flank
 LEAST_MM = 2e-4  # smallest reversal after which a drive is moved through its play
 WORDS = 3  # actuators that X, Y, Z can move one by one
 GOES_ALONG = 1e-2  # weight of the others
@@ -95,25 +96,10 @@ def respond(
     setpoint = nominal if rho is None else rho
     motion = _motion(job, setpoint, travel)
     loading = cache(partial(signal_path.loaded, job.causes, motion, travel.force))
-
-    @cache
-    def held() -> Floats:  # for carriages at their set-points
-        load = loading()
-        where = solve(
-            job.real_machine,
-            FREE,
-            told,
-            aim_rotation=travel.rotation,
-            force=load.force,
-            wrench=load.wrench,
-            rho=motion.encoder,
-            check=False,
-        )
-        return np.nan_to_num(where.drive)
-
     if aim is not None:
         nominal = inverse(job.real_machine, aim, travel.rotation)
     masses = cache(partial(_mass_loads, job, nominal, travel)) if has_moved_mass(job.real_machine.robot) else None
+    held = cache(partial(_held, job, told, motion, travel))
     motion = replace(motion, names=job.real_machine.actuators, held=held, told=lambda: commanded, masses=masses)
     error, guided = signal_path.driven(job.causes, job.real_machine.actuators, motion)
     effort = signal_path.drive_forces(job.causes, job.real_machine.actuators, guided)
@@ -130,6 +116,13 @@ def respond(
     tip = signal_path.placed(job.causes, signal_path.clamped(job.causes, tip), load, motion)
     state = replace(state, commanded=told, rho=setpoint, rho_nominal=nominal, drive=drive)
     return _finite(job, tip, Correction.of(state, state.passes))
+
+
+def _held(job: Job, told: Floats, motion: Motion, travel: Travel) -> Floats:
+    """Drive forces (n, m) under load for carriages at their encoders, near the tips `told` (n, 3), machine frame."""
+    load = signal_path.loaded(job.causes, motion, travel.force)
+    where = _turned(job.real_machine, told, travel.rotation, force=load.force, wrench=load.wrench, rho=motion.encoder)
+    return np.nan_to_num(where.drive)
 
 
 def _mass_loads(job: Job, rho: Floats, travel: Travel) -> MassLoads:
@@ -223,7 +216,7 @@ def aim_pose(
         drive = np.where(on[:, None], exact.drive, np.nan)
         return replace(exact, rho=rho, drive=drive)
     if on.any():
-        rho[on] -= _lost_motion(job, exact.rho[on], travel.take(np.flatnonzero(on)))
+        rho[on] -= _lost_motion(job, exact.rho[on], exact.drive[on], travel.take(np.flatnonzero(on)))
     rates = np.nan_to_num(_rates(job, job.frame.to_machine(target)))
     aimed = job.correctable
     share, least, near, rings = 1.0, np.inf, rho, bool(signal_path.acting(job.causes, "control"))
@@ -289,7 +282,7 @@ def _through_play(job: Job, found: Correction, travel: Travel) -> Floats:
     Eq. (5) alone would pass the play in steps of the residual.
     """
     solved = found.status == 0
-    lag = _lost_motion(job, found.rho[solved], travel.take(np.flatnonzero(solved)))
+    lag = _lost_motion(job, found.rho[solved], found.drive[solved], travel.take(np.flatnonzero(solved)))
     out = np.zeros((len(solved), 3))
     if lag.any():
         rotation = None if travel.rotation is None else travel.rotation[solved]
@@ -297,25 +290,31 @@ def _through_play(job: Job, found: Correction, travel: Travel) -> Floats:
     return out
 
 
-def _lost_motion(job: Job, carriage: Floats, travel: Travel) -> Floats:
-    """Lost motion (n, m), carriage minus encoder, for carriages (n, m) that pass through their play at once."""
+def _lost_motion(job: Job, carriage: Floats, drive: Floats, travel: Travel) -> Floats:
+    """Lost motion (n, m), carriage minus encoder, for carriages (n, m) that pass through their play at once.
+
+    drive (n, m): drive forces there.
+    """
     length = way_per_unit(job)
     sense = ways(carriage * length, LEAST_MM)
-    motion = _motion(job, carriage + AHEAD_MM / length * sense, travel)
-    still = replace(motion, ordered=False, direction=np.zeros_like(carriage))
-    lag, standing = (signal_path.driven(job.causes, job.real_machine.actuators, each)[0] for each in (motion, still))
-    lag = lag - standing
+    motion = replace(_motion(job, carriage + AHEAD_MM / length * sense, travel), held=lambda: drive)
+    lag = _by_memory(job, motion)
     lag[sense == 0.0] = 0.0
     return lag
 
 
+def _by_memory(job: Job, motion: Motion) -> Floats:
+    """Carriage minus encoder (n, m) of a motion minus that of poses with the same loads."""
+    still = replace(motion, ordered=False, direction=np.zeros_like(motion.encoder))
+    return _drive_errors(job, motion) - _drive_errors(job, still)
+
+
 def behind_encoders(job: Job, commanded: Floats, travel: Travel) -> tuple[Floats, Floats]:
     """Encoders (n, m) of commanded tips (n, 3), program frame, and carriage minus encoder (n, m) by the memory of drives."""
-    rho = inverse(job.real_machine, job.frame.to_machine(commanded), travel.rotation)
-    motion = _motion(job, rho, travel)
-    still = replace(motion, ordered=False, direction=np.zeros_like(rho))
-    moving, standing = (signal_path.driven(job.causes, job.real_machine.actuators, each)[0] for each in (motion, still))
-    return motion.encoder, moving - standing
+    told = job.frame.to_machine(commanded)
+    motion = _motion(job, inverse(job.real_machine, told, travel.rotation), travel)
+    motion = replace(motion, held=cache(partial(_held, job, told, motion, travel)))
+    return motion.encoder, _by_memory(job, motion)
 
 
 def _tip_way(job: Job, tip: Floats, by: Floats, rotation: Floats | None = None) -> Floats:
@@ -341,26 +340,57 @@ def way_per_unit(job: Job) -> Floats:
     return np.where(job.real_machine.revolute, HINGE_MM, 1.0)
 
 
-def plays(job: Job, rho: Floats, travel: Travel) -> Bools:
+def plays(job: Job, found: Correction, travel: Travel) -> Bools:
     """Mask (m,) of actuators with lost motion: play, or wind-up against friction."""
-    return _differs(job, rho, travel, ordered=True)
+    motion = _found_motion(job, found, travel)
+    return _differ(job, replace(motion, ordered=False), motion)
 
 
-def winds_up(job: Job, rho: Floats, travel: Travel) -> Bools:
+def winds_up(job: Job, found: Correction, travel: Travel) -> Bools:
     """Mask (m,) of actuators whose drive winds up against friction over some travel of the carriage."""
-    return _differs(job, rho, travel, ordered=False)
+    poses = replace(_found_motion(job, found, travel), ordered=False)
+    return _differ(job, poses, replace(poses, direction=-poses.direction))
 
 
-def _differs(job: Job, rho: Floats, travel: Travel, *, ordered: bool) -> Bools:
-    """Mask (m,) of actuators whose carriage depends on the movement (ordered), or only on its direction."""
-    motion = _motion(job, rho, travel)
+def gives_way(job: Job) -> bool:
+    """Whether loads can push carriages from one flank of their play to the other."""
+    if not job.causes:
+        return False
+    home = job.real_machine.home[None]
+    nothing = Travel(np.zeros((1, 3)), np.zeros(1), np.zeros(1), np.zeros(1, np.bool_))
+    return bool(_on_flanks(job, _motion(job, home, nothing), np.full_like(home, np.finfo(float).max)).any())
+
+
+def load_flanks(job: Job, found: Correction, travel: Travel) -> tuple[Floats, Bools]:
+    """Carriage minus encoder (n, m) on the flanks to which loads push carriages, 0 where none does, and a mask (n,) of stable rows.
+
+    A row is unstable where the load has another sign at the encoder, a play away from the carriage.
+    """
+    motion = _motion(job, found.rho, travel)
+    flank = _on_flanks(job, motion, found.drive)
+    ahead = replace(motion, encoder=found.rho - SURELY * flank)
+    held = _held(job, found.commanded, ahead, travel)
+    return flank, np.asarray((_on_flanks(job, ahead, held) * flank >= 0.0).all(axis=1))
+
+
+def _on_flanks(job: Job, motion: Motion, drive: Floats) -> Floats:
     poses = replace(motion, ordered=False)
-    other = motion if ordered else replace(poses, direction=-motion.direction)
-    out = np.zeros(rho.shape[1], np.bool_)
-    for cause in signal_path.acting(job.causes, "drive"):
-        one, two = (signal_path.driven([cause], job.real_machine.actuators, each)[0] for each in (poses, other))
-        out |= (one != two).any(axis=0)
-    return out
+    return _drive_errors(job, replace(poses, held=lambda: drive)) - _drive_errors(job, poses)
+
+
+def _found_motion(job: Job, found: Correction, travel: Travel) -> Motion:
+    """Motion of the carriages of a solution, with their drive forces."""
+    return replace(_motion(job, found.rho, travel), held=lambda: found.drive)
+
+
+def _drive_errors(job: Job, motion: Motion) -> Floats:
+    """Carriage minus encoder (n, m)."""
+    return signal_path.driven(job.causes, job.real_machine.actuators, motion)[0]
+
+
+def _differ(job: Job, one: Motion, other: Motion) -> Bools:
+    """Mask (m,) of actuators whose carriage error differs between two motions."""
+    return np.asarray((_drive_errors(job, one) != _drive_errors(job, other)).any(axis=0))
 
 
 def _motion(job: Job, setpoint: Floats, travel: Travel) -> Motion:

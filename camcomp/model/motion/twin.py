@@ -184,6 +184,7 @@ class Twin:
         held = self._held(run_path, grid, causes, solved, robot, key)
         rows = replace(
             rows,
+            friction=signal_path.friction_behind_play(causes, self.actuators),
             held=lambda: run_path.row_place.of(held()),
             told=lambda: self._told(run_path, run_path.tip_place, run_path.tip_time),
         )

@@ -24,12 +24,16 @@ class Shift:
 
 @dataclass(frozen=True)
 class Joint:
-    """Actuated joint about ("turn") or along ("slide") a coordinate axis 0, 1, 2; stiffness None is rigid."""
+    """Actuated joint about ("turn") or along ("slide") a coordinate axis 0, 1, 2; stiffness None is rigid.
+
+    play: full width of a dead zone in its spring, which has no energy there.
+    """
 
     motion: str
     axis: int
     stiffness: float | None
     sign: float = 1.0
+    play: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -95,10 +99,12 @@ def settle(arm: list[Element], q: np.ndarray, force: np.ndarray, limit: int = 20
     n, k = len(q), _columns(arm)
     force = np.broadcast_to(np.asarray(force, float), (n, 3))
     stiffness, joints, free, at = np.zeros((k, k)), [], np.ones(k, bool), 0
+    loose = np.zeros(k)
     for e in arm:
         if isinstance(e, Joint):
             joints.append(at)
             stiffness[at, at], free[at] = (1.0, False) if e.stiffness is None else (e.stiffness, True)
+            loose[at] = 0.5 * e.play
             at += 1
         elif isinstance(e, Link):
             stiffness[at : at + 6, at : at + 6] = e.stiffness
@@ -115,7 +121,7 @@ def settle(arm: list[Element], q: np.ndarray, force: np.ndarray, limit: int = 20
             w = np.array([0.0, 0.0, -newton])
             pull[:, :before] += np.einsum("nik,i->nk", walk.m[:, :, :before], w)
             pull[:, :before] += np.einsum("nik,ni->nk", walk.w[:, :, :before], cross(centre, w))
-        new = np.linalg.solve(stiffness, pull.T).T * free
+        new = np.linalg.solve(stiffness, pull.T).T * free + loose * np.sign(pull)
         move, z = np.abs(new - z).max(), new
         if move < 1e-14 * max(1.0, np.abs(z).max()) + 1e-13:
             break
@@ -137,7 +143,7 @@ def energy(arm: list[Element], q: np.ndarray, z: np.ndarray, force: np.ndarray) 
     total, at = -float(walk.t[0] @ force), 0
     for e in arm:
         if isinstance(e, Joint):
-            total += 0.0 if e.stiffness is None else 0.5 * e.stiffness * z[at] ** 2
+            total += 0.0 if e.stiffness is None else 0.5 * e.stiffness * max(abs(z[at]) - 0.5 * e.play, 0.0) ** 2
             at += 1
         elif isinstance(e, Link):
             total += 0.5 * z[at : at + 6] @ e.stiffness @ z[at : at + 6]

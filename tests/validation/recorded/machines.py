@@ -149,11 +149,14 @@ class Serial:
     def structure(self, faults: Faults) -> list[serial.Element]:
         """The chain as it is, to the tip."""
         factors = iter(faults.product("drive_stiffness", "factor", self.actuators))
+        plays = faults.sum("backlash", "width_rad", self.actuators) if self.rotary else np.zeros(len(self.actuators))
+        loose = iter(plays)
         links = float(faults.product("link_stiffness", "factor", (None,))[0])
         out: list[serial.Element] = []
         for each in self.elements():
             if isinstance(each, serial.Joint):
-                each = replace(each, stiffness=each.stiffness * next(factors))
+                factor, rigid = next(factors), each.stiffness is None
+                each = replace(each, stiffness=None if rigid else each.stiffness * factor, play=next(loose))
             elif isinstance(each, serial.Link):
                 each = serial.Link(links * each.stiffness)
             out.append(each)
