@@ -202,14 +202,14 @@ def _axis(run: RunSpec, log: Measured, k: int, revolute: bool, expected: Floats)
     """Rows, one per time and in its order, with all that the log has of this axis; ways and torques of hinges at the end of their arm."""
     lever = lever_mm(revolute)
     expected = lever * expected
-    channels = (lever * log.encoder[:, k], lever * log.setpoint[:, k], log.drive[:, k] / lever)
+    channels = (lever * log.encoder[:, k], lever * log.setpoint[:, k], log.drive[:, k] / lever, lever * log.load[:, k])
     known = np.isfinite(log.encoder[:, k]) & np.isfinite(expected)
     for each in channels:
         if np.isfinite(each).mean() > MOSTLY:
             known &= np.isfinite(each)
     rows = np.flatnonzero(known)
     rows = rows[np.unique(log.time[rows], return_index=True)[1]]
-    encoder, setpoint, force = (each[rows] for each in channels)
+    encoder, setpoint, force, load = (each[rows] for each in channels)
     return AxisRun(
         run.name,
         log.time[rows],
@@ -220,4 +220,5 @@ def _axis(run: RunSpec, log: Measured, k: int, revolute: bool, expected: Floats)
         revolute,
         run.started_s,
         expected=expected[rows] if expected[rows].any() else None,
+        load=load if np.isfinite(load).all() else None,
     )

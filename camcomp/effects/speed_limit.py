@@ -1,8 +1,12 @@
-"""The drive has a largest speed: an encoder whose set-point moves faster falls behind, and catches up at that speed."""
+"""The drive has a largest speed: an encoder whose set-point moves faster falls behind, and catches up at that speed.
+
+Servos behind a bus begin later than they are told: the dead time delays the set-point in front of the limit.
+"""
 
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from scipy.optimize import minimize
 
 from camcomp.ground.datatypes import Floats
 from camcomp.model.effect import Motion, Parameter
@@ -15,12 +19,14 @@ PLAIN = "a drive that goes no faster"
 REMEDY = "program a lower feed or rapid, raise the speed limit of the drive, or look for what brakes it"
 SOURCE = "rate limiter: |d(encoder)/dt| at most the speed, on the set-point where that allows it (Franklin et al., Feedback Control)"
 NO_LIMIT = 1e6
+LONGEST_DEAD_TIME_S = 0.3  # that is looked for
 _SHARE = Parameter("share", "1", 1.0, 0.0, 1.0, 1.0, 0.01, "of what the limit holds back: 1 by definition", sign=1)
 _SOURCE = "feed drives: 0.1 to 1 m/s; axes of arms: 0.2 to 10 rad/s"
 PARAMETERS = (
     Parameter("speed_mm_per_s", "mm/s", NO_LIMIT, 1e-3, NO_LIMIT, 100.0, 0.1, _SOURCE),
     Parameter("speed_rad_per_s", "rad/s", NO_LIMIT, 1e-6, NO_LIMIT, 1.0, 0.001, _SOURCE),
     _SHARE,
+    Parameter("dead_time_ms", "ms", 0.0, 0.0, 1000.0, 20.0, 0.1, "buses of servos: 1 to 200 ms"),
 )
 _SPEEDS = (1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0)
 _ABSENT = Parameter("share", "1", 0.0, 0.0, 1.0, 1.0, 0.01, _SHARE.source, sign=1)
@@ -40,18 +46,46 @@ def first_guess(runs: Sequence[tuple[Floats, Floats, Floats]]) -> float:
     runs: time (n,) s, set-points (n,), encoders (n,) of one actuator.
     """
     runs = [run for run in runs if len(run[0]) > 1 and np.ptp(run[0]) > 0.0]
-    fastest = max((float(np.abs(np.diff(x) / np.maximum(np.diff(t), 1e-9)).max()) for t, x, _ in runs), default=0.0)
+    fastest = _fastest(runs)
     if fastest == 0.0:
         return NO_LIMIT
-
-    def left(speed: float) -> float:
-        return sum(float(np.sum((y - rate_limited(x[:, None], t, speed)[:, 0]) ** 2)) for t, x, y in runs)
-
     shares = np.geomspace(0.02, 1.0, 80)
-    best = int(np.argmin([left(share * fastest) for share in shares]))
+    best = int(np.argmin([_left(runs, share * fastest) for share in shares]))
     near = np.geomspace(shares[max(best - 1, 0)], shares[min(best + 1, len(shares) - 1)], 41)
-    speed = fastest * float(near[np.argmin([left(share * fastest) for share in near])])
-    return speed if left(speed) < left(NO_LIMIT) else NO_LIMIT
+    speed = fastest * float(near[np.argmin([_left(runs, share * fastest) for share in near])])
+    return speed if _left(runs, speed) < _left(runs, NO_LIMIT) else NO_LIMIT
+
+
+def guess(runs: Sequence[tuple[Floats, Floats, Floats]], hinge: bool) -> dict[str, float]:
+    """Largest speed and dead time of logs of one axis by least squares; empty where a dead time alone explains as much.
+
+    runs: as in `first_guess`.
+    """
+    runs = [run for run in runs if len(run[0]) > 1 and np.ptp(run[0]) > 0.0]
+    fastest = max((float(np.abs(np.diff(y) / np.maximum(np.diff(t), 1e-9)).max()) for t, _, y in runs), default=0.0)
+    if fastest == 0.0:
+        return {}
+    deads = np.linspace(0.0, LONGEST_DEAD_TIME_S, 11)
+    first = min(
+        ((speed, dead) for speed in fastest * np.linspace(0.3, 1.2, 24) for dead in deads),
+        key=lambda at: _left(runs, *at),
+    )
+    at = minimize(lambda x: _left(runs, *np.abs(x)), first, method="Nelder-Mead", options={"maxiter": 60}).x
+    speed, dead = (abs(float(each)) for each in at)
+    if min(_left(runs, NO_LIMIT, each) for each in (*deads, dead)) <= _left(runs, speed, dead):
+        return {}
+    return {"speed_rad_per_s" if hinge else "speed_mm_per_s": speed, "dead_time_ms": 1e3 * dead}
+
+
+def _fastest(runs: Sequence[tuple[Floats, Floats, Floats]]) -> float:
+    return max((float(np.abs(np.diff(x) / np.maximum(np.diff(t), 1e-9)).max()) for t, x, _ in runs), default=0.0)
+
+
+def _left(runs: Sequence[tuple[Floats, Floats, Floats]], speed: float, dead: float = 0.0) -> float:
+    """Sum of squares that a limit leaves of the encoders."""
+    return sum(
+        float(np.sum((y - rate_limited(_delayed(x[:, None], t, dead), t, speed)[:, 0]) ** 2)) for t, x, y in runs
+    )
 
 
 def on_servo(position: Floats, motion: Motion, which: Floats, p: Mapping[str, float]) -> Floats:
@@ -63,5 +97,11 @@ def on_servo(position: Floats, motion: Motion, which: Floats, p: Mapping[str, fl
     aimed = which > 0
     asked = position[:, aimed]
     out = position.copy()
-    out[:, aimed] = asked + share * (rate_limited(asked, motion.time, speed) - asked)
+    limited = rate_limited(_delayed(asked, motion.time, 1e-3 * p.get("dead_time_ms", 0.0)), motion.time, speed)
+    out[:, aimed] = asked + share * (limited - asked)
     return out
+
+
+def _delayed(position: Floats, time: Floats, by: float) -> Floats:
+    """Positions (n, m) of `by` s before."""
+    return position if by == 0.0 else np.stack([np.interp(time - by, time, own) for own in position.T], axis=1)

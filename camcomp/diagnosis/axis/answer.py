@@ -111,7 +111,7 @@ def where(found: Sequence[AxisFindings], causes: Sequence[FoundCause]) -> Where:
             )
         largest = {name: share for name, share in sorted(a.unknown_in, key=lambda each: each[1])}
         drivers += [Driver(covariate=name, share=round(share, 4)) for name, share in largest.items()]
-    lag = any(c.effect == "servo_lag" for c in known)
+    lag = any(c.effect in ("servo_lag", "speed_limit") for c in known)
     return Where(
         stage="control" if lag or not known else "drive",
         axes={axis: round(energy.get(axis, 0.0) / total, 4) for axis in "xyz"},

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from camcomp.diagnosis.axis.at_tip import lever_mm
 from camcomp.diagnosis.axis.block_least_squares import (
     LEAST_Z,
     Gain,
@@ -63,16 +62,6 @@ def inertia(m: AxisTravel) -> Floats:
 def speed(m: AxisTravel) -> Floats:
     """mm/s (n,): a lag, or viscous friction."""
     return m.speed
-
-
-def weight_sine(m: AxisTravel) -> Floats:
-    """Sine (n,) of the angle of a hinge: torque of a weight."""
-    return np.sin(m.position / lever_mm(True))
-
-
-def weight_cosine(m: AxisTravel) -> Floats:
-    """Cosine (n,) of the angle of a hinge: torque of a weight."""
-    return np.cos(m.position / lever_mm(True))
 
 
 def either_way(m: AxisTravel) -> Floats:

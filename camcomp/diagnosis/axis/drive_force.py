@@ -33,8 +33,6 @@ from camcomp.diagnosis.axis.channels import (
     table_of,
     turning,
     value_of,
-    weight_cosine,
-    weight_sine,
     within_a_row,
 )
 from camcomp.diagnosis.axis.findings import AxisChannel, AxisFindings, AxisRun
@@ -173,26 +171,25 @@ def _forced(
     """The same for given forces (n,) per run; unsure: as in `close`."""
     found = replace(found, causes=[*found.causes], unknown_in=[*found.unknown_in], details={**found.details})
     data, table = series_of(moves, forces, train), table_of(moves)
-    own: list[Column] = [weight_sine, weight_cosine] if found.revolute else []
     first = withheld(data, table(train, constant))
     floor = found.stated.force_N or rows_floor([runs[k].force for k in train])
-    length = turning(data, lambda d: table(train, constant, inertia, *own, speed, either_way, lambda m: m.reversal(d)))
+    length = turning(data, lambda d: table(train, constant, inertia, speed, either_way, lambda m: m.reversal(d)))
 
     def turn(m: AxisTravel) -> Floats:
         return m.reversal(length)
 
-    columns: list[Column] = [constant, inertia, *own]
-    beside = table(train, constant, inertia, *own, turn, speed, either_way)
+    columns: list[Column] = [constant, inertia]
+    beside = table(train, constant, inertia, turn, speed, either_way)
     before = withheld(data, table(train, *columns))
     channel = AxisChannel(data, train, first, before, floor=floor, stated=found.stated.force_N is not None)
     channel.all_names, channel.beside = [r.name for r in runs], beside
     last, named = before, []
     if "friction" not in without:
-        after = withheld(data, table(train, constant, inertia, *own, turn, speed))
+        after = withheld(data, table(train, constant, inertia, turn, speed))
         moving = telling(data, table(train, turn, *columns), 0, MINOR * floor)
         g = gain(before, after, moving)
         if holds(g) and brakes(data, table(train, turn, speed, *columns)):
-            columns, last = [constant, inertia, *own, turn, speed], after
+            columns, last = [constant, inertia, turn, speed], after
             lopsided = withheld(data, table(train, *columns, either_way))
             more = gain(last, lopsided, moving)
             if helps(more):

@@ -35,6 +35,7 @@ class AxisRun:
     way counts at the end of an arm of 1 m (`at_tip.lever_mm`), in mm and N like that of a slide. started: s, on the clock common to all runs.
     seen (n,): rows of which somebody saw how fast the axis was; all, where it is not given. course: times and set-points of the
     whole log, (m,) each, of which these may be some rows. expected (n,): encoder minus set-point by the machine file's effects.
+    load (n,): second encoder behind the gear, without what the machine file says of it; NaN where there is none.
     """
 
     name: str
@@ -48,6 +49,7 @@ class AxisRun:
     seen: Bools | None = None
     course: tuple[Floats, Floats] | None = None
     expected: Floats | None = None
+    load: Floats | None = None
     _finely: dict[int, tuple[Floats, Floats]] = field(default_factory=dict, init=False, repr=False)
 
     @property
@@ -151,6 +153,7 @@ class AxisRun:
             seen=seen,
             course=self.asked,
             expected=None if self.expected is None else self.expected[rows],
+            load=None if self.load is None else self.load[rows],
         )
 
 
@@ -220,6 +223,7 @@ class AxisFindings:
     causes: list[FoundCause] = field(default_factory=list)
     following: AxisChannel | None = None
     force: AxisChannel | None = None
+    behind: AxisChannel | None = None
     led: Callable[[AxisRun], Floats] | None = None  # what a loop that swings over makes of set-points, mm
     pushed: list[tuple[str, float, float]] = field(default_factory=list)  # for a while: run, and from and to when, s
     one_way: Gain | None = None  # of a lag that differs between the ways by more than loops are known to
@@ -232,7 +236,7 @@ class AxisFindings:
     @property
     def channels(self) -> list[AxisChannel]:
         """Those that were studied."""
-        return [c for c in (self.following, self.force) if c is not None]
+        return [c for c in (self.following, self.behind, self.force) if c is not None]
 
     @property
     def strange(self) -> bool:

@@ -34,7 +34,6 @@ from camcomp.diagnosis.axis.channels import (
 )
 from camcomp.diagnosis.axis.findings import ROWS, AxisChannel, AxisFindings, AxisRun
 from camcomp.diagnosis.axis.gate import MINOR
-from camcomp.diagnosis.axis.hinge import follow_hinge
 from camcomp.diagnosis.axis.noise_floor import REPEATABILITY_MM, rows_floor
 from camcomp.diagnosis.axis.swing import Swing, find_swing
 from camcomp.diagnosis.axis.terms import (
@@ -61,9 +60,7 @@ def follow(
     Inertia in the loop is what every axis has. A loop that swings over takes its place where it explains more, or where
     something is left beside inertia and nothing beside it.
     """
-    floor = found.stated.encoder_mm or float(np.hypot(_scatter([runs[k] for k in train]), REPEATABILITY_MM))
-    if found.revolute:
-        return follow_hinge(found, runs, moves, gaps, floor, train, test, without)
+    floor = found.stated.encoder_mm or float(np.hypot(scatter_of([runs[k] for k in train]), REPEATABILITY_MM))
     swung = None if "servo_overshoot" in without else _swung(
         runs, moves, gaps, train, floor, without, found.carried.late or 0.0
     )  # fmt: skip
@@ -267,7 +264,7 @@ def _overshoot(name: str, swung: _Swung, before: Floats, last: Floats) -> FoundC
     )
 
 
-def _scatter(runs: Sequence[AxisRun]) -> float:
+def scatter_of(runs: Sequence[AxisRun]) -> float:
     """Deviation of one row of the following error; a resolution may show in the encoder or the set-points alone."""
     apart = np.hypot(rows_floor([r.encoder for r in runs]), rows_floor([r.setpoint for r in runs]))
     return max(rows_floor([r.setpoint - r.encoder for r in runs]), float(apart))

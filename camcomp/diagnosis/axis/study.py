@@ -9,6 +9,7 @@ that it was not fitted on, and what is left there is held against the floor: sta
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -19,11 +20,13 @@ from camcomp.diagnosis.axis.block_least_squares import WHOLE_RUNS, log10_chance,
 from camcomp.diagnosis.axis.drive_force import force_of
 from camcomp.diagnosis.axis.drivers import dependences
 from camcomp.diagnosis.axis.findings import ROWS, AxisChannel, AxisDeviation, AxisFindings, AxisRun
-from camcomp.diagnosis.axis.following import follow, share_lag
+from camcomp.diagnosis.axis.following import follow, scatter_of, share_lag
 from camcomp.diagnosis.axis.gate import AxisGate
+from camcomp.diagnosis.axis.joint import AxisSurroundings, JointRows, study_channel
 from camcomp.diagnosis.axis.law import axis_law
 from camcomp.diagnosis.axis.motion import encoder_width, lateness, motion_of
 from camcomp.diagnosis.axis.next_moves import next_moves
+from camcomp.diagnosis.axis.noise_floor import REPEATABILITY_MM, rows_floor
 from camcomp.diagnosis.axis.own_unit import in_own_unit
 from camcomp.diagnosis.axis.terms import AxisTravel, travel
 from camcomp.diagnosis.result.standards import StandardValues
@@ -73,9 +76,9 @@ def studied(
         clean = [r.without_spikes() for r in runs]
         outliers |= {(r.name, int(row)) for r, rows in clean for row in rows}
         cleaned[name] = [r.on_ticks().away_from_gaps() for r, _ in clean]
+    around = AxisSurroundings(robot, cleaned)
     for name, own in headway.steps(cleaned.items(), len(axes) * (1 + again)):
-        others = {other: each for other, each in cleaned.items() if other != name}
-        found.append(_axis(name, own, set(holdout), set(without), stated or AxisDeviation(), others))
+        found.append(_axis(name, own, set(holdout), set(without), stated or AxisDeviation(), around))
     found = [a for a in found if a.channels]
     if not found:
         raise ValueError(
@@ -96,7 +99,7 @@ def studied(
         causes += [answer.unknown(a, whole) for a in found if a.strange or verdict == "ambiguous"]
     gap = answer.gap(found, tip)
     with headway.part(1.0 / (1 + again), 1.0):
-        judged = _judged(cleaned, held, set(without), stated or AxisDeviation()) if again else [found] if held else []
+        judged = _judged(around, held, set(without), stated or AxisDeviation()) if again else [found] if held else []
     every = [c for a in found for c in a.channels]
     result = DiagnosisResult(
         verdict=verdict,
@@ -122,7 +125,7 @@ def _nothing_below_the_floor(axis: AxisFindings) -> None:
     rows = np.concatenate([values for _, values in following.whole])
     if float(np.std(rows)) > following.floor:
         return
-    axis.causes = [c for c in axis.causes if not c.effect.startswith("servo_")]
+    axis.causes = [c for c in axis.causes if not c.effect.startswith(("servo_", "speed_limit"))]
     following.gate = AxisGate("at", 0.0, ())
     if axis.force is None:
         axis.unknown_in, axis.law = [], None
@@ -139,7 +142,7 @@ def _verdict(found: Sequence[AxisFindings]) -> Any:
 
 def _axis(
     name: str, runs: list[AxisRun], holdout: set[str], without: set[str], stated: AxisDeviation,
-    others: Mapping[str, Sequence[AxisRun]] | None = None,
+    around: AxisSurroundings,
 ) -> AxisFindings:  # fmt: skip
     hinge = any(r.revolute for r in runs)
     stated = stated.of(hinge)
@@ -149,18 +152,40 @@ def _axis(
         return found
     train = [k for k, r in enumerate(usable) if r.name not in holdout]
     test = [k for k, r in enumerate(usable) if r.name in holdout]
-    gaps = [r.gap for r in usable]
     found.wide = encoder_width(usable, train)
+    found = (_hinge if hinge else _slide)(found, usable, train, test, without, around)
+    if any(usable[k].load is not None for k in train):
+        found = _second_encoder(found, usable, train, test, without, around)
+    _name_rest(found, usable, {} if hinge else {n: own for n, own in around.axes.items() if n != name})
+    if found.strange:
+        follows = found.following
+        asked = [(usable[k], m) for k, m in zip(follows.runs, follows.moves, strict=True)] if follows else []
+        told = [travel(r.time, r.setpoint, found.wide).of(np.isin(r.time, m.time)) for r, m in asked]
+        found.law = None if hinge else axis_law(name, found.force, found.following, told)
+    return found
+
+
+def _slide(
+    found: AxisFindings, usable: list[AxisRun], train: list[int], test: list[int], without: set[str],
+    around: AxisSurroundings,
+) -> AxisFindings:  # fmt: skip
+    """Following error and drive force of a slide."""
+    name, stated, wide = found.name, found.stated, found.wide
+    gaps = [r.gap for r in usable]
     followed = bool(train) and all(np.isfinite(gaps[k]).all() for k in train)
     forced = bool(train) and all(np.isfinite(usable[k].force).all() for k in train)
     late = lateness(usable, gaps, train) if followed else None
     pushed = list[tuple[str, float, float]]()
     for again in (False, True):  # what pushed an axis shows in what its loop makes of it
-        found = AxisFindings(name, stated=stated, revolute=hinge, wide=found.wide)
+        found = AxisFindings(name, stated=stated, wide=wide)
         if followed:
-            found = follow(
-                found, *motion_of(found, [r.unpushed(pushed) for r in usable], gaps, train, late), train, test, without
-            )
+            runs, moves, values = motion_of(found, [r.unpushed(pushed) for r in usable], gaps, train, late)
+            found = follow(found, runs, moves, values, train, test, without)
+            rows = JointRows(
+                channel="following", runs=usable, moves=moves, values=values, train=train, test=test, floor=0.0,
+                stated=False,
+            )  # fmt: skip
+            found = _limited(found, rows, around, without)
         if forced:
             runs, moves, _ = motion_of(found, usable, [r.force for r in usable], train, late, found.led)
             found = force_of(found, runs, moves, train, test, without)
@@ -170,21 +195,82 @@ def _axis(
     for channel, values in ((found.following, gaps), (found.force, [r.force for r in usable])):
         if channel is not None:
             channel.whole = [(usable[k].time, values[k]) for k in channel.runs]
-    _name_rest(found, usable, others or {})
-    if found.strange:
-        follows = found.following
-        asked = [(usable[k], m) for k, m in zip(follows.runs, follows.moves, strict=True)] if follows else []
-        told = [travel(r.time, r.setpoint, found.wide).of(np.isin(r.time, m.time)) for r, m in asked]
-        found.law = None if hinge else axis_law(name, found.force, found.following, told)
+    return found
+
+
+def _limited(found: AxisFindings, rows: JointRows, around: AxisSurroundings, without: set[str]) -> AxisFindings:
+    """What was found with a largest speed of the drive in the place of other causes, where that explains more."""
+    follows = found.following
+    if follows is None or follows.gate is None or follows.gate.word == "at" or "speed_limit" in without:
+        return found
+    plain = AxisFindings(found.name, stated=found.stated, wide=found.wide, carried=found.carried)
+    rows = replace(rows, floor=follows.floor, stated=follows.stated)
+    limited, channel = study_channel(plain, rows, around, without)
+    if not any(c.effect == "speed_limit" for c in limited.causes) or np.mean(channel.last) >= np.mean(follows.last):
+        return found
+    limited.following = channel
+    return limited
+
+
+def _hinge(
+    found: AxisFindings, usable: list[AxisRun], train: list[int], test: list[int], without: set[str],
+    around: AxisSurroundings,
+) -> AxisFindings:  # fmt: skip
+    """Following error and drive torque of a hinge."""
+    stated, gaps = found.stated, [r.gap for r in usable]
+    late = None
+    if train and all(np.isfinite(gaps[k]).all() for k in train):
+        late = lateness(usable, gaps, train)
+        runs, moves, values = motion_of(found, usable, gaps, train, late)
+        floor = stated.encoder_mm or float(np.hypot(scatter_of([runs[k] for k in train]), REPEATABILITY_MM))
+        rows = JointRows(
+            channel="following", runs=usable, moves=moves, values=values, train=train, test=test, floor=floor,
+            stated=stated.encoder_mm is not None,
+        )  # fmt: skip
+        found, found.following = study_channel(found, rows, around, without)
+        found.following.whole = [(usable[k].time, gaps[k]) for k in found.following.runs]
+    if train and all(np.isfinite(usable[k].force).all() for k in train):
+        forces = [r.force for r in usable]
+        runs, moves, values = motion_of(found, usable, forces, train, late)
+        floor = stated.force_N or rows_floor([runs[k].force for k in train])
+        rows = JointRows(
+            channel="force", runs=usable, moves=moves, values=values, train=train, test=test, floor=floor,
+            stated=stated.force_N is not None,
+        )  # fmt: skip
+        found, found.force = study_channel(found, rows, around, without)
+        found.force.whole = [(usable[k].time, forces[k]) for k in found.force.runs]
+    return found
+
+
+def _second_encoder(
+    found: AxisFindings, usable: list[AxisRun], train: list[int], test: list[int], without: set[str],
+    around: AxisSurroundings,
+) -> AxisFindings:  # fmt: skip
+    """Second encoder behind the gear against the encoder of the motor."""
+    every = [k for k, r in enumerate(usable) if r.load is not None]
+    runs = [usable[k] for k in every]
+    values = [np.asarray(r.load) - r.encoder for r in runs]
+    moves = [travel(r.time, r.encoder, found.wide) for r in runs]
+    own = [(r, rows_floor([r.encoder, np.asarray(r.load)])) for r in runs]
+    floor = found.stated.encoder_mm or float(np.hypot(np.sqrt(2.0) * max(each for _, each in own), REPEATABILITY_MM))
+    rows = JointRows(
+        channel="behind", runs=runs, moves=moves, values=values, train=[every.index(k) for k in train if k in every],
+        test=[every.index(k) for k in test if k in every], floor=floor, stated=found.stated.encoder_mm is not None,
+    )  # fmt: skip
+    found, found.behind = study_channel(found, rows, around, without)
+    found.behind.whole = [(runs[k].time, values[k]) for k in found.behind.runs]
     return found
 
 
 def _judged(
-    axes: Mapping[str, Sequence[AxisRun]], held: Sequence[str], without: set[str], stated: AxisDeviation
+    around: AxisSurroundings, held: Sequence[str], without: set[str], stated: AxisDeviation
 ) -> list[list[AxisFindings]]:
     """Every axis with each of the runs held out in turn: chosen and fitted without it."""
     every = [
-        [_axis(name, list(runs), {one}, without, stated) for name, runs in headway.steps(axes.items(), len(axes))]
+        [
+            _axis(name, list(runs), {one}, without, stated, around)
+            for name, runs in headway.steps(around.axes.items(), len(around.axes))
+        ]
         for one in headway.steps(held, len(held))
     ]
     for found in every:
@@ -212,7 +298,8 @@ def _name_rest(found: AxisFindings, runs: Sequence[AxisRun], others: Mapping[str
             names = [runs[k].name for k in channel.runs]
             beside = {other: _moves(theirs, names, found.wide) for other, theirs in others.items()}
             beside = {other: moves for other, moves in beside.items() if len(moves) == len(names)}
-            for kind, share, chance in dependences(channel.data, channel.columns, channel.moves, beside, channel.floor):
+            each = (channel.data, channel.columns, channel.moves, beside, channel.floor)
+            for kind, share, chance in dependences(*each) if len(channel.columns) else ():
                 found.unknown_in.append((kind if ":" in kind else f"{kind}:{found.name}", share))
                 found.unknown_chance = min(found.unknown_chance, chance)
             if not found.unknown_in and channel.gate.intervals:

@@ -86,12 +86,12 @@ def _gains(gram: Floats, moment: Floats) -> Floats:
 def fit_process(groups: Sequence[Group], left: Sequence[Floats], over: str) -> SmoothProcess | None:
     """The process over posture or time that makes residuals left (n, c), in noise floors, most likely.
 
-    Its noise is free: the residual of many causes is less than the floor. None where there is no clock, or where noise
-    alone makes them as likely.
+    Its noise is free: the residual of many causes is less than the floor. None where rows have no clock or no posture, or
+    where noise alone makes them as likely.
     """
     parts = []
     for g, r in zip(groups, left, strict=True):
-        if over == "time" and g.order is None:
+        if (g.order if over == "time" else g.position) is None:
             return None
         at = g.positions(SmoothProcess(0.0, 1.0, over))
         region = split_regions(at, -(-len(r) // ROWS_OF_PROCESS))

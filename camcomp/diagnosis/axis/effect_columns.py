@@ -1,0 +1,211 @@
+"""Columns of library effects in the channels of one axis, through the signal path: a machine whose tip is not measured.
+
+    encoder - set-point = control(set-points)      load - encoder = drive(encoders) - load of the drive / stiffness
+    drive force = effort(encoders)
+
+An effect that is linear in its parameter has its column once and for all; any other one is made linear where the fit stands.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, Literal
+
+import numpy as np
+
+from camcomp.diagnosis.axis.findings import AxisRun
+from camcomp.effects import friction
+from camcomp.ground import shelf
+from camcomp.ground.datatypes import Floats
+from camcomp.model import signal_path
+from camcomp.model.effect import Cause, Motion, Parameter, applies
+from camcomp.model.hysteresis import direction
+from camcomp.model.seams import Seams
+from camcomp.model.statics.description import Actuator, Robot
+from camcomp.model.statics.masses import MassLoads
+
+ChannelName = Literal["following", "behind", "force"]
+STAGE_OF: Mapping[ChannelName, str] = {"following": "control", "behind": "drive", "force": "drive"}
+# of loops: found by a search of their own; of standing poses; of an interval that is searched; laws; a zero of an encoder
+ELSEWHERE = ("servo_overshoot", "joint_hysteresis", "joint_curve", "disturbance", "formula", "map", "joint_offset")
+
+VISCOUS = {p.name.endswith("rad"): p for p in friction.PARAMETERS if p.name.startswith("viscous")}  # by hinge
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class AxisCause:
+    """A candidate of one axis: parameters (d,) that are fitted, in units of their scales, and its shape.
+
+    ways: number of shapes that were tried for its place. run: the one in which it acts, None for all.
+    """
+
+    effect: str
+    module: Any
+    target: str
+    parameters: tuple[Parameter, ...]
+    shape: Mapping[str, float]
+    ways: float = 1.0
+    run: str | None = None
+
+    @property
+    def scan(self) -> tuple[float, ...]:
+        """Values of its shape that were tried."""
+        own = (*getattr(self.module, "FITTED", ()), *getattr(self.module, "ROTARY", ()))
+        return next((p.scan for p in own if p.scan and p.name in self.shape), ())
+
+    @property
+    def switches(self) -> set[str]:
+        """Names of its shape that are one of a few values."""
+        return {p.name for p in getattr(self.module, "FITTED", ()) if p.either}
+
+    @property
+    def place(self) -> tuple[str, str]:
+        """Effect and target; intervals of one target are several places."""
+        return self.effect, self.target if self.run is None else f"{self.target} {self.run} {self.shape}"
+
+    def cause(self, amounts: Sequence[float]) -> Cause:
+        """The cause at amplitudes (d,)."""
+        nominal = {p.name: p.nominal for p in self.module.PARAMETERS}
+        values = {p.name: p.value(a * p.scale) for p, a in zip(self.parameters, amounts, strict=True)}
+        values = {**{p.name: p.nominal for p in getattr(self.module, "FITTED", ())}, **self.shape, **values}
+        public = getattr(self.module, "public", None)
+        return Cause(self.effect, self.module, self.target, {**nominal, **(public(values) if public else values)})
+
+
+@dataclass(frozen=True, eq=False)
+class DrivenAxis:
+    """One run of one axis as the signal path sees it: mm or rad; lever: the study's mm per unit of the axis.
+
+    weight, inertia (n,): load of the stated masses on the drive, N or N mm; 0 where none are stated.
+    """
+
+    run: AxisRun
+    actuator: Actuator
+    lever: float
+    weight: Floats
+    inertia: Floats
+
+    @cached_property
+    def asked(self) -> Motion:
+        """The motion of the set-points."""
+        return self._motion(self.run.setpoint / self.lever)
+
+    @cached_property
+    def moved(self) -> Motion:
+        """The motion of the encoders."""
+        return self._motion(self.run.encoder / self.lever)
+
+    def channel(self, name: ChannelName, cause: Cause) -> Floats:
+        """What a cause adds to a channel (n,), in the study's mm or N: set-point - encoder, load - encoder, drive force."""
+        names = (self.actuator.name,)
+        if name == "following":
+            late = signal_path.controlled([cause], names, self.asked)
+            return np.asarray(self.lever * (self.asked.encoder - late)[:, 0], float)
+        error, guided = signal_path.driven([cause], names, self.moved)
+        if name == "force":
+            effort = signal_path.drive_forces([cause], names, guided)
+            return np.zeros(len(self.run.time)) if effort is None else np.asarray(effort[:, 0] / self.lever, float)
+        softer = self._compliance(cause) - self._compliance(None)
+        return np.asarray(self.lever * (error[:, 0] - softer * self.weight), float)
+
+    def _compliance(self, cause: Cause | None) -> float:
+        """Way of the drive per unit of its load."""
+        stiffness = self.actuator.stiffness
+        if cause is not None and cause.effect.__name__.endswith("drive_stiffness"):
+            return 0.0 if stiffness is None else 1.0 / (stiffness * cause.values["factor"])
+        more = cause.values.get("compliance_rad_per_Nmm", 0.0) if cause is not None else 0.0
+        return (0.0 if stiffness is None else 1.0 / stiffness) + float(more)
+
+    def _motion(self, way: Floats) -> Motion:
+        time, position = self.run.time, way[:, None]
+        speed = np.gradient(position, time, axis=0)
+        first = (position[1:2] - position[:1]) / (time[1] - time[0])
+        loads = MassLoads(self.inertia[:, None], np.zeros((len(time), 6)))
+        plain = Motion(
+            time, self.run.started + time, np.zeros(len(time)), None, position, speed, direction(position),
+            np.array([self.actuator.home]), np.array([np.inf if self.actuator.stiffness is None else self.actuator.stiffness]),
+            names=(self.actuator.name,), masses=lambda: loads,
+        )  # fmt: skip
+        return replace(plain, seams=Seams(np.zeros(1, int), np.full(1, np.inf), first))
+
+
+def candidates(
+    robot: Robot | None, axes: Sequence[DrivenAxis], channel: ChannelName, without: Sequence[str]
+) -> list[AxisCause]:
+    """Effects of the library, and of users, that may act on a channel of an axis, once for each shape."""
+    actuator = axes[0].actuator
+    found: list[AxisCause] = []
+    for name, module in shelf.usable("effects", ("none", *ELSEWHERE, *without)):
+        if module.TARGET not in ("actuator", "either") or (
+            robot is not None and not applies(module, robot, actuator.name)
+        ):
+            continue
+        if not _acts(name, module, axes[0], channel):
+            continue
+        own = parameters_of(module, actuator.revolute)
+        linear = tuple(p for p in own if not p.shape)
+        fits = [linear]
+        if channel == "force" and name == "friction":
+            fits.append((*linear, VISCOUS[actuator.revolute]))
+        shapes = _shapes(module, own, axes, channel)
+        found += [
+            AxisCause(
+                effect=name, module=module, target=actuator.name, parameters=fitted, shape=shape,
+                ways=float(len(shapes) * len(fits)),
+            )
+            for shape in shapes for fitted in fits if fitted
+        ]  # fmt: skip
+    return found
+
+
+def parameters_of(module: Any, hinge: bool) -> tuple[Parameter, ...]:
+    """Parameters of an effect that are fitted on a hinge or a slide; none where it says nothing of such an axis."""
+    if hinge and getattr(module, "SLIDES_ONLY", False) or not hinge and getattr(module, "ARM_ONLY", False):
+        return ()
+    own = tuple(getattr(module, "FITTED", module.PARAMETERS))
+    if hinge and not hasattr(module, "ROTARY") and "drive" in signal_path.stages_of(module):
+        own = tuple(p for p in own if p.unit == "1")  # lengths of a slide mean nothing to a hinge
+    own = tuple(module.ROTARY) if hinge and hasattr(module, "ROTARY") else own
+    free = {(p.name, p.nominal): p for p in module.PARAMETERS}  # with bounds of the file: a lag may be a lead
+    return tuple(p if p.shape else free.get((p.name, p.nominal), p) for p in own)
+
+
+def _acts(name: str, module: Any, axis: DrivenAxis, channel: ChannelName) -> bool:
+    if name in (
+        "drive_stiffness",
+        "gravity_compliance",
+    ):  # a stated spring errs by its factor, any other one is left out
+        stated = axis.actuator.stiffness is not None
+        return channel == "behind" and bool(np.ptp(axis.weight) > 0.0) and stated is (name == "drive_stiffness")
+    if name == "friction":  # what it winds up is play to a second encoder; its force shows in that of the drive
+        return channel == "force"
+    if name == "inertia":
+        return channel == "behind" and axis.actuator.stiffness is not None and bool(np.ptp(axis.inertia) > 0.0)
+    if channel == "force":
+        return hasattr(module, "on_drive_force")
+    return hasattr(module, "on_servo" if channel == "following" else "on_drive")
+
+
+def _shapes(
+    module: Any, own: Sequence[Parameter], axes: Sequence[DrivenAxis], channel: ChannelName
+) -> list[dict[str, float]]:
+    """Shapes to try: of a guess from the rows, or the values of a scan."""
+    fixed = {p.name: p.either[0] for p in own if p.either}
+    if channel == "following" and hasattr(module, "guess"):
+        runs = [(a.run.time, a.asked.encoder[:, 0], a.moved.encoder[:, 0]) for a in axes]
+        guess = module.guess(runs, axes[0].actuator.revolute)
+        return [{**fixed, **guess}] if guess else []
+    scanned = [p for p in own if p.scan]
+    if any(p.placed or p.turns for p in scanned):
+        return []
+    if not scanned:
+        return [fixed]
+    if len(scanned) != 1:
+        return []
+    ends = [a.moved.common[[0, -1]] for a in axes]
+    longest = (
+        np.ptp(np.concatenate(ends)) if scanned[0].unit in ("s", "min") else np.inf
+    )  # a longer curve is a straight line
+    return [{**fixed, scanned[0].name: value} for value in scanned[0].scan if value <= longest]

@@ -1,0 +1,299 @@
+"""Channels of one axis for the model of every log: following error and drive torque of a hinge, second encoder of any axis.
+
+    set-point - encoder = control effects + a q'' + c tanh(q'/v0) + o + w1 sin q + w2 cos q + e
+    load - encoder      = play, springs, screws + o + d q' + f tau + e        d: delay between two encoders; f tau: compliance
+    drive torque        = friction + J q'' + sum_k J_k q_k'' + weight(q) + o + e
+
+Weight is linear in the first moments of the links behind a joint, whatever their masses are.
+
+Source: Siciliano et al., Robotics, 7.3; `channel_fit` for the choice.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from camcomp.diagnosis.axis.at_tip import lever_mm
+from camcomp.diagnosis.axis.block_least_squares import by_block
+from camcomp.diagnosis.axis.channel_fit import ChannelData, ChannelFit, fit_channel
+from camcomp.diagnosis.axis.channels import not_known, series_of
+from camcomp.diagnosis.axis.drive_force import MOST_PUSHES
+from camcomp.diagnosis.axis.effect_columns import AxisCause, ChannelName, DrivenAxis, candidates
+from camcomp.diagnosis.axis.findings import ROWS, AxisChannel, AxisFindings, AxisRun
+from camcomp.diagnosis.axis.gate import judge
+from camcomp.diagnosis.axis.push import Window, find_window, seen_elsewhere, sharp
+from camcomp.diagnosis.axis.terms import AxisTravel, travel
+from camcomp.ground import shelf
+from camcomp.ground.datatypes import Floats
+from camcomp.model.statics.arm import arm_of
+from camcomp.model.statics.description import Actuator, Robot, Transform
+from camcomp.model.statics.hanging import hang
+from camcomp.model.statics.masses import has_moved_mass, mass_loads
+from camcomp.model.statics.rotation import rotations_of
+
+CREEP = 0.02  # of the fastest row: speed at which Coulomb friction has turned round
+LEAST_ARM = 1e-3  # of a direction, or of an arm of 1 m: by which a weight has to change with the pose
+
+
+@dataclass(frozen=True, eq=False)
+class AxisSurroundings:
+    """What the model of an axis needs beside its own log: the machine, and how all axes moved.
+
+    axes: runs by axis name, in the study's mm per lever.
+    """
+
+    robot: Robot | None
+    axes: Mapping[str, Sequence[AxisRun]]
+
+    def driven(self, name: str, run: AxisRun) -> DrivenAxis:
+        """One run of an axis with the loads of the stated masses on its drive."""
+        lever, none = lever_mm(run.revolute), np.zeros(len(run.time))
+        actuator = next((a for a in self.robot.actuators if a.name == name), None) if self.robot is not None else None
+        if self.robot is None or actuator is None:
+            return DrivenAxis(run, Actuator(name, run.revolute, np.array([0.0, 0.0, 1.0]), None), lever, none, none)
+        if arm_of(self.robot) is None or not has_moved_mass(self.robot, name):
+            return DrivenAxis(run, actuator, lever, none, none)
+        j, q = self._index(name), self.positions(run)
+        inertia = mass_loads(self.robot, q, run.time).drive[:, j]
+        return DrivenAxis(run, actuator, lever, hang(self.robot, q).drive[:, j], inertia)
+
+    def positions(self, run: AxisRun) -> Floats:
+        """Coordinates (n, m) of all actuators at the rows of a run, mm or rad; an axis that is not logged stands at its start."""
+        assert self.robot is not None
+        out = []
+        for a in self.robot.actuators:
+            own = next((r for r in self.axes.get(a.name, ()) if r.name == run.name), None)
+            known = np.isfinite(own.encoder) if own is not None else np.zeros(0, bool)
+            if own is None or not known.any():
+                out.append(np.full(len(run.time), a.home if a.start is None else a.start))
+            else:
+                out.append(np.interp(run.time, own.time[known], own.encoder[known]) / lever_mm(own.revolute))
+        return np.stack(out, axis=1)
+
+    def weights(self, name: str, run: AxisRun) -> Floats:
+        """Columns (n, w): torque of the first moments of a joint's link, and of a weight at the end of the arm, per N mm and N."""
+        arm = None if self.robot is None else arm_of(self.robot)
+        if arm is None or self.robot is None:
+            angle = run.encoder / lever_mm(True)
+            return np.stack([np.sin(angle), np.cos(angle)], axis=1)
+        q, start = self.positions(run), self._index(name)
+        rotation, point, j = np.broadcast_to(arm.chain.frame, (len(q), 3, 3)), np.zeros((len(q), 3)), 0
+        axis, about, link = np.zeros((len(q), 3)), point, rotation
+        for e in arm.chain.elements:
+            if isinstance(e, Transform):
+                point, rotation = point + rotation @ e.translation, rotation @ e.rotation
+            elif isinstance(e, Actuator):
+                along = rotation @ e.axis
+                if e.revolute:
+                    rotation = rotation @ rotations_of(q[:, j, None] * e.axis)
+                else:
+                    point = point + q[:, j, None] * along
+                if j == start:
+                    axis, about, link = along, point, rotation
+                j += 1
+        arms = [*(link[:, :, i] for i in range(3)), (point - about) / lever_mm(True)]
+        columns = [np.einsum("ni,ni->n", axis, np.cross(each, (0.0, 0.0, -1.0))) for each in arms]
+        moving = [each for each in columns if np.ptp(each) > LEAST_ARM]
+        return np.stack(moving, axis=1) if moving else np.zeros((len(q), 0))
+
+    def others(self, name: str, run: AxisRun, wide: int) -> dict[str, AxisTravel]:
+        """How the other axes moved in the same run."""
+        out = {}
+        for other, runs in self.axes.items():
+            own = next((r for r in runs if r.name == run.name), None)
+            if other == name or own is None or len(own.time) < ROWS:
+                continue
+            if np.isfinite(own.encoder).all() and np.ptp(own.encoder) > 0.0:
+                out[other] = travel(own.time, own.encoder, wide)
+        return out
+
+    def _index(self, name: str) -> int:
+        assert self.robot is not None
+        return [a.name for a in self.robot.actuators].index(name)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class JointRows:
+    """Rows of one channel of an axis: runs as logged, how the axis moved in the rows that count, and their values."""
+
+    channel: ChannelName
+    runs: Sequence[AxisRun]
+    moves: list[AxisTravel]
+    values: list[Floats]
+    train: list[int]
+    test: list[int]
+    floor: float
+    stated: bool
+
+
+def study_channel(
+    found: AxisFindings, rows: JointRows, around: AxisSurroundings, without: set[str]
+) -> tuple[AxisFindings, AxisChannel]:
+    """What was found on an axis, with one more channel and its causes."""
+    found = replace(found, causes=[*found.causes], unknown_in=[*found.unknown_in], details={**found.details})
+    axes = [around.driven(found.name, run) for run in rows.runs]
+    terms = candidates(around.robot, [axes[k] for k in rows.train], rows.channel, sorted(without))
+    seen = [np.isin(run.time, m.time) for run, m in zip(rows.runs, rows.moves, strict=True)]
+
+    def response(k: int, term: AxisCause, amounts: Sequence[float]) -> Floats:
+        if term.run not in (None, rows.runs[k].name):
+            return np.zeros(len(rows.values[k]))
+        return axes[k].channel(rows.channel, term.cause(amounts))[seen[k]]
+
+    data = ChannelData(
+        values=rows.values, healthy=_healthy(found, rows, around, seen, axes), covariates=_covariates(found, rows, around),
+        response=response, floor=rows.floor, train=rows.train,
+        level=0.0 if rows.channel == "following" else float(np.mean(np.concatenate([rows.values[k] for k in rows.train]))),
+    )  # fmt: skip
+    done = fit_channel(data, terms)
+    if rows.channel == "force" and "disturbance" not in without:
+        done = _with_pushes(found.name, data, terms, done, rows)
+    found.causes += done.causes
+    channel = _channel(rows, done)
+    _tell(found, rows, done, data.healthy)
+    if channel.gate is not None:
+        found.unknown_chance = min(found.unknown_chance, channel.gate.chance)
+        if channel.gate.word == "above":
+            found.unknown_in += sorted(done.drivers.items(), key=lambda each: -each[1])
+    return found, channel
+
+
+def _healthy(
+    found: AxisFindings,
+    rows: JointRows,
+    around: AxisSurroundings,
+    seen: Sequence[np.ndarray],
+    axes: Sequence[DrivenAxis],
+) -> list[dict[str, Floats]]:
+    """Columns of the sizes that every axis has, by kind, of every run."""
+    fastest = max((float(np.abs(rows.moves[k].speed).max(initial=0.0)) for k in rows.train), default=0.0)
+    out = []
+    for k, m in enumerate(rows.moves):
+        one, angle = np.ones((len(m.time), 1)), m.position / lever_mm(True)
+        turns = np.tanh(m.speed / max(CREEP * fastest, 1e-12))[:, None]
+        weight = np.stack([np.sin(angle), np.cos(angle)], axis=1)
+        own = {"offset": one}
+        if rows.channel == "behind":
+            if rows.runs[k].revolute:
+                own["eccentricity"] = weight
+            force = rows.runs[k].force[seen[k]]
+            own["delay"] = m.speed[:, None]
+            if np.isfinite(force).all() and all(np.isfinite(rows.runs[i].force).all() for i in rows.train):
+                own["compliance"] = force[:, None]
+        else:
+            own["acceleration"] = m.acceleration[:, None]
+        if rows.channel == "following":
+            own |= {"friction": turns, "weight": weight}
+        if rows.channel == "force":
+            own["weight"] = around.weights(found.name, rows.runs[k])[seen[k]]
+            stated = axes[k].weight[seen[k]], axes[k].inertia[seen[k]]
+            if np.ptp(stated[0]) > 0.0 or np.ptp(stated[1]) > 0.0:
+                own["stated masses"] = np.stack(stated, axis=1)
+        out.append(own)
+    common = set.intersection(*(set(each) for each in out))
+    widths = {kind: min(each[kind].shape[1] for each in out) for kind in common}
+    return [{kind: own[kind][:, : widths[kind]] for kind in own if kind in common} for own in out]
+
+
+def _covariates(found: AxisFindings, rows: JointRows, around: AxisSurroundings) -> list[dict[str, Floats]]:
+    out = []
+    for run, m in zip(rows.runs, rows.moves, strict=True):
+        own = {"position": m.position, "velocity": m.speed, "acceleration": m.acceleration, "time": m.time - m.time[0]}
+        each = {f"{kind}:{found.name}": values for kind, values in own.items()}
+        for name, other in around.others(found.name, run, found.wide).items():
+            for kind in ("velocity", "acceleration"):
+                values = other.speed if kind == "velocity" else other.acceleration
+                each[f"{kind}:{name}"] = np.interp(m.time, other.time, values)
+        out.append(each)
+    common = set.intersection(*(set(each) for each in out))
+    return [{name: own[name] for name in own if name in common} for own in out]
+
+
+def _with_pushes(
+    name: str, data: ChannelData, terms: Sequence[AxisCause], done: ChannelFit, rows: JointRows
+) -> ChannelFit:
+    """The same fit beside forces that act for a while, where their windows are clear and the evidence takes them."""
+    pushes: list[AxisCause] = []
+    for _ in range(MOST_PUSHES):
+        beside = {k: np.concatenate([*data.healthy[k].values()], axis=1) for k in rows.train}
+        left = {k: done.left[k] for k in (*rows.train, *rows.test)}
+        found = find_window(left, beside, {k: rows.moves[k].time for k in left}, data.floor)
+        if found is None:
+            break
+        window, rest = found
+        if not (sharp(window, rest, rows.moves[window.run].time) or seen_elsewhere(window, rows.moves)):
+            break
+        more = [*pushes, _push(name, window, rows)]
+        again = fit_channel(data, [*terms, *more])
+        if sum(c.effect == "disturbance" for c in again.causes) < len(more):
+            break
+        done, pushes = again, more
+    return done
+
+
+def _push(name: str, window: Window, rows: JointRows) -> AxisCause:
+    """A force in a window of a run."""
+    run, time = rows.runs[window.run], rows.moves[window.run].time
+    module = shelf.load("effects", "disturbance")
+    own = next(p for p in module.PARAMETERS if p.name == ("force_Nmm" if run.revolute else "force_N"))
+    ends = (run.started + float(time[min(row, len(time) - 1)]) for row in (window.first, window.last))
+    return AxisCause(
+        effect="disturbance", module=module, target=name, parameters=(own,),
+        shape=dict(zip(("from_s", "to_s"), ends, strict=True)), ways=float(len(time)), run=run.name,
+    )  # fmt: skip
+
+
+def _tell(found: AxisFindings, rows: JointRows, done: ChannelFit, healthy: Sequence[Mapping[str, Floats]]) -> None:
+    """Sizes that every axis has, for the reader, in the units of the axis."""
+    lever = lever_mm(rows.runs[0].revolute)
+    if rows.channel == "following":
+        found.details["following"] = {"acceleration_us2": done.combined({"acceleration": [1e6]})}
+        return
+    if rows.channel == "behind":
+        found.details["second_encoder"] = {"delay_ms": done.combined({"delay": [-1e3]})}
+        if "compliance" in done.sizes:
+            key = "compliance_rad_per_Nmm" if rows.runs[0].revolute else "compliance_mm_per_N"
+            found.details["second_encoder"][key] = done.combined({"compliance": [lever**-2]})
+        return
+    parts = {kind: np.concatenate([healthy[k][kind] for k in rows.train]) for kind in healthy[0]}
+    weight, inertia = parts["weight"] @ done.sizes["weight"], {"acceleration": [lever**2]}
+    if "stated masses" in parts:
+        stated, speeding = parts["stated masses"], parts["acceleration"][:, 0]
+        weight = weight + stated[:, 0] * done.sizes["stated masses"][0]
+        by_own = float(stated[:, 1] @ speeding / max(float(speeding @ speeding), 1e-300))  # of the masses' inertia
+        inertia["stated masses"] = [0.0, lever**2 * by_own]
+    found.details["force"] = {
+        "inertia_Nmms2_per_rad": done.combined(inertia),
+        "constant_Nmm": done.combined({"offset": [lever]}),
+        "weight_Nmm": round(lever * float(np.std(weight)), 3),
+    }
+
+
+def _channel(rows: JointRows, done: ChannelFit) -> AxisChannel:
+    """Residuals of the fitted runs, and of those that are judged only, against the floor."""
+    moves, values, train, test = rows.moves, rows.values, rows.train, rows.test
+    constant = done.sizes["offset"][0] if rows.channel != "following" else 0.0
+    data = series_of(moves, values, train)
+    first = by_block(data, data.y - constant)
+    channel = AxisChannel(data, train, first, first, floor=rows.floor, stated=rows.stated)
+    channel.all_names = [run.name for run in rows.runs]
+    channel.moves, channel.left = [moves[k] for k in train], [done.left[k] for k in train]
+    channel.last = by_block(data, np.concatenate(channel.left))
+    if test:
+        seen = series_of(moves, values, test)
+        channel.first = by_block(seen, seen.y - constant)
+        channel.last = by_block(seen, np.concatenate([done.left[k] for k in test]))
+    channel.held = {k: done.left[k] for k in test}
+    channel.held_whole = {k: values[k] - constant for k in test}
+    channel.held_times = {k: moves[k].time for k in test}
+    order = [*train, *test]
+    channel.names = [rows.runs[k].name for k in order]
+    left = [done.left[k] for k in order]
+    if rows.channel == "force":  # beside what laws of friction and inertia are known to
+        known = [np.hypot(rows.floor, not_known(values[k] - done.left[k] - constant)) for k in order]
+        left = [each * rows.floor / own for each, own in zip(left, known, strict=True)]
+    channel.gate = judge(left, left, [moves[k].time for k in order], rows.floor)
+    return channel

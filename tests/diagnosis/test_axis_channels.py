@@ -1,0 +1,126 @@
+"""Torques, second encoders and speed limits in logs of axes, against plants in closed form and a measured servo."""
+
+import numpy as np
+import pytest
+import yaml
+
+from camcomp.api.diagnosis import diagnose
+from tests.commandline import ROOT
+from tests.validation.measured import tables
+
+ARM = """robot:
+  name: one link
+  type: serial
+  convention: modified
+  joints:
+    - {name: J1, alpha_deg: -90, stiffness_Nmm_per_rad: 1.0e+9}
+  flange: {translation_mm: [500, 0, 0]}
+tool: {length_mm: 0}
+workpiece: {origin_mm: [600, 0, 200]}
+"""
+FORCE, VISCOUS, INERTIA, WEIGHT = 2500.0, 3000.0, 900.0, 8000.0  # N mm, N mm s/rad, N mm s2/rad, N mm
+
+
+def write(folder, name, columns):
+    rows = np.column_stack(list(columns.values()))
+    np.savetxt(folder / f"{name}.csv", rows, fmt="%.9g", delimiter=",", header=",".join(columns), comments="")
+
+
+def asked(folder, configs, runs, **keys):
+    listed = [{"name": each, "log": f"{each}.csv", "cutting": False} for each in runs]
+    path = folder / "experiment.yaml"
+    path.write_text(yaml.safe_dump({"config": configs, "runs": listed, **keys}))
+    return diagnose(path).result
+
+
+def course(seed):
+    """Times (n,), angle, speed and acceleration of a joint: three sines."""
+    rng, t = np.random.default_rng(seed), np.arange(0.0, 12.0, 0.005)
+    parts = [(0.5, 0.9, rng.uniform(0, 6)), (0.25, 2.1, rng.uniform(0, 6)), (0.1, 4.3, rng.uniform(0, 6))]
+    q = sum(a * np.sin(w * t + p) for a, w, p in parts)
+    speed = sum(a * w * np.cos(w * t + p) for a, w, p in parts)
+    return t, q, speed, sum(-a * w * w * np.sin(w * t + p) for a, w, p in parts)
+
+
+def torque_log(folder, name, seed, *, rubs):
+    t, q, speed, acceleration = course(seed)
+    torque = INERTIA * acceleration + WEIGHT * np.cos(q) + rubs * (FORCE * np.sign(speed) + VISCOUS * speed)
+    noise = np.random.default_rng(seed + 1)
+    encoder = q + noise.normal(0, 1e-6, len(t))
+    write(folder, name, {"t_s": t, "act_J1_rad": encoder, "act_J1_Nmm": torque + noise.normal(0, 40.0, len(t))})
+
+
+def test_torques_alone_tell_friction_inertia_and_weight_of_a_joint(tmp_path):
+    (tmp_path / "arm.yaml").write_text(ARM)
+    for name, seed in (("a", 1), ("b", 5)):
+        torque_log(tmp_path, name, seed, rubs=True)
+    result = asked(tmp_path, ["arm.yaml"], "ab", holdout=["b"])
+    (friction,) = [c for c in result.causes if c.effect == "friction"]
+    for name, true in (("force_Nmm", FORCE), ("viscous_Nmms_per_rad", VISCOUS)):
+        low, high = friction.parameters[name].ci95
+        assert low <= true <= high and high - low < 0.3 * true
+    detail = result.axes_in_detail["J1"]["force"]
+    assert detail["inertia_Nmms2_per_rad"].value == pytest.approx(INERTIA, rel=0.05)
+    assert detail["weight_Nmm"] == pytest.approx(WEIGHT * np.std(np.cos(course(1)[1])), rel=0.05)
+    assert result.shrinkage.after_rms_um < 0.1 * result.shrinkage.before_rms_um
+
+
+def test_a_joint_that_does_not_rub_has_no_friction(tmp_path):
+    (tmp_path / "arm.yaml").write_text(ARM)
+    torque_log(tmp_path, "a", 1, rubs=False)
+    assert "friction" not in [c.effect for c in asked(tmp_path, ["arm.yaml"], "a").causes]
+
+
+def second_encoder(folder, width, delay_s):
+    """An encoder behind a play of a width, sampled a little later than that of the motor."""
+    t, q, speed, _ = course(3)
+    behind = np.empty_like(q)
+    state = q[0]
+    for i, each in enumerate(q):
+        state = min(max(state, each - width / 2), each + width / 2)
+        behind[i] = state
+    noise = np.random.default_rng(4).normal(0, 1.5e-6, (2, len(t)))
+    load = behind - delay_s * speed + 4e-4 + noise[0]
+    write(folder, "a", {"t_s": t, "cmd_J1_rad": q, "act_J1_rad": q + noise[1], "load_J1_rad": load})
+
+
+def test_a_second_encoder_behind_the_gear_shows_its_play(tmp_path):
+    (tmp_path / "arm.yaml").write_text(ARM)
+    second_encoder(tmp_path, 1.5e-4, 0.002)
+    result = asked(tmp_path, ["arm.yaml"], "a")
+    (play,) = [c for c in result.causes if c.effect != "unknown"]
+    assert (play.effect, play.target) == ("backlash", "J1") and play.probability > 0.9
+    assert play.parameters["width_rad"].value == pytest.approx(1.5e-4, rel=0.03)
+    assert result.axes_in_detail["J1"]["second_encoder"]["delay_ms"].value == pytest.approx(2.0, abs=0.1)
+
+
+def test_two_encoders_that_agree_show_no_play(tmp_path):
+    (tmp_path / "arm.yaml").write_text(ARM)
+    second_encoder(tmp_path, 0.0, 0.002)
+    result = asked(tmp_path, ["arm.yaml"], "a")
+    assert (result.verdict, [c.effect for c in result.causes]) == ("none", [])
+
+
+def test_a_slide_that_goes_no_faster_has_a_speed_limit(tmp_path):
+    t = np.arange(0.0, 10.0, 0.01)
+    wanted = np.interp(t, [0, 1, 1.2, 3, 3.5, 6, 6.3, 8, 10], [0, 0, 40, 40, -10, -10, 60, 60, 0])
+    driven = np.empty_like(t)
+    driven[0] = 0.0
+    for i in range(1, len(t)):
+        driven[i] = driven[i - 1] + np.clip(wanted[i] - driven[i - 1], -0.9, 0.9)
+    noise = np.random.default_rng(2).normal(0, 0.002, len(t))
+    write(tmp_path, "a", {"t_s": t, "cmd_x_mm": wanted, "act_x_mm": driven + noise})
+    result = asked(tmp_path, [str(ROOT / "config/cartesian.yaml")], "a")
+    found = {c.effect: c for c in result.causes}
+    assert "servo_lag" not in found and "servo_overshoot" not in found
+    assert found["speed_limit"].parameters["speed_mm_per_s"].value == pytest.approx(90.0, rel=0.02)
+
+
+def test_a_measured_servo_has_a_speed_limit_and_no_lag(tmp_path):
+    folder = tables.HERE / "uart_servo"
+    for name in ("first", "second"):
+        write(tmp_path, name, tables.read(folder / f"{name}.csv"))
+    result = asked(tmp_path, [str(folder / "servo.yaml")], ("first", "second"), holdout=["second"])
+    effects = [c.effect for c in result.causes]
+    assert "speed_limit" in effects and "servo_lag" not in effects
+    assert result.shrinkage.ratio > 0.8
