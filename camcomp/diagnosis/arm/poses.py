@@ -20,7 +20,7 @@ from camcomp.diagnosis.model.group import Group
 from camcomp.ground import shelf
 from camcomp.ground.datatypes import Floats
 from camcomp.model import signal_path
-from camcomp.model.effect import Cause, Load, Motion, Parameter
+from camcomp.model.effect import Cause, Load, Motion, Parameter, applies
 from camcomp.model.statics.arm import Arm, arm_of
 from camcomp.model.statics.description import Actuator, Link, Robot
 from camcomp.model.statics.hanging import Hung, grown_way, hang
@@ -40,7 +40,8 @@ class Poses:
     """Poses of one campaign: joints q (n, m), measured tips (n, 3) mm, time (n,) s, temperature (n,) or None, run (n,).
 
     sd (n, 3) mm: what the instrument states of itself, NaN or None where it says nothing; row (n,): of the run's log, from 1;
-    approach (n, m): way in which every joint turned last, +1 or -1, 0 where nobody knows.
+    approach (n, m): direction in which every joint turned last, +1 or -1, 0 where unknown; torque (n, m) of the drives as
+    logged, N mm or N, NaN or None where there is none.
     """
 
     label: str
@@ -52,15 +53,17 @@ class Poses:
     sd: Floats | None = None
     row: np.ndarray | None = None
     approach: Floats | None = None
+    torque: Floats | None = None
 
     def take(self, rows: np.ndarray) -> Poses:
         """The poses of a mask or of indices."""
         heat = None if self.temperature is None else self.temperature[rows]
         sd = None if self.sd is None else self.sd[rows]
-        way = None if self.approach is None else self.approach[rows]
+        way, torque = (None if each is None else each[rows] for each in (self.approach, self.torque))
         return Poses(
-            self.label, self.q[rows], self.tip[rows], self.time[rows], heat, self.run[rows], sd, self.rows[rows], way
-        )
+            self.label, self.q[rows], self.tip[rows], self.time[rows], heat, self.run[rows], sd, self.rows[rows], way,
+            torque,
+        )  # fmt: skip
 
     @property
     def rows(self) -> np.ndarray:
@@ -167,7 +170,7 @@ class ArmBench:
         error, _ = signal_path.driven(causes, self.actuators, motion)
         load = signal_path.loaded(causes, motion, np.zeros((len(campaign.q), 3)))
         q = motion.encoder + error
-        hung = hang(robot, q, load.wrench if load.wrench.any() else None)
+        hung = hang(robot, q, load.wrench if load.wrench.any() else None, campaign.torque)
         grown = signal_path.grown(causes, self.actuators, motion)
         if grown is not None:
             hung = replace(hung, point=hung.point + grown_way(robot, q, grown))
@@ -186,15 +189,16 @@ class ArmBench:
         return [] if CURVE in without else self._of_effects([(CURVE, shelf.load("effects", CURVE))])
 
     def shaped(self, without: Sequence[str] = ()) -> list[Column]:
-        """Parameters of drives' effects that need a shape nobody knows (a time of warming up), one column for each value to try."""
+        """Parameters of drives and links that need an unknown shape (a time of warming up), one column for each value to try."""
         found: list[Column] = []
         if not self._warm and not all(each.has_clock for each in self.campaigns):
             return found  # rows without a clock say nothing of a warming curve
         for name, module in shelf.usable("effects", (*_UNSEEN, CURVE, *without)):
-            if "drive" not in signal_path.stages_of(module) or module.TARGET == "named":
+            if not (hasattr(module, "on_drive") or hasattr(module, "on_links")) or module.TARGET == "named":
                 continue
             targets: list[str | None] = [None] if module.TARGET in ("machine", "either") else []
             targets += [] if module.TARGET == "machine" else list(self.actuators)
+            targets = [each for each in targets if applies(module, self.robot, each)]
             for target in targets:
                 turns = self.drive(self.actuators[0] if target is None else target).revolute
                 own = _for(module, turns)
@@ -222,7 +226,7 @@ class ArmBench:
                 continue
             targets: list[str | None] = [None] if module.TARGET == "machine" else list(self.actuators)
             targets = targets[-_WRIST[name] :] if name in _WRIST else targets
-            for target in targets:
+            for target in (each for each in targets if applies(module, self.robot, each)):
                 turns = target is None or self.drive(target).revolute
                 for p in _parameters(module, turns):
                     found.append(Column(name, target, module, p))

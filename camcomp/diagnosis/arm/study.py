@@ -30,6 +30,7 @@ from camcomp.ground import headway
 from camcomp.ground.datatypes import Floats
 from camcomp.model.effect import Cause
 from camcomp.model.statics.description import Robot
+from camcomp.model.statics.masses import has_moved_mass
 
 MOST_POSES = 1200  # of a campaign; more are drawn from
 LEAST_POSES = 12  # of a campaign; fewer do not even tell its frames
@@ -227,7 +228,11 @@ def merged(runs: Sequence[Poses], least: int = LEAST_POSES) -> list[Poses]:
             np.concatenate([getattr(r, f) for r in own]) for f in ("q", "tip", "time", "run", "rows")
         )
         way = np.concatenate([np.zeros_like(r.q) if r.approach is None else r.approach for r in own])
-        every = Poses(label, q, tip, time, heat, run, None if all(d is None for d in deviations) else sd, row, way)
+        torque = np.concatenate([np.full(r.q.shape, np.nan) if r.torque is None else r.torque for r in own])
+        every = Poses(
+            label, q, tip, time, heat, run, None if all(d is None for d in deviations) else sd, row, way,
+            None if np.isnan(torque).all() else torque,
+        )  # fmt: skip
         _, first = np.unique(np.concatenate([q, tip], axis=1), axis=0, return_index=True)  # sorted by joints
         every = every.take(first)
         if len(every.q) < least:
@@ -305,4 +310,15 @@ def studied(
         outliers=tuple(Outlier(run=run, row=row) for run, row in sorted(set(case.outliers))),
         standards=of_poses(robot, bench.campaigns, gaps),
     )
-    return result, (*case.notes, *notes_of_frames(case, named))
+    return result, (*case.notes, *notes_of_weight(robot, bench.campaigns, without), *notes_of_frames(case, named))
+
+
+def notes_of_weight(robot: Robot, campaigns: Sequence[Poses], without: Sequence[str]) -> tuple[str, ...]:
+    """Effects under weight that have no columns, because neither masses nor torques are known."""
+    if has_moved_mass(robot) or any(each.torque is not None for each in campaigns):
+        return ()
+    names = [name for name in ("gravity_compliance", "base_compliance") if name not in without]
+    if not names:
+        return ()
+    text = f"no mass_kg in the machine file and no torques in the logs: {' and '.join(names)} cannot be found"
+    return (text,)

@@ -31,8 +31,10 @@ class Hung:
     drive: Array
 
 
-def hang(robot: Robot, q: Array, wrench: Array | None = None) -> Hung:
+def hang(robot: Robot, q: Array, wrench: Array | None = None, drive: Array | None = None) -> Hung:
     """Poses at joint coordinates q (n, m) under the weights of the arm and a wrench (n, 6) at the platform reference.
+
+    drive (n, m): measured torque or force of the drives, N mm or N, in place of the modelled one; NaN where none is known.
 
     Raises ValueError for a machine that is no arm, ArithmeticError if the deflections diverge.
     """
@@ -52,6 +54,8 @@ def hang(robot: Robot, q: Array, wrench: Array | None = None) -> Hung:
     z = [np.zeros((len(q), len(C))) for C in compliance]
     for _ in range(MOST_PASSES):
         point, rotation, loads = _walk(robot, q, z, wrench)
+        if drive is not None:
+            loads = _with_measured(loads, drive)
         new = [load @ C for load, C in zip(loads, compliance, strict=True)]
         change = max((float(np.abs(a - b).max(initial=0.0)) for a, b in zip(new, z, strict=True)), default=0.0)
         z = new
@@ -61,6 +65,13 @@ def hang(robot: Robot, q: Array, wrench: Array | None = None) -> Hung:
             drives = [load[:, 0] for load, C in zip(loads, compliance, strict=True) if len(C) == 1]
             return Hung(point, rotation, -np.stack(drives, axis=1))
     raise ArithmeticError("the arm gives way under its own weight")
+
+
+def _with_measured(loads: list[Array], drive: Array) -> list[Array]:
+    """Loads (n, 1 or 6) on every spring, those on drives as measured torques (n, m) balance them where these are known."""
+    measured = iter(-drive.T[:, :, None])
+    own = [next(measured) if load.shape[1] == 1 else load for load in loads]
+    return [np.where(np.isnan(each), load, each) for each, load in zip(own, loads, strict=True)]
 
 
 def grown_way(robot: Robot, q: Array, grown: Array) -> Array:

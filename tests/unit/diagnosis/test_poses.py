@@ -63,7 +63,7 @@ def test_empty_cells_of_deviations_and_temperatures_are_filled():
     nan = np.where(np.arange(n) == 2, np.nan, 1.0)
     log = SimpleNamespace(
         time=np.arange(6.0), encoder=np.zeros((n, 2)), tip=np.zeros((n, 3)), temperature=20.0 + np.arange(6.0) * nan,
-        tip_sd=np.full((n, 3), 0.02) * nan[:, None],
+        tip_sd=np.full((n, 3), 0.02) * nan[:, None], has=lambda channel: False,
     )  # fmt: skip
     poses = _poses(SimpleNamespace(clamping=None, started_s=0.0, name="a"), log)
     np.testing.assert_allclose(poses.temperature, 20.0 + np.arange(6.0))
