@@ -10,6 +10,7 @@ for variable in ("NUMBA_NUM_THREADS", "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS")
 import time
 from functools import partial
 from multiprocessing import get_context
+from pathlib import Path
 
 import click
 
@@ -51,6 +52,19 @@ def run(name: str, count: int, minutes: float | None, processes: int, only: tupl
                 )
     for label, (hits, total) in result.get("counts", {}).items():
         click.echo(f"{label:<72} {report.rate(hits, total)}")
+
+
+@main.command("calibrate")
+@click.argument("rows", type=click.Path(path_type=Path))
+@click.option("--count", default=60, help="Development seeds in all, those of ROWS included.")
+@click.option("--minutes", type=float, help="Begin no experiment after that.")
+def calibrate(rows: Path, count: int, minutes: float | None) -> None:
+    """Answer poses of development seeds into the file ROWS, fit the calibration maps and store them in the package."""
+    from tests.validation.poses import calibrate as poses
+
+    for row in poses.answered(rows, count, minutes):
+        click.echo(f"{row['name']} {row.get('failed') or row['verdict']} {row.get('calibration', '')}", err=True)
+    poses.store(rows)
 
 
 def _measured(only: tuple[str, ...], again: bool) -> None:

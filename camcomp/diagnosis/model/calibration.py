@@ -1,6 +1,6 @@
 """The calibration map: from log odds of the posterior to a stated probability, and the inflation of intervals.
 
-One monotone map per kind of log, fitted on simulated experiments by `python -m tests.validation.poses.calibrate` and stored with
+One monotone map per kind of log, fitted on simulated experiments by `python -m tests.validation calibrate` and stored with
 its seeds in camcomp/data/calibration.json. Nothing else changes a probability.
 
 Source: Platt, Advances in Large Margin Classifiers (1999); isotonic regression, Zadrozny, Elkan, KDD 2002.

@@ -135,7 +135,7 @@ def explain(
         if best is None or options[best][1] <= max(weighed[background].values()):
             break
         background = best
-    return posterior_of(model, weighed)
+    return posterior_of(model, weighed, UNKNOWN if noise is None else 0.0)
 
 
 def log_prior(model: LinearModel, background: Background, noise: KnownNoise | None) -> float:
@@ -212,15 +212,21 @@ def best_noise(
         at = best
 
 
-def posterior_of(model: LinearModel, weighed: dict[Background, dict[Members, float]]) -> Explanation:
-    """The posterior over everything that was weighed; sets of the same places count as one."""
+def posterior_of(
+    model: LinearModel, weighed: dict[Background, dict[Members, float]], hidden: float = 0.0
+) -> Explanation:
+    """The posterior over everything that was weighed; sets of the same places count as one.
+
+    hidden: probability that the fitted noise is a discrepancy of any form. The data do not change it where the noise is not
+    known, and beside such a discrepancy they do not determine causes.
+    """
     flat = [(b, m, v) for b, own in weighed.items() for m, v in own.items()]
     value = np.array([v for _, _, v in flat])
-    p = np.exp(value - logsumexp(value))
+    p = (1.0 - hidden) * np.exp(value - logsumexp(value))
     places: dict[Place, float] = {}
     families: dict[str, float] = {}
     merged: dict[frozenset[Place], tuple[Members, float, float]] = {}
-    unknown = 0.0
+    unknown = hidden
     for (background, members, _), each in zip(flat, p.tolist(), strict=True):
         if background.unknown or background.noise > EXCESS:
             unknown += each
