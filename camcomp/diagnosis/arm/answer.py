@@ -153,7 +153,7 @@ def causes(told: Told) -> tuple[tuple[FoundCause, ...], tuple[MinorEffect, ...]]
 def _parts(told: Told) -> list[_Part]:
     found, columns = told.case.explanation, told.case.shelf.columns
     own = [_Part(c.effect, c.target, list(c.columns), found.places[c.place])
-           for c in (told.case.shelf.candidates[i] for i in found.members)]  # fmt: skip
+           for c in (found.model.candidates[i] for i in found.members)]  # fmt: skip
     for name, _ in found.background.families:
         on = [j for j in found.model.family(name)[0].tolist() if told.case.amount[j] != 0.0]
         for target in dict.fromkeys(columns[j].target for j in on):
@@ -220,7 +220,10 @@ def _curve(told: Told, cause: FoundCause, on: Sequence[int]) -> CurveCause:
 def verdict(told: Told, named: Sequence[FoundCause]) -> Any:
     """The word of the result."""
     found = told.case.explanation
-    best = next((p for m, p in found.sets if set(_places(told, m)) == set(_places(told, found.members))), 0.0)
+    named_places = set(_places(told, found.members))
+    best = sum(
+        p for m, p in found.sets if (named_places and named_places <= set(_places(told, m))) or m == found.members
+    )
     floor = told.floor
     inputs = VerdictInputs(
         unknown=told.unmodelled,

@@ -279,6 +279,8 @@ class ArmBench:
                 X[:, :, j] = self._drive_motion(campaign, joints, columns[j])
                 continue
             moved = combined(columns, {**amounts, j: amounts.get(j, 0.0) + _SHARE_OF_SCALE})
+            if columns[j].shape and j not in amounts:  # another shape of the same place may act
+                moved = [*causes, *combined(columns, {j: _SHARE_OF_SCALE})]
             X[:, :, j] = (self.standing(campaign, moved).tips(frame) - here) / _SHARE_OF_SCALE
         return X
 

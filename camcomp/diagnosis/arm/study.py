@@ -134,6 +134,9 @@ def explained(
     """The explanation at a noise sd (mm), linearised about what it finds; with spells where few lasting causes are not all."""
     noise = KnownNoise(floor.freedom) if floor else None
     found = relinearised(bench, shelf, sd, noise, weights)
+    finer = shelf.with_finer_shapes(found.members)
+    if len(finer.columns) > len(shelf.columns):
+        shelf, found = finer, relinearised(bench, finer, sd, noise, weights)
     doubtful = found.unknown > 1.0 - EVEN or len(found.members) >= MANY
     if SPELL in without or not (doubtful or noise is None):
         return shelf, found

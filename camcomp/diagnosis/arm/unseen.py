@@ -160,7 +160,7 @@ def shrinkage(
 
 def left_out_in_turn(case: PoseCase) -> tuple[list[list[Floats]], list[tuple[str, str | None]]]:
     """Residuals (n, 3) of every campaign after 0, 1, ... causes that the others have, and the causes in order."""
-    model, background, candidates = case.model, case.explanation.background, case.shelf.candidates
+    model, background, candidates = case.model, case.explanation.background, case.model.candidates
     order: list[tuple[str, str | None]] = []
     every: list[list[Floats]] = []
     for g, others in folds_of(model) if len(case.bench.own) > 1 else ():

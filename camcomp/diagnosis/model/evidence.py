@@ -10,7 +10,7 @@ Source: George, McCulloch, Statistica Sinica 7 (1997) 339; half-normal slabs whe
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import comb, log
 
@@ -78,6 +78,12 @@ class LinearModel:
         self.layout = ColumnLayout.of(self.groups)
         self._grams: dict[SmoothProcess | None, tuple[NormalEquations, ...]] = {}
         self._totals: dict[tuple[SmoothProcess | None, tuple[int, ...]], NormalEquations] = {}
+        self.candidates = tuple(self._seen(each) for each in self.candidates)
+
+    def _seen(self, candidate: PlacedCause) -> PlacedCause:
+        """A candidate without the columns that nuisances take up, where they leave some of it."""
+        seen = tuple(j for j in candidate.columns if self.size[j] > 0.0)
+        return replace(candidate, columns=seen) if 0 < len(seen) < len(candidate.columns) else candidate
 
     def grams(self, process: SmoothProcess | None = None) -> tuple[NormalEquations, ...]:
         """Normal equations of every group."""
