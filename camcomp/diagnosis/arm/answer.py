@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -219,15 +219,11 @@ def _curve(told: Told, cause: FoundCause, on: Sequence[int]) -> CurveCause:
 
 def verdict(told: Told, named: Sequence[FoundCause]) -> Any:
     """The word of the result."""
-    found = told.case.explanation
-    named_places = set(_places(told, found.members))
-    best = sum(
-        p for m, p in found.sets if (named_places and named_places <= set(_places(told, m))) or m == found.members
-    )
+    calibrate = calibration_of(told.kind).calibrate
     floor = told.floor
     inputs = VerdictInputs(
         unknown=told.unmodelled,
-        best=min([calibration_of(told.kind).calibrate(best), *(c.probability for c in named)]),
+        best=min([_best(told, calibrate), *(c.probability for c in named)]),
         alternatives=len(told.alternatives()) - 1,
         causes=len(named),
         known_noise=floor is not None,
@@ -235,6 +231,15 @@ def verdict(told: Told, named: Sequence[FoundCause]) -> Any:
         confirmed=told.check.at_floor,
     )
     return decide(inputs)
+
+
+def _best(told: Told, calibrate: Callable[[float], float]) -> float:
+    """Probability that all causes of the best set act; of the empty set, that the most probable cause does not."""
+    found = told.case.explanation
+    if not found.members:
+        return 1.0 - calibrate(max(found.places.values(), default=0.0))
+    own = set(_places(told, found.members))
+    return calibrate(sum(p for m, p in found.sets if own <= set(_places(told, m))))
 
 
 def _places(told: Told, members: Sequence[int]) -> list[tuple[str, str | None]]:

@@ -15,9 +15,10 @@ Word = Literal["none", "identified", "ambiguous", "unknown"]
 class VerdictInputs:
     """What a verdict hangs on.
 
-    unknown: probability of something unmodelled. best: probability that all causes of the best set act, others beside them or
-    not. alternatives: number of sets as good as it. causes: number of causes of the best set. known_noise: whether the floor is identifiable. gap_in_noise: whether the gap is at the
-    floor. confirmed: whether groups that were not fitted bear the set out and are at their floor; None: no such group.
+    unknown: probability of something unmodelled. best: probability that all causes of the best set act, others beside them
+    or not; of the empty set, that the most probable cause does not. alternatives: number of sets as good as it. causes: number
+    of causes of the best set. known_noise: whether the floor is identifiable. gap_in_noise: whether the gap is at the floor.
+    confirmed: whether groups that were not fitted bear the set out and are at their floor; None: no such group.
     """
 
     unknown: float
