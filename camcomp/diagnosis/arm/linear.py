@@ -67,7 +67,7 @@ class Shelf:
             ((name, value, low, high),) = next(iter(shapes))
             tried = np.concatenate([np.geomspace(low, value, FINER + 1), np.geomspace(value, high, FINER + 1)[1:]])
             for k in (each for each in range(1, len(tried) - 1) if each != FINER):
-                shape = ((name, *(float(v) for v in (tried[k], tried[k - 1], tried[k + 1]))),)
+                shape = ((name, float(tried[k]), float(tried[k - 1]), float(tried[k + 1])),)
                 first = len(out.columns)
                 own = tuple(range(first, first + len(c.columns)))
                 more = PlacedCause(*c.place, own, c.ways * (2 * FINER - 1))
