@@ -80,6 +80,8 @@ def _circles(path: Path) -> list[Circle]:
     angle: dict[str, float] = {}
     found: dict[str, Circle] = {}
     for k in np.flatnonzero(np.isfinite(path.centre[:, 0]) & path.known & ~path.machine):
+        if np.count_nonzero(path.axis[k]) != 1:
+            continue  # aslant
         a, b = (i for i in range(3) if not path.axis[k, i])
         level = 3 - a - b
         if abs(path.end[k, level] - path.start[k, level]) > 1e-6:

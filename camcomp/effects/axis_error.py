@@ -16,6 +16,7 @@ from camcomp.model.error_table.spec import AxisErrorSpec as Params
 
 __all__ = ["Params"]
 STAGE = "structure"
+GEOMETRY = True
 TARGET = "named"
 TARGETS = tuple(f"E{direction}{axis}" for axis in "XYZ" for direction in "XYZABC")
 SLIDES_ONLY = True

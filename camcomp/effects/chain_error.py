@@ -10,6 +10,7 @@ from camcomp.model.statics.lengths import place_of
 from camcomp.model.statics.rotation import exp_rotation
 
 STAGE = "structure"
+GEOMETRY = True
 TARGET = "actuator"
 PLAIN = "a leg mounted at an angle"
 REMEDY = "measure how the base of this leg sits and turn it back, or keep the angle in the machine file"

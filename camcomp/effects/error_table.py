@@ -12,6 +12,7 @@ from camcomp.model.hysteresis import play_between
 
 __all__ = ["Params"]
 STAGE = "drive"
+GEOMETRY = True
 TARGET = "actuator"
 SLIDES_ONLY = True
 PARAMETERS = ()

@@ -6,6 +6,7 @@ from camcomp.ground.datatypes import Floats
 from camcomp.model.effect import Motion, Parameter
 
 STAGE = "drive"
+GEOMETRY = True
 TARGET = "actuator"
 MOMENTARY = True
 PLAIN = "a wrong zero of the axis"

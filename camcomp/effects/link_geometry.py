@@ -13,6 +13,7 @@ from camcomp.model.statics.lengths import place_of
 from camcomp.model.statics.rotation import exp_rotation
 
 STAGE = "structure"
+GEOMETRY = True
 TARGET = "actuator"
 PLAIN = "a link other than its table says"
 REMEDY = "keep the found geometry in the machine file, or in the robot's own calibration"

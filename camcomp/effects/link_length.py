@@ -7,6 +7,7 @@ from camcomp.model.statics.description import Robot
 from camcomp.model.statics.lengths import lengthened
 
 STAGE = "structure"
+GEOMETRY = True
 TARGET = "actuator"
 PLAIN = "a link longer than stated"
 REMEDY = "measure the link and state its length in the machine file"

@@ -6,6 +6,7 @@ from camcomp.ground.datatypes import Floats
 from camcomp.model.effect import Axes, Parameter
 
 STAGE = "structure"
+GEOMETRY = True
 TARGET = "named"
 TARGETS = ("xy", "xz", "yz")
 PLAIN = "two axes that are not square"

@@ -20,7 +20,7 @@ def canonical(path: Path, digits: int = 4) -> Iterator[str]:
         kind = int(path.kind[k])
         words = [f"{path.line[k]:6d}", f"{_KINDS[kind]:5s}", _point("XYZ", path.end[k], digits)]
         if kind == ARC:
-            axis = "XYZ"[int(np.argmax(path.axis[k]))]
+            axis = "XYZ"[int(np.argmax(path.axis[k]))] if path.axis[k].max() == 1.0 else _point("XYZ", path.axis[k], 6)
             angle = plain(float(np.degrees(path.angle[k])), digits, point=False)
             words += ["centre", _point("XYZ", path.centre[k], digits), f"about {axis} by {angle} deg"]
         if path.orientation is not None:

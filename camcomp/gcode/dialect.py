@@ -3,10 +3,14 @@
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from camcomp.gcode.codes import ENDS, GROUPS, REFUSED
 from camcomp.gcode.numbers import decimals
 from camcomp.gcode.spelling import Spelling
+
+if TYPE_CHECKING:
+    from camcomp.gcode.robot_language import RobotLanguage
 
 
 @dataclass(frozen=True)
@@ -51,6 +55,7 @@ class Dialect:
     brackets_comment: bool = True  # `(...)` is a comment
     comment: tuple[str, str] = ("(", ")")
     decimals_max: int = 9  # behind the point of a length, in either unit
+    robot: "RobotLanguage | None" = None  # reads and writes a language of robots; None: words of NC blocks
 
     @property
     def groups(self) -> dict[int, int]:

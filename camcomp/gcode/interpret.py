@@ -24,6 +24,7 @@ from camcomp.gcode.flow import Flow, Siemens
 from camcomp.gcode.macro import Macro
 from camcomp.gcode.owords import OWords
 from camcomp.gcode.program import Program
+from camcomp.gcode.robot_reader import read_robot_program
 from camcomp.gcode.settings import Settings
 from camcomp.gcode.setup import Setup
 from camcomp.gcode.text import Text
@@ -48,6 +49,8 @@ def read_program(data: bytes, *, name: str, setup: Setup | None = None, dialect:
     text = Text.read(data, name)
     setup = setup or Setup()
     language = dialect_of(text, dialect)
+    if language.robot is not None:
+        return read_robot_program(text, setup, language)
     reader = Interpreter(text, setup, language)
     controller(reader).run()
     path, sites = reader.record.finish()

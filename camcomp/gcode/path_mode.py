@@ -20,11 +20,12 @@ class PathMode:
     merge_mm: float = 0.0  # Q of G64, else P: lines that are straight within it become one; 0: never
     code: int = 640
     stated: bool = True  # False: not stated, the default of controllers
+    own_name: str = ""  # in the language of a robot
 
     @cached_property
     def name(self) -> str:
         """Text of the mode in a program, in mm."""
-        return self.said(1.0)
+        return self.own_name or self.said(1.0)
 
     @property
     def apart(self) -> "PathMode":

@@ -7,6 +7,8 @@ from numpy.typing import NDArray
 
 from camcomp.gcode.dialect import Dialect
 from camcomp.gcode.path_mode import PathMode
+from camcomp.gcode.robot_frames import RobotFrames
+from camcomp.gcode.robot_language import MoveSite
 from camcomp.gcode.setup import Setup, Triple
 from camcomp.gcode.text import Text
 from camcomp.ground.datatypes import RAPID, Bools, Floats, Ints, Path
@@ -74,6 +76,8 @@ class Program:
     straight: bool  # no loops, subprograms, parameters, cycles: a line is at most one motion
     dwelt_s: float = 0.0  # G4 in all
     tool_changes: int = 0  # M6 in all
+    robot_moves: tuple[MoveSite, ...] = ()  # (n,) where the moves of a robot program stand in the text
+    robot_frames: RobotFrames | None = None
 
     @property
     def per_turn(self) -> Bools:

@@ -19,6 +19,7 @@ from camcomp.gcode.lineedit import BLANKS, LineEditor
 from camcomp.gcode.numbers import decimals, plain
 from camcomp.gcode.output import Output, Part, Rewritten, Standing
 from camcomp.gcode.program import P, Program, R, Rebase
+from camcomp.gcode.robot_writer import rewrite_robot_program
 from camcomp.gcode.stamp import stamp_index, stamp_line
 from camcomp.gcode.text import Text
 from camcomp.ground.datatypes import ARC, RAPID, Floats, Ints
@@ -40,6 +41,8 @@ def rewrite(
     machine coordinates and moves before X, Y and Z are all known. model: hash of machine and process. part: only these
     motions are written, without a stamp. Raises ProgramError CC137 for a line with too many functions to be rewritten.
     """
+    if program.language.robot is not None:
+        return rewrite_robot_program(program, out, resolution_mm=resolution_mm, version=version, model=model)
     if part is not None:
         writer = Writer(program, out, resolution_mm)
         behind = writer.run_part(part)

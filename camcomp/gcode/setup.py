@@ -1,9 +1,10 @@
 """Settings of the machine for reading a program."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from camcomp.gcode.path_mode import PathMode
+from camcomp.gcode.robot_frames import RobotFrames
 
 Triple = tuple[float, float, float]
 ASSUMED = PathMode(stated=False)
@@ -27,6 +28,7 @@ class Setup:
     path_mode: PathMode = ASSUMED  # until the program states one
     skip_deleted: bool = False  # the block delete switch: lines that start with `/` are not executed
     rotation: tuple[Triple, Triple, Triple] | None = None  # program axes in machine axes; None: parallel
+    frames: Callable[[], RobotFrames] | None = None  # of the arm, for programs in its own language
 
     def in_machine_axes(self, vector: Sequence[float]) -> list[float]:
         """A vector (3,) of program axes in machine axes."""

@@ -3,6 +3,7 @@
 rpy: words A, B, C in degrees, roll, pitch and yaw: R = Rz(C) Ry(B) Rx(A). Between blocks each word is linear in the path
 length, as in LinuxCNC's genserkins and genhexkins. vector: words A3, B3, C3 of Sinumerik, the direction from the tip along
 the tool; between blocks it moves on a great circle (ORIVECT), and R is the smallest rotation from +Z to it.
+turn: the words of rpy; between two moves one rotation about a fixed axis, linear in the path length, as in robot languages.
 
 R (3, 3) rotates the tool from the orientation that the machine holds without such words, in axes of the program frame.
 
@@ -19,16 +20,16 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-RPY, VECTOR = "rpy", "vector"
-LETTERS = {RPY: ("A", "B", "C"), VECTOR: ("A3", "B3", "C3")}
-UPRIGHT = {RPY: (0.0, 0.0, 0.0), VECTOR: (0.0, 0.0, 1.0)}
+RPY, VECTOR, TURN = "rpy", "vector", "turn"
+LETTERS = {RPY: ("A", "B", "C"), VECTOR: ("A3", "B3", "C3"), TURN: ("A", "B", "C")}
+UPRIGHT = {RPY: (0.0, 0.0, 0.0), VECTOR: (0.0, 0.0, 1.0), TURN: (0.0, 0.0, 0.0)}
 NEAR_POLE_DEG = 89.0  # of B: beyond it A and C rotate about nearly the same axis
 _SAME_DIRECTION = 1e-12  # of the sine between two directions
 
 
 @dataclass(frozen=True, eq=False)
 class Orientation:
-    """Words (n, 3) of n motions at their starts and ends; deg for rpy, a unit vector for vector."""
+    """Words (n, 3) of n motions at their starts and ends; deg for rpy and turn, a unit vector for vector."""
 
     form: str
     start: Floats
@@ -52,12 +53,45 @@ def between(form: str, start: Floats, end: Floats, u: Floats) -> Floats:
     u = u[:, None]
     if form == RPY:
         return start + u * (end - start)
+    if form == TURN:
+        return _turned(start, end, u)
     angle = np.arctan2(np.linalg.norm(np.cross(start, end), axis=1), np.einsum("ni,ni->n", start, end))[:, None]
     sine = np.sin(angle)
     near = sine < _SAME_DIRECTION
     safe = np.where(near, 1.0, sine)
     arc = (np.sin((1.0 - u) * angle) * start + np.sin(u * angle) * end) / safe
     return _unit(np.where(near, start + u * (end - start), arc))
+
+
+def _turned(start: Floats, end: Floats, u: Floats) -> Floats:
+    """Words (k, 3) of rotations at fractions u (k, 1) of the turns from those of `start` to those of `end`."""
+    out = start + u * (end - start)
+    on = np.flatnonzero((np.abs(end - start) > 0.0).sum(axis=1) > 1)  # one word alone turns about one axis anyway
+    if len(on):
+        first = rotations_of(RPY, start[on])
+        step = rotation_vectors(first.transpose(0, 2, 1) @ rotations_of(RPY, end[on])) * u[on]
+        out[on] = words_of(RPY, first @ rotations_about(step), out[on])
+    return out
+
+
+def rotation_vectors(rotation: Floats) -> Floats:
+    """Vectors (k, 3) rad of rotations (k, 3, 3) of less than half a turn."""
+    R = rotation
+    w = 0.5 * np.stack((R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]), axis=1)
+    s = np.linalg.norm(w, axis=1)
+    angle = np.arctan2(s, 0.5 * (np.trace(R, axis1=1, axis2=2) - 1.0))
+    out: Floats = w * np.divide(angle, s, out=np.ones_like(s), where=s > _SAME_DIRECTION)[:, None]
+    return out
+
+
+def rotations_about(vectors: Floats) -> Floats:
+    """Rotations (k, 3, 3) by vectors (k, 3) rad; formula of Rodrigues."""
+    angle = np.linalg.norm(vectors, axis=1)
+    x, y, z = (vectors / np.maximum(angle, 1e-300)[:, None]).T
+    zero = np.zeros_like(x)
+    K = np.moveaxis(np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]), 2, 0)
+    out: Floats = np.eye(3) + np.sin(angle)[:, None, None] * K + (1.0 - np.cos(angle))[:, None, None] * (K @ K)
+    return out
 
 
 def rotations_of(form: str, words: Floats) -> Floats:
@@ -80,10 +114,7 @@ def words_of(form: str, rotation: Floats, near: Floats) -> Floats:
     if form == VECTOR:
         direction: Floats = rotation[:, :, 2].copy()
         return direction
-    b = np.arctan2(-rotation[:, 2, 0], np.hypot(rotation[:, 2, 1], rotation[:, 2, 2]))
-    a = np.arctan2(rotation[:, 2, 1], rotation[:, 2, 2])
-    c = np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0])
-    one = np.degrees(np.stack((a, b, c), axis=1))
+    one = pole_free_words(rotation)
     other = one * [1.0, -1.0, 1.0] + 180.0  # the same orientation over the other side of the pole
     one, other = (each + 360.0 * np.round((near - each) / 360.0) for each in (one, other))
     closer = np.linalg.norm(other - near, axis=1) < np.linalg.norm(one - near, axis=1)
@@ -91,9 +122,18 @@ def words_of(form: str, rotation: Floats, near: Floats) -> Floats:
     return out
 
 
+def pole_free_words(rotation: Floats) -> Floats:
+    """Words A, B, C (k, 3) deg of rotations (k, 3, 3), with B between -90 and 90."""
+    b = np.arctan2(-rotation[:, 2, 0], np.hypot(rotation[:, 2, 1], rotation[:, 2, 2]))
+    a = np.arctan2(rotation[:, 2, 1], rotation[:, 2, 2])
+    c = np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0])
+    out: Floats = np.degrees(np.stack((a, b, c), axis=1))
+    return out
+
+
 def angles_of(form: str, words: Floats) -> Floats:
     """Words (k, 3) of either form as A, B, C in degrees."""
-    return words if form == RPY else words_of(RPY, rotations_of(form, words), np.zeros_like(words))
+    return words if form != VECTOR else words_of(RPY, rotations_of(form, words), np.zeros_like(words))
 
 
 def _unit(vectors: Floats) -> Floats:

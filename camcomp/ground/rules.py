@@ -216,6 +216,17 @@ RULES: dict[str, Rule] = {
         "and none does, or what they state leaves its form or its place open.",
         "state workpiece: stock in the machine file, or use --stock program",
     ),
+    "CC144": Rule(
+        "robot statement not followed",
+        "A program in the language of a robot (KRL, RAPID, Fanuc LS) is read as one module that runs from its first line to its "
+        "last, with poses written as numbers. Control flow, variables, relative moves and unknown statements are refused.",
+        "post plain moves with numbers",
+    ),
+    "CC145": Rule(
+        "robot frame or tool",
+        "A base or tool of a robot program is not stated as numbers, is not in the machine file, or contradicts it.",
+        "state control: base_frames, tool_frames and flange_abc_deg, and section tool, as they are in the control",
+    ),
     # --- CC2xx usage, YAML, config -----------------------------------------------------------------------------
     "CC200": Rule(
         "YAML cannot be read",

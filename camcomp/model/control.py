@@ -2,20 +2,26 @@
 
 import math
 from collections.abc import Iterable
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
+from camcomp.gcode.detect import dialect_of
 from camcomp.gcode.interpret import read_program
 from camcomp.gcode.likeness import like_a_program
 from camcomp.gcode.path_mode import stated_mode
 from camcomp.gcode.program import Program
 from camcomp.gcode.setup import ASSUMED, Setup
+from camcomp.gcode.text import Text
 from camcomp.ground.errors import Location, ProgramError
 from camcomp.ground.files import display_name, read_bytes
 from camcomp.model.config.spec import Config
 from camcomp.model.config.stated import dialect_without_config
+from camcomp.model.robot_frames import robot_frames
 from camcomp.model.statics.build import rotation_of
 from camcomp.model.trajectory.moves import ControlLimits
 
+ACCURACY_NOT_STATED = "control: absolute_accuracy is not stated; where the control corrects the arm's geometry itself, it is corrected twice"
 ORIENTING_ACTUATORS = 6  # of a machine that holds the orientation of its tool
 
 
@@ -41,6 +47,7 @@ def setup_of(config: Config) -> Setup:
         skip_deleted=control.block_delete,
         path_mode=stated_mode(control.path_mode) if control.path_mode else ASSUMED,
         rotation=(_triple(x), _triple(y), _triple(z)) if turned else None,
+        frames=partial(robot_frames, config),
     )
 
 
@@ -75,11 +82,22 @@ def program_of(data: bytes, name: str, config: Config | None = None) -> Program:
     setup = setup_of(config) if config else Setup()
     dialect = config.control.dialect if config else dialect_without_config()
     try:
-        return read_program(data, name=name, setup=setup, dialect=dialect)
+        return _with_remarks(read_program(data, name=name, setup=setup, dialect=dialect), config)
     except ProgramError as error:
-        if error.rule != "CC100" and not like_a_program(data):
+        if error.rule != "CC100" and not like_a_program(data) and not _is_robot_program(data, name, dialect):
             raise ProgramError("CC141", "this is no NC program", at=Location(name, 1, 1)) from error
         raise
+
+
+def _is_robot_program(data: bytes, name: str, dialect: str | None) -> bool:
+    return dialect_of(Text.read(data, name), dialect).robot is not None
+
+
+def _with_remarks(program: Program, config: Config | None) -> Program:
+    """The program, with what is to be said of the control that runs it."""
+    if program.language.robot is None or config is None or config.control.absolute_accuracy is not None:
+        return program
+    return replace(program, warnings=(*program.warnings, ACCURACY_NOT_STATED))
 
 
 def _triple(values: Iterable[float]) -> tuple[float, float, float]:

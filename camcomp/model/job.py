@@ -71,6 +71,8 @@ class Job:
             parts["tools"] = self.config.model_dump(mode="json", include={"tools"}, exclude=own)["tools"]
         for section, keys in _LATER.items():  # keys of later versions: omitted unless they are given
             parts[section] = {key: v for key, v in parts[section].items() if v is not None or key not in keys}
+        if self.config.control.absolute_accuracy:
+            parts["absolute_accuracy"] = True
         if self.config.uncertain and self.config.compensation.policy != "full":  # then the program depends on them
             parts["policy"] = [self.config.compensation.policy]
             parts["policy"] += [[each.name, each.sd, each.group] for each in self.config.spreads]
@@ -104,6 +106,8 @@ class Job:
             )
             for i, each in enumerate(self.config.effects)
         )
+        if self.config.control.absolute_accuracy:  # the control corrects these itself
+            causes = tuple(cause for cause in causes if not getattr(cause.effect, "GEOMETRY", False))
         measured = self.measured_force or self.config.process.force.model == "table"
         return signal_path.under_measured_force(causes) if measured else causes
 
@@ -128,6 +132,8 @@ class Job:
     def _robots(self) -> tuple[Robot, Robot]:
         """The true robot and the robot of the controller's kinematics, with the orientation that the tool keeps."""
         robots = build_robot(self.config.robot, self.config.tool.tip)
+        if self.config.control.absolute_accuracy:  # chain errors are known to the control
+            robots = (robots[1], robots[1])
         if len(robots[0].actuators) != 6:
             return robots
         held = held_orientation(robots[1], self.frame.rotation, self.config.tool.turn_deg)

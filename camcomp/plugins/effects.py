@@ -53,6 +53,7 @@ class EffectPlugin(Protocol):
     - ROTARY: parameters of a hinge. ARM_ONLY: for serial arms. SLIDES_ONLY: for slides.
     - MOMENTARY: True: on_drive and on_drive_force have no memory.
     - WARMS: compensate needs the temperature.
+    - GEOMETRY: True: an error of the arm's geometry, which absolutely accurate controllers correct themselves.
     - MODELLED_FORCE: True: an error of the force model, which does not change measured forces.
     - COULOMB: names of parameters: Coulomb force at the guide, which holds a carriage within the play of its drive.
     - UNCORRECTABLE: True: compensate does not correct its error.

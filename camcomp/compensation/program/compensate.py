@@ -308,7 +308,7 @@ def _compensated(
                     version=version,
                     model=job.fingerprint,
                 )
-    warnings = _warnings(job, control.resting) + control.warnings(
+    warnings = _warnings(job, control.resting, program.language.exact_stop) + control.warnings(
         path.line[track.motion[points.piece[points.judged]]], tolerance_um
     )
     if control.apart:
@@ -421,8 +421,8 @@ def _kept(track: Track, nodes: Nodes, correction: Floats, half: float) -> Bools:
     return out
 
 
-def _warnings(job: Job, resting: int) -> list[str]:
-    out = rest_warning(resting)
+def _warnings(job: Job, resting: int, exact_stop: str) -> list[str]:
+    out = rest_warning(resting, exact_stop)
     if job.config.process.temperature_C is None:
         warm = dict.fromkeys(cause.name for cause in job.causes if getattr(cause.effect, "WARMS", False))
         out += [

@@ -137,11 +137,11 @@ class Orienting:
 
     def lengths(self, words: Floats, budget_mm: float) -> Floats:
         """Words (k, 3) as lengths, so that a miss of TILT_RAD weighs as much as one of the budget, mm."""
-        return words * (budget_mm / TILT_RAD / (DEGREES_PER_RAD if self.form == RPY else 1.0))
+        return words * (budget_mm / TILT_RAD / (1.0 if self.form == VECTOR else DEGREES_PER_RAD))
 
     def from_lengths(self, lengths: Floats, budget_mm: float) -> Floats:
         """The inverse of `lengths`."""
-        return lengths / (budget_mm / TILT_RAD / (DEGREES_PER_RAD if self.form == RPY else 1.0))
+        return lengths / (budget_mm / TILT_RAD / (1.0 if self.form == VECTOR else DEGREES_PER_RAD))
 
     def along(self, ends: Floats, before: Floats, row: Ints, fraction: Floats) -> Floats:
         """Words (k, 3) at fractions (k,) of the moves to words `ends` (N, 3), the first of which begins at `before` (3,)."""

@@ -203,11 +203,13 @@ def under_control(
     )
 
 
-def rest_warning(resting: int) -> list[str]:
+def rest_warning(resting: int, exact_stop: str = "G61") -> list[str]:
     """What there is to say about end points at which the control rests because of joining lines."""
     if not resting:
         return []
-    return [f"G61 at {resting} ends of cuts and joining lines, so that the control does not round these corners"]
+    return [
+        f"{exact_stop} at {resting} ends of cuts and joining lines, so that the control does not round these corners"
+    ]
 
 
 def apart_pays(moves: ToolMoves, cut: Bools, limits: ControlLimits, tolerance_um: float) -> bool:

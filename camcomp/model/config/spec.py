@@ -126,6 +126,13 @@ class Process(Spec):
     )
 
 
+class RobotFrame(Spec):
+    """A base in the machine frame, or a tool in the control's flange frame."""
+
+    origin_mm: Vector = zero("of the frame")
+    abc_deg: Vector = Field([0.0, 0.0, 0.0], description="R = Rz(A) Ry(B) Rx(C); Fanuc has them as R, P, W")
+
+
 class Control(Spec):
     """The controller: settings that the program text does not contain."""
 
@@ -158,6 +165,21 @@ class Control(Spec):
         None,
         description="machines with six actuators: A, B, C are written into programs that do not state the tool's orientation, "
         "so that it is corrected too",
+    )
+    absolute_accuracy: bool | None = Field(
+        None,
+        description="the control corrects the arm's geometry itself (KUKA absolutely accurate, ABB Absolute Accuracy); then only "
+        "compliance is compensated. To be stated for robot programs",
+    )
+    base_frames: dict[ToolNumber, RobotFrame] = Field(
+        default_factory=dict, description="BASE_DATA[n], UFRAME n of the control, in the machine frame"
+    )
+    tool_frames: dict[ToolNumber, RobotFrame] = Field(
+        default_factory=dict, description="TOOL_DATA[n], UTOOL n of the control, in its flange frame"
+    )
+    flange_abc_deg: Vector = Field(
+        [0.0, 180.0, 0.0],
+        description="axes of the control's flange frame in those of the platform: R = Rz(A) Ry(B) Rx(C)",
     )
     block_delete: bool = Field(False, description="the switch is on: lines that start with / are not executed")
     input_increment_mm: Positive | None = Field(
