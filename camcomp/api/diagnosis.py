@@ -17,7 +17,7 @@ from camcomp.ground.headway import part
 from camcomp.ground.places import STANDARD
 from camcomp.model.config.linuxcnc_ini import SUFFIX as INI_SUFFIX
 from camcomp.model.config.load import load_config, load_experiment
-from camcomp.model.config.write_back import machine_file, with_causes
+from camcomp.model.config.write_back import carried, machine_file, with_causes
 from camcomp.report.page import Listing
 
 if TYPE_CHECKING:
@@ -190,6 +190,7 @@ def machine_with_causes(
     configs = [each for each in configs if Path(each).suffix.lower() != INI_SUFFIX]
     texts = [read_bytes(each).decode("utf-8-sig") for each in configs]
     k = machine_file(texts)
+    texts[k] = carried(texts[k], texts[:k], result.known)
     note = f"found by camcomp diagnose, verdict {result.verdict}"
     if result.verdict == "ambiguous":
         note += f": the likeliest of {len(result.alternatives)} sets that explain the data alike"

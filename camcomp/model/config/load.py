@@ -20,7 +20,7 @@ from camcomp.model.config.spec import Config, EffectChoice, Experiment
 from camcomp.model.config.spread import Spread, UncertainInput, replaced, without_spreads
 from camcomp.model.config.stated import in_stated_dialect
 from camcomp.model.config.tool_table import with_tool_tables
-from camcomp.model.config.write_back import key_of_effect
+from camcomp.model.config.write_back import key_of_effect, merged_entries
 from camcomp.model.config.yaml_check import check, choose
 from camcomp.model.config.yaml_tree import Node, merge, plain, read_tree, tree_of
 
@@ -175,8 +175,17 @@ def _read_merged(paths: Sequence[Path | str]) -> tuple[Node | None, list[Camcomp
             continue
         errors += more
         if tree is not None:
-            merged = tree if merged is None else merge(merged, tree)
+            merged = tree if merged is None else _merged(merged, tree)
     return merged, errors
+
+
+def _merged(base: Node, over: Node) -> Node:
+    """`merge`, and the entries of `effects:` one by one."""
+    out, below, above = merge(base, over), _get(base, "effects"), _get(over, "effects")
+    if below is None or above is None or not (isinstance(below.value, list) and isinstance(above.value, list)):
+        return out
+    entries = merged_entries(below.value, above.value, plain)
+    return replace(out, value={**out.value, "effects": replace(above, value=entries)})
 
 
 def _with_other_files(tree: Node) -> tuple[Node, list[Doubt], list[CamcompError]]:

@@ -2,7 +2,7 @@
 
 import io
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from math import inf
 from typing import Any, Protocol
 
@@ -52,8 +52,8 @@ class NamedEffect(Protocol):
 def machine_file(texts: Sequence[str]) -> int:
     """Index of the config file, in order of precedence, to which causes are added.
 
-    It is the last file with a list of effects, because a later list replaces an earlier one; else the last that describes
-    a robot.
+    It is the last file with a list of effects, because its entries replace those of earlier files; else the last that
+    describes a robot.
     """
     trees = [YAML(typ="safe").load(text) or {} for text in texts]
     for key in ("effects", "robot"):
@@ -61,6 +61,60 @@ def machine_file(texts: Sequence[str]) -> int:
         if having:
             return having[-1]
     return len(texts) - 1
+
+
+def carried(text: str, earlier: Sequence[str], causes: Sequence[NamedEffect]) -> str:
+    """Text of a machine file with those entries of earlier files that `causes` change: an entry here replaces them."""
+    found = {cause.effect for cause in causes}
+    yaml = _round_trip()
+    tree, below = yaml.load(text), list[Any]()
+    for each in earlier:
+        below = merged_entries(below, (YAML(typ="safe").load(each) or {}).get("effects") or [])
+    own = list((tree or {}).get("effects") or [])
+    mine = {_key_of_entry(each) for each in own}
+    more = [each for each in below if each["effect"] in found and _key_of_entry(each) not in mine]
+    if not more:
+        return text
+    tree["effects"] = tree.get("effects") or CommentedSeq()
+    for each in more:
+        tree["effects"].append(_entry(each))
+    out = io.StringIO()
+    yaml.dump(tree, out)
+    return out.getvalue()
+
+
+def merged_entries(
+    base: Sequence[Any], over: Sequence[Any], data: Callable[[Any], Any] = lambda each: each
+) -> list[Any]:
+    """Entries of `effects:` of two files: one of the later file replaces the same one of the earlier, in its place.
+
+    data: plain value of an entry.
+    """
+    out = list(base)
+    keys = [_key_of_entry(data(each)) for each in out]
+    for each in over:
+        key = _key_of_entry(data(each))
+        if key is not None and key in keys:
+            out[keys.index(key)] = each
+        else:
+            out.append(each)
+    return out
+
+
+def _key_of_entry(entry: Any) -> tuple[Any, ...] | None:
+    """`key_of_effect` of an entry as in YAML; None for what is no entry."""
+    if not isinstance(entry, Mapping):
+        return None
+    plain = {key: _plain(value) for key, value in entry.items()}
+    return key_of_effect(str(plain.get("effect")), plain.get("target"), plain)
+
+
+def _round_trip() -> YAML:
+    yaml = YAML()
+    yaml.preserve_quotes = True
+    yaml.width = 4096
+    yaml.indent(mapping=2, sequence=4, offset=2)
+    return yaml
 
 
 def with_causes(
@@ -86,10 +140,7 @@ def with_causes(
         laws: more entries, key by key.
         actuators: names; an entry for all actuators is divided into one per actuator if a cause needs it.
     """
-    yaml = YAML()
-    yaml.preserve_quotes = True
-    yaml.width = 4096
-    yaml.indent(mapping=2, sequence=4, offset=2)
+    yaml = _round_trip()
     tree = yaml.load(text)
     _move(tree, folder, moved_to)
     effects = tree.get("effects")
