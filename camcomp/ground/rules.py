@@ -712,4 +712,9 @@ RULES: dict[str, Rule] = {
         "use the original program, or a smaller --tolerance-um; the machine file may describe a machine that needs no "
         "correction here",
     ),
+    "CC610": Rule(
+        "no place for the program",
+        "At every place of the table that was tried the machine cannot reach a point of the program, or leaves its travel.",
+        "give the table as --x-mm and --y-mm, and its height as workpiece: origin_mm",
+    ),
 }

@@ -47,6 +47,7 @@ VERBS = {
     "history": "Store the diagnoses of a machine and show the drift of its parameters.",
     "import": "Turn recordings of others into logs and an experiment file.",
     "init": "Start a project: a machine file, a program, a README.",
+    "place": "Find where on the table a program is cut best: with the least error that compensation cannot be trusted to remove.",
     "schema": "Print the JSON schema of the YAML files, or of a result.",
     "simulate": "Write the log that the modelled machine would produce.",
     "stream": "Compensate single set-points, line by line, from standard input to standard output.",

@@ -1,7 +1,7 @@
 """YAML files to checked specs and plug-ins. Every mistake of every file is reported at once."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
@@ -123,6 +123,41 @@ def _raise(errors: Sequence[CamcompError]) -> None:
 
     files = list(dict.fromkeys(error.at.file for error in errors if error.at))
     raise_all(sorted(errors, key=place))
+
+
+def overridden(config: Config, over: Mapping[str, Any], starts: Mapping[str, float]) -> Config:
+    """A loaded configuration with other values, and hinges of a robot of one chain that start at other angles.
+
+    Args:
+        config: as loaded.
+        over: values by section and key.
+        starts: start angle (deg) by the name of the hinge.
+
+    Raises:
+        ConfigError: a value is refused.
+    """
+    assert config._tree is not None  # every loaded config has one
+    tree = merge(config._tree, tree_of(dict(over), config._tree.at))
+    if starts:
+        tree = replace(tree, value={**tree.value, "robot": _starting(tree.value["robot"], starts)})
+    found, errors = _check_config(tree)
+    _raise(errors)
+    assert found is not None
+    found._spreads, found._doubts = config._spreads, config._doubts
+    return in_stated_dialect(found)
+
+
+def _starting(node: Node, starts: Mapping[str, float]) -> Node:
+    """A tree in which every mapping with one of these names has its start angle."""
+    if isinstance(node.value, list):
+        return replace(node, value=[_starting(each, starts) for each in node.value])
+    if not isinstance(node.value, dict):
+        return node
+    values = {key: _starting(each, starts) for key, each in node.value.items()}
+    name = str(values["name"].value) if "name" in values else ""
+    if name in starts:
+        values["start_deg"] = Node(starts[name], node.at)
+    return replace(node, value=values)
 
 
 def varied(config: Config, source: UncertainInput, size: float) -> Config | None:
