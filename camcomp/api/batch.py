@@ -50,9 +50,15 @@ def compensate_many(
     if config.control.dialect is None:
         list(usable("dialects"))  # warns about unusable plug-ins here, instead of once per worker
     plan = Plan(
-        config, Path(output_dir), method or config.compensation.method,
-        tolerance_um or config.compensation.tolerance_um, joints, __version__, stock, if_compensated == "pass",
-    )  # fmt: skip
+        config=config,
+        output=Path(output_dir),
+        method=method or config.compensation.method,
+        tolerance_um=tolerance_um or config.compensation.tolerance_um,
+        joints=joints,
+        version=__version__,
+        stock=stock,
+        passes=if_compensated == "pass",
+    )
     programs = find_programs(paths, plan.output)
     if scheduler:
         pool = partial(pools.on_a_cluster, address=scheduler, tell=tell)

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 MOST_LISTED = 200_000  # characters: largest file of a next experiment on the page
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class ExperimentDiagnosis:
     """The diagnosis of an experiment file. result: as `diagnose --json` writes it.
 
@@ -76,7 +76,14 @@ class ExperimentDiagnosis:
         from camcomp.diagnosis.report.views import report_of
 
         rows = self._residuals() if self.behind is None else None
-        return report_of(self.experiment, self.result, self.behind, self.opened, rows, self._next_listing())
+        return report_of(
+            path=self.experiment,
+            result=self.result,
+            done=self.behind,
+            opened=self.opened,
+            residuals=rows,
+            next_program=self._next_listing(),
+        )
 
     def _next_listing(self) -> Listing | None:
         """The file of the next experiment for the page; None if there is no proposal or it exceeds MOST_LISTED."""
@@ -157,7 +164,14 @@ def _diagnosed(experiment: str | Path, without: Sequence[str], library: str | Pa
     if study is not None:
         if library is not None and study.result.law is not None and study.result.law.parts:
             keep(str(library), study.result.law, load_config(load_experiment(experiment).config).robot.name)
-        return ExperimentDiagnosis(str(experiment), study.result, None, None, study.residuals, _notes=study.notes)
+        return ExperimentDiagnosis(
+            experiment=str(experiment),
+            result=study.result,
+            behind=None,
+            opened=None,
+            _residuals=study.residuals,
+            _notes=study.notes,
+        )
     from camcomp.diagnosis.diagnose import diagnose as judge
     from camcomp.diagnosis.experiment.open_experiment import open_experiment
     from camcomp.diagnosis.residuals import of_runs
@@ -174,7 +188,12 @@ def _diagnosed(experiment: str | Path, without: Sequence[str], library: str | Pa
     if library is not None and done.result.law is not None:
         keep(str(library), done.result.law, opened.job.config.robot.name)
     return ExperimentDiagnosis(
-        str(experiment), done.result, done, opened, lambda: of_runs(done, opened.twin, opened.runs), tuple(known)
+        experiment=str(experiment),
+        result=done.result,
+        behind=done,
+        opened=opened,
+        _residuals=lambda: of_runs(done, opened.twin, opened.runs),
+        _learned=tuple(known),
     )
 
 

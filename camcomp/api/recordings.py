@@ -35,9 +35,18 @@ def import_recordings(
     told = told_columns(columns, list(actuators), [each.rotary for each in actuators.values()])
     recordings = list[Recording]()
     for run, group in steps(zip(called, groups, strict=True), len(groups)):
-        wishes = Wishes(told, rows, degrees, period_s, by, run in run_programs)
+        wishes = Wishes(
+            columns=told, rows=rows, degrees=degrees, period_s=period_s, join=by, program=run in run_programs
+        )
         if len(group) == 1 and Path(group[0]).suffix.lower() == ".mat":
-            read = read_axis(read_bytes(group[0]), display_name(group[0]), run, actuators, actuator, wishes)
+            read = read_axis(
+                data=read_bytes(group[0]),
+                file=display_name(group[0]),
+                name=run,
+                actuators=actuators,
+                actuator=actuator,
+                wishes=wishes,
+            )
         else:
             read = log_of(run, _parts(group, [each.split() for each in names], period_s), actuators, wishes)
         recordings.append(read)

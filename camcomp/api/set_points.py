@@ -22,4 +22,11 @@ def answer_lines(
     """
     reader = Reader(columns)
     names = [name for trio in zip(*actuator_columns(machine), strict=True) for name in trio]
-    serve(Stream(machine), reader, AnswerWriter(["xc_mm", "yc_mm", "zc_mm", *names], as_json), tally, source, sink)
+    serve(
+        stream=Stream(machine),
+        reader=reader,
+        writer=AnswerWriter(["xc_mm", "yc_mm", "zc_mm", *names], as_json),
+        tally=tally,
+        source=source,
+        sink=sink,
+    )

@@ -46,5 +46,14 @@ def force(cut: Cut, params: Params) -> Floats:
     ratios = np.stack(slanted(params.radial_ratio, params.axial_ratio, bites.rise, bites.run))
     # On a slanted edge the chip is thinner by `rise`, and longer.
     thin = kc11 * bites.rise**-params.mc
-    mean = power_law(chip[bites.place], bites.height, cut.teeth or 0, bites.start, bites.stop, thin, params.mc, ratios)
+    mean = power_law(
+        chip=chip[bites.place],
+        depth=bites.height,
+        teeth=cut.teeth or 0,
+        start=bites.start,
+        stop=bites.stop,
+        kc11=thin,
+        mc=params.mc,
+        ratios=ratios,
+    )
     return to_path(summed(mean, bites.place, len(cut)), sense)

@@ -45,5 +45,13 @@ def force(cut: Cut, params: Params) -> Floats:
     edge = np.stack(
         [params.Kte_N_per_mm * np.ones_like(rise), *slanted(params.Kre_N_per_mm, params.Kae_N_per_mm, rise, run)]
     )
-    mean = linear_edge(chip[bites.place], bites.height, cut.teeth or 0, bites.start, bites.stop, cutting, edge / rise)
+    mean = linear_edge(
+        chip=chip[bites.place],
+        depth=bites.height,
+        teeth=cut.teeth or 0,
+        start=bites.start,
+        stop=bites.stop,
+        cutting=cutting,
+        edge=edge / rise,
+    )
     return to_path(summed(mean, bites.place, len(cut)), sense)

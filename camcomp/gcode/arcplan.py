@@ -35,6 +35,7 @@ def plan(
     end: Point,
     plane: int,
     resolution: float,
+    *,
     unit: float = 1.0,
     turns_allowed: bool = True,
 ) -> list[Move]:

@@ -174,7 +174,7 @@ class Motions(BlockReader):
             self.refuse("CC138", f"an arc of radius {radius:g} mm is out of every machine's reach")
         if state.feed_mode == 93:
             feed *= math.hypot(radius * angle, end3[w] - start3[w])
-        self.record.arc_motion(block, state, code, end3, centre3, angle, feed)
+        self.record.arc_motion(block=block, state=state, code=code, end=end3, centre=centre3, angle=angle, feed=feed)
 
     def _centre_of_radius(
         self, block: Block, start: tuple[float, float], end: tuple[float, float], ccw: bool

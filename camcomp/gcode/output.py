@@ -10,7 +10,7 @@ from camcomp.ground.datatypes import ARC, LINE, RAPID, Bools, Floats, Ints, Path
 FEED_SLACK = 1.0e-3  # relative difference of a feed below which no F word is written
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Output:
     """Moves to be written, N rows in order; every motion of the program has at least one row."""
 
@@ -111,7 +111,7 @@ class Part:
     before: Standing
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Rewritten:
     """The written program, N rows as in Output."""
 

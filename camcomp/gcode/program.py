@@ -19,7 +19,7 @@ PLAIN_LETTERS = "XYZFG"  # of plain lines, in the columns of PlainMotions.begin 
 LETTERS = "XYZIJKRFPABCG"  # A, B, C: words of the orientation of any notation
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Sites:
     """Position in the text and modal state of each of n motions, for rewriting.
 
@@ -57,7 +57,7 @@ class Rebase:
     unit: float
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Program:
     """A program that has been read: its bytes, the path of the tool tip, and the data for rewriting it."""
 

@@ -68,7 +68,18 @@ class Recorder:
 
     def line_motion(self, block: RecordedBlock, state: ControlState, code: int, end: list[float], feed: float) -> None:
         """Record a rapid (code 0) or a straight cut (code 1)."""
-        self._add(block, state, LINE if code else RAPID, code, end, _NO_CENTRE, 0.0, feed, False, block.axes)
+        self._add(
+            block=block,
+            state=state,
+            kind=LINE if code else RAPID,
+            code=code,
+            end=end,
+            centre=_NO_CENTRE,
+            angle=0.0,
+            feed=feed,
+            machine=False,
+            moved=block.axes,
+        )
 
     def machine_motion(
         self,
@@ -82,7 +93,18 @@ class Recorder:
         """Record a move in machine coordinates; code -1 to the intermediate point, -2 to the reference point of G28."""
         axes = block.axes if moved is None else moved
         kind = LINE if code == 1 else RAPID
-        self._add(block, state, kind, code, end, _NO_CENTRE, 0.0, feed, True, axes)
+        self._add(
+            block=block,
+            state=state,
+            kind=kind,
+            code=code,
+            end=end,
+            centre=_NO_CENTRE,
+            angle=0.0,
+            feed=feed,
+            machine=True,
+            moved=axes,
+        )
 
     def arc_motion(
         self,
@@ -91,11 +113,23 @@ class Recorder:
         code: int,
         end: list[float],
         centre: list[float],
+        *,
         angle: float,
         feed: float,
     ) -> None:
         """Record an arc or helix."""
-        self._add(block, state, ARC, code, end, centre, angle, feed, False, block.axes)
+        self._add(
+            block=block,
+            state=state,
+            kind=ARC,
+            code=code,
+            end=end,
+            centre=centre,
+            angle=angle,
+            feed=feed,
+            machine=False,
+            moved=block.axes,
+        )
 
     def _add(
         self,
@@ -104,6 +138,7 @@ class Recorder:
         kind: int,
         code: int,
         end: list[float],
+        *,
         centre: Sequence[float],
         angle: float,
         feed: float,

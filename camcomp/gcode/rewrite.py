@@ -261,7 +261,15 @@ class Writer(LineEditor):
         elif kind == ARC:
             plane = int(self.sites.plane[self.k])
             end = self._landing(moves[0].end, new)
-            moves = plan(self.position, moves[0], end, plane, self.step, self.unit, self.turns)
+            moves = plan(
+                start=self.position,
+                move=moves[0],
+                end=end,
+                plane=plane,
+                resolution=self.step,
+                unit=self.unit,
+                turns_allowed=self.turns,
+            )
             if moves[-1].kind == ARC:
                 self.centres[row] = self._centre_said(moves[0])
         self._path_mode(row, behind=new and after)

@@ -12,7 +12,7 @@ ZERO: Triple = (0.0, 0.0, 0.0)
 TURNS = 1e-12  # entries of a rotation below it are round-off
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Setup:
     """State of the controller at the start of the program; lengths in mm."""
 

@@ -132,7 +132,14 @@ class SiemensLine:
             self.at += 1
 
     def _refuse(self, rule: str, message: str, column: int | None = None, hint: str | None = None) -> NoReturn:
-        refuse(self.text, self.row, self.at if column is None else column, rule, message, hint)
+        refuse(
+            text=self.text,
+            row=self.row,
+            column=self.at if column is None else column,
+            rule=rule,
+            message=message,
+            hint=hint,
+        )
 
     def _next(self, at: int) -> str:
         while at < self.end and self.line[at] in " \t":

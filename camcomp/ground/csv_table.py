@@ -39,7 +39,7 @@ class TableRules:
     cell: str
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class CsvTable:
     """Cells as text, each with its location. header: names of the columns; rows: n rows of cells, of any length.
 
@@ -144,7 +144,16 @@ def read_csv(
         raise ConfigError(rules.table, "cells are separated by commas, not by semicolons", at=at)
     if len(rows) < 2 and not rowless:
         raise ConfigError(rules.table, "the table has no rows", at=at, hint=NEEDED)
-    table = CsvTable(name, rules, mark, header, tuple(rows[1:]), tuple(lines), source, headed)
+    table = CsvTable(
+        name=name,
+        rules=rules,
+        mark=mark,
+        header=header,
+        rows=tuple(rows[1:]),
+        _line=tuple(lines),
+        _source=source,
+        headed=headed,
+    )
     for i, row in enumerate(table.rows):
         beyond = next((j for j in range(len(header), len(row)) if row[j].strip()), None)
         if beyond is not None:

@@ -42,7 +42,7 @@ def frozen(values: ArrayLike, dtype: type = np.float64) -> NDArray[Any]:
     return array
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Path:
     """Programmed path of the tool tip: n motions in program order, independent of the dialect.
 

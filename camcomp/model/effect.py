@@ -66,7 +66,7 @@ class Parameter:
         return float(np.log(value / self.nominal)) if self.log else value - self.nominal
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Motion:
     """Motion of the machine through n instants in order, as hooks see it; m actuators, mm or rad, s.
 

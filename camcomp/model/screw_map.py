@@ -47,5 +47,15 @@ def _errors(job: Job, j: int, way: Floats) -> Floats:
     warm, still = job.config.process.temperature_C, np.zeros(n)
     heat = None if warm is None else np.full(n, warm)
     springs = signal_path.springs(machine.robot)
-    motion = Motion(still, still, still, heat, encoder, 0.0 * encoder, direction, machine.home, springs)
+    motion = Motion(
+        time=still,
+        common=still,
+        cut_min=still,
+        temperature=heat,
+        encoder=encoder,
+        speed=0.0 * encoder,
+        direction=direction,
+        home=machine.home,
+        stiffness=springs,
+    )
     return np.asarray(signal_path.driven(job.causes, machine.actuators, motion)[0][:, j])

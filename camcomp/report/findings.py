@@ -14,7 +14,7 @@ from camcomp.ground.places import STANDARD
 WARNING = "warning"  # rule of all warnings, which have no ids of their own
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Finding:
     """One message about one location. line and column count from 1; 0: the whole file; file None: no file."""
 
@@ -53,9 +53,19 @@ def findings_of(error: CamcompError, file: str | None = None) -> list[Finding]:
         check = isinstance(each, CheckFailed)
         if each.at:
             at = each.at
-            out.append(Finding(each.rule, each.message, at.file, at.line, at.column, at.source, check))
+            out.append(
+                Finding(
+                    rule=each.rule,
+                    message=each.message,
+                    file=at.file,
+                    line=at.line,
+                    column=at.column,
+                    source=at.source,
+                    check=check,
+                )
+            )
         else:
-            out.append(Finding(each.rule, each.message, file, check=check))
+            out.append(Finding(rule=each.rule, message=each.message, file=file, check=check))
     return out
 
 
@@ -63,11 +73,15 @@ def findings_of_messages(messages: Sequence[Mapping[str, Any]], file: str, *, ch
     """Findings of one program of a batch from its messages; check: its outputs are written, and a check failed."""
     return [
         Finding(
-            each.get("rule") or "CC-BUG", each["message"], file, int(each.get("line") or 0), int(each.get("column") or 0),
+            rule=each.get("rule") or "CC-BUG",
+            message=each["message"],
+            file=file,
+            line=int(each.get("line") or 0),
+            column=int(each.get("column") or 0),
             check=check,
         )
         for each in messages
-    ]  # fmt: skip
+    ]
 
 
 def as_json(cases: Sequence[Case]) -> dict[str, Any]:

@@ -27,4 +27,4 @@ def inputs_section(inputs: Sequence[Input], output: bytes | None = None) -> Sect
     if output is not None:
         rows.append(["corrected program", "", str(len(output)), sha256(output).hexdigest()])
     table = Table("Files and their fingerprints", ("what", "name", "bytes", "SHA-256"), rows)
-    return Section("inputs", "Inputs and output" if output is not None else "Inputs", tables=[table])
+    return Section(name="inputs", title="Inputs and output" if output is not None else "Inputs", tables=[table])

@@ -47,7 +47,7 @@ class Listing:
     text: str
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Section:
     """A headed part of a page; `text` are paragraphs of plain text."""
 
@@ -60,7 +60,7 @@ class Section:
     listings: Sequence[Listing] = ()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Page:
     """A report. verdict: its conclusion in one line; good: passed; cards: (quantity, value, remark)."""
 

@@ -26,7 +26,7 @@ BAR_MARGIN = {"l": 70, "r": 60, "t": 34, "b": 50}  # px, with room for the label
 Json = dict[str, Any]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Figure:
     """One plot of a page. label: for screen readers; caption: below the plot.
 

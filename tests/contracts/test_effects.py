@@ -43,9 +43,17 @@ def motion():
     speed = np.gradient(encoder, t, axis=0)
     masses = MassLoads(-0.4 * encoder, np.tile([30.0, -20.0, -900.0, 4e5, 6e5, 1e4], (len(t), 1)))
     return Motion(
-        t, 100.0 + t, t / 60.0, 22.0 + t, encoder, speed, np.sign(speed), np.full(3, -300.0), np.full(3, 1e4),
+        time=t,
+        common=100.0 + t,
+        cut_min=t / 60.0,
+        temperature=22.0 + t,
+        encoder=encoder,
+        speed=speed,
+        direction=np.sign(speed),
+        home=np.full(3, -300.0),
+        stiffness=np.full(3, 1e4),
         masses=lambda: masses,
-    )  # fmt: skip
+    )
 
 
 def inputs(hook, named=None):

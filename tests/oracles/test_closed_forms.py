@@ -85,7 +85,7 @@ def test_a_bent_column_carries_what_the_closed_form_says(load, angle, shortening
 def test_a_cantilever_bends_as_beam_theory_says():
     length, a, E, G = 200.0, 12.0, 70_000.0, 26_300.0
     area, inertia, torsion = a * a, a**4 / 12, 0.1406 * a**4
-    c = beam_compliance(length, E, G, area, inertia, inertia, torsion)
+    c = beam_compliance(length=length, E=E, G=G, A=area, Iy=inertia, Iz=inertia, J=torsion)
     expected = np.zeros((6, 6))
     expected[0, 0], expected[3, 3] = length / (E * area), length / (G * torsion)
     expected[1, 1] = expected[2, 2] = length**3 / (3 * E * inertia)

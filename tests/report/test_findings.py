@@ -54,16 +54,21 @@ def test_fingerprints_stay_when_lines_are_put_in_above():
         log = json.loads(sarif([Case("p.nc", findings)]))
         return [each["partialFingerprints"]["camcomp/v1"] for each in log["runs"][0]["results"]]
 
-    at = [Finding("CC101", "m", "p.nc", line, 3, "G1 X1,5") for line in (4, 9)]
-    moved = [Finding("CC101", "m", "p.nc", line, 3, "G1 X1,5") for line in (5, 10)]
+    at = [Finding(rule="CC101", message="m", file="p.nc", line=line, column=3, source="G1 X1,5") for line in (4, 9)]
+    moved = [Finding(rule="CC101", message="m", file="p.nc", line=line, column=3, source="G1 X1,5") for line in (5, 10)]
     assert prints(*at) == prints(*moved)
     assert len(set(prints(*at))) == 2
-    assert prints(Finding("CC101", "m", "q.nc", 4, 3, "G1 X1,5")) != prints(at[0])
+    assert prints(Finding(rule="CC101", message="m", file="q.nc", line=4, column=3, source="G1 X1,5")) != prints(at[0])
 
 
 def test_standard_input_has_no_place_and_a_file_may_have_no_line():
     log = json.loads(
-        sarif([Case("-", [Finding("CC101", "m", "<stdin>", 1, 1)]), Case("a", [Finding("CC500", "m", "a")])])
+        sarif(
+            [
+                Case("-", [Finding(rule="CC101", message="m", file="<stdin>", line=1, column=1)]),
+                Case("a", [Finding(rule="CC500", message="m", file="a")]),
+            ]
+        )
     )
     first, second = log["runs"][0]["results"]
     assert "locations" not in first
@@ -90,7 +95,7 @@ def test_junit_of_validate(shop):
 
 
 def test_junit_holds_every_text():
-    case = Case("a\x01.nc", [Finding("CC601", "0 < 1 & \x00 \ud800 ]]> ä", "a", check=True)])
+    case = Case("a\x01.nc", [Finding(rule="CC601", message="0 < 1 & \x00 \ud800 ]]> ä", file="a", check=True)])
     root = xml.fromstring(junit("s", [case]))
     assert root[0].get("failures") == "1" and root[0].get("errors") == "0"
     assert "0 < 1 & \ufffd \ufffd ]]> ä" in root[0][0][0].get("message")

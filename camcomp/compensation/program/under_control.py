@@ -252,9 +252,20 @@ def written_moves(program: Program, rows: CorrectedRows, written: Rewritten, fee
     told = np.where(np.isnan(written.feed), feed, written.feed)
     waits = np.asarray(path.waits)[motion] & (np.diff(motion, prepend=-1) > 0)
     return ToolMoves(
-        np.where(arc & ~np.isfinite(centre[:, 0]), 1, rows.kind).astype(np.int64), start, end, centre, axis, angle, told,
-        exact[motion], waits, (stop | path.machine)[motion], tolerance[motion], merged[motion], program.per_turn[motion],
-    )  # fmt: skip
+        kind=np.where(arc & ~np.isfinite(centre[:, 0]), 1, rows.kind).astype(np.int64),
+        start=start,
+        end=end,
+        centre=centre,
+        axis=axis,
+        angle=angle,
+        feed=told,
+        exact=exact[motion],
+        waits=waits,
+        stop=(stop | path.machine)[motion],
+        tolerance=tolerance[motion],
+        merge=merged[motion],
+        per_turn=program.per_turn[motion],
+    )
 
 
 def of_text(original: Program, corrected: Program, job: Job, move: Ints, told: Floats, error: Floats) -> dict[str, Any]:

@@ -30,8 +30,8 @@ def band_section(drawn: DrawnPath, bands: Bands, figures: Summary) -> Section:
     ]
     table = Table("What makes the band: share of the mean square", ("uncertain input", "share %"), rows, sortable=True)
     return Section(
-        "bands",
-        "How far to trust it",
+        name="bands",
+        title="How far to trust it",
         text=[text],
         figures=[_figure_band(drawn, bands), _figure_trust(drawn, bands)],
         tables=[table],
@@ -62,13 +62,16 @@ def _figure_band(drawn: DrawnPath, bands: Bands) -> Figure:
     at = drawn.worst(band)
     words = f"up to {micrometres(band[at])}, in source line {drawn.line[at]}"
     return Figure(
-        "band",
-        "Band around the residual",
-        f"Between what the corrected program leaves if every number of the machine file is right, and the error that 95 % of the "
+        name="band",
+        title="Band around the residual",
+        caption=f"Between what the corrected program leaves if every number of the machine file is right, and the error that 95 % of the "
         f"machines within the stated spreads stay below: {words}. What the control merges and rounds is a curve of its own. Logarithmic scale.",
-        f"Plot of the residual and its 95 % band along the path: {words}.",
-        [between, after, driven, upper, before],
-        {"xaxis": axis("path length in mm"), "yaxis": axis("error in µm", type="log", dtick=1, exponentformat="power")},
+        label=f"Plot of the residual and its 95 % band along the path: {words}.",
+        traces=[between, after, driven, upper, before],
+        layout={
+            "xaxis": axis("path length in mm"),
+            "yaxis": axis("error in µm", type="log", dtick=1, exponentformat="power"),
+        },
     )
 
 
@@ -114,13 +117,13 @@ def _figure_trust(drawn: DrawnPath, bands: Bands) -> Figure:
         })  # fmt: skip
     words = ", ".join(told) or "nothing is cut"
     return Figure(
-        "trust",
-        "Where the correction is trusted",
-        "Trusted: all of the correction is taken, and at least 95 % of the machines gain more than it may leave. Doubtful: all "
+        name="trust",
+        title="Where the correction is trusted",
+        caption="Trusted: all of the correction is taken, and at least 95 % of the machines gain more than it may leave. Doubtful: all "
         "of it is taken, and the band exceeds the gain. Shrunk and left alone: what the policy of the machine file made of "
         f"it. Of the end points: {words}.",
-        f"Three-dimensional plot of the tool path by how far the correction is trusted: {words}.",
-        traces,
-        {"scene": scene_of(drawn.target[shown]), "margin": {"l": 0, "r": 0, "t": 0, "b": 0}},
+        label=f"Three-dimensional plot of the tool path by how far the correction is trusted: {words}.",
+        traces=traces,
+        layout={"scene": scene_of(drawn.target[shown]), "margin": {"l": 0, "r": 0, "t": 0, "b": 0}},
         height=520,
     )

@@ -105,14 +105,14 @@ def figure_trajectories(result: Compensated, found: Trajectories) -> Figure:
     first = float(np.clip(0.12 * extent / max(1e-3 * max(off), 1e-9), 1.0, 1e4))
     words = ", ".join(f"{name} {micrometres(value)}" for (name, _), value in zip(named[1:], off[1:], strict=True))
     return Figure(
-        "trajectories",
-        "Trajectories of the tool tip",
-        "Where the original program takes the tip, for each cause alone and for both where the machine has chain errors, and the "
+        name="trajectories",
+        title="Trajectories of the tool tip",
+        caption="Where the original program takes the tip, for each cause alone and for both where the machine has chain errors, and the "
         "path that is commanded instead. Deviations from the programmed path are enlarged; the slider says how much. "
         f"True largest deviations: {words}.",
-        f"Plot of tool tip trajectories with enlarged deviations. Largest true deviations: {words}.",
-        traces,
-        {"xaxis": axis(""), "yaxis": axis("", scaleanchor="x", scaleratio=1)},
+        label=f"Plot of tool tip trajectories with enlarged deviations. Largest true deviations: {words}.",
+        traces=traces,
+        layout={"xaxis": axis(""), "yaxis": axis("", scaleanchor="x", scaleratio=1)},
         height=560,
         exaggerate={"base": base, "shifts": shifts, "planes": _planes(drawn), "first": first, "most": 1e5},
     )
@@ -146,13 +146,16 @@ def figure_error(drawn: DrawnPath, tolerance_um: float) -> Figure:
         f"(line {drawn.line[c]}), tolerance {tolerance_um:g} µm"
     )
     return Figure(
-        "error",
-        "Tip error along the path",
-        f"Distance of the loaded tip from the programmed tip, on a logarithmic scale: {words}. "
+        name="error",
+        title="Tip error along the path",
+        caption=f"Distance of the loaded tip from the programmed tip, on a logarithmic scale: {words}. "
         "At every end point stands the largest error on the move to it.",
-        f"Plot of the tip error along the path: {words}.",
-        curves,
-        {"xaxis": axis("path length in mm"), "yaxis": axis("error in µm", type="log", dtick=1, exponentformat="power")},
+        label=f"Plot of the tip error along the path: {words}.",
+        traces=curves,
+        layout={
+            "xaxis": axis("path length in mm"),
+            "yaxis": axis("error in µm", type="log", dtick=1, exponentformat="power"),
+        },
     )
 
 
@@ -165,12 +168,12 @@ def figure_shift(drawn: DrawnPath) -> Figure:
     at = drawn.worst(size)
     words = f"up to {micrometres(size[at])}, in source line {drawn.line[at]}"
     return Figure(
-        "shift",
-        "Shift of the commanded tip",
-        f"Commanded minus programmed tip in the program frame: {words}.",
-        f"Plot of the shift of the commanded tip in x, y and z along the path: {words}.",
-        curves,
-        {"xaxis": axis("path length in mm"), "yaxis": axis("shift in µm")},
+        name="shift",
+        title="Shift of the commanded tip",
+        caption=f"Commanded minus programmed tip in the program frame: {words}.",
+        label=f"Plot of the shift of the commanded tip in x, y and z along the path: {words}.",
+        traces=curves,
+        layout={"xaxis": axis("path length in mm"), "yaxis": axis("shift in µm")},
     )
 
 
@@ -199,12 +202,12 @@ def _actuators(drawn: DrawnPath, names: tuple[str, ...], which: Ints, rotary: bo
         note = "Commanded minus nominal actuator coordinate"
     words = f"up to {brief(abs(values[row, column]))} {unit}, actuator {names[which[column]]} in line {drawn.line[row]}"
     return Figure(
-        f"{'drive' if drive else 'change'}-{'hinges' if rotary else 'slides'}",
-        f"{what} along the path",
-        f"{note}: {words}.",
-        f"Plot of {what.lower()} along the path, one curve per actuator: {words}.",
-        curves,
-        {"xaxis": axis("path length in mm"), "yaxis": axis(f"{'drive' if drive else 'change'} in {unit}")},
+        name=f"{'drive' if drive else 'change'}-{'hinges' if rotary else 'slides'}",
+        title=f"{what} along the path",
+        caption=f"{note}: {words}.",
+        label=f"Plot of {what.lower()} along the path, one curve per actuator: {words}.",
+        traces=curves,
+        layout={"xaxis": axis("path length in mm"), "yaxis": axis(f"{'drive' if drive else 'change'} in {unit}")},
     )
 
 
@@ -223,12 +226,12 @@ def figure_path(drawn: DrawnPath) -> Figure:
     low = float(np.nanmin(np.where(drawn.hidden, np.nan, size))) if (~drawn.hidden).any() else 0.0
     words = f"correction from {brief(low)} to {micrometres(size[drawn.worst(size)])}"
     return Figure(
-        "path",
-        "Tool path",
-        f"Feed moves of the program in space, {words}. Drag to turn.",
-        f"Three-dimensional plot of the tool path, coloured by the size of the correction: {words}.",
-        [trace],
-        {"scene": scene_of(drawn.target[~drawn.hidden]), "margin": {"l": 0, "r": 0, "t": 0, "b": 0}},
+        name="path",
+        title="Tool path",
+        caption=f"Feed moves of the program in space, {words}. Drag to turn.",
+        label=f"Three-dimensional plot of the tool path, coloured by the size of the correction: {words}.",
+        traces=[trace],
+        layout={"scene": scene_of(drawn.target[~drawn.hidden]), "margin": {"l": 0, "r": 0, "t": 0, "b": 0}},
         height=520,
     )
 
@@ -266,12 +269,12 @@ def figure_budget(checked: Verified, tolerance_um: float) -> Figure:
     top = max(max(values), tolerance_um)
     span = [float(np.log10(min(values))) - 0.3, float(np.log10(top)) + 1.0]
     return Figure(
-        "parts",
-        "Error budget of the corrected program",
-        f"Read back from the text of the corrected program, largest value of each part: {words}.",
-        f"Bar chart of the parts of the error that is left: {words}.",
-        [bars, limit],
-        {
+        name="parts",
+        title="Error budget of the corrected program",
+        caption=f"Read back from the text of the corrected program, largest value of each part: {words}.",
+        label=f"Bar chart of the parts of the error that is left: {words}.",
+        traces=[bars, limit],
+        layout={
             "xaxis": axis("error in µm", type="log", dtick=1, range=span, exponentformat="power"),
             "yaxis": axis(""),
             "margin": BAR_MARGIN,

@@ -146,20 +146,25 @@ def figure_machine(result: Compensated, job: Job, drawn: DrawnPath) -> Figure | 
     largest = float(np.linalg.norm(off))
     words = f"{micrometres(1e3 * largest)} in line {drawn.line[row]}"
     return Figure(
-        "machine-drawn",
-        "The machine where the original program is off most",
-        f"Legs, tool and path where the load takes the tip off by {words}. Legs follow the platform; its tilt is not drawn. The "
+        name="machine-drawn",
+        title="The machine where the original program is off most",
+        caption=f"Legs, tool and path where the load takes the tip off by {words}. Legs follow the platform; its tilt is not drawn. The "
         "slider says how much deviations are enlarged. Drag to turn.",
-        f"Three-dimensional drawing of the machine at the place of the largest error, {words}.",
-        traces,
-        {"scene": _scene(np.concatenate([path, *(leg.nodes for leg in legs)])),
-         "margin": {"l": 0, "r": 0, "t": 0, "b": 0}},
+        label=f"Three-dimensional drawing of the machine at the place of the largest error, {words}.",
+        traces=traces,
+        layout={
+            "scene": _scene(np.concatenate([path, *(leg.nodes for leg in legs)])),
+            "margin": {"l": 0, "r": 0, "t": 0, "b": 0},
+        },
         height=560,
         exaggerate={
-            "base": base, "shifts": shifts, "planes": [],
-            "first": float(np.clip(_SHOWN * size / max(largest, 1e-9), 1.0, 1e5)), "most": 1e6,
+            "base": base,
+            "shifts": shifts,
+            "planes": [],
+            "first": float(np.clip(_SHOWN * size / max(largest, 1e-9), 1.0, 1e5)),
+            "most": 1e6,
         },
-    )  # fmt: skip
+    )
 
 
 def _scene(points: Floats) -> Json:

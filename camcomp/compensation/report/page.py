@@ -76,7 +76,7 @@ def compensation_html(
             )
     notes = [f"{rule}: {text}" for rule, text in failed] + [str(each) for each in figures.warnings]
     any_feed = bool((~drawn.hidden).any())
-    sections = [Section("warnings", "Warnings", items=notes)] if notes else []
+    sections = [Section(name="warnings", title="Warnings", items=notes)] if notes else []
     if any_feed:
         if result.bands is not None:
             sections.append(band_section(drawn, result.bands, figures))
@@ -84,7 +84,7 @@ def compensation_html(
         programs = [("original program", result.program), ("corrected program", written)]
         if walls := wall_section(job, result.program, programs):
             sections.append(walls)
-        sections.append(Section("lines", "Line by line", tables=[_lines(drawn, job, checked)]))
+        sections.append(Section(name="lines", title="Line by line", tables=[_lines(drawn, job, checked)]))
     sections += [_machine(job), inputs_section(inputs, result.written.data)]
     page = Page(
         title=f"{name} on {job.config.robot.name}",
@@ -169,21 +169,25 @@ def _plots(
     result: Compensated, found: Trajectories, job: Job, drawn: DrawnPath, checked: Verified, tolerance_um: float
 ) -> list[Section]:
     budget = Section(
-        "budget",
-        "Error budget",
+        name="budget",
+        title="Error budget",
         text=[BUDGET],
         figures=[figure_budget(checked, tolerance_um)] if checked.lines else [],
     )
     machine = figure_machine(result, job, drawn)
     return [
-        *([Section("drawing", "The machine", figures=[machine])] if machine else []),
-        Section("paths", "Trajectories", figures=[figure_trajectories(result, found), figure_path(drawn)]),
-        Section("errors", "Tip error and shift", figures=[figure_error(drawn, tolerance_um), figure_shift(drawn)]),
-        Section("actuators", "Actuators", figures=[
-            *figures_actuators(drawn, job, drive=False), *figures_actuators(drawn, job, drive=True)
-        ]),
+        *([Section(name="drawing", title="The machine", figures=[machine])] if machine else []),
+        Section(name="paths", title="Trajectories", figures=[figure_trajectories(result, found), figure_path(drawn)]),
+        Section(
+            name="errors", title="Tip error and shift", figures=[figure_error(drawn, tolerance_um), figure_shift(drawn)]
+        ),
+        Section(
+            name="actuators",
+            title="Actuators",
+            figures=[*figures_actuators(drawn, job, drive=False), *figures_actuators(drawn, job, drive=True)],
+        ),
         budget,
-    ]  # fmt: skip
+    ]
 
 
 def _lines(drawn: DrawnPath, job: Job, checked: Verified) -> Table:
@@ -227,4 +231,4 @@ def _machine(job: Job) -> Section:
     table = Table("Every value in force and where it stands", ("key", "value", "written in"), rows)
     source = job.config.robot.source
     text = [f"{job.config.robot.name}; source: {source}" if source else job.config.robot.name]
-    return Section("machine", "Machine", text=text, tables=[table])
+    return Section(name="machine", title="Machine", text=text, tables=[table])

@@ -53,7 +53,7 @@ def wall_section(job: Job, meant: Program, programs: Sequence[tuple[str, Program
         return None
     if max(nodes_of(job, program) for _, program in programs) > MOST_NODES:
         refused = "The program is too long to lead the bent tool through it here; camcomp simulate --surface does."
-        return Section("walls", "Walls", text=[refused])
+        return Section(name="walls", title="Walls", text=[refused])
     found = cut_walls(job, meant, programs)
     if not any(np.isfinite(each).any() for each in found.off[0]):
         return None
@@ -62,7 +62,7 @@ def wall_section(job: Job, meant: Program, programs: Sequence[tuple[str, Program
         text.append(
             f"At {100.0 * found.restless:.0f} % of the places force and tip do not come to rest: walls are rough there."
         )
-    return Section("walls", "Walls", text=text, figures=[figure_walls(found), figure_along(found)])
+    return Section(name="walls", title="Walls", text=text, figures=[figure_walls(found), figure_along(found)])
 
 
 def figure_walls(found: CutWalls) -> Figure:
@@ -84,12 +84,12 @@ def figure_walls(found: CutWalls) -> Figure:
     extent, largest = float(np.ptp(corners, axis=0).max()), max(_largest(off) for off in found.off)
     words = told(found)
     return Figure(
-        "walls-above",
-        "Walls from above",
-        f"Walls as meant, and as the bent tool leaves them, enlarged; the slider says how much. Off {words}.",
-        f"Drawing of the walls from above with enlarged deviations: {words}.",
-        traces,
-        {"xaxis": axis(""), "yaxis": axis("", scaleanchor="x", scaleratio=1)},
+        name="walls-above",
+        title="Walls from above",
+        caption=f"Walls as meant, and as the bent tool leaves them, enlarged; the slider says how much. Off {words}.",
+        label=f"Drawing of the walls from above with enlarged deviations: {words}.",
+        traces=traces,
+        layout={"xaxis": axis(""), "yaxis": axis("", scaleanchor="x", scaleratio=1)},
         height=560,
         exaggerate={
             "base": base, "shifts": shifts, "planes": ["xy"],
@@ -111,12 +111,12 @@ def figure_along(found: CutWalls) -> Figure:
     ]
     words = told(found)
     return Figure(
-        "walls-along",
-        "Along the walls",
-        f"By how much the walls are off, one behind the other: {words}.",
-        f"Plot of the offset of the walls along their way: {words}.",
-        curves,
-        {"xaxis": axis("way along the walls in mm"), "yaxis": axis("material left in µm")},
+        name="walls-along",
+        title="Along the walls",
+        caption=f"By how much the walls are off, one behind the other: {words}.",
+        label=f"Plot of the offset of the walls along their way: {words}.",
+        traces=curves,
+        layout={"xaxis": axis("way along the walls in mm"), "yaxis": axis("material left in µm")},
     )
 
 

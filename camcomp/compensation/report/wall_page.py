@@ -32,7 +32,7 @@ def walls_html(job: Job, program: Program, inputs: Sequence[Input]) -> bytes:
         verdict=verdict,
         good=drawn,
         cards=[],
-        sections=[section or Section("walls", "Walls", text=[verdict]), inputs_section(inputs)],
+        sections=[section or Section(name="walls", title="Walls", text=[verdict]), inputs_section(inputs)],
         word="Cut" if drawn else "",
     )
     return render(page)

@@ -88,5 +88,16 @@ def covered(seen: Mapping[int, Sequence[tuple[float, float]]], q: Floats) -> np.
 def _drawn(cause: Cause, angle: Floats) -> Floats:
     """Error (n,) rad of a joint with a curve at angles (n,) rad, as the effect itself has it."""
     zero, none = np.zeros((len(angle), 1)), np.zeros(1)
-    motion = Motion(angle, angle, angle, None, angle[:, None], zero, zero, none, none, False)
+    motion = Motion(
+        time=angle,
+        common=angle,
+        cut_min=angle,
+        temperature=None,
+        encoder=angle[:, None],
+        speed=zero,
+        direction=zero,
+        home=none,
+        stiffness=none,
+        ordered=False,
+    )
     return signal_path.driven([cause], (str(cause.target),), motion)[0][:, 0]

@@ -419,9 +419,18 @@ def _standing(robot: Robot, campaign: Poses) -> Motion:
     home, worn = np.array([a.home for a in robot.actuators]), np.zeros(len(campaign.q))
     way = zero if campaign.approach is None else campaign.approach
     return Motion(
-        campaign.time, campaign.time, worn, campaign.temperature, campaign.q, zero, way, home,
-        signal_path.springs(robot), False, masses=cache(partial(mass_loads, robot, campaign.q)),
-    )  # fmt: skip
+        time=campaign.time,
+        common=campaign.time,
+        cut_min=worn,
+        temperature=campaign.temperature,
+        encoder=campaign.q,
+        speed=zero,
+        direction=way,
+        home=home,
+        stiffness=signal_path.springs(robot),
+        ordered=False,
+        masses=cache(partial(mass_loads, robot, campaign.q)),
+    )
 
 
 def _need(arm: Arm | None) -> Arm:

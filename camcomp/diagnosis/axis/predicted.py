@@ -86,8 +86,16 @@ def _motion(robot: Robot, log: Measured, position: Floats, started_s: float) -> 
         else None
     )
     plain = Motion(
-        time, started_s + time, np.zeros(n), heat, position, speed, direction(position),
-        np.array([a.home for a in robot.actuators]), signal_path.springs(robot), ordered,
+        time=time,
+        common=started_s + time,
+        cut_min=np.zeros(n),
+        temperature=heat,
+        encoder=position,
+        speed=speed,
+        direction=direction(position),
+        home=np.array([a.home for a in robot.actuators]),
+        stiffness=signal_path.springs(robot),
+        ordered=ordered,
         names=tuple(a.name for a in robot.actuators),
-    )  # fmt: skip
+    )
     return replace(plain, seams=seams)

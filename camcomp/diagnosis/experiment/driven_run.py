@@ -128,7 +128,12 @@ def drive(
             raise
         told = by == "setpoint" and cut is None
         forces = cutting_forces(
-            program.track, cut or aligned, tip, measured.time, program.rests, bool(np.isfinite(measured.line).any())
+            track=program.track,
+            aligned=cut or aligned,
+            tip=tip,
+            time=measured.time,
+            rests=program.rests,
+            logged_line=bool(np.isfinite(measured.line).any()),
         )
         idle = _idle_or_not(forces, aligned, program, tip, measured.time)
         unsure |= idle
@@ -294,7 +299,15 @@ def _led_by_tip(
         way, on = _driven(path, aligned, program.merged, whole - bend, measured.line, np.asarray(known))
         tip = path_geometry.points(way, on.motion, on.share)
         logged = bool(np.isfinite(measured.line).any())
-        forces = cutting_forces(program.track, aligned, tip, measured.time, program.rests, logged, beside)
+        forces = cutting_forces(
+            track=program.track,
+            aligned=aligned,
+            tip=tip,
+            time=measured.time,
+            rests=program.rests,
+            logged_line=logged,
+            beside_mm=beside,
+        )
         run_path = driven_path(
             name, measured.time, twin.inverse(twin.to_machine(tip)), tip, forces, started=started,
             to_machine=twin.to_machine, vectors=vectors, inverse=twin.inverse, temperature=temperature,

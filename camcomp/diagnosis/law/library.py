@@ -144,7 +144,9 @@ def _where(part: LawPart) -> str:
 def _placed(part: LawPart, size: float) -> EmpiricalLaw:
     keys = part.model_dump(exclude_none=True, exclude={"effect", "target"}, mode="json")
     found = (MapSpec if part.effect == "map" else FormulaSpec).model_validate(keys).law
-    return EmpiricalLaw(found.on, found.shape, found.envelope, found.axis, size, found.label)
+    return EmpiricalLaw(
+        on=found.on, shape=found.shape, envelope=found.envelope, axis=found.axis, factor=size, label=found.label
+    )
 
 
 def keep(folder: str, law: Law, machine: str) -> str:

@@ -55,7 +55,9 @@ def circles_section(views: Sequence[RunView], tests: Sequence[CircularTest]) -> 
     figures = [_figure(groups[key], i) for i, key in enumerate(order[:MOST_CIRCLES], 1)]
     rank = {key: i for i, key in enumerate(order)}
     shown = sorted(tests, key=lambda test: rank.get((test.circle, test.cutting), len(order)))
-    return Section("circles", "On the circle", figures=figures, text=[_ISO], tables=[_values(shown)] if shown else [])
+    return Section(
+        name="circles", title="On the circle", figures=figures, text=[_ISO], tables=[_values(shown)] if shown else []
+    )
 
 
 def _values(tests: Sequence[CircularTest]) -> Table:
@@ -108,13 +110,13 @@ def _figure(gaps: Sequence[RadialGap], number: int) -> Figure:
     words = f"up to {brief(largest)} µm"
     first = float(np.clip(250.0 * circle.radius / max(largest, 1e-3), 1.0, 1e5))
     return Figure(
-        f"circle-{number}",
-        f"Circle {name}",
-        f"Measured minus modelled in the direction of the radius, outwards where the tip ran too far out: {words}. Runs "
+        name=f"circle-{number}",
+        title=f"Circle {name}",
+        caption=f"Measured minus modelled in the direction of the radius, outwards where the tip ran too far out: {words}. Runs "
         f"{runs}. The slider says how much it is enlarged; the dotted ring lies {ring:g} µm outside the circle.",
-        f"Polar plot of the radial gap on the circle {name}, both directions: {words}.",
-        traces,
-        {"xaxis": axis(""), "yaxis": axis("", scaleanchor="x", scaleratio=1)},
+        label=f"Polar plot of the radial gap on the circle {name}, both directions: {words}.",
+        traces=traces,
+        layout={"xaxis": axis(""), "yaxis": axis("", scaleanchor="x", scaleratio=1)},
         height=560,
         exaggerate={"base": base, "shifts": shifts, "planes": ["".join(axes)], "first": first, "most": 1e6},
     )

@@ -31,13 +31,13 @@ def figure_ladder(shrink: UnseenShrinkage, floor: float | None) -> Figure:
     words = ", ".join(f"{name} {brief(value)} µm" for name, value in zip(names, values, strict=True))
     known = "not known" if floor is None else f"{brief(floor)} µm"
     return Figure(
-        "ladder",
-        "Shrinkage ladder",
-        f"Root mean square of the gap on runs that the fit has not seen, with one cause after the other put into the "
+        name="ladder",
+        title="Shrinkage ladder",
+        caption=f"Root mean square of the gap on runs that the fit has not seen, with one cause after the other put into the "
         f"model: {words}. Noise floor {known}.",
-        f"Bar chart of the gap that remains: {words}; noise floor {known}.",
-        [bars] if floor is None else [bars, noise],
-        {
+        label=f"Bar chart of the gap that remains: {words}; noise floor {known}.",
+        traces=[bars] if floor is None else [bars, noise],
+        layout={
             "xaxis": axis("gap in µm (rms)", range=[0.0, 1.15 * max(*values, floor or 0.0)]),
             "yaxis": axis(""),
             "margin": BAR_MARGIN,
@@ -61,12 +61,12 @@ def figure_signed(view: RunView, number: int) -> Figure:
     means = [float(np.nanmean(each)) if np.isfinite(each).any() else 0.0 for each in view.before.T]
     words = ", ".join(f"{channel} {brief(mean)} µm" for channel, mean in zip(view.channels, means, strict=True))
     return Figure(
-        f"time-{number}",
-        f"Run {view.name}: gap along the time, with its sign",
-        f"Measured minus modelled in each direction; mean before: {words}. {_told(view)}",
-        f"Plot of the signed gap of run {view.name} along the time; mean before: {words}.",
-        curves,
-        {"xaxis": axis("time in s"), "yaxis": axis("gap in µm", zerolinecolor=INK)},
+        name=f"time-{number}",
+        title=f"Run {view.name}: gap along the time, with its sign",
+        caption=f"Measured minus modelled in each direction; mean before: {words}. {_told(view)}",
+        label=f"Plot of the signed gap of run {view.name} along the time; mean before: {words}.",
+        traces=curves,
+        layout={"xaxis": axis("time in s"), "yaxis": axis("gap in µm", zerolinecolor=INK)},
     )
 
 
@@ -85,12 +85,12 @@ def figure_size(view: RunView, number: int, floor: float | None) -> Figure:
         f", {brief(rms(after))} µm with the causes found" if view.explained else ", and no cause found takes any of it"
     )
     return Figure(
-        f"path-{number}",
-        f"Run {view.name}: size of the gap along the path",
-        f"Size of measured minus modelled: {words}. {_told(view)}",
-        f"Plot of the size of the gap of run {view.name} along the path: {words}.",
-        curves,
-        {"xaxis": axis("path length in mm"), "yaxis": axis("gap in µm", rangemode="tozero")},
+        name=f"path-{number}",
+        title=f"Run {view.name}: size of the gap along the path",
+        caption=f"Size of measured minus modelled: {words}. {_told(view)}",
+        label=f"Plot of the size of the gap of run {view.name} along the path: {words}.",
+        traces=curves,
+        layout={"xaxis": axis("path length in mm"), "yaxis": axis("gap in µm", rangemode="tozero")},
         height=300,
     )
 
@@ -132,12 +132,12 @@ def figure_map(views: Sequence[RunView]) -> Figure:
         }
         words = f"before and with the causes found: from {words} to {brief(rms(after))} µm"
     return Figure(
-        "map",
-        "Map on the workpiece",
-        f"Every measured row where the tip was, coloured by the size of the gap, {words}.",
-        f"Map of the gap over {a} and {b} of the workpiece, {words}.",
-        traces,
-        layout,
+        name="map",
+        title="Map on the workpiece",
+        caption=f"Every measured row where the tip was, coloured by the size of the gap, {words}.",
+        label=f"Map of the gap over {a} and {b} of the workpiece, {words}.",
+        traces=traces,
+        layout=layout,
         height=430,
     )
 
@@ -156,13 +156,13 @@ def figure_shares(where: Where) -> Figure | None:
     }  # fmt: skip
     words = ", ".join(f"{name} {100 * share:.0f} %" for name, share in rows[::-1] if share)
     return Figure(
-        "shares",
-        "By axis and actuator, and what it depends on",
-        "Share of the gap's energy above the noise by axis of the workpiece and, read as motion of the carriages, by "
+        name="shares",
+        title="By axis and actuator, and what it depends on",
+        caption="Share of the gap's energy above the noise by axis of the workpiece and, read as motion of the carriages, by "
         "actuator; below, how much of the gap follows each quantity. These may overlap.",
-        f"Bar chart of shares of the gap: {words}.",
-        [bars],
-        {"xaxis": axis("share in %", range=[0, 115]), "yaxis": axis(""), "margin": BAR_MARGIN},
+        label=f"Bar chart of shares of the gap: {words}.",
+        traces=[bars],
+        layout={"xaxis": axis("share in %", range=[0, 115]), "yaxis": axis(""), "margin": BAR_MARGIN},
         height=120 + 26 * len(rows),
     )
 
@@ -182,12 +182,12 @@ def figure_spectrum(view: RunView) -> Figure | None:
         peaks.append(f"{name} largest at {brief(frequency[top])} Hz with {brief(amplitude[top])} µm")
     words = "; ".join(peaks)
     return Figure(
-        "spectrum",
-        f"By frequency, run {view.name}",
-        f"Amplitude of the gap, all channels together: {words}.",
-        f"Plot of the amplitude of the gap over frequency: {words}.",
-        curves,
-        {"xaxis": axis("frequency in Hz", type="log", dtick=1, exponentformat="power"),
+        name="spectrum",
+        title=f"By frequency, run {view.name}",
+        caption=f"Amplitude of the gap, all channels together: {words}.",
+        label=f"Plot of the amplitude of the gap over frequency: {words}.",
+        traces=curves,
+        layout={"xaxis": axis("frequency in Hz", type="log", dtick=1, exponentformat="power"),
          "yaxis": axis("amplitude in µm", type="log", dtick=1, exponentformat="power")},
     )  # fmt: skip
 
@@ -207,15 +207,20 @@ def figure_causes(causes: Sequence[FoundCause]) -> Figure:
         })  # fmt: skip
     words = ", ".join(f"{cause_name(c)} {100 * c.probability:.0f} %" for c in causes)
     return Figure(
-        "causes-plot",
-        "Causes by probability",
-        "Probability that the cause is at work, given the library of effects, and its share of the gap's energy.",
-        f"Bar chart of causes and their probabilities: {words}.",
-        bars,
-        {"xaxis": axis("%", range=[0, 115]), "yaxis": axis(""), "margin": BAR_MARGIN, "barmode": "group", "legend": {
-            "orientation": "h", "traceorder": "reversed", "x": 0, "y": 1.02, "yanchor": "bottom"}},
+        name="causes-plot",
+        title="Causes by probability",
+        caption="Probability that the cause is at work, given the library of effects, and its share of the gap's energy.",
+        label=f"Bar chart of causes and their probabilities: {words}.",
+        traces=bars,
+        layout={
+            "xaxis": axis("%", range=[0, 115]),
+            "yaxis": axis(""),
+            "margin": BAR_MARGIN,
+            "barmode": "group",
+            "legend": {"orientation": "h", "traceorder": "reversed", "x": 0, "y": 1.02, "yanchor": "bottom"},
+        },
         height=150 + 60 * len(names),
-    )  # fmt: skip
+    )
 
 
 def figure_rivals(rivals: Sequence[RivalSignals], views: Sequence[RunView]) -> Figure | None:
@@ -230,11 +235,11 @@ def figure_rivals(rivals: Sequence[RivalSignals], views: Sequence[RunView]) -> F
     curves = [line(each.name, x, numbers(each.signals[k][index, c], 3), i) for i, each in enumerate(rivals[:6])]
     alike = ", ".join(f"{each.name} {100 * likeness(rivals[0], each):.1f} %" for each in rivals[1:])
     return Figure(
-        "rivals",
-        "Why they cannot be told apart",
-        f"What each set of causes does to {view.channels[c]} in run {view.name}. Likeness with {rivals[0].name} over all "
+        name="rivals",
+        title="Why they cannot be told apart",
+        caption=f"What each set of causes does to {view.channels[c]} in run {view.name}. Likeness with {rivals[0].name} over all "
         f"runs: {alike}.",
-        f"Plot of the signals of causes that cannot be told apart; likeness with {rivals[0].name}: {alike}.",
-        curves,
-        {"xaxis": axis("time in s"), "yaxis": axis("signal in µm", zerolinecolor=INK)},
+        label=f"Plot of the signals of causes that cannot be told apart; likeness with {rivals[0].name}: {alike}.",
+        traces=curves,
+        layout={"xaxis": axis("time in s"), "yaxis": axis("signal in µm", zerolinecolor=INK)},
     )

@@ -39,7 +39,9 @@ def joints_section(result: DiagnosisResult, residuals: Mapping[str, NDArray[Any]
     figures = [_curve(str(c.target), c.curve) for c in causes]
     if residuals is not None and shrunk is not None and (spread := _spread(residuals, shrunk.holdout)) is not None:
         figures.insert(0, spread)
-    return Section("joints", "Errors of the joints over their turn", text, figures, [table])
+    return Section(
+        name="joints", title="Errors of the joints over their turn", text=text, figures=figures, tables=[table]
+    )
 
 
 def _amplitude(cause: CurveCause) -> tuple[str, str]:
@@ -72,12 +74,12 @@ def _curve(name: str, curve: ErrorCurve) -> Figure:
     }  # fmt: skip
     words = f"seen over {100.0 * curve.seen_share:.0f} % of its turn, largest error {brief(float(np.abs(error).max()))} µrad"
     return Figure(
-        f"joint-{name}",
-        f"Joint {name}",
-        f"Error over the angle, {words}.",
-        f"Curve of the error of joint {name} over its turn with a band: {words}.",
-        [*band, line("taken out", x, numbers(np.where(seen, error, np.nan), 2), 0), marks],
-        {"xaxis": axis("angle in deg", range=[-180, 180], dtick=45), "yaxis": axis("error in µrad")},
+        name=f"joint-{name}",
+        title=f"Joint {name}",
+        caption=f"Error over the angle, {words}.",
+        label=f"Curve of the error of joint {name} over its turn with a band: {words}.",
+        traces=[*band, line("taken out", x, numbers(np.where(seen, error, np.nan), 2), 0), marks],
+        layout={"xaxis": axis("angle in deg", range=[-180, 180], dtick=45), "yaxis": axis("error in µrad")},
         height=280,
     )
 
@@ -94,12 +96,12 @@ def _spread(residuals: Mapping[str, NDArray[Any]], runs: Sequence[str]) -> Figur
     ]
     words = f"rms {brief(_rms(before))} µm before, {brief(_rms(after))} µm with the causes found"
     return Figure(
-        "unseen-poses",
-        f"Unseen poses of {', '.join(runs)}: before and after",
-        f"Share of the poses whose gap is smaller: {words}. None of them was used for the fit.",
-        f"Cumulative distribution of the gap on unseen poses: {words}.",
-        curves,
-        {"xaxis": axis("gap in µm", rangemode="tozero"), "yaxis": axis("% of the poses", range=[0, 100])},
+        name="unseen-poses",
+        title=f"Unseen poses of {', '.join(runs)}: before and after",
+        caption=f"Share of the poses whose gap is smaller: {words}. None of them was used for the fit.",
+        label=f"Cumulative distribution of the gap on unseen poses: {words}.",
+        traces=curves,
+        layout={"xaxis": axis("gap in µm", rangemode="tozero"), "yaxis": axis("% of the poses", range=[0, 100])},
         height=300,
     )
 

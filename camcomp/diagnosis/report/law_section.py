@@ -38,7 +38,7 @@ def law_section(law: Law, view: LawView | None) -> Section:
         "simulate, compensate, verify and stream use it within the bounds in which it was seen."
     )
     if view is None:
-        return Section("law", "The law of what is left", text)
+        return Section(name="law", title="The law of what is left", text=text)
     rows: list[list[str | tuple[float, str]]] = [
         [name, (float(b), brief(float(b))), (float(a), brief(float(a)))]
         for (name, *_), (b, a) in zip(view.runs, view.sizes, strict=True)
@@ -48,7 +48,7 @@ def law_section(law: Law, view: LawView | None) -> Section:
         ("run", "rms µm", "with the law"),
         rows,
     )
-    return Section("law", "The law of what is left", text, [_figure(law, view)], [table])
+    return Section(name="law", title="The law of what is left", text=text, figures=[_figure(law, view)], tables=[table])
 
 
 def _figure(law: Law, view: LawView) -> Figure:
@@ -62,13 +62,13 @@ def _figure(law: Law, view: LawView) -> Figure:
     ]
     words = f"from {brief(law.before_rms_um)} µm to {brief(law.after_rms_um)} µm rms"
     return Figure(
-        "law",
-        f"What is left of tip {view.axis} over {view.covariate}",
-        f"Every row of all runs: what the known causes leave, and {shortened(law.formula)}. On runs that it was not fitted to it takes the "
+        name="law",
+        title=f"What is left of tip {view.axis} over {view.covariate}",
+        caption=f"Every row of all runs: what the known causes leave, and {shortened(law.formula)}. On runs that it was not fitted to it takes the "
         f"gap {words}.",
-        f"Scatter plot of what is left of tip {view.axis} over {view.covariate}, with the law on top; {words}.",
-        traces,
-        {"xaxis": axis(view.covariate), "yaxis": axis("µm")},
+        label=f"Scatter plot of what is left of tip {view.axis} over {view.covariate}, with the law on top; {words}.",
+        traces=traces,
+        layout={"xaxis": axis(view.covariate), "yaxis": axis("µm")},
     )
 
 

@@ -70,7 +70,7 @@ def diagnosis_html(
     seen = [view for view in views if view.held_out] or list(views)
     seen = sorted(seen, key=lambda view: -rms(view.sizes[0]))
     floor = result.gap.noise_floor_um
-    sections = [Section("notes", "Notes", items=notes)] if notes else []
+    sections = [Section(name="notes", title="Notes", items=notes)] if notes else []
     sections.append(_to_do(result, next_program))
     if (circles := circles_section(views, result.standards.circles)) is not None:
         sections.append(circles)
@@ -81,7 +81,11 @@ def diagnosis_html(
         sections.append(_apart(result, rivals, views))
     if result.shrinkage and result.shrinkage.steps:
         ladder = figure_ladder(result.shrinkage, floor)
-        sections.append(Section("shrinkage", "How far the gap shrinks", [_shrinkage(result.shrinkage)], [ladder]))
+        sections.append(
+            Section(
+                name="shrinkage", title="How far the gap shrinks", text=[_shrinkage(result.shrinkage)], figures=[ladder]
+            )
+        )
     if (joints := joints_section(result, residuals)) is not None:
         sections.append(joints)
     shown = seen[:MOST_RUNS]
@@ -89,10 +93,20 @@ def diagnosis_html(
         left_out = len(seen) - len(shown)
         text = [f"The {len(shown)} runs with the largest gap; {left_out} more are not drawn."] if left_out else []
         sections += [
-            Section("time", "Gap along the time", text, [figure_signed(v, i) for i, v in enumerate(shown, 1)]),
-            Section("path", "Gap along the path", text, [figure_size(v, i, floor) for i, v in enumerate(shown, 1)]),
-            Section("map", "On the workpiece", figures=[figure_map(seen)]),
-        ]  # fmt: skip
+            Section(
+                name="time",
+                title="Gap along the time",
+                text=text,
+                figures=[figure_signed(v, i) for i, v in enumerate(shown, 1)],
+            ),
+            Section(
+                name="path",
+                title="Gap along the path",
+                text=text,
+                figures=[figure_size(v, i, floor) for i, v in enumerate(shown, 1)],
+            ),
+            Section(name="map", title="On the workpiece", figures=[figure_map(seen)]),
+        ]
     sections.append(_where(result.where, shown))
     if (standards := standards_section(result.standards)) is not None:
         sections.append(standards)
@@ -136,7 +150,7 @@ def _cards(result: DiagnosisResult) -> list[tuple[str, str, str]]:
 def _causes(result: DiagnosisResult) -> Section:
     causes = result.causes
     if not causes:
-        return Section("causes", "Causes", ["None: the gap is at the noise floor."])
+        return Section(name="causes", title="Causes", text=["None: the gap is at the noise floor."])
     rows = []
     for i, cause in enumerate(causes, 1):
         rows.append([
@@ -144,14 +158,23 @@ def _causes(result: DiagnosisResult) -> Section:
         ])  # fmt: skip
     heads = ("rank", "effect", "target", "probability", "share of the gap", "parameters with 95 % intervals")
     return Section(
-        "causes", "Causes", figures=[figure_causes(causes)], tables=[Table("Causes by probability", heads, rows)]
+        name="causes",
+        title="Causes",
+        figures=[figure_causes(causes)],
+        tables=[Table("Causes by probability", heads, rows)],
     )
 
 
 def _apart(result: DiagnosisResult, rivals: Sequence[RivalSignals], views: Sequence[RunView]) -> Section:
     items = [listed([cause_name(each) for each in one]) for one in result.alternatives]
     figure = figure_rivals(rivals, views)
-    return Section("apart", "What cannot be told apart, and why", [ALIKE_TEXT], [figure] if figure else [], items=items)
+    return Section(
+        name="apart",
+        title="What cannot be told apart, and why",
+        text=[ALIKE_TEXT],
+        figures=[figure] if figure else [],
+        items=items,
+    )
 
 
 def _shrinkage(shrink: UnseenShrinkage) -> str:
@@ -184,7 +207,7 @@ def _to_do(result: DiagnosisResult, next_program: Listing | None) -> Section:
         if next_program is not None:
             listings.append(Listing(next_program.name, next_program.text))
     items = result.next_experiment.outcomes if result.next_experiment else ()
-    return Section("do", "What to do", text, tables=tables, items=items, listings=listings)
+    return Section(name="do", title="What to do", text=text, tables=tables, items=items, listings=listings)
 
 
 def _next(proposal: NextExperiment) -> list[str]:
@@ -218,4 +241,4 @@ def _where(where: Where, shown: Sequence[RunView]) -> Section:
         ]
         tables.append(Table("Times with most of the gap", ("run", "from s", "to s", "share"), intervals, sortable=True))
     text = [f"The gap arises in the stage: {where.stage}."]
-    return Section("where", "Where the gap is", text, figures, tables)
+    return Section(name="where", title="Where the gap is", text=text, figures=figures, tables=tables)

@@ -47,4 +47,4 @@ def standards_section(values: StandardValues) -> Section | None:
     if not text and not values.absent:
         return None
     items = [f"Absent: {each}." for each in values.absent]
-    return Section("standards", "Values by standards", text, tables=tables, items=items)
+    return Section(name="standards", title="Values by standards", text=text, tables=tables, items=items)

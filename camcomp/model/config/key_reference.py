@@ -121,7 +121,7 @@ class KeySection:
     note: str = ""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class KeyRow:
     """One key. unit, default: may be empty; example: as YAML, empty for a value that is a mapping."""
 
@@ -218,7 +218,16 @@ def rows(section: KeySection) -> list[KeyRow]:
         default = "required" if each.is_required() else "" if deeper is not None else default_text(each)
         example = "" if deeper is not None else example_of(key, each, section)
         value = type_text(each) if deeper is None else _MAPPINGS[deeper]
-        out.append(KeyRow(key, unit_of(key), value, default, each.description or "", example))
+        out.append(
+            KeyRow(
+                key=key,
+                unit=unit_of(key),
+                value=value,
+                default=default,
+                meaning=each.description or "",
+                example=example,
+            )
+        )
     return out
 
 

@@ -61,10 +61,25 @@ def config_schema() -> Schema:
     general = definitions["Robot"]
     del general["properties"]["type"]
     shared = {key: general["properties"][key] for key in ROBOT_KEYS}
-    _offer(definitions, "Robot", "robots", "type", shared, ["name"], first=[general])
-    _offer(definitions, ForceChoice.__name__, "forces", "model", {}, [])
+    _offer(
+        definitions=definitions,
+        name="Robot",
+        shelf_name="robots",
+        key="type",
+        shared=shared,
+        required=["name"],
+        first=[general],
+    )
+    _offer(definitions=definitions, name=ForceChoice.__name__, shelf_name="forces", key="model", shared={}, required=[])
     target = definitions[EffectChoice.__name__]["properties"]["target"]
-    _offer(definitions, EffectChoice.__name__, "effects", "effect", {"target": target}, [])
+    _offer(
+        definitions=definitions,
+        name=EffectChoice.__name__,
+        shelf_name="effects",
+        key="effect",
+        shared={"target": target},
+        required=[],
+    )
     schema["properties"]["tools"] = _or_file(schema["properties"]["tools"])
     definitions |= _uncertain(definitions, schema["properties"])
     definitions[_UNCERTAIN] = _SPREAD
@@ -123,6 +138,7 @@ def _offer(
     shelf_name: str,
     key: str,
     shared: Schema,
+    *,
     required: list[str],
     first: list[Schema] | None = None,
 ) -> None:

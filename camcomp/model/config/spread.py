@@ -22,7 +22,7 @@ EXAMPLE = "write {value: 215, sd: 20} or, as a 95 % interval, {low: 180, high: 2
 Keys = tuple[str | int, ...]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Spread:
     """One number of a config and its standard deviation, both in the unit of its key. Drawn from a normal distribution.
 
@@ -113,7 +113,11 @@ def _number(node: Node, keys: Keys, found: list[Spread], errors: list[CamcompErr
         value, sd = given.get("value", 0.5 * (low + high)), (high - low) / (2.0 * HALF_95)
     at = node.value["value"].at if "value" in given else node.at
     group = given.get("group")
-    found.append(Spread(name, keys, float(value), float(sd), None if group is None else str(group), at))
+    found.append(
+        Spread(
+            name=name, keys=keys, value=float(value), sd=float(sd), group=None if group is None else str(group), at=at
+        )
+    )
     return Node(value, at, node.key_at)
 
 

@@ -28,6 +28,7 @@ def linear_edge(
     teeth: int,
     start: ArrayLike,
     stop: ArrayLike,
+    *,
     cutting: ArrayLike,
     edge: ArrayLike,
 ) -> Floats:
@@ -56,6 +57,7 @@ def power_law(
     teeth: int,
     start: ArrayLike,
     stop: ArrayLike,
+    *,
     kc11: ArrayLike,
     mc: float,
     ratios: ArrayLike,

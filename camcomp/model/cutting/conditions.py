@@ -82,4 +82,4 @@ def bites_of(cut: Cut, milling: Milling | None, clockwise: Bools) -> Bites:
         return replace(cut.bites, start=start, stop=stop)
     start, stop = engagement(cut, milling)
     n = len(cut)
-    return Bites(np.arange(n), start, stop, axial_depth(cut), np.ones(n), np.zeros(n))
+    return Bites(place=np.arange(n), start=start, stop=stop, height=axial_depth(cut), rise=np.ones(n), run=np.zeros(n))

@@ -10,7 +10,7 @@ import numpy as np
 from camcomp.ground.datatypes import Bools, Floats, Ints, Path
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Bites:
     """Engagement arcs (b,) of a tool's turn, several per place if the material has several heights.
 
@@ -31,12 +31,26 @@ class Bites:
             a, b = np.searchsorted(self.place, (rows[0], rows[-1] + 1)).tolist()
             own = slice(a, b)
             fresh = self.place[own] - rows[0]
-            return Bites(fresh, self.start[own], self.stop[own], self.height[own], self.rise[own], self.run[own])
+            return Bites(
+                place=fresh,
+                start=self.start[own],
+                stop=self.stop[own],
+                height=self.height[own],
+                rise=self.rise[own],
+                run=self.run[own],
+            )
         first = np.searchsorted(self.place, rows, "left")
         count = np.searchsorted(self.place, rows, "right") - first
         at = np.repeat(first - np.concatenate(([0], np.cumsum(count)[:-1])), count) + np.arange(count.sum())
         fresh = np.repeat(np.arange(len(rows)), count)
-        return Bites(fresh, self.start[at], self.stop[at], self.height[at], self.rise[at], self.run[at])
+        return Bites(
+            place=fresh,
+            start=self.start[at],
+            stop=self.stop[at],
+            height=self.height[at],
+            rise=self.rise[at],
+            run=self.run[at],
+        )
 
     def reach(self, places: int) -> Floats:
         """Extent (places,) of the arcs of every place across the feed, in radii of the tool."""
@@ -92,7 +106,7 @@ class EngagedAt:
         return depth, turn
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Engaged(EngagedAt):
     """Places with the engagement arcs that determine the force."""
 
@@ -104,26 +118,31 @@ class Engaged(EngagedAt):
         """Concatenation of consecutive parts."""
         first = np.cumsum([0] + [len(each.u) for each in parts])
         bites = Bites(
-            np.concatenate([each.bites.place + n for each, n in zip(parts, first, strict=False)]),
-            np.concatenate([each.bites.start for each in parts]),
-            np.concatenate([each.bites.stop for each in parts]),
-            np.concatenate([each.bites.height for each in parts]),
-            np.concatenate([each.bites.rise for each in parts]),
-            np.concatenate([each.bites.run for each in parts]),
+            place=np.concatenate([each.bites.place + n for each, n in zip(parts, first, strict=False)]),
+            start=np.concatenate([each.bites.start for each in parts]),
+            stop=np.concatenate([each.bites.stop for each in parts]),
+            height=np.concatenate([each.bites.height for each in parts]),
+            rise=np.concatenate([each.bites.rise for each in parts]),
+            run=np.concatenate([each.bites.run for each in parts]),
         )
         return cls(
-            np.concatenate([each.motion for each in parts]),
-            np.concatenate([each.u for each in parts]),
-            np.concatenate([each.depth for each in parts]),
-            np.concatenate([each.turn for each in parts]),
-            np.concatenate([each.bends for each in parts]),
-            bites,
+            motion=np.concatenate([each.motion for each in parts]),
+            u=np.concatenate([each.u for each in parts]),
+            depth=np.concatenate([each.depth for each in parts]),
+            turn=np.concatenate([each.turn for each in parts]),
+            bends=np.concatenate([each.bends for each in parts]),
+            bites=bites,
         )
 
     def take(self, rows: Ints) -> Engaged:
         """Some of the places."""
         return Engaged(
-            self.motion[rows], self.u[rows], self.depth[rows], self.turn[rows], self.bends[rows], self.bites.of(rows)
+            motion=self.motion[rows],
+            u=self.u[rows],
+            depth=self.depth[rows],
+            turn=self.turn[rows],
+            bends=self.bends[rows],
+            bites=self.bites.of(rows),
         )
 
     def of_motions(self, first: int, last: int, number: int = 0) -> Engaged:

@@ -22,6 +22,7 @@ from camcomp.model.cutting.cut import Cut
 from camcomp.model.cutting.engaged import Bites, Engage, Engaged
 from camcomp.model.cutting.frame import lateral, to_vector
 from camcomp.model.cutting.grip import Grip, needed
+from camcomp.model.cutting.path_pieces import divide_motions, whole_motions
 from camcomp.model.cutting.upright import Verticals
 
 JOIN_ANGLE = np.radians(5.0)
@@ -39,7 +40,7 @@ class Edges(NamedTuple):
     teeth: int | None
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Conditions:
     """Cutting conditions from the machine file. model: Cut -> (Fr, Ft, Fz) (k, 3) N, None = no force.
 
@@ -65,7 +66,7 @@ class Conditions:
         return self.tools.get(tool, Edges(self.diameter_mm, self.teeth))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Track:
     """Pieces (p,) of a path, in order. motion: index into the path; u0, u1: part of the motion."""
 
@@ -144,14 +145,37 @@ class Track:
             return self._driven(piece, w, direction, feed)
         turn = self.path.orientation
         turned = None if turn is None else turn.rotations(self.motion[piece], self.u(piece, w))
-        return _force(self.path, self.conditions, self.cutting, self.motion, self.s0, self.length, self.grip, piece, w,
-                      direction, self.points(piece, w), feed, turned)  # fmt: skip
+        return _force(
+            path=self.path,
+            c=self.conditions,
+            cutting=self.cutting,
+            motion=self.motion,
+            s0=self.s0,
+            length=self.length,
+            grip=self.grip,
+            piece=piece,
+            w=w,
+            direction=direction,
+            tip=self.points(piece, w),
+            driven=feed,
+            turned=turned,
+        )
 
     def force_meeting(self, piece: Ints, w: Floats, direction: Floats, depth: Floats, bites: Bites) -> Floats:
         """Cutting force (k, 3) N, program frame, of a tool with these engagement arcs (k places) that moves along `direction`."""
         c, rows = self.conditions, self.motion[piece]
         s = self.s0[piece] + w * self.length[piece]
-        found = _components(self.path, c, rows, direction, depth, bites.reach(len(rows)), s, w == 1.0, bites)
+        found = _components(
+            path=self.path,
+            c=c,
+            motion=rows,
+            direction=direction,
+            depth=depth,
+            width=bites.reach(len(rows)),
+            s=s,
+            ends=w == 1.0,
+            bites=bites,
+        )
         return to_vector(found, direction, c.tool_axis)
 
     def _driven(self, piece: Ints, w: Floats, direction: Floats, feed: Floats) -> Floats:
@@ -165,23 +189,58 @@ class Track:
         for rows, part in ((left, 1.0 - share), (right, share)):
             bites = self.engaged.bites.of(rows)
             reach, depth = bites.reach(len(rows)), self.engaged.depth[rows]
-            found = _components(self.path, self.conditions, motion, direction[on], depth, reach, s, w[on] == 1.0, bites,
-                                feed[on])  # fmt: skip
+            found = _components(
+                path=self.path,
+                c=self.conditions,
+                motion=motion,
+                direction=direction[on],
+                depth=depth,
+                width=reach,
+                s=s,
+                ends=w[on] == 1.0,
+                bites=bites,
+                driven=feed[on],
+            )
             out[on] += part[:, None] * to_vector(found, direction[on], self.conditions.tool_axis)
         return out
 
 
 def _force(
-    path: Path, c: Conditions, cutting: Bools, motion: Ints, s0: Floats, length: Floats, grip: Grip | None, piece: Ints,
-    w: Floats, direction: Floats, tip: Floats, driven: Floats | None = None, turned: Floats | None = None,
-) -> Floats:  # fmt: skip
+    path: Path,
+    c: Conditions,
+    cutting: Bools,
+    motion: Ints,
+    s0: Floats,
+    *,
+    length: Floats,
+    grip: Grip | None,
+    piece: Ints,
+    w: Floats,
+    direction: Floats,
+    tip: Floats,
+    driven: Floats | None = None,
+    turned: Floats | None = None,
+) -> Floats:
     """Model force (k, 3) N for given feed directions, program frame.
 
     turned (k, 3, 3): rotation of the tool from the axis of the conditions. The model sees the feed in the frame of the tool.
     """
     if turned is not None:
         seen = np.einsum("kji,kj->ki", turned, direction)
-        force = _force(path, c, cutting, motion, s0, length, grip, piece, w, seen, tip, driven)
+        force = _force(
+            path=path,
+            c=c,
+            cutting=cutting,
+            motion=motion,
+            s0=s0,
+            length=length,
+            grip=grip,
+            piece=piece,
+            w=w,
+            direction=seen,
+            tip=tip,
+            driven=driven,
+        )
         out: Floats = np.einsum("kij,kj->ki", turned, force)
         return out
     out = np.zeros((len(piece), 3))
@@ -199,13 +258,24 @@ def _force(
     width = fill if c.width_mm is None else np.full(len(rows), c.width_mm)
     s = s0[piece[on]] + w[on] * length[piece[on]]
     feed = None if driven is None else driven[on]
-    found = _components(path, c, rows, direction[on], depth, width, s, w[on] == 1.0, None, feed)
+    found = _components(
+        path=path,
+        c=c,
+        motion=rows,
+        direction=direction[on],
+        depth=depth,
+        width=width,
+        s=s,
+        ends=w[on] == 1.0,
+        bites=None,
+        driven=feed,
+    )
     out[on] = to_vector(found, direction[on], c.tool_axis)
     return out
 
 
 def _components(
-    path: Path, c: Conditions, motion: Ints, direction: Floats, depth: Floats, width: Floats, s: Floats, ends: Bools,
+    path: Path, c: Conditions, motion: Ints, direction: Floats, depth: Floats, *, width: Floats, s: Floats, ends: Bools,
     bites: Bites | None = None, driven: Floats | None = None,
 ) -> Floats:  # fmt: skip
     """Fr, Ft, Fz (k, 3) N of the model, evaluated tool by tool. width (k,) mm, with bites: radii of the tool."""
@@ -256,7 +326,17 @@ def base_of(path: Path, c: Conditions, engaged: Engaged, length: Floats, *, exte
         direction = path_geometry.tangents(path, where, u)
         s = np.concatenate(([0.0], np.cumsum(length)))[where] + u * length[where]
         reach = bites.reach(len(rows)) if extent else np.full(len(rows), np.nan)
-        base[rows] = _components(path, c, where, direction, engaged.depth[rows], reach, s, u == 1.0, bites)
+        base[rows] = _components(
+            path=path,
+            c=c,
+            motion=where,
+            direction=direction,
+            depth=engaged.depth[rows],
+            width=reach,
+            s=s,
+            ends=u == 1.0,
+            bites=bites,
+        )
     return base
 
 
@@ -275,48 +355,65 @@ def lay_track(path: Path, conditions: Conditions, engaged: Engaged | None = None
         base = base_of(path, conditions, engaged, length)
         rows = needed(engaged.motion, engaged.u, engaged.turn, engaged.bends, base)
         places, base = engaged.take(rows), base[rows]
-    motion, u0, u1, over = _pieces(path, conditions, upright, places)
+    if conditions.model is None or not len(path):
+        motion, u0, u1, over = whole_motions(path)
+    else:
+        motion, u0, u1, over = divide_motions(path, conditions.stock_top_mm, upright, places)
     beside0, beside1 = upright.beside(path, axis, motion, u0, u1)
-    n = len(motion)
-    piece_length = length[motion] * (u1 - u0)
-    s0 = np.concatenate(([0.0], np.cumsum(length)))[motion] + length[motion] * u0
-    middle = 0.5 * (u0 + u1)
+    middle, feeding = 0.5 * (u0 + u1), (path.kind[motion] != RAPID) & path.known[motion] & ~path.machine[motion]
     first = path_geometry.tangents(path, motion, u0 + beside0)
     arcs = bool((path.kind == ARC).any())  # lines have one direction from end to end
     last = path_geometry.tangents(path, motion, u1 - beside1) if arcs else first
-    feeding = (path.kind[motion] != RAPID) & path.known[motion] & ~path.machine[motion] & (piece_length > 0.0)
-    turn = path.orientation
-
-    def across(direction: Floats, u: Floats) -> Floats:
-        if turn is not None:
-            direction = np.einsum("kji,kj->ki", turn.rotations(motion, u), direction)
-        return lateral(direction, axis)
-
-    sine = across(first, u0)
+    sine = _sine(path, motion, u0, first, axis)
     if arcs:
-        sine = np.maximum(sine, across(path_geometry.tangents(path, motion, middle), middle))
-    cutting = feeding & ((sine > PLUNGE_SINE) | conditions.plunges)
+        sine = np.maximum(sine, _sine(path, motion, middle, path_geometry.tangents(path, motion, middle), axis))
+    piece_length = length[motion] * (u1 - u0)
+    cutting = feeding & (piece_length > 0.0) & ((sine > PLUNGE_SINE) | conditions.plunges)
     grip = None
     if places is not None:
         grip = Grip.of(places, base, motion, u0, u1)
         cutting &= grip.on | (sine <= PLUNGE_SINE)
     elif conditions.stock_top_mm is not None:
         cutting &= path_geometry.points(path, motion, middle)[:, 2] < conditions.stock_top_mm
+    track = Track(
+        path=path, conditions=conditions, motion=motion, u0=u0, u1=u1, cutting=cutting, length=piece_length,
+        s0=np.concatenate(([0.0], np.cumsum(length)))[motion] + length[motion] * u0,
+        fade0=np.zeros((len(motion), 3)), fade1=np.zeros((len(motion), 3)), jump=np.zeros(len(motion), np.bool_),
+        corner=np.ones(len(motion), np.bool_), beside0=beside0, beside1=beside1, grip=grip, engaged=engaged,
+    )  # fmt: skip
+    return _cut_at_swings(_with_corners(track, first, last, over), upright)
 
-    def force(piece: Ints, w: Floats, direction: Floats) -> Floats:
-        u = np.where(w == 0.0, u0[piece], u1[piece])
-        tip = path_geometry.points(path, motion[piece], u)
-        turned = None if turn is None else turn.rotations(motion[piece], u)
-        return _force(
-            path, conditions, cutting, motion, s0, piece_length, grip, piece, w, direction, tip, turned=turned
-        )
 
+def _sine(path: Path, motion: Ints, u: Floats, direction: Floats, axis: Floats) -> Floats:
+    """Sine (p,) of the angle between feed directions (p, 3) and the tool axis, in the frame of a turning tool."""
+    if path.orientation is not None:
+        direction = np.einsum("kji,kj->ki", path.orientation.rotations(motion, u), direction)
+    return lateral(direction, axis)
+
+
+def _end_force(track: Track, piece: Ints, w: Floats, direction: Floats) -> Floats:
+    """Model force (k, 3) N at the start (w 0) or the end (w 1) of pieces (k,), for feed directions (k, 3)."""
+    path, motion = track.path, track.motion[piece]
+    u = np.where(w == 0.0, track.u0[piece], track.u1[piece])
+    return _force(
+        path=path, c=track.conditions, cutting=track.cutting, motion=track.motion, s0=track.s0, length=track.length,
+        grip=track.grip, piece=piece, w=w, direction=direction, tip=path_geometry.points(path, motion, u),
+        turned=None if path.orientation is None else path.orientation.rotations(motion, u),
+    )  # fmt: skip
+
+
+def _with_corners(track: Track, first: Floats, last: Floats, over: Bools) -> Track:
+    """The track with corner loads, jumps and stops; first, last (p, 3): directions at the ends of its pieces.
+
+    over (p,): the direction across the tool reverses at the start of the piece.
+    """
+    cutting, n = track.cutting, len(track.motion)
     every = np.arange(n)
-    own0, own1 = force(every, np.zeros(n), first), force(every, np.ones(n), last)
+    own0, own1 = _end_force(track, every, np.zeros(n), first), _end_force(track, every, np.ones(n), last)
     fade0, fade1 = np.zeros((n, 3)), np.zeros((n, 3))
     jump = np.zeros(n, np.bool_)
-    rapid = path.kind[motion] == RAPID
-    real = np.flatnonzero((piece_length > 0.0) | rapid)
+    rapid = track.path.kind[track.motion] == RAPID
+    real = np.flatnonzero((track.length > 0.0) | rapid)
     a, b = real[:-1], real[1:]
     cosine = np.clip(np.sum(last[a] * first[b], axis=1), -1.0, 1.0)
     straight_on = ~rapid[a] & ~rapid[b] & (cosine >= np.cos(JOIN_ANGLE))
@@ -325,7 +422,7 @@ def lay_track(path: Path, conditions: Conditions, engaged: Engaged | None = None
     smooth = cutting[a] & cutting[b] & straight_on & ~over[b]
     bisector = np.where(smooth[:, None], last[a] + first[b], 0.0)
     bisector /= np.maximum(np.linalg.norm(bisector, axis=1, keepdims=True), 1e-300)
-    ahead, behind = force(a, np.ones(len(a)), bisector), force(b, np.zeros(len(b)), bisector)
+    ahead, behind = _end_force(track, a, np.ones(len(a)), bisector), _end_force(track, b, np.zeros(len(b)), bisector)
     smooth &= np.linalg.norm(behind - ahead, axis=1) <= SAME_FORCE * np.linalg.norm(ahead, axis=1) + NO_FORCE
     jump[b] = ~smooth & (np.linalg.norm(own0[b] - own1[a], axis=1) > NO_FORCE)
     if len(real) and real[0] > 0:  # moves without length before the first cut
@@ -334,26 +431,8 @@ def lay_track(path: Path, conditions: Conditions, engaged: Engaged | None = None
     shared = 0.5 * (ahead + behind)[smooth]
     fade1[a] = shared - own1[a]
     fade0[b] = shared - own0[b]
-    _carry_over((piece_length > 0.0) | rapid, own1 + fade1, fade0, fade1)
-    track = Track(
-        path,
-        conditions,
-        motion,
-        u0,
-        u1,
-        cutting,
-        piece_length,
-        s0,
-        fade0,
-        fade1,
-        jump,
-        corner,
-        beside0,
-        beside1,
-        grip,
-        engaged,
-    )
-    return _cut_at_swings(track, upright)
+    _carry_over((track.length > 0.0) | rapid, own1 + fade1, fade0, fade1)
+    return replace(track, fade0=fade0, fade1=fade1, jump=jump, corner=corner)
 
 
 def _cut_at_swings(track: Track, upright: Verticals) -> Track:
@@ -376,69 +455,3 @@ def _carry_over(moves: Bools, end_force: Floats, fade0: Floats, fade1: Floats) -
 def _beside(track: Track, piece: Ints, w: Floats) -> Floats:
     """Fraction of the motion at which the direction at fraction w of the piece is taken."""
     return np.clip(track.u(piece, w), (track.u0 + track.beside0)[piece], (track.u1 - track.beside1)[piece])
-
-
-def _pieces(
-    path: Path, conditions: Conditions, upright: Verticals, engaged: Engaged | None
-) -> tuple[Ints, Floats, Floats, Bools]:
-    """Motions, divided where a feed motion crosses the stock's top or an arc passes the vertical.
-
-    With a known stock they are divided at the places of its engagement instead of at its top. The last result is a mask of
-    the parts that begin at the vertical.
-    """
-    n = len(path)
-    whole = np.arange(n), np.zeros(n), np.ones(n), np.zeros(n, np.bool_)
-    if conditions.model is None or n == 0:
-        return whole
-    over = upright.overturns(path)
-    cuts = {*over, *(_crossings(path, conditions.stock_top_mm) if engaged is None else _inner(engaged))}
-    if not cuts:
-        return whole
-    motion = np.concatenate((whole[0], [i for i, _ in cuts]))
-    u0 = np.concatenate((whole[1], [at for _, at in cuts]))
-    order = np.lexsort((u0, motion))
-    motion, u0 = motion[order], u0[order]
-    u1 = np.ones(len(u0))
-    same = motion[1:] == motion[:-1]
-    u1[:-1][same] = u0[1:][same]
-    turned = np.zeros(len(motion), np.bool_)
-    for i, at in over:
-        turned |= (motion == i) & (u0 == at)
-    return motion, u0, u1, turned
-
-
-def _inner(engaged: Engaged) -> list[tuple[int, float]]:
-    """Places of the engagement between the ends of motions."""
-    inner = (engaged.u > 0.0) & (engaged.u < 1.0)
-    return list(zip(engaged.motion[inner].tolist(), engaged.u[inner].tolist(), strict=True))
-
-
-def _crossings(path: Path, top: float | None) -> list[tuple[int, float]]:
-    """Feed motions and fractions at which they cross the stock's top."""
-    if top is None:
-        return []
-    u = np.linspace(0.0, 1.0, 65)
-    moves = np.flatnonzero((path.kind != RAPID) & path.known & ~path.machine)
-    below = (path.start[moves, 2] < top, path.end[moves, 2] < top)
-    flat = np.abs(path.axis[moves, 2]) == 1.0  # an arc in the XY plane climbs steadily, if at all
-    crossing = moves[(below[0] != below[1]) | ((path.kind[moves] == ARC) & ~flat)]
-    cuts: list[tuple[int, float]] = []
-    for i in crossing:
-        row = np.full(len(u), i)
-        height = path_geometry.points(path, row, u)[:, 2] - top
-        for k in np.flatnonzero((height[:-1] < 0.0) != (height[1:] < 0.0)):
-            cuts.append((int(i), _crossing(path, int(i), u[k], u[k + 1], top)))
-    return [(i, at) for i, at in cuts if 1e-9 < at < 1.0 - 1e-9]
-
-
-def _crossing(path: Path, motion: int, a: float, b: float, height: float) -> float:
-    """Fraction of a motion at which it passes a height (mm), by bisection."""
-    row = np.array([motion])
-    below = path_geometry.points(path, row, np.array([a]))[0, 2] < height
-    for _ in range(60):
-        middle = 0.5 * (a + b)
-        if (path_geometry.points(path, row, np.array([middle]))[0, 2] < height) == below:
-            a = middle
-        else:
-            b = middle
-    return 0.5 * (a + b)

@@ -32,7 +32,7 @@ class Shape(Protocol):
         """Values (n,)."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class EmpiricalLaw:
     """A formula or map with channel, envelope and factor.
 

@@ -68,7 +68,9 @@ class _LawSpec(Spec):
         """The law as hooks use it."""
         envelope = {name: (low, high) for name, (low, high) in self.envelope.items()}
         label = f"the law on {self.stage}{'' if self.axis is None else ' ' + self.axis}"
-        return EmpiricalLaw(self.stage, self.shape, envelope, "xyz".index(self.axis or "x"), label=label)
+        return EmpiricalLaw(
+            on=self.stage, shape=self.shape, envelope=envelope, axis="xyz".index(self.axis or "x"), label=label
+        )
 
     def effect_values(self) -> dict[str, Any]:
         """Values for the hooks: the law."""

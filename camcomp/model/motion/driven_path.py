@@ -94,12 +94,26 @@ def driven_path(
     # the tip is interpolated, and the drives follow from it: an arm keeps its tool upright between rows
     node_tip = lead_tip(node_time)
     node_rho = inverse(node_tip)
-    node_force = node_loads(time, row_force, sure, jump, node_time, pieces)
+    node_force = node_loads(time=time, force=row_force, sure=sure, jump=jump, at=node_time, pieces=pieces)
     return RunPath(
-        name, time, started, True, node_tip, node_force, node_rho, node_time, grid, grid_rho,
-        forces.cut_at(time, grid) * moving(grid, grid_tip), pieces.of(grid), len(pieces.begin), pieces.at, rho, temperature,
+        name=name,
+        time=time,
+        started=started,
+        ordered=True,
+        node_tip=node_tip,
+        node_force=node_force,
+        node_rho=node_rho,
+        node_time=node_time,
+        grid=grid,
+        grid_rho=grid_rho,
+        grid_cut=forces.cut_at(time, grid) * moving(grid, grid_tip),
+        grid_piece=pieces.of(grid),
+        pieces=len(pieces.begin),
+        place=pieces.at,
+        row_rho=rho,
+        temperature=temperature,
         driven=Driven(row_tip, row_force, np.abs(vectors(forces.doubt)), lead_tip, _seams(time, grid, lead)),
-    )  # fmt: skip
+    )
 
 
 def _seams(time: Floats, grid: Floats, lead: Callable[[Floats], Floats]) -> Seams:
@@ -120,6 +134,7 @@ def cutting_forces(
     tip: Floats,
     time: Floats,
     rests: Bools,
+    *,
     logged_line: bool,
     beside_mm: float = BESIDE_MM,
 ) -> Forces:

@@ -107,7 +107,7 @@ def node_loads(time: Floats, force: Floats, sure: Bools, jump: Ints, at: Floats,
     First derivatives add the difference to the force (n, 3) of a row. A polynomial through all rows would oscillate between
     nodes where a piece begins or ends in a corner.
     """
-    out = _of_stretches(time, force, sure, jump, at, pieces)
+    out = _of_stretches(time=time, values=force, sure=sure, jump=jump, at=at, pieces=pieces)
     piece, most = pieces.of(time), float(np.linalg.norm(force, axis=1).max(initial=0.0))
     local = pieces.local(piece, time)
     order = np.argsort(piece[sure], kind="stable")
@@ -126,7 +126,7 @@ def node_loads(time: Floats, force: Floats, sure: Bools, jump: Ints, at: Floats,
 
 def beside_most(time: Floats, force: Floats, sure: Bools, jump: Ints, pieces: DrivenPieces) -> Bools:
     """Mask (n,) of sure rows with a force far from the polynomial of their piece, as in a blended corner."""
-    loads = node_loads(time, force, sure, jump, pieces.node_times(), pieces)
+    loads = node_loads(time=time, force=force, sure=sure, jump=jump, at=pieces.node_times(), pieces=pieces)
     off = np.linalg.norm(force - pieces.at(time).of(loads), axis=1)
     return np.asarray(sure & (off > _CORNER * float(np.linalg.norm(force, axis=1).max(initial=0.0))))
 

@@ -29,7 +29,7 @@ class Softer:
     drive: Floats
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Solved:
     """The solved structure at the nodes of a run path, with the drive positions and loads of the solution."""
 
@@ -120,7 +120,14 @@ class Slopes:
         if place not in self._at:
             nodes = (self.tip_rho, self.tip_wrench, self.drive_rho, self.drive_wrench)
             tip_rho, tip_wrench, drive_rho, drive_wrench = (rows_together(place.of(each)) for each in nodes)
-            self._at[place] = Slopes(tip_rho, tip_wrench, drive_rho, drive_wrench, self.at_reference, self.key)
+            self._at[place] = Slopes(
+                tip_rho=tip_rho,
+                tip_wrench=tip_wrench,
+                drive_rho=drive_rho,
+                drive_wrench=drive_wrench,
+                at_reference=self.at_reference,
+                key=self.key,
+            )
         return self._at[place]
 
     def tips(self, place: Places) -> Following:

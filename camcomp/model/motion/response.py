@@ -61,7 +61,14 @@ class Travel:
         """Some of the points; rows have to be ascending."""
         around = None if self.around is None else self.around[:, rows]
         rotation = None if self.rotation is None else self.rotation[rows]
-        return Travel(self.force[rows], self.time[rows], self.cut_min[rows], self.stop[rows], around, rotation)
+        return Travel(
+            force=self.force[rows],
+            time=self.time[rows],
+            cut_min=self.cut_min[rows],
+            stop=self.stop[rows],
+            around=around,
+            rotation=rotation,
+        )
 
     @property
     def rested(self) -> Floats:
@@ -400,7 +407,15 @@ def _motion(job: Job, setpoint: Floats, travel: Travel) -> Motion:
     warm = job.config.process.temperature_C
     heat = None if warm is None else np.full(len(setpoint), warm)
     motion = Motion(
-        travel.rested, travel.time, travel.cut_min, heat, setpoint, zero, zero, job.real_machine.home, stiffness
+        time=travel.rested,
+        common=travel.time,
+        cut_min=travel.cut_min,
+        temperature=heat,
+        encoder=setpoint,
+        speed=zero,
+        direction=zero,
+        home=job.real_machine.home,
+        stiffness=stiffness,
     )
     encoder = signal_path.controlled(job.causes, job.real_machine.actuators, motion)
     dt = np.diff(travel.rested, prepend=travel.time[:1] - 1.0)

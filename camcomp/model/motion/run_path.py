@@ -40,7 +40,7 @@ class Driven:
     seams: Seams
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class RunPath:
     """Set-points and nodes of a run: n rows, q nodes, g instants of a fine time grid, m actuators.
 
@@ -239,9 +239,24 @@ def path_of_program(
     grid_cut = (np.abs(where.of(load)).sum(axis=1) > 1e-9) * moving(grid, where.of(tip))
     grid_cut[(grid < 0.0) | (grid > timeline.end)] = 0.0
     return RunPath(
-        name, time, started, True, tip, load, rho, _node_times(timeline, pieces.motion[piece], share), grid, grid_rho, grid_cut,
-        where.piece, len(pieces.motion), place, row_rho, temperature, feed_mm_per_min=60.0 * float(np.median(timeline.feed)),
-    )  # fmt: skip
+        name=name,
+        time=time,
+        started=started,
+        ordered=True,
+        node_tip=tip,
+        node_force=load,
+        node_rho=rho,
+        node_time=_node_times(timeline, pieces.motion[piece], share),
+        grid=grid,
+        grid_rho=grid_rho,
+        grid_cut=grid_cut,
+        grid_piece=where.piece,
+        pieces=len(pieces.motion),
+        place=place,
+        row_rho=row_rho,
+        temperature=temperature,
+        feed_mm_per_min=60.0 * float(np.median(timeline.feed)),
+    )
 
 
 def moving(time: Floats, tip: Floats) -> Floats:

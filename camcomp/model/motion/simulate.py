@@ -21,7 +21,7 @@ from camcomp.model.motion.twin import Reading, twin_of
 TOLD_ROWS = 1000  # rows between two progress messages
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Simulated:
     """n rows: time (n,) s, source line (n,), readings of the sensors, set-points (n, m)."""
 
@@ -76,7 +76,13 @@ def simulate(
         raise not_finite(job.config, f"what the machine does in program line {line[int(np.argmax(bad))]}")
     rotary = tuple(each.revolute for each in twin.robot.actuators)
     return Simulated(
-        time, line, reading, run_path.row_rho, twin.actuators, rotary, spindle_warning(cut_without_spindle(track))
+        time=time,
+        line=line,
+        reading=reading,
+        setpoint=run_path.row_rho,
+        actuators=twin.actuators,
+        rotary=rotary,
+        warnings=spindle_warning(cut_without_spindle(track)),
     )
 
 

@@ -11,7 +11,7 @@ from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import RAPID, Floats, Ints, Path
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Timeline:
     """The feed motions of a path in time. k motions; all arrays (k,).
 
@@ -68,4 +68,12 @@ def schedule(path: Path, acceleration: float) -> Timeline:
     feed = path.feed[index] / 60.0
     duration = trapezoid_duration(length[index], feed, acceleration)
     start = np.concatenate([[0.0], np.cumsum(duration)[:-1]]) if len(index) else np.zeros(0)
-    return Timeline(path, index, start, duration, length[index], feed, acceleration)
+    return Timeline(
+        path=path,
+        index=index,
+        start=start,
+        duration=duration,
+        length=length[index],
+        feed=feed,
+        acceleration=acceleration,
+    )

@@ -311,7 +311,7 @@ class Twin:
         q, uneven = len(run_path.node_tip), run_path.uneven
         if slopes is None or slopes.key == key or not len(uneven):
             tip, drive = self._loaded(run_path, machine, slice(None), shift, load.force, load.wrench)
-            return Solved(key, shift, load, tip, drive)
+            return Solved(key=key, shift=shift, load=load, tip=tip, drive=drive)
         nodes = np.concatenate([np.arange(q), np.tile(uneven, 3)])
         wrench = load.wrench[nodes]
         wrench[q:] += _FORCE_STEP * np.repeat(self._at_reference, len(uneven), axis=0)
@@ -320,7 +320,7 @@ class Twin:
             self._more(run_path, each, usual)
             for each, usual in ((tip, slopes.tip_wrench), (drive, slopes.drive_wrench))
         ))  # fmt: skip
-        return Solved(key, shift, load, tip[:q], drive[:q], softer)
+        return Solved(key=key, shift=shift, load=load, tip=tip[:q], drive=drive[:q], softer=softer)
 
     def _more(self, run_path: RunPath, values: Floats, usual: Floats) -> Floats:
         """Slopes (pieces, ., 3) by force minus usual ones (q, ., 6) by wrench, from nodes with and without additional force."""
@@ -402,16 +402,16 @@ class Twin:
         worn = run_path.cut_before_min + run_path.cut_ahead_min + np.cumsum(dt * run_path.grid_cut) / 60.0
         zero = np.zeros_like(run_path.grid_rho)
         motion = Motion(
-            t,
-            run_path.started + t,
-            worn,
-            temperature,
-            run_path.grid_rho,
-            zero,
-            zero,
-            home,
-            signal_path.springs(self.robot),
-            run_path.ordered,
+            time=t,
+            common=run_path.started + t,
+            cut_min=worn,
+            temperature=temperature,
+            encoder=run_path.grid_rho,
+            speed=zero,
+            direction=zero,
+            home=home,
+            stiffness=signal_path.springs(self.robot),
+            ordered=run_path.ordered,
             names=self.actuators,
             cut_before_min=run_path.cut_before_min,
             seams=None if run_path.driven is None else run_path.driven.seams,

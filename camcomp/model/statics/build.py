@@ -54,7 +54,7 @@ def spring(given: Spring) -> Link:
     if given.beam is not None:
         b = given.beam
         A, Iy, Iz, J = b.section.moments()
-        C = beam_compliance(b.length_mm, b.E_N_per_mm2, b.shear_modulus, A, Iy, Iz, J)
+        C = beam_compliance(length=b.length_mm, E=b.E_N_per_mm2, G=b.shear_modulus, A=A, Iy=Iy, Iz=Iz, J=J)
         return Link(np.asarray(np.linalg.inv(C), float))
     if given.compliance is not None:
         C = np.asarray(given.compliance, float)
@@ -73,13 +73,13 @@ def _element(given: spec.Element, chain: str) -> Element:
         return Transform(np.asarray(given.translation_mm, float), rotation_of(given.rotation_deg))
     if isinstance(given, spec.PrismaticActuator | spec.RevoluteActuator):
         return Actuator(
-            given.name or chain,
-            given.rotary,
-            axis_vector(given.axis),
-            given.stiffness,
-            given.home,
-            given.limits or (-np.inf, np.inf),
-            given.start,
+            name=given.name or chain,
+            revolute=given.rotary,
+            axis=axis_vector(given.axis),
+            stiffness=given.stiffness,
+            home=given.home,
+            limits=given.limits or (-np.inf, np.inf),
+            start=given.start,
         )
     if isinstance(given, spec.PrismaticPassive | spec.RevolutePassive):
         return Passive(given.rotary, axis_vector(given.axis), given.stiffness or 0.0, given.rest, given.start)
@@ -89,7 +89,12 @@ def _element(given: spec.Element, chain: str) -> Element:
         bar = spring(given.bar).stiffness
         arm = np.asarray(given.arm_mm, float)
         return Parallelogram(
-            arm, axis_vector(given.hinge), axis_vector(given.crossbar), given.width_mm, bar, given.start
+            arm=arm,
+            hinge=axis_vector(given.hinge),
+            crossbar=axis_vector(given.crossbar),
+            width=given.width_mm,
+            bar_stiffness=bar,
+            start=given.start,
         )
     return Weight(np.array([0.0, 0.0, -given.force_N]), np.asarray(given.centre_mm, float))
 

@@ -23,7 +23,7 @@ EXACT = 1e-9  # rad, tolerance of parallel and perpendicular axes; times 1000 mm
 _BRANCHES = tuple(product((1.0, -1.0), repeat=3))  # side, elbow, flip
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class ClosedForm:
     """Axes (6, 3) and points on them (6, 3) mm with all joints at zero; the wrist's centre; the platform's pose there."""
 
@@ -98,14 +98,22 @@ def closed_form(arm: Arm) -> ClosedForm | None:
     )[0]
     if max(float(np.linalg.norm(a @ (wrist - p))) for a, p in zip(across, points[3:], strict=True)) > 1e3 * EXACT:
         return None
-    found = ClosedForm(axes, points, wrist, rotation, position, 0, arm.start)
+    found = ClosedForm(
+        axes=axes, points=points, wrist=wrist, rotation=rotation, position=position, branch=0, start=arm.start
+    )
     *_, start_rotation, start_position = joint_lines(arm, arm.start)
     misfit = [
         np.inf if q is None else float(np.abs(np.exp(1j * q) - np.exp(1j * arm.start)).max())
         for q in found.all(start_rotation, start_position)
     ]
     best = int(np.argmin(misfit))
-    return ClosedForm(axes, points, wrist, rotation, position, best, arm.start) if misfit[best] < 1e-6 else None
+    return (
+        ClosedForm(
+            axes=axes, points=points, wrist=wrist, rotation=rotation, position=position, branch=best, start=arm.start
+        )
+        if misfit[best] < 1e-6
+        else None
+    )
 
 
 def _sine(a: float, b: float, c: float, sign: float) -> float | None:

@@ -94,7 +94,15 @@ class Workspace(NamedTuple):
 def new_memory(elastic: Packed, rigid: Packed) -> Workspace:
     """Workspace before the first point."""
     z, y = np.zeros, rigid.scale.shape
-    return Workspace(z(y), z(elastic.scale.shape), z(12), z(12), z(y), z(12), np.zeros(1, np.int64))
+    return Workspace(
+        y=z(y),
+        z=z(elastic.scale.shape),
+        pose=z(12),
+        goal=z(12),
+        y_command=z(y),
+        command=z(12),
+        warm=np.zeros(1, np.int64),
+    )
 
 
 def new_work(elastic: Packed, rigid: Packed) -> Work:

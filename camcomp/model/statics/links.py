@@ -10,7 +10,7 @@ from camcomp.model.statics.rotation import cross_matrix
 Array = NDArray[np.float64]
 
 
-def beam_compliance(length: float, E: float, G: float, A: float, Iy: float, Iz: float, J: float) -> Array:
+def beam_compliance(length: float, E: float, G: float, A: float, Iy: float, *, Iz: float, J: float) -> Array:
     """Tip compliance (6, 6) of an Euler-Bernoulli cantilever along its local x axis; mm, N, rad.
 
     Tip displacement (translation; rotation) = compliance @ tip wrench (force; moment). length mm, E and G N/mm^2,

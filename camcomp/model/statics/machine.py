@@ -17,7 +17,7 @@ from camcomp.model.statics.pack import pack
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Machine:
     """Packed robot. robot: the true one; nominal: that of the controller (perfect chains, nominal lengths)."""
 
@@ -73,4 +73,11 @@ def build_machine(robot: Robot, nominal: Robot | None = None) -> Machine:
     joint_var = np.full(rigid.start.shape, -1, np.int64)
     for row, own, other in zip(joint_var, rigid.joints, elastic.joints, strict=True):
         row[own] = other
-    return Machine(robot, nominal, elastic.packed, rigid.packed, joint_var, rigid.start)
+    return Machine(
+        robot=robot,
+        nominal=nominal,
+        elastic=elastic.packed,
+        rigid=rigid.packed,
+        joint_var=joint_var,
+        start_y=rigid.start,
+    )

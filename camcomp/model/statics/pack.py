@@ -27,7 +27,7 @@ RIGID_STIFFNESS = 1e9  # N/mm; N mm/rad times 1e4: 300 N move a "rigid" drive by
 END_COMPLIANCE = 1e-9  # mm/N, given to the end of a chain whose springs leave it a rigid direction
 
 
-@dataclass
+@dataclass(kw_only=True)
 class _Rows:
     """Elements of one chain while they are collected: integers, floats, and per variable (is spring, angle, start)."""
 
@@ -231,10 +231,14 @@ def pack(robot: Robot, *, rigid: bool) -> Model:
     ints = [row for rows in collected for row in rows.ints]
     floats = [row for rows in collected for row in rows.floats]
     packed = Packed(
-        np.array(ints, np.int64).reshape(len(ints), lay.ELEMENT_INTS),
-        np.array(floats).reshape(len(ints), lay.ELEMENT_FLOATS),
-        np.array(slot_var, np.int64), chain, actuator, np.array(rigid_ends), scale,
-    )  # fmt: skip
+        element=np.array(ints, np.int64).reshape(len(ints), lay.ELEMENT_INTS),
+        value=np.array(floats).reshape(len(ints), lay.ELEMENT_FLOATS),
+        slot_var=np.array(slot_var, np.int64),
+        chain=chain,
+        actuator=actuator,
+        end_compliance=np.array(rigid_ends),
+        scale=scale,
+    )
     return Model(packed, start, tuple(joints))
 
 

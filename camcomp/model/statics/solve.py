@@ -32,7 +32,7 @@ STATUS = {
 }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class State:
     """Solved points. Rows whose status is not 0 hold NaN.
 
@@ -149,7 +149,22 @@ def solve(
     tilt, commanded = rotation_vectors(R @ R_aim.transpose(0, 2, 1)), goal[:, 9:] + R_cmd @ machine.nominal.tool
     f0 = machine.elastic.chain[:, SPRINGS]
     F = np.stack([kept[:, c, k : k + 6] for c, k in enumerate(f0)], axis=1)
-    return State(tip, R, tilt, commanded, r, nominal, drive, f, status, passes, kept, F, R_cmd, total)
+    return State(
+        tip=tip,
+        rotation=R,
+        tilt=tilt,
+        commanded=commanded,
+        rho=r,
+        rho_nominal=nominal,
+        drive=drive,
+        force=f,
+        status=status,
+        passes=passes,
+        x=kept,
+        F=F,
+        commanded_rotation=R_cmd,
+        wrench=total,
+    )
 
 
 def inverse(machine: Machine, tip: Array, rotation: Array | None = None) -> Array:

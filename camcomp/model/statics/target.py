@@ -23,7 +23,7 @@ TIP_DONE = 1e-7  # mm, iteration of eqs. (4) and (5) ends here
 MAX_TARGET_STEPS = 60
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Correction:
     """Solved targets. Rows with status != 0 hold NaN.
 
@@ -45,9 +45,15 @@ class Correction:
     def of(state: State, iterations: NDArray[np.int64]) -> Correction:
         """The correction in a solver state."""
         return Correction(
-            state.commanded, state.rho_nominal, state.rho, state.drive, state.tilt, state.status, iterations,
-            state.commanded_rotation,
-        )  # fmt: skip
+            commanded=state.commanded,
+            rho_nominal=state.rho_nominal,
+            rho=state.rho,
+            drive=state.drive,
+            tilt=state.tilt,
+            status=state.status,
+            iterations=iterations,
+            rotation=state.commanded_rotation,
+        )
 
 
 def correct(

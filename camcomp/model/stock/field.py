@@ -207,7 +207,7 @@ def above(nodes, x, y, z):
 
 
 def room_for(
-    place: Floats, rows: int, columns: int, tools: Floats, sweeps: int, facet: Any, mesh: Floats
+    place: Floats, rows: int, columns: int, tools: Floats, sweeps: int, *, facet: Any, mesh: Floats
 ) -> HeightField:
     """Allocate an uncut height field; untouched pages of it take no memory, except the heights of a box."""
     low = (
@@ -216,7 +216,17 @@ def room_for(
         else np.zeros((rows, columns), np.float32)
     )
     return HeightField(
-        place, np.zeros((rows, columns), np.int32), low, np.zeros((rows, columns), np.int32),
-        np.zeros((rows, columns), np.int32), np.empty((sweeps, 12)), tools, np.zeros(sweeps, np.int32),
-        np.zeros(sweeps, np.int32), np.zeros(4, np.int64), np.zeros(8), facet, mesh,
-    )  # fmt: skip
+        place=place,
+        own=np.zeros((rows, columns), np.int32),
+        low=low,
+        near=np.zeros((rows, columns), np.int32),
+        over=np.zeros((rows, columns), np.int32),
+        sweeps=np.empty((sweeps, 12)),
+        tools=tools,
+        kept=np.zeros(sweeps, np.int32),
+        free=np.zeros(sweeps, np.int32),
+        counts=np.zeros(4, np.int64),
+        last=np.zeros(8),
+        facet=facet,
+        mesh=mesh,
+    )

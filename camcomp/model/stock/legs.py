@@ -15,7 +15,7 @@ SAGITTA_MM = 5e-4  # by which a chord may miss its arc
 MOST_CHORDS = 20_000
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Legs:
     """Straight legs (m,) of the motions of a path that have a length."""
 
@@ -71,7 +71,7 @@ def legs_of(path: Path, before: LegBefore) -> Legs:
     middle = last[both] + first[both + 1]
     last[both], first[both + 1] = middle, middle
     table = np.concatenate((start, end, _level(first, chord), _level(last, chord)), axis=1)
-    return Legs(motion, u0, u1, kind, table, joined, ends)
+    return Legs(motion=motion, u0=u0, u1=u1, kind=kind, table=table, joined=joined, ends=ends)
 
 
 def _chords(path: Path) -> tuple[Ints, Floats, Floats]:

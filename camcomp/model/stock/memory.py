@@ -48,18 +48,35 @@ class StockMemory:
             (stock.low[:2] - (MARGIN - 0.5) * self.cell, [self.cell, stock.form], stock.low, stock.high, [rise])
         )
         facet, mesh = facets_on(stock, place, size)
-        self.nodes = room_for(place, int(size[1]), int(size[0]), rows, 1 << 12, facet, mesh)
+        self.nodes = room_for(
+            place=place, rows=int(size[1]), columns=int(size[0]), tools=rows, sweeps=1 << 12, facet=facet, mesh=mesh
+        )
         self._place = Place(
-            np.zeros(8), np.zeros(1, np.int64), np.zeros(MOST_RECENT, np.int64), np.zeros(1, np.int64), np.zeros(WHAT),
-            np.zeros((ARCS, 2)),
-        )  # fmt: skip
+            at=np.zeros(8),
+            row=np.zeros(1, np.int64),
+            recent=np.zeros(MOST_RECENT, np.int64),
+            many=np.zeros(1, np.int64),
+            told=np.zeros(WHAT),
+            arcs=np.zeros((ARCS, 2)),
+        )
         n, r, deep = 4 * ROOM_FOR_PLACES, 2 * ROOM_FOR_ARCS, DEEP + CHAIN_DEEP
         self._found = Found(
-            np.zeros(n, np.int64), np.zeros(n), np.zeros(n, np.int64), np.zeros(n, np.int64), np.zeros((n, WHAT)),
-            np.zeros((r, BITE)), np.zeros(0, np.bool_), np.zeros(MOST_RECENT), np.zeros(2), np.zeros(3, np.int64),
-            np.zeros(deep), np.zeros((deep, WHAT)), np.zeros((deep, 2), np.int64), np.zeros(MOST_CHAIN + 1),
-            np.zeros(CHAIN_DEEP, np.int64),
-        )  # fmt: skip
+            leg=np.zeros(n, np.int64),
+            u=np.zeros(n),
+            first=np.zeros(n, np.int64),
+            many=np.zeros(n, np.int64),
+            told=np.zeros((n, WHAT)),
+            bites=np.zeros((r, BITE)),
+            crash=np.zeros(0, np.bool_),
+            recent_end=np.zeros(MOST_RECENT),
+            way=np.zeros(2),
+            told_of=np.zeros(3, np.int64),
+            stack_u=np.zeros(deep),
+            stack=np.zeros((deep, WHAT)),
+            stack_rows=np.zeros((deep, 2), np.int64),
+            chain_way=np.zeros(MOST_CHAIN + 1),
+            chain_number=np.zeros(CHAIN_DEEP, np.int64),
+        )
         self._before = LegBefore()
         self._kept = self._kept_rows = 0  # places and arcs kept from the call before
 
@@ -111,7 +128,9 @@ class StockMemory:
         """
         n = meet(self.nodes, self._place, self._found, tip, direction, self._tool(tool))
         start, stop, height, rise, run, _ = self._found.bites[:n].T.copy()
-        return float(self._place.told[DEPTH]), Bites(np.zeros(n, np.int64), start, stop, height, rise, run)
+        return float(self._place.told[DEPTH]), Bites(
+            place=np.zeros(n, np.int64), start=start, stop=stop, height=height, rise=rise, run=run
+        )
 
     def take(self, start: Floats, end: Floats, tool: int, lag_mm: float) -> None:
         """Remove the straight sweep of a tool between two tip positions (3,) mm once the tip is lag_mm farther."""
@@ -141,12 +160,12 @@ class StockMemory:
         n, r = int(found.told_of[PLACES]), int(found.told_of[ROWS])
         first = self._kept
         out = _Places(
-            found.leg[first:n].copy(),
-            found.u[first:n].copy(),
-            found.first[first:n].copy(),
-            found.many[first:n].copy(),
-            found.told[first:n].copy(),
-            found.bites[:r].copy(),
+            leg=found.leg[first:n].copy(),
+            u=found.u[first:n].copy(),
+            first=found.first[first:n].copy(),
+            many=found.many[first:n].copy(),
+            told=found.told[first:n].copy(),
+            bites=found.bites[:r].copy(),
         )
         if not keep:
             found.told_of[PLACES] = self._kept
@@ -175,7 +194,7 @@ class StockMemory:
         )
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class _Places:
     """Places of consecutive legs before thinning; columns as in places.Found."""
 
@@ -214,5 +233,5 @@ def _engaged(parts: list[_Places], legs: Legs) -> Engaged:
     place = np.repeat(np.arange(len(many)), many)
     row = np.repeat(first - (np.cumsum(many) - many), many) + np.arange(int(many.sum()))
     start, stop, height, rise, run, _ = bites[row].T
-    bites_of = Bites(place, start, stop, height, rise, run)
-    return Engaged(motion, at, told[:, DEPTH], told[:, ENGAGED], bends, bites_of)
+    bites_of = Bites(place=place, start=start, stop=stop, height=height, rise=rise, run=run)
+    return Engaged(motion=motion, u=at, depth=told[:, DEPTH], turn=told[:, ENGAGED], bends=bends, bites=bites_of)

@@ -21,7 +21,7 @@ class ControlLimits:
     look_ahead: int  # segments
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class ToolMoves:
     """Moves (n,) of the tip as the controller reads them; program frame."""
 
@@ -67,10 +67,20 @@ def moves_of(
     """Moves of a path, each in its path mode; feed (n,) mm/min: default the path's; per_turn (n,): G95."""
     exact, stop, tolerance, merged = mode_columns(modes)
     return ToolMoves(
-        path.kind.astype(np.int64), path.start, path.end, path.centre, path.axis, path.angle,
-        path.feed if feed is None else feed, exact, np.asarray(path.waits), stop | path.machine, tolerance, merged,
-        np.zeros(len(path), np.bool_) if per_turn is None else per_turn,
-    )  # fmt: skip
+        kind=path.kind.astype(np.int64),
+        start=path.start,
+        end=path.end,
+        centre=path.centre,
+        axis=path.axis,
+        angle=path.angle,
+        feed=path.feed if feed is None else feed,
+        exact=exact,
+        waits=np.asarray(path.waits),
+        stop=stop | path.machine,
+        tolerance=tolerance,
+        merge=merged,
+        per_turn=np.zeros(len(path), np.bool_) if per_turn is None else per_turn,
+    )
 
 
 def line_moves(
@@ -80,9 +90,20 @@ def line_moves(
     n = len(kind)
     none = np.zeros((n, 3))
     return ToolMoves(
-        kind.astype(np.int64), start, end, none, none, none[:, 0], feed, np.full(n, mode.exact), waits & (np.arange(n) == 0),
-        np.full(n, mode.code == 611), np.full(n, mode.tolerance_mm), np.full(n, mode.merge_mm), np.zeros(n, np.bool_),
-    )  # fmt: skip
+        kind=kind.astype(np.int64),
+        start=start,
+        end=end,
+        centre=none,
+        axis=none,
+        angle=none[:, 0],
+        feed=feed,
+        exact=np.full(n, mode.exact),
+        waits=waits & (np.arange(n) == 0),
+        stop=np.full(n, mode.code == 611),
+        tolerance=np.full(n, mode.tolerance_mm),
+        merge=np.full(n, mode.merge_mm),
+        per_turn=np.zeros(n, np.bool_),
+    )
 
 
 def mode_columns(modes: Sequence[PathMode]) -> tuple[Bools, Bools, Floats, Floats]:

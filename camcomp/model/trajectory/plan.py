@@ -22,7 +22,7 @@ from camcomp.model.trajectory.speeds import durations, pieces
 RAPID_MM_PER_S = 10_000.0 / 60.0  # default without a stated velocity
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class ControlPlan:
     """Trajectory and time of moves (n,) as m segments; every corner is the one after its segment."""
 
@@ -73,7 +73,7 @@ def plan_of(moves: ToolMoves, limits: ControlLimits, arrives: float = 0.0) -> Co
         middle[at] = path.centre
         radius[at] = np.linalg.norm(path.start - path.centre, axis=1)
     acceleration = limits.acceleration * most
-    fast, reachable = _speeds(kind, feed, nominal, radius, most, limits)
+    fast, reachable = _speeds(kind=kind, feed=feed, nominal=nominal, radius=radius, most=most, limits=limits)
     way, centre = np.zeros(m, np.int64), np.zeros((m, 3))
     speed, reach, bend, around, time = np.zeros((5, m))
     length, slope, fastest, passes = np.empty((4, 2 * m))
@@ -83,7 +83,19 @@ def plan_of(moves: ToolMoves, limits: ControlLimits, arrives: float = 0.0) -> Co
                 limits.acceleration, limits.velocity, limits.cycle_s, way, speed, reach, bend, around, centre, end)  # fmt: skip
         pieces(nominal, fast, reachable, acceleration, radius, way, speed, reach, bend, around, length, slope, fastest)
         durations(length, slope, fastest, way, speed, limits.cycle_s, limits.look_ahead, arrives, passes, time)
-    return ControlPlan(moves, found.group, start, end, arc, way, reach, bend, centre, time, passes[::2])
+    return ControlPlan(
+        moves=moves,
+        group=found.group,
+        start=start,
+        end=end,
+        arc=arc,
+        way=way,
+        reach=reach,
+        bend=bend,
+        centre=centre,
+        time=time,
+        passes=passes[::2],
+    )
 
 
 def _speeds(

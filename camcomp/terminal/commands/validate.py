@@ -67,4 +67,8 @@ def _place(doubt: "Doubt", name: str) -> str:
 
 def _note(doubt: "Doubt", name: str) -> Finding:
     at = doubt.at
-    return Finding(WARNING, doubt.text, at.file, at.line, at.column) if at else Finding(WARNING, doubt.text, name)
+    return (
+        Finding(rule=WARNING, message=doubt.text, file=at.file, line=at.line, column=at.column)
+        if at
+        else Finding(rule=WARNING, message=doubt.text, file=name)
+    )

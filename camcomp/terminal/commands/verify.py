@@ -79,7 +79,17 @@ def command(
             for each in over:
                 at = source.text.place(each.line - 1, 0)
                 text = f"{each.judged_um:.3f} um are left, more than {tolerance:g} um"
-                findings.append(Finding("CC601", text, at.file, at.line, at.column, at.source, check=True))
+                findings.append(
+                    Finding(
+                        rule="CC601",
+                        message=text,
+                        file=at.file,
+                        line=at.line,
+                        column=at.column,
+                        source=at.source,
+                        check=True,
+                    )
+                )
     except CamcompError as error:
         failure, findings = error, findings_of(error, display_name(corrected))
     case = Case(display_name(corrected), findings, note)

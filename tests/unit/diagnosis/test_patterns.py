@@ -14,7 +14,16 @@ def ground(temperature):
     place = 10.0 * time[:, None]
     still = np.zeros_like(place)
     motion = Motion(
-        time, time, time, temperature, place, still + 10.0, still + 1.0, np.zeros(1), np.full(1, np.inf), True
+        time=time,
+        common=time,
+        cut_min=time,
+        temperature=temperature,
+        encoder=place,
+        speed=still + 10.0,
+        direction=still + 1.0,
+        home=np.zeros(1),
+        stiffness=np.full(1, np.inf),
+        ordered=True,
     )
     tip = np.column_stack([place, still, still])
     measured = {"tip": True, "encoder": False, "drive": False, "dyno": False}

@@ -30,7 +30,17 @@ def moved(job):
     """By how much (n, 3) the guideways of the machine move the tip at SLIDES."""
     n, robot = len(SLIDES), job.real_machine.nominal
     none, t = np.zeros((n, 3)), np.arange(n) * 1.0
-    motion = Motion(t, t, t, None, SLIDES, none, WAY, np.zeros(3), np.full(3, 1e4))
+    motion = Motion(
+        time=t,
+        common=t,
+        cut_min=t,
+        temperature=None,
+        encoder=SLIDES,
+        speed=none,
+        direction=WAY,
+        home=np.zeros(3),
+        stiffness=np.full(3, 1e4),
+    )
     tip = SLIDES - [0.0, 0.0, TOOL]
     return signal_path.led(job.causes, tip, motion, robot, job.frame.origin) - tip
 

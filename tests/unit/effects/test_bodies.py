@@ -71,9 +71,18 @@ def test_a_base_that_turns_about_its_foot_moves_the_tip_as_moments_balance(robot
     base = shelf.load("effects", "base_compliance")
     n = np.zeros((1, 6))
     motion = Motion(
-        np.zeros(1), np.zeros(1), np.zeros(1), None, POSE[None], n, n, n[0], n[0], False,
+        time=np.zeros(1),
+        common=np.zeros(1),
+        cut_min=np.zeros(1),
+        temperature=None,
+        encoder=POSE[None],
+        speed=n,
+        direction=n,
+        home=n[0],
+        stiffness=n[0],
+        ordered=False,
         masses=lambda: mass_loads(robot, POSE[None], None),
-    )  # fmt: skip
+    )
     p = {"rad_per_Nmm": soft, "rad_per_N": depth * soft, "mm_per_N": 0.0}
     got = base.on_pose(tip[None], Load(force[None], np.zeros((1, 6))), motion, p)[0]
     want = bodies.on_pedestal(POSE, force, soft, depth)
@@ -87,7 +96,17 @@ def test_a_drive_with_a_largest_speed_falls_behind_and_catches_up():
 
     time = np.linspace(0.0, 3.0, 3001)
     x = asked(time)[:, None]
-    motion = Motion(time, time, time, None, x, x, x, np.zeros(1), np.ones(1))
+    motion = Motion(
+        time=time,
+        common=time,
+        cut_min=time,
+        temperature=None,
+        encoder=x,
+        speed=x,
+        direction=x,
+        home=np.zeros(1),
+        stiffness=np.ones(1),
+    )
     limit = shelf.load("effects", "speed_limit")
     got = limit.on_servo(x, motion, np.ones(1), {"speed_mm_per_s": 70.0})[:, 0]
     fine, want = bodies.slow_follower(asked, 70.0, 3.0, 5e-4)

@@ -21,7 +21,17 @@ def standing(n=401):
     """One actuator at rest for 4 s from 100 s of the common clock on."""
     t = np.linspace(0.0, 4.0, n)
     zero = np.zeros((n, 1))
-    return Motion(t, 100.0 + t, t / 60.0, None, zero, zero, zero, np.zeros(1), np.array([2e4]))
+    return Motion(
+        time=t,
+        common=100.0 + t,
+        cut_min=t / 60.0,
+        temperature=None,
+        encoder=zero,
+        speed=zero,
+        direction=zero,
+        home=np.zeros(1),
+        stiffness=np.array([2e4]),
+    )
 
 
 def test_it_shifts_the_carriage_and_the_drive_holds_against_a_force():

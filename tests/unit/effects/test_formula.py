@@ -26,7 +26,17 @@ def job_with(tmp_path, *effects, machine="cartesian"):
 def motion(position):
     t = np.arange(len(position)) * 0.1
     zero = np.zeros_like(position)
-    return Motion(t, t, t, None, position, zero, zero, np.zeros(3), np.full(3, np.inf))
+    return Motion(
+        time=t,
+        common=t,
+        cut_min=t,
+        temperature=None,
+        encoder=position,
+        speed=zero,
+        direction=zero,
+        home=np.zeros(3),
+        stiffness=np.full(3, np.inf),
+    )
 
 
 def shifts(job, position):

@@ -12,7 +12,17 @@ def test_the_force_turns_round_over_the_presliding_length(length):
     x = np.concatenate((np.linspace(0.0, 0.1, 401), np.linspace(0.1, 0.0, 401)[1:]))[:, None]
     t = np.linspace(0.0, 8.0, len(x))
     rigid, zero = np.array([np.inf]), np.zeros_like(x)
-    motion = Motion(t, t, t, None, x, np.gradient(x, t, axis=0), np.sign(np.gradient(x, t, axis=0)), np.zeros(1), rigid)
+    motion = Motion(
+        time=t,
+        common=t,
+        cut_min=t,
+        temperature=None,
+        encoder=x,
+        speed=np.gradient(x, t, axis=0),
+        direction=np.sign(np.gradient(x, t, axis=0)),
+        home=np.zeros(1),
+        stiffness=rigid,
+    )
     p = {**nominal(friction), "force_N": 30.0, "presliding_mm": length}
     drive = friction.on_drive_force(zero, motion, np.ones(1), p)[:, 0]
     forth = 30.0 * (1.0 - np.exp(-x[:401, 0] / length))
@@ -26,7 +36,15 @@ def test_it_turns_round_over_the_way_of_carriage_or_encoder():
     t = np.linspace(0.0, 8.0, len(x))
     force, length, spring = 200.0, 0.005, 1e4
     motion = Motion(
-        t, t, t, None, x, np.gradient(x, t, axis=0), np.sign(np.gradient(x, t, axis=0)), np.zeros(1), np.array([spring])
+        time=t,
+        common=t,
+        cut_min=t,
+        temperature=None,
+        encoder=x,
+        speed=np.gradient(x, t, axis=0),
+        direction=np.sign(np.gradient(x, t, axis=0)),
+        home=np.zeros(1),
+        stiffness=np.array([spring]),
     )
     zero = np.zeros_like(x)
     p = {**nominal(friction), "force_N": force, "presliding_mm": length}
@@ -53,7 +71,17 @@ def test_friction_falls_from_breakaway_to_sliding_with_speed(force, more, speed)
     t = np.linspace(0.0, 2.0, 401)
     x = (speed * np.where(t < 1.0, t, 2.0 - t))[:, None]
     way = np.gradient(x, t, axis=0)
-    motion = Motion(t, t, t, None, x, way, np.sign(way), np.zeros(1), np.array([np.inf]))
+    motion = Motion(
+        time=t,
+        common=t,
+        cut_min=t,
+        temperature=None,
+        encoder=x,
+        speed=way,
+        direction=np.sign(way),
+        home=np.zeros(1),
+        stiffness=np.array([np.inf]),
+    )
     p = {**nominal(friction), force: 30.0, "presliding_mm": 1e-4, "presliding_rad": 1e-4, **more}
     drive = friction.on_drive_force(np.zeros_like(x), motion, np.ones(1), p)[:, 0]
     want = 30.0 + 12.0 * np.exp(-((speed / 2.0) ** 2)) + 0.5 * speed

@@ -27,7 +27,18 @@ BEHIND_THE_MOTOR = [
 def motion(q, *, ordered=True, way=None):
     n, m = q.shape
     zero, t = np.zeros_like(q), np.arange(float(n))
-    return Motion(t, t, t, None, q, zero, zero if way is None else way, np.full(m, 0.25), np.full(m, np.inf), ordered)
+    return Motion(
+        time=t,
+        common=t,
+        cut_min=t,
+        temperature=None,
+        encoder=q,
+        speed=zero,
+        direction=zero if way is None else way,
+        home=np.full(m, 0.25),
+        stiffness=np.full(m, np.inf),
+        ordered=ordered,
+    )
 
 
 def test_a_curve_is_its_fourier_series_and_the_same_every_turn():

@@ -20,7 +20,17 @@ def travel(temperature):
     x = np.linspace(-350.0, -250.0, 101)[:, None]
     t, zero = np.linspace(0.0, 5.0, 101), np.zeros((101, 1))
     heat = None if temperature is None else np.full(101, temperature)
-    return Motion(t, 200.0 + t, t, heat, x, zero, zero, np.array([-300.0]), np.array([1e4]))
+    return Motion(
+        time=t,
+        common=200.0 + t,
+        cut_min=t,
+        temperature=heat,
+        encoder=x,
+        speed=zero,
+        direction=zero,
+        home=np.array([-300.0]),
+        stiffness=np.array([1e4]),
+    )
 
 
 def test_it_is_the_warmth_times_the_way_from_home():

@@ -27,7 +27,17 @@ def encoder(*effects):
     x = WAY[:, None]
     for name, values in effects:
         zero, effect = np.zeros_like(x), shelf.load("effects", name)
-        m = Motion(T, T, T, None, x, zero, zero, np.zeros(1), np.array([1e4]))
+        m = Motion(
+            time=T,
+            common=T,
+            cut_min=T,
+            temperature=None,
+            encoder=x,
+            speed=zero,
+            direction=zero,
+            home=np.zeros(1),
+            stiffness=np.array([1e4]),
+        )
         x = effect.on_servo(x, m, np.ones(1), {**nominal(effect), **values})
     return x[:, 0]
 

@@ -15,7 +15,17 @@ def ramp(speed=1.0, n=401):
     t = np.linspace(0.0, 4.0, n)
     x = (speed * np.where(t < 2.0, t, 4.0 - t))[:, None]
     v = np.gradient(x, t, axis=0)
-    return Motion(t, 60.0 + t, t / 60.0, None, x, v, direction(x), np.array([-300.0]), np.array([1e4]))
+    return Motion(
+        time=t,
+        common=60.0 + t,
+        cut_min=t / 60.0,
+        temperature=None,
+        encoder=x,
+        speed=v,
+        direction=direction(x),
+        home=np.array([-300.0]),
+        stiffness=np.array([1e4]),
+    )
 
 
 def drive(name, motion, **p):

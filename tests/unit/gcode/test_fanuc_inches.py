@@ -26,7 +26,15 @@ def test_what_is_written_is_read_again(body):
     away = np.where(free, [0.1234567, -0.0765432, 0.0333333], 0.0)
     end = program.path.end + away
     out = Output.same(program.path)
-    out = Output(out.motion, out.kind, end, out.centre + away, out.angle, program.path.feed * 1.037, out.joining)
+    out = Output(
+        motion=out.motion,
+        kind=out.kind,
+        end=end,
+        centre=out.centre + away,
+        angle=out.angle,
+        feed=program.path.feed * 1.037,
+        joining=out.joining,
+    )
     result = rewrite(program, out, resolution_mm=1e-4, version="1")
     text = result.data.decode()
     for line in text.splitlines()[3:]:
@@ -51,5 +59,13 @@ def test_a_feed_has_a_point_where_the_input_has_one():
     for feed, expected in (("F15.", "F30.0"), ("F15", "F30")):
         program = read_program(f"O0001\nG20 G90\nG0 X0. Y0. Z0.\nG1 X1. {feed}\nM30\n".encode(), name="p.nc")
         out = Output.same(program.path)
-        twice = Output(out.motion, out.kind, out.end, out.centre, out.angle, 2.0 * program.path.feed, out.joining)
+        twice = Output(
+            motion=out.motion,
+            kind=out.kind,
+            end=out.end,
+            centre=out.centre,
+            angle=out.angle,
+            feed=2.0 * program.path.feed,
+            joining=out.joining,
+        )
         assert f"X1. {expected}\n" in rewrite(program, twice, resolution_mm=1e-4, version="1").data.decode()

@@ -28,16 +28,20 @@ def test_sine_power_of_whole_powers_is_elementary() -> None:
 def test_a_power_law_without_exponent_is_the_linear_model_without_edges() -> None:
     start, stop = np.array([0.0, 0.0, 1.9]), np.array([np.pi, 1.1, np.pi])
     chip, depth = np.array([0.05, 0.1, 0.2]), np.array([1.0, 2.0, 3.0])
-    linear = linear_edge(chip, depth, 3, start, stop, (700, 0.3 * 700, 0.2 * 700), (0, 0, 0))
-    power = power_law(chip, depth, 3, start, stop, 700, 0.0, (0.3, 0.2))
+    linear = linear_edge(
+        chip=chip, depth=depth, teeth=3, start=start, stop=stop, cutting=(700, 0.3 * 700, 0.2 * 700), edge=(0, 0, 0)
+    )
+    power = power_law(chip=chip, depth=depth, teeth=3, start=start, stop=stop, kc11=700, mc=0.0, ratios=(0.3, 0.2))
     np.testing.assert_allclose(power, linear, rtol=1e-12, atol=1e-12)
 
 
 def test_engagements_side_by_side_add_up() -> None:
     parts = [(0.0, 0.9), (0.9, 2.2), (2.2, np.pi)]
     for model in (
-        lambda a, b: linear_edge(0.1, 2.0, 2, a, b, (900, 250, 150), (15, 19, 18)),
-        lambda a, b: power_law(0.1, 2.0, 2, a, b, 641, 0.27, (0.3, 0.2)),
+        lambda a, b: linear_edge(
+            chip=0.1, depth=2.0, teeth=2, start=a, stop=b, cutting=(900, 250, 150), edge=(15, 19, 18)
+        ),
+        lambda a, b: power_law(chip=0.1, depth=2.0, teeth=2, start=a, stop=b, kc11=641, mc=0.27, ratios=(0.3, 0.2)),
     ):
         np.testing.assert_allclose(sum(model(*part) for part in parts), model(0.0, np.pi), rtol=1e-12, atol=1e-12)
 

@@ -11,7 +11,7 @@ CHIP = np.array([0.02, 0.05, 0.08, 0.11])
 @pytest.mark.parametrize("clockwise", [True, False])
 def test_coefficients_that_made_the_forces_are_found_again(clockwise: bool) -> None:
     cutting, edge = (812.0, 260.0, -140.0), (21.0, 17.0, 3.5)
-    made = linear_edge(CHIP, np.full(4, 2.5), 3, 0.0, np.pi, cutting, edge)
+    made = linear_edge(chip=CHIP, depth=np.full(4, 2.5), teeth=3, start=0.0, stop=np.pi, cutting=cutting, edge=edge)
     fit = fit_slot(CHIP, to_path(made, clockwise), depth_mm=2.5, teeth=3, clockwise=clockwise)
     np.testing.assert_allclose(fit.cutting, cutting, rtol=1e-10)
     np.testing.assert_allclose(fit.edge, edge, rtol=1e-10)

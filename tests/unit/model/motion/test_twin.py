@@ -125,7 +125,13 @@ def test_slopes_are_not_taken_for_others_that_are_gone(job):
     still = twin.sense(run_path, solved=solved, slopes=known)[0].tip
     away = twin.sense(run_path, solved=solved, slopes=known, measured=moved)[0].tip - still
     for k in range(2, 12):
-        slopes = Slopes(k * known.tip_rho, known.tip_wrench, known.drive_rho, known.drive_wrench, known.at_reference)
+        slopes = Slopes(
+            tip_rho=k * known.tip_rho,
+            tip_wrench=known.tip_wrench,
+            drive_rho=known.drive_rho,
+            drive_wrench=known.drive_wrench,
+            at_reference=known.at_reference,
+        )
         tip = twin.sense(run_path, solved=solved, slopes=slopes, measured=moved)[0].tip
         del slopes
         assert tip - still == pytest.approx(k * away, abs=1e-9)

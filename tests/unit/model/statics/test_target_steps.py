@@ -23,7 +23,14 @@ def test_steps_are_halved_until_the_iteration_converges(gain, monkeypatch):
         n = len(commanded)
         blank, whole = np.zeros((n, 3)), np.zeros(n, np.int64)
         return None, target.Correction(
-            commanded, blank, blank, blank, blank, whole, whole, np.tile(np.eye(3), (n, 1, 1))
+            commanded=commanded,
+            rho_nominal=blank,
+            rho=blank,
+            drive=blank,
+            tilt=blank,
+            status=whole,
+            iterations=whole,
+            rotation=np.tile(np.eye(3), (n, 1, 1)),
         )
 
     monkeypatch.setattr(target, "solve", solve)
