@@ -107,7 +107,7 @@ def _put(place, weight, found, at, weighs):  # type: ignore[no-untyped-def]  # p
 
 
 @kept
-def _places(begin, way, length, at, line, *, low, high, tip, hint, lost):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _places(begin, way, length, at, line, low, high, tip, hint, lost):  # type: ignore[no-untyped-def]  # pragma: no cover
     """Candidates for a tip (3,): path lengths (mm) of local minima of the distance, and their costs (mm²)."""
     place, weight = np.empty(_PLACES), np.empty(_PLACES)
     found, previous = 0, -2
@@ -154,18 +154,7 @@ def _follow(begin, way, length, at, line, low, high, tip, hint, lost):  # type: 
     before, seen = np.full((n, _PLACES), -1), np.full((n, _PLACES), -1)
     held = 0  # candidates of the row before
     for i in range(n):
-        near, off = _places(
-            begin=begin,
-            way=way,
-            length=length,
-            at=at,
-            line=line,
-            low=low,
-            high=high,
-            tip=tip[i],
-            hint=hint[i],
-            lost=lost,
-        )
+        near, off = _places(begin, way, length, at, line, low, high, tip[i], hint[i], lost)
         count = len(near) + held
         s, c = np.empty(count), np.empty(count)
         b, last = np.full(count, -1), np.full(count, i)
