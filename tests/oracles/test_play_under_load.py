@@ -72,7 +72,10 @@ def moved(values, held, friction, **width):
     n = len(values)
     t, x = np.arange(n) * 0.1, np.array(values, float)[:, None]
     loads = np.array(held, float)[:, None]
-    motion = Motion(t, t, t, None, x, 0 * x, 0 * x, np.zeros(1), np.ones(1), held=lambda: loads, friction=friction)
+    motion = Motion(
+        time=t, common=t, cut_min=t, temperature=None, encoder=x, speed=0 * x, direction=0 * x, home=np.zeros(1),
+        stiffness=np.ones(1), held=lambda: loads, friction=friction,
+    )  # fmt: skip
     return backlash.on_drive(0 * x, motion, np.ones(1), width)[:, 0]
 
 

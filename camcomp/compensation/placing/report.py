@@ -28,10 +28,13 @@ def placing_page(result: PlacingResult, program: str, inputs: Sequence[Input]) -
     )  # fmt: skip
     cards = [("Judged by", what, f"{result.motions[0]} of {result.motions[1]} motions"),
              ("As stated", _left(stated), words(stated))]  # fmt: skip
-    sections = [Section("map", "Map of the table", figures=figures), Section("all", "Placements", tables=[table])]
+    sections = [
+        Section(name="map", title="Map of the table", figures=figures),
+        Section(name="all", title="Placements", tables=[table]),
+    ]
     page = Page(
-        f"Where to clamp {program}", "places of the program's zero in the machine frame", verdict, best is not None, cards,
-        [*sections, inputs_section(inputs)], word="Best place" if best is not None else "",
+        title=f"Where to clamp {program}", subtitle="places of the program's zero in the machine frame", verdict=verdict,
+        good=best is not None, cards=cards, sections=[*sections, inputs_section(inputs)], word="Best place" if best is not None else "",
     )  # fmt: skip
     return render(page)
 
@@ -66,9 +69,10 @@ def _map(result: PlacingResult, turn: float, what: str) -> Figure:
             _markers("best", [result.best], {"size": 24, "symbol": "circle-open", "line": {"width": 3}}, "best")
         )
     return Figure(
-        f"map{turn:g}", f"Turned by {turn:g}°", f"{what} by the place of the program's zero.",
-        f"Map of the table: {len(good)} places with what is left, {len(bad)} where the program cannot be cut.", traces,
-        {"xaxis": axis("X of the zero, mm"), "yaxis": axis("Y of the zero, mm", scaleanchor="x")}, 460,
+        name=f"map{turn:g}", title=f"Turned by {turn:g}°", caption=f"{what} by the place of the program's zero.",
+        label=f"Map of the table: {len(good)} places with what is left, {len(bad)} where the program cannot be cut.",
+        traces=traces, height=460,
+        layout={"xaxis": axis("X of the zero, mm"), "yaxis": axis("Y of the zero, mm", scaleanchor="x")},
     )  # fmt: skip
 
 

@@ -124,8 +124,9 @@ class DrivenAxis:
         first = (position[1:2] - position[:1]) / (time[1] - time[0])
         loads = MassLoads(self.inertia[:, None], np.zeros((len(time), 6)))
         plain = Motion(
-            time, self.run.started + time, np.zeros(len(time)), None, position, speed, direction(position),
-            np.array([self.actuator.home]), np.array([np.inf if self.actuator.stiffness is None else self.actuator.stiffness]),
+            time=time, common=self.run.started + time, cut_min=np.zeros(len(time)), temperature=None, encoder=position,
+            speed=speed, direction=direction(position), home=np.array([self.actuator.home]),
+            stiffness=np.array([np.inf if self.actuator.stiffness is None else self.actuator.stiffness]),
             names=(self.actuator.name,), masses=lambda: loads,
         )  # fmt: skip
         return replace(plain, seams=Seams(np.zeros(1, int), np.full(1, np.inf), first))
