@@ -39,6 +39,7 @@ from camcomp.model.motion.log_columns import log_columns
 from camcomp.model.statics.arm import arm_of
 from camcomp.model.statics.build import build_robot
 from camcomp.model.statics.description import Robot
+from camcomp.model.statics.masses import has_moved_mass
 
 MOSTLY = 0.5  # share of rows with a value from which on a channel counts as logged, and rows without it as lost
 
@@ -84,9 +85,8 @@ def study_of(path: str | Path, without: Sequence[str] = ()) -> LogStudy | None:
             result, found = study_axes(
                 axes, holdout=opened.experiment.holdout, without=without, stated=deviation, robot=robot
             )
-            return LogStudy(
-                result, partial(of_axes, found, {a.name: a.revolute for a in robot.actuators}), tuple(opened.notes)
-            )
+            by_axis = {a.name: a.revolute for a in robot.actuators}
+            return LogStudy(result, partial(of_axes, found, by_axis), (*opened.notes, *_without_masses(opened)))
     except np.linalg.LinAlgError as error:  # a ValueError too
         message = (
             f"the rows do not determine the fit: some columns do not move, or repeat others; {_channels_there(opened)}"
@@ -98,6 +98,17 @@ def study_of(path: str | Path, without: Sequence[str] = ()) -> LogStudy | None:
         message = f"{error}; {_channels_there(opened)}"
         raise ConfigError("CC420", message, at=Location(display_name(path), 1, 1)) from error
     return None
+
+
+def _without_masses(opened: _Opened) -> tuple[str, ...]:
+    """What the reader should know where torques or second encoders of an arm show weight, and no mass is stated."""
+    hinges = [k for k, a in enumerate(opened.robot.actuators) if a.revolute]
+    seen = any(np.isfinite(getattr(m, part)[:, hinges]).any() for m in opened.logs for part in ("drive", "load"))
+    if not seen or arm_of(opened.robot) is None or has_moved_mass(opened.robot):
+        return ()
+    return (
+        "no mass_kg in the machine file: weight is fitted by angle, and drives that give way under it are not found",
+    )
 
 
 def _channels_there(opened: _Opened) -> str:

@@ -33,6 +33,13 @@ def asked(folder, configs, runs, **keys):
     return diagnose(path).result
 
 
+def test_weight_without_masses_is_said(tmp_path):
+    (tmp_path / "arm.yaml").write_text(ARM)
+    torque_log(tmp_path, "a", 1, rubs=False)
+    asked(tmp_path, ["arm.yaml"], "a")
+    assert any("no mass_kg" in note for note in diagnose(tmp_path / "experiment.yaml").notes)
+
+
 def course(seed):
     """Times (n,), angle, speed and acceleration of a joint: three sines."""
     rng, t = np.random.default_rng(seed), np.arange(0.0, 12.0, 0.005)
@@ -91,6 +98,7 @@ def test_a_second_encoder_behind_the_gear_shows_its_play(tmp_path):
     (play,) = [c for c in result.causes if c.effect != "unknown"]
     assert (play.effect, play.target) == ("backlash", "J1") and play.probability > 0.9
     assert play.parameters["width_rad"].value == pytest.approx(1.5e-4, rel=0.03)
+    assert result.verdict == "identified" and result.gap.actuators["J1"].rms == pytest.approx(75.0, rel=0.1)
     assert result.axes_in_detail["J1"]["second_encoder"]["delay_ms"].value == pytest.approx(2.0, abs=0.1)
 
 

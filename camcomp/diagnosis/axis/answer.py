@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from camcomp.diagnosis.axis.at_tip import TipMotion, held_errors, lever_mm, whole_errors
+from camcomp.diagnosis.axis.at_tip import TipMotion, held_errors, lever_mm, position_floor, whole_errors
 from camcomp.diagnosis.axis.findings import AxisChannel, AxisFindings
 from camcomp.diagnosis.result.types import (
     ActuatorGap,
@@ -47,7 +47,7 @@ def unknown(axis: AxisFindings, whole: int) -> UnknownCause:
 
 
 def gap(found: Sequence[AxisFindings], tip: TipMotion) -> GapSize:
-    """Size of the following errors at the tip in um, and of every actuator in its own unit; where only forces were logged, of these in mN."""
+    """Size of the errors of position at the tip in um, and of every actuator in its own unit; where only forces were logged, of these in mN."""
     errors = whole_errors(found)
     if not errors:
         rows = [np.concatenate([values for _, values in c.whole]) for a in found for c in a.channels[:1]]
@@ -55,15 +55,15 @@ def gap(found: Sequence[AxisFindings], tip: TipMotion) -> GapSize:
         floor = float(np.sqrt(np.mean([a.channels[0].floor ** 2 for a in found])))
     else:
         size = np.concatenate([tip.errors(run, each) for run, each in errors.items()])
-        floors = {a.name: a.following.floor for a in found if a.following is not None}
+        floors = {a.name: position_floor(a) for a in found}
         times = {run: max((t for t, _ in each.values()), key=len) for run, each in errors.items()}
         floor = _rms(np.concatenate([tip.floor(run, time, floors) for run, time in times.items()]))
     actuators = {
         a.name: ActuatorGap(
             rms=_figure(a, _rms(np.concatenate([each[a.name][1] for each in errors.values() if a.name in each]))),
-            floor=_figure(a, a.following.floor), unit=_unit(a),
+            floor=_figure(a, position_floor(a)), unit=_unit(a),
         )
-        for a in found if a.following is not None
+        for a in found if a.following is not None or a.behind is not None
     }  # fmt: skip
     return GapSize(
         rms_um=round(1e3 * _rms(size), 3),

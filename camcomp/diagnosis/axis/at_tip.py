@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from camcomp.diagnosis.axis.findings import AxisFindings, AxisRun
+from camcomp.diagnosis.axis.findings import AxisChannel, AxisFindings, AxisRun
 from camcomp.ground.datatypes import Floats
 from camcomp.model.statics.arm import ARM_LENGTH, Arm, arm_of, end_pose, jacobian
 from camcomp.model.statics.description import Robot
@@ -83,22 +83,39 @@ class TipMotion:
 
 
 def whole_errors(found: Sequence[AxisFindings]) -> dict[str, Errors]:
-    """Following errors by run and axis, each about its mean over the runs."""
+    """Errors by run and axis: set-point minus encoder, and encoder minus second encoder, each about its mean over the runs."""
     out: dict[str, dict[str, tuple[Floats, Floats]]] = {}
-    for a in found:
-        if a.following is not None:
-            middle = float(np.mean(np.concatenate([values for _, values in a.following.whole])))
-            for k, (time, values) in zip(a.following.runs, a.following.whole, strict=True):
-                out.setdefault(a.following.all_names[k], {})[a.name] = time, values - middle
+    for a, channel, sign in _channels(found):
+        middle = float(np.mean(np.concatenate([values for _, values in channel.whole])))
+        for k, (time, values) in zip(channel.runs, channel.whole, strict=True):
+            _add(out.setdefault(channel.all_names[k], {}), a.name, time, sign * (values - middle))
     return dict(out)
 
 
 def held_errors(found: Sequence[AxisFindings], *, explained: bool) -> dict[str, Errors]:
-    """Following errors by run and axis of runs that were not fitted, without their constant or with all that was found."""
+    """The same of runs that were not fitted, without their constant or with all that was found."""
     out: dict[str, dict[str, tuple[Floats, Floats]]] = {}
-    for a in found:
-        if a.following is not None:
-            held = a.following.held if explained else a.following.held_whole
-            for k, values in held.items():
-                out.setdefault(a.following.all_names[k], {})[a.name] = a.following.held_times[k], values
+    for a, channel, sign in _channels(found):
+        for k, values in (channel.held if explained else channel.held_whole).items():
+            _add(out.setdefault(channel.all_names[k], {}), a.name, channel.held_times[k], sign * values)
     return dict(out)
+
+
+def position_floor(axis: AxisFindings) -> float:
+    """Noise of the error of an axis, in the study's mm."""
+    return float(np.sqrt(sum(c.floor**2 for _, c, _ in _channels([axis]))))
+
+
+def _channels(found: Sequence[AxisFindings]) -> list[tuple[AxisFindings, AxisChannel, float]]:
+    """Axes with their channels of position, and the sign with which these add up to set-point minus carriage."""
+    both = [(a, c, sign) for a in found for c, sign in ((a.following, 1.0), (a.behind, -1.0))]
+    return [(a, c, sign) for a, c, sign in both if c is not None]
+
+
+def _add(errors: dict[str, tuple[Floats, Floats]], name: str, time: Floats, values: Floats) -> None:
+    """Add errors (n,) of a channel to those of an axis, at the times of its first channel."""
+    if name in errors:
+        at, own = errors[name]
+        errors[name] = at, own + np.interp(at, time, values)
+    else:
+        errors[name] = time, values

@@ -152,6 +152,11 @@ def study_channel(
     if rows.channel == "force" and "disturbance" not in without:
         done = _with_pushes(found.name, data, terms, done, rows)
     found.causes += done.causes
+    if (
+        rows.channel == "behind"
+    ):  # what is left of two encoders without their zeros and clocks is an error of the machine
+        apart = [sum(own[kind] @ done.sizes[kind] for kind in ("offset", "delay")) for own in data.healthy]
+        rows = replace(rows, values=[each - own for each, own in zip(rows.values, apart, strict=True)])
     channel = _channel(rows, done)
     _tell(found, rows, done, data.healthy)
     if channel.gate is not None:
@@ -275,13 +280,16 @@ def _tell(found: AxisFindings, rows: JointRows, done: ChannelFit, healthy: Seque
 def _channel(rows: JointRows, done: ChannelFit) -> AxisChannel:
     """Residuals of the fitted runs, and of those that are judged only, against the floor."""
     moves, values, train, test = rows.moves, rows.values, rows.train, rows.test
-    constant = done.sizes["offset"][0] if rows.channel != "following" else 0.0
+    constant = done.sizes["offset"][0] if rows.channel == "force" else 0.0
     data = series_of(moves, values, train)
     first = by_block(data, data.y - constant)
     channel = AxisChannel(data, train, first, first, floor=rows.floor, stated=rows.stated)
     channel.all_names = [run.name for run in rows.runs]
     channel.moves, channel.left = [moves[k] for k in train], [done.left[k] for k in train]
     channel.last = by_block(data, np.concatenate(channel.left))
+    fitted = data.y - np.concatenate(channel.left)
+    channel.columns = np.stack([fitted, np.ones_like(fitted)], axis=1)
+    channel.whole = [(moves[k].time, values[k]) for k in train]
     if test:
         seen = series_of(moves, values, test)
         channel.first = by_block(seen, seen.y - constant)

@@ -17,6 +17,7 @@ import numpy as np
 from camcomp.diagnosis.axis import answer
 from camcomp.diagnosis.axis.at_tip import TipMotion
 from camcomp.diagnosis.axis.block_least_squares import WHOLE_RUNS, log10_chance, solve
+from camcomp.diagnosis.axis.channels import LEFT
 from camcomp.diagnosis.axis.drive_force import force_of
 from camcomp.diagnosis.axis.drivers import dependences
 from camcomp.diagnosis.axis.findings import ROWS, AxisChannel, AxisDeviation, AxisFindings, AxisRun
@@ -127,7 +128,7 @@ def _nothing_below_the_floor(axis: AxisFindings) -> None:
         return
     axis.causes = [c for c in axis.causes if not c.effect.startswith(("servo_", "speed_limit"))]
     following.gate = AxisGate("at", 0.0, ())
-    if axis.force is None:
+    if axis.force is None and axis.behind is None:
         axis.unknown_in, axis.law = [], None
 
 
@@ -199,7 +200,10 @@ def _slide(
 
 
 def _limited(found: AxisFindings, rows: JointRows, around: AxisSurroundings, without: set[str]) -> AxisFindings:
-    """What was found with a largest speed of the drive in the place of other causes, where that explains more."""
+    """What was found with a largest speed of the drive in the place of other causes, where that explains nearly all.
+
+    Anything takes a part of something unknown: what leaves much of it may be no more than that.
+    """
     follows = found.following
     if follows is None or follows.gate is None or follows.gate.word == "at" or "speed_limit" in without:
         return found
@@ -207,6 +211,9 @@ def _limited(found: AxisFindings, rows: JointRows, around: AxisSurroundings, wit
     rows = replace(rows, floor=follows.floor, stated=follows.stated)
     limited, channel = study_channel(plain, rows, around, without)
     if not any(c.effect == "speed_limit" for c in limited.causes) or np.mean(channel.last) >= np.mean(follows.last):
+        return found
+    beyond = [float(np.mean(each)) - channel.floor**2 for each in (channel.first, channel.last)]
+    if beyond[1] > LEFT * beyond[0]:
         return found
     limited.following = channel
     return limited
@@ -257,8 +264,12 @@ def _second_encoder(
         channel="behind", runs=runs, moves=moves, values=values, train=[every.index(k) for k in train if k in every],
         test=[every.index(k) for k in test if k in every], floor=floor, stated=found.stated.encoder_mm is not None,
     )  # fmt: skip
-    found, found.behind = study_channel(found, rows, around, without)
-    found.behind.whole = [(runs[k].time, values[k]) for k in found.behind.runs]
+    more, channel = study_channel(found, rows, around, without)
+    if float(np.std(np.concatenate([own for _, own in channel.whole]))) > floor:
+        found = more
+    else:  # there is no gap that causes would explain
+        channel.gate = AxisGate("at", 0.0, ())
+    found.behind = channel
     return found
 
 
@@ -299,7 +310,7 @@ def _name_rest(found: AxisFindings, runs: Sequence[AxisRun], others: Mapping[str
             beside = {other: _moves(theirs, names, found.wide) for other, theirs in others.items()}
             beside = {other: moves for other, moves in beside.items() if len(moves) == len(names)}
             each = (channel.data, channel.columns, channel.moves, beside, channel.floor)
-            for kind, share, chance in dependences(*each) if len(channel.columns) else ():
+            for kind, share, chance in dependences(*each):
                 found.unknown_in.append((kind if ":" in kind else f"{kind}:{found.name}", share))
                 found.unknown_chance = min(found.unknown_chance, chance)
             if not found.unknown_in and channel.gate.intervals:
