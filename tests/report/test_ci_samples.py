@@ -63,6 +63,18 @@ def test_the_workflow_fails_on_a_bad_program(project, shell):
     assert (project / "validate.sarif").read_text().count('"ruleId": "CC101"') == 1
 
 
+def test_the_recipe_of_the_image_compiles_by_commands_that_work(tmp_path, shell):
+    text = (ROOT / "samples/ci/Containerfile").read_text().replace("\\\n", "")
+    _, warm_up = re.findall(r"^RUN (.*)", text, re.MULTILINE)
+    (tmp_path / "cache").mkdir()
+    done = shell(
+        warm_up.replace("/tmp/start", str(tmp_path / "start")).replace("/var/cache/camcomp", str(tmp_path / "cache")),
+        tmp_path,
+    )
+    assert done.returncode == 0, done.stderr
+    assert re.search(r"^FROM docker\.io/library/python:3\.\d+-slim$", text, re.MULTILINE)
+
+
 @pytest.mark.parametrize("hook", HOOKS, ids=lambda hook: hook["id"])
 def test_a_hook_takes_many_files_and_fails_on_a_bad_one(hook, project, shell):
     files = sorted(each.name for each in project.iterdir() if re.search(hook["files"], each.name))
