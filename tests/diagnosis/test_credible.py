@@ -84,7 +84,7 @@ def test_a_bump_of_a_guide_is_no_wave_with_a_pitch(tmp_path):
 
 
 @pytest.mark.campaign
-@pytest.mark.parametrize("seed", [1744002, 1744005, 1744007])
+@pytest.mark.parametrize("seed", [1744002, 1744005, 1744007], ids=["one arm", "another arm", "a third arm"])
 def test_springs_some_per_cent_off_are_found_though_a_length_or_a_soft_tool_does_for_two_of_them(tmp_path, seed):
     """Two of them are exchanged for one at once; what is no answer, because a member may be minor, speaks against others."""
     result, _ = answer(Plan(seed, "imperfect", imperfect=True, machine="kuka-kr210", **LONG), tmp_path)
@@ -94,7 +94,7 @@ def test_springs_some_per_cent_off_are_found_though_a_length_or_a_soft_tool_does
 
 
 @pytest.mark.campaign
-@pytest.mark.parametrize("seed", [1544009, 1644002])
+@pytest.mark.parametrize("seed", [1544009, 1644002], ids=["one arm", "another arm"])
 def test_springs_of_two_joints_that_give_way_alike_are_alternatives(tmp_path, seed):
     """Found greedily, a frame and an offset stand for springs, and with them one joint for another."""
     result, _ = answer(Plan(seed, "imperfect", imperfect=True, machine="kuka-kr210", **LONG), tmp_path)
@@ -161,7 +161,7 @@ def test_what_only_tolerances_smaller_than_stated_ask_for_is_not_believed(tmp_pa
 
 
 @pytest.mark.campaign
-@pytest.mark.parametrize("seed", [1844008, 1844009, 2044008])
+@pytest.mark.parametrize("seed", [1844008, 1844009, 2044008], ids=["one arm", "another arm", "a third arm"])
 def test_a_spring_too_small_to_be_named_speaks_for_the_springs_beside_it(tmp_path, seed):
     """A5 moves the tip by less than is minor; a soft tool with a stiff A5, or a longer link, took its place and that of others."""
     result, _ = answer(Plan(seed, "imperfect", imperfect=True, machine="kuka-kr210", **LONG), tmp_path)
