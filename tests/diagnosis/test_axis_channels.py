@@ -78,6 +78,18 @@ def test_a_joint_that_does_not_rub_has_no_friction(tmp_path):
     assert "friction" not in [c.effect for c in asked(tmp_path, ["arm.yaml"], "a").causes]
 
 
+def test_what_pushes_a_joint_for_a_while_is_located_in_time(tmp_path):
+    (tmp_path / "arm.yaml").write_text(ARM)
+    t, q, speed, acceleration = course(1)
+    noise = np.random.default_rng(7).normal(0, 1.0, (2, len(t)))
+    torque = INERTIA * acceleration + WEIGHT * np.cos(q) + FORCE * np.tanh(speed / 0.005) - 1500.0 * ((t > 4) & (t < 5))
+    write(tmp_path, "a", {"t_s": t, "act_J1_rad": q + 1e-6 * noise[0], "act_J1_Nmm": torque + 40.0 * noise[1]})
+    (push,) = [c for c in asked(tmp_path, ["arm.yaml"], "a").causes if c.effect == "disturbance"]
+    for name, true in (("force_Nmm", 1500.0), ("from_s", 4.0), ("to_s", 5.0)):
+        low, high = push.parameters[name].ci95
+        assert low <= true <= high and push.parameters[name].value == pytest.approx(true, rel=0.03)
+
+
 def second_encoder(folder, width, delay_s):
     """An encoder behind a play of a width, sampled a little later than that of the motor."""
     t, q, speed, _ = course(3)

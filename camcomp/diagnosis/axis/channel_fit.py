@@ -250,7 +250,7 @@ def _parameters(data: ChannelData, term: AxisCause, amount: Floats, half: Floats
     for name in [each for each in term.shape if each in values and each not in term.switches]:
         value, spread = term.shape[name], 1.96 * _spread_of_shape(data, term, amount, name, sd)
         near = [abs(each - value) for each in term.scan if each != value]
-        low, high = (max(value + sign * max(spread, min(near, default=0.0)), 0.0) for sign in (-1.0, 1.0))
+        low, high = (max(value + sign * max(spread, min(near, default=term.resolution)), 0.0) for sign in (-1.0, 1.0))
         out[name] = _estimate(value, low, high)
     return out
 

@@ -39,6 +39,7 @@ class AxisCause:
     """A candidate of one axis: parameters (d,) that are fitted, in units of their scales, and its shape.
 
     ways: number of shapes that were tried for its place. run: the one in which it acts, None for all.
+    resolution: to which its shape is known at best.
     """
 
     effect: str
@@ -48,12 +49,13 @@ class AxisCause:
     shape: Mapping[str, float]
     ways: float = 1.0
     run: str | None = None
+    resolution: float = 0.0
 
     @property
     def scan(self) -> tuple[float, ...]:
         """Values of its shape that were tried."""
         own = (*getattr(self.module, "FITTED", ()), *getattr(self.module, "ROTARY", ()))
-        return next((p.scan for p in own if p.scan and p.name in self.shape), ())
+        return next((p.scan for p in own if p.scan and not p.placed and p.name in self.shape), ())
 
     @property
     def switches(self) -> set[str]:

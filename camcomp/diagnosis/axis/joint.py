@@ -248,6 +248,7 @@ def _push(name: str, window: Window, rows: JointRows) -> AxisCause:
     return AxisCause(
         effect="disturbance", module=module, target=name, parameters=(own,),
         shape=dict(zip(("from_s", "to_s"), ends, strict=True)), ways=float(len(time)), run=run.name,
+        resolution=2.0 * float(np.median(np.diff(time))),
     )  # fmt: skip
 
 
