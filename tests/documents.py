@@ -13,6 +13,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 ROOT = Path(__file__).parent.parent
+# what a run writes every 10 s, which a document does not show
+_PROGRESS = re.compile(r"^[^\n]+: (?:\d+ %, about [^\n]* left|[^\n]* so far)\n", re.MULTILINE)
 _FENCE = re.compile(r"^```(\w*)([^\n]*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 
@@ -106,13 +108,13 @@ class Reader:
         }
 
     def give(self, command):
-        """Run a command; what it printed, errors included, in the order of writing."""
+        """Run a command; what it printed, errors included, in the order of writing, without lines of progress."""
         done = subprocess.run(
             ["bash", "-eo", "pipefail", "-c", command.text], check=False, cwd=self.folder, env=self.environment,
             stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=600,
         )  # fmt: skip
         assert done.returncode == command.code, f"line {command.line}: `{command.text}`\n{done.stdout}"
-        return done.stdout
+        return _PROGRESS.sub("", done.stdout)
 
     def follow(self, document, skip=lambda text: False):
         """Do everything that a document says."""
