@@ -151,3 +151,32 @@ def _from_upright(direction: Floats) -> Floats:
     )
     out[down] = np.diag([1.0, -1.0, -1.0])
     return out
+
+
+def rotations_of_quaternions(quaternions: Floats) -> Floats:
+    """Rotations (k, 3, 3) of quaternions (k, 4), the real part first; their size is put right."""
+    w, x, y, z = _unit(quaternions).T
+    rows = [
+        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+        [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
+        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
+    ]
+    out: Floats = np.moveaxis(np.array(rows), 2, 0)
+    return out
+
+
+def quaternions_of(rotation: Floats) -> Floats:
+    """Unit quaternions (k, 4) of rotations (k, 3, 3), the real part first, by the largest of its parts."""
+    R = rotation
+    t = np.trace(R, axis1=1, axis2=2)
+    d = np.stack((t, R[:, 0, 0], R[:, 1, 1], R[:, 2, 2]), axis=1)
+    squared = 1.0 + np.column_stack((t, 2.0 * d[:, 1:] - t[:, None]))  # 4 q_i^2
+    s = {(0, 1): R[:, 2, 1] - R[:, 1, 2], (0, 2): R[:, 0, 2] - R[:, 2, 0], (0, 3): R[:, 1, 0] - R[:, 0, 1],
+         (1, 2): R[:, 1, 0] + R[:, 0, 1], (1, 3): R[:, 0, 2] + R[:, 2, 0], (2, 3): R[:, 2, 1] + R[:, 1, 2]}  # fmt: skip
+    products = np.zeros((len(R), 4, 4))  # 4 q_i q_j
+    for (i, j), value in s.items():
+        products[:, i, j] = products[:, j, i] = value
+    for i in range(4):
+        products[:, i, i] = squared[:, i]
+    best = products[np.arange(len(R)), np.argmax(squared, axis=1)]
+    return _unit(best)

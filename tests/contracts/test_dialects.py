@@ -104,6 +104,7 @@ SAMPLES = {
     "grbl": "; made for grbl 1.1\nG21 G90\nG0 X1 Y1\n",
     "fanuc": "%\nO1234 (BRACKET)\nG90 G54 G0 X0. Y0.\nG43 Z25. H1\nG91 G28 Z0.\nM30\n%\n",
     "sinumerik": "%_N_PLATE_MPF\nN10 G17 G90\nN20 G2 X10 Y0 CR=5\nM30\n",
+    "rapid": "MODULE part\nPROC main()\nMoveL p1,v20,z1,tool0;\nENDPROC\nENDMODULE\n",
     "krl": "&ACCESS RVP\nDEF part ( )\nLIN {X 1,Y 2,Z 3}\nEND\n",
 }
 
