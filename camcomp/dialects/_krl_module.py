@@ -69,7 +69,7 @@ def code_of(line: str) -> str:
     return line
 
 
-class Module:
+class KrlModule:
     """Executes the statements of one module in order."""
 
     def __init__(self, reader: RobotReader) -> None:

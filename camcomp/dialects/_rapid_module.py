@@ -115,7 +115,7 @@ def _split(string: str) -> list[tuple[int, int]]:
     return [*out, (begin, len(string))]
 
 
-class Module:
+class RapidModule:
     """Executes the statements of one module in order."""
 
     def __init__(self, reader: RobotReader) -> None:

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from camcomp.dialects._krl_module import DEF, POSE, Module, code_of
+from camcomp.dialects._krl_module import DEF, POSE, KrlModule, code_of
 from camcomp.gcode.dialect import Dialect
 from camcomp.gcode.robot_frames import zyx_rotations
 from camcomp.gcode.robot_language import Edit, MoveSite, NewMove, RobotLanguage
@@ -27,7 +27,7 @@ class Krl(RobotLanguage):
 
     def read(self, reader: RobotReader) -> None:
         """Every line of the module. Raises ProgramError with every mistake."""
-        Module(reader).run()
+        KrlModule(reader).run()
 
     def poses(self, values: Floats) -> tuple[Floats, Floats]:
         """Points and rotations of X, Y, Z, A, B, C."""

@@ -5,7 +5,7 @@ Source: ABB, Technical reference manual, RAPID Instructions, Functions and Data 
 
 import numpy as np
 
-from camcomp.dialects._rapid_module import COMPONENTS, MODULE, Module, code_of
+from camcomp.dialects._rapid_module import COMPONENTS, MODULE, RapidModule, code_of
 from camcomp.gcode.dialect import Dialect
 from camcomp.gcode.robot_language import Edit, MoveSite, NewMove, RobotLanguage
 from camcomp.gcode.robot_reader import RobotReader
@@ -25,7 +25,7 @@ class Rapid(RobotLanguage):
 
     def read(self, reader: RobotReader) -> None:
         """Every line of the module. Raises ProgramError with every mistake."""
-        Module(reader).run()
+        RapidModule(reader).run()
 
     def poses(self, values: Floats) -> tuple[Floats, Floats]:
         """Points and rotations of x, y, z and a quaternion."""
