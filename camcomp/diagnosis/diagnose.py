@@ -15,7 +15,7 @@ from camcomp.diagnosis.answer.locate import channel_axes, patterns_of, run_gaps
 from camcomp.diagnosis.answer.minor import minor_effects, outlying_rows
 from camcomp.diagnosis.answer.nested import causes_without
 from camcomp.diagnosis.answer.stretch import with_stretches
-from camcomp.diagnosis.fit.bench import Bench, CandidateCause, Run
+from camcomp.diagnosis.fit.bench import Bench, Run
 from camcomp.diagnosis.fit.columns import candidate_causes, working_causes
 from camcomp.diagnosis.fit.gap import floor_um, gap_of, main_channels, rest_by_actuator
 from camcomp.diagnosis.fit.intervals import joint_covariance
@@ -43,7 +43,9 @@ from camcomp.diagnosis.result.types import (
     UnseenShrinkage,
     Where,
 )
+from camcomp.diagnosis.search.beside import ROWS_OF_AN_INSTANT
 from camcomp.diagnosis.search.cause_search import CauseSearch, search_causes
+from camcomp.diagnosis.search.established import LEAST_PROBABILITY
 from camcomp.diagnosis.search.indistinguishable import classes, likeness
 from camcomp.diagnosis.search.unexplained import size_um, worst
 from camcomp.diagnosis.search.unknown import firm_prior, residual_tests
@@ -51,7 +53,7 @@ from camcomp.diagnosis.standards import of_runs
 from camcomp.diagnosis.statistics import places
 from camcomp.diagnosis.statistics.cause_sets import Fitted
 from camcomp.diagnosis.statistics.periods import SpectralLine, frequencies
-from camcomp.diagnosis.statistics.probability import EVEN, probability_of_chance, stated
+from camcomp.diagnosis.statistics.probability import probability_of_chance, stated
 from camcomp.ground.datatypes import Floats
 from camcomp.ground.headway import part as part_of_work
 from camcomp.model.effect import Cause
@@ -60,12 +62,10 @@ from camcomp.model.motion.twin import Twin
 
 MOSTLY_ONE_ACTUATOR = 0.6  # share of what is unknown from which on it is one actuator's
 VIBRATION_SHARE = 0.4  # of the gap in one line of the spectrum
-LEAST_RIVAL = 0.02  # probability of a set that an experiment is to exclude
 UNTESTED = 0.1  # of the leader's probability: what a set that explains alike counts as at least
 LEAST_DRIVER = 0.02  # share of what is left, below which nothing is a driver
 MOST_ALTERNATIVES = 4  # sets that are listed (contract, section 6)
 UNLOGGED_RISE = (0.3, 3.0)  # times the 10 K that are taken where no temperature is logged: by how much drives warm up
-ROWS_OF_AN_INSTANT = 2.0  # to both sides, between which something may have begun or ended
 RIVALS = 8  # sets that one experiment is asked to tell from the answer
 
 
@@ -150,7 +150,9 @@ def _next(problem: Problem, found: CauseSearch, word: str, job: Job) -> Proposal
     best = found.verdict.best
     close = [best, *sorted(found.verdict.rivals, key=lambda j: -found.probability[j])[:RIVALS]]
     if len(close) == 1:
-        close += [j for j in np.argsort(-found.probability) if j != best and found.probability[j] > LEAST_RIVAL][:3]
+        close += [j for j in np.argsort(-found.probability) if j != best and found.probability[j] > LEAST_PROBABILITY][
+            :3
+        ]
     p = found.probability[close]
     if found.verdict.rivals:
         p = np.maximum(p, UNTESTED * p.max())  # alike by construction: their prior is no reason to leave them untested
@@ -189,17 +191,13 @@ def _causes(problem: Problem, found: CauseSearch, best: Fitted, law: LawAnswer |
     out: list[FoundCause] = []
     causes = problem.causes(best.members, best.theta, best.extra)
     covariance = joint_covariance(problem, best) if best.members else np.zeros((0, 0))
-    depends = _first_label(found)
     for j, i in enumerate(best.members):
         candidate = problem.columns.candidates[i]
-        likely = found.verdict.inclusion.get(i, 0.0)
-        if _part_of_unknown(candidate, depends):
-            likely = min(likely, EVEN)
         out.append(
             FoundCause(
                 effect=candidate.name,
                 target=candidate.target,
-                probability=round(min(likely, 1.0), 4),
+                probability=round(min(found.verdict.inclusion.get(i, 0.0), 1.0), 4),
                 share=round(energy[j] / whole, 4) if whole > 0 else 0.0,
                 parameters=_parameters(problem, best, covariance, j, causes[j]),
             )
@@ -217,18 +215,6 @@ def _causes(problem: Problem, found: CauseSearch, best: Fitted, law: LawAnswer |
             )
         )
     return tuple(out)
-
-
-def _part_of_unknown(candidate: CandidateCause, depends: str) -> bool:
-    """Whether a cause may be a part of something unknown that depends on one thing above all (a label, empty where nothing unknown is).
-
-    A wave may be the part that waves of what depends on a place, a lag the part that grows with speed of what depends on the
-    same drive's speed.
-    """
-    of, _, target = depends.partition(":")
-    if of == "position":
-        return any(p.turns for p in candidate.shapes)
-    return of == "velocity" and candidate.effect.STAGE == "control" and candidate.target in (None, target)
 
 
 def _parameters(problem: Problem, f: Fitted, covariance: Floats, j: int, cause: Cause) -> dict[str, Estimate]:

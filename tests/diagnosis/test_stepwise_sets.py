@@ -6,7 +6,7 @@ import pytest
 from camcomp.diagnosis.experiment.open_experiment import open_experiment
 from camcomp.diagnosis.fit.bench import Bench, CandidateCause
 from camcomp.diagnosis.fit.open_problem import open_problem
-from camcomp.diagnosis.search import cause_search
+from camcomp.diagnosis.search import cause_search, fitted_sets
 from camcomp.ground import shelf
 from tests.validation.recorded.experiment import Made, Plan, row_times, write
 from tests.validation.recorded.faults import Fault, Faults
@@ -46,7 +46,7 @@ def test_every_effect_is_begun_with_at_all_of_its_targets_and_what_is_left_is_fi
         fitted.add(members)
         return refit(members, theta)
 
-    monkeypatch.setattr(cause_search, "stepwise", stepwise)
+    monkeypatch.setattr(fitted_sets, "stepwise", stepwise)
     monkeypatch.setattr(problem, "refit", spied)
     cause_search.search_causes(problem)
     assert begun == [SPRINGS, (3, 4, 5)]

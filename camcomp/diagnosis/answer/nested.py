@@ -1,20 +1,16 @@
 """What would have been named without a run: that is what the run is judged with, for what is chosen on a run has seen it."""
 
 from collections.abc import Sequence
-from itertools import combinations
 
 import numpy as np
 
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.search.tempering import tempering
-from camcomp.diagnosis.statistics.cause_sets import Fitted, Members, Scale, total
+from camcomp.diagnosis.statistics.cause_sets import Fitted, Members, Scale, parts_of, total
 from camcomp.ground.datatypes import Floats
 from camcomp.model.effect import Cause
 
 RIVALS = 4  # sets beside the answer that another choice of runs might have led to: the contract lists as many
-ALL_PARTS = (
-    3  # members up to which every part of the answer is looked at; of larger ones all but one, each alone, and none
-)
 
 
 def causes_without(
@@ -29,7 +25,7 @@ def causes_without(
     if len(runs) == 1 or not best.members:
         return [_by_candidate(problem, best, best.members, best.theta)] * len(runs)
     rivals = [fits[j] for j in np.argsort(-probability) if _is_rival(fits[j].members, best.members)][:RIVALS]
-    tried = [(best, part) for part in _parts(best.members)] + [(f, f.members) for f in rivals]
+    tried = [(best, part) for part in parts_of(best.members)] + [(f, f.members) for f in rivals]
     temperature = tempering(problem, best)
 
     def value(k: int, f: Fitted, members: Members) -> float:
@@ -46,12 +42,6 @@ def causes_without(
 def _is_rival(members: Members, best: Members) -> bool:
     """Whether a set is another answer: neither a part of the best one, which is tried anyway, nor a larger one."""
     return not (set(members) <= set(best) or len(members) > len(best))
-
-
-def _parts(members: Members) -> list[Members]:
-    n = len(members)
-    sizes = range(n, -1, -1) if n <= ALL_PARTS else (n, n - 1, 1, 0)
-    return [each for size in sizes for each in combinations(members, size)]
 
 
 def _by_candidate(problem: Problem, f: Fitted, members: Members, theta: Floats) -> dict[int, Cause]:

@@ -10,6 +10,7 @@ from scipy.ndimage import median_filter
 from scipy.stats import norm
 
 from camcomp.diagnosis.fit.bench import Bench, thinned
+from camcomp.diagnosis.fit.floor import LEAST_ROWS
 from camcomp.ground.datatypes import Bools, Floats
 
 OFF = 8.0  # robust deviations from the rows beside it by which a single row is off
@@ -20,7 +21,6 @@ FAR_MM = 5.0  # no machine is wrong by so much from one row to the next
 MANY_FAR = 0.25  # of the rows that are as far off: more are no outliers
 SEEN = 12.0  # twice the logarithm of the odds from which on the tip has gone where an encoder says
 HEAVY = 3.5  # robust deviations beyond which a reading counts less
-LEAST_ROWS = 20
 TINY = 1e-12  # mm, rad, N: what rounding makes of nothing
 
 

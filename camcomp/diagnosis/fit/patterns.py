@@ -18,7 +18,7 @@ _KNOTS = 12  # hats along the travel of an actuator
 _PLACES = 20  # hats along an axis of the workpiece: a bump of a tenth of the travel is still seen
 _MOMENTS = 24  # hats along the time of all runs
 _MOVES = 1e-3  # of the highest speed, from which on something moves
-_LEAST_SPAN_MM = 1e-3  # of an axis of the workpiece on which something can depend on it
+MOVES_MM = 1e-3  # of an axis of the workpiece on which something can depend on it
 _RELAX_MM = (0.5, 3.0)
 KINDS = ("tip", "encoder", "drive", "dyno")
 
@@ -208,7 +208,7 @@ def dictionary(grounds: Sequence[Ground], actuators: Sequence[str]) -> list[Dict
     places = np.concatenate([g.tip for g in grounds])
     low, span = places.min(axis=0), np.ptp(places, axis=0)
     for axis, name in enumerate("xyz"):
-        if not found["tip"] or span[axis] < _LEAST_SPAN_MM:
+        if not found["tip"] or span[axis] < MOVES_MM:
             continue
         per_place = [hats((g.tip[:, axis] - low[axis]) / span[axis], places_of) for g in grounds]
         for i in range(places_of):

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from camcomp.diagnosis.fit.floor import GATE
 from camcomp.diagnosis.fit.gap import main_channels
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.law.bench_terms import Spot, TermBench, spots
@@ -22,7 +23,6 @@ from camcomp.diagnosis.search.unknown import about, firm_prior
 from camcomp.diagnosis.statistics.cause_sets import Fitted
 from camcomp.ground.datatypes import Floats
 
-GOOD_ENOUGH = 0.4  # of the floor, or of what was there: what a law may leave before a map is tried
 BETTER = 0.8  # of what a law leaves: what another one or a map has to leave to be told instead
 LEAST_SHRINKAGE = 0.1  # of the gap on withheld parts, below which nothing was found
 
@@ -53,7 +53,7 @@ def answer_law(problem: Problem, f: Fitted, kind: str) -> LawAnswer | None:
 
     def much(best: _Tried | None) -> bool:
         left = float(np.sqrt(max((before if best is None else best.after) ** 2 - floor**2, 0.0)))
-        return left > GOOD_ENOUGH * floor and left > GOOD_ENOUGH * room
+        return left > GATE * floor and left > GATE * room
 
     best = _tried(problem, f, bench, find_law(bench, _base(problem, f, bench, kind), grids))
     if much(best) and room > floor:  # what is small may be the usual small errors

@@ -11,10 +11,11 @@ from camcomp.diagnosis.law.bench_terms import AT_ONCE, Spot, Term, TermBench, sp
 from camcomp.diagnosis.law.folds import Folds
 from camcomp.diagnosis.law.forms import Form, at_drive, at_tip
 from camcomp.diagnosis.law.white import White
+from camcomp.diagnosis.statistics.noise_model import BLOCK
 from camcomp.ground.datatypes import Bools, Floats, Ints
 
 FALSE_RATE = 0.02  # of a law where there is none
-DRAWS, BLOCK = 40, 8  # of signs; rows that share one
+DRAWS = 40  # of signs, one for each block of rows
 KEPT_BYTES = 400e6  # of white columns of all grids together; more are worked out anew at every step
 AT_ONCE_BYTES = 12e6  # of functions before rows are thinned
 

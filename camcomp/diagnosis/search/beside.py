@@ -17,7 +17,7 @@ PART_OF_UNKNOWN = 2.0  # size in units of an unknown effect below which a cause 
 POINTED = 0.85  # share of what is left that one actuator has to have to be that place
 ONE_MORE = SIZES[2] / SIZES[1]  # prior odds of one cause more than the unknown effect
 STAGES = 7  # control, drive, structure, process, tool, workpiece, sensor: contract, section 6
-AT_ONCE = 2.0  # rows within which what began at several actuators began at none of them
+ROWS_OF_AN_INSTANT = 2.0  # to both sides, between which something may have begun or ended
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ def _shared_events(problem: Problem, f: Fitted, members: Members) -> set[int]:
     if len(began) < 2:
         return set()
     rows = max(float(np.median(np.diff(run.run_path.time))) for run in problem.bench.runs)
-    return {i for i in began for j in began if i != j and abs(began[i] - began[j]) <= AT_ONCE * rows}
+    return {i for i in began for j in began if i != j and abs(began[i] - began[j]) <= ROWS_OF_AN_INSTANT * rows}
 
 
 def doubted(

@@ -1,7 +1,6 @@
 """Whether what a set of causes names is surely there, and more than every healthy machine has; what speaks against it."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Callable
 
 import numpy as np
 from scipy.special import chdtri
@@ -20,7 +19,7 @@ from camcomp.diagnosis.statistics.cause_sets import (
     total,
     with_minor,
 )
-from camcomp.diagnosis.statistics.verdict import EQUAL_LOG_ODDS, Verdict
+from camcomp.diagnosis.statistics.verdict import EQUAL_LOG_ODDS
 from camcomp.ground.datatypes import Floats
 
 LEAST_PROBABILITY = 0.02  # of a set that is looked at more closely
@@ -81,26 +80,6 @@ def stands_for_more(problem: Problem, f: Fitted, less: Members, temperature: flo
     scale = Scale(total(f.grams), problem.prior, problem.candidates)
     odds = (scale(f.members) - scale(less)) / temperature
     return odds + problem.candidates.prior(f.members) - problem.candidates.prior(less) > EQUAL_LOG_ODDS
-
-
-def held_against(
-    problem: Problem, fits: tuple[Fitted, ...], probability: Floats, verdict: Verdict, others: Sequence[Fitted],
-    temperature: float,
-) -> Verdict:  # fmt: skip
-    """The verdict beside sets that are no answer and yet explain as well: what these lack is less sure.
-
-    None of them counts for more than the best answer: it is one word against another.
-    """
-    best = fits[verdict.best]
-    beside = {f.members: f for f in others if all(f.members != g.members for g in fits)}.values()
-    shares = [probabilities((f, best), problem.candidates, temperature) for f in beside]
-    counts = np.array([min(mine / max(its, 1e-300), 1.0) for mine, its in shares]) * probability[verdict.best]
-    whole = 1.0 + float(counts.sum())
-    inclusion = {i: p / whole for i, p in verdict.inclusion.items()}
-    for f, p in zip(beside, counts, strict=True):
-        for i in f.members:
-            inclusion[i] = inclusion.get(i, 0.0) + float(p) / whole
-    return replace(verdict, inclusion=inclusion)
 
 
 def standing(problem: Problem, members: Members) -> Fitted:

@@ -7,14 +7,14 @@ from itertools import product
 import numpy as np
 
 from camcomp.diagnosis.fit.columns import grounds
-from camcomp.diagnosis.fit.patterns import Ground, of_actuator
+from camcomp.diagnosis.fit.patterns import MOVES_MM, Ground, of_actuator
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.ground.datatypes import Bools, Floats, Ints
 
 WAVES = 24  # half waves along a travel: a bump of a twentieth of it is still followed
 SLOW = 6  # of them that a guide's bow needs
-MOVES_MM, MOVES_DRIVE = 1e-3, 1e-6  # of an axis, of a drive (mm or rad), on which something can depend
+MOVES_DRIVE = 1e-6  # of a drive, mm or rad, on which something can depend
 NOTHING = 1e-9  # energy of a white column that does nothing
 SAME = 1.0 - 1e-9  # correlation of two places that are one
 DEGREE = 4  # of the polynomials of what depends on several axes at once

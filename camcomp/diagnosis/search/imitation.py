@@ -10,7 +10,7 @@ the sandwich's information (Varin, Reid, Firth, Statistica Sinica 21, 2011).
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations, islice
+from itertools import islice
 
 import numpy as np
 from scipy.special import expit, logsumexp
@@ -21,13 +21,12 @@ from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.search.families import Family, alone, families, kinds
 from camcomp.diagnosis.search.unknown import about
 from camcomp.diagnosis.statistics.by_channel import ByChannel
-from camcomp.diagnosis.statistics.cause_sets import Fitted, Members, total
+from camcomp.diagnosis.statistics.cause_sets import Fitted, Members, parts_of, total
 from camcomp.diagnosis.statistics.evidence import Base, Gram, Prior, base, estimate, gram, holding_back, log_bayes
 from camcomp.ground.datatypes import Floats, Ints
 
 EITHER = 0.5  # one word against another
 UNKNOWN = 0.1  # prior probability of something that the library does not have
-ALL_SETS = 3  # members up to which every subset is looked at; of larger ones each alone, and all but one
 DRAWN = 0.05  # probability of something unknown in a cause's place from which on it is held against what the cause does
 LIKE = 0.1  # of a cause's signal, by which something unknown has to differ to be something else: no cause is modelled better
 MOST_UNLIKE = 0.5  # the same where other causes do far more, which are modelled no better either
@@ -51,7 +50,7 @@ def credibility(problem: Problem, f: Fitted, *, surely: bool, temperature: float
     weight, index = _at_the_tip(problem), problem.member_columns(f.members)
     W, r = ByChannel.behind(about(problem, f)[0]).scaled(weight), weight * np.concatenate(f.residual)
     data = gram(W, r)
-    sets, candidates = _subsets(f.members), problem.candidates
+    sets, candidates = parts_of(f.members), problem.candidates
     hypotheses: list[tuple[Floats, float]] = []  # evidence per set, log prior
     best: tuple[float, Family | None] = (-np.inf, None)
     if not surely:
@@ -174,13 +173,6 @@ def _at_the_tip(problem: Problem) -> Floats:
             size = 1e3 * float(np.median(seen[np.isfinite(seen)])) if np.isfinite(seen).any() else np.inf
             out.append(np.full(len(part), min(1.0, size / (MINOR * problem.floor.tip_um))))
     return np.concatenate(out)
-
-
-def _subsets(members: Members) -> list[Members]:
-    """The set itself, and sets of some of its members."""
-    n = len(members)
-    sizes = range(n - 1, -1, -1) if n <= ALL_SETS else (n - 1, 1, 0)
-    return [members, *(each for size in sizes for each in combinations(members, size))]
 
 
 def _evidence(problem: Problem, at: Base, prior: Prior, sets: Sequence[Members]) -> Floats:

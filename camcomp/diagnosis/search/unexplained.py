@@ -20,9 +20,9 @@ from camcomp.diagnosis.fit.floor import row_scatter
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.statistics.cause_sets import Fitted, total
 from camcomp.diagnosis.statistics.evidence import estimate
+from camcomp.diagnosis.statistics.noise_model import BLOCK
 from camcomp.ground.datatypes import Bools, Floats
 
-BLOCK = 8  # rows that are averaged
 NOTHING_SAID = 0.5  # of a cause's size: runs that know it to no better say nothing of it
 FEW_RUNS = 3  # from which on causes are fitted to the other runs
 KINDS = ("tip", "encoder", "drive", "dyno")

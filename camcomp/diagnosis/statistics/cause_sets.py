@@ -29,6 +29,7 @@ from camcomp.ground.datatypes import Floats
 Members = tuple[int, ...]
 PATTERN = 3  # targets of one effect from which on they may have one origin: springs of several joints are one thing that gives way
 SHARED = 0.5  # probability that they have
+ALL_PARTS = 3  # members up to which every part of a set is looked at; of larger ones all but one, each alone, and none
 SIZES = (0.45, 0.33, 0.13, 0.055, 0.022, 0.009, 0.004)  # prior probability of 0, 1, 2 ... causes
 
 
@@ -109,6 +110,13 @@ def _in_any_order(weights: Sequence[float]) -> float:
     """Log prior probability of causes of these log weights, drawn one after the other."""
     d = len(weights)
     return float(np.log(SIZES[d] * factorial(d))) + sum(weights)
+
+
+def parts_of(members: Members) -> list[Members]:
+    """The set itself and sets of some of its members: of up to ALL_PARTS every one, else all but one, each alone, and none."""
+    n = len(members)
+    sizes = range(n, -1, -1) if n <= ALL_PARTS else (n, n - 1, 1, 0)
+    return [each for size in sizes for each in combinations(members, size)]
 
 
 def total(grams: Sequence[Gram]) -> Gram:

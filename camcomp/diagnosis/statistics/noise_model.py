@@ -12,7 +12,8 @@ from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.ground.datatypes import Bools, Floats, Ints
 from camcomp.ground.machine_code import kept
 
-_REGULAR = 1.6  # a step longer than this many usual steps is a gap
+BLOCK = 8  # rows that are averaged, or whose noise shares a sign
+REGULAR = 1.6  # a step longer than this many usual steps is a gap
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +108,7 @@ def starts(time: Floats, present: Bools) -> Bools:
         return np.zeros(0, bool)
     step = np.diff(time[index])
     usual = float(np.median(step)) if len(step) else 1.0
-    gap = (step > _REGULAR * usual) | (step < 0) if usual > 0 else np.ones(len(step), bool)
+    gap = (step > REGULAR * usual) | (step < 0) if usual > 0 else np.ones(len(step), bool)
     return np.concatenate([[True], gap])
 
 

@@ -1,7 +1,7 @@
 """From ranked sets of causes to a verdict: none, identified, ambiguous or unknown."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -23,11 +23,6 @@ class Verdict:
     best: int
     rivals: tuple[int, ...]
     inclusion: dict[int, float]
-
-
-def worth_a_mention(probability: float) -> float:
-    """The probability of a cause, or even where its lead is not worth a mention: errors of the model make as much."""
-    return EVEN if EVEN < probability < BARE_ODDS / (1.0 + BARE_ODDS) else probability
 
 
 def judge(
@@ -71,21 +66,3 @@ def judge(
             inclusion |= {i: min(inclusion[i], EVEN) for i in leader.members if i not in fits[j].members}
     word = "none" if not leader.members else "ambiguous" if rivals else "identified"
     return Verdict(word, best, tuple(rivals), inclusion)
-
-
-def open_where_even(verdict: Verdict, fits: Sequence[Fitted], probability: Floats) -> Verdict:
-    """The verdict, but `ambiguous` where a member of what it identifies is no more likely than not: sets without it are its rivals.
-
-    Where all are, and no set rivals them, something unknown does.
-    """
-    members = set(fits[verdict.best].members)
-    doubtful = {i for i in members if verdict.inclusion[i] <= EVEN}
-    least = float(probability[verdict.best]) * np.exp(-EQUAL_LOG_ODDS)
-    rivals = tuple(
-        int(j)
-        for j in np.argsort(-probability)
-        if j != verdict.best and probability[j] > least and fits[j].members and doubtful - set(fits[j].members)
-    )
-    if verdict.word != "identified" or not (rivals or doubtful == members):
-        return verdict
-    return replace(verdict, word="ambiguous", rivals=rivals)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from camcomp.diagnosis.search import established as module
-from camcomp.diagnosis.search.established import held_against
+from camcomp.diagnosis.search.stated import held_against
 from camcomp.diagnosis.statistics.cause_sets import CausePrior, Fitted, probabilities, with_minor
 from camcomp.diagnosis.statistics.verdict import judge
 

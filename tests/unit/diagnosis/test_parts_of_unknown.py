@@ -2,8 +2,8 @@
 
 import pytest
 
-from camcomp.diagnosis.diagnose import _part_of_unknown
 from camcomp.diagnosis.fit.bench import CandidateCause
+from camcomp.diagnosis.search.stated import is_part_of_unknown
 from camcomp.ground import shelf
 
 
@@ -22,4 +22,4 @@ from camcomp.ground import shelf
     ],
 )
 def test_a_lag_beside_what_goes_with_its_speed_and_a_wave_beside_what_goes_with_a_place(effect, target, depends, part):
-    assert _part_of_unknown(CandidateCause(effect, target, shelf.load("effects", effect)), depends) == part
+    assert is_part_of_unknown(CandidateCause(effect, target, shelf.load("effects", effect)), depends) == part

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from camcomp.diagnosis.search.stated import open_where_even, worth_a_mention
 from camcomp.diagnosis.statistics.cause_sets import Fitted
-from camcomp.diagnosis.statistics.verdict import Verdict, open_where_even, worth_a_mention
+from camcomp.diagnosis.statistics.verdict import Verdict
 
 
 @pytest.mark.parametrize(
