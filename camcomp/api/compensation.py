@@ -26,7 +26,7 @@ from camcomp.report.inputs import Input
 __all__ = ["CompensatedProgram", "Summary", "compensate", "compensate_file"]
 
 if TYPE_CHECKING:
-    from camcomp.compensation.file_to_file import Finished
+    from camcomp.compensation.file_to_file import FileOutcome
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,7 +128,7 @@ def compensate_file(
     paths: str | None = None, report: str | None = None, method: str | None = None, tolerance_um: float | None = None,
     arcs: bool | None = None, mirror: Sequence[str] = (), dry_run: bool = False, stock: StockChoice | None = None,
     if_compensated: Literal["refuse", "pass"] = "refuse",
-) -> Finished | None:  # fmt: skip
+) -> FileOutcome | None:  # fmt: skip
     """Compensate a program file into the named files, long programs in pieces; "-" is a standard stream.
 
     Without any name the corrected program goes to standard output. A program that was compensated before is refused, or with
@@ -140,7 +140,7 @@ def compensate_file(
     Raises:
         FileError: an output cannot be written; and the errors of `compensate`.
     """
-    from camcomp.compensation.file_to_file import Finished, Wanted, compensate_long
+    from camcomp.compensation.file_to_file import CorrectionSettings, FileOutcome, OutputPaths, compensate_long
 
     machine = load_machine(*configs)
     if report:
@@ -159,10 +159,16 @@ def compensate_file(
         file.seek(0)
         machine = job_of_program(machine, file, name, stock)
         if not (paths or report or mirror):
+            asked = CorrectionSettings(
+                method=method or settings.method,
+                tolerance_um=tolerance_um or settings.tolerance_um,
+                version=__version__,
+                arcs=arcs,
+            )
+            paths_out = OutputPaths(output, joints, summary)
             done = compensate_long(
-                file, name, machine, method=method or settings.method, tolerance_um=tolerance_um or settings.tolerance_um,
-                version=__version__, dry_run=dry_run, arcs=arcs, wanted=Wanted(output, joints, summary), inputs=(program, *configs),
-            )  # fmt: skip
+                file, name, machine, asked, paths=paths_out, inputs=(program, *configs), dry_run=dry_run
+            )
         if done is not None:
             return done
         data = file.read()
@@ -188,4 +194,4 @@ def compensate_file(
     failed = result.failed
     if not dry_run:
         write_all(outputs, inputs=(program, *configs, *mirror))
-    return Finished(result.summary, failed, {each: len(made) for each, made in outputs.items()})
+    return FileOutcome(result.summary, failed, {each: len(made) for each, made in outputs.items()})

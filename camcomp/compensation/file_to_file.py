@@ -1,79 +1,121 @@
-"""Long programs from file to files: which ones are corrected piece by piece, and where the pieces go."""
+"""Programs that are corrected in pieces, and the outputs that the pieces go to."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
-from typing import BinaryIO
+from functools import partial
+from typing import TYPE_CHECKING, BinaryIO
 
 from camcomp.compensation.program.result import Summary
-from camcomp.compensation.report.joint_table import joint_table
+from camcomp.compensation.report.joint_table import JointTable, joint_table
 from camcomp.ground.errors import ProgramError
 from camcomp.ground.files import writing
 from camcomp.model.job import Job
+
+if TYPE_CHECKING:
+    from camcomp.compensation.long.totals import Totals
 
 LONG = 1 << 16  # bytes from which it pays to interpolate: some 2 000 lines
 
 
 @dataclass(frozen=True)
-class Wanted:
-    """Names of the outputs, "-" is standard output; none of them may be None at once."""
+class OutputPaths:
+    """Names of the outputs; "-" is standard output, None is not written."""
 
     program: str | None
     joints: str | None
     summary: str | None
 
     def names(self) -> list[str]:
-        """Those that are wanted."""
+        """Names of the outputs that are written."""
         return [each for each in (self.program, self.joints, self.summary) if each is not None]
 
 
 @dataclass(frozen=True)
-class Finished:
-    """What became of a long program: its figures, the checks it failed, and the size of every output."""
+class FileOutcome:
+    """Figures of a corrected program, its failed checks (rule id and text), and the size of every output by name."""
 
     figures: Summary
     failed: list[tuple[str, str]]
     sizes: dict[str, int]
 
 
-def compensate_long(
-    source: BinaryIO, name: str, job: Job, *, method: str, tolerance_um: float, version: str, wanted: Wanted, inputs: Sequence[str],
-    dry_run: bool, arcs: bool | None = None,
-) -> Finished | None:  # fmt: skip
-    """Corrects a program of at least LONG bytes piece by piece; None when it has to be corrected as a whole.
+@dataclass(frozen=True, kw_only=True)
+class CorrectionSettings:
+    """Settings of a correction in pieces. arcs: whether arcs stay arcs; None: as the machine file says."""
 
-    source: the program, seekable, at its begin and left there on None. name: in messages. A program with a mistake is
-    left to the reader of whole programs too, which finds all of them. Raises CheckFailed CC603 when it was corrected
-    before, and what physics and files raise.
-    """
-    if method != "newton" or job.causes or len(job.machine.actuators) != 3:
-        return None
+    method: str
+    tolerance_um: float
+    version: str
+    arcs: bool | None = None
+
+
+def is_for_pieces(source: BinaryIO, job: Job, settings: CorrectionSettings) -> bool:
+    """Whether a seekable program is long enough, and machine and method are such, that it is corrected in pieces."""
     size = source.seek(0, 2)
     source.seek(0)
-    if size < LONG:
+    return size >= LONG and settings.method == "newton" and not job.causes and len(job.machine.actuators) == 3
+
+
+def compensate_in_pieces(
+    source: BinaryIO, name: str, job: Job, settings: CorrectionSettings, program: Callable[[bytes], object],
+    joints: Callable[[], JointTable] | None,
+) -> Totals | None:  # fmt: skip
+    """Correct a program of at least LONG bytes in pieces; None if it has to be corrected as a whole.
+
+    source: the program, seekable, at its start and left there on None. name: that of messages. program: receives the
+    corrected program in order; on None what it received is void. joints: opens the joint table.
+
+    A program with a mistake is left to the reader of whole programs, which finds all of them. Raises CheckFailed CC603
+    for a program that was compensated before, and the errors of physics and files.
+    """
+    if not is_for_pieces(source, job, settings):
         return None
     from camcomp.compensation.long.plain_run import NotInPieces
-    from camcomp.compensation.long.program import Bulk
+    from camcomp.compensation.long.program import LongProgram
     from camcomp.model.control import setup_of
 
-    names = wanted.names()
     try:
-        with writing(names, inputs=inputs, keep=not dry_run) as files:
-            table = joint_table(files[wanted.joints], wanted.joints, job) if wanted.joints else None
-            bulk = Bulk(
-                job, name, setup_of(job.config), tolerance_um, version, arcs, None if table is None else table.batch
-            )
-            totals = bulk.run(source, files[wanted.program].write if wanted.program else len)
-            if table is not None:
-                table.close()
-            figures = totals.summary()
-            if wanted.summary:
-                files[wanted.summary].write(figures.to_json())
-            sizes = {name: files[name].tell() for name in names}
+        table = joints() if joints is not None else None
+        pieces = LongProgram(
+            job, name, setup_of(job.config), settings.tolerance_um, settings.version, settings.arcs,
+            None if table is None else table.batch,
+        )  # fmt: skip
+        totals = pieces.run(source, program)
+        if table is not None:
+            table.close()
     except (NotInPieces, ProgramError) as error:
         if isinstance(error, ProgramError) and error.rule == "CC142":
-            raise  # what the stock says needs no other reader
+            raise  # only the stock raises it, and the other reader would raise it again
         source.seek(0)
         return None
-    return Finished(figures, totals.failed_checks(tolerance_um), sizes)
+    return totals
+
+
+def compensate_long(
+    source: BinaryIO, name: str, job: Job, settings: CorrectionSettings, *, paths: OutputPaths, inputs: Sequence[str], dry_run: bool
+) -> FileOutcome | None:  # fmt: skip
+    """Correct a program of at least LONG bytes in pieces, from file to files; arguments and errors as above."""
+    if not is_for_pieces(source, job, settings):
+        return None
+    names = paths.names()
+    with suppress(_AsAWhole), writing(names, inputs=inputs, keep=not dry_run) as files:
+        joints = None if paths.joints is None else partial(joint_table, files[paths.joints], paths.joints, job)
+        totals = compensate_in_pieces(
+            source, name, job, settings, files[paths.program].write if paths.program else len, joints
+        )
+        if totals is None:
+            raise _AsAWhole  # files of an interrupted block are not kept
+        figures = totals.summary()
+        if paths.summary:
+            files[paths.summary].write(figures.to_json())
+        return FileOutcome(
+            figures, totals.failed_checks(settings.tolerance_um), {each: files[each].tell() for each in names}
+        )
+    return None
+
+
+class _AsAWhole(Exception):
+    """The program has to be corrected as a whole."""

@@ -104,6 +104,32 @@ def test_a_million_lines(programs, tmp_path):
     assert figures["worst_um"] <= figures["bound_um"] and own[2] < 1000.0 and joints[2] < 1000.0
 
 
+EVERYDAY = {5_000: 1.0, 25_000: 3.0, 60_000: 6.0}  # times faster than pygcode, wanted
+EFFECTS = """
+effects:
+  - {effect: joint_offset, target: x, offset_mm: 0.02}
+  - {effect: screw_pitch, target: y, error_ppm: 30}
+"""
+
+
+@pytest.mark.parametrize(("moves", "wanted"), EVERYDAY.items())
+def test_everyday_programs(tmp_path, moves, wanted):
+    """By processor time, against pygcode reading the same file; and with two effects against without."""
+    reader, program, effects = (tmp_path / name for name in ("reader.py", "p.nc", "effects.yaml"))
+    reader.write_text(PYGCODE)
+    effects.write_text(EFFECTS)
+    write(program, moves)
+    words = [program, *MACHINE, "-o", tmp_path / "out.nc"]
+    compensate(*words)
+    made = [[spent(reader, program), compensate(*words)] for _ in range(3)]
+    pygcode, own = np.min(np.array(made), axis=0)
+    tell(f"{moves} lines, processor time", f"{own[1]:.2f} s, {own[2]:.0f} MB")
+    tell(f"  times faster than pygcode (wanted: {wanted:g})", f"{pygcode[1] / own[1]:.2f}")
+    if moves == min(EVERYDAY):
+        both = compensate(*words, "--config", effects)
+        tell("  with two effects, times the time without (wanted: 2 at most)", f"{both[1] / own[1]:.1f}")
+
+
 def parquet():
     try:
         import pyarrow.parquet  # noqa: F401

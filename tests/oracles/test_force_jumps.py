@@ -13,7 +13,7 @@ import pytest
 
 from camcomp.compensation.long import runs
 from camcomp.compensation.long.plain_run import NotInPieces
-from camcomp.compensation.long.program import Bulk
+from camcomp.compensation.long.program import LongProgram
 from camcomp.compensation.program.compensate import compensate
 from camcomp.compensation.program.verify import verify
 from camcomp.ground.files import shipped
@@ -180,7 +180,7 @@ def test_every_way_sees_the_same_force(tmp_path, monkeypatch, model, arcs):
     assert 1e3 * np.linalg.norm(run.reading.tip - tip, axis=1)[inside].max() < AGREED_UM
 
     batches: list = []
-    bulk = Bulk(job, "p.nc", setup_of(job.config), AGREED_UM, "0", on_rows=batches.append)
+    bulk = LongProgram(job, "p.nc", setup_of(job.config), AGREED_UM, "0", on_rows=batches.append)
     if model == "table":
         with pytest.raises(NotInPieces):
             bulk.run(io.BytesIO(truth.text.encode()), len)

@@ -8,7 +8,8 @@ import threading
 import time
 import warnings
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import lru_cache, partial
+from io import BytesIO
 from typing import TYPE_CHECKING, Any
 
 from camcomp import __version__
@@ -105,16 +106,44 @@ def _compensate(task: Task) -> Outcome:
             return Outcome(task.key, 0, program=task.data)
         raise CheckFailed("CC603", f"{task.name} was compensated before")
     config = task.config
-    program = program_of(task.data, task.name, config)
     job = job_of_program(_job(task.config_key, _Once(config)), task.data, task.name, task.stock)
+    if (outcome := _in_pieces(task, job)) is not None:
+        _settle()
+        return outcome
+    program = program_of(task.data, task.name, config)
     result = compensate(program, job, method=task.method, tolerance_um=task.tolerance_um, version=__version__)
     failed = result.failed_checks(job, task.tolerance_um)
-    messages = [{"rule": rule, "message": text, "text": f"{task.name}: error[{rule}]: {text}"} for rule, text in failed]
     joints = tables.joint_csv(result, job) if task.joints else None
     figures = tables.summary(result, job).as_json()
-    outcome = Outcome(task.key, int(bool(failed)), messages, result.written.data, joints, figures, notes=held())
+    outcome = Outcome(
+        task.key, int(bool(failed)), _checks(task, failed), result.written.data, joints, figures, notes=held()
+    )
     _settle()
     return outcome
+
+
+def _in_pieces(task: Task, job: Job) -> Outcome | None:
+    """The outcome of a long program, as `camcomp compensate` writes it; None: it is corrected as a whole."""
+    from camcomp.compensation.file_to_file import CorrectionSettings, compensate_in_pieces
+    from camcomp.compensation.report.joint_table import joint_table
+
+    program, joints = BytesIO(), BytesIO()
+    totals = compensate_in_pieces(
+        BytesIO(task.data), task.name, job, CorrectionSettings(method=task.method, tolerance_um=task.tolerance_um, version=__version__),
+        program.write, partial(joint_table, joints, "joints.csv", job) if task.joints else None,
+    )  # fmt: skip
+    if totals is None:
+        return None
+    failed = totals.failed_checks(task.tolerance_um)
+    return Outcome(
+        task.key, int(bool(failed)), _checks(task, failed), program.getvalue(), joints.getvalue() if task.joints else None,
+        totals.summary().as_json(), notes=held(),
+    )  # fmt: skip
+
+
+def _checks(task: Task, failed: list[tuple[str, str]]) -> list[dict[str, Any]]:
+    """Messages of failed checks."""
+    return [{"rule": rule, "message": text, "text": f"{task.name}: error[{rule}]: {text}"} for rule, text in failed]
 
 
 @lru_cache(maxsize=1)

@@ -14,7 +14,7 @@ from camcomp.ground.datatypes import Bools, Floats, Ints
 from camcomp.model.trajectory.moves import ControlLimits, ToolMoves
 from camcomp.model.trajectory.plan import plan_of
 
-STRETCH = 1 << 16  # moves that are planned at once
+STRETCH = 1 << 14  # moves that are planned at once
 IN_SIGHT = 1 << 9  # moves behind them that may still change their speed
 
 

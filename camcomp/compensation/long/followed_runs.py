@@ -7,9 +7,9 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from camcomp.compensation.long.met import path_of_run
+from camcomp.compensation.long.engagement import path_of_run
 from camcomp.compensation.long.plain_run import PlainRun
-from camcomp.compensation.long.runs import OddRun, Runs
+from camcomp.compensation.long.runs import InterpretedRun, Runs
 from camcomp.gcode.setup import Setup
 from camcomp.ground.datatypes import RAPID, Path
 from camcomp.ground.errors import Location, ProgramError, raise_all
@@ -45,7 +45,7 @@ class FollowedRuns:
                         bounds.add(path_of_run(run))
                     elif (run.plain.kind != RAPID).any():
                         bounds.tools.add(run.state.tool)
-                elif isinstance(run, OddRun) and run.motions:
+                elif isinstance(run, InterpretedRun) and run.motions:
                     bounds.add(runs.program(run.text, run.row0, run.state).path)
             source.seek(0)
         return cls(job, name, memory_of(job.config, job.tool_axis, bounds), {})

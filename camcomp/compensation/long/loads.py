@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from camcomp.compensation.long.engaged_loads import lay_engaged
+from camcomp.compensation.long.engagement import RunEngagement
 from camcomp.compensation.long.kernel import lay_loads
-from camcomp.compensation.long.met import Met
-from camcomp.compensation.long.met_loads import lay_met
 from camcomp.compensation.long.plain_run import NotInPieces, PlainRun
 from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import LINE, RAPID, Bools, Floats, Ints, Path
@@ -66,7 +66,7 @@ def loads_of(
     after: Edge | None,
     c: Conditions,
     constant: Floats | None,
-    met: Met | None = None,
+    met: RunEngagement | None = None,
 ) -> Loads:
     """Forces along a run. constant (3,): Fr, Ft, Fz of a model that always gives the same; None: any other model.
 
@@ -103,7 +103,7 @@ def _of_model(
     own: slice,
     beside: list[tuple[Edge, int]],
     c: Conditions,
-    met: Met | None,
+    met: RunEngagement | None,
 ) -> Loads:
     n, plain, state = len(kind), run.plain, run.state
     line, feed, speed, turn, tool = np.zeros(n, np.int64), *np.empty((3, n)), np.empty(n, np.int64)
@@ -139,7 +139,7 @@ def _of_model(
     return Loads(at(moves, zero), at(moves, one), jump, length, at, parts, of, None if met is None else sizes)
 
 
-def _where_met(run: PlainRun, path: Path, own: slice, c: Conditions, met: Met) -> Loads:
+def _where_met(run: PlainRun, path: Path, own: slice, c: Conditions, met: RunEngagement) -> Loads:
     """The same where the stock is known: in parts between places of the engagement."""
     met_parts, lengths = met.parts(own), path_geometry.lengths(path)
     base = np.concatenate([base_of(path, c, each, lengths, extent=False) for each in met_parts])
@@ -162,7 +162,7 @@ def _where_met(run: PlainRun, path: Path, own: slice, c: Conditions, met: Met) -
     first, last = np.empty(start.shape), np.empty(start.shape)
     jump, length = np.zeros(len(of) + 1, np.bool_), np.empty(len(of))
     axis = np.asarray(c.tool_axis, float)
-    lay_met(
+    lay_engaged(
         path.kind[of], of, u0, u1, start, end, axis, motion[rows], u[rows], turn[rows], base[rows],
         float(np.cos(JOIN_ANGLE)), PLUNGE_SINE, first, last, jump, length,
     )  # fmt: skip

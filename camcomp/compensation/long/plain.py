@@ -9,11 +9,11 @@ import numpy as np
 
 from camcomp.compensation.bands.outcome import Bands, BandTotals
 from camcomp.compensation.bands.scatter import best_share, excess
-from camcomp.compensation.long.carry import Carry
+from camcomp.compensation.long.engagement import RunEngagement
 from camcomp.compensation.long.field import Field, Tiles
 from camcomp.compensation.long.kernel import BASIC, follow, look_up
 from camcomp.compensation.long.loads import Edge, Loads, constant_of, joints_at, loads_of
-from camcomp.compensation.long.met import Met
+from camcomp.compensation.long.output_state import OutputState
 from camcomp.compensation.long.plain_run import NotInPieces, PlainRun, Unsolved
 from camcomp.compensation.long.run_bands import RunUncertainty
 from camcomp.compensation.program.chords import divide, second_derivative, trial_nodes
@@ -66,7 +66,7 @@ class Answers:
 
 
 @dataclass(frozen=True, eq=False)
-class Done:
+class CorrectedRun:
     """A corrected run."""
 
     data: bytes
@@ -111,8 +111,13 @@ class PlainCorrector:
         self._constant = constant_of(job)
 
     def correct(
-        self, whole: PlainRun, before: Edge | None, after: Edge | None, carry: Carry, met: Met | None = None
-    ) -> Done:
+        self,
+        whole: PlainRun,
+        before: Edge | None,
+        after: Edge | None,
+        carry: OutputState,
+        met: RunEngagement | None = None,
+    ) -> CorrectedRun:
         """The run corrected and written; `carry` is moved along. met: what the tool meets. Raises Unsolved, NotInPieces."""
         loads = loads_of(whole, before, after, self.job.conditions, self._constant, met)
         try:
@@ -121,8 +126,14 @@ class PlainCorrector:
             raise Unsolved(loads.of[error.move], error.target, error.status) from None
 
     def _corrected(
-        self, whole: PlainRun, met: Met | None, loads: Loads, before: Edge | None, after: Edge | None, carry: Carry
-    ) -> Done:
+        self,
+        whole: PlainRun,
+        met: RunEngagement | None,
+        loads: Loads,
+        before: Edge | None,
+        after: Edge | None,
+        carry: OutputState,
+    ) -> CorrectedRun:
         run = loads.run
         uncertainty = RunUncertainty.of(self.job, whole, before, after, met) if self.job.config.uncertain else None
         policy = self.job.config.compensation.policy if uncertainty is not None else "full"
@@ -174,7 +185,7 @@ class PlainCorrector:
         unloaded = np.concatenate((answers.unloaded[judged], middles.unloaded))
         seen = np.concatenate((np.flatnonzero(judged), middles.rows))
         back = self._back(unloaded)
-        return Done(
+        return CorrectedRun(
             data,
             run,
             rows,
@@ -274,7 +285,9 @@ class PlainCorrector:
         inner = np.arange(len(nodes.w)) != nodes.first[nodes.piece]
         return which[nodes.piece[inner]], nodes.w[inner], shift[inner]
 
-    def _drop_small_joints(self, rows: PlainRows, commanded: Floats, carry: Carry, lead: Bools, trail: Bools) -> bool:
+    def _drop_small_joints(
+        self, rows: PlainRows, commanded: Floats, carry: OutputState, lead: Bools, trail: Bools
+    ) -> bool:
         """Takes joining lines out that would be shorter than the resolution; whether there were any."""
         joins = np.flatnonzero(rows.joining)
         previous = np.concatenate((carry.commanded[None], commanded[:-1]))[joins]
@@ -351,11 +364,11 @@ class PlainCorrector:
         follow(tiles.slope, tile, off, out)
         return out
 
-    def off(self, done: Done) -> Floats:
+    def off(self, done: CorrectedRun) -> Floats:
         """Way (N, 3) mm, machine frame, from the exact command of the whole correction to what is written."""
         return self.job.frame.vectors(done.written - done.rows.target) - done.answers.correction
 
-    def actuators(self, done: Done) -> tuple[Floats, Floats]:
+    def actuators(self, done: CorrectedRun) -> tuple[Floats, Floats]:
         """Joints (N, m) of the written end points and drives there: those of the exact command, and the step that rounding makes.
 
         Where more than rounding lies between the two, the written point is solved.
@@ -428,7 +441,7 @@ class PlainCorrector:
     # --- writing -------------------------------------------------------------------------------------------------
 
     def _write(
-        self, run: PlainRun, loads: Loads, rows: PlainRows, commanded: Floats, kept: Bools, carry: Carry
+        self, run: PlainRun, loads: Loads, rows: PlainRows, commanded: Floats, kept: Bools, carry: OutputState
     ) -> tuple[bytes, Floats, Floats, Bools]:
         plain, N = run.plain, len(rows.move)
         rest, mode = self._rests(loads.run, rows), run.state.path_mode
@@ -460,7 +473,9 @@ class PlainCorrector:
             return np.zeros(len(rows.move), np.bool_)
         return rests_of((run.plain.kind[rows.move] == LINE) & ~rows.joining, rows.joining)
 
-    def _apart(self, run: PlainRun, rows: PlainRows, commanded: Floats, rest: Bools, kept: Bools, carry: Carry) -> bool:
+    def _apart(
+        self, run: PlainRun, rows: PlainRows, commanded: Floats, rest: Bools, kept: Bools, carry: OutputState
+    ) -> bool:
         """Whether the control is kept from making one line of several; changes of feed that may do so are left out."""
         kind, feed = run.plain.kind[rows.move], run.plain.feed[rows.move]
         cut = (kind == LINE) & ~rows.joining & ~kept
@@ -469,7 +484,7 @@ class PlainCorrector:
         moves = replace(moves, exact=moves.exact | rest)
         return bool(cut.any()) and apart_pays(moves, cut, limits_of(self.job.config), 1e3 * self.tolerance)
 
-    def _feeds(self, run: PlainRun, rows: PlainRows, commanded: Floats, kept: Bools, carry: Carry) -> Floats:
+    def _feeds(self, run: PlainRun, rows: PlainRows, commanded: Floats, kept: Bools, carry: OutputState) -> Floats:
         """Feed (N,) so that the tip keeps its programmed speed, as in compensate.py."""
         feed = np.where(run.plain.kind[rows.move] == RAPID, np.nan, run.plain.feed[rows.move])
         start = np.concatenate((carry.commanded[None], commanded[:-1]))

@@ -15,12 +15,12 @@ from typing import TYPE_CHECKING, BinaryIO
 
 import numpy as np
 
-from camcomp.compensation.long.carry import Carry
+from camcomp.compensation.long.engagement import RunEngagement, path_of_run
 from camcomp.compensation.long.loads import Edge
-from camcomp.compensation.long.met import Met, path_of_run
+from camcomp.compensation.long.output_state import OutputState
 from camcomp.compensation.long.plain import PlainCorrector
 from camcomp.compensation.long.plain_run import NotInPieces, PlainRun, Unsolved
-from camcomp.compensation.long.runs import RUN, OddRun, Runs
+from camcomp.compensation.long.runs import InterpretedRun, Runs
 from camcomp.compensation.long.totals import Batch, Totals
 from camcomp.compensation.program.compensate import compensate
 from camcomp.compensation.program.moves import MOST_ERRORS, RULE_OF_STATUS
@@ -46,7 +46,7 @@ NEAR = 1e-3  # mm: only the direction of a neighbour matters, and on which side 
 
 
 @dataclass(eq=False)
-class Bulk:
+class LongProgram:
     """One long program. `on_rows` gets every batch of rows, in order; `totals` hold the figures at the end."""
 
     job: Job
@@ -68,7 +68,7 @@ class Bulk:
                 raise CheckFailed("CC603", f"{self.name} was compensated before")
             rest = block[-LINE_OF_STAMP:]
         source.seek(0)
-        self._carry = Carry(np.array(self.setup.start_mm, float), np.array(self.setup.start_mm, float))
+        self._carry = OutputState(np.array(self.setup.start_mm, float), np.array(self.setup.start_mm, float))
         self._told: Future[None] = Future()
         self._told.set_result(None)
         self.totals = Totals(self.job, digest.hexdigest(), size, self.tolerance_um, self.on_rows is not None)
@@ -78,7 +78,6 @@ class Bulk:
         top = self.job.conditions.stock_top_mm if self.job.conditions.model and self._stock is None else None
         self._runs = Runs(
             source, self.name, self.setup, self.job.config.control.dialect, np.nan if top is None else top,
-            RUN if self._stock is None else RUN // 4,  # every motion has many arcs then
         )  # fmt: skip
         self._corrector = PlainCorrector(self.job, self.tolerance_um, self._runs.language, self._runs.feed_point)
         self._stamp: str | None = stamp_text(digest.hexdigest(), self.version, self.job.fingerprint)
@@ -139,7 +138,7 @@ class Bulk:
         return data[:at] + stamp + data[at:]
 
     def _corrected(self, piece: _Piece, before: _Piece | None, after: _Piece | None) -> bytes:
-        if isinstance(piece.run, OddRun):
+        if isinstance(piece.run, InterpretedRun):
             return self._odd(piece.run, piece, before, after)
         return self._plain(piece.run, piece, before, after)
 
@@ -154,7 +153,7 @@ class Bulk:
         self._tell(lambda: self.totals.plain(run, done, self._corrector))
         return done.data
 
-    def _met(self, piece: _Piece, before: _Piece | None, after: _Piece | None) -> Met | None:
+    def _met(self, piece: _Piece, before: _Piece | None, after: _Piece | None) -> RunEngagement | None:
         """What the tool meets on a piece and next to it."""
         if piece.engaged is None:
             return None
@@ -168,7 +167,7 @@ class Bulk:
             if after is None or after.engaged is None
             else after.engaged.of_motions(after.ends[0], after.ends[0] + 1)
         )
-        return Met(piece.engaged, last, first)
+        return RunEngagement(piece.engaged, last, first)
 
     def _tell(self, batch: Callable[[], Batch]) -> None:
         """Adds up a piece and passes its rows on, beside the work on the next piece; one piece at a time, in order."""
@@ -198,7 +197,7 @@ class Bulk:
 
     # --- other lines ---------------------------------------------------------------------------------------------
 
-    def _odd(self, run: OddRun, piece: _Piece, before: _Piece | None, after: _Piece | None) -> bytes:
+    def _odd(self, run: InterpretedRun, piece: _Piece, before: _Piece | None, after: _Piece | None) -> bytes:
         """Through the exact way, with the motions on either side in sight."""
         head, state, row0 = b"", run.state, run.row0
         first = behind = 0
@@ -244,14 +243,14 @@ def _stock_of(job: Job, source: BinaryIO, name: str, setup: Setup) -> FollowedRu
     return FollowedRuns.of(job, source, name, setup)
 
 
-def _text_of(run: PlainRun | OddRun) -> bytes:
-    return run.text if isinstance(run, OddRun) else run.data[run.text_at : run.text_end].tobytes()
+def _text_of(run: PlainRun | InterpretedRun) -> bytes:
+    return run.text if isinstance(run, InterpretedRun) else run.data[run.text_at : run.text_end].tobytes()
 
 
 class _Piece:
     """A run with what its neighbours need to know of it."""
 
-    def __init__(self, run: PlainRun | OddRun, runs: Runs) -> None:
+    def __init__(self, run: PlainRun | InterpretedRun, runs: Runs) -> None:
         self.run = run
         self.engaged: Engaged | None = None  # what the tool meets, or, as long as it is only looked at, at its begin
         self._path: Path | None = None

@@ -9,8 +9,8 @@ import numpy as np
 from camcomp.compensation.bands.scatter import TipMoves
 from camcomp.compensation.bands.stations import Stations
 from camcomp.compensation.bands.tip_field import TipField, of_sides, tip_field_of
+from camcomp.compensation.long.engagement import RunEngagement
 from camcomp.compensation.long.loads import Edge, Loads, constant_of, loads_of
-from camcomp.compensation.long.met import Met
 from camcomp.compensation.long.plain_run import PlainRun
 from camcomp.ground.datatypes import Bools, Floats, Ints
 from camcomp.model.drawn import DrawnJob, UncertainJob
@@ -26,7 +26,9 @@ class RunUncertainty:
     loads: list[list[Loads]]
 
     @staticmethod
-    def of(job: Job, run: PlainRun, before: Edge | None, after: Edge | None, met: Met | None = None) -> RunUncertainty:
+    def of(
+        job: Job, run: PlainRun, before: Edge | None, after: Edge | None, met: RunEngagement | None = None
+    ) -> RunUncertainty:
         """met: what the tool meets, where the stock is known. Raises NotInPieces as loads_of."""
 
         def loads(one: DrawnJob) -> Loads:

@@ -27,8 +27,8 @@ from camcomp.ground.errors import Location, ProgramError
 from camcomp.model.config.spec import Config
 from camcomp.model.control import waiting_s
 
-CHUNK_BYTES = 1 << 22  # bytes read at once
-RUN = 1 << 16  # motions of a plain run at most
+CHUNK_BYTES = 1 << 21  # bytes read at once
+RUN = 1 << 14  # motions of a plain run at most
 PROBE_MOTIONS = 48  # plain motions in a row that make a run of their own
 _END = re.compile(END_OF_LINE.encode())
 
@@ -45,7 +45,7 @@ class Piece(Text):
 
 
 @dataclass(frozen=True, eq=False)
-class OddRun:
+class InterpretedRun:
     """Lines for the interpreter."""
 
     text: bytes
@@ -63,7 +63,6 @@ class Runs:
     setup: Setup
     dialect: str | None
     top_mm: float = np.nan  # of the stock: where cutting begins
-    most: int = RUN  # motions of a plain run
     warnings: list[str] = field(default_factory=list)
     motions: int = 0
 
@@ -84,13 +83,13 @@ class Runs:
         self._seen = False  # a line with something in it was read
         self._told: set[str] = set()
 
-    def __iter__(self) -> Iterator[PlainRun | OddRun | bytes]:
+    def __iter__(self) -> Iterator[PlainRun | InterpretedRun | bytes]:
         """Runs in order; bytes behind the program's end, as they are."""
-        odd = _Odd()
+        odd = _InterpretedLines()
         ended = False
         while not ended:
             row, before = self._row, None if odd.lines else self._state
-            found = self._plain(PROBE_MOTIONS if odd.lines else min(RUN, self.most))
+            found = self._plain(PROBE_MOTIONS if odd.lines else RUN)
             if found is not None:
                 if odd.lines and found.motions < PROBE_MOTIONS:
                     odd.add(found.data[found.text_at : found.text_end].tobytes(), found.motions)
@@ -240,7 +239,7 @@ class Runs:
         )  # fmt: skip
 
 
-class _Odd:
+class _InterpretedLines:
     """Collects the lines of an odd run."""
 
     def __init__(self) -> None:
@@ -258,9 +257,9 @@ class _Odd:
         self.lines.append(lines)
         self._motions += motions
 
-    def take(self) -> OddRun:
+    def take(self) -> InterpretedRun:
         """What was collected."""
         assert self._state is not None
-        run = OddRun(b"".join(self.lines), self._row0, self._state, self._motions)
+        run = InterpretedRun(b"".join(self.lines), self._row0, self._state, self._motions)
         self.lines, self._motions, self._state = [], 0, None
         return run

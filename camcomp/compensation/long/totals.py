@@ -8,8 +8,8 @@ import numpy as np
 
 from camcomp.compensation.bands.outcome import Bands, BandTotals, band_figures
 from camcomp.compensation.long.control_account import ControlAccount, SeenPoints
-from camcomp.compensation.long.met import path_of_run
-from camcomp.compensation.long.plain import Done, PlainCorrector
+from camcomp.compensation.long.engagement import path_of_run
+from camcomp.compensation.long.plain import CorrectedRun, PlainCorrector
 from camcomp.compensation.long.plain_run import PlainRun
 from camcomp.compensation.program.compensate import Compensated
 from camcomp.compensation.program.result import (
@@ -105,7 +105,7 @@ class Totals:
 
     # --- pieces --------------------------------------------------------------------------------------------------
 
-    def plain(self, whole: PlainRun, done: Done, corrector: PlainCorrector) -> Batch:
+    def plain(self, whole: PlainRun, done: CorrectedRun, corrector: PlainCorrector) -> Batch:
         """Adds a run of plain lines."""
         run, rows, answers = done.run, done.rows, done.answers
         plain, frame = run.plain, self.job.frame
@@ -144,7 +144,7 @@ class Totals:
             self._behind(self._known(done.bands), rows.engagement),
         )
 
-    def _plain_control(self, run: PlainRun, done: Done) -> None:
+    def _plain_control(self, run: PlainRun, done: CorrectedRun) -> None:
         """What the control makes of plain lines."""
         plain, rows, mode = run.plain, done.rows, run.state.path_mode
         before, after = self._control

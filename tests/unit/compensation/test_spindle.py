@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from camcomp.compensation.long import runs
-from camcomp.compensation.long.program import Bulk
+from camcomp.compensation.long.program import LongProgram
 from camcomp.compensation.program.compensate import compensate
 from camcomp.ground.errors import ConfigError
 from camcomp.ground.files import shipped
@@ -48,7 +48,7 @@ def test_a_stopped_spindle_is_warned_of(monkeypatch, how, words, lines):
     if how == "short":
         warnings = short(job, text).warnings
     elif how == "long":
-        bulk = Bulk(job, "p.nc", setup_of(job.config), 1.0, "0")
+        bulk = LongProgram(job, "p.nc", setup_of(job.config), 1.0, "0")
         warnings = bulk.run(io.BytesIO(text.encode()), len).warnings
     else:
         warnings = simulate(job, program_of(text.encode(), "p.nc", job.config).path, 0.1).warnings

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from camcomp.api.compensation import compensate_file
 from camcomp.compensation.batch import programs
 from camcomp.compensation.batch.worker import Outcome, Task, work
 from camcomp.ground.errors import ConfigError, FileError
@@ -211,6 +212,16 @@ def test_a_worker_gives_back_program_table_and_figures():
     assert done.exit_code == 0 and done.messages == []
     assert b"camcomp" in done.program and done.joints.startswith(b"line,s_mm")
     assert done.figures["after"]["max_um"] <= 1.0 < done.figures["before"]["max_um"]
+
+
+def test_a_worker_corrects_long_programs_in_pieces_as_the_command_does(tmp_path, monkeypatch):
+    monkeypatch.setattr("camcomp.compensation.file_to_file.LONG", 1)
+    text = GOOD.format(x=9).replace("M30", "".join(f"X{9 - k % 7} Y{k % 5}.25\n" for k in range(200)) + "M30")
+    (tmp_path / "p.nc").write_text(text)
+    compensate_file(str(tmp_path / "p.nc"), [MACHINE], output=str(tmp_path / "o.nc"), joints=str(tmp_path / "j.csv"))
+    done = work(task(text, joints=True))
+    assert done.figures["interpolation"]["checked"] > 0
+    assert done.program == (tmp_path / "o.nc").read_bytes() and done.joints == (tmp_path / "j.csv").read_bytes()
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from camcomp.compensation.long import runs
 from camcomp.compensation.long import totals as bulktotals
 from camcomp.compensation.long.field import Field
 from camcomp.compensation.long.plain_run import NotInPieces
-from camcomp.compensation.long.program import Bulk
+from camcomp.compensation.long.program import LongProgram
 from camcomp.compensation.program.compensate import compensate
 from camcomp.compensation.report.tables import summary
 from camcomp.gcode.plain_rows import csv_rows
@@ -50,7 +50,7 @@ def both(job, text, tolerance=1.0):
     """(bulk output, its totals, its batches), exact result."""
     data = text.encode("latin-1")
     batches, out = [], io.BytesIO()
-    totals = Bulk(job, "p.nc", setup_of(job.config), tolerance, "1", on_rows=batches.append).run(
+    totals = LongProgram(job, "p.nc", setup_of(job.config), tolerance, "1", on_rows=batches.append).run(
         io.BytesIO(data), out.write
     )
     exact = compensate(program_of(data, "p.nc", job.config), job, method="newton", tolerance_um=tolerance, version="1")
@@ -249,7 +249,7 @@ def test_zero_correction_keeps_every_byte(seed, eol):
 
 def run(job, text, **more):
     out = io.BytesIO()
-    totals = Bulk(job, "p.nc", setup_of(job.config), 1.0, "1", **more).run(
+    totals = LongProgram(job, "p.nc", setup_of(job.config), 1.0, "1", **more).run(
         io.BytesIO(text.encode("latin-1")), out.write
     )
     return out.getvalue(), totals

@@ -25,7 +25,9 @@ def line_between(base, left, right, w):
 
 
 @entry
-def lay_met(kind, of, u0, u1, start, end, axis, motion, u, turn, base, join_cosine, plunge_sine, f0, f1, jump, length):
+def lay_engaged(
+    kind, of, u0, u1, start, end, axis, motion, u, turn, base, join_cosine, plunge_sine, f0, f1, jump, length
+):
     """Fills forces at the begin and the end of parts (p,) of moves, f0 and f1 (p, 3), where they jump (p + 1,), their length.
 
     of, u0, u1 (p,): which part of which move; start, end (p, 3). motion, u, turn (k,), base (k, 3): places of the

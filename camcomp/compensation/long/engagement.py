@@ -23,7 +23,7 @@ def path_of_run(run: PlainRun) -> Path:
 
 
 @dataclass(frozen=True, eq=False)
-class Met:
+class RunEngagement:
     """What the tool meets on a run, at the end of the motion before it, and at the begin of the motion behind it."""
 
     own: Engaged

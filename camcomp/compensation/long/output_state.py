@@ -11,7 +11,7 @@ from camcomp.ground.datatypes import Floats
 
 
 @dataclass
-class Carry:
+class OutputState:
     """What one piece of the program leaves for the next; program frame."""
 
     written: Floats  # (3,) mm where the written program stands
