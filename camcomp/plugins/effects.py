@@ -33,7 +33,7 @@ from camcomp.plugins.parameters import check_params
 if TYPE_CHECKING:  # the contract does not need the solver
     from camcomp.model.motion.twin import Reading
 
-_ALSO = ("public", "applies", "first_guess")
+_ALSO = ("public", "applies", "first_guess", "guess")
 _SOME = slice(1, None, 3)  # instants of a trial
 _YAML_KEYS = {"effect", "target", "source"}  # keys of the same mapping as the parameters
 

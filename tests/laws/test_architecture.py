@@ -22,7 +22,7 @@ FLOORS = (
     {"terminal"},
     {"__main__"},
 )  # rooms of one floor do not import each other
-LONGEST_CHAIN = 16
+LONGEST_CHAIN = 17
 
 
 def room(module):

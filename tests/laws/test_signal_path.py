@@ -352,7 +352,16 @@ def test_an_effect_of_drives_and_more_takes_no_short_cut_through_the_twin(hook):
 
 # Files that may name a hook: the path itself, the effects, and what users' effects are held against, which tells what hooks
 # are given and calls each by itself. A table of forces has a key `on_workpiece`, which is none.
-MAY_NAME_HOOKS = ("model/signal_path.py", "effects/", "plugins/effects.py", "plugins/trial.py", "forces/")
+# the last two ask which channels of an axis, or which parts of an arm, an effect acts on
+MAY_NAME_HOOKS = (
+    "model/signal_path.py",
+    "effects/",
+    "plugins/effects.py",
+    "plugins/trial.py",
+    "forces/",
+    "diagnosis/arm/poses.py",
+    "diagnosis/axis/effect_columns.py",
+)
 
 
 def hooks_named(source):

@@ -14,7 +14,7 @@ from camcomp.compensation.long.field import Field, Tiles
 from camcomp.compensation.long.kernel import BASIC, follow, look_up
 from camcomp.compensation.long.loads import Edge, Loads, constant_of, joints_at, loads_of
 from camcomp.compensation.long.output_state import OutputState
-from camcomp.compensation.long.plain_run import NotInPieces, PlainRun, Unsolved
+from camcomp.compensation.long.plain_run import Middles, NotInPieces, PlainRun, Unsolved
 from camcomp.compensation.long.run_bands import RunUncertainty
 from camcomp.compensation.program.chords import divide, second_derivative, trial_nodes
 from camcomp.compensation.program.moves import chord_budget
@@ -215,7 +215,7 @@ class PlainCorrector:
         totals.add(left[judged], moves.take(np.flatnonzero(judged)), taken[judged])
         return Bands(self._back(answers.unloaded), left, moves, taken, np.ones(len(left), np.bool_), totals)
 
-    def _left(self, judged: Bools, answers: Answers, middles: _Middles, share: Floats) -> Floats:
+    def _left(self, judged: Bools, answers: Answers, middles: Middles, share: Floats) -> Floats:
         """Errors (k, 3), program frame, that the policy leaves on purpose."""
         ends = (1.0 - share[judged])[:, None] * answers.unloaded[judged]
         between = (1.0 - middles.share)[:, None] * middles.unloaded
@@ -402,7 +402,7 @@ class PlainCorrector:
 
     # --- middles of lines ----------------------------------------------------------------------------------------
 
-    def _middles(self, run: PlainRun, loads: Loads, rows: PlainRows, share: Floats | None) -> _Middles:
+    def _middles(self, run: PlainRun, loads: Loads, rows: PlainRows, share: Floats | None) -> Middles:
         """The middles of the lines that cut."""
         at = np.flatnonzero(self._judged(run, rows) & (loads.length[rows.move] > 0.0))
         move, w = rows.move[at], rows.w[at]
@@ -415,7 +415,7 @@ class PlainCorrector:
         if share is not None:
             taken = 0.5 * (share[at] + share[np.maximum(at - 1, 0)])
         wanted = target + taken[:, None] * self._back(answer[:, :3])
-        return _Middles(at, move, wanted, taken, answer[:, 3:6], tile, tiles)
+        return Middles(at, move, wanted, taken, answer[:, 3:6], tile, tiles)
 
     def _halfway(self, ends: Floats, first: Floats) -> Floats:
         return 0.5 * (ends + np.concatenate((first[None], ends[:-1])))
@@ -425,7 +425,7 @@ class PlainCorrector:
         rows: PlainRows,
         judged: Bools,
         answers: Answers,
-        middles: _Middles,
+        middles: Middles,
         commanded: Floats,
         written: Floats,
         first: Floats,
@@ -496,16 +496,3 @@ class PlainCorrector:
         size = _sizes(step)
         scale = np.divide(size, programmed, out=np.ones(len(feed)), where=programmed > 1e-6)
         return np.where(rows.joining | kept | (programmed < 0.01), feed, feed * np.clip(scale, 0.2, 5.0))
-
-
-@dataclass(frozen=True, eq=False)
-class _Middles:
-    """Middles (k,) of lines."""
-
-    rows: Ints  # the end point of the line
-    move: Ints
-    wanted: Floats  # (k, 3) mm to be commanded there, program frame
-    share: Floats  # (k,) of the correction
-    unloaded: Floats  # (k, 3) mm, machine frame
-    tile: Ints  # (k,)
-    tiles: Tiles

@@ -16,7 +16,6 @@ from typing import Any, Literal
 import numpy as np
 
 from camcomp.diagnosis.axis.findings import AxisRun
-from camcomp.effects import friction
 from camcomp.ground import shelf
 from camcomp.ground.datatypes import Floats
 from camcomp.model import signal_path
@@ -31,7 +30,9 @@ STAGE_OF: Mapping[ChannelName, str] = {"following": "control", "behind": "drive"
 # of loops: found by a search of their own; of standing poses; of an interval that is searched; laws; a zero of an encoder
 ELSEWHERE = ("servo_overshoot", "joint_hysteresis", "joint_curve", "disturbance", "formula", "map", "joint_offset")
 
-VISCOUS = {p.name.endswith("rad"): p for p in friction.PARAMETERS if p.name.startswith("viscous")}  # by hinge
+VISCOUS = {
+    p.name.endswith("rad"): p for p in shelf.load("effects", "friction").PARAMETERS if p.name.startswith("viscous")
+}  # by hinge
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -253,7 +253,9 @@ def _push(name: str, window: Window, rows: JointRows) -> AxisCause:
 
 
 def _tell(found: AxisFindings, rows: JointRows, done: ChannelFit, healthy: Sequence[Mapping[str, Floats]]) -> None:
-    """Sizes that every axis has, for the reader, in the units of the axis."""
+    """Sizes that every axis has, for the reader, in the units of the axis; none where the rows do not determine them."""
+    if not np.isfinite(done.covariance).all():
+        return
     lever = lever_mm(rows.runs[0].revolute)
     if rows.channel == "following":
         found.details["following"] = {"acceleration_us2": done.combined({"acceleration": [1e6]})}

@@ -171,8 +171,8 @@ def sections(root: type[BaseModel]) -> list[KeySection]:
     def _visit_shelf(shelf_name: str, word: str, path: str) -> None:
         if shelf_name == "effects":
             return  # library.md lists their parameters with ranges and sources
-        for member in shelf.members(shelf_name):
-            params = params_of(shelf.load(shelf_name, member))
+        for member, module in shelf.usable(shelf_name):
+            params = params_of(module)
             if set(params.model_fields) - {SOURCE}:
                 visit(params, path, {word: member})
 

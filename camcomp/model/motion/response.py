@@ -416,6 +416,7 @@ def _motion(job: Job, setpoint: Floats, travel: Travel) -> Motion:
         direction=zero,
         home=job.real_machine.home,
         stiffness=stiffness,
+        names=job.real_machine.actuators,
     )
     encoder = signal_path.controlled(job.causes, job.real_machine.actuators, motion)
     dt = np.diff(travel.rested, prepend=travel.time[:1] - 1.0)
