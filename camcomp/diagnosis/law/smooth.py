@@ -16,7 +16,7 @@ from camcomp.diagnosis.law.folds import Folds, gains, withheld
 from camcomp.diagnosis.law.sizes import Sizes
 from camcomp.diagnosis.law.white import White
 from camcomp.ground.datatypes import Floats
-from camcomp.model.law.spline_map import SplineMap, splines, tensor
+from camcomp.model.law.spline_map import splines, tensor
 
 ALONG, BOTH = 12, 6  # splines over one covariate, and over each of two
 WIDTHS_MM = (0.01, 0.03, 0.1)  # of the coefficients at the tip, standard deviation before any data
@@ -53,10 +53,6 @@ class MapTerm:
     def shape(self) -> tuple[int, ...]:
         """How many splines along each covariate."""
         return (ALONG,) if len(self.names) == 1 else (BOTH, BOTH)
-
-    def with_coefficients(self, theta: Floats) -> SplineMap:
-        """The map."""
-        return SplineMap(self.names, self.limits, theta.reshape(self.shape))
 
 
 def map_values(bench: TermBench, term: MapTerm) -> list[Floats]:

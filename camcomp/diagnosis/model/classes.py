@@ -19,14 +19,6 @@ EQUAL_LOG_ODDS = 3.0  # odds of 20, Kass and Raftery 1995
 MOST_SETS = 4  # contract: alternatives that are listed
 
 
-def sine_between(explanation: Explanation, first: Members, second: Members) -> float:
-    """Sine of the angle between the effect of the first set and the span of the second, nuisances taken out."""
-    data = explanation.data
-    amount = data.estimate(first)[0] if first else np.zeros(0)
-    whole, left = _remaining(data.gram, data.indices(first), amount, data.indices(second))
-    return float(np.sqrt(max(left, 0.0) / whole)) if whole > 0.0 else 0.0
-
-
 def alternatives_of(explanation: Explanation, place_of: Sequence[tuple[str, str | None]]) -> list[Members]:
     """Sets nearly as probable as the best one, or that do the same, the best first; supersets of it are no alternatives."""
     data = explanation.data

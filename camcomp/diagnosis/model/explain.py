@@ -242,10 +242,3 @@ def posterior_of(
     sets = sorted(((m, total) for m, _, total in merged.values()), key=lambda s: -s[1])
     top = int(np.argmax(value))
     return Explanation(model, flat[top][0], flat[top][1], tuple(sets), places, families, unknown, float(value[top]))
-
-
-def relative_evidence(explanation: Explanation, sets: Sequence[Members]) -> Floats:
-    """Log evidence (s,) of sets against the most probable one, beside its background, their priors taken out."""
-    data = explanation.data
-    base = data.value(explanation.members) - data.prior(explanation.members)
-    return np.array([data.value(m) - data.prior(m) - base for m in sets])

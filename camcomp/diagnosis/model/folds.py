@@ -7,16 +7,15 @@ others; near: by the fit to all. E[left near] = noise squared, whatever the fit 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from camcomp.diagnosis.model.evidence import Background, LinearModel, Members
-from camcomp.diagnosis.model.group import Group, SmoothProcess, split_regions
+from camcomp.diagnosis.model.group import SmoothProcess, split_regions
 from camcomp.ground.datatypes import Floats
 
 REGIONS = 16  # of positions or time, between which squares are compared
-FOLDS = 8  # regions of one group that are left out in turn
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,13 +43,6 @@ def folds_of(model: LinearModel) -> list[tuple[int, tuple[int, ...]]]:
     if len(own) < len(model.groups):
         return [(g, own) for g in range(len(model.groups)) if g not in own]
     return [(g, tuple(i for i in own if i != g)) for g in own]
-
-
-def split_group(g: Group, count: int = FOLDS) -> list[Group]:
-    """A group as regions of its positions, or stretches of its time."""
-    at = g.positions(SmoothProcess(0.0, 1.0, "posture" if g.position is not None else "time"))
-    region = split_regions(at, count)
-    return [replace(g.take(region == i), name=f"{g.name}/{i}") for i in np.unique(region)]
 
 
 def held_out(
