@@ -114,10 +114,13 @@ def test_a_machine_with_other_errors_does_not(tmp_path):
 
 
 def test_a_drive_with_play_and_friction_is_led_through_both(tmp_path):
-    """Friction holds back the carriage behind the play. Its turn-round here is Maxwell's, there Dahl's: some um stay."""
-    truth = Truth(play_mm=0.04 * Y, friction_N=150.0 * Y)
+    """Friction holds back the carriage behind the play. Its turn-round here is Maxwell's, there Dahl's: some um stay.
+
+    The plant's play follows the motion alone, so the friction exceeds the largest load of the structure, 403 N.
+    """
+    truth = Truth(play_mm=0.04 * Y, friction_N=450.0 * Y)
     effects = [
-        {"effect": "friction", "target": "y", "force_N": 150, "presliding_mm": 0.0028},
+        {"effect": "friction", "target": "y", "force_N": 450, "presliding_mm": 0.0028},
         {"effect": "backlash", "target": "y", "width_mm": 0.04},
     ]
     (tmp_path / "effects.yaml").write_text(json.dumps({"effects": effects}))

@@ -52,6 +52,7 @@ def test_units_are_those_in_the_names_of_keys(kind):
 @pytest.mark.parametrize("kind", ["config", "experiment"])
 def test_examples_are_allowed_where_they_are_shown(kind):
     schema = schema_of(kind)
+    jsonschema.Draft7Validator.check_schema(schema)
     for where, key, each in properties(kind):
         example = TEXT.fullmatch(each["description"])["example"]
         if "..." in example:
@@ -59,4 +60,4 @@ def test_examples_are_allowed_where_they_are_shown(kind):
         tree, errors = read_tree(f"value: {example}\n".encode(), f"{where}.{key}")
         assert not errors, f"{where}.{key}: {example}"
         one = {**each, "definitions": schema["definitions"], "$schema": schema["$schema"]}
-        jsonschema.validate(plain(tree)["value"], one)
+        jsonschema.Draft7Validator(one).validate(plain(tree)["value"])  # the schema itself is checked once
