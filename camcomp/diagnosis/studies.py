@@ -196,7 +196,7 @@ def _poses(run: RunSpec, log: Measured) -> Poses:
     sd = np.stack(stated, axis=1) if len(stated) == len(columns) else log.tip_sd if stated else None
     every = Poses(
         label, log.encoder, log.tip, run.started_s + log.time, heat, np.full(n, run.name), sd, np.arange(1, n + 1),
-        torque=log.drive if log.has("drive") else None,
+        torque=log.drive if log.has("drive") else None, force=log.force() if log.has("dyno") else None,
     ).take(known)  # fmt: skip
     return replace(every, approach=approached(every.q, every.time))
 

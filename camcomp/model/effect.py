@@ -94,6 +94,7 @@ class Motion:
     masses: Callable[[], MassLoads] | None = None
     friction: Floats | None = None  # (m,) Coulomb force behind the play of a drive, N or N mm; NaN: not stated
     seams: Seams | None = None  # where a recording begins or goes on in motion; None: it starts at rest
+    measured_force: bool = False  # the cutting force is measured, so that errors of a force model do not act
 
     def at(self, instants: Ints | slice) -> Self:
         """Some of the instants, as unordered poses without the functions of all instants."""

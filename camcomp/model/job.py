@@ -108,8 +108,12 @@ class Job:
         )
         if self.config.control.absolute_accuracy:  # the control corrects these itself
             causes = tuple(cause for cause in causes if not getattr(cause.effect, "GEOMETRY", False))
-        measured = self.measured_force or self.config.process.force.model == "table"
-        return signal_path.under_measured_force(causes) if measured else causes
+        return signal_path.under_measured_force(causes) if self.has_measured_force else causes
+
+    @property
+    def has_measured_force(self) -> bool:
+        """Whether the cutting force is measured: given with every set-point, or read from a table."""
+        return self.measured_force or self.config.process.force.model == "table"
 
     @cached_property
     def real_machine(self) -> Machine:

@@ -126,9 +126,9 @@ def springs(robot: Robot) -> Floats:
 
 
 def loaded(causes: Sequence[Cause], motion: Motion, force: Floats) -> Load:
-    """Load on the tool under a modelled cutting force (n, 3)."""
+    """Load on the tool under a cutting force (n, 3), modelled or, where the motion says so, measured."""
     load = Load(force, np.zeros((len(force), 6)))
-    for hook, cause in _hooks(causes, "on_load"):
+    for hook, cause in _hooks(under_measured_force(causes) if motion.measured_force else causes, "on_load"):
         load = hook(load, motion, cause.values)
     return load
 

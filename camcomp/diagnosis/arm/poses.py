@@ -23,7 +23,7 @@ from camcomp.model import signal_path
 from camcomp.model.effect import Cause, Load, Motion, Parameter, applies
 from camcomp.model.statics.arm import Arm, arm_of
 from camcomp.model.statics.description import Actuator, Link, Robot
-from camcomp.model.statics.hanging import Hung, grown_way, hang
+from camcomp.model.statics.hanging import Hung, grown_way, hang, tool_wrench
 from camcomp.model.statics.masses import mass_loads
 
 _SHARE_OF_SCALE = 0.05  # step of a difference
@@ -41,7 +41,8 @@ class Poses:
 
     sd (n, 3) mm: what the instrument states of itself, NaN or None where it says nothing; row (n,): of the run's log, from 1;
     approach (n, m): direction in which every joint turned last, +1 or -1, 0 where unknown; torque (n, m) of the drives as
-    logged, N mm or N, NaN or None where there is none.
+    logged, N mm or N, NaN or None where there is none; force (n, 3) N on the tool as a dynamometer measured it, machine
+    frame, None without one.
     """
 
     label: str
@@ -54,15 +55,16 @@ class Poses:
     row: np.ndarray | None = None
     approach: Floats | None = None
     torque: Floats | None = None
+    force: Floats | None = None
 
     def take(self, rows: np.ndarray) -> Poses:
         """The poses of a mask or of indices."""
         heat = None if self.temperature is None else self.temperature[rows]
         sd = None if self.sd is None else self.sd[rows]
-        way, torque = (None if each is None else each[rows] for each in (self.approach, self.torque))
+        way, torque, force = (None if each is None else each[rows] for each in (self.approach, self.torque, self.force))
         return Poses(
             self.label, self.q[rows], self.tip[rows], self.time[rows], heat, self.run[rows], sd, self.rows[rows], way,
-            torque,
+            torque, force,
         )  # fmt: skip
 
     @property
@@ -168,9 +170,11 @@ class ArmBench:
         motion = _standing(robot, campaign)
         motion = replace(motion, encoder=signal_path.controlled(causes, self.actuators, motion))
         error, _ = signal_path.driven(causes, self.actuators, motion)
-        load = signal_path.loaded(causes, motion, np.zeros((len(campaign.q), 3)))
+        force = np.zeros((len(campaign.q), 3)) if campaign.force is None else campaign.force
+        load = signal_path.loaded(causes, replace(motion, measured_force=True), force)
         q = motion.encoder + error
-        hung = hang(robot, q, load.wrench if load.wrench.any() else None, campaign.torque)
+        wrench = load.wrench + tool_wrench(robot, q, load.force)
+        hung = hang(robot, q, wrench if wrench.any() else None, campaign.torque)
         grown = signal_path.grown(causes, self.actuators, motion)
         if grown is not None:
             hung = replace(hung, point=hung.point + grown_way(robot, q, grown))

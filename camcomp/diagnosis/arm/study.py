@@ -235,6 +235,8 @@ def merged(runs: Sequence[Poses], least: int = LEAST_POSES) -> list[Poses]:
         every = Poses(
             label, q, tip, time, heat, run, None if all(d is None for d in deviations) else sd, row, way,
             None if np.isnan(torque).all() else torque,
+            None if all(r.force is None for r in own)
+            else np.concatenate([np.zeros((len(r.q), 3)) if r.force is None else r.force for r in own]),
         )  # fmt: skip
         _, first = np.unique(np.concatenate([q, tip], axis=1), axis=0, return_index=True)  # sorted by joints
         every = every.take(first)

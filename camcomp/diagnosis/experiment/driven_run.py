@@ -119,7 +119,7 @@ def drive(
     aligned = None if program is None else _aligned(log, name, program, tip, measured)
     unsure = np.asarray(guessed.any(axis=1))
     if program is None or aligned is None:
-        forces, told = Forces.none(len(tip)), False
+        forces, told = _measured_forces(measured, vectors), False
     else:
         try:
             cut = _behind(measured, rho, tip, program, twin) if by == "setpoint" else None
@@ -143,6 +143,7 @@ def drive(
         name, measured.time, rho, tip, forces, started=started, to_machine=twin.to_machine, vectors=vectors,
         inverse=twin.inverse, temperature=temperature,
     )  # fmt: skip
+    run_path = replace(run_path, measured_force=program is None)
     if program is not None:
         run_path = replace(
             run_path, feed_mm_per_min=program.feed, cut_ahead_min=_cut_ahead(program, aligned), told=told
@@ -152,6 +153,21 @@ def drive(
     turns = np.array([a.revolute for a in twin.robot.actuators])
     check_forces(log, name, measured, run_path.row_force, lambda: loaded().drive, turns)
     return DrivenRun(run_path, by, unsure, guessed, None, 0 if aligned is None else aligned.lag)
+
+
+def _measured_forces(measured: Measured, vectors: Callable[[Floats], Floats]) -> Forces:
+    """Cutting force of a log without program: what the dynamometer measured, none without one.
+
+    vectors: program -> machine frame. An empty cell lies between its neighbours in time, with their difference as doubt.
+    """
+    force = measured.force()
+    known = np.asarray(np.isfinite(measured.dyno[:, np.isfinite(measured.dyno).any(axis=0)]).all(axis=1))
+    around = np.append(np.flatnonzero(known), len(known) - 1)
+    after = np.searchsorted(around[:-1], np.arange(len(known)))
+    apart = np.abs(force[around[after]] - force[around[np.maximum(after - 1, 0)]])
+    doubt = np.where(known[:, None], 0.0, apart)
+    to_program = vectors(np.eye(3)).T
+    return replace(Forces.none(len(known)), force=force @ to_program, doubt=np.abs(doubt @ to_program))
 
 
 def _open(program: Program, conditions: Conditions, twin: Twin) -> _Program:

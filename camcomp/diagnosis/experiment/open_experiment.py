@@ -84,9 +84,11 @@ def open_run(spec: RunSpec, job: Job, twin: Twin, notes: list[str]) -> Run:
     if run.by == "setpoint":  # encoders are evidence only against set-points
         measured = replace(measured, encoder=np.where(run.guessed, np.nan, measured.encoder))
     thin = int(np.ceil(len(measured.time) / MOST_ROWS))
+    if run.run_path.measured_force:  # the dynamometer is the force itself
+        measured = replace(measured, dyno=np.full_like(measured.dyno, np.nan))
     return Run(
         spec.name,
-        run.run_path,
+        replace(run.run_path, measured_force=run.run_path.measured_force or job.has_measured_force),
         measured,
         spec.clamping,
         spec.clock,

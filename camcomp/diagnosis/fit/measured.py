@@ -28,6 +28,15 @@ class Measured:
         """Whether the channel holds any value."""
         return bool(np.isfinite(getattr(self, name)).any())
 
+    def force(self) -> Floats:
+        """Force (n, 3) N that the dynamometer measured; empty cells lie between their neighbours in time, 0 without any."""
+        out = np.zeros_like(self.dyno)
+        for own, values in zip(out.T, self.dyno.T, strict=True):
+            known = np.isfinite(values)
+            if known.any():
+                own[:] = np.interp(self.time, self.time[known], values[known])
+        return out
+
     def take(self, rows: Bools | Ints) -> "Measured":
         """The rows that a mask picks."""
         return Measured(**{each: getattr(self, each)[rows] for each in self.__dataclass_fields__})

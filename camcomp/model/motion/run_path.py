@@ -71,6 +71,7 @@ class RunPath:
     between_s: float = 0.0  # estimated offset of the tip readings from the instants of the rows
     told: bool = False  # forces are those at the set-points, so that a lag of the loop delays them too
     led: bool = False  # the motion is that of the measured tip, which then has no clock offset
+    measured_force: bool = False  # forces are those of a table or a dynamometer
 
     @cached_property
     def tip_time(self) -> Floats:

@@ -415,6 +415,7 @@ class Twin:
             names=self.actuators,
             cut_before_min=run_path.cut_before_min,
             seams=None if run_path.driven is None else run_path.driven.seams,
+            measured_force=run_path.measured_force,
         )
         encoder = signal_path.controlled(servo, self.actuators, motion)
         speed = np.gradient(encoder, t, axis=0) if run_path.ordered and len(t) > 1 else zero

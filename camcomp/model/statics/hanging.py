@@ -67,6 +67,13 @@ def hang(robot: Robot, q: Array, wrench: Array | None = None, drive: Array | Non
     raise ArithmeticError("the arm gives way under its own weight")
 
 
+def tool_wrench(robot: Robot, q: Array, force: Array) -> Array:
+    """Wrench (n, 6) N, N mm at the platform reference of forces (n, 3) N on the tool tip of an arm at coordinates q (n, m)."""
+    if not force.any():
+        return np.zeros((len(q), 6))
+    return np.hstack([force, np.cross(hang(robot, q).rotation @ robot.tool, force)])
+
+
 def _with_measured(loads: list[Array], drive: Array) -> list[Array]:
     """Loads (n, 1 or 6) on every spring, those on drives as measured torques (n, m) balance them where these are known."""
     measured = iter(-drive.T[:, :, None])
