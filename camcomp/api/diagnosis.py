@@ -13,8 +13,8 @@ from camcomp.api.result_table import ResultTable
 from camcomp.diagnosis.result.types import DiagnosisResult
 from camcomp.ground.errors import CheckFailed
 from camcomp.ground.files import read_bytes
-from camcomp.ground.headway import part
 from camcomp.ground.places import STANDARD
+from camcomp.ground.progress import part
 from camcomp.model.config.linuxcnc_ini import SUFFIX as INI_SUFFIX
 from camcomp.model.config.load import load_config, load_experiment
 from camcomp.model.config.write_back import carried, machine_file, with_causes

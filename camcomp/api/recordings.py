@@ -9,12 +9,12 @@ from pathlib import Path
 from camcomp.diagnosis.recordings.axis_file import read_axis
 from camcomp.diagnosis.recordings.experiment_file import experiment_yaml, run_names
 from camcomp.diagnosis.recordings.formats import read_sampled
-from camcomp.diagnosis.recordings.naming import told_columns
+from camcomp.diagnosis.recordings.naming import match_columns
 from camcomp.diagnosis.recordings.run_log import Recording, Wishes, log_of
 from camcomp.diagnosis.recordings.sampled import SampledColumns, refuse_names
 from camcomp.ground.errors import FileError
 from camcomp.ground.files import display_name, read_bytes, write_all
-from camcomp.ground.headway import steps
+from camcomp.ground.progress import steps
 from camcomp.model.config.load import load_config
 
 
@@ -32,7 +32,7 @@ def import_recordings(
     groups = [_files_of(each) for each in files]
     called = run_names([group[0] for group in groups])
     run_programs = _programs(programs, called)
-    told = told_columns(columns, list(actuators), [each.rotary for each in actuators.values()])
+    told = match_columns(columns, list(actuators), [each.rotary for each in actuators.values()])
     recordings = list[Recording]()
     for run, group in steps(zip(called, groups, strict=True), len(groups)):
         wishes = Wishes(

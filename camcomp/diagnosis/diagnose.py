@@ -27,7 +27,7 @@ from camcomp.diagnosis.law.law_answer import LawAnswer
 from camcomp.diagnosis.law.library import LearnedLaw
 from camcomp.diagnosis.next_experiment.after_unknown import explore
 from camcomp.diagnosis.next_experiment.designed import propose
-from camcomp.diagnosis.next_experiment.outcomes import NOTHING, with_outcomes
+from camcomp.diagnosis.next_experiment.outcomes import ONLY_NOISE, with_outcomes
 from camcomp.diagnosis.next_experiment.proposal import Proposal
 from camcomp.diagnosis.result.types import (
     UNKNOWN,
@@ -55,7 +55,7 @@ from camcomp.diagnosis.statistics.cause_sets import Fitted
 from camcomp.diagnosis.statistics.periods import SpectralLine, frequencies
 from camcomp.diagnosis.statistics.probability import probability_of_chance, stated
 from camcomp.ground.datatypes import Floats
-from camcomp.ground.headway import part as part_of_work
+from camcomp.ground.progress import part as part_of_work
 from camcomp.model.effect import Cause
 from camcomp.model.job import Job
 from camcomp.model.motion.twin import Twin
@@ -164,7 +164,7 @@ def _next(problem: Problem, found: CauseSearch, word: str, job: Job) -> Proposal
 def _set_name(problem: Problem, f: Fitted) -> str:
     """A set of causes in words."""
     causes = (problem.columns.candidates[i] for i in f.members)
-    return " and ".join(f"{c.name} ({c.target})" if c.target else c.name for c in causes) or NOTHING
+    return " and ".join(f"{c.name} ({c.target})" if c.target else c.name for c in causes) or ONLY_NOISE
 
 
 # -- causes -----------------------------------------------------------------------------------------------------------

@@ -9,7 +9,7 @@ from camcomp.ground.datatypes import Floats
 from camcomp.ground.errors import ConfigError
 from camcomp.model.config.base import Spec
 from camcomp.model.cutting.average import power_law, slanted, summed, to_path
-from camcomp.model.cutting.conditions import bites_of, clockwise, feed_per_tooth
+from camcomp.model.cutting.conditions import clockwise, engagement_arcs, feed_per_tooth
 from camcomp.model.cutting.cut import Cut
 
 SOURCES = (
@@ -42,18 +42,18 @@ def force(cut: Cut, params: Params) -> Floats:
         raise ConfigError("CC257", f"Kienzle's law needs the key process: force: {missing}")
     kc11 = params.kc11_N_per_mm2 * (1 - RAKE_LOSS_PER_DEG * params.rake_deg)
     chip, sense = feed_per_tooth(cut), clockwise(cut, params.spindle)
-    bites = bites_of(cut, params.milling, sense)
-    ratios = np.stack(slanted(params.radial_ratio, params.axial_ratio, bites.rise, bites.run))
+    arcs = engagement_arcs(cut, params.milling, sense)
+    ratios = np.stack(slanted(params.radial_ratio, params.axial_ratio, arcs.rise, arcs.run))
     # On a slanted edge the chip is thinner by `rise`, and longer.
-    thin = kc11 * bites.rise**-params.mc
+    thin = kc11 * arcs.rise**-params.mc
     mean = power_law(
-        chip=chip[bites.place],
-        depth=bites.height,
+        chip=chip[arcs.place],
+        depth=arcs.height,
         teeth=cut.teeth or 0,
-        start=bites.start,
-        stop=bites.stop,
+        start=arcs.start,
+        stop=arcs.stop,
         kc11=thin,
         mc=params.mc,
         ratios=ratios,
     )
-    return to_path(summed(mean, bites.place, len(cut)), sense)
+    return to_path(summed(mean, arcs.place, len(cut)), sense)

@@ -8,7 +8,7 @@ from pydantic import Field
 from camcomp.ground.datatypes import Floats
 from camcomp.model.config.base import Spec
 from camcomp.model.cutting.average import linear_edge, slanted, summed, to_path
-from camcomp.model.cutting.conditions import bites_of, clockwise, feed_per_tooth
+from camcomp.model.cutting.conditions import clockwise, engagement_arcs, feed_per_tooth
 from camcomp.model.cutting.cut import Cut
 
 SOURCES = (
@@ -36,8 +36,8 @@ class Params(Spec):
 def force(cut: Cut, params: Params) -> Floats:
     """(Fr, Ft, Fz) (n, 3) in N. Raises ConfigError CC250 to CC256 when the Cut lacks data."""
     chip, sense = feed_per_tooth(cut), clockwise(cut, params.spindle)
-    bites = bites_of(cut, params.milling, sense)
-    rise, run = bites.rise, bites.run
+    arcs = engagement_arcs(cut, params.milling, sense)
+    rise, run = arcs.rise, arcs.run
     cutting = np.stack(
         [params.Ktc_N_per_mm2 * np.ones_like(rise), *slanted(params.Krc_N_per_mm2, params.Kac_N_per_mm2, rise, run)]
     )
@@ -46,12 +46,12 @@ def force(cut: Cut, params: Params) -> Floats:
         [params.Kte_N_per_mm * np.ones_like(rise), *slanted(params.Kre_N_per_mm, params.Kae_N_per_mm, rise, run)]
     )
     mean = linear_edge(
-        chip=chip[bites.place],
-        depth=bites.height,
+        chip=chip[arcs.place],
+        depth=arcs.height,
         teeth=cut.teeth or 0,
-        start=bites.start,
-        stop=bites.stop,
+        start=arcs.start,
+        stop=arcs.stop,
         cutting=cutting,
         edge=edge / rise,
     )
-    return to_path(summed(mean, bites.place, len(cut)), sense)
+    return to_path(summed(mean, arcs.place, len(cut)), sense)

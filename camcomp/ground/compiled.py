@@ -55,14 +55,14 @@ def entry(function: Callable[..., Any]) -> Callable[..., Any]:
     def call(*args: Any) -> Any:
         if dispatcher.overloads:  # not its `signatures`, which makes a list every time
             return dispatcher(*args)
-        from camcomp.ground import headway
+        from camcomp.ground import progress
 
         resting = gc.isenabled()
         gc.disable()
         try:
             return dispatcher(*args)
         finally:
-            headway.hold("")
+            progress.hold("")
             if resting:
                 gc.enable()
 

@@ -20,7 +20,7 @@ from typing import Any
 import llvmlite
 import numba as _numba
 
-from camcomp.ground import headway
+from camcomp.ground import progress
 from camcomp.ground.notes import note
 from camcomp.ground.replacement import Replacement
 from camcomp.ground.trust import why_file_is_not_ours, why_folder_is_not_ours
@@ -162,7 +162,7 @@ class _Cache:
         except Exception:  # noqa: BLE001 - any failure means compilation
             note("compiled code", f"compiled code on the disk is damaged: {_ANEW}")
         if found is None:
-            headway.hold(headway.COMPILING if self.files is None else headway.ONCE)
+            progress.hold(progress.COMPILING if self.files is None else progress.ONCE)
             context.refresh()
         return found
 

@@ -118,7 +118,7 @@ def micrometres(value: float) -> str:
     return f"below {SMALLEST_UM:g} µm" if 0.0 <= value < SMALLEST_UM else f"{brief(value)} µm"
 
 
-def digits_alike(value: float, low: float, high: float) -> list[str]:
+def format_together(value: float, low: float, high: float) -> list[str]:
     """Texts of a value and the ends of its interval, with two significant digits of the interval's width."""
     doubt = 0.5 * (high - low)
     if not doubt > 0.0 or not np.isfinite(doubt) or doubt < 1e-4:

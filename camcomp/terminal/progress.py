@@ -13,7 +13,7 @@ from typing import Any
 import click
 
 from camcomp.ground.errors import shown
-from camcomp.ground.headway import Headway, watched
+from camcomp.ground.progress import Progress, watched
 
 PATIENCE = 1.0  # s before the progress is shown
 TICK = 0.5  # s
@@ -39,16 +39,16 @@ def working(on: str, *, quiet: bool = False) -> Iterator[None]:
     """
     tell: AbstractContextManager[None]
     if FILTER in os.environ:
-        tell = _telling(lambda headway: f"FILTER_PROGRESS={round(100.0 * (headway.share or 0.0))}\n", (TICK, TICK))
+        tell = _telling(lambda progress: f"FILTER_PROGRESS={round(100.0 * (progress.share or 0.0))}\n", (TICK, TICK))
         end = "FILTER_PROGRESS=100\n"
     elif quiet:
         tell, end = nullcontext(), ""
     elif lively():
         line = _Line(on)
-        tell, end = _telling(lambda headway: f"{WIPE}{line.text(headway)}", (PATIENCE, TICK)), WIPE
+        tell, end = _telling(lambda progress: f"{WIPE}{line.text(progress)}", (PATIENCE, TICK)), WIPE
     else:
         spoken, began = shown(on), time.monotonic()
-        tell, end = _telling(lambda headway: f"{_spoken(spoken, began, headway)}\n", (SELDOM, SELDOM)), ""
+        tell, end = _telling(lambda progress: f"{_spoken(spoken, began, progress)}\n", (SELDOM, SELDOM)), ""
     _drawing.append(end == WIPE)
     try:
         with tell:
@@ -60,20 +60,20 @@ def working(on: str, *, quiet: bool = False) -> Iterator[None]:
 
 
 @contextmanager
-def _telling(text: Callable[[Headway], str], pauses: tuple[float, float]) -> Iterator[None]:
+def _telling(text: Callable[[Progress], str], pauses: tuple[float, float]) -> Iterator[None]:
     """Write texts to standard error from another thread, the first after pauses[0] s, further ones pauses[1] s apart."""
     stream, finished = sys.stderr, threading.Event()
 
-    def tell(headway: Headway) -> None:
+    def tell(progress: Progress) -> None:
         pause, later = pauses
         while not finished.wait(pause):
             with suppress(OSError):
-                stream.write(text(headway))
+                stream.write(text(progress))
                 stream.flush()
             pause = later
 
-    with watched() as headway:
-        teller = threading.Thread(target=tell, args=(headway,), daemon=True)
+    with watched() as progress:
+        teller = threading.Thread(target=tell, args=(progress,), daemon=True)
         teller.start()
         try:
             yield
@@ -82,13 +82,13 @@ def _telling(text: Callable[[Headway], str], pauses: tuple[float, float]) -> Ite
             teller.join()
 
 
-def _spoken(on: str, began: float, headway: Headway) -> str:
+def _spoken(on: str, began: float, progress: Progress) -> str:
     """One line of a log: share and remaining time, or what is known instead."""
     spent = time.monotonic() - began
-    if headway.doing or not headway.share:
-        return f"{on}: {headway.doing + ', ' if headway.doing else ''}{_duration(spent)} so far"
-    rest = spent * (1.0 - headway.share) / headway.share
-    return f"{on}: {100.0 * headway.share:.0f} %, about {_duration(rest)} left"
+    if progress.doing or not progress.share:
+        return f"{on}: {progress.doing + ', ' if progress.doing else ''}{_duration(spent)} so far"
+    rest = spent * (1.0 - progress.share) / progress.share
+    return f"{on}: {100.0 * progress.share:.0f} %, about {_duration(rest)} left"
 
 
 def _duration(seconds: float) -> str:
@@ -113,11 +113,11 @@ class _Line:
         )
         self._bar = bar
 
-    def text(self, headway: Headway) -> str:
+    def text(self, progress: Progress) -> str:
         spent = time.monotonic() - self._start
-        if headway.doing or headway.share is None:
-            return f"{self._on} ... {headway.doing + ', ' if headway.doing else ''}{spent:.0f} s"
-        self._bar.make_step(round(headway.share * STEPS) - self._bar.pos)
+        if progress.doing or progress.share is None:
+            return f"{self._on} ... {progress.doing + ', ' if progress.doing else ''}{spent:.0f} s"
+        self._bar.make_step(round(progress.share * STEPS) - self._bar.pos)
         left = " left" if self._bar.eta_known and not self._bar.finished else ""
         return f"{self._bar.format_progress_line()}{left}"
 

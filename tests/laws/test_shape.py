@@ -14,7 +14,7 @@ BUILT_IN = {"print", "max", "min", "zip"}
 BY_POSITION = {"Parameter"}  # rows of the tables of plug-ins, users' ones included
 # Compiled kernels over 60 lines: numba compiles a split kernel in more time.
 LONG_KERNELS = {
-    "corners", "lay_engaged", "machine_step", "march", "rounded", "scan_lines", "solve_one", "write_lines",
+    "corners", "cut_legs", "lay_engaged", "machine_step", "rounded", "scan_lines", "solve_one", "write_lines",
 }  # fmt: skip
 # Places that are still open, by folder: long functions, functions with many parameters, calls with many positional
 # arguments, dataclasses with more than five fields that are not keyword-only. A number may only be lowered; those of

@@ -85,19 +85,19 @@ def wanted_arcs(block, kind, tip, way, lift, count=1440):
 
 def slices(engaged, row):
     """Of a place: height (middle, mm over the tip) and sum of the arcs (rad) of every slice in which the tool was looked at."""
-    bites = engaged.bites.of(np.array([row]))
-    new = np.concatenate(([True], bites.start[1:] < bites.stop[:-1]))  # arcs of a slice stand in order
-    height = bites.height[new]
-    turn = np.bincount(np.cumsum(new) - 1, bites.stop - bites.start)
+    arcs = engaged.arcs.of(np.array([row]))
+    new = np.concatenate(([True], arcs.start[1:] < arcs.stop[:-1]))  # arcs of a slice stand in order
+    height = arcs.height[new]
+    turn = np.bincount(np.cumsum(new) - 1, arcs.stop - arcs.start)
     top = engaged.depth[row] - np.concatenate((np.cumsum(height[::-1])[::-1][1:], [0.0]))
     return top - 0.5 * height, turn
 
 
 def flat_slice(engaged, row):
     """The same for a cylinder, whose arcs all begin at its tip."""
-    bites = engaged.bites.of(np.array([row]))
+    arcs = engaged.arcs.of(np.array([row]))
     lift = 0.4 * engaged.depth[row]
-    return np.array([lift]), np.array([(bites.stop - bites.start)[bites.height > lift].sum()])
+    return np.array([lift]), np.array([(arcs.stop - arcs.start)[arcs.height > lift].sum()])
 
 
 def places(path, kind, per_motion):

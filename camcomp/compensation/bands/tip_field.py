@@ -29,7 +29,7 @@ MOST_LEVERAGE = 1.5  # of a point that is interpolated; the points of the fit ha
 LONE = 0.02  # of the points may be solved by themselves before the fit is made anew
 FEW = 0.005  # of the points may be left to that by a new fit
 EXTENSIONS, EXTENSION = 6, 40  # times that a fit learns so many more points where it says nothing
-PUSH_N = 1.0  # to find the compliance, beside a hundredth of the largest force
+TRIAL_FORCE_N = 1.0  # to find the compliance, beside a hundredth of the largest force
 
 
 class TipField:
@@ -122,7 +122,7 @@ class TipField:
             slope[:, :, j], bend[:, :, j] = of_sides(each, base, tips)
         parts = [slope.reshape(n, -1), bend.reshape(n, -1)]
         if self._on_force:
-            push = PUSH_N + 0.01 * float(np.abs(force).max(initial=0.0))
+            push = TRIAL_FORCE_N + 0.01 * float(np.abs(force).max(initial=0.0))
             columns = [
                 (self._tips(self._job.real_machine, told, force + push * axis, "")
                  - self._tips(self._job.real_machine, told, force - push * axis, "")) / (2.0 * push)

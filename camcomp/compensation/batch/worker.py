@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Any
 from camcomp import __version__
 from camcomp.ground.errors import CamcompError, FileError, PluginWarning, format_error
 from camcomp.ground.garbage import collect_seldom, keep_what_lives
-from camcomp.ground.headway import watched
 from camcomp.ground.notes import held, hold
 from camcomp.ground.old_names import keep_old_names
+from camcomp.ground.progress import watched
 from camcomp.model.config.spec import Config
 
 if TYPE_CHECKING:

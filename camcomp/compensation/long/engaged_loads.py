@@ -1,4 +1,4 @@
-"""Forces along straight moves whose engagement is known, compiled: what cutting/track.py and grip.py do for all motions."""
+"""Forces along straight moves whose engagement is known, compiled: what cutting/track.py and piece_load.py do for all motions."""
 
 # mypy: disallow-untyped-defs=False, disallow-incomplete-defs=False
 # numba infers the types of these functions; written by hand they would only be repeated.

@@ -14,7 +14,7 @@ from camcomp.compensation.long.plain_run import NotInPieces, PlainRun
 from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import LINE, RAPID, Bools, Floats, Ints, Path
 from camcomp.model.cutting.engaged import EngagedAt
-from camcomp.model.cutting.grip import needed
+from camcomp.model.cutting.piece_load import needed
 from camcomp.model.cutting.track import JOIN_ANGLE, PLUNGE_SINE, Conditions, base_of, lay_track
 from camcomp.model.job import Job
 

@@ -31,8 +31,8 @@ from camcomp.gcode.text import Text
 from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import LINE, RAPID, Path
 from camcomp.ground.errors import CheckFailed, Location, PhysicsError, raise_all
-from camcomp.ground.headway import done
-from camcomp.ground.headway import part as part_of_work
+from camcomp.ground.progress import done
+from camcomp.ground.progress import part as part_of_work
 from camcomp.model.cutting.engaged import Engaged
 from camcomp.model.job import Job
 from camcomp.model.statics.solve import STATUS

@@ -16,7 +16,7 @@ import numpy as np
 
 from camcomp.compensation.program.compensate import compensate
 from camcomp.gcode.program import Program
-from camcomp.ground import headway, path_geometry
+from camcomp.ground import path_geometry, progress
 from camcomp.ground.datatypes import RAPID, Path
 from camcomp.ground.errors import CamcompError
 from camcomp.ground.result import Result, Size
@@ -78,7 +78,7 @@ def search_place(job: Job, program: Program, table: MachineTable) -> PlacingResu
     xs, ys = (_places(job, table, axis) for axis in (0, 1))
     turns = table.turns_deg if job.config.workpiece.rotation_vector_deg is None else (0.0,)
     grid = list(product(xs, ys, turns))
-    with headway.part(0.0, 0.7):
+    with progress.part(0.0, 0.7):
         found = [stated, *about.all(((x, y, turn, "stated") for x, y, turn in grid), len(grid))]
     step = np.array([xs[1] - xs[0] if len(xs) > 1 else 0.0, ys[1] - ys[0] if len(ys) > 1 else 0.0])
     for k in range(ROUNDS):
@@ -90,7 +90,7 @@ def search_place(job: Job, program: Program, table: MachineTable) -> PlacingResu
         others: list[Posture] = ["wrist flipped"] if _wrist(job.config) is not None else []
         tries = [(x, y, best.turn_deg, best.posture) for x, y in inside]
         tries += [(best.x_mm, best.y_mm, best.turn_deg, each) for each in others if k == 0]
-        with headway.part(0.7 + 0.15 * k, 0.85 + 0.15 * k):
+        with progress.part(0.7 + 0.15 * k, 0.85 + 0.15 * k):
             found += about.all(tries, len(tries))
     by: Literal["band", "before"] = "band" if job.config.uncertain else "before"
     count = len(program.path)
@@ -131,8 +131,8 @@ class _Judge:
 
     def all(self, tries: Iterable[Try], count: int) -> Iterator[Placement]:
         """Placements one after the other; each is a part of the work."""
-        for each in headway.steps(tries, max(count, 1)):
-            with headway.watched():
+        for each in progress.steps(tries, max(count, 1)):
+            with progress.watched():
                 yield self.at(each)
 
     def at(self, place: Try) -> Placement:

@@ -46,8 +46,8 @@ from camcomp.gcode.output import Part, Rewritten
 from camcomp.gcode.program import Program
 from camcomp.gcode.rewrite import rewrite
 from camcomp.ground.datatypes import ARC, RAPID, Bools, Floats, Ints
-from camcomp.ground.headway import part as part_of_work
 from camcomp.ground.orientation import UPRIGHT
+from camcomp.ground.progress import part as part_of_work
 from camcomp.model.cutting.assumed import doubtful_force
 from camcomp.model.cutting.engaged import Engaged
 from camcomp.model.cutting.spindle import cut_without_spindle, spindle_warning

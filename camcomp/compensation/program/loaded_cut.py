@@ -16,7 +16,7 @@ from camcomp.compensation.program.moves import refuse_unsolved, travel_of
 from camcomp.gcode.program import Program
 from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import RAPID, Bools, Floats, Ints
-from camcomp.ground.headway import done, part
+from camcomp.ground.progress import done, part
 from camcomp.model.cutting.frame import lateral
 from camcomp.model.cutting.track import PLUNGE_SINE, Track, lay_track
 from camcomp.model.job import Job
@@ -249,12 +249,12 @@ def _at_rest(
         if behind is not None:
             direction = direction + (tip - way.told[k] - behind[1]) / (way.s[k] - behind[0])
             direction = direction / np.linalg.norm(direction)
-        depth, bites = memory.meet(tip, direction, tool)
+        depth, arcs = memory.meet(tip, direction, tool)
         found = np.zeros(3)
-        if len(bites.start):
+        if len(arcs.start):
             found = way.fixed[k]
             if not track.conditions.plunges:
-                found = track.force_meeting(piece, w, direction[None], np.array([depth]), bites)[0]
+                found = track.force_meeting(piece, w, direction[None], np.array([depth]), arcs)[0]
         step = found - force
         left = float(np.abs(slope @ step).max())
         if left < REST_MM:

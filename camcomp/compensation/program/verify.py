@@ -32,7 +32,7 @@ from camcomp.gcode.program import Program
 from camcomp.gcode.stamp import is_stamped, stamped_model
 from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import ARC, RAPID, Bools, Floats, Ints, Path
-from camcomp.ground.headway import part, steps
+from camcomp.ground.progress import part, steps
 from camcomp.model.cutting.track import Track, lay_track
 from camcomp.model.job import Job
 from camcomp.model.motion.response import Travel, aim_at, respond

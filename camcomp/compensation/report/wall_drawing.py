@@ -82,7 +82,7 @@ def figure_walls(found: CutWalls) -> Figure:
         shifts.append({a: _joined([way[:, i] for way in ways], 6) for i, a in enumerate("xy")})
     corners = np.concatenate([w.points for w in found.walls])
     extent, largest = float(np.ptp(corners, axis=0).max()), max(_largest(off) for off in found.off)
-    words = told(found)
+    words = walls_summary(found)
     return Figure(
         name="walls-above",
         title="Walls from above",
@@ -109,7 +109,7 @@ def figure_along(found: CutWalls) -> Figure:
         line(name, x, _joined([off[i][r] for i, r in enumerate(rows)], 2), k)
         for k, (name, off) in enumerate(zip(found.names, found.off, strict=True))
     ]
-    words = told(found)
+    words = walls_summary(found)
     return Figure(
         name="walls-along",
         title="Along the walls",
@@ -120,7 +120,7 @@ def figure_along(found: CutWalls) -> Figure:
     )
 
 
-def told(found: CutWalls) -> str:
+def walls_summary(found: CutWalls) -> str:
     """What every program leaves, in words."""
     parts = []
     for name, off in zip(found.names, found.off, strict=True):

@@ -26,7 +26,7 @@ from camcomp.diagnosis.model.evidence import Background
 from camcomp.diagnosis.model.explain import Explanation, KnownNoise, explain
 from camcomp.diagnosis.model.verdict import EVEN
 from camcomp.diagnosis.result.types import UNKNOWN, DiagnosisResult, Floor, Outlier
-from camcomp.ground import headway
+from camcomp.ground import progress
 from camcomp.ground.datatypes import Floats
 from camcomp.model.effect import Cause
 from camcomp.model.statics.description import Robot
@@ -60,13 +60,13 @@ def solve(
     gaps = [bench.gap(k, ()) for k in range(len(bench.campaigns))]
     least = least_floor(robot, bench.campaigns, gaps, stated)
     sd = least.sd if least else noise_of_richest(bench, shelf, weights)
-    with headway.part(0.1, 0.5):
+    with progress.part(0.1, 0.5):
         shelf, found = explained(bench, shelf, sd, least, weights, without)
     floor = least
     if least is not None:
         floor, again = settled_floor(bench, shelf, found, gaps, stated, least)
         if again:
-            with headway.part(0.5, 0.7):
+            with progress.part(0.5, 0.7):
                 second = explained(bench, shelf, floor.sd, floor, weights, without)
             hidden = found.unknown > EVEN and found.background.unknown and second[1].unknown <= EVEN
             floor, (shelf, found) = (least, (shelf, found)) if hidden else (floor, second)
@@ -284,18 +284,18 @@ def studied(
     stated: StatedDeviation | None = None,
 ) -> tuple[DiagnosisResult, tuple[str, ...]]:
     """The result of `study`, and notes for the reader of the logs."""
-    with headway.part(0.0, 0.7):
+    with progress.part(0.0, 0.7):
         case = solve(robot, causes, runs, holdout, without, StatedDeviation() if stated is None else stated)
     bench = case.bench
     gaps = [bench.gap(k, ()) for k in range(len(bench.campaigns))]
     case = without_far_judged(case)
     check = check_held_out(case)
-    headway.done(0.8)
+    progress.done(0.8)
     told = answer.Told(case, check, gaps[: len(bench.own)])
     named, minor = answer.causes(told)
     word = answer.verdict(told, named)
     named = answer.with_unknown(told, named, word)
-    headway.done(0.9)
+    progress.done(0.9)
     names = [
         n for n in dict.fromkeys(str(r.run[0]) for r in runs) if (n in holdout or not holdout) and n not in case.loose
     ]

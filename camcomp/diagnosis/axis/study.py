@@ -38,7 +38,7 @@ from camcomp.diagnosis.result.types import (
     NamedCause,
     Outlier,
 )
-from camcomp.ground import headway
+from camcomp.ground import progress
 from camcomp.model.statics.description import Robot
 
 NO_TIPS = "ISO 230-2: the tip was not measured"
@@ -78,7 +78,7 @@ def studied(
         outliers |= {(r.name, int(row)) for r, rows in clean for row in rows}
         cleaned[name] = [r.on_ticks().away_from_gaps() for r, _ in clean]
     around = AxisSurroundings(robot, cleaned)
-    for name, own in headway.steps(cleaned.items(), len(axes) * (1 + again)):
+    for name, own in progress.steps(cleaned.items(), len(axes) * (1 + again)):
         found.append(_axis(name, own, set(holdout), set(without), stated or AxisDeviation(), around))
     found = [a for a in found if a.channels]
     if not found:
@@ -99,7 +99,7 @@ def studied(
     if verdict == "unknown" or (verdict == "ambiguous" and not causes):
         causes += [answer.unknown(a, whole) for a in found if a.strange or verdict == "ambiguous"]
     gap = answer.gap(found, tip)
-    with headway.part(1.0 / (1 + again), 1.0):
+    with progress.part(1.0 / (1 + again), 1.0):
         judged = _judged(around, held, set(without), stated or AxisDeviation()) if again else [found] if held else []
     every = [c for a in found for c in a.channels]
     result = DiagnosisResult(
@@ -280,9 +280,9 @@ def _judged(
     every = [
         [
             _axis(name, list(runs), {one}, without, stated, around)
-            for name, runs in headway.steps(around.axes.items(), len(around.axes))
+            for name, runs in progress.steps(around.axes.items(), len(around.axes))
         ]
-        for one in headway.steps(held, len(held))
+        for one in progress.steps(held, len(held))
     ]
     for found in every:
         for a in found:

@@ -16,7 +16,7 @@ from camcomp.diagnosis.experiment.log_checks import (
     check_lines,
     check_on_program,
     check_places,
-    check_told,
+    check_set_points,
     places,
 )
 from camcomp.diagnosis.fit.measured import Measured
@@ -28,7 +28,7 @@ from camcomp.ground.errors import ConfigError, Location, PhysicsError
 from camcomp.model.cutting.track import JOIN_ANGLE, Conditions, Track, lay_track
 from camcomp.model.effect import Cause
 from camcomp.model.motion.alignment import LOST_MM, Aligned, align, way_from_lines
-from camcomp.model.motion.driven_path import BESIDE_MM, Forces, cutting_forces, driven_path
+from camcomp.model.motion.driven_path import MAX_CUT_DISTANCE_MM, Forces, cutting_forces, driven_path
 from camcomp.model.motion.run_path import RunPath
 from camcomp.model.motion.twin import Twin
 from camcomp.model.trajectory.segments import merged
@@ -113,7 +113,7 @@ def drive(
     ])  # fmt: skip
     rotary = all(a.revolute for a in twin.robot.actuators)
     if program is not None:
-        check_told(log, name, by, rho, program.rho, twin.actuators, rotary)
+        check_set_points(log, name, by, rho, program.rho, twin.actuators, rotary)
     near = _near(log, name, measured, rho, program, twin)
     tip = twin.to_program(twin.forward(rho, twin.to_machine(near)))
     aligned = None if program is None else _aligned(log, name, program, tip, measured)
@@ -310,7 +310,7 @@ def _led_by_tip(
     whole = np.column_stack([_over_time(measured.time, np.where(known, v, np.nan)) for v in measured.tip.T])
     bend, changed = np.zeros_like(whole), np.inf
     # a deflected tip is off its program by an unknown amount at first, and its position on arcs depends on the deflection
-    for beside in (np.inf, *[BESIDE_MM] * MOST_PASSES):
+    for beside in (np.inf, *[MAX_CUT_DISTANCE_MM] * MOST_PASSES):
         aligned = _aligned(log, name, program, whole - bend, measured, ASIDE_MM if beside < np.inf else FAR_MM)
         way, on = _driven(path, aligned, program.merged, whole - bend, measured.line, np.asarray(known))
         tip = path_geometry.points(way, on.motion, on.share)
@@ -322,7 +322,7 @@ def _led_by_tip(
             time=measured.time,
             rests=program.rests,
             logged_line=logged,
-            beside_mm=beside,
+            max_distance_mm=beside,
         )
         run_path = driven_path(
             name, measured.time, twin.inverse(twin.to_machine(tip)), tip, forces, started=started,

@@ -172,7 +172,7 @@ def check_places(
             )
 
 
-def check_told(
+def check_set_points(
     name: str, run: str, what: str, told: Floats, program: Floats, actuators: Sequence[str], rotary: bool = False
 ) -> None:
     """Like `check_places` for the motion itself: set-points told (n, m) against actuators program (s, m) of the program."""

@@ -19,7 +19,7 @@ from camcomp.ground.csv_table import CsvTable, TableRules, read_csv
 from camcomp.ground.datatypes import Floats
 from camcomp.ground.errors import ConfigError
 from camcomp.ground.files import display_name, read_bytes
-from camcomp.ground.headway import steps
+from camcomp.ground.progress import steps
 from camcomp.model.config.load import load_config, load_experiment
 from camcomp.model.config.spec import Config, Experiment, RunSpec
 from camcomp.model.control import open_program

@@ -21,7 +21,7 @@ from camcomp.diagnosis.statistics.evidence import Prior
 from camcomp.ground import shelf
 from camcomp.ground.datatypes import Floats, Ints
 from camcomp.ground.errors import ConfigError
-from camcomp.ground.headway import steps
+from camcomp.ground.progress import steps
 from camcomp.model.axes import slides_of
 from camcomp.model.effect import Cause, Load, Parameter, applies
 from camcomp.model.statics.description import Link, Parallelogram, Robot

@@ -11,8 +11,8 @@ import numpy as np
 
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.next_experiment.candidates import single_changes
-from camcomp.diagnosis.next_experiment.foresee import feasible
 from camcomp.diagnosis.next_experiment.outcomes import after_unknown
+from camcomp.diagnosis.next_experiment.predicted_logs import feasible
 from camcomp.diagnosis.next_experiment.proposal import WORTH, Proposal
 from camcomp.diagnosis.next_experiment.ready_program import can_be_run
 from camcomp.diagnosis.next_experiment.site import room_of, site_of

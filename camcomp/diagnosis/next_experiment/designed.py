@@ -21,8 +21,8 @@ from camcomp.diagnosis.next_experiment.candidates import (
     neighbours,
 )
 from camcomp.diagnosis.next_experiment.design import MotionDesign
-from camcomp.diagnosis.next_experiment.foresee import Question, foresee
-from camcomp.diagnosis.next_experiment.information_gain import most_narrowed, program_weight, told
+from camcomp.diagnosis.next_experiment.information_gain import most_narrowed, predicted_gain, program_weight
+from camcomp.diagnosis.next_experiment.predicted_logs import Question, predict_logs
 from camcomp.diagnosis.next_experiment.proposal import WORTH, Proposal
 from camcomp.diagnosis.next_experiment.ready_program import can_be_run
 from camcomp.diagnosis.next_experiment.site import Room, Site, room_of, site_of
@@ -52,10 +52,10 @@ class Desk:
 
     def judged(self, each: Candidate, *, whole: bool = False) -> Proposal | None:
         """A candidate with its expected gain; None if it is infeasible or has no gain."""
-        there = foresee(self.question, each, whole=whole)
+        there = predict_logs(self.question, each, whole=whole)
         if there is None:
             return None
-        found = told(self.question, each, there, self.weight)
+        found = predicted_gain(self.question, each, there, self.weight)
         return Proposal(each, found.gain, separated(self.question.problem, self.question.rivals), told=found)
 
     def refined(self, first: Proposal) -> Proposal:

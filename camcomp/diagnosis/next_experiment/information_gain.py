@@ -26,7 +26,7 @@ from camcomp.ground.datatypes import Floats
 
 if TYPE_CHECKING:
     from camcomp.diagnosis.next_experiment.candidates import Candidate
-    from camcomp.diagnosis.next_experiment.foresee import Foreseen, Question
+    from camcomp.diagnosis.next_experiment.predicted_logs import PredictedLogs, Question
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +53,7 @@ class ExpectedGain:
         return self.separated + self.narrowed
 
 
-def told(question: Question, candidate: Candidate, there: Foreseen, weight: Floats) -> ExpectedGain:
+def predicted_gain(question: Question, candidate: Candidate, there: PredictedLogs, weight: Floats) -> ExpectedGain:
     """Expected information of a predicted candidate. weight: (k, k) of `program_weight`."""
     problem, rivals, probability = question.problem, question.rivals, question.probability
     kinds = [k for k in candidate.channels if k in there.signals]

@@ -9,9 +9,9 @@ from camcomp.diagnosis.law.words import listed
 from camcomp.diagnosis.next_experiment.proposal import Proposal
 from camcomp.report.plot import brief
 
-MOST_TOLD = 3  # rival sets with a sentence of their own
-ALIKE = 4.0  # chi-square (two standard deviations) below which rivals are indistinguishable in one log
-NOTHING = "nothing but noise"  # the name of an empty set of causes
+MAX_SENTENCES = 3  # rival sets with a sentence of their own
+MAX_INDISTINGUISHABLE_CHI2 = 4.0  # two standard deviations: rivals below it look the same in one log
+ONLY_NOISE = "nothing but noise"  # the name of an empty set of causes
 _WHAT = {
     "tip": ("the tip is", 1e3, "µm"),
     "encoder": ("the encoders are", 1e3, "µm"),
@@ -36,9 +36,9 @@ def with_outcomes(proposal: Proposal, names: Sequence[str]) -> Proposal:
         ]
     elif proposal.candidate.knows:
         [(effect, *_)] = proposal.candidate.knows
-        sentences = [_by_hand(name, effect) for name in names[:MOST_TOLD]]
+        sentences = [_by_hand(name, effect) for name in names[:MAX_SENTENCES]]
     else:
-        sentences = [_by_log(proposal, names, i) for i in range(min(len(names), MOST_TOLD))]
+        sentences = [_by_log(proposal, names, i) for i in range(min(len(names), MAX_SENTENCES))]
     if len(names) > 1:
         sentences.append(NEITHER)
     return replace(proposal, outcomes=tuple(sentences), rivals=tuple(names))
@@ -53,20 +53,20 @@ def _by_hand(name: str, effect: str) -> str:
 def _by_log(proposal: Proposal, names: Sequence[str], i: int) -> str:
     found = proposal.told
     assert found is not None
-    if names[i] == NOTHING:
+    if names[i] == ONLY_NOISE:
         return "If nothing but noise is left on it, there is no cause."
     what, scale, unit = _WHAT[found.kind]
     off = f"If it is {names[i]}, {what} off by {brief(scale * float(found.shows[i]), 2)} {unit} (rms) on it"
     others = [j for j in range(len(names)) if j != i]
-    if alike := [names[j] for j in others if found.apart[i, j] < ALIKE]:
-        return f"{off}; {listed(alike[:MOST_TOLD])} would look the same there."
+    if alike := [names[j] for j in others if found.apart[i, j] < MAX_INDISTINGUISHABLE_CHI2]:
+        return f"{off}; {listed(alike[:MAX_SENTENCES])} would look the same there."
     left, nearest = min((float(found.left[i, j]), j) for j in others)
     return f"{off}, of which {names[nearest]} cannot explain {brief(scale * left, 2)} {unit}."
 
 
 def after_unknown(varies: Sequence[str], others: Sequence[str]) -> tuple[str, ...]:
     """Outcomes for an unknown effect; varies: changed covariates, others: unchanged covariates of the residual."""
-    changed, stays = " and ".join(varies), " or ".join(others[:MOST_TOLD])
+    changed, stays = " and ".join(varies), " or ".join(others[:MAX_SENTENCES])
     return (
         f"If what is left changes, it goes with {changed}.",
         f"If it stays as it is, it does not go with {changed}" + (f" but with {stays}." if stays else "."),

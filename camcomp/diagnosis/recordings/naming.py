@@ -126,7 +126,7 @@ def _missing(there: set[str], columns: LogColumns, program: bool) -> list[str]:
     return list(TIP if there.intersection(columns.encoder) else columns.encoder)
 
 
-def leftovers(parts: Sequence[SampledColumns], picked: Picked) -> list[str]:
+def unused_column_notes(parts: Sequence[SampledColumns], picked: Picked) -> list[str]:
     """Notes on unused columns."""
     used = {(each.part, each.column) for each in (*picked.columns.values(), *picked.times.values())}
     rest = [name for i, part in enumerate(parts) for j, name in enumerate(part.names) if (i, j) not in used]
@@ -213,7 +213,7 @@ def _ends(name: str, wanted: str) -> bool:
     return len(words) > 1 and words[-1] == wanted and not _OTHER_QUANTITIES & set(words)
 
 
-def told_columns(words: Sequence[str], actuators: Sequence[str], rotary: Sequence[bool]) -> dict[str, str]:
+def match_columns(words: Sequence[str], actuators: Sequence[str], rotary: Sequence[bool]) -> dict[str, str]:
     """Parse `LOG=THEIRS` of the command line. Raises ConfigError CC421 for an unknown column of this machine's logs."""
     known = log_columns(actuators, rotary).known
     out: dict[str, str] = {}

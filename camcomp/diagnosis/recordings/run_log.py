@@ -8,7 +8,14 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from camcomp.diagnosis.recordings.joining import Joined, SampledTable, join
-from camcomp.diagnosis.recordings.naming import Pick, Picked, check_enough, leftovers, pick_columns, usual_names
+from camcomp.diagnosis.recordings.naming import (
+    Pick,
+    Picked,
+    check_enough,
+    pick_columns,
+    unused_column_notes,
+    usual_names,
+)
 from camcomp.diagnosis.recordings.sampled import SampledColumns
 from camcomp.diagnosis.recordings.units import seconds
 from camcomp.ground.bounds import LARGEST_NUMBER
@@ -62,7 +69,7 @@ def log_of(name: str, sampled: Sequence[SampledColumns], actuators: Actuators, w
     driven = wishes.program or all(log in values for log in columns.setpoint)
     time, keep = _times(joined, values, row, lead, driven, wishes.period_s, notes)
     keep = _thinned(keep, wishes.rows, notes)
-    notes += leftovers(sampled, picked)
+    notes += unused_column_notes(sampled, picked)
     table = {TIME: time[keep]}
     table |= {log: values[log][keep] for log in usual_names(list(actuators), columns) if log in values and log != TIME}
     empty = {log: int(np.isnan(each).sum()) for log, each in table.items() if np.isnan(each).any()}

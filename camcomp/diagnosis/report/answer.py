@@ -11,7 +11,7 @@ from camcomp.report.plot import brief, micrometres
 SURE = 0.95  # probability from which it is not printed
 HALF = 0.5  # of the residual: covariates with a smaller share are printed only if none has a larger one
 MOST_CAUSES = 3  # causes printed on the terminal
-BESIDE_LAW = 1  # causes printed together with a law
+MAX_CAUSES_WITH_LAW = 1  # causes printed together with a law
 MOST_LINES = 10  # lines on the terminal; outcomes beyond them are on the page only
 
 
@@ -74,7 +74,7 @@ def floor_text(gap: GapSize) -> str:
     return "not known" if gap.noise_floor_um is None else micrometres(gap.noise_floor_um)
 
 
-def told_chance(probability: float) -> str:
+def probability_text(probability: float) -> str:
     """Text of a probability below SURE, else empty."""
     return "" if probability > SURE else f", probability {100 * probability:.0f} %"
 
@@ -95,10 +95,10 @@ def law_lines(law: Law) -> list[str]:
 def answer_lines(result: DiagnosisResult) -> list[str]:
     """The result in at most ten lines: verdict, causes with sizes and remedies, next experiment."""
     lines = [f"{result.verdict}: {verdict_text(result)}"]
-    told = by_share(result)[: BESIDE_LAW if result.law else MOST_CAUSES]
+    told = by_share(result)[: MAX_CAUSES_WITH_LAW if result.law else MOST_CAUSES]
     for cause in told:
         size = f"; {found}" if (found := sizes(cause)) else ""
-        share = f"{percent(cause.share)} of the gap{told_chance(cause.probability)}"
+        share = f"{percent(cause.share)} of the gap{probability_text(cause.probability)}"
         lines.append(f"  {cause_name(cause)}: {plain(cause)}{size}; {share}")
         if result.verdict != "ambiguous" and (what := remedy(cause)):
             lines.append(f"    do: {what}")

@@ -8,7 +8,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from camcomp.diagnosis.law.words import listed
-from camcomp.diagnosis.report.answer import by_share, cause_name, floor_text, told_chance, verdict_text
+from camcomp.diagnosis.report.answer import by_share, cause_name, floor_text, probability_text, verdict_text
 from camcomp.diagnosis.report.circles import circles_section
 from camcomp.diagnosis.report.figures import (
     figure_causes,
@@ -32,11 +32,11 @@ from camcomp.report.plot import brief, micrometres
 
 MOST_RUNS = 4
 Row = list[str | tuple[float, str]]  # of a table: text, or a number to sort by and its text
-ALIKE_TEXT = (
+INDISTINGUISHABLE_TEXT = (
     "Each of these sets explains the logs as well as the others. They stay together because, in the runs that were made, "
     "they do the same to what was measured: the same columns, the same places, the same times."
 )
-NOTHING_TO_DO = "Nothing: machine and model agree as far as these runs can tell."
+NO_ACTION = "Nothing: machine and model agree as far as these runs can tell."
 WAIT = "Repair nothing yet: these runs cannot tell which of the causes it is. The next experiment below is made to decide it."
 COMPENSATE = (
     "What stays after a repair can be compensated: camcomp diagnose --write-config writes the machine file with these causes "
@@ -171,7 +171,7 @@ def _apart(result: DiagnosisResult, rivals: Sequence[RivalSignals], views: Seque
     return Section(
         name="apart",
         title="What cannot be told apart, and why",
-        text=[ALIKE_TEXT],
+        text=[INDISTINGUISHABLE_TEXT],
         figures=[figure] if figure else [],
         items=items,
     )
@@ -189,10 +189,10 @@ def _to_do(result: DiagnosisResult, next_program: Listing | None) -> Section:
     """Section with the remedy of each cause, and the next experiment."""
     rows: list[Row] = []
     for cause in by_share(result):
-        share = percent(cause.share) + told_chance(cause.probability)
+        share = percent(cause.share) + probability_text(cause.probability)
         rows.append([f"{cause_name(cause)}: {plain(cause)}", sizes(cause), share, remedy(cause)])
     tables = [Table("Causes and what helps", ("cause", "size", "share of the gap", "what to do"), rows)] if rows else []
-    text = [NOTHING_TO_DO] if result.verdict == "none" else []
+    text = [NO_ACTION] if result.verdict == "none" else []
     if result.verdict == "ambiguous":
         text.append(WAIT)
     elif result.known:

@@ -9,7 +9,7 @@ from typing import Any
 from camcomp.diagnosis.result.types import Driver, Estimate, FoundCause, LawTerm, NamedCause, StretchDriver
 from camcomp.ground import shelf
 from camcomp.ground.errors import ConfigError
-from camcomp.report.plot import digits_alike
+from camcomp.report.plot import format_together
 
 _SMALLER = {  # units of small values
     "mm": (1e3, "µm"), "rad": (1e3, "mrad"), "s": (1e3, "ms"), "mm/N": (1e3, "µm/N"), "rad/Nmm": (1e9, "µrad/Nm"),
@@ -95,7 +95,7 @@ def _told(value: float, ci95: tuple[float, float], unit: str, nominal: float | N
     if unit in _SMALLER and max(abs(low), abs(high), abs(value)) < 1.0:
         scale, unit = _SMALLER[unit]
     behind = "" if unit in ("", "1") else f" {unit}"
-    told, least, most = digits_alike(scale * value, scale * low, scale * high)
+    told, least, most = format_together(scale * value, scale * low, scale * high)
     if nominal is not None and low <= nominal <= high:
         return f"{_NOTHING}{nominal:g} ({least} to {most}{behind})"
     return f" {told}{behind} ({least} to {most})"

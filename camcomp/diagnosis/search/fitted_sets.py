@@ -24,7 +24,7 @@ from camcomp.diagnosis.statistics.cause_sets import (
 from camcomp.diagnosis.statistics.evidence import estimate
 from camcomp.diagnosis.statistics.stepwise import stepwise
 from camcomp.diagnosis.statistics.verdict import EQUAL_LOG_ODDS
-from camcomp.ground import headway
+from camcomp.ground import progress
 
 if TYPE_CHECKING:
     from camcomp.diagnosis.search.sound import Sound
@@ -59,7 +59,7 @@ class FittedSets:
                 index = self.problem.member_columns(members)
                 theta = estimate(total(near.grams), self.problem.prior, index)[0][index]
             self.done[members] = self.problem.refit(members, theta)
-            headway.done(len(self.done) / (SINGLES + PAIRS + TRIPLES))
+            progress.done(len(self.done) / (SINGLES + PAIRS + TRIPLES))
         return self.done[members]
 
     def value(self, f: Fitted) -> float:

@@ -25,8 +25,8 @@ LEVEL_MM = 1e-3  # of height: moves within it stay at one depth
 MOST_LINES = 10  # named in a warning
 MOST_SAMPLES = 20_000  # of a path in the step-over test
 SAMPLE_DIAMETERS = 0.5  # distance of samples along the path, in tool diameters
-BESIDE_DIAMETERS = (0.05, 0.9)  # distance of a neighbouring pass, in tool diameters: retraced paths are no step-over
-MIN_BESIDE_SHARE = 0.1  # of the samples, from which a warning is given
+STEP_OVER_DIAMETERS = (0.05, 0.9)  # distance of a neighbouring pass, in tool diameters: retraced paths are no step-over
+MIN_STEP_OVER_SHARE = 0.1  # of the samples, from which a warning is given
 
 
 @dataclass(frozen=True)
@@ -146,14 +146,14 @@ def _beside_share(path: Path, on: Ints, cutters: Sequence[Cutter]) -> float:
         return 0.0
     from scipy.spatial import cKDTree  # not needed by most runs, and slow to import
 
-    near, far = (share * diameter for share in BESIDE_DIAMETERS)
+    near, far = (share * diameter for share in STEP_OVER_DIAMETERS)
     scaled = point * [1.0, 1.0, 20.0]  # passes of other heights are no neighbours
     pairs = cKDTree(scaled).query_pairs(far, output_type="ndarray")
     apart = np.linalg.norm(scaled[pairs[:, 0]] - scaled[pairs[:, 1]], axis=1)
     way = np.abs(along[pairs[:, 0]] - along[pairs[:, 1]])
     beside = np.unique(pairs[(apart > near) & (way > 3.0 * diameter)].max(axis=1)) if len(pairs) else np.zeros(0)
     share = len(beside) / len(point)
-    return share if share > MIN_BESIDE_SHARE else 0.0
+    return share if share > MIN_STEP_OVER_SHARE else 0.0
 
 
 def _samples(path: Path, on: Ints, step: float) -> tuple[Floats, Floats]:

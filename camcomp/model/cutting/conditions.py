@@ -8,7 +8,7 @@ import numpy as np
 from camcomp.ground.datatypes import Bools, Floats
 from camcomp.ground.errors import ConfigError
 from camcomp.model.cutting.cut import Cut
-from camcomp.model.cutting.engaged import Bites
+from camcomp.model.cutting.engaged import EngagementArcs
 from camcomp.model.cutting.engagement import Milling, immersion
 from camcomp.model.cutting.frame import lateral
 
@@ -72,14 +72,16 @@ def engagement(cut: Cut, milling: Milling | None) -> tuple[Floats, Floats]:
     return immersion(cut.width, d, milling or "up")
 
 
-def bites_of(cut: Cut, milling: Milling | None, clockwise: Bools) -> Bites:
+def engagement_arcs(cut: Cut, milling: Milling | None, clockwise: Bools) -> EngagementArcs:
     """Engagement arcs in the direction of rotation: of the stock, or one per point from width and depth.
 
     Raises the errors of `axial_depth` and `engagement` if the stock is unknown.
     """
-    if cut.bites is not None:
-        start, stop = cut.bites.turned(clockwise)
-        return replace(cut.bites, start=start, stop=stop)
+    if cut.arcs is not None:
+        start, stop = cut.arcs.turned(clockwise)
+        return replace(cut.arcs, start=start, stop=stop)
     start, stop = engagement(cut, milling)
     n = len(cut)
-    return Bites(place=np.arange(n), start=start, stop=stop, height=axial_depth(cut), rise=np.ones(n), run=np.zeros(n))
+    return EngagementArcs(
+        place=np.arange(n), start=start, stop=stop, height=axial_depth(cut), rise=np.ones(n), run=np.zeros(n)
+    )

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from camcomp.ground.datatypes import Bools, Floats, Ints, frozen
-from camcomp.model.cutting.engaged import Bites
+from camcomp.model.cutting.engaged import EngagementArcs
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +32,7 @@ class Cut:
     # (n,) direction of the spindle by the program, +1 clockwise, -1, 0 stopped, NaN not stated; empty: all NaN
     turn: Floats = field(default_factory=lambda: np.zeros(0))
     # Engagement arcs if the stock is known; depth and width are then the highest material and its extent
-    bites: Bites | None = None
+    arcs: EngagementArcs | None = None
 
     def __post_init__(self) -> None:
         n = np.shape(self.line)[0]

@@ -11,7 +11,7 @@ from camcomp.ground.datatypes import Bools, Floats, Ints, Path
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Bites:
+class EngagementArcs:
     """Engagement arcs (b,) of a tool's turn, several per place if the material has several heights.
 
     Angles count as in engagement.py for a clockwise spindle. rise, run: of the tool's surface per length of its edge;
@@ -25,13 +25,13 @@ class Bites:
     rise: Floats
     run: Floats
 
-    def of(self, rows: Ints) -> Bites:
+    def of(self, rows: Ints) -> EngagementArcs:
         """The arcs of some places (r,), renumbered from 0."""
         if len(rows) and rows[-1] - rows[0] + 1 == len(rows) and bool((np.diff(rows) == 1).all()):
             a, b = np.searchsorted(self.place, (rows[0], rows[-1] + 1)).tolist()
             own = slice(a, b)
             fresh = self.place[own] - rows[0]
-            return Bites(
+            return EngagementArcs(
                 place=fresh,
                 start=self.start[own],
                 stop=self.stop[own],
@@ -43,7 +43,7 @@ class Bites:
         count = np.searchsorted(self.place, rows, "right") - first
         at = np.repeat(first - np.concatenate(([0], np.cumsum(count)[:-1])), count) + np.arange(count.sum())
         fresh = np.repeat(np.arange(len(rows)), count)
-        return Bites(
+        return EngagementArcs(
             place=fresh,
             start=self.start[at],
             stop=self.stop[at],
@@ -111,19 +111,19 @@ class Engaged(EngagedAt):
     """Places with the engagement arcs that determine the force."""
 
     bends: Bools  # (k,) the place determines the force; others only depth and sum of the arcs
-    bites: Bites
+    arcs: EngagementArcs
 
     @classmethod
     def joined(cls, parts: list[Engaged]) -> Engaged:
         """Concatenation of consecutive parts."""
         first = np.cumsum([0] + [len(each.u) for each in parts])
-        bites = Bites(
-            place=np.concatenate([each.bites.place + n for each, n in zip(parts, first, strict=False)]),
-            start=np.concatenate([each.bites.start for each in parts]),
-            stop=np.concatenate([each.bites.stop for each in parts]),
-            height=np.concatenate([each.bites.height for each in parts]),
-            rise=np.concatenate([each.bites.rise for each in parts]),
-            run=np.concatenate([each.bites.run for each in parts]),
+        arcs = EngagementArcs(
+            place=np.concatenate([each.arcs.place + n for each, n in zip(parts, first, strict=False)]),
+            start=np.concatenate([each.arcs.start for each in parts]),
+            stop=np.concatenate([each.arcs.stop for each in parts]),
+            height=np.concatenate([each.arcs.height for each in parts]),
+            rise=np.concatenate([each.arcs.rise for each in parts]),
+            run=np.concatenate([each.arcs.run for each in parts]),
         )
         return cls(
             motion=np.concatenate([each.motion for each in parts]),
@@ -131,7 +131,7 @@ class Engaged(EngagedAt):
             depth=np.concatenate([each.depth for each in parts]),
             turn=np.concatenate([each.turn for each in parts]),
             bends=np.concatenate([each.bends for each in parts]),
-            bites=bites,
+            arcs=arcs,
         )
 
     def take(self, rows: Ints) -> Engaged:
@@ -142,7 +142,7 @@ class Engaged(EngagedAt):
             depth=self.depth[rows],
             turn=self.turn[rows],
             bends=self.bends[rows],
-            bites=self.bites.of(rows),
+            arcs=self.arcs.of(rows),
         )
 
     def of_motions(self, first: int, last: int, number: int = 0) -> Engaged:

@@ -19,10 +19,10 @@ import numpy as np
 from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import ARC, RAPID, Bools, Floats, Ints, Path
 from camcomp.model.cutting.cut import Cut
-from camcomp.model.cutting.engaged import Bites, Engage, Engaged
+from camcomp.model.cutting.engaged import Engage, Engaged, EngagementArcs
 from camcomp.model.cutting.frame import lateral, to_vector
-from camcomp.model.cutting.grip import Grip, needed
 from camcomp.model.cutting.path_pieces import divide_motions, whole_motions
+from camcomp.model.cutting.piece_load import PieceLoad, needed
 from camcomp.model.cutting.upright import Verticals
 
 JOIN_ANGLE = np.radians(5.0)
@@ -84,7 +84,7 @@ class Track:
     corner: Bools  # the tip cannot pass the start of the piece without a stop
     beside0: Floats  # fraction of the motion after the start of the piece at which its direction is taken
     beside1: Floats  # fraction of the motion before its end at which its direction is taken
-    grip: Grip | None = None  # if the stock is known
+    load: PieceLoad | None = None  # if the stock is known
     engaged: Engaged | None = None  # if the stock is known
 
     @property
@@ -124,7 +124,7 @@ class Track:
             fade0=a + begin[:, None] * (b - a), fade1=a + end[:, None] * (b - a), jump=self.jump[of] & ~inner,
             corner=self.corner[of] & ~inner, beside0=np.where(inner, 0.0, self.beside0[of]),
             beside1=np.where(end < 1.0, 0.0, self.beside1[of]),
-            grip=None if self.grip is None else self.grip.cut(of, begin, end),
+            load=None if self.load is None else self.load.cut(of, begin, end),
         )  # fmt: skip
 
     def force(self, piece: Ints, w: Floats, feed: Floats | None = None) -> Floats:
@@ -141,7 +141,7 @@ class Track:
 
     def force_along(self, piece: Ints, w: Floats, direction: Floats, feed: Floats | None = None) -> Floats:
         """Cutting force on the tool (k, 3) N, program frame, for a tip driven along unit vectors direction (k, 3)."""
-        if self.grip is not None and feed is not None and not self.conditions.plunges:
+        if self.load is not None and feed is not None and not self.conditions.plunges:
             return self._driven(piece, w, direction, feed)
         turn = self.path.orientation
         turned = None if turn is None else turn.rotations(self.motion[piece], self.u(piece, w))
@@ -152,7 +152,7 @@ class Track:
             motion=self.motion,
             s0=self.s0,
             length=self.length,
-            grip=self.grip,
+            load=self.load,
             piece=piece,
             w=w,
             direction=direction,
@@ -161,7 +161,7 @@ class Track:
             turned=turned,
         )
 
-    def force_meeting(self, piece: Ints, w: Floats, direction: Floats, depth: Floats, bites: Bites) -> Floats:
+    def force_meeting(self, piece: Ints, w: Floats, direction: Floats, depth: Floats, arcs: EngagementArcs) -> Floats:
         """Cutting force (k, 3) N, program frame, of a tool with these engagement arcs (k places) that moves along `direction`."""
         c, rows = self.conditions, self.motion[piece]
         s = self.s0[piece] + w * self.length[piece]
@@ -171,10 +171,10 @@ class Track:
             motion=rows,
             direction=direction,
             depth=depth,
-            width=bites.reach(len(rows)),
+            width=arcs.reach(len(rows)),
             s=s,
             ends=w == 1.0,
-            bites=bites,
+            arcs=arcs,
         )
         return to_vector(found, direction, c.tool_axis)
 
@@ -187,8 +187,8 @@ class Track:
         left, right, share = self.engaged.between(motion, u, w[on] == 0.0)
         s = self.s0[piece[on]] + w[on] * self.length[piece[on]]
         for rows, part in ((left, 1.0 - share), (right, share)):
-            bites = self.engaged.bites.of(rows)
-            reach, depth = bites.reach(len(rows)), self.engaged.depth[rows]
+            arcs = self.engaged.arcs.of(rows)
+            reach, depth = arcs.reach(len(rows)), self.engaged.depth[rows]
             found = _components(
                 path=self.path,
                 c=self.conditions,
@@ -198,7 +198,7 @@ class Track:
                 width=reach,
                 s=s,
                 ends=w[on] == 1.0,
-                bites=bites,
+                arcs=arcs,
                 driven=feed[on],
             )
             out[on] += part[:, None] * to_vector(found, direction[on], self.conditions.tool_axis)
@@ -213,7 +213,7 @@ def _force(
     s0: Floats,
     *,
     length: Floats,
-    grip: Grip | None,
+    load: PieceLoad | None,
     piece: Ints,
     w: Floats,
     direction: Floats,
@@ -234,7 +234,7 @@ def _force(
             motion=motion,
             s0=s0,
             length=length,
-            grip=grip,
+            load=load,
             piece=piece,
             w=w,
             direction=seen,
@@ -247,8 +247,8 @@ def _force(
     on = cutting[piece] & (np.linalg.norm(direction, axis=1) > 0.0)
     if c.model is None or not on.any():
         return out
-    if grip is not None and not c.plunges:
-        out[on] = to_vector(grip.base(piece[on], w[on]), direction[on], c.tool_axis)
+    if load is not None and not c.plunges:
+        out[on] = to_vector(load.base(piece[on], w[on]), direction[on], c.tool_axis)
         return out
     rows = motion[piece[on]]
     fill = np.full(len(rows), np.nan)
@@ -267,7 +267,7 @@ def _force(
         width=width,
         s=s,
         ends=w[on] == 1.0,
-        bites=None,
+        arcs=None,
         driven=feed,
     )
     out[on] = to_vector(found, direction[on], c.tool_axis)
@@ -276,9 +276,9 @@ def _force(
 
 def _components(
     path: Path, c: Conditions, motion: Ints, direction: Floats, depth: Floats, *, width: Floats, s: Floats, ends: Bools,
-    bites: Bites | None = None, driven: Floats | None = None,
+    arcs: EngagementArcs | None = None, driven: Floats | None = None,
 ) -> Floats:  # fmt: skip
-    """Fr, Ft, Fz (k, 3) N of the model, evaluated tool by tool. width (k,) mm, with bites: radii of the tool."""
+    """Fr, Ft, Fz (k, 3) N of the model, evaluated tool by tool. width (k,) mm, with arcs: radii of the tool."""
     if c.model is None:
         return np.zeros((len(motion), 3))
     feed, speed = path.feed[motion] if driven is None else driven, path.speed[motion]
@@ -296,7 +296,7 @@ def _components(
                 feed=feed[at],
                 speed=speed[at],
                 depth=depth[at],
-                width=width[at] * (1.0 if bites is None else 0.5 * (edges.diameter_mm or np.nan)),
+                width=width[at] * (1.0 if arcs is None else 0.5 * (edges.diameter_mm or np.nan)),
                 arc_length=s[at],
                 line=path.line[motion[at]],
                 diameter_mm=edges.diameter_mm,
@@ -304,7 +304,7 @@ def _components(
                 to_machine=np.eye(3) if c.to_machine is None else c.to_machine,
                 ends=ends[at],
                 turn=path.turn[motion[at]],
-                bites=None if bites is None else bites.of(at),
+                arcs=None if arcs is None else arcs.of(at),
             )
         )
     return out
@@ -322,10 +322,10 @@ def base_of(path: Path, c: Conditions, engaged: Engaged, length: Floats, *, exte
     rows = np.flatnonzero(near)
     base = np.zeros((len(engaged.u), 3))
     if len(rows) and not c.plunges:
-        where, u, bites = engaged.motion[rows], engaged.u[rows], engaged.bites.of(rows)
+        where, u, arcs = engaged.motion[rows], engaged.u[rows], engaged.arcs.of(rows)
         direction = path_geometry.tangents(path, where, u)
         s = np.concatenate(([0.0], np.cumsum(length)))[where] + u * length[where]
-        reach = bites.reach(len(rows)) if extent else np.full(len(rows), np.nan)
+        reach = arcs.reach(len(rows)) if extent else np.full(len(rows), np.nan)
         base[rows] = _components(
             path=path,
             c=c,
@@ -335,7 +335,7 @@ def base_of(path: Path, c: Conditions, engaged: Engaged, length: Floats, *, exte
             width=reach,
             s=s,
             ends=u == 1.0,
-            bites=bites,
+            arcs=arcs,
         )
     return base
 
@@ -362,24 +362,24 @@ def lay_track(path: Path, conditions: Conditions, engaged: Engaged | None = None
     beside0, beside1 = upright.beside(path, axis, motion, u0, u1)
     middle, feeding = 0.5 * (u0 + u1), (path.kind[motion] != RAPID) & path.known[motion] & ~path.machine[motion]
     first = path_geometry.tangents(path, motion, u0 + beside0)
-    arcs = bool((path.kind == ARC).any())  # lines have one direction from end to end
-    last = path_geometry.tangents(path, motion, u1 - beside1) if arcs else first
+    curved = bool((path.kind == ARC).any())  # lines have one direction from end to end
+    last = path_geometry.tangents(path, motion, u1 - beside1) if curved else first
     sine = _sine(path, motion, u0, first, axis)
-    if arcs:
+    if curved:
         sine = np.maximum(sine, _sine(path, motion, middle, path_geometry.tangents(path, motion, middle), axis))
     piece_length = length[motion] * (u1 - u0)
     cutting = feeding & (piece_length > 0.0) & ((sine > PLUNGE_SINE) | conditions.plunges)
-    grip = None
+    load = None
     if places is not None:
-        grip = Grip.of(places, base, motion, u0, u1)
-        cutting &= grip.on | (sine <= PLUNGE_SINE)
+        load = PieceLoad.of(places, base, motion, u0, u1)
+        cutting &= load.on | (sine <= PLUNGE_SINE)
     elif conditions.stock_top_mm is not None:
         cutting &= path_geometry.points(path, motion, middle)[:, 2] < conditions.stock_top_mm
     track = Track(
         path=path, conditions=conditions, motion=motion, u0=u0, u1=u1, cutting=cutting, length=piece_length,
         s0=np.concatenate(([0.0], np.cumsum(length)))[motion] + length[motion] * u0,
         fade0=np.zeros((len(motion), 3)), fade1=np.zeros((len(motion), 3)), jump=np.zeros(len(motion), np.bool_),
-        corner=np.ones(len(motion), np.bool_), beside0=beside0, beside1=beside1, grip=grip, engaged=engaged,
+        corner=np.ones(len(motion), np.bool_), beside0=beside0, beside1=beside1, load=load, engaged=engaged,
     )  # fmt: skip
     return _cut_at_swings(_with_corners(track, first, last, over), upright)
 
@@ -397,7 +397,7 @@ def _end_force(track: Track, piece: Ints, w: Floats, direction: Floats) -> Float
     u = np.where(w == 0.0, track.u0[piece], track.u1[piece])
     return _force(
         path=path, c=track.conditions, cutting=track.cutting, motion=track.motion, s0=track.s0, length=track.length,
-        grip=track.grip, piece=piece, w=w, direction=direction, tip=path_geometry.points(path, motion, u),
+        load=track.load, piece=piece, w=w, direction=direction, tip=path_geometry.points(path, motion, u),
         turned=None if path.orientation is None else path.orientation.rotations(motion, u),
     )  # fmt: skip
 

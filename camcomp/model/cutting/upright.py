@@ -13,7 +13,7 @@ import numpy as np
 
 from camcomp.ground.datatypes import ARC, Floats, Ints, Path
 
-BESIDE = 2e-4  # rad from a sharp reversal at which the directions on its sides are taken
+REVERSAL_OFFSET_RAD = 2e-4  # rad from a sharp reversal at which the directions on its sides are taken
 AT_END = 1e-5  # rad from the ends of an arc at which its directions there are taken; undefined at the vertical itself
 NEAR_END = 1e-3  # rad: a reversal so near to an end of an arc, whose end points are rounded, is at that end
 SHARP = 3e-4  # sine of the angle to the tool axis below which the direction reverses at once
@@ -69,7 +69,7 @@ class Verticals:
     @property
     def sides(self) -> Floats:
         """Angles (k,) rad from the reversals at which the directions on their sides are taken."""
-        return np.maximum(BESIDE, SIDES * self.sine)
+        return np.maximum(REVERSAL_OFFSET_RAD, SIDES * self.sine)
 
     def overturns(self, path: Path) -> list[tuple[int, float]]:
         """Motions and fractions, away from their ends, at which the direction reverses at once."""
@@ -80,7 +80,7 @@ class Verticals:
     def swings(self, path: Path) -> tuple[Ints, Floats]:
         """Motions and fractions at which arcs are divided around gradual reversals of their direction."""
         slow = np.flatnonzero(self.sine > LEVEL)
-        powers = SPREAD ** np.arange(np.ceil(np.log(WIDE / BESIDE) / np.log(SPREAD)))
+        powers = SPREAD ** np.arange(np.ceil(np.log(WIDE / REVERSAL_OFFSET_RAD) / np.log(SPREAD)))
         width = np.where(self.sine < SHARP, self.sides, self.sine)[slow, None] * powers
         off = np.concatenate((-width[:, ::-1], width), axis=1) / np.abs(path.angle[self.motion[slow]])[:, None]
         wanted = np.concatenate((width[:, ::-1], width), axis=1) <= WIDE

@@ -18,7 +18,7 @@ from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import Bools, Floats, Ints
 from camcomp.model.cutting.track import Track
 from camcomp.model.motion.alignment import Aligned
-from camcomp.model.motion.driven_pieces import DrivenPieces, beside_most, node_loads
+from camcomp.model.motion.driven_pieces import DrivenPieces, near_largest_change, node_loads
 from camcomp.model.motion.run_path import MOST_STEPS, STEP_S, Driven, RunPath, moving
 from camcomp.model.seams import Seams, missing_rows
 
@@ -27,7 +27,7 @@ _JUMP_SHARE = 0.1  # of the largest force: a change from row to row above it is 
 _USUAL = 4.0  # times the median change from row to row
 _AGREE = np.cos(np.radians(2.0))  # cosine of the angle by which digits of set-points turn the driven direction
 _STILL_MM_PER_S = 0.05
-BESIDE_MM = 0.6  # distance from the path beyond which a row does not cut: blended corners deviate less
+MAX_CUT_DISTANCE_MM = 0.6  # distance from the path beyond which a row does not cut: blended corners deviate less
 _SURE_N = 20.0  # largest error of a force that determines the nodes between rows
 _REST_S = 0.1  # time in which a tip at standstill moves by less than _CHORD_MM
 _CREEPS = 0.05  # of the cutting speed: a slower mean speed over missing rows means a standstill
@@ -89,7 +89,7 @@ def driven_path(
     jump = _jumps(row_force, forces.cutting)
     sure = np.linalg.norm(forces.doubt, axis=1) <= _SURE_N
     pieces = DrivenPieces.along(time, grid, grid_tip, jump)
-    pieces = pieces.around(time, beside_most(time, row_force, sure, jump, pieces))
+    pieces = pieces.around(time, near_largest_change(time, row_force, sure, jump, pieces))
     node_time = pieces.node_times()
     # the tip is interpolated, and the drives follow from it: an arm keeps its tool upright between rows
     node_tip = lead_tip(node_time)
@@ -136,11 +136,11 @@ def cutting_forces(
     rests: Bools,
     *,
     logged_line: bool,
-    beside_mm: float = BESIDE_MM,
+    max_distance_mm: float = MAX_CUT_DISTANCE_MM,
 ) -> Forces:
     """Modelled cutting force along the driven path of the tip (n, 3) mm, program frame, at times (n,) s.
 
-    rests (m,): motions of the path with a stop at their end. beside_mm: distance from the path beyond which rows without line
+    rests (m,): motions of the path with a stop at their end. max_distance_mm: distance from the path beyond which rows without line
     numbers do not cut.
     """
     motion, share, on = _executed(track, aligned, tip, time, logged_line)
@@ -148,7 +148,7 @@ def cutting_forces(
     w = np.clip((share - track.u0[piece]) / np.maximum(track.u1[piece] - track.u0[piece], 1e-12), 0.0, 1.0)
     on &= track.cutting[piece]
     if not logged_line:
-        on &= aligned.distance < beside_mm
+        on &= aligned.distance < max_distance_mm
     if not on.any() or track.conditions.model is None:
         return Forces.none(len(tip))
     tip = _held_at_rest(tip, time)

@@ -124,7 +124,7 @@ def node_loads(time: Floats, force: Floats, sure: Bools, jump: Ints, at: Floats,
     return out
 
 
-def beside_most(time: Floats, force: Floats, sure: Bools, jump: Ints, pieces: DrivenPieces) -> Bools:
+def near_largest_change(time: Floats, force: Floats, sure: Bools, jump: Ints, pieces: DrivenPieces) -> Bools:
     """Mask (n,) of sure rows with a force far from the polynomial of their piece, as in a blended corner."""
     loads = node_loads(time=time, force=force, sure=sure, jump=jump, at=pieces.node_times(), pieces=pieces)
     off = np.linalg.norm(force - pieces.at(time).of(loads), axis=1)

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from camcomp.ground import headway
+from camcomp.ground import progress
 from camcomp.ground.csv_table import refuse_long
 from camcomp.ground.datatypes import Floats, Ints, Path
 from camcomp.ground.errors import ProgramError
@@ -18,7 +18,7 @@ from camcomp.model.motion.run_path import path_of_program
 from camcomp.model.motion.timeline import schedule
 from camcomp.model.motion.twin import Reading, twin_of
 
-TOLD_ROWS = 1000  # rows between two progress messages
+PROGRESS_ROWS = 1000  # rows between two progress messages
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -58,15 +58,15 @@ def simulate(
     conditions = job.conditions if cutting else replace(job.conditions, model=None)
     warm = job.config.process.temperature_C
     track = lay_track(path, conditions, engaged if cutting else None)
-    headway.done(0.1)
+    progress.done(0.1)
     run_path = path_of_program(
         "simulation", timeline, track, time, started=started_s, to_machine=twin.to_machine,
         vectors=job.frame.vectors, inverse=twin.inverse, temperature=None if warm is None else np.full(len(time), warm),
     )  # fmt: skip
-    with headway.part(0.3, 0.7, points=True):
+    with progress.part(0.3, 0.7, points=True):
         _, solved = twin.sense(run_path)
     slopes = twin.slopes(run_path, (), solved)
-    with headway.part(0.8, 1.0):
+    with progress.part(0.8, 1.0):
         reading, _ = twin.sense(run_path, solved=solved, slopes=slopes)
     motion, _ = timeline.locate(time)
     line = path.line[timeline.index[motion]]
@@ -92,8 +92,8 @@ def log_table(run: Simulated) -> str:
     table = np.concatenate([r.tip, run.setpoint, r.encoder, r.drive, r.dyno], axis=1)
     rows = [",".join(log_columns(run.actuators, run.rotary).simulated)]
     for k, (t, line, values) in enumerate(zip(run.time, run.line, table, strict=True)):
-        if k % TOLD_ROWS == 0:
-            headway.done(k / len(table))
+        if k % PROGRESS_ROWS == 0:
+            progress.done(k / len(table))
         cells = ",".join(f"{value:.6f}".replace("-0.000000", "0.000000") for value in values)
         rows.append(f"{t:.6f},{int(line)},{cells}")
     return "\n".join(rows) + "\n"

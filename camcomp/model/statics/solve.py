@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from camcomp.ground.headway import points
+from camcomp.ground.progress import points
 from camcomp.model.statics import point, rigid, sweep
 from camcomp.model.statics.layout import SPRINGS, new_memory, new_work
 from camcomp.model.statics.machine import Machine

@@ -10,8 +10,7 @@ the linear interpolation is below BENT).
 import math
 
 from camcomp.ground.compiled import inner
-from camcomp.model.stock.foreseen import alike, as_foreseen, mix
-from camcomp.model.stock.front import BITE, WHAT
+from camcomp.model.stock.front import ARC_COLUMNS, WHAT
 from camcomp.model.stock.places import (
     BENT,
     CALM,
@@ -35,18 +34,19 @@ from camcomp.model.stock.places import (
     put_place,
     stand,
 )
+from camcomp.model.stock.predicted import has_same_arcs, is_as_predicted, mix
 
 
 @inner
 def blend(found, a, b, w, out):
     """Interpolate the engagement linearly at share w between slots a and b into slot `out`."""
-    first, rows = found.told_of[ROWS], found.bites
+    first, rows = found.told_of[ROWS], found.arc_rows
     for i in range(WHAT):
         found.stack[out, i] = found.stack[a, i] + w * (found.stack[b, i] - found.stack[a, i])
     if apart(found, a, b) <= BENT * found.way[SCALE]:
         found.stack_rows[out, 0], found.stack_rows[out, 1] = found.stack_rows[a, 0], found.stack_rows[a, 1]
         return
-    if alike(found, a, b):
+    if has_same_arcs(found, a, b):
         found.stack_rows[out, 0], found.stack_rows[out, 1] = mix(found, a, b, w), found.stack_rows[a, 1]
         found.told_of[ROWS] = first + found.stack_rows[a, 1]
         return
@@ -55,7 +55,7 @@ def blend(found, a, b, w, out):
         slot = b if side else a
         share = w if side else 1.0 - w
         for r in range(found.stack_rows[slot, 0], found.stack_rows[slot, 0] + found.stack_rows[slot, 1]):
-            for i in range(BITE):
+            for i in range(ARC_COLUMNS):
                 rows[n, i] = rows[r, i]
             rows[n, 2] *= share  # the force goes with the height
             n += 1
@@ -80,7 +80,7 @@ def put_straight(found, k, a, b, slot_a, slot_b):
 
 
 @inner
-def foreseen_between(nodes, place, found, legs, k, a, b, slot_a, slot_b, radius, before):
+def is_predicted_between(nodes, place, found, legs, k, a, b, slot_a, slot_b, radius, before):
     """Whether interpolation predicts the engagement at the ends of short legs k + a to k + b - 2."""
     ends = found.chain_way
     gap = ends[b] - ends[a]
@@ -91,7 +91,7 @@ def foreseen_between(nodes, place, found, legs, k, a, b, slot_a, slot_b, radius,
             continue
         last = j
         stand(nodes, place, legs, k + j - 1, 1.0, before + j)
-        if not as_foreseen(nodes, place, found, slot_a, slot_b, (ends[j] - ends[a]) / gap, BENT * found.way[SCALE]):
+        if not is_as_predicted(nodes, place, found, slot_a, slot_b, (ends[j] - ends[a]) / gap, BENT * found.way[SCALE]):
             return False
     return True
 
@@ -115,7 +115,7 @@ def along_chain(nodes, place, found, legs, k, count, radius, before, joined_on):
             between(nodes, place, found, legs, k + a, gap, radius, before + a)
         elif gap > SHORT * radius or apart(found, FIRST, slot) > CALM * scale or begins(found, FIRST, slot):
             m = (a + b) // 2
-            if foreseen_between(nodes, place, found, legs, k, a, b, FIRST, slot, radius, before):
+            if is_predicted_between(nodes, place, found, legs, k, a, b, FIRST, slot, radius, before):
                 put_straight(found, k, a, b, FIRST, slot)
                 copy_slot(found, slot, FIRST)
                 number[0] = b

@@ -6,7 +6,7 @@
 import math
 
 from camcomp.ground.compiled import inner
-from camcomp.model.stock.front import DEPTH, EDGE, END_ANGLE, TURNS, add_bite, angles_of, stands
+from camcomp.model.stock.front import DEPTH, EDGE, END_ANGLE, TURNS, add_arc, angles_of, stands
 
 ASIDE = 0.02  # share of the step between two angles: distance from an edge
 
@@ -25,7 +25,7 @@ def edge_between(nodes, place, radius, z, a, b, level):
 
 
 @inner
-def step_beside(nodes, place, radius, z, edge, psi, here):
+def step_next_to(nodes, place, radius, z, edge, psi, here):
     """Angle between an edge and psi at which the height of the material steps to `here` (mm), and its height before."""
     first = edge + ASIDE * (psi - edge)
     high = stands(nodes, place, radius, z, first)
@@ -35,8 +35,8 @@ def step_beside(nodes, place, radius, z, edge, psi, here):
 
 
 @inner
-def look_round(nodes, place, bites, n, radius, z):
-    """Append the engagement arcs of a cylinder to `bites` from row n on, and return the new number of rows."""
+def look_round(nodes, place, arc_rows, n, radius, z):
+    """Append the engagement arcs of a cylinder to `arc_rows` from row n on, and return the new number of rows."""
     count = angles_of(nodes, radius)
     begin, end = END_ANGLE, math.pi - END_ANGLE
     start, top, sum_, members = -1.0, 0.0, 0.0, 0
@@ -59,18 +59,18 @@ def look_round(nodes, place, bites, n, radius, z):
             if before > 0.0:
                 step, high = at, 0.0
                 if not both:
-                    step, high = step_beside(nodes, place, radius, z, at, last, before)
-                n = add_bite(bites, n, start, step, sum_ / members, 1.0, 0.0, 0.0)
-                n = add_bite(bites, n, step, at, high, 1.0, 0.0, 0.0)
+                    step, high = step_next_to(nodes, place, radius, z, at, last, before)
+                n = add_arc(arc_rows, n, start, step, sum_ / members, 1.0, 0.0, 0.0)
+                n = add_arc(arc_rows, n, step, at, high, 1.0, 0.0, 0.0)
                 top = max(top, high)
             start, sum_, members = at, now, 1
             if now > 0.0 and not both:
-                start, high = step_beside(nodes, place, radius, z, at, psi, now)
-                n = add_bite(bites, n, at, start, high, 1.0, 0.0, 0.0)
+                start, high = step_next_to(nodes, place, radius, z, at, psi, now)
+                n = add_arc(arc_rows, n, at, start, high, 1.0, 0.0, 0.0)
                 top = max(top, high)
         top = max(top, now)
         before, last = now, psi
     if before > 0.0:
-        n = add_bite(bites, n, start, math.pi, sum_ / members, 1.0, 0.0, 0.0)
+        n = add_arc(arc_rows, n, start, math.pi, sum_ / members, 1.0, 0.0, 0.0)
     place.told[DEPTH] = max(place.told[DEPTH], top)
     return n

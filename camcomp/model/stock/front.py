@@ -24,7 +24,7 @@ NEAR = 1e-4  # mm, accuracy of the lowest and the highest cut of a ball, bull or
 END_ANGLE = 1e-3  # rad from the sides of the front half; within it, a wall just cut lies against the tool
 # Columns of an arc: entry, exit (rad), height (mm), rise and run of the tool's surface per length of its edge, height
 # over the tip (AT, mm).
-BITE, AT = 6, 5
+ARC_COLUMNS, AT = 6, 5
 # Columns of the sums of a place, and their number; columns 0 to 4 are integrals over the arcs.
 DEPTH, ENGAGED, WHAT = 5, 6, 8
 
@@ -63,11 +63,18 @@ def angles_of(nodes, radius):
 
 
 @inner
-def add_bite(bites, n, start, stop, tall, rise, run, at):
+def add_arc(arc_rows, n, start, stop, tall, rise, run, at):
     """Append an arc, and return the new number of arcs."""
-    if stop <= start or n >= bites.shape[0]:
+    if stop <= start or n >= arc_rows.shape[0]:
         return n
-    bites[n, 0], bites[n, 1], bites[n, 2], bites[n, 3], bites[n, 4], bites[n, AT] = start, stop, tall, rise, run, at
+    arc_rows[n, 0], arc_rows[n, 1], arc_rows[n, 2], arc_rows[n, 3], arc_rows[n, 4], arc_rows[n, AT] = (
+        start,
+        stop,
+        tall,
+        rise,
+        run,
+        at,
+    )
     return n + 1
 
 

@@ -14,14 +14,14 @@ from camcomp.model.stock.sweeps import FLAT, KIND, RADIUS
 
 
 @inner
-def sum_up(place, bites, first, n):
+def sum_up(place, arc_rows, first, n):
     """Sum integrals over the arcs from row `first` on, and the angle (rad) of their union, for the place.
 
     Columns 0 to 4: integrals of h, h sin, h cos, h cos 2psi, h sin 2psi over psi, h: height of the tool that cuts, mm.
     """
     told, arcs, k = place.told, place.arcs, 0
     for r in range(first, n):
-        start, stop, tall = bites[r, 0], bites[r, 1], bites[r, 2]
+        start, stop, tall = arc_rows[r, 0], arc_rows[r, 1], arc_rows[r, 2]
         told[0] += tall * (stop - start)
         told[1] += tall * (math.cos(start) - math.cos(stop))
         told[2] += tall * (math.sin(stop) - math.sin(start))
@@ -42,8 +42,8 @@ def sum_up(place, bites, first, n):
 
 
 @inner
-def measure(nodes, place, bites, n):
-    """Measure the engagement at a place: sums into the place, arcs into `bites`; return the new number of arcs."""
+def measure(nodes, place, arc_rows, n):
+    """Measure the engagement at a place: sums into the place, arcs into `arc_rows`; return the new number of arcs."""
     told = place.told
     for k in range(WHAT):
         told[k] = 0.0
@@ -56,8 +56,8 @@ def measure(nodes, place, bites, n):
         return n
     first = n
     if nodes.tools[row, KIND] == FLAT:
-        n = look_round(nodes, place, bites, n, radius - EDGE, z)
+        n = look_round(nodes, place, arc_rows, n, radius - EDGE, z)
     else:
-        n = look_over(nodes, place, bites, n, row)
-    sum_up(place, bites, first, n)
+        n = look_over(nodes, place, arc_rows, n, row)
+    sum_up(place, arc_rows, first, n)
     return n

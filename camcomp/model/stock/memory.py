@@ -8,13 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from camcomp.ground.datatypes import Floats, Ints, Path
-from camcomp.model.cutting.engaged import Bites, Engaged
+from camcomp.model.cutting.engaged import Engaged, EngagementArcs
+from camcomp.model.stock.along_legs import ROOM_FOR_ARCS, ROOM_FOR_PLACES, cut_legs, peek, settle
 from camcomp.model.stock.at_tip import meet, take_way
 from camcomp.model.stock.facets import facets_on
 from camcomp.model.stock.field import SPAN, TOUCHED, USED, XMAX, XMIN, ZMAX, ZMIN, room_for
-from camcomp.model.stock.front import BITE, DEPTH, EDGE, ENGAGED, WHAT, Place
+from camcomp.model.stock.front import ARC_COLUMNS, DEPTH, EDGE, ENGAGED, WHAT, Place
 from camcomp.model.stock.legs import LegBefore, Legs, legs_of
-from camcomp.model.stock.march import ROOM_FOR_ARCS, ROOM_FOR_PLACES, march, peek, settle
 from camcomp.model.stock.places import CHAIN_DEEP, CUT_LEG, DEEP, MOST_CHAIN, MOST_RECENT, PLACES, ROWS, Found
 from camcomp.model.stock.shapes import StockShape, ToolShape
 from camcomp.model.stock.thinning import thin
@@ -66,7 +66,7 @@ class StockMemory:
             first=np.zeros(n, np.int64),
             many=np.zeros(n, np.int64),
             told=np.zeros((n, WHAT)),
-            bites=np.zeros((r, BITE)),
+            arc_rows=np.zeros((r, ARC_COLUMNS)),
             crash=np.zeros(0, np.bool_),
             recent_end=np.zeros(MOST_RECENT),
             way=np.zeros(2),
@@ -110,7 +110,7 @@ class StockMemory:
         leg = 0
         self._carry_over()
         while leg < own:
-            at = march(self.nodes, self._place, found, legs.kind[:own], legs.table[:own], tool[:own], joined, leg)
+            at = cut_legs(self.nodes, self._place, found, legs.kind[:own], legs.table[:own], tool[:own], joined, leg)
             parts.append(self._taken())
             self._make_room()
             leg = at
@@ -121,14 +121,14 @@ class StockMemory:
             self._before = self._behind(path, legs, own, len(path) - ahead - 1)
         return _engaged(parts, legs), np.unique(legs.motion[:own][crash[:own]])
 
-    def meet(self, tip: Floats, direction: Floats, tool: int) -> tuple[float, Bites]:
+    def meet(self, tip: Floats, direction: Floats, tool: int) -> tuple[float, EngagementArcs]:
         """Depth (mm) and engagement arcs of a tool (T number) at a tip (3,) mm that moves along a unit direction (3,).
 
         Not to be mixed with `follow`.
         """
         n = meet(self.nodes, self._place, self._found, tip, direction, self._tool(tool))
-        start, stop, height, rise, run, _ = self._found.bites[:n].T.copy()
-        return float(self._place.told[DEPTH]), Bites(
+        start, stop, height, rise, run, _ = self._found.arc_rows[:n].T.copy()
+        return float(self._place.told[DEPTH]), EngagementArcs(
             place=np.zeros(n, np.int64), start=start, stop=stop, height=height, rise=rise, run=run
         )
 
@@ -165,7 +165,7 @@ class StockMemory:
             first=found.first[first:n].copy(),
             many=found.many[first:n].copy(),
             told=found.told[first:n].copy(),
-            bites=found.bites[:r].copy(),
+            arc_rows=found.arc_rows[:r].copy(),
         )
         if not keep:
             found.told_of[PLACES] = self._kept
@@ -173,7 +173,7 @@ class StockMemory:
             return out
         if n:
             a, many = int(found.first[n - 1]), int(found.many[n - 1])
-            found.bites[:many] = found.bites[a : a + many].copy()
+            found.arc_rows[:many] = found.arc_rows[a : a + many].copy()
             for each in (found.leg, found.u, found.told):
                 each[0] = each[n - 1]
             found.first[0], found.many[0] = 0, many
@@ -203,19 +203,19 @@ class _Places:
     first: Ints
     many: Ints
     told: Floats
-    bites: Floats
+    arc_rows: Floats
 
 
 def _engaged(parts: list[_Places], legs: Legs) -> Engaged:
     """The places that linear interpolation needs, in order."""
-    rows = np.cumsum([0] + [len(each.bites) for each in parts])
+    rows = np.cumsum([0] + [len(each.arc_rows) for each in parts])
     leg, u, told = (
         np.concatenate([getattr(each, name) for each in parts] or [empty])
         for name, empty in (("leg", np.zeros(0, np.int64)), ("u", np.zeros(0)), ("told", np.zeros((0, WHAT))))
     )
     first = np.concatenate([each.first + n for each, n in zip(parts, rows, strict=False)] or [np.zeros(0, np.int64)])
     many = np.concatenate([each.many for each in parts] or [np.zeros(0, np.int64)])
-    bites = np.concatenate([each.bites for each in parts] or [np.zeros((0, BITE))])
+    arc_rows = np.concatenate([each.arc_rows for each in parts] or [np.zeros((0, ARC_COLUMNS))])
     motion = legs.motion[leg]
     at = np.where(u == 1.0, legs.u1[leg], legs.u0[leg] + u * (legs.u1[leg] - legs.u0[leg]))
     # Two legs of an arc share the place between them.
@@ -232,6 +232,6 @@ def _engaged(parts: list[_Places], legs: Legs) -> Engaged:
         motion, at, told, first, many, bends = (each[keep] for each in (motion, at, told, first, many, bends))
     place = np.repeat(np.arange(len(many)), many)
     row = np.repeat(first - (np.cumsum(many) - many), many) + np.arange(int(many.sum()))
-    start, stop, height, rise, run, _ = bites[row].T
-    bites_of = Bites(place=place, start=start, stop=stop, height=height, rise=rise, run=run)
-    return Engaged(motion=motion, u=at, depth=told[:, DEPTH], turn=told[:, ENGAGED], bends=bends, bites=bites_of)
+    start, stop, height, rise, run, _ = arc_rows[row].T
+    engaged_here = EngagementArcs(place=place, start=start, stop=stop, height=height, rise=rise, run=run)
+    return Engaged(motion=motion, u=at, depth=told[:, DEPTH], turn=told[:, ENGAGED], bends=bends, arcs=engaged_here)

@@ -12,9 +12,9 @@ from typing import Any, NamedTuple
 
 from camcomp.ground.compiled import inner
 from camcomp.ground.datatypes import Floats
-from camcomp.model.stock.foreseen import as_foreseen
 from camcomp.model.stock.front import DEPTH, WHAT, lay_back
 from camcomp.model.stock.measure import measure
+from camcomp.model.stock.predicted import is_as_predicted
 
 RAPID_LEG, CUT_LEG, PLUNGE_LEG, UNSEEN_LEG = 0, 1, 2, 3
 FX, FY, FZ, TX, TY, TZ, AX, AY, BX, BY = range(10)  # of a leg: from, to (mm); directions in the plane at both ends
@@ -36,10 +36,10 @@ class Found(NamedTuple):
 
     leg: Any  # (n,) int64
     u: Floats  # (n,) fraction of the leg
-    first: Any  # (n,) int64 row in `bites`
+    first: Any  # (n,) int64 row in `arc_rows`
     many: Any  # (n,) int64
     told: Floats  # (n, WHAT) sums of front.py; the last column: largest engagement so far
-    bites: Floats  # (r, BITE)
+    arc_rows: Floats  # (r, ARC_COLUMNS)
     crash: Any  # (legs,) bool
     recent_end: Floats  # (MOST_RECENT,) path length at the end of a recent sweep, mm
     way: Floats  # (2,)
@@ -85,7 +85,7 @@ def look(nodes, place, found, legs, k, u, many, slot):
     """Measure the engagement at fraction u of leg k into a slot of the stack."""
     stand(nodes, place, legs, k, u, many)
     rows = found.told_of[ROWS]
-    n = measure(nodes, place, found.bites, rows)
+    n = measure(nodes, place, found.arc_rows, rows)
     found.told_of[ROWS] = n
     found.stack_u[slot] = u
     found.stack_rows[slot, 0], found.stack_rows[slot, 1] = rows, n - rows
@@ -152,14 +152,14 @@ def between(nodes, place, found, legs, k, length, radius, before):
         room = (
             top + 2 < DEEP
             and found.told_of[PLACES] + 64 < found.leg.shape[0]
-            and found.told_of[ROWS] + 1024 < found.bites.shape[0]
+            and found.told_of[ROWS] + 1024 < found.arc_rows.shape[0]
         )
         jumps = gap <= JUMP_MM and differ > JUMP * scale
         edge = gap > JUMP_MM and begins(found, 0, top)
         if room and not jumps and gap > FINE_MM and (differ > CALM * scale or gap > SHORT * radius or edge):
             rows = found.told_of[ROWS]
             stand(nodes, place, legs, k, 0.5 * (a + b), before)
-            so = as_foreseen(nodes, place, found, 0, top, 0.5, BENT * scale)
+            so = is_as_predicted(nodes, place, found, 0, top, 0.5, BENT * scale)
             if not so:
                 look(nodes, place, found, legs, k, 0.5 * (a + b), before, top + 1)
             if edge or not so and bent(found, 0, top + 1, top, 0.5) > BENT * scale:

@@ -40,9 +40,9 @@ from camcomp.model.stock.sweeps import (
     Z0,
     Z1,
     across,
-    beside,
     bottom,
     bottom_at,
+    squared_distance,
 )
 
 SAME_LEVEL = 0.02  # mm, tolerance of "about as low", plus the climb of a sweep within its tool
@@ -203,14 +203,14 @@ def cut_node(nodes, k, i, j, x, y, n, s):
             drop_one(nodes, before - 1)
     elif before == 0:
         return
-    aside = beside(sweeps, k, n, s)
+    aside = squared_distance(sweeps, k, n, s)
     lowest = float(low[i, j])
     level = SAME_LEVEL + 2.0 * tools[2 * int(sweeps[k, TOOL]), RADIUS] * abs(sweeps[k, CLIMB])
     first, second = near[i, j], over[i, j]
     away = 0.0
     if first > 0:
         n, s = across(sweeps, first - 1, x, y)
-        away = beside(sweeps, first - 1, n, s)
+        away = squared_distance(sweeps, first - 1, n, s)
     if z <= lowest + level and (
         first == 0 or aside < away - HAIR or z < bottom_at(sweeps, tools, first - 1, 0, n, s) - level
     ):
@@ -220,7 +220,7 @@ def cut_node(nodes, k, i, j, x, y, n, s):
             drop_one(nodes, first - 1)
     if second > 0 and second != first:
         n, s = across(sweeps, second - 1, x, y)
-        away = beside(sweeps, second - 1, n, s)
+        away = squared_distance(sweeps, second - 1, n, s)
     if second == 0 or aside < away + (HAIR if z <= lowest else -HAIR):
         over[i, j] = k + 1
         nodes.kept[k] += 1

@@ -14,7 +14,7 @@ from camcomp.model.stock.front import (
     FLOOR,
     NEAR,
     TURNS,
-    add_bite,
+    add_arc,
     angles_of,
     least_angle,
     meets,
@@ -26,7 +26,7 @@ CLOSER = 6  # halvings of the angle around the one with the highest cut
 
 
 @inner
-def look_slice(nodes, place, bites, n, radius, lift, tall, rise, run, least, thin, stride, first):
+def look_slice(nodes, place, arc_rows, n, radius, lift, tall, rise, run, least, thin, stride, first):
     """Append the arcs of a slice, `lift` mm over the tip and `tall` mm high, and return the new number of arcs.
 
     rise, run: of the tool's surface per length of its edge. least (rad): angle from both sides at which the surface begins
@@ -65,10 +65,10 @@ def look_slice(nodes, place, bites, n, radius, lift, tall, rise, run, least, thi
             part *= 0.5
         at += part
         if before:
-            n = add_bite(bites, n, start, at, tall, rise, run, lift)
+            n = add_arc(arc_rows, n, start, at, tall, rise, run, lift)
         start, before = at, now
     if before:
-        n = add_bite(bites, n, start, math.pi - least, tall, rise, run, lift)
+        n = add_arc(arc_rows, n, start, math.pi - least, tall, rise, run, lift)
     return n
 
 
@@ -128,7 +128,7 @@ def farther(nodes, place, row, best, outside, most, at, count):
 
 
 @inner
-def look_over(nodes, place, bites, n, row):
+def look_over(nodes, place, arc_rows, n, row):
     """Append the arcs of a ball, bull or drill tool slice by slice, and return the new number of arcs."""
     highest = nodes.place[ZMAX] - FLOOR - place.at[2]  # upper bound
     count = angles_of(nodes, nodes.tools[row, RADIUS])
@@ -169,9 +169,9 @@ def look_over(nodes, place, bites, n, row):
         if least < 0.5 * math.pi and radius > 0.0:
             own, tall, rise, lean = n, b - a, (b - a) / edge, run / edge
             if arcs >= 0:  # alternate angles from slice to slice, and all angles where neighbours differ
-                n = look_slice(nodes, place, bites, own, radius, middle, tall, rise, lean, least, thin, 2, 1 + j % 2)
+                n = look_slice(nodes, place, arc_rows, own, radius, middle, tall, rise, lean, least, thin, 2, 1 + j % 2)
             if n - own != arcs:
-                n = look_slice(nodes, place, bites, own, radius, middle, tall, rise, lean, least, thin, 1, 1)
+                n = look_slice(nodes, place, arc_rows, own, radius, middle, tall, rise, lean, least, thin, 1, 1)
             arcs = n - own
     place.told[DEPTH] = high if n > begun else 0.0
     return n

@@ -77,7 +77,7 @@ def across(sweeps, k, x, y):
 
 
 @inner
-def beside(sweeps, k, n, s):
+def squared_distance(sweeps, k, n, s):
     """Square of the distance in the plane (mm2) of a point with coordinates by `across` from the line of a sweep."""
     off = s - min(max(s, 0.0), sweeps[k, LENGTH])
     return n * n + off * off
@@ -102,7 +102,7 @@ def bottom_at(sweeps, tools, k, slim, n, s):
     """Lowest height of sweep k over a point with coordinates n, s by `across`, mm."""
     row = 2 * int(sweeps[k, TOOL]) + slim
     radius = tools[row, RADIUS]
-    square = beside(sweeps, k, n, s)
+    square = squared_distance(sweeps, k, n, s)
     if square > radius * radius:
         return NOWHERE
     length, climb = sweeps[k, LENGTH], sweeps[k, CLIMB]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
-from camcomp.ground import headway
+from camcomp.ground import progress
 from camcomp.terminal.commands._options import (
     config_option,
     dialect_option,
@@ -74,7 +74,7 @@ def command(
     from camcomp.api.batch import compensate_many
 
     def on_status(status: Status, number: int, total: int) -> None:
-        headway.done(number / total)
+        progress.done(number / total)
         if not quiet or status.exit_code:
             _tell(status, number, total)
 

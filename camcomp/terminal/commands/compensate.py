@@ -6,8 +6,8 @@ import click
 
 from camcomp.ground.errors import CheckFailed
 from camcomp.ground.files import display_name
+from camcomp.terminal.commands._figures import controller_line, expected_error_lines
 from camcomp.terminal.commands._options import OUTPUT, dialect_option, quiet_option, stock_option
-from camcomp.terminal.commands._told import control_told, expected_told
 from camcomp.terminal.progress import say, working
 
 if TYPE_CHECKING:
@@ -127,13 +127,13 @@ def _told(figures: "Summary") -> list[str]:
             f"policy {taken.policy}: of {taken.points} points {taken.shrunk} take less than all of the correction and "
             f"{taken.left_alone} none"
         )
-    lines += expected_told(figures)
+    lines += expected_error_lines(figures)
     if checked := figures.interpolation:
         lines.append(
             f"interpolated between {checked.exact_solutions} exact solutions; {checked.checked} points checked: "
             f"{checked.worst_um:.4f} um at most, allowed {checked.bound_um:g} um"
         )
-    lines.append(control_told(figures))
+    lines.append(controller_line(figures))
     if not figures.control_mode_stated and figures.under_control.max_um > figures.after.max_um:
         lines.append(
             "  state the controller's mode as `control: {path_mode: G64 P0.01}` to have the program written for it"

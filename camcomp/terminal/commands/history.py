@@ -55,7 +55,7 @@ def command(
 
 
 def _text(found: "Chronicle") -> list[str]:
-    from camcomp.report.plot import digits_alike
+    from camcomp.report.plot import format_together
 
     if not found.verdicts:
         return ["nothing is kept here yet"]
@@ -67,7 +67,7 @@ def _text(found: "Chronicle") -> list[str]:
     for each in found.parameters:
         name = f"{each.effect} ({each.target})" if each.target else each.effect
         last = each.values[-1]
-        told, low, high = digits_alike(last.value, *last.ci95)
+        told, low, high = format_together(last.value, *last.ci95)
         out.append(f"{name} {each.parameter}: {told} ({low} to {high}) on {last.day}; {_course(each)}")
     places: dict[str, list[str]] = {}
     for value in found.standards:

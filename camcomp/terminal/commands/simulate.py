@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING
 import click
 
 from camcomp.ground.files import display_name, read_bytes, write_all
-from camcomp.ground.headway import part
 from camcomp.ground.places import STANDARD
+from camcomp.ground.progress import part
 from camcomp.terminal.commands._options import OUTPUT, dialect_option, stock_option
 from camcomp.terminal.progress import say, working
 

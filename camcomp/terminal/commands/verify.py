@@ -8,8 +8,8 @@ from camcomp.ground.errors import CamcompError, CheckFailed
 from camcomp.ground.files import display_name, write_all
 from camcomp.report.findings import Case, Finding, findings_of
 from camcomp.report.outputs import findings_files
+from camcomp.terminal.commands._figures import controller_line, expected_error_lines
 from camcomp.terminal.commands._options import OUTPUT, dialect_option, findings_options, quiet_option, stock_option
-from camcomp.terminal.commands._told import control_told, expected_told
 from camcomp.terminal.progress import say, working
 
 if TYPE_CHECKING:
@@ -69,8 +69,8 @@ def command(
             )
         for each_warning in done.warnings:
             say(f"warning: {each_warning}", quiet=quiet)
-        say(control_told(figures), quiet=quiet)
-        say(*expected_told(figures), quiet=quiet)
+        say(controller_line(figures), quiet=quiet)
+        say(*expected_error_lines(figures), quiet=quiet)
         over, worst = [each for each in done.lines if each.judged_um > tolerance], done.worst_um
         if not worst <= tolerance * (1.0 + 1e-9):
             lines = ", ".join(str(each.line) for each in over)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from camcomp.diagnosis.next_experiment.information_gain import ExpectedGain
-from camcomp.diagnosis.next_experiment.outcomes import NEITHER, NOTHING, with_outcomes
+from camcomp.diagnosis.next_experiment.outcomes import NEITHER, ONLY_NOISE, with_outcomes
 from camcomp.diagnosis.next_experiment.proposal import Proposal
 
 
@@ -38,7 +38,7 @@ def test_what_looks_alike_is_said_to_and_no_size_is_made_up(three):
 
 
 def test_nothing_but_noise_is_an_outcome_too():
-    first, second, _ = outcomes(["backlash (x)", NOTHING], [[0, 30], [30, 0]], [[0, 0.01], [0.01, 0]])
+    first, second, _ = outcomes(["backlash (x)", ONLY_NOISE], [[0, 30], [30, 0]], [[0, 0.01], [0.01, 0]])
     assert (
         first.startswith("If it is backlash (x)") and second == "If nothing but noise is left on it, there is no cause."
     )

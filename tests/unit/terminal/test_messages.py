@@ -10,7 +10,7 @@ from camcomp.api import diagnosis
 from camcomp.compensation.report.page import _caution
 from camcomp.ground.files import shipped
 from camcomp.terminal.cli import run
-from camcomp.terminal.commands import _told
+from camcomp.terminal.commands import _figures
 
 CARTESIAN = ("--config", str(shipped("config/cartesian.yaml")))
 SQUARE = "G21 G90 G17 G94\nT1 M6\nG43 H1\nS8000 M3\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X10 F600\nG1 Y10\nX0\nY0\nG0 Z5\nM30\n"
@@ -54,9 +54,9 @@ def test_numbers_without_a_point_say_both_readings(compensated):
 
 def test_expected_errors_name_the_stated_spreads():
     size = SimpleNamespace(rms_um=3.0, rms_ci95_um=(1.0, 5.0), p95_um=6.0)
-    first, second = _told.expected_told(SimpleNamespace(expected=size, advice="cut two slots"))
+    first, second = _figures.expected_error_lines(SimpleNamespace(expected=size, advice="cut two slots"))
     assert first.startswith("expected on a machine within the stated spreads: rms 3.00 um (95 %: 1.00 to 5.00)")
-    assert second == "cut two slots" and _told.expected_told(SimpleNamespace(expected=None)) == []
+    assert second == "cut two slots" and _figures.expected_error_lines(SimpleNamespace(expected=None)) == []
 
 
 @pytest.mark.parametrize(

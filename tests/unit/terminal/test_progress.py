@@ -16,7 +16,7 @@ from camcomp.diagnosis.arm.poses import Poses
 from camcomp.diagnosis.arm.study import study as arm_study
 from camcomp.diagnosis.axis.findings import AxisRun
 from camcomp.diagnosis.axis.study import study as axis_study
-from camcomp.ground import headway
+from camcomp.ground import progress as reported
 from camcomp.model.config.load import load_config
 from camcomp.model.statics.build import build_robot
 from camcomp.terminal import progress
@@ -70,10 +70,10 @@ def lines(seen):
 
 def test_share_and_remaining_time_are_told(screen, monkeypatch):
     seen = screen()
-    with progress.working("turning"), headway.part(0.0, 0.5):
+    with progress.working("turning"), reported.part(0.0, 0.5):
         began = time.time()
         monkeypatch.setattr("click._termui_impl.time.time", lambda: began + 3.0)
-        headway.done(0.5)
+        reported.done(0.5)
         time.sleep(0.1)
     told = lines(seen)
     assert any("turning  [======                  ]   25%" in each for each in told)
@@ -83,10 +83,10 @@ def test_share_and_remaining_time_are_told(screen, monkeypatch):
 def test_what_holds_up_the_work_is_told_instead(screen):
     seen = screen()
     with progress.working("turning"):
-        headway.done(0.5)
-        headway.hold(headway.ONCE)
+        reported.done(0.5)
+        reported.hold(reported.ONCE)
         time.sleep(0.1)
-        headway.hold("")
+        reported.hold("")
         time.sleep(0.1)
     told = lines(seen)
     assert told[0] == "turning ... compiling, once per installation, 0 s"
@@ -97,21 +97,21 @@ def test_what_holds_up_the_work_is_told_instead(screen):
 def shares(monkeypatch):
     """Shares of the work around the test, as they were said."""
     seen = []
-    original = headway.done
+    original = reported.done
 
     def note(share):
         original(share)
-        if headway._watched:
-            seen.append(headway._watched[-1].share)
+        if reported._watched:
+            seen.append(reported._watched[-1].share)
 
-    monkeypatch.setattr(headway, "done", note)
+    monkeypatch.setattr(reported, "done", note)
     return seen
 
 
 def test_programs_say_how_far_they_are(shares):
     """Shares rise to the end, in more than a few steps."""
     groove, machine = WORDS[1], camcomp.load_machine(WORDS[3])
-    with headway.watched() as watched:
+    with reported.watched() as watched:
         done = camcomp.compensate(groove, machine)
         assert_rising(shares, watched)
         watched.share = None
@@ -121,7 +121,7 @@ def test_programs_say_how_far_they_are(shares):
 
 
 def test_a_diagnosis_says_how_far_it_is(shares):
-    with headway.watched() as watched:
+    with reported.watched() as watched:
         camcomp.diagnose(ROOT / "samples/diagnosis/ambiguous/experiment.yaml")
     assert_rising(shares, watched)
 
@@ -130,7 +130,7 @@ def test_an_arm_says_how_far_it_is(shares):
     q = np.random.default_rng(1).uniform(-1.0, 1.0, (60, 6))
     poses = Poses("A", q, measured(q, 1, longer=0.7), np.arange(60.0), None, np.full(60, "A"))
     robot = build_robot(load_config([ROOT / "config/ur10.yaml"]).robot, [0.0, 0.0, 0.0])[0]
-    with headway.watched() as watched:
+    with reported.watched() as watched:
         arm_study(robot, (), [poses], without=["joint_curve"])
     assert_rising(shares, watched)
 
@@ -139,16 +139,16 @@ def test_axes_say_how_far_they_are(shares):
     t = np.arange(0.0, 4.0, 0.01)
     where, force = 100.0 * np.sin(2.0 * t), 50.0 * np.sign(np.cos(2.0 * t))
     runs = [AxisRun(f"r{k}", t, where, where - 0.01 * np.cos(2.0 * t), force, np.arange(400)) for k in range(2)]
-    with headway.watched() as watched:
+    with reported.watched() as watched:
         axis_study({"x": runs, "y": runs}, holdout=["r1"])
     assert_rising(shares, watched, least=2)
 
 
 def test_a_simulation_says_how_far_it_is(shares):
-    with headway.watched() as watched:
+    with reported.watched() as watched:
         log = camcomp.simulate(WORDS[1], camcomp.load_machine(WORDS[3]))
     assert_rising(shares, watched)
-    with headway.watched() as watched:
+    with reported.watched() as watched:
         shares.clear()
         log.to_csv()
     assert shares == [0.0] and watched.share == 0.0  # of a short log
@@ -161,7 +161,7 @@ def test_an_import_says_how_far_it_is(shares, tmp_path):
             "t_s,cmd_x_mm,cmd_y_mm,cmd_z_mm,act_x_mm,act_y_mm,act_z_mm,act_x_N,act_y_N,act_z_N\n" + rows
         )
     files = [str(tmp_path / f"{name}.csv") for name in "abc"]
-    with headway.watched() as watched:
+    with reported.watched() as watched:
         import_recordings(files, [WORDS[3]], tmp_path / "out", columns=[])
     assert_rising(shares, watched)
 
@@ -175,9 +175,9 @@ def assert_rising(shares, watched, least=3):
 def test_verbs_tell_it_on_a_terminal_and_nowhere_else(screen, tmp_path, monkeypatch, verb):
     """The work takes as long as it takes; what is watched is that somebody watches."""
     told = []
-    monkeypatch.setattr(progress._Line, "text", lambda self, headway: told.append(self._on) or self._on)
-    pause = headway.done
-    monkeypatch.setattr(headway, "done", lambda share: (time.sleep(0.05), pause(share)))
+    monkeypatch.setattr(progress._Line, "text", lambda self, reported: told.append(self._on) or self._on)
+    pause = reported.done
+    monkeypatch.setattr(reported, "done", lambda share: (time.sleep(0.05), pause(share)))
     log = tmp_path / "a.csv"
     words = ["simulate", WORDS[1], *WORDS[2:], "--step-s", "0.5"]
     assert run([*words, "-o", str(log)]) == 0
@@ -195,8 +195,8 @@ def test_long_programs_say_how_far_they_are(tmp_path):
     moves = (f"G1 X{k % 97 / 10:.4f} Y{k % 89 / 10:.4f} F600" for k in range(45_000))
     program.write_text("G21 G90 G17 G94\nS8000 M3\nG0 X0 Y0 Z0\n" + "\n".join(moves) + "\nM2\n")
     shares = []
-    with headway.watched() as watched:
-        rest = headway.done
+    with reported.watched() as watched:
+        rest = reported.done
 
         def note(share):
             rest(share)
@@ -212,7 +212,7 @@ def test_long_programs_say_how_far_they_are(tmp_path):
 def test_pipes_stay_silent_while_the_share_is_known(screen):
     seen = screen(is_terminal=False)
     with progress.working("turning"):
-        headway.done(0.5)
+        reported.done(0.5)
         time.sleep(0.05)
     assert seen.getvalue() == ""
 
@@ -224,7 +224,7 @@ def test_logs_get_a_line_now_and_then_with_share_and_remaining_time(screen, monk
         time.sleep(0.07)
         began = time.monotonic()
         monkeypatch.setattr(progress.time, "monotonic", lambda: began + 90.0)
-        headway.done(0.25)
+        reported.done(0.25)
         time.sleep(0.07)
     told = seen.getvalue().splitlines()
     assert told[0] == "turning: 0 s so far"
@@ -249,8 +249,8 @@ def test_a_batch_says_how_far_it_is(screen, tmp_path, monkeypatch):
         (tmp_path / f"{name}.nc").write_text("G21 G90\nG0 X0 Y0 Z0\nG1 X1 F600\nM2\n")
     screen(is_terminal=False)
     told = []
-    original = headway.done
-    monkeypatch.setattr(headway, "done", lambda share: (original(share), told.append(headway._watched[0].share)))
+    original = reported.done
+    monkeypatch.setattr(reported, "done", lambda share: (original(share), told.append(reported._watched[0].share)))
     words = ["batch", str(tmp_path), *WORDS[2:], "--output-dir", str(tmp_path / "out"), "--jobs", "1"]
     assert run(words) == 0
     assert [each for each in dict.fromkeys(told) if each is not None] == [0.5, 1.0]
@@ -260,9 +260,9 @@ def test_compiling_is_told_for_what_it_is(tmp_path):
     """A first run in an installation without machine code says so; the second has nothing to compile."""
     code = """
 import numpy as np, sys
-from camcomp.ground import headway
+from camcomp.ground import progress as reported
 told = []
-headway.hold = told.append
+reported.hold = told.append
 from camcomp.ground import compiled
 sys.path.insert(0, sys.argv[1])
 import kernel
@@ -278,7 +278,7 @@ print("|".join(told))
         )
         for _ in range(2)
     )
-    assert first.stdout.strip() == f"{headway.ONCE}|" and second.stdout.strip() == ""
+    assert first.stdout.strip() == f"{reported.ONCE}|" and second.stdout.strip() == ""
 
 
 def test_the_line_is_wiped_when_the_work_fails(screen):

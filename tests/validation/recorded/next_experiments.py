@@ -27,7 +27,7 @@ from camcomp.diagnosis.fit.lookalikes import without_lookalikes
 from camcomp.diagnosis.fit.open_problem import open_problem
 from camcomp.diagnosis.next_experiment.design import MotionDesign
 from camcomp.diagnosis.next_experiment.designed import Desk, propose
-from camcomp.diagnosis.next_experiment.foresee import Question
+from camcomp.diagnosis.next_experiment.predicted_logs import Question
 from tests.validation import runner
 from tests.validation.plants.causes import Cause
 from tests.validation.plants.experiments import Noise, Plan, even, make, middle, observe_all, size, small_errors, write

@@ -11,7 +11,7 @@ from camcomp.model.config.load import load_config
 from camcomp.model.effect import Cause, Load
 from camcomp.model.job import Job
 from camcomp.model.motion.driven_path import Forces, driven_path
-from camcomp.model.motion.driven_pieces import DrivenPieces, beside_most, node_loads
+from camcomp.model.motion.driven_pieces import DrivenPieces, near_largest_change, node_loads
 from camcomp.model.motion.node_pieces import NODES, direct
 from camcomp.model.motion.twin import twin_of
 
@@ -101,7 +101,7 @@ def test_loads_along_an_arc_turn_with_it_whatever_its_last_rows_do(corner_N):
     none, sure = np.zeros(0, np.int64), np.ones(len(time), bool)
     pieces = DrivenPieces.along(time, time, 10.0 * along, none)
     assert len(pieces.begin) == 1
-    pieces = pieces.around(time, beside_most(time, force, sure, none, pieces))
+    pieces = pieces.around(time, near_largest_change(time, force, sure, none, pieces))
     assert len(pieces.begin) == 1 + (corner_N > 0.0)
     loads = node_loads(time, force, sure, none, pieces.node_times(), pieces)
     off = np.linalg.norm(pieces.at(time).of(loads) - force, axis=1)

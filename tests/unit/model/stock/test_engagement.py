@@ -29,8 +29,8 @@ def arcs_at(engaged, motion, u):
     """Arcs (entry, exit, height) and depth at the place of a motion that is nearest to u."""
     rows = np.flatnonzero(engaged.motion == motion)
     row = rows[np.argmin(np.abs(engaged.u[rows] - u))]
-    bites = engaged.bites.of(np.array([row]))
-    return float(engaged.u[row]), np.column_stack((bites.start, bites.stop, bites.height)), float(engaged.depth[row])
+    arcs = engaged.arcs.of(np.array([row]))
+    return float(engaged.u[row]), np.column_stack((arcs.start, arcs.stop, arcs.height)), float(engaged.depth[row])
 
 
 def test_a_slot_is_cut_with_the_front_half():
@@ -187,15 +187,15 @@ def test_a_ball_beside_its_own_groove_meets_what_stands_on_its_other_side():
     )  # fmt: skip
     engaged = follow(path, kind="ball")
     rows = np.flatnonzero(engaged.motion == 4)[-1:]
-    bites = engaged.bites.of(rows)
+    arcs = engaged.arcs.of(rows)
     # the old groove, right of the feed, is in every slice as wide as the ball: y < r takes 1 + r cos(psi) < r away
-    top = np.cumsum(bites.height)
+    top = np.cumsum(arcs.height)
     low = engaged.depth[rows[0]] - top[-1]
-    z = low + top - 0.5 * bites.height
+    z = low + top - 0.5 * arcs.height
     radius = np.sqrt(R**2 - (R - z) ** 2)
     wanted = np.arccos(np.maximum(1.0 - step / radius, -1.0))
-    np.testing.assert_allclose(bites.stop[1:], wanted[1:], atol=DEGREES)  # the lowest slice is next to the tip
-    np.testing.assert_allclose(bites.start, 0.0, atol=DEGREES)
+    np.testing.assert_allclose(arcs.stop[1:], wanted[1:], atol=DEGREES)  # the lowest slice is next to the tip
+    np.testing.assert_allclose(arcs.start, 0.0, atol=DEGREES)
 
 
 @pytest.mark.parametrize(("kind", "more"), [("bull", {"corner_mm": 1.0}), ("drill", {})])
@@ -221,7 +221,7 @@ def test_a_move_in_parts_meets_what_it_meets_whole(kind, more, slope):
     rows = np.flatnonzero((many.u == 1.0) & (many.motion > 11))  # both begin beside where the groove was widened
     u = (many.motion[rows] - 1) / 50
     np.testing.assert_allclose(many.depth[rows], np.interp(u, one.u[own], one.depth[own]), atol=MICROMETRES)
-    size = [np.bincount(e.bites.place, e.bites.height * (e.bites.stop - e.bites.start), len(e.u)) for e in (one, many)]
+    size = [np.bincount(e.arcs.place, e.arcs.height * (e.arcs.stop - e.arcs.start), len(e.u)) for e in (one, many)]
     missed = 2.0 * BENT * 2.0 * np.pi  # of the slot, the largest engagement; either may miss as much
     np.testing.assert_allclose(size[1][rows], np.interp(u, one.u[own], size[0][own]), atol=missed)
 

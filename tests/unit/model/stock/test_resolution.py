@@ -42,13 +42,13 @@ def errors(kind, cell, turn, shift):
         memory.follow(path_of(*moves, ("rapid", (*way[-1], 5.0)), start=(*way[0], Z)))
     found = []
     for s in np.linspace(-1.5, 1.5, 40):
-        depth, bites = memory.meet(np.append(shift + s * e, Z), np.append(e, 0.0), NO_TOOL)
+        depth, arcs = memory.meet(np.append(shift + s * e, Z), np.append(e, 0.0), NO_TOOL)
         ends = 0.5 * depth * (1.0 - np.cos(np.pi * np.arange(SLICES + 1) / SLICES))
         lift, tall = (0.5 * (ends[1:] + ends[:-1]))[:WIDE], np.diff(ends)[:WIDE]
-        np.testing.assert_allclose(bites.height[:WIDE], tall, rtol=1e-9)  # one arc to a slice
+        np.testing.assert_allclose(arcs.height[:WIDE], tall, rtol=1e-9)  # one arc to a slice
         half, radius = APART[kind] - reach(kind, lift + FLOOR), reach(kind, lift) - EDGE
         wanted = np.where(half >= radius, np.pi, 2.0 * np.arcsin(np.clip(half / radius, 0.0, 1.0)))
-        off = (bites.stop - bites.start)[:WIDE] - wanted
+        off = (arcs.stop - arcs.start)[:WIDE] - wanted
         found.append((np.abs(off).max(), abs(tall @ off) / (tall @ wanted), abs(depth + FLOOR - ridge(kind))))
     return np.mean(found, axis=0)
 

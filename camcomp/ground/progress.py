@@ -15,7 +15,7 @@ COMPILING, ONCE = "compiling", "compiling, once per installation"
 
 
 @dataclass
-class Headway:
+class Progress:
     """Progress of the work in a context.
 
     share: 0 to 1, None before the first report. doing: text of a step that delays the work, or empty. span: interval of the
@@ -28,16 +28,16 @@ class Headway:
     points: bool = False
 
 
-_watched: list[Headway] = []  # innermost last
+_watched: list[Progress] = []  # innermost last
 
 
 @contextmanager
-def watched() -> Iterator[Headway]:
+def watched() -> Iterator[Progress]:
     """Context whose progress can be read from the yielded object."""
-    headway = Headway()
-    _watched.append(headway)
+    progress = Progress()
+    _watched.append(progress)
     try:
-        yield headway
+        yield progress
     finally:
         _watched.pop()
 
@@ -45,9 +45,9 @@ def watched() -> Iterator[Headway]:
 def done(share: float) -> None:
     """Report the share of the present part, 0 to 1."""
     if _watched:
-        headway = _watched[-1]
-        low, high = headway.span
-        headway.share = max(headway.share or 0.0, low + min(max(share, 0.0), 1.0) * (high - low))
+        progress = _watched[-1]
+        low, high = progress.span
+        progress.share = max(progress.share or 0.0, low + min(max(share, 0.0), 1.0) * (high - low))
 
 
 @contextmanager
@@ -56,15 +56,15 @@ def part(low: float, high: float, *, points: bool = False) -> Iterator[None]:
 
     points: the part consists of solved points, whose number is the share.
     """
-    headway = _watched[-1] if _watched else Headway()
-    before = headway.span, headway.points
+    progress = _watched[-1] if _watched else Progress()
+    before = progress.span, progress.points
     start, whole = before[0][0], before[0][1] - before[0][0]
-    headway.span, headway.points = (start + low * whole, start + high * whole), points
+    progress.span, progress.points = (start + low * whole, start + high * whole), points
     try:
         yield
         done(1.0)
     finally:
-        headway.span, headway.points = before
+        progress.span, progress.points = before
 
 
 def steps(items: Iterable[T], count: int) -> Iterator[T]:

@@ -57,7 +57,7 @@ def settle_recent(nodes, place, found, until):
 
 
 @inner
-def push_recent(nodes, place, found, k, end):
+def append_recent(nodes, place, found, k, end):
     """Append a sweep to the recent ones; at MOST_RECENT the oldest is removed from the field first."""
     if found.told_of[RECENT] == MOST_RECENT:
         settle_recent(nodes, place, found, found.recent_end[0])
@@ -73,17 +73,17 @@ def take(nodes, place, found, legs, k, tool, length, lately):
     end = found.way[PATH] + length
     ax, ay, az, bx, by, bz = legs[k, FX], legs[k, FY], legs[k, FZ], legs[k, TX], legs[k, TY], legs[k, TZ]
     if length < 3.0 * lately:
-        push_recent(nodes, place, found, put_sweep(nodes, ax, ay, az, bx, by, bz, tool), end)
+        append_recent(nodes, place, found, put_sweep(nodes, ax, ay, az, bx, by, bz, tool), end)
         return 1
     u = 1.0 - lately / length
     mx, my, mz = ax + u * (bx - ax), ay + u * (by - ay), az + u * (bz - az)
-    push_recent(nodes, place, found, put_sweep(nodes, ax, ay, az, mx, my, mz, tool), end - lately)
-    push_recent(nodes, place, found, put_sweep(nodes, mx, my, mz, bx, by, bz, tool), end)
+    append_recent(nodes, place, found, put_sweep(nodes, ax, ay, az, mx, my, mz, tool), end - lately)
+    append_recent(nodes, place, found, put_sweep(nodes, mx, my, mz, bx, by, bz, tool), end)
     return 2
 
 
 @entry
-def march(nodes, place, found, kind, legs, tool, joined, leg):
+def cut_legs(nodes, place, found, kind, legs, tool, joined, leg):
     """Measure and cut the legs from number `leg` on, and return the number of the first leg that found no room.
 
     kind (m,): RAPID_LEG to UNSEEN_LEG. legs (m, 10): columns of places.py. tool (m,): row of the tool. joined (m + 1,):
@@ -96,7 +96,7 @@ def march(nodes, place, found, kind, legs, tool, joined, leg):
         if (
             counts[FREE] + nodes.sweeps.shape[0] - counts[USED] < MOST_CHAIN + 4
             or found.told_of[PLACES] + ROOM_FOR_PLACES > found.leg.shape[0]
-            or found.told_of[ROWS] + ROOM_FOR_ARCS > found.bites.shape[0]
+            or found.told_of[ROWS] + ROOM_FOR_ARCS > found.arc_rows.shape[0]
         ):
             return leg
         length = leg_length(legs, k)
@@ -115,7 +115,7 @@ def march(nodes, place, found, kind, legs, tool, joined, leg):
         elif kind[k] == PLUNGE_LEG:
             s = put_sweep(nodes, legs[k, FX], legs[k, FY], legs[k, FZ], legs[k, TX], legs[k, TY], legs[k, TZ], which)
             found.way[PATH] += length
-            push_recent(nodes, place, found, s, found.way[PATH])
+            append_recent(nodes, place, found, s, found.way[PATH])
         elif length > 0.0:
             settle_recent(nodes, place, found, found.way[PATH] - lately)
             before = found.told_of[RECENT]

@@ -73,7 +73,7 @@ class Question:
 
 
 @dataclass(frozen=True, eq=False)
-class Foreseen:
+class PredictedLogs:
     """Predicted logs of a candidate with all channels, per kind of channel.
 
     signals: whitened prediction (w, r) of each rival; columns: whitened derivatives (w, k) by uncertain amplitudes; reach:
@@ -89,7 +89,7 @@ class Foreseen:
     size: dict[str, float]
 
 
-def foresee(question: Question, candidate: Candidate, *, whole: bool) -> Foreseen | None:
+def predict_logs(question: Question, candidate: Candidate, *, whole: bool) -> PredictedLogs | None:
     """Predicted logs of a candidate; None if it is infeasible, its cut is unknown, or the rivals are equal there.
 
     whole: include every effect of the library within its tolerance, not only those of the question.
@@ -120,7 +120,7 @@ def _on_bench(problem: Problem, candidate: Candidate, job: Job) -> Bench:
     return bench
 
 
-def _lay(question: Question, candidate: Candidate, whole: bool) -> Foreseen:
+def _lay(question: Question, candidate: Candidate, whole: bool) -> PredictedLogs:
     problem, rivals = question.problem, question.rivals
     bench = _on_bench(problem, candidate, question.job)
     nominal = bench.channels(0, bench.nominal[0])
@@ -147,7 +147,7 @@ def _lay(question: Question, candidate: Candidate, whole: bool) -> Foreseen:
         size[np.ix_(mine, mine)] = _root(covariance[np.ix_(theirs, theirs)])
         signals.append(change + block[:, :, mine] @ mean[theirs])
         reach.append(size)
-    return Foreseen(
+    return PredictedLogs(
         _whitened(problem, bench, np.stack(signals, axis=2)), _whitened(problem, bench, block), reach, mine, theirs,
         _sizes(problem),
     )  # fmt: skip

@@ -6,7 +6,7 @@ if TYPE_CHECKING:
     from camcomp.compensation.program.result import Summary, Verification
 
 
-def control_told(figures: "Summary | Verification") -> str:
+def controller_line(figures: "Summary | Verification") -> str:
     """Tip error and cycle time on the path that the controller drives."""
     mode = figures.control_mode + ("" if figures.control_mode_stated else " (assumed)")
     times, left = figures.cycle_time_s, figures.under_control
@@ -16,7 +16,7 @@ def control_told(figures: "Summary | Verification") -> str:
     )
 
 
-def expected_told(figures: "Summary | Verification") -> list[str]:
+def expected_error_lines(figures: "Summary | Verification") -> list[str]:
     """The error to be expected of real machines, where the machine file states how sure its numbers are."""
     if not (expected := figures.expected):
         return []

@@ -12,7 +12,7 @@ import math
 
 from camcomp.ground.compiled import inner
 from camcomp.model.stock.field import ZMIN
-from camcomp.model.stock.front import AT, BITE, EDGE, END_ANGLE, FLOOR, least_angle, meets
+from camcomp.model.stock.front import ARC_COLUMNS, AT, EDGE, END_ANGLE, FLOOR, least_angle, meets
 from camcomp.model.stock.sweeps import FLAT, KIND, radius_at, slope
 
 OFF, FINEST = 5e-3, 1e-3  # rad: largest tolerance of an edge, and the smallest for which the test is cheaper
@@ -20,9 +20,9 @@ BETWEEN, TURN = 4, 8  # number of angles tested per slice, and of slices after w
 
 
 @inner
-def alike(found, a, b):
+def has_same_arcs(found, a, b):
     """Whether two slots have the same number of arcs in every slice."""
-    rows, n = found.bites, found.stack_rows[a, 1]
+    rows, n = found.arc_rows, found.stack_rows[a, 1]
     first, second = found.stack_rows[a, 0], found.stack_rows[b, 0]
     if n == 0 or n != found.stack_rows[b, 1]:
         return False
@@ -36,10 +36,10 @@ def alike(found, a, b):
 @inner
 def mix(found, a, b, w):
     """Append the arcs at share w between two slots with the same arcs, and return their first row; counts do not change."""
-    rows, first = found.bites, found.told_of[2]
+    rows, first = found.arc_rows, found.told_of[2]
     for r in range(found.stack_rows[a, 1]):
         p, q = found.stack_rows[a, 0] + r, found.stack_rows[b, 0] + r
-        for i in range(BITE):
+        for i in range(ARC_COLUMNS):
             rows[first + r, i] = rows[p, i] + w * (rows[q, i] - rows[p, i])
     return first
 
@@ -58,7 +58,7 @@ def expected(rows, first, last, psi, off):
 @inner
 def looks_so(nodes, place, found, first, last, radius, run, level, least, number, off):
     """Whether the material at one slice of the tool agrees with its predicted arcs; number: index of the slice."""
-    rows = found.bites
+    rows = found.arc_rows
     begin, end = least + END_ANGLE, math.pi - least - END_ANGLE
     for r in range(first, last):
         for side in range(2):
@@ -81,14 +81,14 @@ def looks_so(nodes, place, found, first, last, radius, run, level, least, number
 
 
 @inner
-def as_foreseen(nodes, place, found, a, b, w, missed):
+def is_as_predicted(nodes, place, found, a, b, w, missed):
     """Whether the arcs at the present place (place.at) are those at share w between slots a and b.
 
     missed: tolerance of the engagement, as in places.py. False also where the test cannot decide.
     """
-    row, rows = int(place.row[0]), found.bites
+    row, rows = int(place.row[0]), found.arc_rows
     n = found.stack_rows[a, 1]
-    if nodes.tools[row, KIND] == FLAT or not alike(found, a, b) or found.told_of[2] + n > rows.shape[0]:
+    if nodes.tools[row, KIND] == FLAT or not has_same_arcs(found, a, b) or found.told_of[2] + n > rows.shape[0]:
         return False
     first = mix(found, a, b, w)
     tall = 0.0

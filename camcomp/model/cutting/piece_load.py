@@ -13,7 +13,7 @@ STRAIGHT = 1e-9  # of the force: deviation from the line between its neighbours 
 
 
 @dataclass(frozen=True, eq=False)
-class Grip:
+class PieceLoad:
     """Pieces (p,): force of the model (p, 3) N as Fr, Ft, Fz at both ends, and whether the tool cuts."""
 
     base0: Floats
@@ -21,7 +21,7 @@ class Grip:
     on: Bools
 
     @classmethod
-    def of(cls, engaged: Engaged, base: Floats, motion: Ints, u0: Floats, u1: Floats) -> Grip:
+    def of(cls, engaged: Engaged, base: Floats, motion: Ints, u0: Floats, u1: Floats) -> PieceLoad:
         """Loads of parts u0 to u1 of motions (p,) from the forces (k, 3) at the places; every jump has a place."""
         left, right, known = engaged.around(motion, 0.5 * (u0 + u1))
         if not len(engaged.u):
@@ -38,9 +38,9 @@ class Grip:
         """Fr, Ft, Fz (k, 3) N at fractions w (k,) of pieces (k,)."""
         return self.base0[piece] * (1.0 - w)[:, None] + self.base1[piece] * w[:, None]
 
-    def cut(self, of: Ints, begin: Floats, end: Floats) -> Grip:
+    def cut(self, of: Ints, begin: Floats, end: Floats) -> PieceLoad:
         """Loads of parts `begin` to `end` (q,) of pieces (q,)."""
-        return Grip(self.base(of, begin), self.base(of, end), self.on[of])
+        return PieceLoad(self.base(of, begin), self.base(of, end), self.on[of])
 
 
 def needed(motion: Ints, u: Floats, turn: Floats, bends: Bools, base: Floats) -> Ints:
