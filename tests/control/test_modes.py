@@ -136,6 +136,14 @@ def test_a_program_without_any_correction_keeps_its_mode(tmp_path):
     assert (tmp_path / "o.nc").read_bytes().partition(b"\n")[2] == (tmp_path / "p.nc").read_bytes()
 
 
+@pytest.mark.parametrize("arc", ["G3 X15 Y0", "G2 X15 Y0", "G3 X15 Y0 P3", "G2 X0 Y15 P2", "G3 X0 Y15"])
+def test_arcs_that_stay_as_programmed_keep_their_turns(arc):
+    job = Job(load_config([shipped("config/cartesian.yaml"), shipped("config/no-force.yaml")]))
+    done = compensated(job, ["G0 X15 Y0 Z0", f"{arc} I-15 J0 F1200"], "G64 P0.0005\n")
+    assert done.control.after_s == pytest.approx(done.control.before_s, rel=1e-9)
+    assert 1e3 * np.linalg.norm(done.control.error, axis=1).max() <= 1.0  # um: what P0.0005 allows for, and its ends
+
+
 def test_where_the_control_goes_off_is_told_with_its_lines(orthoglide):
     done = compensated(
         orthoglide, ["G0 X0 Y0 Z5", "G1 Z0 F400", "X9 Y0 F3000", "X18 Y0.5", "X27 Y0", "G1 Z5"], "G64 P0.01"

@@ -5,12 +5,17 @@ Run by LinuxCNC's own Python; what to do and where to write comes from the file 
 solver may be late by itself, and the machine then holds as it should: the operator here switches off and on and goes on.
 """
 
+import ast
 import json
 import os
+import re
+import select
+import shutil
 import signal
 import subprocess
 import sys
 import time
+from types import SimpleNamespace
 
 import linuxcnc
 
@@ -203,8 +208,8 @@ def refused(code, force):
 class Recorder:
     """halsampler into a file, and the servo periods between which something was done."""
 
-    def __init__(self, path):
-        self._process = subprocess.Popen(["halsampler", path])
+    def __init__(self, command):
+        self._process = subprocess.Popen(command)
         self.marks = {}
         time.sleep(0.2)
 
@@ -293,7 +298,7 @@ def hurt(program, word, number):
 
 def orthoglide(task):
     """Enable and homing in both orders, a fast program through what happens to programs, tools, and faults."""
-    recorder, program = Recorder(task["record"]), task["program"]
+    recorder, program = Recorder(["halsampler", task["record"]]), task["program"]
     push(task["force"])
     switch_on()
     time.sleep(0.2)
@@ -319,13 +324,51 @@ def orthoglide(task):
     return {"marks": recorder.marks, "faults": faults}
 
 
+def filter_of_axis():
+    """The function by which AXIS sends a program through its filter, and the progress that it would draw."""
+    with open(shutil.which("axis"), encoding="utf-8") as file:
+        tree = ast.parse(file.read())
+    kept = [each for each in tree.body if isinstance(each, ast.FunctionDef) and each.name == "filter_program"]
+    kept += [
+        each for each in tree.body if isinstance(each, ast.Assign) and ast.unparse(each.targets[0]) == "progress_re"
+    ]
+    shares = []
+    bar = SimpleNamespace(
+        set_text=lambda text: None, update=lambda share, force: shares.append(share), done=lambda: None
+    )
+    space = {"os": os, "sys": sys, "re": re, "select": select, "_": str, "Progress": lambda phases, total: bar,
+             "t": SimpleNamespace(update=lambda: None)}  # fmt: skip
+    exec(compile(ast.Module(kept, []), "axis", "exec"), space)  # noqa: S102
+    return space["filter_program"], shares
+
+
+def opened(task):
+    """A program opened through the filter of the INI file, as AXIS does, run, and recorded."""
+    program, filtered = task["program"], task["program"] + ".filtered"
+    command = linuxcnc.ini(os.environ["INI_FILE_NAME"]).find("FILTER", os.path.splitext(program)[1][1:])
+    filter_program, shares = filter_of_axis()
+    code, said = filter_program(command, program, filtered)
+    if code:
+        return {"exit_code": code, "said": said}
+    switch_on()
+    home()
+    mode(linuxcnc.MODE_AUTO)
+    COMMAND.program_open(filtered)
+    recorder = Recorder(["halsampler", "-t", task["recording"]])
+    COMMAND.auto(linuxcnc.AUTO_RUN, 0)
+    time.sleep(0.5)
+    until(lambda: state().interp_state == linuxcnc.INTERP_IDLE and STATUS.inpos and STATUS.queue == 0, 100.0)
+    recorder.close()
+    return {"exit_code": 0, "said": said, "progress": shares}
+
+
 def main():
     """Does what the file says and writes beside it what came out."""
     with open(os.environ["SCREEN"], encoding="utf-8") as file:
         task = json.load(file)
     signal.signal(signal.SIGCHLD, signal.SIG_DFL)
     try:
-        out = {"steps": steps, "orthoglide": orthoglide}[task["scenario"]](task)
+        out = {"steps": steps, "orthoglide": orthoglide, "opened": opened}[task["scenario"]](task)
     except (OSError, ValueError, LateError, BusyError, linuxcnc.error, subprocess.CalledProcessError) as error:
         out = {"error": repr(error), "busy": isinstance(error, BusyError)}
     with open(task["answer"], "w", encoding="utf-8") as file:

@@ -133,6 +133,13 @@ def sweeps(start: Floats, end: Floats, centre: Floats, axis: Floats, way: Floats
     return out
 
 
+def stated_sweeps(start: Floats, end: Floats, centre: Floats, axis: Floats, angle: Floats) -> Floats:
+    """Signed angles (k,) rad between start and end, with the whole turns of the stated ones; angle (k,) rad."""
+    sweep = sweeps(start, end, centre, axis, angle)
+    out: Floats = sweep + 2.0 * np.pi * np.round((angle - sweep) / (2.0 * np.pi))
+    return out
+
+
 def lengths(start: Floats, end: Floats, arcs: Arcs, axis: Floats) -> Floats:
     """Lengths (k,) mm of moves that may be arcs."""
     straight = np.linalg.norm(end - start, axis=1)
@@ -152,7 +159,7 @@ def along(start: Floats, end: Floats, arcs: Arcs, axis: Floats, f: Floats) -> Fl
         p, q = s - c, e - c
         low, high = np.sum(p * a, axis=1), np.sum(q * a, axis=1)
         p, q = p - low[:, None] * a, q - high[:, None] * a
-        angle = sweeps(s, e, c, a, arcs.angle[on])
+        angle = stated_sweeps(s, e, c, a, arcs.angle[on])
         growth = np.linalg.norm(q, axis=1) / np.maximum(np.linalg.norm(p, axis=1), 1e-300) - 1.0
         height = low + f[on] * (high - low)
         out[on] = c + path_geometry.turn(p, a, f[on] * angle) * (1.0 + growth * f[on])[:, None] + height[:, None] * a

@@ -41,6 +41,11 @@ class CorrectedRows:
     engagement: Floats  # (N, 2) depth of the cut mm, sum of the engaged arcs rad; NaN where no stock is known
     words: Floats | None = None  # (N, 3) of the orientation to be commanded; None: those of the program, if any
 
+    def sweeps(self, path: Path) -> Floats:
+        """Signed angles (N,) rad of the moves that are arcs, corrected or as programmed; 0 for lines."""
+        out: Floats = np.where(self.arcs.on, self.arcs.angle, path.angle[self.motion])
+        return np.where(self.kind == ARC, out, 0.0)
+
 
 def corrected_rows(
     program: Program,
@@ -137,13 +142,12 @@ def output_of(path: Path, rows: CorrectedRows, rest: Bools | None = None, apart:
     """The rows as the writer wants them; rest, apart (N,): those that end at rest, and stay apart, in any case."""
     arc, bent = rows.kind == ARC, rows.arcs.on
     centre = np.where(bent[:, None], rows.arcs.centre, path.centre[rows.motion])
-    angle = np.where(bent, rows.arcs.angle, path.angle[rows.motion])
     return Output(
         motion=rows.motion,
         kind=rows.kind.astype(np.int8),
         end=rows.end,
         centre=np.where(arc[:, None], centre, np.nan),
-        angle=np.where(arc, angle, 0.0),
+        angle=rows.sweeps(path),
         feed=rows.feed,
         joining=rows.joining,
         rest=rest,

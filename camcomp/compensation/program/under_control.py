@@ -246,8 +246,8 @@ def written_moves(program: Program, rows: CorrectedRows, written: Rewritten, fee
     start = np.concatenate((path.start[motion[:1]], end[:-1]))
     centre = np.where(bent[:, None], written.centre, path.centre[motion])
     axis = path.axis[motion]
-    angle = np.where(arc, path.angle[motion], 0.0)
-    angle[bent] = arcs_out.sweeps(start[bent], end[bent], centre[bent], axis[bent], rows.arcs.angle[bent])
+    angle = rows.sweeps(path)
+    angle[bent] = arcs_out.stated_sweeps(start[bent], end[bent], centre[bent], axis[bent], angle[bent])
     exact, stop, tolerance, merged = mode_columns(program.modes)
     told = np.where(np.isnan(written.feed), feed, written.feed)
     waits = np.asarray(path.waits)[motion] & (np.diff(motion, prepend=-1) > 0)
