@@ -337,7 +337,9 @@ _COLUMN_TEXTS = {
     "act_<a>_mm": "encoder of an actuator",
     "act_<a>_N": "force that the drive exerts on its carriage, positive along the actuator",
     "load_<a>_mm": "second encoder, behind the gear",
-    **dict.fromkeys(DYNO, "force on the tool from a dynamometer, machine frame; the cutting force of a run without a program"),
+    **dict.fromkeys(
+        DYNO, "force on the tool from a dynamometer, machine frame; the cutting force of a run without a program"
+    ),
     TEMPERATURE: "temperature of the machine, °C",
     **dict.fromkeys(TIP_SD, "standard deviation of the tip measurement in this row"),
 }

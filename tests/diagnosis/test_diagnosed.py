@@ -34,6 +34,7 @@ def test_play_is_play(tmp_path):
     assert low <= truth["causes"][0]["parameters"]["width_mm"] <= high
 
 
+@pytest.mark.campaign  # test_found_laws has one in the plain run
 def test_what_acts_for_a_while_is_found_beside_a_known_cause_and_located(tmp_path):
     """A drive is pushed aside for some seconds of one run, on a machine with play elsewhere; the library does without a name for it."""
     causes = (("backlash", "x"), ("disturbed_drive", "y"))

@@ -70,6 +70,7 @@ def test_a_longer_link_and_a_soft_joint_are_found_on_other_campaigns(robot, faul
     assert all(m.size_um < 0.3 * NOISE_UM for m in result.minor)
 
 
+@pytest.mark.campaign  # test_answers_on_poses has one in the plain run
 def test_without_a_floor_nothing_is_identified_and_nothing_is_none(robot, faulty, healthy):
     result = arm_study(robot, (), faulty, holdout=["B"])
     assert (result.verdict, result.floor.um, result.floor.source) == ("ambiguous", None, "not identifiable")
@@ -89,6 +90,7 @@ def test_an_arm_that_is_its_model_has_no_cause(robot, healthy):
         assert result.gap.rms_um == pytest.approx(NOISE_UM, rel=0.1)
 
 
+@pytest.mark.campaign  # test_joint_curves has it in the plain run
 def test_one_campaign_identifies_nothing(robot, faulty):
     for stated in (STATED, StatedDeviation()):
         result = arm_study(robot, (), faulty[:1], stated=stated)
@@ -157,6 +159,7 @@ def test_beam_breaks_are_listed_and_not_fitted(robot, faulty):
     assert {(o.run, o.row) for o in result.outliers} == {(name, k + 1) for name, some in rows.items() for k in some}
 
 
+@pytest.mark.campaign  # beam breaks are in the plain run
 def test_heavy_tails_change_no_cause(robot, faulty):
     rng = np.random.default_rng(8)
     runs = [replace(r, tip=r.tip + 0.02 / np.sqrt(3) * rng.standard_t(3, r.tip.shape)) for r in faulty]
@@ -177,6 +180,7 @@ def test_order_and_doubled_rows_change_nothing(robot, faulty):
     assert arm_study(robot, (), slower, holdout=["B"], stated=STATED).to_json() == first.to_json()
 
 
+@pytest.mark.campaign  # programs are in the plain run (tests/validation/recorded)
 @pytest.mark.parametrize("trials", [1, pytest.param(12, marks=pytest.mark.campaign)])
 def test_less_data_gives_no_more_certainty(robot, faulty, trials):
     """Poses and campaigns left out of experiments that are unknown or ambiguous: none becomes another single cause."""
@@ -338,6 +342,7 @@ def test_forces_of_a_withheld_run_are_judged_by_themselves():
     assert abs(1e3 * seen.force.std() / size - 1.0) > 0.1
 
 
+@pytest.mark.campaign  # a push is in the plain run
 def test_a_shift_of_set_points_is_located_in_time():
     log = axis_log()
     setpoint = log.setpoint.copy()
@@ -349,6 +354,7 @@ def test_a_shift_of_set_points_is_located_in_time():
     assert {c.effect for c in result.known} == {"servo_lag", "friction"}
 
 
+@pytest.mark.campaign  # beam breaks of an arm are in the plain run
 def test_spikes_of_an_encoder_are_listed_and_not_fitted():
     log, rows = axis_log(), np.arange(100, 16000, 200)
     encoder = log.encoder.copy()
@@ -360,6 +366,7 @@ def test_spikes_of_an_encoder_are_listed_and_not_fitted():
     assert lag.parameters["time_constant_ms"].value == pytest.approx(5.0, rel=0.01)
 
 
+@pytest.mark.campaign  # test_result has it in the plain run
 def test_what_is_chosen_is_judged_on_runs_that_were_not_fitted():
     runs = [replace(axis_log(seed=k), name=f"r{k}") for k in range(4)]
     runs = [replace(r, **{f: getattr(r, f)[::4] for f in ("time", "setpoint", "encoder", "force")}) for r in runs]

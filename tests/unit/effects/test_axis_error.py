@@ -96,6 +96,7 @@ def test_what_makes_no_sense_is_refused_at_its_place(tmp_path, effect, said):
     assert said in str(error.value) and error.value.at.line == 2
 
 
+@pytest.mark.campaign  # test_every_machine has one in the plain run
 def test_bent_and_twisted_guideways_are_found_and_taken_out_of_the_next_program(tmp_path):
     machine = Guideways(errors={"EZX": lambda x, way: 1.5e-5 * x**2, "EAX": lambda x, way: 2e-5 * x}, tool=TOOL)
     path, better = experiment(tmp_path, machine), tmp_path / "better.yaml"

@@ -51,6 +51,7 @@ def test_an_interval_of_no_length_is_none():
     assert EFFECT.on_drive(error, m, np.ones(1), p) is error and EFFECT.on_drive_force(error, m, np.ones(1), p) is error
 
 
+@pytest.mark.campaign  # test_every_machine has one in the plain run
 def test_it_is_found_and_located_in_time(tmp_path):
     """The plant lifts y by 25 um from second 203 of the common clock on, for 1.5 s: within the third run."""
 

@@ -68,6 +68,7 @@ def test_a_warm_program_stops_short_by_what_the_screw_grows(tmp_path):
 MOVES = "G0 X0 Y0 Z0\nG1 X400 F15000\nY400\nX300 Y200\nX0\nY0\n"
 
 
+@pytest.mark.campaign  # test_every_machine has one in the plain run
 def test_it_is_found_and_is_neither_a_pitch_nor_a_growth_everywhere(tmp_path):
     """A screw of 12 ppm per kelvin carries the nut beyond its scale, from 20 to 26 degrees over an hour."""
 

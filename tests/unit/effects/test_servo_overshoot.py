@@ -114,6 +114,7 @@ RUNS = (
 )
 
 
+@pytest.mark.campaign  # test_every_machine has one in the plain run
 def test_it_is_found_by_set_points_and_encoders(tmp_path):
     """A plain loop of 50 ms that swings is late, too: both are named, and together they are the loop."""
     w, damping = 2.0 * np.pi / 0.05, 0.3

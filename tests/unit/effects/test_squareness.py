@@ -49,6 +49,7 @@ def test_a_ball_bar_reads_it_from_the_radii_at_45_degrees(tmp_path, program):
     assert r[up].mean() - r[diagonal & ~up].mean() == pytest.approx(0.8e-3 * radius, rel=5e-3)
 
 
+@pytest.mark.campaign  # test_every_machine has one in the plain run
 def test_it_is_found_on_a_machine_that_leans_and_its_circles_come_out_round(tmp_path):
     machine = Guideways({("x", "y"): 0.7e-3}, tool=60.0)
     path, better = experiment(tmp_path, machine), tmp_path / "better.yaml"

@@ -120,6 +120,7 @@ def test_programs_say_how_far_they_are(shares):
     assert_rising(shares, watched)
 
 
+@pytest.mark.campaign  # axes are in the plain run
 def test_a_diagnosis_says_how_far_it_is(shares):
     with reported.watched() as watched:
         camcomp.diagnose(ROOT / "samples/diagnosis/ambiguous/experiment.yaml")

@@ -66,6 +66,7 @@ def sample():
     return camcomp.diagnose(ROOT / "samples/ur10/experiment.yaml")
 
 
+@pytest.mark.campaign  # docs/how-to/recordings.md diagnoses the sample in the plain run
 def test_sample(sample):
     result = json.loads(sample.result.to_json())
     check_schema("diagnosis", result)
@@ -82,12 +83,14 @@ def test_sample(sample):
     assert 3e-9 < low < 1.03e-8 < high < 2e-8  # of the shoulder, by all poses of both campaigns
 
 
+@pytest.mark.campaign  # docs/how-to/recordings.md diagnoses the sample in the plain run
 def test_the_written_machine_file_is_one(sample, tmp_path):
     path = tmp_path / "ur10.yaml"
     path.write_text(sample.machine_with_causes(str(path)))
     assert len(load_config([path]).effects) > len(sample.result.known) - 1
 
 
+@pytest.mark.campaign  # docs/how-to/recordings.md diagnoses the sample in the plain run
 def test_residuals_are_those_of_its_poses(sample):
     left = sample.residuals
     fitted = ~np.isin(left["run"], sample.result.shrinkage.holdout)

@@ -13,6 +13,7 @@ from tests.validation.parallel import motion, scenario, structure
 from tests.validation.parallel.machine import read
 from tests.validation.parallel.plant import LIBRARY, Deviation, simulate
 
+pytestmark = pytest.mark.campaign  # of a generator of campaigns; compiles for half a minute
 WARMING = {"rise_K": 8.0, "warm_up_s": 600.0}
 NONE = structure.nominal()
 

@@ -30,6 +30,7 @@ def before(files, tmp_path_factory):
     return runner.ask(metamorphic.write(files, tmp_path_factory.mktemp("before")))
 
 
+@pytest.mark.campaign  # fewer rows are in the plain run
 @pytest.mark.parametrize("name", QUICK_SAME)
 def test_what_carries_no_information_changes_nothing(files, before, name, tmp_path):
     changed, names = metamorphic.SAME[name](files, np.random.default_rng(1))

@@ -18,6 +18,7 @@ def test_information_between_two_causes():
     assert told_of_two(100.0) > 0.999
 
 
+@pytest.mark.campaign  # asks many whole experiments
 def test_a_designed_experiment_beats_chance_and_is_as_good_as_brute_force(tmp_path):
     found = compare(QUESTIONS[0], tmp_path, steps=2, random=8)
     assert found["tried"] >= 15

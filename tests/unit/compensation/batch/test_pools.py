@@ -147,6 +147,7 @@ def test_without_workers_it_says_so_and_waits_and_another_version_is_refused(clu
     assert error.value.rule == "CC505"
 
 
+@pytest.mark.campaign  # a killed worker is in the plain run
 @pytest.mark.filterwarnings("default")
 def test_a_scheduler_that_dies_ends_the_batch_and_what_is_done_stays_done(cluster, tmp_path):
     cluster.work(1)
@@ -193,7 +194,14 @@ def running(pid):
 
 
 @pytest.mark.skipif(not Path("/proc").is_dir(), reason="looks at processes as Linux shows them")
-@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize(
+    "how",
+    [
+        pytest.param(signal.SIGKILL, marks=pytest.mark.campaign),
+        signal.SIGTERM,
+        pytest.param(signal.SIGINT, marks=pytest.mark.campaign),
+    ],
+)
 def test_workers_end_with_the_batch_however_it_ends(tmp_path, how):
     for i in range(400):
         (tmp_path / "in").mkdir(exist_ok=True)
