@@ -26,9 +26,9 @@ def inner(function: Callable[..., Any], *, fastmath: bool = False) -> Any:
     """
     if numba.config.DISABLE_JIT:  # for the debugger
         return function
-    from camcomp.ground.linked_code import Inner
+    from camcomp.ground.linked_code import jit, linking_options
 
-    dispatcher = numba.njit(no_cpython_wrapper=True, fastmath=fastmath, pipeline_class=Inner, **_OPTIONS)(function)
+    dispatcher = jit(function, fastmath=fastmath, no_cpython_wrapper=True, **linking_options(), **_OPTIONS)
     template = getattr(dispatcher, "get_call_template", None)
     if template is not None:  # a numba without it compiles more
 
@@ -53,7 +53,7 @@ def entry(function: Callable[..., Any]) -> Callable[..., Any]:
 
     @functools.wraps(function)
     def call(*args: Any) -> Any:
-        if dispatcher.overloads:  # not its `signatures`, which makes a list every time
+        if getattr(dispatcher, "overloads", None):  # not its `signatures`, which makes a list every time
             return dispatcher(*args)
         from camcomp.ground import progress
 
@@ -76,7 +76,8 @@ def direct(function: Callable[..., Any], args: tuple[Any, ...]) -> Callable[...,
     Calling it avoids numba's dispatch by types, which takes longer than a small kernel.
     """
     dispatcher: Any = getattr(function, "dispatcher", None)
-    if dispatcher is None:
+    try:
+        out: Callable[..., Any] = dispatcher.overloads[tuple(map(dispatcher.typeof_pyval, args))].entry_point
+    except AttributeError:  # not compiled, or a numba without these names
         return function
-    out: Callable[..., Any] = dispatcher.overloads[tuple(map(dispatcher.typeof_pyval, args))].entry_point
     return out

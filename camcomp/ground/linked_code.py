@@ -8,25 +8,41 @@ the trial `is_usable` fails, functions are compiled as usual.
 from __future__ import annotations
 
 import functools
+from collections.abc import Callable
 from typing import Any
 
 import numba as _numba
 
 numba: Any = _numba  # its annotations are incomplete
 
-_compiler: Any = numba.core.compiler
+
+def jit(function: Callable[..., Any], fastmath: bool = False, **saving: Any) -> Any:
+    """Numba's dispatcher of a function. saving: options that only save compile time, left out with a numba without them."""
+    try:
+        return numba.njit(fastmath=fastmath, **saving)(function)
+    except (KeyError, TypeError):
+        return numba.njit(fastmath=fastmath, nogil=True, error_model="numpy")(function)
 
 
-class Inner(_compiler.CompilerBase):  # type: ignore[misc]
-    """Numba's passes up to LLVM code, for a function that compiled functions call."""
+@functools.cache
+def linking_options() -> dict[str, Any]:
+    """Options of njit for a function that compiled functions call; none where numba lacks the classes."""
+    try:
+        from numba.core.compiler import CompilerBase, DefaultPassBuilder
+    except ImportError:
+        return {}
+    base: Any = CompilerBase
 
-    def define_pipelines(self) -> list[Any]:
-        """The passes of numba, with a library that is not optimised if numba permits it."""
-        state = self.state
-        if _trying or is_usable():
-            state.library = _part_class()(state.targetctx.codegen(), state.func_id.func_qualname)
-            state.library.enable_object_caching()
-        return [_compiler.DefaultPassBuilder.define_nopython_pipeline(state)]
+    class Inner(base):  # type: ignore[misc]
+        def define_pipelines(self) -> list[Any]:
+            """The passes of numba, with a library that is not optimised if numba permits it."""
+            state = self.state
+            if _trying or is_usable():
+                state.library = _part_class()(state.targetctx.codegen(), state.func_id.func_qualname)
+                state.library.enable_object_caching()
+            return [DefaultPassBuilder.define_nopython_pipeline(state)]
+
+    return {"pipeline_class": Inner}
 
 
 _trying: list[bool] = []  # not empty while the trial compiles
@@ -37,7 +53,7 @@ def is_usable() -> bool:
     """Whether this numba compiles a small function and its caller this way, with the correct result."""
     _trying.append(True)
     try:
-        part = numba.njit(no_cpython_wrapper=True, pipeline_class=Inner)(_doubled)
+        part = numba.njit(no_cpython_wrapper=True, **linking_options())(_doubled)
         whole = numba.njit(_calling(part))
         return bool(whole(20.0) == 41.0)
     except Exception:  # noqa: BLE001 - any error of another numba version means the usual compilation

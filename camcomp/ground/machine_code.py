@@ -21,6 +21,7 @@ import llvmlite
 import numba as _numba
 
 from camcomp.ground import progress
+from camcomp.ground.linked_code import jit
 from camcomp.ground.notes import note
 from camcomp.ground.replacement import Replacement
 from camcomp.ground.trust import why_file_is_not_ours, why_folder_is_not_ours
@@ -39,7 +40,7 @@ def kept(function: Callable[..., Any], *, allocates: bool = True, **options: Any
     allocates: the code creates arrays. Other code is loaded without numba's compiler, whose import takes a quarter of a
     second.
     """
-    dispatcher = numba.njit(**options)(function)
+    dispatcher = jit(function, **options)
     if not numba.config.DISABLE_JIT:  # for the debugger
         # Without this attribute (another numba version) every process compiles.
         dispatcher._cache = _Cache(function, allocates)

@@ -4,6 +4,7 @@ import functools
 
 import pytest
 
+from tests.contradictions import contradictions
 from tests.validation import runner
 from tests.validation.plants.causes import Cause
 from tests.validation.plants.experiments import Plan, make, write
@@ -28,6 +29,7 @@ class Workshop:
         from camcomp.api.diagnosis import diagnose
 
         done = diagnose(self.made(plan)[0])
+        assert contradictions(done.result.as_json()) == []
         return done.result.as_json(), done.behind, done.opened
 
 

@@ -5,6 +5,7 @@ import json
 import pytest
 import yaml
 
+from tests.contradictions import contradictions
 from tests.validation import runner
 from tests.validation.recorded.experiment import Plan, make, write
 
@@ -16,7 +17,9 @@ def answer(plan, folder, *options):
     made, said = make(plan), folder / "result.json"
     code, text = runner.invoke(["diagnose", str(write(made, plan, folder)), "--json", str(said), *options])
     assert code == 0, text
-    return json.loads(said.read_text()), made.record
+    result = json.loads(said.read_text())
+    assert contradictions(result) == []
+    return result, made.record
 
 
 def test_nothing_is_wrong(tmp_path):

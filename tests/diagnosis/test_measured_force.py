@@ -16,10 +16,10 @@ ONLY = ("joint_curve", "disturbance", "link_geometry", "formula", "map")
 JOINTS = load_arm("kuka-kr210")
 
 
-def written(folder, config, runs, columns, sd=None):
+def written(folder, config, runs, columns, sd=None, *, effects=EFFECTS, **others):
     """Path of an experiment: runs are (name, rows) without a program."""
     effects_file = folder / "effects.yaml"
-    effects_file.write_text(yaml.safe_dump({"effects": EFFECTS}))
+    effects_file.write_text(yaml.safe_dump({"effects": effects}))
     for name, rows in runs:
         np.savetxt(folder / f"{name}.csv", rows, delimiter=",", header=",".join(columns), comments="", fmt="%.9g")
     experiment = {
@@ -28,7 +28,7 @@ def written(folder, config, runs, columns, sd=None):
             {"name": n, "log": f"{n}.csv", "cutting": True, "started_s": 1000.0 * k} for k, (n, _) in enumerate(runs)
         ],
     }
-    (folder / "experiment.yaml").write_text(yaml.safe_dump(experiment | ({"sd": sd} if sd else {})))
+    (folder / "experiment.yaml").write_text(yaml.safe_dump(experiment | ({"sd": sd} if sd else {}) | others))
     return folder / "experiment.yaml"
 
 

@@ -39,15 +39,20 @@ def test_an_effect_of_another_installation_has_its_name_alone():
         (0.0243949, 0.0232628, 0.025527, "width 24.4 µm (23.3 to 25.5)"),
         (0.0243949, 0.02438, 0.02441, "width 24.395 µm (24.380 to 24.410)"),
         (1.5, 1.2, 1.8, "width 1.50 mm (1.20 to 1.80)"),
-        (0.0004, 0.0, 0.0012, "width not told from 0 (0.00 to 1.20 µm)"),
+        (0.0004, 0.0, 0.0012, "width 0.40 µm (0.00 to 1.20)"),
     ],
 )
 def test_digits_follow_the_interval(value, low, high, told):
     assert sizes(found("backlash", "x", width_mm=(value, low, high))) == told
 
 
-def test_a_factor_that_may_be_one_is_not_told_from_one():
-    assert sizes(found("cutting_force", factor=(1.02, 0.98, 1.06))) == "factor not told from 1 (0.980 to 1.060)"
+def test_only_an_improbable_cause_is_not_determined():
+    may_be_one = found("cutting_force", factor=(1.02, 0.98, 1.06))
+    assert sizes(may_be_one) == "factor 1.020 (0.980 to 1.060)"
+    assert sizes(may_be_one.model_copy(update={"probability": 0.4})) == "factor not determined (0.980 to 1.060)"
+
+
+def test_a_factor_is_written_with_its_interval():
     assert sizes(found("cutting_force", factor=(1.30, 1.28, 1.32))) == "factor 1.300 (1.280 to 1.320)"
 
 
@@ -64,13 +69,13 @@ def test_a_unit_stands_once():
 
 def test_a_phase_may_be_zero_and_is_told():
     text = sizes(found("screw_cyclic", "x", amplitude_mm=(0.004, 0.0035, 0.0045), phase_rad=(0.1, -0.1, 0.3)))
-    assert "phase" in text and "phase not told" not in text
+    assert "phase" in text and "phase not determined" not in text
 
 
 def test_parameters_that_may_be_nothing_come_last_by_name():
     frame = found("workpiece_frame", shift_x_mm=(0.05, 0.04, 0.06), shift_y_mm=(0.001, -0.002, 0.004),
                   shift_z_mm=(0.0, -0.003, 0.003))  # fmt: skip
-    assert sizes(frame) == "shift x 50 µm (40 to 60); shift y and shift z not told from nothing"
+    assert sizes(frame) == "shift x 50 µm (40 to 60); shift y and shift z not determined"
 
 
 def test_a_parameter_of_an_unknown_unit_is_told_as_it_stands():

@@ -7,6 +7,7 @@ from functools import cache
 from typing import Any
 
 from camcomp.diagnosis.result.types import Driver, Estimate, FoundCause, LawTerm, NamedCause, StretchDriver
+from camcomp.diagnosis.statistics.probability import EVEN
 from camcomp.ground import shelf
 from camcomp.ground.errors import ConfigError
 from camcomp.report.plot import format_together
@@ -14,7 +15,7 @@ from camcomp.report.plot import format_together
 _SMALLER = {  # units of small values
     "mm": (1e3, "µm"), "rad": (1e3, "mrad"), "s": (1e3, "ms"), "mm/N": (1e3, "µm/N"), "rad/Nmm": (1e9, "µrad/Nm"),
 }  # fmt: skip
-_NOTHING = " not told from "
+_UNDETERMINED = " not determined"
 _LONG_NUMBER = re.compile(r"\d+\.\d{3,}(?:e[+-]?\d+)?")
 _COVARIATES = {
     "position": "where {0} stands",
@@ -52,16 +53,21 @@ def percent(share: float) -> str:
 
 
 def sizes(cause: FoundCause) -> str:
-    """The parameters of a cause with their 95 % intervals; insignificant ones last, by name only."""
+    """The parameters of a cause with their 95 % intervals; undetermined ones last, by name only.
+
+    The intervals are those of a cause that acts, so that one of a probable cause may include the nominal value.
+    """
     kinds = {each.name: each for each in getattr(_effect(cause.effect), "PARAMETERS", ())}
     # the choice between two laws is no size
     sized = {name: each for name, each in cause.parameters.items() if not (name in kinds and kinds[name].either)}
     told = {name: size(name, each, kinds.get(name)) for name, each in sized.items()}
-    nothing = [name for name, text in told.items() if _NOTHING in text]
-    if len(nothing) in (0, len(told)):
+    unknown = [name for name, text in told.items() if _UNDETERMINED in text]
+    if len(unknown) == len(told) and cause.probability > EVEN:
+        return "; ".join(size(name, each, kinds.get(name), acts=True) for name, each in sized.items())
+    if len(unknown) in (0, len(told)):
         return "; ".join(told.values())
-    rest = " and ".join(title(name, kinds.get(name)) for name in nothing)
-    return "; ".join([*(text for name, text in told.items() if name not in nothing), f"{rest}{_NOTHING}nothing"])
+    rest = " and ".join(title(name, kinds.get(name)) for name in unknown)
+    return "; ".join([*(text for name, text in told.items() if name not in unknown), f"{rest}{_UNDETERMINED}"])
 
 
 def title(name: str, parameter: Any = None) -> str:
@@ -70,11 +76,11 @@ def title(name: str, parameter: Any = None) -> str:
     return name.removesuffix(f"_{unit}").replace("_", " ") if unit else name.replace("_", " ")
 
 
-def size(name: str, each: Estimate, parameter: Any = None) -> str:
-    """A value with its 95 % interval, or its upper bound if the interval includes the nominal value."""
+def size(name: str, each: Estimate, parameter: Any = None, acts: bool = False) -> str:
+    """A value with its 95 % interval; `not determined` if that includes the nominal value, unless it is said to act."""
     unit = parameter.unit if parameter is not None else ""
     nominal = parameter.nominal if parameter is not None else 0.0
-    shape = parameter is not None and (bool(parameter.scan) or parameter.tolerance == 0.0)
+    shape = acts or (parameter is not None and (bool(parameter.scan) or parameter.tolerance == 0.0))
     return f"{title(name, parameter)}{_told(each.value, each.ci95, unit, None if shape else nominal)}"
 
 
@@ -89,7 +95,7 @@ def shortened(formula: str) -> str:
 
 
 def _told(value: float, ci95: tuple[float, float], unit: str, nominal: float | None) -> str:
-    """` 24.4 µm (23.3 to 25.5)`, or the text that it does not differ significantly from nominal."""
+    """` 24.4 µm (23.3 to 25.5)`, or that it is not determined, where the interval includes the nominal value."""
     low, high = ci95
     scale = 1.0
     if unit in _SMALLER and max(abs(low), abs(high), abs(value)) < 1.0:
@@ -97,7 +103,7 @@ def _told(value: float, ci95: tuple[float, float], unit: str, nominal: float | N
     behind = "" if unit in ("", "1") else f" {unit}"
     told, least, most = format_together(scale * value, scale * low, scale * high)
     if nominal is not None and low <= nominal <= high:
-        return f"{_NOTHING}{nominal:g} ({least} to {most}{behind})"
+        return f"{_UNDETERMINED} ({least} to {most}{behind})"
     return f" {told}{behind} ({least} to {most})"
 
 

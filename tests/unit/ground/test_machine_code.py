@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from camcomp.ground import linked_code, machine_code, notes
+from camcomp.ground import compiled, linked_code, machine_code, notes
 from camcomp.ground.compiled import entry, inner
 from tests.commandline import ROOT
 
@@ -196,25 +196,48 @@ def poisoned(data, mark):
     return hashlib.sha256(text).digest() + text
 
 
-@pytest.mark.parametrize("missing", ["_reload_init", "_final_module", "no library"])
+@pytest.mark.parametrize("missing", ["_reload_init", "_final_module", "no library", "CompilerBase"])
 def test_a_numba_of_another_build_compiles_as_usual(folder, monkeypatch, missing):
     """The private parts that are used are not there, or are otherwise: numba itself is right all the same."""
-    from numba.core import codegen
+    from numba.core import codegen, compiler
 
-    for each in (linked_code.is_usable, linked_code._part_class):
+    for each in (linked_code.is_usable, linked_code._part_class, linked_code.linking_options):
         each.cache_clear()
     if missing == "no library":
         monkeypatch.delattr(codegen, "JITCodeLibrary")
+    elif hasattr(compiler, missing):
+        monkeypatch.delattr(compiler, missing)
     else:
         monkeypatch.setattr(linked_code, "_part_class", lambda: broken(codegen.JITCodeLibrary, missing))
     try:
-        assert not linked_code.is_usable()
+        assert not linked_code.linking_options() or not linked_code.is_usable()
         made = inner(twice)
         assert entry(lambda x: made(x) + 1.0)(20.0) == 41.0
     finally:
-        for each in (linked_code.is_usable, linked_code._part_class):
+        for each in (linked_code.is_usable, linked_code._part_class, linked_code.linking_options):
             if hasattr(each, "cache_clear"):
                 each.cache_clear()
+
+
+@pytest.mark.parametrize("missing", ["_nrt", "no_cfunc_wrapper"])
+def test_a_numba_without_an_option_that_saves_time_compiles_as_usual(folder, monkeypatch, missing):
+    plain = linked_code.numba.njit
+
+    def njit(**options):
+        if missing in options:
+            raise KeyError(f"Unrecognized options: {missing}")
+        return plain(**options)
+
+    monkeypatch.setattr(linked_code.numba, "njit", njit)
+    made = inner(twice)
+    assert entry(lambda x: made(x) + 1.0)(20.0) == 41.0
+
+
+def test_without_the_names_of_direct_calls_kernels_are_called_as_usual(folder, monkeypatch):
+    made = entry(twice)
+    assert compiled.direct(made, (made(20.0),))(20.0) == 40.0
+    monkeypatch.setattr(made, "dispatcher", object())
+    assert compiled.direct(made, (20.0,)) is made
 
 
 def broken(library, name):
