@@ -58,6 +58,7 @@ def test_lines_that_a_control_merges_are_no_gap(tmp_path):
     assert (result["verdict"], result["causes"]) == ("none", [])
 
 
+@pytest.mark.campaign  # the longest of this file
 def test_what_is_far_behind_in_rapids_is_no_outlier(tmp_path):
     """A lag that grows with the square of the speed: at half the rate few rows are fast, which left a lag, sure."""
     with recording.taken_from("feed_modes"):

@@ -119,6 +119,7 @@ def test_a_cause_that_followed_a_law_goes_once_it_is_known_and_another_stays(tmp
     assert cause.values["error_ppm"] == pytest.approx(300.0, abs=30.0)
 
 
+@pytest.mark.campaign  # test_hidden_laws has one in the plain run
 def test_what_no_form_expresses_is_better_on_an_unseen_run_than_nothing(tmp_path):
     _, files = opened(tmp_path, "tangle", "x", "router", 910022, 10.0, 130)
     unseen = files.runs[2]

@@ -24,7 +24,7 @@ def pulled(encoder):
     return out
 
 
-@pytest.mark.parametrize("logged", ["forces", "no forces"])
+@pytest.mark.parametrize("logged", ["forces", pytest.param("no forces", marks=pytest.mark.campaign)])
 def test_friction_that_the_encoder_s_way_turns_round_is_friction(logged, tmp_path):
     experiment = shipped.experiment(tmp_path, "cartesian", None)
     for log in sorted(tmp_path.glob("*.csv")):

@@ -27,6 +27,7 @@ def test_friction_and_play_leave_nothing_unknown_where_an_axis_waits(tmp_path):
     assert result.verdict != "unknown"
 
 
+@pytest.mark.campaign  # the longest of this file
 def test_play_of_an_axis_that_moves_when_the_log_begins_is_one_of_what_may_have_shifted_it(tmp_path):
     """Every log begins on the way down, the play taken up by rapids that are not in it: all that shows is a constant height."""
     rng = np.random.default_rng(PLAN.seed)

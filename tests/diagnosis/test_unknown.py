@@ -14,7 +14,11 @@ CROSSTALK = plan_of(("force_crosstalk", "y"), design="six", samples=150, seed=62
 
 @pytest.mark.parametrize(
     ("plan", "driver"),
-    [(GROWTH, ("time:z", "temperature:z")), (CREEP, ("time:x", "temperature:x")), (CROSSTALK, ("force:z",))],
+    [
+        (GROWTH, ("time:z", "temperature:z")),
+        pytest.param(CREEP, ("time:x", "temperature:x"), marks=pytest.mark.campaign),
+        pytest.param(CROSSTALK, ("force:z",), marks=pytest.mark.campaign),
+    ],
 )
 def test_what_differs_from_run_to_run_is_not_taken_for_something_that_lasts(workshop, plan, driver):
     result = workshop.answer(plan)[0]
