@@ -75,9 +75,10 @@ def _bit(tree: Node) -> TabledTool:
         raise refused("the tool bit states no Diameter", tree.at)
     keys = {"type": Node(form, shape.at), "diameter_mm": _size(given["Diameter"], _UNITS)}
     if form == "bull":
-        if "CornerRadius" not in given:
-            return TabledTool(number=None, at=tree.at, why_open="bullnose without CornerRadius")
-        keys["corner_radius_mm"] = _size(given["CornerRadius"], _UNITS)
+        corner = _corner(given, keys["diameter_mm"].value)
+        if corner is None:
+            return TabledTool(number=None, at=tree.at, why_open="bullnose without CornerRadius or FlatRadius")
+        keys["corner_radius_mm"] = corner
     if form == "drill" and "TipAngle" in given:
         keys["point_deg"] = _size(given["TipAngle"], _DEGREES)
     if "CuttingEdgeHeight" in given:
@@ -85,6 +86,16 @@ def _bit(tree: Node) -> TabledTool:
     if "Flutes" in given and (teeth := _size(given["Flutes"], {"": 1.0})).value >= 1.0:
         keys["teeth"] = replace(teeth, value=int(teeth.value))
     return TabledTool(number=None, at=tree.at, keys=keys)
+
+
+def _corner(given: dict[str, Node], diameter: float) -> Node | None:
+    """The corner radius of a bull nose. FreeCAD up to 1.0 states the radius of the flat part of the bottom."""
+    if "CornerRadius" in given:
+        return _size(given["CornerRadius"], _UNITS)
+    if "FlatRadius" in given:
+        flat = _size(given["FlatRadius"], _UNITS)
+        return replace(flat, value=round(0.5 * diameter - flat.value, 9))
+    return None
 
 
 def _size(given: Node, units: dict[str, float]) -> Node:

@@ -69,6 +69,14 @@ def test_a_table_of_linuxcnc_gives_diameters_and_lengths(tmp_path):
     assert (config.at("tools", 3, "diameter_mm").line, config.at("tools", 3, "diameter_mm").column) == (3, 7)
 
 
+@pytest.mark.parametrize(("flat", "corner"), [("1.0 mm", 1.5), ("0.05 in", 1.23)])
+def test_older_bull_noses_state_the_radius_of_their_flat_part(tmp_path, flat, corner):
+    """FreeCAD 0.20 makes a bottom of 2 mm and corners up to Z 1.5 mm of Diameter 5 mm and FlatRadius 1 mm."""
+    bit = json.dumps({"shape": "bullnose.fcstd", "parameter": {"Diameter": "5.0 mm", "FlatRadius": flat}})
+    config = machine(tmp_path, "tools: {1: {file: bull.fctb}}\n", {"bull.fctb": bit}).config
+    assert keys(config, 1) == {"diameter_mm": 5.0, "type": "bull", "corner_radius_mm": pytest.approx(corner)}
+
+
 def test_the_name_alone_is_the_file(tmp_path):
     assert machine(tmp_path, "tools: t.tbl\n", {"t.tbl": "T1 D8 Z5"}).config.tools[1].diameter_mm == 8.0
 
