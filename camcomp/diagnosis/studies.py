@@ -24,6 +24,7 @@ from camcomp.diagnosis.axis.findings import AxisDeviation, AxisRun
 from camcomp.diagnosis.axis.plausible import check_axes
 from camcomp.diagnosis.axis.predicted import predict_drives, predict_encoders
 from camcomp.diagnosis.axis.study import studied as study_axes
+from camcomp.diagnosis.experiment.log_checks import check_clock
 from camcomp.diagnosis.experiment.open_experiment import open_log, read_log, unread
 from camcomp.diagnosis.fit.measured import Measured
 from camcomp.diagnosis.residuals import Columns, of_axes, of_poses
@@ -157,6 +158,8 @@ def open_poses(path: str | Path) -> list[Poses]:
 def _checked_axes(opened: _Opened) -> dict[str, list[AxisRun]]:
     robot, causes = opened.robot, _causes(opened.config)
     runs = list(zip(opened.experiment.runs, opened.logs, strict=True))
+    for run, log in runs:
+        check_clock(display_name(run.log), log)
     late = [predict_encoders(robot, causes, log, run.started_s) for run, log in runs]
     logs = [
         replace(log, drive=log.drive - predict_drives(robot, causes, log, run.started_s)) if log.has("drive") else log

@@ -48,6 +48,26 @@ def check_rows(name: str, measured: Measured) -> None:
         raise ConfigError("CC407", message, at=Location(name, 1, 1))
 
 
+def check_clock(name: str, measured: Measured) -> None:
+    """Raise CC405 where the time of a log starts again: rows behind a step back lie between those in front of it.
+
+    Rows that a logger writes late fill a gap instead, so that every step back makes at most four changes between parts of
+    the log in the order of time. Rows that it writes twice count once.
+    """
+    time = measured.time
+    back = np.flatnonzero(np.diff(time) < 0.0)
+    if not len(back):
+        return
+    part = np.concatenate([[0], np.cumsum(np.diff(time) < 0.0)])
+    cells = np.column_stack([getattr(measured, each) for each in measured.__dataclass_fields__])
+    once = np.unique(np.nan_to_num(cells), axis=0, return_index=True)[1]
+    order = once[np.lexsort((once, time[once]))]
+    if int((np.diff(part[order]) != 0).sum()) > 4 * len(back):
+        row = int(back[0])
+        message = f"time goes back from {time[row]:g} s to {time[row + 1]:g} s, and runs once more"
+        raise ConfigError("CC405", message, at=Location(name, row + 3, 1))
+
+
 def check_length(name: str, run: str, measured: Measured, due_s: float) -> None:
     """Raise CC409 for a run with too few rows, CC407 for times in another unit; due_s: duration of the program."""
     rows = len(measured.time)

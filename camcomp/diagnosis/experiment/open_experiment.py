@@ -9,6 +9,7 @@ import numpy as np
 
 from camcomp.diagnosis.experiment.driven_run import drive
 from camcomp.diagnosis.experiment.log_checks import (
+    check_clock,
     check_length,
     check_rows,
 )
@@ -65,7 +66,9 @@ def open_experiment(path: str | FilePath) -> OpenExperiment:
 def open_run(spec: RunSpec, job: Job, twin: Twin, notes: list[str]) -> Run:
     """One run of an experiment."""
     table, log = open_log(spec.log), display_name(spec.log)
-    measured = in_time(read_log(table, columns_of(twin)))
+    measured = read_log(table, columns_of(twin))
+    check_clock(log, measured)
+    measured = in_time(measured)
     notes += unread(table, columns_of(twin))
     check_rows(log, measured)
     program = None if spec.program is None else open_program(spec.program, job.config)

@@ -26,6 +26,14 @@ def triangles_of(data: bytes) -> Floats:
     Raises:
         ValueError: the bytes are no STL file.
     """
+    triangles = _triangles_of(data)
+    lost = np.flatnonzero(~np.isfinite(triangles).all(axis=(1, 2)))
+    if len(lost):
+        raise ValueError(f"a corner of triangle {lost[0] + 1} is no number")
+    return triangles
+
+
+def _triangles_of(data: bytes) -> Floats:
     count = int.from_bytes(data[80:_HEADER_BYTES], "little")
     wanted = _HEADER_BYTES + _TRIANGLE_BYTES * count
     if len(data) >= _HEADER_BYTES and len(data) == wanted:

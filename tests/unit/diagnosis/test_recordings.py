@@ -184,6 +184,11 @@ def test_a_run_that_was_driven_needs_times_that_run_forward(read):
     assert back.code == 2 and "poses.csv:5:1: error[CC405]: time goes back by 0.5 s" in back.told
 
 
+def test_a_run_of_one_axis_needs_times_that_run_forward_too(read):
+    got = read("t,act_x,x_cmd\n0,0,0\n1,1,1\n0.5,2,2\n", config="cartesian")
+    assert got.code == 2 and "poses.csv:4:1: error[CC405]: time goes back by 0.5 s" in got.told
+
+
 def test_what_could_be_several_columns_is_not_guessed(read):
     text = "t,x,y,z,x_cmd,y_cmd,z_cmd\n0,0,0,0,0,0,0\n1,1,0,0,1,0,0\n2,2,0,0,2,0,0\n"
     got = read(text, config="cartesian")  # the tip, or the actuators of these names
