@@ -53,7 +53,6 @@ def simulate(
         ConfigError, ProgramError, FileError: as from `load_machine` and `read_program`.
     """
     source = program_in(program, machine)
-    refuse_orientation(source, "the simulation")
     machine = job_of_program(machine, source.data, source.name, stock)
     engaged = machine.engaged(source) if cutting else None
     return SimulatedLog(
@@ -64,7 +63,7 @@ def simulate(
 def simulate_cut(program: Program | str | Path | bytes, machine: Job, *, stock: StockChoice | None = None) -> Surface:
     """Surface that the loaded machine cuts from the stock. Raises as `simulate`, ConfigError CC298."""
     source = program_in(program, machine)
-    refuse_orientation(source, "the simulation")
+    refuse_orientation(source, "the machined surface")
     return cut_surface(job_of_program(machine, source.data, source.name, stock), source)
 
 
@@ -82,6 +81,6 @@ def walls_report(
     from camcomp.compensation.report.wall_page import walls_html
 
     source = program_in(program, machine)
-    refuse_orientation(source, "the simulation")
+    refuse_orientation(source, "the machined surface")
     machine = job_of_program(machine, source.data, source.name, stock)
     return walls_html(machine, source, [Input("program", source.name, source.data), *inputs])

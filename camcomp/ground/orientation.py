@@ -97,7 +97,7 @@ def rotations_about(vectors: Floats) -> Floats:
 def rotations_of(form: str, words: Floats) -> Floats:
     """Rotations (k, 3, 3) of words (k, 3)."""
     if form == VECTOR:
-        return _from_upright(_unit(words))
+        return smallest_rotations(_unit(words))
     (a, b, c), one = np.radians(words.T), np.ones(len(words))
     ca, sa, cb, sb, cc, sc = np.cos(a), np.sin(a), np.cos(b), np.sin(b), np.cos(c), np.sin(c)
     rows = [
@@ -141,7 +141,7 @@ def _unit(vectors: Floats) -> Floats:
     return out
 
 
-def _from_upright(direction: Floats) -> Floats:
+def smallest_rotations(direction: Floats) -> Floats:
     """The smallest rotations (k, 3, 3) that bring +Z to directions (k, 3); about X where that is -Z."""
     x, y, z = direction.T
     down = z < -1.0 + 1e-12

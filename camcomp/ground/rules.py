@@ -452,9 +452,9 @@ RULES: dict[str, Rule] = {
         "add tool: diameter_mm, or tools: {1: {diameter_mm: ...}} for the tool of that T number",
     ),
     "CC296": Rule(
-        "tool not along Z",
-        "The stock is kept as heights along the program's Z, and the tool has to stand along it.",
-        "take workpiece: stock out for this program",
+        "tool in no one direction",
+        "The stock is kept as heights along one direction, from which the tool may lean by 5 degrees during cuts.",
+        "take workpiece: stock out for this program, or correct every operation in a program of its own",
     ),
     "CC297": Rule(
         "stock file not usable",

@@ -25,7 +25,10 @@ def refuse_orientation(program: Program, what: str) -> None:
     if len(lines):
         at = program.text.place(int(lines[0]) - 1)
         raise ProgramError(
-            "CC115", f"{what} does not follow words of orientation", at=at, hint="compensate and verify do"
+            "CC115",
+            f"{what} does not follow words of orientation",
+            at=at,
+            hint="compensate, verify, simulate of a log and diagnose do",
         )
 
 

@@ -1,17 +1,20 @@
 """Robot programs against what shares no code with their reader: NC programs of the same part, an energy plant, a public grammar."""
 
+import json
 import os
 import re
 import shutil
 import subprocess
 import sys
 from importlib.util import find_spec
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from camcomp.diagnosis.experiment.open_experiment import open_experiment
 from tests.commandline import ROOT, camcomp, compensated, table
 from tests.validation.plants import kuka, serial
 
@@ -115,6 +118,74 @@ def said_by(text):
             held.update((k, float(v)) for k, v in re.findall(r"([XYZABC]) (-?[\d.]+)", line.split("}")[0]))
             out.append([held[each] for each in "XYZABC"])
     return np.array(out)
+
+
+def as_rapid(part):
+    """A robtarget inline per move; quaternions by scipy."""
+    lines = []
+    for k, (x, y, z, a, b, c) in enumerate(part):
+        tcp = Rotation.from_euler("ZYX", [c, b, a], degrees=True) * Rotation.from_euler("Y", 180, degrees=True)
+        q = ",".join(f"{each:.12f}" for each in np.roll(tcp.as_quat(), 1))
+        at = f"[[{x},{y},{z}],[{q}],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]"
+        lines.append(f"    {'MoveL' if k else 'MoveJ'} {at},v10,fine,mill\\WObj:=table;\n")
+    head = (
+        "MODULE part\n  PERS tooldata mill:=[TRUE,[[0,0,250],[1,0,0,0]],[9,[0,0,99],[1,0,0,0],0,0,0]];\n"
+        '  PERS wobjdata table:=[FALSE,TRUE,"",[[1550,0,800],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];\n  PROC main()\n'
+    )
+    return head + "".join(lines) + "  ENDPROC\nENDMODULE\n"
+
+
+def test_a_log_of_a_turning_tool_is_that_of_an_arm_of_its_own(tmp_path):
+    (tmp_path / "part.mod").write_text(as_rapid(PART))
+    log = tmp_path / "log.csv"
+    words = ["--config", KUKA, "--config", CONTROL, "--step-s", "0.3"]
+    done = camcomp("simulate", tmp_path / "part.mod", *words, "-o", log)
+    assert done.returncode == 0, done.stderr
+    rows = table(log)
+    q = np.column_stack([rows[f"cmd_{a}_rad"] for a in AXES])
+    force = np.column_stack([rows[f"f{axis}_N"] for axis in "xyz"])
+    loaded = serial.settle(kuka.arm(), q, force)  # the digits of a log are worth 0.5 urad a joint, 2 um together
+    assert np.abs(loaded.tip - np.column_stack([rows[f"{axis}_mm"] for axis in "xyz"]) - ORIGIN).max() < 2e-3
+    assert np.abs(loaded.drive - np.column_stack([rows[f"act_{a}_Nmm"] for a in AXES])).max() < 1500.0
+    # where the unloaded arm stands is on the line of the program, with the orientation of that place
+    rigid = serial.settle(kuka.arm(weights=False), q, np.zeros(3))
+    tip = rigid.tip - ORIGIN
+    on = np.flatnonzero(rows["line"] == 8)  # the move that turns by 3 deg about Z while Y goes from 0 to 15
+    share = tip[on, 1] / 15.0
+    wanted = Rotation.from_euler("ZYX", np.column_stack((3 * share, 0 * share, 2 + 0 * share)), degrees=True)
+    assert len(on) > 1 and np.abs(rigid.orientation[on] - wanted.as_matrix()).max() < 3e-6
+
+
+def test_diagnosis_knows_where_a_turning_tool_is(tmp_path):
+    """The log is the plant's: the twin predicts its tips from the logged set-points."""
+    joints = joints_of(tmp_path, "part.src", as_krl(PART), KUKA, CONTROL)
+    at = at_programmed_ends(joints, PART)
+    ends = actuators(joints, "_nominal")[at]
+    q = np.concatenate([a + np.linspace(0, 1, 40)[:, None] * (b - a) for a, b in pairwise(ends[1:])])
+    tip = serial.settle(kuka.arm(), q, np.zeros(3)).tip - ORIGIN
+    names = [f"cmd_{a}_rad" for a in AXES]
+    rows = np.column_stack((0.05 * np.arange(len(q)), tip, q))
+    head = ",".join(["t_s", "x_mm", "y_mm", "z_mm", *names])
+    np.savetxt(tmp_path / "log.csv", rows, fmt="%.9f", delimiter=",", header=head, comments="")
+    (tmp_path / "experiment.yaml").write_text(
+        f"config: [{KUKA}, {CONTROL}]\nruns: [{{name: air, program: part.src, log: log.csv, cutting: false}}]\n"
+    )
+    opened = open_experiment(tmp_path / "experiment.yaml")
+    sensed = opened.twin.sense(opened.runs[0].run_path)[0].tip
+    assert np.abs(sensed - tip).max() < 2e-4
+
+
+def test_the_length_of_the_tool_scatters_along_the_tool(tmp_path):
+    spread = tmp_path / "spread.yaml"
+    spread.write_text("tool: {length_mm: {value: 250, sd: 0.05}}\nprocess: {force: {model: none}}\n")
+    done, joints, _, summary, data = compensated(tmp_path, SLOT, [KUKA, CONTROL, spread])
+    assert done.returncode == 0
+    assert abs(summary["expected"]["rms_um"] - 50.0) < 0.1 and summary["band"][0]["share"] > 0.999
+    np.testing.assert_allclose(joints["band_um"][1:], 50.0 * 1.959964, rtol=0.01)
+    (tmp_path / "out.src").write_bytes(data)
+    words = ["--against", SLOT, *(word for each in (KUKA, CONTROL, spread) for word in ("--config", each))]
+    found = camcomp("verify", tmp_path / "out.src", *words, "--json", "-")
+    assert abs(json.loads(found.stdout)["expected"]["rms_um"] - 50.0) < 0.1
 
 
 PARSE = """

@@ -18,6 +18,7 @@ from camcomp.model.job import Job
 from camcomp.model.stock.follow import refuse_untouched
 from camcomp.model.stock.from_config import Bounds, memory_of
 from camcomp.model.stock.memory import StockMemory
+from camcomp.model.stock.tool_frame import tool_frame_of
 from camcomp.model.stock.warnings import Remarks, stock_remarks, stock_warnings
 
 
@@ -48,7 +49,7 @@ class FollowedRuns:
                 elif isinstance(run, InterpretedRun) and run.motions:
                     bounds.add(runs.program(run.text, run.row0, run.state).path)
             source.seek(0)
-        return cls(job, name, memory_of(job.config, job.tool_axis, bounds), {})
+        return cls(job, name, memory_of(job.config, tool_frame_of(job.config, job.tool_axis), bounds), {})
 
     def follow(self, path: Path, ahead: Path | None) -> tuple[Engaged, Engaged]:
         """What the motions of a run meet, and what the tool meets at the begin of those behind it (`ahead`).

@@ -16,7 +16,15 @@ from camcomp.compensation.program import arcs_out
 from camcomp.compensation.program.arcs_out import Arcs, Bend
 from camcomp.compensation.program.chords import Nodes, second_derivative, trial_nodes
 from camcomp.compensation.program.corrected_rows import CorrectedRows, corrected_rows, output_of
-from camcomp.compensation.program.judged_points import JudgedPoints, Seen, judged_points, see, see_original, whole_pose
+from camcomp.compensation.program.judged_points import (
+    JudgedPoints,
+    Seen,
+    judged_points,
+    see,
+    see_original,
+    told_travel,
+    whole_pose,
+)
 from camcomp.compensation.program.load_turns import load_turns
 from camcomp.compensation.program.moves import (
     WITHIN_RAPID,
@@ -197,7 +205,7 @@ def _compensated(
     orienting = Orienting.of(program, job)
     if orienting is not None:
         arcs = False  # a circle of the tip does not turn the tool as a correction needs it
-        refuse_unfollowed(program, job, method, part)
+        refuse_unfollowed(job, method, part)
     turns = load_turns(job, base)
     track, turning = cut_at_reversals(job, cut_at_knots(job, turns.cut(base), spacing), spacing)
     shares = shares_of(job, base)
@@ -323,7 +331,8 @@ def _compensated(
     )
     told = points.along(written.end, replace(rows.arcs, centre=written.centre))
     share = None if shares is None else shares.of_ends(track, rows.piece, rows.w, rows.joining)
-    bands = bands_of(job, track, rows, points, told, before, after, share)
+    as_told = replace(points, travel=told_travel(points, orienting, written.words))
+    bands = bands_of(job, track, rows, as_told, told, before, after, share)
     return replace(
         done, bands=bands, left=None if left is None else left[points.judged], orienting=orienting,
         tilt_after=None if after.tilt is None else after.tilt[points.judged], fraction=track.u(rows.piece, rows.w),

@@ -108,11 +108,16 @@ def see(
     return Seen(tip - points.target, state.status, tip[points.end], Correction(**at))
 
 
-def _see_oriented(job: Job, points: JudgedPoints, told: Floats, orienting: Orienting, words: Floats) -> Seen:
+def told_travel(points: JudgedPoints, orienting: Orienting | None, words: Floats | None) -> Travel:
+    """The travel with the orientation that words (N, 3) of the end points command; None: as programmed."""
+    if orienting is None or words is None:
+        return points.travel
     before = np.array(UPRIGHT[orienting.form])  # the first move begins where nothing is judged
-    row = points.row
-    along = orienting.along(words, before, row, points.fraction)
-    travel = orienting.told(points.travel, along)
+    return orienting.told(points.travel, orienting.along(words, before, points.row, points.fraction))
+
+
+def _see_oriented(job: Job, points: JudgedPoints, told: Floats, orienting: Orienting, words: Floats) -> Seen:
+    row, travel = points.row, told_travel(points, orienting, words)
     assert travel.rotation is not None
     tip, state = respond(job, told, travel, points.target, before=points.before)
     wanted = points.travel.rotation

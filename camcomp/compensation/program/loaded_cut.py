@@ -24,6 +24,7 @@ from camcomp.model.motion.response import respond
 from camcomp.model.stock.from_config import Bounds, memory_of
 from camcomp.model.stock.legs import SAGITTA_MM
 from camcomp.model.stock.memory import StockMemory
+from camcomp.model.stock.tool_frame import tool_frame_of
 
 STEP_MM = 0.25  # between nodes
 PROBE_N = 10.0  # by which the slope is found
@@ -52,7 +53,7 @@ def loaded_cut(job: Job, program: Program, step_mm: float = STEP_MM) -> LoadedCu
     """
     path = program.path
     bounds = Bounds().add(path)
-    engaged = memory_of(job.config, job.tool_axis, bounds).follow(path)[0]
+    engaged = memory_of(job.config, tool_frame_of(job.config, job.tool_axis), bounds).follow(path)[0]
     track = lay_track(path, job.conditions, engaged)
     way = Way.of(track, step_mm)
     piece, w, on = way.piece, way.w, way.on
@@ -71,7 +72,7 @@ def loaded_cut(job: Job, program: Program, step_mm: float = STEP_MM) -> LoadedCu
     reach = max(FARTHER * float(np.linalg.norm(bends, axis=1).max(initial=0.0)), LEAST_REACH_MM)
     slope = np.stack([(tips(none + PROBE_N * axis) - free) / PROBE_N for axis in np.eye(3)], axis=2)
     for turn in range(ROUNDS):
-        memory = memory_of(job.config, job.tool_axis, bounds)
+        memory = memory_of(job.config, tool_frame_of(job.config, job.tool_axis), bounds)
         with part(turn / ROUNDS, (turn + 1) / ROUNDS):
             force, unrest = _lead(memory, track, way, free, slope, reach)
         off = tips(force) - free - np.einsum("kij,kj->ki", slope, force)
@@ -83,7 +84,7 @@ def loaded_cut(job: Job, program: Program, step_mm: float = STEP_MM) -> LoadedCu
 
 def meant_cut(job: Job, program: Program) -> StockMemory:
     """The stock behind a program whose tool does not bend and whose machine goes where it is told."""
-    memory = memory_of(job.config, job.tool_axis, Bounds().add(program.path))
+    memory = memory_of(job.config, tool_frame_of(job.config, job.tool_axis), Bounds().add(program.path))
     memory.follow(program.path)
     memory.settle()
     return memory

@@ -56,9 +56,6 @@ class Orienting:
         if stated is None and program.dialect == "sinumerik":
             raise ProgramError("CC115", "A, B and C are no words of orientation on Sinumerik", at=program.text.place(0),
                                hint="post with TRAORI and A3= B3= C3=, or leave orientation_words out")  # fmt: skip
-        if job.config.uncertain:
-            raise ConfigError("CC205", "standard deviations are not followed in programs with orientation", at=job.config.at("control"),
-                              hint="take the sd out of the machine file")  # fmt: skip
         return cls(job, RPY if stated is None else stated.form)
 
     def programmed(self, track: Track, piece: Ints, w: Floats) -> Floats:
@@ -149,15 +146,18 @@ class Orienting:
         return between(self.form, start, ends[row], fraction)
 
 
-def refuse_unfollowed(program: Program, job: Job, method: str, part: Part | None) -> None:
+def refuse_unfollowed(job: Job, method: str, part: Part | None) -> None:
     """Raises ConfigError where a program with orientation asks for more than is done with one."""
-    if job.config.workpiece.stock is not None:
-        raise ConfigError(
-            "CC296", "a stock is not followed under a tool that turns", at=job.config.at("workpiece", "stock")
-        )
     if method != "newton" or part is not None:
         raise ConfigError(
             "CC205", f"the method {method} does not turn the tool", at=job.config.at("compensation"), hint="use newton"
+        )
+    if job.config.uncertain and job.config.compensation.policy != "full":
+        raise ConfigError(
+            "CC205",
+            "a policy is not followed in programs with orientation",
+            at=job.config.at("compensation", "policy"),
+            hint="use full",
         )
 
 

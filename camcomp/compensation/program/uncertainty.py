@@ -45,10 +45,10 @@ class Uncertainty:
         """Moves of the loaded tip at points (n,) of the track in the order of travel, with their commanded tips (n, 3).
 
         free (n,): points that carry no cutting force, whatever the track says. base (n, 3): the loaded tips themselves, before
-        (3,): the commanded tip in front of them; both for machines with effects only.
+        (3,): the commanded tip in front of them; both for machines with effects and programs with orientation only.
         """
-        if self.job.causes:
-            return self._with_effects(piece, w, commanded, travel, free, base, before)
+        if self.job.causes or travel.rotation is not None:
+            return self._anew(piece, w, commanded, travel, free, base, before)
         moves, compliance = self._field.at(commanded, travel.force)
         for j, each in enumerate(self.inputs):
             if each.moves_force:
@@ -58,7 +58,7 @@ class Uncertainty:
                 moves.bend[:, :, j] += np.einsum("nij,nj->ni", compliance, bend)
         return moves
 
-    def _with_effects(
+    def _anew(
         self,
         piece: Ints,
         w: Floats,
@@ -68,7 +68,7 @@ class Uncertainty:
         base: Floats,
         before: Floats | None,
     ) -> TipMoves:
-        """The whole way anew for every side of every input: what drives remember is no matter of single points."""
+        """The whole way anew for every side of every input: drives remember their way, and a field knows no orientation."""
         slope, bend = np.zeros((2, len(piece), 3, len(self.inputs)))
         for j, each in enumerate(self.inputs):
             tips = []

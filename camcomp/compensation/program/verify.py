@@ -119,7 +119,7 @@ def verify(corrected: Program, original: Program, job: Job) -> Verified:
         residual, missed = _beside(job, track, piece, commanded, w, shares)
         missed = missed[judged]
     if job.config.uncertain:
-        totals = _expected_error(job, track, piece, commanded, w, end, shares)
+        totals = _expected_error(job, track, piece, commanded, w, end, shares, rotation)
     piece, residual, w, vertex = piece[judged], residual[judged], w[judged], f[judged] == 1.0
     convergence = _convergence(job, track, piece[vertex], w[vertex])
     lines = _per_line(original, job, track, piece, vertex, residual, convergence, missed)
@@ -155,13 +155,14 @@ def _beside(job: Job, track: Track, piece: Ints, commanded: Floats, w: Floats, s
 
 
 def _expected_error(
-    job: Job, track: Track, piece: Ints, commanded: Floats, w: Floats, end: Bools, shares: Shares | None
-) -> BandTotals:
+    job: Job, track: Track, piece: Ints, commanded: Floats, w: Floats, end: Bools, shares: Shares | None,
+    rotation: Floats | None,
+) -> BandTotals:  # fmt: skip
     """What machines that may be leave at the ends (k,) of moves; the other points are only there because drives remember."""
     uncertainty = Uncertainty(job, track)
     at = np.arange(len(piece)) if job.causes else np.flatnonzero(end)
     piece, w, commanded, end = piece[at], w[at], commanded[at], end[at]
-    travel = travel_of(job, track, piece, w)
+    travel = _told(travel_of(job, track, piece, w), None if rotation is None else rotation[at])
     tip, _ = respond(job, commanded, travel)
     moves = uncertainty.moves(piece, w, commanded, travel, np.zeros(len(at), np.bool_), tip)
     taken = None if shares is None else shares.at(track, piece, w)[end]

@@ -70,6 +70,7 @@ class _Program:
     """A program with its loads and sampled positions: tips (s, 3) mm, program frame, and actuators (s, m).
 
     merged: its path with lines merged by the controller, or None; rests (n,): motions with a stop at their end.
+    rotation (s, 3, 3): of the platform at the sampled positions, machine frame; None: the one that the machine holds.
     """
 
     track: Track
@@ -77,6 +78,7 @@ class _Program:
     rests: Bools
     tips: Floats
     rho: Floats
+    rotation: Floats | None
 
     @property
     def feed(self) -> float:
@@ -114,15 +116,15 @@ def drive(
     rotary = all(a.revolute for a in twin.robot.actuators)
     if program is not None:
         check_set_points(log, name, by, rho, program.rho, twin.actuators, rotary)
-    near = _near(log, name, measured, rho, program, twin)
-    tip = twin.to_program(twin.forward(rho, twin.to_machine(near)))
+    near, turned = _near(log, name, measured, rho, program, twin)
+    tip, turned = _forward(twin, rho, near, turned)
     aligned = None if program is None else _aligned(log, name, program, tip, measured)
     unsure = np.asarray(guessed.any(axis=1))
     if program is None or aligned is None:
         forces, told = _measured_forces(measured, vectors), False
     else:
         try:
-            cut = _behind(measured, rho, tip, program, twin) if by == "setpoint" else None
+            cut = _behind(measured, tip, turned, program, twin) if by == "setpoint" else None
         except PhysicsError:  # also for encoders in another unit
             check_places(log, name, measured, rho, tip, twin.actuators, rotary, lambda: tip)
             raise
@@ -141,7 +143,7 @@ def drive(
         forces = replace(forces, doubt=np.where(idle[:, None], 0.5 * np.abs(forces.force), forces.doubt))
     run_path = driven_path(
         name, measured.time, rho, tip, forces, started=started, to_machine=twin.to_machine, vectors=vectors,
-        inverse=twin.inverse, temperature=temperature,
+        inverse=twin.inverse, temperature=temperature, rotation=turned,
     )  # fmt: skip
     run_path = replace(run_path, measured_force=program is None)
     if program is not None:
@@ -184,21 +186,31 @@ def _open(program: Program, conditions: Conditions, twin: Twin) -> _Program:
     count = np.maximum(np.ceil(length[moves] / SAMPLE_MM), 1.0).astype(np.int64)
     motion = np.repeat(moves, count + 1)
     u = np.concatenate([np.linspace(0.0, 1.0, c + 1) for c in count]) if len(count) else np.zeros(0)
-    tips = path_geometry.points(path, motion, u)
-    return _Program(track, merged(path, program.modes), rests, tips, twin.inverse(twin.to_machine(tips)))
+    tips, rotation = path_geometry.points(path, motion, u), twin.platform(path, motion, u)
+    rho = twin.inverse(twin.to_machine(tips), rotation)
+    return _Program(track, merged(path, program.modes), rests, tips, rho, rotation)
 
 
-def _near(log: str, name: str, measured: Measured, rho: Floats, program: _Program | None, twin: Twin) -> Floats:
-    """Tips (n, 3), program frame, near those of actuators rho (n, m)."""
+def _forward(twin: Twin, rho: Floats, near: Floats, turned: Floats | None) -> tuple[Floats, Floats | None]:
+    """Tips (n, 3), program frame, and rotations (n, 3, 3) of the platform, of actuators rho (n, m) near tips and rotations."""
+    if turned is None:
+        return twin.to_program(twin.forward(rho, twin.to_machine(near))), None
+    tip, turned = twin.forward_pose(rho, twin.to_machine(near), turned)
+    return twin.to_program(tip), turned
+
+
+def _near(
+    log: str, name: str, measured: Measured, rho: Floats, program: _Program | None, twin: Twin
+) -> tuple[Floats, Floats | None]:
+    """Tips (n, 3), program frame, and rotations (n, 3, 3) of the platform near those of actuators rho (n, m)."""
     if program is not None:
         _, index = KDTree(program.rho).query(rho)
-        near: Floats = program.tips[index]
-        return near
+        return program.tips[index], None if program.rotation is None else program.rotation[index]
     known = np.isfinite(measured.tip).all(axis=1)
     if not known.any():
         message = f"run '{name}' has neither a program nor measured tips: its place is not known"
         raise ConfigError("CC402", message, at=Location(log, 1, 1))
-    return np.column_stack([_over_time(measured.time, np.where(known, v, np.nan)) for v in measured.tip.T])
+    return np.column_stack([_over_time(measured.time, np.where(known, v, np.nan)) for v in measured.tip.T]), None
 
 
 def _aligned(
@@ -235,15 +247,15 @@ def _cut_ahead(program: _Program, aligned: Aligned | None) -> float:
     return track.minutes_cut(int(aligned.motion[cuts[0]]), float(aligned.share[cuts[0]])) if len(cuts) else 0.0
 
 
-def _behind(measured: Measured, rho: Floats, tip: Floats, program: _Program, twin: Twin) -> Aligned | None:
-    """Positions of the drives on the program, behind set-points rho (n, m) of tips (n, 3) mm, for the direction of the force.
+def _behind(measured: Measured, tip: Floats, turned: Floats | None, program: _Program, twin: Twin) -> Aligned | None:
+    """Positions of the drives on the program, behind set-points of tips (n, 3) mm, for the direction of the force.
 
     None without logged encoders, or if more than a delay separates them from the path.
     """
     if np.isfinite(measured.encoder).sum(axis=0).min() < 2:
         return None
     late = np.column_stack([_over_time(measured.time, v) for v in measured.encoder.T])
-    driven = twin.to_program(twin.forward(late, twin.to_machine(tip)))
+    driven = _forward(twin, late, tip, turned)[0]
     found = align(program.track.path, driven, measured.line)
     return found if float(np.median(found.distance)) < ASIDE_MM else None
 
@@ -324,9 +336,10 @@ def _led_by_tip(
             logged_line=logged,
             max_distance_mm=beside,
         )
+        turned = twin.platform(way, on.motion, on.share)
         run_path = driven_path(
-            name, measured.time, twin.inverse(twin.to_machine(tip)), tip, forces, started=started,
-            to_machine=twin.to_machine, vectors=vectors, inverse=twin.inverse, temperature=temperature,
+            name, measured.time, twin.inverse(twin.to_machine(tip), turned), tip, forces, started=started,
+            to_machine=twin.to_machine, vectors=vectors, inverse=twin.inverse, temperature=temperature, rotation=turned,
         )  # fmt: skip
         loaded = twin.sense(run_path)[0].tip
         last, changed = changed, float(np.sqrt(np.mean(np.sum((loaded - tip - bend) ** 2, axis=1))))

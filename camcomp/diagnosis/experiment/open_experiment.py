@@ -29,7 +29,6 @@ from camcomp.model.job import Job
 from camcomp.model.motion.log_columns import DYNO, LINE, TEMPERATURE, TIME, TIP, TIP_SD, LogColumns, log_columns
 from camcomp.model.motion.timeline import schedule
 from camcomp.model.motion.twin import Twin, twin_of
-from camcomp.model.oriented import refuse_orientation
 
 STEADY_S = 15.0  # half width of the local regression of a temperature
 MOST_ROWS = 3000  # rows of a run; neighbours of longer runs are averaged
@@ -72,8 +71,6 @@ def open_run(spec: RunSpec, job: Job, twin: Twin, notes: list[str]) -> Run:
     notes += unread(table, columns_of(twin))
     check_rows(log, measured)
     program = None if spec.program is None else open_program(spec.program, job.config)
-    if program is not None:
-        refuse_orientation(program, "the diagnosis")
     cutting = job if program is None else job_of_program(job, program.data, program.name)
     conditions = cutting.conditions if spec.cutting else replace(job.conditions, model=None)
     if program is not None:

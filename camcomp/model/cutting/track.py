@@ -185,6 +185,7 @@ class Track:
         on = np.flatnonzero(self.cutting[piece] & (np.linalg.norm(direction, axis=1) > 0.0))
         motion, u = self.motion[piece[on]], self.u(piece[on], w[on])
         left, right, share = self.engaged.between(motion, u, w[on] == 0.0)
+        seen = _in_tool_frame(self.path, motion, u, direction[on])
         s = self.s0[piece[on]] + w[on] * self.length[piece[on]]
         for rows, part in ((left, 1.0 - share), (right, share)):
             arcs = self.engaged.arcs.of(rows)
@@ -193,7 +194,7 @@ class Track:
                 path=self.path,
                 c=self.conditions,
                 motion=motion,
-                direction=direction[on],
+                direction=seen,
                 depth=depth,
                 width=reach,
                 s=s,
@@ -201,7 +202,9 @@ class Track:
                 arcs=arcs,
                 driven=feed[on],
             )
-            out[on] += part[:, None] * to_vector(found, direction[on], self.conditions.tool_axis)
+            out[on] += part[:, None] * to_vector(found, seen, self.conditions.tool_axis)
+        if self.path.orientation is not None:
+            out[on] = np.einsum("kij,kj->ki", self.path.orientation.rotations(motion, u), out[on])
         return out
 
 
@@ -323,7 +326,7 @@ def base_of(path: Path, c: Conditions, engaged: Engaged, length: Floats, *, exte
     base = np.zeros((len(engaged.u), 3))
     if len(rows) and not c.plunges:
         where, u, arcs = engaged.motion[rows], engaged.u[rows], engaged.arcs.of(rows)
-        direction = path_geometry.tangents(path, where, u)
+        direction = _in_tool_frame(path, where, u, path_geometry.tangents(path, where, u))
         s = np.concatenate(([0.0], np.cumsum(length)))[where] + u * length[where]
         reach = arcs.reach(len(rows)) if extent else np.full(len(rows), np.nan)
         base[rows] = _components(
@@ -386,9 +389,14 @@ def lay_track(path: Path, conditions: Conditions, engaged: Engaged | None = None
 
 def _sine(path: Path, motion: Ints, u: Floats, direction: Floats, axis: Floats) -> Floats:
     """Sine (p,) of the angle between feed directions (p, 3) and the tool axis, in the frame of a turning tool."""
-    if path.orientation is not None:
-        direction = np.einsum("kji,kj->ki", path.orientation.rotations(motion, u), direction)
-    return lateral(direction, axis)
+    return lateral(_in_tool_frame(path, motion, u, direction), axis)
+
+
+def _in_tool_frame(path: Path, motion: Ints, u: Floats, direction: Floats) -> Floats:
+    """Directions (k, 3) as seen from the tool at fractions u (k,) of motions (k,)."""
+    if path.orientation is None:
+        return direction
+    return np.asarray(np.einsum("kji,kj->ki", path.orientation.rotations(motion, u), direction))
 
 
 def _end_force(track: Track, piece: Ints, w: Floats, direction: Floats) -> Floats:

@@ -16,6 +16,7 @@ from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from camcomp.ground import path_geometry
 from camcomp.ground.datatypes import Bools, Floats, Ints
+from camcomp.ground.orientation import rotation_vectors, rotations_about
 from camcomp.model.cutting.track import Track
 from camcomp.model.motion.alignment import Aligned
 from camcomp.model.motion.driven_pieces import DrivenPieces, near_largest_change, node_loads
@@ -74,12 +75,14 @@ def driven_path(
     started: float,
     to_machine: Callable[[Floats], Floats],
     vectors: Callable[[Floats], Floats],
-    inverse: Callable[[Floats], Floats],
+    inverse: Callable[[Floats, Floats | None], Floats],
     temperature: Floats | None = None,
+    rotation: Floats | None = None,
 ) -> RunPath:
     """Run path of logged actuators rho (n, m) at times (n,) s with their nominal tips (n, 3) mm, program frame.
 
-    to_machine, vectors: program -> machine frame. inverse: machine tips (q, 3) -> set-points (q, m).
+    to_machine, vectors: program -> machine frame. inverse: machine tips (q, 3) and rotations (q, 3, 3) -> set-points
+    (q, m). rotation (n, 3, 3): of the platform at the rows, machine frame; None: the one that the machine holds.
     """
     row_tip, row_force = to_machine(tip), vectors(forces.force)
     span = float(time[-1] - time[0])
@@ -93,7 +96,8 @@ def driven_path(
     node_time = pieces.node_times()
     # the tip is interpolated, and the drives follow from it: an arm keeps its tool upright between rows
     node_tip = lead_tip(node_time)
-    node_rho = inverse(node_tip)
+    turned = None if rotation is None else _turns(time, rotation, node_time)
+    node_rho = inverse(node_tip, turned)
     node_force = node_loads(time=time, force=row_force, sure=sure, jump=jump, at=node_time, pieces=pieces)
     return RunPath(
         name=name,
@@ -112,8 +116,15 @@ def driven_path(
         place=pieces.at,
         row_rho=rho,
         temperature=temperature,
+        node_rotation=turned,
         driven=Driven(row_tip, row_force, np.abs(vectors(forces.doubt)), lead_tip, _seams(time, grid, lead)),
     )
+
+
+def _turns(time: Floats, rotation: Floats, at: Floats) -> Floats:
+    """Rotations (k, 3, 3) at times (k,) between those of rows (n, 3, 3): smooth vectors of the turn from the first row."""
+    vectors = rotation_vectors(rotation @ rotation[0].T)
+    return np.asarray(rotations_about(_smooth(time, vectors)(at)) @ rotation[0])
 
 
 def _seams(time: Floats, grid: Floats, lead: Callable[[Floats], Floats]) -> Seams:

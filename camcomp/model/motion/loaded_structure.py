@@ -59,7 +59,7 @@ class Solved:
 class Following:
     """First derivatives of a quantity (n, 3 or m) between the nodes by carriages and load.
 
-    by_rho (n, ., m), by_wrench (n, ., 6); at_reference (3, 6): wrench there per force at the tip. It holds no reference to
+    by_rho (n, ., m), by_wrench (n, ., 6); at_reference (3, 6) or (n, 3, 6): wrench there per force at the tip. It holds no reference to
     the interpolation, so that the caches can release those of a single reading.
     """
 
@@ -89,7 +89,7 @@ class Following:
         known = self._by_usual_load.get(solved.load) if usual else None
         if known is None:
             force, wrench = load.force - place.of(solved.load.force), load.wrench - place.of(solved.load.wrench)
-            known = force, applied(self.by_wrench, wrench + force @ self.at_reference)
+            known = force, applied(self.by_wrench, wrench + at_reference_of(force, self.at_reference))
         if usual:
             self._by_usual_load[solved.load] = known
         force, by_load = known
@@ -109,7 +109,7 @@ class Slopes:
     tip_wrench: Floats
     drive_rho: Floats
     drive_wrench: Floats
-    at_reference: Floats  # wrench (3, 6) there per force at the tip
+    at_reference: Floats  # wrench (3, 6) or (q, 3, 6) there per force at the tip
     key: tuple[Any, ...] = ()  # key of the machine
     _at: WeakKeyDictionary[Places, Slopes] = field(default_factory=WeakKeyDictionary, init=False, repr=False)
     _tips: WeakKeyDictionary[Places, Following] = field(default_factory=WeakKeyDictionary, init=False, repr=False)
@@ -125,7 +125,7 @@ class Slopes:
                 tip_wrench=tip_wrench,
                 drive_rho=drive_rho,
                 drive_wrench=drive_wrench,
-                at_reference=self.at_reference,
+                at_reference=self.at_reference if self.at_reference.ndim == 2 else place.of(self.at_reference),
                 key=self.key,
             )
         return self._at[place]
@@ -134,14 +134,14 @@ class Slopes:
         """Derivatives of the tips between the nodes."""
         if place not in self._tips:
             there = self.at(place)
-            self._tips[place] = Following(there.tip_rho, there.tip_wrench, self.at_reference)
+            self._tips[place] = Following(there.tip_rho, there.tip_wrench, there.at_reference)
         return self._tips[place]
 
     def drives(self, place: Places) -> Following:
         """Derivatives of the drive forces between the nodes."""
         if place not in self._drives:
             there = self.at(place)
-            self._drives[place] = Following(there.drive_rho, there.drive_wrench, self.at_reference)
+            self._drives[place] = Following(there.drive_rho, there.drive_wrench, there.at_reference)
         return self._drives[place]
 
 
@@ -153,6 +153,13 @@ def _behind(slope, piece, values, gap, shift, by_load, out):  # type: ignore[no-
             for k in range(gap.shape[1]):
                 change += slope[i, k, t] * (gap[t, k] - shift[piece[t], k])
             out[t, i] = values[t, i] + change + by_load[t, i]
+
+
+def at_reference_of(force: Floats, at_reference: Floats) -> Floats:
+    """Wrenches (n, 6) at the platform reference of forces (n, 3) at the tip; at_reference (3, 6) or (n, 3, 6)."""
+    if at_reference.ndim == 2:
+        return np.asarray(force @ at_reference)
+    return np.asarray(np.einsum("ni,nij->nj", force, at_reference))
 
 
 def applied(slope: Floats, change: Floats) -> Floats:

@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from camcomp.ground import path_geometry
-from camcomp.ground.datatypes import Bools, Floats, Ints
+from camcomp.ground.datatypes import Bools, Floats, Ints, Path
 from camcomp.ground.machine_code import kept
 from camcomp.model.cutting.track import Track
 from camcomp.model.hysteresis import direction
@@ -67,6 +67,9 @@ class RunPath:
     feed_mm_per_min: float = np.nan  # median of the program
     cut_before_min: float = 0.0  # in earlier runs
     cut_ahead_min: float = 0.0  # by the program in this run, before its log begins
+    node_rotation: Floats | None = (
+        None  # (q, 3, 3) of the platform, machine frame; None: the one that the machine holds
+    )
     clock_s: float = 0.0  # known lag of the clock of the tip
     between_s: float = 0.0  # estimated offset of the tip readings from the instants of the rows
     told: bool = False  # forces are those at the set-points, so that a lag of the loop delays them too
@@ -207,13 +210,14 @@ def path_of_program(
     started: float,
     to_machine: Callable[[Floats], Floats],
     vectors: Callable[[Floats], Floats],
-    inverse: Callable[[Floats], Floats],
+    inverse: Callable[[Floats, Floats | None], Floats],
+    platform: Callable[[Path, Ints, Floats], Floats | None] | None = None,
     temperature: Floats | None = None,
 ) -> RunPath:
     """Run path of a program's feed motions on its own timeline, with the loads of `track`.
 
-    to_machine: tips (q, 3) program -> machine frame; vectors: the same for vectors. inverse: machine tips (q, 3) ->
-    set-points (q, m).
+    to_machine: tips (q, 3) program -> machine frame; vectors: the same for vectors. inverse: machine tips (q, 3) and
+    rotations (q, 3, 3) -> set-points (q, m). platform: rotations (q, 3, 3) at fractions (q,) of motions (q,) of a path.
     """
     rank = np.full(len(timeline.path), -1)
     rank[timeline.index] = np.arange(len(timeline.index))
@@ -222,8 +226,10 @@ def path_of_program(
     pieces = Pieces(rank[track.motion[own]][part], u0, u1)
     piece, w = pieces.nodes()
     share = pieces.share(piece, w)
-    tip = to_machine(path_geometry.points(timeline.path, timeline.index[pieces.motion[piece]], share))
-    rho = inverse(tip)
+    motion = timeline.index[pieces.motion[piece]]
+    tip = to_machine(path_geometry.points(timeline.path, motion, share))
+    rotation = None if platform is None else platform(timeline.path, motion, share)
+    rho = inverse(tip, rotation)
     of_track = own[part][piece]
     within = (share - track.u0[of_track]) / (track.u1[of_track] - track.u0[of_track])
     load = vectors(track.force(of_track, np.clip(within, 0.0, 1.0)))
@@ -256,6 +262,7 @@ def path_of_program(
         place=place,
         row_rho=row_rho,
         temperature=temperature,
+        node_rotation=rotation,
         feed_mm_per_min=60.0 * float(np.median(timeline.feed)),
     )
 

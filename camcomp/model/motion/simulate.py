@@ -61,7 +61,7 @@ def simulate(
     progress.done(0.1)
     run_path = path_of_program(
         "simulation", timeline, track, time, started=started_s, to_machine=twin.to_machine,
-        vectors=job.frame.vectors, inverse=twin.inverse, temperature=None if warm is None else np.full(len(time), warm),
+        vectors=job.frame.vectors, inverse=twin.inverse, platform=twin.platform, temperature=None if warm is None else np.full(len(time), warm),
     )  # fmt: skip
     with progress.part(0.3, 0.7, points=True):
         _, solved = twin.sense(run_path)

@@ -14,18 +14,21 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from camcomp.ground.datatypes import Floats, Ints
+from camcomp.ground.datatypes import Floats, Ints, Path
 from camcomp.ground.errors import PhysicsError
+from camcomp.ground.orientation import rotations_about
 from camcomp.model import signal_path
 from camcomp.model.effect import Cause, Load, Motion
 from camcomp.model.job import Job
 from camcomp.model.motion.loaded_structure import Slopes, Softer, Solved
 from camcomp.model.motion.longer_links import LongerLinks
 from camcomp.model.motion.node_pieces import Places
+from camcomp.model.motion.response import POSE_SCALE
 from camcomp.model.motion.run_path import RunPath, travel_direction
 from camcomp.model.statics.description import Robot
 from camcomp.model.statics.machine import Machine, build_machine
 from camcomp.model.statics.masses import has_moved_mass, mass_loads
+from camcomp.model.statics.rotation import exp_rotation
 from camcomp.model.statics.solve import FREE, INVERSE, STATUS, solve
 
 _RHO_STEP = 1e-3  # mm or 1e-3 mrad of drive, to first order linear within 1e-6
@@ -87,15 +90,25 @@ class Twin:
 
         def tips(robot: Robot, run_path: RunPath) -> Floats:
             machine, near, rho = build_machine(robot, self.nominal), run_path.node_tip, run_path.node_rho
-            return solve(machine, FREE, near, rho=rho, check=False).tip
+            return solve(machine, FREE, near, aim_rotation=run_path.node_rotation, rho=rho, check=False).tip
 
         return LongerLinks(self.nominal, tips)
 
-    @cached_property
-    def _at_reference(self) -> Floats:
-        """Wrench (3, 6) at the platform reference per force at the tip."""
+    def _at_reference(self, run_path: RunPath) -> Floats:
+        """Wrench (3, 6), at turned nodes (q, 3, 6), at the platform reference per force at the tip."""
         lever = self.nominal.tool  # platform axes; its tilt under load is of second order here
-        return np.hstack([np.eye(3), np.cross(lever, np.eye(3))])
+        if run_path.node_rotation is None:
+            return np.hstack([np.eye(3), np.cross(lever, np.eye(3))])
+        levers = run_path.node_rotation @ lever
+        force = np.broadcast_to(np.eye(3), (len(levers), 3, 3))
+        return np.concatenate([force, np.cross(levers[:, None], force)], axis=2)
+
+    def platform(self, path: Path, motion: Ints, u: Floats) -> Floats | None:
+        """Orientations (k, 3, 3) of the platform at fractions u (k,) of motions (k,); None for a path without words of orientation."""
+        if path.orientation is None:
+            return None
+        F, turned = self.rotation, path.orientation.rotations(motion, u)
+        return np.asarray(F @ turned @ F.T @ self._control.nominal.held_rotation)
 
     def to_machine(self, tip: Floats) -> Floats:
         """Tips (n, 3) program -> machine frame."""
@@ -105,9 +118,12 @@ class Twin:
         """Tips (n, 3) machine -> program frame."""
         return (tip - self.origin) @ self.rotation
 
-    def inverse(self, tip: Floats) -> Floats:
-        """Set-points (n, m) that the control computes for machine tips (n, 3). Raises PhysicsError CC301."""
-        state = solve(self._control, INVERSE, tip)
+    def inverse(self, tip: Floats, rotation: Floats | None = None) -> Floats:
+        """Set-points (n, m) that the control computes for machine tips (n, 3). Raises PhysicsError CC410.
+
+        rotation (n, 3, 3): of the platform; None: the one that the machine holds.
+        """
+        state = solve(self._control, INVERSE, tip, aim_rotation=rotation)
         if (state.status == 3).any():
             bad = int(np.argmax(state.status == 3))
             raise PhysicsError("CC410", f"tip {np.round(tip[bad], 3).tolist()} (machine frame) is {STATUS[3]}")
@@ -134,6 +150,24 @@ class Twin:
         if np.abs(tip - begun).max(initial=0.0) > _FORWARD_NEAR_MM:
             back = self._back(tip)
         return np.asarray(tip[nearest] + np.einsum("nij,nj->ni", back[nearest], rho - rho[knots][nearest]))
+
+    def forward_pose(self, rho: Floats, near: Floats, rotation: Floats) -> tuple[Floats, Floats]:
+        """Forward kinematics of tip (n, 3) and platform (n, 3, 3) together, machine frame, for six actuators rho (n, 6).
+
+        near (n, 3), rotation (n, 3, 3): approximate pose. Newton's method. Raises PhysicsError CC410.
+        """
+        tip, turned = near, rotation
+        for _ in range(_FORWARD_PASSES):
+            off = rho - self.inverse(tip, turned)
+            ways = [self.inverse(tip + _RHO_STEP * axis, turned) for axis in np.eye(3)]
+            ways += [self.inverse(tip, exp_rotation((_RHO_STEP / POSE_SCALE[3]) * axis) @ turned) for axis in np.eye(3)]
+            slopes = np.stack(ways, axis=2) - (rho - off)[:, :, None]
+            slopes /= np.repeat([_RHO_STEP, (_RHO_STEP / POSE_SCALE[3])], 3)
+            step = np.asarray(np.linalg.solve(slopes, off[:, :, None])[:, :, 0], np.float64)
+            tip, turned = tip + step[:, :3], rotations_about(step[:, 3:]) @ turned
+            if np.abs(step * POSE_SCALE).max(initial=0.0) < _FORWARD_MM:
+                break
+        return tip, turned
 
     def _back(self, tip: Floats) -> Floats:
         """Derivatives (n, 3, m) of the tip by the actuators of the perfect machine at machine tips (n, 3)."""
@@ -314,7 +348,7 @@ class Twin:
             return Solved(key=key, shift=shift, load=load, tip=tip, drive=drive)
         nodes = np.concatenate([np.arange(q), np.tile(uneven, 3)])
         wrench = load.wrench[nodes]
-        wrench[q:] += _FORCE_STEP * np.repeat(self._at_reference, len(uneven), axis=0)
+        wrench[q:] += _FORCE_STEP * self._unit_wrenches(run_path).transpose(1, 0, 2).reshape(-1, 6)
         tip, drive = self._loaded(run_path, machine, nodes, shift, load.force[nodes], wrench)
         softer = Softer(*(
             self._more(run_path, each, usual)
@@ -328,8 +362,13 @@ class Twin:
         pushed = values[q:].reshape(3, len(uneven), -1).transpose(1, 2, 0)
         own = (pushed - values[uneven][:, :, None]) / _FORCE_STEP
         out = np.zeros((run_path.pieces, values.shape[1], 3))
-        out[run_path.node_piece[uneven]] = own - usual[uneven] @ self._at_reference.T
+        out[run_path.node_piece[uneven]] = own - usual[uneven] @ self._unit_wrenches(run_path).transpose(0, 2, 1)
         return out
+
+    def _unit_wrenches(self, run_path: RunPath) -> Floats:
+        """Wrenches (k, 3, 6) per force at the tip at the k uneven nodes."""
+        found, uneven = self._at_reference(run_path), run_path.uneven
+        return found[uneven] if found.ndim == 3 else np.broadcast_to(found, (len(uneven), 3, 6))
 
     def _loaded(
         self,
@@ -343,7 +382,8 @@ class Twin:
         """Tips (k, 3) and drives (k, m) at some nodes under a load (k). Raises PhysicsError CC411."""
         near, of = run_path.node_tip[nodes], run_path.node_piece[nodes]
         rho = run_path.node_rho[nodes] + shift[of]
-        state = solve(machine, FREE, near, force=force, wrench=wrench, rho=rho, check=False)
+        turned = None if run_path.node_rotation is None else run_path.node_rotation[nodes]
+        state = solve(machine, FREE, near, aim_rotation=turned, force=force, wrench=wrench, rho=rho, check=False)
         if (state.status != 0).any():
             bad = int(np.argmax(state.status != 0))
             where = np.round(self.to_program(near[bad]), 3).tolist()
@@ -369,7 +409,7 @@ class Twin:
             tips.append((moved.tip - solved.tip) / step)
             drives.append((moved.drive - solved.drive) / step)
         tip, drive = np.stack(tips, axis=2), np.stack(drives, axis=2)
-        return Slopes(tip[:, :, :m], tip[:, :, m:], drive[:, :, :m], drive[:, :, m:], self._at_reference, key)
+        return Slopes(tip[:, :, :m], tip[:, :, m:], drive[:, :, :m], drive[:, :, m:], self._at_reference(run_path), key)
 
     # -- pieces of the path -------------------------------------------------------------------------------------------
 

@@ -11,6 +11,7 @@ from camcomp.model.config.spec import Config
 from camcomp.model.cutting.engaged import Engaged
 from camcomp.model.stock.from_config import Bounds, memory_of
 from camcomp.model.stock.memory import StockMemory
+from camcomp.model.stock.tool_frame import tool_frame_of
 
 MOST_ERRORS = 20
 
@@ -24,8 +25,9 @@ def followed(
         ProgramError: CC142, a rapid moves through material; at its line of the program.
         ConfigError: CC295 to CC298, the stock or a tool cannot be simulated.
     """
-    memory = memory_of(config, tool_axis, Bounds().add(path))
-    engaged, crashes = memory.follow(path)
+    frame = tool_frame_of(config, tool_axis, path)
+    memory = memory_of(config, frame, Bounds().add(path))
+    engaged, crashes = memory.follow(frame.turned(path))
     refuse_crashes(path, crashes, program)
     refuse_untouched(config, memory)
     return engaged, memory

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from camcomp.ground import path_geometry
-from camcomp.ground.datatypes import RAPID, Floats, Path
+from camcomp.ground.datatypes import RAPID, Path
 from camcomp.ground.errors import ConfigError
 from camcomp.model.config.cutting_tool import BoxStock, Cutter, CylinderStock, ProgramStock, StlStock
 from camcomp.model.config.spec import Config
@@ -16,25 +16,21 @@ from camcomp.model.stock.field import MESH, ROUND
 from camcomp.model.stock.memory import NO_TOOL, StockMemory
 from camcomp.model.stock.shapes import POINT_DEG, StockShape, ToolShape
 from camcomp.model.stock.stl_file import open_edges, triangles_of
+from camcomp.model.stock.tool_frame import ToolFrame
 
-UPRIGHT = 1e-6  # of the sine between tool and program Z
 
-
-def memory_of(config: Config, tool_axis: Floats, bounds: Bounds) -> StockMemory:
-    """Uncut stock of a machine file that has one, for a program within given bounds.
+def memory_of(config: Config, frame: ToolFrame, bounds: Bounds) -> StockMemory:
+    """Uncut stock of a machine file that has one, in a frame, for a program within given bounds.
 
     Raises:
-        ConfigError: CC295 (a tool without diameter), CC296 (tool not along Z), CC297 (STL file).
+        ConfigError: CC295 (a tool without diameter), CC297 (STL file).
     """
-    if np.linalg.norm(np.asarray(tool_axis)[:2]) > UPRIGHT:
-        message = "a stock is followed by a height field, for which the tool has to stand along the program's Z"
-        raise ConfigError("CC296", message, at=config.at("workpiece", "stock"))
     tools = {number: _tool(config, cutter, number) for number, cutter in config.tools.items() if number in bounds.tools}
     if bounds.tools - set(config.tools) or not tools:
         tools[NO_TOOL] = _tool(config, config.tool, None)
     stock = config.workpiece.stock
     assert stock is not None
-    return StockMemory(_stock(config, bounds, tools), tools, stock.resolution_mm)
+    return StockMemory(frame.shape(_stock(config, bounds, tools)), tools, stock.resolution_mm)
 
 
 def _tool(config: Config, cutter: Cutter, number: int | None) -> ToolShape:

@@ -51,7 +51,10 @@ def merged(path: Path, modes: Sequence[PathMode]) -> Path | None:
     found = segments(moves_of(path, modes))
     if len(found.first) == np.count_nonzero(path_geometry.lengths(path) > SHORTEST):
         return None
-    return replace(path.take(found.last), start=path.start[found.first])
+    turn = path.orientation
+    if turn is not None:
+        turn = replace(turn.take(found.last), start=turn.start[found.first])
+    return replace(path.take(found.last), start=path.start[found.first], orientation=turn)
 
 
 def read_only(*points: Floats) -> list[Floats]:

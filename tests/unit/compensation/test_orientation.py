@@ -211,10 +211,10 @@ def test_a_corrected_program_is_verified_from_its_text(tmp_path):
     assert done.returncode == 1
 
 
-@pytest.mark.parametrize("verb", ["simulate"])
-def test_verbs_that_do_not_follow_orientation_say_so(tmp_path, verb):
+def test_surfaces_do_not_follow_orientation_and_say_so(tmp_path):
     (tmp_path / "part.nc").write_text(TURNING)
-    done = camcomp(verb, tmp_path / "part.nc", "--config", "config/kuka-kr210.yaml")
+    words = ["--config", "config/kuka-kr210.yaml", "--surface", tmp_path / "left.stl"]
+    done = camcomp("simulate", tmp_path / "part.nc", *words)
     assert done.returncode == 3 and b"CC115" in done.stderr and b"part.nc:5:" in done.stderr
 
 
