@@ -23,8 +23,8 @@ from camcomp.model.job import Job
 from camcomp.model.motion.loaded_structure import Slopes, Softer, Solved
 from camcomp.model.motion.longer_links import LongerLinks
 from camcomp.model.motion.node_pieces import Places
-from camcomp.model.motion.response import POSE_SCALE
 from camcomp.model.motion.run_path import RunPath, travel_direction
+from camcomp.model.statics.arm import ARM_LENGTH
 from camcomp.model.statics.description import Robot
 from camcomp.model.statics.machine import Machine, build_machine
 from camcomp.model.statics.masses import has_moved_mass, mass_loads
@@ -160,12 +160,12 @@ class Twin:
         for _ in range(_FORWARD_PASSES):
             off = rho - self.inverse(tip, turned)
             ways = [self.inverse(tip + _RHO_STEP * axis, turned) for axis in np.eye(3)]
-            ways += [self.inverse(tip, exp_rotation((_RHO_STEP / POSE_SCALE[3]) * axis) @ turned) for axis in np.eye(3)]
+            ways += [self.inverse(tip, exp_rotation((_RHO_STEP / ARM_LENGTH) * axis) @ turned) for axis in np.eye(3)]
             slopes = np.stack(ways, axis=2) - (rho - off)[:, :, None]
-            slopes /= np.repeat([_RHO_STEP, (_RHO_STEP / POSE_SCALE[3])], 3)
+            slopes /= np.repeat([_RHO_STEP, (_RHO_STEP / ARM_LENGTH)], 3)
             step = np.asarray(np.linalg.solve(slopes, off[:, :, None])[:, :, 0], np.float64)
             tip, turned = tip + step[:, :3], rotations_about(step[:, 3:]) @ turned
-            if np.abs(step * POSE_SCALE).max(initial=0.0) < _FORWARD_MM:
+            if np.abs(step * np.repeat([1.0, ARM_LENGTH], 3)).max(initial=0.0) < _FORWARD_MM:
                 break
         return tip, turned
 
