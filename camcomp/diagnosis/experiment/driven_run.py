@@ -65,7 +65,7 @@ class DrivenRun:
     lag: int
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class _Program:
     """A program with its loads and sampled positions: tips (s, 3) mm, program frame, and actuators (s, m).
 
@@ -188,7 +188,8 @@ def _open(program: Program, conditions: Conditions, twin: Twin) -> _Program:
     u = np.concatenate([np.linspace(0.0, 1.0, c + 1) for c in count]) if len(count) else np.zeros(0)
     tips, rotation = path_geometry.points(path, motion, u), twin.platform(path, motion, u)
     rho = twin.inverse(twin.to_machine(tips), rotation)
-    return _Program(track, merged(path, program.modes), rests, tips, rho, rotation)
+    one = merged(path, program.modes)
+    return _Program(track=track, merged=one, rests=rests, tips=tips, rho=rho, rotation=rotation)
 
 
 def _forward(twin: Twin, rho: Floats, near: Floats, turned: Floats | None) -> tuple[Floats, Floats | None]:

@@ -14,31 +14,24 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from camcomp.ground.datatypes import Floats, Ints, Path
+from camcomp.ground.datatypes import Floats, Ints
 from camcomp.ground.errors import PhysicsError
-from camcomp.ground.orientation import rotations_about
 from camcomp.model import signal_path
 from camcomp.model.effect import Cause, Load, Motion
 from camcomp.model.job import Job
+from camcomp.model.motion.control_kinematics import ControlKinematics
 from camcomp.model.motion.loaded_structure import Slopes, Softer, Solved
 from camcomp.model.motion.longer_links import LongerLinks
 from camcomp.model.motion.node_pieces import Places
 from camcomp.model.motion.run_path import RunPath, travel_direction
-from camcomp.model.statics.arm import ARM_LENGTH
 from camcomp.model.statics.description import Robot
 from camcomp.model.statics.machine import Machine, build_machine
 from camcomp.model.statics.masses import has_moved_mass, mass_loads
-from camcomp.model.statics.rotation import exp_rotation
-from camcomp.model.statics.solve import FREE, INVERSE, STATUS, solve
+from camcomp.model.statics.solve import FREE, STATUS, solve
 
 _RHO_STEP = 1e-3  # mm or 1e-3 mrad of drive, to first order linear within 1e-6
 _FORCE_STEP = 1.0  # N
 _MOMENT_STEP = 100.0  # N mm
-_KNOT_MM = 0.25  # or mrad / 4: 0.1 um of a circle of 300 mm
-_FORWARD_PASSES = 12
-_FORWARD_MM = 1e-7
-_FORWARD_FAR_MM = 3.0  # step from which Newton's method recomputes its slopes,
-_FORWARD_NEAR_MM = 0.3  # and distance from its points for first order
 _LATELY = 4  # changed machines kept in the cache
 _CREEPING = 1e-4  # of the squared largest speed: below it the lateness is undefined
 _LATEST_S = 0.1  # largest lateness of a position loop
@@ -57,13 +50,9 @@ class Reading:
 
 
 @dataclass(frozen=True, eq=False)
-class Twin:
-    """Forward model of a machine with effects. origin (3,), rotation (3, 3): program frame in the machine frame."""
+class Twin(ControlKinematics):
+    """Forward model of a machine with effects."""
 
-    robot: Robot
-    nominal: Robot
-    origin: Floats
-    rotation: Floats
     causes: tuple[Cause, ...] = ()
     # caches of this machine with these causes; a changed copy starts empty
     _machines: dict[tuple[Any, ...], Machine] = field(default_factory=dict, init=False, repr=False)
@@ -73,16 +62,6 @@ class Twin:
     _usual: WeakKeyDictionary[RunPath, tuple[Motion, Motion, Motion]] = field(
         default_factory=WeakKeyDictionary, init=False, repr=False
     )
-
-    @cached_property
-    def actuators(self) -> tuple[str, ...]:
-        """Names in the order of every actuator array."""
-        return tuple(each.name for each in self.robot.actuators)
-
-    @cached_property
-    def _control(self) -> Machine:
-        """The machine of the controller's kinematics."""
-        return build_machine(self.nominal, self.nominal)
 
     @cached_property
     def _longer(self) -> LongerLinks:
@@ -102,79 +81,6 @@ class Twin:
         levers = run_path.node_rotation @ lever
         force = np.broadcast_to(np.eye(3), (len(levers), 3, 3))
         return np.concatenate([force, np.cross(levers[:, None], force)], axis=2)
-
-    def platform(self, path: Path, motion: Ints, u: Floats) -> Floats | None:
-        """Orientations (k, 3, 3) of the platform at fractions u (k,) of motions (k,); None for a path without words of orientation."""
-        if path.orientation is None:
-            return None
-        F, turned = self.rotation, path.orientation.rotations(motion, u)
-        return np.asarray(F @ turned @ F.T @ self._control.nominal.held_rotation)
-
-    def to_machine(self, tip: Floats) -> Floats:
-        """Tips (n, 3) program -> machine frame."""
-        return self.origin + tip @ self.rotation.T
-
-    def to_program(self, tip: Floats) -> Floats:
-        """Tips (n, 3) machine -> program frame."""
-        return (tip - self.origin) @ self.rotation
-
-    def inverse(self, tip: Floats, rotation: Floats | None = None) -> Floats:
-        """Set-points (n, m) that the control computes for machine tips (n, 3). Raises PhysicsError CC410.
-
-        rotation (n, 3, 3): of the platform; None: the one that the machine holds.
-        """
-        state = solve(self._control, INVERSE, tip, aim_rotation=rotation)
-        if (state.status == 3).any():
-            bad = int(np.argmax(state.status == 3))
-            raise PhysicsError("CC410", f"tip {np.round(tip[bad], 3).tolist()} (machine frame) is {STATUS[3]}")
-        return state.rho_nominal
-
-    def forward(self, rho: Floats, near: Floats) -> Floats:
-        """Forward kinematics of the perfect, unloaded machine: tips (n, 3) of actuators rho (n, m), machine frame.
-
-        near (n, 3): approximate tips. Newton's method on the inverse kinematics at points _KNOT_MM apart, first order
-        between them. Raises PhysicsError CC410.
-        """
-        knots, nearest = _knots(rho * np.where([a.revolute for a in self.robot.actuators], 1000.0, 1.0))
-        tip = begun = near[knots]
-        off, back = rho[knots] - self.inverse(tip), self._back(tip)
-        for _ in range(_FORWARD_PASSES):
-            step = np.einsum("nij,nj->ni", back, off)
-            tip = tip + step
-            size = float(np.abs(step).max(initial=0.0))
-            if size < _FORWARD_MM:
-                break
-            if size > _FORWARD_FAR_MM:
-                begun, back = tip, self._back(tip)
-            off = rho[knots] - self.inverse(tip)
-        if np.abs(tip - begun).max(initial=0.0) > _FORWARD_NEAR_MM:
-            back = self._back(tip)
-        return np.asarray(tip[nearest] + np.einsum("nij,nj->ni", back[nearest], rho - rho[knots][nearest]))
-
-    def forward_pose(self, rho: Floats, near: Floats, rotation: Floats) -> tuple[Floats, Floats]:
-        """Forward kinematics of tip (n, 3) and platform (n, 3, 3) together, machine frame, for six actuators rho (n, 6).
-
-        near (n, 3), rotation (n, 3, 3): approximate pose. Newton's method. Raises PhysicsError CC410.
-        """
-        tip, turned = near, rotation
-        for _ in range(_FORWARD_PASSES):
-            off = rho - self.inverse(tip, turned)
-            ways = [self.inverse(tip + _RHO_STEP * axis, turned) for axis in np.eye(3)]
-            ways += [self.inverse(tip, exp_rotation((_RHO_STEP / ARM_LENGTH) * axis) @ turned) for axis in np.eye(3)]
-            slopes = np.stack(ways, axis=2) - (rho - off)[:, :, None]
-            slopes /= np.repeat([_RHO_STEP, (_RHO_STEP / ARM_LENGTH)], 3)
-            step = np.asarray(np.linalg.solve(slopes, off[:, :, None])[:, :, 0], np.float64)
-            tip, turned = tip + step[:, :3], rotations_about(step[:, 3:]) @ turned
-            if np.abs(step * np.repeat([1.0, ARM_LENGTH], 3)).max(initial=0.0) < _FORWARD_MM:
-                break
-        return tip, turned
-
-    def _back(self, tip: Floats) -> Floats:
-        """Derivatives (n, 3, m) of the tip by the actuators of the perfect machine at machine tips (n, 3)."""
-        steps = _RHO_STEP * np.eye(3)
-        ways = [(self.inverse(tip + e) - self.inverse(tip - e)) / (2 * _RHO_STEP) for e in steps]
-        back: Floats = np.linalg.pinv(np.stack(ways, axis=2))
-        return back
 
     def edited(self, causes: Sequence[Cause]) -> tuple[Robot, tuple[Any, ...]]:
         """The machine changed by effects, and a key that is equal for equal machines."""
@@ -467,15 +373,6 @@ class Twin:
             direction=travel_direction(run_path, encoder),
             masses=masses if has_moved_mass(self.robot) else None,
         )
-
-
-def _knots(rho: Floats) -> tuple[Ints, Ints]:
-    """Rows _KNOT_MM of travel apart in the actuators (n, m), mm or mrad, and the nearest of them (n,) for every row."""
-    way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(rho, axis=0)).max(axis=1))])
-    knots = np.flatnonzero(np.diff(np.floor(way / _KNOT_MM), prepend=-1.0) > 0)
-    right = np.clip(np.searchsorted(way[knots], way), 0, len(knots) - 1)
-    left = np.maximum(right - 1, 0)
-    return knots, np.where(way - way[knots][left] <= way[knots][right] - way, left, right)
 
 
 def twin_of(job: Job) -> Twin:
