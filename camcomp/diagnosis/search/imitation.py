@@ -178,7 +178,7 @@ def _at_the_tip(problem: Problem) -> Floats:
 def _evidence(problem: Problem, at: Base, prior: Prior, sets: Sequence[Members]) -> Floats:
     columns = problem.candidates.columns
     return np.array([
-        at.log_evidence + (float(log_bayes([at], prior, [columns[i] for i in each])[0]) if each else 0.0)
+        at.log_evidence + float(log_bayes([at], prior, [[columns[i] for i in each]])[0, 0])
         - holding_back(at, prior, [c for i in each for c in columns[i]]) for each in sets
     ])  # fmt: skip
 

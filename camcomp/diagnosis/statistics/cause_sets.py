@@ -20,7 +20,6 @@ from camcomp.diagnosis.statistics.evidence import (
     freed,
     holding_back,
     log_bayes,
-    log_bayes_pairs,
     log_sum,
 )
 from camcomp.diagnosis.statistics.shape_evidence import SoughtShape, shape_log_evidence
@@ -156,7 +155,7 @@ class Scale:
         each = [
             odds
             + shape_log_evidence(groups, sought)
-            + log_bayes(self.bases, self.prior, [[c for i in group for c in columns[i]] for group in groups])
+            + log_bayes(self.bases, self.prior, [[[c for i in group for c in columns[i]] for group in groups]])[:, 0]
             for odds, groups in ways
         ]
         return np.asarray(none + np.logaddexp.reduce(each) - log_sum([odds for odds, _ in ways]))
@@ -199,16 +198,7 @@ def pairs(scale: Scale, candidates: Sequence[int], most: int) -> list[tuple[floa
 def _of_two(scale: Scale, at: Base, two: Sequence[Members]) -> Floats:
     """Log Bayes factor (p,) of pairs at one base."""
     columns = scale.candidates.columns
-    single = np.array([len(columns[a]) == len(columns[b]) == 1 for a, b in two], bool)
-    rough = np.empty(len(two))
-    if single.any():
-        first, second = np.array(
-            [(columns[a][0], columns[b][0]) for (a, b), one in zip(two, single, strict=True) if one]
-        ).T
-        rough[single] = log_bayes_pairs(at, scale.prior, first, second)
-    for k in map(int, np.flatnonzero(~single)):
-        rough[k] = log_bayes([at], scale.prior, [columns[i] for i in two[k]])[0]
-    return rough
+    return np.asarray(log_bayes([at], scale.prior, [[columns[i] for i in pair] for pair in two])[0])
 
 
 def exchanges(scale: Scale, members: Members, candidates: Sequence[int], most: int) -> list[tuple[float, Members]]:
@@ -234,7 +224,7 @@ def parted(scale: Scale, members: Members, candidates: Sequence[int], most: int)
         if not two:
             continue
         rough = _of_two(scale, freed(at, scale.prior, own) if own else at, two)
-        rough += float(log_bayes([at], scale.prior, [own])[0]) if own else 0.0
+        rough += float(log_bayes([at], scale.prior, [[own]])[0, 0]) if own else 0.0
         sets = [tuple(sorted((*rest, *each))) for each in two]
         rough += [scale.candidates.prior(each) for each in sets]
         found |= {sets[k]: float(rough[k]) for k in np.argsort(-rough)[:most]}
@@ -261,11 +251,9 @@ def _screened(scale: Scale, sets: Sequence[Members], most: int) -> list[Members]
     """The best of sets at the stated tolerances, all members of one width: each one's own takes four times as long per member."""
     at = scale.bases[TOLERANCES.index(1.0)]
 
-    def rough(each: Members) -> float:
-        columns = [c for i in each for c in scale.candidates.columns[i]]
-        return scale.candidates.prior(each) + (float(log_bayes([at], scale.prior, [columns])[0]) if each else 0.0)
-
-    return sorted(sets, key=rough, reverse=True)[:most]
+    columns = [[[c for i in each for c in scale.candidates.columns[i]]] if each else [] for each in sets]
+    rough = log_bayes([at], scale.prior, columns)[0] + [scale.candidates.prior(each) for each in sets]
+    return [sets[k] for k in np.argsort(-rough, kind="stable")[:most]]
 
 
 def _scored(scale: Scale, sets: Sequence[Members]) -> list[tuple[float, Members]]:

@@ -115,26 +115,37 @@ def _inverse(scaled: Floats, size: Floats) -> tuple[Floats, float]:
     return size[:, None] * inverse * size, float(log_det)
 
 
-def log_bayes(at: Sequence[Base], prior: Prior, candidates: Sequence[Sequence[int]]) -> Floats:
-    """Log Bayes factor (b,) of `candidates` (each the columns of one cause) being causes, against no cause, for every base."""
-    index = np.array([i for candidate in candidates for i in candidate])
-    group = np.array([g for g, candidate in enumerate(candidates) for _ in candidate])
-    C = np.array([each.covariance[index[:, None], index] for each in at])
-    mean, narrow = np.array([each.mean[index] for each in at]), np.array([each.precision[index] for each in at])
+def log_bayes(at: Sequence[Base], prior: Prior, sets: Sequence[Sequence[Sequence[int]]]) -> Floats:
+    """Log Bayes factor (b, s) of sets of causes (each the columns of every cause) against no cause, for every base.
+
+    Sets whose causes have the same numbers of columns are worked out at once.
+    """
+    out = np.zeros((len(at), len(sets)))
+    shapes = [tuple(map(len, causes)) for causes in sets]
+    for shape in {each for each in shapes if each}:
+        own = [i for i, each in enumerate(shapes) if each == shape]
+        index = np.array([[c for cause in sets[i] for c in cause] for i in own])
+        out[:, own] = _log_bayes(at, prior, index, np.repeat(np.arange(len(shape)), shape))
+    return out
+
+
+def _log_bayes(at: Sequence[Base], prior: Prior, index: Ints, cause: Ints) -> Floats:
+    """The same (b, s) of sets with columns index (s, d), which belong to the causes (d,)."""
+    count, d = index.shape
+    C = np.concatenate([each.covariance[index[:, :, None], index[:, None]] for each in at])
+    mean = np.concatenate([each.mean[index] for each in at])
+    narrow = np.concatenate([each.precision[index] for each in at])
     inverse = np.linalg.inv(C)
     h = (inverse @ mean[:, :, None])[:, :, 0]
-    sizes, weight = _widths(len(candidates))
-    wide = 1.0 / (prior.scale[index] * sizes[:, group]) ** 2  # (w, d)
-    # a cause is at least as wide as its tolerance
-    wide = np.minimum(wide, narrow[:, None])
-    posterior, spread, fit, log_det = _posteriors(inverse - narrow[:, :, None] * np.eye(len(index)), h, wide)
-    volume = 0.5 * np.log(wide).sum(axis=2) - 0.5 * log_det
+    sizes, weight = _widths(int(cause[-1]) + 1)
+    wide = np.tile(1.0 / (prior.scale[index][:, None] * sizes[:, cause]) ** 2, (len(at), 1, 1))  # (b s, w, d)
+    wide = np.minimum(wide, narrow[:, None])  # a cause is at least as wide as its tolerance
+    posterior, spread, fit, log_det = _posteriors(inverse - narrow[:, :, None] * np.eye(d), h, wide)
     none = np.log(narrow).sum(axis=1) - np.linalg.slogdet(inverse)[1] + np.sum(mean * h, axis=1)
-    volume -= 0.5 * none[:, None]
-    signed = prior.sign[index] > 0
-    positive = (log_ndtr(posterior[:, :, signed] / spread[:, :, signed]) + np.log(2.0)).sum(axis=2)
-    value = 0.5 * fit + volume + positive + weight
-    return np.array([log_sum(each) for each in value])
+    value = 0.5 * (fit + np.log(wide).sum(axis=2) - log_det - none[:, None]) + weight
+    signed = np.tile(prior.sign[index] > 0, (len(at), 1))[:, None]
+    value += np.where(signed, log_ndtr(posterior / spread) + np.log(2.0), 0.0).sum(axis=2)
+    return np.asarray(logsumexp(value, axis=1).reshape(len(at), count), float)
 
 
 def _widths(count: int) -> tuple[Floats, Floats]:
@@ -184,52 +195,6 @@ def _posteriors(likelihood, h, wide):  # type: ignore[no-untyped-def]  # pragma:
                         mean[b, w, i] += A[i, j] * h[b, j]
                     fit[b, w] += h[b, i] * mean[b, w, i]
     return mean, spread, fit, log_det
-
-
-def log_bayes_singles(at: Base, prior: Prior, index: Ints) -> Floats:
-    """log_bayes (p,) of causes of one column each, `index` (p,); all at once."""
-    precision, narrow = 1.0 / at.covariance[index, index], at.precision[index]
-    h = at.mean[index] * precision
-    sizes, weight = _widths(1)
-    wide = np.minimum(1.0 / (prior.scale[index] * sizes) ** 2, narrow)  # (w, p)
-    M = (precision - narrow) + wide
-    good = M > 0
-    M = np.where(good, M, 1.0)
-    value = 0.5 * (h**2 / M - h * at.mean[index]) + 0.5 * np.log(wide / narrow * precision / M) + weight[:, None]
-    value += np.where(prior.sign[index] > 0, log_ndtr(h / np.sqrt(M)) + np.log(2.0), 0.0)
-    out: Floats = logsumexp(np.where(good, value, -np.inf), axis=0)
-    return out
-
-
-def log_bayes_pairs(at: Base, prior: Prior, first: Ints, second: Ints) -> Floats:
-    """log_bayes (p,) of pairs of one-column causes, columns `first` and `second` (p,); all at once."""
-    i = np.stack([first, second], axis=1)  # (p, 2)
-    C = at.covariance[i[:, :, None], i[:, None, :]]
-    mean = at.mean[i]
-    narrow = at.precision[i]
-    inverse = np.linalg.inv(C)
-    h = np.einsum("pij,pj->pi", inverse, mean)
-    eye = np.eye(2)
-    likelihood = inverse - narrow[:, :, None] * eye
-    sizes, weight = _widths(2)
-    wide = 1.0 / (prior.scale[i][:, None, :] * sizes[None]) ** 2  # (p, w, 2)
-    wide = np.minimum(wide, narrow[:, None, :])
-    M = likelihood[:, None] + wide[..., None] * eye
-    det = M[..., 0, 0] * M[..., 1, 1] - M[..., 0, 1] * M[..., 1, 0]
-    good = det > 0
-    det = np.where(good, det, 1.0)
-    c00, c11, c01 = M[..., 1, 1] / det, M[..., 0, 0] / det, -M[..., 0, 1] / det
-    post0, post1 = c00 * h[:, None, 0] + c01 * h[:, None, 1], c01 * h[:, None, 0] + c11 * h[:, None, 1]
-    fit = 0.5 * (post0 * h[:, None, 0] + post1 * h[:, None, 1]) - 0.5 * (mean * h).sum(axis=1)[:, None]
-    volume = 0.5 * np.log(wide).sum(axis=2) - 0.5 * np.log(det) - 0.5 * np.log(narrow).sum(axis=1)[:, None]
-    volume += 0.5 * np.log(np.maximum(np.linalg.det(inverse), 1e-300))[:, None]
-    signs = prior.sign[i]
-    for k, (mid, var) in enumerate(((post0, c00), (post1, c11))):
-        chance = log_ndtr(mid / np.sqrt(np.maximum(var, 1e-300))) + np.log(2.0)
-        volume = volume + np.where(signs[:, k, None] > 0, chance, 0.0)
-    value = fit + volume + weight
-    out: Floats = logsumexp(np.where(good, value, -np.inf), axis=1)
-    return out
 
 
 def estimate(data: Gram, prior: Prior, members: Sequence[int], factor: float = 1.0) -> tuple[Floats, Floats]:

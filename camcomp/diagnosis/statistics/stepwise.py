@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from camcomp.diagnosis.statistics.cause_sets import CausePrior, Members, Scale
-from camcomp.diagnosis.statistics.evidence import TOLERANCES, Base, Prior, freed, log_bayes, log_bayes_singles
+from camcomp.diagnosis.statistics.evidence import TOLERANCES, Base, Prior, freed, log_bayes
 from camcomp.ground.datatypes import Floats
 
 
@@ -39,10 +39,5 @@ def _gains(at: Base, prior: Prior, known: CausePrior, members: Members, more: Se
     """Log Bayes factor and log prior odds (m,) of one more member each, all of `members` free."""
     columns = [known.columns[i] for i in more]
     beside = freed(at, prior, [c for i in members for c in known.columns[i]]) if members else at
-    out = np.array([known.prior(tuple(sorted((*members, i)))) for i in more]) - known.prior(members)
-    single = np.array([len(each) == 1 for each in columns])
-    if single.any():
-        out[single] += log_bayes_singles(beside, prior, np.array([each[0] for each in columns if len(each) == 1]))
-    for k in map(int, np.flatnonzero(~single)):
-        out[k] += log_bayes([beside], prior, [columns[k]])[0]
-    return out
+    odds = np.array([known.prior(tuple(sorted((*members, i)))) for i in more]) - known.prior(members)
+    return np.asarray(odds + log_bayes([beside], prior, [[each] for each in columns])[0])

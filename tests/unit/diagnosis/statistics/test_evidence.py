@@ -18,8 +18,6 @@ from camcomp.diagnosis.statistics.evidence import (
     gram,
     holding_back,
     log_bayes,
-    log_bayes_pairs,
-    log_bayes_singles,
 )
 
 RNG = np.random.default_rng(7)
@@ -46,7 +44,7 @@ def test_bayes_factor_of_one_cause_is_the_integral_it_stands_for():
     weights = [0.2, 0.25, 0.3, 0.25]
     wide = sum(w * integral(lambda x, s=s: norm.pdf(x, 0, s)) for w, s in zip(weights, PRIOR_WIDTHS, strict=True))
     narrow = integral(lambda x: norm.pdf(x, 0, 0.01))
-    assert log_bayes([base(g, p, 1.0)], p, [[0]])[0] == pytest.approx(np.log(wide / narrow), abs=1e-5)
+    assert log_bayes([base(g, p, 1.0)], p, [[[0]]])[0, 0] == pytest.approx(np.log(wide / narrow), abs=1e-5)
 
 
 def test_of_two_that_do_the_same_the_one_of_larger_typical_size_is_no_less_likely():
@@ -54,35 +52,31 @@ def test_of_two_that_do_the_same_the_one_of_larger_typical_size_is_no_less_likel
     for size in (0.5, 0.25, 0.1):
         g = data([size], n=10_000, k=1)
         small, large = prior(1, tolerance=1e-3), replace(prior(1, tolerance=1e-3), scale=np.array([5.0]))
-        odds = [log_bayes([base(g, p, 1.0)], p, [[0]])[0] for p in (small, large)]
+        odds = [log_bayes([base(g, p, 1.0)], p, [[[0]]])[0, 0] for p in (small, large)]
         assert abs(odds[0] - odds[1]) < 0.4
 
 
 def test_a_cause_of_the_wrong_sign_is_held_against_it():
     g = data([-0.5], k=1)
     free, signed = prior(1), prior(1, [1.0])
-    assert log_bayes([base(g, signed, 1.0)], signed, [[0]])[0] < log_bayes([base(g, free, 1.0)], free, [[0]])[0] - 10
+    assert (
+        log_bayes([base(g, signed, 1.0)], signed, [[[0]]])[0, 0]
+        < log_bayes([base(g, free, 1.0)], free, [[[0]]])[0, 0] - 10
+    )
 
 
-def test_single_causes_at_once_equal_those_one_by_one():
+def test_sets_at_once_equal_sets_one_by_one():
     g, p = data([0.3, 0.0, -0.2, 0.05]), prior(4, [0.0, 1.0, 1.0, 1.0])
-    at, index = freed(base(g, p, 1.0), p, [3]), np.array([2, 0, 1])
-    one_by_one = [log_bayes([at], p, [[i]])[0] for i in index]
-    assert log_bayes_singles(at, p, index) == pytest.approx(one_by_one, abs=1e-8)
-
-
-def test_pairs_at_once_equal_pairs_one_by_one():
-    g, p = data([0.3, 0.0, -0.2, 0.05]), prior(4, [0.0, 1.0, 0.0, 1.0])
-    at = base(g, p, 1.0)
-    first, second = np.array([0, 0, 1, 2]), np.array([1, 2, 3, 3])
-    one_by_one = [log_bayes([at], p, [[i], [j]])[0] for i, j in zip(first, second, strict=True)]
-    assert log_bayes_pairs(at, p, first, second) == pytest.approx(one_by_one, abs=1e-8)
+    at = [base(g, p, 1.0), freed(base(g, p, 1.0), p, [3])]
+    sets = [[[2]], [[0], [1]], [[0, 2]], [], [[1]], [[0, 1], [2]]]
+    one_by_one = [[log_bayes([each], p, [causes])[0, 0] for causes in sets] for each in at]
+    assert log_bayes(at, p, sets) == pytest.approx(np.array(one_by_one), abs=1e-8)
 
 
 def test_what_is_within_tolerance_is_no_finding():
     p = prior(4, tolerance=0.3)
-    assert log_bayes([base(data([0.2, 0, 0, 0]), p, 1.0)], p, [[0]])[0] < 1.0
-    assert log_bayes([base(data([2.0, 0, 0, 0]), p, 1.0)], p, [[0]])[0] > 5.0
+    assert log_bayes([base(data([0.2, 0, 0, 0]), p, 1.0)], p, [[[0]]])[0, 0] < 1.0
+    assert log_bayes([base(data([2.0, 0, 0, 0]), p, 1.0)], p, [[[0]]])[0, 0] > 5.0
 
 
 def test_the_right_cause_wins_and_its_estimate_covers_the_truth():
