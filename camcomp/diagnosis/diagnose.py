@@ -25,6 +25,7 @@ from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.law.answer import answer_law
 from camcomp.diagnosis.law.law_answer import LawAnswer
 from camcomp.diagnosis.law.library import LearnedLaw
+from camcomp.diagnosis.model.calibration import calibration_of
 from camcomp.diagnosis.next_experiment.after_unknown import explore
 from camcomp.diagnosis.next_experiment.designed import propose
 from camcomp.diagnosis.next_experiment.outcomes import ONLY_NOISE, with_outcomes
@@ -53,7 +54,7 @@ from camcomp.diagnosis.standards import of_runs
 from camcomp.diagnosis.statistics import places
 from camcomp.diagnosis.statistics.cause_sets import Fitted
 from camcomp.diagnosis.statistics.periods import SpectralLine, frequencies
-from camcomp.diagnosis.statistics.probability import probability_of_chance, stated
+from camcomp.diagnosis.statistics.probability import probability_of_chance
 from camcomp.ground.datatypes import Floats
 from camcomp.ground.progress import part as part_of_work
 from camcomp.model.effect import Cause
@@ -197,7 +198,7 @@ def _causes(problem: Problem, found: CauseSearch, best: Fitted, law: LawAnswer |
             FoundCause(
                 effect=candidate.name,
                 target=candidate.target,
-                probability=round(min(found.verdict.inclusion.get(i, 0.0), 1.0), 4),
+                probability=found.verdict.inclusion.get(i, 0.0),
                 share=round(energy[j] / whole, 4) if whole > 0 else 0.0,
                 parameters=_parameters(problem, best, covariance, j, causes[j]),
             )
@@ -209,7 +210,9 @@ def _causes(problem: Problem, found: CauseSearch, best: Fitted, law: LawAnswer |
         out.append(
             UnknownCause(
                 target=target,
-                probability=stated(probability_of_chance(worst(found.beyond).log10_chance)),
+                probability=calibration_of("programs").calibrate(
+                    probability_of_chance(worst(found.beyond).log10_chance)
+                ),
                 share=round(left / whole, 4) if whole > 0 else 1.0,
                 law=None if law is None else law.law,
             )

@@ -67,6 +67,11 @@ def gap_of(problem: Problem, f: Fitted) -> dict[str, float]:
     }
 
 
+def is_at_floor(problem: Problem, f: Fitted) -> bool:
+    """Whether the gap is not above the noise floor; f: the causes, which labels are seen beside."""
+    return float((gap_sizes(problem, f) ** 2).mean()) <= floor_um(problem) ** 2
+
+
 def floor_um(problem: Problem) -> float:
     """The floor in the channels in which the gap is stated, um."""
     part = main_channels(problem)

@@ -100,12 +100,6 @@ def _of_actuator(g: Ground, size: _Sizes, j: int, knots: int) -> dict[str, list[
     return out
 
 
-def of_actuator(grounds: Sequence[Ground], j: int) -> list[dict[str, list[Floats]]]:
-    """Functions (n,) of about size one, per run, of what actuator j does, by covariate."""
-    size = _sizes(grounds)
-    return [_of_actuator(g, size, j, _KNOTS) for g in grounds]
-
-
 def hats(x: Floats, knots: int) -> list[Floats]:
     """Piecewise linear functions (n,) that are 1 at one knot and 0 at the others, for x (n,) in 0 .. 1."""
     return [np.maximum(1.0 - np.abs(x * (knots - 1) - n), 0.0) for n in range(knots)]

@@ -19,7 +19,6 @@ from camcomp.diagnosis.statistics.cause_sets import (
     total,
     with_minor,
 )
-from camcomp.diagnosis.statistics.verdict import EQUAL_LOG_ODDS
 from camcomp.ground.datatypes import Floats
 
 LEAST_PROBABILITY = 0.02  # of a set that is looked at more closely
@@ -73,13 +72,6 @@ def established(
         less = max(*same, with_minor(same[0], f), key=lambda g: problem.candidates.value(g, temperature))
         fits = (*(g for j, g in enumerate(fits) if j != at and g.members != without), less)
         probability = probabilities(fits, problem.candidates, temperature)
-
-
-def stands_for_more(problem: Problem, f: Fitted, less: Members, temperature: float) -> bool:
-    """Whether a set is far more likely than the same without a member: something is there that this one explains."""
-    scale = Scale(total(f.grams), problem.prior, problem.candidates)
-    odds = (scale(f.members) - scale(less)) / temperature
-    return odds + problem.candidates.prior(f.members) - problem.candidates.prior(less) > EQUAL_LOG_ODDS
 
 
 def standing(problem: Problem, members: Members) -> Fitted:

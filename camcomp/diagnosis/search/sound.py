@@ -1,6 +1,6 @@
 """Which sets of causes are answers at all: those whose members all matter, and do not undo one another."""
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping
 from itertools import combinations
 
 from camcomp.diagnosis.fit.floor import MINOR
@@ -59,22 +59,6 @@ class Sound:
             if not self.cancels(f) and self(less):
                 found[less.members] = max(found.get(less.members, less), with_minor(less, f), key=value)
         return sorted(found.values(), key=value, reverse=True)
-
-    def share_minor(
-        self, found: dict[Members, Fitted], alike: Collection[Members], fit: Callable[[Members], Fitted],
-        temperature: float,
-    ) -> None:  # fmt: skip
-        """What is minor beside one of the sets that do the same may be beside the others: puts those of them that are likelier with it."""
-        candidates = self.problem.candidates
-        for minor in {found[members].minor for members in alike} - {()}:
-            for members in alike:
-                both = tuple(sorted({*members, *minor}))
-                if both == members or any(candidates.exclusive(i, j) for i, j in combinations(both, 2)):
-                    continue
-                f = fit(both)
-                if set(self.minor(f)) <= set(minor) and not self.cancels(f):
-                    either = found[members], with_minor(found[members], f)
-                    found[members] = max(either, key=lambda f: candidates.value(f, temperature))
 
 
 def small_members(problem: Problem, f: Fitted) -> Members:

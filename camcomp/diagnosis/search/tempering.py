@@ -3,10 +3,7 @@
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.statistics.cause_sets import Fitted, total
 from camcomp.diagnosis.statistics.evidence import estimate
-
-TEMPERATURE = (
-    1.5  # what evidence is divided by before it becomes a probability, where the model is as good as its noise
-)
+from camcomp.diagnosis.statistics.probability import TEMPERATURE
 
 
 def tempering(problem: Problem, f: Fitted) -> float:

@@ -9,12 +9,7 @@ from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.statistics.by_channel import ByChannel
 from camcomp.diagnosis.statistics.cause_sets import Fitted, Members, total
 from camcomp.diagnosis.statistics.evidence import Prior, estimate
-from camcomp.diagnosis.statistics.score_test import (
-    Projected,
-    ResidualTest,
-    project,
-    score_test,
-)
+from camcomp.diagnosis.statistics.score_test import JointProducts, Patterns, ResidualTest, score_test
 from camcomp.ground.datatypes import Bools, Floats, Ints
 
 SEEN_SHARE = 0.1  # of the energy of the run that shows a cause best, from which on a run says something about it
@@ -25,12 +20,17 @@ SURE_SD = 3.0  # of the floor: what noise leaves of a row
 
 
 def residual_tests(problem: Problem, f: Fitted, prior: Prior) -> dict[str, ResidualTest]:
-    """Score test on what the set leaves, per kind of channel; prior: of everything beside the set."""
-    rows = {
-        words.kind: sum(len(parts[k]) for parts in problem.white_patterns)
-        for k, words in enumerate(problem.dictionaries)
-    }
-    return score_test(_projected(problem, prior, *about(problem, f), f.members), rows)
+    """Score test on the residual of a set, per kind of channel; prior: of all other columns."""
+    joint = joint_products(problem, f)
+    return score_test(joint, *joint.projected(prior, problem.member_columns(f.members)), rows_by_kind(problem))
+
+
+def joint_products(problem: Problem, f: Fitted, weight: Sequence[Sequence[float]] | None = None) -> JointProducts:
+    """Products of columns, residual and functions of covariates about a fit; weight: of a row, per run and kind."""
+    white, residual = about(problem, f)
+    labels = [words.labels for words in problem.dictionaries]
+    kinds = [words.kind for words in problem.dictionaries]
+    return JointProducts.of(Patterns(white, residual, problem.white_patterns, labels, kinds, weight))
 
 
 def about(problem: Problem, f: Fitted) -> tuple[list[ByChannel], list[Floats]]:
@@ -49,15 +49,6 @@ def _held(prior: Prior, columns: Ints) -> Prior:
     tolerance = prior.tolerance.copy()
     tolerance[columns] *= 1e-3
     return replace(prior, tolerance=tolerance)
-
-
-def _projected(
-    problem: Problem, prior: Prior, white: list[ByChannel], residual: list[Floats], members: Members
-) -> Projected:
-    return project(
-        white, problem.white_patterns, residual, [w.labels for w in problem.dictionaries],
-        [w.kind for w in problem.dictionaries], prior, problem.member_columns(members),
-    )  # fmt: skip
 
 
 def signal_rms(problem: Problem, f: Fitted, members: Members | None = None) -> dict[str, float]:

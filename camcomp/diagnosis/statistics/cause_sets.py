@@ -231,17 +231,6 @@ def parted(scale: Scale, members: Members, candidates: Sequence[int], most: int)
     return _scored(scale, sorted(found, key=lambda each: found[each], reverse=True)[:most])
 
 
-def both_exchanged(candidates: CausePrior, members: Members, near: Sequence[Members]) -> list[Members]:
-    """Sets with two members exchanged at once, each as a set that is near exchanges it alone."""
-    one = [(set(members) - set(each), set(each) - set(members)) for each in near if len(each) == len(members)]
-    out = set()
-    for (gone, come), (also_gone, also_come) in combinations([each for each in one if len(each[0]) == 1], 2):
-        new = (set(members) - gone - also_gone) | come | also_come
-        if len(new) == len(members) and not any(candidates.exclusive(i, j) for i, j in combinations(new, 2)):
-            out.add(tuple(sorted(new)))
-    return sorted(out)
-
-
 def _beside(scale: Scale, rest: Members, without: Members, candidates: Sequence[int]) -> list[int]:
     """The candidates that make sense beside a set."""
     return [j for j in candidates if j not in without and not any(scale.candidates.exclusive(j, x) for x in rest)]

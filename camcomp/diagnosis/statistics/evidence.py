@@ -202,13 +202,18 @@ def estimate(data: Gram, prior: Prior, members: Sequence[int], factor: float = 1
 
     The covariance is that without the ends of the reaches: never too small.
     """
-    precision = prior.precision(factor)
-    members = list(members)
-    precision[members] = _free(prior, members)
+    precision = estimate_precision(prior, members, factor)
     size = 1.0 / np.sqrt(np.diag(data.A) + precision)
     scaled = size[:, None] * data.A * size + np.diag(precision * size**2)
     covariance, _ = _inverse(scaled, size)
     return within(covariance @ data.b, lambda held: covariance[:, held], _reach(prior, members))[0], covariance
+
+
+def estimate_precision(prior: Prior, members: Sequence[int], factor: float = 1.0) -> Floats:
+    """Precision (k,) with the columns `members` free within 10 scales, the others within tolerance."""
+    precision = prior.precision(factor)
+    precision[list(members)] = _free(prior, members)
+    return precision
 
 
 def freed(at: Base, prior: Prior, members: Sequence[int]) -> Base:

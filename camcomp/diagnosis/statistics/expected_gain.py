@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from camcomp.diagnosis.statistics.probability import TEMPERATURE
 from camcomp.ground.datatypes import Floats
 
 _OUTCOME_DRAWS = 64
 _SEED = 20120624
-_TEMPERATURE = 1.5  # what evidence is divided by before it becomes a probability, as in the survey
 
 
 def expected_gain(apart: Floats, probability: Floats) -> float:
@@ -17,7 +17,7 @@ def expected_gain(apart: Floats, probability: Floats) -> float:
     after = 0.0
     for i, p in enumerate(probability):
         scatter = np.sqrt(apart[i]) * rng.standard_normal((_OUTCOME_DRAWS, len(probability)))
-        logs = np.log(np.maximum(probability, 1e-12)) - (0.5 * apart[i] + scatter) / _TEMPERATURE
+        logs = np.log(np.maximum(probability, 1e-12)) - (0.5 * apart[i] + scatter) / TEMPERATURE
         weight = np.exp(logs - logs.max(axis=1, keepdims=True))
         after += p * float(np.mean([_entropy(w / w.sum()) for w in weight]))
     return max(_entropy(probability) - float(after), 0.0)

@@ -1,10 +1,10 @@
-"""From the chance of a test to the probability of a cause, and how a result states it."""
+"""From the chance of a test, and from evidence, to a probability."""
 
 from math import exp, log
 
 EVEN = 0.5  # of an effect, before the data are looked at
-UNSURE = 0.8  # of what may be something else at most: beyond it a probability is taken for sure
 PLACES = 4
+TEMPERATURE = 1.5  # divides log evidence before it becomes a probability, where the model is as good as its noise
 
 
 def probability_of_chance(log10_chance: float, prior: float = EVEN) -> float:
@@ -20,5 +20,5 @@ def probability_of_chance(log10_chance: float, prior: float = EVEN) -> float:
 
 
 def stated(probability: float) -> float:
-    """A probability as a result states it: rounded, and never to what would read as certain."""
+    """A probability as a result states it: rounded, and never to one that reads as certain."""
     return min(round(probability, PLACES), 1.0 - 10.0**-PLACES)

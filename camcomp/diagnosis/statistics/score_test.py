@@ -1,25 +1,28 @@
-"""What is left when the best causes are in: is it more than noise, and what does it depend on?
+"""What do functions of a covariate explain of a residual, with causes free and every healthy tolerance allowed for?
 
-A score test on the generic patterns: with the causes free and every healthy tolerance allowed for, the patterns'
-amplitudes are estimated and their joint size compared with what chance makes of it. Source: Rao's score test.
+The covariates' functions enter by their normal equations, causes and tolerances integrated out. Their joint size is compared
+with what chance makes of it (Rao's score test), and their evidence at a scale is that of model/discrepancy.
 """
+
+from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import cholesky, solve_triangular
 
 from camcomp.diagnosis.statistics.by_channel import ByChannel
-from camcomp.diagnosis.statistics.evidence import Prior
+from camcomp.diagnosis.statistics.evidence import Gram, Prior, estimate_precision
 from camcomp.ground.datatypes import Floats, Ints
 
-_TOLD = 0.01  # share of its information that a direction keeps beside the others, below which it tells of the noise's colour
+_DETERMINED = 0.01  # share of its information that a direction keeps jointly with the others, below which it is the noise's colour
 
 
 @dataclass(frozen=True, eq=False)
 class ResidualTest:
-    """What the patterns of one kind of channel carry. rms: size beyond chance in units of the kind's noise, rows: how many
-    the kind has; labels: covariates with the share of it that each carries alone, largest first.
+    """Patterns of one kind of channel: rms beyond chance in units of the kind's noise, number of rows, and covariates with
+    the share of it that each carries alone, largest first.
     """
 
     kind: str
@@ -34,79 +37,75 @@ class ResidualTest:
 
 
 @dataclass(frozen=True, eq=False)
-class Projected:
-    """Patterns (p) with causes and tolerances taken out: P (p, p), h (p,) normal equations, white rows, labels, kinds."""
+class Patterns:
+    """Patterns (p) of all runs, white. white (w, k), residual (w,) per run; blocks per run and kind, whose rows follow each
+    other in `white`; labels: covariates of the patterns per kind; weight: of a row, per run and kind.
+    """
 
-    P: Floats
+    white: Sequence[ByChannel]
+    residual: Sequence[Floats]
+    blocks: Sequence[Sequence[ByChannel]]
+    labels: Sequence[Sequence[str]]
+    kinds: Sequence[str]
+    weight: Sequence[Sequence[float]] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class JointProducts:
+    """Products of columns (k), residual and patterns (p): data of the columns, B (k, p), h (p,), P (p, p); labels, kinds (p,).
+
+    rows: number of white rows, each with the square of its weight.
+    """
+
+    data: Gram
+    B: Floats
     h: Floats
-    rows: int
+    P: Floats
     labels: tuple[str, ...]
     kinds: tuple[str, ...]
-    own: Floats  # (p,) energy of a pattern before anything was taken out
+    rows: float
+
+    @staticmethod
+    def of(patterns: Patterns) -> JointProducts:
+        """Sum over runs."""
+        k, p = patterns.white[0].width, sum(map(len, patterns.labels))
+        A, B, P, rows = np.zeros((k + 1, k + 1)), np.zeros((k + 1, p)), np.zeros((p, p)), 0.0
+        for run, (W, r, parts) in enumerate(zip(patterns.white, patterns.residual, patterns.blocks, strict=True)):
+            joint, row, at = W.beside(r[:, None]), 0, 0
+            for kind, (part, names) in enumerate(zip(parts, patterns.labels, strict=True)):
+                square = 1.0 if patterns.weight is None else patterns.weight[run][kind] ** 2
+                own, to = joint[row : row + len(part)], slice(at, at + len(names))
+                A += square * (own.T @ own)
+                B[:, to] += square * (own.T @ part)
+                P[to, to] += square * (part.T @ part)
+                row, at, rows = row + len(part), at + len(names), rows + square * len(part)
+        kinds = tuple(kind for kind, each in zip(patterns.kinds, patterns.labels, strict=True) for _ in each)
+        names = tuple(name for each in patterns.labels for name in each)
+        return JointProducts(Gram(A[:k, :k], A[:k, k], float(A[k, k]), round(rows)), B[:k], B[k], P, names, kinds, rows)
+
+    def projected(self, prior: Prior, members: Sequence[int]) -> tuple[Floats, Floats]:
+        """Normal equations (p, p), (p,) of the patterns with the columns `members` free and all others within tolerance."""
+        M = self.data.A + np.diag(estimate_precision(prior, members))
+        size = 1.0 / np.sqrt(np.diag(M))
+        L = cholesky(size[:, None] * M * size + 1e-12 * np.eye(len(M)), lower=True)
+        half = solve_triangular(L, size[:, None] * np.column_stack([self.B, self.data.b]), lower=True)
+        return self.P - half[:, :-1].T @ half[:, :-1], self.h - half[:, :-1].T @ half[:, -1]
 
 
-def project(
-    white: Sequence[ByChannel],
-    patterns: Sequence[Sequence[ByChannel]],
-    residual: Sequence[Floats],
-    labels: Sequence[Sequence[str]],
-    kinds: Sequence[str],
-    prior: Prior,
-    members: Sequence[int],
-    factor: float = 1.0,
-) -> Projected:
-    """White (w, k), residual (w,) per run; patterns per run and kind, whose rows follow each other in `white`; labels per
-    kind; members: columns that are free.
-    """
-    precision = prior.precision(factor)
-    members = list(members)
-    precision[members] = 1.0 / (10.0 * prior.scale[members]) ** 2
-    k, p = white[0].shape[1], sum(len(each) for each in labels)
-    A, B = np.zeros((k + 1, k + 1)), np.zeros((k + 1, p))
-    P = np.zeros((p, p))
-    for W, r, parts in zip(white, residual, patterns, strict=True):
-        joint = W.beside(r[:, None])
-        A += joint.T @ joint
-        row = at = 0
-        for part, names in zip(parts, labels, strict=True):
-            B[:, at : at + len(names)] += joint[row : row + len(part)].T @ part
-            P[at : at + len(names), at : at + len(names)] += part.T @ part
-            row, at = row + len(part), at + len(names)
-    M = A[:k, :k] + np.diag(precision)
-    size = 1.0 / np.sqrt(np.diag(M))
-    L = np.linalg.cholesky(size[:, None] * M * size + 1e-12 * np.eye(k))
-    half = np.linalg.solve(L, size[:, None] * np.concatenate([B[:k], A[:k, k:]], axis=1))
-    own = np.diag(P).copy()
-    every = tuple(name for each in labels for name in each)
-    of_kind = tuple(kind for kind, each in zip(kinds, labels, strict=True) for _ in each)
-    return Projected(
-        P - half[:, :p].T @ half[:, :p],
-        B[k] - half[:, :p].T @ half[:, p],
-        sum(len(r) for r in residual),
-        every,
-        of_kind,
-        own,
-    )
-
-
-def score_test(left: Projected, rows: Mapping[str, int]) -> dict[str, ResidualTest]:
-    """Size of the patterns of every kind against chance; rows: white rows per kind."""
+def score_test(joint: JointProducts, P: Floats, h: Floats, rows: Mapping[str, int]) -> dict[str, ResidualTest]:
+    """Size of the patterns of every kind against chance; P (p, p), h (p,): projected; rows: white rows per kind."""
     out = {}
-    for kind in dict.fromkeys(left.kinds):
-        mine = np.flatnonzero(np.array(left.kinds) == kind)
-        P, h = left.P[np.ix_(mine, mine)], left.h[mine]
-        usable = np.diag(P) > 1e-6 * np.maximum(left.own[mine], 1e-30)
-        scale = np.sqrt(np.maximum(np.diag(P)[usable], 1e-30))
-        value, vector = np.linalg.eigh(P[np.ix_(usable, usable)] / scale[:, None] / scale)
-        keep = value > _TOLD
-        z = (vector[:, keep] / np.sqrt(value[keep])).T @ (h[usable] / scale)
-        dof, total = max(int(keep.sum()), 1), float(z @ z)
-        out[kind] = ResidualTest(
-            kind,
-            float(np.sqrt(max(total - dof, 0.0) / rows[kind])),
-            rows[kind],
-            _shares(P, h, [left.labels[i] for i in mine]),
-        )
+    for kind in dict.fromkeys(joint.kinds):
+        mine = np.flatnonzero(np.array(joint.kinds) == kind)
+        own, b = P[np.ix_(mine, mine)], h[mine]
+        usable = np.diag(own) > 1e-6 * np.maximum(np.diag(joint.P)[mine], 1e-30)
+        scale = np.sqrt(np.maximum(np.diag(own)[usable], 1e-30))
+        value, vector = np.linalg.eigh(own[np.ix_(usable, usable)] / scale[:, None] / scale)
+        keep = value > _DETERMINED
+        z = (vector[:, keep] / np.sqrt(value[keep])).T @ (b[usable] / scale)
+        freedom, total = max(int(keep.sum()), 1), float(z @ z)
+        rms = float(np.sqrt(max(total - freedom, 0.0) / rows[kind]))
+        out[kind] = ResidualTest(kind, rms, rows[kind], _shares(own, b, [joint.labels[i] for i in mine]))
     return out
 
 
@@ -121,9 +120,8 @@ def _explained(P: Floats, h: Floats, index: Ints) -> float:
 
 def _shares(P: Floats, h: Floats, labels: Sequence[str]) -> tuple[tuple[str, float], ...]:
     """Energy that the patterns of one covariate carry alone, per covariate, as shares of the largest sum."""
-    names = list(dict.fromkeys(labels))
     every = np.array(labels)
-    energy = {name: _explained(P, h, np.flatnonzero(every == name)) for name in names}
+    energy = {name: _explained(P, h, np.flatnonzero(every == name)) for name in dict.fromkeys(labels)}
     whole = _explained(P, h, np.arange(len(labels)))
     if whole <= 0.0:
         return ()

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from camcomp.diagnosis.search import sound
-from camcomp.diagnosis.statistics.cause_sets import CausePrior, Fitted, probabilities, with_minor
+from camcomp.diagnosis.statistics.cause_sets import CausePrior, Fitted, probabilities
 
 FORCE, SPRING, FRICTION = 0, 1, 2
 ROWS = 3600
@@ -142,12 +142,3 @@ def test_what_is_minor_makes_no_answer_likelier_once_evidence_is_tempered(weighe
     assert FREE.value(done[0, 1, 2]) > FREE.value(done[0, 1])
     assert [f.minor for f in search.answers(done, fit)] == [(2,)]
     assert [f.minor for f in search.answers(done, fit, 1.5)] == [()]
-
-
-def test_a_set_that_does_the_same_has_what_is_minor_beside_it_too(weighed):
-    search, _ = weighed
-    fits = {(0, 2, 4): fitted(12.0, 0, 2, 4), (0, 2, 3): fitted(1.0, 0, 2, 3)}
-    found = {f.members: f for f in (fitted(0.0, 0, 1), fitted(0.0, 0, 3), fitted(0.0, 0, 4))}
-    found[0, 1] = with_minor(found[0, 1], fitted(14.0, 0, 1, 2))
-    search.share_minor(found, list(found), lambda members: fits.get(members, fitted(14.0, *members)), 1.5)
-    assert {members: f.minor for members, f in found.items()} == {(0, 1): (2,), (0, 3): (), (0, 4): (2,)}

@@ -1,14 +1,44 @@
-"""Patterns that say the same thing twice say it once."""
+"""Functions of covariates on a residual: what they explain, with columns of causes free and others within tolerance."""
 
 import numpy as np
 import pytest
 
-from camcomp.diagnosis.statistics.score_test import Projected, score_test
+from camcomp.diagnosis.statistics.by_channel import ByChannel
+from camcomp.diagnosis.statistics.evidence import Gram, Prior
+from camcomp.diagnosis.statistics.score_test import JointProducts, Patterns, score_test
 
 
-def test_a_pattern_told_twice_counts_once():
-    def left(n):
-        return Projected(np.full((n, n), 50.0), np.full(n, 40.0), 1000, tuple("ab"[:n]), ("tip",) * n, np.full(n, 50.0))
+def test_a_pattern_given_twice_counts_once():
+    def rms(n):
+        P, names = np.full((n, n), 50.0), tuple("ab"[:n])
+        data = Gram(np.zeros((0, 0)), np.zeros(0), 0.0, 1000)
+        joint = JointProducts(data, np.zeros((0, n)), np.full(n, 40.0), P, names, ("tip",) * n, 1000.0)
+        return score_test(joint, P, np.full(n, 40.0), {"tip": 1000})["tip"].rms
 
-    once, twice = (score_test(left(n), {"tip": 1000})["tip"] for n in (1, 2))
-    assert twice.rms == pytest.approx(once.rms) and once.rms > 0.0
+    assert rms(2) == pytest.approx(rms(1)) and rms(1) > 0.0
+
+
+@pytest.mark.parametrize("weight", [None, [[0.5, 2.0], [1.0, 0.0]]])
+def test_normal_equations_of_patterns_are_those_of_the_stacked_rows(weight):
+    """Two runs, two kinds of channel; a free column and one with a tolerance."""
+    rng = np.random.default_rng(3)
+    prior = Prior(np.array([0.1, 0.2]), np.ones(2), np.zeros(2), np.ones(2), np.full(2, np.inf))
+    W, r = [rng.normal(size=(30, 2)) for _ in range(2)], [rng.normal(size=30) for _ in range(2)]
+    D = [[rng.normal(size=(20, 2)), rng.normal(size=(10, 1))] for _ in range(2)]
+    patterns = Patterns(
+        [ByChannel.of([w[:20], w[20:]]) for w in W], r, [[ByChannel.of([d]) for d in run] for run in D],
+        [["velocity:x", "velocity:y"], ["force:x"]], ["tip", "drive"], weight,
+    )  # fmt: skip
+    joint = JointProducts.of(patterns)
+    P, h = joint.projected(prior, [0])
+
+    factor = [np.repeat(w, [20, 10]) for w in weight or [[1.0, 1.0]] * 2]
+    every = np.concatenate([f[:, None] * w for f, w in zip(factor, W, strict=True)])
+    left = np.concatenate([f * x for f, x in zip(factor, r, strict=True)])
+    blocks = [np.block([[a, np.zeros((20, 1))], [np.zeros((10, 2)), b]]) for a, b in D]
+    functions = np.concatenate([f[:, None] * d for f, d in zip(factor, blocks, strict=True)])
+    taken = np.linalg.solve(every.T @ every + np.diag([0.01, 25.0]), every.T @ np.column_stack([functions, left]))
+    apart = np.column_stack([functions, left]) - every @ taken
+    assert P == pytest.approx(functions.T @ apart[:, :3], abs=1e-9)
+    assert h == pytest.approx(functions.T @ apart[:, 3], abs=1e-9)
+    assert joint.rows == pytest.approx(sum(float((f**2).sum()) for f in factor))

@@ -1,0 +1,59 @@
+"""How sure a cause is where functions of one covariate may do the same, or other things as well."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from camcomp.diagnosis.search import credible
+from camcomp.diagnosis.statistics.by_channel import ByChannel
+from camcomp.diagnosis.statistics.cause_sets import CausePrior, Fitted
+from camcomp.diagnosis.statistics.evidence import Prior
+from camcomp.diagnosis.statistics.score_test import JointProducts, Patterns
+
+ROWS = 400
+U = np.linspace(0.0, 1.0, ROWS)
+COVARIATE = np.stack([np.sin(2 * np.pi * U), np.cos(2 * np.pi * U), np.sin(4 * np.pi * U)], axis=1)
+
+
+def present(monkeypatch, column, left, *, surely=False):
+    """Probability of a cause with a column (n,), and of something unmodelled in its place, given the measured rows (n,)."""
+    one = np.ones(1)
+    problem = SimpleNamespace(
+        prior=Prior(0.01 * one, one, 0.0 * one, one, np.inf * one), member_columns=list,
+        candidates=CausePrior(((0,),), np.log(0.5 * one), lambda i, j: True),
+    )  # fmt: skip
+    patterns = Patterns(
+        [ByChannel.of([column[:, None]])], [left], [[ByChannel.of([COVARIATE])]], [["place:x"] * 3], ["tip"]
+    )
+    monkeypatch.setattr(credible, "joint_products", lambda *_: JointProducts.of(patterns))
+    monkeypatch.setattr(credible, "_weights", lambda _: None)
+    amount = float(column @ left / (column @ column))
+    f = Fitted((0,), np.array([amount]), np.eye(1), 0.0, ())
+    found = credible.credibility(problem, f, surely=surely, temperature=1.5)
+    return found.present[0], found.replaced[0]
+
+
+def noise(seed):
+    return np.random.default_rng(seed).normal(size=ROWS)
+
+
+def test_a_cause_that_no_function_of_a_covariate_does_is_sure(monkeypatch):
+    ramp = np.where(U > 0.3, 1.0, -1.0) * np.sin(23.0 * U)
+    sure, replaced = present(monkeypatch, ramp, 0.6 * ramp + noise(1))
+    assert sure > 0.95 and replaced < 0.05
+
+
+def test_a_column_that_follows_the_half_of_an_unmodelled_effect_is_replaced_by_it(monkeypatch):
+    """The residual is the covariate's function; the column of the cause goes along with three quarters of it."""
+    effect = 2.0 * COVARIATE[:, 0] - 1.5 * COVARIATE[:, 2]
+    column = COVARIATE[:, 0] + 0.5 * np.sign(COVARIATE[:, 1])
+    sure, replaced = present(monkeypatch, column, effect + noise(2))
+    assert sure < 0.5 and replaced > 0.5
+
+
+@pytest.mark.parametrize("surely", [False, True])
+def test_functions_that_draw_just_the_cause_are_the_cause_under_another_name(monkeypatch, surely):
+    column = COVARIATE[:, 0] + 0.5 * COVARIATE[:, 2]
+    sure, _ = present(monkeypatch, column, 8.0 * column + noise(3), surely=surely)
+    assert sure > 0.95
