@@ -16,6 +16,7 @@ import numpy as np
 
 from camcomp.diagnosis.axis.channels import KNOWN
 from camcomp.diagnosis.axis.effect_columns import AxisCause
+from camcomp.diagnosis.axis.gate import MINOR
 from camcomp.diagnosis.model.calibration import calibration_of
 from camcomp.diagnosis.model.candidates import AmplitudeBounds, PlacedCause
 from camcomp.diagnosis.model.discrepancy import covariate_columns, gains_of_more, smooth_functions
@@ -28,9 +29,10 @@ from camcomp.ground.datatypes import Floats
 
 STEP = 1e-3  # of an amplitude in scales, for slopes
 PASSES = 3  # in which columns are made linear again where the fit stands
+MOST_CHANGE = 0.7  # of the logarithm of a shape in one step
 CAUSES = 3  # of one channel of one axis
 HEALTHY_SHARE = 0.3  # of the channel's size: scale of a size that every axis has
-LEAST_MEANS = 40  # of all rows: fewer do not carry a fit
+SHAPE_SD = 1.5  # of the logarithm of a shape: scans of shapes span four
 Sizes = Mapping[str, Floats]  # kind -> columns (n, q)
 
 
@@ -38,14 +40,14 @@ Sizes = Mapping[str, Floats]  # kind -> columns (n, q)
 class ChannelData:
     """Rows of one channel, per run: values (n,), columns of healthy sizes, covariates (n,) of the dictionary.
 
-    response: what a cause adds to the channel of run k (n,). floor: noise of the channel. train: runs that are fitted.
+    response: what causes with their amplitudes (d,) add to the channel of run k (n,). floor: noise of the channel. train: runs that are fitted.
     level: constant without a meaning.
     """
 
     values: Sequence[Floats]
     healthy: Sequence[Sizes]
     covariates: Sequence[Mapping[str, Floats]]
-    response: Callable[[int, AxisCause, Sequence[float]], Floats]
+    response: Callable[[int, Sequence[tuple[AxisCause, Floats]]], Floats]
     floor: float
     train: Sequence[int]
     level: float = 0.0
@@ -84,74 +86,118 @@ class _Linear:
 def fit_channel(data: ChannelData, terms: Sequence[AxisCause]) -> ChannelFit:
     """The most probable causes of a channel, their sizes, and what is left."""
     at = [np.zeros(len(t.parameters)) for t in terms]
-    responses = [_columns(data, terms, k, at) for k in range(len(data.values))]
-    sd, together = _noise(data, [A for A, _ in responses])
-    linear = _explained(data, terms, responses, sd, together)
-    for _ in range(PASSES):
+    for again in range(PASSES + 1):
+        responses = [_columns(data, terms, k, at) for k in range(len(data.values))]
+        sd = _noise(data, responses)
+        linear = _explained(data, terms, responses, sd)
         members = linear.found.members
-        if not members:
-            break
         amount = _amounts(linear, terms)
         moved = [amount[i] if i in members else np.zeros(len(t.parameters)) for i, t in enumerate(terms)]
-        if all(np.allclose(a, b, rtol=1e-3, atol=1e-6) for a, b in zip(at, moved, strict=True)):
+        same = all(np.allclose(a, b, rtol=1e-3, atol=1e-6) for a, b in zip(at, moved, strict=True))
+        if not members or same or again == PASSES:
             break
-        at = moved
-        responses = [_columns(data, terms, k, at) for k in range(len(data.values))]
-        linear = _explained(data, terms, responses, sd, together)
-    return _answer(data, terms, linear, sd, together)
+        terms, at = _shaped(data, terms, members, moved)
+    return _answer(data, terms, linear, sd)
 
 
 def _columns(data: ChannelData, terms: Sequence[AxisCause], k: int, at: Sequence[Floats]) -> tuple[Floats, Floats]:
-    """Columns (n, k) of all terms at amplitudes, and what their tangents miss at 0 (n,)."""
-    n = len(data.values[k])
-    columns, offset = [np.zeros((n, 0))], np.zeros(n)
-    for term, own in zip(terms, at, strict=True):
-        here = data.response(k, term, own.tolist())
-        step = np.where(own == 0.0, 1.0, STEP * np.maximum(np.abs(own), 1.0))
+    """Columns (n, k) of all terms beside those that act, and what their tangents miss at 0 (n,)."""
+    acting = {i: (term, own) for i, (term, own) in enumerate(zip(terms, at, strict=True)) if own.any()}
+    here = data.response(k, [*acting.values()])
+    columns, offset = [np.zeros((len(here), 0))], here.copy()
+    for i, (term, own) in enumerate(zip(terms, at, strict=True)):
+        first = np.array(term.steps or np.ones(len(own)))
+        step = np.where(own == 0.0, first, STEP * np.maximum(np.abs(own), first))
+        others = [each for j, each in acting.items() if j != i]
         A = np.stack(
-            [(data.response(k, term, (own + d).tolist()) - here) / d[i] for i, d in enumerate(np.diag(step))], axis=1
+            [(data.response(k, [*others, (term, own + d)]) - here) / d[j] for j, d in enumerate(np.diag(step))], axis=1
         )
         columns.append(A)
-        offset += here - A @ own
+        offset -= A @ own
     return np.concatenate(columns, axis=1), offset
 
 
-def _noise(data: ChannelData, columns: Sequence[Floats]) -> tuple[float, int]:
-    """Standard deviation of the mean of rows that count as one, and how many these are, from residuals beside all columns."""
+def _shaped(
+    data: ChannelData, terms: Sequence[AxisCause], members: Sequence[int], at: Sequence[Floats]
+) -> tuple[list[AxisCause], list[Floats]]:
+    """Terms and amplitudes with the shapes of the causes that act by one Gauss-Newton step; as they are where it does not help."""
+    names = [(i, name) for i in members for name in terms[i].scanned if terms[i].shape[name] > 0.0]
+    terms, at = [*terms], [*at]
+    if not names:
+        return terms, at
+    base = _misfit(data, terms, members, at)
+    acting = [i for i in members]
+    columns = [np.concatenate([*own.values()], axis=1) for own in data.healthy]
+    slopes = []
+    for k in data.train:
+        here = data.response(k, [(terms[i], at[i]) for i in acting])
+        own = [columns[k]]
+        for i in acting:
+            for d in np.diag(STEP * np.maximum(np.abs(at[i]), 1.0)):
+                more = data.response(k, [(terms[j], at[j] + d if j == i else at[j]) for j in acting])
+                own.append((more - here)[:, None] / d.sum())
+        for i, name in names:
+            longer = replace(terms[i], shape={**terms[i].shape, name: terms[i].shape[name] * (1.0 + STEP)})
+            more = data.response(k, [(longer if j == i else terms[j], at[j]) for j in acting])
+            own.append((more - here)[:, None] / STEP)
+        slopes.append((np.concatenate(own, axis=1), data.values[k] - here))
+    J, y = (np.concatenate([each[part] for each in slopes]) for part in (0, 1))
+    size = np.sqrt(np.mean(J**2, axis=0)) + 1e-300
+    c = (np.linalg.lstsq(J / size, y, rcond=1e-9)[0] / size)[columns[0].shape[1] :]
+    for share in (1.0, 0.3, 0.1):
+        moved, by, place = [*at], [*terms], 0
+        for i in acting:
+            moved[i] = at[i] + share * c[place : (place := place + len(at[i]))]
+        for (i, name), change in zip(names, c[place:], strict=True):
+            factor = float(np.exp(np.clip(share * change, -MOST_CHANGE, MOST_CHANGE)))
+            by[i] = replace(by[i], shape={**by[i].shape, name: terms[i].bounded(name, by[i].shape[name] * factor)})
+        if _misfit(data, by, members, moved) < base:
+            return by, moved
+    return terms, at
+
+
+def _misfit(data: ChannelData, terms: Sequence[AxisCause], members: Sequence[int], at: Sequence[Floats]) -> float:
+    """Sum of squares that causes and healthy sizes leave of the fitted runs."""
+    A = np.concatenate([np.concatenate([*data.healthy[k].values()], axis=1) for k in data.train])
+    acting = [(terms[i], at[i]) for i in members]
+    y = np.concatenate([data.values[k] - data.response(k, acting) for k in data.train])
+    size = np.sqrt(np.mean(A**2, axis=0)) + 1e-300
+    return float(np.sum((y - A / size @ np.linalg.lstsq(A / size, y, rcond=1e-9)[0]) ** 2))
+
+
+def _noise(data: ChannelData, responses: Sequence[tuple[Floats, Floats]]) -> float:
+    """Standard deviation of a row that counts as one of its own, from residuals jointly with all columns.
+
+    Rows that are correlated count for less: the variance is that of a row times the rows that count as one.
+    """
     healthy = [np.concatenate([*own.values()], axis=1) for own in data.healthy]
-    A = np.concatenate([np.concatenate([columns[k], healthy[k]], axis=1) for k in data.train])
-    y = np.concatenate([data.values[k] for k in data.train])
+    A = np.concatenate([np.concatenate([responses[k][0], healthy[k]], axis=1) for k in data.train])
+    y = np.concatenate([data.values[k] - responses[k][1] for k in data.train])
     size = np.sqrt(np.mean(A**2, axis=0)) + 1e-300
     left = y - A / size @ np.linalg.lstsq(A / size, y, rcond=1e-9)[0]
-    together = int(max(min(rows_together(left), len(left) / LEAST_MEANS), 1.0))
-    means = block_means(left[:, None], together)[:, 0]
-    sd = max(float(np.sqrt(np.mean(means**2))), data.floor / float(np.sqrt(together)))
-    return sd * float(np.sqrt(rows_together(means))), together
+    return max(float(np.sqrt(np.mean(left**2) * rows_together(left))), data.floor)
 
 
 def _explained(
     data: ChannelData, terms: Sequence[AxisCause], responses: Sequence[tuple[Floats, Floats]],
-    sd: float, together: int,
+    sd: float,
 ) -> _Linear:  # fmt: skip
-    def means(columns: Floats) -> Floats:
-        return block_means(columns, together)[:, None, :]
-
     kinds = {kind: np.concatenate([data.healthy[k][kind] for k in data.train]) for kind in data.healthy[0]}
     unit = {kind: sd / (np.sqrt(np.mean(own**2, axis=0)) + 1e-300) for kind, own in kinds.items()}
     ends = _ends(data)
     groups = []
     for k in data.train:
         A, offset = responses[k]
-        y = means((data.values[k] - offset)[:, None])
+        y = (data.values[k] - offset)[:, None]
         n = len(y)
-        white = {kind: means(own * unit[kind]) for kind, own in data.healthy[k].items()}
+        white = {kind: (own * unit[kind])[:, None] for kind, own in data.healthy[k].items()}
         smooth = {
-            name: covariate_columns(means(smooth_functions(own, *ends[name]))[:, 0], np.full((n, 1, 1), sd))
+            name: covariate_columns(smooth_functions(own, *ends[name]), np.full((n, 1, 1), sd))
             for name, own in data.covariates[k].items() if name in ends
         }  # fmt: skip
         groups.append(
             Group(
-                name=str(k), label="axis", y=y[:, :, 0], A=means(A), N=np.zeros((n, 1, 0)),
+                name=str(k), label="axis", y=y, A=A[:, None], N=np.zeros((n, 1, 0)),
                 sd=np.full((n, 1), sd), B={**white, **smooth},
             )
         )  # fmt: skip
@@ -188,7 +234,7 @@ def _amounts(linear: _Linear, terms: Sequence[AxisCause]) -> list[Floats]:
     return out
 
 
-def _answer(data: ChannelData, terms: Sequence[AxisCause], linear: _Linear, sd: float, together: int) -> ChannelFit:
+def _answer(data: ChannelData, terms: Sequence[AxisCause], linear: _Linear, sd: float) -> ChannelFit:
     found, model = linear.found, linear.model
     amount = _amounts(linear, terms)
     covariance = found.amplitudes()[1]
@@ -201,16 +247,17 @@ def _answer(data: ChannelData, terms: Sequence[AxisCause], linear: _Linear, sd: 
     small = [at.mean[list(c.columns)] for c in model.candidates]
     amount = [a if i in found.members else small[i] for i, a in enumerate(amount)]
     for k, y in enumerate(data.values):
-        part = sum(
-            (data.response(k, t, a.tolist()) for t, a in zip(terms, amount, strict=True) if a.any()), np.zeros(len(y))
-        )
+        part = data.response(k, [(t, a) for t, a in zip(terms, amount, strict=True) if a.any()])
         left.append(y - part - sum((data.healthy[k][kind] @ sizes[kind] for kind in sizes), np.zeros(len(y))))
+    spreads = _spreads_of_shapes(data, terms, linear, amount)
     scale = calibration_of("axes")
     causes = []
     whole = sum(float(np.sum((data.values[k] - data.level) ** 2)) for k in data.train)
     for i in found.members:
         term, columns = terms[i], list(model.candidates[i].columns)
-        own = [data.response(k, term, amount[i].tolist()) for k in data.train]
+        own = [data.response(k, [(term, amount[i])]) for k in data.train]
+        if float(np.mean(np.concatenate(own) ** 2)) < (MINOR * data.floor) ** 2:
+            continue  # as large as on every healthy machine
         less = sum(float(np.sum((left[k] + each) ** 2)) for k, each in zip(data.train, own, strict=True))
         rest = sum(float(np.sum(left[k] ** 2)) for k in data.train)
         half = 1.96 * scale.interval * np.sqrt(np.diag(covariance)[columns]) + KNOWN * np.abs(amount[i])
@@ -219,13 +266,12 @@ def _answer(data: ChannelData, terms: Sequence[AxisCause], linear: _Linear, sd: 
                 effect=term.effect, target=term.target,
                 probability=scale.calibrate(found.places[term.place]),
                 share=round(min(max((less - rest) / max(whole, 1e-300), 0.0), 1.0), 4),
-                parameters=_parameters(data, term, amount[i], half, sd * together**0.5),
+                parameters=_parameters(term, amount[i], half, spreads.get(i, {})),
             )
         )  # fmt: skip
     gains = gains_of_more(model, found.background, found.members)
     names = {b.scales[-1][0] for b, gain in gains.items() if b.scales and gain > 0.0}
-    kept = [block_means(left[k][:, None], together)[:, 0] for k in data.train]
-    drivers = {name: _share_of(linear, name, kept, sd) for name in names}
+    drivers = {name: _share_of(linear, name, [left[k] for k in data.train], sd) for name in names}
     return ChannelFit(
         tuple(causes), sizes, among, left, drivers
     )  # fmt: skip
@@ -239,7 +285,7 @@ def _share_of(linear: _Linear, name: str, left: Sequence[Floats], sd: float) -> 
     return float(np.clip(1.0 - np.sum((y - B @ c) ** 2) / max(float(np.sum(y**2)), 1e-300), 0.0, 1.0))
 
 
-def _parameters(data: ChannelData, term: AxisCause, amount: Floats, half: Floats, sd: float) -> dict[str, Estimate]:
+def _parameters(term: AxisCause, amount: Floats, half: Floats, spreads: Mapping[str, float]) -> dict[str, Estimate]:
     """Parameters as the effect's file has them; shapes that were fitted with the deviation of a fit around them."""
     out: dict[str, Estimate] = {}
     values = term.cause(amount.tolist()).values
@@ -248,43 +294,54 @@ def _parameters(data: ChannelData, term: AxisCause, amount: Floats, half: Floats
         if p.name in values:
             out[p.name] = _estimate(value, low, high)
     for name in [each for each in term.shape if each in values and each not in term.switches]:
-        value, spread = term.shape[name], 1.96 * _spread_of_shape(data, term, amount, name, sd)
-        near = [abs(each - value) for each in term.scan if each != value]
-        low, high = (max(value + sign * max(spread, min(near, default=term.resolution)), 0.0) for sign in (-1.0, 1.0))
+        value = term.shape[name]
+        if name in term.known:
+            low, high = value - term.known[name], value + term.known[name]
+        else:
+            factor = float(np.exp(1.96 * float(np.hypot(spreads[name], KNOWN))))
+            low, high = value / factor, value * factor
         out[name] = _estimate(value, low, high)
     return out
 
 
-def _spread_of_shape(data: ChannelData, term: AxisCause, amount: Floats, name: str, sd: float) -> float:
-    """Standard deviation of a shape from the slopes of all shapes of its cause together."""
-    names = list(term.shape)
-    columns = []
-    for each in names:
-        step = max(STEP * abs(term.shape[each]), 1e-9)
-        ends = [replace(term, shape={**term.shape, each: term.shape[each] + sign * step}) for sign in (-1.0, 1.0)]
-        slopes = [
-            (data.response(k, ends[1], amount.tolist()) - data.response(k, ends[0], amount.tolist())) / (2.0 * step)
-            for k in data.train
-        ]
-        columns.append(np.concatenate(slopes))
-    J = np.stack(columns, axis=1)
-    size = np.sqrt(np.mean(J**2, axis=0)) + 1e-300
-    inverse = np.linalg.pinv((J / size).T @ (J / size), rcond=1e-9)
-    i = names.index(name)
-    return float(sd * np.sqrt(inverse[i, i]) / size[i]) if size[i] > 1e-200 else 0.0
+def _spreads_of_shapes(
+    data: ChannelData, terms: Sequence[AxisCause], linear: _Linear, amount: Sequence[Floats]
+) -> dict[int, dict[str, float]]:
+    """Standard deviations of logarithms of shapes by term, jointly with amplitudes and healthy sizes under their priors."""
+    members, model = linear.found.members, linear.model
+    names = [(i, name) for i in members for name in terms[i].scanned]
+    if not names:
+        return {}
+    acting = {i: (terms[i], amount[i]) for i in members}
+    slopes = []
+    for k in data.train:
+        own = []
+        for i, name in names:
+            both = [
+                replace(terms[i], shape={**terms[i].shape, name: terms[i].shape[name] * (1.0 + e * STEP)})
+                for e in (1, -1)
+            ]
+            ends = [data.response(k, [*{**acting, i: (each, amount[i])}.values()]) for each in both]
+            own.append((ends[0] - ends[1]) / (2.0 * STEP))
+        slopes.append(np.stack(own, axis=1))
+    columns = [j for i in members for j in model.candidates[i].columns]
+    healthy = [j for kind in linear.unit for j in range(*model.layout.covariates[kind].indices(model.layout.size))]
+    designs = [model.layout.design(g)[:, 0, [*columns, *healthy]] for g in model.groups]
+    J = np.concatenate([np.hstack(pair) for pair in zip(slopes, designs, strict=True)]) / model.groups[0].sd[0, 0]
+    prior = np.zeros(J.shape[1])
+    prior[: len(names)] = SHAPE_SD**-2
+    prior[len(names) + len(columns) :] = 1.0 / next(iter(model.healthy.values())) ** 2
+    size = np.sqrt(np.sum(J**2, axis=0) + prior) + 1e-300
+    inverse = np.linalg.pinv((J / size).T @ (J / size) + np.diag(prior / size**2), rcond=1e-9)
+    out: dict[int, dict[str, float]] = {}
+    for place, (i, name) in enumerate(names):
+        out.setdefault(i, {})[name] = float(np.sqrt(max(inverse[place, place], 0.0)) / size[place])
+    return out
 
 
 def _estimate(value: float, low: float, high: float) -> Estimate:
     low, value, high = (float(f"{each:.6g}") for each in (low, value, high))
     return Estimate(value=value, ci95=(min(low, value), max(high, value)))
-
-
-def block_means(columns: Floats, together: int) -> Floats:
-    """Means (n / together, q) of rows that follow each other; what is over at the end counts as a block of its own."""
-    if together == 1:
-        return columns
-    starts = np.arange(0, len(columns), together)
-    return np.asarray(np.add.reduceat(columns, starts, axis=0) / np.diff(np.append(starts, len(columns)))[:, None])
 
 
 def rows_together(left: Floats) -> float:

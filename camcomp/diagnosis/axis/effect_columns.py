@@ -9,7 +9,7 @@ An effect that is linear in its parameter has its column once and for all; any o
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Literal
 
@@ -21,6 +21,7 @@ from camcomp.ground.datatypes import Floats
 from camcomp.model import signal_path
 from camcomp.model.effect import Cause, Motion, Parameter, applies
 from camcomp.model.hysteresis import direction
+from camcomp.model.motion.between_rows import between_rows
 from camcomp.model.seams import Seams
 from camcomp.model.statics.description import Actuator, Robot
 from camcomp.model.statics.masses import MassLoads
@@ -30,9 +31,13 @@ STAGE_OF: Mapping[ChannelName, str] = {"following": "control", "behind": "drive"
 # of loops: found by a search of their own; of standing poses; of an interval that is searched; laws; a zero of an encoder
 ELSEWHERE = ("servo_overshoot", "joint_hysteresis", "joint_curve", "disturbance", "formula", "map", "joint_offset")
 
-VISCOUS = {
-    p.name.endswith("rad"): p for p in shelf.load("effects", "friction").PARAMETERS if p.name.startswith("viscous")
-}  # by hinge
+DRAG = {
+    hinge: tuple(p for p in shelf.load("effects", "friction").PARAMETERS if p.name in names)
+    for hinge, names in (
+        (False, ("viscous_Ns_per_mm", "asymmetry_Ns_per_mm")),
+        (True, ("viscous_Nmms_per_rad", "asymmetry_Nmms_per_rad")),
+    )
+}  # of friction, by hinge: with the speed, and with its size
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -40,7 +45,7 @@ class AxisCause:
     """A candidate of one axis: parameters (d,) that are fitted, in units of their scales, and its shape.
 
     ways: number of shapes that were tried for its place. run: the one in which it acts, None for all.
-    resolution: to which its shape is known at best.
+    known: to what values of its shape are known. steps (d,): amplitudes at which an absent cause is made linear, in scales.
     """
 
     effect: str
@@ -50,13 +55,18 @@ class AxisCause:
     shape: Mapping[str, float]
     ways: float = 1.0
     run: str | None = None
-    resolution: float = 0.0
+    known: Mapping[str, float] = field(default_factory=dict)
+    steps: tuple[float, ...] = ()
 
     @property
-    def scan(self) -> tuple[float, ...]:
-        """Values of its shape that were tried."""
-        own = (*getattr(self.module, "FITTED", ()), *getattr(self.module, "ROTARY", ()))
-        return next((p.scan for p in own if p.scan and not p.placed and p.name in self.shape), ())
+    def scanned(self) -> tuple[str, ...]:
+        """Names of its shape that may have any value."""
+        return tuple(name for name in self.shape if name not in self.switches and self.run is None)
+
+    def bounded(self, name: str, value: float) -> float:
+        """A value of its shape between the bounds of its parameter."""
+        own = next(p for p in self.module.PARAMETERS if p.name == name)
+        return float(min(max(value, own.low), own.high))
 
     @property
     def switches(self) -> set[str]:
@@ -92,25 +102,27 @@ class DrivenAxis:
 
     @cached_property
     def asked(self) -> Motion:
-        """The motion of the set-points."""
-        return self._motion(self.run.setpoint / self.lever)
+        """The motion of the set-points of the whole log, with instants between its rows."""
+        time, way = self.run.asked
+        return between_rows(self._motion(time, way / self.lever))
 
     @cached_property
     def moved(self) -> Motion:
         """The motion of the encoders."""
-        return self._motion(self.run.encoder / self.lever)
+        return self._motion(self.run.time, self.run.encoder / self.lever)
 
-    def channel(self, name: ChannelName, cause: Cause) -> Floats:
-        """What a cause adds to a channel (n,), in the study's mm or N: set-point - encoder, load - encoder, drive force."""
+    def channel(self, name: ChannelName, causes: Sequence[Cause]) -> Floats:
+        """What causes add to a channel (n,), in the study's mm or N: set-point - encoder, load - encoder, drive force."""
         names = (self.actuator.name,)
         if name == "following":
-            late = signal_path.controlled([cause], names, self.asked)
-            return np.asarray(self.lever * (self.asked.encoder - late)[:, 0], float)
-        error, guided = signal_path.driven([cause], names, self.moved)
+            late = signal_path.controlled(causes, names, self.asked)
+            behind = self.lever * (self.asked.encoder - late)[:, 0]
+            return np.asarray(np.interp(self.run.time, self.asked.time, behind), float)
+        error, guided = signal_path.driven(causes, names, self.moved)
         if name == "force":
-            effort = signal_path.drive_forces([cause], names, guided)
+            effort = signal_path.drive_forces(causes, names, guided)
             return np.zeros(len(self.run.time)) if effort is None else np.asarray(effort[:, 0] / self.lever, float)
-        softer = self._compliance(cause) - self._compliance(None)
+        softer = sum(self._compliance(cause) - self._compliance(None) for cause in causes)
         return np.asarray(self.lever * (error[:, 0] - softer * self.weight), float)
 
     def _compliance(self, cause: Cause | None) -> float:
@@ -121,8 +133,8 @@ class DrivenAxis:
         more = cause.values.get("compliance_rad_per_Nmm", 0.0) if cause is not None else 0.0
         return (0.0 if stiffness is None else 1.0 / stiffness) + float(more)
 
-    def _motion(self, way: Floats) -> Motion:
-        time, position = self.run.time, way[:, None]
+    def _motion(self, time: Floats, way: Floats) -> Motion:
+        position = way[:, None]
         speed = np.gradient(position, time, axis=0)
         first = (position[1:2] - position[:1]) / (time[1] - time[0])
         loads = MassLoads(self.inertia[:, None], np.zeros((len(time), 6)))
@@ -152,15 +164,18 @@ def candidates(
         linear = tuple(p for p in own if not p.shape)
         fits = [linear]
         if channel == "force" and name == "friction":
-            fits.append((*linear, VISCOUS[actuator.revolute]))
+            fits += [(*linear, *DRAG[actuator.revolute][:many]) for many in (1, 2)]
         shapes = _shapes(module, own, axes, channel)
-        found += [
-            AxisCause(
-                effect=name, module=module, target=actuator.name, parameters=fitted, shape=shape,
-                ways=float(len(shapes) * len(fits)),
-            )
-            for shape in shapes for fitted in fits if fitted
-        ]  # fmt: skip
+        for shape, fitted in ((shape, fitted) for shape in shapes for fitted in fits if fitted):
+            names = {p.name for p in fitted}
+            found.append(
+                AxisCause(
+                    effect=name, module=module, target=actuator.name, parameters=fitted,
+                    shape={key: value for key, value in shape.items() if key not in names},
+                    ways=float(len(shapes) * len(fits)),
+                    steps=tuple(shape[p.name] / p.scale if p.name in shape else 1.0 for p in fitted),
+                )
+            )  # fmt: skip
     return found
 
 
@@ -198,7 +213,10 @@ def _shapes(
     """Shapes to try: of a guess from the rows, or the values of a scan."""
     fixed = {p.name: p.either[0] for p in own if p.either}
     if channel == "following" and hasattr(module, "guess"):
-        runs = [(a.run.time, a.asked.encoder[:, 0], a.moved.encoder[:, 0]) for a in axes]
+        runs = [
+            (a.asked.time, a.asked.encoder[:, 0], np.interp(a.asked.time, a.run.time, a.run.encoder / a.lever))
+            for a in axes
+        ]
         guess = module.guess(runs, axes[0].actuator.revolute)
         return [{**fixed, **guess}] if guess else []
     scanned = [p for p in own if p.scan]

@@ -138,10 +138,9 @@ def study_channel(
     terms = candidates(around.robot, [axes[k] for k in rows.train], rows.channel, sorted(without))
     seen = [np.isin(run.time, m.time) for run, m in zip(rows.runs, rows.moves, strict=True)]
 
-    def response(k: int, term: AxisCause, amounts: Sequence[float]) -> Floats:
-        if term.run not in (None, rows.runs[k].name):
-            return np.zeros(len(rows.values[k]))
-        return axes[k].channel(rows.channel, term.cause(amounts))[seen[k]]
+    def response(k: int, acting: Sequence[tuple[AxisCause, Floats]]) -> Floats:
+        causes = [term.cause(own.tolist()) for term, own in acting if term.run in (None, rows.runs[k].name)]
+        return axes[k].channel(rows.channel, causes)[seen[k]] if causes else np.zeros(len(rows.values[k]))
 
     data = ChannelData(
         values=rows.values, healthy=_healthy(found, rows, around, seen, axes), covariates=_covariates(found, rows, around),
@@ -244,11 +243,15 @@ def _push(name: str, window: Window, rows: JointRows) -> AxisCause:
     run, time = rows.runs[window.run], rows.moves[window.run].time
     module = shelf.load("effects", "disturbance")
     own = next(p for p in module.PARAMETERS if p.name == ("force_Nmm" if run.revolute else "force_N"))
-    ends = (run.started + float(time[min(row, len(time) - 1)]) for row in (window.first, window.last))
+    step = float(np.median(np.diff(time)))
+    shape, known = {}, {}
+    for key, row in (("from_s", window.first), ("to_s", window.last)):
+        at = min(row, len(time) - 1)
+        lost = 0.5 * max(float(time[at] - time[max(at - 1, 0)]) - step, 0.0)  # rows before it may be missing
+        shape[key], known[key] = run.started + float(time[at]) - lost, lost + 2.0 * step
     return AxisCause(
-        effect="disturbance", module=module, target=name, parameters=(own,),
-        shape=dict(zip(("from_s", "to_s"), ends, strict=True)), ways=float(len(time)), run=run.name,
-        resolution=2.0 * float(np.median(np.diff(time))),
+        effect="disturbance", module=module, target=name, parameters=(own,), shape=shape, ways=float(len(time)),
+        run=run.name, known=known,
     )  # fmt: skip
 
 

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.interpolate import Akima1DInterpolator
 
 from camcomp.diagnosis.axis.noise_floor import REPEATABILITY_MM
 from camcomp.diagnosis.fit.measured import Measured
@@ -14,13 +13,9 @@ from camcomp.ground.datatypes import Floats
 from camcomp.model import signal_path
 from camcomp.model.effect import Cause, Motion
 from camcomp.model.hysteresis import direction
+from camcomp.model.motion.between_rows import between_rows
 from camcomp.model.seams import Seams
-from camcomp.model.statics.arm import arm_of
 from camcomp.model.statics.description import Robot
-from camcomp.model.statics.hanging import hang, tool_wrench
-
-STEP_S = 1e-3  # of servo controllers
-MOST_STEPS = 20  # between two rows
 
 
 def predict_encoders(robot: Robot, causes: Sequence[Cause], log: Measured, started_s: float) -> Floats:
@@ -32,7 +27,7 @@ def predict_encoders(robot: Robot, causes: Sequence[Cause], log: Measured, start
     servo = signal_path.acting(causes, "control")
     if not servo:
         return np.zeros_like(log.setpoint)
-    motion = _between_rows(_motion(robot, log, _filled(log.time, log.setpoint, robot), started_s))
+    motion = between_rows(_motion(robot, log, _filled(log.time, log.setpoint, robot), started_s))
     late = signal_path.controlled(servo, motion.names, motion) - motion.encoder
     from_rest = signal_path.controlled(servo, motion.names, replace(motion, seams=None)) - motion.encoder
     late, from_rest = (each[:: (len(each) - 1) // max(len(log.time) - 1, 1) or 1] for each in (late, from_rest))
@@ -41,19 +36,14 @@ def predict_encoders(robot: Robot, causes: Sequence[Cause], log: Measured, start
 
 
 def predict_drives(robot: Robot, causes: Sequence[Cause], log: Measured, started_s: float) -> Floats:
-    """Drive forces or torques (n, m), N or N mm: of effects of the drives, and against the force of a dynamometer on an arm."""
+    """Drive forces or torques (n, m), N or N mm, that the effects of the drives exert along the logged encoders."""
     drives = [cause for cause in signal_path.acting(causes, "drive") if signal_path.pushes(cause.effect)]
-    encoder = _filled(log.time, log.encoder, robot)
-    out = np.zeros_like(log.encoder)
-    if log.has("dyno") and arm_of(robot) is not None:
-        wrench = tool_wrench(robot, encoder, log.force())
-        out += hang(robot, encoder, wrench).drive - hang(robot, encoder).drive
     if not drives:
-        return out
-    motion = _motion(robot, log, encoder, started_s)
+        return np.zeros_like(log.encoder)
+    motion = _motion(robot, log, _filled(log.time, log.encoder, robot), started_s)
     _, guided = signal_path.driven(drives, motion.names, motion)
     effort = signal_path.drive_forces(drives, motion.names, guided)
-    return out if effort is None else out + effort
+    return np.zeros_like(log.encoder) if effort is None else effort
 
 
 def _filled(time: Floats, values: Floats, robot: Robot) -> Floats:
@@ -63,21 +53,6 @@ def _filled(time: Floats, values: Floats, robot: Robot) -> Floats:
         known = np.isfinite(own)
         out[:, j] = np.interp(time, time[known], own[known]) if known.any() else actuator.home
     return out
-
-
-def _between_rows(motion: Motion) -> Motion:
-    """The motion with instants between its rows, STEP_S apart at most, over which set-points go on smoothly."""
-    time, n = motion.time, len(motion.time)
-    per = int(np.clip(np.ceil(float(np.median(np.diff(time))) / STEP_S), 1, MOST_STEPS)) if motion.ordered else 1
-    if per == 1 or n < 5:
-        return motion
-    fine = np.interp(np.arange((n - 1) * per + 1) / per, np.arange(n), time)
-    position = Akima1DInterpolator(time, motion.encoder)(np.clip(fine, time[0], time[-1]))
-    return replace(
-        motion, time=fine, common=motion.common[0] + fine - time[0], cut_min=np.zeros(len(fine)), encoder=position,
-        speed=np.gradient(position, fine, axis=0), direction=direction(position),
-        temperature=None if motion.temperature is None else np.interp(fine, time, motion.temperature),
-    )  # fmt: skip
 
 
 def _motion(robot: Robot, log: Measured, position: Floats, started_s: float) -> Motion:
