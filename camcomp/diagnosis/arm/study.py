@@ -150,12 +150,17 @@ def explained(
 def relinearised(
     bench: ArmBench, shelf: Shelf, sd: float, noise: KnownNoise | None, weights: Sequence[Floats]
 ) -> Explanation:
-    """Explain at the nominal arm, then at what was found (Gauss-Newton)."""
-    found = explain(linearise(bench, shelf, sd, None, weights), noise)
+    """Explain at the nominal arm, then at what was found (Gauss-Newton).
+
+    A column that the nominal arm does not show acts through another one, such as weight on rigid joints, and takes no part.
+    """
+    nominal = linearise(bench, shelf, sd, None, weights)
+    found = explain(nominal, noise)
     for _ in range(PASSES - 1):
         at = found.amplitudes()[0]
         if at.any():
-            found = explain(linearise(bench, shelf, sd, at, weights), noise, found.background)
+            model = linearise(bench, shelf, sd, at, weights).with_columns(nominal.size > 0.0)
+            found = explain(model, noise, found.background)
     return found
 
 

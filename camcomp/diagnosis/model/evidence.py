@@ -80,6 +80,10 @@ class LinearModel:
         self._totals: dict[tuple[SmoothProcess | None, tuple[int, ...]], NormalEquations] = {}
         self.candidates = tuple(self._seen(each) for each in self.candidates)
 
+    def with_columns(self, kept: np.ndarray) -> LinearModel:
+        """The model in which columns of effects outside of a mask (k,) do nothing."""
+        return replace(self, groups=tuple(replace(g, A=np.where(kept, g.A, 0.0)) for g in self.groups))
+
     def _seen(self, candidate: PlacedCause) -> PlacedCause:
         """A candidate without the columns that nuisances take up, where they leave some of it."""
         seen = tuple(j for j in candidate.columns if self.size[j] > 0.0)
