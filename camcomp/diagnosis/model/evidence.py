@@ -31,7 +31,7 @@ from camcomp.diagnosis.statistics.cause_sets import SIZES
 from camcomp.ground.datatypes import Floats, Ints
 
 WIDTHS = (2.0, 6.0, 20.0, 60.0, 200.0)  # of the floor: effect of a cause on the channels
-SMALL = 0.08  # of the floor: effect of a healthy machine's small error; sixty of them make 0.6
+SMALL = 0.08  # of the noise: effect of a healthy machine's small error; sixty of them make 0.6
 LONG = 20  # columns: a longer candidate has no small errors
 FREE = 1e-6  # precision of nuisances in units of their columns
 ABSENT = 1e30  # precision of a column that takes no part
@@ -155,7 +155,7 @@ class LinearModel:
             out[own] = FREE
         for name, scale in (*self.healthy.items(), *background.scales):
             out[self.layout.covariates[name]] = 1.0 / scale**2
-        width = self.small.copy()
+        width = self.small * background.noise
         for name, scale in background.families:
             on, unit = self.family(name)
             width[on] = np.hypot(width[on], scale * unit)
