@@ -434,6 +434,7 @@ def _standing(robot: Robot, campaign: Poses) -> Motion:
         stiffness=signal_path.springs(robot),
         ordered=False,
         masses=cache(partial(mass_loads, robot, campaign.q)),
+        held=cache(lambda: hang(robot, campaign.q, None, campaign.torque).drive),
     )
 
 

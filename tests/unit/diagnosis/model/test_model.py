@@ -41,6 +41,12 @@ def model(rng, amounts=(), more=None, groups=2, n=60, sd=SD, memory=None, seen=S
     return LinearModel(tuple(out), candidates, AmplitudeBounds.of([free] * 6, [False] * 6))
 
 
+def test_small_errors_are_as_large_as_the_noise_that_acts_lets_them_be():
+    m = model(np.random.default_rng(1))
+    stated, acting = (1.0 / m.precision(Background(noise=factor))[:6] for factor in (1.0, 4.0))
+    assert np.sqrt(acting) == pytest.approx(4.0 * np.sqrt(stated))
+
+
 @pytest.mark.parametrize("background", [Background(), Background(noise=1.5, scales=(("position:x", 2.0),))])
 @pytest.mark.parametrize("members", [(), (1,), (0, 3)])
 def test_evidence_is_the_density_of_a_normal_distribution(background, members):
