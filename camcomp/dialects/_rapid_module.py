@@ -235,6 +235,7 @@ class RapidModule:
             size = float(np.linalg.norm(values[3:]))
             if len(values) != 7 or len(point.items) != 3 or abs(size - 1.0) > 0.01:
                 raise ValueError
+            values[3:] = [each / size for each in values[3:]]  # as the control does: posts round to a few digits
         except (ValueError, AttributeError):
             self.reader.refuse(
                 "CC144",

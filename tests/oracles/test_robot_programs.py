@@ -50,6 +50,21 @@ def as_krl(part):
     return head + "".join(lines) + "END\n"
 
 
+def as_rapid(part):
+    """A robtarget inline per move; quaternions by scipy."""
+    lines = []
+    for k, (x, y, z, a, b, c) in enumerate(part):
+        tcp = Rotation.from_euler("ZYX", [c, b, a], degrees=True) * Rotation.from_euler("Y", 180, degrees=True)
+        q = ",".join(f"{each:.12f}" for each in np.roll(tcp.as_quat(), 1))
+        at = f"[[{x},{y},{z}],[{q}],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]"
+        lines.append(f"    {'MoveL' if k else 'MoveJ'} {at},v10,fine,mill\\WObj:=table;\n")
+    head = (
+        "MODULE part\n  PERS tooldata mill:=[TRUE,[[0,0,250],[1,0,0,0]],[9,[0,0,99],[1,0,0,0],0,0,0]];\n"
+        '  PERS wobjdata table:=[FALSE,TRUE,"",[[1550,0,800],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];\n  PROC main()\n'
+    )
+    return head + "".join(lines) + "  ENDPROC\nENDMODULE\n"
+
+
 def actuators(joints, which=""):
     return np.column_stack([joints[f"act_{a}{which}_rad"] for a in AXES])
 
@@ -70,17 +85,18 @@ def joints_of(folder, name, text, *configs):
     return table(out)
 
 
-def test_one_part_in_nc_and_in_krl_has_one_actuator_path(tmp_path):
+@pytest.mark.parametrize(("name", "spelled"), [("part.src", as_krl), ("part.mod", as_rapid)])
+def test_one_part_in_nc_and_in_a_robot_language_has_one_actuator_path(tmp_path, name, spelled):
     fine = tmp_path / "fine.yaml"
     fine.write_text("control: {resolution_mm: 0.000001}\n")
     nc = joints_of(tmp_path, "part.nc", as_nc(PART), KUKA, fine)
-    krl = joints_of(tmp_path, "part.src", as_krl(PART), KUKA, CONTROL, fine)
-    one, other = at_programmed_ends(nc, PART), at_programmed_ends(krl, PART)
-    assert np.abs(actuators(nc, "_nominal")[one] - actuators(krl, "_nominal")[other]).max() < 1e-8
-    tips = [kuka_tips(actuators(each)[rows]) for each, rows in ((nc, one), (krl, other))]
+    robot = joints_of(tmp_path, name, spelled(PART), KUKA, CONTROL, fine)
+    one, other = at_programmed_ends(nc, PART), at_programmed_ends(robot, PART)
+    assert np.abs(actuators(nc, "_nominal")[one] - actuators(robot, "_nominal")[other]).max() < 1e-8
+    tips = [kuka_tips(actuators(each)[rows]) for each, rows in ((nc, one), (robot, other))]
     assert np.abs(tips[0] - tips[1]).max() < 1e-5  # mm
     # words of six decimals, rounded about other axes, turn joints by some 1e-8 rad
-    assert np.abs(actuators(nc)[one] - actuators(krl)[other]).max() < 1e-8
+    assert np.abs(actuators(nc)[one] - actuators(robot)[other]).max() < 1e-8
 
 
 def kuka_tips(q):
@@ -118,21 +134,6 @@ def said_by(text):
             held.update((k, float(v)) for k, v in re.findall(r"([XYZABC]) (-?[\d.]+)", line.split("}")[0]))
             out.append([held[each] for each in "XYZABC"])
     return np.array(out)
-
-
-def as_rapid(part):
-    """A robtarget inline per move; quaternions by scipy."""
-    lines = []
-    for k, (x, y, z, a, b, c) in enumerate(part):
-        tcp = Rotation.from_euler("ZYX", [c, b, a], degrees=True) * Rotation.from_euler("Y", 180, degrees=True)
-        q = ",".join(f"{each:.12f}" for each in np.roll(tcp.as_quat(), 1))
-        at = f"[[{x},{y},{z}],[{q}],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]"
-        lines.append(f"    {'MoveL' if k else 'MoveJ'} {at},v10,fine,mill\\WObj:=table;\n")
-    head = (
-        "MODULE part\n  PERS tooldata mill:=[TRUE,[[0,0,250],[1,0,0,0]],[9,[0,0,99],[1,0,0,0],0,0,0]];\n"
-        '  PERS wobjdata table:=[FALSE,TRUE,"",[[1550,0,800],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];\n  PROC main()\n'
-    )
-    return head + "".join(lines) + "  ENDPROC\nENDMODULE\n"
 
 
 def test_a_log_of_a_turning_tool_is_that_of_an_arm_of_its_own(tmp_path):
