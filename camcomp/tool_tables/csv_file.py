@@ -21,7 +21,7 @@ _RULES = TableRules("CC299", "CC299", "CC299")
 
 
 def read(file: ToolFile) -> Iterator[TabledTool]:
-    """The tools row by row; empty cells state nothing."""
+    """The tools row by row; empty cells are not stated."""
     table = read_csv(file.data, file.name, _RULES, spreadsheet=True)
     table.refuse_twice()
     known = ("number", *(key for key in Cutter.yaml_keys()), "length_mm", *_PASSED)

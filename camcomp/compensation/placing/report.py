@@ -1,4 +1,4 @@
-"""The page of `camcomp place`: a map of what is left over the table, a figure per turn, and the placements as a table."""
+"""The page of `camcomp place`: a map of the error over the table, a figure per turn, and the placements as a table."""
 
 from __future__ import annotations
 
@@ -54,10 +54,12 @@ def _cell(value: float | None) -> str | tuple[float, str]:
 
 
 def _map(result: PlacingResult, turn: float, what: str) -> Figure:
-    """Placements of one turn as markers, coloured by what is left; crosses where the program cannot be cut."""
+    """Placements of one turn as markers, coloured by their error; crosses where the program cannot be cut."""
     here = [each for each in result.placements if each.turn_deg == turn]
-    good = [each for each in here if each.judged_um is not None]
-    bad = [each for each in here if each.judged_um is None]
+    worst_first = sorted((e for e in here if e.judged_um is not None), key=lambda each: -(each.judged_um or 0.0))
+    good = list({(each.x_mm, each.y_mm): each for each in worst_first}.values())  # the best posture of each place
+    cut = {(each.x_mm, each.y_mm) for each in good}
+    bad = [each for each in here if (each.x_mm, each.y_mm) not in cut]
     marker: Json = {"size": 18, "symbol": "square", "color": [e.judged_um for e in good], "colorscale": SCALE,
                     "showscale": True, "colorbar": {"title": {"text": "µm"}}}  # fmt: skip
     traces: list[Json] = [
@@ -72,7 +74,7 @@ def _map(result: PlacingResult, turn: float, what: str) -> Figure:
         name=f"map{turn:g}", title=f"Turned by {turn:g}°", caption=f"{what} by the place of the program's zero.",
         label=f"Map of the table: {len(good)} places with what is left, {len(bad)} where the program cannot be cut.",
         traces=traces, height=460,
-        layout={"xaxis": axis("X of the zero, mm"), "yaxis": axis("Y of the zero, mm", scaleanchor="x")},
+        layout={"legend": {"orientation": "h", "y": 1.12}, "xaxis": axis("X of the zero, mm"), "yaxis": axis("Y of the zero, mm", scaleanchor="x")},
     )  # fmt: skip
 
 

@@ -2,18 +2,21 @@
 
 Judged by the band where the machine file has uncertain numbers: 95 % of the points of machines drawn from them stay
 below it after compensation. Without uncertain numbers by the largest error before compensation, of which an unmodelled
-share stays. A grid over the table comes first, then two rounds of half the step about the best place.
+share stays. A grid over the table comes first, its corners included, then the other start postures of an arm at the best place,
+then two rounds of half the step about the best one.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import Literal
 
 import numpy as np
+from pydantic import Field
 
+from camcomp.compensation.placing.postures import STATED, start_postures
 from camcomp.compensation.program.compensate import compensate
 from camcomp.gcode.program import Program
 from camcomp.ground import path_geometry, progress
@@ -21,32 +24,31 @@ from camcomp.ground.datatypes import RAPID, Path
 from camcomp.ground.errors import CamcompError
 from camcomp.ground.result import Result, Size
 from camcomp.model.config.load import overridden
-from camcomp.model.config.robot import PrismaticActuator, RevoluteActuator
+from camcomp.model.config.robot import PrismaticActuator
 from camcomp.model.config.spec import Config
 from camcomp.model.control import program_of
 from camcomp.model.job import Job
 
-Posture = Literal["stated", "wrist flipped"]
 HALF_TABLE_MM = 500.0  # of the square that is searched by default, where no travel is shorter
 MOST_MOTIONS = 400  # of a program that is judged whole
 SAMPLED = 60  # motions of a longer one
 ROUNDS = 2  # of refinement
-WRIST = 3  # last joints of an arm
-ALIKE_DECIMALS = 2  # of um: what differs by less is alike
+EQUAL_DECIMALS = 2  # of um: placements that differ by less are equal
 
 
 class Placement(Result):
-    """One place of the program's zero (G54, machine frame) and what is left there. why: why it cannot be cut there."""
+    """A position of the program's zero (G54, machine frame), its error, and the reason where it cannot be cut there."""
 
     x_mm: float
     y_mm: float
     z_mm: float
     turn_deg: float
-    posture: Posture
+    posture: str
     judged_um: Size | None
     before_max_um: Size | None
     band_p95_um: Size | None
     why: str = ""
+    start_deg: dict[str, float] = Field(default_factory=dict)  # of the joints, in another posture than the stated one
 
 
 class PlacingResult(Result):
@@ -72,14 +74,18 @@ class MachineTable:
 def search_place(job: Job, program: Program, table: MachineTable) -> PlacingResult:
     """The best placement, with all that were judged."""
     data, judged = _short(program)
-    about = _Judge(job, data, program.name)
+    about = _Judge(job, data, program.name, start_postures(job))
     x0, y0, _ = job.config.workpiece.origin_mm
-    stated = about.at((x0, y0, 0.0, "stated"))
+    stated = about.at((x0, y0, 0.0, STATED))
     xs, ys = (_places(job, table, axis) for axis in (0, 1))
     turns = table.turns_deg if job.config.workpiece.rotation_vector_deg is None else (0.0,)
     grid = list(product(xs, ys, turns))
-    with progress.part(0.0, 0.7):
-        found = [stated, *about.all(((x, y, turn, "stated") for x, y, turn in grid), len(grid))]
+    with progress.part(0.0, 0.6):
+        found = [stated, *about.all(((x, y, turn, STATED) for x, y, turn in grid), len(grid))]
+    start = _best(found) or stated
+    others = [(start.x_mm, start.y_mm, start.turn_deg, each) for each in about.starts]
+    with progress.part(0.6, 0.7):
+        found += about.all(others, len(others))
     step = np.array([xs[1] - xs[0] if len(xs) > 1 else 0.0, ys[1] - ys[0] if len(ys) > 1 else 0.0])
     for k in range(ROUNDS):
         step, best = 0.5 * step, _best(found)
@@ -87,9 +93,7 @@ def search_place(job: Job, program: Program, table: MachineTable) -> PlacingResu
             break
         near = [(best.x_mm + a * step[0], best.y_mm + b * step[1]) for a, b in product((-1, 0, 1), repeat=2) if a or b]
         inside = [(x, y) for x, y in near if xs[0] <= x <= xs[-1] and ys[0] <= y <= ys[-1]]
-        others: list[Posture] = ["wrist flipped"] if _wrist(job.config) is not None else []
         tries = [(x, y, best.turn_deg, best.posture) for x, y in inside]
-        tries += [(best.x_mm, best.y_mm, best.turn_deg, each) for each in others if k == 0]
         with progress.part(0.7 + 0.15 * k, 0.85 + 0.15 * k):
             found += about.all(tries, len(tries))
     by: Literal["band", "before"] = "band" if job.config.uncertain else "before"
@@ -100,9 +104,9 @@ def search_place(job: Job, program: Program, table: MachineTable) -> PlacingResu
 
 
 def _best(found: Sequence[Placement]) -> Placement | None:
-    """The first of those with the least that is left."""
+    """The placement with the smallest error, the first of equal ones."""
     usable = [each for each in found if each.judged_um is not None and np.isfinite(each.judged_um)]
-    return min(usable, key=lambda each: round(each.judged_um or 0.0, ALIKE_DECIMALS), default=None)
+    return min(usable, key=lambda each: round(each.judged_um or 0.0, EQUAL_DECIMALS), default=None)
 
 
 def _places(job: Job, table: MachineTable, axis: int) -> list[float]:
@@ -118,16 +122,17 @@ def _places(job: Job, table: MachineTable, axis: int) -> list[float]:
     return np.linspace(low, high, table.steps).tolist() if high > low else [low]
 
 
-Try = tuple[float, float, float, Posture]
+Try = tuple[float, float, float, str]
 
 
 @dataclass(frozen=True)
 class _Judge:
-    """Compensates one program at other places."""
+    """Compensates one program at other places. starts: start angles (deg) by posture and joint."""
 
     job: Job
     data: bytes
     name: str
+    starts: dict[str, dict[str, float]]
 
     def all(self, tries: Iterable[Try], count: int) -> Iterator[Placement]:
         """Placements one after the other; each is a part of the work."""
@@ -136,11 +141,12 @@ class _Judge:
                 yield self.at(each)
 
     def at(self, place: Try) -> Placement:
-        """What is left at one place; errors say why it is none."""
+        """Judge one placement; the message of an error is its reason."""
         x, y, turn, posture = place
-        config = self.job.taken.into(placed(self.job.config, place))
+        config = self.job.taken.into(placed(self.job.config, place, self.starts))
         job = replace(self.job, config=config)
-        where = {"x_mm": x, "y_mm": y, "z_mm": config.workpiece.origin_mm[2], "turn_deg": turn, "posture": posture}
+        where = {"x_mm": x, "y_mm": y, "z_mm": config.workpiece.origin_mm[2], "turn_deg": turn, "posture": posture,
+                 "start_deg": self.starts.get(posture, {})}  # fmt: skip
         settings, nothing = config.compensation, {"judged_um": None, "before_max_um": None, "band_p95_um": None}
         try:
             program = program_of(self.data, self.name, config)
@@ -159,34 +165,13 @@ class _Judge:
         return Placement.model_validate({**where, **sizes})
 
 
-def placed(config: Config, place: Try) -> Config:
+def placed(config: Config, place: Try, starts: Mapping[str, dict[str, float]]) -> Config:
     """The configuration with the program's zero at a place, turned, and an arm that starts in a posture."""
     x, y, turn, posture = place
     over: dict[str, object] = {"origin_mm": [x, y, config.workpiece.origin_mm[2]]}
     if turn:
         over["rotation_deg"] = (config.workpiece.rotation_deg or 0.0) + turn
-    starts = _wrist(config) if posture == "wrist flipped" else None
-    return overridden(config, {"workpiece": over}, starts or {})
-
-
-def _wrist(config: Config) -> dict[str, float] | None:
-    """Start angles (deg) of the last three hinges of an arm with its wrist flipped; None for other machines."""
-    actuators = config.robot.actuators
-    if len(config.robot.chains) != 1 or len(actuators) != 2 * WRIST:
-        return None
-    last = list(actuators.items())[-WRIST:]
-    angles = []
-    for _, each in last:
-        if not isinstance(each, RevoluteActuator):
-            return None
-        angles.append(each.home_deg if each.start_deg is None else each.start_deg)
-    flipped = (_opposite(angles[0]), -angles[1], _opposite(angles[2]))
-    return {name: angle for (name, _), angle in zip(last, flipped, strict=True)}
-
-
-def _opposite(angle: float) -> float:
-    """Half a turn on, at the smaller size of angle."""
-    return angle - 180.0 if angle > 0.0 else angle + 180.0
+    return overridden(config, {"workpiece": over}, {} if posture == STATED else starts[posture])
 
 
 def _short(program: Program) -> tuple[bytes, int]:

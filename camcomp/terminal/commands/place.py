@@ -44,8 +44,8 @@ def command(
 ) -> None:  # fmt: skip
     """Find where on the table a program is cut best: with the least error that compensation cannot be trusted to remove.
 
-    The program is compensated at places of its zero (G54) over the table, turned about the tool axis and, for arms, with the
-    wrist flipped; two rounds about the best place follow. Judged by the band where the machine file has uncertain numbers
+    The program is compensated at places of its zero (G54) over the table, turned about the tool axis, and at the
+    best one with shoulder, elbow and wrist of an arm flipped; two rounds about the best place follow. Judged by the band where the machine file has uncertain numbers
     (sd), else by the largest error before compensation. Of programs beyond 400 motions single ones are judged. Exit code 1
     where the program can be cut at none of the places.
     """
@@ -73,3 +73,6 @@ def command(
     at = f"[{result.best.x_mm:g}, {result.best.y_mm:g}, {result.best.z_mm:g}]"
     turn = (machine.config.workpiece.rotation_deg or 0.0) + result.best.turn_deg
     say(f"write: workpiece: {{origin_mm: {at}, rotation_deg: {turn:g}}}", quiet=quiet)
+    if result.best.start_deg:
+        joints = ", ".join(f"{name} {angle:g}" for name, angle in result.best.start_deg.items())
+        say(f"and start_deg of the joints: {joints}", quiet=quiet)

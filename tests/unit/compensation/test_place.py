@@ -1,6 +1,7 @@
 """Where on the table a program is cut best, against a screw whose error grows in closed form with the place."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ import pytest
 from camcomp.api.compensation import compensate
 from camcomp.api.machine import Job, load_machine
 from camcomp.api.placing import MachineTable, place
+from camcomp.compensation.placing.postures import start_postures
 from camcomp.compensation.placing.search import placed
 from camcomp.terminal.cli import run
 from tests.commandline import ROOT
@@ -63,14 +65,45 @@ def test_of_long_programs_single_motions_are_judged_the_outermost_included(tmp_p
     assert found.best.judged_um == pytest.approx(8.0, abs=0.1)
 
 
-def test_a_flipped_wrist_reaches_the_same_points_with_other_angles():
+def test_other_postures_reach_the_same_points_with_other_angles():
     job = load_machine(KUKA)
+    starts = start_postures(job)
+    assert "wrist flipped" in starts and len(starts) <= 7
     sides = []
     for posture in ("stated", "wrist flipped"):
-        joints = compensate(LINE, Job(placed(job.config, (1550.0, 0.0, 0.0, posture)))).joints
+        joints = compensate(LINE, Job(placed(job.config, (1550.0, 0.0, 0.0, posture), starts))).joints
         sides.append(joints.array("act_A1_nominal_rad", "act_A5_nominal_rad"))
     assert sides[0][:, 0] == pytest.approx(sides[1][:, 0]) and sides[0][:, 1] == pytest.approx(-sides[1][:, 1])
     assert abs(sides[0][:, 1]).min() > 1.0
+
+
+def test_every_posture_holds_the_platform_at_its_start_pose(tmp_path):
+    """Against the product of the DH matrices of the machine file."""
+    (tmp_path / "free.yaml").write_text(re.sub(r"limits_deg: \[.*?\],", "", KUKA.read_text()))
+    job = load_machine(tmp_path / "free.yaml")
+    stated = {name: each.start_deg for name, each in job.config.robot.actuators.items()}
+    starts = start_postures(job)
+    assert {"elbow flipped", "shoulder flipped", "shoulder and elbow and wrist flipped"} <= set(starts)
+    wanted = tip_of(stated.values())
+    for angles in starts.values():
+        assert tip_of(angles.values()) == pytest.approx(wanted, abs=1e-6)
+
+
+def tip_of(angles):
+    """Pose (4, 4) of the flange of the KUKA from its joint angles (deg), DH table of the machine file."""
+    table = [
+        (350, -90, 449.4, 0),
+        (1150, 0, 0, 0),
+        (41, -90, 0, 90),
+        (0, 90, -1200, 0),
+        (0, -90, 0, 0),
+        (0, 180, -420, 180),
+    ]
+    pose = np.eye(4)
+    for (a, alpha, d, theta), angle in zip(table, angles, strict=True):
+        c, s, ca, sa = (f(np.radians(v)) for v in (theta + angle, alpha) for f in (np.cos, np.sin))
+        pose = pose @ [[c, -s * ca, s * sa, a * c], [s, c * ca, -c * sa, a * s], [0, sa, ca, d], [0, 0, 0, 1]]
+    return pose
 
 
 def test_the_verb_writes_result_and_map_and_says_where(tmp_path, capfd):
