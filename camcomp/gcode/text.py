@@ -19,6 +19,11 @@ LONGEST_LINE = 1 << 14  # characters; controllers read some hundred
 _UTF16 = {b"\xff\xfe": "utf-16-le", b"\xfe\xff": "utf-16-be"}
 
 
+def count_lines(data: bytes) -> int:
+    """Ends of lines in a program's bytes."""
+    return len(re.findall(END_OF_LINE.encode(), data)) if b"\r" in data else data.count(b"\n")
+
+
 @dataclass(frozen=True, eq=False)
 class Text:
     """A program's characters. `encode(string)` is the inverse of reading; `starts`/`ends` bound each line."""

@@ -10,6 +10,7 @@ from camcomp.compensation.bands.outcome import Bands, band_figures
 from camcomp.compensation.program.compensate import Compensated, Trajectories
 from camcomp.compensation.program.result import CycleTime, Summary, error_size, job_figures
 from camcomp.compensation.program.under_control import mode_name
+from camcomp.gcode.text import count_lines
 from camcomp.ground.datatypes import Floats
 from camcomp.ground.orientation import angles_of
 from camcomp.model.control import waiting_s
@@ -130,8 +131,8 @@ def summary(result: Compensated, job: Job) -> Summary:
         {
             "points": len(result.rows.piece),
             "segments_in": len(result.program.path),
-            "lines_in": result.program.data.count(b"\n"),
-            "lines_out": result.written.data.count(b"\n"),
+            "lines_in": count_lines(result.program.data),
+            "lines_out": count_lines(result.written.data),
             "before": error_size(result.before),
             "after": error_size(result.after),
             **sizes,

@@ -2,7 +2,7 @@
 
 import pytest
 
-from camcomp.gcode.text import Text
+from camcomp.gcode.text import Text, count_lines
 from camcomp.ground.errors import ProgramError
 
 
@@ -30,6 +30,11 @@ def test_writing_back_gives_the_same_bytes(data):
 def test_lines(data, lines):
     text = Text.read(data, "x")
     assert [text.line(k) for k in range(len(text))] == lines
+
+
+@pytest.mark.parametrize("end", [b"\n", b"\r\n", b"\r", b"\r\r\n"])
+def test_lines_are_counted_by_their_ends(end):
+    assert count_lines(b"a" + end + b"b" + end + end + b"c") == 3
 
 
 def test_end_of_line_of_the_last_line_is_that_of_the_one_before():
