@@ -8,10 +8,17 @@ import time
 import numpy as np
 
 
+def installed():
+    """Environment of a user: the bytecode of camcomp is on disk, as pip leaves it."""
+    return {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+
+
 def spent(*args):
     """Wall time, processor time (s) and peak memory (MB) of a process that has to end well."""
     begin = time.perf_counter()
-    process = subprocess.Popen([sys.executable, *map(str, args)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    process = subprocess.Popen(
+        [sys.executable, *map(str, args)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=installed()
+    )
     _, status, usage = os.wait4(process.pid, 0)
     process.returncode = status
     assert status == 0
