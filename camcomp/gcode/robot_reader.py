@@ -98,14 +98,18 @@ class RobotReader:
                 self.refuse("CC112", "an arc without a known start", at)
         self._add(kind, site, values, middle, sweep_deg, -1)
 
+    def unknown_move(self, why: str) -> None:
+        """A rapid that is passed on, to a place that is not known: cuts from there are refused, with why, if it says something."""
+        self._unfollowed, self._cut_off = why, True
+
     def joint_move(self, site: MoveSite, angles_deg: Sequence[float]) -> None:
         """A rapid to joint angles; it is passed on as it stands."""
         find = self.frames.pose_of_joints
         pose = None if find is None else find(angles_deg)
-        self._unfollowed = "" if pose is None else pose.why
         if pose is None or pose.why:
-            self._cut_off = True
+            self.unknown_move("" if pose is None else pose.why)
             return
+        self._unfollowed = ""
         self._joint_poses.append(pose)
         self._add(RAPID, site, [0.0] * len(self.language.components), None, None, len(self._joint_poses) - 1)
 

@@ -5,7 +5,9 @@ import re
 
 from camcomp.gcode.text import Text
 
-_STAMP = re.compile(rb"(?:^|[\r\n])[ \t]*[(;!][ \t]*camcomp [0-9][^ )]* sha256:[0-9a-f]{64}(?![0-9a-f])")
+_STAMP = re.compile(
+    rb"(?:^|[\r\n])[ \t]*(?:\d*[ \t]*:[ \t]*)?[(;!][ \t]*camcomp [0-9][^ )]* sha256:[0-9a-f]{64}(?![0-9a-f])"
+)
 _MODEL = re.compile(_STAMP.pattern + rb" model:([0-9a-f]{16})")
 _MARKS = (b"\xef\xbb\xbf", b"\xff\xfe", b"\xfe\xff")
 

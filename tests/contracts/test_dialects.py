@@ -105,6 +105,7 @@ SAMPLES = {
     "fanuc": "%\nO1234 (BRACKET)\nG90 G54 G0 X0. Y0.\nG43 Z25. H1\nG91 G28 Z0.\nM30\n%\n",
     "sinumerik": "%_N_PLATE_MPF\nN10 G17 G90\nN20 G2 X10 Y0 CR=5\nM30\n",
     "rapid": "MODULE part\nPROC main()\nMoveL p1,v20,z1,tool0;\nENDPROC\nENDMODULE\n",
+    "fanuc_ls": "/PROG  PART\n/ATTR\nLINE_COUNT = 1;\n/MN\n   1:L P[1] 20mm/sec FINE    ;\n/POS\n/END\n",
     "krl": "&ACCESS RVP\nDEF part ( )\nLIN {X 1,Y 2,Z 3}\nEND\n",
 }
 

@@ -65,6 +65,19 @@ def as_rapid(part):
     return head + "".join(lines) + "  ENDPROC\nENDMODULE\n"
 
 
+def as_ls(part):
+    """Positions with W, P, R, which turn about the fixed axes x, y, z."""
+    moves, positions = [], []
+    for k, (x, y, z, a, b, c) in enumerate(part):
+        tcp = Rotation.from_euler("ZYX", [c, b, a], degrees=True) * Rotation.from_euler("Y", 180, degrees=True)
+        w, p, r = tcp.as_euler("xyz", degrees=True)
+        moves.append(f"   {k + 3}:{'L' if k else 'J'} P[{k + 1}] {'10mm/sec' if k else '50%'} FINE    ;\n")
+        at = f"X = {x} mm, Y = {y} mm, Z = {z} mm,\n\tW = {w:.12f} deg, P = {p:.12f} deg, R = {r:.12f} deg"
+        positions.append(f"P[{k + 1}]{{\n   GP1:\n\tUF : 1, UT : 1,\t\tCONFIG : 'N U T, 0, 0, 0',\n\t{at}\n}};\n")
+    head = "/PROG  PART\n/ATTR\nDEFAULT_GROUP\t= 1,*,*,*,*;\n/MN\n   1:  UFRAME_NUM=1 ;\n   2:  UTOOL_NUM=1 ;\n"
+    return head + "".join(moves) + "/POS\n" + "".join(positions) + "/END\n"
+
+
 def actuators(joints, which=""):
     return np.column_stack([joints[f"act_{a}{which}_rad"] for a in AXES])
 
@@ -85,7 +98,7 @@ def joints_of(folder, name, text, *configs):
     return table(out)
 
 
-@pytest.mark.parametrize(("name", "spelled"), [("part.src", as_krl), ("part.mod", as_rapid)])
+@pytest.mark.parametrize(("name", "spelled"), [("part.src", as_krl), ("part.mod", as_rapid), ("part.ls", as_ls)])
 def test_one_part_in_nc_and_in_a_robot_language_has_one_actuator_path(tmp_path, name, spelled):
     fine = tmp_path / "fine.yaml"
     fine.write_text("control: {resolution_mm: 0.000001}\n")
