@@ -81,7 +81,9 @@ def _stock(comment: Comment, fields: dict[str, str], origin: tuple[Comment, dict
 def _tool(comment: Comment, fields: dict[str, str]) -> Statement:
     name = fields.get("type", "").lower()
     form = _FORMS.get(name) or _MORE_FORMS.get(name)
-    number = int(_value(comment, fields, "number"))
+    stated = _value(comment, fields, "number")
+    if stated != (number := int(stated)):
+        raise StatedError(comment, f"{stated:g} is no tool number")
     if form is None:
         return OpenStatement(comment, f"T{number}: a tool of the type '{fields.get('type', '')}' cannot be followed")
     diameter = _value(comment, fields, "diameter")

@@ -71,10 +71,12 @@ def _tool(comment: Comment, kind: str, words: Sequence[str]) -> Statement:
     values = numbers(comment, words, kind)
     if not values:
         raise StatedError(comment, f"{kind} has no diameter")
-    diameter, second, third, *_ = [*values, 0.0, 0.0, 0.0]
+    diameter, second, third, taper, *_ = [*values, 0.0, 0.0, 0.0, 0.0]
     if kind == "TOOL/DRILL":
         keys = cutter(comment, "drill", diameter)
         if 0.0 < second < 180.0:
             keys["point_deg"] = second
         return StatedTool(comment, comment.next_tool, keys)
+    if taper != 0.0:
+        return OpenStatement(comment, f"T{comment.next_tool}: a tapered mill cannot be followed")
     return StatedTool(comment, comment.next_tool, cutter(comment, form_of(diameter, second), diameter, second, third))

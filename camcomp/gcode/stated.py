@@ -220,6 +220,8 @@ def cutter(comment: Comment, kind: str, diameter: float, corner: float = 0.0, fl
     k = comment.unit_mm
     if not diameter > 0.0:
         raise StatedError(comment, "the diameter of the tool is not above zero")
+    if not 0.0 <= corner <= 0.501 * diameter:  # rounded, as in form_of
+        raise StatedError(comment, f"a corner radius of {corner:g} does not fit a diameter of {diameter:g}")
     keys: dict[str, Any] = {"diameter_mm": _mm((diameter,), k)[0], "type": kind}
     if kind == "bull":
         keys["corner_radius_mm"] = _mm((corner,), k)[0]

@@ -115,5 +115,37 @@ def test_tools(text, number, keys):
     assert (tool.number, tool.keys) == (number, keys)
 
 
+@pytest.mark.parametrize(
+    ("text", "keys"),
+    [
+        (
+            "(T4 D=8. CR=1. - ZMIN=-5. - bullnose end mill)",
+            {"diameter_mm": 8.0, "type": "bull", "corner_radius_mm": 1.0},
+        ),
+        ("(T5 D=5. CR=0. TAPER=118deg - ZMIN=-12. - drill)", {"diameter_mm": 5.0, "type": "drill", "point_deg": 118.0}),
+        ("G20\n(T6 : End Mill {1/4 inch})", {"diameter_mm": 6.35, "type": "flat"}),
+    ],
+)
+def test_more_tools(text, keys):
+    (tool,) = stated(text).tools
+    assert tool.keys == keys
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("(TOOL/MILL,6,4,20,0)\nT1", "does not fit"),
+        ("(TOOL/MILL,6,0,20,5)\nT1", "tapered"),
+        ("(T9 D=6,5 CR=0, - ZMIN=-5, - flat end mill)", "'6,5' is no number"),
+        ("(@FC|TOOL|number=1.5|type=endmill|diameter=6)", "no tool number"),
+        ("(@FC|TOOL|number=2|type=bullnose|diameter=6|cornerRadius=5)", "does not fit"),
+    ],
+)
+def test_tools_that_cannot_be_are_doubts(text, why):
+    found = stated(text)
+    assert not found.tools
+    assert [why in each.why for each in found.doubts] == [True]
+
+
 def test_programs_without_marks_state_nothing():
     assert stated("(STOCKTAKING)\n(pocket D 6)\nG1 X1 T1\n") == stated("")
