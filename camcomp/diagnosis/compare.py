@@ -23,7 +23,7 @@ KEYS = ("line", "s_mm", "t_s")
 SAME = 2e-6  # mm or s: places that a table with six decimals cannot tell apart
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Difference:
     """A minus B of one column, or the distance of two points, over the rows that have both.
 
@@ -41,7 +41,7 @@ class Difference:
     b: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Comparison:
     """by: s_mm, t_s or row. rows: those of A; of these, unmatched have no counterpart in B and interpolated lie between two.
 
@@ -108,28 +108,50 @@ def compare(a: Columns, b: Columns, by: str | None = None) -> Comparison:
             other[name][rows_a[found]] = mixed[found]
     place = a[by] if by != "row" else np.arange(n, dtype=float)
     line = a.get("line")
-    out = [_difference(name, a[name] - other[name], line, place, a[name], other[name]) for name in names]
+    out = [
+        _difference(column=name, gap=a[name] - other[name], line=line, place=place, a=a[name], b=other[name])
+        for name in names
+    ]
     for prefix in ("", "c"):
         trio = [f"{axis}{prefix}_mm" for axis in "xyz"]
         if all(name in names for name in trio):
             gap = np.sqrt(sum((a[name] - other[name]) ** 2 for name in trio))
             empty = np.full(n, np.nan)
-            out.append(_difference(f"distance({','.join(trio)})", gap, line, place, empty, empty))
+            out.append(
+                _difference(column=f"distance({','.join(trio)})", gap=gap, line=line, place=place, a=empty, b=empty)
+            )
     only_a, only_b = ([each for each in one if each not in two] for one, two in ((a, b), (b, a)))
-    return Comparison(by, n, int((~matched).sum()), between, out, only_a, only_b)
+    return Comparison(
+        by=by,
+        rows=n,
+        unmatched=int((~matched).sum()),
+        interpolated=between,
+        differences=out,
+        only_a=only_a,
+        only_b=only_b,
+    )
 
 
 def _difference(column: str, gap: Floats, line: Floats | None, place: Floats, a: Floats, b: Floats) -> Difference:
     known = np.flatnonzero(np.isfinite(gap))
     if not len(known):
-        return Difference(column, 0, 0.0, 0.0, 0.0, None, np.nan, np.nan, np.nan)
+        return Difference(
+            column=column, rows=0, most=0.0, rms=0.0, mean=0.0, line=None, place=np.nan, a=np.nan, b=np.nan
+        )
     values = gap[known]
     at = int(known[np.argmax(np.abs(values))])
     number = int(line[at]) if line is not None and np.isfinite(line[at]) else None
     return Difference(
-        column, len(known), float(np.abs(values).max()), float(np.sqrt(np.mean(values**2))), float(values.mean()),
-        number, float(place[at]), float(a[at]), float(b[at]),
-    )  # fmt: skip
+        column=column,
+        rows=len(known),
+        most=float(np.abs(values).max()),
+        rms=float(np.sqrt(np.mean(values**2))),
+        mean=float(values.mean()),
+        line=number,
+        place=float(place[at]),
+        a=float(a[at]),
+        b=float(b[at]),
+    )
 
 
 def _blocks(a: Columns, b: Columns, by: str) -> Iterator[tuple[Ints, Ints]]:

@@ -109,7 +109,9 @@ def diagnose(
     stands = problem
     if law is not None:  # causes have the values that they have beside it; those that had only followed it are gone
         stands, best = law.problem, law.fit
-    shrinkage = _shrinkage(twin, runs, holdout, stands, best, found if law is None else None)
+    shrinkage = _shrinkage(
+        twin=twin, runs=runs, holdout=holdout, problem=stands, best=best, found=found if law is None else None
+    )
     unseen = len(used) < len(runs) or (len(used) > 1 and not holdout)
     proposal = _next(problem, found, word, job)
     result = DiagnosisResult(
@@ -367,7 +369,15 @@ def _shrinkage(
         rivals = () if found is None else found.fits
         chosen = causes_without(problem, best, rivals, np.zeros(0) if found is None else found.probability)
     floor = round(floor_um(problem), 3)
-    return shrinkage_of(problem, best, seen, chosen, _by_energy(problem, best), main_channels(problem), floor)
+    return shrinkage_of(
+        problem,
+        best,
+        seen=seen,
+        chosen=chosen,
+        order=_by_energy(problem, best),
+        part=main_channels(problem),
+        floor_um=floor,
+    )
 
 
 def _by_energy(problem: Problem, f: Fitted) -> list[int]:

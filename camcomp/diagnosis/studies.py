@@ -198,9 +198,17 @@ def _poses(run: RunSpec, log: Measured) -> Poses:
     stated = [own for own in columns if own is not None]
     sd = np.stack(stated, axis=1) if len(stated) == len(columns) else log.tip_sd if stated else None
     every = Poses(
-        label, log.encoder, log.tip, run.started_s + log.time, heat, np.full(n, run.name), sd, np.arange(1, n + 1),
-        torque=log.drive if log.has("drive") else None, force=log.force() if log.has("dyno") else None,
-    ).take(known)  # fmt: skip
+        label=label,
+        q=log.encoder,
+        tip=log.tip,
+        time=run.started_s + log.time,
+        temperature=heat,
+        run=np.full(n, run.name),
+        sd=sd,
+        row=np.arange(1, n + 1),
+        torque=log.drive if log.has("drive") else None,
+        force=log.force() if log.has("dyno") else None,
+    ).take(known)
     return replace(every, approach=approached(every.q, every.time))
 
 
@@ -226,14 +234,14 @@ def _axis(run: RunSpec, log: Measured, k: int, revolute: bool, expected: Floats)
     rows = rows[np.unique(log.time[rows], return_index=True)[1]]
     encoder, setpoint, force, load = (each[rows] for each in channels)
     return AxisRun(
-        run.name,
-        log.time[rows],
-        setpoint,
-        encoder,
-        force,
-        rows + 1,
-        revolute,
-        run.started_s,
+        name=run.name,
+        time=log.time[rows],
+        setpoint=setpoint,
+        encoder=encoder,
+        force=force,
+        row=rows + 1,
+        revolute=revolute,
+        started=run.started_s,
         expected=expected[rows] if expected[rows].any() else None,
         load=load if np.isfinite(load).all() else None,
     )

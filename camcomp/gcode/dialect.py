@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from camcomp.gcode.robot_language import RobotLanguage
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Dialect:
     """The language of a family of controllers. Codes count in tenths (G59.1 is 591)."""
 

@@ -11,7 +11,7 @@ ROUNDING_DISTANCE = 6410  # Sinumerik: corners are blended from ADIS mm before t
 PATTERN = rf"^G(61|61\.1|64)( P({NUMBER}))?( Q({NUMBER}))?$"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class PathMode:
     """A mode of the modal group 13, lengths in mm."""
 

@@ -156,7 +156,7 @@ class Writer(LineEditor):
         assert self._runs is not None
         self.open(a)
         feed = self.feed[1] if self.feed is not None and self.feed[0] == 94 else None
-        done = self._runs.write(a, b, self.position, self.code, feed, self.half)
+        done = self._runs.write(a, b, position=self.position, code=self.code, feed=feed, half=self.half)
         rows, sites = slice(int(bounds[a]), int(bounds[b])), self.sites
         motion, joining = self.out.motion[rows], self.out.joining[rows]
         position = np.arange(rows.start, rows.stop)

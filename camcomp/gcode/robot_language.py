@@ -84,7 +84,7 @@ class RobotLanguage(ABC):
         return [resolution_digits] * 3 + [self.turn_digits] * (len(self.components) - 3)
 
 
-@dataclass
+@dataclass(kw_only=True)
 class Collected:
     """Moves as they are read, a row each."""
 

@@ -19,14 +19,18 @@ def legs() -> Robot:
     behind = (
         Link(1e4 * np.eye(6)),
         Passive(True, z),
-        Parallelogram(310.0 * x, y, z, 80.0, 1e4 * np.eye(6)),
+        Parallelogram(arm=310.0 * x, hinge=y, crossbar=z, width=80.0, bar_stiffness=1e4 * np.eye(6)),
         Passive(True, z),
     )
     chains = [
-        Chain(name, (Actuator(name, False, x, 1e4, -300.0), *behind), np.roll(np.eye(3), k, axis=0))
+        Chain(
+            name,
+            (Actuator(name=name, revolute=False, axis=x, stiffness=1e4, home=-300.0), *behind),
+            np.roll(np.eye(3), k, axis=0),
+        )
         for k, name in enumerate("xyz")
     ]
-    return Robot("three legs", tuple(chains), np.array([0.0, 0.0, -100.0]))
+    return Robot(name="three legs", chains=tuple(chains), tool=np.array([0.0, 0.0, -100.0]))
 
 
 def arm() -> Robot:
@@ -34,11 +38,11 @@ def arm() -> Robot:
     elements: list[Any] = []
     for k in range(6):
         elements += [
-            Actuator(f"a{k + 1}", True, np.eye(3)[2 - k % 2], 1e9),
+            Actuator(name=f"a{k + 1}", revolute=True, axis=np.eye(3)[2 - k % 2], stiffness=1e9),
             Transform(np.array([100.0, 0.0, 50.0])),
             Link(1e6 * np.eye(6)),
         ]
-    return Robot("six hinges", (Chain("arm", tuple(elements)),), np.array([0.0, 0.0, -100.0]))
+    return Robot(name="six hinges", chains=(Chain("arm", tuple(elements)),), tool=np.array([0.0, 0.0, -100.0]))
 
 
 def inputs(robot: Robot, *, whole: bool, named: str | None = None) -> dict[str, tuple[Any, ...]]:

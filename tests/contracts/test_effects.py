@@ -27,14 +27,17 @@ ACTUATORS = ("x", "y", "z")
 def robot():
     x, y, z = np.eye(3)
     elements = (
-        Actuator("?", False, x, 1e4, -300.0), Link(1e4 * np.eye(6)), Passive(True, z),
-        Parallelogram(310.0 * x, y, z, 80.0, 1e4 * np.eye(6)), Passive(True, z),
-    )  # fmt: skip
+        Actuator(name="?", revolute=False, axis=x, stiffness=1e4, home=-300.0),
+        Link(1e4 * np.eye(6)),
+        Passive(True, z),
+        Parallelogram(arm=310.0 * x, hinge=y, crossbar=z, width=80.0, bar_stiffness=1e4 * np.eye(6)),
+        Passive(True, z),
+    )
     chains = []
     for k, name in enumerate(ACTUATORS):
-        drive = Actuator(name, False, x, 1e4, -300.0)
+        drive = Actuator(name=name, revolute=False, axis=x, stiffness=1e4, home=-300.0)
         chains.append(Chain(name, (drive, *elements[1:]), np.roll(np.eye(3), k, axis=0)))
-    return Robot("three legs", tuple(chains), np.array([0.0, 0.0, -100.0]))
+    return Robot(name="three legs", chains=tuple(chains), tool=np.array([0.0, 0.0, -100.0]))
 
 
 def motion():

@@ -36,9 +36,11 @@ def model(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.Mo
 def cut(rows: Any = slice(None), turn: float = 0.0) -> Cut:
     angle = np.linspace(0, 5, N) + turn
     tangent = np.stack([np.cos(angle), np.sin(angle), np.zeros(N)], axis=1)
-    columns = (np.linspace(300, 900, N), np.full(N, 6000.0), np.linspace(0, 3, N), np.linspace(5, 25, N))
-    place = (np.linspace(0, 99, N), np.arange(N))
-    return Cut(tangent[rows], [0, 0, 1], *(c[rows] for c in columns + place), diameter_mm=25.0, teeth=2)
+    return Cut(
+        tangent=tangent[rows], tool_axis=[0, 0, 1], feed=np.linspace(300, 900, N)[rows], speed=np.full(N, 6000.0)[rows],
+        depth=np.linspace(0, 3, N)[rows], width=np.linspace(5, 25, N)[rows], arc_length=np.linspace(0, 99, N)[rows],
+        line=np.arange(N)[rows], diameter_mm=25.0, teeth=2,
+    )  # fmt: skip
 
 
 def test_every_shipped_model_is_tested() -> None:

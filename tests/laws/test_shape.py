@@ -11,7 +11,8 @@ PACKAGE = Path(camcomp.__file__).parent
 MOST_LINES, MOST_PARAMETERS, MOST_ARGUMENTS, MOST_FIELDS = 60, 6, 5, 5
 COMPILERS = {"allocating", "entry", "inner", "kept", "njit", "jit"}  # numba passes arguments of kernels by position
 BUILT_IN = {"print", "max", "min", "zip"}
-BY_POSITION = {"Parameter"}  # rows of the tables of plug-ins, users' ones included
+# Rows of the tables of plug-ins, users' ones included; functions of any number of names of one kind.
+BY_POSITION = {"Parameter", "at", "exactly_one"}
 # Compiled kernels over 60 lines: numba compiles a split kernel in more time.
 LONG_KERNELS = {
     "corners", "cut_legs", "lay_engaged", "machine_step", "rounded", "scan_lines", "solve_one", "write_lines",
@@ -106,7 +107,7 @@ def _is_open_dataclass(node):
     made = [each for each in node.decorator_list if _name(each) == "dataclass"]
     keywords = [k.arg for each in made if isinstance(each, ast.Call) for k in each.keywords]
     fields = [each for each in node.body if isinstance(each, ast.AnnAssign) and "ClassVar" not in ast.unparse(each)]
-    return bool(made) and "kw_only" not in keywords and len(fields) > MOST_FIELDS
+    return bool(made) and node.name not in BY_POSITION and "kw_only" not in keywords and len(fields) > MOST_FIELDS
 
 
 def _found():

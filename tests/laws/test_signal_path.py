@@ -291,7 +291,7 @@ def test_a_stream_of_set_points_makes_up_for_every_effect(name):
     stream, force = Stream(job), np.array([[100.0, 20.0, -30.0]] * 2)
     wanted = np.array([[10.0, 10.0, 0.0], [12.0, 11.0, 0.0]])
     told = np.array([stream.correct(tip, load).commanded for tip, load in zip(wanted, force, strict=True)])
-    travel = Travel(force, np.array([0.0, 1.0]), np.zeros(2), np.zeros(2, np.bool_))
+    travel = Travel(force=force, time=np.array([0.0, 1.0]), cut_min=np.zeros(2), stop=np.zeros(2, np.bool_))
     reached, _ = respond(job, told, travel)
     assert np.abs(reached[1] - wanted[1]).max() < TOLERANCE_MM
 
@@ -327,7 +327,7 @@ def test_poses_of_an_arm_ask_the_hooks_that_a_tracker_can_see():
 
 def test_poses_of_an_arm_and_the_model_along_a_program_agree():
     job, n = arm().job, len(TIPS)
-    travel = Travel(np.zeros((n, 3)), np.arange(n) * 1.0, np.zeros(n), np.zeros(n, np.bool_))
+    travel = Travel(force=np.zeros((n, 3)), time=np.arange(n) * 1.0, cut_min=np.zeros(n), stop=np.zeros(n, np.bool_))
     # nobody knows how these joints came there, and those of the wrist move no tip
     without = (*STILL, "joint_hysteresis", "joint_coupling")
     every = [*bench()[0].columns(without), *bench()[0].waves()[::7]]

@@ -25,8 +25,10 @@ def machine_of(name):
 
 def gantry(*rest):
     """Three rigid axes that carry the given elements; the tip is their end."""
-    axes = tuple(Actuator(n, False, a, None) for n, a in zip("xyz", (X, Y, Z), strict=True))
-    return Robot("gantry", (Chain("a", (*axes, *rest)),), np.zeros(3))
+    axes = tuple(
+        Actuator(name=n, revolute=False, axis=a, stiffness=None) for n, a in zip("xyz", (X, Y, Z), strict=True)
+    )
+    return Robot(name="gantry", chains=(Chain("a", (*axes, *rest)),), tool=np.zeros(3))
 
 
 # --- Euler's column: two rigid bars, pinned ends, a torsion spring between them ---------------------------------------
@@ -41,12 +43,29 @@ def column(kink=0.0):
     along = Transform(np.array([BAR, 0.0, 0.0]))
     spring = Link(np.diag([0, 0, 0, 0, TORSION, 0.0]), active=(4,))
     legs = (
-        Chain("column", (Actuator("x", False, X, None), Passive(True, Y), along, Transform(rotation=bent), spring,
-                         along, Passive(True, Y))),
-        Chain("guide", (Actuator("y", False, Y, None), Actuator("z", False, Z, None), Passive(False, X))),
-    )  # fmt: skip
+        Chain(
+            "column",
+            (
+                Actuator(name="x", revolute=False, axis=X, stiffness=None),
+                Passive(True, Y),
+                along,
+                Transform(rotation=bent),
+                spring,
+                along,
+                Passive(True, Y),
+            ),
+        ),
+        Chain(
+            "guide",
+            (
+                Actuator(name="y", revolute=False, axis=Y, stiffness=None),
+                Actuator(name="z", revolute=False, axis=Z, stiffness=None),
+                Passive(False, X),
+            ),
+        ),
+    )
     reference = np.array([2 * BAR * np.cos(kink), 0.0, 0.0])
-    robot = Robot("column", legs, np.zeros(3), start_reference=reference)
+    robot = Robot(name="column", chains=legs, tool=np.zeros(3), start_reference=reference)
     return build_machine(robot, replace(robot, chains=column(0.0).robot.chains) if kink else robot)
 
 

@@ -28,7 +28,18 @@ def cut(feed: np.ndarray, speed: float, depth: float, teeth: int, width: float =
     n = len(feed)
     same = np.ones(n)
     along_x = np.tile([1.0, 0.0, 0.0], (n, 1))
-    return Cut(along_x, [0, 0, 1], feed, speed * same, depth * same, width * same, 0 * same, 0 * same, diameter, teeth)
+    return Cut(
+        tangent=along_x,
+        tool_axis=[0, 0, 1],
+        feed=feed,
+        speed=speed * same,
+        depth=depth * same,
+        width=width * same,
+        arc_length=0 * same,
+        line=0 * same,
+        diameter_mm=diameter,
+        teeth=teeth,
+    )
 
 
 def test_fit_gives_the_published_lines_and_coefficients() -> None:

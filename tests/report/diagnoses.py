@@ -16,7 +16,16 @@ def run_view(name, held_out, *, size=20.0, left=2.0, seed=0, frequency=0.5):
     swing = np.column_stack((np.sin(2 * np.pi * frequency * t), *np.zeros((2, len(t)))))
     line = np.where(t < 10, 8.0, 9.0)
     channels = ("tip x", "tip y", "tip z")
-    return RunView(name, held_out, t, line, position, size * swing + noise, left * swing + noise, channels)
+    return RunView(
+        name=name,
+        held_out=held_out,
+        time=t,
+        line=line,
+        position=position,
+        before=size * swing + noise,
+        after=left * swing + noise,
+        channels=channels,
+    )
 
 
 def cause(effect, target, probability, share, **parameters):

@@ -23,8 +23,18 @@ def view(name, *, clockwise, radial, rows=1441, cutting=False):
     gap = radial(told)[:, None] * np.column_stack((np.cos(told), np.sin(told), np.zeros(rows)))
     program = read_program(CIRCLE.format(way="G2" if clockwise else "G3").encode(), name="c").path
     return RunView(
-        name, False, np.abs(told), np.full(rows, 4.0), at, gap, 0.0 * gap, ("tip x", "tip y", "tip z"), at, program, cutting
-    )  # fmt: skip
+        name=name,
+        held_out=False,
+        time=np.abs(told),
+        line=np.full(rows, 4.0),
+        position=at,
+        before=gap,
+        after=0.0 * gap,
+        channels=("tip x", "tip y", "tip z"),
+        commanded=at,
+        program=program,
+        cutting=cutting,
+    )
 
 
 def test_a_ring_of_points_about_any_centre_has_no_deviation():

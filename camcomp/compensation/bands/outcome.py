@@ -100,7 +100,7 @@ class BandTotals:
         return [(error[::stride], moves.take(np.arange(0, len(error), stride))) for error, moves in self._kept]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Bands:
     """What is known of the end points (N,) of a program, or of a piece of one, and what adds up to its expected error."""
 

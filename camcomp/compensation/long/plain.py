@@ -213,7 +213,14 @@ class PlainCorrector:
         totals = BandTotals(uncertainty.inputs)
         taken = np.ones(len(left)) if share is None else share
         totals.add(left[judged], moves.take(np.flatnonzero(judged)), taken[judged])
-        return Bands(self._back(answers.unloaded), left, moves, taken, np.ones(len(left), np.bool_), totals)
+        return Bands(
+            before=self._back(answers.unloaded),
+            after=left,
+            moves=moves,
+            share=taken,
+            known=np.ones(len(left), np.bool_),
+            totals=totals,
+        )
 
     def _left(self, judged: Bools, answers: Answers, middles: Middles, share: Floats) -> Floats:
         """Errors (k, 3), program frame, that the policy leaves on purpose."""

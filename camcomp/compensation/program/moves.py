@@ -124,7 +124,9 @@ def travel_of(job: Job, track: Track, piece: Ints, w: Floats) -> Travel:
     turn, rotation = track.path.orientation, None
     if turn is not None:
         rotation = platform_rotations(job, turn.form, turn.words(track.motion[piece], track.u(piece, w)))
-    return Travel(force, time, worn[piece] + w * cut[piece], stop, around, rotation)
+    return Travel(
+        force=force, time=time, cut_min=worn[piece] + w * cut[piece], stop=stop, around=around, rotation=rotation
+    )
 
 
 def _around(track: Track, seconds: Floats, piece: Ints, time: Floats) -> Floats:

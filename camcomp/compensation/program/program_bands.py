@@ -35,4 +35,11 @@ def bands_of(job: Job, track: Track, rows: CorrectedRows, points: JudgedPoints, 
     totals = BandTotals(uncertainty.inputs)
     taken = np.ones(len(rows.w)) if share is None else share
     totals.add(after.error[counted], ends.take(points.row[counted]), taken[points.row[counted]])
-    return Bands(before.error[points.end], after.error[points.end], ends, taken, rows.corrected, totals)
+    return Bands(
+        before=before.error[points.end],
+        after=after.error[points.end],
+        moves=ends,
+        share=taken,
+        known=rows.corrected,
+        totals=totals,
+    )

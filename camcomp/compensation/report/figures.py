@@ -33,7 +33,7 @@ AXES = "xyz"
 NO_ERROR_MM = 1e-6  # below it chain errors have no curve of their own
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class DrawnPath:
     """What is drawn along the path, at the end points (N, ...) of the corrected program."""
 

@@ -68,7 +68,19 @@ def joint_bytes(result: Compensated, job: Job, name: str) -> bytes:
     state = result.state
     file = BytesIO()
     table = joint_table(file, name, job, result.orienting is not None)
-    table.batch(Batch(result.lines, result.s, result.t, result.rows.target, result.written.end, result.force, result.nominal, state.rho,
-                      state.drive, values_behind(result, job)))  # fmt: skip
+    table.batch(
+        Batch(
+            line=result.lines,
+            s=result.s,
+            t=result.t,
+            target=result.rows.target,
+            written=result.written.end,
+            force=result.force,
+            nominal=result.nominal,
+            joints=state.rho,
+            drive=state.drive,
+            behind=values_behind(result, job),
+        )
+    )
     table.close()
     return file.getvalue()

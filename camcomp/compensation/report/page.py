@@ -80,7 +80,7 @@ def compensation_html(
     if any_feed:
         if result.bands is not None:
             sections.append(band_section(drawn, result.bands, figures))
-        sections += _plots(result, found, job, drawn, checked, tolerance_um)
+        sections += _plots(result=result, found=found, job=job, drawn=drawn, checked=checked, tolerance_um=tolerance_um)
         programs = [("original program", result.program), ("corrected program", written)]
         if walls := wall_section(job, result.program, programs):
             sections.append(walls)
@@ -93,7 +93,9 @@ def compensation_html(
         verdict=verdict,
         good=not failed,
         caution=_caution(figures, tolerance_um),
-        cards=_cards(figures, tolerance_um, drawn, result.state.rho, job, len(notes)),
+        cards=_cards(
+            figures=figures, tolerance_um=tolerance_um, drawn=drawn, rho=result.state.rho, job=job, warnings=len(notes)
+        ),
         sections=sections,
     )
     return render(page)

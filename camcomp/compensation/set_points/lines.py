@@ -20,11 +20,14 @@ _LIKE_A_NUMBER = re.compile(r"[+-]?([.\d]|nan$|inf)", re.IGNORECASE)
 _MARK = b"\xef\xbb\xbf"  # byte order mark
 
 
+Triple = tuple[float, float, float]
+
+
 class SetPoint(NamedTuple):
     """One line: programmed tip (mm, program frame), force on the tool (N, machine axes), time or None."""
 
-    tip: tuple[float, float, float]
-    force: tuple[float, float, float]
+    tip: Triple
+    force: Triple
     time: float | None
 
 
@@ -105,7 +108,7 @@ class Reader:
         self._known = self._begun = True
         a, b, c, d, e, f = self._order
         time = v[self._time] if self._time is not None and self._time < len(v) else None
-        return _bounded(v[a], v[b], v[c], v[d], v[e], v[f], time)
+        return _bounded((v[a], v[b], v[c]), (v[d], v[e], v[f]), time)
 
 
 def _cells(text: str) -> list[str]:
@@ -133,7 +136,7 @@ def _from_json(text: str) -> SetPoint:
             raise ConfigError("CC270", f"{name} is not a number")
     try:
         x, y, z, fx, fy, fz = (float(data[name]) for name in NEEDED)
-        return _bounded(x, y, z, fx, fy, fz, float(data[TIME]) if TIME in data else None)
+        return _bounded((x, y, z), (fx, fy, fz), float(data[TIME]) if TIME in data else None)
     except OverflowError:
         raise ConfigError("CC270", "a number is too large") from None
 
@@ -145,11 +148,11 @@ def _refuse_constant(word: str) -> float:
 _JSON = json.JSONDecoder(object_pairs_hook=list, parse_constant=_refuse_constant)
 
 
-def _bounded(x: float, y: float, z: float, fx: float, fy: float, fz: float, time: float | None) -> SetPoint:
-    size = abs(x) + abs(y) + abs(z) + abs(fx) + abs(fy) + abs(fz)
+def _bounded(tip: Triple, force: Triple, time: float | None) -> SetPoint:
+    size = sum(map(abs, tip)) + sum(map(abs, force))
     if not (size <= LARGEST_NUMBER and (time is None or abs(time) <= LARGEST_NUMBER)):
         raise ConfigError("CC270", f"a number is larger than {LARGEST_NUMBER:g}")
-    return SetPoint((x, y, z), (fx, fy, fz), time)
+    return SetPoint(tip, force, time)
 
 
 def _check_names(names: Sequence[str]) -> None:

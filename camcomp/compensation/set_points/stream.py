@@ -92,7 +92,7 @@ class Stream:
         """The set-point behind the one before, so that there is a direction of travel."""
         before = self._before or (tip, load)
         tips, loads = np.stack((before[0], tip)), np.stack((before[1], load))
-        travel = Travel(loads, np.array([0.0, 1.0]), np.zeros(2), np.zeros(2, np.bool_))
+        travel = Travel(force=loads, time=np.array([0.0, 1.0]), cut_min=np.zeros(2), stop=np.zeros(2, np.bool_))
         found = aim_at(self._job, tips, travel, "newton")
         _refuse(int(found.status[1]))
         told = replace(found, commanded=np.where(np.isfinite(found.commanded), found.commanded, tips)).commanded

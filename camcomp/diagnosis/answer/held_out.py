@@ -21,6 +21,7 @@ _STEP = 0.02  # of an interval's half width, for differences of the gap
 def shrinkage_of(
     problem: Problem,
     best: Fitted,
+    *,
     seen: Bench,
     chosen: Sequence[Mapping[int, Cause]],
     order: Sequence[int],

@@ -36,7 +36,20 @@ def run_gaps(problem: Problem, causes: Sequence[Cause] = ()) -> list[places.RunG
             thinned(v, run.thin) for v in (problem.bench.nominal[k].tip, motion.encoder, motion.direction)
         )
         noise = np.where(np.isfinite(noise), np.hypot(noise, RUN_OFFSET_MM if part.start == 0 else 0.0), 1.0)
-        out.append(places.RunGap(run.name, gap, noise, thin, problem.times[k], line, drives, tip, position, direction))
+        out.append(
+            places.RunGap(
+                name=run.name,
+                gap=gap,
+                noise=noise,
+                thin=thin,
+                time=problem.times[k],
+                line=line,
+                drives=drives,
+                tip=tip,
+                position=position,
+                direction=direction,
+            )
+        )
     return out
 
 

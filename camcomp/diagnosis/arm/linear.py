@@ -108,7 +108,14 @@ def linearise(
     if weights is not None:
         groups = [replace(g, sd=g.sd * w[:, None]) for g, w in zip(groups, weights, strict=True)]
     healthy = {DRIFT: DRIFT_FLOORS} if DRIFT in groups[0].B else {}
-    return LinearModel(tuple(groups), shelf.candidates, shelf.bounds, bench.own, shelf.families, healthy)
+    return LinearModel(
+        groups=tuple(groups),
+        candidates=shelf.candidates,
+        bounds=shelf.bounds,
+        fitted=bench.own,
+        families=shelf.families,
+        healthy=healthy,
+    )
 
 
 def with_dictionary(bench: ArmBench, groups: Sequence[Group], sd: float) -> list[Group]:

@@ -210,7 +210,10 @@ def _explained(
     )
     size = float(np.sqrt(np.mean(np.concatenate([data.values[k] for k in data.train]) ** 2)))
     model = LinearModel(
-        tuple(groups), tuple(placed), bounds, healthy=dict.fromkeys(kinds, max(HEALTHY_SHARE * size / sd, 1e-6))
+        groups=tuple(groups),
+        candidates=tuple(placed),
+        bounds=bounds,
+        healthy=dict.fromkeys(kinds, max(HEALTHY_SHARE * size / sd, 1e-6)),
     )
     values = search_sets(model.reduced(Background()), CAUSES).values
     return _Linear(model, posterior_of(model, {Background(): values}), unit)

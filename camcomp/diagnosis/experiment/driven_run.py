@@ -48,7 +48,7 @@ STANDING_MM_PER_S = 0.05
 _UPRIGHT = 0.9  # cosine of the path to z beyond which x defines its lateral directions
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class DrivenRun:
     """Run path of a log.
 
@@ -87,9 +87,18 @@ class _Program:
 
 
 def drive(
-    log: str, name: str, measured: Measured, text: Program | None, conditions: Conditions, twin: Twin, started: float,
-    vectors: Callable[[Floats], Floats], temperature: Floats | None, acceleration: float,
-) -> DrivenRun:  # fmt: skip
+    log: str,
+    name: str,
+    *,
+    measured: Measured,
+    text: Program | None,
+    conditions: Conditions,
+    twin: Twin,
+    started: float,
+    vectors: Callable[[Floats], Floats],
+    temperature: Floats | None,
+    acceleration: float,
+) -> DrivenRun:
     """The run of a log; text: its program, or None; acceleration: of the controller, mm/s2.
 
     Raises ConfigError CC402, CC406 to CC408.
@@ -101,7 +110,17 @@ def drive(
         raise ConfigError("CC402", message, at=Location(log, 1, 1))
     if by == "tip":
         assert program is not None
-        return _led_by_tip(log, name, measured, program, twin, started, vectors, temperature, acceleration)
+        return _led_by_tip(
+            log,
+            name,
+            measured=measured,
+            program=program,
+            twin=twin,
+            started=started,
+            vectors=vectors,
+            temperature=temperature,
+            acceleration=acceleration,
+        )
     told = getattr(measured, by)
     known = np.isfinite(told)
     if known.sum(axis=0).min() < 2:
@@ -126,7 +145,16 @@ def drive(
         try:
             cut = _behind(measured, tip, turned, program, twin) if by == "setpoint" else None
         except PhysicsError:  # also for encoders in another unit
-            check_places(log, name, measured, rho, tip, twin.actuators, rotary, lambda: tip)
+            check_places(
+                log,
+                name,
+                measured=measured,
+                rho=rho,
+                tip=tip,
+                actuators=twin.actuators,
+                rotary=rotary,
+                loaded=lambda: tip,
+            )
             raise
         told = by == "setpoint" and cut is None
         forces = cutting_forces(
@@ -151,10 +179,23 @@ def drive(
             run_path, feed_mm_per_min=program.feed, cut_ahead_min=_cut_ahead(program, aligned), told=told
         )
     loaded = cache(lambda: twin.sense(run_path)[0])
-    check_places(log, name, measured, rho, tip, twin.actuators, rotary, lambda: loaded().tip)
+    check_places(
+        log,
+        name,
+        measured=measured,
+        rho=rho,
+        tip=tip,
+        actuators=twin.actuators,
+        rotary=rotary,
+        loaded=lambda: loaded().tip,
+    )
     turns = np.array([a.revolute for a in twin.robot.actuators])
-    check_forces(log, name, measured, run_path.row_force, lambda: loaded().drive, turns)
-    return DrivenRun(run_path, by, unsure, guessed, None, 0 if aligned is None else aligned.lag)
+    check_forces(
+        name=log, run=name, measured=measured, force=run_path.row_force, drives=lambda: loaded().drive, rotary=turns
+    )
+    return DrivenRun(
+        run_path=run_path, by=by, unsure=unsure, guessed=guessed, turn=None, lag=0 if aligned is None else aligned.lag
+    )
 
 
 def _measured_forces(measured: Measured, vectors: Callable[[Floats], Floats]) -> Forces:
@@ -313,9 +354,17 @@ def _idle_or_not(forces: Forces, aligned: Aligned, program: _Program, tip: Float
 
 
 def _led_by_tip(
-    log: str, name: str, measured: Measured, program: _Program, twin: Twin, started: float,
-    vectors: Callable[[Floats], Floats], temperature: Floats | None, acceleration: float,
-) -> DrivenRun:  # fmt: skip
+    log: str,
+    name: str,
+    *,
+    measured: Measured,
+    program: _Program,
+    twin: Twin,
+    started: float,
+    vectors: Callable[[Floats], Floats],
+    temperature: Floats | None,
+    acceleration: float,
+) -> DrivenRun:
     """Run of a measured tip aligned with the program: its timing is free, and only its lateral deviation is evidence."""
     path = program.track.path
     known = np.isfinite(measured.tip).all(axis=1)
@@ -324,8 +373,22 @@ def _led_by_tip(
     bend, changed = np.zeros_like(whole), np.inf
     # a deflected tip is off its program by an unknown amount at first, and its position on arcs depends on the deflection
     for beside in (np.inf, *[MAX_CUT_DISTANCE_MM] * MOST_PASSES):
-        aligned = _aligned(log, name, program, whole - bend, measured, ASIDE_MM if beside < np.inf else FAR_MM)
-        way, on = _driven(path, aligned, program.merged, whole - bend, measured.line, np.asarray(known))
+        aligned = _aligned(
+            log=log,
+            name=name,
+            program=program,
+            tip=whole - bend,
+            measured=measured,
+            aside_mm=ASIDE_MM if beside < np.inf else FAR_MM,
+        )
+        way, on = _driven(
+            path=path,
+            aligned=aligned,
+            other=program.merged,
+            tip=whole - bend,
+            line=measured.line,
+            known=np.asarray(known),
+        )
         tip = path_geometry.points(way, on.motion, on.share)
         logged = bool(np.isfinite(measured.line).any())
         forces = cutting_forces(
@@ -353,7 +416,9 @@ def _led_by_tip(
     velocity = (twin.sense(run_path, [later])[0].tip - loaded) / SOON_S
     run_path = replace(run_path, feed_mm_per_min=program.feed, led=True, cut_ahead_min=_cut_ahead(program, aligned))
     guessed = np.zeros((len(tip), len(twin.actuators)), bool)
-    return DrivenRun(run_path, "tip", unsure, guessed, _across(way, on, velocity), aligned.lag)
+    return DrivenRun(
+        run_path=run_path, by="tip", unsure=unsure, guessed=guessed, turn=_across(way, on, velocity), lag=aligned.lag
+    )
 
 
 def _driven(

@@ -144,7 +144,9 @@ def check_lines(name: str, run: str, away: Floats) -> None:
         raise ConfigError("CC406", message, at=Location(name, 1, 1))
 
 
-def check_rows_together(name: str, run: str, what: str, time: Floats, found: Floats, due: Floats, other: str) -> None:
+def check_rows_together(
+    name: str, run: str, *, what: str, time: Floats, found: Floats, due: Floats, other: str
+) -> None:
     """Raise CC412 for a channel found (n, k) that fits the expected one, due (n, k), far better when shifted by rows.
 
     Only for rows longer than LATEST_S, because a clock offset or a late drive could otherwise be the reason.
@@ -168,9 +170,16 @@ def check_rows_together(name: str, run: str, what: str, time: Floats, found: Flo
 
 
 def check_places(
-    name: str, run: str, measured: Measured, rho: Floats, tip: Floats, actuators: Sequence[str], rotary: bool = False,
+    name: str,
+    run: str,
+    *,
+    measured: Measured,
+    rho: Floats,
+    tip: Floats,
+    actuators: Sequence[str],
+    rotary: bool = False,
     loaded: Callable[[], Floats] | None = None,
-) -> None:  # fmt: skip
+) -> None:
     """Raise CC407 (units), CC408 (axes), CC406 (another program), CC412 (rows) for tip or encoders far from the expected ones.
 
     tip (n, 3) mm, rho (n, m): expected tips and actuators; rotary: all actuators are hinges; loaded: returns the tips (n, 3)
@@ -186,23 +195,48 @@ def check_places(
         if rows.any():
             if what.startswith("tip") and loaded is not None and _distance(found[rows], due=due[rows]) >= most:
                 due = loaded()
-            check_rows_together(name, run, what, measured.time, found, due, f"the {told}s")
+            check_rows_together(name, run, what=what, time=measured.time, found=found, due=due, other=f"the {told}s")
             _check(
-                name, run, what, found[rows], partial(_distance, due=due[rows]), most, names, rotary and most == FAR_RAD
+                name,
+                run,
+                what=what,
+                found=found[rows],
+                distance=partial(_distance, due=due[rows]),
+                far=most,
+                names=names,
+                rotary=rotary and most == FAR_RAD,
             )
 
 
 def check_set_points(
-    name: str, run: str, what: str, told: Floats, program: Floats, actuators: Sequence[str], rotary: bool = False
+    name: str, run: str, *, what: str, told: Floats, program: Floats, actuators: Sequence[str], rotary: bool = False
 ) -> None:
     """Like `check_places` for the motion itself: set-points told (n, m) against actuators program (s, m) of the program."""
     far = FAR_RAD if rotary else FAR_MM
-    _check(name, run, f"{what}s look", told, _to_nearest(program, far), far, actuators, rotary)
+    _check(
+        name,
+        run,
+        what=f"{what}s look",
+        found=told,
+        distance=_to_nearest(program, far),
+        far=far,
+        names=actuators,
+        rotary=rotary,
+    )
 
 
 def check_on_program(name: str, run: str, tip: Floats, program: Floats) -> None:
     """Like `check_places` if the tip is the motion: tip (n, 3) against points program (s, 3) of the program."""
-    _check(name, run, "tip looks", tip, _to_nearest(program, FAR_MM), FAR_MM, AXES, False)
+    _check(
+        name,
+        run,
+        what="tip looks",
+        found=tip,
+        distance=_to_nearest(program, FAR_MM),
+        far=FAR_MM,
+        names=AXES,
+        rotary=False,
+    )
 
 
 def places(points: Floats, far: float = FAR_MM) -> Ints:
@@ -217,9 +251,16 @@ def _to_nearest(program: Floats, far: float) -> Callable[[Floats], float]:
 
 
 def _check(
-    name: str, run: str, what: str, found: Floats, distance: Callable[[Floats], float], far: float, names: Sequence[str],
+    name: str,
+    run: str,
+    *,
+    what: str,
+    found: Floats,
+    distance: Callable[[Floats], float],
+    far: float,
+    names: Sequence[str],
     rotary: bool,
-) -> None:  # fmt: skip
+) -> None:
     off = distance(found)
     if off < far:
         return

@@ -162,5 +162,13 @@ def _due(
         bound = drift_bound(days[since], deviations[since])
         if bound == 0.0:  # one measurement does not predict
             return None
-        course = Course(course.kind, course.level, course.level_sd, 0.0, bound, course.jumps, course.spread)
+        course = Course(
+            kind=course.kind,
+            level=course.level,
+            level_sd=course.level_sd,
+            rate=0.0,
+            rate_sd=bound,
+            jumps=course.jumps,
+            spread=course.spread,
+        )
     return last.day + timedelta(days=int(days_until(course, limit)))

@@ -19,7 +19,7 @@ FEWEST = 4  # measurements needed for a line or a jump
 _MARGIN = 4.0  # least difference of the criterion for a richer description: odds of 7 to 1
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Course:
     """Course of a value.
 
@@ -42,24 +42,56 @@ def course_of(days: Floats, values: Floats, deviations: Floats) -> Course:
     weight = 1.0 / np.maximum(deviations, 1e-300) ** 2
     mean, misfit = _constant(values, weight)
     if n < FEWEST:
-        return Course("too few", mean, float(weight.sum() ** -0.5), 0.0, 0.0, (), _spread(misfit, n - 1))
+        return Course(
+            kind="too few",
+            level=mean,
+            level_sd=float(weight.sum() ** -0.5),
+            rate=0.0,
+            rate_sd=0.0,
+            jumps=(),
+            spread=_spread(misfit, n - 1),
+        )
     line = _line(days, values, weight)
     cost: list[tuple[float, Course]] = [
-        (misfit + np.log(n), Course("steady", mean, float(weight.sum() ** -0.5), 0.0, 0.0, (), _spread(misfit, n - 1)))
+        (
+            misfit + np.log(n),
+            Course(
+                kind="steady",
+                level=mean,
+                level_sd=float(weight.sum() ** -0.5),
+                rate=0.0,
+                rate_sd=0.0,
+                jumps=(),
+                spread=_spread(misfit, n - 1),
+            ),
+        )
     ]
     now, now_sd, rate, rate_sd, left = line
-    cost.append((left + 2 * np.log(n) + _MARGIN, Course("drift", now, now_sd, rate, rate_sd, (), _spread(left, n - 2))))
+    cost.append(
+        (
+            left + 2 * np.log(n) + _MARGIN,
+            Course(
+                kind="drift",
+                level=now,
+                level_sd=now_sd,
+                rate=rate,
+                rate_sd=rate_sd,
+                jumps=(),
+                spread=_spread(left, n - 2),
+            ),
+        )
+    )
     for count, (starts, left) in enumerate(_steps(values, weight), 1):
         last = slice(starts[-1], n)
         level, _ = _constant(values[last], weight[last])
         own = Course(
-            "jumps",
-            level,
-            float(weight[last].sum() ** -0.5),
-            0.0,
-            0.0,
-            tuple(starts[1:]),
-            _spread(left, n - 1 - 2 * count),
+            kind="jumps",
+            level=level,
+            level_sd=float(weight[last].sum() ** -0.5),
+            rate=0.0,
+            rate_sd=0.0,
+            jumps=tuple(starts[1:]),
+            spread=_spread(left, n - 1 - 2 * count),
         )
         cost.append((left + (1 + 2 * count) * np.log(n) + _MARGIN * count, own))
     return min(cost, key=lambda each: each[0])[1]

@@ -58,7 +58,7 @@ class Background:
         return bool(self.scales or self.process)
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, kw_only=True)
 class LinearModel:
     """Groups with their candidates, linearised at one state; normal equations are kept per process.
 
@@ -212,7 +212,7 @@ class LinearModel:
         return Reduced(self, gram, moment, at.log_evidence)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class AmplitudePosterior:
     """Columns `live` under their priors: mean (q,), 0 where a column takes no part, and log evidence of the data."""
 
@@ -237,7 +237,9 @@ class AmplitudePosterior:
         mean[live] = scale * solved
         value = -0.5 * (data.c / square - float(b @ solved)) - data.log_size - data.rows * log(noise)
         value -= float(np.log(np.diag(factor[0])).sum() - np.log(scale).sum() - 0.5 * np.log(own).sum())
-        return AmplitudePosterior(data, live, noise, scale, factor, mean, value)
+        return AmplitudePosterior(
+            data=data, live=live, noise=noise, scale=scale, factor=factor, mean=mean, log_evidence=value
+        )
 
     def covariance(self, columns: Sequence[int]) -> Floats:
         """Covariance (d, d) of some of the live columns."""

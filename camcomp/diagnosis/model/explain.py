@@ -55,7 +55,7 @@ class KnownNoise:
         return float(np.logaddexp(inside, outside))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Explanation:
     """The posterior over sets and backgrounds.
 
@@ -241,4 +241,13 @@ def posterior_of(
         merged[own] = (members if each > most else first, max(most, each), total + each)
     sets = sorted(((m, total) for m, _, total in merged.values()), key=lambda s: -s[1])
     top = int(np.argmax(value))
-    return Explanation(model, flat[top][0], flat[top][1], tuple(sets), places, families, unknown, float(value[top]))
+    return Explanation(
+        model=model,
+        background=flat[top][0],
+        members=flat[top][1],
+        sets=tuple(sets),
+        places=places,
+        families=families,
+        unknown=unknown,
+        log_evidence=float(value[top]),
+    )

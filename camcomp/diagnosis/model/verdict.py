@@ -11,7 +11,7 @@ SURE = 0.8  # probability from which on a set stands out
 Word = Literal["none", "identified", "ambiguous", "unknown"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class VerdictInputs:
     """What a verdict hangs on.
 

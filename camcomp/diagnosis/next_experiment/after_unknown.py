@@ -38,7 +38,7 @@ def explore(problem: Problem, labels: Sequence[tuple[str, float]], job: Job) -> 
                 family for family in sorted(weight, key=lambda each: -weight[each]) if family not in candidate.varies
             ]
             outcomes = after_unknown([v for v in candidate.varies if v in weight] or candidate.varies, others)
-            found.append(Proposal(candidate, gain, ("unknown",), outcomes))
+            found.append(Proposal(candidate=candidate, gain=gain, separates=("unknown",), outcomes=outcomes))
     ranked = sorted(found, key=lambda each: -each.value)
     bench = problem.bench
     can = (each for each in ranked if can_be_run(each.candidate, bench.runs, job, bench.twin))

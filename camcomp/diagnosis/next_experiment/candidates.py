@@ -36,7 +36,7 @@ _BY_HAND = (
 )
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Candidate:
     """A feasible experiment.
 
@@ -66,14 +66,21 @@ class Candidate:
 def candidate(site: Site, design: MotionDesign, varies: tuple[str, ...] = ()) -> Candidate:
     """Experiment of a design, with the channels of the runs."""
     design = design.tidy()
-    return Candidate(design.action, design, site.channels, site.end + design.wait_s, design.minutes, varies=varies)
+    return Candidate(
+        action=design.action,
+        design=design,
+        channels=site.channels,
+        started=site.end + design.wait_s,
+        minutes=design.minutes,
+        varies=varies,
+    )
 
 
 def usual(site: Site) -> MotionDesign:
     """Circle with the position, size and feed of the runs."""
     if site.cut is not None:
-        return MotionDesign(_triple(site.cut.centre), site.cut.radius, site.cut.feed, cutting=True)
-    return _in_air(site, MotionDesign(_triple(site.work.centre), site.work.radius, site.work.feed))
+        return MotionDesign(centre=_triple(site.cut.centre), radius=site.cut.radius, feed=site.cut.feed, cutting=True)
+    return _in_air(site, MotionDesign(centre=_triple(site.work.centre), radius=site.work.radius, feed=site.work.feed))
 
 
 def coarse(site: Site, room: Room) -> Iterator[Candidate]:

@@ -18,7 +18,7 @@ STOCK_MIN = 10.0  # to clamp material for a cut
 SOON_S = 60.0  # after the last run, at the earliest
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class MotionDesign:
     """A full circle in a plane, or a straight line forth and back through its centre; then a standstill.
 
@@ -42,9 +42,16 @@ class MotionDesign:
         x, y, z = (round(v, 1) + 0.0 for v in self.centre)  # no -0
         feed = float(f"{self.feed:.3g}")
         return MotionDesign(
-            (x, y, z), max(round(self.radius, 1), 0.1), feed, self.plane, self.turns, self.along, self.cutting, self.wait_s,
-            self.dwell_s,
-        )  # fmt: skip
+            centre=(x, y, z),
+            radius=max(round(self.radius, 1), 0.1),
+            feed=feed,
+            plane=self.plane,
+            turns=self.turns,
+            along=self.along,
+            cutting=self.cutting,
+            wait_s=self.wait_s,
+            dwell_s=self.dwell_s,
+        )
 
     @property
     def length(self) -> float:

@@ -56,7 +56,12 @@ class Desk:
         if there is None:
             return None
         found = predicted_gain(self.question, each, there, self.weight)
-        return Proposal(each, found.gain, separated(self.question.problem, self.question.rivals), told=found)
+        return Proposal(
+            candidate=each,
+            gain=found.gain,
+            separates=separated(self.question.problem, self.question.rivals),
+            told=found,
+        )
 
     def refined(self, first: Proposal) -> Proposal:
         """The best design near one, by steps of descent."""

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from camcomp.diagnosis.next_experiment.predicted_logs import PredictedLogs, Question
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class ExpectedGain:
     """Expected information of an experiment.
 
@@ -86,14 +86,14 @@ def predicted_gain(question: Question, candidate: Candidate, there: PredictedLog
     size = there.size[kinds[k]] if kinds else 0.0
     a, b = (int(ends[k]), int(ends[k + 1])) if kinds else (0, 0)
     return ExpectedGain(
-        expected_gain(apart, probability) if n > 1 else 0.0,
-        0.5 * float(np.log2((before + noise) / (after + noise))),
-        1e3 * before**0.5,
-        1e3 * after**0.5,
-        kinds[k] if kinds else "",
-        size * np.sqrt(np.mean(signals[a:b] ** 2, axis=0)) if b > a else np.zeros(n),
-        size * rests[:, :, k] if kinds else np.zeros((n, n)),
-        apart,
+        separated=expected_gain(apart, probability) if n > 1 else 0.0,
+        narrowed=0.5 * float(np.log2((before + noise) / (after + noise))),
+        before_um=1e3 * before**0.5,
+        after_um=1e3 * after**0.5,
+        kind=kinds[k] if kinds else "",
+        shows=size * np.sqrt(np.mean(signals[a:b] ** 2, axis=0)) if b > a else np.zeros(n),
+        left=size * rests[:, :, k] if kinds else np.zeros((n, n)),
+        apart=apart,
     )
 
 

@@ -72,7 +72,7 @@ class Question:
         return {**self.problem.shapes, **own}
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class PredictedLogs:
     """Predicted logs of a candidate with all channels, per kind of channel.
 
@@ -148,9 +148,13 @@ def _lay(question: Question, candidate: Candidate, whole: bool) -> PredictedLogs
         signals.append(change + block[:, :, mine] @ mean[theirs])
         reach.append(size)
     return PredictedLogs(
-        _whitened(problem, bench, np.stack(signals, axis=2)), _whitened(problem, bench, block), reach, mine, theirs,
-        _sizes(problem),
-    )  # fmt: skip
+        signals=_whitened(problem, bench, np.stack(signals, axis=2)),
+        columns=_whitened(problem, bench, block),
+        reach=reach,
+        mine=mine,
+        theirs=theirs,
+        size=_sizes(problem),
+    )
 
 
 def _root(covariance: Floats) -> Floats:
@@ -209,10 +213,17 @@ def _run(problem: Problem, candidate: Candidate, job: Job) -> Run:
     nan = np.full(n, np.nan)
     encoder = run_path.row_rho if "encoder" in candidate.channels else np.full((n, m), np.nan)
     measured = Measured(
-        time, nan, np.zeros((n, 3)), np.full((n, m), np.nan), encoder, np.zeros((n, m)), np.full((n, m), np.nan),
-        np.zeros((n, 3)), nan,
-        np.full((n, 3), np.nan),
-    )  # fmt: skip
+        time=time,
+        line=nan,
+        tip=np.zeros((n, 3)),
+        setpoint=np.full((n, m), np.nan),
+        encoder=encoder,
+        drive=np.zeros((n, m)),
+        load=np.full((n, m), np.nan),
+        dyno=np.zeros((n, 3)),
+        temperature=nan,
+        tip_sd=np.full((n, 3), np.nan),
+    )
     by = _motion(problem, candidate)
     tips = twin.to_program(run_path.row_place.of(run_path.node_tip))
     return Run("candidate", run_path, measured, None, None, by=by, turn=_across(tips) if by == "tip" else None)

@@ -14,7 +14,7 @@ WORTH = 0.1  # bits below which an experiment is not worth proposing
 PRICE = 0.5 / 60.0  # bits per minute of machine time
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Proposal:
     """An experiment, the effects that it separates, its expected information; gain: bits. rivals: names of the sets."""
 

@@ -60,7 +60,16 @@ def read_mcap(data: bytes, name: str) -> list[SampledColumns]:
         names = list(dict.fromkeys(key for row in found for key in row))
         if names:
             table = np.array([[row.get(key, np.nan) for key in names] for row in found])
-            out.append(_sampled(name, names, table, np.array(times[topic]), SI if in_si[topic] else "", notes))
+            out.append(
+                _sampled(
+                    file=name,
+                    names=names,
+                    table=table,
+                    times=np.array(times[topic]),
+                    unit=SI if in_si[topic] else "",
+                    notes=notes,
+                )
+            )
             notes = []
     if not out:
         raise ConfigError("CC452", "the file has no messages with numbers", at=Location(name, 1, 1))
@@ -72,7 +81,14 @@ def _sampled(file: str, names: list[str], table: Floats, times: Floats, unit: st
     time = times[:, 0] if np.isfinite(times[:, 0]).all() else times[:, 1]
     units = (unit,) * len(names)
     return SampledColumns(
-        file, tuple(names), units, len(table), time, partial(_column, table), partial(_at, file), tuple(notes)
+        file=file,
+        names=tuple(names),
+        units=units,
+        rows=len(table),
+        time=time,
+        read=partial(_column, table),
+        at=partial(_at, file),
+        notes=tuple(notes),
     )
 
 

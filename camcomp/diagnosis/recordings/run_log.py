@@ -38,7 +38,7 @@ class Recording:
     notes: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Wishes:
     """Options of the user for recordings.
 
@@ -168,9 +168,15 @@ def _without_dead_encoders(values: dict[str, Floats], columns: LogColumns, notes
 
 
 def _times(
-    joined: Joined, values: Mapping[str, Floats], row: Ints, lead: SampledColumns, driven: bool,
-    period_s: float | None, notes: list[str],
-) -> tuple[Floats, Ints]:  # fmt: skip
+    joined: Joined,
+    values: Mapping[str, Floats],
+    *,
+    row: Ints,
+    lead: SampledColumns,
+    driven: bool,
+    period_s: float | None,
+    notes: list[str],
+) -> tuple[Floats, Ints]:
     """Seconds since the earliest row (n,), and the rows that are kept. Raises ConfigError CC405 for decreasing times."""
     n = len(next(iter(values.values())))
     if joined.time is None:

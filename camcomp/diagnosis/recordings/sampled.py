@@ -12,7 +12,7 @@ from camcomp.ground.datatypes import Floats
 from camcomp.ground.errors import CamcompError, ConfigError, Location
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class SampledColumns:
     """Columns sampled together, n rows each.
 

@@ -60,15 +60,15 @@ def of_table(
 
     names = tuple(table.header[j] for j in kept)
     return SampledColumns(
-        table.name,
-        names,
-        tuple(units or ("",) * len(names)),
-        len(table.rows),
-        time,
-        read,
-        at,
-        tuple(notes),
-        table.headed,
+        file=table.name,
+        names=names,
+        units=tuple(units or ("",) * len(names)),
+        rows=len(table.rows),
+        time=time,
+        read=read,
+        at=at,
+        notes=tuple(notes),
+        headed=table.headed,
     )
 
 

@@ -59,7 +59,19 @@ def read_xlsx(data: bytes, name: str, names: Sequence[str] = ()) -> list[Sampled
 
     notes = [f"sheet {title}"] + ([f"dropped sheets: {some(others)}"] if others else [])
     labels = tuple(header[j] for j in kept)
-    return [SampledColumns(name, labels, ("",) * len(labels), len(lines), None, read, at, tuple(notes), headed)]
+    return [
+        SampledColumns(
+            file=name,
+            names=labels,
+            units=("",) * len(labels),
+            rows=len(lines),
+            time=None,
+            read=read,
+            at=at,
+            notes=tuple(notes),
+            headed=headed,
+        )
+    ]
 
 
 def _filled_rows(sheet: Any, name: str) -> dict[int, list[Any]]:

@@ -9,7 +9,7 @@ import numpy as np
 from camcomp.ground.datatypes import Floats, Path
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class RunView:
     """Rows (n,) of one run. before, after: measured minus modelled (n, c) um, without and with the causes found.
 

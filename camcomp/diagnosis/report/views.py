@@ -117,14 +117,14 @@ def _view(problem: Problem, bench: Bench, k: int, causes: Sequence[Cause], *, he
     path = run.run_path
     told = path.row_place.of(path.node_tip) if path.driven is None else path.driven.tip
     return RunView(
-        run.name,
-        held_out,
-        thinned(run.run_path.time[:, None], run.thin)[:, 0],
-        thinned(run.measured.line[:, None], run.thin)[:, 0],
-        thinned(bench.nominal[k].tip, run.thin),
-        MICRO * before[:, part],
-        MICRO * after[:, part],
-        ("along the path", "across the path", "normal to both")
+        name=run.name,
+        held_out=held_out,
+        time=thinned(run.run_path.time[:, None], run.thin)[:, 0],
+        line=thinned(run.measured.line[:, None], run.thin)[:, 0],
+        position=thinned(bench.nominal[k].tip, run.thin),
+        before=MICRO * before[:, part],
+        after=MICRO * after[:, part],
+        channels=("along the path", "across the path", "normal to both")
         if run.turn is not None and part.start == 0
         else tuple(each.replace("_", " ") for each in channel_names(bench.actuators)[part]),
         commanded=thinned(bench.twin.to_program(told), run.thin),

@@ -8,7 +8,7 @@ from camcomp.ground.datatypes import Bools, Floats, Ints, frozen
 from camcomp.model.cutting.engaged import EngagementArcs
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Cut:
     """n points at which the tool cuts; rapids and air moves are not among them.
 

@@ -41,7 +41,7 @@ POSE_SCALE = np.array([1.0, 1.0, 1.0, 1e3, 1e3, 1e3])  # mm per mm, mm per rad o
 HINGE_MM = 1e3  # mm per rad of a hinge, where limits in mm apply to it: an arm of 1 m
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Travel:
     """n points in the order of travel: cutting force (n, 3) N in the machine frame, time, minutes of cutting.
 
@@ -364,7 +364,7 @@ def gives_way(job: Job) -> bool:
     if not job.causes:
         return False
     home = job.real_machine.home[None]
-    nothing = Travel(np.zeros((1, 3)), np.zeros(1), np.zeros(1), np.zeros(1, np.bool_))
+    nothing = Travel(force=np.zeros((1, 3)), time=np.zeros(1), cut_min=np.zeros(1), stop=np.zeros(1, np.bool_))
     return bool(_on_flanks(job, _motion(job, home, nothing), np.full_like(home, np.finfo(float).max)).any())
 
 

@@ -157,7 +157,9 @@ class Twin(ControlKinematics):
             shift = known.shift
         load = self._node_load(run_path, grid, causes, known, key)
         if known is None or known.key != key or load is not known.load:
-            known = self.structure(run_path, self._machine(robot, key), key, shift, load, slopes)
+            known = self.structure(
+                run_path=run_path, machine=self._machine(robot, key), key=key, shift=shift, load=load, slopes=slopes
+            )
         solved = known
         force, cut = run_path.row_force, place_tip
         late_force = run_path.told and bool(signal_path.acting(causes, "control"))
@@ -250,7 +252,9 @@ class Twin(ControlKinematics):
         """
         q, uneven = len(run_path.node_tip), run_path.uneven
         if slopes is None or slopes.key == key or not len(uneven):
-            tip, drive = self._loaded(run_path, machine, slice(None), shift, load.force, load.wrench)
+            tip, drive = self._loaded(
+                run_path=run_path, machine=machine, nodes=slice(None), shift=shift, force=load.force, wrench=load.wrench
+            )
             return Solved(key=key, shift=shift, load=load, tip=tip, drive=drive)
         nodes = np.concatenate([np.arange(q), np.tile(uneven, 3)])
         wrench = load.wrench[nodes]
@@ -378,7 +382,13 @@ class Twin(ControlKinematics):
 def twin_of(job: Job) -> Twin:
     """The forward model of a config, its `effects:` included. Raises ConfigError CC205."""
     machine = job.machine
-    return Twin(machine.robot, machine.nominal, job.frame.origin, job.frame.rotation, job.causes)
+    return Twin(
+        robot=machine.robot,
+        nominal=machine.nominal,
+        origin=job.frame.origin,
+        rotation=job.frame.rotation,
+        causes=job.causes,
+    )
 
 
 def _at(run_path: RunPath, grid: Motion, at: Floats, rho: Floats | None) -> Motion:

@@ -122,7 +122,7 @@ def build_robot(given: spec.RobotSpec, tip_mm: list[float]) -> tuple[Robot, Robo
             )
         )
     tool, start = np.asarray(tip_mm, float), np.asarray(given.start_reference_mm, float)
-    robot = Robot(given.name, tuple(chains), tool, start)
+    robot = Robot(name=given.name, chains=tuple(chains), tool=tool, start_reference=start)
     nominal = perfect(robot)
     arm = arm_of(nominal)
     if arm is not None:

@@ -26,7 +26,7 @@ class Transform:
     rotation: Array = field(default_factory=lambda: np.eye(3))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Actuator:
     """Actuated joint with its drive spring: coordinate rho (commanded) plus spring deflection.
 
@@ -65,7 +65,7 @@ class Link:
     active: tuple[int, ...] = (0, 1, 2, 3, 4, 5)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Parallelogram:
     """Two equal bars between hinges: the arm swings about the hinge axis, the cross-bar keeps its orientation.
 
@@ -103,7 +103,7 @@ class Chain:
     end_error: Array = field(default_factory=lambda: np.zeros(6))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Robot:
     """A machine: chains, the tool (3,) mm from the platform reference to the tip, and the start pose (3,) mm, (3, 3).
 

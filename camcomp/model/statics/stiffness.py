@@ -33,7 +33,7 @@ class Stiffness:
     by_rho: Array
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class TipSensitivity:
     """Derivatives at n loaded points with the actuators given: of the tip (mm) and of the drive forces (N or N mm).
 
@@ -89,8 +89,11 @@ def tip_sensitivity(machine: Machine, state: State) -> TipSensitivity:
     """First derivatives of tip and drive forces at points solved with keep=True, exact at the loaded point."""
     m = state.rho.shape[1]
     tip, drive = _gradients(machine, state)[3:]
-    parts = [(a[..., :m], a[..., m : m + 3], a[..., m + 3 :]) for a in (tip, drive)]
-    return TipSensitivity(*parts[0], *parts[1])
+    rho, force, wrench = slice(None, m), slice(m, m + 3), slice(m + 3, None)
+    return TipSensitivity(
+        by_rho=tip[..., rho], by_force=tip[..., force], by_wrench=tip[..., wrench],
+        drive_by_rho=drive[..., rho], drive_by_force=drive[..., force], drive_by_wrench=drive[..., wrench],
+    )  # fmt: skip
 
 
 def tip_compliance(machine: Machine, state: State) -> Array:

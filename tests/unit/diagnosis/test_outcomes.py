@@ -12,8 +12,17 @@ from camcomp.diagnosis.next_experiment.proposal import Proposal
 
 def outcomes(names, apart, left, *, knows=()):
     r = len(names)
-    told = ExpectedGain(0.5, 0.1, 2.6, 1.2, "tip", np.full(r, 0.034), np.array(left), np.array(apart))
-    proposal = Proposal(SimpleNamespace(knows=knows, minutes=3.0), 0.6, (), told=told)
+    told = ExpectedGain(
+        separated=0.5,
+        narrowed=0.1,
+        before_um=2.6,
+        after_um=1.2,
+        kind="tip",
+        shows=np.full(r, 0.034),
+        left=np.array(left),
+        apart=np.array(apart),
+    )
+    proposal = Proposal(candidate=SimpleNamespace(knows=knows, minutes=3.0), gain=0.6, separates=(), told=told)
     return with_outcomes(proposal, names).outcomes
 
 

@@ -92,7 +92,7 @@ def test_the_response_has_it_and_the_correction_takes_it_out(tmp_path):
     job = job_with(tmp_path, "effect: formula, stage: structure, axis: x, formula: 2e-3*y_mm + 0.01*sin(x_mm/5)")
     target = np.array([[0.0, 0.0, 0.0], [5.0, 10.0, 0.0], [9.0, 25.0, 0.0]])
     n = len(target)
-    travel = Travel(np.zeros((n, 3)), np.arange(n) * 1.0, np.zeros(n), np.ones(n, bool))
+    travel = Travel(force=np.zeros((n, 3)), time=np.arange(n) * 1.0, cut_min=np.zeros(n), stop=np.ones(n, bool))
     plain, _ = respond(job, target, travel)
     assert (plain - target)[:, 0] == pytest.approx(2e-3 * target[:, 1] + 0.01 * np.sin(target[:, 0] / 5), abs=1e-9)
     told = aim_at(job, target, travel, "newton").commanded
@@ -102,8 +102,8 @@ def test_the_response_has_it_and_the_correction_takes_it_out(tmp_path):
 def test_the_place_is_where_the_set_points_lead_the_tip_and_not_where_the_load_bends_it(tmp_path):
     plain = Job(load_config([str(CONFIG / "orthoglide.yaml")]))
     job = job_with(tmp_path, "effect: formula, stage: structure, axis: x, formula: 0.1*y_mm", machine="orthoglide")
-    told, at = np.array([[5.0, 10.0, 0.0]]), (np.zeros(1), np.zeros(1), np.ones(1, bool))
-    travel = Travel(np.array([[150.0, 180.0, 60.0]]), *at)
+    told, at = np.array([[5.0, 10.0, 0.0]]), {"time": np.zeros(1), "cut_min": np.zeros(1), "stop": np.ones(1, bool)}
+    travel = Travel(force=np.array([[150.0, 180.0, 60.0]]), **at)
     loaded, found = respond(plain, told, travel)[0], respond(job, told, travel)[0]
     assert abs(loaded - told)[0, 1] > 0.05
     assert found - loaded == pytest.approx(np.array([[1.0, 0.0, 0.0]]), abs=1e-9)
@@ -129,7 +129,9 @@ def test_a_drive_that_gives_way_evenly_with_its_load_is_a_softer_one(tmp_path, m
         tmp_path, f"effect: formula, stage: drive, target: {target}, formula: -{load}/{4 * spring}", machine=machine
     )
     soft = job_with(tmp_path, f"effect: drive_stiffness, target: {target}, factor: 0.8", machine=machine)
-    travel = Travel(np.array([[150.0, -180.0, 60.0]]), np.zeros(1), np.zeros(1), np.ones(1, bool))
+    travel = Travel(
+        force=np.array([[150.0, -180.0, 60.0]]), time=np.zeros(1), cut_min=np.zeros(1), stop=np.ones(1, bool)
+    )
     tips = [respond(job, np.array([at]), travel)[0][0] for job in (plain, law, soft)]
     assert np.linalg.norm(tips[2] - tips[0]) > 1e-3
     assert tips[1] - tips[0] == pytest.approx(tips[2] - tips[0], abs=0.02 * np.linalg.norm(tips[2] - tips[0]))

@@ -1,3 +1,4 @@
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,17 @@ TURNED = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 def cut() -> Cut:
     n = len(TANGENT)
     nothing = np.full(n, np.nan)
-    return Cut(TANGENT, [0, 0, 1], nothing, nothing, nothing, nothing, np.arange(n), np.arange(n), to_machine=TURNED)
+    return Cut(
+        tangent=TANGENT,
+        tool_axis=[0, 0, 1],
+        feed=nothing,
+        speed=nothing,
+        depth=nothing,
+        width=nothing,
+        arc_length=np.arange(n),
+        line=np.arange(n),
+        to_machine=TURNED,
+    )
 
 
 def test_machine_forces_come_back_as_the_same_vectors_plunges_included(tmp_path: Path) -> None:
@@ -55,5 +66,5 @@ def test_bytes_that_are_no_text_are_refused_in_their_cell(tmp_path: Path) -> Non
 def test_before_a_jump_the_end_of_a_motion_takes_the_row_before_it(tmp_path: Path) -> None:
     file = tmp_path / "forces.csv"
     file.write_text("s_mm,Fr_N,Ft_N,Fz_N\n0,0,0,0\n1,0,0,0\n1,9,0,0\n5,9,0,0\n")
-    at = Cut(TANGENT, [0, 0, 1], *[np.full(3, np.nan)] * 4, [0, 1, 1], [7, 7, 8], ends=[False, True, False])
+    at = replace(cut(), arc_length=[0, 1, 1], line=[7, 7, 8], ends=[False, True, False])
     np.testing.assert_array_equal(force(at, Params(file=str(file)))[:, 0], [0, 0, 9])

@@ -148,14 +148,25 @@ def random_designs(desk: Desk, count: int, seed: int) -> list[MotionDesign]:
         if rng.uniform() < 0.25:
             centre, radius = site.cut.centre, site.cut.radius * rng.uniform(0.2, 1.0)
             design = MotionDesign(
-                tuple(centre), radius, site.cut.feed * rng.uniform(0.5, 1.5), turns=turns, cutting=True
+                centre=tuple(centre),
+                radius=radius,
+                feed=site.cut.feed * rng.uniform(0.5, 1.5),
+                turns=turns,
+                cutting=True,
             )
         else:
             centre = site.work.centre + site.farther * rng.uniform(-1.0, 1.0, 3)
             way = rng.normal(size=3)
             line = tuple(way / np.linalg.norm(way)) if rng.uniform() < 0.25 else None
             plane = ("XY", "XZ", "YZ")[rng.integers(3)]
-            design = MotionDesign(tuple(centre), 3.0 * (site.farther / 3.0) ** rng.uniform(), feed, plane, turns, line)
+            design = MotionDesign(
+                centre=tuple(centre),
+                radius=3.0 * (site.farther / 3.0) ** rng.uniform(),
+                feed=feed,
+                plane=plane,
+                turns=turns,
+                along=line,
+            )
         if allowed(desk, design):
             out.append(design.tidy())
     return out
@@ -170,14 +181,20 @@ def every_design(desk: Desk, steps: int) -> list[MotionDesign]:
     radii = site.farther * np.array([0.2, 0.45, 0.7, 0.9] if steps > 3 else [0.3, 0.8])
     for x, y, z, radius, plane, feed in product(at, at, up, radii, ("XY", "XZ", "YZ"), feeds):
         centre = site.work.centre + [x, y, z + (0.0 if plane == "XY" else radius)]
-        out.append(MotionDesign(tuple(centre), float(radius), float(feed), plane))
+        out.append(MotionDesign(centre=tuple(centre), radius=float(radius), feed=float(feed), plane=plane))
     for way in ((1, 0, 0), (0, 1, 0), (1, 1, 0), (1, -1, 0)):
         unit = np.array(way) / np.linalg.norm(way)
         out += [
-            MotionDesign(tuple(site.work.centre), float(r), float(f), along=tuple(unit)) for r in radii for f in feeds
+            MotionDesign(centre=tuple(site.work.centre), radius=float(r), feed=float(f), along=tuple(unit))
+            for r in radii
+            for f in feeds
         ]
     for share, feed in product((0.3, 0.6, 1.0), (0.5, 1.0, 1.5)):
-        out.append(MotionDesign(tuple(site.cut.centre), share * site.cut.radius, feed * site.cut.feed, cutting=True))
+        out.append(
+            MotionDesign(
+                centre=tuple(site.cut.centre), radius=share * site.cut.radius, feed=feed * site.cut.feed, cutting=True
+            )
+        )
     return [each.tidy() for each in out if allowed(desk, each)]
 
 

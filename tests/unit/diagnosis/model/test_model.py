@@ -38,7 +38,7 @@ def model(rng, amounts=(), more=None, groups=2, n=60, sd=SD, memory=None, seen=S
         )  # fmt: skip
     free = SimpleNamespace(low=-10.0, high=10.0, scale=1.0, log=False, sign=0, coordinate=lambda v: v)
     candidates = tuple(PlacedCause("wave", str(k), (k,)) for k in range(6))
-    return LinearModel(tuple(out), candidates, AmplitudeBounds.of([free] * 6, [False] * 6))
+    return LinearModel(groups=tuple(out), candidates=candidates, bounds=AmplitudeBounds.of([free] * 6, [False] * 6))
 
 
 def test_small_errors_are_as_large_as_the_noise_that_acts_lets_them_be():
@@ -122,7 +122,7 @@ def test_the_same_column_twice_is_one_class():
         Group(name=g.name, label=g.label, y=g.y, A=np.repeat(g.A[:, :, :1], 6, axis=2), N=g.N, sd=g.sd)
         for g in m.groups
     ]  # fmt: skip
-    found = explain(LinearModel(tuple(twins), m.candidates, m.bounds), KnownNoise())
+    found = explain(LinearModel(groups=tuple(twins), candidates=m.candidates, bounds=m.bounds), KnownNoise())
     assert len(found.members) == 1
     assert len(alternatives_of(found, [c.place for c in m.candidates])) == 4
 
@@ -182,7 +182,7 @@ def test_a_family_keeps_to_the_bounds_of_columns_that_nuisances_hide():
     hidden = [replace(g, A=np.concatenate([1.0 + 0.01 * g.A[:, :, :1], g.A[:, :, 1:]], axis=2)) for g in m.groups]
     ends = SimpleNamespace(low=-0.1, high=0.1, scale=1.0, log=False, sign=0, coordinate=lambda v: v)
     bounds = AmplitudeBounds.of([ends] * 6, [False] * 6)
-    bounded = LinearModel(tuple(hidden), (), bounds, families={"wave": tuple(range(6))})
+    bounded = LinearModel(groups=tuple(hidden), candidates=(), bounds=bounds, families={"wave": tuple(range(6))})
     found = explain(bounded, KnownNoise())
     assert found.background.families
     amount, covariance = found.amplitudes()

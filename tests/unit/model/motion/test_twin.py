@@ -39,7 +39,7 @@ def a_run(job):
 
 
 def changed(twin, robot, causes=()):
-    return Twin(robot, twin.nominal, twin.origin, twin.rotation, causes)
+    return Twin(robot=robot, nominal=twin.nominal, origin=twin.origin, rotation=twin.rotation, causes=causes)
 
 
 def softer(robot):
