@@ -93,7 +93,7 @@ def diagnose(
 ) -> Diagnosis:
     """The diagnosis of an experiment; `without` names effects that the library is to do without, learned are laws found before."""
     used = [run for run in runs if run.name not in holdout] or list(runs)
-    bench = Bench(twin, used)
+    bench = Bench(twin=twin, runs=used)
     laws = [each.candidate(twin.actuators) for each in learned if each.name not in without]
     found_before = [each for each in laws if each is not None]
     offered = [*candidate_causes(twin.robot, without), *found_before]
@@ -361,7 +361,7 @@ def _shrinkage(
     sets that were found, too, where the problem is still theirs.
     """
     if holdout:
-        seen = Bench(twin, [run for run in runs if run.name in holdout])
+        seen = Bench(twin=twin, runs=[run for run in runs if run.name in holdout])
         causes = problem.causes(best.members, best.theta, best.extra)
         chosen = [dict(zip(best.members, causes, strict=True))] * len(seen.runs)
     else:

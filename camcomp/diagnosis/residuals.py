@@ -38,7 +38,7 @@ def of_runs(done: Diagnosis, twin: Twin, runs: Sequence[Run]) -> Columns:
     seen = {run.name: (problem.bench, k) for k, run in enumerate(problem.bench.runs)}
     unseen = [run for run in runs if run.name not in seen]
     if unseen:
-        bench = Bench(twin, unseen)
+        bench = Bench(twin=twin, runs=unseen)
         seen |= {run.name: (bench, k) for k, run in enumerate(unseen)}
     parts = list[Columns]()
     for run in runs:

@@ -19,7 +19,7 @@ _OTHER = [k for k in range(len(LETTERS)) if k not in _PLAIN]
 _NO_MODE = np.zeros(0, np.uint8)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class WrittenRun:
     """Text in the place of some lines, and the state of the controller behind them; r rows."""
 

@@ -96,7 +96,7 @@ class RobotReader:
                             hint="go to the start of the cut with a rapid to a Cartesian pose")  # fmt: skip
             if not self.moves.kind and (kind == ARC):
                 self.refuse("CC112", "an arc without a known start", at)
-        self._add(kind, site, values, middle, sweep_deg, -1)
+        self._add(kind=kind, site=site, values=values, middle=middle, sweep=sweep_deg, joints=-1)
 
     def unknown_move(self, why: str) -> None:
         """A rapid that is passed on, to a place that is not known: cuts from there are refused, with why, if it says something."""
@@ -111,7 +111,14 @@ class RobotReader:
             return
         self._unfollowed = ""
         self._joint_poses.append(pose)
-        self._add(RAPID, site, [0.0] * len(self.language.components), None, None, len(self._joint_poses) - 1)
+        self._add(
+            kind=RAPID,
+            site=site,
+            values=[0.0] * len(self.language.components),
+            middle=None,
+            sweep=None,
+            joints=len(self._joint_poses) - 1,
+        )
 
     def _add(self, kind: int, site: MoveSite, values: Sequence[float], middle: Sequence[float] | None,
              sweep: float | None, joints: int) -> None:  # fmt: skip
@@ -142,7 +149,7 @@ class RobotReader:
         start[alone], before[alone] = end[alone], words[alone]
         kind = np.array(m.kind, np.int8)
         centre, axis, angle = self._arcs(kind, start, end)
-        self._check_turns(kind, start, end, before, words, angle)
+        self._check_turns(kind=kind, start=start, end=end, before=before, words=words, angle=angle)
         rows = np.array([each.row for each in m.site], np.int64)
         path = Path(
             line=rows + 1, kind=kind, start=start, end=end, centre=centre, axis=axis, angle=angle, feed=np.array(m.feed),

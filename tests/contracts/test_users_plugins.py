@@ -469,7 +469,7 @@ def test_an_effect_that_fails_on_the_runs_is_no_candidate_and_breaks_no_diagnosi
     ours = [CandidateCause("backlash", "x", shelf.load("effects", "backlash"))]
     theirs = [CandidateCause(each, None, shelf.load("effects", each)) for each in (bad, good)]
     with pytest.warns(PluginWarning, match=f"entry point {bad} = .*ValueError: odd") as told:
-        left = working_causes(Bench(opened.twin, opened.runs), ours + theirs)
+        left = working_causes(Bench(twin=opened.twin, runs=opened.runs), ours + theirs)
     assert [each.name for each in left] == ["backlash", good] and len(told) == 1
 
 

@@ -159,7 +159,7 @@ def test_where_the_control_goes_off_is_told_with_its_lines(orthoglide):
 def test_long_programs_take_the_same_time_and_go_as_far_off(orthoglide, mode, monkeypatch):
     monkeypatch.setattr(control_account, "STRETCH", 100)
     text = "\n".join([HEAD + mode, "S8000 M3", *raster(3000, 2000), "M2", ""]).encode()
-    bulk = LongProgram(orthoglide, "p.nc", setup_of(orthoglide.config), 1.0, "1")
+    bulk = LongProgram(job=orthoglide, name="p.nc", setup=setup_of(orthoglide.config), tolerance_um=1.0, version="1")
     mine = bulk.run(io.BytesIO(text), len).summary()
     program = program_of(text, "p.nc", orthoglide.config)
     whole = compensate(program, orthoglide, method="newton", tolerance_um=1.0, version="1")
@@ -231,7 +231,10 @@ def test_long_programs_wait_as_long(monkeypatch, orthoglide):
     text = "\n".join([HEAD + "T1 M6 G4 P2", "S8000 M3", *raster(3000, 300), "G4 P0.5", "M2", ""]).encode()
     job = job_of(tool_change_s=8.0)
     with_waits, without = (
-        LongProgram(each, "p.nc", setup_of(each.config), 1.0, "1").run(io.BytesIO(what), len).summary().cycle_time_s
+        LongProgram(job=each, name="p.nc", setup=setup_of(each.config), tolerance_um=1.0, version="1")
+        .run(io.BytesIO(what), len)
+        .summary()
+        .cycle_time_s
         for each, what in (
             (job, text),
             (job, text.replace(b"G4 P2", b"").replace(b"G4 P0.5", b"").replace(b"T1 M6", b"")),
@@ -276,6 +279,8 @@ def test_long_programs_keep_lines_apart_where_they_begin_to_merge(orthoglide):
     lines = ["G0 X0 Y10 Z5", "G1 Z0 F400", *cuts[:200], "G64 P0.01", *cuts[200:], "G1 Z5"]
     text = "\n".join([HEAD + "G61", "S8000 M3", *lines, "M2", ""]).encode()
     out = []
-    LongProgram(orthoglide, "p.nc", setup_of(orthoglide.config), 1.0, "1").run(io.BytesIO(text), out.append)
+    LongProgram(job=orthoglide, name="p.nc", setup=setup_of(orthoglide.config), tolerance_um=1.0, version="1").run(
+        io.BytesIO(text), out.append
+    )
     said = [each for each in b"".join(out).decode().splitlines() if each.startswith("G6")]
     assert said[:3] == ["G61", "G64 P0.01", "G64 P0.01 Q0"]

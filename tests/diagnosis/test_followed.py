@@ -44,7 +44,7 @@ def test_model_and_plant_are_at_the_same_place(name, path, cutting, tmp_path):
     t = row_times(run, Plan(0, rows=150), True, np.random.default_rng(1))
     state = observe(machine, run, Faults(), Character(ripple=0.0), t)
     opened = logged(tmp_path, machine, run, state)
-    bench = Bench(opened.twin, opened.runs)
+    bench = Bench(twin=opened.twin, runs=opened.runs)
     off = 1e3 * np.linalg.norm(bench.nominal[0].tip - state.tip, axis=1)
     sure = state.steady & ~opened.runs[0].run_path.jumping
     assert sure.mean() > 0.6
@@ -65,7 +65,7 @@ def test_where_a_guide_holds_its_carriage_when_a_log_begins_is_not_known(tmp_pat
     machine, run = MACHINES["router"], Run(recording.load("zigzag-10um"), True, 100.0)
     t = row_times(run, Plan(0, rows=150), False, np.random.default_rng(1))
     opened = logged(tmp_path, machine, run, observe(machine, run, Faults(), Character(), t))
-    columns = build(Bench(opened.twin, opened.runs), [], {}, 3.0, 1.0)
+    columns = build(Bench(twin=opened.twin, runs=opened.runs), [], {}, 3.0, 1.0)
     within = dict(zip(columns.names, columns.prior.tolerance, strict=True))
     assert within["start.one.x"] > 0.05
     assert within["held.one.x"] > 150.0

@@ -75,7 +75,7 @@ def test_a_drive_that_another_drives_load_moves_is_told_so_and_its_spring_not_bl
 ):
     truth, files = driven(tmp_path, machine, Fault("crosstalk", target, {"size": size, "place_mm": 0.0}))
     causes = [CandidateCause("drive_stiffness", at, shelf.load("effects", "drive_stiffness")) for at in truth.actuators]
-    problem = open_problem(Bench(files.twin, files.runs), causes, 0.003)
+    problem = open_problem(Bench(twin=files.twin, runs=files.runs), causes, 0.003)
     answer = answer_law(problem, standing(problem, (truth.actuators.index(target),)), "tip")
     assert answer.fit.members == ()  # the law tells it better than the spring
     (found,) = answer.law.terms
@@ -88,7 +88,7 @@ def test_a_drive_that_another_drives_load_moves_is_told_so_and_its_spring_not_bl
 def test_a_swing_in_time_is_told_by_how_many_turns_it_does_between_runs(tmp_path):
     swing = {"size": 1.0, "place_mm": 0.0, "period_mm": 20.0, "phase": 0.4, "period_s": 27.1}
     _, files = driven(tmp_path, "router", Fault("breathing", "x", swing))
-    problem = open_problem(Bench(files.twin, files.runs), [], 0.003)
+    problem = open_problem(Bench(twin=files.twin, runs=files.runs), [], 0.003)
     bench, spot = term_bench(problem), Spot("structure", 0)
     step = _base(problem, None, bench, "tip")(usual_split(len(files.runs)), False)
     waves = [f for f in at_tip(bench.sizes(spot)) if (f.family, f.about) == ("wave", ("common_s",))]
@@ -107,7 +107,7 @@ def test_a_cause_that_followed_a_law_goes_once_it_is_known_and_another_stays(tmp
         CandidateCause(name, at, shelf.load("effects", name))
         for name, at in [("thermal_growth", "x"), ("screw_pitch", "y")]
     ]
-    problem = open_problem(Bench(files.twin, files.runs), causes, 0.003)
+    problem = open_problem(Bench(twin=files.twin, runs=files.runs), causes, 0.003)
     assert standing(problem, (0, 1)).members == (0, 1)
     bench, spot = term_bench(problem), Spot("structure", 0)
     forms = [f for f in at_tip(bench.sizes(spot)) if f.family == "settling" and "force_N" in f.about]
@@ -124,7 +124,7 @@ def test_what_no_form_expresses_is_better_on_an_unseen_run_than_nothing(tmp_path
     _, files = opened(tmp_path, "tangle", "x", "router", 910022, 10.0, 130)
     unseen = files.runs[2]
     law = diagnose(files.job, files.twin, files.runs, holdout=[unseen.name], stated_mm=0.003).result.law
-    bench = Bench(files.twin, [unseen])
+    bench = Bench(twin=files.twin, runs=[unseen])
     before = rms(bench.gap(0))
     assert before > 30.0
     learned = LearnedLaw("found", "router", law)

@@ -15,7 +15,7 @@ def test_jitter_is_measured(workshop, unsteady):
     plan = plan_of(design="six", samples=250)
     plan = replace(plan, noise=replace(plan.noise, jitter_s=unsteady))
     campaign = open_experiment(workshop.made(plan)[0])
-    assert jitter(Bench(campaign.twin, campaign.runs)) == pytest.approx(unsteady, rel=0.35)
+    assert jitter(Bench(twin=campaign.twin, runs=campaign.runs)) == pytest.approx(unsteady, rel=0.35)
 
 
 @pytest.mark.campaign

@@ -17,7 +17,7 @@ def test_a_clock_that_is_off_by_nothing_changes_nothing_beside_a_lag(tmp_path):
     opened(tmp_path / "e", 0.0, without=("act_",))
     found = open_experiment(tmp_path / "e" / "experiment.yaml")
     assert found.runs[0].run_path.told
-    bench = Bench(found.twin, found.runs)
+    bench = Bench(twin=found.twin, runs=found.runs)
     lag = cause("servo_lag", time_constant_ms=5.0)
     alone = bench.read(0, [lag])
     both = bench.read(0, [lag, cause("time_sync", offset_s=1e-9)])

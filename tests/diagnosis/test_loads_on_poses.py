@@ -35,7 +35,7 @@ def campaign(name, seed, off, grown=lambda off, warm: off, torques=False):
     stands = [arm.stand(q[[k]], grown(off.copy(), warm[k])) for k in range(len(q))]
     tip = np.concatenate([s.point + s.turn @ [20.0, 40.0, -90.0] for s in stands]) + SD * rng.standard_normal((60, 3))
     torque = -np.concatenate([s.load for s in stands]) if torques else None
-    return Poses(name, q, tip, time, 20.0 + warm, np.full(60, name), torque=torque)
+    return Poses(label=name, q=q, tip=tip, time=time, temperature=20.0 + warm, run=np.full(60, name), torque=torque)
 
 
 def test_measured_torques_find_a_soft_joint_of_an_arm_without_masses(tmp_path):

@@ -30,7 +30,7 @@ def opened():
 
 @pytest.fixture(scope="module")
 def bench(opened):
-    return Bench(opened.twin, opened.runs[:2])
+    return Bench(twin=opened.twin, runs=opened.runs[:2])
 
 
 @pytest.fixture(scope="module")

@@ -29,7 +29,7 @@ TOGETHER = {
 @pytest.fixture(scope="module")
 def bench(workshop):
     campaign = open_experiment(workshop.made(PLAN)[0])
-    return Bench(campaign.twin, campaign.runs[:1])
+    return Bench(twin=campaign.twin, runs=campaign.runs[:1])
 
 
 @pytest.mark.parametrize("name", TOGETHER)

@@ -63,7 +63,7 @@ def missing(folder, moves):
     )
     (folder / "experiment.yaml").write_text(text)
     opened = open_experiment(folder / "experiment.yaml")
-    return float(np.isnan(Bench(opened.twin, opened.runs).observed(0)[:, 0]).mean())
+    return float(np.isnan(Bench(twin=opened.twin, runs=opened.runs).observed(0)[:, 0]).mean())
 
 
 def test_rows_beside_corners_do_not_count_unless_there_are_hardly_others(tmp_path):

@@ -38,7 +38,7 @@ def problem(tmp_path_factory):
     causes = [
         CandidateCause(name, "y", shelf.load("effects", name)) for name in ("drive_stiffness", "backlash", "friction")
     ]
-    return open_problem(Bench(files.twin, files.runs), causes, 0.003)
+    return open_problem(Bench(twin=files.twin, runs=files.runs), causes, 0.003)
 
 
 def test_a_small_force_moves_a_soft_drive_as_much_farther_as_it_is_softer(problem):

@@ -62,7 +62,7 @@ def stood(tmp_path):
 def test_its_drives_say_nothing_of_its_force(stood):
     path, first = stood
     opened = open_experiment(path)
-    bench = Bench(opened.twin, opened.runs)
+    bench = Bench(twin=opened.twin, runs=opened.runs)
     drives = slice(6, 9)
     there = bench.observed(0)[first + 1 : first + ROWS - 1, drives]
     assert np.isnan(there).all()

@@ -32,7 +32,7 @@ def problem(tmp_path):
         for name in ("drive_stiffness", "screw_pitch")
         for axis in "xyz"
     ]
-    return open_problem(Bench(files.twin, files.runs), causes, 0.003)
+    return open_problem(Bench(twin=files.twin, runs=files.runs), causes, 0.003)
 
 
 def test_every_effect_is_begun_with_at_all_of_its_targets_and_what_is_left_is_fitted(problem, monkeypatch):

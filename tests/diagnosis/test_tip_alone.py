@@ -55,7 +55,7 @@ def with_breaks(rows):
 @pytest.mark.parametrize("change", [lambda rows: rows, without_line, lambda rows: with_breaks(without_line(rows))])
 def test_a_machine_that_bends_by_more_than_half_a_millimetre_leaves_the_noise(tmp_path, change):
     found = opened(tmp_path, change, away=(30.0, -20.0, 14.0))
-    bench = Bench(found.twin, found.runs)
+    bench = Bench(twin=found.twin, runs=found.runs)
     gaps = np.concatenate([bench.gap(k)[:, :3] for k in range(len(bench.runs))])
     size = 1e3 * np.linalg.norm(gaps[np.isfinite(gaps).all(axis=1)], axis=1)
     assert len(size) > 0.6 * len(gaps)
@@ -65,7 +65,7 @@ def test_a_machine_that_bends_by_more_than_half_a_millimetre_leaves_the_noise(tm
 
 def test_no_clock_is_seen_and_no_lag_that_all_drives_share(tmp_path):
     found = opened(tmp_path)
-    bench = Bench(found.twin, found.runs)
+    bench = Bench(twin=found.twin, runs=found.runs)
     causes = {(each.name, each.target): each for each in candidate_causes(found.twin.robot)}
 
     def moves(name, target):

@@ -9,46 +9,30 @@ import camcomp
 
 PACKAGE = Path(camcomp.__file__).parent
 MOST_LINES, MOST_PARAMETERS, MOST_ARGUMENTS, MOST_FIELDS = 60, 6, 5, 5
-COMPILERS = {"allocating", "entry", "inner", "kept", "njit", "jit"}  # numba passes arguments of kernels by position
+COMPILERS = {"allocating", "entry", "fast", "inner", "kept", "njit", "jit"}  # numba passes arguments of kernels by position
 BUILT_IN = {"print", "max", "min", "zip"}
 # Rows of the tables of plug-ins, users' ones included; functions of any number of names of one kind.
-BY_POSITION = {"Parameter", "at", "exactly_one"}
+BY_POSITION = {"Parameter", "at", "exactly_one", "table"}
+BEFORE_KERNELS = {"look_up", "scan", "write_rows"}  # pass the arrays of a kernel on, in its order
 # Compiled kernels over 60 lines: numba compiles a split kernel in more time.
 LONG_KERNELS = {
     "corners", "cut_legs", "lay_engaged", "machine_step", "rounded", "scan_lines", "solve_one", "write_lines",
 }  # fmt: skip
 # Places that are still open, by folder: long functions, functions with many parameters, calls with many positional
-# arguments, dataclasses with more than five fields that are not keyword-only. A number may only be lowered; those of
-# compensation and diagnosis are rounded up to a multiple of five.
+# arguments, dataclasses with more than five fields that are not keyword-only. A number may only be lowered.
 OPEN = {
     "api": 1,
-    "compensation": 4,
-    "compensation/bands": 5,
-    "compensation/batch": 12,
-    "compensation/long": 55,
-    "compensation/program": 65,
-    "compensation/report": 5,
-    "compensation/set_points": 5,
-    "diagnosis": 15,
-    "diagnosis/answer": 5,
-    "diagnosis/arm": 15,
-    "diagnosis/axis": 43,
-    "diagnosis/experiment": 25,
-    "diagnosis/fit": 20,
-    "diagnosis/history": 10,
-    "diagnosis/law": 25,
-    "diagnosis/model": 10,
-    "diagnosis/next_experiment": 10,
-    "diagnosis/recordings": 10,
-    "diagnosis/report": 5,
-    "diagnosis/search": 15,
-    "diagnosis/statistics": 10,
-    "gcode": 11,
-    "model": 1,
-    "model/config": 2,
-    "model/cutting": 2,
-    "model/motion": 8,
-    "model/statics": 5,
+    "compensation/long": 1,
+    "compensation/program": 3,
+    "compensation/report": 1,
+    "diagnosis/axis": 3,
+    "diagnosis/experiment": 2,
+    "diagnosis/fit": 2,
+    "diagnosis/law": 1,
+    "diagnosis/report": 1,
+    "model/cutting": 1,
+    "model/motion": 1,
+    "model/statics": 1,
     "terminal/commands": 1,
 }
 
@@ -120,13 +104,18 @@ def _found():
             if isinstance(node, ast.FunctionDef):
                 is_verb = node.name == "command" or any(_name(each) == "option" for each in node.decorator_list)
                 found[folder] += _lines(node) > MOST_LINES and node.name not in LONG_KERNELS
-                found[folder] += _parameters(node) > MOST_PARAMETERS and not is_verb and node not in compiled
+                found[folder] += (
+                    _parameters(node) > MOST_PARAMETERS
+                    and not is_verb
+                    and node not in compiled
+                    and node.name not in BEFORE_KERNELS
+                )
             elif isinstance(node, ast.ClassDef):
                 found[folder] += _is_open_dataclass(node)
             elif len(node.args) > MOST_ARGUMENTS:
                 callee = _name(node)
                 method = isinstance(node.func, ast.Attribute) and callee in ("join", "einsum", "format")
-                found[folder] += not method and callee not in names | BUILT_IN | BY_POSITION
+                found[folder] += not method and callee not in names | BUILT_IN | BY_POSITION | BEFORE_KERNELS
     return {key: count for key, count in found.items() if count}
 
 
@@ -136,7 +125,7 @@ def test_open_places_only_become_fewer():
 
 
 def test_the_number_of_open_places_is_stated():
-    assert sum(OPEN.values()) == 400
+    assert sum(OPEN.values()) == 19
 
 
 def test_exempt_kernels_exist_and_are_long():

@@ -310,7 +310,11 @@ def bench():
     tip = job.frame.to_machine(TIPS)
     q = solve(job.machine, FREE, tip, check=False).rho_nominal
     n = len(q)
-    out = ArmBench(job.machine.robot, (), [Poses("law", q, tip, np.arange(n) * 1.0, None, np.zeros(n, int))])
+    out = ArmBench(
+        robot=job.machine.robot,
+        causes=(),
+        campaigns=[Poses(label="law", q=q, tip=tip, time=np.arange(n) * 1.0, temperature=None, run=np.zeros(n, int))],
+    )
     return out, replace(out.start[0], rotation=np.eye(3), origin=np.zeros(3), tool=np.asarray(job.machine.robot.tool))
 
 

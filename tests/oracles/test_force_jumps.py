@@ -180,7 +180,9 @@ def test_every_way_sees_the_same_force(tmp_path, monkeypatch, model, arcs):
     assert 1e3 * np.linalg.norm(run.reading.tip - tip, axis=1)[inside].max() < AGREED_UM
 
     batches: list = []
-    bulk = LongProgram(job, "p.nc", setup_of(job.config), AGREED_UM, "0", on_rows=batches.append)
+    bulk = LongProgram(
+        job=job, name="p.nc", setup=setup_of(job.config), tolerance_um=AGREED_UM, version="0", on_rows=batches.append
+    )
     if model == "table":
         with pytest.raises(NotInPieces):
             bulk.run(io.BytesIO(truth.text.encode()), len)

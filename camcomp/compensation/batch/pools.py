@@ -104,7 +104,9 @@ def _on_workers(tasks: Iterable[Task], jobs: int) -> Iterator[Outcome]:
 def died(key: str) -> Outcome:
     """Outcome of a task that brought its workers down."""
     text = "the worker process died, perhaps for lack of memory"
-    return Outcome(key, BUG, [{"rule": None, "message": text, "text": f"internal error: {text}"}])
+    return Outcome(
+        key=key, exit_code=BUG, messages=[{"rule": None, "message": text, "text": f"internal error: {text}"}]
+    )
 
 
 def on_a_cluster(tasks: Iterable[Task], address: str, tell: Callable[[str], None] = print) -> Iterator[Outcome]:
@@ -180,7 +182,9 @@ class _Cluster:
         except Exception as error:  # noqa: BLE001 - the cluster's, not the task's: `work` never raises
             self._workers()
             text = f"the cluster did not do it: {type(error).__name__}: {error}"
-            return Outcome(key, FileError.exit_code, [{"rule": "CC503", "message": text, "text": text}])
+            return Outcome(
+                key=key, exit_code=FileError.exit_code, messages=[{"rule": "CC503", "message": text, "text": text}]
+            )
         if outcome.version != __version__:
             self._refuse("a worker", outcome.version)
         return outcome

@@ -33,7 +33,7 @@ class FoundProgram:
     relative: Path
 
 
-@dataclass
+@dataclass(kw_only=True)
 class Status:
     """What became of one program."""
 
@@ -83,7 +83,7 @@ def _first_magic(path: Path) -> int:
     return next(i for i, part in enumerate(path.parts) if glob.has_magic(part))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Plan:
     """What is the same for every program of a batch."""
 
@@ -160,16 +160,16 @@ def run_batch(
                 continue
             pending[key] = each
             yield Task(
-                str(each.source),
-                key,
-                data,
-                plan.config,
-                config_key,
-                plan.method,
-                plan.tolerance_um,
-                plan.joints,
-                plan.stock,
-                plan.passes,
+                name=str(each.source),
+                key=key,
+                data=data,
+                config=plan.config,
+                config_key=config_key,
+                method=plan.method,
+                tolerance_um=plan.tolerance_um,
+                joints=plan.joints,
+                stock=plan.stock,
+                passes=plan.passes,
             )
 
     try:
@@ -208,12 +208,12 @@ def _known(plan: Plan, found: FoundProgram, key: str) -> Status | None:
     except (OSError, ValueError, KeyError, TypeError):
         return None
     return Status(
-        str(found.source),
-        str(plan.output / found.relative),
-        SKIPPED,
-        note["exit_code"],
-        note["figures"],
-        note["messages"],
+        source=str(found.source),
+        output=str(plan.output / found.relative),
+        status=SKIPPED,
+        exit_code=note["exit_code"],
+        figures=note["figures"],
+        messages=note["messages"],
     )
 
 
@@ -221,7 +221,14 @@ def _keep(plan: Plan, found: FoundProgram, outcome: Outcome) -> Status:
     """Writes what a program became."""
     made = {"program": outcome.program, "joints": outcome.joints}
     if outcome.program is None:
-        return Status(str(found.source), None, ERROR, outcome.exit_code, outcome.figures, outcome.messages)
+        return Status(
+            source=str(found.source),
+            output=None,
+            status=ERROR,
+            exit_code=outcome.exit_code,
+            figures=outcome.figures,
+            messages=outcome.messages,
+        )
     targets = _targets(plan, found)
     contents = {target: made[name] or b"" for name, target in targets.items()}
     note = {
@@ -242,13 +249,20 @@ def _keep(plan: Plan, found: FoundProgram, outcome: Outcome) -> Status:
         return _refused(found, error)
     status = FAILED_CHECK if outcome.exit_code else DONE
     return Status(
-        str(found.source), str(targets["program"]), status, outcome.exit_code, outcome.figures, outcome.messages
+        source=str(found.source),
+        output=str(targets["program"]),
+        status=status,
+        exit_code=outcome.exit_code,
+        figures=outcome.figures,
+        messages=outcome.messages,
     )
 
 
 def _refused(found: FoundProgram, error: CamcompError) -> Status:
     messages = [{"rule": each.rule, "message": each.message, "text": format_error(each)} for each in error.all()]
-    return Status(str(found.source), None, ERROR, error.exit_code, {}, messages)
+    return Status(
+        source=str(found.source), output=None, status=ERROR, exit_code=error.exit_code, figures={}, messages=messages
+    )
 
 
 def summary(statuses: Sequence[Status], programs: Sequence[FoundProgram] = (), stopped: int = 0) -> dict[str, Any]:
@@ -257,7 +271,11 @@ def summary(statuses: Sequence[Status], programs: Sequence[FoundProgram] = (), s
     stopped: exit code of what ended the batch before all of `programs` had their turn; those left are not done.
     """
     told = {each.source for each in statuses}
-    left = [Status(str(each.source), None, OPEN, stopped) for each in programs if str(each.source) not in told]
+    left = [
+        Status(source=str(each.source), output=None, status=OPEN, exit_code=stopped)
+        for each in programs
+        if str(each.source) not in told
+    ]
     ordered = sorted([*statuses, *left], key=lambda each: each.source)
     counts = {name: sum(each.status == name for each in ordered) for name in (DONE, SKIPPED, FAILED_CHECK, ERROR, OPEN)}
     worst = {"max_um": max((each.figures["after"]["max_um"] for each in ordered if each.figures), default=0.0)}

@@ -29,7 +29,7 @@ WATCH = 0.5  # s between two looks at the parent
 keep_old_names()  # tasks bring parameters of users' plug-ins, whose modules are imported before anything is asked of them
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Task:
     """A program with everything that is needed to compensate it."""
 
@@ -45,7 +45,7 @@ class Task:
     passes: bool = False  # a program that was compensated before goes through unchanged
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Outcome:
     """What became of a task. exit_code as `camcomp compensate` would leave with; 0 and 1 have outputs, others not."""
 
@@ -82,15 +82,23 @@ def work(task: Task) -> Outcome:
             with watched():  # a program is one step of the batch around it
                 return _compensate(task)
     except CamcompError as error:
-        return Outcome(task.key, error.exit_code, [_message(each, format_error(each)) for each in error.all()])
+        return Outcome(
+            key=task.key,
+            exit_code=error.exit_code,
+            messages=[_message(each, format_error(each)) for each in error.all()],
+        )
     except MemoryError:
         text = "there is not enough memory"
         return Outcome(
-            task.key, FileError.exit_code, [{"rule": "CC503", "message": text, "text": f"{task.name}: {text}"}]
+            key=task.key,
+            exit_code=FileError.exit_code,
+            messages=[{"rule": "CC503", "message": text, "text": f"{task.name}: {text}"}],
         )
     except Exception as error:  # noqa: BLE001 - a bug in one program must not take the others with it
         text = f"internal error: {type(error).__name__}: {error}"
-        return Outcome(task.key, BUG, [{"rule": None, "message": text, "text": f"{task.name}: {text}"}])
+        return Outcome(
+            key=task.key, exit_code=BUG, messages=[{"rule": None, "message": text, "text": f"{task.name}: {text}"}]
+        )
 
 
 def _compensate(task: Task) -> Outcome:
@@ -103,7 +111,7 @@ def _compensate(task: Task) -> Outcome:
 
     if is_stamped(task.data):
         if task.passes:
-            return Outcome(task.key, 0, program=task.data)
+            return Outcome(key=task.key, exit_code=0, program=task.data)
         raise CheckFailed("CC603", f"{task.name} was compensated before")
     config = task.config
     job = job_of_program(_job(task.config_key, _Once(config)), task.data, task.name, task.stock)
@@ -116,7 +124,13 @@ def _compensate(task: Task) -> Outcome:
     joints = tables.joint_csv(result, job) if task.joints else None
     figures = tables.summary(result, job).as_json()
     outcome = Outcome(
-        task.key, int(bool(failed)), _checks(task, failed), result.written.data, joints, figures, notes=held()
+        key=task.key,
+        exit_code=int(bool(failed)),
+        messages=_checks(task, failed),
+        program=result.written.data,
+        joints=joints,
+        figures=figures,
+        notes=held(),
     )
     _settle()
     return outcome
@@ -129,16 +143,25 @@ def _in_pieces(task: Task, job: Job) -> Outcome | None:
 
     program, joints = BytesIO(), BytesIO()
     totals = compensate_in_pieces(
-        BytesIO(task.data), task.name, job, CorrectionSettings(method=task.method, tolerance_um=task.tolerance_um, version=__version__),
-        program.write, partial(joint_table, joints, "joints.csv", job) if task.joints else None,
-    )  # fmt: skip
+        source=BytesIO(task.data),
+        name=task.name,
+        job=job,
+        settings=CorrectionSettings(method=task.method, tolerance_um=task.tolerance_um, version=__version__),
+        program=program.write,
+        joints=partial(joint_table, joints, "joints.csv", job) if task.joints else None,
+    )
     if totals is None:
         return None
     failed = totals.failed_checks(task.tolerance_um)
     return Outcome(
-        task.key, int(bool(failed)), _checks(task, failed), program.getvalue(), joints.getvalue() if task.joints else None,
-        totals.summary().as_json(), notes=held(),
-    )  # fmt: skip
+        key=task.key,
+        exit_code=int(bool(failed)),
+        messages=_checks(task, failed),
+        program=program.getvalue(),
+        joints=joints.getvalue() if task.joints else None,
+        figures=totals.summary().as_json(),
+        notes=held(),
+    )
 
 
 def _checks(task: Task, failed: list[tuple[str, str]]) -> list[dict[str, Any]]:

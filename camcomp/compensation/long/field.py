@@ -45,7 +45,7 @@ WIDER = 1.02  # force range, so that it is not left for nothing
 _ZERO = np.zeros(3)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Basis:
     """A rung of the ladder: normalised sample points in [-1, 1], and the matrices that turn answers into coefficients."""
 
@@ -69,9 +69,16 @@ class Basis:
         points = np.cos(np.pi * (np.arange(1, k + TESTS + 1)[:, None] * EVEN % 1.0))
         both, alone = _products(points, a, b, count)
         return Basis(
-            a, b, count, (max(degrees), len(degrees) - 1), points, _pseudoinverse(both[TESTS:]),
-            _pseudoinverse(alone[TESTS:]), both[:TESTS], alone[:TESTS],
-        )  # fmt: skip
+            position=a,
+            force=b,
+            count=count,
+            degree=(max(degrees), len(degrees) - 1),
+            samples=points,
+            solve_both=_pseudoinverse(both[TESTS:]),
+            solve_position=_pseudoinverse(alone[TESTS:]),
+            both=both[:TESTS],
+            alone=alone[:TESTS],
+        )
 
     def terms(self, points: Floats) -> Floats:
         """Terms (n, sum of count) at points (n, 6)."""
@@ -99,7 +106,7 @@ def _products(points: Floats, position: Ints, force: Ints, count: Ints) -> tuple
     return np.concatenate([B[:, b, None] * A[:, :n] for b, n in enumerate(count)], axis=1), A
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Tiles:
     """Everything the compiled code needs; t tiles, machine frame."""
 
@@ -138,10 +145,17 @@ class Field:
         self._narrow = (-np.log(share) / np.log(NARROW)).astype(int)
         self.bases = [Basis.of(RUNGS[0], self._narrow)]
         self.tiles = Tiles(
-            CELL_MM, np.full(1 << 12, -1, np.int64), np.zeros(1 << 12, np.int64), np.zeros((0, 3)), np.zeros(0),
-            np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0), np.zeros((0, 3, 3)),
-            np.zeros((0, len(self.machine.actuators), 3)),
-        )  # fmt: skip
+            size=CELL_MM,
+            keys=np.full(1 << 12, -1, np.int64),
+            values=np.zeros(1 << 12, np.int64),
+            centre=np.zeros((0, 3)),
+            half=np.zeros(0),
+            rung=np.zeros(0, np.int64),
+            first=np.zeros(0, np.int64),
+            W=np.zeros(0),
+            slope=np.zeros((0, 3, 3)),
+            rates=np.zeros((0, len(self.machine.actuators), 3)),
+        )
 
     def prepare(self, tips: Floats, force: Floats) -> Floats:
         """Makes the tiles for points (n, 3) and forces (n, 3) that are going to be asked for; the points as look_up wants them."""

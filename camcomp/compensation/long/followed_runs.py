@@ -39,7 +39,7 @@ class FollowedRuns:
             return None
         bounds = Bounds()
         if stock.type == "program" or job.config.tools:
-            runs = Runs(source, name, setup, job.config.control.dialect)
+            runs = Runs(source=source, name=name, setup=setup, dialect=job.config.control.dialect)
             for run in runs:
                 if isinstance(run, PlainRun):
                     if stock.type == "program":

@@ -19,7 +19,7 @@ from camcomp.model.cutting.track import JOIN_ANGLE, PLUNGE_SINE, Conditions, bas
 from camcomp.model.job import Job
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Edge:
     """The motion next to a run, as a straight move with the direction that it has at the run's side. Program frame."""
 
@@ -34,7 +34,7 @@ class Edge:
     machine: bool = False  # in machine coordinates
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Loads:
     """Forces of n moves, program frame."""
 
@@ -82,7 +82,7 @@ def loads_of(
     for each, row in beside:
         start[row], end[row] = each.start, each.end
     if constant is None:
-        return _of_model(run, kind, start, end, own, beside, c, met)
+        return _of_model(run, kind, start=start, end=end, own=own, beside=beside, c=c, met=met)
     first, last, length = np.empty(start.shape), np.empty(start.shape), np.empty(len(kind))
     jump = np.zeros(len(kind) + 1, np.bool_)
     axis = np.asarray(c.tool_axis, float)
@@ -92,12 +92,15 @@ def loads_of(
     def at(move: Ints, w: Floats) -> Floats:
         return f0[move] + w[:, None] * (f1[move] - f0[move])
 
-    return Loads(f0, f1, jump[own.start : own.stop + 1], length[own], at, run, np.arange(n))
+    return Loads(
+        first=f0, last=f1, jump=jump[own.start : own.stop + 1], length=length[own], at=at, run=run, of=np.arange(n)
+    )
 
 
 def _of_model(
     run: PlainRun,
     kind: np.ndarray,
+    *,
     start: Floats,
     end: Floats,
     own: slice,
@@ -136,7 +139,16 @@ def _of_model(
     of = track.motion[first:last] - own.start
     parts = run if met is None else run.parts(of, track.points(moves + first, zero), track.points(moves + first, one))
     length = track.length[first:last]
-    return Loads(at(moves, zero), at(moves, one), jump, length, at, parts, of, None if met is None else sizes)
+    return Loads(
+        first=at(moves, zero),
+        last=at(moves, one),
+        jump=jump,
+        length=length,
+        at=at,
+        run=parts,
+        of=of,
+        sizes=None if met is None else sizes,
+    )
 
 
 def _where_met(run: PlainRun, path: Path, own: slice, c: Conditions, met: RunEngagement) -> Loads:
@@ -179,7 +191,9 @@ def _where_met(run: PlainRun, path: Path, own: slice, c: Conditions, met: RunEng
         return np.column_stack(places.sizes(of[move], at, w == 0.0))
 
     places = EngagedAt(motion, u, depth, turn)
-    return Loads(f0, f1, jump[a : b + 1], length[a:b], at, parts, of - own.start, sizes)
+    return Loads(
+        first=f0, last=f1, jump=jump[a : b + 1], length=length[a:b], at=at, run=parts, of=of - own.start, sizes=sizes
+    )
 
 
 def joints_at(loads: Loads, kind: np.ndarray, before: Edge | None, after: Edge | None) -> tuple[Bools, Bools]:

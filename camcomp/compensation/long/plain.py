@@ -40,7 +40,7 @@ COARSE_MM = 1e-3  # a control with larger steps moves the joints by more than fi
 SLICE = 4096  # rows that a thread takes at once
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class PlainRows:
     """End points (N,) of the corrected run, in order; program frame."""
 
@@ -53,7 +53,7 @@ class PlainRows:
     engagement: Floats | None  # (N, 2) depth of the cut mm, engaged arcs rad; None: no stock is known
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Answers:
     """What the machine says to rows (N,), machine frame."""
 
@@ -65,7 +65,7 @@ class Answers:
     tiles: Tiles  # that are counted by `tile`
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class CorrectedRun:
     """A corrected run."""
 
@@ -119,9 +119,9 @@ class PlainCorrector:
         met: RunEngagement | None = None,
     ) -> CorrectedRun:
         """The run corrected and written; `carry` is moved along. met: what the tool meets. Raises Unsolved, NotInPieces."""
-        loads = loads_of(whole, before, after, self.job.conditions, self._constant, met)
+        loads = loads_of(run=whole, before=before, after=after, c=self.job.conditions, constant=self._constant, met=met)
         try:
-            return self._corrected(whole, met, loads, before, after, carry)
+            return self._corrected(whole=whole, met=met, loads=loads, before=before, after=after, carry=carry)
         except Unsolved as error:
             raise Unsolved(loads.of[error.move], error.target, error.status) from None
 
@@ -149,7 +149,7 @@ class PlainCorrector:
         hard = (loads.length > EASY_MM) & (run.plain.kind == LINE)
         settled = False
         for left in range(ROUNDS, 0, -1):
-            rows = self._rows(run, loads, lead, trail, hard, tolerance)
+            rows = self._rows(run=run, loads=loads, lead=lead, trail=trail, hard=hard, tolerance=tolerance)
             answers = self._answers(rows)
             commanded, kept, share = self._commanded(rows, answers, loads.of, uncertainty, policy)
             if not settled:
@@ -163,9 +163,19 @@ class PlainCorrector:
                 hard[middles.move[bent]] = True
                 continue
             trial = replace(carry)
-            data, written, held, rest = self._write(whole, loads, rows, commanded, kept, trial)
+            data, written, held, rest = self._write(
+                run=whole, loads=loads, rows=rows, commanded=commanded, kept=kept, carry=trial
+            )
             judged = self._judged(run, rows)
-            error = self._after(rows, judged, answers, middles, commanded, written, carry.written)
+            error = self._after(
+                rows,
+                judged,
+                answers=answers,
+                middles=middles,
+                commanded=commanded,
+                written=written,
+                first=carry.written,
+            )
             worst = np.zeros(run.motions)
             at = np.concatenate((rows.move[judged], middles.move))
             np.maximum.at(worst, at, _sizes(error))
@@ -181,32 +191,45 @@ class PlainCorrector:
         if share is not None:
             meant = self._left(judged, answers, middles, share)
             error = error + meant
-        bands = None if uncertainty is None else self._bands(uncertainty, rows, answers, judged, error, written, share)
+        bands = (
+            None
+            if uncertainty is None
+            else self._bands(
+                uncertainty, rows, answers=answers, judged=judged, error=error, written=written, share=share
+            )
+        )
         unloaded = np.concatenate((answers.unloaded[judged], middles.unloaded))
         seen = np.concatenate((np.flatnonzero(judged), middles.rows))
         back = self._back(unloaded)
         return CorrectedRun(
-            data,
-            run,
-            rows,
-            answers,
-            commanded,
-            written,
-            back,
-            error,
-            begin,
-            held,
-            rest,
-            seen,
-            bands,
-            meant,
-            bool(carry.apart),
+            data=data,
+            run=run,
+            rows=rows,
+            answers=answers,
+            commanded=commanded,
+            written=written,
+            before=back,
+            after=error,
+            begin=begin,
+            feed=held,
+            rest=rest,
+            seen=seen,
+            bands=bands,
+            left=meant,
+            apart=bool(carry.apart),
         )
 
     def _bands(
-        self, uncertainty: RunUncertainty, rows: PlainRows, answers: Answers, judged: Bools, error: Floats, written: Floats,
+        self,
+        uncertainty: RunUncertainty,
+        rows: PlainRows,
+        *,
+        answers: Answers,
+        judged: Bools,
+        error: Floats,
+        written: Floats,
         share: Floats | None,
-    ) -> Bands:  # fmt: skip
+    ) -> Bands:
         moves = uncertainty.moves(written, rows.move, rows.w, rows.force, rows.joining & (rows.w > 0.0))
         left = np.zeros_like(written) if share is None else (1.0 - share)[:, None] * self._back(answers.unloaded)
         left[judged] = error[: int(judged.sum())]
@@ -277,7 +300,9 @@ class PlainCorrector:
             force[inside] = loads.at(move[inside], w[inside])
         force[kind == 2] = 0.0
         engagement = None if loads.sizes is None else loads.sizes(move, w)
-        return PlainRows(move, w, kind != 1, target, force, shift, engagement)
+        return PlainRows(
+            move=move, w=w, joining=kind != 1, target=target, force=force, shift=shift, engagement=engagement
+        )
 
     def _divided(self, run: PlainRun, loads: Loads, which: Ints, tolerance: Floats) -> tuple[Ints, Floats, Floats]:
         """Division points of some moves: move, w and shift of each."""
@@ -315,7 +340,14 @@ class PlainCorrector:
 
     def _answers(self, rows: PlainRows) -> Answers:
         answer, nominal, tile, tiles = self.ask(rows.move, rows.target, rows.force, every=True)
-        return Answers(answer[:, :3], answer[:, 3:6], answer[:, 6:], nominal, tile, tiles)
+        return Answers(
+            correction=answer[:, :3],
+            unloaded=answer[:, 3:6],
+            rest=answer[:, 6:],
+            nominal=nominal,
+            tile=tile,
+            tiles=tiles,
+        )
 
     def ask(self, move: Ints, target: Floats, force: Floats, every: bool) -> tuple[Floats, Floats, Ints, Tiles]:
         """Answers (n, .) as in look_up, machine frame, for points of moves, program frame; nominal joints, tiles (n,).
@@ -422,7 +454,7 @@ class PlainCorrector:
         if share is not None:
             taken = 0.5 * (share[at] + share[np.maximum(at - 1, 0)])
         wanted = target + taken[:, None] * self._back(answer[:, :3])
-        return Middles(at, move, wanted, taken, answer[:, 3:6], tile, tiles)
+        return Middles(rows=at, move=move, wanted=wanted, share=taken, unloaded=answer[:, 3:6], tile=tile, tiles=tiles)
 
     def _halfway(self, ends: Floats, first: Floats) -> Floats:
         return 0.5 * (ends + np.concatenate((first[None], ends[:-1])))
@@ -431,6 +463,7 @@ class PlainCorrector:
         self,
         rows: PlainRows,
         judged: Bools,
+        *,
         answers: Answers,
         middles: Middles,
         commanded: Floats,
@@ -453,7 +486,7 @@ class PlainCorrector:
         plain, N = run.plain, len(rows.move)
         rest, mode = self._rests(loads.run, rows), run.state.path_mode
         able = merging(mode, self.language)
-        apart = able and self._apart(loads.run, rows, commanded, rest, kept, carry)
+        apart = able and self._apart(run=loads.run, rows=rows, commanded=commanded, rest=rest, kept=kept, carry=carry)
         begins = -1 if able and apart != carry.apart else 0
         carry.apart = apart
         own = (mode.apart if apart else mode).said(run.state.unit)

@@ -25,7 +25,7 @@ class Unsolved(Exception):
         self.move, self.target, self.status = move, target, status
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class PlainRun:
     """Plain lines: bytes text_at to text_end of `data`."""
 
@@ -74,7 +74,7 @@ class PlainRun:
         return self.row0 + int(self.plain.row[motion])
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Middles:
     """Middles (k,) of lines."""
 

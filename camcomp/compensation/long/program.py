@@ -45,7 +45,7 @@ LINE_OF_STAMP = 256  # bytes
 NEAR = 1e-3  # mm: only the direction of a neighbour matters, and on which side of the stock's top it is
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, kw_only=True)
 class LongProgram:
     """One long program. `on_rows` gets every batch of rows, in order; `totals` hold the figures at the end."""
 
@@ -77,8 +77,12 @@ class LongProgram:
         self._stock = _stock_of(self.job, source, self.name, self.setup)
         top = self.job.conditions.stock_top_mm if self.job.conditions.model and self._stock is None else None
         self._runs = Runs(
-            source, self.name, self.setup, self.job.config.control.dialect, np.nan if top is None else top,
-        )  # fmt: skip
+            source=source,
+            name=self.name,
+            setup=self.setup,
+            dialect=self.job.config.control.dialect,
+            top_mm=np.nan if top is None else top,
+        )
         self._corrector = PlainCorrector(self.job, self.tolerance_um, self._runs.language, self._runs.feed_point)
         self._stamp: str | None = stamp_text(digest.hexdigest(), self.version, self.job.fingerprint)
         with ThreadPoolExecutor(1) as self._beside:
@@ -263,13 +267,13 @@ class _Piece:
             state = run.state
             self.first, self.last = (
                 Edge(
-                    int(plain.kind[k]),
-                    plain.start[k],
-                    plain.end[k],
-                    float(plain.feed[k]),
-                    state.speed,
-                    state.sense,
-                    state.tool,
+                    kind=int(plain.kind[k]),
+                    start=plain.start[k],
+                    end=plain.end[k],
+                    feed=float(plain.feed[k]),
+                    speed=state.speed,
+                    turn=state.sense,
+                    tool=state.tool,
                 )
                 for k in self.ends
             )
@@ -287,15 +291,15 @@ class _Piece:
             kind = RAPID if path.kind[k] == RAPID else LINE
             edges.append(
                 Edge(
-                    kind,
-                    point - (u * way),
-                    point + (1.0 - u) * way,
-                    float(path.feed[k]),
-                    float(path.speed[k]),
-                    float(path.turn[k]),
-                    int(path.tool[k]),
-                    bool(corrected[k]),
-                    bool(path.machine[k]),
+                    kind=kind,
+                    start=point - (u * way),
+                    end=point + (1.0 - u) * way,
+                    feed=float(path.feed[k]),
+                    speed=float(path.speed[k]),
+                    turn=float(path.turn[k]),
+                    tool=int(path.tool[k]),
+                    corrected=bool(corrected[k]),
+                    machine=bool(path.machine[k]),
                 )
             )
         self.first, self.last = edges

@@ -32,7 +32,7 @@ class RunUncertainty:
         """met: what the tool meets, where the stock is known. Raises NotInPieces as loads_of."""
 
         def loads(one: DrawnJob) -> Loads:
-            return loads_of(run, before, after, one.conditions, constant_of(one), met)
+            return loads_of(run=run, before=before, after=after, c=one.conditions, constant=constant_of(one), met=met)
 
         field = tip_field_of(job)
         return RunUncertainty(

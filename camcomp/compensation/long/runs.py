@@ -54,7 +54,7 @@ class InterpretedRun:
     motions: int
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, kw_only=True)
 class Runs:
     """Cuts a program into runs. `warnings` grow while it is read."""
 
@@ -186,7 +186,15 @@ class Runs:
         row0, self._row = self._row, self._row + rows
         self.motions += n
         waits, state.waits = state.waits, False
-        return PlainRun(self._data, begin, at, row0, room.take(0, n), deepcopy(state), waits)
+        return PlainRun(
+            data=self._data,
+            text_at=begin,
+            text_end=at,
+            row0=row0,
+            plain=room.take(0, n),
+            state=deepcopy(state),
+            waits=waits,
+        )
 
     def _interpret(self, line: bytes) -> tuple[int, bool]:
         """Executes a line: its number of motions, and whether the program ends there."""

@@ -41,7 +41,7 @@ BOUND_UM = 0.05  # no point may differ by more from its exact solution
 SAMPLE, SAMPLE_SHARE = 1000, 0.05  # points that are solved exactly, at most and of all
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Batch:
     """Rows (N,) of the corrected program as the joint table has them."""
 
@@ -119,8 +119,19 @@ class Totals:
         self._s, self._t = self._s + float(length.sum()), float(t[-1])
         joints, drive = corrector.actuators(done)
         self.step_mm = max(self.step_mm, corrector.resolution)
-        self._common(whole.motions, rows.joining, np.ones(len(s), np.bool_), plain.row[rows.move] + run.row0 + 1, answers.nominal,
-                     joints, drive, answers.rest[:, :3], done.before, done.after, done.missed)  # fmt: skip
+        self._common(
+            whole.motions,
+            rows.joining,
+            corrected=np.ones(len(s), np.bool_),
+            line=plain.row[rows.move] + run.row0 + 1,
+            nominal=answers.nominal,
+            joints=joints,
+            drive=drive,
+            tilt=answers.rest[:, :3],
+            before=done.before,
+            after=done.after,
+            missed=done.missed,
+        )
         self._plain_control(run, done)
         self._rapids.add(path_of_run(whole))
         if run.state.sense == 0.0:
@@ -132,16 +143,16 @@ class Totals:
             parts = (frame.to_machine(rows.target), force, answers.correction, answers.unloaded, joints, drive, off)
             self._sample.append(np.concatenate([each[chosen] for each in parts], axis=1))
         return Batch(
-            plain.row[rows.move] + run.row0 + 1,
-            s,
-            t,
-            rows.target,
-            done.written,
-            force,
-            answers.nominal,
-            joints,
-            drive,
-            self._behind(self._known(done.bands), rows.engagement),
+            line=plain.row[rows.move] + run.row0 + 1,
+            s=s,
+            t=t,
+            target=rows.target,
+            written=done.written,
+            force=force,
+            nominal=answers.nominal,
+            joints=joints,
+            drive=drive,
+            behind=self._behind(self._known(done.bands), rows.engagement),
         )
 
     def _plain_control(self, run: PlainRun, done: CorrectedRun) -> None:
@@ -151,9 +162,11 @@ class Totals:
         default = self.job.config.process.feed_mm_per_min or np.nan
         self.modes[mode] = None
         told = np.where(np.isnan(plain.feed), default, plain.feed)
-        before.add(line_moves(plain.kind, plain.start, plain.end, told, mode, run.waits))
+        before.add(line_moves(kind=plain.kind, start=plain.start, end=plain.end, feed=told, mode=mode, waits=run.waits))
         start = np.concatenate((done.begin[None], done.written[:-1]))
-        moves = line_moves(plain.kind[rows.move], start, done.written, done.feed, mode, run.waits)
+        moves = line_moves(
+            kind=plain.kind[rows.move], start=start, end=done.written, feed=done.feed, mode=mode, waits=run.waits
+        )
         moves = replace(moves, exact=moves.exact | done.rest)
         if done.apart:
             self.apart[mode] = None
@@ -190,13 +203,34 @@ class Totals:
         corrected = rows.corrected[own]
         self._odd_control(result, own, part)
         self._rapids.add(result.program.path.take(np.arange(part.first, part.last)))
-        self._common(part.last - part.first, rows.joining[own], corrected, result.lines[own], result.nominal[own], state.rho[own], state.drive[own],
-                     state.tilt[own], result.before, result.after, result.missed)  # fmt: skip
+        self._common(
+            part.last - part.first,
+            rows.joining[own],
+            corrected=corrected,
+            line=result.lines[own],
+            nominal=result.nominal[own],
+            joints=state.rho[own],
+            drive=state.drive[own],
+            tilt=state.tilt[own],
+            before=result.before,
+            after=result.after,
+            missed=result.missed,
+        )
         self.iterations = max(self.iterations, result.iterations)
         self._stands(result.without_spindle)
         force = self.job.frame.vectors(rows.force[own])
-        return Batch(result.lines[own], s, t, rows.target[own], result.written.end[own], force, result.nominal[own], state.rho[own],
-                     state.drive[own], self._behind(self._known(result.bands, own), rows.engagement[own]))  # fmt: skip
+        return Batch(
+            line=result.lines[own],
+            s=s,
+            t=t,
+            target=rows.target[own],
+            written=result.written.end[own],
+            force=force,
+            nominal=result.nominal[own],
+            joints=state.rho[own],
+            drive=state.drive[own],
+            behind=self._behind(self._known(result.bands, own), rows.engagement[own]),
+        )
 
     def _behind(self, bands: Floats | None, engagement: Floats | None) -> Floats | None:
         """Columns behind the others: bands, and with a stock the engagement."""
@@ -215,9 +249,20 @@ class Totals:
         return bands.columns(with_share=self.job.config.compensation.policy != "full")[own]
 
     def _common(
-        self, motions: int, joining: Bools, corrected: Bools, line: Ints, nominal: Floats, joints: Floats, drive: Floats,
-        tilt: Floats, before: Floats, after: Floats, missed: Floats,
-    ) -> None:  # fmt: skip
+        self,
+        motions: int,
+        joining: Bools,
+        *,
+        corrected: Bools,
+        line: Ints,
+        nominal: Floats,
+        joints: Floats,
+        drive: Floats,
+        tilt: Floats,
+        before: Floats,
+        after: Floats,
+        missed: Floats,
+    ) -> None:
         self.points += len(line)
         self.motions += motions
         self.joins += int(joining.sum())

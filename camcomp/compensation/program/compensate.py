@@ -72,7 +72,7 @@ COARSE_MM, FINE_MM = 8.0, 0.5  # distance of trial points on straight lines, wit
 SHARE_OF_WAVE = 0.15  # between them, at most: no row of points meets a wave at its zeros alone
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Compensated:
     """The corrected program and everything that is known about it; points (N, ...) are its end points."""
 
@@ -221,7 +221,16 @@ def _compensated(
 
     trial = trial_nodes(track.length, track.angle, feeding & ~turning & (track.length > 0.0), spacing)
     with part_of_work(0.0, 0.4, points=True):
-        aimed = _aim(program, job, track, trial, corrected, method, shares, orienting)
+        aimed = _aim(
+            program,
+            job,
+            track=track,
+            nodes=trial,
+            corrected=corrected,
+            method=method,
+            shares=shares,
+            orienting=orienting,
+        )
     curve, weight = aimed.commanded, 1e-3 * tolerance_um
     correction = aimed.commanded - track.points(trial.piece, trial.w)
     kept = _kept(track, trial, correction, 0.5 * resolution)
@@ -236,7 +245,7 @@ def _compensated(
         goal *= WITH_SHARES
     tolerance[kept | turning] = np.inf
     able = feeding & ~kept & (arcs and not job.causes)  # what drives leave over has waves that no arc follows
-    bend = Bend.of(track, trial, aimed.commanded, second, tolerance, able)
+    bend = Bend.of(track=track, trial=trial, commanded=aimed.commanded, second=second, tolerance=tolerance, able=able)
     rounded = np.maximum(budget - np.sqrt(0.5) * resolution, 0.1 * budget)  # the centre is rounded, too
     tolerance[bend.use] = rounded[bend.use]
     last, last_count = np.full(len(tolerance), np.inf), np.zeros(len(tolerance), np.int64)
@@ -248,14 +257,32 @@ def _compensated(
             nodes, shift = bend.divided(trial, tolerance)
         with part_of_work(1.0 - 0.6 * 0.5**round_, 1.0 - 0.35 * 0.5**round_, points=True):
             commanded, circles, words = _bent(
-                program, job, track, nodes, shift, corrected, method, bend, shares, orienting
+                program,
+                job,
+                track=track,
+                nodes=nodes,
+                shift=shift,
+                corrected=corrected,
+                method=method,
+                bend=bend,
+                shares=shares,
+                orienting=orienting,
             )
         if orienting is not None:
             words = words + orienting.from_lengths(shift[:, 3:], weight)
         rows = corrected_rows(
-            program, job, track, nodes, commanded, kept, circles, begins=part is None or part.first == 0, shares=shares,
-            orienting=orienting, words=None if orienting is None else words,
-        )  # fmt: skip
+            program,
+            job,
+            track=track,
+            nodes=nodes,
+            commanded=commanded,
+            kept=kept,
+            circles=circles,
+            begins=part is None or part.first == 0,
+            shares=shares,
+            orienting=orienting,
+            words=None if orienting is None else words,
+        )
         written = rewrite(
             program,
             output_of(path, rows),
@@ -265,10 +292,17 @@ def _compensated(
             model=job.fingerprint,
         )
         points = judged_points(job, track, rows, feeding & ~pushed)
-        after = see(job, points, written.end, replace(rows.arcs, centre=written.centre), orienting, written.words)
+        after = see(
+            job=job,
+            points=points,
+            ends=written.end,
+            arcs=replace(rows.arcs, centre=written.centre),
+            orienting=orienting,
+            words=written.words,
+        )
         left = None
         if shares is not None:
-            left = shares.left(job, track, points.piece, points.w, points.travel, points.before)
+            left = shares.left(job, track, points.piece, points.w, travel=points.travel, before=points.before)
         worst = np.zeros(len(tolerance))
         missed_by = after.error if left is None else after.error - left
         size = np.where(after.status == 0, np.linalg.norm(missed_by, axis=1), np.inf)
@@ -302,11 +336,13 @@ def _compensated(
             model=job.fingerprint,
         )
     seen = replace(after, error=missed_by)
-    control = under_control(program, job, rows, written, points, seen, rest)
+    control = under_control(program, job, rows=rows, written=written, points=points, after=seen, rest=rest)
     if part is None and control.stated and 1e3 * control.off_joins > tolerance_um * (1.0 + 1e-9):
         apart = stays_apart(program, rows)
         if apart.any():
-            other = under_control(program, job, rows, written, points, seen, rest, apart)
+            other = under_control(
+                program, job, rows=rows, written=written, points=points, after=seen, rest=rest, apart=apart
+            )
             if other.better_than(control, tolerance_um):
                 control = other
                 written = rewrite(
@@ -327,7 +363,19 @@ def _compensated(
         warnings += stock_warnings(stock_remarks(job.config, path, track.engaged))
     iterations = int(aimed.iterations.max(initial=0))
     done = _assemble(
-        program, job, track, rows, written, points, before, after, control, iterations, method, still, warnings
+        program,
+        job,
+        track=track,
+        rows=rows,
+        written=written,
+        points=points,
+        before=before,
+        after=after,
+        control=control,
+        iterations=iterations,
+        method=method,
+        still=still,
+        warnings=warnings,
     )
     told = points.along(written.end, replace(rows.arcs, centre=written.centre))
     share = None if shares is None else shares.of_ends(track, rows.piece, rows.w, rows.joining)
@@ -353,9 +401,16 @@ class _Aimed:
 
 
 def _aim(
-    program: Program, job: Job, track: Track, nodes: Nodes, corrected: Bools, method: str, shares: Shares | None,
+    program: Program,
+    job: Job,
+    *,
+    track: Track,
+    nodes: Nodes,
+    corrected: Bools,
+    method: str,
+    shares: Shares | None,
     orienting: Orienting | None = None,
-) -> _Aimed:  # fmt: skip
+) -> _Aimed:
     """Modified targets at nodes, program frame; nodes of uncorrected pieces stay as programmed."""
     on = corrected[nodes.piece]
     piece, w = nodes.piece[on], nodes.w[on]
@@ -387,6 +442,7 @@ def _aim(
 def _bent(
     program: Program,
     job: Job,
+    *,
     track: Track,
     nodes: Nodes,
     shift: Floats,
@@ -400,7 +456,9 @@ def _bent(
     orientation there. Turns off what cannot bend.
     """
     both, middle = arcs_out.middles(nodes, bend.use)
-    aimed = _aim(program, job, track, both, corrected, method, shares, orienting)
+    aimed = _aim(
+        program, job, track=track, nodes=both, corrected=corrected, method=method, shares=shares, orienting=orienting
+    )
     solved = aimed.commanded
     commanded = solved[~middle] + shift[:, :3]
     circles = Arcs.none(len(commanded))
@@ -409,7 +467,12 @@ def _bent(
         motion = track.motion[nodes.piece[to]]
         flat = arcs_out.FLATTEST * program.step_mm(job.config.control.resolution_mm)
         found, wrong = arcs_out.through(
-            commanded[to - 1], solved[middle], commanded[to], track.path.axis[motion], track.path.angle[motion], flat
+            start=commanded[to - 1],
+            middle=solved[middle],
+            end=commanded[to],
+            axis=track.path.axis[motion],
+            way=track.path.angle[motion],
+            flat=flat,
         )
         circles.centre[to], circles.angle[to] = found.centre, found.angle
         bend.use[nodes.piece[to[wrong]]] = False
@@ -441,9 +504,21 @@ def _warnings(job: Job, resting: int, exact_stop: str) -> list[str]:
 
 
 def _assemble(
-    program: Program, job: Job, track: Track, rows: CorrectedRows, written: Rewritten, points: JudgedPoints, before: Seen,
-    after: Seen, control: UnderControl, iterations: int, method: str, still: Ints, warnings: list[str],
-) -> Compensated:  # fmt: skip
+    program: Program,
+    job: Job,
+    *,
+    track: Track,
+    rows: CorrectedRows,
+    written: Rewritten,
+    points: JudgedPoints,
+    before: Seen,
+    after: Seen,
+    control: UnderControl,
+    iterations: int,
+    method: str,
+    still: Ints,
+    warnings: list[str],
+) -> Compensated:
     s = track.s0[rows.piece] + rows.w * track.length[rows.piece]
     feed = program.path.feed[rows.motion]
     default = job.config.process.feed_mm_per_min or np.nan
@@ -460,5 +535,22 @@ def _assemble(
         told = points.along(written.end, replace(rows.arcs, centre=written.centre))
         state = whole_pose(job, points, told, rows.corrected, state)
     force = acting_force(job, state.rho, points.travel.take(points.end))
-    return Compensated(program, written, rows, s, t, nominal, state, force, before.tip, before.error[points.judged],
-                       after.error[points.judged], control, points.row[points.judged], iterations, method, still, warnings)  # fmt: skip
+    return Compensated(
+        program=program,
+        written=written,
+        rows=rows,
+        s=s,
+        t=t,
+        nominal=nominal,
+        state=state,
+        force=force,
+        uncorrected=before.tip,
+        before=before.error[points.judged],
+        after=after.error[points.judged],
+        control=control,
+        judged=points.row[points.judged],
+        iterations=iterations,
+        method=method,
+        without_spindle=still,
+        warnings=warnings,
+    )

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from camcomp.compensation.program.policy import Shares
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class CorrectedRows:
     """End points (N,) of the motions of the corrected program, in order."""
 
@@ -52,10 +52,10 @@ def corrected_rows(
     job: Job,
     track: Track,
     nodes: Nodes,
+    *,
     commanded: Floats,
     kept: Bools,
     circles: Arcs,
-    *,
     begins: bool,
     shares: Shares | None = None,
     orienting: Orienting | None = None,
@@ -108,19 +108,19 @@ def corrected_rows(
         words = np.concatenate((words[keep], turned))[order]
         words[whole] = orienting.programmed(track, piece, w)[whole]
     rows = CorrectedRows(
-        piece,
-        track.motion[piece],
-        w,
-        rows_kind,
-        joining,
-        ~passed,
-        force,
-        target,
-        end,
-        np.empty(len(piece)),
-        circles,
-        engagement,
-        words,
+        piece=piece,
+        motion=track.motion[piece],
+        w=w,
+        kind=rows_kind,
+        joining=joining,
+        corrected=~passed,
+        force=force,
+        target=target,
+        end=end,
+        feed=np.empty(len(piece)),
+        arcs=circles,
+        engagement=engagement,
+        words=words,
     )
     return replace(rows, feed=_feeds(program, track, rows))
 

@@ -19,7 +19,7 @@ from camcomp.model.motion.response import Travel, aim_pose, respond
 from camcomp.model.statics.target import Correction
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class JudgedPoints:
     """Where a corrected program is looked at, in the order of travel.
 
@@ -74,7 +74,18 @@ def judged_points(job: Job, track: Track, rows: CorrectedRows, feeding: Bools) -
     axis = track.path.axis[track.motion[piece]]
     travel = replace(travel, force=force)
     before = track.path.start[0] if n and track.path.known[0] else None
-    return JudgedPoints(row, fraction, axis, piece, w, track.points(piece, w), travel, cut[row], kept, before)
+    return JudgedPoints(
+        row=row,
+        fraction=fraction,
+        axis=axis,
+        piece=piece,
+        w=w,
+        target=track.points(piece, w),
+        travel=travel,
+        judged=cut[row],
+        kept=kept,
+        before=before,
+    )
 
 
 @dataclass(frozen=True, eq=False)

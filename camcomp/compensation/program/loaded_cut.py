@@ -74,7 +74,7 @@ def loaded_cut(job: Job, program: Program, step_mm: float = STEP_MM) -> LoadedCu
     for turn in range(ROUNDS):
         memory = memory_of(job.config, tool_frame_of(job.config, job.tool_axis), bounds)
         with part(turn / ROUNDS, (turn + 1) / ROUNDS):
-            force, unrest = _lead(memory, track, way, free, slope, reach)
+            force, unrest = _lead(memory=memory, track=track, way=way, free=free, slope=slope, reach=reach)
         off = tips(force) - free - np.einsum("kij,kj->ki", slope, force)
         if np.abs(off).max(initial=0.0) < STILL_MM:
             break
@@ -96,7 +96,7 @@ def nodes_of(job: Job, program: Program, step_mm: float = STEP_MM) -> int:
     return int(np.ceil(np.nan_to_num(path_geometry.lengths(program.path)[feeds]) / step_mm).sum()) + int(feeds.sum())
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Way:
     """Nodes (k,) of a track in order, first and last of every piece among them."""
 
@@ -133,7 +133,19 @@ class Way:
         long = np.bincount(run, track.length).astype(float)[run]
         s = track.s0[piece] + w * track.length[piece]
         told, on = track.points(piece, w), np.flatnonzero(seen[piece])
-        return cls(piece, w, told, direction, on, feeds[piece], loads, fixed, s, run[piece], long[piece])
+        return cls(
+            piece=piece,
+            w=w,
+            told=told,
+            direction=direction,
+            on=on,
+            feeds=feeds[piece],
+            loads=loads,
+            fixed=fixed,
+            s=s,
+            run=run[piece],
+            run_length=long[piece],
+        )
 
 
 def _directions(track: Track, feeds: Bools, piece: Ints, w: Floats) -> Floats:
@@ -196,7 +208,11 @@ def _lead(
             rest = FARTHER * float(np.linalg.norm(at - way.told[k])) if goes_on else 0.0
             short = goes_on and way.run_length[k] < reach
             if skipped and not short and way.loads[k]:
-                there = free[k] + slope[k] @ _at_rest(memory, track, way, k, free[k], slope[k], before, [])[0]
+                there = (
+                    free[k]
+                    + slope[k]
+                    @ _at_rest(memory, track, way=way, k=k, free=free[k], slope=slope[k], start=before, bend=[])[0]
+                )
                 if np.linalg.norm(there - at) > REAL * np.linalg.norm(way.told[k] - at):  # not joined where it stood
                     memory.take(at, there, int(tool[k]), reach)
                     at, rest = there, 0.0
@@ -207,7 +223,9 @@ def _lead(
             force[k] = before
             continue
         if way.loads[k]:
-            force[k], left = _at_rest(memory, track, way, k, free[k], slope[k], before, bend)
+            force[k], left = _at_rest(
+                memory, track, way=way, k=k, free=free[k], slope=slope[k], start=before, bend=bend
+            )
             unrest.append(left)
         elif way.feeds[k]:
             force[k] = way.fixed[k]
@@ -232,9 +250,16 @@ def _behind(bend: list[tuple[float, Floats]]) -> tuple[float, Floats] | None:
 
 
 def _at_rest(
-    memory: StockMemory, track: Track, way: Way, k: int, free: Floats, slope: Floats, start: Floats,
+    memory: StockMemory,
+    track: Track,
+    *,
+    way: Way,
+    k: int,
+    free: Floats,
+    slope: Floats,
+    start: Floats,
     bend: list[tuple[float, Floats]],
-) -> tuple[Floats, float]:  # fmt: skip
+) -> tuple[Floats, float]:
     """Force (3,) N at node k under which the tip meets what makes this force, and by how much (mm) it does not.
 
     The tool advances where its tip does: along the program's direction and as its bend changes.

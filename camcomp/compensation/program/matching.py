@@ -33,7 +33,9 @@ def match_moves(
     """
     if not foreign:
         try:
-            first, last, joins, off = _as_expected(path, track, expected, reach, layout, stamped)
+            first, last, joins, off = _as_expected(
+                path=path, track=track, expected=expected, reach=reach, layout=layout, stamped=stamped
+            )
         except CheckFailed:
             if not stamped:
                 raise
@@ -43,7 +45,9 @@ def match_moves(
     found = _by_course(path, track, expected, reach, layout)
     if found is not None:
         return found
-    first, last, joins, _ = _as_expected(path, track, expected, reach, layout, stamped)
+    first, last, joins, _ = _as_expected(
+        path=path, track=track, expected=expected, reach=reach, layout=layout, stamped=stamped
+    )
     return first, last, joins
 
 
@@ -114,7 +118,9 @@ def _by_course(
                 if begin >= moves - (n - i - 1) or (lead and not (line[way.at] and step[way.at] < NEAR_MM)):
                     continue
                 cost = way.cost + lead * JOINING * step[way.at]
-                for stop, more, longer in _ends(path, step, track, expected, reach, i, begin, moves - (n - i - 1)):
+                for stop, more, longer in _ends(
+                    path, step, track=track, expected=expected, reach=reach, i=i, begin=begin, room=moves - (n - i - 1)
+                ):
                     for trail in (0, 1) if feeding[i] and stop + 1 < moves - (n - i - 1) else (0,):
                         if trail and not (line[stop + 1] and step[stop + 1] < NEAR_MM):
                             continue
@@ -138,7 +144,7 @@ def _by_course(
 
 
 def _ends(
-    path: Path, step: Floats, track: Track, expected: Floats, reach: Floats, i: int, begin: int, room: int
+    path: Path, step: Floats, *, track: Track, expected: Floats, reach: Floats, i: int, begin: int, room: int
 ) -> list[tuple[int, float, float]]:
     """Last moves that piece i may have if it begins with move `begin`, what each of them costs, and the stretch, mm."""
     limit = 1.3 * max(track.length[i], reach[i]) + NEAR_MM

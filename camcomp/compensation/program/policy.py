@@ -89,7 +89,9 @@ def shares_of(job: Job, track: Track) -> Shares | None:
     solved = (aimed.status == 0) & (plain.status == 0)
     if not solved.all():  # told with its line when the program is corrected
         return None
-    moves = Uncertainty(job, track).moves(piece, w, aimed.commanded, travel, np.zeros(len(w), np.bool_), target)
+    moves = Uncertainty(job, track).moves(
+        piece, w, commanded=aimed.commanded, travel=travel, free=np.zeros(len(w), np.bool_), base=target
+    )
     error = tip - target
     value: Floats
     if policy == "shrink":

@@ -17,8 +17,17 @@ if TYPE_CHECKING:
     from camcomp.compensation.program.judged_points import JudgedPoints, Seen
 
 
-def bands_of(job: Job, track: Track, rows: CorrectedRows, points: JudgedPoints, told: Floats, before: Seen, after: Seen,
-             share: Floats | None = None) -> Bands | None:  # fmt: skip
+def bands_of(
+    job: Job,
+    track: Track,
+    *,
+    rows: CorrectedRows,
+    points: JudgedPoints,
+    told: Floats,
+    before: Seen,
+    after: Seen,
+    share: Floats | None = None,
+) -> Bands | None:
     """Bands of a corrected program; told (k, 3) mm: what is commanded at the points, share (N,) of the correction taken there."""
     if not job.config.uncertain:
         return None
@@ -28,8 +37,10 @@ def bands_of(job: Job, track: Track, rows: CorrectedRows, points: JudgedPoints, 
     else:
         at = np.flatnonzero(points.end)
     free = (rows.joining & (rows.w > 0.0))[points.row]
-    moves = uncertainty.moves(points.piece[at], points.w[at], told[at], points.travel.take(at), free[at],
-                              (after.error + points.target)[at], points.before)  # fmt: skip
+    moves = uncertainty.moves(
+        points.piece[at], points.w[at], commanded=told[at], travel=points.travel.take(at), free=free[at],
+        base=(after.error + points.target)[at], before=points.before,
+    )  # fmt: skip
     ends = moves.take(np.flatnonzero(points.end[at]))
     counted = np.flatnonzero(points.judged)
     totals = BandTotals(uncertainty.inputs)

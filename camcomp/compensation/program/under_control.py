@@ -66,7 +66,7 @@ def warnings_of(modes: tuple[PathMode, ...], beside: FarOff, elsewhere: FarOff) 
     return beside.told(mode, " beside joining lines") + elsewhere.told(mode, "")
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class UnderControl:
     """What the control makes of a program."""
 
@@ -170,9 +170,16 @@ def stays_apart(program: Program, rows: CorrectedRows) -> Bools:
 
 
 def under_control(
-    program: Program, job: Job, rows: CorrectedRows, written: Rewritten, points: JudgedPoints, after: Seen,
-    rest: Bools, apart: Bools | None = None,
-) -> UnderControl:  # fmt: skip
+    program: Program,
+    job: Job,
+    *,
+    rows: CorrectedRows,
+    written: Rewritten,
+    points: JudgedPoints,
+    after: Seen,
+    rest: Bools,
+    apart: Bools | None = None,
+) -> UnderControl:
     """The account of a corrected program; rest, apart (N,): rows at which the control rests, and that stay apart, in any case."""
     path, limits = program.path, limits_of(job.config)
     default = job.config.process.feed_mm_per_min or np.nan
@@ -191,15 +198,15 @@ def under_control(
     cuts = np.flatnonzero((path.kind != RAPID) & ~path.machine)
     error = after.error[judged] + plan.leaves_by(row, told)
     return UnderControl(
-        before.duration_s,
-        plan.duration_s,
-        distinct(program.modes[k] for k in cuts),
-        error,
-        beside,
-        row,
-        told,
-        int(rest.sum()),
-        apart is not None,
+        before_s=before.duration_s,
+        after_s=plan.duration_s,
+        modes=distinct(program.modes[k] for k in cuts),
+        error=error,
+        joined=beside,
+        row=row,
+        told=told,
+        resting=int(rest.sum()),
+        apart=apart is not None,
     )
 
 

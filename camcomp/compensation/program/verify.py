@@ -48,7 +48,7 @@ LARGEST_GAP_MM = 0.05  # of a piece, in one pass
 ALLOWED_SHARE = 0.05  # of the correction, between the share that was taken and that of the policy
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Verified:
     """Residuals (k,) mm at all points looked at along feed moves, and per source line."""
 
@@ -94,7 +94,10 @@ def verify(corrected: Program, original: Program, job: Job) -> Verified:
     corrected_ones = corrected_pieces(original.path, track)
     orienting = Orienting.of(original, job, corrected)
     with part(0.0, 0.3, points=True):
-        begin, expected = (_expected(original, job, track, corrected_ones, w, shares, orienting) for w in (0.0, 1.0))
+        begin, expected = (
+            _expected(original, job, track=track, corrected=corrected_ones, w=w, shares=shares, orienting=orienting)
+            for w in (0.0, 1.0)
+        )
     step = np.linalg.norm(begin - np.concatenate((original.path.start[:1], expected[:-1])), axis=1)
     layout = row_layout(original.path, track, step, original.step_mm(job.config.control.resolution_mm))
     reach = _reach(original, job, track, corrected_ones, orienting)
@@ -105,37 +108,79 @@ def verify(corrected: Program, original: Program, job: Job) -> Verified:
     moving = np.flatnonzero(layout.corrected & (track.length > 0.0))
     piece, move, f = _samples(corrected.path, moving, first[moving], last[moving])
     commanded = path_geometry.points(corrected.path, move, f)
-    guess = _fraction(job, track, reach, corrected.path, piece, move, f, orienting)
+    guess = _fraction(job, track, reach=reach, path=corrected.path, piece=piece, move=move, f=f, orienting=orienting)
     rotation = None if orienting is None else orienting.of_moves(corrected.path, move, f)
     with part(0.3, 0.9):
-        residual, w = _residual(job, track, piece, commanded, guess, shares, rotation)
+        residual, w = _residual(job, track, piece=piece, commanded=commanded, w=guess, shares=shares, rotation=rotation)
     # Rapids and starts are only there because drives remember them.
     judged = (f > 0.0) & (original.path.kind[track.motion[piece]] != RAPID)
     judged &= ~load_turns(job, track).passed(piece, move, f, w)
     end = judged & (f == 1.0)
-    control = _under_control(original, corrected, job, track, piece, move, commanded, w, judged, shares, rotation)
+    control = _under_control(
+        original,
+        corrected,
+        job=job,
+        track=track,
+        piece=piece,
+        move=move,
+        commanded=commanded,
+        w=w,
+        judged=judged,
+        shares=shares,
+        rotation=rotation,
+    )
     missed, totals = None, None
     if shares is not None:
-        residual, missed = _beside(job, track, piece, commanded, w, shares)
+        residual, missed = _beside(job=job, track=track, piece=piece, commanded=commanded, w=w, shares=shares)
         missed = missed[judged]
     if job.config.uncertain:
         totals = _expected_error(job, track, piece, commanded, w, end, shares, rotation)
     piece, residual, w, vertex = piece[judged], residual[judged], w[judged], f[judged] == 1.0
     convergence = _convergence(job, track, piece[vertex], w[vertex])
-    lines = _per_line(original, job, track, piece, vertex, residual, convergence, missed)
-    return Verified(residual, lines, joins, control, warnings, missed, totals, job.config.compensation.policy)
+    lines = _per_line(
+        original,
+        job,
+        track=track,
+        piece=piece,
+        vertex=vertex,
+        residual=residual,
+        convergence=convergence,
+        missed=missed,
+    )
+    return Verified(
+        residual=residual,
+        lines=lines,
+        joining=joins,
+        control=control,
+        warnings=warnings,
+        missed=missed,
+        totals=totals,
+        policy=job.config.compensation.policy,
+    )
 
 
 def _under_control(
-    original: Program, corrected: Program, job: Job, track: Track, piece: Ints, move: Ints, commanded: Floats, w: Floats,
-    judged: Bools, shares: Shares | None, rotation: Floats | None = None,
-) -> dict[str, Any]:  # fmt: skip
+    original: Program,
+    corrected: Program,
+    *,
+    job: Job,
+    track: Track,
+    piece: Ints,
+    move: Ints,
+    commanded: Floats,
+    w: Floats,
+    judged: Bools,
+    shares: Shares | None,
+    rotation: Floats | None = None,
+) -> dict[str, Any]:
     """What the control adds to the error at the points (k,) that are judged, without what a policy leaves on purpose."""
     travel = _told(travel_of(job, track, piece, w), rotation)
     error = respond(job, commanded, travel)[0] - track.points(piece, w)
     if shares is not None:
         error = error - shares.left(job, track, piece, w, travel)
-    return of_text(original, corrected, job, move[judged], commanded[judged], error[judged])
+    return of_text(
+        original=original, corrected=corrected, job=job, move=move[judged], told=commanded[judged], error=error[judged]
+    )
 
 
 def _beside(job: Job, track: Track, piece: Ints, commanded: Floats, w: Floats, shares: Shares) -> tuple[Floats, Floats]:
@@ -164,7 +209,7 @@ def _expected_error(
     piece, w, commanded, end = piece[at], w[at], commanded[at], end[at]
     travel = _told(travel_of(job, track, piece, w), None if rotation is None else rotation[at])
     tip, _ = respond(job, commanded, travel)
-    moves = uncertainty.moves(piece, w, commanded, travel, np.zeros(len(at), np.bool_), tip)
+    moves = uncertainty.moves(piece, w, commanded=commanded, travel=travel, free=np.zeros(len(at), np.bool_), base=tip)
     taken = None if shares is None else shares.at(track, piece, w)[end]
     totals = BandTotals(uncertainty.inputs)
     totals.add((tip - track.points(piece, w))[end], moves.take(np.flatnonzero(end)), taken)
@@ -209,8 +254,15 @@ def _aimed(job: Job, track: Track, piece: Ints, w: Floats, orienting: Orienting 
 
 
 def _expected(
-    program: Program, job: Job, track: Track, corrected: Bools, w: float, shares: Shares | None, orienting: Orienting | None
-) -> Floats:  # fmt: skip
+    program: Program,
+    job: Job,
+    *,
+    track: Track,
+    corrected: Bools,
+    w: float,
+    shares: Shares | None,
+    orienting: Orienting | None,
+) -> Floats:
     """Commanded tip (p, 3) at fraction w of every piece, as compensate would have it."""
     pieces = np.arange(len(track.motion))
     at = np.full(len(pieces), w)
@@ -235,8 +287,16 @@ def _reach(program: Program, job: Job, track: Track, corrected: Bools, orienting
 
 
 def _fraction(
-    job: Job, track: Track, reach: Floats, path: Path, piece: Ints, move: Ints, f: Floats, orienting: Orienting | None
-) -> Floats:  # fmt: skip
+    job: Job,
+    track: Track,
+    *,
+    reach: Floats,
+    path: Path,
+    piece: Ints,
+    move: Ints,
+    f: Floats,
+    orienting: Orienting | None,
+) -> Floats:
     """First guess (k,) of the fraction of each piece: by the length of the path that ought to be commanded."""
     length = path_geometry.lengths(path)
     before = np.cumsum(length) - length
@@ -264,7 +324,7 @@ def _fraction(
 
 
 def _residual(
-    job: Job, track: Track, piece: Ints, commanded: Floats, w: Floats, shares: Shares | None, rotation: Floats | None
+    job: Job, track: Track, *, piece: Ints, commanded: Floats, w: Floats, shares: Shares | None, rotation: Floats | None
 ) -> tuple[Floats, Floats]:
     """Distance (k,) mm of the loaded tip from the programmed path, and the fraction of the nearest point.
 
@@ -308,6 +368,7 @@ def _convergence(job: Job, track: Track, piece: Ints, w: Floats) -> Floats:
 def _per_line(
     original: Program,
     job: Job,
+    *,
     track: Track,
     piece: Ints,
     vertex: Bools,

@@ -17,7 +17,7 @@ GAP_DEG = 6.0  # angles closer than this are one interval: less than the shortes
 DRAWN_DEG = 3.0  # step at which a curve is told
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class CurveOfJoint:
     """The curve of one joint: angles (n,) deg, error and deviation (n,) rad; amplitude with deviation, rad; intervals seen.
 
@@ -55,7 +55,15 @@ def curve_of(bench: ArmBench, columns: Sequence[Column], amount: Floats, covaria
         "band_rad": [float(s) for s in sd],
     }
     error = _drawn(replace(cause, values=values), np.radians(angle))
-    return CurveOfJoint(angle, error, sd, amplitude, float(np.sqrt(slope @ covariance @ slope)), seen, values)
+    return CurveOfJoint(
+        angle=angle,
+        error=error,
+        sd=sd,
+        amplitude=amplitude,
+        amplitude_sd=float(np.sqrt(slope @ covariance @ slope)),
+        seen=seen,
+        values=values,
+    )
 
 
 def seen_angles(angle: Floats) -> tuple[tuple[float, float], ...]:

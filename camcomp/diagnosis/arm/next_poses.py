@@ -126,7 +126,7 @@ def proposed(
     poses = _as_poses(q)
     place = bench.standing(poses, ()).hung.point
     poses = replace(poses, tip=bench.start[0].tips(place, bench.standing(poses, ()).hung.rotation))
-    there = ArmBench(bench.robot, bench.causes, [poses])
+    there = ArmBench(robot=bench.robot, causes=bench.causes, campaigns=[poses])
     group = there.groups(columns, noise)[0]
     k = len(columns)
     whole = np.zeros((k + 9,) * 2)
@@ -153,4 +153,6 @@ def unseen_share(bench: ArmBench, columns: Sequence[Column], q: Floats) -> float
 
 def _as_poses(q: Floats) -> Poses:
     n = len(q)
-    return Poses("next", q, np.zeros((n, 3)), np.arange(float(n)), None, np.full(n, "next"))
+    return Poses(
+        label="next", q=q, tip=np.zeros((n, 3)), time=np.arange(float(n)), temperature=None, run=np.full(n, "next")
+    )

@@ -35,7 +35,7 @@ _WRIST = {"joint_coupling": 2}  # effects of the last joints only: of how many
 _UNSEEN = ("time_sync", "workpiece_frame", "tool_length", "chain_error", "servo_lag", "backlash", "friction", "none")
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Poses:
     """Poses of one campaign: joints q (n, m), measured tips (n, 3) mm, time (n,) s, temperature (n,) or None, run (n,).
 
@@ -63,9 +63,18 @@ class Poses:
         sd = None if self.sd is None else self.sd[rows]
         way, torque, force = (None if each is None else each[rows] for each in (self.approach, self.torque, self.force))
         return Poses(
-            self.label, self.q[rows], self.tip[rows], self.time[rows], heat, self.run[rows], sd, self.rows[rows], way,
-            torque, force,
-        )  # fmt: skip
+            label=self.label,
+            q=self.q[rows],
+            tip=self.tip[rows],
+            time=self.time[rows],
+            temperature=heat,
+            run=self.run[rows],
+            sd=sd,
+            row=self.rows[rows],
+            approach=way,
+            torque=torque,
+            force=force,
+        )
 
     @property
     def rows(self) -> np.ndarray:
@@ -125,7 +134,7 @@ class LoadedArm:
         return signal_path.posed(self.causes, at.tips(self.hung.point, self.hung.rotation), self.load, self.motion)
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, kw_only=True)
 class ArmBench:
     """An arm's model and its campaigns, the first `fitted` of which are fitted (None: all); the others are judged.
 

@@ -61,13 +61,13 @@ def solve(
     least = least_floor(robot, bench.campaigns, gaps, stated)
     sd = least.sd if least else noise_of_richest(bench, shelf, weights)
     with progress.part(0.1, 0.5):
-        shelf, found = explained(bench, shelf, sd, least, weights, without)
+        shelf, found = explained(bench=bench, shelf=shelf, sd=sd, floor=least, weights=weights, without=without)
     floor = least
     if least is not None:
-        floor, again = settled_floor(bench, shelf, found, gaps, stated, least)
+        floor, again = settled_floor(bench=bench, shelf=shelf, found=found, gaps=gaps, stated=stated, least=least)
         if again:
             with progress.part(0.5, 0.7):
-                second = explained(bench, shelf, floor.sd, floor, weights, without)
+                second = explained(bench=bench, shelf=shelf, sd=floor.sd, floor=floor, weights=weights, without=without)
             hidden = found.unknown > EVEN and found.background.unknown and second[1].unknown <= EVEN
             floor, (shelf, found) = (least, (shelf, found)) if hidden else (floor, second)
     amount, covariance = found.amplitudes()
@@ -83,7 +83,7 @@ def bench_of(robot: Robot, causes: tuple[Cause, ...], runs: Sequence[Poses], hol
     """All poses of the campaigns that are fitted and judged, with the frames that they are judged in."""
     own = merged([r for r in runs if str(r.run[0]) not in holdout])
     held, _ = judged_campaigns(robot, [r for r in runs if str(r.run[0]) in holdout], own)
-    return ArmBench(robot, causes, [*own, *held], len(own))
+    return ArmBench(robot=robot, causes=causes, campaigns=[*own, *held], fitted=len(own))
 
 
 def cleaned(
@@ -93,7 +93,7 @@ def cleaned(
 
     Weights of Huber, Ann. Math. Stat. 35 (1964) 73; the scale is that of the median.
     """
-    bench = ArmBench(robot, causes, campaigns, fitted)
+    bench = ArmBench(robot=robot, causes=causes, campaigns=campaigns, fitted=fitted)
     shelf = Shelf.of([*bench.columns(without), *bench.shaped(without), *bench.waves(without)])
     left = beside_richest(bench, shelf)
     outliers: list[tuple[str, int]] = []
@@ -106,13 +106,13 @@ def cleaned(
         square = size[~far] ** 2
         scale = max(float(np.median(square)) / CHI2_3_MEDIAN, 1e-18)
         weights.append(np.maximum(np.sqrt(square / scale / CHI2_3_EDGE), 1.0))
-    return ArmBench(robot, causes, campaigns, fitted), shelf, outliers, weights
+    return ArmBench(robot=robot, causes=causes, campaigns=campaigns, fitted=fitted), shelf, outliers, weights
 
 
 def beside_richest(bench: ArmBench, shelf: Shelf) -> list[Floats]:
     """Residuals (n, 3) mm of every campaign beside all single effects at once, of usual sizes (ridge)."""
     plain = shelf.without_shapes()
-    model = linearise(ArmBench(bench.robot, bench.causes, bench.campaigns), plain, 1.0)
+    model = linearise(ArmBench(robot=bench.robot, causes=bench.causes, campaigns=bench.campaigns), plain, 1.0)
     size = max(float(np.median(np.abs(np.concatenate([g.y for g in model.groups])))), 1e-9)
     slab = {int(j): 1.0 for j in np.flatnonzero(model.size > 0.0)}
     at = model.posterior(Background(noise=size), slab)
@@ -218,7 +218,7 @@ def fixes_frame(robot: Robot, poses: Poses) -> bool:
     """Whether the rows of a campaign fix the frame of its instrument and the place of its target."""
     if len(poses.q) < LEAST_POSES:
         return False
-    bench = ArmBench(robot, (), [poses])
+    bench = ArmBench(robot=robot, causes=(), campaigns=[poses])
     N = bench.groups([], 1.0)[0].N.reshape(-1, 9)
     size = np.linalg.svd(N / np.linalg.norm(N, axis=0), compute_uv=False)
     return bool(size[-1] > LOOSE_FRAME * size[0])
@@ -238,11 +238,20 @@ def merged(runs: Sequence[Poses], least: int = LEAST_POSES) -> list[Poses]:
         way = np.concatenate([np.zeros_like(r.q) if r.approach is None else r.approach for r in own])
         torque = np.concatenate([np.full(r.q.shape, np.nan) if r.torque is None else r.torque for r in own])
         every = Poses(
-            label, q, tip, time, heat, run, None if all(d is None for d in deviations) else sd, row, way,
-            None if np.isnan(torque).all() else torque,
-            None if all(r.force is None for r in own)
+            label=label,
+            q=q,
+            tip=tip,
+            time=time,
+            temperature=heat,
+            run=run,
+            sd=None if all(d is None for d in deviations) else sd,
+            row=row,
+            approach=way,
+            torque=None if np.isnan(torque).all() else torque,
+            force=None
+            if all(r.force is None for r in own)
             else np.concatenate([np.zeros((len(r.q), 3)) if r.force is None else r.force for r in own]),
-        )  # fmt: skip
+        )
         _, first = np.unique(np.concatenate([q, tip], axis=1), axis=0, return_index=True)  # sorted by joints
         every = every.take(first)
         if len(every.q) < least:
@@ -290,7 +299,14 @@ def studied(
 ) -> tuple[DiagnosisResult, tuple[str, ...]]:
     """The result of `study`, and notes for the reader of the logs."""
     with progress.part(0.0, 0.7):
-        case = solve(robot, causes, runs, holdout, without, StatedDeviation() if stated is None else stated)
+        case = solve(
+            robot=robot,
+            causes=causes,
+            runs=runs,
+            holdout=holdout,
+            without=without,
+            stated=StatedDeviation() if stated is None else stated,
+        )
     bench = case.bench
     gaps = [bench.gap(k, ()) for k in range(len(bench.campaigns))]
     case = without_far_judged(case)

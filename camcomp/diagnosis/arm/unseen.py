@@ -83,7 +83,7 @@ def without_far_judged(case: PoseCase) -> PoseCase:
     if len(outliers) == len(case.outliers):
         return case
     model = replace(case.model, groups=tuple(groups))
-    bench = ArmBench(bench.robot, bench.causes, campaigns, bench.fitted)
+    bench = ArmBench(robot=bench.robot, causes=bench.causes, campaigns=campaigns, fitted=bench.fitted)
     return replace(case, bench=bench, explanation=replace(case.explanation, model=model), outliers=tuple(outliers))
 
 

@@ -112,9 +112,18 @@ def value_of(value: float, spread: float) -> Estimate:
 
 
 def close(
-    found: AxisFindings, channel: AxisChannel, effects: Sequence[str], data: Series, table: Any, columns: list[Any],
-    test: list[int], values: list[Floats], moves: list[AxisTravel], unsure: Mapping[int, Floats] | None = None,
-) -> None:  # fmt: skip
+    found: AxisFindings,
+    channel: AxisChannel,
+    *,
+    effects: Sequence[str],
+    data: Series,
+    table: Any,
+    columns: list[Any],
+    test: list[int],
+    values: list[Floats],
+    moves: list[AxisTravel],
+    unsure: Mapping[int, Floats] | None = None,
+) -> None:
     """Leftovers of the channel and their gate; where runs are held out, sizes are of what is left there, not of withheld blocks.
 
     unsure: what rows (n,) of runs are not known to, by the run's number, beside what the laws of inertia and friction are not.
@@ -145,7 +154,8 @@ def close(
     channel.names = [channel.all_names[k] for k in every]
     if inertia in columns:
         inside, left = (
-            _beside_law(rows, every, channel.floor, table, columns, c, unsure or {}) for rows in (inside, left)
+            _beside_law(rows, every, floor=channel.floor, table=table, columns=columns, c=c, unsure=unsure or {})
+            for rows in (inside, left)
         )
     offset = 0.0 if inertia in columns else 2.0 * REPEATABILITY_MM
     channel.gate = judge(inside, left, [moves[k].time for k in every], channel.floor, offset)
@@ -165,9 +175,15 @@ def within_a_row(own: Floats) -> Floats:
 
 
 def _beside_law(
-    rows: Sequence[Floats], runs: Sequence[int], floor: float, table: Any, columns: list[Any], c: Floats,
+    rows: Sequence[Floats],
+    runs: Sequence[int],
+    *,
+    floor: float,
+    table: Any,
+    columns: list[Any],
+    c: Floats,
     unsure: Mapping[int, Floats],
-) -> list[Floats]:  # fmt: skip
+) -> list[Floats]:
     """Leftovers (n,) by run without what their law is not known to."""
     out = []
     for left, k in zip(rows, runs, strict=True):

@@ -81,7 +81,7 @@ def force_of(
     runs = [r.of(on) for r, on in zip(runs, rows, strict=True)]
     moves = [m.of(on) for m, on in zip(moves, rows, strict=True)]
     forces, raw = [r.force for r in runs], series_of(moves, [r.force for r in runs], train)
-    plain = now = kept = _forced(found, runs, moves, forces, train, test, without)
+    plain = now = kept = _forced(found, runs, moves=moves, forces=forces, train=train, test=test, without=without)
     pushes, named = list[Window](), list[Window]()
     for _ in range(0 if "disturbance" in without else MOST_PUSHES):
         channel = now.force
@@ -94,9 +94,21 @@ def force_of(
         pushes = [*pushes, window]
         for again in range(PASSES):  # what friction looks like, and where the push ends, is known when the push is gone
             if again:
-                pushes = [_placed(each, i, pushes, channel, forces, moves) for i, each in enumerate(pushes)]
+                pushes = [
+                    _placed(push=each, number=i, pushes=pushes, channel=channel, forces=forces, moves=moves)
+                    for i, each in enumerate(pushes)
+                ]
             shifted = [_without(pushes, k, force) for k, force in enumerate(forces)]
-            now = _forced(found, runs, moves, shifted, train, test, without, _edges(pushes, moves))
+            now = _forced(
+                found,
+                runs,
+                moves=moves,
+                forces=shifted,
+                train=train,
+                test=test,
+                without=without,
+                unsure=_edges(pushes, moves),
+            )
             channel = now.force
             assert channel is not None
         if _beyond(now) < LEFT * _beyond(plain):
@@ -165,9 +177,16 @@ def _beyond(found: AxisFindings) -> float:
 
 
 def _forced(
-    found: AxisFindings, runs: list[AxisRun], moves: list[AxisTravel], forces: list[Floats], train: list[int], test: list[int],
-    without: set[str], unsure: Mapping[int, Floats] | None = None,
-) -> AxisFindings:  # fmt: skip
+    found: AxisFindings,
+    runs: list[AxisRun],
+    *,
+    moves: list[AxisTravel],
+    forces: list[Floats],
+    train: list[int],
+    test: list[int],
+    without: set[str],
+    unsure: Mapping[int, Floats] | None = None,
+) -> AxisFindings:
     """The same for given forces (n,) per run; unsure: as in `close`."""
     found = replace(found, causes=[*found.causes], unknown_in=[*found.unknown_in], details={**found.details})
     data, table = series_of(moves, forces, train), table_of(moves)
@@ -181,7 +200,9 @@ def _forced(
     columns: list[Column] = [constant, inertia]
     beside = table(train, constant, inertia, turn, speed, either_way)
     before = withheld(data, table(train, *columns))
-    channel = AxisChannel(data, train, first, before, floor=floor, stated=found.stated.force_N is not None)
+    channel = AxisChannel(
+        data=data, runs=train, first=first, last=before, floor=floor, stated=found.stated.force_N is not None
+    )
     channel.all_names, channel.beside = [r.name for r in runs], beside
     last, named = before, []
     if "friction" not in without:
@@ -195,7 +216,9 @@ def _forced(
             if helps(more):
                 columns, last = [*columns, either_way], lopsided
             shape = (
-                None if length.speed is not None else second_distance(data, table, train, columns, last, length, moving)
+                None
+                if length.speed is not None
+                else second_distance(data, table, train=train, columns=columns, last=last, length=length, moving=moving)
             )
             if shape is not None:
                 columns, last = [*columns, shape.column], shape.last
@@ -206,16 +229,39 @@ def _forced(
 
             alike = as_good(data, turned, length.distance) if length.speed is None else []
             lengths = around(alike) if alike else [length.distance]
-            unsure = not_known_beside(data, turned, train, [*train, *test], length, lengths, unsure or {})
+            unsure = not_known_beside(
+                data, turned, train=train, runs=[*train, *test], length=length, alike=lengths, unsure=unsure or {}
+            )
             tables = [*(turned(Turning(d)) for d in lengths if alike), table(train, *columns)]
             found.causes.append(
-                friction_of(found, data, tables, length, shape, lengths, probability_of(g), before, last)
+                friction_of(
+                    found,
+                    data,
+                    tables=tables,
+                    length=length,
+                    shape=shape,
+                    lengths=lengths,
+                    probability=probability_of(g),
+                    before=before,
+                    last=last,
+                )
             )
             found.details["force"]["asymmetry_z"] = round(more.z, 2)
             named.append("friction")
-    _refused(found, data, table, train, columns, last, moves, length, floor)
+    _refused(found, data, table=table, train=train, columns=columns, last=last, moves=moves, length=length, floor=floor)
     known = _weighed(data, table(train, *columns), [len(moves[k].time) for k in train], floor)
-    close(found, channel, named, known, table, columns, test, forces, moves, unsure)
+    close(
+        found,
+        channel,
+        effects=named,
+        data=known,
+        table=table,
+        columns=columns,
+        test=test,
+        values=forces,
+        moves=moves,
+        unsure=unsure,
+    )
     found.force = channel
     line = ripple([moves[k] for k in train], channel.left)
     if line is not None and line.share > LEAST_RIPPLE and line.amplitude**2 / 2.0 > (MINOR * floor) ** 2:
@@ -287,9 +333,17 @@ def _weighed(data: Series, A: Floats, rows: Sequence[int], floor: float) -> Seri
 
 
 def _refused(
-    found: AxisFindings, data: Series, table: Any, train: list[int], columns: list[Any], last: Floats,
-    moves: list[AxisTravel], length: Turning, floor: float,
-) -> None:  # fmt: skip
+    found: AxisFindings,
+    data: Series,
+    *,
+    table: Any,
+    train: list[int],
+    columns: list[Any],
+    last: Floats,
+    moves: list[AxisTravel],
+    length: Turning,
+    floor: float,
+) -> None:
     """Terms that nobody states, tried on withheld blocks; those that hold are part of the unknown.
 
     They have to hold where rows count for less that inertia and friction are not known for to the floor, too, and beside all that

@@ -27,7 +27,7 @@ ANSWER_S = (0.02, 0.3)  # ahead of a push, and behind it until a loop has answer
 BESIDE_GAP = 5  # rows of which a gap leaves speed and acceleration uncertain
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class AxisRun:
     """Log of one axis in one run: time (n,) s; setpoint, encoder mm; force N, each (n,), NaN where nothing was logged.
 
@@ -174,7 +174,7 @@ class AxisDeviation:
         return AxisDeviation(None if rad is None else ARM_LENGTH * rad, None if torque is None else torque / ARM_LENGTH)
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, kw_only=True)
 class AxisChannel:
     """One channel of one axis: what was fitted, block by block."""
 
@@ -211,7 +211,7 @@ class Carried:
     late: float | None = None
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, kw_only=True)
 class AxisFindings:
     """What was found on one axis."""
 

@@ -52,7 +52,7 @@ EQUAL = 1.05  # of what a loop with inertia leaves: what one that swings over ma
 
 
 def follow(
-    found: AxisFindings, runs: list[AxisRun], moves: list[AxisTravel], gaps: list[Floats], train: list[int], test: list[int],
+    found: AxisFindings, runs: list[AxisRun], moves: list[AxisTravel], gaps: list[Floats], *, train: list[int], test: list[int],
     without: set[str],
 ) -> AxisFindings:  # fmt: skip
     """What was found on the axis, with the channel of the following error and its causes; test: runs that are judged only.
@@ -61,13 +61,25 @@ def follow(
     something is left beside inertia and nothing beside it.
     """
     floor = found.stated.encoder_mm or float(np.hypot(scatter_of([runs[k] for k in train]), REPEATABILITY_MM))
-    swung = None if "servo_overshoot" in without else _swung(
-        runs, moves, gaps, train, floor, without, found.carried.late or 0.0
-    )  # fmt: skip
-    plain = _followed(found, runs, moves, gaps, train, test, without, floor)
+    swung = (
+        None
+        if "servo_overshoot" in without
+        else _swung(runs, moves, gaps=gaps, train=train, floor=floor, without=without, late=found.carried.late or 0.0)
+    )
+    plain = _followed(found, runs, moves=moves, gaps=gaps, train=train, test=test, without=without, floor=floor)
     if swung is None or not (swung.better or _above(plain)):
         return plain
-    swings = _followed(found, swung.runs, swung.moves, swung.gaps, train, test, without, floor, swung)
+    swings = _followed(
+        found,
+        swung.runs,
+        moves=swung.moves,
+        gaps=swung.gaps,
+        train=train,
+        test=test,
+        without=without,
+        floor=floor,
+        swung=swung,
+    )
     return swings if swung.better or not _above(swings) else plain
 
 
@@ -77,15 +89,25 @@ def _above(found: AxisFindings) -> bool:
 
 
 def _followed(
-    found: AxisFindings, runs: list[AxisRun], moves: list[AxisTravel], gaps: list[Floats], train: list[int], test: list[int],
-    without: set[str], floor: float, swung: _Swung | None = None,
-) -> AxisFindings:  # fmt: skip
+    found: AxisFindings,
+    runs: list[AxisRun],
+    *,
+    moves: list[AxisTravel],
+    gaps: list[Floats],
+    train: list[int],
+    test: list[int],
+    without: set[str],
+    floor: float,
+    swung: _Swung | None = None,
+) -> AxisFindings:
     """The same, with a loop that swings over or without one."""
     found = replace(found, causes=[*found.causes], details={**found.details})
     data, table = series_of(moves, gaps, train), table_of(moves)
     columns: list[Column] = [constant, acceleration] if swung is None else [constant, swung.error]
     before, last = withheld(data, table(train, constant)), withheld(data, table(train, *columns))
-    channel = AxisChannel(data, train, before, last, floor=floor, stated=found.stated.encoder_mm is not None)
+    channel = AxisChannel(
+        data=data, runs=train, first=before, last=last, floor=floor, stated=found.stated.encoder_mm is not None
+    )
     channel.all_names = [r.name for r in runs]
     named = []
     if swung is not None:
@@ -120,7 +142,7 @@ def _followed(
         found.details["following"] = {} if i is None else {"acceleration_us2": value_of(1e6 * c[i], 1e3 * spread[i])}
         if lag.turn in columns:
             found.details["following"] |= {"reversal_um": value[lag.turn], "presliding_mm": lag.length.distance}
-    close(found, channel, named, data, table, columns, test, gaps, moves)
+    close(found, channel, effects=named, data=data, table=table, columns=columns, test=test, values=gaps, moves=moves)
     found.following = channel
     taken, beyond = float(np.mean(before) - np.mean(last)), float(np.mean(last)) - floor**2
     if _above(found):
@@ -135,7 +157,7 @@ def _followed(
     return found
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class _Lag:
     """A lag beside other columns: its own columns, what they leave of withheld blocks, and what that gains."""
 
@@ -168,15 +190,21 @@ def _lag(
         lopsided = withheld(data, table(train, *base, speed, turn, either_way))
         more = gain(last, lopsided, moving)
         if holds(more):
-            return _Lag([speed, turn, either_way], lopsided, g, turn, length, more)
-        return _Lag([speed, turn], last, g, turn, length)
+            return _Lag(
+                columns=[speed, turn, either_way], last=lopsided, gain=g, turn=turn, length=length, lopsided=more
+            )
+        return _Lag(columns=[speed, turn], last=last, gain=g, turn=turn, length=length)
     # at one speed a lag and a reversal are nearly the same: what needs less is it
     last = withheld(data, table(train, *base, speed))
     g = gain(withheld(data, table(train, *base)), last, moving)
-    return _Lag([speed], last, g, turn, length) if holds(g) and np.mean(last) <= np.mean(blind) else None
+    return (
+        _Lag(columns=[speed], last=last, gain=g, turn=turn, length=length)
+        if holds(g) and np.mean(last) <= np.mean(blind)
+        else None
+    )
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class _Swung:
     """A loop that swings over, and the rows that tell of it: runs without how their loops were before the log began."""
 
@@ -197,6 +225,7 @@ class _Swung:
 def _swung(
     runs: list[AxisRun],
     moves: list[AxisTravel],
+    *,
     gaps: list[Floats],
     train: list[int],
     floor: float,
@@ -221,13 +250,13 @@ def _swung(
         return None
     errors = [swing.error(r)[on] for r, on in zip(runs, rows, strict=True)]
     found = _Swung(
-        swing,
-        spread,
-        Gain(0.0, 0.0, 0),
-        [r.of(on) for r, on in zip(runs, rows, strict=True)],
-        [m.of(on) for m, on in zip(moves, rows, strict=True)],
-        [g[on] for g, on in zip(gaps, rows, strict=True)],
-        errors,
+        swing=swing,
+        spread=spread,
+        gain=Gain(0.0, 0.0, 0),
+        runs=[r.of(on) for r, on in zip(runs, rows, strict=True)],
+        moves=[m.of(on) for m, on in zip(moves, rows, strict=True)],
+        gaps=[g[on] for g, on in zip(gaps, rows, strict=True)],
+        errors=errors,
     )
     data, table = series_of(found.moves, found.gaps, train), table_of(found.moves)
     plain = withheld(data, table(train, constant, acceleration))

@@ -37,7 +37,7 @@ class TurningShape:
 
 
 def second_distance(
-    data: Series, table: Any, train: list[int], columns: list[Column], last: Floats, length: Turning, moving: Bools
+    data: Series, table: Any, *, train: list[int], columns: list[Column], last: Floats, length: Turning, moving: Bools
 ) -> TurningShape | None:
     """The second distance that helps withheld blocks most; None where one is enough.
 
@@ -60,6 +60,7 @@ def second_distance(
 def friction_of(
     found: AxisFindings,
     data: Series,
+    *,
     tables: Sequence[Floats],
     length: Turning,
     shape: TurningShape | None,
@@ -122,9 +123,15 @@ def around(lengths: Sequence[float]) -> list[float]:
 
 
 def not_known_beside(
-    data: Series, turned: Callable[..., Floats], train: list[int], runs: Sequence[int], length: Turning,
-    alike: Sequence[float], unsure: Mapping[int, Floats],
-) -> dict[int, Floats]:  # fmt: skip
+    data: Series,
+    turned: Callable[..., Floats],
+    *,
+    train: list[int],
+    runs: Sequence[int],
+    length: Turning,
+    alike: Sequence[float],
+    unsure: Mapping[int, Floats],
+) -> dict[int, Floats]:
     """What rows (n,) of runs are not known to, where friction may turn round over other distances as well."""
     fitted = {d: solved(data, turned(Turning(d), train)) for d in (length.distance, *alike)}
     out = dict(unsure)

@@ -295,7 +295,7 @@ def _channel(rows: JointRows, done: ChannelFit) -> AxisChannel:
     constant = done.sizes["offset"][0] if rows.channel == "force" else 0.0
     data = series_of(moves, values, train)
     first = by_block(data, data.y - constant)
-    channel = AxisChannel(data, train, first, first, floor=rows.floor, stated=rows.stated)
+    channel = AxisChannel(data=data, runs=train, first=first, last=first, floor=rows.floor, stated=rows.stated)
     channel.all_names = [run.name for run in rows.runs]
     channel.moves, channel.left = [moves[k] for k in train], [done.left[k] for k in train]
     channel.last = by_block(data, np.concatenate(channel.left))

@@ -140,7 +140,15 @@ def _waves(rows: _Rows, chosen: Sequence[Form], moves: Sequence[AxisTravel]) -> 
     apart = tuple(f"{text}*{way.format(turn=TURN_MM)}" for way in ONE_WAY for text in texts)
     bounds = ((0.99 * line.period, 1.01 * line.period),)
     kinds = [
-        Form("wave", ("act_mm",), each, ("",) * len(each), (float(line.period),), bounds) for each in (texts, apart)
+        Form(
+            family="wave",
+            about=("act_mm",),
+            texts=each,
+            units=("",) * len(each),
+            shape=(float(line.period),),
+            bounds=bounds,
+        )
+        for each in (texts, apart)
     ]
     return [_refined(rows, chosen, each) for each in kinds], line.tried
 

@@ -79,7 +79,16 @@ def studied(
         cleaned[name] = [r.on_ticks().away_from_gaps() for r, _ in clean]
     around = AxisSurroundings(robot, cleaned)
     for name, own in progress.steps(cleaned.items(), len(axes) * (1 + again)):
-        found.append(_axis(name, own, set(holdout), set(without), stated or AxisDeviation(), around))
+        found.append(
+            _axis(
+                name=name,
+                runs=own,
+                holdout=set(holdout),
+                without=set(without),
+                stated=stated or AxisDeviation(),
+                around=around,
+            )
+        )
     found = [a for a in found if a.channels]
     if not found:
         raise ValueError(
@@ -147,16 +156,16 @@ def _axis(
 ) -> AxisFindings:  # fmt: skip
     hinge = any(r.revolute for r in runs)
     stated = stated.of(hinge)
-    found = AxisFindings(name, stated=stated, revolute=hinge)
+    found = AxisFindings(name=name, stated=stated, revolute=hinge)
     usable = [r for r in runs if np.isfinite(r.encoder).sum() >= ROWS]
     if not usable:
         return found
     train = [k for k, r in enumerate(usable) if r.name not in holdout]
     test = [k for k, r in enumerate(usable) if r.name in holdout]
     found.wide = encoder_width(usable, train)
-    found = (_hinge if hinge else _slide)(found, usable, train, test, without, around)
+    found = (_hinge if hinge else _slide)(found, usable, train, test, without=without, around=around)
     if any(usable[k].load is not None for k in train):
-        found = _second_encoder(found, usable, train, test, without, around)
+        found = _second_encoder(found=found, usable=usable, train=train, test=test, without=without, around=around)
     _name_rest(found, usable, {} if hinge else {n: own for n, own in around.axes.items() if n != name})
     if found.strange:
         follows = found.following
@@ -178,18 +187,20 @@ def _slide(
     late = lateness(usable, gaps, train) if followed else None
     pushed = list[tuple[str, float, float]]()
     for again in (False, True):  # what pushed an axis shows in what its loop makes of it
-        found = AxisFindings(name, stated=stated, wide=wide)
+        found = AxisFindings(name=name, stated=stated, wide=wide)
         if followed:
             runs, moves, values = motion_of(found, [r.unpushed(pushed) for r in usable], gaps, train, late)
-            found = follow(found, runs, moves, values, train, test, without)
+            found = follow(found, runs, moves, values, train=train, test=test, without=without)
             rows = JointRows(
                 channel="following", runs=usable, moves=moves, values=values, train=train, test=test, floor=0.0,
                 stated=False,
             )  # fmt: skip
             found = _limited(found, rows, around, without)
         if forced:
-            runs, moves, _ = motion_of(found, usable, [r.force for r in usable], train, late, found.led)
-            found = force_of(found, runs, moves, train, test, without)
+            runs, moves, _ = motion_of(
+                found=found, runs=usable, values=[r.force for r in usable], train=train, late=late, led=found.led
+            )
+            found = force_of(found=found, runs=runs, moves=moves, train=train, test=test, without=without)
         if again or not (followed and found.pushed):
             break
         pushed = found.pushed
@@ -207,7 +218,7 @@ def _limited(found: AxisFindings, rows: JointRows, around: AxisSurroundings, wit
     follows = found.following
     if follows is None or follows.gate is None or follows.gate.word == "at" or "speed_limit" in without:
         return found
-    plain = AxisFindings(found.name, stated=found.stated, wide=found.wide, carried=found.carried)
+    plain = AxisFindings(name=found.name, stated=found.stated, wide=found.wide, carried=found.carried)
     rows = replace(rows, floor=follows.floor, stated=follows.stated)
     limited, channel = study_channel(plain, rows, around, without)
     if not any(c.effect == "speed_limit" for c in limited.causes) or np.mean(channel.last) >= np.mean(follows.last):
@@ -279,7 +290,7 @@ def _judged(
     """Every axis with each of the runs held out in turn: chosen and fitted without it."""
     every = [
         [
-            _axis(name, list(runs), {one}, without, stated, around)
+            _axis(name=name, runs=list(runs), holdout={one}, without=without, stated=stated, around=around)
             for name, runs in progress.steps(around.axes.items(), len(around.axes))
         ]
         for one in progress.steps(held, len(held))

@@ -101,7 +101,7 @@ def strangers(at: AxisTravel, how: Turning) -> dict[str, tuple[str, Floats]]:
     }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Ripple:
     """A line in the leftover over position: period mm, amplitude (both directions), share of the leftover's energy; how many
     periods were tried.
@@ -159,12 +159,12 @@ def ripple(at: list[AxisTravel], left: list[Floats], shortest: float = 0.5, long
     c = np.linalg.lstsq(A, y, rcond=None)[0]
     share = 1.0 - float(((y - A @ c) ** 2).sum() / max(float((y**2).sum()), 1e-300))
     return Ripple(
-        1.0 / f,
-        float(np.hypot(*c)),
-        float(2 * np.abs(lines[0][best])),
-        float(2 * np.abs(lines[1][best])),
-        share,
-        len(frequency),
+        period=1.0 / f,
+        amplitude=float(np.hypot(*c)),
+        forward=float(2 * np.abs(lines[0][best])),
+        backward=float(2 * np.abs(lines[1][best])),
+        share=share,
+        tried=len(frequency),
     )
 
 

@@ -74,7 +74,7 @@ def public_values(effect: Any, values: Mapping[str, float]) -> dict[str, float]:
     return dict(effect.public(values)) if hasattr(effect, "public") else dict(values)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Run:
     """A run on the bench: its run path, what was measured, its labels, and a factor by which rows are thinned."""
 
@@ -95,7 +95,7 @@ class Run:
         return self.measured.encoder if self.measured.has("encoder") else None
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, kw_only=True)
 class Bench:
     """A twin and the runs compared with it."""
 

@@ -164,7 +164,7 @@ def build(
     parts: list[list[Floats]] = []
 
     def put(
-        who: int, name: str, size: float, most: float, per_run: list[Floats], signed: int = 0, loose: bool = False
+        who: int, name: str, size: float, most: float, per_run: list[Floats], *, signed: int = 0, loose: bool = False
     ) -> None:
         owner.append(who)
         names.append(name)
@@ -180,12 +180,14 @@ def build(
             candidate_columns(bench, candidate, shapes.get(i, shape_default(candidate))),
             strict=True,
         ):
-            size, most = healthy_sizes(bench, candidate, p, per_run, floor_um, minor_um)
-            put(i, f"{candidate.label}.{p.name}", size, most, per_run, p.sign, True)
+            size, most = healthy_sizes(
+                bench=bench, candidate=candidate, p=p, per_run=per_run, floor_um=floor_um, minor_um=minor_um
+            )
+            put(i, f"{candidate.label}.{p.name}", size, most, per_run, signed=p.sign, loose=True)
     for name, size, per_run, loose in _nuisances(bench):
         if name.startswith("spring."):  # a soft machine has no more of it than of anything else
             size = min(size, HEALTHY * floor_um / max(tip_um(bench, per_run), 1e-9))
-        put(-1, name, size, minor_um / (HEALTHY * floor_um) * size, per_run, 0, loose)
+        put(-1, name, size, minor_um / (HEALTHY * floor_um) * size, per_run, loose=loose)
     channels = range(6 + 2 * len(bench.actuators))
     blocks = tuple(
         ByChannel.of(np.stack([each[r][:, c] for each in parts], axis=1) for c in channels)
@@ -347,7 +349,14 @@ def grounds(bench: Bench) -> list[Ground]:
         present = {n: run.measured.has(n) for n in ("tip", "encoder", "drive", "dyno")}
         present["encoder"] &= run.by == "setpoint"  # else it is the motion itself
         out.append(
-            Ground(reading.motion.at(keep), reading.drive[keep], reading.dyno[keep], tip[keep], velocity[keep], present)
+            Ground(
+                motion=reading.motion.at(keep),
+                drive=reading.drive[keep],
+                force=reading.dyno[keep],
+                tip=tip[keep],
+                velocity=velocity[keep],
+                present=present,
+            )
         )
     return out
 

@@ -7,7 +7,7 @@ import numpy as np
 from camcomp.ground.datatypes import Bools, Floats, Ints
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Measured:
     """n rows, m actuators. tip (n, 3) mm program frame; setpoint, encoder, drive (n, m); load (n, m): second encoder
     behind the gear; dyno (n, 3) N machine frame; tip_sd (n, 3) mm: what the instrument states of its own deviation.

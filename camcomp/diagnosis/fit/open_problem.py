@@ -49,13 +49,35 @@ def open_problem(bench: Bench, candidates: Sequence[CandidateCause], stated_mm: 
         i: guessed.get(i, shape_default(a)) for i, a in enumerate(candidates) if a.shapes or a.switches
     }
     words = patterns(bench)
-    rough = _whiten(bench, columns, [], floor, noise, inflate, times, residuals, shapes, outliers)
+    rough = _whiten(
+        bench,
+        columns,
+        words=[],
+        floor=floor,
+        noise=noise,
+        inflate=inflate,
+        times=times,
+        residuals=residuals,
+        shapes=shapes,
+        outliers=outliers,
+    )
     if len(columns.of_labels):
         columns = with_scatter(columns, bench, estimate(total(rough.base_grams), rough.prior, ())[0])
         rough = replace(rough, columns=columns)
     noise = _with_model_error(rough)
     del rough  # its white columns are as large as all that follows
-    problem = _whiten(bench, columns, words, floor, noise, inflate, times, residuals, shapes, outliers)
+    problem = _whiten(
+        bench,
+        columns,
+        words=words,
+        floor=floor,
+        noise=noise,
+        inflate=inflate,
+        times=times,
+        residuals=residuals,
+        shapes=shapes,
+        outliers=outliers,
+    )
     return _scanned(problem) if shapes else problem
 
 
@@ -79,17 +101,40 @@ def _with_model_error(problem: Problem) -> Noise:
 
 
 def _whiten(
-    bench: Bench, columns: Columns, words: list[Dictionary], floor: NoiseFloor, noise: Noise, inflate: list[Floats],
-    times: list[Floats], residuals: list[Floats], shapes: dict[int, dict[str, float]], outliers: list[Bools],
-) -> Problem:  # fmt: skip
+    bench: Bench,
+    columns: Columns,
+    *,
+    words: list[Dictionary],
+    floor: NoiseFloor,
+    noise: Noise,
+    inflate: list[Floats],
+    times: list[Floats],
+    residuals: list[Floats],
+    shapes: dict[int, dict[str, float]],
+    outliers: list[Bools],
+) -> Problem:
     white, white_patterns, white_residual = [], [], []
     for k in range(len(bench.runs)):
         white.append(noise.by_channel(k, columns.blocks[k], inflate[k], times[k]))
         white_patterns.append([noise.by_channel(k, w.blocks[k], inflate[k], times[k], w.first) for w in words])
         white_residual.append(noise.rows(k, residuals[k][:, :, None], inflate[k], times[k])[:, 0])
     words = [replace(each, blocks=()) for each in words]  # white they are enough
-    return Problem(bench, columns, words, inflate, times, residuals, floor, noise, outliers, white, white_patterns,
-                   white_residual, shapes, cause_prior(columns))  # fmt: skip
+    return Problem(
+        bench=bench,
+        columns=columns,
+        dictionaries=words,
+        inflate=inflate,
+        times=times,
+        residuals=residuals,
+        floor=floor,
+        noise=noise,
+        outliers=outliers,
+        white=white,
+        white_patterns=white_patterns,
+        white_residual=white_residual,
+        shapes=shapes,
+        candidates=cause_prior(columns),
+    )
 
 
 def _scanned(problem: Problem) -> Problem:
@@ -122,7 +167,12 @@ def _scanned(problem: Problem) -> Problem:
         candidate = problem.columns.candidates[problem.columns.candidate[index[0]]]
         for c, p, per_run in zip(index, candidate.parameters, columns, strict=True):
             prior.tolerance[c], prior.reach[c] = healthy_sizes(
-                problem.bench, candidate, p, per_run, floor_um, MINOR * floor_um
+                bench=problem.bench,
+                candidate=candidate,
+                p=p,
+                per_run=per_run,
+                floor_um=floor_um,
+                minor_um=MINOR * floor_um,
             )
         for k in range(len(blocks)):
             new = np.stack([each[k] for each in columns], axis=2)

@@ -23,7 +23,7 @@ _RELAX_MM = (0.5, 3.0)
 KINDS = ("tip", "encoder", "drive", "dyno")
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Ground:
     """What patterns of one run are made of: motion at its rows (n), model drive force (n, m), model force (n, 3), rate of
     the tip (n, 3) mm/s in the program frame, and which channels were measured.
@@ -57,7 +57,7 @@ def _reversal(motion: Motion, length: float, j: int) -> Floats:
         return np.where(np.isfinite(last), 2.0 * np.exp(-(travelled - last) / length) * sign, 0.0)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class _Sizes:
     """What makes covariates dimensionless, over all runs."""
 
@@ -74,12 +74,12 @@ def _sizes(grounds: Sequence[Ground]) -> _Sizes:
     low = position.min(axis=0)
     start = min(float(g.motion.common.min()) for g in grounds)
     return _Sizes(
-        low,
-        np.maximum(position.max(axis=0) - low, 1e-9),
-        np.maximum(np.max([np.abs(g.motion.speed).max(axis=0) for g in grounds], axis=0), 1e-9),
-        np.maximum(np.max([np.abs(g.drive).max(axis=0) for g in grounds], axis=0), 1e-9),
-        start,
-        max(max(float(g.motion.common.max()) for g in grounds) - start, 1e-9),
+        low=low,
+        span=np.maximum(position.max(axis=0) - low, 1e-9),
+        fast=np.maximum(np.max([np.abs(g.motion.speed).max(axis=0) for g in grounds], axis=0), 1e-9),
+        strong=np.maximum(np.max([np.abs(g.drive).max(axis=0) for g in grounds], axis=0), 1e-9),
+        start=start,
+        length=max(max(float(g.motion.common.max()) for g in grounds) - start, 1e-9),
     )
 
 

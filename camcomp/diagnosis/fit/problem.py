@@ -34,7 +34,7 @@ ROWS_AT_ONCE = 256  # in a sum over rows: all of a long run at once are much mem
 STRAIGHT = 0.3  # chi-square that the bend of the model may cost before it is followed
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, kw_only=True)
 class Problem:
     """Everything that stays the same while sets of causes are tried."""
 
@@ -147,7 +147,15 @@ class Problem:
         grams = self.base_grams
         if not members:
             scale = Scale(total(grams), self.prior, self.candidates)
-            return Fitted((), np.zeros(0), np.zeros((0, 0)), scale(()), grams, {}, scale.factor(()))
+            return Fitted(
+                members=(),
+                theta=np.zeros(0),
+                covariance=np.zeros((0, 0)),
+                log_evidence=scale(()),
+                grams=grams,
+                extra={},
+                factor=scale.factor(()),
+            )
         if theta is None:
             theta = estimate(total(grams), self.prior, index)[0][index]
         theta = self._bounded(members, theta)
@@ -180,7 +188,9 @@ class Problem:
             theta = after
             size = float(change @ np.linalg.solve(full[np.ix_(index, index)] + 1e-18 * np.eye(len(index)), change))
             if self.shapes_of(members) and (step < passes - 1 or (far and step < most - 1)):
-                size, far, sought = self._move_shapes(members, theta, shapes, left, white, mean)
+                size, far, sought = self._move_shapes(
+                    members=members, theta=theta, shapes=shapes, left=left, white=white, mean=mean
+                )
             else:
                 far = False
             if step > 0 and size < SETTLED:
@@ -200,17 +210,17 @@ class Problem:
         mean, full = estimate(total(grams), self.prior, index, factor)
         theta, covariance = self._bounded(members, mean[index]), full[np.ix_(index, index)]
         return Fitted(
-            members,
-            theta,
-            covariance,
-            scale(members, sought),
-            grams,
-            shapes,
-            factor,
-            tuple(white),
-            tuple(left),
-            pushed,
-            pushed_at,
+            members=members,
+            theta=theta,
+            covariance=covariance,
+            log_evidence=scale(members, sought),
+            grams=grams,
+            extra=shapes,
+            factor=factor,
+            white=tuple(white),
+            residual=tuple(left),
+            pushed=pushed,
+            pushed_at=pushed_at,
         )
 
     def _pushed(self, beside: Members, causes: Sequence[Cause]) -> tuple[Floats, ...]:

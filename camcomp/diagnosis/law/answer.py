@@ -74,7 +74,15 @@ def answer_law(problem: Problem, f: Fitted, kind: str) -> LawAnswer | None:
         best = _beside(problem, fit, bench, fitted_beside(best.found, base))
     without = _gaps(problem, f if fit.members == f.members else problem.refit(fit.members))
     law = law_result(bench, best.found, _rms(without), best.after)
-    return LawAnswer(law, tuple(without), tuple(best.gaps), tuple(best.signal), best.found, joint, fit)
+    return LawAnswer(
+        law=law,
+        before=tuple(without),
+        gaps=tuple(best.gaps),
+        signal=tuple(best.signal),
+        found=best.found,
+        problem=joint,
+        fit=fit,
+    )
 
 
 def _base(problem: Problem, f: Fitted | None, bench: TermBench, kind: str) -> Callable[[Split, bool], Folds]:
@@ -90,7 +98,9 @@ def _base(problem: Problem, f: Fitted | None, bench: TermBench, kind: str) -> Ca
     places = [problem.row_places(k) for k in range(len(residual))]
     tips = [s for s in spots(len(problem.bench.actuators), kind) if s.on != "drive"]
     ones = [bench.white(s, [np.ones((r.rows, 1)) for r in bench.rows(s)]) for s in tips]
-    return lambda split, free: Folds(white, residual, precision, places, split, ones if free else [])
+    return lambda split, free: Folds(
+        white=white, residual=residual, precision=precision, places=places, split=split, constants=ones if free else []
+    )
 
 
 def _gaps(problem: Problem, f: Fitted | None) -> list[Floats]:

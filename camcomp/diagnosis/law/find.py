@@ -29,11 +29,11 @@ POOL = 14  # terms among which all sets of up to three are tried
 SAME = 3.0  # log density by which a term may be worse and is still as good
 LEAST_GAIN = 0.01  # of the log density that a law has brought: less is not worth a term
 LEAST_SHARE = 0.03  # of a law's energy at the tip, below which a term goes again
-CONSTANT = Form("constant", (), ("1",), ("",))
+CONSTANT = Form(family="constant", about=(), texts=("1",), units=("",))
 _PLAIN = ("line", "power", "product", "rate", "force")  # simpler kinds of the same value come first
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class FoundLaw:
     """terms with theta (c,), covariance (c, c) of their columns in order, theta_without (f, c): fitted without each part;
     gain: log density on withheld parts; alike: other terms for each that the data cannot tell from it; columns: white, with
@@ -232,7 +232,15 @@ class _Search:
             alike.append(tuple(found))
         columns, precision = tuple(map(self._white, chosen)), np.concatenate([self._precision(t) for t in chosen])
         return FoundLaw(
-            tuple(chosen), theta[0], covariance, theta[1:], gain, tuple(alike), self.folds, columns, precision
+            terms=tuple(chosen),
+            theta=theta[0],
+            covariance=covariance,
+            theta_without=theta[1:],
+            gain=gain,
+            alike=tuple(alike),
+            folds=self.folds,
+            columns=columns,
+            precision=precision,
         )
 
 

@@ -18,7 +18,7 @@ _CENTRES, _MOMENTS = 13, 40
 _LASTS = (0.5, 1.0, 2.0, 4.0, 8.0)  # s that something acts for
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Form:
     """texts: one or two functions that belong together, with {0}, {1} for the shape; units of their coefficients per mm.
 
@@ -54,7 +54,10 @@ def _waves(name: str, low: float, span: float, shortest: float) -> list[Form]:
     most = min(int(4.0 * span / shortest), MOST_WAVES)
     texts = (f"sin(2*pi*{name}/{{0}})", f"cos(2*pi*{name}/{{0}})")
     bounds = ((0.5 * shortest, 4.0 * span),)
-    return [Form("wave", (name,), texts, ("", ""), (4.0 * span / k,), bounds) for k in range(2, max(most, 2) + 1)]
+    return [
+        Form(family="wave", about=(name,), texts=texts, units=("", ""), shape=(4.0 * span / k,), bounds=bounds)
+        for k in range(2, max(most, 2) + 1)
+    ]
 
 
 def _bumps(name: str, low: float, span: float) -> list[Form]:
@@ -62,17 +65,26 @@ def _bumps(name: str, low: float, span: float) -> list[Form]:
     for centre in np.linspace(low, low + span, _CENTRES):
         for width in (0.06 * span, 0.12 * span, 0.24 * span):
             bounds = ((low - 0.1 * span, low + 1.1 * span), (0.02 * span, 0.5 * span))
-            out.append(Form("bump", (name,), (text,), ("",), (float(centre), width), bounds))
+            out.append(
+                Form(
+                    family="bump",
+                    about=(name,),
+                    texts=(text,),
+                    units=("",),
+                    shape=(float(centre), width),
+                    bounds=bounds,
+                )
+            )
     return out
 
 
 def _powers(name: str, unit: str, most: int) -> list[Form]:
     return [
         Form(
-            "power" if k > 1 else "line",
-            (name,),
-            (name if k == 1 else f"{name}^{k}",),
-            (f"{unit}{k if k > 1 else ''}",),
+            family="power" if k > 1 else "line",
+            about=(name,),
+            texts=(name if k == 1 else f"{name}^{k}",),
+            units=(f"{unit}{k if k > 1 else ''}",),
         )
         for k in range(1, most + 1)
     ]
@@ -83,12 +95,39 @@ def _senses(name: str, span: float) -> list[Form]:
     out = []
     for length in (_HARD_MM, 0.02 * span, 0.06 * span, 0.18 * span):
         bounds = ((0.2 * _HARD_MM, 0.5 * span),)
-        out.append(Form("sense", (name,), (f"way({name}, {{0}})",), ("",), (length,), bounds))
+        out.append(
+            Form(
+                family="sense",
+                about=(name,),
+                texts=(f"way({name}, {{0}})",),
+                units=("",),
+                shape=(length,),
+                bounds=bounds,
+            )
+        )
     for width in (0.04 * span, 0.12 * span, 0.3 * span):
-        out.append(Form("drag", (name,), (f"drag({name}, {{0}})",), ("mm",), (width,), ((0.005 * span, 0.8 * span),)))
+        out.append(
+            Form(
+                family="drag",
+                about=(name,),
+                texts=(f"drag({name}, {{0}})",),
+                units=("mm",),
+                shape=(width,),
+                bounds=((0.005 * span, 0.8 * span),),
+            )
+        )
     for length in (0.02 * span, 0.06 * span, 0.2 * span):
         text = f"way({name}, {_HARD_MM})*exp(-since({name})/{{0}})"
-        out.append(Form("reversal", (name,), (text,), ("",), (length,), ((0.005 * span, 0.8 * span),)))
+        out.append(
+            Form(
+                family="reversal",
+                about=(name,),
+                texts=(text,),
+                units=("",),
+                shape=(length,),
+                bounds=((0.005 * span, 0.8 * span),),
+            )
+        )
     return out
 
 
@@ -100,22 +139,64 @@ def _times(size: Sizes) -> list[Form]:
     for a, b in size.stretches:
         bounds = ((a, b),)
         for moment in np.linspace(a, b, max(_MOMENTS // len(size.stretches), 6))[1:-1]:
-            out.append(Form("step", ("common_s",), ("step(common_s - {0})",), ("",), (float(moment),), bounds))
+            out.append(
+                Form(
+                    family="step",
+                    about=("common_s",),
+                    texts=("step(common_s - {0})",),
+                    units=("",),
+                    shape=(float(moment),),
+                    bounds=bounds,
+                )
+            )
             for last in _LASTS:
                 text = "step(common_s - {0})*step({0} + {1} - common_s)"
-                out.append(Form("while", ("common_s",), (text,), ("",), (float(moment), last), ((a, b), (0.2, 30.0))))
+                out.append(
+                    Form(
+                        family="while",
+                        about=("common_s",),
+                        texts=(text,),
+                        units=("",),
+                        shape=(float(moment), last),
+                        bounds=((a, b), (0.2, 30.0)),
+                    )
+                )
     out += [
-        Form("step", ("common_s",), ("step(common_s - {0})",), ("",), (a,), ((low, high),))
+        Form(
+            family="step",
+            about=("common_s",),
+            texts=("step(common_s - {0})",),
+            units=("",),
+            shape=(a,),
+            bounds=((low, high),),
+        )
         for a, _ in size.stretches[1:]
     ]
     out += [
-        Form("settling", ("common_s",), ("exp(-common_s/{0})",), ("",), (share * span,), ((0.01 * span, 10.0 * span),))
+        Form(
+            family="settling",
+            about=("common_s",),
+            texts=("exp(-common_s/{0})",),
+            units=("",),
+            shape=(share * span,),
+            bounds=((0.01 * span, 10.0 * span),),
+        )
         for share in (0.1, 0.3, 1.0)
     ]
     longest = max((b - a for a, b in size.stretches), default=span)
     periods = 1.0 / np.linspace(1.0 / (8.0 * longest), 1.0 / max(0.15 * longest, 1.0), 200)
     wave = ("sin(2*pi*common_s/{0})", "cos(2*pi*common_s/{0})")
-    out += [Form("wave", ("common_s",), wave, ("", ""), (float(p),), ((0.5, 4.0 * span),)) for p in periods]
+    out += [
+        Form(
+            family="wave",
+            about=("common_s",),
+            texts=wave,
+            units=("", ""),
+            shape=(float(p),),
+            bounds=((0.5, 4.0 * span),),
+        )
+        for p in periods
+    ]
     if size.wide("cut_min"):
         out += _powers("cut_min", "min", 1)
         worn = size.limits["cut_min"][1]
@@ -125,10 +206,13 @@ def _times(size: Sizes) -> list[Form]:
             kinds.append((("cut_min", "force_N"), (settled, f"{settled}*force_N"), ("", "N")))
         for share in (0.02, 0.05, 0.2):
             bounds = ((1e-3 * worn, worn),)
-            out += [Form("settling", about, texts, units, (share * worn,), bounds) for about, texts, units in kinds]
+            out += [
+                Form(family="settling", about=about, texts=texts, units=units, shape=(share * worn,), bounds=bounds)
+                for about, texts, units in kinds
+            ]
     if size.wide("temp_C"):
-        out.append(Form("line", ("temp_C",), ("(temp_C - 20)",), ("K",)))
-        out.append(Form("power", ("temp_C",), ("(temp_C - 20)^2",), ("K2",)))
+        out.append(Form(family="line", about=("temp_C",), texts=("(temp_C - 20)",), units=("K",)))
+        out.append(Form(family="power", about=("temp_C",), texts=("(temp_C - 20)^2",), units=("K2",)))
     return out
 
 
@@ -141,26 +225,35 @@ def at_tip(size: Sizes) -> list[Form]:
         low, span = size.limits[name][0], size.span(name)
         out += _powers(name, "mm", 4) + _waves(name, low, span, max(3.0 * size.apart[name], span / 25.0))
         out += _bumps(name, low, span) + _senses(name, span)
-        out.append(Form("rate", (f"v{a}_mm_per_s",), (f"v{a}_mm_per_s",), ("mm/s",)))
-        out.append(Form("rate", (f"v{a}_mm_per_s",), (f"v{a}_mm_per_s*abs(v{a}_mm_per_s)",), ("(mm/s)2",)))
+        out.append(Form(family="rate", about=(f"v{a}_mm_per_s",), texts=(f"v{a}_mm_per_s",), units=("mm/s",)))
+        out.append(
+            Form(
+                family="rate",
+                about=(f"v{a}_mm_per_s",),
+                texts=(f"v{a}_mm_per_s*abs(v{a}_mm_per_s)",),
+                units=("(mm/s)2",),
+            )
+        )
     for a, b in [(a, b) for a in axes for b in axes if a < b]:
-        out.append(Form("product", (f"{a}_mm", f"{b}_mm"), (f"{a}_mm*{b}_mm",), ("mm2",)))
-        out.append(Form("product", (f"{a}_mm", f"{b}_mm"), (f"{a}_mm^2*{b}_mm",), ("mm3",)))
-        out.append(Form("product", (f"{a}_mm", f"{b}_mm"), (f"{a}_mm*{b}_mm^2",), ("mm3",)))
+        out.append(Form(family="product", about=(f"{a}_mm", f"{b}_mm"), texts=(f"{a}_mm*{b}_mm",), units=("mm2",)))
+        out.append(Form(family="product", about=(f"{a}_mm", f"{b}_mm"), texts=(f"{a}_mm^2*{b}_mm",), units=("mm3",)))
+        out.append(Form(family="product", about=(f"{a}_mm", f"{b}_mm"), texts=(f"{a}_mm*{b}_mm^2",), units=("mm3",)))
     if size.wide("feed_mm_per_s"):
-        out += [Form("rate", ("feed_mm_per_s",), ("feed_mm_per_s",), ("mm/s",))]
-        out += [Form("rate", ("feed_mm_per_s",), ("feed_mm_per_s^2",), ("(mm/s)2",))]
+        out += [Form(family="rate", about=("feed_mm_per_s",), texts=("feed_mm_per_s",), units=("mm/s",))]
+        out += [Form(family="rate", about=("feed_mm_per_s",), texts=("feed_mm_per_s^2",), units=("(mm/s)2",))]
     if len(axes) > 1:
         for k in range(1, 5):
             angle = "heading_rad" if k == 1 else f"{k}*heading_rad"
             texts = f"sin({angle})", f"cos({angle})"
-            out.append(Form(f"heading {k}", ("heading_rad",), texts, ("", "")))
+            out.append(Form(family=f"heading {k}", about=("heading_rad",), texts=texts, units=("", "")))
             while_moving = tuple(f"moving*{text}" for text in texts)
-            out.append(Form(f"heading {k}", ("heading_rad", "moving"), while_moving, ("", "")))
+            out.append(Form(family=f"heading {k}", about=("heading_rad", "moving"), texts=while_moving, units=("", "")))
     for f in [f"f{a}_N" for a in "xyz" if size.wide(f"f{a}_N")]:
-        out.append(Form("force", (f,), (f,), ("N",)))
-        out.append(Form("force squared", (f,), (f"{f}*abs({f})",), ("N2",)))
-        out += [Form("force by place", (f, f"{a}_mm"), (f"{f}*{a}_mm",), ("N mm",)) for a in axes]
+        out.append(Form(family="force", about=(f,), texts=(f,), units=("N",)))
+        out.append(Form(family="force squared", about=(f,), texts=(f"{f}*abs({f})",), units=("N2",)))
+        out += [
+            Form(family="force by place", about=(f, f"{a}_mm"), texts=(f"{f}*{a}_mm",), units=("N mm",)) for a in axes
+        ]
     return out + _times(size)
 
 
@@ -175,8 +268,8 @@ def at_drive(size: Sizes, revolute: bool) -> list[Form]:
     out = _powers(name, unit, 3) + _waves(name, low, span, shortest) + _bumps(name, low, span) + _senses(name, span)
     speed = f"{name}_per_s"
     for text, of in ((speed, f"{unit}/s"), (f"abs({speed})", f"{unit}/s"), (f"{speed}*abs({speed})", f"({unit}/s)2")):
-        out.append(Form("rate", (speed,), (text,), (of,)))
-    out.append(Form("acceleration", (f"{speed}2",), (f"{speed}2",), (f"{unit}/s2",)))
+        out.append(Form(family="rate", about=(speed,), texts=(text,), units=(of,)))
+    out.append(Form(family="acceleration", about=(f"{speed}2",), texts=(f"{speed}2",), units=(f"{unit}/s2",)))
     return out + _loads(size) + _times(size)
 
 
@@ -187,7 +280,10 @@ def _loads(size: Sizes) -> list[Form]:
         unit = "N" if name.endswith("N") else "N mm"
         square, cube = (f"({unit}){k}" if " " in unit else f"{unit}{k}" for k in (2, 3))
         if load_of(name) is not None:
-            out.append(Form("force", (name,), (name,), (unit,)))
-        out.append(Form("force squared", (name,), (f"{name}*abs({name})",), (square,)))
-        out += [Form("force power", (name,), (f"{name}^{k}",), (per,)) for k, per in ((2, square), (3, cube))]
+            out.append(Form(family="force", about=(name,), texts=(name,), units=(unit,)))
+        out.append(Form(family="force squared", about=(name,), texts=(f"{name}*abs({name})",), units=(square,)))
+        out += [
+            Form(family="force power", about=(name,), texts=(f"{name}^{k}",), units=(per,))
+            for k, per in ((2, square), (3, cube))
+        ]
     return out

@@ -13,7 +13,7 @@ from camcomp.diagnosis.statistics.cause_sets import Fitted
 from camcomp.ground.datatypes import Floats
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class LawAnswer:
     """law: as in the result; before: gaps (n, 3) mm of the tip per run that the causes alone leave; gaps: what they leave as they
     stand beside the law; signal: what it does to the tip (n, 3) mm per run; all fitted without what they are judged on; found: its

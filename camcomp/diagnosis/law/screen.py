@@ -20,7 +20,7 @@ KEPT_BYTES = 400e6  # of white columns of all grids together; more are worked ou
 AT_ONCE_BYTES = 12e6  # of functions before rows are thinned
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class TermGrid:
     """All terms that are tried at spots where the same covariates stand, whose functions are evaluated once.
 
@@ -77,7 +77,15 @@ def _forms(bench: TermBench, spot: Spot) -> Sequence[Form]:
 
 def _grid(bench: TermBench, where: Sequence[Spot], forms: Sequence[Form], at_once: int, keep: bool) -> TermGrid:
     ends = np.cumsum([0, *(len(each.texts) for each in forms)])
-    return TermGrid(bench, tuple(where), tuple(forms), ends[:-1], int(ends[-1]), at_once, keep)
+    return TermGrid(
+        bench=bench,
+        spots=tuple(where),
+        forms=tuple(forms),
+        first=ends[:-1],
+        width=int(ends[-1]),
+        at_once=at_once,
+        keep=keep,
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +100,7 @@ class _Part:
     products: Floats
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class _View:
     """The terms at a spot with the base taken out, all data: G, h (c,), products (c,) with the next column, usable (c,); chance (d,):
     the largest gain in evidence of any for every draw of signs.
@@ -147,7 +155,10 @@ class Screen:
                 e = e - half.T @ chance
                 gain = np.where(good[n, at, None], 0.5 * e**2 / np.maximum(G[n, at], 1e-12)[:, None], 0.0)
                 most[n] = np.maximum(most[n], gain.max(axis=0, initial=0.0))
-        return [_View(grid, spot, *each) for spot, *each in zip(grid.spots, G, h, products, good, most, strict=True)]
+        return [
+            _View(grid=grid, spot=spot, G=G[n], h=h[n], products=products[n], good=good[n], chance=most[n])
+            for n, spot in enumerate(grid.spots)
+        ]
 
     def _part(self, spot: Spot, first: int, white: White) -> _Part:
         """Columns of a spot from number `first` of its grid on, against the base."""

@@ -25,7 +25,7 @@ MOST_MAPS = 3
 _SINGLE = ("heading_rad", "temp_C", "cut_min", "fx_N", "fy_N", "fz_N")
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class FoundMap:
     """Maps (spot, covariates, limits, counts) with theta of all their coefficients, and theta_without (f, c) each part; columns:
     white, with their prior precision (c,).
@@ -95,7 +95,15 @@ def find_map(bench: TermBench, folds: Folds, kind: str) -> FoundMap | None:
     size_of = _precision(chosen)
     theta = folds.coefficients(columns, size_of)[0]
     gain = float(withheld(gains(data.G[:, None], data.h[:, None], size_of[None]))[0])
-    return FoundMap(tuple(chosen), theta[0], theta[1:], gain, folds, columns, size_of)
+    return FoundMap(
+        maps=tuple(chosen),
+        theta=theta[0],
+        theta_without=theta[1:],
+        gain=gain,
+        folds=folds,
+        columns=columns,
+        precision=size_of,
+    )
 
 
 def _precision(chosen: Sequence[MapTerm]) -> Floats:

@@ -114,7 +114,7 @@ def _on_bench(problem: Problem, candidate: Candidate, job: Job) -> Bench:
     low, high = np.array(job.machine.limits).T
     if (run.run_path.grid_rho < low).any() or (run.run_path.grid_rho > high).any():
         raise ValueError("out of the travel of an actuator")
-    bench = Bench(problem.bench.twin, [run])
+    bench = Bench(twin=problem.bench.twin, runs=[run])
     if bench.transmission > STRETCH * problem.bench.transmission:
         raise ValueError("too near a singular pose for the model to be trusted")
     return bench
@@ -226,7 +226,15 @@ def _run(problem: Problem, candidate: Candidate, job: Job) -> Run:
     )
     by = _motion(problem, candidate)
     tips = twin.to_program(run_path.row_place.of(run_path.node_tip))
-    return Run("candidate", run_path, measured, None, None, by=by, turn=_across(tips) if by == "tip" else None)
+    return Run(
+        name="candidate",
+        run_path=run_path,
+        measured=measured,
+        clamping=None,
+        clock=None,
+        by=by,
+        turn=_across(tips) if by == "tip" else None,
+    )
 
 
 def _motion(problem: Problem, candidate: Candidate) -> str:

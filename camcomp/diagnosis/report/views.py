@@ -87,7 +87,7 @@ def views_of(done: Diagnosis, twin: Twin, runs: Sequence[Run], holdout: Sequence
     out = [_view(problem, problem.bench, k, causes, held_out=each_one) for k, causes in enumerate(chosen)]
     unseen = [run for run in runs if run.name in holdout and run.name not in {each.name for each in problem.bench.runs}]
     if unseen:
-        bench = Bench(twin, unseen)
+        bench = Bench(twin=twin, runs=unseen)
         out += [_view(problem, bench, k, answer, held_out=True) for k in range(len(unseen))]
     return out
 

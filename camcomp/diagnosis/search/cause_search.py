@@ -40,7 +40,7 @@ LEFT_OPEN = 0.25  # of what causes explain together: no set explains what leaves
 INSTEAD = 0.95  # probability of something unknown in place of a cause, where without it nothing unknown would show
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class CauseSearch:
     """Sets of causes that were fitted, their probabilities, the verdict, and what the best of them leaves."""
 

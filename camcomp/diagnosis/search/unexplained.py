@@ -31,7 +31,7 @@ SURE_Z = 5.0  # standard deviations of chance
 TINY = 1e-12  # mm2, below which no noise is
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Unexplained:
     """One kind of channel. excess_um: rms at the tip beyond the floor; z: in standard deviations of its chance; local_um:
     the largest over a stretch of blocks; where: (run, t0 s, t1 s) of it; energy (m or 3,): by actuator or axis.
@@ -156,7 +156,7 @@ def unexplained_of(problem: Problem, kind: str, at_tip: Sequence[Floats]) -> Une
             place.append((k, float(t[a]), float(t[min(a + BLOCK, len(t)) - 1])))
     e, v, w = np.array(excess), np.array(chance), np.array(weight)
     if not len(e):
-        return Unexplained(kind, 0.0, 0.0, 0.0, (0, 0.0, 0.0), np.zeros(3))
+        return Unexplained(kind=kind, excess_um=0.0, z=0.0, local_um=0.0, where=(0, 0.0, 0.0), energy=np.zeros(3))
     whole = np.maximum(w.sum(axis=0), 1.0)
     mean = float((np.sum(w * e, axis=0) / whole).sum())
     doubt = float(np.sqrt(2.0 * np.sum(np.sum((w * v) ** 2, axis=0) / whole**2))) + TINY
@@ -165,7 +165,14 @@ def unexplained_of(problem: Problem, kind: str, at_tip: Sequence[Floats]) -> Une
     fast, its_z = _fast(swing)
     if its_z > SURE_Z:
         mean, z, energy = max(mean, 0.0) + float(fast.sum()), max(z, its_z), np.maximum(energy, 0.0) + len(e) * fast
-    return Unexplained(kind, 1e3 * float(np.sqrt(max(mean, 0.0))), z, 1e3 * float(np.sqrt(max(local, 0.0))), at, energy)
+    return Unexplained(
+        kind=kind,
+        excess_um=1e3 * float(np.sqrt(max(mean, 0.0))),
+        z=z,
+        local_um=1e3 * float(np.sqrt(max(local, 0.0))),
+        where=at,
+        energy=energy,
+    )
 
 
 def _inflation(problem: Problem, k: int, kind: str, values: Floats) -> Floats:

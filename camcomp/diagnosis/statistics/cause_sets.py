@@ -32,7 +32,7 @@ ALL_PARTS = 3  # members up to which every part of a set is looked at; of larger
 SIZES = (0.45, 0.33, 0.13, 0.055, 0.022, 0.009, 0.004)  # prior probability of 0, 1, 2 ... causes
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Fitted:
     """A set of causes with the evidence for it. theta (d,): coordinates of its columns in units of their scales."""
 

@@ -18,7 +18,7 @@ _BIN_S = 0.4
 _CLOSE_MM = 3.0  # behind a reversal
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class RunGap:
     """One run: gap (n, 3) mm of the tip (or (n, m) of the encoders), noise (3 or m,) mm, rows per independent one,
     time (n,), line (n,) (NaN unknown), drives: the gap as motion of the carriages (n, m). tip (n, 3): where the model is,

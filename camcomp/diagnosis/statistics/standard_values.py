@@ -10,7 +10,7 @@ import numpy as np
 from camcomp.ground.datatypes import Floats
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Positioning:
     """Values of an axis: accuracy, repeatability, reversal, systematic deviation of both and of either direction, range of means."""
 

@@ -48,7 +48,7 @@ def test_a_stopped_spindle_is_warned_of(monkeypatch, how, words, lines):
     if how == "short":
         warnings = short(job, text).warnings
     elif how == "long":
-        bulk = LongProgram(job, "p.nc", setup_of(job.config), 1.0, "0")
+        bulk = LongProgram(job=job, name="p.nc", setup=setup_of(job.config), tolerance_um=1.0, version="0")
         warnings = bulk.run(io.BytesIO(text.encode()), len).warnings
     else:
         warnings = simulate(job, program_of(text.encode(), "p.nc", job.config).path, 0.1).warnings

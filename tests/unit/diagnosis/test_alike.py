@@ -19,7 +19,16 @@ def problem_of(twin):
     prior = Prior(1e-3 * one, one, 0.0 * one, one, np.inf * one)
     candidates = CausePrior(((0,), (1,)), np.log(0.5 * one), lambda i, j: True)
     scale = Scale(data, prior, candidates)
-    fits = tuple(Fitted((i,), estimate(data, prior, [i])[0][[i]], np.eye(1), scale((i,)), (data,)) for i in range(2))
+    fits = tuple(
+        Fitted(
+            members=(i,),
+            theta=estimate(data, prior, [i])[0][[i]],
+            covariance=np.eye(1),
+            log_evidence=scale((i,)),
+            grams=(data,),
+        )
+        for i in range(2)
+    )
     free = SimpleNamespace(parameters=(SimpleNamespace(sign=0),))
     columns = SimpleNamespace(candidates=(free, free))
     return SimpleNamespace(prior=prior, columns=columns, member_columns=list), fits

@@ -36,7 +36,10 @@ def test_a_push_that_begins_among_lost_rows_is_not_known_to_better(begin):
     force[begin:7000] += FORCE
     there = np.ones(len(time), bool)
     there[3998:4022] = False
-    log = AxisRun("r", *(x[there] for x in (time, way, way + 5e-4 * rng.standard_normal(len(time)), force)))
+    log = AxisRun(
+        name="r", time=time[there], setpoint=way[there],
+        encoder=(way + 5e-4 * rng.standard_normal(len(time)))[there], force=force[there],
+    )  # fmt: skip
     (push,) = (c for c in study({"x": [log]}).causes if c.effect == "disturbance")
     for name, truth in (("from_s", begin), ("to_s", 7000)):
         low, high = push.parameters[name].ci95
@@ -65,7 +68,13 @@ def late(one_way_um):
     speed = 90.0 * np.cos(0.9 * time) + 92.0 * np.cos(2.3 * time + 0.4)
     way = 100.0 * np.sin(0.9 * time) + 40.0 * np.sin(2.3 * time + 0.4)
     behind = 5e-5 * speed + 1e-3 * one_way_um * np.abs(speed) / np.sqrt(np.mean(speed**2))
-    log = AxisRun("r", time, way, way - behind + 1e-4 * rng.standard_normal(len(time)), np.full(len(time), np.nan))
+    log = AxisRun(
+        name="r",
+        time=time,
+        setpoint=way,
+        encoder=way - behind + 1e-4 * rng.standard_normal(len(time)),
+        force=np.full(len(time), np.nan),
+    )
     return study({"x": [log]}, stated=AxisDeviation(encoder_mm=3e-4))
 
 
@@ -85,7 +94,7 @@ def test_what_comes_and_goes_beside_a_ripple_is_of_time(pulses, first):
     force += 4.0 * np.sin(2.0 * np.pi * way / 5.0)
     for begin in rng.permutation(np.arange(1000, 23000, 1500))[:pulses]:
         force[begin : begin + 200] += 20.0 * rng.choice([-1.0, 1.0])
-    log = AxisRun("r", time, way, way + 5e-4 * rng.standard_normal(len(time)), force)
+    log = AxisRun(name="r", time=time, setpoint=way, encoder=way + 5e-4 * rng.standard_normal(len(time)), force=force)
     result = study({"x": [log]})
     covariates = [each.covariate for each in result.where.drivers]
     assert result.verdict == "unknown" and covariates[0] == first and "position:x" in covariates

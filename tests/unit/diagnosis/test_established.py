@@ -14,7 +14,9 @@ PROBLEM = SimpleNamespace(
 
 
 def fitted(evidence, *members):
-    return Fitted(members, np.zeros(len(members)), np.eye(len(members)), evidence, ())
+    return Fitted(
+        members=members, theta=np.zeros(len(members)), covariance=np.eye(len(members)), log_evidence=evidence, grams=()
+    )
 
 
 def test_what_may_as_well_be_minor_is_not_named_and_the_others_are_as_likely_as_with_it(monkeypatch):

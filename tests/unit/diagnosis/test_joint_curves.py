@@ -32,7 +32,15 @@ def poses(name, seed, ranges, fault):
     q = np.random.default_rng(seed).uniform(*ranges, (COUNT, 6))
     time = np.arange(float(COUNT))
     return Poses(
-        name, q, measured(q, seed, error=fault(q)), time, None, np.full(COUNT, name), None, None, approached(q, time)
+        label=name,
+        q=q,
+        tip=measured(q, seed, error=fault(q)),
+        time=time,
+        temperature=None,
+        run=np.full(COUNT, name),
+        sd=None,
+        row=None,
+        approach=approached(q, time),
     )
 
 

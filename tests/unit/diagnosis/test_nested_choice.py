@@ -47,7 +47,13 @@ def experiment(sizes, weights, *, only_last=False):
 
     def fit(members):
         theta = estimate(total(runs), prior, list(members))[0][list(members)]
-        return Fitted(members, theta, np.eye(len(members)), scale(members), tuple(runs))
+        return Fitted(
+            members=members,
+            theta=theta,
+            covariance=np.eye(len(members)),
+            log_evidence=scale(members),
+            grams=tuple(runs),
+        )
 
     return problem, fit
 

@@ -27,7 +27,14 @@ def ground(temperature):
     )
     tip = np.column_stack([place, still, still])
     measured = {"tip": True, "encoder": False, "drive": False, "dyno": False}
-    return Ground(motion, still, np.zeros((ROWS, 3)), tip, np.gradient(tip, time, axis=0), measured)
+    return Ground(
+        motion=motion,
+        drive=still,
+        force=np.zeros((ROWS, 3)),
+        tip=tip,
+        velocity=np.gradient(tip, time, axis=0),
+        present=measured,
+    )
 
 
 def test_a_run_without_temperatures_says_nothing_of_them():

@@ -28,7 +28,9 @@ def axis_run(name="r", *, ripple=0.0, friction=30.0, noise=0.5, seed=0):
     rng = np.random.default_rng(seed)
     force = friction * np.tanh(speed / 0.5) + 0.1 * speed + ripple * np.sin(2 * np.pi * x / 15.0)
     force += noise * rng.standard_normal(len(t))
-    return AxisRun(name, t, x + 0.005 * speed + 5e-4 * rng.standard_normal(len(t)), x, force)
+    return AxisRun(
+        name=name, time=t, setpoint=x + 0.005 * speed + 5e-4 * rng.standard_normal(len(t)), encoder=x, force=force
+    )
 
 
 @pytest.fixture(scope="module")

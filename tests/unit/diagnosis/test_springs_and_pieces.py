@@ -27,7 +27,15 @@ def deviation_of_force(apart, *, log=True, as_stated=False):
         member_columns=list, shapes_of=lambda members: [], row_places=lambda k: np.linspace(0.0, 1.0, len(r)),
         white_at=lambda f: [ByChannel.of([D])],
     )  # fmt: skip
-    fit = Fitted((0,), np.array([0.1]), np.eye(1), 0.0, (), white=(D[:, :1],), residual=(r,))
+    fit = Fitted(
+        members=(0,),
+        theta=np.array([0.1]),
+        covariance=np.eye(1),
+        log_evidence=0.0,
+        grams=(),
+        white=(D[:, :1],),
+        residual=(r,),
+    )
     return 0.3 * np.sqrt(joint_covariance(problem, fit, as_stated=as_stated)[0, 0])
 
 
@@ -66,4 +74,9 @@ def test_rows_follow_what_acts_while_they_are_read(seen_um, answer):
         columns=SimpleNamespace(blocks=(ByChannel.of(channels),)), member_columns=list, causes=lambda *a: [],
         floor=SimpleNamespace(axis_mm=0.003),
     )  # fmt: skip
-    assert followed(problem, Fitted((0,), np.array([shift]), np.eye(1), 0.0, ()), 0) is answer
+    assert (
+        followed(
+            problem, Fitted(members=(0,), theta=np.array([shift]), covariance=np.eye(1), log_evidence=0.0, grams=()), 0
+        )
+        is answer
+    )

@@ -167,7 +167,14 @@ def test_poses_visited_thirty_times(visits):
         q += [a, a, b]
         tip += [corners[k % 4] + [0, 0, 0.5], corners[k % 4] - [0, 0, 0.5], np.zeros(3)]
     n = len(q)
-    poses = Poses("A", np.array(q), 1e-3 * np.array(tip), np.arange(float(n)), None, np.full(n, "A"))
+    poses = Poses(
+        label="A",
+        q=np.array(q),
+        tip=1e-3 * np.array(tip),
+        time=np.arange(float(n)),
+        temperature=None,
+        run=np.full(n, "A"),
+    )
     values = of_poses(robot, [poses], [poses.tip + [0.003, 0.004, 0.0]])
     if visits < 30:
         assert values == StandardValues(absent=(NO_VISITS,))

@@ -25,7 +25,7 @@ from tests.validation.plants.arm_poses import measured
 def run(name, seed, low, high, **truth):
     q = np.random.default_rng(seed).uniform(low, high, (250, 6))
     time = np.arange(250.0) + np.random.default_rng(seed).uniform(0.0, 0.4, 250)  # a clock, no row numbers
-    return Poses(name, q, measured(q, seed, **truth), time, None, np.full(250, name))
+    return Poses(label=name, q=q, tip=measured(q, seed, **truth), time=time, temperature=None, run=np.full(250, name))
 
 
 @pytest.fixture(scope="module")
@@ -237,7 +237,7 @@ def axis_log(lag=0.005, coulomb=30.0, viscous=0.1, lopsided=0.0, line=0.0, seed=
     force = 0.08 * push + coulomb * np.tanh(speed / 0.5) + viscous * speed + lopsided * np.abs(speed)
     force += line * np.sin(2 * np.pi * position / 5.0) + 0.5 * rng.standard_normal(len(t))
     setpoint = position + lag * speed + 5e-4 * rng.standard_normal(len(t))
-    return AxisRun("r", t, setpoint, position, force)
+    return AxisRun(name="r", time=t, setpoint=setpoint, encoder=position, force=force)
 
 
 def test_an_axis_with_lag_friction_and_an_unlisted_ripple():
@@ -269,7 +269,7 @@ def test_friction_that_one_run_of_four_lacks_is_not_named():
     def runs(coulomb):
         logs = [axis_log(lag=0.0, coulomb=c, viscous=0.0, seed=k) for k, c in enumerate(coulomb)]
         return [
-            AxisRun(f"r{k}", *(getattr(log, f)[::20] for f in ("time", "setpoint", "encoder", "force")))
+            AxisRun(name=f"r{k}", **{f: getattr(log, f)[::20] for f in ("time", "setpoint", "encoder", "force")})
             for k, log in enumerate(logs)
         ]
 
@@ -405,7 +405,7 @@ def test_axes_that_cannot_be_what_their_columns_say_are_refused(rule, words, spo
 def test_logs_that_say_nothing_are_refused():
     nothing = np.full(100, np.nan)
     with pytest.raises(ValueError, match="no axis"):
-        axis_study({"x": [AxisRun("r", np.arange(100.0), nothing, nothing, nothing)]})
+        axis_study({"x": [AxisRun(name="r", time=np.arange(100.0), setpoint=nothing, encoder=nothing, force=nothing)]})
 
 
 def test_an_arm_whose_base_bends_is_judged_with_a_warning(robot, healthy):

@@ -129,7 +129,9 @@ def test_a_diagnosis_says_how_far_it_is(shares):
 
 def test_an_arm_says_how_far_it_is(shares):
     q = np.random.default_rng(1).uniform(-1.0, 1.0, (60, 6))
-    poses = Poses("A", q, measured(q, 1, longer=0.7), np.arange(60.0), None, np.full(60, "A"))
+    poses = Poses(
+        label="A", q=q, tip=measured(q, 1, longer=0.7), time=np.arange(60.0), temperature=None, run=np.full(60, "A")
+    )
     robot = build_robot(load_config([ROOT / "config/ur10.yaml"]).robot, [0.0, 0.0, 0.0])[0]
     with reported.watched() as watched:
         arm_study(robot, (), [poses], without=["joint_curve"])
@@ -139,7 +141,17 @@ def test_an_arm_says_how_far_it_is(shares):
 def test_axes_say_how_far_they_are(shares):
     t = np.arange(0.0, 4.0, 0.01)
     where, force = 100.0 * np.sin(2.0 * t), 50.0 * np.sign(np.cos(2.0 * t))
-    runs = [AxisRun(f"r{k}", t, where, where - 0.01 * np.cos(2.0 * t), force, np.arange(400)) for k in range(2)]
+    runs = [
+        AxisRun(
+            name=f"r{k}",
+            time=t,
+            setpoint=where,
+            encoder=where - 0.01 * np.cos(2.0 * t),
+            force=force,
+            row=np.arange(400),
+        )
+        for k in range(2)
+    ]
     with reported.watched() as watched:
         axis_study({"x": runs, "y": runs}, holdout=["r1"])
     assert_rising(shares, watched, least=2)

@@ -142,14 +142,14 @@ def campaigns():
         log = table(ROOT / f"samples/ur10/{name}.csv")
         q = np.stack([log[f"act_{a.name}_rad"] for a in robot.actuators], axis=1)
         tip = np.stack([log[f"{axis}_mm"] for axis in "xyz"], axis=1)
-        runs.append(Poses(name, q, tip, log["t_s"], None, np.full(len(q), name)))
+        runs.append(Poses(label=name, q=q, tip=tip, time=log["t_s"], temperature=None, run=np.full(len(q), name)))
     return robot, runs
 
 
 @pytest.mark.campaign  # the bench of measured data has all opponents
 def test_plain_least_squares_of_everything_overfits_where_camcomp_does_not():
     robot, runs = campaigns()
-    bench = ArmBench(robot, (), runs)
+    bench = ArmBench(robot=robot, causes=(), campaigns=runs)
     found = solve(robot, (), runs, ["series_B"], (), StatedDeviation())
     mine = rms(bench.gap(1, found.causes))
     columns = bench.columns()

@@ -130,7 +130,7 @@ def told_of_two(square: float) -> float:
 def opened_question(folder: Path, world: World) -> Desk:
     """What camcomp makes of the files of a world, asked about the two causes."""
     opened = open_experiment(write(world.made, world.plan, folder, runner.CONFIG))
-    bench = Bench(opened.twin, opened.runs)
+    bench = Bench(twin=opened.twin, runs=opened.runs)
     causes = without_lookalikes(bench, working_causes(bench, candidate_causes(opened.twin.robot)))
     problem = open_problem(bench, causes)
     names = [(world.plan.causes[0].effect, world.plan.causes[0].target), (world.other.effect, world.other.target)]

@@ -25,7 +25,16 @@ GOOD = "G21 G90 G94\nG0 X0 Y0 Z5\nG1 Z0 F100\nX{x}\nM30\n"
 def tasks(count, text=GOOD):
     config = load_config([shipped("config/cartesian.yaml")])
     for i in range(count):
-        yield Task(f"{i}.nc", f"key-{i}", text.format(x=i + 1).encode(), config, "config", "newton", 1.0, False)
+        yield Task(
+            name=f"{i}.nc",
+            key=f"key-{i}",
+            data=text.format(x=i + 1).encode(),
+            config=config,
+            config_key="config",
+            method="newton",
+            tolerance_um=1.0,
+            joints=False,
+        )
 
 
 def deadly(task):
@@ -38,7 +47,7 @@ def deadly(task):
         except FileExistsError:
             pass
     time.sleep(0.01)
-    return pools.Outcome(task.key, 0)
+    return pools.Outcome(key=task.key, exit_code=0)
 
 
 @pytest.mark.parametrize("always", ["", "key-5"])

@@ -98,13 +98,29 @@ def bench(tmp_path):
                     name = Path(task.name).name
                     self.worked.append(name)
                     if name in bad:
-                        yield Outcome(task.key, 3, [{"rule": "CC102", "message": "m", "text": "t"}])
+                        yield Outcome(
+                            key=task.key, exit_code=3, messages=[{"rule": "CC102", "message": "m", "text": "t"}]
+                        )
                     else:
                         figures = {"before": {"max_um": 9.0}, "after": {"max_um": 0.5}}
-                        yield Outcome(task.key, 0, [], b"corrected " + task.data, None, figures)
+                        yield Outcome(
+                            key=task.key,
+                            exit_code=0,
+                            messages=[],
+                            program=b"corrected " + task.data,
+                            joints=None,
+                            figures=figures,
+                        )
 
             config = load_config([MACHINE])
-            plan = programs.Plan(config, tmp_path / "out", "newton", tolerance, False, version)
+            plan = programs.Plan(
+                config=config,
+                output=tmp_path / "out",
+                method="newton",
+                tolerance_um=tolerance,
+                joints=False,
+                version=version,
+            )
             found = programs.find_programs([str(self.folder)], plan.output)
             return {Path(each.source).name: each for each in programs.run_batch(plan, found, pool)}
 
@@ -146,7 +162,9 @@ def test_changed_configuration_is_noticed_by_its_content(tmp_path):
     keys = set()
     for stiffness in ("2.0e+4", "3.0e+4"):
         machine.write_text(machine.read_text().replace("2.0e+4", stiffness))
-        plan = programs.Plan(load_config([machine]), tmp_path, "newton", 1.0, False, "1")
+        plan = programs.Plan(
+            config=load_config([machine]), output=tmp_path, method="newton", tolerance_um=1.0, joints=False, version="1"
+        )
         keys.add(plan.key_of_config())
     assert len(keys) == 2
 
@@ -159,7 +177,11 @@ def test_configuration_on_standard_input_counts_by_its_content(tmp_path, monkeyp
         Path(MACHINE).read_text().replace("2.0e+4", "3.0e+4"),
     ):
         monkeypatch.setattr("sys.stdin", TextIOWrapper(BytesIO(text.encode())))
-        keys.append(programs.Plan(load_config(["-"]), tmp_path, "newton", 1.0, False, "1").key_of_config())
+        keys.append(
+            programs.Plan(
+                config=load_config(["-"]), output=tmp_path, method="newton", tolerance_um=1.0, joints=False, version="1"
+            ).key_of_config()
+        )
     assert keys[0] == keys[1] != keys[2]
 
 
@@ -170,12 +192,23 @@ def test_a_changed_table_is_noticed_wherever_the_configuration_names_it(tmp_path
     for force in (1, 2):
         table.write_text(f"feed_mm_min,fr_N,ft_N,fz_N\n100,{force},0,0\n200,{force},0,0\n")
         config = load_config([MACHINE, machine])
-        keys.add(programs.Plan(config, tmp_path, "newton", 1.0, False, "1").key_of_config())
+        keys.add(
+            programs.Plan(
+                config=config, output=tmp_path, method="newton", tolerance_um=1.0, joints=False, version="1"
+            ).key_of_config()
+        )
     assert len(keys) == 2
 
 
 def test_two_batches_do_not_write_into_one_folder(tmp_path):
-    plan = programs.Plan(load_config([MACHINE]), tmp_path / "out", "newton", 1.0, False, "1")
+    plan = programs.Plan(
+        config=load_config([MACHINE]),
+        output=tmp_path / "out",
+        method="newton",
+        tolerance_um=1.0,
+        joints=False,
+        version="1",
+    )
     with programs.output_tree(plan, [], []):
         with pytest.raises(FileError) as error, programs.output_tree(plan, [], []):
             pass
@@ -187,7 +220,14 @@ def test_two_batches_do_not_write_into_one_folder(tmp_path):
 def test_outputs_that_are_one_file_through_links_are_refused(bench, tmp_path):
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "a.nc").symlink_to("b.nc")
-    plan = programs.Plan(load_config([MACHINE]), tmp_path / "out", "newton", 1.0, False, "1")
+    plan = programs.Plan(
+        config=load_config([MACHINE]),
+        output=tmp_path / "out",
+        method="newton",
+        tolerance_um=1.0,
+        joints=False,
+        version="1",
+    )
     found = programs.find_programs([str(bench.folder)], plan.output)
     with pytest.raises(FileError, match="same file") as error, programs.output_tree(plan, found, []):
         pass
@@ -204,7 +244,15 @@ def test_outputs_that_are_one_file_through_links_are_refused(bench, tmp_path):
 
 def task(text, **more):
     given = {"joints": False, "tolerance_um": 1.0, **more}
-    return Task("p.nc", "key", text.encode(), load_config([MACHINE]), "config", "newton", **given)
+    return Task(
+        name="p.nc",
+        key="key",
+        data=text.encode(),
+        config=load_config([MACHINE]),
+        config_key="config",
+        method="newton",
+        **given,
+    )
 
 
 def test_a_worker_gives_back_program_table_and_figures():

@@ -50,9 +50,9 @@ def both(job, text, tolerance=1.0):
     """(bulk output, its totals, its batches), exact result."""
     data = text.encode("latin-1")
     batches, out = [], io.BytesIO()
-    totals = LongProgram(job, "p.nc", setup_of(job.config), tolerance, "1", on_rows=batches.append).run(
-        io.BytesIO(data), out.write
-    )
+    totals = LongProgram(
+        job=job, name="p.nc", setup=setup_of(job.config), tolerance_um=tolerance, version="1", on_rows=batches.append
+    ).run(io.BytesIO(data), out.write)
     exact = compensate(program_of(data, "p.nc", job.config), job, method="newton", tolerance_um=tolerance, version="1")
     return (out.getvalue().decode("latin-1"), totals, batches), exact
 
@@ -249,7 +249,7 @@ def test_zero_correction_keeps_every_byte(seed, eol):
 
 def run(job, text, **more):
     out = io.BytesIO()
-    totals = LongProgram(job, "p.nc", setup_of(job.config), 1.0, "1", **more).run(
+    totals = LongProgram(job=job, name="p.nc", setup=setup_of(job.config), tolerance_um=1.0, version="1", **more).run(
         io.BytesIO(text.encode("latin-1")), out.write
     )
     return out.getvalue(), totals

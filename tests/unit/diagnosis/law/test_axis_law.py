@@ -28,7 +28,7 @@ def axis_run(ripple, seed=0):
     screw = ripple * ways * np.sin(2 * np.pi * at / PERIOD_MM + np.where(speed > 0, 0.0, 1.0))
     force = 0.004 * push + 20.0 * np.tanh(speed / 5.0) + 0.1 * speed + screw + 0.2 * rng.standard_normal(len(t))
     encoder = at - LOOP_MM_PER_N * screw + 2e-4 * rng.standard_normal(len(t))
-    return AxisRun("r", t, setpoint, encoder, force), screw
+    return AxisRun(name="r", time=t, setpoint=setpoint, encoder=encoder, force=force), screw
 
 
 @pytest.fixture(scope="module")

@@ -15,15 +15,22 @@ from camcomp.diagnosis.statistics.by_channel import ByChannel
 TIPS = (Spot("structure", 0), Spot("structure", 1))
 PERIODS = (30.0, 24.0, 17.0, 12.0, 9.0)
 WAVES = tuple(
-    Form("wave", ("x_mm",), ("sin(2*pi*x_mm/{0})", "cos(2*pi*x_mm/{0})"), ("", ""), (each,), ((1.0, 90.0),))
+    Form(
+        family="wave",
+        about=("x_mm",),
+        texts=("sin(2*pi*x_mm/{0})", "cos(2*pi*x_mm/{0})"),
+        units=("", ""),
+        shape=(each,),
+        bounds=((1.0, 90.0),),
+    )
     for each in PERIODS
 )
 FORMS = (
-    Form("line", ("x_mm",), ("x_mm",), ("mm",)),
+    Form(family="line", about=("x_mm",), texts=("x_mm",), units=("mm",)),
     *WAVES,
-    Form("drag", ("x_mm",), ("drag(x_mm, 4)",), ("mm",)),
+    Form(family="drag", about=("x_mm",), texts=("drag(x_mm, 4)",), units=("mm",)),
 )
-NOWHERE = Form("power", ("x_mm",), ("1/x_mm",), ("",))  # at 0
+NOWHERE = Form(family="power", about=("x_mm",), texts=("1/x_mm",), units=("",))  # at 0
 
 
 class Rows(dict):
@@ -49,7 +56,9 @@ class Runs(TermBench):
 def screen(bench, keep, at_once):
     rng = np.random.default_rng(3)
     ends = np.cumsum([0, *(len(each.texts) for each in FORMS)])
-    grid = TermGrid(bench, TIPS, FORMS, ends[:-1], int(ends[-1]), at_once, keep)
+    grid = TermGrid(
+        bench=bench, spots=TIPS, forms=FORMS, first=ends[:-1], width=int(ends[-1]), at_once=at_once, keep=keep
+    )
     swing = [np.sin(2 * np.pi * (run["x_mm"] + 2.0) / PERIODS[2]) for run in bench.runs]
     residual = [rng.normal(size=400) + np.concatenate([np.zeros(200), each]) for each in swing]
     white = [ByChannel(3, ((np.arange(3), rng.normal(size=(400, 3))),)) for _ in residual]

@@ -23,7 +23,9 @@ def candidates(n):
 
 
 def fitted(*members):
-    return Fitted(members, np.zeros(len(members)), np.eye(len(members)), 0.0, ())
+    return Fitted(
+        members=members, theta=np.zeros(len(members)), covariance=np.eye(len(members)), log_evidence=0.0, grams=()
+    )
 
 
 @pytest.mark.parametrize("size", [0, 1, 2, 3])

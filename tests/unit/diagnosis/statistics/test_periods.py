@@ -20,7 +20,16 @@ def run(seed, drives=None, gap=None, feed=10.0, noise=0.001):
     gap_ = noise * rng.standard_normal((400, 3)) + (0.0 if gap is None else gap(t))
     gap_ = gap_ + (0.0 if drives is None else drives(position, direction))
     return places.RunGap(
-        "r", gap_, np.full(3, noise), 1.0, t, np.full(400, 5.0), drives_, position, position - 300.0, direction
+        name="r",
+        gap=gap_,
+        noise=np.full(3, noise),
+        thin=1.0,
+        time=t,
+        line=np.full(400, 5.0),
+        drives=drives_,
+        tip=position,
+        position=position - 300.0,
+        direction=direction,
     )
 
 
