@@ -380,7 +380,7 @@ def _compensated(
     told = points.along(written.end, replace(rows.arcs, centre=written.centre))
     share = None if shares is None else shares.of_ends(track, rows.piece, rows.w, rows.joining)
     as_told = replace(points, travel=told_travel(points, orienting, written.words))
-    bands = bands_of(job, track, rows, as_told, told, before, after, share)
+    bands = bands_of(job, track, rows=rows, points=as_told, told=told, before=before, after=after, share=share)
     return replace(
         done, bands=bands, left=None if left is None else left[points.judged], orienting=orienting,
         tilt_after=None if after.tilt is None else after.tilt[points.judged], fraction=track.u(rows.piece, rows.w),

@@ -49,7 +49,7 @@ class Uncertainty:
         (3,): the commanded tip in front of them; both for machines with effects and programs with orientation only.
         """
         if self.job.causes or travel.rotation is not None:
-            return self._anew(piece, w, commanded, travel, free, base, before)
+            return self._anew(piece, w, commanded=commanded, travel=travel, free=free, base=base, before=before)
         moves, compliance = self._field.at(commanded, travel.force)
         for j, each in enumerate(self.inputs):
             if each.moves_force:

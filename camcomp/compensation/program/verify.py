@@ -134,7 +134,9 @@ def verify(corrected: Program, original: Program, job: Job) -> Verified:
         residual, missed = _beside(job=job, track=track, piece=piece, commanded=commanded, w=w, shares=shares)
         missed = missed[judged]
     if job.config.uncertain:
-        totals = _expected_error(job, track, piece, commanded, w, end, shares, rotation)
+        totals = _expected_error(
+            job, track, piece=piece, commanded=commanded, w=w, end=end, shares=shares, rotation=rotation
+        )
     piece, residual, w, vertex = piece[judged], residual[judged], w[judged], f[judged] == 1.0
     convergence = _convergence(job, track, piece[vertex], w[vertex])
     lines = _per_line(
@@ -200,9 +202,16 @@ def _beside(job: Job, track: Track, piece: Ints, commanded: Floats, w: Floats, s
 
 
 def _expected_error(
-    job: Job, track: Track, piece: Ints, commanded: Floats, w: Floats, end: Bools, shares: Shares | None,
+    job: Job,
+    track: Track,
+    *,
+    piece: Ints,
+    commanded: Floats,
+    w: Floats,
+    end: Bools,
+    shares: Shares | None,
     rotation: Floats | None,
-) -> BandTotals:  # fmt: skip
+) -> BandTotals:
     """What machines that may be leave at the ends (k,) of moves; the other points are only there because drives remember."""
     uncertainty = Uncertainty(job, track)
     at = np.arange(len(piece)) if job.causes else np.flatnonzero(end)

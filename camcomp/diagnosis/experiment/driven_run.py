@@ -134,8 +134,8 @@ def drive(
     ])  # fmt: skip
     rotary = all(a.revolute for a in twin.robot.actuators)
     if program is not None:
-        check_set_points(log, name, by, rho, program.rho, twin.actuators, rotary)
-    near, turned = _near(log, name, measured, rho, program, twin)
+        check_set_points(log, name, what=by, told=rho, program=program.rho, actuators=twin.actuators, rotary=rotary)
+    near, turned = _near(log=log, name=name, measured=measured, rho=rho, program=program, twin=twin)
     tip, turned = _forward(twin, rho, near, turned)
     aligned = None if program is None else _aligned(log, name, program, tip, measured)
     unsure = np.asarray(guessed.any(axis=1))

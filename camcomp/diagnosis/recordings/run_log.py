@@ -67,7 +67,7 @@ def log_of(name: str, sampled: Sequence[SampledColumns], actuators: Actuators, w
     row = order[joined.lead][joined.row]
     values = _in_rad(_without_dead_encoders(joined.values, columns, notes), columns, picked, wishes.degrees, notes)
     driven = wishes.program or any(log in values for log in columns.setpoint)
-    time, keep = _times(joined, values, row, lead, driven, wishes.period_s, notes)
+    time, keep = _times(joined, values, row=row, lead=lead, driven=driven, period_s=wishes.period_s, notes=notes)
     keep = _thinned(keep, wishes.rows, notes)
     notes += unused_column_notes(sampled, picked)
     table = {TIME: time[keep]}

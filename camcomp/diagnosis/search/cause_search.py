@@ -64,7 +64,14 @@ def search_causes(problem: Problem) -> CauseSearch:
     left = residual_tests(problem, beside.known, prior)
     kind = beside.kind if beside.kind is None or beside.kind in left else next(iter(left))
     verdict = _state(weighed, beside)
-    return CauseSearch(weighed.fits, weighed.probability, verdict, left, kind, beside.beyond)
+    return CauseSearch(
+        fits=weighed.fits,
+        probability=weighed.probability,
+        verdict=verdict,
+        left=left,
+        unknown_in=kind,
+        beyond=beside.beyond,
+    )
 
 
 @dataclass(frozen=True, eq=False)

@@ -30,7 +30,11 @@ def joint_products(problem: Problem, f: Fitted, weight: Sequence[Sequence[float]
     white, residual = about(problem, f)
     labels = [words.labels for words in problem.dictionaries]
     kinds = [words.kind for words in problem.dictionaries]
-    return JointProducts.of(Patterns(white, residual, problem.white_patterns, labels, kinds, weight))
+    return JointProducts.of(
+        Patterns(
+            white=white, residual=residual, blocks=problem.white_patterns, labels=labels, kinds=kinds, weight=weight
+        )
+    )
 
 
 def about(problem: Problem, f: Fitted) -> tuple[list[ByChannel], list[Floats]]:

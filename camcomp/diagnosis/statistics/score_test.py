@@ -36,7 +36,7 @@ class ResidualTest:
         return self.rms**2 * self.rows
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Patterns:
     """Patterns (p) of all runs, white. white (w, k), residual (w,) per run; blocks per run and kind, whose rows follow each
     other in `white`; labels: covariates of the patterns per kind; weight: of a row, per run and kind.
@@ -50,7 +50,7 @@ class Patterns:
     weight: Sequence[Sequence[float]] | None = None
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class JointProducts:
     """Products of columns (k), residual and patterns (p): data of the columns, B (k, p), h (p,), P (p, p); labels, kinds (p,).
 
@@ -81,7 +81,15 @@ class JointProducts:
                 row, at, rows = row + len(part), at + len(names), rows + square * len(part)
         kinds = tuple(kind for kind, each in zip(patterns.kinds, patterns.labels, strict=True) for _ in each)
         names = tuple(name for each in patterns.labels for name in each)
-        return JointProducts(Gram(A[:k, :k], A[:k, k], float(A[k, k]), round(rows)), B[:k], B[k], P, names, kinds, rows)
+        return JointProducts(
+            data=Gram(A[:k, :k], A[:k, k], float(A[k, k]), round(rows)),
+            B=B[:k],
+            h=B[k],
+            P=P,
+            labels=names,
+            kinds=kinds,
+            rows=rows,
+        )
 
     def projected(self, prior: Prior, members: Sequence[int]) -> tuple[Floats, Floats]:
         """Normal equations (p, p), (p,) of the patterns with the columns `members` free and all others within tolerance."""

@@ -259,7 +259,9 @@ class Twin(ControlKinematics):
         nodes = np.concatenate([np.arange(q), np.tile(uneven, 3)])
         wrench = load.wrench[nodes]
         wrench[q:] += _FORCE_STEP * self._unit_wrenches(run_path).transpose(1, 0, 2).reshape(-1, 6)
-        tip, drive = self._loaded(run_path, machine, nodes, shift, load.force[nodes], wrench)
+        tip, drive = self._loaded(
+            run_path=run_path, machine=machine, nodes=nodes, shift=shift, force=load.force[nodes], wrench=wrench
+        )
         softer = Softer(*(
             self._more(run_path, each, usual)
             for each, usual in ((tip, slopes.tip_wrench), (drive, slopes.drive_wrench))
@@ -319,7 +321,14 @@ class Twin(ControlKinematics):
             tips.append((moved.tip - solved.tip) / step)
             drives.append((moved.drive - solved.drive) / step)
         tip, drive = np.stack(tips, axis=2), np.stack(drives, axis=2)
-        return Slopes(tip[:, :, :m], tip[:, :, m:], drive[:, :, :m], drive[:, :, m:], self._at_reference(run_path), key)
+        return Slopes(
+            tip_rho=tip[:, :, :m],
+            tip_wrench=tip[:, :, m:],
+            drive_rho=drive[:, :, :m],
+            drive_wrench=drive[:, :, m:],
+            at_reference=self._at_reference(run_path),
+            key=key,
+        )
 
     # -- pieces of the path -------------------------------------------------------------------------------------------
 

@@ -24,7 +24,11 @@ def present(monkeypatch, column, left, *, surely=False):
         candidates=CausePrior(((0,),), np.log(0.5 * one), lambda i, j: True),
     )  # fmt: skip
     patterns = Patterns(
-        [ByChannel.of([column[:, None]])], [left], [[ByChannel.of([COVARIATE])]], [["place:x"] * 3], ["tip"]
+        white=[ByChannel.of([column[:, None]])],
+        residual=[left],
+        blocks=[[ByChannel.of([COVARIATE])]],
+        labels=[["place:x"] * 3],
+        kinds=["tip"],
     )
     monkeypatch.setattr(credible, "joint_products", lambda *_: JointProducts.of(patterns))
     monkeypatch.setattr(credible, "_weights", lambda _: None)

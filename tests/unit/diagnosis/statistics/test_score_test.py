@@ -12,7 +12,9 @@ def test_a_pattern_given_twice_counts_once():
     def rms(n):
         P, names = np.full((n, n), 50.0), tuple("ab"[:n])
         data = Gram(np.zeros((0, 0)), np.zeros(0), 0.0, 1000)
-        joint = JointProducts(data, np.zeros((0, n)), np.full(n, 40.0), P, names, ("tip",) * n, 1000.0)
+        joint = JointProducts(
+            data=data, B=np.zeros((0, n)), h=np.full(n, 40.0), P=P, labels=names, kinds=("tip",) * n, rows=1000.0
+        )
         return score_test(joint, P, np.full(n, 40.0), {"tip": 1000})["tip"].rms
 
     assert rms(2) == pytest.approx(rms(1)) and rms(1) > 0.0
@@ -26,9 +28,13 @@ def test_normal_equations_of_patterns_are_those_of_the_stacked_rows(weight):
     W, r = [rng.normal(size=(30, 2)) for _ in range(2)], [rng.normal(size=30) for _ in range(2)]
     D = [[rng.normal(size=(20, 2)), rng.normal(size=(10, 1))] for _ in range(2)]
     patterns = Patterns(
-        [ByChannel.of([w[:20], w[20:]]) for w in W], r, [[ByChannel.of([d]) for d in run] for run in D],
-        [["velocity:x", "velocity:y"], ["force:x"]], ["tip", "drive"], weight,
-    )  # fmt: skip
+        white=[ByChannel.of([w[:20], w[20:]]) for w in W],
+        residual=r,
+        blocks=[[ByChannel.of([d]) for d in run] for run in D],
+        labels=[["velocity:x", "velocity:y"], ["force:x"]],
+        kinds=["tip", "drive"],
+        weight=weight,
+    )
     joint = JointProducts.of(patterns)
     P, h = joint.projected(prior, [0])
 
