@@ -80,14 +80,9 @@ def compensate_in_pieces(
     try:
         table = joints() if joints is not None else None
         pieces = LongProgram(
-            job=job,
-            name=name,
-            setup=setup_of(job.config),
-            tolerance_um=settings.tolerance_um,
-            version=settings.version,
-            arcs=settings.arcs,
-            on_rows=None if table is None else table.batch,
-        )
+            job=job, name=name, setup=setup_of(job.config), tolerance_um=settings.tolerance_um,
+            version=settings.version, arcs=settings.arcs, on_rows=None if table is None else table.batch,
+        )  # fmt: skip
         totals = pieces.run(source, program)
         if table is not None:
             table.close()
@@ -109,13 +104,9 @@ def compensate_long(
     with suppress(_AsAWhole), writing(names, inputs=inputs, keep=not dry_run) as files:
         joints = None if paths.joints is None else partial(joint_table, files[paths.joints], paths.joints, job)
         totals = compensate_in_pieces(
-            source=source,
-            name=name,
-            job=job,
-            settings=settings,
-            program=files[paths.program].write if paths.program else len,
-            joints=joints,
-        )
+            source=source, name=name, job=job, settings=settings,
+            program=files[paths.program].write if paths.program else len, joints=joints,
+        )  # fmt: skip
         if totals is None:
             raise _AsAWhole  # files of an interrupted block are not kept
         figures = totals.summary()

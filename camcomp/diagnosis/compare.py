@@ -122,14 +122,9 @@ def compare(a: Columns, b: Columns, by: str | None = None) -> Comparison:
             )
     only_a, only_b = ([each for each in one if each not in two] for one, two in ((a, b), (b, a)))
     return Comparison(
-        by=by,
-        rows=n,
-        unmatched=int((~matched).sum()),
-        interpolated=between,
-        differences=out,
-        only_a=only_a,
+        by=by, rows=n, unmatched=int((~matched).sum()), interpolated=between, differences=out, only_a=only_a,
         only_b=only_b,
-    )
+    )  # fmt: skip
 
 
 def _difference(column: str, gap: Floats, line: Floats | None, place: Floats, a: Floats, b: Floats) -> Difference:
@@ -142,16 +137,9 @@ def _difference(column: str, gap: Floats, line: Floats | None, place: Floats, a:
     at = int(known[np.argmax(np.abs(values))])
     number = int(line[at]) if line is not None and np.isfinite(line[at]) else None
     return Difference(
-        column=column,
-        rows=len(known),
-        most=float(np.abs(values).max()),
-        rms=float(np.sqrt(np.mean(values**2))),
-        mean=float(values.mean()),
-        line=number,
-        place=float(place[at]),
-        a=float(a[at]),
-        b=float(b[at]),
-    )
+        column=column, rows=len(known), most=float(np.abs(values).max()), rms=float(np.sqrt(np.mean(values**2))),
+        mean=float(values.mean()), line=number, place=float(place[at]), a=float(a[at]), b=float(b[at]),
+    )  # fmt: skip
 
 
 def _blocks(a: Columns, b: Columns, by: str) -> Iterator[tuple[Ints, Ints]]:

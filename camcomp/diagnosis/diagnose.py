@@ -115,30 +115,23 @@ def diagnose(
     unseen = len(used) < len(runs) or (len(used) > 1 and not holdout)
     proposal = _next(problem, found, word, job)
     result = DiagnosisResult(
-        verdict=word,
-        gap=GapSize(**gap),
-        where=_where(problem, found, best, law),
+        verdict=word, gap=GapSize(**gap), where=_where(problem, found, best, law),
         causes=_causes(stands, found, best, law),
         alternatives=_alternatives(problem, found) if word == "ambiguous" else (),
         shrinkage=UnseenShrinkage.model_validate(shrinkage) if unseen else None,
-        next_experiment=_proposed(proposal) if proposal is not None else None,
-        minor=minor_effects(stands, best),
-        outliers=outlying_rows(problem),
-        floor=Floor(um=gap["noise_floor_um"], source=problem.floor.source),
+        next_experiment=_proposed(proposal) if proposal is not None else None, minor=minor_effects(stands, best),
+        outliers=outlying_rows(problem), floor=Floor(um=gap["noise_floor_um"], source=problem.floor.source),
         equivalent=tuple(tuple(_named(problem, i) for i in group) for group in classes(likeness(problem))),
         standards=of_runs(twin, runs),
-    )
+    )  # fmt: skip
     return Diagnosis(result, problem, found, proposal, law)
 
 
 def _proposed(proposal: Proposal) -> NextExperiment:
     return NextExperiment(
-        action=proposal.candidate.action,
-        separates=tuple(proposal.separates),
-        gain=round(proposal.gain, 4),
-        minutes=round(proposal.candidate.minutes, 1),
-        outcomes=proposal.outcomes,
-    )
+        action=proposal.candidate.action, separates=tuple(proposal.separates), gain=round(proposal.gain, 4),
+        minutes=round(proposal.candidate.minutes, 1), outcomes=proposal.outcomes,
+    )  # fmt: skip
 
 
 def _next(problem: Problem, found: CauseSearch, word: str, job: Job) -> Proposal | None:
@@ -370,14 +363,9 @@ def _shrinkage(
         chosen = causes_without(problem, best, rivals, np.zeros(0) if found is None else found.probability)
     floor = round(floor_um(problem), 3)
     return shrinkage_of(
-        problem,
-        best,
-        seen=seen,
-        chosen=chosen,
-        order=_by_energy(problem, best),
-        part=main_channels(problem),
+        problem, best, seen=seen, chosen=chosen, order=_by_energy(problem, best), part=main_channels(problem),
         floor_um=floor,
-    )
+    )  # fmt: skip
 
 
 def _by_energy(problem: Problem, f: Fitted) -> list[int]:

@@ -234,14 +234,7 @@ def _axis(run: RunSpec, log: Measured, k: int, revolute: bool, expected: Floats)
     rows = rows[np.unique(log.time[rows], return_index=True)[1]]
     encoder, setpoint, force, load = (each[rows] for each in channels)
     return AxisRun(
-        name=run.name,
-        time=log.time[rows],
-        setpoint=setpoint,
-        encoder=encoder,
-        force=force,
-        row=rows + 1,
-        revolute=revolute,
-        started=run.started_s,
-        expected=expected[rows] if expected[rows].any() else None,
+        name=run.name, time=log.time[rows], setpoint=setpoint, encoder=encoder, force=force, row=rows + 1,
+        revolute=revolute, started=run.started_s, expected=expected[rows] if expected[rows].any() else None,
         load=load if np.isfinite(load).all() else None,
-    )
+    )  # fmt: skip

@@ -42,17 +42,11 @@ class PlainMotions(NamedTuple):
     def room(n: int) -> PlainMotions:
         """Arrays for n motions."""
         return PlainMotions(
-            row=np.empty(n, np.int64),
-            line=np.empty((n, 3), np.int64),
-            begin=np.empty((n, 5), np.int64),
-            finish=np.empty((n, 5), np.int64),
-            kind=np.empty(n, np.int8),
-            start=np.empty((n, 3)),
-            end=np.empty((n, 3)),
-            feed=np.empty(n),
-            code_stated=np.empty(n, np.bool_),
+            row=np.empty(n, np.int64), line=np.empty((n, 3), np.int64), begin=np.empty((n, 5), np.int64),
+            finish=np.empty((n, 5), np.int64), kind=np.empty(n, np.int8), start=np.empty((n, 3)),
+            end=np.empty((n, 3)), feed=np.empty(n), code_stated=np.empty(n, np.bool_),
             feed_stated=np.empty(n, np.bool_),
-        )
+        )  # fmt: skip
 
     def take(self, a: int, b: int) -> PlainMotions:
         """Motions a to b, as views."""

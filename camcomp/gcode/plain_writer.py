@@ -132,10 +132,6 @@ class PlainWriter:
         )  # fmt: skip
         feeds = np.where(self.out.kind[own] == RAPID, np.nan, held)
         return WrittenRun(
-            text=out[:size].tobytes().decode("latin-1"),
-            ends=ends,
-            feeds=feeds,
-            position=place.tolist(),
-            code=None if state[0] < 0.0 else int(state[0]),
-            feed=None if np.isnan(state[1]) else float(state[1]),
-        )
+            text=out[:size].tobytes().decode("latin-1"), ends=ends, feeds=feeds, position=place.tolist(),
+            code=None if state[0] < 0.0 else int(state[0]), feed=None if np.isnan(state[1]) else float(state[1]),
+        )  # fmt: skip

@@ -55,12 +55,9 @@ def rewrite(
         data = _stamped(program.text, Edits(), stamp)
         line = program.path.line[out.motion] + 1
         return Rewritten(
-            data=data,
-            end=program.path.end[out.motion],
-            line=line,
-            centre=program.path.centre[out.motion],
+            data=data, end=program.path.end[out.motion], line=line, centre=program.path.centre[out.motion],
             feed=program.path.feed[out.motion],
-        )
+        )  # fmt: skip
     if not program.straight:
         program = flatten(program, resolution_mm)
     writer = Writer(program, out, resolution_mm)
@@ -262,14 +259,9 @@ class Writer(LineEditor):
             plane = int(self.sites.plane[self.k])
             end = self._landing(moves[0].end, new)
             moves = plan(
-                start=self.position,
-                move=moves[0],
-                end=end,
-                plane=plane,
-                resolution=self.step,
-                unit=self.unit,
+                start=self.position, move=moves[0], end=end, plane=plane, resolution=self.step, unit=self.unit,
                 turns_allowed=self.turns,
-            )
+            )  # fmt: skip
             if moves[-1].kind == ARC:
                 self.centres[row] = self._centre_said(moves[0])
         self._path_mode(row, behind=new and after)

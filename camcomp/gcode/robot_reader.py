@@ -112,13 +112,9 @@ class RobotReader:
         self._unfollowed = ""
         self._joint_poses.append(pose)
         self._add(
-            kind=RAPID,
-            site=site,
-            values=[0.0] * len(self.language.components),
-            middle=None,
-            sweep=None,
+            kind=RAPID, site=site, values=[0.0] * len(self.language.components), middle=None, sweep=None,
             joints=len(self._joint_poses) - 1,
-        )
+        )  # fmt: skip
 
     def _add(self, kind: int, site: MoveSite, values: Sequence[float], middle: Sequence[float] | None,
              sweep: float | None, joints: int) -> None:  # fmt: skip

@@ -57,17 +57,9 @@ def inputs(robot: Robot, *, whole: bool, named: str | None = None) -> dict[str, 
     home, stiffness = np.full(m, -300.0), np.full(m, 1e4)
     masses = MassLoads(0.5 * encoder, np.tile([30.0, -20.0, -900.0, 4e5, 6e5, 1e4], (_ROWS, 1)))
     motion = Motion(
-        time=time,
-        common=100.0 + time,
-        cut_min=time / 60.0,
-        temperature=22.0 + time,
-        encoder=encoder,
-        speed=speed,
-        direction=np.sign(speed),
-        home=home,
-        stiffness=stiffness,
-        masses=lambda: masses,
-    )
+        time=time, common=100.0 + time, cut_min=time / 60.0, temperature=22.0 + time, encoder=encoder, speed=speed,
+        direction=np.sign(speed), home=home, stiffness=stiffness, masses=lambda: masses,
+    )  # fmt: skip
     load = Load(np.tile([200.0, -10.0, -25.0], (_ROWS, 1)), np.zeros((_ROWS, 6)))
     which = np.ones(m) if whole else np.eye(m)[0]
     tip = 20.0 * np.column_stack((np.sin(time), np.cos(time), time))

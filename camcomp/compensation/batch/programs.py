@@ -99,14 +99,9 @@ class Plan:
     def key_of_config(self) -> str:
         """Hash of the configuration, of the tables that it names, and of the options: by content, whatever the names."""
         options = (
-            self.version,
-            self.method,
-            self.tolerance_um,
-            self.joints,
-            self.stock,
-            self.passes,
+            self.version, self.method, self.tolerance_um, self.joints, self.stock, self.passes,
             self.config.control.dialect,
-        )
+        )  # fmt: skip
         digest = hashlib.sha256(repr(options).encode())
         assert self.config._tree is not None  # every loaded config has one
         for name, node in sorted(leaves(self.config._tree), key=lambda each: each[0]):
@@ -160,17 +155,10 @@ def run_batch(
                 continue
             pending[key] = each
             yield Task(
-                name=str(each.source),
-                key=key,
-                data=data,
-                config=plan.config,
-                config_key=config_key,
-                method=plan.method,
-                tolerance_um=plan.tolerance_um,
-                joints=plan.joints,
-                stock=plan.stock,
+                name=str(each.source), key=key, data=data, config=plan.config, config_key=config_key,
+                method=plan.method, tolerance_um=plan.tolerance_um, joints=plan.joints, stock=plan.stock,
                 passes=plan.passes,
-            )
+            )  # fmt: skip
 
     try:
         for outcome in pool(tasks()):
@@ -208,13 +196,9 @@ def _known(plan: Plan, found: FoundProgram, key: str) -> Status | None:
     except (OSError, ValueError, KeyError, TypeError):
         return None
     return Status(
-        source=str(found.source),
-        output=str(plan.output / found.relative),
-        status=SKIPPED,
-        exit_code=note["exit_code"],
-        figures=note["figures"],
-        messages=note["messages"],
-    )
+        source=str(found.source), output=str(plan.output / found.relative), status=SKIPPED,
+        exit_code=note["exit_code"], figures=note["figures"], messages=note["messages"],
+    )  # fmt: skip
 
 
 def _keep(plan: Plan, found: FoundProgram, outcome: Outcome) -> Status:
@@ -222,13 +206,9 @@ def _keep(plan: Plan, found: FoundProgram, outcome: Outcome) -> Status:
     made = {"program": outcome.program, "joints": outcome.joints}
     if outcome.program is None:
         return Status(
-            source=str(found.source),
-            output=None,
-            status=ERROR,
-            exit_code=outcome.exit_code,
-            figures=outcome.figures,
+            source=str(found.source), output=None, status=ERROR, exit_code=outcome.exit_code, figures=outcome.figures,
             messages=outcome.messages,
-        )
+        )  # fmt: skip
     targets = _targets(plan, found)
     contents = {target: made[name] or b"" for name, target in targets.items()}
     note = {
@@ -249,13 +229,9 @@ def _keep(plan: Plan, found: FoundProgram, outcome: Outcome) -> Status:
         return _refused(found, error)
     status = FAILED_CHECK if outcome.exit_code else DONE
     return Status(
-        source=str(found.source),
-        output=str(targets["program"]),
-        status=status,
-        exit_code=outcome.exit_code,
-        figures=outcome.figures,
-        messages=outcome.messages,
-    )
+        source=str(found.source), output=str(targets["program"]), status=status, exit_code=outcome.exit_code,
+        figures=outcome.figures, messages=outcome.messages,
+    )  # fmt: skip
 
 
 def _refused(found: FoundProgram, error: CamcompError) -> Status:

@@ -124,14 +124,9 @@ def _compensate(task: Task) -> Outcome:
     joints = tables.joint_csv(result, job) if task.joints else None
     figures = tables.summary(result, job).as_json()
     outcome = Outcome(
-        key=task.key,
-        exit_code=int(bool(failed)),
-        messages=_checks(task, failed),
-        program=result.written.data,
-        joints=joints,
-        figures=figures,
-        notes=held(),
-    )
+        key=task.key, exit_code=int(bool(failed)), messages=_checks(task, failed), program=result.written.data,
+        joints=joints, figures=figures, notes=held(),
+    )  # fmt: skip
     _settle()
     return outcome
 
@@ -143,25 +138,17 @@ def _in_pieces(task: Task, job: Job) -> Outcome | None:
 
     program, joints = BytesIO(), BytesIO()
     totals = compensate_in_pieces(
-        source=BytesIO(task.data),
-        name=task.name,
-        job=job,
+        source=BytesIO(task.data), name=task.name, job=job,
         settings=CorrectionSettings(method=task.method, tolerance_um=task.tolerance_um, version=__version__),
-        program=program.write,
-        joints=partial(joint_table, joints, "joints.csv", job) if task.joints else None,
-    )
+        program=program.write, joints=partial(joint_table, joints, "joints.csv", job) if task.joints else None,
+    )  # fmt: skip
     if totals is None:
         return None
     failed = totals.failed_checks(task.tolerance_um)
     return Outcome(
-        key=task.key,
-        exit_code=int(bool(failed)),
-        messages=_checks(task, failed),
-        program=program.getvalue(),
-        joints=joints.getvalue() if task.joints else None,
-        figures=totals.summary().as_json(),
-        notes=held(),
-    )
+        key=task.key, exit_code=int(bool(failed)), messages=_checks(task, failed), program=program.getvalue(),
+        joints=joints.getvalue() if task.joints else None, figures=totals.summary().as_json(), notes=held(),
+    )  # fmt: skip
 
 
 def _checks(task: Task, failed: list[tuple[str, str]]) -> list[dict[str, Any]]:

@@ -69,16 +69,10 @@ class Basis:
         points = np.cos(np.pi * (np.arange(1, k + TESTS + 1)[:, None] * EVEN % 1.0))
         both, alone = _products(points, a, b, count)
         return Basis(
-            position=a,
-            force=b,
-            count=count,
-            degree=(max(degrees), len(degrees) - 1),
-            samples=points,
-            solve_both=_pseudoinverse(both[TESTS:]),
-            solve_position=_pseudoinverse(alone[TESTS:]),
-            both=both[:TESTS],
+            position=a, force=b, count=count, degree=(max(degrees), len(degrees) - 1), samples=points,
+            solve_both=_pseudoinverse(both[TESTS:]), solve_position=_pseudoinverse(alone[TESTS:]), both=both[:TESTS],
             alone=alone[:TESTS],
-        )
+        )  # fmt: skip
 
     def terms(self, points: Floats) -> Floats:
         """Terms (n, sum of count) at points (n, 6)."""
@@ -145,17 +139,10 @@ class Field:
         self._narrow = (-np.log(share) / np.log(NARROW)).astype(int)
         self.bases = [Basis.of(RUNGS[0], self._narrow)]
         self.tiles = Tiles(
-            size=CELL_MM,
-            keys=np.full(1 << 12, -1, np.int64),
-            values=np.zeros(1 << 12, np.int64),
-            centre=np.zeros((0, 3)),
-            half=np.zeros(0),
-            rung=np.zeros(0, np.int64),
-            first=np.zeros(0, np.int64),
-            W=np.zeros(0),
-            slope=np.zeros((0, 3, 3)),
-            rates=np.zeros((0, len(self.machine.actuators), 3)),
-        )
+            size=CELL_MM, keys=np.full(1 << 12, -1, np.int64), values=np.zeros(1 << 12, np.int64),
+            centre=np.zeros((0, 3)), half=np.zeros(0), rung=np.zeros(0, np.int64), first=np.zeros(0, np.int64),
+            W=np.zeros(0), slope=np.zeros((0, 3, 3)), rates=np.zeros((0, len(self.machine.actuators), 3)),
+        )  # fmt: skip
 
     def prepare(self, tips: Floats, force: Floats) -> Floats:
         """Makes the tiles for points (n, 3) and forces (n, 3) that are going to be asked for; the points as look_up wants them."""
@@ -316,15 +303,10 @@ class Field:
                 product *= (_SLOPE_AT_ZERO if other == axis else _AT_ZERO)[basis.position[:, other]]
             slope[:, axis], rates[:, axis] = product[:n] @ both[:n, 3:6] / half, product @ alone / half
         self.tiles = replace(
-            t,
-            centre=np.concatenate((t.centre, centre[None])),
-            half=np.append(t.half, half),
-            rung=np.append(t.rung, rung),
-            first=np.append(t.first, len(t.W)),
-            W=np.concatenate((t.W, W)),
-            slope=np.concatenate((t.slope, (np.eye(3) + slope)[None])),
-            rates=np.concatenate((t.rates, rates[None])),
-        )
+            t, centre=np.concatenate((t.centre, centre[None])), half=np.append(t.half, half),
+            rung=np.append(t.rung, rung), first=np.append(t.first, len(t.W)), W=np.concatenate((t.W, W)),
+            slope=np.concatenate((t.slope, (np.eye(3) + slope)[None])), rates=np.concatenate((t.rates, rates[None])),
+        )  # fmt: skip
         return len(t.half)
 
 

@@ -140,15 +140,9 @@ def _of_model(
     parts = run if met is None else run.parts(of, track.points(moves + first, zero), track.points(moves + first, one))
     length = track.length[first:last]
     return Loads(
-        first=at(moves, zero),
-        last=at(moves, one),
-        jump=jump,
-        length=length,
-        at=at,
-        run=parts,
-        of=of,
+        first=at(moves, zero), last=at(moves, one), jump=jump, length=length, at=at, run=parts, of=of,
         sizes=None if met is None else sizes,
-    )
+    )  # fmt: skip
 
 
 def _where_met(run: PlainRun, path: Path, own: slice, c: Conditions, met: RunEngagement) -> Loads:

@@ -111,13 +111,9 @@ class PlainCorrector:
         self._constant = constant_of(job)
 
     def correct(
-        self,
-        whole: PlainRun,
-        before: Edge | None,
-        after: Edge | None,
-        carry: OutputState,
+        self, whole: PlainRun, before: Edge | None, after: Edge | None, carry: OutputState,
         met: RunEngagement | None = None,
-    ) -> CorrectedRun:
+    ) -> CorrectedRun:  # fmt: skip
         """The run corrected and written; `carry` is moved along. met: what the tool meets. Raises Unsolved, NotInPieces."""
         loads = loads_of(run=whole, before=before, after=after, c=self.job.conditions, constant=self._constant, met=met)
         try:
@@ -126,14 +122,9 @@ class PlainCorrector:
             raise Unsolved(loads.of[error.move], error.target, error.status) from None
 
     def _corrected(
-        self,
-        whole: PlainRun,
-        met: RunEngagement | None,
-        loads: Loads,
-        before: Edge | None,
-        after: Edge | None,
+        self, whole: PlainRun, met: RunEngagement | None, loads: Loads, before: Edge | None, after: Edge | None,
         carry: OutputState,
-    ) -> CorrectedRun:
+    ) -> CorrectedRun:  # fmt: skip
         run = loads.run
         uncertainty = RunUncertainty.of(self.job, whole, before, after, met) if self.job.config.uncertain else None
         policy = self.job.config.compensation.policy if uncertainty is not None else "full"
@@ -168,14 +159,9 @@ class PlainCorrector:
             )
             judged = self._judged(run, rows)
             error = self._after(
-                rows,
-                judged,
-                answers=answers,
-                middles=middles,
-                commanded=commanded,
-                written=written,
+                rows, judged, answers=answers, middles=middles, commanded=commanded, written=written,
                 first=carry.written,
-            )
+            )  # fmt: skip
             worst = np.zeros(run.motions)
             at = np.concatenate((rows.move[judged], middles.move))
             np.maximum.at(worst, at, _sizes(error))
@@ -202,34 +188,15 @@ class PlainCorrector:
         seen = np.concatenate((np.flatnonzero(judged), middles.rows))
         back = self._back(unloaded)
         return CorrectedRun(
-            data=data,
-            run=run,
-            rows=rows,
-            answers=answers,
-            commanded=commanded,
-            written=written,
-            before=back,
-            after=error,
-            begin=begin,
-            feed=held,
-            rest=rest,
-            seen=seen,
-            bands=bands,
-            left=meant,
+            data=data, run=run, rows=rows, answers=answers, commanded=commanded, written=written, before=back,
+            after=error, begin=begin, feed=held, rest=rest, seen=seen, bands=bands, left=meant,
             apart=bool(carry.apart),
-        )
+        )  # fmt: skip
 
     def _bands(
-        self,
-        uncertainty: RunUncertainty,
-        rows: PlainRows,
-        *,
-        answers: Answers,
-        judged: Bools,
-        error: Floats,
-        written: Floats,
-        share: Floats | None,
-    ) -> Bands:
+        self, uncertainty: RunUncertainty, rows: PlainRows, *, answers: Answers, judged: Bools, error: Floats,
+        written: Floats, share: Floats | None,
+    ) -> Bands:  # fmt: skip
         moves = uncertainty.moves(written, rows.move, rows.w, rows.force, rows.joining & (rows.w > 0.0))
         left = np.zeros_like(written) if share is None else (1.0 - share)[:, None] * self._back(answers.unloaded)
         left[judged] = error[: int(judged.sum())]
@@ -237,13 +204,9 @@ class PlainCorrector:
         taken = np.ones(len(left)) if share is None else share
         totals.add(left[judged], moves.take(np.flatnonzero(judged)), taken[judged])
         return Bands(
-            before=self._back(answers.unloaded),
-            after=left,
-            moves=moves,
-            share=taken,
-            known=np.ones(len(left), np.bool_),
-            totals=totals,
-        )
+            before=self._back(answers.unloaded), after=left, moves=moves, share=taken,
+            known=np.ones(len(left), np.bool_), totals=totals,
+        )  # fmt: skip
 
     def _left(self, judged: Bools, answers: Answers, middles: Middles, share: Floats) -> Floats:
         """Errors (k, 3), program frame, that the policy leaves on purpose."""
@@ -341,13 +304,9 @@ class PlainCorrector:
     def _answers(self, rows: PlainRows) -> Answers:
         answer, nominal, tile, tiles = self.ask(rows.move, rows.target, rows.force, every=True)
         return Answers(
-            correction=answer[:, :3],
-            unloaded=answer[:, 3:6],
-            rest=answer[:, 6:],
-            nominal=nominal,
-            tile=tile,
+            correction=answer[:, :3], unloaded=answer[:, 3:6], rest=answer[:, 6:], nominal=nominal, tile=tile,
             tiles=tiles,
-        )
+        )  # fmt: skip
 
     def ask(self, move: Ints, target: Floats, force: Floats, every: bool) -> tuple[Floats, Floats, Ints, Tiles]:
         """Answers (n, .) as in look_up, machine frame, for points of moves, program frame; nominal joints, tiles (n,).
@@ -460,16 +419,9 @@ class PlainCorrector:
         return 0.5 * (ends + np.concatenate((first[None], ends[:-1])))
 
     def _after(
-        self,
-        rows: PlainRows,
-        judged: Bools,
-        *,
-        answers: Answers,
-        middles: Middles,
-        commanded: Floats,
-        written: Floats,
-        first: Floats,
-    ) -> Floats:
+        self, rows: PlainRows, judged: Bools, *, answers: Answers, middles: Middles, commanded: Floats,
+        written: Floats, first: Floats,
+    ) -> Floats:  # fmt: skip
         """Errors (k, 3) of the written program, program frame: end points that are judged, then middles."""
         R = self.job.frame.rotation
         off = (written - commanded + rows.shift)[judged]

@@ -77,12 +77,9 @@ class LongProgram:
         self._stock = _stock_of(self.job, source, self.name, self.setup)
         top = self.job.conditions.stock_top_mm if self.job.conditions.model and self._stock is None else None
         self._runs = Runs(
-            source=source,
-            name=self.name,
-            setup=self.setup,
-            dialect=self.job.config.control.dialect,
+            source=source, name=self.name, setup=self.setup, dialect=self.job.config.control.dialect,
             top_mm=np.nan if top is None else top,
-        )
+        )  # fmt: skip
         self._corrector = PlainCorrector(self.job, self.tolerance_um, self._runs.language, self._runs.feed_point)
         self._stamp: str | None = stamp_text(digest.hexdigest(), self.version, self.job.fingerprint)
         with ThreadPoolExecutor(1) as self._beside:
@@ -223,15 +220,9 @@ class LongProgram:
         here = row0 / self._lines
         with part_of_work(here, here):
             result = compensate(
-                program,
-                self.job,
-                method="newton",
-                tolerance_um=self.tolerance_um,
-                version=self.version,
-                part=part,
-                arcs=self.arcs,
-                engaged=None if met is None else met.within(first, len(program.path) - 1),
-            )
+                program, self.job, method="newton", tolerance_um=self.tolerance_um, version=self.version, part=part,
+                arcs=self.arcs, engaged=None if met is None else met.within(first, len(program.path) - 1),
+            )  # fmt: skip
         own = (result.rows.motion >= part.first) & (result.rows.motion < part.last)
         assert result.written.behind is not None
         self._carry.take(result.written.behind, result.rows.end[np.flatnonzero(own)[-1]])

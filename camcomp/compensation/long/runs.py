@@ -187,14 +187,9 @@ class Runs:
         self.motions += n
         waits, state.waits = state.waits, False
         return PlainRun(
-            data=self._data,
-            text_at=begin,
-            text_end=at,
-            row0=row0,
-            plain=room.take(0, n),
-            state=deepcopy(state),
+            data=self._data, text_at=begin, text_end=at, row0=row0, plain=room.take(0, n), state=deepcopy(state),
             waits=waits,
-        )
+        )  # fmt: skip
 
     def _interpret(self, line: bytes) -> tuple[int, bool]:
         """Executes a line: its number of motions, and whether the program ends there."""

@@ -120,18 +120,10 @@ class Totals:
         joints, drive = corrector.actuators(done)
         self.step_mm = max(self.step_mm, corrector.resolution)
         self._common(
-            whole.motions,
-            rows.joining,
-            corrected=np.ones(len(s), np.bool_),
-            line=plain.row[rows.move] + run.row0 + 1,
-            nominal=answers.nominal,
-            joints=joints,
-            drive=drive,
-            tilt=answers.rest[:, :3],
-            before=done.before,
-            after=done.after,
-            missed=done.missed,
-        )
+            whole.motions, rows.joining, corrected=np.ones(len(s), np.bool_),
+            line=plain.row[rows.move] + run.row0 + 1, nominal=answers.nominal, joints=joints, drive=drive,
+            tilt=answers.rest[:, :3], before=done.before, after=done.after, missed=done.missed,
+        )  # fmt: skip
         self._plain_control(run, done)
         self._rapids.add(path_of_run(whole))
         if run.state.sense == 0.0:
@@ -143,17 +135,10 @@ class Totals:
             parts = (frame.to_machine(rows.target), force, answers.correction, answers.unloaded, joints, drive, off)
             self._sample.append(np.concatenate([each[chosen] for each in parts], axis=1))
         return Batch(
-            line=plain.row[rows.move] + run.row0 + 1,
-            s=s,
-            t=t,
-            target=rows.target,
-            written=done.written,
-            force=force,
-            nominal=answers.nominal,
-            joints=joints,
-            drive=drive,
+            line=plain.row[rows.move] + run.row0 + 1, s=s, t=t, target=rows.target, written=done.written, force=force,
+            nominal=answers.nominal, joints=joints, drive=drive,
             behind=self._behind(self._known(done.bands), rows.engagement),
-        )
+        )  # fmt: skip
 
     def _plain_control(self, run: PlainRun, done: CorrectedRun) -> None:
         """What the control makes of plain lines."""
@@ -204,33 +189,18 @@ class Totals:
         self._odd_control(result, own, part)
         self._rapids.add(result.program.path.take(np.arange(part.first, part.last)))
         self._common(
-            part.last - part.first,
-            rows.joining[own],
-            corrected=corrected,
-            line=result.lines[own],
-            nominal=result.nominal[own],
-            joints=state.rho[own],
-            drive=state.drive[own],
-            tilt=state.tilt[own],
-            before=result.before,
-            after=result.after,
-            missed=result.missed,
-        )
+            part.last - part.first, rows.joining[own], corrected=corrected, line=result.lines[own],
+            nominal=result.nominal[own], joints=state.rho[own], drive=state.drive[own], tilt=state.tilt[own],
+            before=result.before, after=result.after, missed=result.missed,
+        )  # fmt: skip
         self.iterations = max(self.iterations, result.iterations)
         self._stands(result.without_spindle)
         force = self.job.frame.vectors(rows.force[own])
         return Batch(
-            line=result.lines[own],
-            s=s,
-            t=t,
-            target=rows.target[own],
-            written=result.written.end[own],
-            force=force,
-            nominal=result.nominal[own],
-            joints=state.rho[own],
-            drive=state.drive[own],
+            line=result.lines[own], s=s, t=t, target=rows.target[own], written=result.written.end[own], force=force,
+            nominal=result.nominal[own], joints=state.rho[own], drive=state.drive[own],
             behind=self._behind(self._known(result.bands, own), rows.engagement[own]),
-        )
+        )  # fmt: skip
 
     def _behind(self, bands: Floats | None, engagement: Floats | None) -> Floats | None:
         """Columns behind the others: bands, and with a stock the engagement."""
@@ -309,13 +279,10 @@ class Totals:
         worst = max(1e3 * float(np.abs(each).max()) for each in gaps)
         self.iterations = max(self.iterations, int(exact.iterations.max()))
         self.interpolated = Interpolation(
-            bound_um=BOUND_UM,
-            checked=len(p),
-            worst_um=worst if np.isfinite(worst) else float("inf"),
+            bound_um=BOUND_UM, checked=len(p), worst_um=worst if np.isfinite(worst) else float("inf"),
             worst_drive_force=float(np.nan_to_num(np.abs(written.drive - drive), nan=np.inf).max()),
-            tiles=len(known.tiles.half),
-            exact_solutions=known.solved + 3 * len(p) + 2 * corrector.exact,
-        )
+            tiles=len(known.tiles.half), exact_solutions=known.solved + 3 * len(p) + 2 * corrector.exact,
+        )  # fmt: skip
 
     def summary(self) -> Summary:
         """The figures, as report.tables.summary has them for short programs, and those of the interpolation."""

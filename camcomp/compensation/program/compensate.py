@@ -222,15 +222,9 @@ def _compensated(
     trial = trial_nodes(track.length, track.angle, feeding & ~turning & (track.length > 0.0), spacing)
     with part_of_work(0.0, 0.4, points=True):
         aimed = _aim(
-            program,
-            job,
-            track=track,
-            nodes=trial,
-            corrected=corrected,
-            method=method,
-            shares=shares,
+            program, job, track=track, nodes=trial, corrected=corrected, method=method, shares=shares,
             orienting=orienting,
-        )
+        )  # fmt: skip
     curve, weight = aimed.commanded, 1e-3 * tolerance_um
     correction = aimed.commanded - track.points(trial.piece, trial.w)
     kept = _kept(track, trial, correction, 0.5 * resolution)
@@ -257,49 +251,25 @@ def _compensated(
             nodes, shift = bend.divided(trial, tolerance)
         with part_of_work(1.0 - 0.6 * 0.5**round_, 1.0 - 0.35 * 0.5**round_, points=True):
             commanded, circles, words = _bent(
-                program,
-                job,
-                track=track,
-                nodes=nodes,
-                shift=shift,
-                corrected=corrected,
-                method=method,
-                bend=bend,
-                shares=shares,
-                orienting=orienting,
-            )
+                program, job, track=track, nodes=nodes, shift=shift, corrected=corrected, method=method, bend=bend,
+                shares=shares, orienting=orienting,
+            )  # fmt: skip
         if orienting is not None:
             words = words + orienting.from_lengths(shift[:, 3:], weight)
         rows = corrected_rows(
-            program,
-            job,
-            track=track,
-            nodes=nodes,
-            commanded=commanded,
-            kept=kept,
-            circles=circles,
-            begins=part is None or part.first == 0,
-            shares=shares,
-            orienting=orienting,
+            program, job, track=track, nodes=nodes, commanded=commanded, kept=kept, circles=circles,
+            begins=part is None or part.first == 0, shares=shares, orienting=orienting,
             words=None if orienting is None else words,
-        )
+        )  # fmt: skip
         written = rewrite(
-            program,
-            output_of(path, rows),
-            resolution_mm=job.config.control.resolution_mm,
-            version=version,
-            part=part,
-            model=job.fingerprint,
-        )
+            program, output_of(path, rows), resolution_mm=job.config.control.resolution_mm, version=version,
+            part=part, model=job.fingerprint,
+        )  # fmt: skip
         points = judged_points(job, track, rows, feeding & ~pushed)
         after = see(
-            job=job,
-            points=points,
-            ends=written.end,
-            arcs=replace(rows.arcs, centre=written.centre),
-            orienting=orienting,
-            words=written.words,
-        )
+            job=job, points=points, ends=written.end, arcs=replace(rows.arcs, centre=written.centre),
+            orienting=orienting, words=written.words,
+        )  # fmt: skip
         left = None
         if shares is not None:
             left = shares.left(job, track, points.piece, points.w, travel=points.travel, before=points.before)
@@ -329,12 +299,9 @@ def _compensated(
     rest = np.zeros(len(rows.piece), np.bool_) if part is not None else rests(program, rows, tolerance_um)
     if rest.any():
         written = rewrite(
-            program,
-            output_of(path, rows, rest),
-            resolution_mm=job.config.control.resolution_mm,
-            version=version,
+            program, output_of(path, rows, rest), resolution_mm=job.config.control.resolution_mm, version=version,
             model=job.fingerprint,
-        )
+        )  # fmt: skip
     seen = replace(after, error=missed_by)
     control = under_control(program, job, rows=rows, written=written, points=points, after=seen, rest=rest)
     if part is None and control.stated and 1e3 * control.off_joins > tolerance_um * (1.0 + 1e-9):
@@ -346,12 +313,9 @@ def _compensated(
             if other.better_than(control, tolerance_um):
                 control = other
                 written = rewrite(
-                    program,
-                    output_of(path, rows, rest, apart),
-                    resolution_mm=job.config.control.resolution_mm,
-                    version=version,
-                    model=job.fingerprint,
-                )
+                    program, output_of(path, rows, rest, apart), resolution_mm=job.config.control.resolution_mm,
+                    version=version, model=job.fingerprint,
+                )  # fmt: skip
     warnings = _warnings(job, control.resting, program.language.exact_stop) + control.warnings(
         path.line[track.motion[points.piece[points.judged]]], tolerance_um
     )
@@ -363,20 +327,9 @@ def _compensated(
         warnings += stock_warnings(stock_remarks(job.config, path, track.engaged))
     iterations = int(aimed.iterations.max(initial=0))
     done = _assemble(
-        program,
-        job,
-        track=track,
-        rows=rows,
-        written=written,
-        points=points,
-        before=before,
-        after=after,
-        control=control,
-        iterations=iterations,
-        method=method,
-        still=still,
-        warnings=warnings,
-    )
+        program, job, track=track, rows=rows, written=written, points=points, before=before, after=after,
+        control=control, iterations=iterations, method=method, still=still, warnings=warnings,
+    )  # fmt: skip
     told = points.along(written.end, replace(rows.arcs, centre=written.centre))
     share = None if shares is None else shares.of_ends(track, rows.piece, rows.w, rows.joining)
     as_told = replace(points, travel=told_travel(points, orienting, written.words))
@@ -467,13 +420,9 @@ def _bent(
         motion = track.motion[nodes.piece[to]]
         flat = arcs_out.FLATTEST * program.step_mm(job.config.control.resolution_mm)
         found, wrong = arcs_out.through(
-            start=commanded[to - 1],
-            middle=solved[middle],
-            end=commanded[to],
-            axis=track.path.axis[motion],
-            way=track.path.angle[motion],
-            flat=flat,
-        )
+            start=commanded[to - 1], middle=solved[middle], end=commanded[to], axis=track.path.axis[motion],
+            way=track.path.angle[motion], flat=flat,
+        )  # fmt: skip
         circles.centre[to], circles.angle[to] = found.centre, found.angle
         bend.use[nodes.piece[to[wrong]]] = False
     return commanded, circles, aimed.words[~middle]
@@ -536,21 +485,8 @@ def _assemble(
         state = whole_pose(job, points, told, rows.corrected, state)
     force = acting_force(job, state.rho, points.travel.take(points.end))
     return Compensated(
-        program=program,
-        written=written,
-        rows=rows,
-        s=s,
-        t=t,
-        nominal=nominal,
-        state=state,
-        force=force,
-        uncorrected=before.tip,
-        before=before.error[points.judged],
-        after=after.error[points.judged],
-        control=control,
-        judged=points.row[points.judged],
-        iterations=iterations,
-        method=method,
-        without_spindle=still,
+        program=program, written=written, rows=rows, s=s, t=t, nominal=nominal, state=state, force=force,
+        uncorrected=before.tip, before=before.error[points.judged], after=after.error[points.judged], control=control,
+        judged=points.row[points.judged], iterations=iterations, method=method, without_spindle=still,
         warnings=warnings,
-    )
+    )  # fmt: skip

@@ -108,20 +108,9 @@ def corrected_rows(
         words = np.concatenate((words[keep], turned))[order]
         words[whole] = orienting.programmed(track, piece, w)[whole]
     rows = CorrectedRows(
-        piece=piece,
-        motion=track.motion[piece],
-        w=w,
-        kind=rows_kind,
-        joining=joining,
-        corrected=~passed,
-        force=force,
-        target=target,
-        end=end,
-        feed=np.empty(len(piece)),
-        arcs=circles,
-        engagement=engagement,
-        words=words,
-    )
+        piece=piece, motion=track.motion[piece], w=w, kind=rows_kind, joining=joining, corrected=~passed, force=force,
+        target=target, end=end, feed=np.empty(len(piece)), arcs=circles, engagement=engagement, words=words,
+    )  # fmt: skip
     return replace(rows, feed=_feeds(program, track, rows))
 
 
@@ -143,14 +132,7 @@ def output_of(path: Path, rows: CorrectedRows, rest: Bools | None = None, apart:
     arc, bent = rows.kind == ARC, rows.arcs.on
     centre = np.where(bent[:, None], rows.arcs.centre, path.centre[rows.motion])
     return Output(
-        motion=rows.motion,
-        kind=rows.kind.astype(np.int8),
-        end=rows.end,
-        centre=np.where(arc[:, None], centre, np.nan),
-        angle=rows.sweeps(path),
-        feed=rows.feed,
-        joining=rows.joining,
-        rest=rest,
-        apart=apart,
-        words=rows.words,
-    )
+        motion=rows.motion, kind=rows.kind.astype(np.int8), end=rows.end,
+        centre=np.where(arc[:, None], centre, np.nan), angle=rows.sweeps(path), feed=rows.feed, joining=rows.joining,
+        rest=rest, apart=apart, words=rows.words,
+    )  # fmt: skip

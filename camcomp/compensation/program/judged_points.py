@@ -75,17 +75,9 @@ def judged_points(job: Job, track: Track, rows: CorrectedRows, feeding: Bools) -
     travel = replace(travel, force=force)
     before = track.path.start[0] if n and track.path.known[0] else None
     return JudgedPoints(
-        row=row,
-        fraction=fraction,
-        axis=axis,
-        piece=piece,
-        w=w,
-        target=track.points(piece, w),
-        travel=travel,
-        judged=cut[row],
-        kept=kept,
-        before=before,
-    )
+        row=row, fraction=fraction, axis=axis, piece=piece, w=w, target=track.points(piece, w), travel=travel,
+        judged=cut[row], kept=kept, before=before,
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)

@@ -134,18 +134,9 @@ class Way:
         s = track.s0[piece] + w * track.length[piece]
         told, on = track.points(piece, w), np.flatnonzero(seen[piece])
         return cls(
-            piece=piece,
-            w=w,
-            told=told,
-            direction=direction,
-            on=on,
-            feeds=feeds[piece],
-            loads=loads,
-            fixed=fixed,
-            s=s,
-            run=run[piece],
-            run_length=long[piece],
-        )
+            piece=piece, w=w, told=told, direction=direction, on=on, feeds=feeds[piece], loads=loads, fixed=fixed,
+            s=s, run=run[piece], run_length=long[piece],
+        )  # fmt: skip
 
 
 def _directions(track: Track, feeds: Bools, piece: Ints, w: Floats) -> Floats:

@@ -47,10 +47,6 @@ def bands_of(
     taken = np.ones(len(rows.w)) if share is None else share
     totals.add(after.error[counted], ends.take(points.row[counted]), taken[points.row[counted]])
     return Bands(
-        before=before.error[points.end],
-        after=after.error[points.end],
-        moves=ends,
-        share=taken,
-        known=rows.corrected,
+        before=before.error[points.end], after=after.error[points.end], moves=ends, share=taken, known=rows.corrected,
         totals=totals,
-    )
+    )  # fmt: skip

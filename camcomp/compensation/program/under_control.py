@@ -198,16 +198,9 @@ def under_control(
     cuts = np.flatnonzero((path.kind != RAPID) & ~path.machine)
     error = after.error[judged] + plan.leaves_by(row, told)
     return UnderControl(
-        before_s=before.duration_s,
-        after_s=plan.duration_s,
-        modes=distinct(program.modes[k] for k in cuts),
-        error=error,
-        joined=beside,
-        row=row,
-        told=told,
-        resting=int(rest.sum()),
-        apart=apart is not None,
-    )
+        before_s=before.duration_s, after_s=plan.duration_s, modes=distinct(program.modes[k] for k in cuts),
+        error=error, joined=beside, row=row, told=told, resting=int(rest.sum()), apart=apart is not None,
+    )  # fmt: skip
 
 
 def rest_warning(resting: int, exact_stop: str = "G61") -> list[str]:
@@ -259,20 +252,11 @@ def written_moves(program: Program, rows: CorrectedRows, written: Rewritten, fee
     told = np.where(np.isnan(written.feed), feed, written.feed)
     waits = np.asarray(path.waits)[motion] & (np.diff(motion, prepend=-1) > 0)
     return ToolMoves(
-        kind=np.where(arc & ~np.isfinite(centre[:, 0]), 1, rows.kind).astype(np.int64),
-        start=start,
-        end=end,
-        centre=centre,
-        axis=axis,
-        angle=angle,
-        feed=told,
-        exact=exact[motion],
-        waits=waits,
-        stop=(stop | path.machine)[motion],
-        tolerance=tolerance[motion],
-        merge=merged[motion],
+        kind=np.where(arc & ~np.isfinite(centre[:, 0]), 1, rows.kind).astype(np.int64), start=start, end=end,
+        centre=centre, axis=axis, angle=angle, feed=told, exact=exact[motion], waits=waits,
+        stop=(stop | path.machine)[motion], tolerance=tolerance[motion], merge=merged[motion],
         per_turn=program.per_turn[motion],
-    )
+    )  # fmt: skip
 
 
 def of_text(original: Program, corrected: Program, job: Job, move: Ints, told: Floats, error: Floats) -> dict[str, Any]:

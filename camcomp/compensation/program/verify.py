@@ -69,15 +69,10 @@ class Verified:
             max_um=float(size.max()) if len(size) else 0.0,
         )
         return Verification(
-            tolerance_um=tolerance_um,
-            residual=residual,
-            points=len(size),
-            joining_lines=self.joining,
-            **self.control,
-            warnings=self.warnings,
-            **({} if self.totals is None else band_figures(self.totals, self.policy)),
-            lines=tuple(self.lines),
-        )
+            tolerance_um=tolerance_um, residual=residual, points=len(size), joining_lines=self.joining,
+            **self.control, warnings=self.warnings,
+            **({} if self.totals is None else band_figures(self.totals, self.policy)), lines=tuple(self.lines),
+        )  # fmt: skip
 
     @property
     def worst_um(self) -> float:
@@ -117,18 +112,9 @@ def verify(corrected: Program, original: Program, job: Job) -> Verified:
     judged &= ~load_turns(job, track).passed(piece, move, f, w)
     end = judged & (f == 1.0)
     control = _under_control(
-        original,
-        corrected,
-        job=job,
-        track=track,
-        piece=piece,
-        move=move,
-        commanded=commanded,
-        w=w,
-        judged=judged,
-        shares=shares,
-        rotation=rotation,
-    )
+        original, corrected, job=job, track=track, piece=piece, move=move, commanded=commanded, w=w, judged=judged,
+        shares=shares, rotation=rotation,
+    )  # fmt: skip
     missed, totals = None, None
     if shares is not None:
         residual, missed = _beside(job=job, track=track, piece=piece, commanded=commanded, w=w, shares=shares)
@@ -140,25 +126,13 @@ def verify(corrected: Program, original: Program, job: Job) -> Verified:
     piece, residual, w, vertex = piece[judged], residual[judged], w[judged], f[judged] == 1.0
     convergence = _convergence(job, track, piece[vertex], w[vertex])
     lines = _per_line(
-        original,
-        job,
-        track=track,
-        piece=piece,
-        vertex=vertex,
-        residual=residual,
-        convergence=convergence,
+        original, job, track=track, piece=piece, vertex=vertex, residual=residual, convergence=convergence,
         missed=missed,
-    )
+    )  # fmt: skip
     return Verified(
-        residual=residual,
-        lines=lines,
-        joining=joins,
-        control=control,
-        warnings=warnings,
-        missed=missed,
-        totals=totals,
-        policy=job.config.compensation.policy,
-    )
+        residual=residual, lines=lines, joining=joins, control=control, warnings=warnings, missed=missed,
+        totals=totals, policy=job.config.compensation.policy,
+    )  # fmt: skip
 
 
 def _under_control(

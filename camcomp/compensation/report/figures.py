@@ -65,18 +65,12 @@ def drawn_path_of(result: Compensated, job: Job) -> DrawnPath:
 
     drive_scale = np.where(job.machine.revolute, 1e-3, 1.0)
     return DrawnPath(
-        s=result.s,
-        line=result.lines,
-        hidden=(rows.kind == RAPID) | ~rows.corrected | rows.joining,
-        target=rows.target,
-        shift=1e3 * (result.written.end - rows.target),
-        change=1e3 * (result.state.rho - result.nominal),
-        drive=result.state.drive * drive_scale,
-        before=largest(result.before, result.judged),
-        after=largest(result.after, result.judged),
-        driven=largest(result.control.error, result.control.row),
-        mode=mode_name(result.control.modes),
-    )
+        s=result.s, line=result.lines, hidden=(rows.kind == RAPID) | ~rows.corrected | rows.joining,
+        target=rows.target, shift=1e3 * (result.written.end - rows.target),
+        change=1e3 * (result.state.rho - result.nominal), drive=result.state.drive * drive_scale,
+        before=largest(result.before, result.judged), after=largest(result.after, result.judged),
+        driven=largest(result.control.error, result.control.row), mode=mode_name(result.control.modes),
+    )  # fmt: skip
 
 
 def figure_trajectories(result: Compensated, found: Trajectories) -> Figure:
@@ -168,13 +162,11 @@ def figure_shift(drawn: DrawnPath) -> Figure:
     at = drawn.worst(size)
     words = f"up to {micrometres(size[at])}, in source line {drawn.line[at]}"
     return Figure(
-        name="shift",
-        title="Shift of the commanded tip",
+        name="shift", title="Shift of the commanded tip",
         caption=f"Commanded minus programmed tip in the program frame: {words}.",
-        label=f"Plot of the shift of the commanded tip in x, y and z along the path: {words}.",
-        traces=curves,
+        label=f"Plot of the shift of the commanded tip in x, y and z along the path: {words}.", traces=curves,
         layout={"xaxis": axis("path length in mm"), "yaxis": axis("shift in µm")},
-    )
+    )  # fmt: skip
 
 
 def figures_actuators(drawn: DrawnPath, job: Job, *, drive: bool) -> list[Figure]:
@@ -202,13 +194,11 @@ def _actuators(drawn: DrawnPath, names: tuple[str, ...], which: Ints, rotary: bo
         note = "Commanded minus nominal actuator coordinate"
     words = f"up to {brief(abs(values[row, column]))} {unit}, actuator {names[which[column]]} in line {drawn.line[row]}"
     return Figure(
-        name=f"{'drive' if drive else 'change'}-{'hinges' if rotary else 'slides'}",
-        title=f"{what} along the path",
-        caption=f"{note}: {words}.",
-        label=f"Plot of {what.lower()} along the path, one curve per actuator: {words}.",
+        name=f"{'drive' if drive else 'change'}-{'hinges' if rotary else 'slides'}", title=f"{what} along the path",
+        caption=f"{note}: {words}.", label=f"Plot of {what.lower()} along the path, one curve per actuator: {words}.",
         traces=curves,
         layout={"xaxis": axis("path length in mm"), "yaxis": axis(f"{'drive' if drive else 'change'} in {unit}")},
-    )
+    )  # fmt: skip
 
 
 def figure_path(drawn: DrawnPath) -> Figure:
@@ -226,14 +216,12 @@ def figure_path(drawn: DrawnPath) -> Figure:
     low = float(np.nanmin(np.where(drawn.hidden, np.nan, size))) if (~drawn.hidden).any() else 0.0
     words = f"correction from {brief(low)} to {micrometres(size[drawn.worst(size)])}"
     return Figure(
-        name="path",
-        title="Tool path",
-        caption=f"Feed moves of the program in space, {words}. Drag to turn.",
+        name="path", title="Tool path", caption=f"Feed moves of the program in space, {words}. Drag to turn.",
         label=f"Three-dimensional plot of the tool path, coloured by the size of the correction: {words}.",
         traces=[trace],
         layout={"scene": scene_of(drawn.target[~drawn.hidden]), "margin": {"l": 0, "r": 0, "t": 0, "b": 0}},
         height=520,
-    )
+    )  # fmt: skip
 
 
 def scene_of(points: Floats) -> dict[str, Any]:

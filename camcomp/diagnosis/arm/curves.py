@@ -56,14 +56,9 @@ def curve_of(bench: ArmBench, columns: Sequence[Column], amount: Floats, covaria
     }
     error = _drawn(replace(cause, values=values), np.radians(angle))
     return CurveOfJoint(
-        angle=angle,
-        error=error,
-        sd=sd,
-        amplitude=amplitude,
-        amplitude_sd=float(np.sqrt(slope @ covariance @ slope)),
-        seen=seen,
-        values=values,
-    )
+        angle=angle, error=error, sd=sd, amplitude=amplitude, amplitude_sd=float(np.sqrt(slope @ covariance @ slope)),
+        seen=seen, values=values,
+    )  # fmt: skip
 
 
 def seen_angles(angle: Floats) -> tuple[tuple[float, float], ...]:
@@ -97,15 +92,7 @@ def _drawn(cause: Cause, angle: Floats) -> Floats:
     """Error (n,) rad of a joint with a curve at angles (n,) rad, as the effect itself has it."""
     zero, none = np.zeros((len(angle), 1)), np.zeros(1)
     motion = Motion(
-        time=angle,
-        common=angle,
-        cut_min=angle,
-        temperature=None,
-        encoder=angle[:, None],
-        speed=zero,
-        direction=zero,
-        home=none,
-        stiffness=none,
-        ordered=False,
-    )
+        time=angle, common=angle, cut_min=angle, temperature=None, encoder=angle[:, None], speed=zero, direction=zero,
+        home=none, stiffness=none, ordered=False,
+    )  # fmt: skip
     return signal_path.driven([cause], (str(cause.target),), motion)[0][:, 0]

@@ -109,13 +109,9 @@ def linearise(
         groups = [replace(g, sd=g.sd * w[:, None]) for g, w in zip(groups, weights, strict=True)]
     healthy = {DRIFT: DRIFT_FLOORS} if DRIFT in groups[0].B else {}
     return LinearModel(
-        groups=tuple(groups),
-        candidates=shelf.candidates,
-        bounds=shelf.bounds,
-        fitted=bench.own,
-        families=shelf.families,
-        healthy=healthy,
-    )
+        groups=tuple(groups), candidates=shelf.candidates, bounds=shelf.bounds, fitted=bench.own,
+        families=shelf.families, healthy=healthy,
+    )  # fmt: skip
 
 
 def with_dictionary(bench: ArmBench, groups: Sequence[Group], sd: float) -> list[Group]:

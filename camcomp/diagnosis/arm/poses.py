@@ -63,18 +63,9 @@ class Poses:
         sd = None if self.sd is None else self.sd[rows]
         way, torque, force = (None if each is None else each[rows] for each in (self.approach, self.torque, self.force))
         return Poses(
-            label=self.label,
-            q=self.q[rows],
-            tip=self.tip[rows],
-            time=self.time[rows],
-            temperature=heat,
-            run=self.run[rows],
-            sd=sd,
-            row=self.rows[rows],
-            approach=way,
-            torque=torque,
-            force=force,
-        )
+            label=self.label, q=self.q[rows], tip=self.tip[rows], time=self.time[rows], temperature=heat,
+            run=self.run[rows], sd=sd, row=self.rows[rows], approach=way, torque=torque, force=force,
+        )  # fmt: skip
 
     @property
     def rows(self) -> np.ndarray:
@@ -432,19 +423,11 @@ def _standing(robot: Robot, campaign: Poses) -> Motion:
     home, worn = np.array([a.home for a in robot.actuators]), np.zeros(len(campaign.q))
     way = zero if campaign.approach is None else campaign.approach
     return Motion(
-        time=campaign.time,
-        common=campaign.time,
-        cut_min=worn,
-        temperature=campaign.temperature,
-        encoder=campaign.q,
-        speed=zero,
-        direction=way,
-        home=home,
-        stiffness=signal_path.springs(robot),
-        ordered=False,
+        time=campaign.time, common=campaign.time, cut_min=worn, temperature=campaign.temperature, encoder=campaign.q,
+        speed=zero, direction=way, home=home, stiffness=signal_path.springs(robot), ordered=False,
         masses=cache(partial(mass_loads, robot, campaign.q)),
         held=cache(lambda: hang(robot, campaign.q, None, campaign.torque).drive),
-    )
+    )  # fmt: skip
 
 
 def _need(arm: Arm | None) -> Arm:

@@ -300,13 +300,9 @@ def studied(
     """The result of `study`, and notes for the reader of the logs."""
     with progress.part(0.0, 0.7):
         case = solve(
-            robot=robot,
-            causes=causes,
-            runs=runs,
-            holdout=holdout,
-            without=without,
+            robot=robot, causes=causes, runs=runs, holdout=holdout, without=without,
             stated=StatedDeviation() if stated is None else stated,
-        )
+        )  # fmt: skip
     bench = case.bench
     gaps = [bench.gap(k, ()) for k in range(len(bench.campaigns))]
     case = without_far_judged(case)
@@ -324,18 +320,14 @@ def studied(
     alternatives = answer.alternatives(told, named) if word == "ambiguous" or (word == "unknown" and known) else ()
     floor = case.floor
     result = DiagnosisResult(
-        verdict=word,
-        gap=answer.gap(told.gaps, floor),
-        where=answer.where(told, word),
-        causes=named,
+        verdict=word, gap=answer.gap(told.gaps, floor), where=answer.where(told, word), causes=named,
         alternatives=alternatives if word == "ambiguous" or len(alternatives) > 1 else (),
-        shrinkage=shrinkage(case, named, sorted(names), bool(holdout)),
-        minor=minor,
+        shrinkage=shrinkage(case, named, sorted(names), bool(holdout)), minor=minor,
         next_experiment=answer.next_experiment(told, word),
         floor=Floor(um=round(floor.um, 3), source=floor.source) if floor else Floor(um=None, source="not identifiable"),
         outliers=tuple(Outlier(run=run, row=row) for run, row in sorted(set(case.outliers))),
         standards=of_poses(robot, bench.campaigns, gaps),
-    )
+    )  # fmt: skip
     return result, (*case.notes, *notes_of_weight(robot, bench.campaigns, without), *notes_of_frames(case, named))
 
 

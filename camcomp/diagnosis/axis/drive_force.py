@@ -100,15 +100,9 @@ def force_of(
                 ]
             shifted = [_without(pushes, k, force) for k, force in enumerate(forces)]
             now = _forced(
-                found,
-                runs,
-                moves=moves,
-                forces=shifted,
-                train=train,
-                test=test,
-                without=without,
+                found, runs, moves=moves, forces=shifted, train=train, test=test, without=without,
                 unsure=_edges(pushes, moves),
-            )
+            )  # fmt: skip
             channel = now.force
             assert channel is not None
         if _beyond(now) < LEFT * _beyond(plain):
@@ -251,17 +245,9 @@ def _forced(
     _refused(found, data, table=table, train=train, columns=columns, last=last, moves=moves, length=length, floor=floor)
     known = _weighed(data, table(train, *columns), [len(moves[k].time) for k in train], floor)
     close(
-        found,
-        channel,
-        effects=named,
-        data=known,
-        table=table,
-        columns=columns,
-        test=test,
-        values=forces,
-        moves=moves,
-        unsure=unsure,
-    )
+        found, channel, effects=named, data=known, table=table, columns=columns, test=test, values=forces,
+        moves=moves, unsure=unsure,
+    )  # fmt: skip
     found.force = channel
     line = ripple([moves[k] for k in train], channel.left)
     if line is not None and line.share > LEAST_RIPPLE and line.amplitude**2 / 2.0 > (MINOR * floor) ** 2:

@@ -144,17 +144,10 @@ class AxisRun:
         time, setpoint, encoder, force = (x[rows] for x in (self.time, self.setpoint, self.encoder, self.force))
         seen = self.clear[rows]
         return replace(
-            self,
-            time=time,
-            setpoint=setpoint,
-            encoder=encoder,
-            force=force,
-            row=row[rows],
-            seen=seen,
-            course=self.asked,
-            expected=None if self.expected is None else self.expected[rows],
+            self, time=time, setpoint=setpoint, encoder=encoder, force=force, row=row[rows], seen=seen,
+            course=self.asked, expected=None if self.expected is None else self.expected[rows],
             load=None if self.load is None else self.load[rows],
-        )
+        )  # fmt: skip
 
 
 @dataclass(frozen=True)

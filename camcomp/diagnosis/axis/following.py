@@ -70,16 +70,9 @@ def follow(
     if swung is None or not (swung.better or _above(plain)):
         return plain
     swings = _followed(
-        found,
-        swung.runs,
-        moves=swung.moves,
-        gaps=swung.gaps,
-        train=train,
-        test=test,
-        without=without,
-        floor=floor,
+        found, swung.runs, moves=swung.moves, gaps=swung.gaps, train=train, test=test, without=without, floor=floor,
         swung=swung,
-    )
+    )  # fmt: skip
     return swings if swung.better or not _above(swings) else plain
 
 
@@ -250,14 +243,10 @@ def _swung(
         return None
     errors = [swing.error(r)[on] for r, on in zip(runs, rows, strict=True)]
     found = _Swung(
-        swing=swing,
-        spread=spread,
-        gain=Gain(0.0, 0.0, 0),
-        runs=[r.of(on) for r, on in zip(runs, rows, strict=True)],
+        swing=swing, spread=spread, gain=Gain(0.0, 0.0, 0), runs=[r.of(on) for r, on in zip(runs, rows, strict=True)],
         moves=[m.of(on) for m, on in zip(moves, rows, strict=True)],
-        gaps=[g[on] for g, on in zip(gaps, rows, strict=True)],
-        errors=errors,
-    )
+        gaps=[g[on] for g, on in zip(gaps, rows, strict=True)], errors=errors,
+    )  # fmt: skip
     data, table = series_of(found.moves, found.gaps, train), table_of(found.moves)
     plain = withheld(data, table(train, constant, acceleration))
     lag = None if "servo_lag" in without else _lag(data, table, train, [constant, acceleration], floor)

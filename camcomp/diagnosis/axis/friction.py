@@ -95,12 +95,9 @@ def friction_of(
     if length.speed is not None:
         found.details["force"]["turning_mm_per_s"] = length.speed
     return FoundCause(
-        effect="friction",
-        target=found.name,
-        probability=probability,
-        share=round(1.0 - float(np.mean(last) / np.mean(before)), 4),
-        parameters=parameters,
-    )
+        effect="friction", target=found.name, probability=probability,
+        share=round(1.0 - float(np.mean(last) / np.mean(before)), 4), parameters=parameters,
+    )  # fmt: skip
 
 
 def as_good(data: Series, table: Any, length: float) -> list[float]:

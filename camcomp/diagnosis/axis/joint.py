@@ -54,12 +54,9 @@ class AxisSurroundings:
         actuator = next((a for a in self.robot.actuators if a.name == name), None) if self.robot is not None else None
         if self.robot is None or actuator is None:
             return DrivenAxis(
-                run,
-                Actuator(name=name, revolute=run.revolute, axis=np.array([0.0, 0.0, 1.0]), stiffness=None),
-                lever,
-                none,
-                none,
-            )
+                run, Actuator(name=name, revolute=run.revolute, axis=np.array([0.0, 0.0, 1.0]), stiffness=None),
+                lever, none, none,
+            )  # fmt: skip
         if arm_of(self.robot) is None or not has_moved_mass(self.robot, name):
             return DrivenAxis(run, actuator, lever, none, none)
         j, q = self._index(name), self.positions(run)

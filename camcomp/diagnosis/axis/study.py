@@ -112,18 +112,14 @@ def studied(
         judged = _judged(around, held, set(without), stated or AxisDeviation()) if again else [found] if held else []
     every = [c for a in found for c in a.channels]
     result = DiagnosisResult(
-        verdict=verdict,
-        gap=gap,
-        where=answer.where(found, causes),
-        causes=tuple(causes),
+        verdict=verdict, gap=gap, where=answer.where(found, causes), causes=tuple(causes),
         alternatives=(known, (*known, NamedCause(effect=UNKNOWN, target=None))) if verdict == "ambiguous" else (),
         shrinkage=answer.shrinkage(judged, held, tip) if judged else None,
         next_experiment=next_moves(found, cleaned, verdict),
         floor=Floor(um=gap.noise_floor_um, source="stated" if all(c.stated for c in every) else "rows"),
         outliers=tuple(Outlier(run=run, row=row) for run, row in sorted(outliers)),
-        axes_in_detail={a.name: a.details for a in found},
-        standards=StandardValues(absent=(NO_TIPS,)),
-    )
+        axes_in_detail={a.name: a.details for a in found}, standards=StandardValues(absent=(NO_TIPS,)),
+    )  # fmt: skip
     return result, found
 
 

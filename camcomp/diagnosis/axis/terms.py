@@ -159,13 +159,9 @@ def ripple(at: list[AxisTravel], left: list[Floats], shortest: float = 0.5, long
     c = np.linalg.lstsq(A, y, rcond=None)[0]
     share = 1.0 - float(((y - A @ c) ** 2).sum() / max(float((y**2).sum()), 1e-300))
     return Ripple(
-        period=1.0 / f,
-        amplitude=float(np.hypot(*c)),
-        forward=float(2 * np.abs(lines[0][best])),
-        backward=float(2 * np.abs(lines[1][best])),
-        share=share,
-        tried=len(frequency),
-    )
+        period=1.0 / f, amplitude=float(np.hypot(*c)), forward=float(2 * np.abs(lines[0][best])),
+        backward=float(2 * np.abs(lines[1][best])), share=share, tried=len(frequency),
+    )  # fmt: skip
 
 
 def _lines(x: Floats, y: Floats, weight: Floats, frequency: Floats) -> np.ndarray:

@@ -111,16 +111,9 @@ def drive(
     if by == "tip":
         assert program is not None
         return _led_by_tip(
-            log,
-            name,
-            measured=measured,
-            program=program,
-            twin=twin,
-            started=started,
-            vectors=vectors,
-            temperature=temperature,
-            acceleration=acceleration,
-        )
+            log, name, measured=measured, program=program, twin=twin, started=started, vectors=vectors,
+            temperature=temperature, acceleration=acceleration,
+        )  # fmt: skip
     told = getattr(measured, by)
     known = np.isfinite(told)
     if known.sum(axis=0).min() < 2:
@@ -146,25 +139,15 @@ def drive(
             cut = _behind(measured, tip, turned, program, twin) if by == "setpoint" else None
         except PhysicsError:  # also for encoders in another unit
             check_places(
-                log,
-                name,
-                measured=measured,
-                rho=rho,
-                tip=tip,
-                actuators=twin.actuators,
-                rotary=rotary,
+                log, name, measured=measured, rho=rho, tip=tip, actuators=twin.actuators, rotary=rotary,
                 loaded=lambda: tip,
-            )
+            )  # fmt: skip
             raise
         told = by == "setpoint" and cut is None
         forces = cutting_forces(
-            track=program.track,
-            aligned=cut or aligned,
-            tip=tip,
-            time=measured.time,
-            rests=program.rests,
+            track=program.track, aligned=cut or aligned, tip=tip, time=measured.time, rests=program.rests,
             logged_line=bool(np.isfinite(measured.line).any()),
-        )
+        )  # fmt: skip
         idle = _idle_or_not(forces, aligned, program, tip, measured.time)
         unsure |= idle
         # at standstill in a cut the drives may carry the cutting force or not
@@ -180,15 +163,9 @@ def drive(
         )
     loaded = cache(lambda: twin.sense(run_path)[0])
     check_places(
-        log,
-        name,
-        measured=measured,
-        rho=rho,
-        tip=tip,
-        actuators=twin.actuators,
-        rotary=rotary,
+        log, name, measured=measured, rho=rho, tip=tip, actuators=twin.actuators, rotary=rotary,
         loaded=lambda: loaded().tip,
-    )
+    )  # fmt: skip
     turns = np.array([a.revolute for a in twin.robot.actuators])
     check_forces(
         name=log, run=name, measured=measured, force=run_path.row_force, drives=lambda: loaded().drive, rotary=turns
@@ -374,32 +351,19 @@ def _led_by_tip(
     # a deflected tip is off its program by an unknown amount at first, and its position on arcs depends on the deflection
     for beside in (np.inf, *[MAX_CUT_DISTANCE_MM] * MOST_PASSES):
         aligned = _aligned(
-            log=log,
-            name=name,
-            program=program,
-            tip=whole - bend,
-            measured=measured,
+            log=log, name=name, program=program, tip=whole - bend, measured=measured,
             aside_mm=ASIDE_MM if beside < np.inf else FAR_MM,
-        )
+        )  # fmt: skip
         way, on = _driven(
-            path=path,
-            aligned=aligned,
-            other=program.merged,
-            tip=whole - bend,
-            line=measured.line,
+            path=path, aligned=aligned, other=program.merged, tip=whole - bend, line=measured.line,
             known=np.asarray(known),
-        )
+        )  # fmt: skip
         tip = path_geometry.points(way, on.motion, on.share)
         logged = bool(np.isfinite(measured.line).any())
         forces = cutting_forces(
-            track=program.track,
-            aligned=aligned,
-            tip=tip,
-            time=measured.time,
-            rests=program.rests,
-            logged_line=logged,
-            max_distance_mm=beside,
-        )
+            track=program.track, aligned=aligned, tip=tip, time=measured.time, rests=program.rests,
+            logged_line=logged, max_distance_mm=beside,
+        )  # fmt: skip
         turned = twin.platform(way, on.motion, on.share)
         run_path = driven_path(
             name, measured.time, twin.inverse(twin.to_machine(tip), turned), tip, forces, started=started,

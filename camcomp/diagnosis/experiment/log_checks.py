@@ -197,15 +197,9 @@ def check_places(
                 due = loaded()
             check_rows_together(name, run, what=what, time=measured.time, found=found, due=due, other=f"the {told}s")
             _check(
-                name,
-                run,
-                what=what,
-                found=found[rows],
-                distance=partial(_distance, due=due[rows]),
-                far=most,
-                names=names,
-                rotary=rotary and most == FAR_RAD,
-            )
+                name, run, what=what, found=found[rows], distance=partial(_distance, due=due[rows]), far=most,
+                names=names, rotary=rotary and most == FAR_RAD,
+            )  # fmt: skip
 
 
 def check_set_points(
@@ -214,29 +208,17 @@ def check_set_points(
     """Like `check_places` for the motion itself: set-points told (n, m) against actuators program (s, m) of the program."""
     far = FAR_RAD if rotary else FAR_MM
     _check(
-        name,
-        run,
-        what=f"{what}s look",
-        found=told,
-        distance=_to_nearest(program, far),
-        far=far,
-        names=actuators,
+        name, run, what=f"{what}s look", found=told, distance=_to_nearest(program, far), far=far, names=actuators,
         rotary=rotary,
-    )
+    )  # fmt: skip
 
 
 def check_on_program(name: str, run: str, tip: Floats, program: Floats) -> None:
     """Like `check_places` if the tip is the motion: tip (n, 3) against points program (s, 3) of the program."""
     _check(
-        name,
-        run,
-        what="tip looks",
-        found=tip,
-        distance=_to_nearest(program, FAR_MM),
-        far=FAR_MM,
-        names=AXES,
+        name, run, what="tip looks", found=tip, distance=_to_nearest(program, FAR_MM), far=FAR_MM, names=AXES,
         rotary=False,
-    )
+    )  # fmt: skip
 
 
 def places(points: Floats, far: float = FAR_MM) -> Ints:

@@ -76,17 +76,10 @@ def open_run(spec: RunSpec, job: Job, twin: Twin, notes: list[str]) -> Run:
     if program is not None:
         check_length(log, spec.name, measured, schedule(program.path, job.config.control.acceleration_mm_per_s2).end)
     run = drive(
-        log,
-        spec.name,
-        measured=measured,
-        text=program,
-        conditions=conditions,
-        twin=twin,
-        started=spec.started_s,
-        vectors=job.frame.vectors,
-        temperature=steadied(measured.time, measured.temperature),
+        log, spec.name, measured=measured, text=program, conditions=conditions, twin=twin, started=spec.started_s,
+        vectors=job.frame.vectors, temperature=steadied(measured.time, measured.temperature),
         acceleration=job.config.control.acceleration_mm_per_s2,
-    )
+    )  # fmt: skip
     if run.lag:
         notes.append(f"{log}: line numbers are {abs(run.lag)} rows {'late' if run.lag > 0 else 'early'}")
     if run.by == "setpoint":  # encoders are evidence only against set-points
@@ -97,15 +90,9 @@ def open_run(spec: RunSpec, job: Job, twin: Twin, notes: list[str]) -> Run:
     return Run(
         name=spec.name,
         run_path=replace(run.run_path, measured_force=run.run_path.measured_force or job.has_measured_force),
-        measured=measured,
-        clamping=spec.clamping,
-        clock=spec.clock,
-        thin=thin,
-        by=run.by,
-        unsure=run.unsure,
-        turn=run.turn,
-        program=None if program is None else program.path,
-    )
+        measured=measured, clamping=spec.clamping, clock=spec.clock, thin=thin, by=run.by, unsure=run.unsure,
+        turn=run.turn, program=None if program is None else program.path,
+    )  # fmt: skip
 
 
 def in_time(measured: Measured) -> Measured:
@@ -196,14 +183,7 @@ def read_log(table: CsvTable, columns: LogColumns) -> Measured:
             at=table.at(row, table.header.index(TIME) if TIME in table.header else 0),
         )
     return Measured(
-        time=time,
-        line=column(LINE),
-        tip=group(TIP),
-        setpoint=group(columns.setpoint),
-        encoder=group(columns.encoder),
-        drive=group(columns.drive),
-        load=group(columns.load),
-        dyno=group(DYNO),
-        temperature=column(TEMPERATURE),
-        tip_sd=group(TIP_SD),
-    )
+        time=time, line=column(LINE), tip=group(TIP), setpoint=group(columns.setpoint),
+        encoder=group(columns.encoder), drive=group(columns.drive), load=group(columns.load), dyno=group(DYNO),
+        temperature=column(TEMPERATURE), tip_sd=group(TIP_SD),
+    )  # fmt: skip

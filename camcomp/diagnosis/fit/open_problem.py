@@ -50,34 +50,18 @@ def open_problem(bench: Bench, candidates: Sequence[CandidateCause], stated_mm: 
     }
     words = patterns(bench)
     rough = _whiten(
-        bench,
-        columns,
-        words=[],
-        floor=floor,
-        noise=noise,
-        inflate=inflate,
-        times=times,
-        residuals=residuals,
-        shapes=shapes,
-        outliers=outliers,
-    )
+        bench, columns, words=[], floor=floor, noise=noise, inflate=inflate, times=times, residuals=residuals,
+        shapes=shapes, outliers=outliers,
+    )  # fmt: skip
     if len(columns.of_labels):
         columns = with_scatter(columns, bench, estimate(total(rough.base_grams), rough.prior, ())[0])
         rough = replace(rough, columns=columns)
     noise = _with_model_error(rough)
     del rough  # its white columns are as large as all that follows
     problem = _whiten(
-        bench,
-        columns,
-        words=words,
-        floor=floor,
-        noise=noise,
-        inflate=inflate,
-        times=times,
-        residuals=residuals,
-        shapes=shapes,
-        outliers=outliers,
-    )
+        bench, columns, words=words, floor=floor, noise=noise, inflate=inflate, times=times, residuals=residuals,
+        shapes=shapes, outliers=outliers,
+    )  # fmt: skip
     return _scanned(problem) if shapes else problem
 
 
@@ -120,21 +104,10 @@ def _whiten(
         white_residual.append(noise.rows(k, residuals[k][:, :, None], inflate[k], times[k])[:, 0])
     words = [replace(each, blocks=()) for each in words]  # white they are enough
     return Problem(
-        bench=bench,
-        columns=columns,
-        dictionaries=words,
-        inflate=inflate,
-        times=times,
-        residuals=residuals,
-        floor=floor,
-        noise=noise,
-        outliers=outliers,
-        white=white,
-        white_patterns=white_patterns,
-        white_residual=white_residual,
-        shapes=shapes,
-        candidates=cause_prior(columns),
-    )
+        bench=bench, columns=columns, dictionaries=words, inflate=inflate, times=times, residuals=residuals,
+        floor=floor, noise=noise, outliers=outliers, white=white, white_patterns=white_patterns,
+        white_residual=white_residual, shapes=shapes, candidates=cause_prior(columns),
+    )  # fmt: skip
 
 
 def _scanned(problem: Problem) -> Problem:
@@ -167,13 +140,9 @@ def _scanned(problem: Problem) -> Problem:
         candidate = problem.columns.candidates[problem.columns.candidate[index[0]]]
         for c, p, per_run in zip(index, candidate.parameters, columns, strict=True):
             prior.tolerance[c], prior.reach[c] = healthy_sizes(
-                bench=problem.bench,
-                candidate=candidate,
-                p=p,
-                per_run=per_run,
-                floor_um=floor_um,
+                bench=problem.bench, candidate=candidate, p=p, per_run=per_run, floor_um=floor_um,
                 minor_um=MINOR * floor_um,
-            )
+            )  # fmt: skip
         for k in range(len(blocks)):
             new = np.stack([each[k] for each in columns], axis=2)
             blocks[k] = blocks[k].exchanged(index, channel_behind_channel(new))

@@ -74,13 +74,11 @@ def _sizes(grounds: Sequence[Ground]) -> _Sizes:
     low = position.min(axis=0)
     start = min(float(g.motion.common.min()) for g in grounds)
     return _Sizes(
-        low=low,
-        span=np.maximum(position.max(axis=0) - low, 1e-9),
+        low=low, span=np.maximum(position.max(axis=0) - low, 1e-9),
         fast=np.maximum(np.max([np.abs(g.motion.speed).max(axis=0) for g in grounds], axis=0), 1e-9),
-        strong=np.maximum(np.max([np.abs(g.drive).max(axis=0) for g in grounds], axis=0), 1e-9),
-        start=start,
+        strong=np.maximum(np.max([np.abs(g.drive).max(axis=0) for g in grounds], axis=0), 1e-9), start=start,
         length=max(max(float(g.motion.common.max()) for g in grounds) - start, 1e-9),
-    )
+    )  # fmt: skip
 
 
 def _of_actuator(g: Ground, size: _Sizes, j: int, knots: int) -> dict[str, list[Floats]]:

@@ -148,14 +148,9 @@ class Problem:
         if not members:
             scale = Scale(total(grams), self.prior, self.candidates)
             return Fitted(
-                members=(),
-                theta=np.zeros(0),
-                covariance=np.zeros((0, 0)),
-                log_evidence=scale(()),
-                grams=grams,
-                extra={},
-                factor=scale.factor(()),
-            )
+                members=(), theta=np.zeros(0), covariance=np.zeros((0, 0)), log_evidence=scale(()), grams=grams,
+                extra={}, factor=scale.factor(()),
+            )  # fmt: skip
         if theta is None:
             theta = estimate(total(grams), self.prior, index)[0][index]
         theta = self._bounded(members, theta)
@@ -210,18 +205,9 @@ class Problem:
         mean, full = estimate(total(grams), self.prior, index, factor)
         theta, covariance = self._bounded(members, mean[index]), full[np.ix_(index, index)]
         return Fitted(
-            members=members,
-            theta=theta,
-            covariance=covariance,
-            log_evidence=scale(members, sought),
-            grams=grams,
-            extra=shapes,
-            factor=factor,
-            white=tuple(white),
-            residual=tuple(left),
-            pushed=pushed,
-            pushed_at=pushed_at,
-        )
+            members=members, theta=theta, covariance=covariance, log_evidence=scale(members, sought), grams=grams,
+            extra=shapes, factor=factor, white=tuple(white), residual=tuple(left), pushed=pushed, pushed_at=pushed_at,
+        )  # fmt: skip
 
     def _pushed(self, beside: Members, causes: Sequence[Cause]) -> tuple[Floats, ...]:
         """Per run (n, c, p): what small forces do to the channels of the machine that the causes make."""

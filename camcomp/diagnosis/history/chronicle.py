@@ -111,12 +111,9 @@ def _verdict(kept: Kept) -> DatedVerdict:
     result = kept.result
     names = (f"{c.effect} ({c.target})" if c.target else c.effect for c in result.causes)
     return DatedVerdict(
-        day=kept.day,
-        verdict=result.verdict,
-        gap_rms_um=result.gap.rms_um,
-        floor_um=result.gap.noise_floor_um,
+        day=kept.day, verdict=result.verdict, gap_rms_um=result.gap.rms_um, floor_um=result.gap.noise_floor_um,
         causes=tuple(names),
-    )
+    )  # fmt: skip
 
 
 def _course(
@@ -163,12 +160,7 @@ def _due(
         if bound == 0.0:  # one measurement does not predict
             return None
         course = Course(
-            kind=course.kind,
-            level=course.level,
-            level_sd=course.level_sd,
-            rate=0.0,
-            rate_sd=bound,
-            jumps=course.jumps,
-            spread=course.spread,
-        )
+            kind=course.kind, level=course.level, level_sd=course.level_sd, rate=0.0, rate_sd=bound,
+            jumps=course.jumps, spread=course.spread,
+        )  # fmt: skip
     return last.day + timedelta(days=int(days_until(course, limit)))

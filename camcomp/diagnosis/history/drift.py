@@ -43,14 +43,9 @@ def course_of(days: Floats, values: Floats, deviations: Floats) -> Course:
     mean, misfit = _constant(values, weight)
     if n < FEWEST:
         return Course(
-            kind="too few",
-            level=mean,
-            level_sd=float(weight.sum() ** -0.5),
-            rate=0.0,
-            rate_sd=0.0,
-            jumps=(),
+            kind="too few", level=mean, level_sd=float(weight.sum() ** -0.5), rate=0.0, rate_sd=0.0, jumps=(),
             spread=_spread(misfit, n - 1),
-        )
+        )  # fmt: skip
     line = _line(days, values, weight)
     cost: list[tuple[float, Course]] = [
         (
@@ -85,14 +80,9 @@ def course_of(days: Floats, values: Floats, deviations: Floats) -> Course:
         last = slice(starts[-1], n)
         level, _ = _constant(values[last], weight[last])
         own = Course(
-            kind="jumps",
-            level=level,
-            level_sd=float(weight[last].sum() ** -0.5),
-            rate=0.0,
-            rate_sd=0.0,
-            jumps=tuple(starts[1:]),
-            spread=_spread(left, n - 1 - 2 * count),
-        )
+            kind="jumps", level=level, level_sd=float(weight[last].sum() ** -0.5), rate=0.0, rate_sd=0.0,
+            jumps=tuple(starts[1:]), spread=_spread(left, n - 1 - 2 * count),
+        )  # fmt: skip
         cost.append((left + (1 + 2 * count) * np.log(n) + _MARGIN * count, own))
     return min(cost, key=lambda each: each[0])[1]
 

@@ -75,14 +75,9 @@ def answer_law(problem: Problem, f: Fitted, kind: str) -> LawAnswer | None:
     without = _gaps(problem, f if fit.members == f.members else problem.refit(fit.members))
     law = law_result(bench, best.found, _rms(without), best.after)
     return LawAnswer(
-        law=law,
-        before=tuple(without),
-        gaps=tuple(best.gaps),
-        signal=tuple(best.signal),
-        found=best.found,
-        problem=joint,
-        fit=fit,
-    )
+        law=law, before=tuple(without), gaps=tuple(best.gaps), signal=tuple(best.signal), found=best.found,
+        problem=joint, fit=fit,
+    )  # fmt: skip
 
 
 def _base(problem: Problem, f: Fitted | None, bench: TermBench, kind: str) -> Callable[[Split, bool], Folds]:

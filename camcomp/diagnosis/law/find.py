@@ -232,16 +232,9 @@ class _Search:
             alike.append(tuple(found))
         columns, precision = tuple(map(self._white, chosen)), np.concatenate([self._precision(t) for t in chosen])
         return FoundLaw(
-            terms=tuple(chosen),
-            theta=theta[0],
-            covariance=covariance,
-            theta_without=theta[1:],
-            gain=gain,
-            alike=tuple(alike),
-            folds=self.folds,
-            columns=columns,
-            precision=precision,
-        )
+            terms=tuple(chosen), theta=theta[0], covariance=covariance, theta_without=theta[1:], gain=gain,
+            alike=tuple(alike), folds=self.folds, columns=columns, precision=precision,
+        )  # fmt: skip
 
 
 def margin(tried: Sequence[Term], best: Sequence[Term]) -> float:

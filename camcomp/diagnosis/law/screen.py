@@ -78,14 +78,9 @@ def _forms(bench: TermBench, spot: Spot) -> Sequence[Form]:
 def _grid(bench: TermBench, where: Sequence[Spot], forms: Sequence[Form], at_once: int, keep: bool) -> TermGrid:
     ends = np.cumsum([0, *(len(each.texts) for each in forms)])
     return TermGrid(
-        bench=bench,
-        spots=tuple(where),
-        forms=tuple(forms),
-        first=ends[:-1],
-        width=int(ends[-1]),
-        at_once=at_once,
+        bench=bench, spots=tuple(where), forms=tuple(forms), first=ends[:-1], width=int(ends[-1]), at_once=at_once,
         keep=keep,
-    )
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)

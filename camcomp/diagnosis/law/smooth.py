@@ -96,14 +96,9 @@ def find_map(bench: TermBench, folds: Folds, kind: str) -> FoundMap | None:
     theta = folds.coefficients(columns, size_of)[0]
     gain = float(withheld(gains(data.G[:, None], data.h[:, None], size_of[None]))[0])
     return FoundMap(
-        maps=tuple(chosen),
-        theta=theta[0],
-        theta_without=theta[1:],
-        gain=gain,
-        folds=folds,
-        columns=columns,
+        maps=tuple(chosen), theta=theta[0], theta_without=theta[1:], gain=gain, folds=folds, columns=columns,
         precision=size_of,
-    )
+    )  # fmt: skip
 
 
 def _precision(chosen: Sequence[MapTerm]) -> Floats:

@@ -242,12 +242,6 @@ def posterior_of(
     sets = sorted(((m, total) for m, _, total in merged.values()), key=lambda s: -s[1])
     top = int(np.argmax(value))
     return Explanation(
-        model=model,
-        background=flat[top][0],
-        members=flat[top][1],
-        sets=tuple(sets),
-        places=places,
-        families=families,
-        unknown=unknown,
-        log_evidence=float(value[top]),
-    )
+        model=model, background=flat[top][0], members=flat[top][1], sets=tuple(sets), places=places,
+        families=families, unknown=unknown, log_evidence=float(value[top]),
+    )  # fmt: skip

@@ -67,13 +67,9 @@ def candidate(site: Site, design: MotionDesign, varies: tuple[str, ...] = ()) ->
     """Experiment of a design, with the channels of the runs."""
     design = design.tidy()
     return Candidate(
-        action=design.action,
-        design=design,
-        channels=site.channels,
-        started=site.end + design.wait_s,
-        minutes=design.minutes,
-        varies=varies,
-    )
+        action=design.action, design=design, channels=site.channels, started=site.end + design.wait_s,
+        minutes=design.minutes, varies=varies,
+    )  # fmt: skip
 
 
 def usual(site: Site) -> MotionDesign:

@@ -42,16 +42,9 @@ class MotionDesign:
         x, y, z = (round(v, 1) + 0.0 for v in self.centre)  # no -0
         feed = float(f"{self.feed:.3g}")
         return MotionDesign(
-            centre=(x, y, z),
-            radius=max(round(self.radius, 1), 0.1),
-            feed=feed,
-            plane=self.plane,
-            turns=self.turns,
-            along=self.along,
-            cutting=self.cutting,
-            wait_s=self.wait_s,
-            dwell_s=self.dwell_s,
-        )
+            centre=(x, y, z), radius=max(round(self.radius, 1), 0.1), feed=feed, plane=self.plane, turns=self.turns,
+            along=self.along, cutting=self.cutting, wait_s=self.wait_s, dwell_s=self.dwell_s,
+        )  # fmt: skip
 
     @property
     def length(self) -> float:

@@ -87,14 +87,11 @@ def predicted_gain(question: Question, candidate: Candidate, there: PredictedLog
     a, b = (int(ends[k]), int(ends[k + 1])) if kinds else (0, 0)
     return ExpectedGain(
         separated=expected_gain(apart, probability) if n > 1 else 0.0,
-        narrowed=0.5 * float(np.log2((before + noise) / (after + noise))),
-        before_um=1e3 * before**0.5,
-        after_um=1e3 * after**0.5,
-        kind=kinds[k] if kinds else "",
+        narrowed=0.5 * float(np.log2((before + noise) / (after + noise))), before_um=1e3 * before**0.5,
+        after_um=1e3 * after**0.5, kind=kinds[k] if kinds else "",
         shows=size * np.sqrt(np.mean(signals[a:b] ** 2, axis=0)) if b > a else np.zeros(n),
-        left=size * rests[:, :, k] if kinds else np.zeros((n, n)),
-        apart=apart,
-    )
+        left=size * rests[:, :, k] if kinds else np.zeros((n, n)), apart=apart,
+    )  # fmt: skip
 
 
 def most_narrowed(question: Question, weight: Floats) -> float:

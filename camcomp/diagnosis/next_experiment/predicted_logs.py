@@ -148,13 +148,9 @@ def _lay(question: Question, candidate: Candidate, whole: bool) -> PredictedLogs
         signals.append(change + block[:, :, mine] @ mean[theirs])
         reach.append(size)
     return PredictedLogs(
-        signals=_whitened(problem, bench, np.stack(signals, axis=2)),
-        columns=_whitened(problem, bench, block),
-        reach=reach,
-        mine=mine,
-        theirs=theirs,
-        size=_sizes(problem),
-    )
+        signals=_whitened(problem, bench, np.stack(signals, axis=2)), columns=_whitened(problem, bench, block),
+        reach=reach, mine=mine, theirs=theirs, size=_sizes(problem),
+    )  # fmt: skip
 
 
 def _root(covariance: Floats) -> Floats:
@@ -213,28 +209,16 @@ def _run(problem: Problem, candidate: Candidate, job: Job) -> Run:
     nan = np.full(n, np.nan)
     encoder = run_path.row_rho if "encoder" in candidate.channels else np.full((n, m), np.nan)
     measured = Measured(
-        time=time,
-        line=nan,
-        tip=np.zeros((n, 3)),
-        setpoint=np.full((n, m), np.nan),
-        encoder=encoder,
-        drive=np.zeros((n, m)),
-        load=np.full((n, m), np.nan),
-        dyno=np.zeros((n, 3)),
-        temperature=nan,
+        time=time, line=nan, tip=np.zeros((n, 3)), setpoint=np.full((n, m), np.nan), encoder=encoder,
+        drive=np.zeros((n, m)), load=np.full((n, m), np.nan), dyno=np.zeros((n, 3)), temperature=nan,
         tip_sd=np.full((n, 3), np.nan),
-    )
+    )  # fmt: skip
     by = _motion(problem, candidate)
     tips = twin.to_program(run_path.row_place.of(run_path.node_tip))
     return Run(
-        name="candidate",
-        run_path=run_path,
-        measured=measured,
-        clamping=None,
-        clock=None,
-        by=by,
+        name="candidate", run_path=run_path, measured=measured, clamping=None, clock=None, by=by,
         turn=_across(tips) if by == "tip" else None,
-    )
+    )  # fmt: skip
 
 
 def _motion(problem: Problem, candidate: Candidate) -> str:

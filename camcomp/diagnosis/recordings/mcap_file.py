@@ -81,15 +81,9 @@ def _sampled(file: str, names: list[str], table: Floats, times: Floats, unit: st
     time = times[:, 0] if np.isfinite(times[:, 0]).all() else times[:, 1]
     units = (unit,) * len(names)
     return SampledColumns(
-        file=file,
-        names=tuple(names),
-        units=units,
-        rows=len(table),
-        time=time,
-        read=partial(_column, table),
-        at=partial(_at, file),
-        notes=tuple(notes),
-    )
+        file=file, names=tuple(names), units=units, rows=len(table), time=time, read=partial(_column, table),
+        at=partial(_at, file), notes=tuple(notes),
+    )  # fmt: skip
 
 
 def _column(table: Floats, j: int) -> Floats:

@@ -60,16 +60,9 @@ def of_table(
 
     names = tuple(table.header[j] for j in kept)
     return SampledColumns(
-        file=table.name,
-        names=names,
-        units=tuple(units or ("",) * len(names)),
-        rows=len(table.rows),
-        time=time,
-        read=read,
-        at=at,
-        notes=tuple(notes),
-        headed=table.headed,
-    )
+        file=table.name, names=names, units=tuple(units or ("",) * len(names)), rows=len(table.rows), time=time,
+        read=read, at=at, notes=tuple(notes), headed=table.headed,
+    )  # fmt: skip
 
 
 def _clock_times(table: CsvTable, column: int) -> Floats | None:

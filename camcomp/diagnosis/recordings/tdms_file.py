@@ -81,15 +81,9 @@ def _sampled(file: str, key: _Key, channels: list[tuple[str, str, Floats]], note
     time = None if step is None else np.asarray(start + step * np.arange(rows), float)
     names, units, values = zip(*channels, strict=True)
     return SampledColumns(
-        file=file,
-        names=tuple(names),
-        units=tuple(units),
-        rows=rows,
-        time=time,
-        read=partial(_column, values),
-        at=partial(_at, file),
-        notes=notes,
-    )
+        file=file, names=tuple(names), units=tuple(units), rows=rows, time=time, read=partial(_column, values),
+        at=partial(_at, file), notes=notes,
+    )  # fmt: skip
 
 
 def _column(values: tuple[Floats, ...], j: int) -> Floats:

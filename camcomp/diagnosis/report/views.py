@@ -58,17 +58,11 @@ def report_of(
         views = views_of(done, opened.twin, opened.runs, experiment.holdout)
         rivals = rivals_of(done)
     return diagnosis_html(
-        result,
-        views,
-        title=PurePath(path).name,
-        machine=load_config(experiment.config).robot.name,
-        inputs=inputs,
-        notes=opened.notes if opened is not None else (),
-        rivals=rivals,
-        next_program=next_program,
+        result, views, title=PurePath(path).name, machine=load_config(experiment.config).robot.name, inputs=inputs,
+        notes=opened.notes if opened is not None else (), rivals=rivals, next_program=next_program,
         law=law_view(done.problem, done.law) if done is not None and done.law is not None else None,
         residuals=residuals,
-    )
+    )  # fmt: skip
 
 
 def views_of(done: Diagnosis, twin: Twin, runs: Sequence[Run], holdout: Sequence[str]) -> list[RunView]:

@@ -65,13 +65,9 @@ def search_causes(problem: Problem) -> CauseSearch:
     kind = beside.kind if beside.kind is None or beside.kind in left else next(iter(left))
     verdict = _state(weighed, beside)
     return CauseSearch(
-        fits=weighed.fits,
-        probability=weighed.probability,
-        verdict=verdict,
-        left=left,
-        unknown_in=kind,
+        fits=weighed.fits, probability=weighed.probability, verdict=verdict, left=left, unknown_in=kind,
         beyond=beside.beyond,
-    )
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)

@@ -166,13 +166,9 @@ def unexplained_of(problem: Problem, kind: str, at_tip: Sequence[Floats]) -> Une
     if its_z > SURE_Z:
         mean, z, energy = max(mean, 0.0) + float(fast.sum()), max(z, its_z), np.maximum(energy, 0.0) + len(e) * fast
     return Unexplained(
-        kind=kind,
-        excess_um=1e3 * float(np.sqrt(max(mean, 0.0))),
-        z=z,
-        local_um=1e3 * float(np.sqrt(max(local, 0.0))),
-        where=at,
-        energy=energy,
-    )
+        kind=kind, excess_um=1e3 * float(np.sqrt(max(mean, 0.0))), z=z,
+        local_um=1e3 * float(np.sqrt(max(local, 0.0))), where=at, energy=energy,
+    )  # fmt: skip
 
 
 def _inflation(problem: Problem, k: int, kind: str, values: Floats) -> Floats:

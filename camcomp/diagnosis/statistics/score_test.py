@@ -82,14 +82,9 @@ class JointProducts:
         kinds = tuple(kind for kind, each in zip(patterns.kinds, patterns.labels, strict=True) for _ in each)
         names = tuple(name for each in patterns.labels for name in each)
         return JointProducts(
-            data=Gram(A[:k, :k], A[:k, k], float(A[k, k]), round(rows)),
-            B=B[:k],
-            h=B[k],
-            P=P,
-            labels=names,
-            kinds=kinds,
-            rows=rows,
-        )
+            data=Gram(A[:k, :k], A[:k, k], float(A[k, k]), round(rows)), B=B[:k], h=B[k], P=P, labels=names,
+            kinds=kinds, rows=rows,
+        )  # fmt: skip
 
     def projected(self, prior: Prior, members: Sequence[int]) -> tuple[Floats, Floats]:
         """Normal equations (p, p), (p,) of the patterns with the columns `members` free and all others within tolerance."""

@@ -40,19 +40,12 @@ def positioning(forward: Sequence[Floats], backward: Sequence[Floats]) -> Positi
     tops, bottoms = (np.stack([up + k * s_up, down + k * s_down]) for k in (2.0, -2.0))
     means = np.stack([up, down])
     return Positioning(
-        A=float(tops.max() - bottoms.min()),
-        A_forward=float(tops[0].max() - bottoms[0].min()),
-        A_backward=float(tops[1].max() - bottoms[1].min()),
-        R=float(both.max()),
-        R_forward=float(4.0 * s_up.max()),
-        R_backward=float(4.0 * s_down.max()),
-        B=float(np.abs(reversal).max()),
-        B_mean=float(reversal.mean()),
-        E=float(np.ptp(means)),
-        E_forward=float(np.ptp(up)),
-        E_backward=float(np.ptp(down)),
+        A=float(tops.max() - bottoms.min()), A_forward=float(tops[0].max() - bottoms[0].min()),
+        A_backward=float(tops[1].max() - bottoms[1].min()), R=float(both.max()), R_forward=float(4.0 * s_up.max()),
+        R_backward=float(4.0 * s_down.max()), B=float(np.abs(reversal).max()), B_mean=float(reversal.mean()),
+        E=float(np.ptp(means)), E_forward=float(np.ptp(up)), E_backward=float(np.ptp(down)),
         M=float(np.ptp(means.mean(axis=0))),
-    )
+    )  # fmt: skip
 
 
 def circular_deviation(points: Sequence[Floats]) -> float:

@@ -121,13 +121,10 @@ class Slopes:
             nodes = (self.tip_rho, self.tip_wrench, self.drive_rho, self.drive_wrench)
             tip_rho, tip_wrench, drive_rho, drive_wrench = (rows_together(place.of(each)) for each in nodes)
             self._at[place] = Slopes(
-                tip_rho=tip_rho,
-                tip_wrench=tip_wrench,
-                drive_rho=drive_rho,
-                drive_wrench=drive_wrench,
+                tip_rho=tip_rho, tip_wrench=tip_wrench, drive_rho=drive_rho, drive_wrench=drive_wrench,
                 at_reference=self.at_reference if self.at_reference.ndim == 2 else place.of(self.at_reference),
                 key=self.key,
-            )
+            )  # fmt: skip
         return self._at[place]
 
     def tips(self, place: Places) -> Following:

@@ -62,13 +62,9 @@ class Travel:
         around = None if self.around is None else self.around[:, rows]
         rotation = None if self.rotation is None else self.rotation[rows]
         return Travel(
-            force=self.force[rows],
-            time=self.time[rows],
-            cut_min=self.cut_min[rows],
-            stop=self.stop[rows],
-            around=around,
-            rotation=rotation,
-        )
+            force=self.force[rows], time=self.time[rows], cut_min=self.cut_min[rows], stop=self.stop[rows],
+            around=around, rotation=rotation,
+        )  # fmt: skip
 
     @property
     def rested(self) -> Floats:
@@ -407,17 +403,9 @@ def _motion(job: Job, setpoint: Floats, travel: Travel) -> Motion:
     warm = job.config.process.temperature_C
     heat = None if warm is None else np.full(len(setpoint), warm)
     motion = Motion(
-        time=travel.rested,
-        common=travel.time,
-        cut_min=travel.cut_min,
-        temperature=heat,
-        encoder=setpoint,
-        speed=zero,
-        direction=zero,
-        home=job.real_machine.home,
-        stiffness=stiffness,
-        names=job.real_machine.actuators,
-    )
+        time=travel.rested, common=travel.time, cut_min=travel.cut_min, temperature=heat, encoder=setpoint,
+        speed=zero, direction=zero, home=job.real_machine.home, stiffness=stiffness, names=job.real_machine.actuators,
+    )  # fmt: skip
     encoder = signal_path.controlled(job.causes, job.real_machine.actuators, motion)
     dt = np.diff(travel.rested, prepend=travel.time[:1] - 1.0)
     step = np.diff(encoder, axis=0, prepend=encoder[:1])

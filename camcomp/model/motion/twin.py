@@ -322,13 +322,9 @@ class Twin(ControlKinematics):
             drives.append((moved.drive - solved.drive) / step)
         tip, drive = np.stack(tips, axis=2), np.stack(drives, axis=2)
         return Slopes(
-            tip_rho=tip[:, :, :m],
-            tip_wrench=tip[:, :, m:],
-            drive_rho=drive[:, :, :m],
-            drive_wrench=drive[:, :, m:],
-            at_reference=self._at_reference(run_path),
-            key=key,
-        )
+            tip_rho=tip[:, :, :m], tip_wrench=tip[:, :, m:], drive_rho=drive[:, :, :m], drive_wrench=drive[:, :, m:],
+            at_reference=self._at_reference(run_path), key=key,
+        )  # fmt: skip
 
     # -- pieces of the path -------------------------------------------------------------------------------------------
 
@@ -361,43 +357,27 @@ class Twin(ControlKinematics):
         worn = run_path.cut_before_min + run_path.cut_ahead_min + np.cumsum(dt * run_path.grid_cut) / 60.0
         zero = np.zeros_like(run_path.grid_rho)
         motion = Motion(
-            time=t,
-            common=run_path.started + t,
-            cut_min=worn,
-            temperature=temperature,
-            encoder=run_path.grid_rho,
-            speed=zero,
-            direction=zero,
-            home=home,
-            stiffness=signal_path.springs(self.robot),
-            ordered=run_path.ordered,
-            names=self.actuators,
-            cut_before_min=run_path.cut_before_min,
-            seams=None if run_path.driven is None else run_path.driven.seams,
-            measured_force=run_path.measured_force,
-        )
+            time=t, common=run_path.started + t, cut_min=worn, temperature=temperature, encoder=run_path.grid_rho,
+            speed=zero, direction=zero, home=home, stiffness=signal_path.springs(self.robot),
+            ordered=run_path.ordered, names=self.actuators, cut_before_min=run_path.cut_before_min,
+            seams=None if run_path.driven is None else run_path.driven.seams, measured_force=run_path.measured_force,
+        )  # fmt: skip
         encoder = signal_path.controlled(servo, self.actuators, motion)
         speed = np.gradient(encoder, t, axis=0) if run_path.ordered and len(t) > 1 else zero
         masses = cache(partial(mass_loads, self.robot, encoder, t if run_path.ordered else None))
         return replace(
-            motion,
-            encoder=encoder,
-            speed=speed,
-            direction=travel_direction(run_path, encoder),
+            motion, encoder=encoder, speed=speed, direction=travel_direction(run_path, encoder),
             masses=masses if has_moved_mass(self.robot) else None,
-        )
+        )  # fmt: skip
 
 
 def twin_of(job: Job) -> Twin:
     """The forward model of a config, its `effects:` included. Raises ConfigError CC205."""
     machine = job.machine
     return Twin(
-        robot=machine.robot,
-        nominal=machine.nominal,
-        origin=job.frame.origin,
-        rotation=job.frame.rotation,
+        robot=machine.robot, nominal=machine.nominal, origin=job.frame.origin, rotation=job.frame.rotation,
         causes=job.causes,
-    )
+    )  # fmt: skip
 
 
 def _at(run_path: RunPath, grid: Motion, at: Floats, rho: Floats | None) -> Motion:
@@ -407,19 +387,11 @@ def _at(run_path: RunPath, grid: Motion, at: Floats, rho: Floats | None) -> Moti
         setpoint = setpoint + run_path.between(grid.encoder - run_path.grid_rho, at)
     temperature = None if grid.temperature is None else run_path.between(grid.temperature[:, None], at)[:, 0]
     return replace(
-        grid,
-        time=at,
-        common=run_path.started + at,
-        cut_min=run_path.between(grid.cut_min[:, None], at)[:, 0],
-        temperature=temperature,
-        encoder=setpoint,
-        speed=run_path.between(grid.speed, at),
-        direction=run_path.between(grid.direction, at),
-        held=None,
-        told=None,
-        masses=grid.masses_at(lambda values: run_path.between(values, at)),
-        seams=None,
-    )
+        grid, time=at, common=run_path.started + at, cut_min=run_path.between(grid.cut_min[:, None], at)[:, 0],
+        temperature=temperature, encoder=setpoint, speed=run_path.between(grid.speed, at),
+        direction=run_path.between(grid.direction, at), held=None, told=None,
+        masses=grid.masses_at(lambda values: run_path.between(values, at)), seams=None,
+    )  # fmt: skip
 
 
 def _around_rows(run_path: RunPath, grid: Motion) -> Motion:

@@ -73,14 +73,9 @@ def _element(given: spec.Element, chain: str) -> Element:
         return Transform(np.asarray(given.translation_mm, float), rotation_of(given.rotation_deg))
     if isinstance(given, spec.PrismaticActuator | spec.RevoluteActuator):
         return Actuator(
-            name=given.name or chain,
-            revolute=given.rotary,
-            axis=axis_vector(given.axis),
-            stiffness=given.stiffness,
-            home=given.home,
-            limits=given.limits or (-np.inf, np.inf),
-            start=given.start,
-        )
+            name=given.name or chain, revolute=given.rotary, axis=axis_vector(given.axis), stiffness=given.stiffness,
+            home=given.home, limits=given.limits or (-np.inf, np.inf), start=given.start,
+        )  # fmt: skip
     if isinstance(given, spec.PrismaticPassive | spec.RevolutePassive):
         return Passive(given.rotary, axis_vector(given.axis), given.stiffness or 0.0, given.rest, given.start)
     if isinstance(given, spec.LinkSpec):
@@ -89,13 +84,9 @@ def _element(given: spec.Element, chain: str) -> Element:
         bar = spring(given.bar).stiffness
         arm = np.asarray(given.arm_mm, float)
         return Parallelogram(
-            arm=arm,
-            hinge=axis_vector(given.hinge),
-            crossbar=axis_vector(given.crossbar),
-            width=given.width_mm,
-            bar_stiffness=bar,
-            start=given.start,
-        )
+            arm=arm, hinge=axis_vector(given.hinge), crossbar=axis_vector(given.crossbar), width=given.width_mm,
+            bar_stiffness=bar, start=given.start,
+        )  # fmt: skip
     return Weight(np.array([0.0, 0.0, -given.force_N]), np.asarray(given.centre_mm, float))
 
 
