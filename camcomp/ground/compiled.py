@@ -1,71 +1,83 @@
 """Compilation of kernels by numba: decorators for entry functions and for functions inside them.
 
-Only the entry functions, those that Python calls, are cached; the functions that they call are compiled into them. Numba is
-imported when something has to be compiled, and not to run what is in the cache.
+Only the entry functions, those that Python calls, are cached; the functions that they call are compiled into them.
 """
 
 from __future__ import annotations
 
 import functools
-import os
+import gc
 from collections.abc import Callable
 from typing import Any
 
-_PLAIN_PYTHON = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")  # for the debugger
+import numba as _numba
+
+numba: Any = _numba  # its annotations leave out what it has
+
+# Kernels allocate, raise and return no Python objects: numba's support for that costs compile time.
+_OPTIONS = {"nogil": True, "error_model": "numpy", "_nrt": False, "no_cfunc_wrapper": True}
 
 
-def inner(function: Callable[..., Any], *, fastmath: bool = False, allocates: bool = False) -> Any:
-    """Mark a function that only compiled functions call.
+def inner(function: Callable[..., Any], *, fastmath: bool = False) -> Any:
+    """Compile a function that only compiled functions call, without allocation, interpreter lock and exceptions.
 
-    fastmath: sums may be formed in any order, which allows vector instructions. allocates: the code creates arrays or raises.
+    fastmath: sums may be formed in any order, which allows vector instructions. Constant arguments count as plain numbers:
+    numba would otherwise compile the function for every constant.
     """
-    from camcomp.ground.native_code import INNER
+    if numba.config.DISABLE_JIT:  # for the debugger
+        return function
+    from camcomp.ground.linked_code import jit, linking_options
 
-    INNER[function] = fastmath, allocates
-    return function
+    dispatcher = jit(function, fastmath=fastmath, no_cpython_wrapper=True, **linking_options(), **_OPTIONS)
+    template = getattr(dispatcher, "get_call_template", None)
+    if template is not None:  # a numba without it compiles more
+
+        def plain(args: Any, kws: Any) -> Any:
+            return template(tuple(numba.core.types.unliteral(a) for a in args), kws)
+
+        dispatcher.get_call_template = plain
+    return dispatcher
 
 
-def entry(function: Callable[..., Any], *, allocates: bool = False) -> Callable[..., Any]:
+def entry(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile a function that Python calls, cached on disk until its source or the source of its callees changes.
 
-    Without a cache folder every process compiles anew. allocates: the code creates arrays or raises; to return an array it
-    imports numba.
+    Without a cache folder every process compiles anew. Garbage collection is disabled meanwhile, which saves a sixth of the
+    time.
     """
-    if _PLAIN_PYTHON:
+    if numba.config.DISABLE_JIT:
         return function
-    from camcomp.ground.machine_code import Cached
-    from camcomp.ground.native_code import describe
+    from camcomp.ground.machine_code import kept  # slow import, needed to compile only
 
-    cached = Cached(function, allocates)
-    runs: dict[tuple[Any, ...], Any] = {}
+    dispatcher = kept(function, allocates=False, **_OPTIONS)
 
     @functools.wraps(function)
     def call(*args: Any) -> Any:
-        try:
-            types = describe(args)
-        except TypeError:
-            return cached.compiled(*args)
-        run = runs.get(types)
-        if run is None:
-            run = runs[types] = cached.load(types, args)
-        return run(None, args, None)
+        if getattr(dispatcher, "overloads", None):  # not its `signatures`, which makes a list every time
+            return dispatcher(*args)
+        from camcomp.ground import progress
 
-    call.load = cached.load  # type: ignore[attr-defined]
+        resting = gc.isenabled()
+        gc.disable()
+        try:
+            return dispatcher(*args)
+        finally:
+            progress.hold("")
+            if resting:
+                gc.enable()
+
+    call.dispatcher = dispatcher  # type: ignore[attr-defined]
     return call
 
 
-kept = functools.partial(entry, allocates=True)
-
-
 def direct(function: Callable[..., Any], args: tuple[Any, ...]) -> Callable[..., Any]:
-    """Machine code of an entry function for exactly the types of `args`.
+    """Machine code of an entry function for exactly the types of `args`, with which it has been called before.
 
-    Calling it avoids the look at the types, which takes longer than a small kernel.
+    Calling it avoids numba's dispatch by types, which takes longer than a small kernel.
     """
-    load: Any = getattr(function, "load", None)
-    if load is None:
+    dispatcher: Any = getattr(function, "dispatcher", None)
+    try:
+        out: Callable[..., Any] = dispatcher.overloads[tuple(map(dispatcher.typeof_pyval, args))].entry_point
+    except AttributeError:  # not compiled, or a numba without these names
         return function
-    from camcomp.ground.native_code import describe
-
-    run = load(describe(args), args)
-    return lambda *given: run(None, given, None)
+    return out
