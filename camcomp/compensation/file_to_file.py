@@ -22,7 +22,7 @@ LONG = 1 << 16  # bytes from which it pays to interpolate: some 2 000 lines
 
 @dataclass(frozen=True)
 class OutputPaths:
-    """Names of the outputs; "-" is standard output, None is not written."""
+    """Names of the outputs; "-" is standard output, None omits the output."""
 
     program: str | None
     joints: str | None

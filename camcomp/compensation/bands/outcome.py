@@ -28,7 +28,7 @@ class Expected:
 
 
 class BandTotals:
-    """Adds up what is expected of a program, piece by piece."""
+    """Accumulate the expected error of a program, piece by piece."""
 
     def __init__(self, inputs: Sequence[UncertainJob]) -> None:
         self.inputs = [each.source for each in inputs]
@@ -43,7 +43,7 @@ class BandTotals:
         return self._count
 
     def add(self, error: Floats, moves: TipMoves, share: Floats | None = None) -> None:
-        """Points that count: errors (n, 3) mm of the machine at its stated values, the moves there, shares (n,) of the correction."""
+        """Add points: errors (n, 3) mm at the stated values, tip moves by input, shares (n,) of the correction."""
         if share is not None:
             self.alone += int((share <= LITTLE).sum())
             self.shrunk += int(((share > LITTLE) & (share < 1.0 - LITTLE)).sum())
@@ -61,7 +61,7 @@ class BandTotals:
         self._weight.append(len(error))
 
     def join(self, other: BandTotals) -> BandTotals:
-        """Itself, with what another part of the program has added up."""
+        """Add the totals of another part of the program; return self."""
         self._count, self._square = self._count + other._count, self._square + other._square
         self._by_input = self._by_input + other._by_input
         self._kept += other._kept
@@ -70,7 +70,7 @@ class BandTotals:
         return self
 
     def expected(self) -> Expected:
-        """The error to be expected; zero where nothing counts."""
+        """Expected error, µm, over drawn machines; zero without points."""
         if not self._count:
             return Expected(0.0, 0.0, (0.0, 0.0))
         z = np.random.default_rng(0).standard_normal((len(self.inputs), MACHINES))
@@ -102,7 +102,7 @@ class BandTotals:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Bands:
-    """What is known of the end points (N,) of a program, or of a piece of one, and what adds up to its expected error."""
+    """Bands of the end points (N,) of a program or of a piece of it, with the totals of its expected error."""
 
     before: Floats  # (N, 3) mm error of the original program at the stated values
     after: Floats  # (N, 3) mm of the corrected one
@@ -144,7 +144,7 @@ ADVICE = (
 
 
 def in_words(inputs: Sequence[UncertainInput], shares: Sequence[tuple[str, float]]) -> str:
-    """What makes most of the band, and what would make it smaller."""
+    """Name the largest contribution to the band and how to reduce it."""
     name, share = shares[0]
     source = next(each for each in inputs if each.name == name)
     first = source.members[0].name

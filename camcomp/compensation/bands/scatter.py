@@ -43,7 +43,7 @@ class TipMoves:
 
     @property
     def squares(self) -> Floats:
-        """What every input adds to the sum of squares of the errors, in the mean of machines (k,) mm^2."""
+        """Mean contribution of every input to the sum of squared errors (k,) mm^2."""
         slope, bend = (np.einsum("nik,nik->k", each, each) for each in (self.slope, self.bend))
         return np.asarray(slope + 0.5 * bend)
 
@@ -95,7 +95,7 @@ def gained(before: Floats, after: Floats, moves: TipMoves, level: float = LEVEL)
 
 
 def excess(before: Floats, moves: TipMoves) -> Floats:
-    """By how much (n,) mm the band of a correction that leaves nothing of errors before (n, 3) mm exceeds its gain."""
+    """Band minus gain (n,) mm of a full correction, from errors before (n, 3) mm; positive: correcting may do harm."""
     return size_below(moves.mean, moves.covariance) - gained(before, np.zeros_like(before), moves)
 
 

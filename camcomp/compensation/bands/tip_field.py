@@ -60,7 +60,7 @@ class TipField:
         return self._split(found)
 
     def _interpolated(self, fit: _Fit, points: Floats, *, check: bool) -> Floats | None:
-        """Values at points, solved where the fit says nothing. check: None where it does not hold for these points."""
+        """Values at points, solved outside the support of the fit. check: None where the fit is too inaccurate here."""
         terms = fit.terms(points)
         lone = np.flatnonzero(~fit.supports(terms))
         if check:
@@ -92,7 +92,7 @@ class TipField:
         return None
 
     def _supporting(self, points: Floats, degree: int, random: np.random.Generator) -> _Fit:
-        """A fit of what is known, after learning more where it says nothing of the points."""
+        """Fit the known solutions, after solving more points outside the support of the fit."""
         for left in range(EXTENSIONS, -1, -1):
             fit = _Fit.of(self._known, self._values, degree, np.concatenate((self._known, points)))
             lone = np.flatnonzero(~fit.supports(fit.terms(points)))
@@ -148,7 +148,7 @@ class TipField:
 
 @lru_cache(maxsize=2)
 def tip_field_of(job: Job) -> TipField:
-    """The field of a job; parts of one program share what it has learnt."""
+    """The field of a job; all parts of one program share its solutions."""
     return TipField(job)
 
 
@@ -161,7 +161,7 @@ def of_sides(each: UncertainJob, base: Floats, tips: Sequence[Floats]) -> tuple[
 
 
 def unsolved(job: Job, name: str) -> PhysicsError:
-    """What is said where a machine at one deviation of an input has no solution."""
+    """Error CC301: the machine at one deviation of an input has no solution."""
     at = next((each.at for each in job.config.spreads if name in (each.name, each.group)), None)
     text = (
         f"one deviation of '{name}' off its value the machine cannot be solved"
@@ -225,7 +225,7 @@ class _Fit:
         return out
 
     def misses(self, points: Floats, values: Floats, moves: int) -> float:
-        """Largest root mean square of what is missed in a column, over that of the largest column of its kind.
+        """Largest root mean square error of a column, relative to the largest column of its kind.
 
         Only of points that the fit supports. moves: the first columns, which are slopes and bends; the others are compliances.
         """

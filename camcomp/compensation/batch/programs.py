@@ -85,7 +85,7 @@ def _first_magic(path: Path) -> int:
 
 @dataclass(frozen=True, kw_only=True)
 class Plan:
-    """What is the same for every program of a batch."""
+    """Settings that all programs of a batch share."""
 
     config: Config
     output: Path
@@ -202,7 +202,7 @@ def _known(plan: Plan, found: FoundProgram, key: str) -> Status | None:
 
 
 def _keep(plan: Plan, found: FoundProgram, outcome: Outcome) -> Status:
-    """Writes what a program became."""
+    """Write the outputs of a program and their hashes."""
     made = {"program": outcome.program, "joints": outcome.joints}
     if outcome.program is None:
         return Status(

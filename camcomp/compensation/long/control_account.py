@@ -1,6 +1,6 @@
-"""What the control makes of a long program: its moves come piece by piece, a control looks some moves ahead.
+"""Time and contour error of a long program under its controller, piece by piece.
 
-A stretch of moves is planned with the ones that follow already in sight, and with some that were planned before.
+A controller looks some moves ahead: a stretch is planned with the moves that follow it and with some before it.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ IN_SIGHT = 1 << 9  # moves behind them that may still change their speed
 
 @dataclass(frozen=True, eq=False)
 class SeenPoints:
-    """Points (k,) on moves of the written program, and what the text leaves there."""
+    """Points (k,) on moves of the written program, and the tip errors there before the controller."""
 
     move: Ints
     told: Floats  # (k, 3) mm as commanded

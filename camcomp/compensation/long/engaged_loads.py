@@ -20,7 +20,7 @@ def size_of(v):
 
 @inner
 def line_between(base, left, right, w):
-    """What lies at share w between two rows of base (k, 3)."""
+    """Point at share w between two rows of base (k, 3)."""
     return plus(part(base[left], 0), plus(part(base[right], 0), part(base[left], 0), -1.0), w)
 
 

@@ -1,4 +1,4 @@
-"""What the tool meets on a run of a long program and next to it."""
+"""Engagement of the tool on a run of a long program and on the motions next to it."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def path_of_run(run: PlainRun) -> Path:
 
 @dataclass(frozen=True, eq=False)
 class RunEngagement:
-    """What the tool meets on a run, at the end of the motion before it, and at the begin of the motion behind it."""
+    """Engagement on a run, at the end of the motion before it, and at the begin of the motion after it."""
 
     own: Engaged
     before: Engaged | None
@@ -51,7 +51,7 @@ class RunEngagement:
 
 
 def _still(engaged: Engaged, row: int, motion: int) -> Engaged:
-    """A motion on which nothing changes: as at one of the places."""
+    """A motion with the constant engagement of one row."""
     if not len(engaged.u):
         return engaged
     out = engaged.take(np.array([row % len(engaged.u)] * 2))

@@ -1,4 +1,4 @@
-"""What the loaded machine does, interpolated between exact solutions: for programs of more points than it pays to solve.
+"""Interpolate the response of the loaded machine between exact solutions, for programs of very many points.
 
 Space is divided into cubes; where the program comes through one, the machine is solved exactly at some hundred points of
 the cube and of the range of forces, and polynomials in position and force are fitted to the answers. Further exact

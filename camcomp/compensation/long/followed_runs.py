@@ -24,7 +24,7 @@ from camcomp.model.stock.warnings import Remarks, stock_remarks, stock_warnings
 
 @dataclass(eq=False)
 class FollowedRuns:
-    """The stock of a long program, and what there is to say of it."""
+    """The stock of a long program, and the remarks on it."""
 
     job: Job
     name: str
@@ -33,7 +33,7 @@ class FollowedRuns:
 
     @classmethod
     def of(cls, job: Job, source: BinaryIO, name: str, setup: Setup) -> FollowedRuns | None:
-        """None where no stock is known. Reads the program for its bounds and tools where the stock depends on them."""
+        """Set up the stock, reading the program where the stock depends on its bounds or tools; None without a stock."""
         stock = job.config.workpiece.stock
         if stock is None:
             return None
@@ -52,7 +52,7 @@ class FollowedRuns:
         return cls(job, name, memory_of(job.config, tool_frame_of(job.config, job.tool_axis), bounds), {})
 
     def follow(self, path: Path, ahead: Path | None) -> tuple[Engaged, Engaged]:
-        """What the motions of a run meet, and what the tool meets at the begin of those behind it (`ahead`).
+        """Engagement on the motions of a run, and at the begin of those after it (`ahead`).
 
         Raises ProgramError CC142 for rapids through material.
         """

@@ -1,4 +1,4 @@
-"""What one piece of a long program leaves for the next."""
+"""State of the output between two pieces of a long program."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from camcomp.ground.datatypes import Floats
 
 @dataclass
 class OutputState:
-    """What one piece of the program leaves for the next; program frame."""
+    """State of the output at the end of a piece; program frame."""
 
     written: Floats  # (3,) mm where the written program stands
     commanded: Floats  # (3,) mm the same before rounding

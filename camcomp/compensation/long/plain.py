@@ -55,7 +55,7 @@ class PlainRows:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Answers:
-    """What the machine says to rows (N,), machine frame."""
+    """Response of the machine at rows (N,), machine frame."""
 
     correction: Floats  # (N, 3) mm
     unloaded: Floats  # (N, 3) mm, loaded tip minus target when the target itself is commanded
@@ -87,7 +87,7 @@ class CorrectedRun:
 
     @property
     def missed(self) -> Floats:
-        """What `after` (k, 3) mm has beside that."""
+        """`after` (k, 3) mm minus the errors that the policy accepts."""
         return self.after if self.left is None else self.after - self.left
 
 
@@ -215,7 +215,7 @@ class PlainCorrector:
         return self._back(np.concatenate((ends, between)))
 
     def _left_lines(self, run: PlainRun, loads: Loads, uncertainty: RunUncertainty) -> Loads:
-        """The loads, with jumps where lines that are left alone meet others; which lines those are is kept for `_commanded`."""
+        """Add load jumps where uncorrected lines meet corrected ones; mark the uncorrected lines for `_commanded`."""
         n, plain = run.motions, run.plain
         fresh = loads.jump[:-1].copy()  # the other lines begin as the line before ends
         fresh[0] = True
@@ -357,13 +357,13 @@ class PlainCorrector:
         return rows.target + np.where(kept[:, None], 0.0, moved), kept, share
 
     def _error_of(self, off: Floats, tile: Ints, tiles: Tiles) -> Floats:
-        """Errors (n, 3) of tips that are commanded `off` (n, 3) mm beside the right place, machine frame."""
+        """Tip errors (n, 3) mm of commands that are `off` (n, 3) mm from the exact command, machine frame."""
         out = off.copy()
         follow(tiles.slope, tile, off, out)
         return out
 
     def off(self, done: CorrectedRun) -> Floats:
-        """Way (N, 3) mm, machine frame, from the exact command of the whole correction to what is written."""
+        """Written command minus exact command of the full correction (N, 3) mm, machine frame."""
         return self.job.frame.vectors(done.written - done.rows.target) - done.answers.correction
 
     def actuators(self, done: CorrectedRun) -> tuple[Floats, Floats]:
@@ -460,7 +460,7 @@ class PlainCorrector:
         return out[:size].tobytes(), written, held, rest
 
     def _rests(self, run: PlainRun, rows: PlainRows) -> Bools:
-        """Rows (N,) at which the control has to rest; those at the run's end are left to it."""
+        """Rows (N,) at which an exact stop keeps a corner sharp; the last row of a run is never one."""
         if not rounds(run.state.path_mode, 1e3 * self.tolerance):
             return np.zeros(len(rows.move), np.bool_)
         return rests_of((run.plain.kind[rows.move] == LINE) & ~rows.joining, rows.joining)
@@ -468,7 +468,7 @@ class PlainCorrector:
     def _apart(
         self, run: PlainRun, rows: PlainRows, commanded: Floats, rest: Bools, kept: Bools, carry: OutputState
     ) -> bool:
-        """Whether the control is kept from making one line of several; changes of feed that may do so are left out."""
+        """Whether to forbid the controller to merge lines; changes of feed are not considered."""
         kind, feed = run.plain.kind[rows.move], run.plain.feed[rows.move]
         cut = (kind == LINE) & ~rows.joining & ~kept
         start = np.concatenate((carry.commanded[None], commanded[:-1]))

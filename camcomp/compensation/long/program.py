@@ -155,7 +155,7 @@ class LongProgram:
         return done.data
 
     def _met(self, piece: _Piece, before: _Piece | None, after: _Piece | None) -> RunEngagement | None:
-        """What the tool meets on a piece and next to it."""
+        """Engagement of the tool on a piece and next to it."""
         if piece.engaged is None:
             return None
         last = (
@@ -171,7 +171,7 @@ class LongProgram:
         return RunEngagement(piece.engaged, last, first)
 
     def _tell(self, batch: Callable[[], Batch]) -> None:
-        """Adds up a piece and passes its rows on, beside the work on the next piece; one piece at a time, in order."""
+        """Add up a piece and pass on its rows while the next piece is computed; one piece at a time, in order."""
 
         def tell() -> None:
             rows = batch()

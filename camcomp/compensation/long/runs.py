@@ -112,13 +112,13 @@ class Runs:
         yield from self._rest()
 
     def waiting_s(self, config: Config) -> float:
-        """Time of what was read so far beside its moves."""
+        """Time, s, of the dwells and tool changes read so far."""
         return waiting_s(config, self._state.dwelt_s, self._state.tool_changes)
 
     # --- bytes ---------------------------------------------------------------------------------------------------
 
     def _more(self) -> bool:
-        """Reads on; what is not used up stays in front."""
+        """Read the next chunk and append it to the unread bytes."""
         if self._last:
             return False
         fresh = self.source.read(CHUNK_BYTES)
@@ -154,7 +154,7 @@ class Runs:
     # --- lines ---------------------------------------------------------------------------------------------------
 
     def _plain(self, limit: int) -> PlainRun | None:
-        """The plain lines from here on; None when there are no motions in them."""
+        """The plain lines from here on; None if they contain no motion."""
         state = self._state
         if (
             state.relative
@@ -256,12 +256,12 @@ class _InterpretedLines:
         self._row0, self._state = row0, state
 
     def add(self, lines: bytes, motions: int) -> None:
-        """Lines and what they moved."""
+        """Add lines and the number of their motions."""
         self.lines.append(lines)
         self._motions += motions
 
     def take(self) -> InterpretedRun:
-        """What was collected."""
+        """Return the collected lines as a run, and start anew."""
         assert self._state is not None
         run = InterpretedRun(b"".join(self.lines), self._row0, self._state, self._motions)
         self.lines, self._motions, self._state = [], 0, None

@@ -141,7 +141,7 @@ class Totals:
         )  # fmt: skip
 
     def _plain_control(self, run: PlainRun, done: CorrectedRun) -> None:
-        """What the control makes of plain lines."""
+        """Plan the moves of plain lines as the controller does."""
         plain, rows, mode = run.plain, done.rows, run.state.path_mode
         before, after = self._control
         default = self.job.config.process.feed_mm_per_min or np.nan
@@ -165,7 +165,7 @@ class Totals:
         after.add(moves, SeenPoints(seen, told, done.missed, line, joining[seen - 1] | joining[seen + 1]))
 
     def _odd_control(self, result: Compensated, own: Bools, part: Part) -> None:
-        """What the control makes of lines that were corrected exactly."""
+        """Plan the moves of exactly corrected lines as the controller does."""
         path, modes, control = result.program.path, result.program.modes, result.control
         before, after = self._control
         default = self.job.config.process.feed_mm_per_min or np.nan
@@ -210,7 +210,7 @@ class Totals:
         return np.column_stack(parts) if parts else None
 
     def _known(self, bands: Bands | None, own: Bools | slice = slice(None)) -> Floats | None:
-        """Adds up what is expected of a piece; the columns of its own rows, where they are asked for."""
+        """Add the expected error of a piece; return the band columns of its own rows if the table needs them."""
         if bands is None:
             return None
         self.bands = bands.totals if self.bands is None else self.bands.join(bands.totals)

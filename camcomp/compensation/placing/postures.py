@@ -34,7 +34,7 @@ def start_postures(job: Job) -> dict[str, dict[str, float]]:
 
 
 def _within_limits(job: Job, angles: Floats) -> Floats | None:
-    """Angles (6,) deg plus whole turns, the smallest within limits; None where a joint has none."""
+    """Angles (6,) deg plus whole turns, the smallest within limits; None if a joint is out of its limits."""
     out = []
     for angle, each in zip(angles, job.config.robot.actuators.values(), strict=True):
         low, high = each.limits or (-np.pi, np.pi)

@@ -101,7 +101,7 @@ class Compensated:
 
     @property
     def missed(self) -> Floats:
-        """What `after` (k, 3) mm has beside what a policy leaves on purpose."""
+        """`after` (k, 3) mm minus the errors that the policy accepts."""
         return self.after if self.left is None else self.after - self.left
 
     @property

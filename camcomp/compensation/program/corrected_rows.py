@@ -128,7 +128,7 @@ def _feeds(program: Program, track: Track, rows: CorrectedRows) -> Floats:
 
 
 def output_of(path: Path, rows: CorrectedRows, rest: Bools | None = None, apart: Bools | None = None) -> Output:
-    """The rows as the writer wants them; rest, apart (N,): those that end at rest, and stay apart, in any case."""
+    """The rows in the form of the writer. rest, apart (N,): force a stop at the end, forbid merging."""
     arc, bent = rows.kind == ARC, rows.arcs.on
     centre = np.where(bent[:, None], rows.arcs.centre, path.centre[rows.motion])
     return Output(

@@ -10,7 +10,7 @@ from camcomp.model.stock.surface import Surface, surface_of
 
 
 def cut_surface(job: Job, program: Program) -> Surface:
-    """What a program leaves of the stock when the loaded machine executes it as it stands, effects included.
+    """Surface that a program cuts as written on the loaded machine, effects included.
 
     Raises ConfigError CC298 without a stock, PhysicsError where the machine cannot be.
     """

@@ -1,4 +1,4 @@
-"""Where a program is looked at, and what the full model says there: the errors before and after."""
+"""Tip errors before and after compensation, by the full model, at the judged points of a program."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class JudgedPoints:
 
 
 def judged_points(job: Job, track: Track, rows: CorrectedRows, feeding: Bools) -> JudgedPoints:
-    """End points of the rows, and what lies between them on `feeding` pieces (p,)."""
+    """End points of the rows, and points between them on `feeding` pieces (p,)."""
     n = len(rows.piece)
     cut = feeding[rows.piece] & ~rows.joining
     begins = np.concatenate(([True], rows.piece[1:] != rows.piece[:-1])) | np.concatenate(([True], rows.joining[:-1]))

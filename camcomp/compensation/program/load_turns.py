@@ -85,7 +85,7 @@ def load_turns(job: Job, track: Track) -> LoadTurns:
 
 
 def _flanks(job: Job, track: Track, piece: Ints, w: Floats) -> tuple[Floats, Bools]:
-    """As `load_flanks` says, at fractions w (n,) of pieces; points that the machine does not reach do not stay."""
+    """`load_flanks` at fractions w (n,) of pieces; False in the second mask where the machine does not reach."""
     travel = travel_of(job, track, piece, w)
     found = without_drives(job, track.points(piece, w), travel)
     flank, stays = load_flanks(job, found, travel)

@@ -40,7 +40,7 @@ LEAST_SHARE = 0.03  # of a step towards the force that was found
 
 @dataclass(frozen=True, eq=False)
 class LoadedCut:
-    """What a program leaves. unrest (k,) mm: what was left at every place where force and tip were sought, 0 where they rest."""
+    """Cut stock, and the imbalance unrest (k,) mm of tip and force at every solved node; 0: balanced."""
 
     memory: StockMemory
     unrest: Floats
@@ -83,7 +83,7 @@ def loaded_cut(job: Job, program: Program, step_mm: float = STEP_MM) -> LoadedCu
 
 
 def meant_cut(job: Job, program: Program) -> StockMemory:
-    """The stock behind a program whose tool does not bend and whose machine goes where it is told."""
+    """The stock that a rigid tool on an exact machine cuts."""
     memory = memory_of(job.config, tool_frame_of(job.config, job.tool_axis), Bounds().add(program.path))
     memory.follow(program.path)
     memory.settle()
@@ -251,7 +251,7 @@ def _at_rest(
     start: Floats,
     bend: list[tuple[float, Floats]],
 ) -> tuple[Floats, float]:
-    """Force (3,) N at node k under which the tip meets what makes this force, and by how much (mm) it does not.
+    """Solve force (3,) N and tip at node k together; return the force and the imbalance of the tip, mm.
 
     The tool advances where its tip does: along the program's direction and as its bend changes.
 

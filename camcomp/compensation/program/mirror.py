@@ -41,7 +41,7 @@ LEAST_SHARE = 0.8  # of the rows in motion that have to lie on the program
 
 @dataclass(frozen=True, eq=False)
 class DeviationField:
-    """What one test cut showed: rows (n, 3) mm on the program, deviation (n, 3) mm across it, smoothing mm."""
+    """Deviation (n, 3) mm of a test cut across the path, at rows (n, 3) mm of the program; smoothing length mm."""
 
     rows: Floats
     deviation: Floats
@@ -52,7 +52,7 @@ class DeviationField:
         return cKDTree(self.rows)
 
     def at(self, tip: Floats) -> Floats:
-        """Smoothed deviation (k, 3) mm at tips (k, 3); 0 where nothing was measured."""
+        """Smoothed deviation (k, 3) mm at tips (k, 3) mm; 0 far from measured rows."""
         far, index = self._tree.query(tip, k=min(NEAR, len(self.rows)))
         weight = np.exp(-0.5 * np.minimum((far**2 - far[:, :1] ** 2) / self.smooth_mm**2, 700.0))
         found = np.einsum("kr,kri->ki", weight, self.deviation[index]) / weight.sum(axis=1, keepdims=True)
@@ -75,7 +75,7 @@ class MirroredJob(Job):
 
     @cached_property
     def real_machine(self) -> Machine:
-        """What a model would say is in the measured deviation already: perfect chains, without weight."""
+        """Rigid, weightless machine: the measured deviation already contains the deflection."""
         nominal = self._robots[1]
         light = nominal.edit(Weight, lambda each: replace(each, force=np.zeros(3)))
         return self._build(light, nominal)
@@ -89,7 +89,7 @@ def mirrored(job: Job, path: Path, logs: Sequence[str]) -> MirroredJob:
 
 
 def deviations(path: Path, log: str) -> DeviationField:
-    """What the log of a test cut of a program shows. Raises ConfigError CC400 to CC406, FileError."""
+    """Deviations of a test cut from its program, by its log. Raises ConfigError CC400 to CC406, FileError."""
     time, tip = _measured(log)
     velocity = np.gradient(tip, time, axis=0)
     speed = np.linalg.norm(velocity, axis=1)

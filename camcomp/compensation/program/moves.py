@@ -1,6 +1,6 @@
-"""What the moves of a corrected program are: which pieces are corrected, where joining lines stand, what cannot be done.
+"""Moves of a corrected program: corrected pieces, joining lines, unsupported cases.
 
-Shared by the stories that write corrected programs and that check them.
+Shared by `compensate` and `verify`.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ def error_goals(tolerance_um: float, step_mm: float, correction: Floats) -> Floa
 
 
 def chord_budget(goal: Floats, step_mm: float) -> Floats:
-    """Share (p,) of error goals (p,) mm that straight lines may use, beside the rounding of their ends to steps of step_mm.
+    """Part (p,) mm of error goals (p,) mm for chords, after the rounding of their ends to steps of step_mm.
 
     Where rounding alone leaves more than the goal, finer lines do not help and get all of it.
     """

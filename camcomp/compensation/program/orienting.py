@@ -38,7 +38,7 @@ class Orienting:
 
     @classmethod
     def of(cls, program: Program, job: Job, corrected: Program | None = None) -> Orienting | None:
-        """None where the program states no orientation, nor its correction, and none is asked for.
+        """Orientation handling of a program; None if program, correction and config all lack orientations.
 
         Raises ConfigError CC205 and ProgramError CC115 where it cannot be followed or written.
         """
@@ -90,7 +90,7 @@ class Orienting:
         return found, words
 
     def _held_back(self, target: Floats, travel: Travel, found: Correction, words: Floats) -> Floats | None:
-        """Words (n, 3) by which effects in drives and structure turn the platform less; None where they turn it by nothing."""
+        """Words (n, 3) that cancel the tilt by effects in drives and structure; None where the tilt is negligible."""
         told, wanted = self.platform(words), travel.rotation
         if wanted is None:
             wanted = np.broadcast_to(self.job.machine.nominal.held_rotation, told.shape)
@@ -108,7 +108,7 @@ class Orienting:
         return _told(travel, self.platform(words))
 
     def tilt(self, told: Floats, state: Correction, wanted: Floats) -> Floats:
-        """Angles (k,) rad of the loaded platform against orientations wanted (k, 3, 3); NaN where nothing was solved.
+        """Angles (k,) rad of the loaded platform to the programmed orientations (k, 3, 3); NaN without a solution.
 
         Of the tool's axis alone where words say no more.
         """

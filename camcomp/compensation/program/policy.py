@@ -64,7 +64,7 @@ class Shares:
     def left(
         self, job: Job, track: Track, piece: Ints, w: Floats, travel: Travel, before: Floats | None = None
     ) -> Floats:
-        """Errors (k, 3) mm that are left on purpose at points in the order of travel; NaN where there is no solution."""
+        """Tip errors (k, 3) mm that the policy accepts, at points in the order of travel; NaN without a solution."""
         target = track.points(piece, w)
         aimed = aim_at(job, target, travel, "newton").commanded
         tip, _ = respond(job, self.taken(track, piece, w, target, aimed), travel, target, before=before)
@@ -73,7 +73,7 @@ class Shares:
 
 
 def shares_of(job: Job, track: Track) -> Shares | None:
-    """What the policy of the config says to the track of a path; None: everything is corrected in full."""
+    """Shares of the correction by the policy of the config; None: the correction is taken in full."""
     policy = job.config.compensation.policy
     if policy == "full" or not job.config.uncertain:
         return None

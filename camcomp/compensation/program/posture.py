@@ -1,4 +1,4 @@
-"""What a program asks of an arm's posture: one branch of the inverse kinematics, room to singular configurations.
+"""Whether a program keeps an arm on one branch of its inverse kinematics, away from singular configurations.
 
 The branch is fixed by the start pose: every point is reached from there by walking in short steps. Here it is proved that
 no step of the program changes it.

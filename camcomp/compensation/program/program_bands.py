@@ -28,7 +28,7 @@ def bands_of(
     after: Seen,
     share: Floats | None = None,
 ) -> Bands | None:
-    """Bands of a corrected program; told (k, 3) mm: what is commanded at the points, share (N,) of the correction taken there."""
+    """Bands of a corrected program. told (k, 3) mm: commanded points; share (N,): taken part of the correction."""
     if not job.config.uncertain:
         return None
     uncertainty = Uncertainty(job, track)

@@ -23,7 +23,7 @@ class ErrorSize(Result):
 
 
 def error_size(error: Floats) -> ErrorSize:
-    """Size of errors (k, 3) mm; those that are not known do not count."""
+    """RMS and largest size of errors (k, 3) mm, in µm; NaN rows are ignored."""
     size = np.linalg.norm(error, axis=1)
     size = 1e3 * size[np.isfinite(size)]
     if not len(size):
@@ -79,7 +79,7 @@ class BandShare(Result):
 
 
 class TakenCorrection(Result):
-    """What a policy other than `full` did, at points that cut."""
+    """Points that cut, by the share of the correction that a policy other than `full` took."""
 
     policy: str
     points: int
@@ -99,7 +99,7 @@ class Force(Result):
 
 
 def job_figures(job: Job) -> dict[str, Any]:
-    """What a summary says of the job itself: the assumed force, and what the program's comments state."""
+    """Figures of the job for a summary: the assumed force, and the statements in the program's comments."""
     force = assumed_force(job.config)
     said = {"stated_in_program": job.taken.said} if job.taken.said else {}
     return {"force": Force(model=force.model, engagement=force.engagement, text=force.text), **said}
@@ -153,7 +153,7 @@ class Summary(Result):
     warnings: list[str]
 
     def as_json(self) -> dict[str, Any]:
-        """As a mapping of what JSON knows, without the keys that this machine or program has no use for."""
+        """As a mapping for JSON; keys that were not set are omitted."""
         return self.model_dump(mode="json", exclude_unset=True)
 
 
@@ -177,7 +177,7 @@ class LineResult(Result):
 
     @property
     def judged_um(self) -> float:
-        """What the tolerance is held against."""
+        """Error, µm, to compare with the tolerance."""
         return self.residual_um if self.missed_um is None else self.missed_um
 
 
@@ -202,5 +202,5 @@ class Verification(Result):
     lines: tuple[LineResult, ...]
 
     def as_json(self) -> dict[str, Any]:
-        """As a mapping of what JSON knows, without the keys that exact numbers and whole corrections have no use for."""
+        """As a mapping for JSON; keys that were not set are omitted."""
         return self.model_dump(mode="json", exclude_unset=True)

@@ -62,7 +62,7 @@ def cut_at_knots(job: Job, track: Track, spacing: float) -> Track:
 
 
 def _instants(cause: Cause) -> list[float]:
-    """Times, s, at which what acts for a while begins, is all there, begins to end, is over."""
+    """Times, s, of a temporary effect: begin, end of its rise, begin of its fall, end."""
     ends = [cause.values[p.name] for p in cause.effect.PARAMETERS if p.placed]
     rise = getattr(cause.effect, "RISE_S", 0.0)
     return [] if len(ends) != 2 else [ends[0], ends[0] + rise, ends[1] - rise, ends[1]]

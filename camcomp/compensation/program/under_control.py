@@ -1,6 +1,7 @@
-"""What the control makes of a program before and after its compensation: the time it takes, and how far off it goes.
+"""Execution time and contour error of a program under its controller, before and after compensation.
 
-It merges lines, rounds corners, stops at ends (model/trajectory); what this leaves stands beside what the text leaves.
+The controller merges lines, rounds corners and stops at ends (model/trajectory). Its contour error is reported
+separately from the tip error of the written program.
 """
 
 from __future__ import annotations
@@ -49,7 +50,7 @@ class FarOff:
         return FarOff(tuple(sorted(((size, line) for line, size in found.items()), reverse=True)[: MOST_LINES + 1]))
 
     def told(self, mode: str, what: str) -> list[str]:
-        """As a warning; none when there is nothing to tell."""
+        """Warning of the contour error in this path mode; empty if it is small."""
         if not self.um:
             return []
         lines = ", ".join(str(line) for line in sorted(line for _, line in self.um[:MOST_LINES]))
@@ -59,7 +60,7 @@ class FarOff:
 
 
 def warnings_of(modes: tuple[PathMode, ...], beside: FarOff, elsewhere: FarOff) -> list[str]:
-    """What there is to say about errors beside joining lines and elsewhere, in modes that were stated."""
+    """Warnings of contour errors next to joining lines and elsewhere; none unless all path modes were stated."""
     if not all(each.stated for each in modes):
         return []
     mode = mode_name(modes)
@@ -68,7 +69,7 @@ def warnings_of(modes: tuple[PathMode, ...], beside: FarOff, elsewhere: FarOff) 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class UnderControl:
-    """What the control makes of a program."""
+    """Execution times and contour errors of a program under its controller."""
 
     before_s: float
     after_s: float
@@ -94,7 +95,7 @@ class UnderControl:
 
     @property
     def at_joins(self) -> float:
-        """Largest error beside joining lines, mm."""
+        """Largest error next to joining lines, mm."""
         size = np.linalg.norm(self.error[self.joined], axis=1)
         return float(np.nanmax(size, initial=0.0))
 
@@ -133,9 +134,9 @@ def rounds(mode: PathMode, tolerance_um: float) -> bool:
 
 
 def rests(program: Program, rows: CorrectedRows, tolerance_um: float) -> Bools:
-    """End points (N,) at which the control has to rest, or it would round the corner of a cut and a joining line.
+    """End points (N,) at which an exact stop keeps the corner of a cut and a joining line sharp.
 
-    A line that sets the mode itself is left alone.
+    Lines that set the path mode themselves are unchanged.
     """
     modes = program.modes
     free = np.array([rounds(mode, tolerance_um) for mode in modes], bool)
@@ -146,7 +147,7 @@ def rests(program: Program, rows: CorrectedRows, tolerance_um: float) -> Bools:
 
 
 def merging(mode: PathMode, language: Dialect) -> bool:
-    """Whether a mode that was stated makes one line of several, and can be told not to."""
+    """Whether a stated path mode merges lines, and the dialect can switch that off."""
     return mode.stated and not mode.exact and mode.merge_mm > 0.0 and language.merges
 
 
@@ -180,7 +181,7 @@ def under_control(
     rest: Bools,
     apart: Bools | None = None,
 ) -> UnderControl:
-    """The account of a corrected program; rest, apart (N,): rows at which the control rests, and that stay apart, in any case."""
+    """Plan a corrected program as its controller does. rest, apart (N,): forced stops, lines that are not merged."""
     path, limits = program.path, limits_of(job.config)
     default = job.config.process.feed_mm_per_min or np.nan
     feed = np.where(np.isnan(path.feed), default, path.feed)
@@ -204,7 +205,7 @@ def under_control(
 
 
 def rest_warning(resting: int, exact_stop: str = "G61") -> list[str]:
-    """What there is to say about end points at which the control rests because of joining lines."""
+    """Warning of exact stops that were written because of joining lines."""
     if not resting:
         return []
     return [
@@ -227,7 +228,7 @@ def apart_pays(moves: ToolMoves, cut: Bools, limits: ControlLimits, tolerance_um
 
 
 def apart_warning(modes: Iterable[PathMode]) -> list[str]:
-    """What there is to say where lines are kept from being made one in these modes."""
+    """Warning of codes that keep lines from being merged in these path modes."""
     said = ", ".join(mode.apart.name for mode in distinct(modes))
     return [f"{said} around the cuts, so that the control does not make one line of several"] if said else []
 

@@ -149,7 +149,7 @@ def _under_control(
     shares: Shares | None,
     rotation: Floats | None = None,
 ) -> dict[str, Any]:
-    """What the control adds to the error at the points (k,) that are judged, without what a policy leaves on purpose."""
+    """Contour errors at the judged points (k,); errors that the policy accepts are subtracted."""
     travel = _told(travel_of(job, track, piece, w), rotation)
     error = respond(job, commanded, travel)[0] - track.points(piece, w)
     if shares is not None:
@@ -341,7 +341,7 @@ def _residual(
 
 
 def _convergence(job: Job, track: Track, piece: Ints, w: Floats) -> Floats:
-    """What the solver leaves (k,) mm: the exact command of the nearest point, put through the model again."""
+    """Solver error (k,) mm: model tip of the exact command of the nearest point, minus that point."""
     target, travel = track.points(piece, w), travel_of(job, track, piece, w)
     tip, _ = respond(job, aim_at(job, target, travel, "newton").commanded, travel)
     out: Floats = np.linalg.norm(tip - target, axis=1)

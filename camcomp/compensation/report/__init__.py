@@ -1,1 +1,1 @@
-"""What a compensation prints and draws: tables, page, figures."""
+"""Tables, page and figures of a compensation."""

@@ -35,7 +35,7 @@ NO_ERROR_MM = 1e-6  # below it chain errors have no curve of their own
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class DrawnPath:
-    """What is drawn along the path, at the end points (N, ...) of the corrected program."""
+    """Quantities drawn along the path, at the end points (N, ...) of the corrected program."""
 
     s: Floats  # mm
     line: Ints
@@ -50,7 +50,7 @@ class DrawnPath:
     mode: str  # of the control
 
     def worst(self, size: Floats) -> int:
-        """Row where `size` (N,) is largest among what is drawn."""
+        """Drawn row with the largest `size` (N,)."""
         return int(np.nanargmax(np.where(self.hidden | ~np.isfinite(size), -1.0, size)))
 
 
@@ -235,7 +235,7 @@ def scene_of(points: Floats) -> dict[str, Any]:
 
 
 def figure_budget(checked: Verified, tolerance_um: float) -> Figure:
-    """Where the error that is left comes from, worst case over the program."""
+    """Contributions to the error after compensation, worst case over the program."""
     worst = {
         "solver": max(each.convergence_um for each in checked.lines),
         "rounding (bound)": max(each.rounding_um for each in checked.lines),

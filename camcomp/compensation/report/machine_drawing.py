@@ -84,7 +84,7 @@ def _walk(chain: Chain, rho: Floats, angles: Floats) -> tuple[Floats, Floats, Fl
 
 
 def _way(chain: Chain) -> Floats | None:
-    """Ends (2, 3) of the travel of a slide that stands on the base, local axes; None where there is none."""
+    """Ends (2, 3) mm of the travel of a slide on the base, local axes; None for other chains."""
     before: list[Transform] = []
     for each in chain.elements:
         if isinstance(each, Transform):
@@ -100,7 +100,7 @@ def _way(chain: Chain) -> Floats | None:
 
 
 def figure_machine(result: Compensated, job: Job, drawn: DrawnPath) -> Figure | None:
-    """The machine where the original program is off most; a slider enlarges what the load does. None without legs to draw."""
+    """The machine at the largest error of the original program, deflection enlarged by a slider; None without legs."""
     row = drawn.worst(drawn.before)
     robot = job.machine.nominal
     turn, origin = job.frame.rotation, job.frame.origin
@@ -168,7 +168,7 @@ def figure_machine(result: Compensated, job: Job, drawn: DrawnPath) -> Figure | 
 
 
 def _scene(points: Floats) -> Json:
-    """Axes of one scale about points (n, 3) with room for what is enlarged, all of them in sight."""
+    """Axes of one scale around points (n, 3) mm, with margins for the enlarged deflection."""
     middle, half = 0.5 * (points.max(axis=0) + points.min(axis=0)), 0.5 * np.ptp(points, axis=0)
     half = half + _SHOWN * 2.0 * half.max()
     ranges = np.column_stack((middle - half, middle + half)).round(3).tolist()

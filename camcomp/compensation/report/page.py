@@ -153,7 +153,7 @@ def _cards(
 
 
 def _travel(drawn: DrawnPath, rho: Floats, job: Job) -> list[tuple[str, str, str]]:
-    """How near an actuator comes to the end of its travel; nothing where no ends are stated. rho (N, m): commanded."""
+    """Smallest distance of an actuator to its travel limits, empty without limits; rho (N, m): commanded."""
     low, high = np.array(job.machine.limits, float).T
     ends = np.flatnonzero(np.isfinite(high - low))
     if not len(ends) or not np.isfinite(rho[:, ends]).any():

@@ -43,7 +43,7 @@ def joint_columns(job: Job, oriented: bool = False) -> list[str]:
 
 
 def band_columns(job: Job) -> list[str]:
-    """Column names of what is known of the error that is left; none where every number of the config is exact."""
+    """Column names of the bands; empty if every number of the config is exact."""
     if not job.config.uncertain:
         return []
     return ["band_um", "gain_um"] + (["share"] if job.config.compensation.policy != "full" else [])
@@ -55,7 +55,7 @@ def band_values(bands: Bands | None, job: Job) -> list[Floats]:
 
 
 def values_behind(result: Compensated, job: Job) -> Floats | None:
-    """The columns (N, e) behind those of the actuators, None where there are none."""
+    """The columns (N, e) after those of the actuators; None if there are none."""
     parts = band_values(result.bands, job)
     if job.config.workpiece.stock is not None:
         parts.append(result.rows.engagement)

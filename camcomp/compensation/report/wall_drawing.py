@@ -36,7 +36,7 @@ class CutWalls:
 
 
 def cut_walls(job: Job, meant: Program, programs: Sequence[tuple[str, Program]]) -> CutWalls:
-    """Walls that programs leave beside those that one of them means, whose loads are left out."""
+    """Walls that the loaded machine cuts by each program, compared with the walls of `meant` on a rigid machine."""
     walls = walls_of(meant_cut(job, meant))
     off, restless = [], 0.0
     for _, program in programs:
@@ -48,7 +48,7 @@ def cut_walls(job: Job, meant: Program, programs: Sequence[tuple[str, Program]])
 
 
 def wall_section(job: Job, meant: Program, programs: Sequence[tuple[str, Program]]) -> Section | None:
-    """Both drawings; None where no stock is known or nothing of it is left as a wall."""
+    """Both drawings of the walls; None without a stock or a wall."""
     if job.config.workpiece.stock is None or job.conditions.model is None:
         return None
     if max(nodes_of(job, program) for _, program in programs) > MOST_NODES:
@@ -121,7 +121,7 @@ def figure_along(found: CutWalls) -> Figure:
 
 
 def walls_summary(found: CutWalls) -> str:
-    """What every program leaves, in words."""
+    """Wall errors of every program in words: rms and largest, µm."""
     parts = []
     for name, off in zip(found.names, found.off, strict=True):
         every = np.concatenate(off)

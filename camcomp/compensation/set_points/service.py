@@ -15,7 +15,7 @@ LONGEST = 1 << 16  # bytes of a line; a set-point has about a hundred
 
 
 class Tally:
-    """What was answered, and how long set-points took, counted per microsecond: a stream may last for days."""
+    """Answered set-points and their computing times, counted per microsecond: a stream may last for days."""
 
     def __init__(self) -> None:
         self._bins = array("q", bytes(8 * 10_001))
@@ -36,7 +36,7 @@ class Tally:
         return len(self._bins)
 
     def text(self) -> str:
-        """How long set-points took, or nothing."""
+        """Computing times of the set-points in words; empty without any."""
         if not self.count:
             return ""
         return f"compute: half within {self._within(0.5)} us, 99.9 % within {self._within(0.999)} us; "
