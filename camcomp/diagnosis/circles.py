@@ -93,7 +93,7 @@ def _circles(path: Path) -> list[Circle]:
 
 
 def _turn(circle: Circle, counter_clockwise: bool, commanded: Floats, known: Bools) -> Turn | None:
-    """The rows on a circle in one direction; None where they make no whole turn."""
+    """The rows on a circle in one direction; None where they do not cover a whole turn."""
     a, b = circle.plane
     told = commanded - circle.centre
     angle = np.arctan2(told[:, b], told[:, a])

@@ -57,7 +57,7 @@ class Comparison:
     only_b: list[str]
 
     def as_json(self) -> dict[str, Any]:
-        """Figures for JSON; what does not exist is null."""
+        """Figures for JSON; missing and infinite values are null."""
         rows = [
             {
                 key: None if isinstance(value, float) and not np.isfinite(value) else value

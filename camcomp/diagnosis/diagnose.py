@@ -72,7 +72,7 @@ RIVALS = 8  # sets that one experiment is asked to tell from the answer
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
-    """The result, and what a report may want to draw."""
+    """The result, and the fitted problem, search, proposal and law that a report draws."""
 
     result: DiagnosisResult
     problem: Problem
@@ -91,7 +91,7 @@ def diagnose(
     stated_mm: float | None = None,
     learned: Sequence[LearnedLaw] = (),
 ) -> Diagnosis:
-    """The diagnosis of an experiment; `without` names effects that the library is to do without, learned are laws found before."""
+    """The diagnosis of an experiment; `without` names excluded effects, `learned` holds laws of earlier diagnoses."""
     used = [run for run in runs if run.name not in holdout] or list(runs)
     bench = Bench(twin=twin, runs=used)
     laws = [each.candidate(twin.actuators) for each in learned if each.name not in without]
@@ -216,7 +216,9 @@ def _causes(problem: Problem, found: CauseSearch, best: Fitted, law: LawAnswer |
 
 
 def _parameters(problem: Problem, f: Fitted, covariance: Floats, j: int, cause: Cause) -> dict[str, Estimate]:
-    """Values with 95 % intervals; those of derived values follow the slopes of what they are derived from."""
+    """Parameter values with 95 % intervals; intervals of derived values follow by their slopes in the fitted
+    coordinates.
+    """
     idle = _idle_shapes(problem, cause)
     kinds = {p.name: p for p in cause.effect.PARAMETERS}
     d = len(f.theta)
@@ -257,7 +259,9 @@ def _parameters(problem: Problem, f: Fitted, covariance: Floats, j: int, cause: 
 
 
 def _idle_shapes(problem: Problem, cause: Cause) -> set[str]:
-    """Shapes that say nothing here: a warm-up time where temperatures are logged, a law that is the usual one."""
+    """Shapes without information here: a warm-up time where temperatures are logged, a law that has its nominal
+    value.
+    """
     usual = {p.name for p in cause.effect.PARAMETERS if p.either and cause.values.get(p.name) == p.nominal}
     warming = {p.name for p in cause.effect.PARAMETERS if p.scan and p.unit == "s" and not p.placed}
     return usual | (warming if _heat_logged(problem) else set())
@@ -329,7 +333,7 @@ def _first_label(found: CauseSearch) -> str:
 
 
 def _drivers(problem: Problem, found: CauseSearch, heard: Sequence[SpectralLine]) -> list[Driver]:
-    """What the gap depends on; with an unknown cause, what the rest depends on."""
+    """Covariates of the gap; with an unknown cause, covariates of the residual."""
     if found.unknown_in:
         labels = (*_vibrations(heard), *found.left[found.unknown_in].labels)
     else:
@@ -340,7 +344,7 @@ def _drivers(problem: Problem, found: CauseSearch, heard: Sequence[SpectralLine]
 
 
 def _vibrations(heard: Sequence[SpectralLine]) -> tuple[tuple[str, float], ...]:
-    """What shakes at one frequency depends on time and on nothing else."""
+    """Labels and shares of spectral lines above VIBRATION_SHARE: a vibration of one frequency depends on time alone."""
     return tuple((f"time:{line.name}", line.share) for line in heard if line.share > VIBRATION_SHARE)
 
 

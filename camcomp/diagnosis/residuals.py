@@ -1,7 +1,8 @@
-"""What was measured minus what is modelled, row by row, as columns: the gap, and the rest that the causes leave of it.
+"""How large are the gap and the residual in every row and channel?
 
-Every kind of study fills the same columns: `run`, where they are known `row` (of the log, from 1), `t_s` and `line`, and
-per channel `gap_<channel>` and `rest_<channel>`, called and measured as in logs. Channels that nobody logged are left out.
+Gap: measured minus modelled by the machine file. Residual: measured minus modelled with the causes. Every kind of study
+fills the same columns: `run`, where they are known `row` (of the log, from 1), `t_s` and `line`, and per channel
+`gap_<channel>` and `rest_<channel>`, with the names and units of logs. Channels that were not logged are omitted.
 """
 
 from __future__ import annotations
@@ -83,7 +84,7 @@ def of_axes(found: Sequence[AxisFindings], revolute: Mapping[str, bool]) -> Colu
 
 
 def _lay(cells: dict[tuple[str, float], dict[str, float]], channel: AxisChannel, name: str, factor: float) -> None:
-    """Adds the gap of every row of one channel's runs, and the rest by what was fitted; runs that were held out, too."""
+    """Add gap and residual of every row of one channel's fitted and held-out runs to the cells."""
     middle = float(np.mean(np.concatenate([values for _, values in channel.whole])))
     parts = [
         (k, times, values - middle, move.time, rest)
@@ -105,6 +106,6 @@ def _both(names: Sequence[str], gap: Floats, rest: Floats) -> Columns:
 
 
 def _stacked(parts: Sequence[Columns]) -> Columns:
-    """Runs below each other, without channels that hold no number."""
+    """Runs below each other; numeric channels without a finite value are dropped."""
     whole = {name: np.concatenate([each[name] for each in parts]) for name in parts[0]}
     return {name: values for name, values in whole.items() if values.dtype.kind != "f" or np.isfinite(values).any()}

@@ -1,5 +1,7 @@
-"""Values of ISO 230-2 and ISO 230-4 from the runs of a diagnosis, where these hold what the standards ask for: stops at five
-targets or more on a line that one axis drives, each approached five times from either side, without load; whole circles.
+"""Which values of ISO 230-2 and ISO 230-4 do the runs of a diagnosis give?
+
+ISO 230-2 needs at least five unloaded stops on a line of one axis, each approached five times from either side. ISO
+230-4 needs whole circles.
 """
 
 from __future__ import annotations

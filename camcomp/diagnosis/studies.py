@@ -58,7 +58,7 @@ class LogStudy:
 
 
 def study_of(path: str | Path, without: Sequence[str] = ()) -> LogStudy | None:
-    """The study of an experiment without programs, of static poses or of axis logs; None where it is for the general diagnosis.
+    """The study of an experiment without programs: static poses or axis logs; None for the general diagnosis.
 
     Raises ConfigError CC420 where the logs say too little, CC407, CC408, CC412, CC413 where they cannot be of this machine
     as they are read.
@@ -102,7 +102,9 @@ def study_of(path: str | Path, without: Sequence[str] = ()) -> LogStudy | None:
 
 
 def _without_masses(opened: _Opened) -> tuple[str, ...]:
-    """What the reader should know where torques or second encoders of an arm show weight, and no mass is stated."""
+    """Note for the reader where torques or second encoders of an arm show weight and the machine file states no
+    mass.
+    """
     hinges = [k for k, a in enumerate(opened.robot.actuators) if a.revolute]
     seen = any(np.isfinite(getattr(m, part)[:, hinges]).any() for m in opened.logs for part in ("drive", "load"))
     if not seen or arm_of(opened.robot) is None or has_moved_mass(opened.robot):
@@ -213,7 +215,9 @@ def _poses(run: RunSpec, log: Measured) -> Poses:
 
 
 def _filled(time: Floats, values: Floats) -> Floats | None:
-    """A channel (n,) that is logged, its empty cells between those in front of and behind them; None where it is not."""
+    """A logged channel (n,) with its empty cells interpolated in time; None where the share of known cells is at most
+    MOSTLY.
+    """
     known = np.isfinite(values)
     if known.mean() <= MOSTLY:
         return None

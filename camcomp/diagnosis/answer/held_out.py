@@ -1,4 +1,6 @@
-"""How far the gap shrinks on runs that were not used for the fit, how far it could, and what was re-fitted to say so."""
+"""Shrinkage of the gap on held-out runs by the named causes, its attainable value, and the nuisances that were
+re-fitted.
+"""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -89,8 +91,8 @@ def _ceiling(problem: Problem, best: Fitted, seen: Bench, part: slice, free: Seq
 
 
 def _nuisances(seen: Bench, fitted: Sequence[Run], part: slice) -> tuple[list[Floats], list[str]]:
-    """Columns (per run (n, c, k)) of what only the held-out runs themselves can tell, and their names: the frame of another
-    clamping, the offset of another clock.
+    """Columns (per run (n, c, k)) and names of the nuisances that only held-out runs determine: the workpiece frame of
+    another clamping and the offset of another clock.
     """
     blocks = [
         np.zeros((len(thinned(run.run_path.time[:, None], run.thin)), part.stop - part.start, 0)) for run in seen.runs
@@ -116,7 +118,7 @@ def _nuisances(seen: Bench, fitted: Sequence[Run], part: slice) -> tuple[list[Fl
 
 
 def _without(gaps: Sequence[Floats], free: Sequence[Floats]) -> list[Floats]:
-    """Gaps less what the free columns explain of them, over all runs together."""
+    """Gaps minus their least-squares fit by the free columns, over all runs together."""
     if not free or free[0].shape[2] == 0:
         return list(gaps)
     r = np.concatenate([gap.ravel() for gap in gaps])

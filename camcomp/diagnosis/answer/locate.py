@@ -1,4 +1,6 @@
-"""The gap of every run as the place-finding engines want it, and what they find: sizes, directions, periods, places."""
+"""Where and along which direction the gap of every run is largest: directions of travel, screw periods, frequencies and
+regions of the workspace.
+"""
 
 from collections.abc import Sequence
 from typing import Any
@@ -59,7 +61,9 @@ def channel_axes(problem: Problem) -> list[str]:
 
 
 def patterns_of(problem: Problem, gaps: list[places.RunGap], heard: Sequence[SpectralLine]) -> dict[str, Any]:
-    """What the gap does with the direction of travel, the turns of the screws, time, and the place in the workspace."""
+    """Dependence of the gap on the direction of travel, the turns of the screws, time, and the region of the
+    workspace.
+    """
     actuators = problem.bench.actuators
     return {
         "travel": places.travel(gaps, actuators),

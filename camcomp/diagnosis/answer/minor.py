@@ -1,4 +1,6 @@
-"""What was seen and is no cause: effects of the size that every healthy machine has, and rows that are no readings."""
+"""Which fitted effects and rows does the answer list apart from the causes: effects below MINOR, and outliers of the
+logs?
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,7 @@ MOST_LISTED = 8
 
 
 def minor_effects(problem: Problem, f: Fitted) -> tuple[MinorEffect, ...]:
-    """Effects beside the causes as a fit with shrinkage has them, largest first."""
+    """Effects of a fit with shrinkage that are no causes, largest first."""
     mean, _ = estimate(total(f.grams), problem.prior, problem.member_columns(f.members), f.factor)
     found = []
     for i, (candidate, columns) in enumerate(zip(problem.columns.candidates, problem.candidates.columns, strict=True)):
@@ -28,7 +30,7 @@ def minor_effects(problem: Problem, f: Fitted) -> tuple[MinorEffect, ...]:
 
 
 def outlying_rows(problem: Problem) -> tuple[Outlier, ...]:
-    """Rows of the logs of which something was left out, counted from 1."""
+    """Rows of the logs, counted from 1, with at least one cell that was excluded as an outlier."""
     return tuple(
         Outlier(run=run.name, row=int(row) + 1)
         for run, cells in zip(problem.bench.runs, problem.outliers, strict=True)

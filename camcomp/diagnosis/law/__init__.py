@@ -1,1 +1,3 @@
-"""A law for what no effect explains: candidate terms, a sparse choice on withheld runs, a smooth map, words for it."""
+"""Which law does the unexplained residual follow: candidate terms, a sparse choice on withheld runs, a smooth map, and
+a sentence.
+"""

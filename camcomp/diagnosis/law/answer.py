@@ -29,7 +29,9 @@ LEAST_SHRINKAGE = 0.1  # of the gap on withheld parts, below which nothing was f
 
 @dataclass(frozen=True, eq=False)
 class _Tried:
-    """A law or map beside the causes of a fit, or None: beside nothing; gaps, signal as in LawAnswer; after: rms, um."""
+    """A law or map fitted jointly with the causes of f, or alone where f is None; gaps and signal as in LawAnswer;
+    after: rms, um.
+    """
 
     f: Fitted | None
     found: FoundLaw | FoundMap
@@ -39,10 +41,11 @@ class _Tried:
 
 
 def answer_law(problem: Problem, f: Fitted, kind: str) -> LawAnswer | None:
-    """The law or map that an unknown effect in a kind of channel follows; None where none holds on withheld parts.
+    """The law or map that an unknown effect follows in a kind of channel; None where all fail on withheld parts.
 
-    Where a law beside the causes leaves much, causes and tolerances may have stretched to follow the unknown effect: then it is
-    sought without them. Where that leaves much too, a map is. Whichever it is, every cause is judged anew beside it.
+    A large residual of the law with the causes suggests that causes and tolerances follow the unknown effect: then a
+    law is sought without them. If that residual is large too, a map is sought. All causes are judged again jointly with
+    the result.
     """
     if main_channels(problem).start != 0 or kind not in ("tip", "encoder"):
         return None
@@ -81,8 +84,10 @@ def answer_law(problem: Problem, f: Fitted, kind: str) -> LawAnswer | None:
 
 
 def _base(problem: Problem, f: Fitted | None, bench: TermBench, kind: str) -> Callable[[Split, bool], Folds]:
-    """What stands beside a law: causes and everything within its tolerance, or where f is None what has none; and where asked
-    a free constant at every spot of the tip.
+    """Base of a law search: the causes of f and all coordinates with a tolerance, or the firm prior alone where f is
+    None.
+
+    On request it has a free constant at every spot of the tip.
     """
     if f is None:
         white, residual, precision = problem.white, problem.white_residual, firm_prior(problem).precision(1.0)
@@ -114,7 +119,7 @@ def _tried(problem: Problem, f: Fitted | None, bench: TermBench, found: FoundLaw
 
 
 def _beside(problem: Problem, f: Fitted | None, bench: TermBench, found: FoundLaw | FoundMap) -> _Tried:
-    """What a law leaves where the causes have the values that they have beside it."""
+    """Gaps and tip motion of a law, with the values of the causes that were fitted jointly with it."""
     signal, gaps = moved_without(bench, found, _terms(bench, found)), _gaps(problem, None)
     if f is not None and f.members:
         theta = found.folds.means(found.columns, found.precision)[:, problem.member_columns(f.members)]

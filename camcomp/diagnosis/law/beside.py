@@ -20,7 +20,9 @@ from camcomp.ground.datatypes import Floats
 def with_law(
     problem: Problem, bench: TermBench, found: FoundLaw | FoundMap, terms: Sequence[tuple[Spot, list[Floats]]]
 ) -> Problem:
-    """The problem with a law among what stands beside causes, as free as its coefficients are; terms: as of terms_of."""
+    """The problem with the terms of a law as further nuisances, with the prior of its coefficients; terms: as of
+    terms_of.
+    """
     more, old = len(found.precision), problem.prior
     prior = Prior(
         np.concatenate([old.tolerance, found.precision**-0.5]),
@@ -49,7 +51,7 @@ def with_law(
 
 
 def fitted_beside(found: FoundLaw | FoundMap, folds: Folds) -> FoundLaw | FoundMap:
-    """The same law with the coefficients that it has beside another base."""
+    """The same law with coefficients fitted jointly with another base."""
     theta, covariance = folds.coefficients(found.columns, found.precision)
     if isinstance(found, FoundMap):
         return replace(found, theta=theta[0], theta_without=theta[1:], folds=folds)

@@ -178,7 +178,7 @@ def _round(value: float) -> float:
 def moved_without(
     bench: TermBench, found: FoundLaw | FoundMap, terms: Sequence[tuple[Spot, list[Floats]]]
 ) -> list[Floats]:
-    """What the law, fitted to the other parts, does to the tip (n, 3) mm in every run; terms: spots with their functions."""
+    """Tip motion (n, 3) mm in every run by the law fitted to the other parts; terms: spots with their functions."""
     out = [np.zeros((len(t), 3)) for t in bench.times]
     at = 0
     for spot, values in terms:

@@ -54,10 +54,9 @@ class FoundLaw:
 def find_law(
     bench: TermBench, base: Callable[[Split, bool], Folds], grids: Sequence[TermGrid], *, seed: int = 0
 ) -> FoundLaw | None:
-    """The law, of terms like those of the grids, that what is left follows; None where none holds on withheld parts.
+    """The law with terms of the grids that the residual follows; None where all fail on withheld parts.
 
-    base: what stands beside a law when time is split so, with a free constant at every spot of the tip, which no law is
-    asked for, or without.
+    base: makes the folds of a split of time, with or without a free constant at every spot of the tip.
     """
     return _Search(bench, base, usual_split(len(bench.bench.runs)), grids, np.random.default_rng(seed)).run()
 
@@ -105,7 +104,7 @@ class _Search:
         return self._answer(self._with_constants(chosen), pool)
 
     def _with_constants(self, chosen: list[Term]) -> list[Term]:
-        """The terms, and where the law does not swing about zero, what it swings about."""
+        """The terms, and a constant per spot where it raises the score by more than PER_TERM."""
         for spot in dict.fromkeys(term.spot for term in chosen):
             more = [*chosen, Term(spot, CONSTANT)]
             if self._score(more) > self._score(chosen) + PER_TERM:
@@ -169,7 +168,7 @@ class _Search:
         return self._scores(terms)(range(len(terms)))
 
     def _scores(self, terms: Sequence[Term]) -> Callable[[Sequence[int]], float]:
-        """Log density on withheld parts, less what they cost, of some of these terms, by their numbers."""
+        """Function of term numbers: log density on withheld parts minus the cost of these terms."""
         data = self.folds.together([self._white(t) for t in terms])
         size = np.concatenate([self._precision(t) for t in terms])
         ends = np.cumsum([len(t.form.texts) for t in terms])
@@ -184,7 +183,7 @@ class _Search:
         return score
 
     def _exhaustive(self, chosen: list[Term], pool: Sequence[Term], score: float) -> list[Term]:
-        """The best of all sets of up to three terms of the pool, where it is better than what was chosen."""
+        """The best of all sets of up to three terms of the pool, where it exceeds the chosen set by the margin."""
         terms = list(dict.fromkeys([*chosen, *sorted(pool, key=lambda t: -self._score([t]))]))[: max(POOL, len(chosen))]
         of = self._scores(terms)
         best, value = chosen, score
@@ -196,7 +195,7 @@ class _Search:
         return best
 
     def _without_idle(self, chosen: list[Term]) -> list[Term]:
-        """The terms that do something beside the others."""
+        """The terms whose share of the law's energy exceeds LEAST_SHARE."""
         while len(chosen) > 1:
             theta = self._coefficients(chosen)[0][0]
             size, at = [], 0

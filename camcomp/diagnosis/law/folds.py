@@ -25,7 +25,9 @@ WIDE_MM = 0.2  # what a law may move the tip by, standard deviation before any d
 
 @dataclass(frozen=True)
 class Split:
-    """How the time of a run is divided into what is withheld: stretches of equal length, of which every `parts`-th belong together."""
+    """Division of a run's time into withheld parts: stretches of equal length, of which every `parts`-th belong
+    together.
+    """
 
     stretches: int
     parts: int
@@ -124,7 +126,7 @@ class Folds:
         return out
 
     def means(self, more: Sequence[White], precision: Floats) -> Floats:
-        """Coordinates (f, k) of what stands beside a law, law columns of that prior precision fitted with it: of all data, and
+        """Coordinates (f, k) of the base, fitted jointly with law columns of that prior precision: with all data, and
         without each part.
         """
         both = self.beside(more, precision)
@@ -167,7 +169,7 @@ class Folds:
         )
 
     def of_target(self, half: Floats) -> Floats:
-        """What of these products (c,) the base explains."""
+        """Products (c,) that the base explains."""
         return np.asarray(half.T @ self._targets[0])
 
     def of_all(self, x: White) -> FoldedColumns:

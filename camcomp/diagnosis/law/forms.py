@@ -91,7 +91,7 @@ def _powers(name: str, unit: str, most: int) -> list[Form]:
 
 
 def _senses(name: str, span: float) -> list[Form]:
-    """What goes with the sense of travel: at once, over a length, as play has it, or fading behind a reversal."""
+    """Forms of the sense of travel: at once, over a length, as lost motion, or decaying after a reversal."""
     out = []
     for length in (_HARD_MM, 0.02 * span, 0.06 * span, 0.18 * span):
         bounds = ((0.2 * _HARD_MM, 0.5 * span),)
@@ -132,7 +132,7 @@ def _senses(name: str, span: float) -> list[Form]:
 
 
 def _times(size: Sizes) -> list[Form]:
-    """What goes with the clock: drift, a step, something that acts for a while, warming up, a slow swing; and with wear."""
+    """Forms of time and wear: drift, step, temporary offset, warm-up, slow oscillation."""
     low, high = size.limits["common_s"]
     span = max(high - low, 1e-9)
     out = _powers("common_s", "s", 2)
@@ -217,7 +217,7 @@ def _times(size: Sizes) -> list[Form]:
 
 
 def at_tip(size: Sizes) -> list[Form]:
-    """Forms of what moves the tip."""
+    """Forms of effects that move the tip."""
     out: list[Form] = []
     axes = [a for a in "xyz" if size.span(f"{a}_mm") > LEAST_SPAN_MM]
     for a in axes:
@@ -274,7 +274,7 @@ def at_drive(size: Sizes, revolute: bool) -> list[Form]:
 
 
 def _loads(size: Sizes) -> list[Form]:
-    """What goes with the loads of drives: of its own beyond what a spring gives, which is its stiffness; of others, anything."""
+    """Forms of drive loads: powers of the own load beyond the linear spring; any form of the loads of other drives."""
     out = []
     for name in [each for each in size.limits if is_load(each) and size.wide(each)]:
         unit = "N" if name.endswith("N") else "N mm"

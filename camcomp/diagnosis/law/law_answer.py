@@ -1,4 +1,4 @@
-"""What the search for a law answers with."""
+"""The result of the search for a law."""
 
 from __future__ import annotations
 

@@ -58,7 +58,7 @@ class LearnedLaw:
         return tuple(Parameter(name, "1", 0.0, -20.0, 20.0, 1.0, 0.01, _SOURCE) for name in names)
 
     def candidate(self, actuators: Sequence[str]) -> CandidateCause | None:
-        """The law as a cause that may be at work on a machine with these actuators; None where it has no place there."""
+        """The law as a candidate on a machine with these actuators; None where it cannot act there."""
         pieces = self.pieces()
         if not pieces or any(part.target is not None and part.target not in actuators for part, _ in pieces):
             return None
@@ -159,7 +159,7 @@ def keep(folder: str, law: Law, machine: str) -> str:
 
 
 def learned(folder: str) -> list[LearnedLaw]:
-    """The laws of a library, by name; none where the folder is not there yet. Raises ConfigError CC292, FileError."""
+    """The laws of a library, by name; an absent folder gives an empty list. Raises ConfigError CC292, FileError."""
     out = []
     for path in sorted(Path(folder).glob("law_*.json")):
         try:

@@ -1,4 +1,4 @@
-"""All terms that are tried, each alone beside what is in the base, and what the best of them would gain by chance."""
+"""Which single term explains most in addition to the base, and how much would the best one gain by chance?"""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class TermGrid:
 
 
 def term_grids(bench: TermBench, kind: str) -> list[TermGrid]:
-    """What is tried where a law may act that shows in a kind of channel."""
+    """Grids of terms for the spots of a law that shows in a kind of channel."""
     every = spots(len(bench.bench.actuators), kind)
     tip = [each for each in every if each.on == "structure"]
     groups = [each for each in (tip, *([each] for each in every if each not in tip)) if each]
@@ -111,15 +111,16 @@ class _View:
 
 
 class Screen:
-    """The terms of grids beside a base of a law search, and beside the same with terms in it."""
+    """Gains of all terms of the grids in addition to a base of a law search, and to that base with terms in it."""
 
     def __init__(self, grids: Sequence[TermGrid], base: Folds, rng: np.random.Generator) -> None:
         self.grids, self.base, self.rng = grids, base, rng
         self._parts: dict[tuple[Spot, int], _Part] = {}
 
     def gains(self, step: Folds) -> tuple[list[tuple[float, Term]], float]:
-        """(gain in evidence, term) of all terms beside what is in the base, best first, and the gain that the best of them would have
-        by chance in FALSE_RATE of data without a law.
+        """(gain in evidence, term) of all terms in addition to the base, best first, and the chance gain.
+
+        Chance gain: the gain that the best term exceeds in FALSE_RATE of data without a law.
         """
         draws = self._draws(step.rest())
         chance = step.projected(draws)
@@ -127,7 +128,7 @@ class Screen:
         return _singles(views), _by_chance(views)
 
     def _draws(self, rest: Sequence[Floats]) -> list[Floats]:
-        """What is left with signs drawn at random (w, d) per run."""
+        """Residuals (w, d) per run with random signs, one per block of rows."""
         out = []
         for r in rest:
             signs = self.rng.choice([-1.0, 1.0], size=(-(-len(r) // BLOCK), DRAWS))

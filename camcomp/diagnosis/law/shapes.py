@@ -38,7 +38,7 @@ class Shapes:
         return self.bench.white(term.spot, values), np.full(len(term.form.texts), (size / WIDE_MM) ** 2 + TINY)
 
     def followed(self, step: Folds, term: Term) -> Term:
-        """The term with the shape that the data want beside what is in the base."""
+        """The term with the shape that fits the data best in addition to the base."""
         if not term.form.shape:
             return term
         if term.form.passing:

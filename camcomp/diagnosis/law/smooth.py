@@ -1,7 +1,7 @@
-"""A smooth, bounded map for what no short law fits: cubic splines over the one or two covariates that matter.
+"""Which smooth map does a residual follow that no short law fits: cubic splines over one or two covariates.
 
-Every coefficient has a prior about zero; its width, the covariates and the spots are those that make withheld parts most
-probable, one spot after the other. Where none helps withheld parts there is no map.
+Every coefficient has a prior about zero. Its width, the covariates and the spots maximise the probability of withheld
+parts, one spot after the other. Without a gain on withheld parts the answer has no map.
 """
 
 from __future__ import annotations
@@ -68,7 +68,9 @@ def map_values(bench: TermBench, term: MapTerm) -> list[Floats]:
 
 
 def find_map(bench: TermBench, folds: Folds, kind: str) -> FoundMap | None:
-    """The maps that what is left in a kind of channel follows; None where none helps withheld parts."""
+    """The maps that the residual of a kind of channel follows; None where the gain on withheld parts stays below
+    LEAST_GAIN.
+    """
     where, step = spots(len(bench.bench.actuators), kind), folds
     chosen: list[MapTerm] = []
     while len(chosen) < MOST_MAPS:

@@ -18,7 +18,7 @@ WORDS = {
 
 
 def law_sentence(forms: Sequence[Form]) -> str:
-    """What a law says, in words."""
+    """The sentence that states the forms of a law."""
     said = [f"{WORDS.get(each.family, 'goes with')} {listed(each.about)}{_place(each)}" for each in forms if each.about]
     return f"What is left {listed(list(dict.fromkeys(said)))}."
 

@@ -1,1 +1,1 @@
-"""Which sets of causes are tried, how they are ranked, and whether something unknown is left."""
+"""Which sets of causes are fitted, how are they ranked, and is the residual above the noise floor?"""

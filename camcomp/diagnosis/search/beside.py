@@ -1,4 +1,6 @@
-"""Which causes stand beside an effect that no library has, and how sure they are where it points at their own place."""
+"""Which causes are kept jointly with an unmodelled effect, and how probable are they where it acts at their own
+actuator?
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -30,10 +32,10 @@ class _Beside:
 
 
 def beside_unknown(problem: Problem, f: Fitted, beyond: Mapping[str, Unexplained]) -> Members:
-    """The members that stand beside an unknown effect, one by one.
+    """The members that are kept jointly with an unknown effect, judged one by one.
 
-    They foretell what unseen runs show. What is smaller than the unknown one and aimed at the actuator that the rest
-    points at is most likely a part of it; so is what is smaller and of no actuator.
+    They predict withheld runs. A member that is smaller than the unknown effect is taken for a part of it where it acts
+    at the actuator of the residual, or at no actuator.
     """
     members = foretelling(problem, f)
     each = _beside(problem, f, beyond, members)

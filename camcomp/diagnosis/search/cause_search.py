@@ -42,7 +42,7 @@ INSTEAD = 0.95  # probability of something unknown in place of a cause, where wi
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CauseSearch:
-    """Sets of causes that were fitted, their probabilities, the verdict, and what the best of them leaves."""
+    """Fitted sets of causes, their probabilities, the verdict, and the residual of the best set."""
 
     fits: tuple[Fitted, ...]
     probability: Floats
@@ -53,7 +53,7 @@ class CauseSearch:
 
 
 def search_causes(problem: Problem) -> CauseSearch:
-    """Fit sets, weigh the answers among them, look for something unmodelled beside the best one, state probabilities."""
+    """Fit sets, rank them, test the best one for an unmodelled effect, and state probabilities."""
     sets = FittedSets(problem, Sound(problem))
     sets.search()
     weighed = _weigh_answers(problem, sets)
@@ -98,7 +98,8 @@ def _weigh_answers(problem: Problem, sets: FittedSets) -> _Weighed:
 
 @dataclass(frozen=True, eq=False)
 class _Beside:
-    """The answer that stays beside something unmodelled, how sure its members are, and what unseen runs show beyond it.
+    """The answer that is kept jointly with an unmodelled effect, the probabilities of its members, and the excess
+    residual on held-out runs.
 
     kind: of channel in which something unmodelled shows, None where none does.
     """
@@ -110,7 +111,7 @@ class _Beside:
 
 
 def _look_beside(problem: Problem, best: Fitted, sets: FittedSets) -> _Beside:
-    """Whether something unmodelled acts beside the best answer, and which of its members stay."""
+    """Test for an unmodelled effect jointly with the best answer, and select the members that are kept."""
     beyond = unexplained(problem, sets.fit(best.all_members))  # minor effects explain their part, too
     kind = unknown_kind(problem, best, beyond)
     known, credible, instead = _credible(problem, best, beyond, sets.fit)
@@ -153,10 +154,10 @@ def _credible(
     beyond: Mapping[str, Unexplained],
     fit: Callable[[Members], Fitted],
 ) -> tuple[Fitted, dict[int, float], bool]:
-    """What is left of a set when members that something unknown does as well have gone, one by one; how sure they are;
-    whether something unknown took the place of one, even where what every machine has would stretch to cover it.
+    """Drop members, one by one, that an unmodelled effect explains as well; return the reduced fit, the probabilities
+    of its members, and whether an unmodelled effect replaced a member above the size that counts.
 
-    Where something unknown shows, those that do not foretell unseen runs beside it go first.
+    Where an unmodelled effect shows, members that do not predict withheld runs jointly with it are dropped first.
     """
     instead = False
     while True:
@@ -175,7 +176,7 @@ def _credible(
 
 
 def unknown_kind(problem: Problem, f: Fitted, beyond: Mapping[str, Unexplained]) -> str | None:
-    """The kind of channel in which unseen runs show more than the floor, None where none does."""
+    """The kind of channel in which withheld runs exceed the floor most; None where all stay within it."""
     least = _least(problem, f)
     for_a_while = max(GATE_LOCAL * problem.floor.tip_um, 2.0 * _modelled(problem, f))
     # where the tip is measured it says itself what moves it; only of the control it knows nothing
@@ -185,14 +186,15 @@ def unknown_kind(problem: Problem, f: Fitted, beyond: Mapping[str, Unexplained])
 
 
 def _least(problem: Problem, f: Fitted) -> float:
-    """Size (um at the tip) from which on something beside what a set explains is worth a name."""
+    """Smallest excess residual (um at the tip) that makes a set of causes incomplete."""
     return max(GATE * problem.floor.tip_um, _modelled(problem, f))
 
 
 def _modelled(problem: Problem, f: Fitted) -> float:
-    """How far (um at the tip) what a set leaves may be an error of its own members.
+    """Residual (um at the tip) that errors in a set's own members may explain.
 
-    That of the largest: what undoes another's work is modelled no better for it. But what is left of that work sets a limit.
+    GATE_SHARE of the largest member or of all together, at most LEFT_OPEN of all together: members that cancel are not
+    modelled more exactly.
     """
     together, alone = size_um(problem, f), [size_um(problem, f, (i,)) for i in f.members]
     return min(GATE_SHARE * max(together, *alone, 0.0), LEFT_OPEN * together)

@@ -1,4 +1,4 @@
-"""Whether what a set of causes names is surely there, and more than every healthy machine has; what speaks against it."""
+"""Is every member of a set of causes significantly above MINOR, and which data contradict it?"""
 
 from collections.abc import Callable
 
@@ -52,10 +52,11 @@ def established(
     temperature: float,
     probability: Floats,
 ) -> tuple[tuple[Fitted, ...], Floats]:
-    """The fits without those that have a member which may as well be minor; what they are without it takes their place.
+    """Drop members whose effect at the tip is not significantly above MINOR; the reduced sets take the places of the
+    fits.
 
-    As likely as they were: that member is there, and nobody names it. Not of the leader alone: rivals that keep what the leader
-    has lost would be no rivals of what it is now.
+    Every likely set is reduced, not the best alone: otherwise rivals would keep a member that the best one has lost.
+    Probabilities are computed again after each step.
     """
     firm = set[Members]()
     while True:
@@ -88,7 +89,9 @@ def standing(problem: Problem, members: Members) -> Fitted:
 
 
 def _idle(problem: Problem, f: Fitted) -> int | None:
-    """The member that is wanted least, by the evidence and on withheld runs, or that may be minor; None where none is idle."""
+    """The member that evidence or withheld runs speak against most, else one that may be minor; None where every member
+    is needed.
+    """
     if not f.members:
         return None
     smaller = [tuple(each for each in f.members if each != i) for i in f.members]

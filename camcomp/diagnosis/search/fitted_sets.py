@@ -142,7 +142,7 @@ class FittedSets:
         return bool(f.members) and f.members not in self._exchanged and len(f.members) <= EXCHANGEABLE
 
     def exchange(self, near: Fitted) -> None:
-        """The best sets with one member of a fit exchanged, left out, or replaced by two."""
+        """Fit the best sets that exchange one member of a fit, omit it, or replace it by two."""
         self._exchanged.add(near.members)
         scale = self.scale(near)
         others: Ranked = [

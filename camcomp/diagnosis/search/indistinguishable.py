@@ -1,8 +1,8 @@
-"""Which causes no analysis of these runs can tell apart: computed from the model, the runs and the channels present.
+"""Which causes can no analysis of these runs distinguish: computed from the model, the runs and the channels present.
 
-Nothing here looks at residuals. The signature of one cause is compared with all that another could do, with nuisances
-and what every healthy machine has of everything allowed for: the sine of the angle between the two under the noise.
-Source: principal angles between subspaces (Bjoerck and Golub, Mathematics of Computation 27, 1973).
+Residuals are not used. The signature of one cause is compared with all signatures that another can have, with nuisances
+and minor effects free: the sine of the angle between the two under the noise. Source: principal angles between
+subspaces (Bjoerck and Golub, Mathematics of Computation 27, 1973).
 """
 
 from collections.abc import Sequence
@@ -38,7 +38,8 @@ class Likeness:
         return self._kinds[i][1] > _SHOWS
 
     def apart(self, i: int, others: Sequence[int], free: Sequence[int] = (), direction: Floats | None = None) -> Floats:
-        """What tells candidate i, `LARGE` times the noise, from the best that each other one (j,) can do beside the free candidates: in units of the noise.
+        """Distance, in units of the noise, of candidate i at `LARGE` times the noise from the best fit of each other
+        one (j,) with the free candidates.
 
         direction (d,): of the parameters of i; the most alike one when it is not given.
         """
@@ -84,7 +85,9 @@ class Likeness:
 
 
 def _share(left: Floats, own: Floats, direction: Floats | None) -> Floats:
-    """Of the energy own (d, d) in a direction (d,), or in the one that keeps least, what is left (n, d, d) of it, (n,)."""
+    """Share (n,) of the energy own (d, d) that remains as `left` (n, d, d), in a direction (d,) or in the direction
+    that keeps least.
+    """
     d = len(own)
     if direction is not None and d > 1:
         whole = float(direction @ own @ direction)

@@ -62,10 +62,10 @@ class Sound:
 
 
 def small_members(problem: Problem, f: Fitted) -> Members:
-    """The members that move the tip by no more than what is minor, or by no more than what may be wrong of another one.
+    """The members whose effect at the tip is at most MINOR or within the model error of another member.
 
-    A small one at the actuator of a large one is what that one's law says wrongly, and so is one below the floor where either
-    is of no actuator: none is modelled better than GATE_SHARE. Of two at one actuator what they do together counts as well.
+    A member counts as model error of another at the same actuator, or, below the floor, of any where either acts at no
+    actuator: models are exact to GATE_SHARE at best. The joint effect of two members at one actuator is judged as well.
     """
     target = {i: problem.columns.candidates[i].target for i in f.members}
     alone: list[Members] = [(i,) for i in f.members]

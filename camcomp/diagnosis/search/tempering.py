@@ -12,7 +12,7 @@ def tempering(problem: Problem, f: Fitted) -> float:
 
 
 def misfit(problem: Problem, f: Fitted) -> float:
-    """Chi-square left when the members are free and everything else stays within tolerance, penalties included."""
+    """Minimum chi-square with the members free and all other coordinates under their tolerances, penalties included."""
     data = total(f.grams)
     index = problem.member_columns(f.members)
     mean, _ = estimate(data, problem.prior, index, 1.0)

@@ -1,10 +1,9 @@
-"""What a set of causes leaves on runs that it was not fitted to, at the scale of the tip: how far is the tip from where
-the model with these causes lets one expect it, beyond the noise floor?
+"""How far is the tip of withheld runs from the model with these causes, beyond the noise floor?
 
-Every kind of channel is read as micrometres at the tip: an encoder through the kinematics, a drive force through the
-spring that it winds up, a dynamometer through the compliance. Fast noise is averaged out over blocks of rows; what the
-instruments are allowed to drift is taken off. Causes are fitted to the other runs; what every healthy machine has, and
-what runs and clampings differ by, is fitted too, within its reach.
+Every kind of channel is converted to micrometres at the tip: an encoder by the kinematics, a drive force by the spring
+that it loads, a dynamometer by the compliance. Blocks of rows average fast noise; the permitted drift of the
+instruments is subtracted. Causes are fitted to the other runs; minor effects and differences between runs and clampings
+are fitted too, within their tolerances.
 """
 
 from __future__ import annotations
@@ -86,7 +85,8 @@ def _left(problem: Problem, f: Fitted, k: int) -> Floats:
 
 
 def untold(theta: Floats, doubt: Floats, widths: Sequence[int]) -> Bools:
-    """Of which coordinates (d,) runs say nothing that know them to a standard deviation (d,): those of a cause go together.
+    """Mask (d,) of coordinates theta that runs do not determine, given their standard deviations doubt (d,); a cause is
+    masked as a whole.
 
     widths: how many are a cause's. One that is small beside its cause's others is no reason to ask the run itself.
     """
@@ -96,7 +96,7 @@ def untold(theta: Floats, doubt: Floats, widths: Sequence[int]) -> Bools:
 
 
 def _at_tip(problem: Problem, k: int, left: Floats, kind: str) -> Floats:
-    """Left-overs of one kind (n, 3) mm at the tip."""
+    """Residuals (n, 3) of one kind of channel, mm at the tip, of run k."""
     bench, run = problem.bench, problem.bench.runs[k]
     m = len(bench.actuators)
     if kind == "tip":
@@ -120,7 +120,7 @@ def _at_tip(problem: Problem, k: int, left: Floats, kind: str) -> Floats:
 
 
 def unexplained_of(problem: Problem, kind: str, at_tip: Sequence[Floats]) -> Unexplained:
-    """Of one kind of channel, from left-overs (n, 3) mm of every run at the tip."""
+    """Excess residual of one kind of channel, from residuals (n, 3) of every run, mm at the tip."""
     slow = problem.floor.slow_mm if kind == "tip" else 0.0
     # no encoder is worse than the tip's instrument, nor is that one in one run so much worse than in all
     noisiest = {"encoder": problem.floor.axis_mm, "tip": NOISIEST * problem.floor.axis_mm}

@@ -1,4 +1,6 @@
-"""What a set of causes leaves: how much, what it depends on, and whether it is an effect that the library does not have."""
+"""How large is the residual of a set of causes, on which covariates does it depend, and is it an effect outside of the
+library?
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -56,7 +58,9 @@ def _held(prior: Prior, columns: Ints) -> Prior:
 
 
 def signal_rms(problem: Problem, f: Fitted, members: Members | None = None) -> dict[str, float]:
-    """Size of what the members (or some of them) explain, per kind of channel, in units of the noise."""
+    """Root mean square of the members' contribution (all, or the given ones) per kind of channel, in units of the
+    noise.
+    """
     index = problem.member_columns(f.members)
     mine = set(problem.member_columns(f.members if members is None else members))
     theta = np.array([t if c in mine else 0.0 for c, t in zip(index, f.theta, strict=True)])
@@ -78,10 +82,11 @@ def rows_by_kind(problem: Problem) -> dict[str, int]:
 
 
 def foretelling(problem: Problem, f: Fitted) -> Members:
-    """The members that foretell, fitted to the other runs, what a run shows: they stand or fall one by one.
+    """The members that predict a withheld run when they are fitted to the other runs; the weakest is dropped until all
+    do.
 
-    In the runs that they were fitted to, any few effects follow an unknown one for some way; a cause that is there takes
-    away from a run that it has not seen what it takes away from the others.
+    Few effects can follow an unknown one in the runs of their fit. A true cause reduces the residual of withheld runs
+    as well.
     """
     members = f.members
     if len(problem.bench.runs) < 2:
@@ -136,7 +141,7 @@ def _gain(before: Mapping[str, Floats], after: Mapping[str, Floats], own: Mappin
 
 
 def _own(problem: Problem, f: Fitted, members: Members, i: int) -> dict[str, Floats]:
-    """Energy per row (runs,) of what a member does and the others would not take over, per kind of channel.
+    """Energy per row (runs,) and kind of channel that a member explains and the other members cannot.
 
     Where they would take over more than OWN of it, the others may be what is there, and all that it does counts.
     """
