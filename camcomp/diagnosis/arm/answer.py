@@ -58,7 +58,7 @@ POSES_MAP, BESIDE_MAP = "poses", "poses beside unknown"  # kinds of log of the c
 
 @dataclass(frozen=True, eq=False)
 class Told:
-    """What an answer is made of; gaps (n, 3) mm of the fitted campaigns to the arm of the config."""
+    """Inputs of an answer; gaps (n, 3) mm of the fitted campaigns to the arm of the config."""
 
     case: PoseCase
     check: HeldOutCheck
@@ -66,7 +66,7 @@ class Told:
 
     @property
     def floor(self) -> TipFloor | None:
-        """The noise floor, None where it is not identifiable."""
+        """The noise floor, None where these poses do not determine it."""
         return self.case.floor
 
     @property
@@ -83,7 +83,7 @@ class Told:
 
     @cached_property
     def rest(self) -> list[Floats]:
-        """Residuals (n, 3) mm of the fitted campaigns beside the causes, frames fitted."""
+        """Residuals (n, 3) mm of the fitted campaigns with the causes, frames fitted."""
         return [self.case.bench.gap(k, self.case.causes) for k in self.case.bench.own]
 
     @cached_property
@@ -97,7 +97,7 @@ class Told:
         return 1e3 * _size(self.gaps)
 
     def alternatives(self) -> list[tuple[int, ...]]:
-        """Sets that these poses cannot tell apart, the best first."""
+        """Sets that are indistinguishable by these poses, the best first."""
         return alternatives_of(self.case.explanation, [c.place for c in self.case.shelf.candidates])
 
 
@@ -258,7 +258,9 @@ def with_unknown(told: Told, named: tuple[FoundCause, ...], word: str) -> tuple[
 
 
 def alternatives(told: Told, named: Sequence[FoundCause]) -> tuple[tuple[NamedCause, ...], ...]:
-    """Sets that the poses cannot tell apart, the best first; where it has no rival, the rival is something unmodelled."""
+    """Sets that are indistinguishable by the poses, the best first; a lone set gets itself plus an unknown effect as
+    its rival.
+    """
     known = tuple(NamedCause(effect=c.effect, target=c.target) for c in named if not isinstance(c, UnknownCause))
     others = [tuple(NamedCause(effect=e, target=t) for e, t in _places(told, m)) for m in told.alternatives()[1:]]
     others = [each for each in others if each and known]
@@ -269,7 +271,9 @@ def alternatives(told: Told, named: Sequence[FoundCause]) -> tuple[tuple[NamedCa
 
 
 def where(told: Told, word: str) -> Where:
-    """Shares of axes and actuators; with an unknown, what it depends on, when and in which places it stands out."""
+    """Shares of axes and actuators; for an unknown cause its covariates, and the intervals and regions above the
+    noise.
+    """
     case = told.case
     energy = (np.concatenate(list(told.gaps)) ** 2).sum(axis=0)
     actuators = dict.fromkeys(case.bench.actuators, 0.0)
@@ -328,7 +332,7 @@ def _energy(parts: Sequence[Floats]) -> float:
 
 
 def _energy_beside(told: Told, background: Background) -> float:
-    """Energy of the residual, in floors, beside a covariate as well."""
+    """Energy of the residual, in floors, with a further covariate fitted."""
     model, found = told.case.model, told.case.explanation
     at = model.posterior(background, model.reduced(background).slab(found.members))
     groups = [model.groups[g] for g in model.own]
@@ -400,7 +404,7 @@ def _places_above(told: Told) -> tuple[PlaceShare, ...]:
 
 
 def next_experiment(told: Told, word: str) -> NextExperiment | None:
-    """Poses that tell most, as a campaign of their own; repeats where there is no floor."""
+    """The most informative poses, as a campaign of their own; repeats where the floor is unknown."""
     if word in ("none", "identified"):
         return None
     case, whole = told.case, len(told.case.bench.campaigns) > 1

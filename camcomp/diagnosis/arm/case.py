@@ -35,7 +35,7 @@ class PoseCase:
 
     @property
     def model(self) -> LinearModel:
-        """The linear model at what was found."""
+        """The linear model at the fitted causes."""
         return self.explanation.model
 
     @property

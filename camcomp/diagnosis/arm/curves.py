@@ -77,7 +77,7 @@ def seen_angles(angle: Floats) -> tuple[tuple[float, float], ...]:
 
 
 def covered(seen: Mapping[int, Sequence[tuple[float, float]]], q: Floats) -> np.ndarray:
-    """Which poses q (n, m) have every joint (its number) inside of what was seen of it: a mask (n,)."""
+    """Mask (n,) of poses q (n, m) whose joints all lie inside their measured intervals (by joint number, degrees)."""
     out = np.ones(len(q), bool)
     for joint, intervals in seen.items():
         angle = np.degrees(q[:, joint])

@@ -51,7 +51,7 @@ def designed(X: Floats, covariance: Floats, noise: float, count: int, interest: 
 
 
 class _Belief:
-    """What is known of the effects after some poses, updated pose by pose."""
+    """Posterior covariance of the effects after some poses, updated pose by pose."""
 
     def __init__(self, X: Floats, covariance: Floats, noise: float, interest: Floats | None) -> None:
         self.X, self.covariance = X, covariance.copy()
@@ -60,7 +60,7 @@ class _Belief:
         self.spread = np.einsum("nik,kl,njl->nij", X, covariance, X, optimize=True)  # of every candidate's tip
 
     def best(self, without: list[int]) -> int:
-        """The candidate that tells most."""
+        """The most informative candidate outside of `without`."""
         if self.interest is None:
             value = np.linalg.slogdet(np.eye(3) + self.spread / self.square[0, 0])[1]
         else:
@@ -115,10 +115,11 @@ def candidates(bench: ArmBench, count: int = CANDIDATES) -> Floats:
 def proposed(
     bench: ArmBench, columns: Sequence[Column], covariance: Floats, noise: float
 ) -> tuple[Floats, Floats, float]:
-    """Joints (POSES, m) to measure in a new campaign, their platform points (POSES, 3), and what they tell of effects (bits).
+    """Joints (POSES, m) to measure in a new campaign, their platform points (POSES, 3), and the expected information
+    (bits).
 
-    columns with their covariance (k, k): what is to be known better. Empty where that is nothing, or no candidate stands where
-    poses stood.
+    columns with their covariance (k, k): the effects to determine. Empty without columns, or where candidate poses are
+    missing.
     """
     q = candidates(bench)
     if not columns or not len(q):

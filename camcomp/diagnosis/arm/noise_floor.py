@@ -56,7 +56,7 @@ def _with_rounding(floor: TipFloor | None, campaigns: Sequence[Poses]) -> TipFlo
 
 @dataclass(frozen=True)
 class StatedDeviation:
-    """What an experiment states of its instruments, mm per axis; None where it says nothing."""
+    """Standard deviations of the instruments as the experiment states them, mm per axis; None where unstated."""
 
     tip: float | None = None
     encoder: float | None = None
@@ -65,10 +65,10 @@ class StatedDeviation:
 def tip_floor(
     robot: Robot, campaigns: Sequence[Poses], gaps: Sequence[Floats], stated: StatedDeviation
 ) -> TipFloor | None:
-    """The floor of campaigns with gaps (n, 3) mm to a model; None where nothing tells it.
+    """The floor of campaigns with gaps (n, 3) mm to a model; None where neither a statement nor repeats determine it.
 
-    The larger of what is stated and of what repeats show beside slow waves in time: the frame of an instrument does not show
-    in repeats, and a statement that repeats belie is none.
+    It is the larger of the stated floor and the scatter of repeats about slow waves in time: repeats do not show an
+    error of the instrument's frame, and they may contradict a statement.
     """
     known = [each for each in (_stated(robot, campaigns, stated), _repeated(robot, campaigns, gaps)) if each]
     return _with_rounding(max(known, key=lambda each: each.sd, default=None), campaigns)
@@ -77,7 +77,7 @@ def tip_floor(
 def least_floor(
     robot: Robot, campaigns: Sequence[Poses], gaps: Sequence[Floats], stated: StatedDeviation
 ) -> TipFloor | None:
-    """What the floor may be at least, to begin with: what is stated, else what the quieter half of repeats shows."""
+    """Lower bound of the floor: the stated one, else the scatter of the quieter half of repeats."""
     found = _stated(robot, campaigns, stated) or _repeated(robot, campaigns, gaps, quiet=True)
     return _with_rounding(found, campaigns)
 
@@ -125,7 +125,7 @@ def _repeated(robot: Robot, campaigns: Sequence[Poses], gaps: Sequence[Floats], 
 
 
 def _near(visits: Sequence[np.ndarray], gap: Floats) -> list[np.ndarray]:
-    """Visits whose gaps (n, 3) differ by no more than noise may, as far as the median of all tells."""
+    """Visits whose gaps (n, 3) scatter by at most FAR times the median scatter of all visits."""
     size = np.array([np.sqrt(_square(gap[rows]) / (len(rows) - 1)) for rows in visits])
     return [rows for rows, own in zip(visits, size, strict=True) if own <= FAR * max(float(np.median(size)), 1e-6)]
 
@@ -135,7 +135,9 @@ def _square(values: Floats) -> float:
 
 
 def _beside_sways(visits: Sequence[np.ndarray], gap: Floats, order: np.ndarray) -> list[tuple[float, float]]:
-    """Squares of what gaps (n, 3) of visits of one pose differ by, beside slow waves of all rows in time, and their freedom."""
+    """(Sum of squares, degrees of freedom) of gaps (n, 3) within visits of one pose, with slow waves of all rows in
+    time removed.
+    """
     more = sum(len(rows) - 1 for rows in visits)
     if more < ENOUGH * SWAYS:
         return [(_square(gap[rows]), len(rows) - 1.0) for rows in visits]

@@ -68,7 +68,7 @@ def _bending(robot: Robot, q: Floats, point: Floats) -> dict[str, Floats]:
 
 
 def _readings(robot: Robot, q: Floats, tip: Floats, rows: np.ndarray) -> list[tuple[str, str, Callable[[], float]]]:
-    """Rule, what it looks like, and its misfit, of every other way to read the poses."""
+    """Rule, description and misfit of every other way to read the poses."""
     names = [a.name for a in robot.actuators]
     hinges = np.array([a.revolute for a in robot.actuators])
 

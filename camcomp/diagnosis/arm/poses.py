@@ -87,7 +87,9 @@ class Poses:
 
     @property
     def features(self) -> Floats:
-        """What makes two postures alike: sines and cosines (n, 2 m) of hinges. Slides count by their share of 1 m."""
+        """Features (n, 2 m) that measure how similar two postures are: sines and cosines of hinges; slides count by
+        their share of 1 m.
+        """
         return np.concatenate([np.sin(self.q), np.cos(self.q)], axis=1)
 
 
@@ -289,7 +291,9 @@ class ArmBench:
         return X
 
     def _drive_motion(self, campaign: Poses, joints: Floats, column: Column) -> Floats:
-        """Motion (n, 3) of tips by what a column does to drives. joints (n, 3, m): motion per rad (mm) of every joint."""
+        """Tip motion (n, 3) by the drive errors of a column; joints (n, 3, m): tip motion per rad (mm) of every
+        joint.
+        """
         cause = column.cause(1.0)
         cause = replace(cause, values=complete(cause))
         error, _ = signal_path.driven([cause], self.actuators, _standing(self.robot, campaign))

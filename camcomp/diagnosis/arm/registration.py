@@ -64,7 +64,8 @@ def register(measured: Floats, point: Floats, pose: Floats, tool: Floats) -> Reg
 
 
 def nuisance_columns(tips: Floats, pose: Floats, about: Floats) -> Floats:
-    """Motion (n, 3, 9) of tips, machine frame, per unit of what a registration is moved by (rad, mm, mm), negated frame.
+    """Tip motion (n, 3, 9), machine frame, per unit of a registration's step: turn (rad) and shift (mm) of the frame,
+    negated, and tool (mm).
 
     The columns are those of model tips against measured points that are brought into the machine frame.
     """

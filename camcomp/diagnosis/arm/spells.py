@@ -60,7 +60,9 @@ def _between(time: Floats, k: int) -> tuple[float, float, float]:
 
 
 def _window(joint: Floats, left: Floats, frame: Floats) -> tuple[int, int]:
-    """First row of the spell and the row after it that takes most off the squares of left (n, 3), the frames fitted beside it."""
+    """First row and end row of the temporary offset that reduces the squares of left (n, 3) most, the frames fitted
+    jointly.
+    """
     n = len(left)
     Q = np.linalg.qr(frame.reshape(-1, frame.shape[2]))[0].reshape(n, 3, -1)
     said = np.concatenate([[0.0], np.cumsum((joint * left).sum(axis=1))])

@@ -89,7 +89,8 @@ def bench_of(robot: Robot, causes: tuple[Cause, ...], runs: Sequence[Poses], hol
 def cleaned(
     robot: Robot, causes: tuple[Cause, ...], campaigns: list[Poses], fitted: int, without: Sequence[str]
 ) -> tuple[ArmBench, Shelf, list[tuple[str, int]], list[Floats]]:
-    """Bench without poses far off beside the richest model, and factors (n,) on the noise of rows that lie far out.
+    """Bench without poses that are outliers of the richest model, and factors (n,) on the noise of rows with large
+    residuals.
 
     Weights of Huber, Ann. Math. Stat. 35 (1964) 73; the scale is that of the median.
     """
@@ -110,7 +111,7 @@ def cleaned(
 
 
 def beside_richest(bench: ArmBench, shelf: Shelf) -> list[Floats]:
-    """Residuals (n, 3) mm of every campaign beside all single effects at once, of usual sizes (ridge)."""
+    """Residuals (n, 3) mm of every campaign after a ridge fit of all single effects at once, at their usual sizes."""
     plain = shelf.without_shapes()
     model = linearise(ArmBench(robot=bench.robot, causes=bench.causes, campaigns=bench.campaigns), plain, 1.0)
     size = max(float(np.median(np.abs(np.concatenate([g.y for g in model.groups])))), 1e-9)
@@ -120,7 +121,9 @@ def beside_richest(bench: ArmBench, shelf: Shelf) -> list[Floats]:
 
 
 def noise_of_richest(bench: ArmBench, shelf: Shelf, weights: Sequence[Floats]) -> float:
-    """Noise, mm per coordinate, where nothing states it: what the richest model leaves, its freedom counted."""
+    """Noise, mm per coordinate, for an experiment that states none: the residual of the richest model per degree of
+    freedom.
+    """
     left = beside_richest(bench, shelf)[: len(bench.own)]
     values = sum(r.size for r in left)
     used = len(shelf.without_shapes().columns) + 9 * len(left)
@@ -131,7 +134,9 @@ def noise_of_richest(bench: ArmBench, shelf: Shelf, weights: Sequence[Floats]) -
 def explained(
     bench: ArmBench, shelf: Shelf, sd: float, floor: TipFloor | None, weights: Sequence[Floats], without: Sequence[str]
 ) -> tuple[Shelf, Explanation]:
-    """The explanation at a noise sd (mm), linearised about what it finds; with spells where few lasting causes are not all."""
+    """The explanation at a noise sd (mm), linearised at its own result; with temporary offsets where few lasting causes
+    do not suffice.
+    """
     noise = KnownNoise(floor.freedom) if floor else None
     found = relinearised(bench, shelf, sd, noise, weights)
     finer = shelf.with_finer_shapes(found.members)
@@ -150,9 +155,9 @@ def explained(
 def relinearised(
     bench: ArmBench, shelf: Shelf, sd: float, noise: KnownNoise | None, weights: Sequence[Floats]
 ) -> Explanation:
-    """Explain at the nominal arm, then at what was found (Gauss-Newton).
+    """Explain at the nominal arm, then at the fitted arm (Gauss-Newton).
 
-    A column that the nominal arm does not show acts through another one, such as weight on rigid joints, and takes no part.
+    A column that is zero at the nominal arm acts through another one, such as weight on rigid joints, and is excluded.
     """
     nominal = linearise(bench, shelf, sd, None, weights)
     found = explain(nominal, noise)
@@ -165,7 +170,9 @@ def relinearised(
 
 
 def with_spells(bench: ArmBench, shelf: Shelf, found: Explanation) -> Shelf:
-    """With one stretch of time per joint and campaign in which it may have been shifted, beside what was found and beside nothing."""
+    """The candidates plus the likeliest temporary offset per joint and campaign, in the residuals of the empty set and
+    of the fitted set.
+    """
     model = found.model
     joints = [bench.joint_motion(c, (), bench.start[k]) for k, c in enumerate(bench.campaigns)]
     frames = [g.N for g in model.groups]
@@ -182,7 +189,9 @@ def with_spells(bench: ArmBench, shelf: Shelf, found: Explanation) -> Shelf:
 def settled_floor(
     bench: ArmBench, shelf: Shelf, found: Explanation, gaps: Sequence[Floats], stated: StatedDeviation, least: TipFloor
 ) -> tuple[TipFloor, bool]:
-    """The floor that repeats show beside what was found, and whether it differs from the least one that there may be."""
+    """The smaller of the floors that repeats show with and without the fitted causes, and whether it clearly exceeds
+    the least floor.
+    """
     amount = found.amplitudes()[0]
     acting = combined(shelf.columns, {int(j): float(amount[j]) for j in np.flatnonzero(amount)})
     beside = [bench.gap(k, acting) for k in range(len(bench.campaigns))]

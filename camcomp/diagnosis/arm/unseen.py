@@ -35,9 +35,9 @@ REGIONS_OF_ONE = 4  # that a campaign visits, at least: it differs from the next
 
 @dataclass(frozen=True, eq=False)
 class HeldOutCheck:
-    """Residuals of unseen campaigns beside what was found. whole: campaigns were unseen, not regions of a fitted one.
+    """Residuals of held-out campaigns with the fitted causes; parts: per campaign or region.
 
-    excess None: no campaign is unseen.
+    excess None: all campaigns are fitted.
     """
 
     parts: tuple[HeldOut, ...]
@@ -50,14 +50,14 @@ class HeldOutCheck:
 
     @property
     def at_floor(self) -> bool | None:
-        """Whether unseen poses are at the floor; None where no campaign is unseen."""
+        """Whether held-out poses are at the floor; None where all campaigns are fitted."""
         if self.excess is None:
             return None
         return self.excess.mean + LIKELY * self.excess.error < LEVEL
 
 
 def check_held_out(case: PoseCase) -> HeldOutCheck:
-    """What unseen campaigns keep beside the causes, under the noise of the floor alone."""
+    """Residuals of held-out campaigns with the causes, under the noise of the floor alone."""
     found = case.explanation
     if len(case.bench.campaigns) < 2:
         return HeldOutCheck((), None)
@@ -71,7 +71,7 @@ def check_held_out(case: PoseCase) -> HeldOutCheck:
 
 
 def without_far_judged(case: PoseCase) -> PoseCase:
-    """Without withheld poses far off beside the causes, which are no measurement."""
+    """The case without withheld poses that are outliers of the fitted causes."""
     bench, causes = case.bench, case.causes
     first = len(bench.own)
     campaigns, groups, outliers = list(bench.campaigns), list(case.model.groups), list(case.outliers)
@@ -121,7 +121,7 @@ def notes_of_frames(case: PoseCase, named: Sequence[FoundCause]) -> tuple[str, .
 def shrinkage(
     case: PoseCase, named: Sequence[FoundCause], names: Sequence[str], withheld: bool
 ) -> UnseenShrinkage | None:
-    """How far unseen campaigns shrink by causes that were found without them; None where no campaign is unseen."""
+    """Shrinkage of withheld campaigns by causes that were fitted to the others; None where all campaigns are fitted."""
     bench = case.bench
     known = [c for c in named if not isinstance(c, UnknownCause)]
     if withheld:
@@ -183,7 +183,9 @@ def left_out_in_turn(case: PoseCase) -> tuple[list[list[Floats]], list[tuple[str
 def where_covered(
     case: PoseCase, named: Sequence[FoundCause], judged: Sequence[int], after: Sequence[Floats]
 ) -> tuple[float | None, float | None]:
-    """Share of unseen poses whose joints with a curve stand where it was seen, and what is left there, um."""
+    """Share of withheld poses whose joints with an error curve lie in its measured range, and the rms residual there,
+    um.
+    """
     bench = case.bench
     joints = sorted({bench.actuators.index(str(c.target)) for c in named if c.effect == CURVE})
     if not joints:

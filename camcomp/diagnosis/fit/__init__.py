@@ -1,1 +1,3 @@
-"""Runs beside the twin as a regression problem: residuals, columns, noise, Gauss-Newton; no cause is judged here."""
+"""Runs and the nominal model as a regression problem: residuals, columns, noise, Gauss-Newton; causes are judged
+elsewhere.
+"""

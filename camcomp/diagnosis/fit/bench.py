@@ -91,7 +91,7 @@ class Run:
 
     @cached_property
     def encoders(self) -> Floats | None:
-        """Logged encoders (n, m), None where there are none."""
+        """Encoders (n, m) of the log, None where the log lacks them."""
         return self.measured.encoder if self.measured.has("encoder") else None
 
 
@@ -268,7 +268,7 @@ def _means(columns, ways, factor, out):  # type: ignore[no-untyped-def]  # pragm
 
 
 def cause_of(candidate: CandidateCause, coordinates: Mapping[str, float]) -> Cause:
-    """The cause at fitting coordinates by parameter name; what is missing is nominal."""
+    """The cause at fitting coordinates by parameter name; a missing coordinate takes its nominal value."""
     values = {p.name: p.value(coordinates.get(p.name, p.nominal if p.shape else 0.0)) for p in fitted(candidate)}
     return Cause(candidate.name, candidate.effect, candidate.target, public_values(candidate.effect, values))
 

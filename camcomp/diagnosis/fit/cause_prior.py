@@ -1,4 +1,4 @@
-"""What is believed of causes before a log is looked at."""
+"""How probable is a set of causes before any log is read?"""
 
 import numpy as np
 

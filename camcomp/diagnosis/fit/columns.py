@@ -202,7 +202,11 @@ def build(
 def healthy_sizes(
     bench: Bench, candidate: CandidateCause, p: Parameter, per_run: Sequence[Floats], floor_um: float, minor_um: float
 ) -> tuple[float, float]:
-    """What every healthy machine has of a parameter with columns (n, c) per run, and the most that is no cause, in scales of it."""
+    """Standard deviation of a parameter on healthy machines, and the largest size below MINOR, both in scales of the
+    parameter.
+
+    per_run: columns (n, c) of the parameter; floor_um and minor_um: noise floor and MINOR at the tip, um.
+    """
     healthy = HEALTHY * floor_um / max(tip_um(bench, per_run), 1e-9)
     if any(each.placed for each in candidate.shapes):  # nothing happens for a while to every healthy machine
         healthy = min(healthy, p.tolerance / p.scale)
@@ -278,7 +282,9 @@ def _by_label(found: list[Any], bench: Bench, label: str, columns: Sequence[tupl
 
 
 def _allowances(bench: Bench) -> list[tuple[str, float, list[Floats], bool]]:
-    """What is always a little wrong with any model and is no effect of the library: each chain's own springs."""
+    """Nuisances that allow for the usual errors of any model: springs of single chains, direction of the cutting
+    force.
+    """
     found: list[tuple[str, float, list[Floats], bool]] = []
     edits: list[tuple[str, Callable[[Robot], Robot]]] = []
     for chain in bench.twin.robot.chains:

@@ -23,7 +23,7 @@ def main_channels(problem: Problem) -> slice:
 
 
 def gap_sizes(problem: Problem, f: Fitted, members: Members = ()) -> Floats:
-    """Length (n,), um, of the gap at all rows of all runs where it is known, without what labels differ by beside the set f.
+    """Length (n,), um, of the gap at all known rows of all runs, with the offsets of labels from the fit f removed.
 
     members: those of f that are not to count to the gap either.
     """
@@ -111,7 +111,7 @@ def rest_by_actuator(problem: Problem, f: Fitted, kind: str) -> dict[str, float]
 
 
 def tip_by_actuator(problem: Problem, f: Fitted, i: int) -> dict[str, float]:
-    """Energy of what one member of a set does to the tip, read as motion of the carriages, by actuator, as shares."""
+    """Energy of one member's tip motion, converted to carriage motion, as shares by actuator."""
     names, at, index = problem.bench.actuators, problem.member_columns(f.members), problem.member_columns((i,))
     theta = f.theta[[at.index(c) for c in index]]
     energy = np.zeros(len(names))

@@ -1,4 +1,7 @@
-"""Shapes that nothing shows while an effect is absent (pitches, time constants): tried one by one against a leftover."""
+"""Which value of a shape (pitch, time constant) explains most of a residual?
+
+The residual has no slope in a shape while its effect is absent, therefore the values of a grid are tried one by one.
+"""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -21,9 +24,9 @@ White = Callable[[int, ByChannel], ByChannel]  # what makes columns of a run whi
 
 @dataclass(frozen=True, eq=False)
 class Beside:
-    """A leftover with other columns softly fitted and taken out, and what they take of further columns.
+    """A residual from which other columns are removed by a ridge fit, and the same removal for further columns.
 
-    A column that is tried against the leftover has to lose the same: a warm-up less its mean is another curve than a warm-up.
+    Residual and candidate columns lose the same part: a warm-up minus its mean is another curve than a warm-up.
     """
 
     rest: list[Floats]  # white, per run
@@ -32,7 +35,9 @@ class Beside:
     half: Floats  # (o, o): its square is the inverse of the others' products
 
     def taken(self, columns: Sequence[ByChannel]) -> Floats:
-        """What of white columns (w, d) per run lies in the others: (o, d), in coordinates whose products are those of columns."""
+        """Part (o, d) of white columns (w, d) per run that the other columns explain, in coordinates that keep the
+        products of columns.
+        """
         return np.asarray(
             self.half @ sum((W.T @ C for W, C in zip(self.white, columns, strict=True)), np.zeros(1))[self.others]
         )
@@ -54,7 +59,7 @@ def beside(
 
 
 def best_shape(bench: Bench, candidate: CandidateCause, left: Beside, whitened: White) -> dict[str, float] | None:
-    """The scanned shape whose columns explain most of what is left; None where the effect is not scanned."""
+    """The scanned shape whose columns explain most of the residual; None where the effect is not scanned."""
     p = candidate.shapes[0]
     values = np.asarray(p.scan)
     values = np.sort(values[values <= max(longest(bench, candidate, p), values.min())])
@@ -82,9 +87,10 @@ def _gains(
     bench: Bench, candidate: CandidateCause, shapes: Sequence[Mapping[str, float]], left: Beside,
     whitened: White,
 ) -> Floats | None:  # fmt: skip
-    """Chi-square (v,) that an effect explains with each of v shapes, its size within its usual one; None where it is not scanned.
+    """Chi-square (v,) that an effect explains with each of v shapes under the prior of its size; None where it is not
+    scanned.
 
-    Where rows do not tell a shape (an early stretch of a warm-up is straight, however long that takes), usual sizes do.
+    The prior decides where rows do not determine a shape: the first part of every warm-up is straight.
     """
     gains = []
     for i in range(0, len(shapes), _AT_ONCE):  # all together they are as large as all other columns
@@ -106,9 +112,10 @@ def settled_interval(
     bench: Bench, candidate: CandidateCause, shapes: Sequence[Mapping[str, float]], left: Beside,
     whitened: White,
 ) -> dict[str, float]:  # fmt: skip
-    """The interval near the best of those that were found whose columns explain most when they lose to the others what the leftover has lost.
+    """The interval, near the best candidate interval, whose columns explain most after the removal of the other
+    columns.
 
-    What begins where a drive turns is halfway a play: the leftover beside all plays shows less of it there.
+    An interval that begins at a reversal resembles play: a residual without all plays shows less of it there.
     """
     paths = [run.run_path for run in bench.runs]
     every = _gains(bench, candidate, shapes, left, whitened)

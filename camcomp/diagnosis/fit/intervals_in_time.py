@@ -24,7 +24,7 @@ _JUMPS = 5  # of a leftover, between which an interval is tried
 
 
 def never_ending(candidate: CandidateCause) -> dict[str, float]:
-    """The instants of what is always there."""
+    """The instants of an effect that acts all the time."""
     return dict(zip((p.name for p in candidate.shapes), (-1e9, 1e9), strict=True))
 
 
@@ -32,11 +32,12 @@ def likely_intervals(
     bench: Bench, candidate: CandidateCause, always: Sequence[ByChannel], rest: Sequence[Floats],
     places: Callable[[int], Floats],
 ) -> list[dict[str, float]]:  # fmt: skip
-    """Pairs of instants, by the names of the candidate's shapes, between which it explains much of `rest` (white, per run).
+    """Intervals of time, by the names of the candidate's shapes, in which it explains much of `rest` (white, per run).
 
-    always: white columns (w, p) per run of the candidate as if it never ended. places: where in the time of a run its white
-    rows lie, 0 to 1. Empty where no interval stands out. The first is the best as far as those columns tell; where noise has a
-    long memory they tell little, and of a shift its begin and end are left: the others lie between the largest jumps.
+    always: white columns (w, p) per run of the candidate acting all the time. places: position of a run's white rows in
+    its time, 0 to 1. Empty where every gain is below LEAST_GAIN. The first interval has the largest gain. Noise with a
+    long memory hides all of a shift but its begin and end; therefore the further intervals lie between the largest
+    jumps.
     """
     start, end = (each.name for each in candidate.shapes)
     best: tuple[float, list[tuple[float, float]]] = (LEAST_GAIN, [])
@@ -72,7 +73,7 @@ def _between(instants: Floats, i: int, j: int, rise: float) -> tuple[float, floa
 
 
 def _jumps(energy: Floats) -> list[int]:
-    """The instants (of n) at which a leftover jumps most, none beside a larger one."""
+    """The instants (of n) with the largest jumps of a residual, at least LEAST_ROWS rows apart."""
     left, out = energy.copy(), list[int]()
     for _ in range(min(_JUMPS, len(left) // LEAST_ROWS)):
         at = int(np.argmax(left))

@@ -63,7 +63,7 @@ def _offset(twin: Twin, runs: Sequence[Run]) -> float:
 
 
 def _middle(values: Floats, weights: Floats) -> float:
-    """Weighted median, 0 of nothing."""
+    """Weighted median; 0 of an empty array."""
     if not len(values):
         return 0.0
     order = np.argsort(values)
@@ -72,7 +72,7 @@ def _middle(values: Floats, weights: Floats) -> float:
 
 
 def with_scatter(columns: Columns, bench: Bench, amplitude: Floats) -> Columns:
-    """The columns with labels held to what they have in common, by as much as they scatter; amplitude (k,): of all columns."""
+    """The columns with the tolerance of labels set to the scatter of their offsets; amplitude (k,): of all columns."""
     tolerance = columns.prior.tolerance.copy()
     for label, effect in EFFECT_OF.items():
         labels = [getattr(run, label) for run in bench.runs]

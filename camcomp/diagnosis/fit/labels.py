@@ -23,12 +23,12 @@ def apart(labels: Sequence[Label]) -> list[str | int]:
 
 
 def scattering(labels: Sequence[Label]) -> bool:
-    """Whether labels scatter about what they have in common, because no run is without."""
+    """Whether labels scatter about a common mean, because every run has one."""
     return len(set(labels)) > 1 and None not in labels
 
 
 def scatter(offsets: Floats) -> float:
-    """Standard deviation of labels about what they have in common, from their offsets (labels,), as large as few may hide."""
+    """Upper bound of the standard deviation of offsets (labels,) about their mean, by Student's t for few labels."""
     few = float(stdtrit(len(offsets) - 1, SIDE) / ndtri(SIDE))
     return float(np.std(offsets, ddof=1)) * few
 

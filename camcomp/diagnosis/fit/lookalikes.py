@@ -1,7 +1,8 @@
-"""Candidates that these runs could not tell from a simpler one are not asked about: each would make an answer ambiguous.
+"""Which candidates are indistinguishable from a simpler one in these runs? They are removed, since each would make an
+answer ambiguous.
 
-An angle of a carriage whose arm hardly changes is a slope, that is a squareness or a pitch; all of the paths that show it
-would have to be long in two directions. Computed from the model and the runs alone, residuals are not looked at.
+The tilt of a carriage whose arm hardly changes resembles a slope, that is a squareness or a pitch; only paths that are
+long in two directions show the difference. Computed from the model and the runs; residuals are not used.
 """
 
 from collections.abc import Sequence
@@ -44,9 +45,10 @@ def without_lookalikes(bench: Bench, candidates: Sequence[CandidateCause]) -> li
 
 
 def without_twins(bench: Bench, candidates: Sequence[CandidateCause]) -> list[CandidateCause]:
-    """The candidates that act for a while, less those of their parameters that do in every channel what an earlier one does.
+    """The temporary candidates without parameters that are indistinguishable in every channel from an earlier
+    parameter.
 
-    A force on a drive shifts its carriage through the spring: without the drive's force in the log it is a shift.
+    A force on a drive shifts its carriage by the spring: where the log lacks the drive's force, it is a shift.
     """
     out = []
     for each in candidates:
@@ -93,7 +95,7 @@ def _tips(bench: Bench, candidates: Sequence[CandidateCause]) -> Floats:
 
 
 def _alike(own: Floats, others: Floats) -> bool:
-    """Whether `others` (n, k) follow some direction of `own` (n, d) but for ALIKE of its size."""
+    """Whether `others` (n, k) explain some direction of `own` (n, d) to within ALIKE of its size."""
     size = np.linalg.norm(others, axis=0)
     basis = np.linalg.qr(others[:, size > 0.0] / size[size > 0.0])[0]
     rest = own - basis @ (basis.T @ own)

@@ -1,4 +1,4 @@
-"""What was measured in one run, row by row; NaN where a cell is empty or a column is missing."""
+"""The measured rows of one run; NaN where a cell is empty or a column is missing."""
 
 from dataclasses import dataclass
 

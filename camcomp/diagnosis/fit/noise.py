@@ -19,10 +19,10 @@ REMEMBERED_S = 1.0  # for which slow noise lasts
 
 
 def instrument_noise(bench: Bench, floor: NoiseFloor, least: Floats, times: Sequence[Floats]) -> Noise:
-    """Noise per run and channel from the scatter of its rows; it is never what a fitted model leaves.
+    """Noise per run and channel from the scatter of its rows, independent of the residual of any fit.
 
-    Slow noise of the tip is what the floor states; that of the other instruments counts as large as their fast noise, of a
-    dynamometer in the run in which it has least: in the cut the teeth shake it.
+    Slow noise of the tip is the stated floor. Slow noise of other instruments equals their fast noise; for a
+    dynamometer that of its quietest run, because teeth excite it in the cut.
     """
     runs, c = len(bench.runs), len(floor.fast)
     sigma = np.full((runs, c), np.nan)
@@ -110,7 +110,7 @@ def _changes(run: Run) -> Floats:
 
 
 def _late(bench: Bench) -> Floats:
-    """By how much (m,) s the drives are behind their set-points, from the encoders where they are fast; 0 where nobody knows."""
+    """Delay (m,), s, of the drives behind their set-points, by the encoders in fast rows; 0 where unknown."""
     m = len(bench.actuators)
     behind: list[list[Floats]] = [[] for _ in range(m)]
     for k, run in enumerate(bench.runs):
@@ -127,7 +127,7 @@ def _late(bench: Bench) -> Floats:
 
 
 def _doubt(bench: Bench, k: int) -> Floats:
-    """What the channels (n, c) may be off by where the force is not known, standard deviations."""
+    """Standard deviations (n, c) of the channels by the uncertainty of the cutting force."""
     run = bench.runs[k]
     out = np.zeros_like(bench.observed(k))
     if run.run_path.driven is None or not run.run_path.driven.doubt.any():

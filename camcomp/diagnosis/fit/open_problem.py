@@ -111,7 +111,9 @@ def _whiten(
 
 
 def _scanned(problem: Problem) -> Problem:
-    """The problem with the scanned shapes (pitches, time constants) that explain most of what the others leave."""
+    """The problem with the scanned shapes (pitches, time constants) that explain most of the residual of the other
+    columns.
+    """
     scanned = [i for i in problem.shapes if problem.columns.candidates[i].shapes]
     own = [c for i in scanned for c in problem.candidates.columns[i]]
     others = np.setdiff1d(np.arange(len(problem.columns.names)), own)

@@ -111,7 +111,7 @@ def _gone_along(tip: Floats, encoder: Floats, slopes: Floats, bad: Bools) -> Boo
 
 
 def _medians(values: Floats) -> Floats:
-    """Of the columns (n, c), 0 of those that hold nothing."""
+    """Medians (c,) of the finite values of columns (n, c); 0 for an empty column."""
     known = np.isfinite(values).any(axis=0)
     out = np.zeros(values.shape[1])
     out[known] = np.nanmedian(values[:, known], axis=0)

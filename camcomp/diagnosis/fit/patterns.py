@@ -59,7 +59,7 @@ def _reversal(motion: Motion, length: float, j: int) -> Floats:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class _Sizes:
-    """What makes covariates dimensionless, over all runs."""
+    """Scales, over all runs, that make covariates dimensionless."""
 
     low: Floats
     span: Floats
@@ -124,7 +124,7 @@ def _of_direction(g: Ground) -> list[Floats]:
 
 
 class _Store:
-    """Collects patterns of one kind; those that are zero in every run are left out."""
+    """Collects patterns of one kind; patterns that are zero in every run are dropped."""
 
     def __init__(self, kind: str, first: int, width: int, runs: int) -> None:
         self.kind, self.first, self.width = kind, first, width

@@ -58,7 +58,7 @@ class Problem:
 
     @cached_property
     def tip_gram(self) -> Floats:
-        """Products (k, k) of what the columns do to the tip, mean over the rows of all runs, mm2."""
+        """Products (k, k) of the columns' tip motion, mean over the rows of all runs, mm2."""
         out = np.zeros((len(self.columns.names),) * 2)
         for k, (block, own) in enumerate(zip(self.columns.blocks, self.residuals, strict=True)):
             for first in range(0, len(own), ROWS_AT_ONCE):
@@ -272,7 +272,9 @@ class Problem:
         return W
 
     def _grams_at(self, index: Sequence[int], white: Sequence[Floats], left: Sequence[Floats]) -> tuple[Gram, ...]:
-        """Per run, with the columns `index` replaced by white (w, d) and the residual by left (w,)."""
+        """Normal equations per run, with the columns `index` replaced by white (w, d) and the residual by `left`
+        (w,).
+        """
         out = []
         for k, (own, r) in enumerate(zip(white, left, strict=True)):
             W = self.white[k]

@@ -20,7 +20,7 @@ SOFT = 0.5  # of a stated spring: on one that is not softer, what small forces d
 def small_forces(
     candidates: Sequence[CandidateCause], members: Sequence[int], causes: Sequence[Cause]
 ) -> tuple[int, ...]:
-    """Candidates beside the members, which are as the causes say, that push on springs which these make SOFT."""
+    """Candidates outside of the members that load springs which the members' causes make SOFT."""
     changed = [(cause, candidates[i].parameters[0]) for i, cause in zip(members, causes, strict=True)]
     soft = {
         cause.target

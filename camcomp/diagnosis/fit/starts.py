@@ -1,7 +1,8 @@
-"""Where play and guides stood when a run began, nobody knows: until an actuator has moved, its carriage may be anywhere.
+"""Which rows are uncertain because lost motion and guides start in an unknown state?
 
-Nor does anybody where a log goes on after motions that are not in it. Where that lasts for some rows of a run it is a
-nuisance of its own; where one row later all is known again, that row says nothing of it.
+Until an actuator has moved, its carriage may be at either side of its play. The same holds after motions that the log
+lacks. Where the unknown state lasts for some rows it is a nuisance; where it lasts for one row, that row gets a large
+standard deviation.
 """
 
 from __future__ import annotations
@@ -59,10 +60,10 @@ def start_columns(
 
 
 def unknown_starts(bench: Bench, k: int) -> Floats:
-    """What single rows of run k may be off by (n, c), standard deviations, because nobody saw how its actuators came there.
+    """Standard deviations (n, c) of single rows of run k by the unknown motion of its actuators before them.
 
-    Of the first row, and of that behind missing ones from which it turned back, where the next has the actuator moved on, and
-    of those until its play is taken up; of encoders until a loop has settled that nobody saw speed up.
+    These are the first row and rows after missing ones at which an actuator reverses, up to the row at which its play
+    is taken up; for encoders, rows until the loop has settled.
     """
     out, path = np.zeros_like(bench.observed(k)), bench.runs[k].run_path
     if not path.ordered or len(path.time) < 3:

@@ -41,7 +41,7 @@ def alternatives_of(explanation: Explanation, place_of: Sequence[tuple[str, str 
 
 
 def _remaining(gram: Floats, on: list[int], amount: Floats, by: list[int]) -> tuple[float, float]:
-    """Square of an effect in floors, and what is left of it when other columns do all they can."""
+    """Square of an effect in floors, and the part of it that other columns cannot explain."""
     whole = float(amount @ gram[np.ix_(on, on)] @ amount)
     if not by:
         return whole, whole

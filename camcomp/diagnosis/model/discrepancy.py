@@ -44,7 +44,7 @@ def covariate_columns(functions: Floats, directions: Floats) -> Floats:
 
 
 def prior_of_covariate(model: LinearModel) -> float:
-    """Log prior of one covariate or process at one scale, against nothing unmodelled."""
+    """Log prior odds of one covariate or process at one scale against the absence of discrepancy."""
     many = len(model.layout.covariates) - len(model.healthy) + len(LENGTHS)
     return log(UNKNOWN / (1.0 - UNKNOWN)) - log(many)
 
@@ -55,7 +55,9 @@ def prior_of_family(model: LinearModel) -> float:
 
 
 def gains_of_more(model: LinearModel, background: Background, members: Members) -> dict[Background, float]:
-    """Log Bayes factors, priors included, of one covariate or family more at each of SCALES, beside a set of causes."""
+    """Log Bayes factors, priors included, of one further covariate or family at each of SCALES, jointly with a set of
+    causes.
+    """
     at = model.posterior(background, model.reduced(background).slab(members))
     active = {*model.healthy, *(name for name, _ in background.scales)}
     covariates = {name: np.arange(s.start, s.stop) for name, s in model.layout.covariates.items() if name not in active}
@@ -84,10 +86,10 @@ def _gains(gram: Floats, moment: Floats) -> Floats:
 
 
 def fit_process(groups: Sequence[Group], left: Sequence[Floats], over: str) -> SmoothProcess | None:
-    """The process over posture or time that makes residuals left (n, c), in noise floors, most likely.
+    """The most likely process over posture or time for residuals `left` (n, c), in noise floors.
 
-    Its noise is free: the residual of many causes is less than the floor. None where rows have no clock or no posture, or
-    where noise alone makes them as likely.
+    Its noise is free: the residual of many causes is less than the floor. None where rows lack a clock or a posture, or
+    where noise alone is as likely.
     """
     parts = []
     for g, r in zip(groups, left, strict=True):
@@ -114,7 +116,9 @@ def fit_process(groups: Sequence[Group], left: Sequence[Floats], over: str) -> S
 
 
 def residuals(model: LinearModel, background: Background, members: Members) -> list[Floats]:
-    """Residuals (n, c) of the fitted groups in floors, beside causes, small errors and nuisances but no discrepancy."""
+    """Residuals (n, c) of the fitted groups in floors, with causes, minor effects and nuisances fitted; discrepancy
+    stays in them.
+    """
     mean = model.posterior(background, model.reduced(background).slab(members)).mean.copy()
     for name, own in model.layout.covariates.items():
         mean[own] = mean[own] if name in model.healthy else 0.0

@@ -41,7 +41,7 @@ Members = tuple[int, ...]
 
 @dataclass(frozen=True)
 class Background:
-    """What acts beside single causes, each with its scale in floors.
+    """Noise, discrepancy and families that act jointly with single causes, each with its scale in floors.
 
     noise: factor on the noise. scales: covariates of the dictionary. families: effects at all their targets. process: a
     smooth process.
@@ -81,7 +81,7 @@ class LinearModel:
         self.candidates = tuple(self._seen(each) for each in self.candidates)
 
     def with_columns(self, kept: np.ndarray) -> LinearModel:
-        """The model in which columns of effects outside of a mask (k,) do nothing."""
+        """The model with the effect columns outside of a mask (k,) set to zero."""
         return replace(self, groups=tuple(replace(g, A=np.where(kept, g.A, 0.0)) for g in self.groups))
 
     def _seen(self, candidate: PlacedCause) -> PlacedCause:
@@ -179,7 +179,7 @@ class LinearModel:
         groups: Sequence[int] | None = None,
         absent: Sequence[int] = (),
     ) -> AmplitudePosterior:
-        """Normal distribution of all columns that take part, from some groups or all that are fitted, `absent` ones left out."""
+        """Normal distribution of all columns except `absent`, from the given groups or from all fitted ones."""
         k, data, precision = (
             self.layout.effects,
             self.total(background.process, groups),

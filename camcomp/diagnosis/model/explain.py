@@ -74,7 +74,7 @@ class Explanation:
 
     @cached_property
     def data(self) -> Reduced:
-        """The normal equations of the effects beside the background."""
+        """The normal equations of the effects under the background."""
         return self.model.reduced(self.background)
 
     def amplitudes(self) -> tuple[Floats, Floats]:
@@ -104,7 +104,7 @@ class Explanation:
 
     @property
     def columns(self) -> list[int]:
-        """Columns of the most probable set and of the families beside it."""
+        """Columns of the most probable set and of the families in the background."""
         own = {j for name, _ in self.background.families for j in self.model.family(name)[0].tolist()}
         return sorted({*own, *self.data.indices(self.members)})
 
@@ -112,7 +112,7 @@ class Explanation:
 def explain(
     model: LinearModel, noise: KnownNoise | None, start: Background | None = None, most: int = MOST
 ) -> Explanation:
-    """Sets of causes and what is unmodelled, from all groups that are fitted; start: a background to begin with."""
+    """Sets of causes and the model discrepancy, from all fitted groups; start: a background to begin with."""
     weighed: dict[Background, dict[Members, float]] = {}
 
     def search_beside(background: Background) -> Visited:

@@ -48,7 +48,9 @@ def folds_of(model: LinearModel) -> list[tuple[int, tuple[int, ...]]]:
 def held_out(
     model: LinearModel, background: Background, members: Members, folds: Sequence[tuple[int, tuple[int, ...]]]
 ) -> tuple[list[HeldOut], float]:
-    """Residuals of folds beside a set and its background, and the sum of their log predictive densities."""
+    """Residuals of folds with a set and its background fitted to their other groups, and the sum of log predictive
+    densities.
+    """
     slab = model.reduced(background).slab(members)
     out, density = [], 0.0
     for g, others in folds:

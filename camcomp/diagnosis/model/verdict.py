@@ -13,12 +13,13 @@ Word = Literal["none", "identified", "ambiguous", "unknown"]
 
 @dataclass(frozen=True, kw_only=True)
 class VerdictInputs:
-    """What a verdict hangs on.
+    """Inputs of a verdict.
 
-    unknown: probability of something unmodelled. best: probability that all causes of the best set act, others beside them
-    or not; of the empty set, that the most probable cause does not. alternatives: number of sets as good as it. causes: number
-    of causes of the best set. known_noise: whether the floor is identifiable. gap_in_noise: whether the gap is at the floor.
-    confirmed: whether groups that were not fitted bear the set out and are at their floor; None: no such group.
+    unknown: probability of model discrepancy. best: probability that all causes of the best set act, with or without
+    others; of the empty set, that the most probable cause is absent. alternatives: number of sets as good as it.
+    causes: number of causes of the best set. known_noise: whether the floor is identifiable. gap_in_noise: whether the
+    gap is at the floor. confirmed: whether withheld groups support the set and are at their floor; None: all groups are
+    fitted.
     """
 
     unknown: float

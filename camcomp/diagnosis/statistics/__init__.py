@@ -1,1 +1,1 @@
-"""Pure numerics on arrays (evidence, noise, periods, verdicts); nothing here knows a machine."""
+"""Pure numerics on arrays (evidence, noise, periods, verdicts), independent of any machine."""

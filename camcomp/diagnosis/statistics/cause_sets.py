@@ -51,7 +51,7 @@ class Fitted:
 
     @property
     def all_members(self) -> Members:
-        """The members and what is minor beside them: what the evidence is of."""
+        """The members and the minor effects fitted with them, to which the evidence belongs."""
         return tuple(sorted((*self.members, *self.minor)))
 
 
@@ -72,13 +72,13 @@ class CausePrior:
     _priors: dict[tuple[Members, Members], float] = field(default_factory=dict, init=False, repr=False)
 
     def prior(self, members: Members, minor: Members = ()) -> float:
-        """Log prior probability of a set, and of what is minor beside it; asked of the same sets again and again."""
+        """Log prior probability of a set with its minor effects; cached."""
         if (members, minor) not in self._priors:
             self._priors[members, minor] = log_sum([odds for odds, _ in self.ways(members, minor)])
         return self._priors[members, minor]
 
     def value(self, f: Fitted, temperature: float = 1.0) -> float:
-        """Log evidence of a set and what is minor beside it, tempered, + their log prior."""
+        """Tempered log evidence of a set with its minor effects, plus their log prior."""
         return f.log_evidence / temperature + self.prior(f.members, f.minor)
 
     def ways(self, members: Members, minor: Members = ()) -> list[tuple[float, list[Members]]]:
@@ -202,7 +202,7 @@ def _of_two(scale: Scale, at: Base, two: Sequence[Members]) -> Floats:
 
 
 def exchanges(scale: Scale, members: Members, candidates: Sequence[int], most: int) -> list[tuple[float, Members]]:
-    """The best sets with one member exchanged or left out, best first: screened, then scored."""
+    """The best sets with one member exchanged or omitted, best first: screened, then scored."""
     near = {tuple(x for x in members if x != i) for i in members}
     for rest in list(near):
         near |= {tuple(sorted((*rest, j))) for j in _beside(scale, rest, members, candidates)}
@@ -232,7 +232,7 @@ def parted(scale: Scale, members: Members, candidates: Sequence[int], most: int)
 
 
 def _beside(scale: Scale, rest: Members, without: Members, candidates: Sequence[int]) -> list[int]:
-    """The candidates that make sense beside a set."""
+    """The candidates outside of `without` that may act jointly with all members of a set."""
     return [j for j in candidates if j not in without and not any(scale.candidates.exclusive(j, x) for x in rest)]
 
 

@@ -1,4 +1,6 @@
-"""How much an experiment is expected to tell between hypotheses (Chaloner and Verdinelli, Statistical Science 10, 1995)."""
+"""How much information on the hypotheses is expected of an experiment? (Chaloner and Verdinelli, Statistical Science
+10, 1995)
+"""
 
 from __future__ import annotations
 

@@ -33,7 +33,7 @@ class SpectralLine:
 
 
 def _trend(x: Floats, signs: Floats | None) -> Floats:
-    """Columns (n, k) of what is smooth in x (n,), apart for each direction of travel."""
+    """Columns (n, k) of polynomials in x (n,), separate for each direction of travel."""
     span = max(float(np.ptp(x)), 1e-9)
     u = 2.0 * (x - x.min()) / span - 1.0
     powers = u[:, None] ** np.arange(_TREND)
@@ -41,7 +41,9 @@ def _trend(x: Floats, signs: Floats | None) -> Floats:
 
 
 def _spectrum(y: Floats, x: Floats, frequencies: Floats, trend: Floats) -> tuple[Floats, float]:
-    """Energy (f,) that sines of x at each frequency explain of y (n,) beside the trend, and the energy there is."""
+    """Energy (f,) that sines of x at each frequency explain in y (n,) after the trend is removed, and the total
+    energy.
+    """
     Q, _ = np.linalg.qr(trend)
     rest = y - Q @ (Q.T @ y)
     found = [np.zeros(0)]
@@ -144,7 +146,7 @@ def _finer(y: Floats, x: Floats, tried: Floats, best: int, trend: Floats) -> flo
 
 
 def _wave(y: Floats, x: Floats, f: float) -> complex:
-    """Amplitude and phase of the sine at frequency f in y (n,) over x (n,), beside a trend."""
+    """Amplitude and phase of the sine at frequency f in y (n,) over x (n,), fitted jointly with a trend."""
     columns = np.column_stack([np.sin(2 * np.pi * f * x), np.cos(2 * np.pi * f * x), _trend(x, None)])
     a = np.linalg.lstsq(columns, y, rcond=1e-9)[0]
     return complex(a[0], a[1])

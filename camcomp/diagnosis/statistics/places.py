@@ -38,7 +38,7 @@ class RunGap:
 
 
 def shares(values: Mapping[str, float]) -> dict[str, float]:
-    """Values as shares of their sum, rounded to 4 places; all zero when there is nothing to share."""
+    """Values as shares of their sum, rounded to 4 places; all zero when the sum is zero."""
     whole = sum(max(v, 0.0) for v in values.values())
     return {k: round(max(v, 0.0) / whole, 4) if whole > 0 else 0.0 for k, v in values.items()}
 
@@ -166,7 +166,7 @@ def _behind(x: Floats, sign: Floats) -> Floats:
 
 
 def places(runs: Sequence[RunGap], most: int = 6) -> list[dict[str, object]]:
-    """Parts of the workspace (thirds of what was visited, per axis) where the gap stands out of the noise, by share."""
+    """Regions of the workspace (thirds of the visited range, per axis) where the gap exceeds the noise, by share."""
     tips = np.concatenate([r.tip for r in runs])
     low, span = tips.min(axis=0), np.ptp(tips, axis=0)
     parts = np.where(span > 1.0, 3, 1)

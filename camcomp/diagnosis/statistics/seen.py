@@ -1,4 +1,4 @@
-"""How far apart two foreseen logs are, less what no model gets right."""
+"""How far apart are two predicted logs, beyond the error of any model?"""
 
 import numpy as np
 
@@ -6,9 +6,9 @@ from camcomp.ground.datatypes import Floats
 
 
 def seen_apart(signals: Floats, left: Floats, hidden: float, large: float) -> float:
-    """Chi-square of white rows left (w,) beyond what no model gets right of signals (w, 2), however many rows there are.
+    """Chi-square of white rows `left` (w,) beyond the model error of signals (w, 2), for any number of rows.
 
-    hidden, in units of the noise: what nobody believes of signals `large` times as large.
+    hidden: model error, in units of the noise, of signals `large` times the noise.
     """
     own = np.max(signals**2, axis=1) / large**2
     return max(float((left**2).sum()) - hidden**2 * (len(left) + float(own.sum())), 0.0)

@@ -21,10 +21,10 @@ class SoughtShape:
 
 
 def shape_log_evidence(groups: Iterable[Sequence[int]], sought: Mapping[int, Sequence[SoughtShape]]) -> float:
-    """Log of how much of the likelihood at the best shapes is left in the mean over all shapes that were possible, <= 0.
+    """Log of the ratio of the likelihood averaged over all shapes to that at the best shapes, at most 0.
 
-    Laplace's approximation, every logarithm within its range being as likely. groups: candidates of one origin, whose shapes
-    are alike: normal about a common value, with deviation ALIKE_LOG.
+    Laplace's approximation with a uniform prior of every logarithm in its range. groups: candidates of one origin,
+    whose shapes are normal about a common value with deviation ALIKE_LOG.
     """
     out = 0.0
     for group in groups:
