@@ -19,10 +19,10 @@ from camcomp.compensation.program.corrected_rows import CorrectedRows, corrected
 from camcomp.compensation.program.judged_points import (
     JudgedPoints,
     Seen,
+    commanded_travel,
     judged_points,
     see,
     see_original,
-    told_travel,
     whole_pose,
 )
 from camcomp.compensation.program.load_turns import load_turns
@@ -332,7 +332,7 @@ def _compensated(
     )  # fmt: skip
     told = points.along(written.end, replace(rows.arcs, centre=written.centre))
     share = None if shares is None else shares.of_ends(track, rows.piece, rows.w, rows.joining)
-    as_told = replace(points, travel=told_travel(points, orienting, written.words))
+    as_told = replace(points, travel=commanded_travel(points, orienting, written.words))
     bands = bands_of(job, track, rows=rows, points=as_told, told=told, before=before, after=after, share=share)
     return replace(
         done, bands=bands, left=None if left is None else left[points.judged], orienting=orienting,

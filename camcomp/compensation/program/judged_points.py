@@ -111,7 +111,7 @@ def see(
     return Seen(tip - points.target, state.status, tip[points.end], Correction(**at))
 
 
-def told_travel(points: JudgedPoints, orienting: Orienting | None, words: Floats | None) -> Travel:
+def commanded_travel(points: JudgedPoints, orienting: Orienting | None, words: Floats | None) -> Travel:
     """The travel with the orientation that words (N, 3) of the end points command; None: as programmed."""
     if orienting is None or words is None:
         return points.travel
@@ -120,7 +120,7 @@ def told_travel(points: JudgedPoints, orienting: Orienting | None, words: Floats
 
 
 def _see_oriented(job: Job, points: JudgedPoints, told: Floats, orienting: Orienting, words: Floats) -> Seen:
-    row, travel = points.row, told_travel(points, orienting, words)
+    row, travel = points.row, commanded_travel(points, orienting, words)
     assert travel.rotation is not None
     tip, state = respond(job, told, travel, points.target, before=points.before)
     wanted = points.travel.rotation

@@ -105,7 +105,7 @@ def job_figures(job: Job) -> dict[str, Any]:
     return {"force": Force(model=force.model, engagement=force.engagement, text=force.text), **said}
 
 
-_CONTROL_ADDS = "with what the control's merging and rounding adds, beside joining lines, too, and without what a policy leaves on purpose"
+_CONTROL_ADDS = "with the contour error of the controller, also next to joining lines; errors that the policy accepts are subtracted"
 # Figures that a compensation and a verification share.
 ControlMode = Annotated[
     str, Field(description="path modes in which the program cuts: G61, G61.1, G64 with P and Q in mm")

@@ -56,7 +56,8 @@ class FarOff:
         lines = ", ".join(str(line) for line in sorted(line for _, line in self.um[:MOST_LINES]))
         more = " ..." if len(self.um) > MOST_LINES else ""
         plural = "s" if len(self.um) > 1 else ""
-        return [f"in {mode} the control goes up to {self.um[0][0]:.1f} um off{what}: source line{plural} {lines}{more}"]
+        off = f"in {mode} the controller drives up to {self.um[0][0]:.1f} um off the written path{what}"
+        return [f"{off}: source line{plural} {lines}{more}; a smaller tolerance of the path mode reduces it"]
 
 
 def warnings_of(modes: tuple[PathMode, ...], beside: FarOff, elsewhere: FarOff) -> list[str]:
@@ -64,7 +65,7 @@ def warnings_of(modes: tuple[PathMode, ...], beside: FarOff, elsewhere: FarOff) 
     if not all(each.stated for each in modes):
         return []
     mode = mode_name(modes)
-    return beside.told(mode, " beside joining lines") + elsewhere.told(mode, "")
+    return beside.told(mode, " next to joining lines") + elsewhere.told(mode, "")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -208,9 +209,8 @@ def rest_warning(resting: int, exact_stop: str = "G61") -> list[str]:
     """Warning of exact stops that were written because of joining lines."""
     if not resting:
         return []
-    return [
-        f"{exact_stop} at {resting} ends of cuts and joining lines, so that the control does not round these corners"
-    ]
+    where = f"at {resting} end{'s' if resting > 1 else ''} of cuts and joining lines"
+    return [f"{exact_stop} is written {where}: the controller stops there instead of rounding; nothing to do"]
 
 
 def apart_pays(moves: ToolMoves, cut: Bools, limits: ControlLimits, tolerance_um: float) -> bool:
@@ -230,7 +230,9 @@ def apart_pays(moves: ToolMoves, cut: Bools, limits: ControlLimits, tolerance_um
 def apart_warning(modes: Iterable[PathMode]) -> list[str]:
     """Warning of codes that keep lines from being merged in these path modes."""
     said = ", ".join(mode.apart.name for mode in distinct(modes))
-    return [f"{said} around the cuts, so that the control does not make one line of several"] if said else []
+    return (
+        [f"{said} is written around the cuts: the controller does not merge lines there; nothing to do"] if said else []
+    )
 
 
 def distinct(modes: Iterable[PathMode]) -> tuple[PathMode, ...]:

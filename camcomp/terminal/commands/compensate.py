@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from camcomp.api.machine import StockChoice
 
 LEAST_TILT_MRAD = 0.005  # below it the two decimals show none
+LEAST_FIGURE = 1e-9  # mm, rad, N or N mm: smaller figures are rounding errors of zero
 
 
 @click.command()
@@ -119,7 +120,7 @@ def _told(figures: "Summary") -> list[str]:
         f"largest correction at an actuator {_either(*changes)}, largest drive load {_either(*efforts)}",
     ]
     if (tilt := figures.platform_tilt_max_mrad) >= LEAST_TILT_MRAD:
-        lines.append(f"platform tilt under load {tilt:.2f} mrad, not corrected by words X Y Z")
+        lines.append(f"platform tilt under load {tilt:.2f} mrad; a program without orientation words cannot correct it")
     if joins := figures.joining_lines:
         lines.append(f"{joins} joining lines where the cutting force jumps; not counted in the tip error")
     if taken := figures.taken:
@@ -142,6 +143,6 @@ def _told(figures: "Summary") -> list[str]:
 
 
 def _either(*figures: tuple[float | None, str]) -> str:
-    """The figures that are not zero, with their units; a machine may have slides, hinges or both."""
-    parts = [f"{most:.4g} {unit}" for most, unit in figures if most]
+    """The figures that are not zero but for rounding, with their units; a machine may have slides, hinges or both."""
+    parts = [f"{most:.4g} {unit}" for most, unit in figures if most and most > LEAST_FIGURE]
     return " and ".join(parts) or "0"

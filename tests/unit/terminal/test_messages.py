@@ -7,10 +7,12 @@ from types import SimpleNamespace
 import pytest
 
 from camcomp.api import diagnosis
+from camcomp.compensation.program.under_control import rest_warning
 from camcomp.compensation.report.page import _caution
 from camcomp.ground.files import shipped
 from camcomp.terminal.cli import run
 from camcomp.terminal.commands import _figures
+from camcomp.terminal.commands.compensate import _either
 
 CARTESIAN = ("--config", str(shipped("config/cartesian.yaml")))
 SQUARE = "G21 G90 G17 G94\nT1 M6\nG43 H1\nS8000 M3\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X10 F600\nG1 Y10\nX0\nY0\nG0 Z5\nM30\n"
@@ -81,3 +83,17 @@ def test_a_report_that_passes_by_its_model_alone_says_so():
     assert _caution(figures(0.9, False), 1.0) == ""
     assert "up to 95" in _caution(figures(95.0, False), 1.0) and "path_mode" in _caution(figures(95.0, False), 1.0)
     assert "see the warnings" in _caution(figures(95.0, True), 1.0)
+
+
+def test_rounding_errors_of_zero_are_printed_as_zero():
+    assert _either((5.027e-88, "N"), (None, "Nmm")) == "0"
+    assert _either((330.94, "N"), (1e-12, "Nmm")) == "330.9 N"
+
+
+def test_exact_stops_that_were_written_need_no_action():
+    (said,) = rest_warning(1)
+    assert (
+        said
+        == "G61 is written at 1 end of cuts and joining lines: the controller stops there instead of rounding; nothing to do"
+    )
+    assert "at 2 ends" in rest_warning(2)[0] and rest_warning(0) == []
