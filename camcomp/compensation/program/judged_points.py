@@ -142,14 +142,19 @@ def whole_pose(job: Job, points: JudgedPoints, commanded: Floats, on: Bools, sta
     """The state with joint commands that bring tip and orientation to the target, for machines with six actuators.
 
     Words X Y Z can carry the correction of the tip only, and leave the platform tilted under load; the joint table can
-    carry both. commanded (k, 3) mm: tips of the written program at the points, program frame; on (N,): end points to
-    correct. The tilt of the state stays that of the written program.
+    carry both. Set-points go straight between the rows of the table, so only end points of corrected feed moves are aimed.
+    commanded (k, 3) mm: tips of the written program at the points, program frame; on (N,): end points to correct. The
+    tilt of the state stays that of the written program.
     """
     if len(job.machine.actuators) != 6 or not on.any():
         return state
     on = on[points.row]
-    exact = aim_pose(job, commanded, points.target, points.travel, on, before=points.before)
-    solved = np.flatnonzero((exact.status == 0) & on & points.end)
+    taken = np.flatnonzero(points.end | ~points.judged | ~on)
+    row, on, end = points.row[taken], on[taken], points.end[taken]
+    exact = aim_pose(
+        job, commanded[taken], points.target[taken], points.travel.take(taken), on, before=points.before
+    )  # fmt: skip
+    solved = np.flatnonzero((exact.status == 0) & on & end)
     rho, drive = state.rho.copy(), state.drive.copy()
-    rho[points.row[solved]], drive[points.row[solved]] = exact.rho[solved], exact.drive[solved]
+    rho[row[solved]], drive[row[solved]] = exact.rho[solved], exact.drive[solved]
     return replace(state, rho=rho, drive=drive)

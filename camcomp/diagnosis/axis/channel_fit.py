@@ -183,7 +183,7 @@ def _explained(
     sd: float,
 ) -> _Linear:  # fmt: skip
     kinds = {kind: np.concatenate([data.healthy[k][kind] for k in data.train]) for kind in data.healthy[0]}
-    unit = {kind: sd / (np.sqrt(np.mean(own**2, axis=0)) + 1e-300) for kind, own in kinds.items()}
+    unit = {kind: _shares(sd, np.sqrt(np.mean(own**2, axis=0))) for kind, own in kinds.items()}
     ends = _ends(data)
     groups = []
     for k in data.train:
@@ -217,6 +217,11 @@ def _explained(
     )
     values = search_sets(model.reduced(Background()), CAUSES).values
     return _Linear(model, posterior_of(model, {Background(): values}), unit)
+
+
+def _shares(sd: float, size: Floats) -> Floats:
+    """Ratio of sd to the size of every column (k,); 0 for a column that is 0, as of an axis that stands still."""
+    return np.divide(sd, size, out=np.zeros_like(size), where=size > 0.0)
 
 
 def _ends(data: ChannelData) -> dict[str, tuple[float, float]]:
