@@ -67,7 +67,7 @@ def test_a_code_moves_as_its_control_does_or_is_refused(dialect):
 
 
 def test_the_tables_cover_the_shelf():
-    assert set(MODES) == set(members("dialects")) - {"krl", "rapid"}  # robot languages have no codes
+    assert set(MODES) == set(members("dialects")) - {"fanuc_ls", "krl", "rapid"}  # robot languages have no codes
 
 
 @pytest.mark.parametrize("block", ["G5.1 Q1", "G8 P1", "G187 P1", "G23", "G67", "G11", "G5 P10000", "G113"])
@@ -83,3 +83,10 @@ def test_what_fanuc_and_its_kin_do_with_a_code_stands_in_the_message(code):
     with pytest.raises(ProgramError) as caught:
         motions("fanuc", f"{code} X5. Y6.")
     assert caught.value.rule in ("CC106", "CC120", "CC124") and "turning" not in str(caught.value)
+
+
+@pytest.mark.parametrize("code", ["G31", "G38", "G38.2"])
+def test_sinumerik_has_no_code_of_probing(code):
+    with pytest.raises(ProgramError, match="is not a code that Siemens Sinumerik") as caught:
+        motions("sinumerik", f"{code} X5 Y6 Z-2")
+    assert caught.value.rule == "CC106"
