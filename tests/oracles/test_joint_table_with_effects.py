@@ -51,6 +51,7 @@ OFTEN = {("kuka-kr210", each) for each in ("joint_offset", "drive_stiffness", "c
 OFTEN |= {
     ("orthoglide", "cutting_force"),
     ("hexapod", "joint_offset"),
+    ("hexapod", "servo_lag"),
     ("cartesian", "backlash"),
     ("cartesian", "servo_lag"),
 }
@@ -92,7 +93,7 @@ def late(x, time, line, constant):
         stops = line[after] not in (line[i], SMOOTHLY) or (
             after > i and time[after] == time[i]
         )  # so does a joining line
-        if dt > 0 and not stops and (line[i] == line[i - 1] or line[i] == SMOOTHLY):
+        if dt > 0 and not stops:
             behind = constant * (x[i] - x[i - 1]) / dt
             out[i] = x[i] - behind + (out[i - 1] - x[i - 1] + behind) * np.exp(-dt / constant)
     return out

@@ -218,15 +218,11 @@ def aim_pose(
     if not job.causes:
         drive = np.where(on[:, None], exact.drive, np.nan)
         return replace(exact, rho=rho, drive=drive)
-    rings = bool(signal_path.acting(job.causes, "control"))
-    if rings:  # the words lead the loop already: only the turn of the platform is added
-        along = inverse(job.real_machine, without_drives(job, target, travel).commanded)
-        rho[on] += (inverse(job.real_machine, told) - along)[on]
-    elif on.any():
+    if on.any():
         rho[on] -= _lost_motion(job, exact.rho[on], exact.drive[on], travel.take(np.flatnonzero(on)))
     rates = np.nan_to_num(_rates(job, job.frame.to_machine(target)))
     aimed = job.correctable
-    share, least, near = 1.0, np.inf, rho
+    share, least, near, rings = 1.0, np.inf, rho, bool(signal_path.acting(job.causes, "control"))
     for _ in range(MAX_AIM_STEPS):
         tip, state = respond(aimed, commanded, travel, target, before=before, rho=rho)
         left = np.column_stack((job.frame.vectors(target - tip), -state.tilt))
