@@ -31,7 +31,7 @@ STRETCHES_OF_ONE = 4  # that a run holds, at least; it differs from the next one
 
 
 def unknown(axis: AxisFindings, whole: int) -> UnknownCause:
-    """What is left: its share of the gap, not of the leftover, as for every cause. Even odds where nothing shows it."""
+    """The unknown cause of an axis: its share of the gap, and its probability (even odds where no test shows it)."""
     shares = []
     for channel in axis.channels:
         left, first = float(np.mean(channel.last)), max(float(np.mean(channel.first)), 1e-300)
@@ -88,7 +88,7 @@ def _rms(values: Floats) -> float:
 
 
 def where(found: Sequence[AxisFindings], causes: Sequence[FoundCause]) -> Where:
-    """Shares of axes; what leftovers depend on, and when they stand out."""
+    """Shares of axes; covariates of the residuals, and the intervals in which they exceed the floor."""
     known = [c for c in causes if not isinstance(c, UnknownCause)]
     energy = {a.name: float(np.mean(c.first)) for a in found if (c := a.following or a.force) is not None}
     total = max(sum(energy.values()), 1e-300)
@@ -156,7 +156,7 @@ def shrinkage(judged: Sequence[Sequence[AxisFindings]], names: Sequence[str], ti
 
 
 def _unseen(judged: Sequence[Sequence[AxisFindings]], tip: TipMotion, *, explained: bool) -> list[Floats] | None:
-    """Distances (n,) mm of the tip per fit, on the runs that it has not seen; None where no set-points were logged."""
+    """Distances (n,) mm of the tip per fit, on its withheld runs; None where the logs lack set-points."""
     out = []
     for found in judged:
         runs = held_errors(found, explained=explained)
@@ -167,7 +167,7 @@ def _unseen(judged: Sequence[Sequence[AxisFindings]], tip: TipMotion, *, explain
 
 
 def _actuators_unseen(judged: Sequence[Sequence[AxisFindings]]) -> dict[str, ActuatorShrinkage]:
-    """Sizes of every actuator's errors on unseen runs, without and with what was found."""
+    """Rms errors of every actuator on withheld runs, without and with the causes."""
     out = {}
     for name in dict.fromkeys(a.name for found in judged for a in found if a.following is not None):
         axes = [a for found in judged for a in found if a.name == name and a.following is not None]

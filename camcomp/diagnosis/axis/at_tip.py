@@ -93,7 +93,7 @@ def whole_errors(found: Sequence[AxisFindings]) -> dict[str, Errors]:
 
 
 def held_errors(found: Sequence[AxisFindings], *, explained: bool) -> dict[str, Errors]:
-    """The same of runs that were not fitted, without their constant or with all that was found."""
+    """Errors of withheld runs by run and axis, minus their constant or minus the fitted model."""
     out: dict[str, dict[str, tuple[Floats, Floats]]] = {}
     for a, channel, sign in _channels(found):
         for k, values in (channel.held if explained else channel.held_whole).items():

@@ -39,10 +39,10 @@ class Series:
 
 
 def series(times: Sequence[Floats], values: Sequence[Floats], telling: int | None = None) -> Series:
-    """Blocks of equal stretches of every run's time; where there are four runs or more, their whole run is left out for them.
+    """Blocks of equal stretches of every run's time; with four runs or more, a block's whole run is withheld with it.
 
-    Stretches, for an axis may stand in most of the runs. telling: how many of the runs it moves in, all where not given; the
-    others foretell nothing of one that is left out.
+    Stretches are of time, since an axis may stand still in most of a run. telling: number of runs in which the axis
+    moves, all by default; only these predict a withheld run.
     """
     y = np.concatenate(list(values))
     run = np.concatenate([np.full(len(t), k) for k, t in enumerate(times)])
@@ -109,7 +109,9 @@ def leftover(data: Series, A: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class Gain:
-    """What a term adds: mean log ratio of rms on withheld blocks, that mean over its standard error, and how many blocks."""
+    """Gain of a term: mean log ratio of rms on withheld blocks, that mean over its standard error, and number of
+    blocks.
+    """
 
     log_ratio: float
     z: float
@@ -147,7 +149,7 @@ def log10_chance(found: Gain, tried: int = 1) -> float:
 
 
 def fit(data: Series, A: Floats) -> tuple[Floats, Floats]:
-    """Coefficients (k,) and their covariance (k, k), robust against anything that is alike within a block.
+    """Coefficients (k,) and their covariance (k, k), robust against correlation within a block.
 
     Source: Liang, Zeger, Biometrika 73 (1986) 13, with the usual correction for the number of blocks.
     """

@@ -1,4 +1,6 @@
-"""What a channel of an axis is made of: columns over its motion, how terms prove themselves, and what is left against the floor."""
+"""Which columns over its motion explain a channel of an axis, which terms help withheld blocks, and is the residual at
+the floor?
+"""
 
 from __future__ import annotations
 
@@ -86,7 +88,9 @@ def table_of(moves: list[AxisTravel]) -> Callable[..., Floats]:
 
 
 def turning(data: Series, table: Any) -> Turning:
-    """How friction turns round, by withheld blocks; what is shorter than sampled comes out as a step."""
+    """Shape of friction at a reversal (distance or speed), by withheld blocks; a shape below the sampling gives a
+    step.
+    """
     return min(TURNINGS, key=lambda how: float(np.mean(np.log(np.maximum(withheld(data, table(how)), 1e-300)))))
 
 
@@ -96,7 +100,7 @@ def holds(g: Gain) -> bool:
 
 
 def helps(g: Gain) -> bool:
-    """The same for what an effect that is at work may have as well: a little surely will do."""
+    """Whether a term that a known effect may include helps: a small significant gain suffices."""
     return g.z > ALIKE_Z and g.log_ratio > LEAST_SHARE
 
 
@@ -124,9 +128,10 @@ def close(
     moves: list[AxisTravel],
     unsure: Mapping[int, Floats] | None = None,
 ) -> None:
-    """Leftovers of the channel and their gate; where runs are held out, sizes are of what is left there, not of withheld blocks.
+    """Compute the residuals of the channel and judge them against the floor, on held-out runs where there are any, else
+    on withheld blocks.
 
-    unsure: what rows (n,) of runs are not known to, by the run's number, beside what the laws of inertia and friction are not.
+    unsure: uncertainty of rows (n,) by run number, in addition to that of inertia and friction.
     """
     A = table(channel.runs, *columns)
     c = solved(data, A)
@@ -164,12 +169,12 @@ def close(
 
 
 def not_known(own: Floats) -> Floats:
-    """What a force (n,) N by inertia and friction is not known to, row by row: its size, and when within a row."""
+    """Uncertainty (n,) N of a force (n,) N by inertia and friction: its size, and the instant within a row."""
     return np.asarray(np.hypot(KNOWN * own, within_a_row(own)))
 
 
 def within_a_row(own: Floats) -> Floats:
-    """What values (n,) are not known to, row by row, where the instant of a row is not; at a peak of one row, too."""
+    """Uncertainty (n,) of values (n,) by the unknown instant within a row, at a peak of one row as well."""
     steps = np.abs(np.diff(own))
     return np.asarray(WITHIN * np.maximum(np.append(steps, 0.0), np.insert(steps, 0, 0.0)))
 
@@ -184,7 +189,7 @@ def _beside_law(
     c: Floats,
     unsure: Mapping[int, Floats],
 ) -> list[Floats]:
-    """Leftovers (n,) by run without what their law is not known to."""
+    """Residuals (n,) by run, scaled down by the uncertainty of the law of inertia and friction."""
     out = []
     for left, k in zip(rows, runs, strict=True):
         law = np.hypot(unsure.get(k, np.zeros(1)), not_known(table([k], *columns[1:]) @ c[1:]))
@@ -193,7 +198,7 @@ def _beside_law(
 
 
 def _carried(found: AxisFindings, channel: AxisChannel, moves: list[AxisTravel], c: Mapping[Column, float]) -> float:
-    """What the noise of what is taken for the motion, resolution included, does to a channel by way of speed and acceleration."""
+    """Noise of a channel by the position noise of its motion, resolution included, through speed and acceleration."""
     noise, wide, late = [found.carried.noise[k] for k in channel.runs], found.carried.wide, found.carried.late
     gains = [noise_gains(float(np.median(np.diff(moves[k].time))), wide, late) for k in channel.runs]
     push = c.get(acceleration, 0.0) + 1e-3 * c.get(inertia, 0.0)

@@ -1,4 +1,4 @@
-"""What the drive force of an axis is made of: moving mass, friction, pushes that last for a while, and what nobody states."""
+"""Which terms make up the drive force of an axis: moving mass, friction, disturbance forces, and unmodelled terms."""
 
 from __future__ import annotations
 
@@ -72,10 +72,10 @@ def force_of(
     test: list[int],
     without: set[str],
 ) -> AxisFindings:
-    """What was found on the axis, with its drive force; what pushed it for a while goes first.
+    """The findings of the axis with its drive force; disturbance forces are removed first.
 
-    Other stretches tell nothing of a push: the rows that it lasts for have to follow it, and little of what was left may be
-    left beside it.
+    Other stretches do not predict a disturbance force: the rows of its interval have to follow it, and it has to
+    explain most of their residual.
     """
     rows = [r.moved() for r in runs]
     runs = [r.of(on) for r, on in zip(runs, rows, strict=True)]
@@ -126,14 +126,18 @@ def force_of(
 
 
 def _left_of(channel: AxisChannel) -> dict[int, Floats]:
-    """What is left of every run, fitted or held out, by its number: a push is of its own run and foretells nothing."""
+    """Residuals of every fitted or held-out run by its number; a disturbance force belongs to one run and predicts no
+    other.
+    """
     return dict(zip(channel.runs, channel.left, strict=True)) | channel.held
 
 
 def _window(
     channel: AxisChannel, pushes: Sequence[Window], forces: Sequence[Floats], moves: Sequence[AxisTravel]
 ) -> tuple[Window, Floats] | None:
-    """The push that explains most of what all else, and other pushes, leave, as `find_window` has it."""
+    """The disturbance force that explains most of the residual of all other terms and disturbance forces, as
+    `find_window` gives it.
+    """
     values = {k: _without(pushes, k, forces[k]) for k in _left_of(channel)}
     ends = np.cumsum([len(m.time) for m in channel.moves])[:-1]
     beside = dict(zip(channel.runs, np.split(channel.beside, ends), strict=True))
@@ -143,7 +147,7 @@ def _window(
 def _next_push(
     channel: AxisChannel, pushes: Sequence[Window], forces: Sequence[Floats], moves: Sequence[AxisTravel]
 ) -> Window | None:
-    """One more push; None where nothing stands out, or a place may be it."""
+    """One further disturbance force; None where its interval is unclear or a function of position explains it."""
     found = _window(channel, pushes, forces, moves)
     if found is None:
         return None
@@ -163,7 +167,7 @@ def _placed(
 
 
 def _beyond(found: AxisFindings) -> float:
-    """Mean square of what is left of the drive force beyond its floor."""
+    """Mean square of the residual of the drive force beyond its floor."""
     channel = found.force
     if channel is None:
         return 0.0
@@ -259,7 +263,7 @@ def _forced(
 
 
 def _force_of(push: Window, rows: int) -> Floats:
-    """What a push adds to the forces (n,) of its run."""
+    """Force (n,) N that a disturbance adds to the rows of its run."""
     out = np.zeros(rows)
     out[push.first : push.last] = push.shift
     return out
@@ -330,10 +334,10 @@ def _refused(
     length: Turning,
     floor: float,
 ) -> None:
-    """Terms that nobody states, tried on withheld blocks; those that hold are part of the unknown.
+    """Unmodelled terms, tried on withheld blocks; accepted ones are part of the unknown.
 
-    They have to hold where rows count for less that inertia and friction are not known for to the floor, too, and beside all that
-    friction may have, whether or not it has shown.
+    They have to help also where rows with uncertain inertia and friction have less weight, and jointly with all terms
+    of friction.
     """
     if speed in columns and either_way not in columns:
         columns = [*columns, either_way]

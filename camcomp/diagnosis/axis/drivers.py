@@ -1,4 +1,6 @@
-"""What the leftovers of an axis depend on: its own motion, the way it goes, time, or how another axis moves."""
+"""On which covariates do the residuals of an axis depend: its own motion, its direction, time, or the motion of another
+axis?
+"""
 
 from __future__ import annotations
 

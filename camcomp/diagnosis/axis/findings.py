@@ -1,4 +1,4 @@
-"""Runs of one axis, and what was found on it, channel by channel."""
+"""Runs of one axis, and its findings channel by channel."""
 
 from __future__ import annotations
 
@@ -114,7 +114,9 @@ class AxisRun:
         return replace(self, time=time)
 
     def away_from_gaps(self) -> AxisRun:
-        """The run with rows beside lost ones unseen: nobody knows how fast it was there. All are seen where gaps are the rule."""
+        """The run with the rows next to missing ones masked, since their speed is unknown; unmasked where that would
+        mask most rows.
+        """
         gaps = np.flatnonzero(missing_rows(self.time))
         near = np.zeros(len(self.time), bool)
         for gap in gaps:
@@ -152,7 +154,7 @@ class AxisRun:
 
 @dataclass(frozen=True)
 class AxisDeviation:
-    """What an experiment states of its instruments; None where it says nothing."""
+    """Standard deviations of the instruments as the experiment states them; None where unstated."""
 
     encoder_mm: float | None = None
     force_N: float | None = None
@@ -197,7 +199,7 @@ class AxisChannel:
 
 @dataclass(frozen=True, eq=False)
 class Carried:
-    """Noise (mm per run) of what is taken for the motion, and how cubics and a loop's lateness (s, of set-points) hand it on."""
+    """Position noise per run (mm), and how differentiation and loop lag (s, of set-points) propagate it."""
 
     noise: list[float]
     wide: int
@@ -206,7 +208,7 @@ class Carried:
 
 @dataclass(eq=False, kw_only=True)
 class AxisFindings:
-    """What was found on one axis."""
+    """Findings of one axis."""
 
     name: str
     stated: AxisDeviation
@@ -233,5 +235,5 @@ class AxisFindings:
 
     @property
     def strange(self) -> bool:
-        """Whether something is left that no effect states."""
+        """Whether the residual shows an unmodelled effect."""
         return bool(self.ripple or self.unknown_in or any(c.gate and c.gate.word == "above" for c in self.channels))

@@ -55,10 +55,10 @@ def follow(
     found: AxisFindings, runs: list[AxisRun], moves: list[AxisTravel], gaps: list[Floats], *, train: list[int], test: list[int],
     without: set[str],
 ) -> AxisFindings:  # fmt: skip
-    """What was found on the axis, with the channel of the following error and its causes; test: runs that are judged only.
+    """The findings of the axis with the channel of the following error and its causes; test: held-out runs.
 
-    Inertia in the loop is what every axis has. A loop that swings over takes its place where it explains more, or where
-    something is left beside inertia and nothing beside it.
+    Inertia in the loop is a nuisance. An oscillating loop replaces it where it explains more, or where the residual
+    exceeds the floor with inertia and stays within it with the loop.
     """
     floor = found.stated.encoder_mm or float(np.hypot(scatter_of([runs[k] for k in train]), REPEATABILITY_MM))
     swung = (
@@ -152,7 +152,7 @@ def _followed(
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class _Lag:
-    """A lag beside other columns: its own columns, what they leave of withheld blocks, and what that gains."""
+    """A lag fitted jointly with other columns: its columns, its residual on withheld blocks, and its gain."""
 
     columns: list[Column]
     last: Floats
@@ -165,7 +165,7 @@ class _Lag:
 def _lag(
     data: Series, table: Callable[..., Floats], train: list[int], base: Sequence[Column], floor: float
 ) -> _Lag | None:
-    """Whether an axis is late, beside friction that turns round; None where it is not, or early: no loop is."""
+    """Lag of an axis, fitted jointly with reversing friction; None where it is zero or negative."""
     length = turning(data, lambda d: table(train, speed, *reversed(base), lambda m: m.reversal(d)))
 
     def turn(m: AxisTravel) -> Floats:
@@ -199,7 +199,9 @@ def _lag(
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class _Swung:
-    """A loop that swings over, and the rows that tell of it: runs without how their loops were before the log began."""
+    """An oscillating loop, and the rows that determine it: runs without their first rows, where the loop is still
+    settling.
+    """
 
     swing: Swing
     spread: tuple[float, float]
@@ -211,7 +213,7 @@ class _Swung:
     better: bool = False  # than inertia in the loop
 
     def error(self, m: AxisTravel) -> Floats:
-        """What the loop makes of the set-points of a run."""
+        """Following error (n,) mm of the loop in a run."""
         return next(error for each, error in zip(self.moves, self.errors, strict=True) if each is m)
 
 

@@ -1,4 +1,4 @@
-"""What is left of a channel of an axis against its floor: in size, and in stretches of time."""
+"""Does the residual of a channel of an axis exceed its floor, in size or within intervals of time?"""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ LEAST_ROWS = 20  # of a stretch
 
 @dataclass(frozen=True)
 class Interval:
-    """A stretch of a run's time in which more is left than elsewhere: its share of the leftover's energy."""
+    """An interval of a run's time with a larger residual than elsewhere, and its share of the residual's energy."""
 
     run: int
     t0: float
@@ -49,10 +49,10 @@ class AxisGate:
 def judge(
     inside: Sequence[Floats], left: Sequence[Floats], times: Sequence[Floats], floor: float, offset: float = 0.0
 ) -> AxisGate:
-    """Leftovers (n,) mm or N per run against a floor. left, times: of rows that were not fitted; offset: constant by which a run
-    may differ from the others, which is repeatability.
+    """Judge residuals (n,) mm or N per run against a floor.
 
-    inside: where everything is fitted. What goes away then is what the rows leave open, and no unknown.
+    left, times: of withheld rows. inside: residuals with all rows fitted; a residual that vanishes then was
+    undetermined by the rows, and no unknown effect. offset: repeatability, the constant by which runs may differ.
     """
     inside, left = ([each - np.clip(each.mean(), -offset, offset) for each in part] for part in (inside, left))
     own = inside if [len(each) for each in inside] == [len(each) for each in left] else None

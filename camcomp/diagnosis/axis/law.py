@@ -1,7 +1,8 @@
-"""A law for what is left of an axis: the forms of drives over its travel, added one by one while withheld stretches gain.
+"""Which law does the residual of an axis follow: the forms of drives over its travel, added one by one while withheld
+stretches gain.
 
-The drive force shows it over the encoder, in N. Where the following error shows the same over the set-points, that part is in
-mm and can be put into a machine file.
+The drive force shows it over the encoder, in N. Where the following error shows the same over the set-points, that part
+is in mm and can be put into a machine file.
 """
 
 from __future__ import annotations
@@ -45,7 +46,7 @@ LEFT = 1e-4  # of a column's energy beside the others, below which it says nothi
 
 @dataclass(frozen=True, eq=False)
 class _Rows:
-    """Covariates (n,) by name of all rows of a channel, and what stands beside a law."""
+    """Covariates (n,) by name of all rows of a channel, and the base columns that are fitted jointly with a law."""
 
     data: Series
     base: Floats  # (n, k)
@@ -62,7 +63,7 @@ class _Rows:
         return withheld(self.data, np.concatenate([self.base, self.columns(forms)], axis=1))
 
     def rms(self, forms: Sequence[Form]) -> float:
-        """Of the same, all rows alike."""
+        """Rms residual of a joint fit of base and forms to all rows."""
         left = leftover(self.data, np.concatenate([self.base, self.columns(forms)], axis=1))
         return float(np.sqrt(np.mean(left**2)))
 
@@ -70,7 +71,7 @@ class _Rows:
 def axis_law(
     name: str, force: AxisChannel | None, following: AxisChannel | None, told: Sequence[AxisTravel]
 ) -> Law | None:
-    """The law of what the channels of an axis leave, mm; told: the travel of its set-points, per run of the following error."""
+    """The law of the residuals of an axis, mm; told: the travel of its set-points, per run of the following error."""
     own = [each for each in (force, following) if each is not None]
     if not own:
         return None
@@ -125,12 +126,14 @@ def _holds(g: Gain, tried: int) -> bool:
 
 
 def _size(g: Gain, before: Floats) -> float:
-    """Rms of what a form takes from withheld stretches."""
+    """Rms that a form explains on withheld stretches."""
     return float(np.sqrt(max(1.0 - np.exp(-2.0 * g.log_ratio), 0.0) * np.mean(before)))
 
 
 def _waves(rows: _Rows, chosen: Sequence[Form], moves: Sequence[AxisTravel]) -> tuple[list[Form], int]:
-    """The strongest period over the travel, alike both ways and each way its own, and how many periods were tried."""
+    """The strongest period over the travel, in common for both directions and separate for each, and the number of
+    periods tried.
+    """
     A = np.concatenate([rows.base, rows.columns(chosen)], axis=1)
     left = rows.data.y - A @ solve(A, rows.data.y)
     line = ripple(list(moves), np.split(left, np.cumsum([len(m.time) for m in moves])[:-1]))
@@ -154,7 +157,7 @@ def _waves(rows: _Rows, chosen: Sequence[Form], moves: Sequence[AxisTravel]) -> 
 
 
 def _leaders(rows: _Rows, chosen: Sequence[Form], library: Sequence[Form]) -> list[Form]:
-    """The best form of every kind by what it explains of all rows, with the shape that they ask for."""
+    """The form of every kind that explains most of all rows, with its shape refined."""
     left, clean = _beside(rows, chosen)
     X = rows.columns(library)
     own = np.einsum("nc,nc->c", X, X)

@@ -90,14 +90,14 @@ def motion_of(
 
 
 def _usual(m: AxisTravel) -> Floats:
-    """What every axis has (n, 4): a constant, inertia, and something with the speed and its sense."""
+    """Terms of every axis (n, 4): a constant, inertia, speed, and the sign of speed."""
     return np.stack([np.ones_like(m.time), 1e-3 * m.acceleration, m.speed, np.sign(m.speed)], axis=1)
 
 
 def _misfit(runs: list[AxisRun], values: list[Floats], moves: list[AxisTravel]) -> float:
-    """Mean absolute value of what is left of a channel's changes when those of what every axis has are fitted to them.
+    """Mean absolute residual of a channel's changes after a fit of the changes of the usual terms.
 
-    Changes and absolute values: a push for a while must not weigh more than how the corners of a motion are met.
+    Changes and absolute values keep a disturbance force from outweighing the corners of a motion.
     """
     changes = [
         _changes(r.time[r.clear], np.column_stack([_usual(m)[:, 1:], y])[r.clear])

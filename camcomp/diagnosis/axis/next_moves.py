@@ -45,7 +45,7 @@ _MEANS = {
 def next_moves(
     found: Sequence[AxisFindings], runs: Mapping[str, Sequence[AxisRun]], verdict: str
 ) -> NextExperiment | None:
-    """Strokes of the axis that has most left; None where machine and model agree, or no axis moved."""
+    """Strokes of the axis with the largest residual; None where machine and model agree, or all axes stood still."""
     if verdict not in (UNKNOWN, "ambiguous"):
         return None
     asked = [a for a in found if a.strange] or found  # something unknown is asked of the axes that show it
@@ -92,7 +92,7 @@ def _left(axis: AxisFindings) -> float:
 
 
 def _designed(axis: AxisFindings, logs: Sequence[AxisRun], verdict: str) -> tuple[AxisMoves, float] | None:
-    """Strokes and what they tell, bits."""
+    """Strokes and their expected information, bits."""
     if not logs:
         return None
     seen = [travel(run.time, run.encoder, axis.wide) for run in logs]
@@ -150,7 +150,7 @@ def _weights(axis: AxisFindings, verdict: str) -> dict[str, float]:
 
 
 def _depends_on(axis: AxisFindings) -> list[tuple[str, str, float]]:
-    """Kind of covariate, of which axis, and the share of the leftover that goes with it."""
+    """Kind of covariate, its axis, and the share of the residual that depends on it."""
     parted = [(name.partition(":"), share) for name, share in axis.unknown_in]
     return [(kind, of, share) for (kind, _, of), share in parted]
 
@@ -168,9 +168,9 @@ def _blocks(low: float, high: float, fastest: float, hardest: float) -> Iterator
 
 
 def _apart(moves: AxisMoves, kinds: Sequence[str], bins: Mapping[str, Floats], size: float) -> Floats:
-    """Chi-square (r, r) by which hypothesis j misses a leftover of `size` floors that is a function of i.
+    """Chi-square (r, r) by which hypothesis j misses a residual of `size` floors that is a function of i.
 
-    bins: between which values of a covariate, as the runs had them, a function is level. A stretch of time counts once.
+    bins: limits between which a function of a covariate is constant, from the runs. A stretch of time counts once.
     """
     time, place = set_points(moves)
     some = np.unique(np.linspace(0, len(time) - 1, ROWS).astype(int))
@@ -205,7 +205,7 @@ def _steps(values: Floats, edges: Floats) -> Floats:
 
 
 def _way(start: float, end: float, speed: float, acceleration: float, step: float) -> Floats:
-    """Set-points (n,) from rest to rest, trapezoidal in speed."""
+    """Set-points (n,) of one stroke between standstills, trapezoidal in speed."""
     length = abs(end - start)
     if length == 0.0:
         return np.zeros(0)

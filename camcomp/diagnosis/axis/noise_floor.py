@@ -34,10 +34,10 @@ def rows_floor(channels: Sequence[Floats]) -> float:
 
 
 def spikes(y: Floats, least: float) -> np.ndarray:
-    """Mask (n,) of rows that stand out of what is before and behind them alike, by SPIKE deviations, `least` and any step.
+    """Mask (n,) of rows above or below both neighbourhoods by more than SPIKE deviations, `least`, and any usual step.
 
-    A row's deviation is that of its neighbours, and at least its resolution: what stands flickers by that. None where they are
-    many.
+    A row's deviation is that of its neighbours, and at least the resolution, by which a standing axis flickers. The
+    mask is empty where such rows are many.
     """
     rows = np.flatnonzero(np.isfinite(y))
     out = np.zeros(len(y), bool)

@@ -40,12 +40,14 @@ def check_axes(log: str, runs: Mapping[str, AxisRun], cutting: bool = False) -> 
 
 
 def _moves(setpoint: Floats, encoder: Floats) -> bool:
-    """Whether set-points or encoder go so far that noise is small beside it: what stands says nothing of units and columns."""
+    """Whether the travel of set-points or encoder is large against noise; otherwise units and columns cannot be
+    checked.
+    """
     return bool(max(_spread(setpoint), _spread(encoder)) > TRAVELS * rows_floor([encoder]) > 0.0)
 
 
 def _spread(values: Floats) -> float:
-    """How far values (n,) spread, without the few that are no measurement."""
+    """Range of values (n,) between the quantiles of MIDDLE, without outliers."""
     return float(np.ptp(np.quantile(values, MIDDLE)))
 
 
@@ -103,7 +105,7 @@ def _check_size(log: str, name: str, run: AxisRun, cutting: bool) -> None:
 
 
 def _moved_kg(at: AxisTravel, force: Floats) -> float:
-    """The mass that drive forces (n,) N move, kg; 0 where the rows do not tell it from a force that goes with the position.
+    """The mass that drive forces (n,) N move, kg; 0 where the rows do not separate inertia from a force over position.
 
     On a circle at one speed acceleration is a multiple of position, and so is the cutting force.
     """

@@ -112,14 +112,14 @@ def _step(values: Floats, inside: Bools, outside: Bools) -> float:
 
 
 def _seen(base: Floats, first: int, last: int) -> Floats:
-    """What a basis (n, k) leaves of a push of 1 in a window (n,)."""
+    """A unit disturbance force in a window (n,) minus its projection on a basis (n, k)."""
     push = np.zeros(len(base))
     push[first:last] = 1.0
     return np.asarray(push - base @ base[first:last].sum(axis=0))
 
 
 def _alone(rest: Floats, base: Floats, first: int, last: int) -> tuple[float, Floats]:
-    """Size of a window, fitted together with a basis (n, k), and what the basis then leaves of its run (n,)."""
+    """Size of a window, fitted jointly with a basis (n, k), and the run (n,) minus the basis part of that fit."""
     inside = base[first:last].sum(axis=0)
     shift = float(rest[first:last].sum() / max(last - first - float(inside @ inside), 1e-300))
     return shift, np.asarray(rest + shift * (base @ inside))
@@ -160,7 +160,7 @@ def _at_ends(first: int, last: int, time: Floats) -> Bools:
 
 
 def sharp(window: Window, rest: Floats, time: Floats) -> bool:
-    """Whether leftovers (n,) N of the window's run jump at both of its ends, neither of them an end of the run."""
+    """Whether residuals (n,) N of the window's run jump at both of its ends, and both lie inside the run."""
     reach = max(round(SHARP_S / float(np.median(np.diff(time)))), 2)
     if window.first < reach or window.last + reach > len(rest):
         return False

@@ -67,7 +67,7 @@ def studied(
     stated: AxisDeviation | None = None,
     robot: Robot | None = None,
 ) -> tuple[DiagnosisResult, list[AxisFindings]]:
-    """As study, with what the result was drawn from."""
+    """The result of `study`, with the findings of all axes."""
     outliers: set[tuple[str, int]] = set()
     found, cleaned = [], {}
     names = sorted({r.name for runs in axes.values() for r in runs})
@@ -138,7 +138,7 @@ def _nothing_below_the_floor(axis: AxisFindings) -> None:
 
 
 def _verdict(found: Sequence[AxisFindings]) -> Any:
-    """The word; where the rows are too few to show that nothing is left, nothing is said to be identified."""
+    """The verdict; `ambiguous` where too few rows show the residual to be at the floor."""
     if any(a.strange for a in found):
         return "unknown"
     if any(c.gate is None or c.gate.word != "at" for a in found for c in a.channels):
@@ -207,9 +207,9 @@ def _slide(
 
 
 def _limited(found: AxisFindings, rows: JointRows, around: AxisSurroundings, without: set[str]) -> AxisFindings:
-    """What was found with a largest speed of the drive in the place of other causes, where that explains nearly all.
+    """The findings with a largest speed of the drive in place of other causes, where it explains nearly the whole gap.
 
-    Anything takes a part of something unknown: what leaves much of it may be no more than that.
+    Any cause explains a part of an unknown effect: one with a large residual may be no more than that.
     """
     follows = found.following
     if follows is None or follows.gate is None or follows.gate.word == "at" or "speed_limit" in without:
@@ -298,8 +298,8 @@ def _judged(
 
 
 def _name_rest(found: AxisFindings, runs: Sequence[AxisRun], others: Mapping[str, Sequence[AxisRun]]) -> None:
-    """What leftovers above the floor depend on, where nothing else says so; a lag that differs between the ways without friction
-    that does.
+    """Name covariates of residuals above the floor that lack one; a lag that differs by direction without such friction
+    is a covariate.
     """
     if found.one_way and not any("asymmetry_Ns_per_mm" in c.parameters for c in found.causes):
         found.unknown_in.append((f"velocity:{found.name}", 1.0 - float(np.exp(-2.0 * found.one_way.log_ratio))))
@@ -325,7 +325,9 @@ def _name_rest(found: AxisFindings, runs: Sequence[AxisRun], others: Mapping[str
 
 
 def _of_time(channel: AxisChannel, period: float) -> bool:
-    """Whether waves of a period mm over the position leave most of what stands out in time."""
+    """Whether waves of a period mm over the position fail to explain most of the residual inside the gate's
+    intervals.
+    """
     x = np.concatenate([m.position for m in channel.moves])
     A = np.stack([wave(2.0 * np.pi * x / period) for wave in (np.ones_like, np.sin, np.cos)], axis=1)
     left = np.concatenate(channel.left)

@@ -36,11 +36,11 @@ class Swing:
     late: float = 0.0
 
     def error(self, run: AxisRun) -> Floats:
-        """Set-point minus encoder (n,) mm of a run, without what a lag behind the loop adds."""
+        """Set-point minus encoder (n,) mm of a run, without the contribution of a lag behind the loop."""
         return -self._swings(run, self.late)
 
     def led(self, run: AxisRun) -> Floats:
-        """What the loop makes of the set-points (n,) mm of a run; what a lag makes of that is left out."""
+        """Output (n,) mm of the loop for the set-points of a run, without a lag."""
         return np.asarray(run.setpoint + self._swings(run, 0.0))
 
     def _swings(self, run: AxisRun, late: float) -> Floats:
@@ -64,7 +64,7 @@ class Swing:
         return any(abs(np.log(value / end)) < STEP for value, end in ends)
 
     def settled(self, run: AxisRun) -> Bools:
-        """Rows (n,) that no longer show what the axis did before its log began."""
+        """Rows (n,) after the loop's response to motion before the log has decayed."""
         w, d = 2.0 * np.pi / self.period, self.damping
         slowest = w * (d if d < 1.0 else d - np.sqrt(d * d - 1.0))
         return np.asarray(run.time > run.time[0] + SETTLES / slowest)
@@ -73,10 +73,10 @@ class Swing:
 def find_swing(
     runs: Sequence[AxisRun], gaps: Sequence[Floats], moves: Sequence[AxisTravel], late: float = 0.0
 ) -> tuple[Swing, tuple[float, float], float]:
-    """The loop that explains following errors (n,) mm best beside a constant and a lag, deviations of its period and damping,
-    and the mean square mm2 that is left.
+    """The loop that explains following errors (n,) mm best jointly with a constant and a lag, the deviations of its
+    period and damping, and the mean square residual, mm2.
 
-    Source of the deviations: robust against what is alike within a stretch, as in `block_least_squares.fit`.
+    Source of the deviations: robust against correlation within a stretch, as in `block_least_squares.fit`.
     """
     grid = [Swing(period, damping, late) for period in PERIODS_S for damping in DAMPINGS]
     every = [np.ones(len(run.time), bool) for run in runs]
@@ -105,7 +105,7 @@ def find_swing(
 def _rest(
     swing: Swing, runs: Sequence[AxisRun], gaps: Sequence[Floats], moves: Sequence[AxisTravel], rows: Sequence[Bools]
 ) -> Floats:
-    """What a loop leaves of some rows, with a constant and a lag beside it."""
+    """Residual of some rows after a joint fit of a loop, a constant and a lag."""
     each = zip(runs, gaps, rows, strict=True)
     y = np.concatenate([(gap - swing.error(run))[on] for run, gap, on in each])
     beside = np.concatenate(

@@ -1,4 +1,4 @@
-"""What the following error and the drive force of one axis may be made of."""
+"""Which terms may make up the following error and the drive force of one axis?"""
 
 from __future__ import annotations
 
@@ -103,8 +103,8 @@ def strangers(at: AxisTravel, how: Turning) -> dict[str, tuple[str, Floats]]:
 
 @dataclass(frozen=True, kw_only=True)
 class Ripple:
-    """A line in the leftover over position: period mm, amplitude (both directions), share of the leftover's energy; how many
-    periods were tried.
+    """A line in the residual over position: period mm, amplitude (both directions), share of the residual's energy,
+    number of periods tried.
     """
 
     period: float
@@ -116,9 +116,10 @@ class Ripple:
 
 
 def ripple(at: list[AxisTravel], left: list[Floats], shortest: float = 0.5, longest: float = 60.0) -> Ripple | None:
-    """The strongest line over position, where it stands out and both directions of travel show it alike.
+    """The strongest line over position that is significant and equal in both directions of travel, else None.
 
-    Periods are scanned evenly in frequency, finer than the travel resolves. Lines that only one direction shows are none.
+    Periods are scanned evenly in frequency, finer than the travel resolves. A line in one direction alone does not
+    count.
     """
     x = np.concatenate([t.position for t in at])
     y = np.concatenate(left)
