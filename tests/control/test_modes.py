@@ -112,7 +112,7 @@ def test_lines_are_kept_from_being_made_one(orthoglide, mode):
     apart = mode.partition(" Q")[0] + " Q0"
     text = done.written.data.decode().splitlines()
     assert done.control.apart and done.control.off_joins < 2e-3
-    assert any(each.startswith(f"{apart} around the cuts") for each in done.warnings)
+    assert any(each.startswith(f"{apart} is written around the cuts") for each in done.warnings)
     assert apart in text[text.index(mode, 5) :] and apart in text[: text.index(mode, 5)]
     read = read_program(done.written.data, name="out.nc", setup=setup_of(orthoglide.config))
     cuts = np.flatnonzero(done.rows.force.any(axis=1) & (done.rows.motion != done.rows.motion[0]))
