@@ -44,10 +44,10 @@ from camcomp.diagnosis.result.types import (
     UnseenShrinkage,
     Where,
 )
-from camcomp.diagnosis.search.beside import ROWS_OF_AN_INSTANT
 from camcomp.diagnosis.search.cause_search import CauseSearch, search_causes
 from camcomp.diagnosis.search.established import LEAST_PROBABILITY
 from camcomp.diagnosis.search.indistinguishable import classes, likeness
+from camcomp.diagnosis.search.kept_causes import ROWS_OF_AN_INSTANT
 from camcomp.diagnosis.search.unexplained import size_um, worst
 from camcomp.diagnosis.search.unknown import firm_prior, residual_tests
 from camcomp.diagnosis.standards import of_runs

@@ -11,9 +11,9 @@ from camcomp.diagnosis.fit.bench import Bench, CandidateCause
 from camcomp.diagnosis.fit.open_problem import open_problem
 from camcomp.diagnosis.law.answer import _base, answer_law
 from camcomp.diagnosis.law.bench_terms import Spot, Term
-from camcomp.diagnosis.law.beside import with_law
 from camcomp.diagnosis.law.folds import usual_split
 from camcomp.diagnosis.law.forms import at_tip
+from camcomp.diagnosis.law.joint_law import with_law
 from camcomp.diagnosis.law.law_answer import term_bench
 from camcomp.diagnosis.law.library import LearnedLaw
 from camcomp.diagnosis.law.shapes import Shapes

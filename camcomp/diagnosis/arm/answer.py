@@ -45,7 +45,7 @@ from camcomp.diagnosis.result.types import (
 from camcomp.ground.datatypes import Floats
 
 MINOR = 0.3  # of the floor: an effect that moves the tip less is no cause
-FAINT = 0.01  # of the floor: an effect that moves the tip less is not listed
+MIN_LISTED_FLOORS = 0.01  # of the floor: an effect that moves the tip less is not listed
 PLACES = 8  # parts of the workspace
 REPEATS = 20  # poses to be visited again: a floor known to a sixth
 STRETCHES = 16  # of a campaign's time
@@ -53,11 +53,11 @@ SHORTEST = 12  # poses in a stretch
 FALSE = 0.01  # of the stretches and places that are named
 CLEAR = 3.0  # log evidence from which on the gap depends on a covariate: odds of 20
 MOST_DRIVERS = 6  # that are listed
-POSES_MAP, BESIDE_MAP = "poses", "poses beside unknown"  # kinds of log of the calibration
+POSES_MAP, UNKNOWN_MAP = "poses", "poses beside unknown"  # kinds of log of the calibration
 
 
 @dataclass(frozen=True, eq=False)
-class Told:
+class AnswerInputs:
     """Inputs of an answer; gaps (n, 3) mm of the fitted campaigns to the arm of the config."""
 
     case: PoseCase
@@ -79,7 +79,7 @@ class Told:
     @property
     def kind(self) -> str:
         """The calibration map of causes."""
-        return BESIDE_MAP if self.unmodelled > EVEN else POSES_MAP
+        return UNKNOWN_MAP if self.unmodelled > EVEN else POSES_MAP
 
     @cached_property
     def rest(self) -> list[Floats]:
@@ -125,7 +125,7 @@ class _Part:
     probability: float
 
 
-def causes(told: Told) -> tuple[tuple[FoundCause, ...], tuple[MinorEffect, ...]]:
+def causes(told: AnswerInputs) -> tuple[tuple[FoundCause, ...], tuple[MinorEffect, ...]]:
     """Causes of the most probable set in falling probability, and those too small to be causes."""
     whole = sum(float((gap**2).sum()) for gap in told.gaps)
     rows = sum(len(gap) for gap in told.gaps)
@@ -135,7 +135,7 @@ def causes(told: Told) -> tuple[tuple[FoundCause, ...], tuple[MinorEffect, ...]]
         energy = energy_of(told, part.columns)
         size = 1e3 * float(np.sqrt(energy / rows))
         if told.floor is not None and size < MINOR * told.floor.um:
-            if size >= FAINT * told.floor.um:
+            if size >= MIN_LISTED_FLOORS * told.floor.um:
                 minor.append(MinorEffect(effect=part.effect, target=part.target, size_um=_round(size)))
             continue
         cause = FoundCause(
@@ -150,7 +150,7 @@ def causes(told: Told) -> tuple[tuple[FoundCause, ...], tuple[MinorEffect, ...]]
     return tuple(out), tuple(minor)
 
 
-def _parts(told: Told) -> list[_Part]:
+def _parts(told: AnswerInputs) -> list[_Part]:
     found, columns = told.case.explanation, told.case.shelf.columns
     own = [_Part(c.effect, c.target, list(c.columns), found.places[c.place])
            for c in (found.model.candidates[i] for i in found.members)]  # fmt: skip
@@ -167,14 +167,14 @@ def _parts(told: Told) -> list[_Part]:
     return own
 
 
-def energy_of(told: Told, on: Sequence[int]) -> float:
+def energy_of(told: AnswerInputs, on: Sequence[int]) -> float:
     """Sum of squares, mm2, of what columns move the tips by, frames fitted."""
     case = told.case
     groups = [case.model.groups[k] for k in case.bench.own]
     return sum(float((without_nuisances(g.A[:, :, on] @ case.amount[on], g.N) ** 2).sum()) for g in groups)
 
 
-def parameters_of(told: Told, on: Sequence[int]) -> dict[str, Estimate]:
+def parameters_of(told: AnswerInputs, on: Sequence[int]) -> dict[str, Estimate]:
     """Parameters of columns with their intervals."""
     out = {}
     wide = 1.96 * calibration_of(told.kind).interval
@@ -188,7 +188,7 @@ def parameters_of(told: Told, on: Sequence[int]) -> dict[str, Estimate]:
     return out
 
 
-def _curve(told: Told, cause: FoundCause, on: Sequence[int]) -> CurveCause:
+def _curve(told: AnswerInputs, cause: FoundCause, on: Sequence[int]) -> CurveCause:
     """The cause with the curve of its joint."""
     case = told.case
     found = curve_of(case.bench, [case.shelf.columns[j] for j in on], case.amount[on], case.covariance[np.ix_(on, on)])
@@ -217,7 +217,7 @@ def _curve(told: Told, cause: FoundCause, on: Sequence[int]) -> CurveCause:
     return out
 
 
-def verdict(told: Told, named: Sequence[FoundCause]) -> Any:
+def verdict(told: AnswerInputs, named: Sequence[FoundCause]) -> Any:
     """The word of the result."""
     calibrate = calibration_of(told.kind).calibrate
     floor = told.floor
@@ -233,7 +233,7 @@ def verdict(told: Told, named: Sequence[FoundCause]) -> Any:
     return decide(inputs)
 
 
-def _best(told: Told, calibrate: Callable[[float], float]) -> float:
+def _best(told: AnswerInputs, calibrate: Callable[[float], float]) -> float:
     """Probability that all causes of the best set act; of the empty set, that the most probable cause does not."""
     found = told.case.explanation
     if not found.members:
@@ -242,11 +242,11 @@ def _best(told: Told, calibrate: Callable[[float], float]) -> float:
     return calibrate(sum(p for m, p in found.sets if own <= set(_places(told, m))))
 
 
-def _places(told: Told, members: Sequence[int]) -> list[tuple[str, str | None]]:
+def _places(told: AnswerInputs, members: Sequence[int]) -> list[tuple[str, str | None]]:
     return [told.case.shelf.candidates[i].place for i in members]
 
 
-def with_unknown(told: Told, named: tuple[FoundCause, ...], word: str) -> tuple[FoundCause, ...]:
+def with_unknown(told: AnswerInputs, named: tuple[FoundCause, ...], word: str) -> tuple[FoundCause, ...]:
     """The causes of a verdict: none for `none`; with the unknown cause where something unmodelled is, or nothing is named."""
     if word == "none":
         return ()
@@ -257,7 +257,7 @@ def with_unknown(told: Told, named: tuple[FoundCause, ...], word: str) -> tuple[
     return named
 
 
-def alternatives(told: Told, named: Sequence[FoundCause]) -> tuple[tuple[NamedCause, ...], ...]:
+def alternatives(told: AnswerInputs, named: Sequence[FoundCause]) -> tuple[tuple[NamedCause, ...], ...]:
     """Sets that are indistinguishable by the poses, the best first; a lone set gets itself plus an unknown effect as
     its rival.
     """
@@ -270,7 +270,7 @@ def alternatives(told: Told, named: Sequence[FoundCause]) -> tuple[tuple[NamedCa
 # -- where ------------------------------------------------------------------------------------------------------------
 
 
-def where(told: Told, word: str) -> Where:
+def where(told: AnswerInputs, word: str) -> Where:
     """Shares of axes and actuators; for an unknown cause its covariates, and the intervals and regions above the
     noise.
     """
@@ -297,7 +297,7 @@ def where(told: Told, word: str) -> Where:
     )
 
 
-def drivers(told: Told, intervals: Sequence[IntervalShare]) -> tuple[Driver, ...]:
+def drivers(told: AnswerInputs, intervals: Sequence[IntervalShare]) -> tuple[Driver, ...]:
     """Covariates of the residual with the share of its energy that each explains alone, the most first.
 
     Where none is clear: time where stretches of it stand out, else the covariate that explains most.
@@ -331,7 +331,7 @@ def _energy(parts: Sequence[Floats]) -> float:
     return sum(float((r**2).sum()) for r in parts)
 
 
-def _energy_beside(told: Told, background: Background) -> float:
+def _energy_beside(told: AnswerInputs, background: Background) -> float:
     """Energy of the residual, in floors, with a further covariate fitted."""
     model, found = told.case.model, told.case.explanation
     at = model.posterior(background, model.reduced(background).slab(found.members))
@@ -363,7 +363,7 @@ def standing_out(size: Floats, groups: Sequence[np.ndarray]) -> list[int]:
     return out
 
 
-def _intervals(told: Told) -> tuple[IntervalShare, ...]:
+def _intervals(told: AnswerInputs) -> tuple[IntervalShare, ...]:
     """Stretches of a run's time in which the residual is larger than elsewhere."""
     whole = max(_energy(told.rest), 1e-300)
     out = []
@@ -382,7 +382,7 @@ def _intervals(told: Told) -> tuple[IntervalShare, ...]:
     return tuple(sorted(out, key=lambda each: -each.share))
 
 
-def _places_above(told: Told) -> tuple[PlaceShare, ...]:
+def _places_above(told: AnswerInputs) -> tuple[PlaceShare, ...]:
     """Parts of the workspace, boxes in the machine frame, in which the residual is larger than elsewhere."""
     bench = told.case.bench
     point = np.concatenate([bench.standing(bench.campaigns[k], ()).hung.point for k in bench.own])
@@ -403,7 +403,7 @@ def _places_above(told: Told) -> tuple[PlaceShare, ...]:
 # -- what to measure next -----------------------------------------------------------------------------------------------
 
 
-def next_experiment(told: Told, word: str) -> NextExperiment | None:
+def next_experiment(told: AnswerInputs, word: str) -> NextExperiment | None:
     """The most informative poses, as a campaign of their own; repeats where the floor is unknown."""
     if word in ("none", "identified"):
         return None
@@ -441,7 +441,7 @@ def next_experiment(told: Told, word: str) -> NextExperiment | None:
     )
 
 
-def _second_campaign(told: Told, q: Floats, place: Floats) -> NextExperiment:
+def _second_campaign(told: AnswerInputs, q: Floats, place: Floats) -> NextExperiment:
     """Other postures, where there is one campaign only: within it, effects stand in for each other."""
     sets_of = [_places(told, m) for m in told.alternatives()]
     effects = list(dict.fromkeys(effect for each in sets_of for effect, _ in each))
@@ -458,7 +458,7 @@ def _second_campaign(told: Told, q: Floats, place: Floats) -> NextExperiment:
     )
 
 
-def _again(told: Told) -> NextExperiment:
+def _again(told: AnswerInputs) -> NextExperiment:
     """Repeats: every other quantile of the poses there are, in an order that does not stay in one place."""
     effects = [*dict.fromkeys(p.effect for p in told.parts), UNKNOWN]
     campaign = told.case.bench.campaigns[0]
@@ -477,7 +477,7 @@ def _again(told: Told) -> NextExperiment:
     )
 
 
-def _listed(told: Told, q: Floats, place: Floats) -> PosesToMeasure:
+def _listed(told: AnswerInputs, q: Floats, place: Floats) -> PosesToMeasure:
     return PosesToMeasure(
         joints=told.case.bench.actuators,
         positions=tuple(tuple(round(float(v), 6) for v in row) for row in q),

@@ -20,7 +20,7 @@ from camcomp.model.statics.description import Robot
 
 SAME_POSE = 1e-3  # rad or m between two visits of one pose; the model turns the rest of the way into mm
 LEAST_VISITS = 10  # beyond the first ones; fewer know a deviation to no better than a fifth
-SWAYS = 8  # slow waves in time: how an instrument wanders over a campaign
+DRIFT_WAVES = 8  # slow waves in time: how an instrument wanders over a campaign
 ENOUGH = 4.0  # visits per wave from which on they are told from noise
 FAR = 8.0  # medians: no noise reaches so far, beams that were cut do
 IN_A_ROW = 3  # poses far off: something lasts
@@ -118,7 +118,7 @@ def _repeated(robot: Robot, campaigns: Sequence[Poses], gaps: Sequence[Floats], 
         order[np.argsort(each.time, kind="stable")] = np.arange(len(each.q))
         visits = _near(visits_of(robot, each), gap)
         again = [rows for rows in visits if np.ptp(order[rows]) > len(rows) - 1]
-        anew += _beside_sways(again, gap, order)
+        anew += _minus_drift(again, gap, order)
         stood = [rows for rows in visits if np.ptp(order[rows]) == len(rows) - 1]
         still += [(_square(gap[rows]), len(rows) - 1.0) for rows in stood]
     return _scatter(anew, "repeats", quiet) or _scatter(still, "rest", quiet)
@@ -134,19 +134,19 @@ def _square(values: Floats) -> float:
     return float(((values - values.mean(axis=0)) ** 2).sum())
 
 
-def _beside_sways(visits: Sequence[np.ndarray], gap: Floats, order: np.ndarray) -> list[tuple[float, float]]:
+def _minus_drift(visits: Sequence[np.ndarray], gap: Floats, order: np.ndarray) -> list[tuple[float, float]]:
     """(Sum of squares, degrees of freedom) of gaps (n, 3) within visits of one pose, with slow waves of all rows in
     time removed.
     """
     more = sum(len(rows) - 1 for rows in visits)
-    if more < ENOUGH * SWAYS:
+    if more < ENOUGH * DRIFT_WAVES:
         return [(_square(gap[rows]), len(rows) - 1.0) for rows in visits]
-    waves = np.cos(np.pi * np.arange(1, SWAYS + 1) * ((order + 0.5) / len(order))[:, None])
+    waves = np.cos(np.pi * np.arange(1, DRIFT_WAVES + 1) * ((order + 0.5) / len(order))[:, None])
     left = np.concatenate([gap[rows] - gap[rows].mean(axis=0) for rows in visits])
     basis = np.concatenate([waves[rows] - waves[rows].mean(axis=0) for rows in visits])
     left = left - basis @ np.linalg.lstsq(basis, left, rcond=1e-9)[0]
     parts = np.split(left, np.cumsum([len(rows) for rows in visits])[:-1])
-    share = 1.0 - SWAYS / more  # of the freedom is left
+    share = 1.0 - DRIFT_WAVES / more  # of the freedom is left
     return [(float((each**2).sum()), share * (len(each) - 1)) for each in parts]
 
 

@@ -18,8 +18,8 @@ from camcomp.diagnosis.arm.linear import Shelf, linearise
 from camcomp.diagnosis.arm.noise_floor import StatedDeviation, TipFloor, far_off, least_floor, resolution, tip_floor
 from camcomp.diagnosis.arm.pose_values import of_poses
 from camcomp.diagnosis.arm.poses import ArmBench, Poses, combined
-from camcomp.diagnosis.arm.spells import EFFECT as SPELL
-from camcomp.diagnosis.arm.spells import spells
+from camcomp.diagnosis.arm.temporary_offsets import EFFECT as SPELL
+from camcomp.diagnosis.arm.temporary_offsets import temporary_offsets
 from camcomp.diagnosis.arm.unseen import check_held_out, notes_of_frames, shrinkage, without_far_judged
 from camcomp.diagnosis.model.discrepancy import residuals
 from camcomp.diagnosis.model.evidence import Background
@@ -96,7 +96,7 @@ def cleaned(
     """
     bench = ArmBench(robot=robot, causes=causes, campaigns=campaigns, fitted=fitted)
     shelf = Shelf.of([*bench.columns(without), *bench.shaped(without), *bench.waves(without)])
-    left = beside_richest(bench, shelf)
+    left = residuals_of_richest(bench, shelf)
     outliers: list[tuple[str, int]] = []
     weights = []
     for k, rest in enumerate(left):
@@ -110,7 +110,7 @@ def cleaned(
     return ArmBench(robot=robot, causes=causes, campaigns=campaigns, fitted=fitted), shelf, outliers, weights
 
 
-def beside_richest(bench: ArmBench, shelf: Shelf) -> list[Floats]:
+def residuals_of_richest(bench: ArmBench, shelf: Shelf) -> list[Floats]:
     """Residuals (n, 3) mm of every campaign after a ridge fit of all single effects at once, at their usual sizes."""
     plain = shelf.without_shapes()
     model = linearise(ArmBench(robot=bench.robot, causes=bench.causes, campaigns=bench.campaigns), plain, 1.0)
@@ -124,7 +124,7 @@ def noise_of_richest(bench: ArmBench, shelf: Shelf, weights: Sequence[Floats]) -
     """Noise, mm per coordinate, for an experiment that states none: the residual of the richest model per degree of
     freedom.
     """
-    left = beside_richest(bench, shelf)[: len(bench.own)]
+    left = residuals_of_richest(bench, shelf)[: len(bench.own)]
     values = sum(r.size for r in left)
     used = len(shelf.without_shapes().columns) + 9 * len(left)
     square = sum(float(((r / w[:, None]) ** 2).sum()) for r, w in zip(left, weights, strict=False))
@@ -145,7 +145,7 @@ def explained(
     doubtful = found.unknown > 1.0 - EVEN or len(found.members) >= MANY
     if SPELL in without or not (doubtful or noise is None):
         return shelf, found
-    more = with_spells(bench, shelf, found)
+    more = with_temporary_offsets(bench, shelf, found)
     if len(more.columns) == len(shelf.columns):
         return shelf, found
     again = relinearised(bench, more, sd, noise, weights)
@@ -169,7 +169,7 @@ def relinearised(
     return found
 
 
-def with_spells(bench: ArmBench, shelf: Shelf, found: Explanation) -> Shelf:
+def with_temporary_offsets(bench: ArmBench, shelf: Shelf, found: Explanation) -> Shelf:
     """The candidates plus the likeliest temporary offset per joint and campaign, in the residuals of the empty set and
     of the fitted set.
     """
@@ -179,7 +179,7 @@ def with_spells(bench: ArmBench, shelf: Shelf, found: Explanation) -> Shelf:
     out = shelf
     for members in dict.fromkeys(((), found.members)):
         rest = [r * model.groups[k].sd for k, r in enumerate(residuals(model, Background(), members))]
-        columns, own = spells(bench, rest, frames, joints, len(out.columns))
+        columns, own = temporary_offsets(bench, rest, frames, joints, len(out.columns))
         new = [k for k, column in enumerate(columns) if column not in out.columns]
         own = [replace(own[k], columns=(len(out.columns) + i,)) for i, k in enumerate(new)]
         out = out.with_more([columns[k] for k in new], own)
@@ -317,7 +317,7 @@ def studied(
     case = without_far_judged(case)
     check = check_held_out(case)
     progress.done(0.8)
-    told = answer.Told(case, check, gaps[: len(bench.own)])
+    told = answer.AnswerInputs(case, check, gaps[: len(bench.own)])
     named, minor = answer.causes(told)
     word = answer.verdict(told, named)
     named = answer.with_unknown(told, named, word)

@@ -39,7 +39,7 @@ from camcomp.ground.datatypes import Floats
 STANDS = 0.01  # of its longest way in a run: in one in which it goes less an axis stands
 LEFT = 0.2  # of what was beyond the floor: more than that beside causes, and they may be a part of something else
 WITHIN = 0.5  # rows: force and motion of one row are not known to be of one instant to better than that
-ALIKE_Z = 2.0  # the same, below which two ways of turning round are alike
+MIN_DIFFERENCE_Z = 2.0  # the same, below which two ways of turning round are alike
 KNOWN = 0.01  # of the constants of a loop, and of friction: no law of them is better than that
 
 
@@ -101,7 +101,7 @@ def holds(g: Gain) -> bool:
 
 def helps(g: Gain) -> bool:
     """Whether a term that a known effect may include helps: a small significant gain suffices."""
-    return g.z > ALIKE_Z and g.log_ratio > LEAST_SHARE
+    return g.z > MIN_DIFFERENCE_Z and g.log_ratio > LEAST_SHARE
 
 
 def probability_of(g: Gain) -> float:

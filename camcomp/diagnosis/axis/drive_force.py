@@ -41,8 +41,8 @@ from camcomp.diagnosis.axis.friction import (
     as_good,
     brakes,
     friction_of,
-    not_known_beside,
     second_distance,
+    uncertainty_of_friction,
 )
 from camcomp.diagnosis.axis.gate import MINOR
 from camcomp.diagnosis.axis.noise_floor import rows_floor
@@ -227,7 +227,7 @@ def _forced(
 
             alike = as_good(data, turned, length.distance) if length.speed is None else []
             lengths = around(alike) if alike else [length.distance]
-            unsure = not_known_beside(
+            unsure = uncertainty_of_friction(
                 data, turned, train=train, runs=[*train, *test], length=length, alike=lengths, unsure=unsure or {}
             )
             tables = [*(turned(Turning(d)) for d in lengths if alike), table(train, *columns)]

@@ -24,7 +24,7 @@ FIRST_MOVE_MM = 0.2  # after which friction has its sense
 MOVING = 0.1  # of the fastest row's way
 FAR = 10.0  # times as far goes an axis that moves
 ANSWER_S = (0.02, 0.3)  # ahead of a push, and behind it until a loop has answered
-BESIDE_GAP = 5  # rows of which a gap leaves speed and acceleration uncertain
+GAP_MARGIN_ROWS = 5  # rows of which a gap leaves speed and acceleration uncertain
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -120,7 +120,7 @@ class AxisRun:
         gaps = np.flatnonzero(missing_rows(self.time))
         near = np.zeros(len(self.time), bool)
         for gap in gaps:
-            near[max(gap + 1 - BESIDE_GAP, 0) : gap + 1 + BESIDE_GAP] = True
+            near[max(gap + 1 - GAP_MARGIN_ROWS, 0) : gap + 1 + GAP_MARGIN_ROWS] = True
         if not near.any() or near.mean() > EVEN:
             return self
         return replace(self, seen=~near)

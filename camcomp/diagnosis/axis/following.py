@@ -47,7 +47,7 @@ from camcomp.diagnosis.statistics.probability import EVEN
 from camcomp.ground.datatypes import Floats
 
 CRITICAL = 1.0  # damping of a loop from which on it does not swing over
-ALIKE = 0.02  # of a time constant: by which those of axes may differ and be one
+SAME_TIME_CONSTANT = 0.02  # of a time constant: by which those of axes may differ and be one
 EQUAL = 1.05  # of what a loop with inertia leaves: what one that swings over may leave to be the simpler answer
 
 
@@ -302,7 +302,7 @@ def share_lag(found: Sequence[AxisFindings]) -> None:
     value, half = np.array([e.value for e in each]), np.array([0.5 * (e.ci95[1] - e.ci95[0]) for e in each])
     weight = 1.0 / np.maximum(half, 1e-12) ** 2
     common = float(weight @ value / weight.sum())
-    if np.any(np.abs(value - common) > np.maximum(half, ALIKE * abs(common))):
+    if np.any(np.abs(value - common) > np.maximum(half, SAME_TIME_CONSTANT * abs(common))):
         return
     together = FoundCause(
         effect="servo_lag",

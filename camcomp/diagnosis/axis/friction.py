@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from camcomp.diagnosis.axis.block_least_squares import Series, fit, gain, solved, withheld
-from camcomp.diagnosis.axis.channels import ALIKE_Z, KNOWN, Column, helps, value_of
+from camcomp.diagnosis.axis.channels import KNOWN, MIN_DIFFERENCE_Z, Column, helps, value_of
 from camcomp.diagnosis.axis.findings import AxisFindings
 from camcomp.diagnosis.axis.terms import PRESLIDING_GRID_MM, AxisTravel, Turning
 from camcomp.diagnosis.result.types import Estimate, FoundCause
@@ -105,7 +105,7 @@ def as_good(data: Series, table: Any, length: float) -> list[float]:
     best = withheld(data, table(Turning(length)))
     return [
         d for d in PRESLIDING_GRID_MM
-        if d == length or gain(withheld(data, table(Turning(d))), best).z < ALIKE_Z
+        if d == length or gain(withheld(data, table(Turning(d))), best).z < MIN_DIFFERENCE_Z
     ]  # fmt: skip
 
 
@@ -119,7 +119,7 @@ def around(lengths: Sequence[float]) -> list[float]:
     return list(PRESLIDING_GRID_MM[max(ends[0] - 2, 0) : ends[1] + 2])
 
 
-def not_known_beside(
+def uncertainty_of_friction(
     data: Series,
     turned: Callable[..., Floats],
     *,

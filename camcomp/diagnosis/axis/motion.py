@@ -20,7 +20,7 @@ from camcomp.ground.datatypes import Bools, Floats
 LATEST_S = 0.1  # of a loop
 ENCODER_BETTER = 0.8  # of what set-points leave of a channel: what encoders have to leave to be the motion
 SETPOINT_WIDE = (2, *WIDE)  # samples on either side of a local cubic through set-points
-ALIKE = (
+SAME_MISFIT = (
     1.01  # of what the best width leaves: the narrowest that leaves no more is it, for wide cubics round corners off
 )
 APART_S = 0.1  # between the rows that are compared: a push for a while shows at its begin and its end only
@@ -80,7 +80,7 @@ def motion_of(
         wide: [travel(r.time, way, wide, late) for r, way in zip(runs, asked, strict=True)] for wide in SETPOINT_WIDE
     }
     left = {each: misfit(moves) for each, moves in ways.items()}
-    wide = next(each for each in ways if left[each] <= ALIKE * min(left.values()))
+    wide = next(each for each in ways if left[each] <= SAME_MISFIT * min(left.values()))
     setpoints = ways[wide]
     if misfit(encoders) < ENCODER_BETTER * misfit(setpoints):
         found.carried = Carried([rows_floor([r.encoder]) for r in runs], found.wide)

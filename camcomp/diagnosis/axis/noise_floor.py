@@ -15,7 +15,7 @@ SPIKE = 12.0  # deviations from the neighbours' median
 FAST_S = 0.005  # between rows: within two of them no drive goes out and comes back, however little
 LEAST_SPIKE_MM = 0.1  # the same between rows that are further apart: none goes so far
 MOST_SPIKES = 0.03  # of the rows; more are no mistakes
-BESIDE = 3  # rows on either side, so that two that follow each other do not hide each other
+NEIGHBOURS = 3  # rows on either side, so that two that follow each other do not hide each other
 
 
 def rows_floor(channels: Sequence[Floats]) -> float:
@@ -41,12 +41,12 @@ def spikes(y: Floats, least: float) -> np.ndarray:
     """
     rows = np.flatnonzero(np.isfinite(y))
     out = np.zeros(len(y), bool)
-    if len(rows) < 4 * BESIDE:
+    if len(rows) < 4 * NEIGHBOURS:
         return out
     known = y[rows]
-    padded = np.concatenate([known[:1].repeat(BESIDE), known, known[-1:].repeat(BESIDE)])
-    median = np.median(np.lib.stride_tricks.sliding_window_view(padded, BESIDE), axis=1)
-    before, behind = median[: len(known)], median[BESIDE + 1 :]
+    padded = np.concatenate([known[:1].repeat(NEIGHBOURS), known, known[-1:].repeat(NEIGHBOURS)])
+    median = np.median(np.lib.stride_tricks.sliding_window_view(padded, NEIGHBOURS), axis=1)
+    before, behind = median[: len(known)], median[NEIGHBOURS + 1 :]
     over = np.maximum(known - np.maximum(before, behind), np.minimum(before, behind) - known)
     off = known - 0.5 * (before + behind)
     step = 3.0 * float(np.quantile(np.abs(np.diff(known)), 0.95))

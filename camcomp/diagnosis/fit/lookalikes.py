@@ -17,7 +17,7 @@ from camcomp.diagnosis.fit.intervals_in_time import never_ending
 from camcomp.ground.datatypes import Floats
 from camcomp.model import signal_path
 
-ALIKE = 0.3  # share of its own size that a candidate has to keep beside another one and the workpiece's frame
+MIN_OWN_SHARE = 0.3  # share of its own size that a candidate has to keep beside another one and the workpiece's frame
 LEVEL = 0.1  # share of its own size that has to lie within runs: as much as a row's noise where it is ten times that
 _FRAME = "workpiece_frame"
 
@@ -95,8 +95,8 @@ def _tips(bench: Bench, candidates: Sequence[CandidateCause]) -> Floats:
 
 
 def _alike(own: Floats, others: Floats) -> bool:
-    """Whether `others` (n, k) explain some direction of `own` (n, d) to within ALIKE of its size."""
+    """Whether `others` (n, k) explain some direction of `own` (n, d) to within MIN_OWN_SHARE of its size."""
     size = np.linalg.norm(others, axis=0)
     basis = np.linalg.qr(others[:, size > 0.0] / size[size > 0.0])[0]
     rest = own - basis @ (basis.T @ own)
-    return bool((np.linalg.norm(rest, axis=0) < ALIKE * np.linalg.norm(own, axis=0)).any())
+    return bool((np.linalg.norm(rest, axis=0) < MIN_OWN_SHARE * np.linalg.norm(own, axis=0)).any())

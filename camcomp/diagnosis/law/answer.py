@@ -11,10 +11,10 @@ from camcomp.diagnosis.fit.floor import GATE
 from camcomp.diagnosis.fit.gap import main_channels
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.law.bench_terms import Spot, TermBench, spots
-from camcomp.diagnosis.law.beside import fitted_beside, with_law
 from camcomp.diagnosis.law.describe import law_result, moved_without, terms_of
 from camcomp.diagnosis.law.find import FoundLaw, find_law
 from camcomp.diagnosis.law.folds import Folds, Split, usual_split
+from camcomp.diagnosis.law.joint_law import fit_jointly, with_law
 from camcomp.diagnosis.law.law_answer import LawAnswer, term_bench
 from camcomp.diagnosis.law.screen import term_grids
 from camcomp.diagnosis.law.smooth import FoundMap, find_map, map_values
@@ -74,7 +74,7 @@ def answer_law(problem: Problem, f: Fitted, kind: str) -> LawAnswer | None:
     fit = standing(joint, f.members)
     if best.f is not None or fit.members:  # about the values that the causes have beside it
         base = _base(problem, fit, bench, kind)(best.found.folds.split, False)
-        best = _beside(problem, fit, bench, fitted_beside(best.found, base))
+        best = _beside(problem, fit, bench, fit_jointly(best.found, base))
     without = _gaps(problem, f if fit.members == f.members else problem.refit(fit.members))
     law = law_result(bench, best.found, _rms(without), best.after)
     return LawAnswer(

@@ -10,11 +10,11 @@ from camcomp.diagnosis.fit.gap import is_at_floor
 from camcomp.diagnosis.fit.problem import Problem
 from camcomp.diagnosis.model.calibration import calibration_of
 from camcomp.diagnosis.model.verdict import SURE
-from camcomp.diagnosis.search.beside import beside_unknown
 from camcomp.diagnosis.search.credible import credibility
 from camcomp.diagnosis.search.established import LEAST_PROBABILITY, established
 from camcomp.diagnosis.search.fitted_sets import EXCHANGES, FittedSets
 from camcomp.diagnosis.search.indistinguishable import likeness, stand_ins
+from camcomp.diagnosis.search.kept_causes import kept_with_unknown
 from camcomp.diagnosis.search.sound import GATE_SHARE, Sound
 from camcomp.diagnosis.search.tempering import misfit, tempering
 from camcomp.diagnosis.search.unexplained import SURE_Z, Unexplained, size_um, unexplained, worst
@@ -162,7 +162,7 @@ def _credible(
     instead = False
     while True:
         unknown = unknown_kind(problem, f, beyond) is not None
-        kept = beside_unknown(problem, f, beyond) if unknown else f.members
+        kept = kept_with_unknown(problem, f, beyond) if unknown else f.members
         if kept == f.members:
             credible = credibility(problem, f, surely=unknown, temperature=TEMPERATURE)
             replaced = credible.replaced

@@ -22,7 +22,7 @@ from camcomp.diagnosis.statistics.evidence import estimate
 from camcomp.diagnosis.statistics.noise_model import BLOCK
 from camcomp.ground.datatypes import Bools, Floats
 
-NOTHING_SAID = 0.5  # of a cause's size: runs that know it to no better say nothing of it
+UNDETERMINED = 0.5  # of a cause's size: runs that know it to no better say nothing of it
 FEW_RUNS = 3  # from which on causes are fitted to the other runs
 KINDS = ("tip", "encoder", "drive", "dyno")
 NOISIEST = 2.0  # of the floor: what the tip scatters by in one run and is its instrument's
@@ -90,7 +90,7 @@ def untold(theta: Floats, doubt: Floats, widths: Sequence[int]) -> Bools:
 
     widths: how many are a cause's. One that is small beside its cause's others is no reason to ask the run itself.
     """
-    faint, ends = doubt > NOTHING_SAID * np.abs(theta), np.cumsum(widths)
+    faint, ends = doubt > UNDETERMINED * np.abs(theta), np.cumsum(widths)
     each = [bool(faint[end - width : end].all()) for end, width in zip(ends, widths, strict=True)]
     return np.repeat(each, widths).astype(bool)
 

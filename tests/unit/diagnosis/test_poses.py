@@ -7,7 +7,7 @@ import pytest
 
 from camcomp.diagnosis.arm.noise_floor import far_off
 from camcomp.diagnosis.arm.poses import _shapes
-from camcomp.diagnosis.arm.spells import _window
+from camcomp.diagnosis.arm.temporary_offsets import _window
 from camcomp.diagnosis.studies import _poses
 from camcomp.effects import disturbance, thermal_growth
 

@@ -50,7 +50,7 @@ def calibrate(file: Path) -> dict:
     rows = {row["name"]: row for row in _read(file) if "failed" not in row}
     misses = [m for row in rows.values() for m in row.get("misses", ()) if m < SHAPES]
     out = {}
-    for kind, unknown in ((answer.POSES_MAP, False), (answer.BESIDE_MAP, True)):
+    for kind, unknown in ((answer.POSES_MAP, False), (answer.UNKNOWN_MAP, True)):
         own = [row for row in rows.values() if row["unknown"] == unknown]
         pairs = [pair for row in own for pair in row["calibration"] if pair[0]]
         found = fit_map([p for p, _ in pairs], [right for _, right in pairs], misses)

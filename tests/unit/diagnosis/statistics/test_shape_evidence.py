@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from camcomp.diagnosis.statistics.shape_evidence import ALIKE_LOG, SoughtShape, shape_log_evidence
+from camcomp.diagnosis.statistics.shape_evidence import COMMON_LOG, SoughtShape, shape_log_evidence
 
 SPAN = 4.0
 
@@ -14,7 +14,7 @@ def mean_likelihood(at, sd):
     out = np.ones_like(common)
     for a, s in zip(at, sd, strict=True):
         own = np.linspace(a - 8 * s, a + 8 * s, 4001)
-        alike = np.exp(-0.5 * ((own - common[:, None]) / ALIKE_LOG) ** 2) / ALIKE_LOG / np.sqrt(2 * np.pi)
+        alike = np.exp(-0.5 * ((own - common[:, None]) / COMMON_LOG) ** 2) / COMMON_LOG / np.sqrt(2 * np.pi)
         out *= np.trapezoid(np.exp(-0.5 * ((own - a) / s) ** 2) * alike, own, axis=1)
     return np.log(np.trapezoid(out, common) / SPAN)
 

@@ -19,7 +19,7 @@ LEAST_FREE = 0.02  # of a spell's squares that frames have to leave
 STEP = 256  # begins that are looked at together
 
 
-def spells(
+def temporary_offsets(
     bench: ArmBench, rest: Sequence[Floats], frames: Sequence[Floats], joints: Sequence[Floats], first: int
 ) -> tuple[list[Column], list[PlacedCause]]:  # fmt: skip
     """Columns and candidates, one per joint and campaign. rest (n, 3) mm: what is left beside the nuisances frames (n, 3, 9).

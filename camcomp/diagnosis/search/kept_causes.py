@@ -12,7 +12,7 @@ from camcomp.diagnosis.search.unknown import foretelling, signal_rms
 from camcomp.diagnosis.statistics.cause_sets import Fitted, Members
 from camcomp.diagnosis.statistics.probability import EVEN
 
-LEAST_BESIDE = 0.4  # size in units of an unknown effect below which nothing is named beside it
+LEAST_NAMED = 0.4  # size in units of an unknown effect below which nothing is named beside it
 PART_OF_UNKNOWN = 2.0  # size in units of an unknown effect below which a cause at its place is taken for a part of it
 POINTED = 0.85  # share of what is left that one actuator has to have to be that place
 ROWS_OF_AN_INSTANT = 2.0  # to both sides, between which something may have begun or ended
@@ -31,7 +31,7 @@ class _Beside:
     anywhere: bool
 
 
-def beside_unknown(problem: Problem, f: Fitted, beyond: Mapping[str, Unexplained]) -> Members:
+def kept_with_unknown(problem: Problem, f: Fitted, beyond: Mapping[str, Unexplained]) -> Members:
     """The members that are kept jointly with an unknown effect, judged one by one.
 
     They predict withheld runs. A member that is smaller than the unknown effect is taken for a part of it where it acts
@@ -41,7 +41,7 @@ def beside_unknown(problem: Problem, f: Fitted, beyond: Mapping[str, Unexplained
     each = _beside(problem, f, beyond, members)
 
     def stands(of: _Beside) -> bool:
-        return of.of_all > LEAST_BESIDE and of.size > (PART_OF_UNKNOWN if of.there else 1.0 if of.anywhere else 0.0)
+        return of.of_all > LEAST_NAMED and of.size > (PART_OF_UNKNOWN if of.there else 1.0 if of.anywhere else 0.0)
 
     return tuple(i for i in members if stands(each[i]))
 

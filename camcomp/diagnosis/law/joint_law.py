@@ -50,7 +50,7 @@ def with_law(
     return replace(problem, columns=columns, white=white)
 
 
-def fitted_beside(found: FoundLaw | FoundMap, folds: Folds) -> FoundLaw | FoundMap:
+def fit_jointly(found: FoundLaw | FoundMap, folds: Folds) -> FoundLaw | FoundMap:
     """The same law with coefficients fitted jointly with another base."""
     theta, covariance = folds.coefficients(found.columns, found.precision)
     if isinstance(found, FoundMap):
