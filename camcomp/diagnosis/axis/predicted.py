@@ -15,7 +15,9 @@ from camcomp.model.effect import Cause, Motion
 from camcomp.model.hysteresis import direction
 from camcomp.model.motion.between_rows import between_rows
 from camcomp.model.seams import Seams
+from camcomp.model.statics.arm import arm_of
 from camcomp.model.statics.description import Robot
+from camcomp.model.statics.hanging import hang, tool_wrench
 
 
 def predict_encoders(robot: Robot, causes: Sequence[Cause], log: Measured, started_s: float) -> Floats:
@@ -36,14 +38,19 @@ def predict_encoders(robot: Robot, causes: Sequence[Cause], log: Measured, start
 
 
 def predict_drives(robot: Robot, causes: Sequence[Cause], log: Measured, started_s: float) -> Floats:
-    """Drive forces or torques (n, m), N or N mm, that the effects of the drives exert along the logged encoders."""
+    """Drive forces or torques (n, m), N or N mm: of effects of the drives, and against the force of a dynamometer on an arm."""
     drives = [cause for cause in signal_path.acting(causes, "drive") if signal_path.pushes(cause.effect)]
+    encoder = _filled(log.time, log.encoder, robot)
+    out = np.zeros_like(log.encoder)
+    if log.has("dyno") and arm_of(robot) is not None:
+        wrench = tool_wrench(robot, encoder, log.force())
+        out += hang(robot, encoder, wrench).drive - hang(robot, encoder).drive
     if not drives:
-        return np.zeros_like(log.encoder)
-    motion = _motion(robot, log, _filled(log.time, log.encoder, robot), started_s)
+        return out
+    motion = _motion(robot, log, encoder, started_s)
     _, guided = signal_path.driven(drives, motion.names, motion)
     effort = signal_path.drive_forces(drives, motion.names, guided)
-    return np.zeros_like(log.encoder) if effort is None else effort
+    return out if effort is None else out + effort
 
 
 def _filled(time: Floats, values: Floats, robot: Robot) -> Floats:

@@ -11,7 +11,7 @@ from camcomp.model.effect import Motion
 from camcomp.model.hysteresis import direction
 
 STEP_S = 1e-3  # of servo controllers
-MOST_STEPS = 20  # between two rows; rows further apart do not show a smooth motion
+MOST_STEPS = 50  # between two rows; rows further apart do not show a smooth motion
 
 
 def between_rows(motion: Motion) -> Motion:

@@ -14,7 +14,10 @@ def log(order, time=TIME):
     """Rows of a log by their numbers, with times of their own."""
     x = np.sin(TIME)[order][:, None] * np.ones(3)
     none = np.full_like(x, np.nan)
-    return Measured(time[order], x[:, 0], x, x, x, none, none, none, none[:, 0], none)
+    return Measured(
+        time=time[order], line=x[:, 0], tip=x, setpoint=x, encoder=x, drive=none, load=none, dyno=none,
+        temperature=none[:, 0], tip_sd=none,
+    )  # fmt: skip
 
 
 @pytest.mark.parametrize("back_s", [1.0, 1.005, 0.5])

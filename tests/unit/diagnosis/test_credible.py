@@ -33,7 +33,7 @@ def present(monkeypatch, column, left, *, surely=False):
     monkeypatch.setattr(credible, "joint_products", lambda *_: JointProducts.of(patterns))
     monkeypatch.setattr(credible, "_weights", lambda _: None)
     amount = float(column @ left / (column @ column))
-    f = Fitted((0,), np.array([amount]), np.eye(1), 0.0, ())
+    f = Fitted(members=(0,), theta=np.array([amount]), covariance=np.eye(1), log_evidence=0.0, grams=())
     found = credible.credibility(problem, f, surely=surely, temperature=1.5)
     return found.present[0], found.replaced[0]
 

@@ -28,7 +28,13 @@ def both_predictions(step, cause, wanted):
         time=t, line=np.zeros(n), tip=nothing, setpoint=asked, encoder=asked, drive=nothing, load=nothing, dyno=nothing,
         temperature=np.full(n, np.nan), tip_sd=nothing,
     )  # fmt: skip
-    axis = DrivenAxis(AxisRun("r", t, wanted(t), wanted(t), np.full(n, np.nan)), robot.actuators[0], 1.0, 0 * t, 0 * t)
+    axis = DrivenAxis(
+        AxisRun(name="r", time=t, setpoint=wanted(t), encoder=wanted(t), force=np.full(n, np.nan)),
+        robot.actuators[0],
+        1.0,
+        0 * t,
+        0 * t,
+    )
     return t, predict_encoders(robot, [cause], log, 0.0)[:, 0], -axis.channel("following", [cause])
 
 

@@ -20,7 +20,8 @@ SD = 0.02  # mm per coordinate
 def bench(q, tip):
     n = len(q)
     robot = build_robot(load_config([ROOT / "config/ur10.yaml"]).robot, [0.0, 0.0, 0.0])[0]
-    return ArmBench(robot, (), [Poses("A", q, tip, np.arange(float(n)), None, np.full(n, "A"))])
+    run = Poses(label="A", q=q, tip=tip, time=np.arange(float(n)), temperature=None, run=np.full(n, "A"))
+    return ArmBench(robot=robot, causes=(), campaigns=[run])
 
 
 def test_weight_is_no_cause_on_an_arm_whose_model_has_no_spring():
