@@ -324,7 +324,9 @@ class KrlModule:
         if kind == "CIRC":
             used = targets[0][1] + 1 - first
             if not (comma := re.match(r"\s*,", body[used:])):
-                self.reader.refuse("CC112", "CIRC needs an auxiliary point and an end point", at)
+                self.reader.refuse(
+                    "CC112", "CIRC needs an auxiliary point and an end point", at, "write CIRC {...},{...}"
+                )
             targets.append(self._target(body[used + comma.end() :], first + used + comma.end(), at))
         used = targets[-1][1] + 1 - first
         if kind == "CIRC" and (told := _SWEEP.match(body, used)):

@@ -24,9 +24,8 @@ _STATEMENT = re.compile(r"[ \t]*\d*[ \t]*:(.*);[ \t]*\Z")
 _CONTINUED = re.compile(r"[ \t]*\d*[ \t]*:(.*?)[ \t]*\Z")
 _MOVE = re.compile(r"[ \t]*([JLCA])[ \t]+(P\[(\d+)(?::[^\]]*)?\])[ \t]*(.*?)[ \t]*\Z", re.IGNORECASE)
 _SECOND = re.compile(r"[ \t]*(P\[(\d+)(?::[^\]]*)?\])[ \t]*(.*?)[ \t]*\Z", re.IGNORECASE)
-_HOW = re.compile(
-    rf"({_NUMBER})[ \t]*(%|mm/sec|cm/min|sec|msec)[ \t]+(FINE|CNT[ \t]*\d+)(?:[ \t]+ACC[ \t]*\d+)?\Z", re.IGNORECASE
-)
+_SPEED = re.compile(rf"({_NUMBER})[ \t]*(%|mm/sec|cm/min)(?=[ \t]|\Z)[ \t]*", re.IGNORECASE)
+_END = re.compile(r"(FINE|CNT[ \t]*\d+)(?=[ \t]|\Z)(?:[ \t]+ACC[ \t]*\d+(?=[ \t]|\Z))?[ \t]*", re.IGNORECASE)
 _CHOSEN = re.compile(r"[ \t]*(UFRAME_NUM|UTOOL_NUM)[ \t]*=[ \t]*(\d+)[ \t]*\Z", re.IGNORECASE)
 _WAIT = re.compile(rf"[ \t]*WAIT[ \t]+({_NUMBER})[ \t]*\(sec\)[ \t]*\Z", re.IGNORECASE)
 _IDLE = re.compile(
@@ -122,7 +121,12 @@ class LsProgram:
         at = begin + len(line) - len(line.lstrip())
         found = _STATEMENT.match(line)
         if found is None:
-            reader.refuse("CC144", f"'{line.strip()[:40]}' is no statement 'n: ... ;'", at)
+            reader.refuse(
+                "CC144",
+                f"'{line.strip()[:40]}' is no statement 'n: ... ;'",
+                at,
+                "write the number, a colon, the statement, a semicolon",
+            )
         body, place = found[1], begin + found.start(1)
         place += len(body) - len(body.lstrip())
         if move := _MOVE.match(body):
@@ -139,7 +143,10 @@ class LsProgram:
             reader.waits |= body.strip().upper().startswith(("WAIT", "PAUSE"))
         else:
             reader.refuse(
-                "CC144", f"'{body.strip()[:40]}' is not followed", place, "post J, L and C to positions of /POS"
+                "CC144",
+                f"'{body.strip()[:40]}' is not followed",
+                place,
+                "post J, L and C to positions of /POS, without registers and control flow",
             )
 
     def _choose(self, key: str, number: int, at: int) -> None:
@@ -168,7 +175,7 @@ class LsProgram:
         if one is None or two is None or one[4] or one[1].upper() == "A":
             reader.refuse("CC144", "C needs two lines, with an auxiliary point and an end point", at)
         base, place = int(self.text.starts[row + 1]) + second.start(1), begin + found.start(1) + one.start(1)
-        middle = self._values(int(one[3]), place, cut=True)
+        middle = self._values(int(one[3]), begin + found.start(1) + one.start(2), cut=True)
         blend = self._how(two[3], base + two.start(3), "C")
         number = int(two[2])
         self._values(number, base + two.start(1), cut=True)
@@ -230,12 +237,20 @@ class LsProgram:
 
     def _how(self, words: str, at: int, kind: str) -> tuple[int, int]:
         """Speed and termination of a move; the span of the latter."""
-        found = _HOW.match(words)
-        if found is None or (found[2].lower() in _FEED) == (kind == "J"):
-            self.reader.refuse("CC110", f"'{words[:30]}' is no speed with FINE or CNT that is followed", at,
-                               "write N mm/sec or N cm/min, for J N %, and FINE or CNTn; no other options")  # fmt: skip
+        refuse, units = self.reader.refuse, "N %" if kind == "J" else "N mm/sec or N cm/min"
+        if not words or words.upper().startswith(("FINE", "CNT")):
+            refuse("CC110", f"{kind} without a speed", at, f"write {units} behind the position")
+        speed = _SPEED.match(words)
+        if speed is None or (speed[2].lower() in _FEED) == (kind == "J"):
+            refuse("CC144", f"'{words.split()[0][:30]}' is no speed of {kind} that is followed", at, f"write {units}")
+        end = _END.match(words, speed.end())
+        if end is None:
+            text = words[speed.end() :][:30] or "nothing"
+            refuse("CC144", f"{text} in place of FINE or CNTn", at + speed.end(), "write FINE or CNTn, n a number")
+        if rest := words[end.end() :]:
+            refuse("CC144", f"'{rest[:30]}' is not followed", at + end.end(), "post moves without options")
         if kind != "J":
-            self.reader.feed = float(found[1]) * _FEED[found[2].lower()]
-        word = found[3].upper()
+            self.reader.feed = float(speed[1]) * _FEED[speed[2].lower()]
+        word = end[1].upper()
         self.reader.mode = EXACT if word == "FINE" else PathMode(own_name=word)
-        return at + found.start(3), at + found.end(3)
+        return at + end.start(1), at + end.end(1)

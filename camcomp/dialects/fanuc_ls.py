@@ -23,6 +23,7 @@ class FanucLs(RobotLanguage):
 
     components = COMPONENTS
     comment = ("   :  !", " ;")
+    comment_width = 32
 
     def read(self, reader: RobotReader) -> None:
         """Every statement of the program. Raises ProgramError with every mistake."""

@@ -46,6 +46,11 @@ def dialect_of(text: Text, name: str | None = None) -> Dialect:
     return best
 
 
+def endings() -> frozenset[str]:
+    """Endings of file names that belong to one dialect."""
+    return frozenset(each for _, member in usable("dialects") for each in _of(member).endings)
+
+
 def _record(name: str) -> Dialect:
     return _of(load("dialects", name))
 

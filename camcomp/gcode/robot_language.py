@@ -49,6 +49,7 @@ class RobotLanguage(ABC):
 
     components: tuple[str, ...]
     comment: tuple[str, str]
+    comment_width: int = 0  # most characters of a comment; 0: any
     turn_digits: int = 6  # of angles in degrees; quaternions have more
 
     @abstractmethod

@@ -89,13 +89,13 @@ class RobotReader:
                     "CC110",
                     "a cutting motion without a feed",
                     at,
-                    hint="state the speed before it, " + self.dialect.title,
+                    hint=f"state its speed, above 0, as {self.dialect.title} does",
                 )
             if self._unfollowed:
                 self.refuse("CC144", f"the tool starts at joint angles that cannot be followed: {self._unfollowed}", at,
                             hint="go to the start of the cut with a rapid to a Cartesian pose")  # fmt: skip
             if not self.moves.kind and (kind == ARC):
-                self.refuse("CC112", "an arc without a known start", at)
+                self.refuse("CC112", "an arc without a known start", at, hint="start with a rapid or a line to a pose")
         self._add(kind=kind, site=site, values=values, middle=middle, sweep=sweep_deg, joints=-1)
 
     def unknown_move(self, why: str) -> None:
@@ -186,7 +186,8 @@ class RobotReader:
             through = self.frames.to_program(point, turned, site.base, site.tool)[0][0]
             arc = arc_through(start[k], through, end[k], m.sweep_deg[k])
             if arc is None:
-                self.refuse("CC112", "start, auxiliary point and end of the arc lie on one line", site.instruction[0])
+                self.refuse("CC112", "start, auxiliary point and end of the arc lie on one line", site.instruction[0],
+                            hint="post a line, or another auxiliary point")  # fmt: skip
             centre[k], axis[k], angle[k], end[k] = arc
             if k + 1 < n and not m.alone[k + 1]:
                 start[k + 1] = end[k]

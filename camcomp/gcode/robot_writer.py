@@ -14,7 +14,7 @@ from camcomp.gcode.output import Output, Rewritten
 from camcomp.gcode.program import Program
 from camcomp.gcode.robot_language import NewMove
 from camcomp.gcode.robot_reader import groups
-from camcomp.gcode.stamp import stamp_line
+from camcomp.gcode.stamp import stamp_parts
 from camcomp.ground.datatypes import ARC, Bools, Floats, Ints
 from camcomp.ground.orientation import TURN, pole_free_words, rotations_of
 
@@ -27,12 +27,15 @@ def rewrite_robot_program(
     assert language is not None
     writer = RobotWriter(program, out, resolution_mm)
     writer.run()
-    stamp = stamp_line(program.data, version, *language.comment, model)
+    (opening, closing), eol = language.comment, program.text.end_of_line(0)
+    stamp = [
+        opening + each + closing + eol for each in stamp_parts(program.data, version, model, language.comment_width)
+    ]
     at = language.stamp_index(program.text)
     row = int(np.searchsorted(program.text.starts, at, side="right")) - 1 if at else 0
-    writer.edits.insert(at, stamp + program.text.end_of_line(0), first=True)
+    writer.edits.insert(at, "".join(stamp), first=True)
     text = language.finish(writer.edits.apply(program.text.string))
-    shift = 1 + (writer.source_row >= row).astype(np.int64)
+    shift = 1 + len(stamp) * (writer.source_row >= row).astype(np.int64)
     return Rewritten(
         data=program.text.encode(text), end=writer.ends, line=writer.lines + shift, centre=writer.centres,
         feed=program.path.feed[out.motion], words=writer.words,

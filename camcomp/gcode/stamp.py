@@ -2,13 +2,18 @@
 
 import hashlib
 import re
+import textwrap
 
 from camcomp.gcode.text import Text
 
+# A remark of Fanuc LS goes on in the next one.
+_NEXT_REMARK = rb"[ \t]*;[ \t]*[\r\n]+[ \t]*\d*[ \t]*:[ \t]*![ \t]*"
+_GAP, _HEX = rb"(?: |" + _NEXT_REMARK + rb")", rb"(?:(?:" + _NEXT_REMARK + rb")?[0-9a-f])"
 _STAMP = re.compile(
-    rb"(?:^|[\r\n])[ \t]*(?:\d*[ \t]*:[ \t]*)?[(;!][ \t]*camcomp [0-9][^ )]* sha256:[0-9a-f]{64}(?![0-9a-f])"
-)
-_MODEL = re.compile(_STAMP.pattern + rb" model:([0-9a-f]{16})")
+    rb"(?:^|[\r\n])[ \t]*(?:\d*[ \t]*:[ \t]*)?[(;!][ \t]*camcomp"
+    + _GAP + rb"[0-9][^ );\r\n]*" + _GAP + rb"sha256:" + _HEX + rb"{64}(?![0-9a-f])"
+)  # fmt: skip
+_MODEL = re.compile(_STAMP.pattern + _GAP + rb"model:(" + _HEX + rb"{16})")
 _MARKS = (b"\xef\xbb\xbf", b"\xff\xfe", b"\xfe\xff")
 
 
@@ -25,6 +30,12 @@ def stamp_line(data: bytes, version: str, opening: str = "(", closing: str = ")"
     return opening + stamp_text(hashlib.sha256(data).hexdigest(), version, model) + closing
 
 
+def stamp_parts(data: bytes, version: str, model: str, width: int) -> list[str]:
+    """Text of the stamp in parts of at most `width` characters; 0: one part."""
+    text = stamp_text(hashlib.sha256(data).hexdigest(), version, model)
+    return textwrap.wrap(text, width, break_on_hyphens=False) if width else [text]
+
+
 def stamp_text(digest: str, version: str, model: str = "") -> str:
     """Text of the stamp without comment brackets."""
     return f"camcomp {version} sha256:{digest}" + (f" model:{model}" if model else "")
@@ -33,7 +44,7 @@ def stamp_text(digest: str, version: str, model: str = "") -> str:
 def stamped_model(data: bytes) -> str | None:
     """The hash of machine and process in a stamp, or None."""
     found = _MODEL.search(data.replace(b"\0", b""))
-    return found[1].decode() if found else None
+    return re.sub(_NEXT_REMARK, b"", found[1]).decode() if found else None
 
 
 def stamp_index(text: Text) -> int:

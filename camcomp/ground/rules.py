@@ -408,7 +408,7 @@ RULES: dict[str, Rule] = {
     "CC271": Rule(
         "no program found",
         "None of the paths, folders and patterns names an NC program.",
-        "programs end in .nc, .ngc, .tap, .gcode, .cnc, .mpf, .ncc or .txt, or are named one by one",
+        "programs end in .nc, .ngc, .tap, .gcode, .cnc, .mpf, .spf, .src, .mod, .prg, .ls, .ncc, .eia, .min or .iso, or are named one by one",
     ),
     "CC280": Rule(
         "plug-in not usable",

@@ -116,8 +116,13 @@ def kuka_tips(q):
     return serial.settle(kuka.arm(weights=False), q, np.zeros(3)).tip
 
 
-def test_the_sample_holds_tip_and_orientation_on_an_arm_of_its_own(tmp_path):
-    done, joints, _, summary, data = compensated(tmp_path, SLOT, [KUKA, CONTROL])
+@pytest.mark.parametrize(
+    ("name", "text"), [("slot.src", SLOT.read_text()), ("part.mod", as_rapid(PART)), ("part.ls", as_ls(PART))]
+)
+def test_an_output_holds_tip_and_orientation_on_an_arm_of_its_own(tmp_path, name, text):
+    source = tmp_path / name
+    source.write_text(text)
+    done, joints, _, summary, data = compensated(tmp_path, source, [KUKA, CONTROL])
     assert done.returncode == 0 and summary["after"]["max_um"] <= 1.0 and summary["tilt_after_mrad"] < 0.01
     q, force = actuators(joints), np.column_stack([joints[f"f{axis}_N"] for axis in "xyz"])
     loaded = serial.settle(kuka.arm(), q, force)
@@ -126,21 +131,40 @@ def test_the_sample_holds_tip_and_orientation_on_an_arm_of_its_own(tmp_path):
     turned = Rotation.from_euler("ZYX", np.column_stack([joints[f"{each}_deg"] for each in "cba"]), degrees=True)
     assert np.abs(loaded.orientation - turned.as_matrix()).max() < 1e-5
     # what the text says, read by hand, is where the unloaded arm stands with these joints
-    poses = said_by(data.decode())
+    points, rotations = said_by(data.decode(), source.suffix)
     rigid = serial.settle(kuka.arm(weights=False), q, np.zeros(3))
-    assert len(poses) == len(q)
-    assert np.abs(rigid.tip - poses[:, :3] - ORIGIN).max() < 1e-4
+    assert len(points) == len(q)
+    assert np.abs(rigid.tip - points - ORIGIN).max() < 1e-4
     flange = rigid.orientation @ np.diag([-1.0, 1.0, -1.0])
-    np.testing.assert_allclose(flange, Rotation.from_euler("ZYX", poses[:, 3:], degrees=True).as_matrix(), atol=1e-8)
-    (tmp_path / "out.src").write_bytes(data)
-    words = ["--against", SLOT, "--config", KUKA, "--config", CONTROL]
-    assert camcomp("verify", tmp_path / "out.src", *words).returncode == 0
-    again = camcomp("compensate", tmp_path / "out.src", *words[2:])
+    np.testing.assert_allclose(flange, rotations.as_matrix(), atol=2e-8)
+    out = tmp_path / ("out" + source.suffix)
+    out.write_bytes(data)
+    words = ["--against", source, "--config", KUKA, "--config", CONTROL]
+    assert camcomp("verify", out, *words).returncode == 0
+    again = camcomp("compensate", out, *words[2:])
     assert again.returncode == 1 and b"CC603" in again.stderr
 
 
-def said_by(text):
-    """Poses (n, 6) of a module without arcs; what a statement does not name stays."""
+def said_by(text, ending):
+    """Points (n, 3) and rotations of a program without arcs."""
+    if ending == ".src":
+        poses = said_by_krl(text)
+        return poses[:, :3], Rotation.from_euler("ZYX", poses[:, 3:], degrees=True)
+    if ending == ".mod":
+        found = re.findall(r"Move[LJ] \[\[(.*?)\],\[(.*?)\]", text)
+        at, q = (np.array([each[k].split(",") for each in found], float) for k in (0, 1))
+        return at, Rotation.from_quat(np.roll(q, -1, axis=1))
+    moves, positions = text.split("/POS")
+    known = {
+        number: re.findall(r"\b[XYZWPR] = (\S+)", body)
+        for number, body in re.findall(r"P\[(\d+)\]\{(.*?)\}", positions, re.DOTALL)
+    }
+    poses = np.array([known[each] for each in re.findall(r":[JL] P\[(\d+)\]", moves)], float)
+    return poses[:, :3], Rotation.from_euler("xyz", poses[:, 3:], degrees=True)
+
+
+def said_by_krl(text):
+    """Poses (n, 6); what a statement does not name stays."""
     held, out = dict.fromkeys("XYZABC", 0.0), []
     for line in text.splitlines():
         if re.match(r"(PTP|LIN) \{", line):
@@ -149,11 +173,12 @@ def said_by(text):
     return np.array(out)
 
 
-def test_a_log_of_a_turning_tool_is_that_of_an_arm_of_its_own(tmp_path):
-    (tmp_path / "part.mod").write_text(as_rapid(PART))
+@pytest.mark.parametrize(("name", "spelled", "line"), [("part.mod", as_rapid, 8), ("part.ls", as_ls, 10)])
+def test_a_log_of_a_turning_tool_is_that_of_an_arm_of_its_own(tmp_path, name, spelled, line):
+    (tmp_path / name).write_text(spelled(PART))
     log = tmp_path / "log.csv"
     words = ["--config", KUKA, "--config", CONTROL, "--step-s", "0.3"]
-    done = camcomp("simulate", tmp_path / "part.mod", *words, "-o", log)
+    done = camcomp("simulate", tmp_path / name, *words, "-o", log)
     assert done.returncode == 0, done.stderr
     rows = table(log)
     q = np.column_stack([rows[f"cmd_{a}_rad"] for a in AXES])
@@ -164,7 +189,7 @@ def test_a_log_of_a_turning_tool_is_that_of_an_arm_of_its_own(tmp_path):
     # where the unloaded arm stands is on the line of the program, with the orientation of that place
     rigid = serial.settle(kuka.arm(weights=False), q, np.zeros(3))
     tip = rigid.tip - ORIGIN
-    on = np.flatnonzero(rows["line"] == 8)  # the move that turns by 3 deg about Z while Y goes from 0 to 15
+    on = np.flatnonzero(rows["line"] == line)  # the move that turns by 3 deg about Z while Y goes from 0 to 15
     share = tip[on, 1] / 15.0
     wanted = Rotation.from_euler("ZYX", np.column_stack((3 * share, 0 * share, 2 + 0 * share)), degrees=True)
     assert len(on) > 1 and np.abs(rigid.orientation[on] - wanted.as_matrix()).max() < 3e-6

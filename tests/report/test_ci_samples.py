@@ -88,7 +88,8 @@ def test_a_hook_takes_many_files_and_fails_on_a_bad_one(hook, project, shell):
 
 def test_hooks_see_programs_of_every_ending_that_batch_takes():
     from camcomp.compensation.batch.programs import SUFFIXES
+    from camcomp.gcode.detect import endings
 
     (pattern,) = [hook["files"] for hook in HOOKS if hook["id"] == "camcomp-programs"]
-    assert all(re.search(pattern, f"a/b{suffix}") for suffix in SUFFIXES)
+    assert all(re.search(pattern, f"a/b{suffix}") for suffix in {*SUFFIXES, *endings()})
     assert not re.search(pattern, "a/b.ncx")

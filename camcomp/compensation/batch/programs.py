@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from camcomp.compensation.batch.worker import Outcome, Task
+from camcomp.gcode.detect import endings
 from camcomp.ground.errors import CamcompError, ConfigError, FileError, format_error
 from camcomp.ground.files import alone_in, read_bytes, write_all
 from camcomp.ground.places import one_place_each
@@ -20,7 +21,7 @@ from camcomp.model.config.spec import Config
 from camcomp.model.config.yaml_tree import leaves, plain
 from camcomp.model.from_program import StockChoice
 
-SUFFIXES = frozenset((".nc", ".ngc", ".ncc", ".tap", ".gcode", ".cnc", ".mpf", ".spf", ".eia", ".min", ".iso"))
+SUFFIXES = (".nc", ".ngc", ".ncc", ".tap", ".gcode", ".cnc", ".eia", ".min", ".iso")  # of several dialects
 STATE = ".camcomp"  # folder beside the outputs: what each was made from
 DONE, FAILED_CHECK, SKIPPED, ERROR, OPEN = "done", "check failed", "unchanged", "error", "not done"
 
@@ -52,11 +53,12 @@ def find_programs(paths: Sequence[str], output: Path) -> list[FoundProgram]:
     lies behind its part without wildcards. A link is a program of its own, beside the file that it leads to.
     """
     found: dict[Path, Path] = {}
+    usual = {*SUFFIXES, *endings()}
     out = Path(os.path.realpath(output))
     for text in paths:
         path = Path(text)
         if path.is_dir():
-            base, files = path, [each for each in path.rglob("*") if each.suffix.lower() in SUFFIXES]
+            base, files = path, [each for each in path.rglob("*") if each.suffix.lower() in usual]
         elif path.exists() or not glob.has_magic(text):
             if not path.exists():
                 raise FileError("CC500", f"cannot read {text}: no such file")

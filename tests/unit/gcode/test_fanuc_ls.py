@@ -1,5 +1,7 @@
 """Programs of Fanuc robots: read, written with the same bytes, refused where they are not clear."""
 
+import re
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -9,7 +11,7 @@ from camcomp.gcode.output import Output
 from camcomp.gcode.rewrite import rewrite
 from camcomp.gcode.robot_frames import CoordinateFrame, RobotFrames
 from camcomp.gcode.setup import Setup
-from camcomp.gcode.stamp import is_stamped
+from camcomp.gcode.stamp import is_stamped, stamped_model
 from camcomp.ground.datatypes import ARC, LINE, RAPID
 from camcomp.ground.errors import ProgramError
 from camcomp.ground.orientation import TURN, rotations_of
@@ -79,9 +81,17 @@ def test_what_is_not_changed_keeps_its_bytes(end):
     program = read(text)
     assert program.path.kind.tolist() == [RAPID, LINE, LINE, ARC, LINE, LINE] and program.dwelt_s == 1.5
     np.testing.assert_allclose(program.path.feed[1:], [1200, 1200, 1200, 1200, 6000])
-    written = rewrite(program, Output.same(program.path), resolution_mm=1e-4, version="1").data
+    written = rewrite(
+        program, Output.same(program.path), resolution_mm=1e-4, version="1", model="0123456789abcdef"
+    ).data
     lines = written.splitlines(keepends=True)
-    assert is_stamped(written) and b"camcomp" in lines.pop(9) and b"".join(lines) == text
+    remarks = [lines.pop(9).decode() for _ in range(4)]
+    assert "camcomp" in remarks[0] and b"".join(lines) == text
+    assert all(len(each.split("!")[1].split(" ;")[0]) <= 32 and each.endswith(" ;" + end) for each in remarks)
+    assert is_stamped(written) and stamped_model(written) == "0123456789abcdef"
+    loaded = re.sub(rb"(?m)^   :(?=  !)", b"   9:", written)  # as the control numbers them
+    assert is_stamped(loaded) and stamped_model(loaded) == "0123456789abcdef"
+    assert not is_stamped(written.replace(remarks[2].encode(), b""))
     assert len(read(written).path) == 6
 
 
@@ -122,31 +132,36 @@ def test_written_poses_read_as_what_was_wanted(seed):
 
 
 BAD = [
-    "  14:L P[9] 20mm/sec FINE ;", "  14:L P[1] FINE ;", "  14:L P[1] 20mm/sec ;", "  14:L P[1] 20% FINE ;", "  14:J P[1] 20mm/sec FINE ;",
-    "  14:L P[1] 20deg/sec FINE ;", "  14:L P[1] R[1]mm/sec FINE ;", "  14:L P[1] 20mm/sec CNTR[1] ;", "  14:L P[1] 20mm/sec CR10mm ;",
-    "  14:L P[1] 20mm/sec FINE Offset,PR[1] ;", "  14:L P[1] 20mm/sec FINE INC ;", "  14:L P[1] 20mm/sec FINE Skip,LBL[1] ;",
-    "  14:L P[1] 20mm/sec FINE Tool_Offset,PR[2] ;", "  14:L P[1] 20mm/sec FINE TA .10sec,DO[1]=ON ;", "  14:L P[1] 20mm/sec FINE Wjnt ;",
-    "  14:L PR[1] 20mm/sec FINE ;", "  14:L P[R[1]] 20mm/sec FINE ;", "  14:L P[x] 20mm/sec FINE ;", "  14:L P[1] 0mm/sec FINE ;",
-    "  14:L P[1] 20mm/sec FINE", "  14 L P[1] 20mm/sec FINE ;", "L P[1] 20mm/sec FINE ;", "  14:A P[1] 20mm/sec FINE ;", "  14:S P[1] 20mm/sec FINE ;",
-    "  14:C P[4] ;", "  14:C P[4] 20mm/sec FINE ;", "  14:C P[9]\n    :  P[5] 20mm/sec FINE ;", "  14:C P[4]\n    :  P[9] 20mm/sec FINE ;",
-    "  14:C P[4]\n    :  P[5] FINE ;", "  14:C P[1]\n    :  P[1] 20mm/sec FINE ;", "  14:  UFRAME_NUM=7 ;", "  14:  UTOOL_NUM=7 ;", "  14:  UFRAME_NUM=R[1] ;",
-    "  14:  UTOOL_NUM=0 ;", "  14:  UFRAME_NUM=0 ;\n  15:L P[3] 20mm/sec FINE ;", "  14:  R[1]=5 ;", "  14:  PR[1]=LPOS ;", "  14:  P[1]=LPOS ;",
-    "  14:  JMP LBL[1] ;", "  14:  IF R[1]=1,JMP LBL[1] ;", "  14:  FOR R[1]=1 TO 3 ;", "  14:  SELECT R[1]=1,CALL A ;", "  14:  OFFSET CONDITION PR[1] ;",
-    "  14:  SKIP CONDITION DI[1]=ON ;", "  14:  UFRAME[1]=PR[1] ;", "  14:  Weave Sine[1] ;", "  14:  Arc Start[1] ;", "G1 X5 F100",
+    ("  14:L P[9] 20mm/sec FINE ;", 14, 8, "CC144"), ("  14:L P[1] FINE ;", 14, 13, "CC110"), ("  14:L P[1] 20mm/sec ;", 14, 21, "CC144"),
+    ("  14:L P[1] 20% FINE ;", 14, 13, "CC144"), ("  14:J P[1] 20mm/sec FINE ;", 14, 13, "CC144"), ("  14:L P[1] 20deg/sec FINE ;", 14, 13, "CC144"),
+    ("  14:L P[1] R[1]mm/sec FINE ;", 14, 13, "CC144"), ("  14:L P[1] 20mm/sec CNTR[1] ;", 14, 22, "CC144"),
+    ("  14:L P[1] 20mm/sec CR10mm ;", 14, 22, "CC144"), ("  14:L P[1] 20mm/sec FINE Offset,PR[1] ;", 14, 27, "CC144"),
+    ("  14:L P[1] 20mm/sec FINE INC ;", 14, 27, "CC144"), ("  14:L P[1] 20mm/sec FINE Skip,LBL[1] ;", 14, 27, "CC144"),
+    ("  14:L P[1] 20mm/sec FINE Tool_Offset,PR[2] ;", 14, 27, "CC144"), ("  14:L P[1] 20mm/sec FINE TA .10sec,DO[1]=ON ;", 14, 27, "CC144"),
+    ("  14:L P[1] 20mm/sec FINE Wjnt ;", 14, 27, "CC144"), ("  14:L PR[1] 20mm/sec FINE ;", 14, 6, "CC144"),
+    ("  14:L P[R[1]] 20mm/sec FINE ;", 14, 6, "CC144"), ("  14:L P[x] 20mm/sec FINE ;", 14, 6, "CC144"),
+    ("  14:L P[1] 0mm/sec FINE ;", 14, 6, "CC110"), ("  14:L P[1] 20mm/sec FINE", 14, 3, "CC144"), ("  14 L P[1] 20mm/sec FINE ;", 14, 3, "CC144"),
+    ("L P[1] 20mm/sec FINE ;", 14, 1, "CC144"), ("  14:A P[1] 20mm/sec FINE ;", 14, 6, "CC144"), ("  14:S P[1] 20mm/sec FINE ;", 14, 6, "CC144"),
+    ("  14:C P[4] ;", 14, 6, "CC144"), ("  14:C P[4] 20mm/sec FINE ;", 14, 6, "CC144"), ("  14:C P[9]\n    :  P[5] 20mm/sec FINE ;", 14, 8, "CC144"),
+    ("  14:C P[4]\n    :  P[9] 20mm/sec FINE ;", 15, 8, "CC144"), ("  14:C P[4]\n    :  P[5] FINE ;", 15, 13, "CC110"),
+    ("  14:C P[1]\n    :  P[1] 20mm/sec FINE ;", 14, 6, "CC112"), ("  14:  UFRAME_NUM=7 ;", 14, 8, "CC145"), ("  14:  UTOOL_NUM=7 ;", 14, 8, "CC145"),
+    ("  14:  UFRAME_NUM=R[1] ;", 14, 8, "CC144"), ("  14:  UTOOL_NUM=0 ;", 14, 8, "CC145"),
+    ("  14:  UFRAME_NUM=0 ;\n  15:L P[3] 20mm/sec FINE ;", 15, 8, "CC145"), ("  14:  R[1]=5 ;", 14, 8, "CC144"),
+    ("  14:  PR[1]=LPOS ;", 14, 8, "CC144"), ("  14:  P[1]=LPOS ;", 14, 8, "CC144"), ("  14:  JMP LBL[1] ;", 14, 8, "CC144"),
+    ("  14:  IF R[1]=1,JMP LBL[1] ;", 14, 8, "CC144"), ("  14:  FOR R[1]=1 TO 3 ;", 14, 8, "CC144"), ("  14:  SELECT R[1]=1,CALL A ;", 14, 8, "CC144"),
+    ("  14:  OFFSET CONDITION PR[1] ;", 14, 8, "CC144"), ("  14:  SKIP CONDITION DI[1]=ON ;", 14, 8, "CC144"),
+    ("  14:  UFRAME[1]=PR[1] ;", 14, 8, "CC144"), ("  14:  Weave Sine[1] ;", 14, 8, "CC144"), ("  14:  Arc Start[1] ;", 14, 8, "CC144"),
+    ("G1 X5 F100", 14, 1, "CC144"),
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize("line", BAD)
-def test_malformed_programs_are_refused_with_their_place(line):
+@pytest.mark.parametrize(("line", "row", "column", "rule"), BAD)
+def test_malformed_programs_are_refused_with_their_place(line, row, column, rule):
     with pytest.raises(ProgramError) as caught:
         read(HEAD + line + "\n" + TAIL)
     error = caught.value
-    assert (
-        error.rule.startswith("CC1")
-        and error.at.line in (14, 14 + line.count("\n"))
-        and error.at.column >= 1
-        and error.hint
-    )
+    assert (error.rule, error.at.line, error.at.column) == (rule, row, column), str(error)
+    assert error.hint
 
 
 def test_there_are_forty_malformed_programs():

@@ -36,7 +36,7 @@ def places(paths, out="out"):
 
 @pytest.fixture
 def parts(tmp_path):
-    for name in ("a.nc", "deep/b.NGC", "deep/c.tap", "deep/notes.md", "out/a.nc", "d.gcode"):
+    for name in ("a.nc", "deep/b.NGC", "deep/c.tap", "deep/notes.md", "out/a.nc", "d.gcode", "r.src", "deep/r.LS"):
         path = tmp_path / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(GOOD)
@@ -44,11 +44,11 @@ def parts(tmp_path):
 
 
 def test_folders_are_searched_and_mirrored_without_the_outputs(parts):
-    assert places([parts], parts / "out") == {"a.nc", "deep/b.NGC", "deep/c.tap", "d.gcode"}
+    assert places([parts], parts / "out") == {"a.nc", "deep/b.NGC", "deep/c.tap", "d.gcode", "r.src", "deep/r.LS"}
 
 
 def test_patterns_mirror_what_lies_behind_their_fixed_part(parts):
-    assert places([parts / "deep" / "*"]) == {"b.NGC", "c.tap", "notes.md"}
+    assert places([parts / "deep" / "*"]) == {"b.NGC", "c.tap", "notes.md", "r.LS"}
     assert places([parts / "**" / "*.tap"]) == {"deep/c.tap"}
 
 
@@ -65,9 +65,18 @@ def test_two_programs_for_one_place_are_refused(parts):
 def test_a_link_is_a_program_beside_the_file_that_it_leads_to(parts):
     (parts / "link.nc").symlink_to("a.nc")
     (parts / "gone.nc").symlink_to("nothing.nc")
-    assert places([parts], parts / "out") == {"a.nc", "link.nc", "gone.nc", "deep/b.NGC", "deep/c.tap", "d.gcode"}
+    assert places([parts], parts / "out") == {
+        "a.nc",
+        "link.nc",
+        "gone.nc",
+        "deep/b.NGC",
+        "deep/c.tap",
+        "d.gcode",
+        "r.src",
+        "deep/r.LS",
+    }
     (parts / "same").symlink_to("deep")
-    assert places([parts / "deep", parts / "same"]) == {"b.NGC", "c.tap"}
+    assert places([parts / "deep", parts / "same"]) == {"b.NGC", "c.tap", "r.LS"}
 
 
 def test_nothing_found_is_an_error(parts):
