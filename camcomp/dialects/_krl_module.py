@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 
 from camcomp.gcode.path_mode import ROUNDING_DISTANCE, PathMode
 from camcomp.gcode.robot_frames import IDENTITY, CoordinateFrame
-from camcomp.gcode.robot_language import MoveSite
+from camcomp.gcode.robot_language import BLANKS, MoveSite
 from camcomp.gcode.robot_reader import EXACT, RobotReader
 from camcomp.ground.datatypes import ARC, LINE, RAPID
 from camcomp.ground.errors import ProgramError, raise_all
@@ -15,14 +15,17 @@ AXES = ("A1", "A2", "A3", "A4", "A5", "A6")
 _OTHERS = frozenset(("S", "T", *(f"E{n}" for n in range(1, 7))))
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _VALUE = re.compile(rf"\s*({_NUMBER})\s*\Z")
-_FIELD = re.compile(rf"\s*([A-Za-z_]\w*)\s+({_NUMBER}|'[BH][0-9A-Fa-f]+'|#?\w[\w.$\[\]]*)\s*(?:,|\Z)", re.IGNORECASE)
+_FIELD = re.compile(
+    rf"\s*([A-Za-z_]\w*)\s+({_NUMBER}|'[BH]?\s*[0-9A-Fa-f]+'|#?\w[\w.$\[\]]*)\s*(?:,|\Z)", re.IGNORECASE
+)
 _AGGREGATE = re.compile(r"\s*\{(?:\s*[A-Za-z]\w*\s*:)?([^{}]*)\}", re.IGNORECASE)
-_NAMED = re.compile(r"\s*(BASE_DATA|TOOL_DATA)\s*\[\s*(\d+)\s*\]\s*\Z", re.IGNORECASE)
+_NAMED = re.compile(r"\s*(BASE|TOOL)_DATA\s*\[\s*(\d+)\s*\]\s*\Z", re.IGNORECASE)
 _MOVE = re.compile(r"[ \t]*(PTP|LIN|CIRC)(?![A-Za-z0-9_])", re.IGNORECASE)
 _BLEND = re.compile(r"[ \t]*((?:C_(?:DIS|VEL|ORI|PTP|SPL)(?![A-Za-z0-9_])[ \t]*){1,2})\Z", re.IGNORECASE)
 _SWEEP = re.compile(rf"\s*,\s*CA\s+({_NUMBER})", re.IGNORECASE)
 _ASSIGNED = re.compile(r"\s*(\$?[A-Za-z_][\w.]*(?:\[[^\]]*\])?)\s*=(?!=)\s*(.*?)\s*\Z", re.IGNORECASE)
 _CALL = re.compile(r"\s*([A-Za-z_]\w*)\s*\((.*)\)\s*\Z")
+_SIGNAL = re.compile(r"\s*SIGNAL\s+(\w+)\s+\$\w+\[", re.IGNORECASE)
 _BAS = re.compile(r"\s*#(\w+)\s*(?:,\s*(.*?))?\s*\Z")
 DEF = re.compile(r"[ \t]*(?:GLOBAL[ \t]+)?DEF[ \t]+[A-Za-z_]\w*[ \t]*\(([^)]*)\)[ \t]*\Z", re.IGNORECASE)
 
@@ -32,7 +35,7 @@ _UNFOLLOWED = (
     (r"IF|ELSE|ENDIF|FOR|ENDFOR|WHILE|ENDWHILE|LOOP|ENDLOOP|REPEAT|UNTIL|SWITCH|CASE|DEFAULT|ENDSWITCH|GOTO|EXIT|RETURN",
      "control flow", "post one module that runs from its first line to its last"),
     (r"TRIGGER", "TRIGGER counts from a point to which lines may be added", "switch between two moves"),
-    (r"DEFFCT|DEFDAT|ENDDAT|ENDFCT|IMPORT|STRUC|ENUM|SIGNAL", "no statement of a plain module", "post one .src with inline poses"),
+    (r"DEFFCT|DEFDAT|ENDDAT|ENDFCT|IMPORT|STRUC|ENUM", "a declaration of other modules", "post one .src with inline poses"),
     (r"ASYPTP|ASYSTOP|ASYCANCEL|BRAKE|RESUME", "an asynchronous move or stop", ""),
 )  # fmt: skip
 _UNFOLLOWED_AT = [
@@ -79,6 +82,9 @@ class KrlModule:
         self.angles: list[float] | None = None  # A1 to A6
         self.apo_mm = 0.0  # $APO.CDIS
         self.numbers: dict[str, int] = {}  # of FDAT_ACT
+        frames = reader.frames
+        self.known = {"BASE": dict(frames.bases), "TOOL": dict(frames.tools)}  # by BASE_DATA[n], TOOL_DATA[n]
+        self.signals: set[str] = set()
         self.circ_stated = False
         self.external: dict[str, float] = {}  # E1 to E6
         self.base_stated = self.tool_stated = False
@@ -103,7 +109,7 @@ class KrlModule:
     def _line(self, row: int) -> None:
         begin = int(self.text.starts[row])
         code = code_of(self.text.line(row))
-        stripped = code.strip()
+        stripped = code.strip(BLANKS)
         if not stripped or stripped.startswith("&"):
             return
         at = begin + len(code) - len(code.lstrip())
@@ -133,6 +139,8 @@ class KrlModule:
                 reader.refuse("CC119" if what == "a spline" else "CC144", f"{what}, which is not followed", at, hint)
         if found := _ASSIGNED.match(code):
             self._assign(begin, found, at)
+        elif found := _SIGNAL.match(code):
+            self.signals.add(found[1].upper())
         elif re.match(r"\s*(WAIT|HALT)(?!\w)", code, re.IGNORECASE):
             self._wait(code, at)
         elif _PASSED.match(code):
@@ -157,6 +165,8 @@ class KrlModule:
         where = begin + found.start(2)
         if name in ("$BASE", "$TOOL"):
             self._set_frame(name, value, where)
+        elif data := _NAMED.match(name):
+            self.known[data[1]][int(data[2])] = self._frame(name, value, where)
         elif name in ("$VEL.CP", "$APO.CDIS", "$APO.CVEL"):
             self._set_number(name, value, where)
         elif name in ("$VEL", "$APO"):
@@ -164,6 +174,9 @@ class KrlModule:
                 if f"{name}.{key}" in ("$VEL.CP", "$APO.CDIS"):
                     self._set_number(f"{name}.{key}", self.text.string[slice(*span)], span[0])
         elif name == "FDAT_ACT":
+            if not _AGGREGATE.match(value):
+                self.reader.refuse("CC144", f"FDAT_ACT={value[:30]} is data of another file", where,
+                                   "write FDAT_ACT={TOOL_NO n,BASE_NO n,IPO_FRAME #BASE}, or $BASE and $TOOL with numbers")  # fmt: skip
             fields = self._fields(value, where, names=None)[0]
             for key in ("TOOL_NO", "BASE_NO"):
                 if key in fields:
@@ -173,7 +186,7 @@ class KrlModule:
                 hint = f"use {name}={_STATED[name][0]}"
                 self.reader.refuse("CC115", f"{name}={value} turns the tool in a way that is not followed", where, hint)
             self.circ_stated |= name == "$CIRC_TYPE"
-        elif not _IDLE.match(name):
+        elif not _IDLE.match(name) and name not in self.signals:
             self.reader.refuse(
                 "CC144", f"{found[1]} is a variable that is not followed", at, "post numbers in place of variables"
             )
@@ -198,32 +211,31 @@ class KrlModule:
         self.reader.feed = 60_000.0 * metres_per_s
 
     def _set_frame(self, name: str, value: str, at: int) -> None:
-        reader = self.reader
         if value.upper() in ("$NULLFRAME", "$WORLD"):
             frame = IDENTITY
         elif found := _NAMED.match(value):
-            self._take_numbered(name, found[1].upper().removesuffix("_DATA"), int(found[2]), at)
+            self._take_numbered(name, found[1].upper(), int(found[2]), at)
             return
-        elif _AGGREGATE.match(value):
-            numbers = self._numbers(value, at, POSE)
-            values = [numbers.get(each, 0.0) for each in POSE]
-            frame = CoordinateFrame.of(values[:3], values[3:])
-            if len(numbers) < 6:
-                reader.refuse("CC145", f"{name} does not state all of X, Y, Z, A, B, C", at)
         else:
-            reader.refuse(
-                "CC145",
-                f"{name} is not given as numbers",
-                at,
-                f"write {{X ..., Y ..., Z ..., A ..., B ..., C ...}} or {name[1:]}_DATA[n]",
-            )
+            frame = self._frame(name, value, at)
         self._take(name, frame, at)
+
+    def _frame(self, name: str, value: str, at: int) -> CoordinateFrame:
+        if not _AGGREGATE.match(value):
+            also = f" or {name[1:]}_DATA[n]" if name[0] == "$" else ""
+            hint = f"write {{X ..., Y ..., Z ..., A ..., B ..., C ...}}{also}"
+            self.reader.refuse("CC145", f"{name} is not given as numbers", at, hint)
+        numbers = self._numbers(value, at, POSE)
+        if len(numbers) < 6:
+            self.reader.refuse("CC145", f"{name} does not state all of X, Y, Z, A, B, C", at)
+        values = [numbers[each] for each in POSE]
+        return CoordinateFrame.of(values[:3], values[3:])
 
     def _take_numbered(self, name: str, kind: str, number: int, at: int) -> None:
         """A frame of the machine file; number 0 is none."""
         if kind != name[1:]:
             self.reader.refuse("CC145", f"{kind}_DATA is not for {name}", at)
-        known = self.reader.frames.bases if kind == "BASE" else self.reader.frames.tools
+        known = self.known[kind]
         if number and number not in known:
             key = "base_frames" if kind == "BASE" else "tool_frames"
             self.reader.refuse(

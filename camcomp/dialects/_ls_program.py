@@ -15,7 +15,7 @@ from camcomp.ground.errors import ProgramError, raise_all
 COMPONENTS = ("X", "Y", "Z", "W", "P", "R")
 JOINTS = ("J1", "J2", "J3", "J4", "J5", "J6")
 SECTION = re.compile(r"^[ \t]*/(MN|POS|END)[ \t\r]*$", re.MULTILINE | re.IGNORECASE)
-POSITION = re.compile(r"P\[(\d+)(?::[^\]]*)?\][ \t]*\{(.*?)\}[ \t]*;", re.DOTALL)
+POSITION = re.compile(r"P\[(\d+)(?::[^\]]*)?\][ \t]*\{(.*?)\}[ \t]*;", re.DOTALL | re.IGNORECASE)
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)"
 _VALUE = re.compile(rf"\b([XYZWPR]|[JE]\d)[ \t]*=[ \t]*({_NUMBER})[ \t]*(mm|deg)\b", re.IGNORECASE)
 _FIELD = re.compile(r"\b([XYZWPR]|[JE]\d)[ \t]*=", re.IGNORECASE)
@@ -24,16 +24,16 @@ _STATEMENT = re.compile(r"[ \t]*\d*[ \t]*:(.*);[ \t]*\Z")
 _CONTINUED = re.compile(r"[ \t]*\d*[ \t]*:(.*?)[ \t]*\Z")
 _MOVE = re.compile(r"[ \t]*([JLCA])[ \t]+(P\[(\d+)(?::[^\]]*)?\])[ \t]*(.*?)[ \t]*\Z", re.IGNORECASE)
 _SECOND = re.compile(r"[ \t]*(P\[(\d+)(?::[^\]]*)?\])[ \t]*(.*?)[ \t]*\Z", re.IGNORECASE)
-_SPEED = re.compile(rf"({_NUMBER})[ \t]*(%|mm/sec|cm/min)(?=[ \t]|\Z)[ \t]*", re.IGNORECASE)
+_SPEED = re.compile(rf"({_NUMBER})[ \t]*(%|mm/sec|cm/min|inch/min)(?=[ \t]|\Z)[ \t]*", re.IGNORECASE)
 _END = re.compile(r"(FINE|CNT[ \t]*\d+)(?=[ \t]|\Z)(?:[ \t]+ACC[ \t]*\d+(?=[ \t]|\Z))?[ \t]*", re.IGNORECASE)
-_CHOSEN = re.compile(r"[ \t]*(UFRAME_NUM|UTOOL_NUM)[ \t]*=[ \t]*(\d+)[ \t]*\Z", re.IGNORECASE)
+_CHOSEN = re.compile(r"[ \t]*(UFRAME_NUM|UTOOL_NUM)(?:\[GP1\])?[ \t]*=[ \t]*(\d+)[ \t]*\Z", re.IGNORECASE)
 _WAIT = re.compile(rf"[ \t]*WAIT[ \t]+({_NUMBER})[ \t]*\(sec\)[ \t]*\Z", re.IGNORECASE)
 _IDLE = re.compile(
-    r"[ \t]*(?:(?:!|--).*|(?:[DRGA]O|F)\[.*|OVERRIDE[ \t]*=.*|PAYLOAD\[.*|MESSAGE\[.*|TIMER\[.*|LBL\[.*|WAIT[ \t].*|PAUSE|END|COL .*)?[ \t]*\Z",
+    r"[ \t]*(?:(?:!|--|//).*|\$WAITTM\w*[ \t]*=.*|(?:[DRGA]O|F)\[.*|OVERRIDE[ \t]*=.*|PAYLOAD\[.*|MESSAGE\[.*|TIMER\[.*|LBL\[.*|WAIT[ \t].*|PAUSE|END|COL .*)?[ \t]*\Z",
     re.IGNORECASE,
 )
 _CALL = re.compile(r"[ \t]*(?:CALL|RUN)[ \t]+(\w+)", re.IGNORECASE)
-_FEED = {"mm/sec": 60.0, "cm/min": 10.0}  # mm/min
+_FEED = {"mm/sec": 60.0, "cm/min": 10.0, "inch/min": 25.4}  # mm/min
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ class LsProgram:
         errors: list[ProgramError] = []
         for found in POSITION.finditer(string, sections["POS"].end()):
             self._collect(errors, self._position, found)
-        for found in re.finditer(r"P\[(\d+)", string[begin:end]):
+        for found in re.finditer(r"P\[(\d+)", string[begin:end], re.IGNORECASE):
             self.uses[int(found[1])] = self.uses.get(int(found[1]), 0) + 1
         row = rows.start
         while row < rows.stop:
@@ -83,7 +83,7 @@ class LsProgram:
                     r"[ \t]*\d*[ \t]*:[ \t]*[CA][ \t]", self.text.line(row), re.IGNORECASE
                 )
                 self._collect(errors, self._arc if two else self._statement, row)
-                row += 1 if two else 0
+                row += 1 if two else len(self._continued(row))
             row += 1
         raise_all(errors[:20])
         for key, name in (("UF", "UFRAME_NUM"), ("UT", "UTOOL_NUM")):
@@ -116,8 +116,24 @@ class LsProgram:
             values, spans, {each[1].upper(): each[2] for each in _FRAME.finditer(found[2])}
         )
 
+    def _continued(self, row: int) -> list[str]:
+        """The lines `: ...` that go on with the statement of a row."""
+        out: list[str] = []
+        line = self.text.line(row)
+        while not line.rstrip().endswith(";") and row + len(out) + 1 < len(self.text):
+            line = self.text.line(row + len(out) + 1)
+            if not line.lstrip().startswith(":"):
+                break
+            out.append(line.lstrip()[1:])
+        return out
+
     def _statement(self, row: int) -> None:
         reader, line, begin = self.reader, self.text.line(row), int(self.text.starts[row])
+        if (more := self._continued(row)) and not re.match(r"[ \t]*\d*[ \t]*:[ \t]*[JL][ \t]", line, re.IGNORECASE):
+            line = " ".join((line.rstrip(), *more))
+        elif more:
+            place = begin + len(line) - len(line.lstrip())
+            reader.refuse("CC144", "a move over several lines", place, "write J and L on one line, with the semicolon")
         at = begin + len(line) - len(line.lstrip())
         found = _STATEMENT.match(line)
         if found is None:
@@ -237,7 +253,7 @@ class LsProgram:
 
     def _how(self, words: str, at: int, kind: str) -> tuple[int, int]:
         """Speed and termination of a move; the span of the latter."""
-        refuse, units = self.reader.refuse, "N %" if kind == "J" else "N mm/sec or N cm/min"
+        refuse, units = self.reader.refuse, "N %" if kind == "J" else "N mm/sec, N cm/min or N inch/min"
         if not words or words.upper().startswith(("FINE", "CNT")):
             refuse("CC110", f"{kind} without a speed", at, f"write {units} behind the position")
         speed = _SPEED.match(words)

@@ -8,7 +8,7 @@ import numpy as np
 
 from camcomp.gcode.path_mode import ROUNDING_DISTANCE, PathMode
 from camcomp.gcode.robot_frames import IDENTITY, CoordinateFrame
-from camcomp.gcode.robot_language import MoveSite
+from camcomp.gcode.robot_language import BLANKS, MoveSite
 from camcomp.gcode.robot_reader import EXACT, RobotReader
 from camcomp.ground.datatypes import ARC, LINE, RAPID
 from camcomp.ground.errors import ProgramError, raise_all
@@ -26,7 +26,7 @@ _MOVE = re.compile(r"\s*(MoveL|MoveC|MoveJ|MoveAbsJ)\s+(.*?)\s*;\s*\Z", re.IGNOR
 _WAIT = re.compile(r"\s*WaitTime\s+(?:\\InPos\s*,\s*)?(\S+?)\s*;\s*\Z", re.IGNORECASE)
 _SKIPPED = re.compile(
     r"\s*(?:ConfL|ConfJ|AccSet|SetDO|SetAO|SetGO|Set|Reset|PulseDO|TPWrite|TPErase|GripLoad|ActUnit|PathResol|WaitRob|WaitDI|WaitDO"
-    r"|WaitUntil|Stop|SingArea\s*\\Off|CirPathMode\s*\\ObjectFrame|VelSet\s+100\s*,.*)(?!\w)",
+    r"|WaitUntil|Stop|PDispOff|EOffsOff|SingArea\s*\\Off|CirPathMode\s*\\ObjectFrame|VelSet\s+100\s*,.*)(?!\w)",
     re.IGNORECASE,
 )
 _FLOW = re.compile(
@@ -37,6 +37,8 @@ _OTHER_MOVE = re.compile(
     r"\s*(?:Move\w+|Trigg\w+|Search\w+|SingArea|CirPathMode|VelSet|ArcL|ArcC|EOffs\w*|PDisp\w*|Sync\w+)(?!\w)",
     re.IGNORECASE,
 )
+_HINTS = {"singarea": "use SingArea \\Off", "cirpathmode": "use CirPathMode \\ObjectFrame"}
+_UNFINISHED = re.compile(r"[^;]*[\[,(=][^;]*\Z")  # a list or an argument without the semicolon
 _CALL = re.compile(r"\s*(\w+)\b[^:=]*;\s*\Z")
 _STARTS = re.compile(r"\s*(?:PROC\s+\w+\s*\((.*)\)|ENDPROC|ENDMODULE|%%%|VERSION:.*|LANGUAGE:.*)\s*\Z", re.IGNORECASE)
 
@@ -148,7 +150,7 @@ class RapidModule:
 
     def _line(self, row: int, code: str, begin: int) -> None:
         reader, at = self.reader, begin + len(code) - len(code.lstrip())
-        if not code.strip() or _DECLARED.match(code) or MODULE.match(code):
+        if not code.strip(BLANKS) or _DECLARED.match(code) or MODULE.match(code):
             return
         if found := _STARTS.match(code):
             if found[1] is not None:
@@ -164,14 +166,21 @@ class RapidModule:
             reader.waits = True
         elif _SKIPPED.match(code):
             reader.waits |= code.strip().lower().startswith(("wait", "stop"))
+        elif re.match(r"\s*Move\w+\s*\\", code, re.IGNORECASE):
+            reader.refuse(
+                "CC144", f"'{code.strip()[:20]}' has an option that is not followed", at, "post moves without it"
+            )
         elif _FLOW.match(code):
             reader.refuse(
                 "CC144", "control flow, which is not followed", at, "post one routine from its first line to its last"
             )
-        elif _OTHER_MOVE.match(code):
+        elif _UNFINISHED.match(code):
             reader.refuse(
-                "CC144", f"'{code.strip()[:40]}' is not followed", at, "post MoveL, MoveC, MoveJ and MoveAbsJ"
+                "CC144", f"'{code.strip()[:40]}' goes on in the next line", at, "write every statement on one line"
             )
+        elif _OTHER_MOVE.match(code):
+            hint = _HINTS.get(code.split()[0].split("\\")[0].lower(), "post MoveL, MoveC, MoveJ and MoveAbsJ")
+            reader.refuse("CC144", f"'{code.strip()[:40]}' is not followed", at, hint)
         elif found := _CALL.match(code):
             reader.warn(f"{found[1]} is not followed; it must not move the tool")
             reader.waits = True
@@ -180,6 +189,10 @@ class RapidModule:
 
     def _move(self, row: int, begin: int, found: re.Match[str]) -> None:
         kind, at, base = found[1].lower(), begin + found.start(1), begin + found.start(2)
+        if ";" in found[2]:
+            self.reader.refuse(
+                "CC144", "two statements on one line", base + found[2].index(";"), "write one on each line"
+            )
         spans = _split(found[2])
         targets = 2 if kind == "movec" else 1
         if len(spans) != targets + 3:
@@ -215,6 +228,11 @@ class RapidModule:
         if (value := parse(word, span[0])) is not None:
             return value, False
         found = self.data.get(word.lower())
+        if computed := re.match(r"\w+(?=\()|[\w\[\],.]*(\\\w+)", word):
+            text, hint = computed[1] or computed[0] + "()", f"write the {kind} as numbers, without it"
+            self.reader.refuse(
+                "CC144", f"{text} is not followed", span[0] + computed.start(1 if computed[1] else 0), hint
+            )
         if found is None or found[0] != kind:
             self.reader.refuse(
                 "CC144",

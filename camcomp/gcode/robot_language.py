@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from camcomp.gcode.robot_frames import CoordinateFrame
     from camcomp.gcode.text import Text
 
+BLANKS = " \t\r\n\x1a"  # and the end of file of DOS
 Span = tuple[int, int]
 Edit = tuple[int, int, str]  # characters begin to end, and what is to stand there
 

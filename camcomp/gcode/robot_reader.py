@@ -38,6 +38,7 @@ class RobotReader:
         self.frames = setup.frames() if setup.frames is not None else RobotFrames()
         self.base: CoordinateFrame = self.frames.program
         self.tool: CoordinateFrame = self.frames.tool_of_machine()
+        self._tool_at: int | None = None  # where the tool is stated; None: it is checked
         self.feed: float | None = None  # mm/min
         self.mode = EXACT
         self.waits = False
@@ -67,20 +68,23 @@ class RobotReader:
             self.warnings.append(text)
 
     def set_tool(self, tool: CoordinateFrame, at: int) -> None:
-        """Another tool; it has to be that of the machine file."""
-        off = self.frames.off_tip(tool)
-        if off > SAME_TIP_MM:
+        """Another tool, stated at a character; the first move to a pose with it has to find that of the machine file."""
+        self.tool, self._tool_at = tool, at
+
+    def _check_tool(self) -> None:
+        at, self._tool_at = self._tool_at, None
+        if at is not None and (off := self.frames.off_tip(self.tool)) > SAME_TIP_MM:
             x, y, z = self.frames.tool_of_machine().origin
             self.refuse(
                 "CC145", f"the tip of this tool lies {off:.3f} mm from that of the machine file, {x:g} {y:g} {z:g} of the flange", at,
                 hint="correct section tool of the machine file (and robot: flange, control: flange_abc_deg)",
             )  # fmt: skip
-        self.tool = tool
 
     def move(self, kind: int, site: MoveSite, values: Sequence[float], *, middle: Sequence[float] | None = None,
              sweep_deg: float | None = None) -> None:  # fmt: skip
         """A rapid, a line, or an arc through `middle`."""
         at = site.instruction[0]
+        self._check_tool()
         if max(map(abs, values[:3])) > FARTHEST_MM:
             self.refuse("CC138", "the point is out of every machine's reach", at)
         if kind != RAPID:

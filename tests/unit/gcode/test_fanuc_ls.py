@@ -95,6 +95,17 @@ def test_what_is_not_changed_keeps_its_bytes(end):
     assert len(read(written).path) == 6
 
 
+def test_forms_of_other_writers_are_read():
+    """Small letters, statements over two lines, lines that are commented out, a wait for inputs, inches."""
+    wait = "   6:  $WAITTMOUT=100 ;\n   7:  WAIT DI[1:the spindle turns]=ON\n    :  TIMEOUT,LBL[1] ;\n   8:  //L P[9] 20mm/sec FINE ;\n"
+    text = (HEAD + wait + MOVES + TAIL).replace("UFRAME_NUM=1", "UFRAME_NUM[GP1]=1")
+    text = text.replace("L P[3] 120cm/min", "l p[3] 10inch/min")
+    program = read(text)
+    assert len(program.path) == 6 and program.path.feed[2] == 254.0
+    lines = rewrite(program, Output.same(program.path), resolution_mm=1e-4, version="1").data.decode().splitlines()
+    assert lines[:9] + lines[12:] == text.splitlines()
+
+
 def test_frames_and_angles_are_those_of_scipy():
     path = read(HEAD + MOVES + TAIL).path
     base, tool = (
@@ -145,7 +156,7 @@ BAD = [
     ("  14:C P[4] ;", 14, 6, "CC144"), ("  14:C P[4] 20mm/sec FINE ;", 14, 6, "CC144"), ("  14:C P[9]\n    :  P[5] 20mm/sec FINE ;", 14, 8, "CC144"),
     ("  14:C P[4]\n    :  P[9] 20mm/sec FINE ;", 15, 8, "CC144"), ("  14:C P[4]\n    :  P[5] FINE ;", 15, 13, "CC110"),
     ("  14:C P[1]\n    :  P[1] 20mm/sec FINE ;", 14, 6, "CC112"), ("  14:  UFRAME_NUM=7 ;", 14, 8, "CC145"), ("  14:  UTOOL_NUM=7 ;", 14, 8, "CC145"),
-    ("  14:  UFRAME_NUM=R[1] ;", 14, 8, "CC144"), ("  14:  UTOOL_NUM=0 ;", 14, 8, "CC145"),
+    ("  14:  UFRAME_NUM=R[1] ;", 14, 8, "CC144"), ("  14:  UTOOL_NUM=0 ;\n  15:L P[3:] 20mm/sec FINE ;", 15, 8, "CC145"), ("  14:L P[3]\n    :  20mm/sec FINE ;", 14, 3, "CC144"),
     ("  14:  UFRAME_NUM=0 ;\n  15:L P[3] 20mm/sec FINE ;", 15, 8, "CC145"), ("  14:  R[1]=5 ;", 14, 8, "CC144"),
     ("  14:  PR[1]=LPOS ;", 14, 8, "CC144"), ("  14:  P[1]=LPOS ;", 14, 8, "CC144"), ("  14:  JMP LBL[1] ;", 14, 8, "CC144"),
     ("  14:  IF R[1]=1,JMP LBL[1] ;", 14, 8, "CC144"), ("  14:  FOR R[1]=1 TO 3 ;", 14, 8, "CC144"), ("  14:  SELECT R[1]=1,CALL A ;", 14, 8, "CC144"),

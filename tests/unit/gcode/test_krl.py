@@ -38,6 +38,35 @@ def test_missing_components_keep_their_value_and_speed_is_in_metres_per_second()
     np.testing.assert_allclose(path.orientation.end[:, 0], [0, 0, 2, 2])  # C turns about x
 
 
+POSTED = """DEF posted ( )
+DECL INT I
+SIGNAL SPINDLE $OUT[5]
+BAS (#INITMOV,0)
+BAS (#TOOL,0)
+BAS (#BASE,0)
+BASE_DATA[3] = {FRAME: X 100,Y 0,Z 0,A 90,B 0,C 0}
+$BASE = BASE_DATA[3]
+$TOOL = {FRAME: X 0,Y 0,Z 250,A 0,B 0,C 0}
+$VEL.CP = 0.01
+SPINDLE = TRUE
+PTP {E6POS: X 0, Y 0, Z 20, A 0, B 180, C 0, E1 0, S 'B 010', T 'B 100011'} C_PTP
+LIN {E6POS: X 40, Y 0, Z 20, A 0, B 180, C 0, E1 0} C_DIS
+END
+\x1a"""
+
+
+def test_modules_of_other_writers_are_read():
+    """Frames by BASE_DATA[n] = ..., tool 0 in the header, signals, numbers in bits, the end of file of DOS."""
+    program = read(POSTED, tip=np.array([0.0, 0.0, 250.0]), flange=np.diag([-1.0, 1.0, -1.0]))
+    np.testing.assert_allclose(program.path.end, [[100, 0, 20], [100, 40, 20]], atol=1e-9)
+    written = rewrite(program, Output.same(program.path), resolution_mm=1e-4, version="1").data.decode()
+    lines = written.splitlines(keepends=True)
+    assert lines.pop(1).startswith(";camcomp") and "".join(lines) == POSTED
+    with pytest.raises(ProgramError, match="lies 250") as caught:
+        read(POSTED.replace("$TOOL = {", "; {"), tip=np.array([0.0, 0.0, 250.0]), flange=np.diag([-1.0, 1.0, -1.0]))
+    assert (caught.value.rule, caught.value.at.line) == ("CC145", 5)
+
+
 def test_a_circle_goes_through_its_auxiliary_point():
     text = (
         HEAD
@@ -145,7 +174,7 @@ BAD = [
     ("$BASE = TOOL_DATA[1]", 4, 9, "CC145"), ("$BASE = MYBASE", 4, 9, "CC145"), ("$TOOL = {X 1}", 4, 9, "CC145"), ("$ORI_TYPE = #JOINT", 4, 13, "CC115"),
     ("$CIRC_TYPE = #PATH", 4, 14, "CC115"), ("$IPO_MODE = #TCP", 4, 13, "CC115"), ("TRIGGER WHEN DISTANCE=0 DELAY=0 DO $OUT[1]=TRUE", 4, 1, "CC144"),
     ("WAIT SEC T", 4, 1, "CC131"), ("LIN {A 5}", 4, 1, "CC115"), ("LIN {B 90,X 5}", 4, 1, "CC115"), ("LIN {X 1e9}", 4, 1, "CC138"), ("BAS (#CP_DAT)", 4, 1, "CC144"),
-    ("DEF q()", 4, 1, "CC144"), ("END\nLIN {X 1}", 5, 1, "CC144"), ("G1 X5 F100", 4, 1, "CC144"), ("LIN {X 1,E1 5}\nLIN {X 2,E1 6}", 5, 13, "CC115"),
+    ("FDAT_ACT=FHOME", 4, 10, "CC144"), ("SIGNAL", 4, 1, "CC144"), ("BASE_DATA[1]={X 1}", 4, 14, "CC145"), ("DEF q()", 4, 1, "CC144"), ("END\nLIN {X 1}", 5, 1, "CC144"), ("G1 X5 F100", 4, 1, "CC144"), ("LIN {X 1,E1 5}\nLIN {X 2,E1 6}", 5, 13, "CC115"),
 ]  # fmt: skip
 
 

@@ -38,6 +38,12 @@ def test_what_is_not_changed_keeps_its_bytes():
 
 
 BAD = [
+    ('MoveL Offs(p1,0,0,5),v20,z1,tool0;', 7, 'CC144'),
+    ('MoveL p1,v20\\V:=20,z1,tool0;', 13, 'CC144'),
+    ('MoveL p1,v20,z1\\Inpos:=inpos50,tool0;', 16, 'CC144'),
+    ('MoveL\\Conc,p1,v20,z1,tool0;', 1, 'CC144'),
+    ('MoveL p1,v20,z1,tool0; MoveL p1,v20,z1,tool0;', 22, 'CC144'),
+    ('MoveL [[0,0,0],[1,0,0,0],', 1, 'CC144'),
     ('MoveL p9,v20,z1,tool0;', 7, 'CC144'),
     ('MoveL p1,v20,z1,mill;', 17, 'CC145'),
     ('MoveL p1,v20,tool0;', 1, 'CC144'),
