@@ -202,7 +202,8 @@ def machine_with_causes(
 ) -> str:
     """Text of the machine file of `configs` with the causes, for a file called `target`; learned: laws by name."""
     every, before = configs, {each.name: each for each in learned}
-    laws = [] if result.law is None else [each.model_dump(exclude_none=True) for each in result.law.parts]
+    parts = [*result.axis_laws, *(() if result.law is None else result.law.parts)]
+    laws = [each.model_dump(exclude_none=True) for each in parts]
     for cause in result.known:
         if cause.effect in before:
             laws += before[cause.effect].entries({name: each.value for name, each in cause.parameters.items()})

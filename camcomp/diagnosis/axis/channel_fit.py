@@ -57,10 +57,11 @@ class ChannelData:
 class ChannelFit:
     """What the model says of a channel: causes, healthy sizes by kind with their covariance, and residuals per run.
 
-    drivers: covariate of the dictionary that is more likely than not -> share of the residual's energy.
+    acting: the causes with their amplitudes. drivers: covariate of the dictionary that is more likely than not -> share of the residual's energy.
     """
 
     causes: tuple[FoundCause, ...]
+    acting: tuple[tuple[AxisCause, Floats], ...]
     sizes: Mapping[str, Floats]
     covariance: Floats
     left: Sequence[Floats]
@@ -98,6 +99,24 @@ def fit_channel(data: ChannelData, terms: Sequence[AxisCause]) -> ChannelFit:
             break
         terms, at = _shaped(data, terms, members, moved)
     return _answer(data, terms, linear, sd)
+
+
+def healthy_sizes(columns: Sequence[Sizes], values: Sequence[Floats], floor: float) -> tuple[dict[str, Floats], Floats]:
+    """Sizes by kind that every axis has in values (n,) per run, under their prior, with their covariance.
+
+    floor: least noise of a row. The prior is that of `fit_channel`.
+    """
+    X = np.concatenate([np.concatenate([*own.values()], axis=1) for own in columns])
+    y = np.concatenate([*values])
+    scale = np.sqrt(np.mean(X**2, axis=0)) + 1e-300
+    X = X / scale
+    left = y - X @ np.linalg.lstsq(X, y, rcond=1e-9)[0]
+    sd = max(float(np.sqrt(np.mean(left**2) * rows_together(left))), floor)
+    prior = max(HEALTHY_SHARE * float(np.sqrt(np.mean(y**2))), 1e-6 * sd)
+    inverse = np.linalg.inv(X.T @ X / sd**2 + np.eye(X.shape[1]) / prior**2)
+    mean = inverse @ (X.T @ y) / sd**2 / scale
+    ends = np.cumsum([own.shape[1] for own in columns[0].values()])[:-1]
+    return dict(zip(columns[0], np.split(mean, ends), strict=True)), inverse / np.outer(scale, scale)
 
 
 def _columns(data: ChannelData, terms: Sequence[AxisCause], k: int, at: Sequence[Floats]) -> tuple[Floats, Floats]:
@@ -259,7 +278,7 @@ def _answer(data: ChannelData, terms: Sequence[AxisCause], linear: _Linear, sd: 
         left.append(y - part - sum((data.healthy[k][kind] @ sizes[kind] for kind in sizes), np.zeros(len(y))))
     spreads = _spreads_of_shapes(data, terms, linear, amount)
     scale = calibration_of("axes")
-    causes = []
+    causes, acting = [], []
     whole = sum(float(np.sum((data.values[k] - data.level) ** 2)) for k in data.train)
     for i in found.members:
         term, columns = terms[i], list(model.candidates[i].columns)
@@ -269,6 +288,7 @@ def _answer(data: ChannelData, terms: Sequence[AxisCause], linear: _Linear, sd: 
         less = sum(float(np.sum((left[k] + each) ** 2)) for k, each in zip(data.train, own, strict=True))
         rest = sum(float(np.sum(left[k] ** 2)) for k in data.train)
         half = 1.96 * scale.interval * np.sqrt(np.diag(covariance)[columns]) + KNOWN * np.abs(amount[i])
+        acting.append((term, amount[i]))
         causes.append(
             FoundCause(
                 effect=term.effect, target=term.target,
@@ -281,7 +301,7 @@ def _answer(data: ChannelData, terms: Sequence[AxisCause], linear: _Linear, sd: 
     names = {b.scales[-1][0] for b, gain in gains.items() if b.scales and gain > 0.0}
     drivers = {name: _share_of(linear, name, [left[k] for k in data.train], sd) for name in names}
     return ChannelFit(
-        tuple(causes), sizes, among, left, drivers
+        tuple(causes), tuple(acting), sizes, among, left, drivers
     )  # fmt: skip
 
 

@@ -21,6 +21,8 @@ from camcomp.ground.datatypes import Floats
 from camcomp.model import signal_path
 from camcomp.model.effect import Cause, Motion, Parameter, applies
 from camcomp.model.hysteresis import direction
+from camcomp.model.law.covariates import AT_DRIVE, DriveRows
+from camcomp.model.law.expression import parse
 from camcomp.model.motion.between_rows import between_rows
 from camcomp.model.seams import Seams
 from camcomp.model.statics.description import Actuator, Robot
@@ -108,8 +110,9 @@ class DrivenAxis:
 
     @cached_property
     def moved(self) -> Motion:
-        """The motion of the encoders."""
-        return self._motion(self.run.time, self.run.encoder / self.lever)
+        """The motion of the encoders; a play behind them gives way to the weight of stated masses."""
+        plain = self._motion(self.run.time, self.run.encoder / self.lever)
+        return replace(plain, held=lambda: self.weight[:, None]) if self.weight.any() else plain
 
     def channel(self, name: ChannelName, causes: Sequence[Cause]) -> Floats:
         """What causes add to a channel (n,), in the study's mm or N: set-point - encoder, load - encoder, drive force."""
@@ -124,6 +127,13 @@ class DrivenAxis:
             return np.zeros(len(self.run.time)) if effort is None else np.asarray(effort[:, 0] / self.lever, float)
         softer = sum(self._compliance(cause) - self._compliance(None) for cause in causes)
         return np.asarray(self.lever * (error[:, 0] - softer * self.weight), float)
+
+    def laws(self, texts: Sequence[str], causes: Sequence[Cause]) -> Floats:
+        """What formulas at the stage control, behind causes, add to the following error (n, q), in the study's mm."""
+        late = signal_path.controlled(causes, (self.actuator.name,), self.asked)
+        rows = DriveRows(self.asked, 0, followed=late[:, 0])
+        added = [parse(text, AT_DRIVE)(rows, rows.rows) for text in texts]
+        return -self.lever * np.stack([np.interp(self.run.time, self.asked.time, each) for each in added], axis=1)
 
     def _compliance(self, cause: Cause | None) -> float:
         """Way of the drive per unit of its load."""

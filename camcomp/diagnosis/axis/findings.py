@@ -13,7 +13,7 @@ from camcomp.diagnosis.axis.block_least_squares import Gain, Series
 from camcomp.diagnosis.axis.gate import AxisGate
 from camcomp.diagnosis.axis.noise_floor import FAST_S, LEAST_SPIKE_MM, spikes
 from camcomp.diagnosis.axis.terms import WIDE, AxisTravel, Ripple
-from camcomp.diagnosis.result.types import FoundCause, Law
+from camcomp.diagnosis.result.types import FoundCause, Law, LawPart
 from camcomp.diagnosis.statistics.probability import EVEN
 from camcomp.ground.datatypes import Bools, Floats
 from camcomp.model.seams import missing_rows
@@ -227,6 +227,7 @@ class AxisFindings:
     unknown_chance: float = 0.0  # log10, the least of all that is unknown
     details: dict[str, Any] = field(default_factory=dict)
     law: Law | None = None
+    laws: list[LawPart] = field(default_factory=list)  # of its following error, as the machine file has them
 
     @property
     def channels(self) -> list[AxisChannel]:

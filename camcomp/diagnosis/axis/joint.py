@@ -1,6 +1,6 @@
 """Channels of one axis for the model of every log: following error and drive torque of a hinge, second encoder of any axis.
 
-    set-point - encoder = control effects + a q'' + c tanh(q'/v0) + o + w1 sin q + w2 cos q + e
+    encoder - set-point = control effects + a q'' + c tanh(q'/v0) + o + w1 sin q + w2 cos q + e    q: behind these effects
     load - encoder      = play, springs, screws + o + d q' + f tau + e        d: delay between two encoders; f tau: compliance
     drive torque        = friction + J q'' + sum_k J_k q_k'' + weight(q) + o + e
 
@@ -18,7 +18,7 @@ import numpy as np
 
 from camcomp.diagnosis.axis.at_tip import lever_mm
 from camcomp.diagnosis.axis.block_least_squares import by_block
-from camcomp.diagnosis.axis.channel_fit import ChannelData, ChannelFit, fit_channel
+from camcomp.diagnosis.axis.channel_fit import ChannelData, ChannelFit, fit_channel, healthy_sizes
 from camcomp.diagnosis.axis.channels import not_known, series_of
 from camcomp.diagnosis.axis.drive_force import MOST_PUSHES
 from camcomp.diagnosis.axis.effect_columns import AxisCause, ChannelName, DrivenAxis, candidates
@@ -26,6 +26,8 @@ from camcomp.diagnosis.axis.findings import ROWS, AxisChannel, AxisFindings, Axi
 from camcomp.diagnosis.axis.gate import judge
 from camcomp.diagnosis.axis.push import Window, find_window, seen_elsewhere, sharp
 from camcomp.diagnosis.axis.terms import AxisTravel, travel
+from camcomp.diagnosis.law.words import law_sum
+from camcomp.diagnosis.result.types import LawPart
 from camcomp.ground import shelf
 from camcomp.ground.datatypes import Floats
 from camcomp.model.statics.arm import arm_of
@@ -145,12 +147,20 @@ def study_channel(
         causes = [term.cause(own.tolist()) for term, own in acting if term.run in (None, rows.runs[k].name)]
         return axes[k].channel(rows.channel, causes)[seen[k]] if causes else np.zeros(len(rows.values[k]))
 
+    following = rows.channel == "following"
+
     data = ChannelData(
         values=rows.values, healthy=_healthy(found, rows, around, seen, axes), covariates=_covariates(found, rows, around),
         response=response, floor=rows.floor, train=rows.train,
-        level=0.0 if rows.channel == "following" else float(np.mean(np.concatenate([rows.values[k] for k in rows.train]))),
+        level=0.0 if following else float(np.mean(np.concatenate([rows.values[k] for k in rows.train]))),
     )  # fmt: skip
     done = fit_channel(data, terms)
+    if following:
+        texts = _following_laws(rows)
+        behind = [term.cause(own.tolist()) for term, own in done.acting]
+        columns = [_by_kind(texts, axes[k].laws(_all(texts), behind)[own]) for k, own in enumerate(seen)]
+        done = _behind_causes(data, done, columns)
+        found.laws = [_written_law(found, texts, done.sizes)]
     if rows.channel == "force" and "disturbance" not in without:
         done = _with_pushes(found.name, data, terms, done, rows)
     found.causes += done.causes
@@ -166,6 +176,44 @@ def study_channel(
         if channel.gate.word == "above":
             found.unknown_in += sorted(done.drivers.items(), key=lambda each: -each[1])
     return found, channel
+
+
+def _following_laws(rows: JointRows) -> dict[str, tuple[str, ...]]:
+    """Formulas of what every axis has in its following error, by kind, over its motion behind effects of the control, mm or rad.
+
+    The speed is that of a lag too small or too unsure to be a cause.
+    """
+    hinge = any(run.revolute for run in rows.runs)
+    fastest = max((float(np.abs(rows.moves[k].speed).max(initial=0.0)) for k in rows.train), default=0.0)
+    place, creep = "followed_rad" if hinge else "followed_mm", max(CREEP * fastest / lever_mm(hinge), 1e-12)
+    out = {"acceleration": (f"{place}_per_s2",), "speed": (f"{place}_per_s",), "offset": ("1",)}
+    out["friction"] = (f"tanh({place}_per_s/{creep:.6g})",)
+    return out | ({"weight": (f"sin({place})", f"cos({place})")} if hinge else {})
+
+
+def _all(texts: Mapping[str, Sequence[str]]) -> list[str]:
+    return [text for own in texts.values() for text in own]
+
+
+def _by_kind(texts: Mapping[str, Sequence[str]], columns: Floats) -> dict[str, Floats]:
+    """Columns (n, q) of all formulas, by kind."""
+    ends = np.cumsum([len(own) for own in texts.values()])[:-1]
+    return dict(zip(texts, np.split(columns, ends, axis=1), strict=True))
+
+
+def _behind_causes(data: ChannelData, done: ChannelFit, columns: Sequence[Mapping[str, Floats]]) -> ChannelFit:
+    """The fit of a following error with what its written laws and causes leave. columns (n, q): of the laws by kind, per run."""
+    rest = [values - data.response(k, done.acting) for k, values in enumerate(data.values)]
+    sizes, covariance = healthy_sizes([columns[k] for k in data.train], [rest[k] for k in data.train], data.floor)
+    left = [own - sum(columns[k][kind] @ size for kind, size in sizes.items()) for k, own in enumerate(rest)]
+    return replace(done, sizes=sizes, covariance=covariance, left=left)
+
+
+def _written_law(found: AxisFindings, texts: Mapping[str, Sequence[str]], sizes: Mapping[str, Floats]) -> LawPart:
+    """The entry of a machine file for what every axis has in its following error; it holds at any motion."""
+    amounts = [float(v) for kind in texts for v in sizes[kind]]
+    formula = law_sum(list(zip(amounts, _all(texts), strict=True)))
+    return LawPart(effect="formula", stage="control", target=found.name, axis=None, envelope={}, formula=formula)
 
 
 def _healthy(
@@ -264,7 +312,7 @@ def _tell(found: AxisFindings, rows: JointRows, done: ChannelFit, healthy: Seque
         return
     lever = lever_mm(rows.runs[0].revolute)
     if rows.channel == "following":
-        found.details["following"] = {"acceleration_us2": done.combined({"acceleration": [1e6]})}
+        found.details["following"] = {"acceleration_us2": done.combined({"acceleration": [-1e6]})}
         return
     if rows.channel == "behind":
         found.details["second_encoder"] = {"delay_ms": done.combined({"delay": [-1e3]})}

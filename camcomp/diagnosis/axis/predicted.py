@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from camcomp.diagnosis.axis.at_tip import lever_mm
 from camcomp.diagnosis.axis.noise_floor import REPEATABILITY_MM
 from camcomp.diagnosis.fit.measured import Measured
 from camcomp.ground.datatypes import Floats
@@ -23,18 +24,40 @@ from camcomp.model.statics.hanging import hang, tool_wrench
 def predict_encoders(robot: Robot, causes: Sequence[Cause], log: Measured, started_s: float) -> Floats:
     """Encoder minus set-point (n, m) that the controller makes of the logged set-points; 0 where none are logged.
 
-    NaN as long as it depends on how the axes moved before the log began: there the prediction from rest and that from a
-    settled loop differ by more than REPEATABILITY_MM.
+    NaN as long as it depends on how the axes moved before the log began: there predictions from a settled loop, from rest,
+    and from rest where the first encoder stands differ by more than REPEATABILITY_MM.
     """
     servo = signal_path.acting(causes, "control")
     if not servo:
         return np.zeros_like(log.setpoint)
     motion = between_rows(_motion(robot, log, _filled(log.time, log.setpoint, robot), started_s))
-    late = signal_path.controlled(servo, motion.names, motion) - motion.encoder
-    from_rest = signal_path.controlled(servo, motion.names, replace(motion, seams=None)) - motion.encoder
-    late, from_rest = (each[:: (len(each) - 1) // max(len(log.time) - 1, 1) or 1] for each in (late, from_rest))
-    unsure = np.abs(late - from_rest) > REPEATABILITY_MM
+    late = signal_path.controlled(servo, motion.names, motion)
+    others = [signal_path.controlled(servo, motion.names, replace(motion, seams=None)) - late]
+    loops = [cause for cause in servo if "law" not in cause.values]
+    if loops and len(motion.time) > 1:
+        begun = _begun(motion, _filled(log.time, log.encoder, robot)[:1])
+        settled = signal_path.controlled(loops, motion.names, motion)
+        others.append(signal_path.controlled(loops, motion.names, begun)[1:] - settled)
+    known_mm = REPEATABILITY_MM / np.array([lever_mm(a.revolute) for a in robot.actuators])
+    unsure = np.any([np.abs(each) > known_mm for each in others], axis=0)
+    every = (len(motion.time) - 1) // max(len(log.time) - 1, 1) or 1
+    late, unsure = (late - motion.encoder)[::every], unsure[::every]
     return np.where(np.isfinite(log.setpoint), np.where(unsure, np.nan, late), 0.0)
+
+
+def _begun(motion: Motion, start: Floats) -> Motion:
+    """The motion with a row before it, at which the axes stand at positions (1, m)."""
+
+    def held(values: Floats) -> Floats:
+        return np.concatenate([values[:1], values])
+
+    step = motion.time[1] - motion.time[0]
+    time, common = (np.concatenate([each[:1] - step, each]) for each in (motion.time, motion.common))
+    return replace(
+        motion, time=time, common=common, cut_min=held(motion.cut_min), encoder=np.concatenate([start, motion.encoder]),
+        speed=held(motion.speed), direction=held(motion.direction), seams=None,
+        temperature=None if motion.temperature is None else held(motion.temperature),
+    )  # fmt: skip
 
 
 def predict_drives(robot: Robot, causes: Sequence[Cause], log: Measured, started_s: float) -> Floats:

@@ -118,6 +118,7 @@ def studied(
         next_experiment=next_moves(found, cleaned, verdict),
         floor=Floor(um=gap.noise_floor_um, source="stated" if all(c.stated for c in every) else "rows"),
         outliers=tuple(Outlier(run=run, row=row) for run, row in sorted(outliers)),
+        axis_laws=tuple(law for a in found for law in a.laws),
         axes_in_detail={a.name: a.details for a in found}, standards=StandardValues(absent=(NO_TIPS,)),
     )  # fmt: skip
     return result, found
@@ -133,6 +134,9 @@ def _nothing_below_the_floor(axis: AxisFindings) -> None:
         return
     axis.causes = [c for c in axis.causes if not c.effect.startswith(("servo_", "speed_limit"))]
     following.gate = AxisGate("at", 0.0, ())
+    if axis.laws:  # the machine file has none of them, and nothing of the gap is claimed
+        axis.laws, following.held = [], following.held_whole
+        following.left = np.split(following.data.y, np.cumsum([len(each) for each in following.left])[:-1])
     if axis.force is None and axis.behind is None:
         axis.unknown_in, axis.law = [], None
 

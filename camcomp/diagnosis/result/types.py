@@ -338,6 +338,10 @@ class DiagnosisResult(Result):
     equivalent: Annotated[
         tuple[tuple[NamedCause, ...], ...], Field(description="causes that these runs cannot tell apart")
     ] = ()
+    axis_laws: Annotated[
+        tuple[LawPart, ...],
+        Field(description="acceleration, friction, weight and constant of following errors, for the machine file"),
+    ] = ()
     axes_in_detail: dict[str, dict[str, Any]] = Field(default_factory=dict, description="studies of axes: every fit")
     standards: Annotated[StandardValues, Field(description="ISO 230-2, ISO 230-4 and ISO 9283")] = StandardValues()
 

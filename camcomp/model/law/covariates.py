@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.signal import savgol_filter
 
 from camcomp.ground.datatypes import Bools, Floats
 from camcomp.model.effect import Load, Motion
@@ -34,6 +35,12 @@ AT_DRIVE = {
     "act_rad": "position of a hinge",
     "act_rad_per_s": "its velocity",
     "act_rad_per_s2": "its acceleration",
+    "followed_mm": "position that the effects listed above make of the set-points of a slide, at the stage control",
+    "followed_mm_per_s": "its velocity",
+    "followed_mm_per_s2": "its acceleration",
+    "followed_rad": "the same of a hinge",
+    "followed_rad_per_s": "its velocity",
+    "followed_rad_per_s2": "its acceleration",
     **_TIME,
 }
 LOADS = {
@@ -44,6 +51,7 @@ LOADS = {
 }
 _LOAD = re.compile(r"load(?:_(\w+))?_(?:N|Nmm)")
 REFERENCE_C = 20.0
+SMOOTH_S = 0.02  # over which the motion behind a loop is smooth
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,12 +113,14 @@ class TipRows(Mapping[str, Floats]):
 class DriveRows(Mapping[str, Floats]):
     """Covariates of n rows at drive j, computed on access: of its set-points at the stage control, else of its encoder.
 
-    loads: names of drive loads that iteration lists in addition; access works for any.
+    loads: names of drive loads that iteration lists in addition; access works for any. followed (n,): position of the drive
+    behind the effects above the law, mm or rad; None: as `motion` has it.
     """
 
     motion: Motion
     j: int
     loads: tuple[str, ...] = ()
+    followed: Floats | None = None
     _known: dict[str, Floats] = field(default_factory=dict)
 
     def __getitem__(self, name: str) -> Floats:
@@ -123,8 +133,11 @@ class DriveRows(Mapping[str, Floats]):
             return _of_time(name, self.motion)
         if is_load(name):
             return self._load(load_of(name))
-        position = self.motion.encoder[:, self.j]
-        order = {"": 0, "_per_s": 1, "_per_s2": 2}[name.removeprefix("act_mm").removeprefix("act_rad")]
+        whose, _, unit = name.partition("_")
+        position = self.motion.encoder[:, self.j] if whose == "act" or self.followed is None else self.followed
+        order = {"": 0, "_per_s": 1, "_per_s2": 2}[unit.removeprefix("mm").removeprefix("rad")]
+        if whose == "followed" and order:
+            return smooth_rate(position, self.motion, order)
         for _ in range(order):
             position = rate(position[:, None], self.motion)[:, 0]
         return position
@@ -168,6 +181,22 @@ def rate(values: Floats, motion: Motion) -> Floats:
         return np.zeros_like(values)
     found = np.gradient(values[apart], t[apart], axis=0)
     return np.asarray(found[np.cumsum(apart) - 1])
+
+
+def smooth_rate(values: Floats, motion: Motion, order: int) -> Floats:
+    """Derivative (n,) of values (n,) in time by local cubics over SMOOTH_S, five rows at least; set-points are rounded.
+
+    Source: Savitzky, Golay, Analytical Chemistry 36 (1964) 1627.
+    """
+    t = motion.time
+    apart = np.concatenate([[True], np.diff(t) > 1e-9]) if len(t) else np.zeros(0, bool)
+    if not motion.ordered or apart.sum() < 2:
+        return np.zeros_like(values)
+    step = float(np.median(np.diff(t[apart])))
+    rows = 2 * max(round(0.5 * SMOOTH_S / step), 2) + 1
+    even = t[0] + step * np.arange(max(round((t[-1] - t[0]) / step) + 1, rows))
+    found = savgol_filter(np.interp(even, t[apart], values[apart]), rows, 3, deriv=order, delta=step, mode="interp")
+    return np.asarray(np.interp(t, even, found), float)
 
 
 def _moving(velocity: Floats) -> Bools:
