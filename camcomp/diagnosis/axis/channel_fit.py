@@ -53,7 +53,7 @@ class ChannelData:
     level: float = 0.0
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class ChannelFit:
     """What the model says of a channel: causes, healthy sizes by kind with their covariance, and residuals per run.
 
@@ -301,8 +301,8 @@ def _answer(data: ChannelData, terms: Sequence[AxisCause], linear: _Linear, sd: 
     names = {b.scales[-1][0] for b, gain in gains.items() if b.scales and gain > 0.0}
     drivers = {name: _share_of(linear, name, [left[k] for k in data.train], sd) for name in names}
     return ChannelFit(
-        tuple(causes), tuple(acting), sizes, among, left, drivers
-    )  # fmt: skip
+        causes=tuple(causes), acting=tuple(acting), sizes=sizes, covariance=among, left=left, drivers=drivers
+    )
 
 
 def _share_of(linear: _Linear, name: str, left: Sequence[Floats], sd: float) -> float:
