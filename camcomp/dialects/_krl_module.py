@@ -13,7 +13,7 @@ from camcomp.ground.errors import ProgramError, raise_all
 POSE = ("X", "Y", "Z", "A", "B", "C")
 AXES = ("A1", "A2", "A3", "A4", "A5", "A6")
 _OTHERS = frozenset(("S", "T", *(f"E{n}" for n in range(1, 7))))
-_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_NUMBER = r"[-+]?(?:\d{1,12}\.?\d*|\.\d+)(?:[eE][-+]?\d{1,2})?"
 _VALUE = re.compile(rf"\s*({_NUMBER})\s*\Z")
 _FIELD = re.compile(
     rf"\s*([A-Za-z_]\w*)\s+({_NUMBER}|'[BH]?\s*[0-9A-Fa-f]+'|#?\w[\w.$\[\]]*)\s*(?:,|\Z)", re.IGNORECASE
@@ -180,7 +180,12 @@ class KrlModule:
             fields = self._fields(value, where, names=None)[0]
             for key in ("TOOL_NO", "BASE_NO"):
                 if key in fields:
-                    self.numbers[key] = round(float(self.text.string[slice(*fields[key])]))
+                    number = self.text.string[slice(*fields[key])]
+                    if not number.isascii() or not number.isdigit():
+                        self.reader.refuse(
+                            "CC144", f"{key} {number[:20]} is no number", fields[key][0], "write 0 to 32"
+                        )
+                    self.numbers[key] = int(number)
         elif name in _STATED:
             if value.upper() not in _STATED[name]:
                 hint = f"use {name}={_STATED[name][0]}"

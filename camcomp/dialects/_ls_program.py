@@ -16,7 +16,7 @@ COMPONENTS = ("X", "Y", "Z", "W", "P", "R")
 JOINTS = ("J1", "J2", "J3", "J4", "J5", "J6")
 SECTION = re.compile(r"^[ \t]*/(MN|POS|END)[ \t\r]*$", re.MULTILINE | re.IGNORECASE)
 POSITION = re.compile(r"P\[(\d+)(?::[^\]]*)?\][ \t]*\{(.*?)\}[ \t]*;", re.DOTALL | re.IGNORECASE)
-_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)"
+_NUMBER = r"[-+]?(?:\d{1,12}\.?\d*|\.\d+)"
 _VALUE = re.compile(rf"\b([XYZWPR]|[JE]\d)[ \t]*=[ \t]*({_NUMBER})[ \t]*(mm|deg)\b", re.IGNORECASE)
 _FIELD = re.compile(r"\b([XYZWPR]|[JE]\d)[ \t]*=", re.IGNORECASE)
 _FRAME = re.compile(r"\b(UF|UT)[ \t]*:[ \t]*(\d+|F)", re.IGNORECASE)

@@ -18,7 +18,7 @@ COMPONENTS = ("X", "Y", "Z", "Q1", "Q2", "Q3", "Q4")
 MODULE = re.compile(r"\s*MODULE\s+\w+", re.IGNORECASE)
 FASTEST_ZONE_MM = {0: 0.3}  # z0; zN is a zone of N mm
 UNUSED = 9e9  # an external axis that is not there
-_NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:E[-+]?\d+)?)\s*", re.IGNORECASE)
+_NUMBER = re.compile(r"\s*([-+]?(?:\d{1,12}\.?\d*|\.\d+)(?:E[-+]?\d{1,2})?)\s*", re.IGNORECASE)
 _DECLARED = re.compile(
     r"\s*(?:(?:LOCAL|TASK)\s+)?(?:CONST|PERS|VAR)\s+(\w+)\s+(\w+)\s*(?::=\s*(.*?))?\s*;\s*\Z", re.IGNORECASE
 )
@@ -79,6 +79,12 @@ def _number(item: Any) -> float:
     if isinstance(item, Nested) or not (found := _NUMBER.fullmatch(item[0])):
         raise ValueError("not a number")
     return float(found[1])
+
+
+def _span(item: Any) -> tuple[int, int]:
+    """Where an item of a list stands."""
+    span: tuple[int, int] = item.span if isinstance(item, Nested) else item[1]
+    return span
 
 
 def parse(string: str, at: int) -> Nested | None:
@@ -249,7 +255,7 @@ class RapidModule:
         try:
             point, turn, conf, external = value.items
             values = [*point.numbers(), *turn.numbers()]
-            axes = external.numbers()
+            axes = self._named(external, "extjoint").numbers()
             size = float(np.linalg.norm(values[3:]))
             if len(values) != 7 or len(point.items) != 3 or abs(size - 1.0) > 0.01:
                 raise ValueError
@@ -261,8 +267,9 @@ class RapidModule:
                 argument[0],
                 "write [[x,y,z],[q1,q2,q3,q4],[cf1,cf4,cf6,cfx],[9E9,...]], the quaternion of size 1",
             )
+        self._named(conf, "confdata")
         self._external(axes, instruction[0])
-        rest = f"{self.text.string[slice(*conf.span)]},{self.text.string[slice(*external.span)]}"
+        rest = ",".join(self.text.string[slice(*_span(each))] for each in (conf, external))
         places = [each[1] for each in (*point.items, *turn.items)]
         site = MoveSite(
             row=row, instruction=instruction, numbers=dict(zip(COMPONENTS, places, strict=True)), close=argument[1], blend=zone,
@@ -270,6 +277,10 @@ class RapidModule:
             more=Written(declared, argument, rest, end),
         )  # fmt: skip
         return values, site
+
+    def _named(self, item: Any, kind: str) -> Nested:
+        """The list that a part of a target is or names."""
+        return item if isinstance(item, Nested) else self._value(item[1], kind)[0]
 
     def _external(self, axes: list[float], at: int) -> None:
         """External axes may move between cuts, and stand while the tool cuts."""
@@ -317,9 +328,14 @@ class RapidModule:
             size = FASTEST_ZONE_MM.get(int(found[1]), float(found[1]))
         else:
             value, _ = self._value((at, at + len(word)), "zonedata")
-            if value.items[0][0].upper() == "TRUE":
-                return EXACT
-            size = _number(value.items[1])
+            try:
+                if value.items[0][0].upper() == "TRUE":
+                    return EXACT
+                size = _number(value.items[1])
+            except (ValueError, AttributeError, IndexError, TypeError):
+                self.reader.refuse(
+                    "CC144", "no zonedata of numbers", at, "write [FALSE,pzone_tcp,...] in mm, fine or zN"
+                )
         return PathMode(
             tolerance_mm=size, code=ROUNDING_DISTANCE, own_name=word if len(word) < 20 else f"zone {size:g} mm"
         )

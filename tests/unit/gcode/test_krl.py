@@ -174,7 +174,7 @@ BAD = [
     ("$BASE = TOOL_DATA[1]", 4, 9, "CC145"), ("$BASE = MYBASE", 4, 9, "CC145"), ("$TOOL = {X 1}", 4, 9, "CC145"), ("$ORI_TYPE = #JOINT", 4, 13, "CC115"),
     ("$CIRC_TYPE = #PATH", 4, 14, "CC115"), ("$IPO_MODE = #TCP", 4, 13, "CC115"), ("TRIGGER WHEN DISTANCE=0 DELAY=0 DO $OUT[1]=TRUE", 4, 1, "CC144"),
     ("WAIT SEC T", 4, 1, "CC131"), ("LIN {A 5}", 4, 1, "CC115"), ("LIN {B 90,X 5}", 4, 1, "CC115"), ("LIN {X 1e9}", 4, 1, "CC138"), ("BAS (#CP_DAT)", 4, 1, "CC144"),
-    ("FDAT_ACT=FHOME", 4, 10, "CC144"), ("SIGNAL", 4, 1, "CC144"), ("BASE_DATA[1]={X 1}", 4, 14, "CC145"), ("DEF q()", 4, 1, "CC144"), ("END\nLIN {X 1}", 5, 1, "CC144"), ("G1 X5 F100", 4, 1, "CC144"), ("LIN {X 1,E1 5}\nLIN {X 2,E1 6}", 5, 13, "CC115"),
+    ("FDAT_ACT=FHOME", 4, 10, "CC144"), ("FDAT_ACT={TOOL_NO A}", 4, 19, "CC144"), ("LIN {X 1e400}", 4, 8, "CC144"), ("SIGNAL", 4, 1, "CC144"), ("BASE_DATA[1]={X 1}", 4, 14, "CC145"), ("DEF q()", 4, 1, "CC144"), ("END\nLIN {X 1}", 5, 1, "CC144"), ("G1 X5 F100", 4, 1, "CC144"), ("LIN {X 1,E1 5}\nLIN {X 2,E1 6}", 5, 13, "CC115"),
 ]  # fmt: skip
 
 

@@ -38,6 +38,10 @@ def test_what_is_not_changed_keeps_its_bytes():
 
 
 BAD = [
+    ('MoveL p1,v20,[[1],0.3],tool0;', 14, 'CC144'),
+    ('MoveL p1,v20,[FALSE],tool0;', 14, 'CC144'),
+    ('MoveL [[1e400,0,0],[1,0,0,0],AXES],v20,z1,tool0;', 7, 'CC144'),
+    ('MoveL [[1,0,0],[1,0,0,0],conf,[9E9,9E9,9E9,9E9,9E9,9E9]],v20,z1,tool0;', 26, 'CC144'),
     ('MoveL Offs(p1,0,0,5),v20,z1,tool0;', 7, 'CC144'),
     ('MoveL p1,v20\\V:=20,z1,tool0;', 13, 'CC144'),
     ('MoveL p1,v20,z1\\Inpos:=inpos50,tool0;', 16, 'CC144'),
@@ -106,6 +110,19 @@ def test_malformed_programs_are_refused_with_their_place(line, column, rule):
     error = caught.value
     assert (error.rule, error.at.line, error.at.column) == (rule, 5, column), str(error)
     assert error.hint
+
+
+def test_configuration_and_external_axes_may_be_named():
+    named = "PERS confdata ahead:=[0,-1,0,1];\nPERS extjoint none:=[9E9,9E9,9E9,9E9,9E9,9E9];\n"
+    text = HEAD.replace("PROC", named + "PROC") + "MoveL [[9,0,0],[1,0,0,0],ahead,none],v20,z5,tool0;\n" + END
+    program = read_program(text.encode(), name="m.mod")
+    same, n = Output.same(program.path), len(program.path)
+    moved = Output(
+        motion=same.motion, kind=same.kind, end=same.end + [0.0, 0.0, 0.1], centre=same.centre, angle=np.zeros(n), feed=same.feed,
+        joining=np.zeros(n, bool), words=program.path.orientation.end, rest=np.zeros(n, bool),
+    )  # fmt: skip
+    written = rewrite(program, moved, resolution_mm=1e-4, version="1").data
+    assert b"[[9,0,0.1],[1,0,0,0],ahead,none]" in written.replace(b" ", b"")
 
 
 def test_there_are_forty_malformed_programs():
