@@ -74,7 +74,7 @@ class RobotReader:
     def _check_tool(self) -> None:
         at, self._tool_at = self._tool_at, None
         if at is not None and (off := self.frames.off_tip(self.tool)) > SAME_TIP_MM:
-            x, y, z = self.frames.tool_of_machine().origin
+            x, y, z = self.frames.tool_of_machine().origin.round(6) + 0.0
             self.refuse(
                 "CC145", f"the tip of this tool lies {off:.3f} mm from that of the machine file, {x:g} {y:g} {z:g} of the flange", at,
                 hint="correct section tool of the machine file (and robot: flange, control: flange_abc_deg)",

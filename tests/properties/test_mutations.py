@@ -2,6 +2,7 @@
 
 import contextlib
 import io
+import re
 import time
 import warnings
 from pathlib import Path
@@ -13,6 +14,8 @@ from camcomp.ground.files import shipped
 from camcomp.terminal.cli import run
 from tests.mutations import mutated_markup, mutated_table, mutated_text
 from tests.pace import soon
+from tests.unit.gcode.test_fanuc_ls import HEAD, MOVES, TAIL
+from tests.unit.gcode.test_rapid import POSTED
 from tests.unit.model.config.test_urdf import urdf
 
 CONTRACT = (0, 1, 2, 3, 4, 5)
@@ -20,6 +23,33 @@ LONGEST_S = 2.0
 MACHINES = ("cartesian", "orthoglide-1deg", "puu", "router", "kuka-kr210")
 PROGRAM = str(shipped("samples/groove-circle-2.nc"))
 STUDY = shipped("samples/diagnosis/ambiguous")
+TOKENS = (
+    "[",
+    "]",
+    "{",
+    "}",
+    ",",
+    ";",
+    ":",
+    ":=",
+    "\\",
+    '"',
+    "'",
+    "-9",
+    "9E9",
+    "1e400",
+    "TRUE",
+    "fine",
+    "A",
+    "(",
+    "!",
+    "#X",
+    "\0",
+    "ä",
+)
+FRAME = "{origin_mm: [1550, 0, 800], abc_deg: [0, 0, 0]}"
+TOOL = "{origin_mm: [0, 0, 250], abc_deg: [0, 0, 0]}"
+FRAMES = f"control:\n  absolute_accuracy: false\n  base_frames: {{1: {FRAME}, 2: {FRAME}}}\n  tool_frames: {{1: {TOOL}, 2: {TOOL}}}\n"
 
 
 def end_of(data, *words, longest=LONGEST_S):
@@ -49,6 +79,38 @@ def warm(tmp_path_factory):
     out = tmp_path_factory.mktemp("warm") / "out"
     for verb in ("compensate", "simulate"):
         end_of(b"", verb, PROGRAM, "--config", shipped("config/cartesian.yaml"), "-o", out, longest=300.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("a.src", shipped("samples/robot/slot.src").read_text()),
+        ("a.mod", POSTED.replace("[[10.5,-3,248],[0.99904822,0,0.04361939,0]]", "[[0,0,250],[1,0,0,0]]")),
+        ("a.ls", HEAD + MOVES + TAIL),
+    ],
+)
+def test_robot_programs(tmp_path, name, text):
+    random, ends = Random(8), set()
+    tokens = re.findall(r"\w+|\s+|[^\w\s]", text)
+    (tmp_path / "frames.yaml").write_text(FRAMES)
+    for _ in range(150):
+        changed = list(tokens)
+        for _ in range(random.choice((1, 1, 2, 3))):
+            changed[random.randrange(len(changed))] = random.choice((*TOKENS, random.choice(tokens), ""))
+        data = "".join(changed).encode()
+        (tmp_path / name).write_bytes(data)
+        ends.add(
+            end_of(
+                data,
+                "canon",
+                tmp_path / name,
+                "--config",
+                shipped("config/kuka-kr210.yaml"),
+                "--config",
+                tmp_path / "frames.yaml",
+            )
+        )
+    assert ends == {0, 3}
 
 
 @pytest.mark.parametrize("seed", range(4))

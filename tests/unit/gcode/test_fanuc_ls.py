@@ -15,6 +15,7 @@ from camcomp.gcode.stamp import is_stamped, stamped_model
 from camcomp.ground.datatypes import ARC, LINE, RAPID
 from camcomp.ground.errors import ProgramError
 from camcomp.ground.orientation import TURN, rotations_of
+from tests.rewritten import written_poses
 
 # the forms of public files: tabs, a name and group of positions, remarks, empty statements
 HEAD = """/PROG  PART
@@ -122,24 +123,7 @@ def test_frames_and_angles_are_those_of_scipy():
 @pytest.mark.parametrize("seed", range(4))
 def test_written_poses_read_as_what_was_wanted(seed):
     """P[1] and P[2] are used twice: their changes may not move the other use."""
-    program = read(HEAD + MOVES + TAIL)
-    rng, same = np.random.default_rng(seed), Output.same(program.path)
-    rows = np.repeat(np.arange(len(program.path)), [1, *rng.integers(1, 4, len(program.path) - 1)])
-    n = len(rows)
-    words = program.path.orientation.end[rows] + rng.uniform(-0.1, 0.1, (n, 3))
-    kind = np.where(program.path.kind[rows] == ARC, LINE, program.path.kind[rows]).astype(np.int8)
-    out = Output(
-        motion=rows, kind=kind, end=same.end[rows] + rng.uniform(-1, 1, (n, 3)), centre=np.full((n, 3), np.nan), angle=np.zeros(n),
-        feed=same.feed[rows], joining=rng.random(n) < 0.3, words=words, rest=rng.random(n) < 0.3,
-    )  # fmt: skip
-    written = rewrite(program, out, resolution_mm=1e-4, version="1")
-    again = read(written.data)
-    np.testing.assert_allclose(again.path.end, out.end, atol=1e-4)
-    np.testing.assert_allclose(again.path.end, written.end, atol=1e-9)
-    off = rotations_of(TURN, again.path.orientation.end) - rotations_of(TURN, words)
-    assert np.abs(off).max() < 5e-8
-    np.testing.assert_allclose(again.path.feed, program.path.feed[rows])
-    assert again.path.line.tolist() == written.line.tolist()
+    written_poses(read(HEAD + MOVES + TAIL), read, seed, turned=5e-8)
 
 
 BAD = [
