@@ -17,10 +17,11 @@ __all__ = ["MachineTable", "Placed", "PlacingResult", "place", "words"]
 
 @dataclass(frozen=True)
 class Placed:
-    """Placements of a program."""
+    """Placements of a program. warnings: those of reading it."""
 
     program: str
     result: PlacingResult
+    warnings: tuple[str, ...] = ()
 
     def report(self, inputs: Sequence[Input] = ()) -> bytes:
         """The page with the map, HTML. Raises ConfigError CC216 without plotly."""
@@ -39,4 +40,5 @@ def place(
         stock: source of the stock; None: the machine file, else the comments of the program.
     """
     source = program_in(program, machine)
-    return Placed(source.name, search_place(job_of_program(machine, source.data, source.name, stock), source, table))
+    result = search_place(job_of_program(machine, source.data, source.name, stock), source, table)
+    return Placed(source.name, result, source.warnings)

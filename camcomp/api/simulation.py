@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -55,9 +55,8 @@ def simulate(
     source = program_in(program, machine)
     machine = job_of_program(machine, source.data, source.name, stock)
     engaged = machine.engaged(source) if cutting else None
-    return SimulatedLog(
-        story.simulate(machine, source.path, step_s, cutting=cutting, started_s=started_s, engaged=engaged)
-    )
+    log = story.simulate(machine, source.path, step_s, cutting=cutting, started_s=started_s, engaged=engaged)
+    return SimulatedLog(replace(log, warnings=[*source.warnings, *log.warnings]))
 
 
 def simulate_cut(program: Program | str | Path | bytes, machine: Job, *, stock: StockChoice | None = None) -> Surface:

@@ -43,7 +43,7 @@ class Flow:
         self._blocks = 0
         self._idle = 0
         self._motions = 0
-        self.rows = self._end_of_tape()
+        self.rows = self.end_row = self._end_of_tape()  # end_row: behind the last line that is run
 
     # --- the program as a whole --------------------------------------------------------------------------------
 
@@ -60,6 +60,7 @@ class Flow:
                     continue
             after = self.step(row)
             if after is None:
+                self.end_row = row + 1
                 return
             row = after
 

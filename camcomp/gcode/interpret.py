@@ -29,15 +29,13 @@ from camcomp.gcode.settings import Settings
 from camcomp.gcode.setup import Setup
 from camcomp.gcode.text import Text
 from camcomp.gcode.trace import Trace
+from camcomp.gcode.uncorrected import UncorrectedFeeds, behind_end_warning, has_motion
 from camcomp.gcode.words import code_of, points_in_feeds
 from camcomp.ground.errors import ProgramError
 
 _NO_AXES = frozenset((40, 921, 922, 923, 281, 301))
 
-# Text without effect; and lines with a motion, which a program without any executed motion has behind its end or in an
-# uncalled subroutine.
 _IDLE = re.compile(r"%|\b[NO:]\d+|\bM0?2\b|\bM30\b|[\0\x1a]", re.IGNORECASE)
-_MOVES = re.compile(r"(?!.*G[ \t]*0*(4|10|52|92)(?!\d)).*[XYZ][ \t]*[-+.\d\[#=]", re.IGNORECASE)
 
 
 def read_program(data: bytes, *, name: str, setup: Setup | None = None, dialect: str | None = None) -> Program:
@@ -52,13 +50,21 @@ def read_program(data: bytes, *, name: str, setup: Setup | None = None, dialect:
     if language.robot is not None:
         return read_robot_program(text, setup, language)
     reader = Interpreter(text, setup, language)
-    controller(reader).run()
+    flow = controller(reader)
+    flow.run()
     path, sites = reader.record.finish()
     if len(path) == 0:
         lines = [_IDLE.sub("", code_of(text.line(row))).strip() for row in range(len(text.starts))]
-        if not any(lines) or any(_MOVES.match(each) for each in lines):
+        if not any(lines) or any(has_motion(each) for each in lines):
             raise ProgramError("CC100", "the program moves nothing", at=text.place(0))
         reader.warnings.append("the program moves nothing")
+    else:
+        feeds = UncorrectedFeeds(name)
+        feeds.add(path)
+        reader.warnings += feeds.warnings()
+        if reader.straight:
+            behind = [row for row in range(flow.end_row, len(text)) if has_motion(text.line(row))]
+            reader.warnings += [behind_end_warning(name, len(behind), behind[0] + 1)] if behind else []
     return Program(
         data=data,
         name=name,

@@ -125,6 +125,8 @@ class Subprograms(Flow):
     def _back(self, row: int, target: Word | None) -> int | None:
         """M99: repeat for the remaining passes, then return behind the call; in the main program it ends the run."""
         if not self._returns:
+            self.reader.block.row = row
+            self.reader.warn("M99 ends the main program: controls begin it again, and the corrected program runs once")
             return None
         if target is not None:
             self.refuse(row, target.begin, "CC124", "M99 with P is not followed")

@@ -20,6 +20,7 @@ from camcomp.gcode.robot_frames import SAME_TIP_MM, CoordinateFrame, JointPose, 
 from camcomp.gcode.robot_language import Collected, MoveSite, RobotLanguage
 from camcomp.gcode.setup import Setup
 from camcomp.gcode.text import Text
+from camcomp.gcode.uncorrected import UncorrectedFeeds
 from camcomp.ground.datatypes import ARC, LINE, RAPID, Floats, Ints, Path, frozen
 from camcomp.ground.errors import ProgramError
 from camcomp.ground.orientation import NEAR_POLE_DEG, TURN, Orientation, pole_free_words
@@ -156,6 +157,9 @@ class RobotReader:
             speed=np.zeros(n), turn=np.full(n, np.nan), tool=np.full(n, self.setup.tool), known=np.ones(n, np.bool_),
             machine=joints, waits=np.array(self._waits), orientation=Orientation(TURN, frozen(before), frozen(words)),
         )  # fmt: skip
+        feeds = UncorrectedFeeds(text.name)
+        feeds.add(path, from_unknown=alone & (kind != RAPID))
+        self.warnings += feeds.warnings()
         return Program(
             data=text.encode(text.string), name=text.name, dialect=self.dialect.name, path=path, warnings=tuple(self.warnings),
             text=text, sites=self._sites(rows, kind), rebases=(), setup=self.setup, language=self.dialect, feed_point=False,

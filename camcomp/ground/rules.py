@@ -227,6 +227,13 @@ RULES: dict[str, Rule] = {
         "A base or tool of a robot program is not stated as numbers, is not in the machine file, or contradicts it.",
         "state control: base_frames, tool_frames and flange_abc_deg, and section tool, as they are in the control",
     ),
+    "CC146": Rule(
+        "moves pass uncorrected",
+        "A warning. Feed moves before X, Y and Z have all been commanded, in machine coordinates (G53 G1), from a place that a "
+        "robot program does not state, or behind the end of the program stay as they are. So do all moves where every correction "
+        "is below the step of the output.",
+        "begin with a rapid that names X, Y and Z (control: start_mm if the machine stands elsewhere)",
+    ),
     # --- CC2xx usage, YAML, config -----------------------------------------------------------------------------
     "CC200": Rule(
         "YAML cannot be read",

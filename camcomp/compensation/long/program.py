@@ -71,7 +71,14 @@ class LongProgram:
         self._carry = OutputState(np.array(self.setup.start_mm, float), np.array(self.setup.start_mm, float))
         self._told: Future[None] = Future()
         self._told.set_result(None)
-        self.totals = Totals(self.job, digest.hexdigest(), size, self.tolerance_um, self.on_rows is not None)
+        self.totals = Totals(
+            self.job,
+            self.name,
+            digest.hexdigest(),
+            size,
+            tolerance_um=self.tolerance_um,
+            tabled=self.on_rows is not None,
+        )
         self._lines = max(lines, 1)
         self.totals.lines_in = lines
         self._stock = _stock_of(self.job, source, self.name, self.setup)

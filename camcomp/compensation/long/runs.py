@@ -22,6 +22,7 @@ from camcomp.gcode.program import Program
 from camcomp.gcode.setup import Setup
 from camcomp.gcode.state import ControlState
 from camcomp.gcode.text import END_OF_LINE, Text
+from camcomp.gcode.uncorrected import behind_end_warning, has_motion
 from camcomp.gcode.words import points_in_feeds
 from camcomp.ground.errors import Location, ProgramError
 from camcomp.model.config.spec import Config
@@ -145,11 +146,19 @@ class Runs:
         return rest[:end]
 
     def _rest(self) -> Iterator[bytes]:
+        moving = first = 0
         while True:
-            yield self._data[self._at :].tobytes()
+            data = self._data[self._at :].tobytes()
+            lines = [row for row, line in enumerate(_END.split(data)) if has_motion(line.decode("latin-1"))]
+            if lines:
+                moving, first = moving + len(lines), first or self._row + lines[0] + 1
+            self._row += len(_END.findall(data))
+            yield data
             self._at = len(self._data)
             if not self._more():
-                return
+                break
+        if moving:
+            self.warnings.append(behind_end_warning(self.name, moving, first))
 
     # --- lines ---------------------------------------------------------------------------------------------------
 

@@ -29,6 +29,7 @@ from camcomp.compensation.program.under_control import (
 )
 from camcomp.gcode.output import Part
 from camcomp.gcode.path_mode import PathMode
+from camcomp.gcode.uncorrected import UncorrectedFeeds, nothing_corrected_warning
 from camcomp.ground.datatypes import LINE, RAPID, Bools, Floats, Ints
 from camcomp.model.control import limits_of
 from camcomp.model.cutting.assumed import RapidsAtDepth
@@ -37,6 +38,7 @@ from camcomp.model.job import Job
 from camcomp.model.statics.target import correct, settle
 from camcomp.model.trajectory.moves import line_moves, moves_of
 
+SAME_MM = 1e-9  # of a place as programmed and as written
 BOUND_UM = 0.05  # no point may differ by more from its exact solution
 SAMPLE, SAMPLE_SHARE = 1000, 0.05  # points that are solved exactly, at most and of all
 
@@ -78,8 +80,10 @@ class _Errors:
 class Totals:
     """Everything that the summary of a run says."""
 
-    def __init__(self, job: Job, digest: str, size: int, tolerance_um: float, tabled: bool = True) -> None:
-        """Digest and size are those of the program; they decide which points are checked. tabled: rows are asked for."""
+    def __init__(
+        self, job: Job, name: str, digest: str, size: int, *, tolerance_um: float, tabled: bool = True
+    ) -> None:
+        """name, digest and size are those of the program; they decide which points are checked. tabled: rows are asked for."""
         self.job, self._tabled = job, tabled
         self.before, self.after, self.missed = _Errors(), _Errors(), _Errors()
         self.points = self.motions = self.lines_in = self.lines_out = self.joins = self.iterations = 0
@@ -101,6 +105,8 @@ class Totals:
         self.waiting_s = 0.0  # beside its moves
         self.resting = 0  # end points at which the control rests because of joining lines
         self._rapids = RapidsAtDepth(job.config)
+        self._feeds = UncorrectedFeeds(name)
+        self._moved = False  # any feed move is corrected
         self._still: list[int] = []  # source lines that cut while the spindle stands, the first ones
 
     # --- pieces --------------------------------------------------------------------------------------------------
@@ -125,7 +131,10 @@ class Totals:
             tilt=answers.rest[:, :3], before=done.before, after=done.after, missed=done.missed,
         )  # fmt: skip
         self._plain_control(run, done)
-        self._rapids.add(path_of_run(whole))
+        moves = path_of_run(whole)
+        self._rapids.add(moves)
+        self._feeds.add(moves)
+        self._moved = self._moved or _differ(rows.target, done.written, plain.kind[rows.move] != RAPID)
         if run.state.sense == 0.0:
             self._stands(np.unique(plain.row[rows.move[rows.force.any(axis=1)]]) + run.row0 + 1)
         force = frame.vectors(rows.force)
@@ -187,7 +196,10 @@ class Totals:
         state, rows = result.state, result.rows
         corrected = rows.corrected[own]
         self._odd_control(result, own, part)
-        self._rapids.add(result.program.path.take(np.arange(part.first, part.last)))
+        moves = result.program.path.take(np.arange(part.first, part.last))
+        self._rapids.add(moves)
+        self._feeds.add(moves)
+        self._moved = self._moved or _differ(rows.target[own], result.written.end[own], rows.kind[own] != RAPID)
         self._common(
             part.last - part.first, rows.joining[own], corrected=corrected, line=result.lines[own],
             nominal=result.nominal[own], joints=state.rho[own], drive=state.drive[own], tilt=state.tilt[own],
@@ -255,7 +267,10 @@ class Totals:
 
     def finish(self, corrector: PlainCorrector, warnings: list[str]) -> None:
         """Solves the sample exactly and keeps the largest differences."""
-        self.warnings = list(dict.fromkeys([*self.job.taken.remarks, *self._rapids.warnings(), *warnings]))
+        feeds = self._feeds.warnings()
+        if not (self._moved or feeds) and self._feeds.feeds:
+            feeds = [nothing_corrected_warning(self._feeds.name, self._feeds.feeds, self.step_mm)]
+        self.warnings = list(dict.fromkeys([*self.job.taken.remarks, *self._rapids.warnings(), *feeds, *warnings]))
         self.warnings += rest_warning(self.resting)
         for each in self._control:
             each.finish()
@@ -347,3 +362,8 @@ class Totals:
             )
             out.append(("CC607", text))
         return out
+
+
+def _differ(target: Floats, written: Floats, feed: Bools) -> bool:
+    """Whether any feed move ends elsewhere than programmed; target, written (N, 3) mm."""
+    return bool((np.abs(written - target)[feed] > SAME_MM).any())

@@ -178,9 +178,9 @@ def _short(program: Program) -> tuple[bytes, int]:
     """The program, or of a long one single motions spread over it and those at its outermost points; how many."""
     path = program.path
     count = len(path)
-    if count <= MOST_MOTIONS:
-        return program.data, count
     feeds = np.flatnonzero((path.kind != RAPID) & path.known & ~path.machine)
+    if count <= MOST_MOTIONS or not len(feeds):
+        return program.data, count
     ends = path.end[feeds]
     outermost = [f(ends[:, axis]) for axis in range(3) for f in (np.argmin, np.argmax)]
     spread = np.linspace(0, len(feeds) - 1, SAMPLED).astype(int)

@@ -96,9 +96,9 @@ def verify(corrected: Program, original: Program, job: Job) -> Verified:
     step = np.linalg.norm(begin - np.concatenate((original.path.start[:1], expected[:-1])), axis=1)
     layout = row_layout(original.path, track, step, original.step_mm(job.config.control.resolution_mm))
     reach = _reach(original, job, track, corrected_ones, orienting)
-    warnings = _other_model(corrected, job)
+    warnings, foreign = list(original.warnings), _other_model(corrected, job)
     first, last, joins = match_moves(
-        corrected.path, track, expected, reach, layout, stamped=is_stamped(corrected.data), foreign=bool(warnings)
+        corrected.path, track, expected, reach, layout, stamped=is_stamped(corrected.data), foreign=bool(foreign)
     )
     moving = np.flatnonzero(layout.corrected & (track.length > 0.0))
     piece, move, f = _samples(corrected.path, moving, first[moving], last[moving])
@@ -130,7 +130,7 @@ def verify(corrected: Program, original: Program, job: Job) -> Verified:
         missed=missed,
     )  # fmt: skip
     return Verified(
-        residual=residual, lines=lines, joining=joins, control=control, warnings=warnings, missed=missed,
+        residual=residual, lines=lines, joining=joins, control=control, warnings=[*warnings, *foreign], missed=missed,
         totals=totals, policy=job.config.compensation.policy,
     )  # fmt: skip
 

@@ -94,4 +94,5 @@ def _tell(status: Status, number: int, total: int) -> None:
     if status.figures:
         before, after = (status.figures[each]["max_um"] for each in ("before", "after"))
         text += f": largest error {before:.1f} um, now {after:.2f} um"
-    say(text, *("  " + each["text"].replace("\n", "\n  ") for each in status.messages))
+    warnings = [f"  warning: {each}" for each in status.figures.get("warnings", ())]
+    say(text, *warnings, *("  " + each["text"].replace("\n", "\n  ") for each in status.messages))

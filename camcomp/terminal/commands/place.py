@@ -62,6 +62,7 @@ def command(
         inputs = [Input(role, display_name(each), read_bytes(each)) for each, role in named if each != STANDARD]
         outputs[report] = done.report(inputs)
     write_all(outputs, inputs=(program, *configs))
+    say(*(f"warning: {each}" for each in done.warnings), quiet=quiet)
     result = done.result
     if result.best is None:
         raise CheckFailed(
