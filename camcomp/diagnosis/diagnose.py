@@ -30,6 +30,7 @@ from camcomp.diagnosis.next_experiment.after_unknown import explore
 from camcomp.diagnosis.next_experiment.designed import propose
 from camcomp.diagnosis.next_experiment.outcomes import ONLY_NOISE, with_outcomes
 from camcomp.diagnosis.next_experiment.proposal import Proposal
+from camcomp.diagnosis.result.floor_rule import within_floor
 from camcomp.diagnosis.result.types import (
     UNKNOWN,
     DiagnosisResult,
@@ -114,7 +115,7 @@ def diagnose(
     )
     unseen = len(used) < len(runs) or (len(used) > 1 and not holdout)
     proposal = _next(problem, found, word, job)
-    result = DiagnosisResult(
+    result = within_floor(DiagnosisResult(
         verdict=word, gap=GapSize(**gap), where=_where(problem, found, best, law),
         causes=_causes(stands, found, best, law),
         alternatives=_alternatives(problem, found) if word == "ambiguous" else (),
@@ -123,8 +124,14 @@ def diagnose(
         outliers=outlying_rows(problem), floor=Floor(um=gap["noise_floor_um"], source=problem.floor.source),
         equivalent=tuple(tuple(_named(problem, i) for i in group) for group in classes(likeness(problem))),
         standards=of_runs(twin, runs),
-    )  # fmt: skip
-    return Diagnosis(result, problem, found, proposal, law)
+    ))  # fmt: skip
+    return Diagnosis(
+        result,
+        problem,
+        found,
+        None if result.next_experiment is None else proposal,
+        None if result.law is None else law,
+    )
 
 
 def _proposed(proposal: Proposal) -> NextExperiment:

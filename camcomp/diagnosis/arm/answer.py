@@ -91,11 +91,6 @@ class AnswerInputs:
         """Members of the most probable set, and the targets of its families."""
         return _parts(self)
 
-    @property
-    def gap_um(self) -> float:
-        """Root mean square of the gap, um."""
-        return 1e3 * _size(self.gaps)
-
     def alternatives(self) -> list[tuple[int, ...]]:
         """Sets that are indistinguishable by these poses, the best first."""
         return alternatives_of(self.case.explanation, [c.place for c in self.case.shelf.candidates])
@@ -220,14 +215,12 @@ def _curve(told: AnswerInputs, cause: FoundCause, on: Sequence[int]) -> CurveCau
 def verdict(told: AnswerInputs, named: Sequence[FoundCause]) -> Any:
     """The word of the result."""
     calibrate = calibration_of(told.kind).calibrate
-    floor = told.floor
     inputs = VerdictInputs(
         unknown=told.unmodelled,
         best=min([_best(told, calibrate), *(c.probability for c in named)]),
         alternatives=len(told.alternatives()) - 1,
         causes=len(named),
-        known_noise=floor is not None,
-        gap_in_noise=floor is not None and told.gap_um <= floor.um and told.check.at_floor is not False,
+        known_noise=told.floor is not None,
         confirmed=told.check.at_floor,
     )
     return decide(inputs)

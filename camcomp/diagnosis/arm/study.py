@@ -25,6 +25,7 @@ from camcomp.diagnosis.model.discrepancy import residuals
 from camcomp.diagnosis.model.evidence import Background
 from camcomp.diagnosis.model.explain import Explanation, KnownNoise, explain
 from camcomp.diagnosis.model.verdict import EVEN
+from camcomp.diagnosis.result.floor_rule import within_floor
 from camcomp.diagnosis.result.types import UNKNOWN, DiagnosisResult, Floor, Outlier
 from camcomp.ground import progress
 from camcomp.ground.datatypes import Floats
@@ -337,7 +338,11 @@ def studied(
         outliers=tuple(Outlier(run=run, row=row) for run, row in sorted(set(case.outliers))),
         standards=of_poses(robot, bench.campaigns, gaps),
     )  # fmt: skip
-    return result, (*case.notes, *notes_of_weight(robot, bench.campaigns, without), *notes_of_frames(case, named))
+    return within_floor(result), (
+        *case.notes,
+        *notes_of_weight(robot, bench.campaigns, without),
+        *notes_of_frames(case, named),
+    )
 
 
 def notes_of_weight(robot: Robot, campaigns: Sequence[Poses], without: Sequence[str]) -> tuple[str, ...]:

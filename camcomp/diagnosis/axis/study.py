@@ -30,6 +30,7 @@ from camcomp.diagnosis.axis.next_moves import next_moves
 from camcomp.diagnosis.axis.noise_floor import REPEATABILITY_MM, rows_floor
 from camcomp.diagnosis.axis.own_unit import in_own_unit
 from camcomp.diagnosis.axis.terms import AxisTravel, travel
+from camcomp.diagnosis.result.floor_rule import within_floor
 from camcomp.diagnosis.result.standards import StandardValues
 from camcomp.diagnosis.result.types import (
     UNKNOWN,
@@ -121,7 +122,9 @@ def studied(
         axis_laws=tuple(law for a in found for law in a.laws),
         axes_in_detail={a.name: a.details for a in found}, standards=StandardValues(absent=(NO_TIPS,)),
     )  # fmt: skip
-    return result, found
+    positions = [c for a in found if a.strange for c in (a.following, a.behind) if c is not None]
+    in_forces = all(c.gate is None or c.gate.word == "at" for c in positions)
+    return within_floor(result, in_forces=in_forces), found
 
 
 def _nothing_below_the_floor(axis: AxisFindings) -> None:

@@ -17,8 +17,7 @@ class VerdictInputs:
 
     unknown: probability of model discrepancy. best: probability that all causes of the best set act, with or without
     others; of the empty set, that the most probable cause is absent. alternatives: number of sets as good as it.
-    causes: number of causes of the best set. known_noise: whether the floor is identifiable. gap_in_noise: whether the
-    gap is at the floor. confirmed: whether withheld groups support the set and are at their floor; None: all groups are
+    causes: number of causes of the best set. known_noise: whether the floor is identifiable. confirmed: whether withheld groups support the set and are at their floor; None: all groups are
     fitted.
     """
 
@@ -27,14 +26,11 @@ class VerdictInputs:
     alternatives: int
     causes: int
     known_noise: bool
-    gap_in_noise: bool
     confirmed: bool | None
 
 
 def decide(s: VerdictInputs) -> Word:
-    """The word of a result."""
-    if s.known_noise and s.gap_in_noise:
-        return "none"
+    """The word of a result, before the noise floor is asked (result.floor_rule)."""
     if s.unknown > EVEN:
         return "unknown"
     if not s.known_noise:

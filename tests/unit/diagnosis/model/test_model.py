@@ -162,7 +162,6 @@ def test_the_calibration_map_rises_and_makes_probabilities_come_true():
         ({"confirmed": None}, "ambiguous"),
         ({"alternatives": 1}, "ambiguous"),
         ({"unknown": 0.6}, "unknown"),
-        ({"unknown": 0.6, "gap_in_noise": True}, "none"),
         ({"known_noise": False}, "ambiguous"),
         ({"causes": 0}, "none"),
         ({"causes": 0, "confirmed": False}, "ambiguous"),
@@ -170,8 +169,7 @@ def test_the_calibration_map_rises_and_makes_probabilities_come_true():
 )
 def test_verdicts(more, word):
     own = {
-        "unknown": 0.01, "best": 0.95, "alternatives": 0, "causes": 1, "known_noise": True, "gap_in_noise": False,
-        "confirmed": True,
+        "unknown": 0.01, "best": 0.95, "alternatives": 0, "causes": 1, "known_noise": True, "confirmed": True,
     }  # fmt: skip
     assert decide(VerdictInputs(**{**own, **more})) == word
 
