@@ -55,7 +55,7 @@ def behind_end_warning(name: str, count: int, first: int) -> str:
     return f"{name}:{first}: lines with moves behind the end of the program ({count}) are not run, and pass uncorrected [{RULE}]"
 
 
-def nothing_corrected_warning(name: str, feeds: int, step_mm: float) -> str:
+def below_step_warning(name: str, feeds: int, step_mm: float) -> str:
     """Warning for a program whose corrections are all lost in rounding to steps of step_mm."""
     return (
         f"{name}: all {feeds} feed moves pass uncorrected: by the model their corrections are below the step of "

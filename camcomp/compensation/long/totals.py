@@ -29,7 +29,7 @@ from camcomp.compensation.program.under_control import (
 )
 from camcomp.gcode.output import Part
 from camcomp.gcode.path_mode import PathMode
-from camcomp.gcode.uncorrected import UncorrectedFeeds, nothing_corrected_warning
+from camcomp.gcode.uncorrected import UncorrectedFeeds, below_step_warning
 from camcomp.ground.datatypes import LINE, RAPID, Bools, Floats, Ints
 from camcomp.model.control import limits_of
 from camcomp.model.cutting.assumed import RapidsAtDepth
@@ -269,7 +269,7 @@ class Totals:
         """Solves the sample exactly and keeps the largest differences."""
         feeds = self._feeds.warnings()
         if not (self._moved or feeds) and self._feeds.feeds:
-            feeds = [nothing_corrected_warning(self._feeds.name, self._feeds.feeds, self.step_mm)]
+            feeds = [below_step_warning(self._feeds.name, self._feeds.feeds, self.step_mm)]
         self.warnings = list(dict.fromkeys([*self.job.taken.remarks, *self._rapids.warnings(), *feeds, *warnings]))
         self.warnings += rest_warning(self.resting)
         for each in self._control:

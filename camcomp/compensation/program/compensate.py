@@ -53,7 +53,7 @@ from camcomp.compensation.program.under_control import (
 from camcomp.gcode.output import Part, Rewritten
 from camcomp.gcode.program import Program
 from camcomp.gcode.rewrite import rewrite
-from camcomp.gcode.uncorrected import nothing_corrected_warning
+from camcomp.gcode.uncorrected import below_step_warning
 from camcomp.ground.datatypes import ARC, RAPID, Bools, Floats, Ints
 from camcomp.ground.orientation import UPRIGHT
 from camcomp.ground.progress import part as part_of_work
@@ -328,7 +328,7 @@ def _compensated(
         warnings += stock_warnings(stock_remarks(job.config, path, track.engaged))
         if feeding.any() and kept[feeding].all():
             feeds = len(np.unique(track.motion[feeding]))
-            warnings.append(nothing_corrected_warning(program.name, feeds, resolution))
+            warnings.append(below_step_warning(program.name, feeds, resolution))
     iterations = int(aimed.iterations.max(initial=0))
     done = _assemble(
         program, job, track=track, rows=rows, written=written, points=points, before=before, after=after,
