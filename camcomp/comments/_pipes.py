@@ -17,6 +17,7 @@ from camcomp.gcode.stated import (
     cutter,
     form_of,
     numbers,
+    read_each,
 )
 
 _FORMS = {"endmill": "flat", "ballend": "ball", "bullnose": "bull", "drill": "drill"}
@@ -32,26 +33,20 @@ SAME = 1e-6  # of a diameter
 
 def read_pipes(comments: Sequence[Comment], name: str) -> Iterator[Statement]:
     """Statements of the comments that begin with `@name|`."""
-    stock: tuple[Comment, dict[str, str]] | None = None
-    origin: tuple[Comment, dict[str, str]] | None = None
+    found: dict[str, list[tuple[Comment, dict[str, str]]]] = {"TOOL": [], "MATERIAL": [], "STOCK": [], "ORIGIN": []}
     for comment in comments:
         head, *words = comment.text.split("|")
-        if head.strip().upper() != f"@{name}" or not words:
-            continue
-        fields = {
-            key.strip().lower(): value.strip() for key, sign, value in (w.partition("=") for w in words[1:]) if sign
-        }
-        match words[0].strip().upper():
-            case "TOOL":
-                yield _tool(comment, fields)
-            case "STOCK":
-                stock = comment, fields
-            case "ORIGIN":
-                origin = comment, fields
-            case "MATERIAL":
-                yield StatedMaterial(comment, fields.get("name", ""))
-    if stock is not None:
-        yield _stock(*stock, origin)
+        if head.strip().upper() == f"@{name}" and words and (rows := found.get(words[0].strip().upper())) is not None:
+            pairs = (each.partition("=") for each in words[1:])
+            rows.append((comment, {key.strip().lower(): value.strip() for key, sign, value in pairs if sign}))
+    fields = {comment: words for rows in found.values() for comment, words in rows}
+    yield from read_each([each for each, _ in found["TOOL"]], lambda each: _tool(each, fields[each]))
+    yield from (StatedMaterial(comment, words.get("name", "")) for comment, words in found["MATERIAL"])
+    stocks, origins = found["STOCK"], found["ORIGIN"]
+    if any(len({each.text for each, _ in rows}) > 1 for rows in (stocks, origins)):
+        yield OpenStatement((stocks or origins)[-1][0], "several stocks or places of the zero are stated")
+    elif stocks:
+        yield from read_each([stocks[0][0]], lambda each: _stock(each, fields[each], origins[0] if origins else None))
 
 
 def _value(comment: Comment, fields: dict[str, str], key: str) -> float:

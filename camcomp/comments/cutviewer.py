@@ -6,6 +6,7 @@ ox, oy, oz lead from the lower left bottom corner of the block to the program's 
 
 import re
 from collections.abc import Iterator, Sequence
+from functools import partial
 
 from camcomp.gcode.stated import (
     Comment,
@@ -18,6 +19,7 @@ from camcomp.gcode.stated import (
     cutter,
     form_of,
     numbers,
+    read_each,
 )
 
 TITLE = "CutViewer (STOCK/..., TOOL/...)"
@@ -28,20 +30,23 @@ SAME_MM = 0.02  # corners are written with two decimals
 
 def read(comments: Sequence[Comment]) -> Iterator[Statement]:
     """Blocks, tools in the order in which they come into use, and what contradicts itself."""
-    corners: dict[str, list[float]] = {}
-    for comment in comments:
-        if found := _CORNER.match(comment.text):
-            words = [each.strip().lower().removesuffix("mm").removesuffix("in") for each in found[2].split(",")]
-            corners[found[1].upper()] = numbers(comment, words, f"stockM{found[1].lower()}")
-            continue
-        head, *words = (each.strip() for each in comment.text.split(","))
-        kind = head.upper()
-        if kind == "STOCK/BLOCK":
-            yield _block(comment, words, corners)
-        elif kind in ("TOOL/MILL", "TOOL/DRILL"):
-            yield _tool(comment, kind, words)
-        elif kind.startswith(("STOCK/", "TOOL/")):
-            yield OpenStatement(comment, f"{head} cannot be followed")
+    return read_each(comments, partial(_statement, {}))
+
+
+def _statement(corners: dict[str, list[float]], comment: Comment) -> Statement | None:
+    """The statement of a comment; corners that it states are kept for the block, empty where they cannot be read."""
+    if found := _CORNER.match(comment.text):
+        words = [each.strip().lower().removesuffix("mm").removesuffix("in") for each in found[2].split(",")]
+        corners[found[1].upper()] = []
+        corners[found[1].upper()] = numbers(comment, words, f"stockM{found[1].lower()}")
+        return None
+    head, *words = (each.strip() for each in comment.text.split(","))
+    kind = head.upper()
+    if kind == "STOCK/BLOCK":
+        return _block(comment, words, corners)
+    if kind in ("TOOL/MILL", "TOOL/DRILL"):
+        return _tool(comment, kind, words)
+    return OpenStatement(comment, f"{head} cannot be followed") if kind.startswith(("STOCK/", "TOOL/")) else None
 
 
 def _block(comment: Comment, words: Sequence[str], corners: dict[str, list[float]]) -> Statement:
@@ -53,8 +58,8 @@ def _block(comment: Comment, words: Sequence[str], corners: dict[str, list[float
     size, origin = values[:3], values[3:]
     low = [-each for each in origin]
     high = [a + b for a, b in zip(low, size, strict=True)]
-    if len(corners) == 2:
-        stated = [*corners["IN"], *corners["AX"]]
+    if corners:
+        stated = [*corners.get("IN", ()), *corners.get("AX", ())]
         if len(stated) != 6 or any(abs(a - b) > SAME_MM for a, b in zip(stated, [*low, *high], strict=True)):
             return OpenStatement(comment, "stockMin and stockMax state another block")
     elif any(not 0.0 <= o <= s for o, s in zip(origin, size, strict=True)):

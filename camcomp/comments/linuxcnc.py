@@ -5,7 +5,7 @@ Source: LinuxCNC pull request 4476 (2026), which draws them in the current work 
 
 from collections.abc import Iterator, Sequence
 
-from camcomp.gcode.stated import Comment, OpenStatement, StatedError, Statement, bar, box, numbers
+from camcomp.gcode.stated import Comment, OpenStatement, StatedError, Statement, bar, box, numbers, read_each
 
 TITLE = "LinuxCNC (WORKPIECE,...)"
 MARKS = (b"WORKPIECE,",)
@@ -13,22 +13,24 @@ _BOX = ("XMIN", "YMIN", "ZMIN", "XMAX", "YMAX", "ZMAX")
 
 
 def read(comments: Sequence[Comment]) -> Iterator[Statement]:
-    """The stock of every comment; the last one counts, and several are doubtful for the caller."""
-    for comment in comments:
-        head, *words = (each.strip() for each in comment.text.split(","))
-        if head.upper() != "WORKPIECE" or not words:
-            continue
-        shape, fields = words[0].upper(), _fields(comment, words[1:])
-        if shape == "BOX":
-            values = numbers(comment, [_need(comment, fields, key) for key in _BOX], "BOX")
-            yield box(comment, values[:3], values[3:])
-        elif shape == "CYLINDER" and fields.get("AXIS", "Z").upper() == "Z":
-            keys = ("X", "Y", "DIAMETER", "ZMIN", "ZMAX")
-            x, y, diameter, low, high = numbers(comment, [_need(comment, fields, key) for key in keys], "CYLINDER")
-            yield bar(comment, (x, y), diameter, low, high)
-        else:
-            kind = f"{shape} along {fields.get('AXIS', 'Z')}" if shape == "CYLINDER" else shape
-            yield OpenStatement(comment, f"a workpiece of the form {kind} cannot be followed")
+    """The stock of every comment."""
+    return read_each(comments, _stock)
+
+
+def _stock(comment: Comment) -> Statement | None:
+    head, *words = (each.strip() for each in comment.text.split(","))
+    if head.upper() != "WORKPIECE" or not words:
+        return None
+    shape, fields = words[0].upper(), _fields(comment, words[1:])
+    if shape == "BOX":
+        values = numbers(comment, [_need(comment, fields, key) for key in _BOX], "BOX")
+        return box(comment, values[:3], values[3:])
+    if shape == "CYLINDER" and fields.get("AXIS", "Z").upper() == "Z":
+        keys = ("X", "Y", "DIAMETER", "ZMIN", "ZMAX")
+        x, y, diameter, low, high = numbers(comment, [_need(comment, fields, key) for key in keys], "CYLINDER")
+        return bar(comment, (x, y), diameter, low, high)
+    kind = f"{shape} along {fields.get('AXIS', 'Z')}" if shape == "CYLINDER" else shape
+    return OpenStatement(comment, f"a workpiece of the form {kind} cannot be followed")
 
 
 def _fields(comment: Comment, words: Sequence[str]) -> dict[str, str]:

@@ -22,6 +22,7 @@ class Setup:
     home_mm: Triple = ZERO  # G28, machine coordinates
     second_home_mm: Triple = ZERO  # G30
     tool: int = 0  # in the spindle
+    unit_mm: float = 1.0  # of lengths and feeds until the program states one
     increment_mm: float | None = None  # unit of a number without a point, on controllers that count increments
     orients: bool = False  # the machine has six actuators, so that words of orientation move its tool
     table_axes: frozenset[str] = frozenset()  # A, B, C that turn the workpiece and only position it

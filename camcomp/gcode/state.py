@@ -50,8 +50,8 @@ class ControlState:
         self.relative = False
         self.centre_absolute = False
         self.feed_mode = 94
-        self.unit = 1.0  # mm per programmed unit
-        self.feed_unit = 1.0  # of feeds
+        self.unit = setup.unit_mm  # mm per programmed unit
+        self.feed_unit = setup.unit_mm  # of feeds
         self.path_mode = setup.path_mode
         self.rounding = 0.0  # ADIS, in units
         self.retract_to_start = dialect.retract_to_start  # G98

@@ -8,13 +8,17 @@ from __future__ import annotations
 
 import re
 from bisect import bisect_left, bisect_right
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, BinaryIO
 
 from camcomp.ground import shelf
 
 CHUNK = 1 << 22  # bytes read at once
+NEAR_LINES, NEAR_BYTES = (
+    4,
+    400,
+)  # between a tool's comment and its T word: posts write stop, dwell and message in between
 INCH_MM = 25.4
 _UNIT_CODES = {b"20": INCH_MM, b"70": INCH_MM, b"700": INCH_MM, b"21": 1.0, b"71": 1.0, b"710": 1.0}
 _COMMENT = re.compile(rb"\([^)\r\n]*\)|;[^\r\n]*")
@@ -24,11 +28,12 @@ _TOOL = re.compile(rb"T[ \t]*([0-9]{1,8})")
 _OFFSET = re.compile(rb"G(5[4-9](?:\.[123])?)(?![0-9])")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Comment:
     """A comment without its brackets. line, column: from 1; unit_mm: mm per unit of length in force there.
 
-    next_tool: the next T word after it, or None.
+    next_tool: the next T word after it, or None. near_tool: the T word on the nearest line, 0 in a program without T words;
+    None if no T word is near, or two are equally near.
     """
 
     line: int
@@ -36,6 +41,7 @@ class Comment:
     text: str
     unit_mm: float
     next_tool: int | None = None
+    near_tool: int | None = None
 
 
 @dataclass(frozen=True)
@@ -67,6 +73,15 @@ class StatedMaterial:
 
 
 @dataclass(frozen=True)
+class StatedUnit:
+    """The unit of length as named in the comment, mm each."""
+
+    comment: Comment
+    size_mm: float
+    reader: str = ""
+
+
+@dataclass(frozen=True)
 class OpenStatement:
     """An ambiguous or incomplete statement in a comment, and the reason."""
 
@@ -75,18 +90,23 @@ class OpenStatement:
     reader: str = ""
 
 
-Statement = StatedStock | StatedTool | StatedMaterial | OpenStatement
+Statement = StatedStock | StatedTool | StatedMaterial | StatedUnit | OpenStatement
 
 
-@dataclass
+@dataclass(kw_only=True)
 class Stated:
-    """All statements in the comments of a program. offsets: work offsets that the program uses, G54 to G59.3."""
+    """All statements in the comments of a program.
+
+    offsets: work offsets that the program uses, G54 to G59.3; has_unit: it has a code for the unit of length.
+    """
 
     stocks: list[StatedStock] = field(default_factory=list)
     tools: list[StatedTool] = field(default_factory=list)
     materials: list[StatedMaterial] = field(default_factory=list)
+    units: list[StatedUnit] = field(default_factory=list)
     doubts: list[OpenStatement] = field(default_factory=list)
     offsets: set[str] = field(default_factory=set)
+    has_unit: bool = True
 
     def add(self, statement: Statement) -> None:
         """Add a reader's statement to its list."""
@@ -97,12 +117,16 @@ class Stated:
                 self.tools.append(statement)
             case StatedMaterial():
                 self.materials.append(statement)
+            case StatedUnit():
+                self.units.append(statement)
             case OpenStatement():
                 self.doubts.append(statement)
 
 
-def read_stated(source: BinaryIO) -> Stated:
+def read_stated(source: BinaryIO, unit_mm: float = 1.0) -> Stated:
     """Read the statements in a program's comments. source: seekable, at its start, and reset to it.
+
+    unit_mm: of lengths in a program without a unit code.
 
     A comment with a reader's mark that the reader cannot parse is a doubt.
     """
@@ -111,7 +135,9 @@ def read_stated(source: BinaryIO) -> Stated:
         return Stated()
     data = source.read()
     source.seek(0)
-    out, comments = Stated(), _comments(data, b"|".join(re.escape(mark) for reader in readers for mark in reader.MARKS))
+    words = _Words(data)
+    comments = words.comments(b"|".join(re.escape(mark) for reader in readers for mark in reader.MARKS), unit_mm)
+    out = Stated(has_unit=bool(words.units))
     for reader in readers:
         own = [each for each in comments if any(mark.decode() in each.text.upper() for mark in reader.MARKS)]
         try:
@@ -121,6 +147,17 @@ def read_stated(source: BinaryIO) -> Stated:
             out.add(OpenStatement(error.comment, str(error), reader.TITLE))
     out.offsets = {f"G{each.decode()}" for each in set(_OFFSET.findall(data.upper()))}
     return out
+
+
+def read_each(comments: Iterable[Comment], read: Callable[[Comment], Statement | None]) -> Iterator[Statement]:
+    """Statements of comments, one by one; a comment that `read` cannot parse (StatedError) is a doubt of its own."""
+    for comment in comments:
+        try:
+            found = read(comment)
+        except StatedError as error:
+            found = OpenStatement(error.comment, str(error))
+        if found is not None:
+            yield found
 
 
 class StatedError(ValueError):
@@ -145,42 +182,63 @@ def _is_marked(source: BinaryIO, marks: Sequence[bytes]) -> bool:
         source.seek(0)
 
 
-def _comments(data: bytes, marks: bytes) -> list[Comment]:
-    """Comments with one of the marks (an expression of capitals), with the unit in force there.
+class _Words:
+    """Comments of a program, and the words outside of them that say in which unit and for which tool they are."""
 
-    Before the first unit code the unit is that of the program if it has a single one, else mm.
-    """
-    spans = [each.span() for each in _COMMENT.finditer(data)]
-    capitals, marked = data.upper(), re.compile(marks)  # a search in one case is many times faster
-    units, tools = _words(_UNIT, capitals, spans), _words(_TOOL, capitals, spans)
-    sizes = {_UNIT_CODES[each[1]] for each in units}
-    first = sizes.pop() if len(sizes) == 1 else 1.0
-    unit_at, tool_at = ([each.start() for each in found] for found in (units, tools))
-    out, line, begin = [], 1, 0
-    for start, end in spans:
-        raw = data[start:end]
-        if not marked.search(raw.upper()):
-            continue
-        line, begin = line + data.count(b"\n", begin, start), start
-        column = start - max(data.rfind(b"\n", 0, start), data.rfind(b"\r", 0, start))
-        text = (raw[1:-1] if raw.startswith(b"(") else raw[1:]).decode("utf-8", "replace").strip()
-        unit, tool = bisect_left(unit_at, start), bisect_left(tool_at, end)
-        size = _UNIT_CODES[units[unit - 1][1]] if unit else first
-        out.append(Comment(line, column, text, size, int(tools[tool][1]) if tool < len(tools) else None))
-    return out
+    def __init__(self, data: bytes) -> None:
+        self.data, self.capitals = data, data.upper()  # a search in one case is many times faster
+        self.spans = [each.span() for each in _COMMENT.finditer(data)]
+        self.starts = [start for start, _ in self.spans]
+        self.units, self.tools = self._found(_UNIT), self._found(_TOOL)
+        self.unit_at, self.tool_at = ([each.start() for each in found] for found in (self.units, self.tools))
 
+    def comments(self, marks: bytes, unit_mm: float) -> list[Comment]:
+        """Comments with one of the marks (an expression of capitals), with the unit in force there.
 
-def _words(pattern: re.Pattern[bytes], data: bytes, spans: Sequence[tuple[int, int]]) -> list[re.Match[bytes]]:
-    """Matches of a word at the start of a word and outside of the spans (ascending)."""
-    starts = [start for start, _ in spans]
-    out = []
-    for each in pattern.finditer(data):
-        at = each.start()
-        before = bisect_right(starts, at) - 1
-        outside = before < 0 or at >= spans[before][1]
-        if outside and not (at and _INSIDE.match(data, at - 1)):
-            out.append(each)
-    return out
+        Before the first unit code the unit is that of the program if it has a single one, else unit_mm.
+        """
+        data, marked = self.data, re.compile(marks)
+        sizes = {_UNIT_CODES[each[1]] for each in self.units}
+        first = sizes.pop() if len(sizes) == 1 else unit_mm
+        out, line, begin = [], 1, 0
+        for start, end in self.spans:
+            if not marked.search(self.capitals, start, end):
+                continue
+            line, begin = line + data.count(b"\n", begin, start), start
+            column = start - max(data.rfind(b"\n", 0, start), data.rfind(b"\r", 0, start))
+            raw = data[start:end]
+            text = (raw[1:-1] if raw.startswith(b"(") else raw[1:]).decode("utf-8", "replace").strip()
+            unit, tool = bisect_left(self.unit_at, start), bisect_left(self.tool_at, end)
+            size = _UNIT_CODES[self.units[unit - 1][1]] if unit else first
+            after = int(self.tools[tool][1]) if tool < len(self.tools) else None
+            near = self._near(tool, start, end)
+            out.append(Comment(line=line, column=column, text=text, unit_mm=size, next_tool=after, near_tool=near))
+        return out
+
+    def _near(self, after: int, start: int, end: int) -> int | None:
+        """The T word on the nearest line; `after`: index of the first one behind the comment."""
+        if not self.tools:
+            return 0
+        near: list[tuple[int, int]] = []
+        for index in (after - 1, after):
+            if 0 <= index < len(self.tools):
+                between = sorted((self.tool_at[index], start if index < after else end))
+                if between[1] - between[0] <= NEAR_BYTES:
+                    near.append((self.data.count(b"\n", *between), int(self.tools[index][1])))
+        lines, number = min(near, default=(NEAR_LINES + 1, None))
+        tied = any(each != number for count, each in near if count == lines)
+        return None if tied or lines > NEAR_LINES else number
+
+    def _found(self, pattern: re.Pattern[bytes]) -> list[re.Match[bytes]]:
+        """Matches of a pattern at the start of a word and outside of the comments."""
+        out = []
+        for each in pattern.finditer(self.capitals):
+            at = each.start()
+            before = bisect_right(self.starts, at) - 1
+            outside = before < 0 or at >= self.spans[before][1]
+            if outside and not (at and _INSIDE.match(self.capitals, at - 1)):
+                out.append(each)
+        return out
 
 
 def numbers(comment: Comment, words: Sequence[str], what: str) -> list[float]:

@@ -234,6 +234,12 @@ RULES: dict[str, Rule] = {
         "is below the step of the output.",
         "begin with a rapid that names X, Y and Z (control: start_mm if the machine stands elsewhere)",
     ),
+    "CC147": Rule(
+        "unit in a comment only",
+        "A comment says that lengths are in inch, and the program has no G20 or G70: without a unit code lengths are read in mm, "
+        "25.4 times too small. Some posts leave the unit to a setting of the controller.",
+        "write G20 before the first move, or state control: {program_unit: inch} or mm in the machine file",
+    ),
     # --- CC2xx usage, YAML, config -----------------------------------------------------------------------------
     "CC200": Rule(
         "YAML cannot be read",

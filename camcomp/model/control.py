@@ -12,6 +12,7 @@ from camcomp.gcode.likeness import like_a_program
 from camcomp.gcode.path_mode import stated_mode
 from camcomp.gcode.program import Program
 from camcomp.gcode.setup import ASSUMED, Setup
+from camcomp.gcode.stated import INCH_MM
 from camcomp.gcode.text import Text
 from camcomp.ground.errors import Location, ProgramError
 from camcomp.ground.files import display_name, read_bytes
@@ -41,6 +42,7 @@ def setup_of(config: Config) -> Setup:
         home_mm=places.get("G28", (0.0, 0.0, 0.0)),
         second_home_mm=places.get("G30", (0.0, 0.0, 0.0)),
         tool=control.tool_number,
+        unit_mm=INCH_MM if control.program_unit == "inch" else 1.0,
         increment_mm=control.input_increment_mm,
         table_axes=frozenset(control.table_axes),
         orients=len(config.robot.actuators) == ORIENTING_ACTUATORS,

@@ -15,7 +15,10 @@ class CommentsPlugin(Protocol):
     MARKS: tuple[bytes, ...]
 
     def read(self, comments: Sequence[Comment]) -> Iterator[Statement]:
-        """Statements in comments that contain a mark; raises `camcomp.gcode.stated.StatedError` for an unreadable one."""
+        """Statements in comments that contain a mark, e.g. by `camcomp.gcode.stated.read_each`.
+
+        StatedError for an unreadable one ends the reader, unless read_each meets it.
+        """
 
 
 def checked(name: str, found: Any, who: str) -> ModuleType:

@@ -9,10 +9,11 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
+from camcomp.gcode.stated import INCH_MM
 from camcomp.ground.bounds import number_of
 from camcomp.ground.errors import FileError
 from camcomp.ground.files import read_bytes
-from camcomp.model.config.tool_table import INCH_MM, TabledTool, ToolFile, refused
+from camcomp.model.config.tool_table import TabledTool, ToolFile, refused
 from camcomp.model.config.yaml_tree import Node, child, read_tree
 
 TITLE = "FreeCAD tool library (.fctl) or tool bit (.fctb)"

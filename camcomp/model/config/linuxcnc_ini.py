@@ -12,16 +12,17 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
+from camcomp.gcode.stated import INCH_MM
 from camcomp.ground.bounds import number_of
 from camcomp.ground.errors import CamcompError, ConfigError, Location
 from camcomp.model.config.doubt import Doubt
-from camcomp.model.config.tool_table import INCH_MM
 from camcomp.model.config.yaml_tree import Node, child
 
 SUFFIX = ".ini"
 TRAVEL = "travel of LinuxCNC's axes"  # key of a merged tree under which the travel waits for the actuators
 _SECTION = re.compile(r"\[([A-Z][A-Z0-9_]*)\]")
 _ENTRY = re.compile(r"([A-Za-z][A-Za-z0-9_]*)\s*=\s*(.*)")
+_STARTUP_UNIT = re.compile(r"G\s*2([01])(?![0-9.])", re.IGNORECASE)
 _UNITS_MM = {"mm": 1.0, "metric": 1.0, "inch": INCH_MM, "imperial": INCH_MM, "in": INCH_MM}
 _LINEAR = "XYZ"
 
@@ -101,7 +102,7 @@ class _Ini:
         return replace(found, value=round(value * self.unit_mm, 9))
 
     def control(self) -> dict[str, Node]:
-        """The lowest speed and acceleration of the linear axes: the machine file has one of each for all."""
+        """Lowest speed and acceleration of the linear axes, of which the machine file has one each; unit before G20 or G21."""
         out: dict[str, Node] = {}
         for key, theirs, whole in (
             ("velocity_mm_per_s", "MAX_VELOCITY", "MAX_LINEAR_VELOCITY"),
@@ -111,6 +112,11 @@ class _Ini:
             found = [each for section, name in places if (each := self.number(section, name)) is not None]
             if found:
                 out[key] = min(found, key=lambda each: float(each.value))
+        startup, unit = self.text("RS274NGC", "RS274NGC_STARTUP_CODE"), self.text("TRAJ", "LINEAR_UNITS")
+        if startup is not None and (code := _STARTUP_UNIT.search(startup.value)):
+            out["program_unit"] = Node("inch" if code[1] == "0" else "mm", startup.at)
+        elif unit is not None:
+            out["program_unit"] = Node("mm" if self.unit_mm == 1.0 else "inch", unit.at)
         return out
 
     def travel(self) -> Node:

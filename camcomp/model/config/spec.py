@@ -186,6 +186,9 @@ class Control(Spec):
         None,
         description="worth of one unit in a number without decimal point (Fanuc IS-B: 0.001); missing = a number is in mm",
     )
+    program_unit: Literal["mm", "inch"] | None = Field(
+        None, description="of lengths and feeds before the first G20 or G21 of a program; default: mm"
+    )
     acceleration_mm_per_s2: Positive = Field(1500.0, description="largest of every axis")
     velocity_mm_per_s: Positive | None = Field(None, description="largest of every axis; default: feeds as programmed")
     path_mode: Annotated[str, Field(pattern=PATTERN)] | None = Field(

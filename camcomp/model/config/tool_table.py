@@ -11,13 +11,13 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from camcomp.gcode.stated import INCH_MM
 from camcomp.ground import shelf
 from camcomp.ground.errors import CamcompError, ConfigError, Location
 from camcomp.ground.files import display_name, read_bytes
 from camcomp.model.config.doubt import Doubt
 from camcomp.model.config.yaml_tree import Node, child
 
-INCH_MM = 25.4
 UNITS_MM = {"mm": 1.0, "inch": INCH_MM}
 SAME_MM = 1e-3  # lengths that are alike: tables have three decimals
 _FORM = ("type", "corner_radius_mm", "point_deg")

@@ -35,7 +35,7 @@ def test_stock_of_the_comments_takes_the_force_out_of_the_air(tmp_path):
     assert abs(joints.array("x_mm")[cut]).max() <= 44.0 + 1e-9  # the block and the radius of the tool
     assert abs(plain.joints.array("x_mm")[plain.joints.array("fx_N", "fy_N", "fz_N").any(axis=1)]).max() == 60.0
     assert found.summary.force.engagement == "stock" and plain.summary.force.engagement == "none"
-    assert [each.split(":")[0] for each in found.summary.stated_in_program] == ["line 2", "line 1"]
+    assert [each.split(":")[0] for each in found.summary.stated_in_program] == ["line 1", "line 2"]
 
 
 def test_none_ignores_stocks_of_comments_and_machine_file(tmp_path):
@@ -66,12 +66,80 @@ def test_what_agrees_is_not_said(tmp_path):
     assert job_of_program(own, (STOCK + TOOL + CUTS).encode(), "p.nc") is own
 
 
+def remarks(tmp_path, yaml, comments):
+    return job_of_program(machine(tmp_path, yaml), (comments + CUTS).encode(), "p.nc").taken.remarks
+
+
+BALL = TOOL.replace("CR=0.", "CR=4.").replace("flat", "ball")
+
+
+@pytest.mark.parametrize(
+    ("yaml", "comments", "both"),
+    [
+        ("", TOOL + TOOL.replace("8.", "6."), ("flat 8 mm", "flat 6 mm", "neither is taken")),
+        ("tools: {1: {diameter_mm: 8, type: ball}}\n", TOOL, ("flat 8 mm", "tools: 1: ball 8 mm, which counts")),
+        ("tool: {diameter_mm: 10, type: bull, corner_radius_mm: 1}\n",
+         TOOL.replace("D=8. CR=0.", "D=10. CR=2.").replace("flat", "bull nose"), ("corner radius 2 mm", "tool: bull 10 mm, corner radius 1 mm")),
+        ("", "(@FC|MATERIAL|name=Steel)\n(MATERIAL - ALUMINUM MM - 2024)\n", ("Steel", "ALUMINUM")),
+        ("", "(Units: inch)\n", ("the comment says inch", "unit code says mm, which counts")),
+        ("", STOCK + STOCK.replace("40", "41"), ("[40, 40, 0]", "[41, 41, 0]")),
+    ],
+)  # fmt: skip
+def test_contradictions_are_said_with_both_values(tmp_path, yaml, comments, both):
+    (said,) = remarks(tmp_path, yaml, comments)
+    assert all(each in said for each in both), said
+
+
+@pytest.mark.parametrize(
+    ("yaml", "keys"),
+    [
+        ("tool: {diameter_mm: 8, teeth: 3}\n", {"diameter_mm": 8, "teeth": 3, "type": "ball"}),
+        ("tools: {1: {teeth: 4}}\n", {"diameter_mm": 8, "teeth": 4, "type": "ball"}),
+    ],
+)
+def test_comments_add_the_keys_that_the_machine_file_leaves_open(tmp_path, yaml, keys):
+    job = job_of_program(machine(tmp_path, yaml), (BALL + CUTS).encode(), "p.nc")
+    assert job.config.tools[1].model_dump(exclude_none=True) == keys and not job.taken.remarks
+    assert job.taken.said == ("line 1: T1 ball 8 mm (Fusion (@F360|..., T1 D=...))",)
+
+
+def test_a_broken_tool_is_a_remark_and_the_next_one_is_taken(tmp_path):
+    for choice in (None, "program", "comments"):
+        text = STOCK + TOOL.replace("8.", "8,5") + TOOL.replace("T1", "T2") + CUTS
+        job = job_of_program(machine(tmp_path), text.encode(), "p.nc", choice)
+        assert set(job.taken.tools) == {2} and [each[:34] for each in job.taken.remarks] == [
+            "not taken from the program: line 2:"[:34]
+        ]
+
+
+def test_a_great_many_doubts_are_counted(tmp_path):
+    said = remarks(tmp_path, "", "".join(f"(T{k} D=x CR=0. - ZMIN=-5. - flat end mill)\n" for k in range(500)))
+    assert len(said) == 21 and said[-1].startswith("480 more")
+
+
+INCHES = "(Units: 'in' and 'in/min')\n" + CUTS.replace("G21 ", "")
+
+
+def test_a_unit_that_stands_in_a_comment_only_is_refused(tmp_path):
+    for choice in (None, "none", "program"):
+        with pytest.raises(ProgramError) as caught:
+            job_of_program(machine(tmp_path), INCHES.encode(), "p.nc", choice)
+        assert caught.value.rule == "CC147" and caught.value.at.line == 1
+    job = job_of_program(machine(tmp_path, "control: {program_unit: inch}\n"), INCHES.encode(), "p.nc")
+    assert not job.taken.remarks
+    (said,) = remarks(tmp_path, "control: {program_unit: mm}\n", "(Units: inch)\n") or [""]
+    assert "which counts" in said
+
+
 @pytest.mark.parametrize(
     ("text", "why"),
     [
         ("", "no comment states the stock"),
         ("(STOCK/BLOCK,9,9,9)\n", "place of the block"),
-        (STOCK + STOCK.replace("40", "41"), "another comment states another stock"),
+        (
+            STOCK + STOCK.replace("40", "41"),
+            "to [40, 40, 0] mm (LinuxCNC (WORKPIECE,...)) contradicts line 2: stock box [-41,",
+        ),
         (STOCK + "G55\n", "work offset, and the program uses G55"),
     ],
 )

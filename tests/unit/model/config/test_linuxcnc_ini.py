@@ -4,6 +4,7 @@ import pytest
 
 from camcomp.api.machine import load_machine
 from camcomp.ground.errors import ConfigError
+from camcomp.model.control import program_of
 from camcomp.model.from_program import job_of_program
 from camcomp.terminal.cli import run
 from tests.commandline import ROOT
@@ -104,3 +105,21 @@ def test_what_cannot_be_read_is_told_with_its_place(tmp_path, ini, rule, line):
     with pytest.raises(ConfigError) as caught:
         machine(tmp_path, ini)
     assert (caught.value.rule, caught.value.at.line) == (rule, line)
+
+
+@pytest.mark.parametrize(
+    ("ini", "own", "unit"),
+    [
+        (INI, "", 25.4),
+        (INI.replace("= inch", "= mm"), "", 1.0),
+        (INI + "[RS274NGC]\nRS274NGC_STARTUP_CODE = G17 G21 G90\n", "", 1.0),
+        (INI, "control: {program_unit: mm}\n", 1.0),
+    ],
+)
+def test_a_program_without_a_unit_code_is_in_the_unit_of_the_control(tmp_path, ini, own, unit):
+    (tmp_path / "mill.ini").write_text(ini)
+    (tmp_path / "tool.tbl").write_text("T1 P1 D.25\n")
+    (tmp_path / "own.yaml").write_text(own or "workpiece: {}\n")
+    config = load_machine(CARTESIAN, tmp_path / "mill.ini", tmp_path / "own.yaml").config
+    path = program_of(b"G90 G0 X1 Y2 Z3\nG1 X2 F10\nG21 X5\n", "p.nc", config).path
+    assert path.end[:, 0] == pytest.approx([unit, 2 * unit, 5.0]) and path.feed[1] == pytest.approx(10 * unit)
