@@ -1,83 +1,71 @@
 """Compilation of kernels by numba: decorators for entry functions and for functions inside them.
 
-Only the entry functions, those that Python calls, are cached; the functions that they call are compiled into them.
+Only the entry functions, those that Python calls, are cached; the functions that they call are compiled into them. Numba is
+imported when something has to be compiled, and not to run what is in the cache.
 """
 
 from __future__ import annotations
 
 import functools
-import gc
+import os
 from collections.abc import Callable
 from typing import Any
 
-import numba as _numba
-
-numba: Any = _numba  # its annotations leave out what it has
-
-# Kernels allocate, raise and return no Python objects: numba's support for that costs compile time.
-_OPTIONS = {"nogil": True, "error_model": "numpy", "_nrt": False, "no_cfunc_wrapper": True}
+_PLAIN_PYTHON = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")  # for the debugger
 
 
-def inner(function: Callable[..., Any], *, fastmath: bool = False) -> Any:
-    """Compile a function that only compiled functions call, without allocation, interpreter lock and exceptions.
+def inner(function: Callable[..., Any], *, fastmath: bool = False, allocates: bool = False) -> Any:
+    """Mark a function that only compiled functions call.
 
-    fastmath: sums may be formed in any order, which allows vector instructions. Constant arguments count as plain numbers:
-    numba would otherwise compile the function for every constant.
+    fastmath: sums may be formed in any order, which allows vector instructions. allocates: the code creates arrays or raises.
     """
-    if numba.config.DISABLE_JIT:  # for the debugger
-        return function
-    from camcomp.ground.linked_code import jit, linking_options
+    from camcomp.ground.native_code import INNER
 
-    dispatcher = jit(function, fastmath=fastmath, no_cpython_wrapper=True, **linking_options(), **_OPTIONS)
-    template = getattr(dispatcher, "get_call_template", None)
-    if template is not None:  # a numba without it compiles more
-
-        def plain(args: Any, kws: Any) -> Any:
-            return template(tuple(numba.core.types.unliteral(a) for a in args), kws)
-
-        dispatcher.get_call_template = plain
-    return dispatcher
+    INNER[function] = fastmath, allocates
+    return function
 
 
-def entry(function: Callable[..., Any]) -> Callable[..., Any]:
+def entry(function: Callable[..., Any], *, allocates: bool = False) -> Callable[..., Any]:
     """Compile a function that Python calls, cached on disk until its source or the source of its callees changes.
 
-    Without a cache folder every process compiles anew. Garbage collection is disabled meanwhile, which saves a sixth of the
-    time.
+    Without a cache folder every process compiles anew. allocates: the code creates arrays or raises; to return an array it
+    imports numba.
     """
-    if numba.config.DISABLE_JIT:
+    if _PLAIN_PYTHON:
         return function
-    from camcomp.ground.machine_code import kept  # slow import, needed to compile only
+    from camcomp.ground.machine_code import Cached
+    from camcomp.ground.native_code import describe
 
-    dispatcher = kept(function, allocates=False, **_OPTIONS)
+    cached = Cached(function, allocates)
+    runs: dict[tuple[Any, ...], Any] = {}
 
     @functools.wraps(function)
     def call(*args: Any) -> Any:
-        if getattr(dispatcher, "overloads", None):  # not its `signatures`, which makes a list every time
-            return dispatcher(*args)
-        from camcomp.ground import progress
-
-        resting = gc.isenabled()
-        gc.disable()
         try:
-            return dispatcher(*args)
-        finally:
-            progress.hold("")
-            if resting:
-                gc.enable()
+            types = describe(args)
+        except TypeError:
+            return cached.compiled(*args)
+        run = runs.get(types)
+        if run is None:
+            run = runs[types] = cached.load(types, args)
+        return run(None, args, None)
 
-    call.dispatcher = dispatcher  # type: ignore[attr-defined]
+    call.load = cached.load  # type: ignore[attr-defined]
     return call
 
 
-def direct(function: Callable[..., Any], args: tuple[Any, ...]) -> Callable[..., Any]:
-    """Machine code of an entry function for exactly the types of `args`, with which it has been called before.
+kept = functools.partial(entry, allocates=True)
 
-    Calling it avoids numba's dispatch by types, which takes longer than a small kernel.
+
+def direct(function: Callable[..., Any], args: tuple[Any, ...]) -> Callable[..., Any]:
+    """Machine code of an entry function for exactly the types of `args`.
+
+    Calling it avoids the look at the types, which takes longer than a small kernel.
     """
-    dispatcher: Any = getattr(function, "dispatcher", None)
-    try:
-        out: Callable[..., Any] = dispatcher.overloads[tuple(map(dispatcher.typeof_pyval, args))].entry_point
-    except AttributeError:  # not compiled, or a numba without these names
+    load: Any = getattr(function, "load", None)
+    if load is None:
         return function
-    return out
+    from camcomp.ground.native_code import describe
+
+    run = load(describe(args), args)
+    return lambda *given: run(None, given, None)

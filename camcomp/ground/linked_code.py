@@ -8,12 +8,48 @@ the trial `is_usable` fails, functions are compiled as usual.
 from __future__ import annotations
 
 import functools
+import sys
 from collections.abc import Callable
+from types import FunctionType, ModuleType
 from typing import Any
 
 import numba as _numba
 
+from camcomp.ground.native_code import INNER
+
 numba: Any = _numba  # its annotations are incomplete
+
+
+# Kernels allocate, raise and return no Python objects: numba's support for that costs compile time.
+_OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "_nrt": False, "no_cfunc_wrapper": True}
+
+
+def dispatcher(function: Callable[..., Any], allocates: bool) -> Any:
+    """Numba's dispatcher of an entry function; allocates: with numba's support for arrays and exceptions."""
+    for module in list(sys.modules.values()):
+        for name, value in list(vars(module).items()) if isinstance(module, ModuleType) else ():
+            if isinstance(value, FunctionType) and value in INNER:
+                setattr(module, name, inner(value, *INNER[value]))
+    return jit(function, **({} if allocates else _OPTIONS))
+
+
+@functools.cache
+def inner(function: Callable[..., Any], fastmath: bool = False, allocates: bool = False) -> Any:
+    """Numba's dispatcher of a function that only compiled functions call.
+
+    Constant arguments count as plain numbers: numba would otherwise compile the function for every constant.
+    """
+    if allocates:
+        return jit(function)
+    found = jit(function, fastmath=fastmath, no_cpython_wrapper=True, **linking_options(), **_OPTIONS)
+    template = getattr(found, "get_call_template", None)
+    if template is not None:  # a numba without it compiles more
+
+        def plain(args: Any, kws: Any) -> Any:
+            return template(tuple(numba.core.types.unliteral(a) for a in args), kws)
+
+        found.get_call_template = plain
+    return found
 
 
 def jit(function: Callable[..., Any], fastmath: bool = False, **saving: Any) -> Any:

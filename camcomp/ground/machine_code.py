@@ -7,6 +7,7 @@ executed, files and folders that other users own or can write to are not used. N
 from __future__ import annotations
 
 import functools
+import gc
 import hashlib
 import os
 import pickle
@@ -14,37 +15,20 @@ import re
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import suppress
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-import llvmlite
-import numba as _numba
-
-from camcomp.ground import progress
-from camcomp.ground.linked_code import jit
+from camcomp.ground import native_code, progress
 from camcomp.ground.notes import note
 from camcomp.ground.replacement import Replacement
 from camcomp.ground.trust import why_file_is_not_ours, why_folder_is_not_ours
 
-numba: Any = _numba  # its annotations are incomplete
-
 _SUM = hashlib.sha256().digest_size
+_NOT_IN_CODE = {"NUMBA_CACHE_DIR", "NUMBA_NUM_THREADS"}
 _ANEW = "it is compiled anew, which takes half a minute"
 ROOT = Path(__file__).parents[2]  # of the package
 _IMPORT = re.compile(r"^(?:from (camcomp[\w.]*) import (\([^)]*\)|.*)|import (camcomp[\w.]*))", re.MULTILINE)
-
-
-def kept(function: Callable[..., Any], *, allocates: bool = True, **options: Any) -> Any:
-    """Numba's dispatcher of `function`, with its code cached on disk if a folder is usable; options as for njit.
-
-    allocates: the code creates arrays. Other code is loaded without numba's compiler, whose import takes a quarter of a
-    second.
-    """
-    dispatcher = jit(function, **options)
-    if not numba.config.DISABLE_JIT:  # for the debugger
-        # Without this attribute (another numba version) every process compiles.
-        dispatcher._cache = _Cache(function, allocates)
-    return dispatcher
 
 
 @functools.cache
@@ -128,15 +112,16 @@ def find_folder(file: Path) -> Path | None:
     return None
 
 
-class _Cache:
-    """Cache in the form of numba's dispatcher, which loads code before it compiles and saves it afterwards."""
+class Cached:
+    """A function that numba compiles once; its code is on disk if a folder is usable."""
 
-    def __init__(self, function: Callable[..., Any], allocates: bool) -> None:
-        code, self._allocates = function.__code__, allocates
+    def __init__(self, function: Callable[..., Any], allocates: bool = False) -> None:
+        code, self._function, self._allocates = function.__code__, function, allocates
         self._file = Path(code.co_filename)
         module = function.__module__.rpartition(".")[2]
-        self._base = f"{module}.{function.__qualname__}-{code.co_firstlineno}.{sys.implementation.cache_tag}"
-        self._base = re.sub(r"[^\w.-]", "_", self._base)
+        base = f"{module}.{function.__qualname__}-{code.co_firstlineno}.{sys.implementation.cache_tag}"
+        self._base = re.sub(r"[^\w.-]", "_", base)
+        self.hits = 0  # code that came from the disk
 
     @functools.cached_property
     def files(self) -> CodeFiles | None:
@@ -147,59 +132,58 @@ class _Cache:
             return None
         return None if folder is None else CodeFiles(folder, self._base, stamp)
 
-    @property
-    def cache_path(self) -> str | None:
-        """The folder, for numba's statistics."""
-        return str(self.files.folder) if self.files is not None else None
+    @functools.cached_property
+    def compiled(self) -> Any:
+        """Numba's dispatcher."""
+        from camcomp.ground.linked_code import dispatcher  # imports numba
 
-    def load_overload(self, signature: Any, context: Any) -> Any:
-        """Compile result for a signature, or None."""
-        found = None
-        if self._allocates:
-            context.refresh()
+        return dispatcher(self._function, self._allocates)
+
+    def load(self, types: tuple[Any, ...], args: tuple[Any, ...]) -> native_code.Run:
+        """Machine code for types of arguments, from the disk or compiled for `args`."""
+        key: Any = None
         try:
             if self.files is not None:
-                found = _load(self.files, signature, context)
+                key = types, native_code.platform(), _settings()
+                found = self.files.load(key)
+                if found is not None:
+                    run = native_code.load(self._base, native_code.ObjectCode(*found))
+                    self.hits += 1
+                    return run
         except Exception:  # noqa: BLE001 - any failure means compilation
             note("compiled code", f"compiled code on the disk is damaged: {_ANEW}")
-        if found is None:
-            progress.hold(progress.COMPILING if self.files is None else progress.ONCE)
-            context.refresh()
-        return found
+        progress.hold(progress.COMPILING if self.files is None else progress.ONCE)
+        resting = gc.isenabled()
+        gc.disable()  # saves a sixth of the time
+        try:
+            self._save(key, self.compiled, self.compiled.compile(tuple(map(self.compiled.typeof_pyval, args))))
+        except AttributeError:  # a numba without these names compiles when it is called
+            _not_kept("another numba")
+        finally:
+            progress.hold("")
+            if resting:
+                gc.enable()
+        return lambda _, given, __: self.compiled(*given)
 
-    def save_overload(self, signature: Any, result: Any) -> None:
-        """Save a compile result."""
+    def _save(self, key: Any, dispatcher: Any, entry_point: Any) -> None:
+        """Save the code of a dispatcher's newest signature."""
         if self.files is None:
             return _not_kept("no folder for it can be written to")
         try:
+            result = next(each for each in dispatcher.overloads.values() if each.entry_point is entry_point)
             if result.library.has_dynamic_globals:
                 raise ValueError("it holds addresses of this process")
-            self.files.save(_key(signature, result.library.codegen), result._reduce())
+            code = result.library.serialize_using_object_code()[2][0]
+            symbols = result.fndesc.llvm_cpython_wrapper_name, result.fndesc.env_name
+            constants = tuple(result.environment.consts)
+            self.files.save(key, tuple(native_code.ObjectCode(code, *symbols, constants)))
         except Exception as error:  # noqa: BLE001 - the compiled code works without the cache
             _not_kept(getattr(error, "strerror", None) or str(error))
 
-    def flush(self) -> None:
-        """Delete the cached code."""
-        if self.files is not None:
-            self.files.flush()
 
-    def enable(self) -> None:
-        """Do nothing: the cache is always enabled."""
-
-    disable = enable
-
-
-def _load(files: CodeFiles, signature: Any, context: Any) -> Any:
-    from numba.core.compiler import CompileResult
-
-    data = files.load(_key(signature, context.codegen()))
-    rebuild: Any = CompileResult._rebuild
-    return rebuild(context, *data) if data is not None else None
-
-
-def _key(signature: Any, codegen: Any) -> tuple[Any, ...]:
-    """Key of compiled code in addition to its sources: types of arguments, platform and processor."""
-    return str(signature), codegen.magic_tuple()
+def _settings() -> tuple[tuple[str, str], ...]:
+    """Numba's settings that can change the code."""
+    return tuple(sorted((k, v) for k, v in os.environ.items() if k.startswith("NUMBA_") and k not in _NOT_IN_CODE))
 
 
 class CodeFiles:
@@ -228,9 +212,7 @@ class CodeFiles:
 
     def save(self, key: Any, code: Any) -> None:
         """Save code, and delete that of other sources under the same name. Raises OSError, FileError."""
-        from numba.core.serialize import dumps
-
-        data = dumps((key, code))
+        data = pickle.dumps((key, code))
         with Replacement(str(self._path(key)), mode=0o600) as file:
             file.file.write(hashlib.sha256(data).digest() + data)
             file.finish()
@@ -246,8 +228,14 @@ class CodeFiles:
             with suppress(OSError):
                 each.unlink()
 
+    def leave(self, most: int) -> None:
+        """Delete the oldest files of this name, so that `most` are left."""
+        files = sorted(self.folder.glob(f"{self._base}-*.nbc"), key=lambda each: each.stat().st_mtime)
+        for each in files[:-most]:
+            each.unlink(missing_ok=True)
+
     def _stem(self) -> str:
-        made_by = (numba.__version__, llvmlite.__version__, self._source_stamp)
+        made_by = (version("numba"), version("llvmlite"), self._source_stamp)
         return f"{self._base}-{_short(made_by)}-"
 
     def _path(self, key: Any) -> Path:

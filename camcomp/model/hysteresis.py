@@ -4,8 +4,8 @@ from itertools import pairwise
 
 import numpy as np
 
+from camcomp.ground.compiled import inner, kept
 from camcomp.ground.datatypes import Floats
-from camcomp.ground.machine_code import kept
 from camcomp.model.seams import Seams
 
 SAME = 1e-9  # relative difference below which two time steps are equal
@@ -55,7 +55,7 @@ def first_order(x: Floats, time: Floats, tau: float, seams: Seams | None = None)
     return out
 
 
-@kept
+@inner
 def _free_swing(w, damping, dt):  # type: ignore[no-untyped-def]  # pragma: no cover
     """Free response of a second-order loop over dt: its state transition matrix (error, rate), four elements."""
     fade, square = damping * w, (damping * damping - 1.0) * w * w

@@ -9,7 +9,7 @@ import camcomp
 
 PACKAGE = Path(camcomp.__file__).parent
 MOST_LINES, MOST_PARAMETERS, MOST_ARGUMENTS, MOST_FIELDS = 60, 6, 5, 5
-COMPILERS = {"entry", "fast", "inner", "kept", "njit", "jit"}  # numba passes arguments of kernels by position
+COMPILERS = {"allocating", "entry", "fast", "inner", "kept", "njit", "jit"}  # kernels take arguments by position
 BUILT_IN = {"print", "max", "min", "zip"}
 # Rows of the tables of plug-ins, users' ones included; functions of any number of names of one kind.
 BY_POSITION = {"Parameter", "at", "exactly_one", "table"}

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from camcomp.diagnosis.fit.measured import Measured, stack
+from camcomp.ground.compiled import kept
 from camcomp.ground.datatypes import Bools, Floats, Path
-from camcomp.ground.machine_code import kept
 from camcomp.model.effect import Cause, Parameter
 from camcomp.model.motion.loaded_structure import Slopes, Solved, rows_together
 from camcomp.model.motion.run_path import RunPath

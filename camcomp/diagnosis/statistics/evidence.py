@@ -25,8 +25,8 @@ from scipy.linalg.lapack import dpotrf, dpotri
 from scipy.special import log_ndtr, logsumexp
 
 from camcomp.diagnosis.statistics.by_channel import ByChannel
+from camcomp.ground.compiled import kept
 from camcomp.ground.datatypes import Floats, Ints
-from camcomp.ground.machine_code import kept
 
 PRIOR_WIDTHS = np.array([0.02, 0.1, 0.5, 2.5])
 _WEIGHTS = np.log([0.2, 0.25, 0.3, 0.25])

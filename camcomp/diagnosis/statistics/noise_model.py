@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from camcomp.diagnosis.statistics.by_channel import ByChannel
+from camcomp.ground.compiled import kept
 from camcomp.ground.datatypes import Bools, Floats, Ints
-from camcomp.ground.machine_code import kept
 
 BLOCK = 8  # rows that are averaged, or whose noise shares a sign
 REGULAR = 1.6  # a step longer than this many usual steps is a gap

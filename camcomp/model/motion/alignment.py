@@ -8,13 +8,14 @@ along the path for all rows jointly, by dynamic programming, which copes with re
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from scipy.optimize import isotonic_regression
 
 from camcomp.ground import path_geometry
+from camcomp.ground.compiled import inner, kept
 from camcomp.ground.datatypes import ARC, Floats, Ints, Path
-from camcomp.ground.machine_code import kept
 
 _CHORD_RAD = 0.05  # chord of an arc
 _LINE_MM2 = 0.01  # mm²: cost of a wrong line number, plus _LINE_TIMES times the squared distance
@@ -94,7 +95,10 @@ def _chords(path: Path) -> tuple[Ints, Floats, Floats]:
     return motion, within / of, (within + 1) / of
 
 
-@kept
+allocating = partial(inner, allocates=True)
+
+
+@inner
 def _put(place, weight, found, at, weighs):  # type: ignore[no-untyped-def]  # pragma: no cover
     """Add a candidate, in place of the worst one if there are _PLACES, and return their number."""
     k = found
@@ -106,7 +110,7 @@ def _put(place, weight, found, at, weighs):  # type: ignore[no-untyped-def]  # p
     return min(found + 1, _PLACES)
 
 
-@kept
+@allocating
 def _places(begin, way, length, at, line, low, high, tip, hint, lost):  # type: ignore[no-untyped-def]  # pragma: no cover
     """Candidates for a tip (3,): path lengths (mm) of local minima of the distance, and their costs (mm²)."""
     place, weight = np.empty(_PLACES), np.empty(_PLACES)

@@ -11,8 +11,8 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from camcomp.ground.compiled import kept
 from camcomp.ground.datatypes import Floats
-from camcomp.ground.machine_code import kept
 from camcomp.model.effect import Load
 from camcomp.model.motion.node_pieces import Places
 from camcomp.model.motion.run_path import RunPath

@@ -7,8 +7,8 @@ from functools import cached_property
 import numpy as np
 
 from camcomp.ground import path_geometry
+from camcomp.ground.compiled import kept
 from camcomp.ground.datatypes import Bools, Floats, Ints, Path
-from camcomp.ground.machine_code import kept
 from camcomp.model.cutting.track import Track
 from camcomp.model.hysteresis import direction
 from camcomp.model.motion.node_pieces import Pieces, Places, cut

@@ -2,6 +2,7 @@
 
 import errno
 import hashlib
+import importlib
 import os
 import pickle
 import shutil
@@ -13,8 +14,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from camcomp.ground import compiled, linked_code, machine_code, notes
-from camcomp.ground.compiled import entry, inner
+from camcomp.ground import compiled, linked_code, machine_code, native_code, notes
+from camcomp.ground.compiled import entry
 from tests.commandline import ROOT
 
 
@@ -30,10 +31,13 @@ def folder(tmp_path, monkeypatch):
 
 
 def fresh():
-    """As a new process would make it: (dispatcher, what it gives, whether the code came from the disk)."""
-    made = machine_code.kept(twice)
-    value = made(21)
-    return value, sum(made.stats.cache_hits.values())
+    """As a new process would make it: what the function gives, and whether its code came from the disk."""
+    made = machine_code.Cached(twice)
+    return call(made, 21), made.hits
+
+
+def call(made, *args):
+    return made.load(native_code.describe(args), args)(None, args, None)
 
 
 def files(folder):
@@ -76,10 +80,10 @@ def test_a_folder_in_the_place_of_a_file_is_survived(folder, capsys):
 
 
 def test_code_under_the_name_of_other_code_is_not_taken(folder):
-    made = machine_code.kept(twice)
-    made(21)
+    made = machine_code.Cached(twice)
+    call(made, 21)
     (whole_numbers,) = files(folder)
-    made(1.5)
+    call(made, 1.5)
     (fraction,) = set(files(folder)) - {whole_numbers}
     shutil.copy(fraction, whole_numbers)
     assert fresh() == (42, 0)
@@ -87,9 +91,9 @@ def test_code_under_the_name_of_other_code_is_not_taken(folder):
 
 def test_code_of_other_sources_goes(folder):
     fresh()
-    made = machine_code.kept(twice)
-    made._cache.files._source_stamp = "another"
-    made(21)
+    made = machine_code.Cached(twice)
+    made.files._source_stamp = "another"
+    call(made, 21)
     assert len(files(folder)) == 1 and fresh() == (42, 0)
 
 
@@ -211,10 +215,10 @@ def test_a_numba_of_another_build_compiles_as_usual(folder, monkeypatch, missing
         monkeypatch.setattr(linked_code, "_part_class", lambda: broken(codegen.JITCodeLibrary, missing))
     try:
         assert not linked_code.linking_options() or not linked_code.is_usable()
-        made = inner(twice)
+        made = linked_code.inner(twice)
         assert entry(lambda x: made(x) + 1.0)(20.0) == 41.0
     finally:
-        for each in (linked_code.is_usable, linked_code._part_class, linked_code.linking_options):
+        for each in (linked_code.is_usable, linked_code._part_class, linked_code.linking_options, linked_code.inner):
             if hasattr(each, "cache_clear"):
                 each.cache_clear()
 
@@ -228,16 +232,24 @@ def test_a_numba_without_an_option_that_saves_time_compiles_as_usual(folder, mon
             raise KeyError(f"Unrecognized options: {missing}")
         return plain(**options)
 
+    linked_code.inner.cache_clear()
     monkeypatch.setattr(linked_code.numba, "njit", njit)
-    made = inner(twice)
+    made = linked_code.inner(twice)
     assert entry(lambda x: made(x) + 1.0)(20.0) == 41.0
 
 
-def test_without_the_names_of_direct_calls_kernels_are_called_as_usual(folder, monkeypatch):
+def test_a_numba_without_the_names_of_its_dispatcher_compiles_as_usual(folder, monkeypatch):
+    class Dispatcher:
+        def __call__(self, x):
+            return twice(x)
+
+    monkeypatch.setattr(linked_code, "dispatcher", lambda function, allocates: Dispatcher())
+    assert entry(twice)(20.0) == 40.0
+
+
+def test_direct_calls_give_the_same(folder):
     made = entry(twice)
-    assert compiled.direct(made, (made(20.0),))(20.0) == 40.0
-    monkeypatch.setattr(made, "dispatcher", object())
-    assert compiled.direct(made, (20.0,)) is made
+    assert compiled.direct(made, (20.0,))(20.0) == 40.0 == made(20.0)
 
 
 def broken(library, name):
@@ -248,14 +260,57 @@ def broken(library, name):
     return Broken
 
 
-@pytest.mark.parametrize("name", ["_reduce", "_rebuild"])
-def test_a_numba_whose_results_cannot_be_kept_compiles_every_time(folder, monkeypatch, name):
-    from numba.core.compiler import CompileResult
+@pytest.mark.parametrize("lacks", ["object files", "helpers"])
+def test_a_numba_whose_results_cannot_be_kept_compiles_every_time(folder, monkeypatch, lacks):
+    from numba.core.codegen import CPUCodeLibrary
 
-    if name == "_rebuild":
+    if lacks == "object files":
+        monkeypatch.delattr(CPUCodeLibrary, "serialize_using_object_code")
+    else:
         assert fresh() == (42, 0)
-    monkeypatch.delattr(CompileResult, name)
+        monkeypatch.setattr(native_code, "_link", lambda: importlib.import_module("numba._no_such_module"))
     assert fresh() == (42, 0) == fresh()
+
+
+def test_code_from_the_disk_needs_no_numba(folder):
+    code = (
+        "import sys; import numpy as np; from camcomp.compensation.long.kernel import follow; out = np.zeros((1, 3)); "
+        "follow(2.0 * np.eye(3)[None], np.array([0]), np.ones((1, 3)), out); print(out[0], 'numba' in sys.modules)"
+    )
+    said = [
+        subprocess.check_output([sys.executable, "-c", code], env={**os.environ, "PYTHONPATH": str(ROOT)}, text=True)
+        for _ in range(2)
+    ]
+    assert said == ["[2. 2. 2.] True\n", "[2. 2. 2.] False\n"]
+
+
+class TestTypesOfArguments:
+    """Code for one kind of array is wrong for every other one."""
+
+    @pytest.mark.parametrize(
+        "other",
+        [
+            np.zeros((2, 3), np.float32), np.zeros((2, 3), np.int64), np.zeros(6), np.zeros((2, 3)).T, np.zeros((2, 6))[:, ::2],
+            np.broadcast_to(0.0, (2, 3)), 0.0, (np.zeros((2, 3)),),
+        ],
+        ids=["narrow", "whole numbers", "one dimension", "columns first", "steps", "read-only", "a number", "a tuple"],
+    )  # fmt: skip
+    def test_another_kind_is_told_apart(self, other):
+        def described(value):
+            try:
+                return native_code.describe((value,))
+            except TypeError:
+                return None  # numba's business
+
+        assert described(np.zeros((2, 3))) != described(other)
+
+    def test_a_number_counts_as_numba_takes_it(self):
+        values = (True, 1, 1.0, np.float64(1.0), np.int64(1), np.bool_(True))
+        numbers = ("|b1", "<i8", "<f8", "<f8", "<i8", "|b1")
+        assert native_code.describe(values) == numbers
+
+    def test_kinds_that_only_numba_knows_are_left_to_it(self, folder):
+        assert entry(twice)(1j) == 2j and entry(twice)(np.float32(1.5)) == 3.0
 
 
 def test_code_with_addresses_of_this_process_is_not_kept(folder, capsys):
@@ -264,7 +319,7 @@ def test_code_with_addresses_of_this_process_is_not_kept(folder, capsys):
     def first(x):
         return big[0] + x
 
-    assert machine_code.kept(first)(42.0) == 42.0
+    assert entry(first)(42.0) == 42.0
     assert files(folder) == [] and "addresses" in capsys.readouterr().err
 
 

@@ -183,7 +183,7 @@ def test_messages_that_cannot_be_written_change_no_exit_code(folder, words, code
 @pytest.mark.parametrize("way", ["variable", "file of the folder"])
 def test_settings_with_which_numba_does_not_start(folder, way):
     words = ["compensate", "a.nc", "--config", config(), "-q"]
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "NUMBA_CACHE_DIR": str(folder / "nothing compiled yet")}
     if way == "variable":
         environment["NUMBA_NUM_THREADS"] = "0"
     else:

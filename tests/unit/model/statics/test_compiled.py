@@ -20,9 +20,11 @@ def module_of(path):
 
 def python_of(value):
     """The Python function behind a compiled one, or None."""
-    value = getattr(value, "dispatcher", value)
-    value = getattr(value, "py_func", value)
-    return value if isinstance(value, FunctionType) and value.__module__.startswith("camcomp.") else None
+    value = value.py_func if hasattr(value, "py_func") else value
+    if not isinstance(value, FunctionType):
+        return None
+    value = getattr(value, "__wrapped__", value)
+    return value if value.__module__.startswith("camcomp.") else None
 
 
 def compiled_into(function, seen):
@@ -45,7 +47,11 @@ def test_there_are_kernels():
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
 def test_every_function_and_constant_comes_from_a_source(path):
     sources = machine_code.sources(path)
-    entries = [each.dispatcher.py_func for each in vars(module_of(path)).values() if hasattr(each, "dispatcher")]
+    entries = [
+        each.__wrapped__
+        for each in vars(module_of(path)).values()
+        if isinstance(each, FunctionType) and hasattr(each, "load")
+    ]
     assert entries
     for function in set().union(*(compiled_into(each, set()) for each in entries)):
         assert Path(function.__code__.co_filename) in sources
