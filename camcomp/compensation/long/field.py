@@ -4,11 +4,14 @@ Space is divided into cubes; where the program comes through one, the machine is
 the cube and of the range of forces, and polynomials in position and force are fitted to the answers. Further exact
 solutions, not used in the fit, measure its error. A cube with too large an error is divided into eight; where that does
 not help (near singular configurations, at the border of the workspace) its points are solved exactly, one by one.
+
+The cubes depend on the machine, the range of forces and the origin of the programs: files keep them for later programs.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -23,6 +26,7 @@ from camcomp.compensation.long.kernel import (
     missing_cells,
     put_cells,
 )
+from camcomp.compensation.long.tile_files import TileFiles
 from camcomp.ground.datatypes import Floats, Ints
 from camcomp.model.statics.machine import Machine
 from camcomp.model.statics.solve import FREE, TARGET, solve
@@ -41,7 +45,8 @@ RUNGS = (
 SHIFT_STEPS = 4
 EVEN = 1.1127756842787055 ** -np.arange(1.0, 7.0)  # multiples fill the cube evenly; the root of x^7 = x + 1
 NARROW = 6.0  # a force component so many times smaller than the largest needs a degree less in position
-WIDER = 1.02  # force range, so that it is not left for nothing
+WIDER = 1.25  # limits of the force range are powers of it, so that programs with about the same forces share cubes
+NO_FORCE_N = 1e-9
 _ZERO = np.zeros(3)
 
 
@@ -53,11 +58,6 @@ class Basis:
     force: Ints  # (nf, 3)
     count: Ints  # (nf,) position terms that go with each force term
     degree: tuple[int, int]
-    samples: Floats  # (TESTS + k, 6), the test points first
-    solve_both: Floats  # (sum of count, k)
-    solve_position: Floats  # (np, k)
-    both: Floats  # (TESTS, sum of count) terms at the test points
-    alone: Floats  # (TESTS, np)
 
     @staticmethod
     def of(degrees: tuple[int, ...], narrow: Ints) -> Basis:
@@ -65,14 +65,37 @@ class Basis:
         a, b = exponents(max(degrees)), exponents(len(degrees) - 1)
         degree = np.array(degrees)[b.sum(axis=1)] - b @ narrow
         count = (a.sum(axis=1) <= degree[:, None]).sum(axis=1)
-        k = int(RATIO * count.sum())
-        points = np.cos(np.pi * (np.arange(1, k + TESTS + 1)[:, None] * EVEN % 1.0))
-        both, alone = _products(points, a, b, count)
-        return Basis(
-            position=a, force=b, count=count, degree=(max(degrees), len(degrees) - 1), samples=points,
-            solve_both=_pseudoinverse(both[TESTS:]), solve_position=_pseudoinverse(alone[TESTS:]), both=both[:TESTS],
-            alone=alone[:TESTS],
-        )  # fmt: skip
+        return Basis(position=a, force=b, count=count, degree=(max(degrees), len(degrees) - 1))
+
+    @cached_property
+    def samples(self) -> Floats:
+        """Sample points (TESTS + k, 6), the test points first."""
+        k = int(RATIO * self.count.sum())
+        return np.asarray(np.cos(np.pi * (np.arange(1, k + TESTS + 1)[:, None] * EVEN % 1.0)))
+
+    @cached_property
+    def _terms(self) -> tuple[Floats, Floats]:
+        return _products(self.samples, self.position, self.force, self.count)
+
+    @cached_property
+    def solve_both(self) -> Floats:
+        """(sum of count, k)"""
+        return _pseudoinverse(self._terms[0][TESTS:])
+
+    @cached_property
+    def solve_position(self) -> Floats:
+        """(np, k)"""
+        return _pseudoinverse(self._terms[1][TESTS:])
+
+    @property
+    def both(self) -> Floats:
+        """(TESTS, sum of count) terms at the test points"""
+        return self._terms[0][:TESTS]
+
+    @property
+    def alone(self) -> Floats:
+        """(TESTS, np)"""
+        return self._terms[1][:TESTS]
 
     def terms(self, points: Floats) -> Floats:
         """Terms (n, sum of count) at points (n, 6)."""
@@ -114,25 +137,33 @@ class Tiles:
     W: Floats
     slope: Floats  # (t, 3, 3) d loaded tip / d commanded tip at the centre
     rates: Floats  # (t, m, 3) d joints / d tip at the centre
+    solved: Ints  # (t,) exact solutions that it was made of
+
+
+def _outward(limit: Floats) -> Floats:
+    """Limits (3,) of at least zero, up to the next powers of WIDER; forces below NO_FORCE_N are zero."""
+    force = limit > NO_FORCE_N
+    return np.where(force, WIDER ** np.ceil(np.log(np.where(force, limit, 1.0)) / np.log(WIDER) - 1e-9), 0.0)
 
 
 class Field:
     """A machine's correction, loaded tip, tilt, drives and joints by interpolation. Machine frame."""
 
-    def __init__(self, machine: Machine, force: Floats, middle: Floats = _ZERO) -> None:
+    def __init__(self, machine: Machine, force: Floats, middle: Floats = _ZERO, files: TileFiles | None = None) -> None:
         """Force (n, 3) N: forces that will occur, or some of them. Machines of up to three actuators.
 
-        middle (3,) mm: centre of a cube; programs lie round their origin, and so in the fewest cubes.
+        middle (3,) mm: centre of a cube; programs lie round their origin, and so in the fewest cubes. files: those that
+        keep the tiles for later programs.
         """
-        self.machine = machine
+        self.machine, self._files = machine, files
         self.corner = middle - 0.5 * CELL_MM
         self.solved = 0  # exact solutions so far
-        self.worst = 0.0  # mm, largest error at test points of the tiles in use
+        self.worst = 0.0  # mm, largest error at test points of the new tiles
         self._set_range(force)
 
     def _set_range(self, force: Floats) -> None:
         low, high = np.minimum(force.min(axis=0), 0.0), np.maximum(force.max(axis=0), 0.0)
-        self.low, self.high = low * WIDER, high * WIDER
+        self.low, self.high = -_outward(-low), _outward(high)
         self.force_mid = 0.5 * (self.low + self.high)
         self.force_half = np.maximum(0.5 * (self.high - self.low), 1e-9)
         share = self.force_half / max(1e-3, self.force_half.max())
@@ -142,7 +173,30 @@ class Field:
             size=CELL_MM, keys=np.full(1 << 12, -1, np.int64), values=np.zeros(1 << 12, np.int64),
             centre=np.zeros((0, 3)), half=np.zeros(0), rung=np.zeros(0, np.int64), first=np.zeros(0, np.int64),
             W=np.zeros(0), slope=np.zeros((0, 3, 3)), rates=np.zeros((0, len(self.machine.actuators), 3)),
+            solved=np.zeros(0, np.int64),
         )  # fmt: skip
+        known = None if self._files is None else self._files.load(self._key)
+        if known is not None:
+            self.tiles = Tiles(**known)
+            self.bases = [Basis.of(each, self._narrow) for each in RUNGS[: self.tiles.rung.max(initial=0) + 1]]
+        self._loaded = self.tiles
+        self.used = np.zeros(len(self.tiles.half), np.bool_)  # tiles with points of the program in them
+
+    @property
+    def _key(self) -> tuple[Any, ...]:
+        """Numbers on which the tiles depend, besides those of the machine."""
+        limits = (self.corner, self.low, self.high)
+        return (CELL_MM, ALLOWED, DRIVE_ALLOWED, TESTS, RATIO, RUNGS, *(tuple(each.tolist()) for each in limits))
+
+    def keep(self, sound: bool) -> None:
+        """Keep the tiles for later programs; sound: a sample of the program agrees with exact solutions."""
+        if self._files is not None and (self.tiles is not self._loaded or not sound):
+            self._files.save(self._key, vars(self.tiles) if sound else None)
+
+    def mark(self, tile: Ints) -> None:
+        """Count tiles (n,), negative ones left out, as used."""
+        self.used = np.append(self.used, np.zeros(len(self.tiles.half) - len(self.used), np.bool_))
+        self.used[tile[tile >= 0]] = True
 
     def prepare(self, tips: Floats, force: Floats) -> Floats:
         """Makes the tiles for points (n, 3) and forces (n, 3) that are going to be asked for; the points as look_up wants them."""
@@ -178,7 +232,10 @@ class Field:
         centre = (2 * index + 1) * half[:, None]
         value = np.empty(len(cells), np.int64)
         for n in range(len(cells)):
+            before = self.solved
             tile = self._fit(centre[n], half[n])
+            if tile is not None:
+                self.tiles = replace(self.tiles, solved=np.append(self.tiles.solved, self.solved - before))
             value[n] = tile if tile is not None else EXACT if level[n] == LEVELS - 1 else SPLIT
         keys, values = self._room(len(cells))
         put_cells(keys, values, cells, value)

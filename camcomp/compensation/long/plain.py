@@ -16,6 +16,7 @@ from camcomp.compensation.long.loads import Edge, Loads, constant_of, joints_at,
 from camcomp.compensation.long.output_state import OutputState
 from camcomp.compensation.long.plain_run import Middles, NotInPieces, PlainRun, Unsolved
 from camcomp.compensation.long.run_bands import RunUncertainty
+from camcomp.compensation.long.tile_files import TileFiles
 from camcomp.compensation.program.chords import divide, second_derivative, trial_nodes
 from camcomp.compensation.program.moves import chord_budget
 from camcomp.compensation.program.policy import left_alone
@@ -130,7 +131,7 @@ class PlainCorrector:
         policy = self.job.config.compensation.policy if uncertainty is not None else "full"
         if self.field is None:
             force = self.job.frame.vectors(np.concatenate((loads.first, loads.last)))
-            self.field = Field(self.machine, force, self.job.frame.origin)
+            self.field = Field(self.machine, force, self.job.frame.origin, TileFiles(self.machine))
         if uncertainty is not None and policy == "skip":
             loads = self._left_lines(run, loads, uncertainty)
         lead, trail = joints_at(loads, run.plain.kind, before, after)
@@ -327,6 +328,7 @@ class PlainCorrector:
 
         with ThreadPoolExecutor(threads()) as pool:
             list(pool.map(work, range(0, n, SLICE)))
+        known.mark(tile)
         lost = np.flatnonzero(tile < 0)
         if len(lost):
             self.exact += len(lost)

@@ -296,8 +296,9 @@ class Totals:
         self.interpolated = Interpolation(
             bound_um=BOUND_UM, checked=len(p), worst_um=worst if np.isfinite(worst) else float("inf"),
             worst_drive_force=float(np.nan_to_num(np.abs(written.drive - drive), nan=np.inf).max()),
-            tiles=len(known.tiles.half), exact_solutions=known.solved + 3 * len(p) + 2 * corrector.exact,
+            tiles=int(known.used.sum()), exact_solutions=int(known.tiles.solved[known.used].sum()) + 3 * len(p) + 2 * corrector.exact,
         )  # fmt: skip
+        known.keep(sound=worst <= BOUND_UM)
 
     def summary(self) -> Summary:
         """The figures, as report.tables.summary has them for short programs, and those of the interpolation."""
